@@ -13,6 +13,7 @@ use wakescope_estimate::{
     bound::{Noise, WindowModel},
     estimators::{LagWindowPeak, likelihood_tapers},
     polar_points,
+    spectrum::unweighted_lags,
 };
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run;
@@ -73,11 +74,13 @@ fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> Ma
     let (statistic, estimator): (Correlogram<f64>, Box<dyn Estimator>) = match velocities {
         Velocities::Likelihood => (
             Correlogram::with_tapers(likelihood_tapers(&window, taken.snr).unwrap()).unwrap(),
-            Box::new(SpectralPeak::new(&sampling, kind, 64, 1024, Refinement::Parabola).unwrap()),
+            Box::new(SpectralPeak::new(&sampling, kind, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap()),
         ),
         Velocities::LagWindow => (
             Correlogram::new(Weighting::default(), 64).unwrap(),
-            Box::new(LagWindowPeak::new(&sampling, kind, 64, 16, 1024, Refinement::Parabola).unwrap()),
+            Box::new(
+                LagWindowPeak::new(&sampling, kind, &unweighted_lags(64), 16, 1024, Refinement::Parabola).unwrap(),
+            ),
         ),
     };
     let scan = Scan::new(&statistic, &sampling, &gates, &taken.setup.elevation_rad, taken.records_a.view()).unwrap();

@@ -7,7 +7,7 @@ use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFitOptions, RangeKernel, Sharing, SignalFitOptions, VelocityMap, Wake,
     WakeModel, fit_map_of_estimator, fit_signals,
 };
-use wakescope_estimate::{Correlogram, Error, estimators::*, map::*, window::*};
+use wakescope_estimate::{Correlogram, Error, estimators::*, map::*, spectrum::unweighted_lags, window::*};
 use wakescope_les::winds::Sum;
 use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::NoiseModel;
@@ -83,7 +83,8 @@ impl<'s> Guided<'s> {
         let all: Vec<usize> = (0..self.scene.elevation_rad.len()).collect();
         let (sampling, kind) = (&self.scene.sampling, SignalKind::Real);
         let setup = self.scene.setup().unwrap();
-        let lag_window = LagWindowPeak::new(sampling, kind, WINDOW, 16, 1024, Refinement::Parabola).unwrap();
+        let lag_window =
+            LagWindowPeak::new(sampling, kind, &unweighted_lags(WINDOW), 16, 1024, Refinement::Parabola).unwrap();
         let velocity_m_s = self.map(&self.scan(records, Weighting::default(), &all), &lag_window);
         let map = VelocityMap {
             elevation_rad: &self.scene.elevation_rad,
@@ -113,7 +114,8 @@ impl<'s> Guided<'s> {
 
     /// Maps against the pulse's and the gate's velocity, drawn towards a wake; towards rest without one.
     fn guided(&self, records: &Array2<f64>, wake: Option<&Wake>, options: &ShrinkageOptions) -> [Array2<f64>; 2] {
-        let moment = FirstMoment::new(&self.scene.sampling, SignalKind::Real, WINDOW, 512, 3.5).unwrap();
+        let moment =
+            FirstMoment::new(&self.scene.sampling, SignalKind::Real, &unweighted_lags(WINDOW), 512, 3.5).unwrap();
         let lines = self.scene.elevation_rad.len();
         let map = |lines: Vec<usize>| self.map(&self.scan(records, Weighting::Rectangular, &lines), &moment);
         let whole = map((0..lines).collect());
@@ -163,7 +165,15 @@ fn measured(scene: &PairScan, scans: std::ops::Range<usize>, signals: bool) -> V
             errors.add(scene, &pulse, &gate);
         }
         let lines = (0..scene.elevation_rad.len()).collect::<Vec<_>>();
-        let peak = AutoregressivePeak::new(&scene.sampling, SignalKind::Real, WINDOW, 16, 2048, Refinement::Parabola);
+        let peak = ModelPeak::new(
+            ModelReading::Spectrum,
+            &scene.sampling,
+            SignalKind::Real,
+            WINDOW,
+            16,
+            2048,
+            Refinement::Parabola,
+        );
         let ca = guided.map(&guided.scan(&records, Weighting::Rectangular, &lines), &peak.unwrap());
         all[4].1.add(scene, &ca, &ca);
     }

@@ -6,6 +6,7 @@ use rand_xoshiro::rand_core::SeedableRng;
 use wakescope_estimate::{
     Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
     bound::{Noise, WindowModel},
+    spectrum::unweighted_lags,
     window::SPEED_OF_LIGHT_M_S,
 };
 use wakescope_signal::{GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, Simulator};
@@ -48,7 +49,9 @@ fn target() -> Target {
 /// Estimates from [`PULSES`] pulses each.
 fn estimates_m_s(target: &Target, sampling: &Sampling) -> Vec<f64> {
     let statistic = Correlogram::<f64>::new(Weighting::default(), WINDOW).unwrap();
-    let peak = SpectralPeak::new(sampling, statistic.kind(), statistic.lags(), 1024, Default::default()).unwrap();
+    let peak =
+        SpectralPeak::new(sampling, SignalKind::Real, &unweighted_lags(statistic.lags()), 1024, Default::default())
+            .unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
     let (mut scratch, mut records) = (Scratch::new(), Default::default());
     let mut out = vec![0.0; statistic.statistic_len()];

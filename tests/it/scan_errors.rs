@@ -3,7 +3,9 @@
 
 use fixtures::WINDOW;
 use fixtures::pair::{PairCase, PairScan};
-use wakescope_estimate::{Correlogram, Scratch, SignalKind, Weighting, estimators::*, map::*};
+use wakescope_estimate::{
+    Correlogram, Scratch, SignalKind, Weighting, estimators::*, map::*, spectrum::unweighted_lags,
+};
 use wakescope_signal::NoiseModel;
 
 /// Root-mean-square errors of an estimator: against the velocity of the pulse within 8 m of a core and beyond 30 m from
@@ -46,10 +48,10 @@ fn all_errors(snr_db: f64) -> [Errors; 4] {
     let scans: Vec<Scan> =
         (0..2).map(|scan| scene.statistics(&scene.records(scan).unwrap(), &statistic).unwrap()).collect();
     let estimators: [Box<dyn Estimator>; 4] = [
-        Box::new(SpectralPeak::new(sampling, kind, WINDOW, 1024, refinement).unwrap()),
-        Box::new(AutoregressivePeak::new(sampling, kind, WINDOW, 16, 2048, refinement).unwrap()),
-        Box::new(LagWindowPeak::new(sampling, kind, WINDOW, 16, 1024, refinement).unwrap()),
-        Box::new(FirstMoment::new(sampling, kind, WINDOW, 512, 3.5).unwrap()),
+        Box::new(SpectralPeak::new(sampling, kind, &unweighted_lags(WINDOW), 1024, refinement).unwrap()),
+        Box::new(ModelPeak::new(ModelReading::Spectrum, sampling, kind, WINDOW, 16, 2048, refinement).unwrap()),
+        Box::new(LagWindowPeak::new(sampling, kind, &unweighted_lags(WINDOW), 16, 1024, refinement).unwrap()),
+        Box::new(FirstMoment::new(sampling, kind, &unweighted_lags(WINDOW), 512, 3.5).unwrap()),
     ];
     estimators.map(|estimator| errors(&scene, &scans, estimator.as_ref()))
 }
@@ -106,8 +108,8 @@ fn moments_outside_m_s(wind_m_s: f64) -> [f64; 3] {
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW).unwrap();
     let (sampling, kind) = (&scene.sampling, SignalKind::Real);
     let scan = scene.statistics(&scene.records(0).unwrap(), &statistic).unwrap();
-    let moment = |reach| Box::new(FirstMoment::new(sampling, kind, WINDOW, 512, reach).unwrap());
-    let peak = SpectralPeak::new(sampling, kind, WINDOW, 512, Refinement::Parabola).unwrap();
+    let moment = |reach| Box::new(FirstMoment::new(sampling, kind, &unweighted_lags(WINDOW), 512, reach).unwrap());
+    let peak = SpectralPeak::new(sampling, kind, &unweighted_lags(WINDOW), 512, Refinement::Parabola).unwrap();
     let estimators: [Box<dyn Estimator>; 3] = [moment(3.5), moment(2.0), Box::new(AboveMedian(peak))];
     estimators.map(|estimator| errors(&scene, std::slice::from_ref(&scan), estimator.as_ref()).outside_m_s)
 }

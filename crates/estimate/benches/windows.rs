@@ -48,17 +48,15 @@ fn windows(criterion: &mut Criterion) {
             sum
         });
     });
-    let ca = AutoregressivePeak::new(&sampling, SignalKind::Real, 64, 16, 2048, Refinement::Parabola).unwrap();
+    let ca = ModelPeak::new(ModelReading::Spectrum, &sampling, SignalKind::Real, 64, 16, 2048, Refinement::Parabola)
+        .unwrap();
     criterion.bench_function("AR(16), spectrum of 2048 points and peak", |b| {
         b.iter(|| ca.estimate(black_box(&lags), &mut scratch));
     });
-    let lag_window = LagWindowPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
+    let lag_window =
+        LagWindowPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 16, 1024, Refinement::Parabola).unwrap();
     criterion.bench_function("Hann lag window, spectrum of 1024 points and peak", |b| {
         b.iter(|| lag_window.estimate(black_box(&lags), &mut scratch));
-    });
-    let direct = Periodogram::<f64>::new(Weighting::default(), 64, 1024).unwrap();
-    criterion.bench_function("direct periodogram of 1024 points", |b| {
-        b.iter(|| direct.density(black_box(&real), &mut scratch).unwrap()[300]);
     });
     let model = WindowModel::gaussian_pulse(&sampling, 64, 120e-9, Noise::White).unwrap();
     let mut tapers = likelihood_tapers(&model, 10.0).unwrap();
@@ -70,7 +68,8 @@ fn windows(criterion: &mut Criterion) {
             plan.estimator.estimate(&lags, &mut scratch)
         });
     });
-    let capon = CaponPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
+    let capon =
+        ModelPeak::new(ModelReading::Capon, &sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
     criterion.bench_function("Capon of 17 samples, 1024 points and peak", |b| {
         b.iter(|| capon.estimate(black_box(&lags), &mut scratch));
     });

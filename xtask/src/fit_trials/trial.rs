@@ -13,6 +13,7 @@ use wakescope_estimate::{
     Correlogram, Error, Refinement, SignalKind, SpectralPeak,
     bound::{Noise, WindowModel},
     estimators::likelihood_tapers,
+    spectrum::unweighted_lags,
 };
 
 /// Radius of the regions of the maps \[m\].
@@ -34,7 +35,8 @@ impl<'a> FitTrial<'a> {
         let records = pair.records(scan)?;
         let window = WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
         let tapered = Correlogram::with_tapers(likelihood_tapers(&window, pair.snr)?)?;
-        let peak = SpectralPeak::new(&pair.sampling, SignalKind::Real, WINDOW, 1024, Refinement::Parabola)?;
+        let peak =
+            SpectralPeak::new(&pair.sampling, SignalKind::Real, &unweighted_lags(WINDOW), 1024, Refinement::Parabola)?;
         let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, radius_m, &peak)?;
         Ok(Self { pair, radius_m, records, tapered, peak, velocities })
     }

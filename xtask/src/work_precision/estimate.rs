@@ -12,8 +12,9 @@ use fixtures::{WINDOW, sampling};
 use wakescope_estimate::{
     Correlogram, Estimator, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
     bound::{GradientModel, Noise, WindowModel},
-    estimators::{AutoregressivePeak, CaponPeak, GradientLikelihood, LagWindowPeak},
+    estimators::{GradientLikelihood, LagWindowPeak, ModelPeak, ModelReading},
     map::good_and_bad,
+    spectrum::unweighted_lags,
 };
 use wakescope_signal::NoiseModel;
 
@@ -111,14 +112,14 @@ impl Uniform {
         let (s, kind) = (sampling()?, SignalKind::Real);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
         for padded in [64, 128, 256, 1024, 4096] {
-            let peak = SpectralPeak::new(&s, kind, WINDOW, padded, Refinement::Parabola)?;
+            let peak = SpectralPeak::new(&s, kind, &unweighted_lags(WINDOW), padded, Refinement::Parabola)?;
             rows.push(self.row("PA by padding", ("padded_samples", padded as f64), &plain, &peak)?);
         }
         for order in [4, 8, 16, 32] {
             let knob = ("order", order as f64);
-            let ca = AutoregressivePeak::new(&s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
-            let capon = CaponPeak::new(&s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
-            let lags = LagWindowPeak::new(&s, kind, WINDOW, order, 1024, Refinement::Parabola)?;
+            let ca = ModelPeak::new(ModelReading::Spectrum, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
+            let capon = ModelPeak::new(ModelReading::Capon, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
+            let lags = LagWindowPeak::new(&s, kind, &unweighted_lags(WINDOW), order, 1024, Refinement::Parabola)?;
             rows.push(self.row("CA by order", knob, &plain, &ca)?);
             rows.push(self.row("Capon by order", knob, &plain, &capon)?);
             rows.push(self.row("CA-BT by lags", ("lags", order as f64), &plain, &lags)?);

@@ -5,7 +5,8 @@
 use num_complex::Complex;
 use twofloat::TwoFloat;
 
-use crate::window::SignalKind;
+use crate::bound::window_model::phase_slope;
+use crate::window::{Sampling, SignalKind};
 
 /// A number of some 31 digits.
 type Long = Complex<TwoFloat>;
@@ -13,83 +14,65 @@ type Long = Complex<TwoFloat>;
 /// Most samples of a window for which it is done: the time grows by their cube.
 const MOST_SAMPLES: usize = 256;
 
-/// Window of the signal of a Gaussian pulse in noise that is flat in a band and small outside it.
-pub(super) struct GaussianWindow {
-    pub(super) samples: usize,
-    /// Half-width of |f|^2 at 1/e, in periods of the samples.
-    pub(super) sigma: f64,
-    /// Frequency of the signal, cycles per sample.
-    pub(super) cycles: f64,
-    /// Derivative of the phase per sample with respect to the parameter.
-    pub(super) slope: f64,
-    /// Band of the noise, cycles per sample.
-    pub(super) band: (f64, f64),
-    /// Two-sided density of the noise in the band, where that of the samples' power is 1.
-    pub(super) density: f64,
-    /// Density outside the band over that inside.
-    pub(super) floor: f64,
-    pub(super) kind: SignalKind,
-}
-
-impl GaussianWindow {
-    /// tr(R^-1 dR R^-1 dR) = |L^-1 dR L^-H|^2 with R = L L^H.
-    ///
-    /// None for a window that is too long, and where the smallest eigenvalue, that of the floor, is below the rounding of
-    /// samples in double precision.
-    pub(super) fn information(&self) -> Option<f64> {
-        let smallest = self.floor * self.density * self.white_share();
-        let largest = self.samples as f64 * (1.0 + self.density * (self.band.1 - self.band.0));
-        if self.samples > MOST_SAMPLES || smallest < f64::EPSILON * largest {
-            return None;
-        }
-        let (covariance, derivative): (Vec<Long>, Vec<Long>) = (0..self.samples).map(|lag| self.at_lag(lag)).unzip();
-        let factor = cholesky(&covariance)?;
-        let order = 0..self.samples;
-        let mut whitened: Vec<Vec<Long>> =
-            order.clone().map(|n| order.clone().map(|m| element(&derivative, n, m)).collect()).collect();
-        for _ in 0..2 {
-            solve_lower(&factor, &mut whitened);
-            whitened = order.clone().map(|n| order.clone().map(|m| whitened[m][n].conj()).collect()).collect();
-        }
-        Some(whitened.iter().flatten().map(|value| f64::from(value.norm_sqr())).sum())
+/// tr(R^-1 dR R^-1 dR) = |L^-1 dR L^-H|^2 with R = L L^H, of a window of so many samples of a Gaussian pulse of that half-width
+/// \[s\] of |f|^2 at 1/e, in noise with `floor` times its density outside the band.
+///
+/// None for a window that is too long, and where the smallest eigenvalue, that of the floor, is below the rounding of
+/// samples in double precision.
+pub(super) fn information(
+    (sampling, samples, sigma_s): (&Sampling, usize, f64),
+    floor: f64,
+    velocity_m_s: f64,
+    snr: f64,
+    kind: SignalKind,
+) -> Option<f64> {
+    let rate_hz = sampling.sample_rate_hz;
+    let (low, high) = (sampling.band_hz.0 / rate_hz, sampling.band_hz.1 / rate_hz);
+    // density of the noise in the band, where that of the samples' power is 1
+    let density = 1.0 / (snr * (high - low));
+    let smallest = floor * density * kind.one_sided_share();
+    let largest = samples as f64 * (1.0 + density * (high - low));
+    if samples > MOST_SAMPLES || smallest < f64::EPSILON * largest {
+        return None;
     }
-
-    /// Share of the density that a covariance of white noise shows at lag 0: real samples carry half at negative frequencies.
-    fn white_share(&self) -> f64 {
-        match self.kind {
-            SignalKind::Real => 0.5,
-            SignalKind::Complex => 1.0,
-        }
-    }
-
-    /// Covariance and its derivative.
-    fn at_lag(&self, lag: usize) -> (Long, Long) {
+    let (sigma, cycles) = (sigma_s * rate_hz, sampling.frequency_hz(velocity_m_s) / rate_hz);
+    let slope = phase_slope(sampling);
+    let phasor = |cycles: TwoFloat, size: TwoFloat| {
+        let (sine, cosine) = (twofloat::consts::TAU * (cycles - cycles.round())).sin_cos();
+        Long::new(cosine * size, sine * size)
+    };
+    // exp of the crate is good for small arguments alone, powers are good for all
+    let unit = (TwoFloat::from(-1.0 / 256.0) / (TwoFloat::from(sigma) * sigma)).exp();
+    let (low, high) = (TwoFloat::from(low), TwoFloat::from(high));
+    // covariance and its derivative
+    let at_lag = |lag: usize| {
         let steps = TwoFloat::from(lag as f64);
-        let phasor = |cycles: TwoFloat, size: TwoFloat| {
-            let (sine, cosine) = (twofloat::consts::TAU * (cycles - cycles.round())).sin_cos();
-            Long::new(cosine * size, sine * size)
-        };
-        // exp of the crate is good for small arguments alone, powers are good for all
-        let unit = (TwoFloat::from(-1.0 / 256.0) / (TwoFloat::from(self.sigma) * self.sigma)).exp();
-        let envelope = unit.powi((64 * lag * lag) as i32);
-        let signal = phasor(steps * self.cycles, envelope);
-        let (low, high) = (TwoFloat::from(self.band.0), TwoFloat::from(self.band.1));
-        let in_band = match lag {
-            0 => Long::from(high - low),
+        let signal = phasor(steps * cycles, unit.powi((64 * lag * lag) as i32));
+        let (in_band, white) = match lag {
+            0 => (Long::from(high - low), kind.one_sided_share() * floor),
             _ => {
                 let half = phasor(steps * (high - low) * 0.5, TwoFloat::from(1.0)).im;
-                phasor(steps * (high + low) * 0.5, half / (twofloat::consts::PI * steps))
+                (phasor(steps * (high + low) * 0.5, half / (twofloat::consts::PI * steps)), 0.0)
             }
         };
-        let white = if lag == 0 { self.white_share() * self.floor } else { 0.0 };
-        let noise = in_band.scale(TwoFloat::from(1.0) - self.floor) + TwoFloat::from(white);
-        let parts =
-            (signal + noise.scale(TwoFloat::from(self.density)), signal * Long::new(0.0.into(), steps * self.slope));
-        match self.kind {
+        let noise = in_band.scale(TwoFloat::from(1.0) - floor) + TwoFloat::from(white);
+        let parts = (signal + noise.scale(TwoFloat::from(density)), signal * Long::new(0.0.into(), steps * slope));
+        match kind {
             SignalKind::Real => (Long::from(parts.0.re), Long::from(parts.1.re)),
             SignalKind::Complex => parts,
         }
+    };
+    let (covariance, derivative): (Vec<Long>, Vec<Long>) = (0..samples).map(at_lag).unzip();
+    let factor = cholesky(&covariance)?;
+    let square = |of: &dyn Fn(usize, usize) -> Long| -> Vec<Vec<Long>> {
+        (0..samples).map(|n| (0..samples).map(|m| of(n, m)).collect()).collect()
+    };
+    let mut whitened = square(&|n, m| element(&derivative, n, m));
+    for _ in 0..2 {
+        solve_lower(&factor, &mut whitened);
+        whitened = square(&|n, m| whitened[m][n].conj());
     }
+    Some(whitened.iter().flatten().map(|value| f64::from(value.norm_sqr())).sum())
 }
 
 fn element(by_lag: &[Long], n: usize, m: usize) -> Long {

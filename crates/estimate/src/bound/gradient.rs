@@ -9,18 +9,18 @@
 use ndarray::Array2;
 use num_complex::Complex;
 
-use crate::bound::window_model::{turned, with_floor_named};
-use crate::bound::{Noise, information_complex, information_real};
+use crate::bound::Noise;
+use crate::bound::window_model::{Carrier, information, with_floor_named};
 use crate::error::{Error, at_least_one, finite, positive};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Second-order model of a window of a Gaussian pulse in a wind with a constant gradient along the line of sight.
 #[derive(Debug, Clone)]
 pub struct GradientModel {
-    sampling: Sampling,
-    window_samples: usize,
+    pub(crate) sampling: Sampling,
+    pub(crate) window_samples: usize,
     pulse_sigma_s: f64,
-    noise: Noise,
+    pub(crate) noise: Noise,
 }
 
 /// What bounds the estimates of velocity and gradient from the same windows.
@@ -47,24 +47,6 @@ impl GradientModel {
         Ok(Self { sampling: *sampling, window_samples, pulse_sigma_s, noise })
     }
 
-    /// The sampling.
-    #[must_use]
-    pub fn sampling(&self) -> &Sampling {
-        &self.sampling
-    }
-
-    /// The noise.
-    #[must_use]
-    pub fn noise(&self) -> Noise {
-        self.noise
-    }
-
-    /// Samples of the window.
-    #[must_use]
-    pub fn window_samples(&self) -> usize {
-        self.window_samples
-    }
-
     /// Signal covariance at rest with unit power and its derivative per 1/s of gradient, with the carrier removed.
     ///
     /// The centre of the window is N/2 samples after its first one, as [`Gates`](crate::Gates) counts ranges.
@@ -84,56 +66,31 @@ impl GradientModel {
                 Complex::from_polar((pulse + broadening * gradient_per_s.powi(2)).exp(), phase * gradient_per_s);
             [value, value * Complex::new(2.0 * broadening * gradient_per_s, phase)]
         };
-        let mut by_gradient = Array2::zeros(shape);
-        let envelope = Array2::from_shape_fn(shape, |place| {
-            let [value, slope] = parts(place);
-            by_gradient[place] = slope;
-            value
-        });
-        [envelope, by_gradient]
+        let both = Array2::from_shape_fn(shape, parts);
+        [0, 1].map(|k| both.mapv(|pair| pair[k]))
     }
 
-    /// Of the lags -(N - 1) to N - 1 of a window: the carrier, and the noise where the signal has unit power.
-    fn carrier_and_noise(
-        &self,
-        velocity_m_s: f64,
-        snr: f64,
-        kind: SignalKind,
-    ) -> Result<Vec<[Complex<f64>; 2]>, Error> {
-        positive("snr", snr)?;
-        finite("velocity_m_s", velocity_m_s)?;
-        self.sampling.validate_for(kind)?;
-        let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
-        let bandwidth = (self.sampling.band_hz.1 - self.sampling.band_hz.0) / self.sampling.sample_rate_hz;
-        let density = 1.0 / (snr * bandwidth);
-        let longest = self.window_samples as i64 - 1;
-        let of_lag = |lag: i64| {
-            let lag = lag as f64;
-            let noise = self.noise.covariance(&self.sampling, lag, kind) * density;
-            [Complex::from_polar(1.0, turned(cycles, lag)), noise]
-        };
-        Ok((-longest..=longest).map(of_lag).collect())
+    fn carrier(&self, velocity_m_s: f64, snr: f64, kind: SignalKind) -> Result<Carrier, Error> {
+        Carrier::new((&self.sampling, self.noise), self.window_samples, velocity_m_s, (1.0, snr), kind)
     }
 
-    /// Covariance of complex samples of unit signal power, from the [`envelope`](Self::envelope) of a gradient.
+    /// Covariance of samples of unit signal power, from the [`envelope`](Self::envelope) of a gradient.
     ///
     /// # Errors
     /// As [`GradientModel::covariance`].
-    pub(crate) fn moved(
+    pub(crate) fn of_samples(
         &self,
         envelope: &Array2<Complex<f64>>,
         velocity_m_s: f64,
         snr: f64,
         kind: SignalKind,
     ) -> Result<Array2<Complex<f64>>, Error> {
-        let lags = self.carrier_and_noise(velocity_m_s, snr, kind)?;
-        let mut signal = envelope.clone();
-        for (row, mut values) in signal.rows_mut().into_iter().enumerate() {
-            // along a row the lag falls
-            let lags = lags[row..row + self.window_samples].iter().rev();
-            values.iter_mut().zip(lags).for_each(|(value, [carrier, noise])| *value = *value * carrier + noise);
-        }
-        Ok(signal)
+        let carrier = self.carrier(velocity_m_s, snr, kind)?;
+        let covariance = carrier.covariance(carrier.signal(envelope));
+        Ok(match kind {
+            SignalKind::Real => covariance.mapv(|value| Complex::from(value.re)),
+            SignalKind::Complex => covariance,
+        })
     }
 
     /// Covariance and its derivatives with respect to velocity \[per m/s\] and gradient \[per 1/s\], complex samples
@@ -151,23 +108,16 @@ impl GradientModel {
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 3], Error> {
         finite("gradient_per_s", gradient_per_s)?;
-        let lags = self.carrier_and_noise(velocity_m_s, snr, kind)?;
-        let slope = -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m;
-        let of_lag = |(n, m): (usize, usize)| lags[n + self.window_samples - 1 - m];
-        let [envelope, mut by_gradient] = self.envelope(gradient_per_s);
-        let signal = self.moved(&envelope, velocity_m_s, snr, kind)?;
-        by_gradient.indexed_iter_mut().for_each(|(place, value)| *value *= of_lag(place)[0]);
-        let by_velocity = Array2::from_shape_fn(signal.dim(), |place| {
-            let lag = place.0 as f64 - place.1 as f64;
-            envelope[place] * of_lag(place)[0] * Complex::new(0.0, slope * lag)
-        });
-        Ok([signal, by_velocity, by_gradient])
+        let carrier = self.carrier(velocity_m_s, snr, kind)?;
+        let [signal, by_gradient] = self.envelope(gradient_per_s).map(|envelope| carrier.signal(&envelope));
+        let by_velocity = carrier.by_velocity(&signal);
+        Ok([carrier.covariance(signal), by_velocity, by_gradient])
     }
 
     /// Bounds for `windows` independent windows.
     ///
     /// # Errors
-    /// As [`GradientModel::covariance`] and [`information_complex`]; [`Error::NoiseFloor`] for too small a floor of the noise.
+    /// As [`GradientModel::covariance`] and [`bound_m_s`](crate::bound::bound_m_s); [`Error::NoiseFloor`] for too small a floor of the noise.
     pub fn bound(
         &self,
         velocity_m_s: f64,
@@ -179,14 +129,8 @@ impl GradientModel {
         with_floor_named(self.noise, self.window_samples, |noise| {
             positive("windows", windows)?;
             let model = Self { noise, ..self.clone() };
-            let parts = model.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
-            let information = match kind {
-                SignalKind::Complex => information_complex(parts[0].view(), &[parts[1].view(), parts[2].view()])?,
-                SignalKind::Real => {
-                    let [covariance, a, b] = parts.map(|x| x.mapv(|value| value.re));
-                    information_real(covariance.view(), &[a.view(), b.view()])?
-                }
-            };
+            let [covariance, by_velocity, by_gradient] = model.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
+            let information = information(kind, &covariance, &[by_velocity, by_gradient])?;
             GradientBound::of(&(information * windows))
         })
     }

@@ -7,4 +7,4 @@ pub(crate) mod window_model;
 
 pub use gradient::{GradientBound, GradientModel};
 pub use record::RecordModel;
-pub use window_model::{Noise, WindowModel, bound_complex_m_s, bound_real_m_s, information_complex, information_real};
+pub use window_model::{Noise, WindowModel, bound_m_s};

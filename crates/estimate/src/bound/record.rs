@@ -9,7 +9,7 @@
 use ndarray::{Array2, s};
 
 use super::Noise;
-use super::window_model::{LEAST_CONDITION, turned};
+use super::window_model::{LEAST_CONDITION, phase_slope, turned};
 use crate::error::{Error, at_least_one};
 use crate::linalg::cholesky::{cholesky, forward};
 use crate::window::{Gates, Sampling, SignalKind};
@@ -74,15 +74,11 @@ impl RecordModel {
             forward(factor.view(), &mut derivative);
             derivative = derivative.reversed_axes().as_standard_layout().into_owned();
         }
-        let share = match self.kind {
-            SignalKind::Real => 0.5,
-            SignalKind::Complex => 1.0,
-        };
         let mut sum = 0.0;
         let mut so_far = Vec::with_capacity(order);
         for n in 0..order {
             let off: f64 = derivative.slice(s![n, ..n]).iter().map(|x| x * x).sum();
-            sum += share * (2.0 * off + derivative[[n, n]].powi(2));
+            sum += self.kind.one_sided_share() * (2.0 * off + derivative[[n, n]].powi(2));
             so_far.push(sum);
         }
         let mut information: Vec<f64> = ends.iter().map(|end| so_far[end - 1]).collect();
@@ -99,7 +95,7 @@ impl RecordModel {
     fn matrices(&self, places: &[f64], snr: impl Fn(f64) -> f64) -> [Array2<f64>; 2] {
         let sampling = &self.sampling;
         let cycles = sampling.intermediate_frequency_hz * sampling.period_s();
-        let slope = -4.0 * std::f64::consts::PI * sampling.period_s() / sampling.wavelength_m;
+        let slope = phase_slope(sampling);
         let density = sampling.sample_rate_hz / (sampling.band_hz.1 - sampling.band_hz.0);
         // Two samples of a Gaussian pulse share the air in the middle between them: ratios at every half sample.
         let [first, last] = [f64::min, f64::max].map(|of| places.iter().copied().fold(places[0], of));

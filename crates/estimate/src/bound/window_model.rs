@@ -5,79 +5,48 @@
 //! 1993). n independent windows lower it by sqrt(n). Check: a stored curve for a 200 ns pulse over -40 to
 //! 60 dB; a point target of known closed form; any difference quotient of the covariance.
 
-use ndarray::{Array2, ArrayView2};
+use std::ops::Mul;
+
+use ndarray::Array2;
 use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
 
-use super::extended::GaussianWindow;
+use super::extended;
 use crate::error::{Error, finite, length, positive};
 use crate::linalg;
 use crate::window::{Sampling, SignalKind};
 
-/// Bound on the standard deviation of velocity \[m/s\] from one or more independent circular complex windows.
+/// Bound on the standard deviation of velocity \[m/s\] from one or more independent Gaussian windows.
 ///
-/// `covariance` \[n, n\] = E{x x^H} and `derivative` \[n, n\], its derivative per m/s, in any common unit; `windows`
-/// counts independent windows and may be an effective number.
+/// `covariance` \[n, n\] = E{x x^H} and `derivative` \[n, n\], its derivative per m/s, in any common unit, of real samples the real
+/// parts; `windows` counts independent windows and may be an effective number.
 ///
 /// # Errors
 /// [`Error::IllConditioned`] if the covariance is singular in double precision, [`Error::Length`] if shapes differ,
 /// [`Error::OutOfRange`] if nothing depends on velocity.
-pub fn bound_complex_m_s(
-    covariance: ArrayView2<'_, Complex<f64>>,
-    derivative: ArrayView2<'_, Complex<f64>>,
+pub fn bound_m_s(
+    kind: SignalKind,
+    covariance: &Array2<Complex<f64>>,
+    derivative: &Array2<Complex<f64>>,
     windows: f64,
 ) -> Result<f64, Error> {
-    from_information(information_complex(covariance, &[derivative])?[[0, 0]], windows)
+    from_information(information(kind, covariance, std::slice::from_ref(derivative))?[[0, 0]], windows)
 }
 
-/// The same for real Gaussian windows, E{x x^T}.
-///
-/// # Errors
-/// As [`bound_complex_m_s`].
-pub fn bound_real_m_s(
-    covariance: ArrayView2<'_, f64>,
-    derivative: ArrayView2<'_, f64>,
-    windows: f64,
-) -> Result<f64, Error> {
-    from_information(information_real(covariance, &[derivative])?[[0, 0]], windows)
-}
-
-/// Fisher information of one circular complex window on any parameters: tr(R^-1 dR_i R^-1 dR_j), \[i, j\].
+/// Fisher information of one window on any parameters, \[i, j\]: tr(R^-1 dR_i R^-1 dR_j) if circular complex, half of that if real.
 ///
 /// `derivatives` are those of the covariance \[n, n\] with respect to each parameter. The inverse of the sum over all
 /// windows bounds the covariance of any unbiased estimates.
-///
-/// # Errors
-/// [`Error::IllConditioned`] if the covariance is singular in double precision, [`Error::Length`] if shapes differ.
-pub fn information_complex(
-    covariance: ArrayView2<'_, Complex<f64>>,
-    derivatives: &[ArrayView2<'_, Complex<f64>>],
+pub(crate) fn information(
+    kind: SignalKind,
+    covariance: &Array2<Complex<f64>>,
+    derivatives: &[Array2<Complex<f64>>],
 ) -> Result<Array2<f64>, Error> {
-    check_hermitian(
-        covariance.indexed_iter().map(|((i, j), value)| (*value - covariance[[j, i]].conj()).norm()),
-        covariance.iter().map(|value| value.norm()),
-    )?;
-    let x = solved(covariance, derivatives)?;
-    let trace = |(i, j): (usize, usize)| x[i].indexed_iter().map(|((n, m), value)| (value * x[j][[m, n]]).re).sum();
-    Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
-}
-
-/// The same for one real Gaussian window: half of that trace.
-///
-/// # Errors
-/// As [`information_complex`].
-pub fn information_real(
-    covariance: ArrayView2<'_, f64>,
-    derivatives: &[ArrayView2<'_, f64>],
-) -> Result<Array2<f64>, Error> {
-    check_hermitian(
-        covariance.indexed_iter().map(|((i, j), value)| (value - covariance[[j, i]]).abs()),
-        covariance.iter().map(|value| value.abs()),
-    )?;
-    let x = solved(covariance, derivatives)?;
-    let trace =
-        |(i, j): (usize, usize)| 0.5 * x[i].indexed_iter().map(|((n, m), value)| value * x[j][[m, n]]).sum::<f64>();
-    Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
+    if kind == SignalKind::Complex {
+        return traces(covariance, derivatives);
+    }
+    let real = |matrix: &Array2<Complex<f64>>| matrix.mapv(|value| value.re);
+    Ok(kind.one_sided_share() * traces(&real(covariance), &derivatives.iter().map(real).collect::<Vec<_>>())?)
 }
 
 /// Least reciprocal condition of a covariance that is inverted, per unit of its order.
@@ -87,15 +56,23 @@ pub fn information_real(
 /// loses all meaning.
 pub(super) const LEAST_CONDITION: f64 = 32.0 * f64::EPSILON;
 
-/// R^-1 dR for each derivative, unless R is too near a singular matrix.
-fn solved<T: Scalar<Real = f64> + Lapack>(
-    covariance: ArrayView2<'_, T>,
-    derivatives: &[ArrayView2<'_, T>],
-) -> Result<Vec<Array2<T>>, Error> {
-    let what = "covariance";
-    let (order, least) = (covariance.nrows(), LEAST_CONDITION * covariance.nrows() as f64);
+/// tr(R^-1 dR_i R^-1 dR_j), unless R is no covariance or too near a singular matrix.
+fn traces<T: Scalar<Real = f64> + Lapack>(
+    covariance: &Array2<T>,
+    derivatives: &[Array2<T>],
+) -> Result<Array2<f64>, Error> {
+    let (what, order) = ("covariance", covariance.nrows());
+    length(what, order, covariance.ncols())?;
+    let difference = |((i, j), value): ((usize, usize), &T)| (*value - covariance[[j, i]].conj()).abs();
+    let value = covariance.indexed_iter().map(difference).fold(0.0, f64::max);
+    // more than rounding
+    if value > 1e-10 * covariance.iter().map(|value| value.abs()).fold(0.0, f64::max) {
+        let allowed = "0 up to rounding";
+        return Err(Error::OutOfRange { field: "covariance minus its adjoint", value, allowed });
+    }
+    let least = LEAST_CONDITION * order as f64;
     let refused = |reciprocal_condition| Error::IllConditioned { what, order, reciprocal_condition, least };
-    let factors = match linalg::Factors::new(what, covariance) {
+    let factors = match linalg::Factors::new(what, covariance.view()) {
         Err(Error::Linalg { reason: linalg::SINGULAR, .. }) => return Err(refused(0.0)),
         other => other?,
     };
@@ -103,7 +80,9 @@ fn solved<T: Scalar<Real = f64> + Lapack>(
     if reciprocal_condition < least {
         return Err(refused(reciprocal_condition));
     }
-    derivatives.iter().map(|derivative| factors.solve(*derivative)).collect()
+    let x = derivatives.iter().map(|derivative| factors.solve(derivative.view())).collect::<Result<Vec<_>, _>>()?;
+    let trace = |(i, j): (usize, usize)| x[i].indexed_iter().map(|((n, m), value)| (*value * x[j][[m, n]]).re()).sum();
+    Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
 }
 
 /// `bound` with the noise as it is; where its floor makes the covariance singular, says which floor would do.
@@ -135,17 +114,6 @@ pub(crate) fn with_floor_named<B>(
         }
     }
     found
-}
-
-/// Refuses a covariance that differs from its adjoint by more than rounding.
-fn check_hermitian(differences: impl Iterator<Item = f64>, sizes: impl Iterator<Item = f64>) -> Result<(), Error> {
-    let worst = differences.fold(0.0, f64::max);
-    let allowed = 1e-10 * sizes.fold(0.0, f64::max);
-    if worst <= allowed {
-        Ok(())
-    } else {
-        Err(Error::OutOfRange { field: "covariance minus its adjoint", value: worst, allowed: "0 up to rounding" })
-    }
 }
 
 fn from_information(information: f64, windows: f64) -> Result<f64, Error> {
@@ -185,12 +153,7 @@ impl Noise {
     /// Covariance of the noise, complex and for two-sided density 1 in the band, at a lag \[samples\].
     pub(crate) fn covariance(self, sampling: &Sampling, lag: f64, kind: SignalKind) -> Complex<f64> {
         let (low, high) = (sampling.band_hz.0 / sampling.sample_rate_hz, sampling.band_hz.1 / sampling.sample_rate_hz);
-        // real samples carry half of their power at the negative frequencies
-        let share = match kind {
-            SignalKind::Real => 0.5,
-            SignalKind::Complex => 1.0,
-        };
-        let white = if lag == 0.0 { share } else { 0.0 };
+        let white = if lag == 0.0 { kind.one_sided_share() } else { 0.0 };
         let in_band = match lag {
             0.0 => Complex::new(high - low, 0.0),
             _ => {
@@ -238,12 +201,77 @@ pub(crate) fn turned(cycles: f64, lag: f64) -> f64 {
     std::f64::consts::TAU * (product - product.round() + rest)
 }
 
+/// Derivative of the phase from sample to sample with respect to velocity \[rad per m/s\].
+pub(crate) fn phase_slope(sampling: &Sampling) -> f64 {
+    -4.0 * std::f64::consts::PI * sampling.period_s() / sampling.wavelength_m
+}
+
+/// Carrier of a velocity and noise at the lags of a window: what makes the covariance of its samples from the envelope of the signal.
+pub(crate) struct Carrier {
+    window_samples: usize,
+    /// Carrier and noise of the lags from -(N - 1) to N - 1.
+    lags: Vec<[Complex<f64>; 2]>,
+    phase_slope: f64,
+}
+
+impl Carrier {
+    /// For a signal of mean power `power`, `snr` times that of the noise in the detector band.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if `snr` is not above 0 or the velocity not finite; [`Error::Band`] for an impossible band.
+    pub(crate) fn new(
+        (sampling, noise): (&Sampling, Noise),
+        window_samples: usize,
+        velocity_m_s: f64,
+        (power, snr): (f64, f64),
+        kind: SignalKind,
+    ) -> Result<Self, Error> {
+        positive("snr", snr)?;
+        finite("velocity_m_s", velocity_m_s)?;
+        sampling.validate_for(kind)?;
+        let cycles = sampling.frequency_hz(velocity_m_s) * sampling.period_s();
+        let bandwidth = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
+        let density = power / (snr * bandwidth);
+        let longest = window_samples as i64 - 1;
+        let of_lag = |lag: i64| {
+            let lag = lag as f64;
+            [Complex::from_polar(1.0, turned(cycles, lag)), noise.covariance(sampling, lag, kind) * density]
+        };
+        let lags = (-longest..=longest).map(of_lag).collect();
+        Ok(Self { window_samples, lags, phase_slope: phase_slope(sampling) })
+    }
+
+    fn at(&self, (n, m): (usize, usize)) -> &[Complex<f64>; 2] {
+        &self.lags[n + self.window_samples - 1 - m]
+    }
+
+    /// Signal of that envelope on the carrier.
+    pub(crate) fn signal<E: Copy>(&self, envelope: &Array2<E>) -> Array2<Complex<f64>>
+    where
+        Complex<f64>: Mul<E, Output = Complex<f64>>,
+    {
+        Array2::from_shape_fn(envelope.dim(), |place| self.at(place)[0] * envelope[place])
+    }
+
+    /// Covariance of signal and noise.
+    pub(crate) fn covariance(&self, mut signal: Array2<Complex<f64>>) -> Array2<Complex<f64>> {
+        signal.indexed_iter_mut().for_each(|(place, value)| *value += self.at(place)[1]);
+        signal
+    }
+
+    /// Derivative of that with respect to velocity \[per m/s\].
+    pub(crate) fn by_velocity(&self, signal: &Array2<Complex<f64>>) -> Array2<Complex<f64>> {
+        let turn = |(n, m): (usize, usize)| Complex::new(0.0, self.phase_slope * (n as f64 - m as f64));
+        Array2::from_shape_fn(signal.dim(), |place| signal[place] * turn(place))
+    }
+}
+
 /// Second-order model of a window: signal envelope, carrier, and noise at a given SNR.
 ///
 /// R(n, m) = envelope(n, m) exp(j 2 pi f (t_n - t_m)) + noise, with f from (30); real samples take the real part.
 #[derive(Debug, Clone)]
 pub struct WindowModel {
-    sampling: Sampling,
+    pub(crate) sampling: Sampling,
     envelope: Array2<f64>,
     /// Half-width at 1/e of a Gaussian pulse \[s\], whose covariance is known beyond double precision.
     gaussian_sigma_s: Option<f64>,
@@ -298,14 +326,8 @@ impl WindowModel {
 
     /// The envelope of the covariance \[n, m\].
     #[must_use]
-    pub fn envelope(&self) -> ArrayView2<'_, f64> {
-        self.envelope.view()
-    }
-
-    /// The sampling.
-    #[must_use]
-    pub fn sampling(&self) -> &Sampling {
-        &self.sampling
+    pub fn envelope(&self) -> &Array2<f64> {
+        &self.envelope
     }
 
     /// Covariance and its derivative with respect to velocity \[per m/s\], complex samples.
@@ -321,74 +343,31 @@ impl WindowModel {
         snr: f64,
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 2], Error> {
-        positive("snr", snr)?;
-        finite("velocity_m_s", velocity_m_s)?;
-        self.sampling.validate_for(kind)?;
-        let cycles = self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
-        let slope = self.phase_slope();
-        let power = self.envelope.diag().mean().unwrap_or(0.0);
-        let bandwidth = (self.sampling.band_hz.1 - self.sampling.band_hz.0) / self.sampling.sample_rate_hz;
-        let density = power / (snr * bandwidth);
-        let lag = |(n, m): (usize, usize)| n as f64 - m as f64;
-        let signal = |place: (usize, usize)| Complex::from_polar(self.envelope[place], turned(cycles, lag(place)));
-        let covariance = Array2::from_shape_fn(self.envelope.dim(), |place| {
-            signal(place) + self.noise.covariance(&self.sampling, lag(place), kind) * density
-        });
-        let derivative =
-            Array2::from_shape_fn(self.envelope.dim(), |place| signal(place) * Complex::new(0.0, slope * lag(place)));
-        Ok([covariance, derivative])
+        let (power, samples) = (self.envelope.diag().mean().unwrap_or(0.0), self.envelope.nrows());
+        let carrier = Carrier::new((&self.sampling, self.noise), samples, velocity_m_s, (power, snr), kind)?;
+        let signal = carrier.signal(&self.envelope);
+        let derivative = carrier.by_velocity(&signal);
+        Ok([carrier.covariance(signal), derivative])
     }
 
     /// Bound on the standard deviation of velocity \[m/s\] for `windows` independent windows.
     ///
     /// # Errors
-    /// As [`WindowModel::covariance`] and [`bound_complex_m_s`]; [`Error::NoiseFloor`] for too small a floor of the noise.
+    /// As [`WindowModel::covariance`] and [`bound_m_s`]; [`Error::NoiseFloor`] for too small a floor of the noise.
     pub fn bound_m_s(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
         with_floor_named(self.noise, self.envelope.nrows(), |noise| {
             let [covariance, derivative] = Self { noise, ..self.clone() }.covariance(velocity_m_s, snr, kind)?;
-            let (found, share) = match kind {
-                SignalKind::Complex => (bound_complex_m_s(covariance.view(), derivative.view(), windows), 1.0),
-                SignalKind::Real => {
-                    let [covariance, derivative] = [covariance, derivative].map(|x| x.mapv(|value| value.re));
-                    (bound_real_m_s(covariance.view(), derivative.view(), windows), 0.5)
-                }
+            let found = bound_m_s(kind, &covariance, &derivative, windows);
+            let (Err(Error::IllConditioned { .. }), Noise::Band { floor }, Some(sigma_s)) =
+                (&found, noise, self.gaussian_sigma_s)
+            else {
+                return found;
             };
-            match (found, noise, self.gaussian_sigma_s) {
-                (Err(refused @ Error::IllConditioned { .. }), Noise::Band { floor }, Some(sigma_s)) => {
-                    match self.gaussian_window(sigma_s, floor, velocity_m_s, snr, kind).information() {
-                        Some(information) => from_information(share * information, windows),
-                        None => Err(refused),
-                    }
-                }
-                (found, ..) => found,
+            let window = (&self.sampling, self.envelope.nrows(), sigma_s);
+            match extended::information(window, floor, velocity_m_s, snr, kind) {
+                Some(information) => from_information(kind.one_sided_share() * information, windows),
+                None => found,
             }
         })
-    }
-
-    fn gaussian_window(
-        &self,
-        sigma_s: f64,
-        floor: f64,
-        velocity_m_s: f64,
-        snr: f64,
-        kind: SignalKind,
-    ) -> GaussianWindow {
-        let (rate_hz, band_hz) = (self.sampling.sample_rate_hz, self.sampling.band_hz);
-        let band = (band_hz.0 / rate_hz, band_hz.1 / rate_hz);
-        GaussianWindow {
-            samples: self.envelope.nrows(),
-            sigma: sigma_s * rate_hz,
-            cycles: self.sampling.frequency_hz(velocity_m_s) / rate_hz,
-            slope: self.phase_slope(),
-            band,
-            density: 1.0 / (snr * (band.1 - band.0)),
-            floor,
-            kind,
-        }
-    }
-
-    /// Derivative of the phase from sample to sample with respect to velocity \[rad per m/s\].
-    fn phase_slope(&self) -> f64 {
-        -4.0 * std::f64::consts::PI * self.sampling.period_s() / self.sampling.wavelength_m
     }
 }

@@ -14,8 +14,6 @@ use crate::window::{Sampling, Scratch, SignalKind};
 #[derive(Clone)]
 pub struct LagWindowPeak {
     weights: Vec<f64>,
-    lags: usize,
-    kind: SignalKind,
     peak: SpectralPeak,
     /// The same of all lags, whose peak shows the width where the lag window's fills the band.
     sharp: SpectralPeak,
@@ -23,44 +21,30 @@ pub struct LagWindowPeak {
 
 impl LagWindowPeak {
     /// Plans the lag window w_m = (1 + cos(pi m / `reach_lags`)) / 2, which falls to 0 at lag `reach_lags`, for
-    /// correlograms with `lags` lags, and the search over `padded_samples` frequencies. A reach of 16 suits 64 samples.
+    /// correlograms as [`SpectralPeak::new`] takes them, and the search over `padded_samples` frequencies. A reach of 16 suits 64 samples.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] unless 1 <= `reach_lags` < `lags`; [`Error::Band`] for an impossible band.
+    /// [`Error::OutOfRange`] unless 1 <= `reach_lags` < lags; [`Error::Band`] for an impossible band.
     pub fn new(
         sampling: &Sampling,
         kind: SignalKind,
-        lags: usize,
+        lag_weights: &[f64],
         reach_lags: usize,
         padded_samples: usize,
         refinement: Refinement,
     ) -> Result<Self, Error> {
-        check_order(reach_lags, lags)?;
+        check_order(reach_lags, lag_weights.len())?;
         let step_rad = std::f64::consts::PI / reach_lags as f64;
         let weights: Vec<f64> = (0..reach_lags).map(|m| 0.5 + 0.5 * (step_rad * m as f64).cos()).collect();
-        Ok(Self {
-            weights,
-            lags,
-            kind,
-            peak: SpectralPeak::new(sampling, kind, reach_lags, padded_samples, refinement)?,
-            sharp: SpectralPeak::new(sampling, kind, lags, padded_samples, refinement)?,
-        })
-    }
-
-    /// As [`SpectralPeak::with_lag_weights`]; these are the weights of the window.
-    ///
-    /// # Errors
-    /// [`Error::Length`] if there are not as many weights as lags.
-    pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
-        self.sharp = self.sharp.with_lag_weights(lag_weights)?;
-        let seen: Vec<f64> = self.weights.iter().zip(lag_weights).map(|(weight, own)| weight * own).collect();
-        self.peak = self.peak.with_lag_weights(&seen)?;
-        Ok(self)
+        let seen: Vec<f64> = weights.iter().zip(lag_weights).map(|(weight, own)| weight * own).collect();
+        let [peak, sharp] = [&seen, lag_weights]
+            .map(|lag_weights| SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement));
+        Ok(Self { weights, peak: peak?, sharp: sharp? })
     }
 
     /// The peak of the lag-windowed spectrum alone, without a width.
     pub(crate) fn smooth(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        let per_lag = self.kind.lag_numbers(1);
+        let per_lag = self.peak.search.kind.lag_numbers(1);
         let mut numbers = std::mem::take(&mut scratch.numbers);
         numbers.clear();
         numbers.extend(
@@ -76,16 +60,14 @@ impl LagWindowPeak {
 
 impl Estimator for LagWindowPeak {
     fn statistic_len(&self) -> usize {
-        self.kind.lag_numbers(self.lags)
+        self.sharp.statistic_len()
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
         let estimate = self.smooth(mean, scratch);
         let sharp = self.sharp.estimate(mean, scratch);
-        let resolution_m_s = {
-            let sampling = self.peak.sampling();
-            0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.weights.len() as f64
-        };
+        let sampling = self.peak.sampling();
+        let resolution_m_s = 0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.weights.len() as f64;
         // the width of another peak is not that of this one
         match (sharp.velocity_m_s - estimate.velocity_m_s).abs() < resolution_m_s {
             true => {
@@ -104,47 +86,29 @@ impl Estimator for LagWindowPeak {
 /// the share of its power.
 #[derive(Clone)]
 pub struct PulsePair {
-    sampling: Sampling,
-    kind: SignalKind,
-    lags: usize,
     band: SpectralPeak,
     /// exp(2 pi i f / F_s) at the frequencies of the band.
     phasors: Vec<Complex<f64>>,
 }
 
 impl PulsePair {
-    /// Plans the estimator for correlograms with `lags` lags, at least 2.
+    /// Plans the estimator for correlograms as [`SpectralPeak::new`] takes them, with at least 2 lags.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] with less than 2 lags; [`Error::Band`] for an impossible band.
-    pub fn new(sampling: &Sampling, kind: SignalKind, lags: usize) -> Result<Self, Error> {
-        check_order(1, lags)?;
-        let band = SpectralPeak::new(sampling, kind, lags, 4 * lags, Refinement::None)?;
+    pub fn new(sampling: &Sampling, kind: SignalKind, lag_weights: &[f64]) -> Result<Self, Error> {
+        check_order(1, lag_weights.len())?;
+        let band = SpectralPeak::new(sampling, kind, lag_weights, 4 * lag_weights.len(), Refinement::None)?;
         let rad_per_hz = std::f64::consts::TAU * sampling.period_s();
-        let phasors =
-            band.band_frequencies_hz().iter().map(|f_hz| Complex::from_polar(1.0, rad_per_hz * f_hz)).collect();
-        Ok(Self { sampling: *sampling, kind, lags, band, phasors })
-    }
-
-    /// As [`SpectralPeak::with_lag_weights`].
-    ///
-    /// # Errors
-    /// [`Error::Length`] if there are not as many weights as lags.
-    pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
-        self.band = self.band.with_lag_weights(lag_weights)?;
-        Ok(self)
-    }
-
-    /// Lag 1 of the band-limited analytic signal.
-    fn band_limited(&self, mean: &[f64], scratch: &mut Scratch) -> Option<Complex<f64>> {
-        let density = self.band.band_density(mean, scratch).ok()?;
-        Some(density.iter().zip(&self.phasors).map(|(s, phasor)| phasor * s).sum())
+        let phasor = |f_hz: f64| Complex::from_polar(1.0, rad_per_hz * f_hz);
+        let phasors = band.band_frequencies_hz().into_iter().map(phasor).collect();
+        Ok(Self { band, phasors })
     }
 }
 
 impl Estimator for PulsePair {
     fn statistic_len(&self) -> usize {
-        self.kind.lag_numbers(self.lags)
+        self.band.statistic_len()
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
@@ -153,18 +117,20 @@ impl Estimator for PulsePair {
         if !matches!(peak.flag, Quality::Good | Quality::OutOfBand) {
             return peak;
         }
-        let lag = match self.kind {
-            SignalKind::Complex => Some(self.kind.lag(mean, 1)),
-            SignalKind::Real => self.band_limited(mean, scratch),
+        let lag: Complex<f64> = match self.band.search.kind {
+            SignalKind::Complex => SignalKind::Complex.lag(mean, 1),
+            // lag 1 of the band-limited analytic signal
+            SignalKind::Real => match self.band.band_density(mean, scratch) {
+                Ok(density) => density.iter().zip(&self.phasors).map(|(s, phasor)| phasor * s).sum(),
+                Err(_) => return GateVelocity::none(Quality::Invalid),
+            },
         };
-        let Some(lag) = lag else {
-            return GateVelocity::none(Quality::Invalid);
-        };
-        let frequency_hz = lag.arg() / std::f64::consts::TAU * self.sampling.sample_rate_hz;
-        let (low_hz, high_hz) = self.sampling.band_hz;
+        let sampling = self.band.sampling();
+        let frequency_hz = lag.arg() / std::f64::consts::TAU * sampling.sample_rate_hz;
+        let (low_hz, high_hz) = sampling.band_hz;
         let inside = (low_hz..=high_hz).contains(&frequency_hz);
         GateVelocity {
-            velocity_m_s: self.sampling.velocity_m_s(frequency_hz),
+            velocity_m_s: sampling.velocity_m_s(frequency_hz),
             flag: if inside { peak.flag } else { Quality::OutOfBand },
             ..peak
         }

@@ -36,7 +36,7 @@ use statrs::function::gamma::ln_gamma;
 
 use crate::bound::Noise;
 use crate::error::{Error, length, positive};
-use crate::estimators::tails::gamma_tail;
+use crate::estimators::tails::{bisected, gamma_tail};
 use crate::map::{PolarPoint, ScanGeometry};
 use crate::spectrum::Taper;
 use crate::spectrum::lag_spectrum::Band;
@@ -297,14 +297,7 @@ impl NoiseTest {
         while self.false_alarm(region, high) > rate && high < f64::MAX {
             (low, high) = (high, 2.0 * high);
         }
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            if self.false_alarm(region, middle) > rate {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
+        let [low, high] = bisected(low, high, 60, |level| self.false_alarm(region, level) > rate);
         Ok(if region.n_eff > 0.0 { 0.5 * (low + high) } else { f64::NAN })
     }
 }

@@ -29,7 +29,7 @@ pub struct FirstMoment {
 }
 
 impl FirstMoment {
-    /// Plans the estimator for correlograms of `lags` lags of windows without weighting, and `padded_samples` frequencies.
+    /// Plans the estimator for correlograms as [`SpectralPeak::new`] takes them and `padded_samples` frequencies.
     ///
     /// `reach` is the half width of the window about the centroid in standard deviations of the density in it, 1.5 to 3.
     ///
@@ -38,29 +38,19 @@ impl FirstMoment {
     pub fn new(
         sampling: &Sampling,
         kind: SignalKind,
-        lags: usize,
+        lag_weights: &[f64],
         padded_samples: usize,
         reach: f64,
     ) -> Result<Self, Error> {
         positive("reach", reach)?;
-        let refinement = Refinement::Parabola;
+        let (refinement, lags) = (Refinement::Parabola, lag_weights.len());
         Ok(Self {
-            start: LagWindowPeak::new(sampling, kind, lags, (lags / 4).max(1), padded_samples, refinement)?,
-            spectrum: SpectralPeak::new(sampling, kind, lags, padded_samples, refinement)?,
+            start: LagWindowPeak::new(sampling, kind, lag_weights, (lags / 4).max(1), padded_samples, refinement)?,
+            spectrum: SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement)?,
             reach,
             // the main lobe of the window
             least: padded_samples as f64 / lags as f64,
         })
-    }
-
-    /// As [`SpectralPeak::with_lag_weights`].
-    ///
-    /// # Errors
-    /// [`Error::Length`] if there are not as many weights as lags.
-    pub fn with_lag_weights(mut self, lag_weights: &[f64]) -> Result<Self, Error> {
-        self.start = self.start.with_lag_weights(lag_weights)?;
-        self.spectrum = self.spectrum.with_lag_weights(lag_weights)?;
-        Ok(self)
     }
 }
 
@@ -76,7 +66,8 @@ impl Estimator for FirstMoment {
             return peak;
         }
         let sampling = *self.spectrum.sampling();
-        let (low_hz, spacing_hz) = self.spectrum.first_and_spacing_hz();
+        let [low_hz, next_hz] = [0.0, 1.0].map(|bin| self.spectrum.search.band.frequency_hz(bin));
+        let spacing_hz = next_hz - low_hz;
         let Ok(density) = self.spectrum.band_density(mean, scratch) else {
             return GateVelocity::none(Quality::Invalid);
         };

@@ -13,20 +13,16 @@
 //! of the list reads beside the true one. Check: the bound of [`GradientModel::bound`]; with the
 //! gradient 0 alone, that of [`WindowModel::bound_m_s`](crate::bound::WindowModel::bound_m_s).
 
-use std::sync::Arc;
-
 use ndarray::Array2;
 use num_complex::Complex;
-use rustfft::Fft;
 
 use crate::bound::{GradientModel, Noise};
 use crate::error::{Error, finite, increasing, length, positive};
 use crate::estimators::gradient_tapers::{LagWeights, Tapers, band_lag, tapers};
-use crate::estimators::search::{PeakSearch, highest, unusable};
+use crate::estimators::search::{PeakSearch, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
-use crate::spectrum::ZoomSpectrum;
-use crate::spectrum::transform::complex_transforms;
-use crate::window::{Gates, Sample, Sampling, Scratch, SignalKind};
+use crate::spectrum::transform::WindowTransform;
+use crate::window::{Gates, Sample, Scratch, SignalKind};
 
 type C64 = Complex<f64>;
 
@@ -48,24 +44,18 @@ pub struct GradientStatistic<S> {
     tapers: Vec<Tapers>,
     /// What the lags 0, 1, ... of the window weigh in the energy inside the band.
     band_lags: Vec<C64>,
-    window_samples: usize,
-    forward: Arc<dyn Fft<f64>>,
-    inverse: Arc<dyn Fft<f64>>,
+    transform: WindowTransform,
     sample: std::marker::PhantomData<fn(S)>,
 }
 
 /// The peak of the likelihood over velocity and gradient.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct GradientPeak {
     gradient_per_s: Vec<f64>,
     /// The one nearest to 0, whose spectrum is tested against noise.
     slowest: usize,
     spread: Vec<f64>,
     samples_in_band: f64,
-    numbers: usize,
-    sampling: Sampling,
-    zoom: ZoomSpectrum,
-    whole: ZoomSpectrum,
     search: PeakSearch,
     /// For each gradient what the peak reads for increasing true velocities \[m/s\]: (read, true); empty for complex samples.
     corrections: Vec<Vec<(f64, f64)>>,
@@ -99,7 +89,7 @@ impl<S: Sample> GradientLikelihood<S> {
         }
         gradient_per_s.iter().try_for_each(|&g| finite("gradient_per_s", g))?;
         increasing("gradient_per_s", gradient_per_s)?;
-        let (sampling, n) = (model.sampling(), model.window_samples());
+        let (sampling, n) = (&model.sampling, model.window_samples);
         sampling.validate_for(S::KIND)?;
         let share = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
         let tapers =
@@ -109,14 +99,13 @@ impl<S: Sample> GradientLikelihood<S> {
         // Tapers of other gradients are these with a chirp, which takes out that of the wind.
         let tone = LagWeights::new(&tapers[slowest], n).expected_lags(&Array2::ones((n, n)));
         let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
-        let search = PeakSearch::new(sampling, SignalKind::Complex, padded_samples, &weights)?;
-        let white = model.noise() == Noise::White;
+        let search = PeakSearch::new(sampling, SignalKind::Complex, (padded_samples, 4 * n), &weights)?;
+        let white = model.noise == Noise::White;
         let sides = if S::KIND == SignalKind::Real { 0.5 } else { 1.0 };
         let band_lags = match white {
             true => std::iter::once(Complex::from(sides)).chain(std::iter::repeat_n(Complex::ZERO, n - 1)).collect(),
             false => (0..n).map(|m| band_lag(sampling, m, share)).collect(),
         };
-        let grid_hz: Vec<f64> = (0..4 * n).map(|k| k as f64 * sampling.sample_rate_hz / (4 * n) as f64).collect();
         let mut estimator = GradientPeak {
             corrections: Vec::new(),
             gradient_readings: Vec::new(),
@@ -124,25 +113,14 @@ impl<S: Sample> GradientLikelihood<S> {
             slowest,
             spread: tapers.iter().map(|tapers| tapers.spread).collect(),
             samples_in_band: if white { sides * n as f64 } else { share * n as f64 },
-            numbers: 2 * n,
-            sampling: *sampling,
-            zoom: ZoomSpectrum::new(SignalKind::Complex, n, sampling, &search.band.with_neighbours_hz())?,
-            whole: ZoomSpectrum::new(SignalKind::Complex, n, sampling, &grid_hz)?,
             search,
         };
         if S::KIND == SignalKind::Real {
             let read = gradient_per_s.iter().zip(&tapers).map(|(&g, tapers)| estimator.readings(model, g, snr, tapers));
             estimator.corrections = read.collect::<Result<_, _>>()?;
         }
-        let [forward, inverse] = complex_transforms(2 * n);
-        let statistic = GradientStatistic {
-            tapers,
-            band_lags,
-            window_samples: n,
-            forward,
-            inverse,
-            sample: std::marker::PhantomData,
-        };
+        let transform = WindowTransform::new(SignalKind::Complex, 2 * n);
+        let statistic = GradientStatistic { tapers, band_lags, transform, sample: std::marker::PhantomData };
         estimator.gradient_readings = statistic.gradient_readings(&estimator, model, snr)?;
         Ok(Self { statistic, estimator })
     }
@@ -154,9 +132,9 @@ impl<S: Sample> GradientLikelihood<S> {
     /// # Errors
     /// As [`NoiseTest::new`].
     pub fn noise_test(&self, gates: &Gates, noise: Noise) -> Result<NoiseTest, Error> {
-        let (estimator, padded) = (&self.estimator, self.estimator.search.padded());
+        let (estimator, padded) = (&self.estimator, self.estimator.search.padded);
         let tapers = &self.statistic.tapers[estimator.slowest].weights;
-        NoiseTest::of_complex(&estimator.sampling, gates, tapers, None, padded, noise)
+        NoiseTest::of_complex(&estimator.search.sampling, gates, tapers, None, padded, noise)
     }
 
     /// The mean statistic of windows whose samples have the autocovariance `lags`, of all lags of a window: that of a noise
@@ -165,7 +143,7 @@ impl<S: Sample> GradientLikelihood<S> {
     /// # Errors
     /// [`Error::Length`] for another number of lags.
     pub fn mean_statistic(&self, lags: &[f64]) -> Result<Vec<f64>, Error> {
-        let n = self.statistic.window_samples;
+        let n = self.statistic.band_lags.len();
         length("lags", S::KIND.lag_numbers(n), lags.len())?;
         let covariance = Array2::from_shape_fn((n, n), |(i, j)| {
             let lag = S::KIND.lag(lags, i.abs_diff(j));
@@ -177,51 +155,43 @@ impl<S: Sample> GradientLikelihood<S> {
 
 impl<S: Sample> Statistic<S> for GradientStatistic<S> {
     fn window_samples(&self) -> usize {
-        self.window_samples
+        self.band_lags.len()
     }
 
     fn statistic_len(&self) -> usize {
-        self.tapers.len() * 2 * self.window_samples + 1
+        self.tapers.len() * 2 * self.band_lags.len() + 1
     }
 
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]) {
-        let padded = 2 * self.window_samples;
-        let inner = self.forward.get_inplace_scratch_len().max(self.inverse.get_inplace_scratch_len());
-        scratch.transform.resize(inner.max(scratch.transform.len()), Complex::ZERO);
-        let inner = &mut scratch.transform[..inner];
-        let line = &mut scratch.complex;
-        for (tapers, lags) in self.tapers.iter().zip(out.chunks_exact_mut(padded)) {
-            scratch.power.clear();
-            scratch.power.resize(padded, 0.0);
+        let samples = window.iter().map(|sample| sample.to_complex());
+        for (tapers, lags) in self.tapers.iter().zip(out.chunks_exact_mut(2 * window.len())) {
+            self.transform.reset(scratch);
             for taper in &tapers.weights {
-                line.clear();
-                line.extend(window.iter().zip(taper).map(|(sample, weight)| sample.to_complex() * weight));
-                line.resize(padded, Complex::ZERO);
-                self.forward.process_with_scratch(line, inner);
-                scratch.power.iter_mut().zip(line.iter()).for_each(|(sum, value)| *sum += value.norm_sqr());
+                let weighted = samples.clone().zip(taper).map(|(sample, weight)| sample * weight);
+                self.transform.add_power(weighted, 1.0, scratch);
             }
-            line.clear();
-            line.extend(scratch.power.iter().map(|power| Complex::from(power / padded as f64)));
-            self.inverse.process_with_scratch(line, inner);
-            for (pair, lag) in lags.as_chunks_mut::<2>().0.iter_mut().zip(line.iter()) {
-                *pair = [lag.re, lag.im];
-            }
+            self.transform.lags_of_power(scratch, lags);
         }
-        if let Some(energy) = out.last_mut() {
-            *energy = self.energy(window, scratch);
-        }
+        self.transform.reset(scratch);
+        self.transform.add_power(samples, 1.0, scratch);
+        let mut lags = std::mem::take(&mut scratch.numbers);
+        lags.resize(2 * window.len(), 0.0);
+        self.transform.lags_of_power(scratch, &mut lags);
+        let in_band = |(m, weight): (usize, &C64)| (SignalKind::Complex.lag(&lags, m) * weight).re;
+        out[self.tapers.len() * 2 * window.len()] = self.band_lags.iter().enumerate().map(in_band).sum();
+        scratch.numbers = lags;
     }
 }
 
 impl<S: Sample> GradientStatistic<S> {
     /// What products of samples weigh in the lags of each gradient.
     fn lag_weights(&self) -> Vec<LagWeights> {
-        self.tapers.iter().map(|tapers| LagWeights::new(tapers, self.window_samples)).collect()
+        self.tapers.iter().map(|tapers| LagWeights::new(tapers, self.band_lags.len())).collect()
     }
 
     /// The mean statistic of windows of that covariance.
     fn expected(&self, covariance: &Array2<C64>, weights: &[LagWeights]) -> Vec<f64> {
-        let n = self.window_samples;
+        let n = self.band_lags.len();
         let mut numbers: Vec<f64> = weights.iter().flat_map(|weights| weights.expected_lags(covariance)).collect();
         let lag = |m: usize| (0..n - m).map(|k| covariance[[k + m, k]]).sum::<C64>();
         numbers.push(self.band_lags.iter().enumerate().map(|(m, weight)| (lag(m) * weight).re).sum());
@@ -235,18 +205,15 @@ impl<S: Sample> GradientStatistic<S> {
         model: &GradientModel,
         snr: f64,
     ) -> Result<Vec<(f64, f64)>, Error> {
-        let middle_hz = 0.5 * (estimator.sampling.band_hz.0 + estimator.sampling.band_hz.1);
-        let velocity_m_s = estimator.sampling.velocity_m_s(middle_hz);
+        let sampling = &estimator.search.sampling;
+        let velocity_m_s = sampling.velocity_m_s(0.5 * (sampling.band_hz.0 + sampling.band_hz.1));
         let weights = self.lag_weights();
         let mut readings = Vec::<(f64, f64)>::new();
         for pair in estimator.gradient_per_s.windows(2) {
             for part in 0..=READINGS {
                 let gradient_per_s = pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
                 let [envelope, _] = model.envelope(gradient_per_s);
-                let mut covariance = model.moved(&envelope, velocity_m_s, snr, S::KIND)?;
-                if S::KIND == SignalKind::Real {
-                    covariance.mapv_inplace(|value| C64::from(value.re));
-                }
+                let covariance = model.of_samples(&envelope, velocity_m_s, snr, S::KIND)?;
                 let found = estimator.velocity_and_gradient(&self.expected(&covariance, &weights), &mut Scratch::new());
                 // the ends of the list read themselves however far off the wind: only increasing readings can be inverted
                 if found.gradient_per_s.is_finite() && readings.last().is_none_or(|last| last.0 < found.gradient_per_s)
@@ -256,19 +223,6 @@ impl<S: Sample> GradientStatistic<S> {
             }
         }
         Ok(readings)
-    }
-
-    /// Energy of the window inside the band.
-    fn energy(&self, window: &[S], scratch: &mut Scratch) -> f64 {
-        let padded = 2 * self.window_samples;
-        let line = &mut scratch.complex;
-        line.clear();
-        line.extend(window.iter().map(|sample| sample.to_complex()));
-        line.resize(padded, Complex::ZERO);
-        self.forward.process_with_scratch(line, &mut scratch.transform);
-        line.iter_mut().for_each(|value| *value = Complex::from(value.norm_sqr() / padded as f64));
-        self.inverse.process_with_scratch(line, &mut scratch.transform);
-        line.iter().zip(&self.band_lags).map(|(lag, weight)| (lag * weight).re).sum()
     }
 }
 
@@ -281,22 +235,21 @@ impl GradientPeak {
         snr: f64,
         tapers: &Tapers,
     ) -> Result<Vec<(f64, f64)>, Error> {
-        let (low_m_s, high_m_s) = self.sampling.velocity_limits_m_s();
+        let sampling = &self.search.sampling;
+        let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         // the sidelobes of a taper pass the image twice as fast as the velocity changes: a quarter of one per step
-        let step_m_s =
-            0.0625 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / model.window_samples() as f64;
+        let step_m_s = 0.0625 * sampling.wavelength_m * sampling.sample_rate_hz / model.window_samples as f64;
         let steps = ((high_m_s - low_m_s) / step_m_s).ceil().max(1.0);
-        let weights = LagWeights::new(tapers, model.window_samples());
+        let weights = LagWeights::new(tapers, model.window_samples);
         let [envelope, _] = model.envelope(gradient_per_s);
-        let mut density = Vec::new();
+        let mut scratch = Scratch::new();
         let mut readings = Vec::<(f64, f64)>::with_capacity(steps as usize + 1);
         for k in 0..=steps as usize {
             let velocity_m_s = low_m_s + (high_m_s - low_m_s) * k as f64 / steps;
-            let covariance = model.moved(&envelope, velocity_m_s, snr, SignalKind::Real)?;
-            let lags = weights.expected_lags(&covariance.mapv(|value| C64::from(value.re)));
-            self.zoom.density_into(&lags, &mut density)?;
-            let found = self.search.locate(&density, Refinement::Parabola, &[], || None);
-            let read_m_s = self.sampling.velocity_m_s(self.search.band.frequency_hz(found.bin));
+            let lags = weights.expected_lags(&model.of_samples(&envelope, velocity_m_s, snr, SignalKind::Real)?);
+            self.search.zoom.density_into(&lags, &mut scratch.band)?;
+            let found = self.search.locate(&scratch.band, Refinement::Parabola, &[], || None);
+            let read_m_s = sampling.velocity_m_s(self.search.band.frequency_hz(found.bin));
             // at the edges of the band the peak leaves it: only increasing readings can be inverted
             if found.flag == Quality::Good && readings.last().is_none_or(|last| last.0 < read_m_s) {
                 readings.push((read_m_s, velocity_m_s));
@@ -323,17 +276,11 @@ impl GradientPeak {
         let mut best: Option<(usize, f64, GateVelocity)> = None;
         let mut at_rest = (f64::NAN, f64::NAN);
         let mut found = Vec::with_capacity(self.spread.len());
-        for (k, (lags, spread)) in mean.chunks_exact(self.numbers).zip(&self.spread).enumerate() {
-            if self.zoom.density_into(lags, &mut scratch.band).is_err() {
+        for (k, (lags, spread)) in mean.chunks_exact(self.search.statistic_len()).zip(&self.spread).enumerate() {
+            let is_real = !self.corrections.is_empty();
+            let Some(located) = self.search.find(lags, Refinement::Parabola, is_real, scratch) else {
                 return none(Quality::Invalid);
-            }
-            let located = self.search.locate(&scratch.band, Refinement::Parabola, lags, || {
-                self.whole.density_into(lags, &mut scratch.density).ok()?;
-                let (place, highest) = highest(&scratch.density);
-                let place = place as f64 / scratch.density.len() as f64;
-                // of real samples the image may be the higher one
-                Some((highest, if self.corrections.is_empty() { place } else { place.min(1.0 - place) }))
-            });
+            };
             let estimate = self.search.velocity(&located, self.search.band.frequency_hz(located.bin));
             if k == self.slowest {
                 at_rest = (estimate.power, estimate.detection);
@@ -373,7 +320,8 @@ impl GradientPeak {
         let (slope, curvature) = slopes(|pair| pair.1);
         let moved_m_s = slope * step + curvature * step * step;
         // two peaks of like height may change places from one gradient to the next
-        let resolution_m_s = 0.5 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / self.numbers as f64;
+        let sampling = &self.search.sampling;
+        let resolution_m_s = 0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.search.statistic_len() as f64;
         let moved_m_s = if moved_m_s.abs() < resolution_m_s { moved_m_s } else { 0.0 };
         (at + step, found[k].1 + moved_m_s)
     }
@@ -391,7 +339,7 @@ fn truth(readings: &[(f64, f64)], value: f64) -> f64 {
 
 impl Estimator for GradientPeak {
     fn statistic_len(&self) -> usize {
-        self.spread.len() * self.numbers + 1
+        self.spread.len() * self.search.statistic_len() + 1
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {

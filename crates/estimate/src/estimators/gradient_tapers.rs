@@ -62,10 +62,10 @@ pub(crate) fn tapers(
     kind: SignalKind,
 ) -> Result<Tapers, Error> {
     let [signal, _] = model.envelope(gradient_per_s);
-    let n = model.window_samples();
+    let n = model.window_samples;
     let whitener = match kind {
         SignalKind::Complex => None,
-        SignalKind::Real => Some(whitener(model.sampling(), &signal, power)?),
+        SignalKind::Real => Some(whitener(&model.sampling, &signal, power)?),
     };
     let whitened = whitener.as_ref().map_or_else(|| signal.clone(), |root| root.dot(&signal).dot(root));
     let (values, vectors) = hermitian_eigen("signal covariance", whitened.view())?;

@@ -7,32 +7,33 @@
 //! and tones.
 
 use crate::error::Error;
-use crate::estimators::search::{PeakSearch, highest, unusable};
+use crate::estimators::search::{PeakSearch, unusable};
 use crate::estimators::{Estimator, GateVelocity, Quality, Refinement};
 use crate::models::autoregressive::check_order;
 use crate::models::{Autoregression, OrderChoice};
-use crate::spectrum::ZoomSpectrum;
 use crate::window::{Sampling, Scratch, SignalKind};
 
-/// Which spectrum a model is read by.
+/// What is read of a model of the accumulated correlogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Reading {
+pub enum ModelReading {
+    /// CA: peak of the autoregressive spectrum. The chapter uses order 16; 2048 frequencies or more resolve its peaks.
     Spectrum,
+    /// Peak of Capon's minimum-variance spectrum, by filters of one sample more than the order.
     Capon,
+    /// The pole of the autoregressive model nearest to the unit circle in the band; frequencies serve the quality figures.
+    ///
+    /// SNR, quality and flags are those of the model's spectrum; where that has less than half of its peak at the pole, the estimate is
+    /// [`Quality::Ambiguous`].
     Pole,
 }
 
-/// The common part: a model of the correlogram and the search on one over a polynomial.
-#[derive(Debug, Clone)]
-struct ModelPeak {
-    reading: Reading,
+/// Velocity from a model of the accumulated correlogram, in the detector band.
+#[derive(Clone)]
+pub struct ModelPeak {
+    reading: ModelReading,
     order: usize,
     choice: OrderChoice,
     lags: usize,
-    kind: SignalKind,
-    sampling: Sampling,
-    zoom: ZoomSpectrum,
-    whole: ZoomSpectrum,
     search: PeakSearch,
     refinement: Refinement,
     /// Weights of the lags for the test against noise.
@@ -47,77 +48,32 @@ pub fn model_lag_weights(order: usize) -> Vec<f64> {
 }
 
 impl ModelPeak {
-    fn new(
-        reading: Reading,
+    /// Plans a model of order `order` of correlograms with `lags` lags and a search over `padded_samples` frequencies.
+    ///
+    /// Only `order` + 1 lags are needed. [`Refinement::Exact`] counts as the parabola.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless 1 <= `order` < `lags`; [`Error::Band`] for an impossible band.
+    pub fn new(
+        reading: ModelReading,
         sampling: &Sampling,
         kind: SignalKind,
         lags: usize,
         order: usize,
-        padded: usize,
+        padded_samples: usize,
         refinement: Refinement,
     ) -> Result<Self, Error> {
         check_order(order, lags)?;
         let lag_weights = model_lag_weights(order);
-        let search = PeakSearch::new(sampling, kind, padded, &lag_weights)?;
-        let distinct = match kind {
-            SignalKind::Real => padded / 2 + 1,
-            SignalKind::Complex => padded,
-        };
-        let spacing_hz = sampling.sample_rate_hz / padded as f64;
-        let grid_hz: Vec<f64> = (0..distinct).map(|k| k as f64 * spacing_hz).collect();
-        Ok(Self {
-            reading,
-            order,
-            choice: OrderChoice::Fixed,
-            lags,
-            kind,
-            sampling: *sampling,
-            zoom: ZoomSpectrum::new(kind, order + 1, sampling, &search.band.with_neighbours_hz())?,
-            whole: ZoomSpectrum::new(kind, order + 1, sampling, &grid_hz)?,
-            search,
-            refinement,
-            lag_weights,
-        })
+        let search = PeakSearch::new(sampling, kind, (padded_samples, padded_samples), &lag_weights)?;
+        Ok(Self { reading, order, choice: OrderChoice::Fixed, lags, search, refinement, lag_weights })
     }
 
-    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        if let Some(flag) = unusable(mean) {
-            return GateVelocity::none(flag);
-        }
-        let mut model = std::mem::take(&mut scratch.model);
-        let mut numbers = std::mem::take(&mut scratch.numbers);
-        let mut band = std::mem::take(&mut scratch.band);
-        let solved = model.solve(mean, self.kind, self.order, &mut numbers).and_then(|()| self.choose(&mut model));
-        let mut estimate = match solved {
-            Ok(()) => self.read(&model, &mut numbers, &mut band),
-            Err(_) => GateVelocity::none(Quality::Invalid),
-        };
-        // The density of a model is not linear in the correlogram: power and detection are those of its lags, which also tell what
-        // lines outside leak. How wide a spectrum is a model does not show: its peaks narrow with the signal-to-noise ratio.
-        numbers.clear();
-        numbers.extend(
-            mean.chunks(self.kind.lag_numbers(1))
-                .zip(&self.lag_weights)
-                .flat_map(|(lag, w)| lag.iter().map(move |r| r * w)),
-        );
-        if self.zoom.density_into(&numbers, &mut band).is_ok() {
-            let found = self.search.locate(&band, Refinement::None, &numbers, || {
-                self.whole.density_into(&numbers, &mut scratch.density).ok()?;
-                let (place, highest) = highest(&scratch.density);
-                Some((highest, place as f64 / self.search.padded() as f64))
-            });
-            match (estimate.flag, found.flag) {
-                (Quality::Good | Quality::OutOfBand, flag @ Quality::NoSignal) => estimate = GateVelocity::none(flag),
-                (Quality::Good, flag) => estimate.flag = flag,
-                _ => {}
-            }
-            (estimate.power, estimate.detection) = (self.search.power(found.sum), found.peak);
-            estimate.spread_m2_s2 = f64::NAN;
-        }
-        scratch.model = model;
-        scratch.numbers = numbers;
-        scratch.band = band;
-        estimate
+    /// The same with the order chosen for each estimate; `order` is then the largest.
+    #[must_use]
+    pub fn choosing(mut self, choice: OrderChoice) -> Self {
+        self.choice = choice;
+        self
     }
 
     /// Lowers the order to the one chosen.
@@ -129,9 +85,9 @@ impl ModelPeak {
     }
 
     fn read(&self, model: &Autoregression, numbers: &mut Vec<f64>, band: &mut Vec<f64>) -> GateVelocity {
-        model.inverse_lags(self.kind, self.reading == Reading::Capon, numbers);
-        numbers.resize(self.kind.lag_numbers(self.order + 1), 0.0);
-        if self.zoom.density_into(numbers, band).is_err() {
+        model.inverse_lags(self.search.kind, self.reading == ModelReading::Capon, numbers);
+        numbers.resize(self.search.statistic_len(), 0.0);
+        if self.search.zoom.density_into(numbers, band).is_err() {
             return GateVelocity::none(Quality::Invalid);
         }
         // a pole on the circle to rounding must not turn the density negative or infinite
@@ -140,7 +96,7 @@ impl ModelPeak {
         let found = self.search.locate(band, self.refinement, &[], || None);
         let estimate = self.search.velocity(&found, self.search.band.frequency_hz(found.bin));
         match self.reading {
-            Reading::Pole if found.flag == Quality::Good => self.at_pole(model, found.peak, estimate),
+            ModelReading::Pole if found.flag == Quality::Good => self.at_pole(model, found.peak, estimate),
             _ => estimate,
         }
     }
@@ -148,11 +104,12 @@ impl ModelPeak {
     /// The same estimate at the pole nearest to the circle, ambiguous where the spectrum does not peak there; out of band if none lies
     /// in it.
     fn at_pole(&self, model: &Autoregression, peak: f64, estimate: GateVelocity) -> GateVelocity {
-        match model.nearest_pole(&self.sampling) {
+        let sampling = &self.search.sampling;
+        match model.nearest_pole(sampling) {
             Ok(Some((frequency_hz, _))) => {
-                let is_beside = 2.0 * model.density(frequency_hz, &self.sampling) < peak;
+                let is_beside = 2.0 * model.density(frequency_hz, sampling) < peak;
                 let flag = if is_beside { Quality::Ambiguous } else { estimate.flag };
-                GateVelocity { velocity_m_s: self.sampling.velocity_m_s(frequency_hz), flag, ..estimate }
+                GateVelocity { velocity_m_s: sampling.velocity_m_s(frequency_hz), flag, ..estimate }
             }
             Ok(None) => GateVelocity { flag: Quality::OutOfBand, ..estimate },
             Err(_) => GateVelocity::none(Quality::Invalid),
@@ -160,74 +117,38 @@ impl ModelPeak {
     }
 }
 
-macro_rules! model_estimator {
-    ($(#[$doc:meta])* $name:ident, $reading:ident, $(#[$new_doc:meta])*) => {
-        $(#[$doc])*
-        #[derive(Debug, Clone)]
-        pub struct $name(ModelPeak);
+impl Estimator for ModelPeak {
+    fn statistic_len(&self) -> usize {
+        self.search.kind.lag_numbers(self.lags)
+    }
 
-        impl $name {
-            $(#[$new_doc])*
-            ///
-            /// # Errors
-            /// [`Error::OutOfRange`] unless 1 <= `order` < `lags`; [`Error::Band`] for an impossible band.
-            pub fn new(
-                sampling: &Sampling,
-                kind: SignalKind,
-                lags: usize,
-                order: usize,
-                padded_samples: usize,
-                refinement: Refinement,
-            ) -> Result<Self, Error> {
-                ModelPeak::new(Reading::$reading, sampling, kind, lags, order, padded_samples, refinement).map(Self)
-            }
-
-            /// The same with the order chosen for each estimate; `order` is then the largest.
-            #[must_use]
-            pub fn choosing(mut self, choice: OrderChoice) -> Self {
-                self.0.choice = choice;
-                self
-            }
+    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
+        if let Some(flag) = unusable(mean) {
+            return GateVelocity::none(flag);
         }
-
-        impl Estimator for $name {
-            fn statistic_len(&self) -> usize {
-                self.0.kind.lag_numbers(self.0.lags)
+        let kind = self.search.kind;
+        let mut model = std::mem::take(&mut scratch.model);
+        let mut numbers = std::mem::take(&mut scratch.numbers);
+        let solved = model.fit(mean, kind, self.order, &mut numbers).and_then(|()| self.choose(&mut model));
+        let mut estimate = match solved {
+            Ok(()) => self.read(&model, &mut numbers, &mut scratch.band),
+            Err(_) => GateVelocity::none(Quality::Invalid),
+        };
+        // The density of a model is not linear in the correlogram: power and detection are those of its lags, which also tell what
+        // lines outside leak. How wide a spectrum is a model does not show: its peaks narrow with the signal-to-noise ratio.
+        numbers.clear();
+        let lags = mean.chunks(kind.lag_numbers(1)).zip(&self.lag_weights);
+        numbers.extend(lags.flat_map(|(lag, w)| lag.iter().map(move |r| r * w)));
+        if let Some(found) = self.search.find(&numbers, Refinement::None, false, scratch) {
+            match (estimate.flag, found.flag) {
+                (Quality::Good | Quality::OutOfBand, flag @ Quality::NoSignal) => estimate = GateVelocity::none(flag),
+                (Quality::Good, flag) => estimate.flag = flag,
+                _ => {}
             }
-
-            fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-                self.0.estimate(mean, scratch)
-            }
+            (estimate.power, estimate.detection) = (self.search.power(found.sum), found.peak);
+            estimate.spread_m2_s2 = f64::NAN;
         }
-    };
+        (scratch.model, scratch.numbers) = (model, numbers);
+        estimate
+    }
 }
-
-model_estimator!(
-    /// CA: peak of the autoregressive spectrum of the accumulated correlogram in the detector band.
-    AutoregressivePeak,
-    Spectrum,
-    /// Plans AR(`order`) of correlograms with `lags` lags and a search over `padded_samples` frequencies.
-    ///
-    /// The chapter uses order 16; 2048 frequencies or more resolve its peaks. [`Refinement::Exact`] counts as
-    /// the parabola. Only `order` + 1 lags are needed.
-);
-
-model_estimator!(
-    /// Velocity of the pole nearest to the unit circle in the detector band, of the autoregressive model of the
-    /// accumulated correlogram.
-    ///
-    /// SNR, quality and flags are those of the model's spectrum; where that has less than half of its peak at the pole, the estimate is
-    /// [`Quality::Ambiguous`].
-    AutoregressivePole,
-    Pole,
-    /// Plans AR(`order`) of correlograms with `lags` lags; `padded_samples` frequencies serve the quality figures.
-);
-
-model_estimator!(
-    /// Peak of Capon's minimum-variance spectrum of the accumulated correlogram in the detector band.
-    CaponPeak,
-    Capon,
-    /// Plans filters of `order` + 1 samples for correlograms with `lags` lags, and a search over `padded_samples` frequencies.
-    ///
-    /// [`Refinement::Exact`] counts as the parabola.
-);

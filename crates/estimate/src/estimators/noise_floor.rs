@@ -5,7 +5,7 @@
 //! stay below are taken, until the mean that they tell is the one that they were chosen by. Check: draws of noise
 //! alone and beside signals, for any number of gates and deviation.
 
-use crate::estimators::tails::gamma_tail;
+use crate::estimators::tails::{bisected, gamma_tail};
 
 /// Share of the gates of noise that the mean is taken from.
 const SHARE: f64 = 0.9;
@@ -45,11 +45,8 @@ fn below(shape: f64, level: f64) -> f64 {
 
 /// Level that a gamma variable of that shape and mean 1 stays below with that probability.
 fn quantile(shape: f64, probability: f64) -> f64 {
-    let (mut low, mut high) = (0.0, 1.0 + 20.0 / shape.sqrt().min(shape));
-    for _ in 0..60 {
-        let middle = 0.5 * (low + high);
-        if gamma_tail(shape, shape * middle) > 1.0 - probability { low = middle } else { high = middle }
-    }
+    let highest = 1.0 + 20.0 / shape.sqrt().min(shape);
+    let [low, high] = bisected(0.0, highest, 60, |level| gamma_tail(shape, shape * level) > 1.0 - probability);
     0.5 * (low + high)
 }
 

@@ -1,15 +1,14 @@
-//! Periodogram of a single window, and the periodogram estimator as one plan.
+//! The periodogram estimator as one plan.
 //!
-//! Computes (29), corrected: |sum h(n) s(n) exp(-2 pi i k n / M)|^2 / sum h^2, divided by the sum of h^2 and not by N, so that
+//! (29), corrected: |sum h(n) s(n) exp(-2 pi i k n / M)|^2 / sum h^2, divided by the sum of h^2 and not by N, so that
 //! white noise reads its variance for every weighting. Check: the naive sum, white noise, and a tone's
 //! velocity through (30). The default pads to 1024 frequencies and refines by a parabola;
 //! [`PeriodogramOptions::literal`] does neither and stays on a grid of 3 m/s, as the equations are printed.
 
-use crate::error::{Error, length};
+use crate::error::Error;
 use crate::estimators::{GateVelocity, Refinement, SpectralPeak, estimate_window};
 use crate::spectrum::Correlogram;
-use crate::spectrum::transform::WindowTransform;
-use crate::window::{Sample, Sampling, Scratch, SignalKind, Weighting};
+use crate::window::{Sample, Sampling, Scratch, Weighting};
 
 /// Choices of the periodogram estimator.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,56 +36,6 @@ impl PeriodogramOptions {
     }
 }
 
-/// Direct periodogram of single windows: (29), corrected.
-#[derive(Clone)]
-pub struct Periodogram<S> {
-    weights: Vec<f64>,
-    energy: f64,
-    transform: WindowTransform<S>,
-}
-
-impl<S: Sample> Periodogram<S> {
-    /// Plans the periodogram of windows of `window_samples` at `padded_samples` frequencies.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for an empty window, an impossible weighting or `padded_samples` below the window.
-    pub fn new(weighting: Weighting, window_samples: usize, padded_samples: usize) -> Result<Self, Error> {
-        let weights = weighting.weights(window_samples)?;
-        if padded_samples < window_samples {
-            return Err(Error::OutOfRange {
-                field: "padded_samples",
-                value: padded_samples as f64,
-                allowed: "at least window_samples",
-            });
-        }
-        Ok(Self {
-            energy: weights.iter().map(|h| h * h).sum(),
-            weights,
-            transform: WindowTransform::new(padded_samples),
-        })
-    }
-
-    /// Number of distinct frequencies k F_s / M: k = 0 .. M/2 for real samples, 0 .. M-1 for complex ones.
-    #[must_use]
-    pub fn frequencies(&self) -> usize {
-        match S::KIND {
-            SignalKind::Real => self.transform.padded() / 2 + 1,
-            SignalKind::Complex => self.transform.padded(),
-        }
-    }
-
-    /// Densities of `window` in signal units squared, two-sided (not doubled for real samples).
-    ///
-    /// # Errors
-    /// [`Error::Length`] if the window has the wrong length.
-    pub fn density<'s>(&self, window: &[S], scratch: &'s mut Scratch) -> Result<&'s [f64], Error> {
-        length("window", self.weights.len(), window.len())?;
-        self.transform.reset(scratch);
-        self.transform.add_power(window, &self.weights, self.energy.recip(), scratch);
-        Ok(&scratch.power)
-    }
-}
-
 /// The periodogram estimator: statistic and peak search, planned together.
 ///
 /// `statistic` and `estimator` go to the accumulation as they are (PA).
@@ -105,9 +54,8 @@ impl<S: Sample> PeriodogramPlan<S> {
     /// [`Error::Band`] or [`Error::OutOfRange`] if sampling, window or options make no sense.
     pub fn new(sampling: &Sampling, window_samples: usize, options: &PeriodogramOptions) -> Result<Self, Error> {
         let statistic = Correlogram::new(options.weighting, window_samples)?;
-        let estimator =
-            SpectralPeak::new(sampling, S::KIND, window_samples, options.padded_samples, options.refinement)?
-                .with_lag_weights(&statistic.lag_weights())?;
+        let weights = statistic.lag_weights();
+        let estimator = SpectralPeak::new(sampling, S::KIND, &weights, options.padded_samples, options.refinement)?;
         Ok(Self { statistic, estimator })
     }
 

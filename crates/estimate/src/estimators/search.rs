@@ -7,8 +7,8 @@ use num_complex::Complex;
 
 use crate::error::Error;
 use crate::estimators::{GateVelocity, Quality, Refinement, RunnerUp};
-use crate::spectrum::LagSpectrum;
 use crate::spectrum::lag_spectrum::Band;
+use crate::spectrum::{LagSpectrum, ZoomSpectrum};
 use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Most that noise raises what a line outside leaks into the band, in amplitudes of that.
@@ -49,16 +49,16 @@ fn density_limit(correlogram: &[f64]) -> f64 {
     2.0 * correlogram.iter().map(|value| value.abs()).sum::<f64>()
 }
 
-/// The highest density at any frequency \[its value, its place in cycles per sample\].
-pub(crate) type Highest = (f64, f64);
-
-/// The peak search on any density in the detector band.
-#[derive(Debug, Clone)]
+/// The spectrum of correlograms in the detector band and the search for its peak, or that of any density there.
+#[derive(Clone)]
 pub(crate) struct PeakSearch {
     pub(crate) sampling: Sampling,
     pub(crate) band: Band,
-    kind: SignalKind,
-    padded: usize,
+    pub(crate) kind: SignalKind,
+    pub(crate) padded: usize,
+    /// Spectrum at the frequencies of the band and one neighbour on each side, and on a whole grid.
+    pub(crate) zoom: ZoomSpectrum,
+    whole: LagSpectrum,
     /// A line closer to 0 Hz than this \[cycles per sample\] counts as a constant.
     constant: f64,
     /// Squares of the standard deviations of peak and spectrum \[bins^2\], from that of a line on; empty where the peak does not
@@ -90,14 +90,18 @@ struct Lobe {
 }
 
 impl PeakSearch {
-    /// For the spectrum of correlograms whose lags have those weights.
+    /// For the spectrum of correlograms whose lags have those weights, sought among `padded` frequencies over 0 .. F_s; lines outside the
+    /// band are seen among `whole` ones.
     pub(crate) fn new(
         sampling: &Sampling,
         kind: SignalKind,
-        padded: usize,
+        (padded, whole): (usize, usize),
         lag_weights: &[f64],
     ) -> Result<Self, Error> {
-        let (band, lags) = (Band::new(sampling, kind, padded)?, lag_weights.len());
+        let lags = lag_weights.len();
+        let whole = LagSpectrum::new(kind, lags, whole)?;
+        let band = Band::new(sampling, kind, padded)?;
+        let zoom = ZoomSpectrum::new(kind, lags, sampling, &band.with_neighbours_hz())?;
         let line = LagSpectrum::new(SignalKind::Real, lags, padded.max(8 * lags))?;
         let mut scratch = Scratch::new();
         let line = line.density(lag_weights, &mut scratch)?;
@@ -106,12 +110,33 @@ impl PeakSearch {
             leak[place - 1] = leak[place - 1].max(leak[place]);
         }
         let (constant, widths) = (1.0 / lags as f64, widths(lag_weights, padded, band.bins)?);
-        Ok(Self { sampling: *sampling, band, kind, padded, constant, widths, leak })
+        Ok(Self { sampling: *sampling, band, kind, padded, zoom, whole, constant, widths, leak })
     }
 
-    /// Frequencies of the grid over 0 .. F_s.
-    pub(crate) fn padded(&self) -> usize {
-        self.padded
+    /// Numbers of the correlograms.
+    pub(crate) fn statistic_len(&self) -> usize {
+        self.whole.numbers()
+    }
+
+    /// The peak of the spectrum of a correlogram. With `mirrored` the complex lags are those of real samples, whose image may be the
+    /// higher line. `None` for another number of lags.
+    pub(crate) fn find(
+        &self,
+        lags: &[f64],
+        refinement: Refinement,
+        mirrored: bool,
+        scratch: &mut Scratch,
+    ) -> Option<Located> {
+        let mut band = std::mem::take(&mut scratch.band);
+        self.zoom.density_into(lags, &mut band).ok()?;
+        let found = self.locate(&band, refinement, lags, || {
+            let density = self.whole.density(lags, scratch).ok()?;
+            let (place, highest) = highest(density);
+            let place = place as f64 / density.len() as f64;
+            Some((highest, if mirrored { place.min(1.0 - place) } else { place }))
+        });
+        scratch.band = band;
+        Some(found)
     }
 
     /// Highest density in the band, by bin or by parabola through its logarithm.
@@ -123,7 +148,7 @@ impl PeakSearch {
         density: &[f64],
         refinement: Refinement,
         lags: &[f64],
-        anywhere: impl FnOnce() -> Option<Highest>,
+        anywhere: impl FnOnce() -> Option<(f64, f64)>,
     ) -> Located {
         let inside = &density[1..=self.band.bins];
         let (top, peak) = highest(inside);
@@ -190,7 +215,7 @@ impl PeakSearch {
     }
 
     /// Flag of a search whose highest density in the band is `peak` above the mean beside it, `floor`, in bin `top`.
-    fn flag(&self, peak: f64, top: usize, floor: f64, anywhere: Option<Highest>) -> Quality {
+    fn flag(&self, peak: f64, top: usize, floor: f64, anywhere: Option<(f64, f64)>) -> Quality {
         let is_real = self.kind == SignalKind::Real;
         if let Some((highest, place)) = anywhere
             && !self.holds(place)

@@ -73,7 +73,7 @@ pub fn estimate_window<S: Sample>(
     if !window.iter().all(|sample| rule.is_measured(*sample)) {
         return Ok(GateVelocity::none(Quality::Invalid));
     }
-    let scale = rule.binary_scale(window.iter().copied());
+    let scale = rule.binary_scale(window.iter().copied()).unwrap_or(1.0);
     let scaled: Vec<S> = window.iter().map(|sample| sample.scaled(scale.recip())).collect();
     let mut numbers = vec![0.0; statistic.statistic_len()];
     statistic.evaluate(&scaled, scratch, &mut numbers);

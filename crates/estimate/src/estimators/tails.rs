@@ -23,6 +23,15 @@ pub(crate) fn gamma_tail(a: f64, x: f64) -> f64 {
     }
 }
 
+/// Ends of the interval about the place up to which `is_below` holds, after so many bisections.
+pub(crate) fn bisected(mut low: f64, mut high: f64, steps: usize, is_below: impl Fn(f64) -> bool) -> [f64; 2] {
+    for _ in 0..steps {
+        let middle = 0.5 * (low + high);
+        if is_below(middle) { low = middle } else { high = middle }
+    }
+    [low, high]
+}
+
 /// Probability that a beta variable of shapes `a` and `b` stays below `x`; NaN for shapes that are none.
 pub(crate) fn beta_below(a: f64, b: f64, x: f64) -> f64 {
     checked_beta_reg(a, b, x).unwrap_or(f64::NAN)

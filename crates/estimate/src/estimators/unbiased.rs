@@ -11,26 +11,6 @@ use crate::error::{Error, length};
 use crate::estimators::{Estimator, GateVelocity};
 use crate::window::{Scratch, SignalKind};
 
-/// The unbiased correlogram that belongs to a biased one (both stored as [`SignalKind::lag_numbers`] says).
-///
-/// `lag_weights` are those of the window: [`Correlogram::lag_weights`](crate::Correlogram::lag_weights).
-///
-/// # Errors
-/// [`Error::Length`] unless there is one weight per lag, [`Error::OutOfRange`] for a weight that is 0 or not finite.
-pub fn unbiased_correlogram(biased: &[f64], kind: SignalKind, lag_weights: &[f64]) -> Result<Vec<f64>, Error> {
-    length("correlogram", kind.lag_numbers(lag_weights.len()), biased.len())?;
-    check_weights(lag_weights)?;
-    let per_lag = kind.lag_numbers(1);
-    Ok(biased.iter().enumerate().map(|(place, value)| value / lag_weights[place / per_lag]).collect())
-}
-
-fn check_weights(lag_weights: &[f64]) -> Result<(), Error> {
-    match lag_weights.iter().find(|weight| !weight.is_finite() || **weight == 0.0) {
-        Some(&value) => Err(Error::OutOfRange { field: "lag_weights", value, allowed: "finite and not 0" }),
-        None => Ok(()),
-    }
-}
-
 /// Any estimator, on the unbiased correlogram instead of the biased one that was accumulated.
 #[derive(Debug, Clone)]
 pub struct Unbiased<E> {
@@ -40,13 +20,16 @@ pub struct Unbiased<E> {
 }
 
 impl<E: Estimator> Unbiased<E> {
-    /// Wraps an estimator of correlograms; `lag_weights` are those of the window, one per lag.
+    /// Wraps an estimator of correlograms; `lag_weights` are those of the window, one per lag
+    /// ([`Correlogram::lag_weights`](crate::Correlogram::lag_weights)).
     ///
     /// # Errors
-    /// As [`unbiased_correlogram`].
+    /// [`Error::Length`] unless there is one weight per lag, [`Error::OutOfRange`] for a weight that is 0 or not finite.
     pub fn new(estimator: E, kind: SignalKind, lag_weights: &[f64]) -> Result<Self, Error> {
         length("lag_weights", estimator.statistic_len(), kind.lag_numbers(lag_weights.len()))?;
-        check_weights(lag_weights)?;
+        if let Some(&value) = lag_weights.iter().find(|weight| !weight.is_finite() || **weight == 0.0) {
+            return Err(Error::OutOfRange { field: "lag_weights", value, allowed: "finite and not 0" });
+        }
         Ok(Self { estimator, kind, gains: lag_weights.iter().map(|weight| weight.recip()).collect() })
     }
 }

@@ -6,6 +6,7 @@
 //! not by much more; the radius grows with range.
 
 use crate::error::{Error, positive};
+use crate::estimators::tails::bisected;
 use crate::map::{PolarPoint, Radius, ScanGeometry};
 
 /// Bisections of the radius: to a thousandth of the largest.
@@ -32,19 +33,11 @@ impl ScanGeometry {
         if !enough(largest_m) {
             return Ok(None);
         }
-        let (mut low_m, mut high_m) = (0.0, largest_m);
-        if enough(low_m) {
-            return Ok(Some(low_m));
+        if enough(0.0) {
+            return Ok(Some(0.0));
         }
-        for _ in 0..BISECTIONS {
-            let middle_m = 0.5 * (low_m + high_m);
-            if enough(middle_m) {
-                high_m = middle_m;
-            } else {
-                low_m = middle_m;
-            }
-        }
-        Ok(Some(high_m))
+        let [_, enough_m] = bisected(0.0, largest_m, BISECTIONS, |radius_m| !enough(radius_m));
+        Ok(Some(enough_m))
     }
 }
 

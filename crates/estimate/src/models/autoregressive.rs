@@ -14,7 +14,8 @@ use num_complex::Complex;
 use crate::error::{Error, positive};
 use crate::models::levinson::reflect;
 use crate::models::poles::roots;
-use crate::window::{MissingSamples, Sample, Sampling, SignalKind};
+use crate::window::missing::Rule;
+use crate::window::{Sample, Sampling, SignalKind};
 
 /// How the order of a model is found, from the prediction errors of all orders up to a largest one.
 ///
@@ -102,17 +103,6 @@ impl Autoregression {
         work: &mut Vec<f64>,
     ) -> Result<(), Error> {
         check_order(order, correlogram.len() / kind.lag_numbers(1))?;
-        self.solve(correlogram, kind, order, work)
-    }
-
-    /// The recursion for an order that is known to fit.
-    pub(crate) fn solve(
-        &mut self,
-        correlogram: &[f64],
-        kind: SignalKind,
-        order: usize,
-        work: &mut Vec<f64>,
-    ) -> Result<(), Error> {
         self.coefficients.clear();
         self.reflection.clear();
         self.noise_power = kind.lag(correlogram, 0).re;
@@ -152,20 +142,6 @@ impl Autoregression {
         Ok(model)
     }
 
-    /// The model of the order that `choice` prefers among those up to `largest`.
-    ///
-    /// # Errors
-    /// As [`Autoregression::yule_walker`] and [`OrderChoice::order`].
-    pub fn of_chosen_order(
-        correlogram: &[f64],
-        kind: SignalKind,
-        largest: usize,
-        choice: OrderChoice,
-    ) -> Result<Self, Error> {
-        let model = Self::yule_walker(correlogram, kind, largest)?;
-        model.truncated(choice.order(&model.reflection)?)
-    }
-
     /// Model of order `order` of one window by Burg's method: forward and backward prediction errors together.
     ///
     /// Exact for a complex tone. The peak of a real tone moves with its phase by up to a tenth of F_s / N (0.3 m/s for 64
@@ -175,7 +151,7 @@ impl Autoregression {
     /// [`Error::OutOfRange`] if the order is 0 or not below the number of samples, or if there is no power.
     pub fn burg<S: Sample>(window: &[S], order: usize) -> Result<Self, Error> {
         check_order(order, window.len())?;
-        let scale = MissingSamples::not_finite().rule(window.iter().copied()).binary_scale(window.iter().copied());
+        let scale = Rule::NOT_FINITE.binary_scale(window.iter().copied()).unwrap_or(1.0);
         let scaled = |sample: &S| sample.scaled(scale.recip()).to_complex();
         let mut forward: Vec<Complex<f64>> = window.iter().map(scaled).collect();
         let mut backward = forward.clone();
@@ -220,12 +196,6 @@ impl Autoregression {
         self.coefficients.len()
     }
 
-    /// Whether all reflection coefficients, and with them all poles, lie inside the unit circle.
-    #[must_use]
-    pub fn is_stable(&self) -> bool {
-        self.reflection.iter().all(|reflection| reflection.norm() < 1.0)
-    }
-
     /// Density (32) at `frequency_hz`, in signal units squared; white noise has its variance.
     #[must_use]
     pub fn density(&self, frequency_hz: f64, sampling: &Sampling) -> f64 {
@@ -233,12 +203,6 @@ impl Autoregression {
         // Horner from the highest coefficient
         let sum = self.coefficients.iter().rev().fold(Complex::ZERO, |sum, a| (sum + a) * step);
         self.noise_power / (sum + 1.0).norm_sqr()
-    }
-
-    /// Densities (32) at any frequencies \[Hz\], in their order.
-    #[must_use]
-    pub fn densities(&self, frequency_hz: &[f64], sampling: &Sampling) -> Vec<f64> {
-        frequency_hz.iter().map(|&f_hz| self.density(f_hz, sampling)).collect()
     }
 
     /// Poles: the p roots of z^p + a_1 z^(p-1) + ... + a_p, in no order.

@@ -6,10 +6,12 @@
 //!
 //! With several weightings (tapers) it is the weighted sum of their correlograms.
 
+use std::marker::PhantomData;
+
 use crate::error::{Error, length, positive};
 use crate::estimators::Statistic;
 use crate::spectrum::transform::WindowTransform;
-use crate::window::{Sample, Scratch, SignalKind, Weighting};
+use crate::window::{Sample, Scratch, Weighting};
 
 /// One weighting and its share in the sum.
 #[derive(Debug, Clone, PartialEq)]
@@ -32,11 +34,18 @@ impl Taper {
     }
 }
 
+/// Weights 1 - m / N of the lags of white data in windows of N samples without weighting.
+#[must_use]
+pub fn unweighted_lags(window_samples: usize) -> Vec<f64> {
+    (0..window_samples).map(|m| 1.0 - m as f64 / window_samples as f64).collect()
+}
+
 /// Biased correlogram with all lags, of one or several weightings.
 #[derive(Clone)]
 pub struct Correlogram<S> {
     tapers: Vec<Taper>,
-    transform: WindowTransform<S>,
+    transform: WindowTransform,
+    sample: PhantomData<fn(S)>,
 }
 
 impl<S: Sample> Correlogram<S> {
@@ -60,7 +69,7 @@ impl<S: Sample> Correlogram<S> {
         for taper in &tapers {
             length("taper", window_samples, taper.weights.len())?;
         }
-        Ok(Self { tapers, transform: WindowTransform::new(2 * window_samples) })
+        Ok(Self { tapers, transform: WindowTransform::new(S::KIND, 2 * window_samples), sample: PhantomData })
     }
 
     /// The tapers.
@@ -72,7 +81,7 @@ impl<S: Sample> Correlogram<S> {
     /// Weights of the lags of white data, w_m = sum over tapers of factor times the tapers' correlogram, w_0 = 1: 1 -
     /// m / N without weighting.
     ///
-    /// [`SpectralPeak::with_lag_weights`](crate::SpectralPeak::with_lag_weights) takes them to tell spectral width from resolution.
+    /// [`SpectralPeak::new`](crate::SpectralPeak::new) takes them to tell spectral width from resolution.
     #[must_use]
     pub fn lag_weights(&self) -> Vec<f64> {
         let at = |m: usize| -> f64 {
@@ -86,12 +95,6 @@ impl<S: Sample> Correlogram<S> {
     #[must_use]
     pub fn lags(&self) -> usize {
         self.tapers[0].weights.len()
-    }
-
-    /// Kind of the samples.
-    #[must_use]
-    pub fn kind(&self) -> SignalKind {
-        S::KIND
     }
 }
 
@@ -107,29 +110,9 @@ impl<S: Sample> Statistic<S> for Correlogram<S> {
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]) {
         self.transform.reset(scratch);
         for taper in &self.tapers {
-            self.transform.add_power(window, &taper.weights, taper.factor, scratch);
+            let weighted = window.iter().zip(&taper.weights).map(|(sample, h)| sample.to_complex() * h);
+            self.transform.add_power(weighted, taper.factor, scratch);
         }
         self.transform.lags_of_power(scratch, out);
     }
-}
-
-/// The biased correlogram written out as a double sum: slow, the oracle of [`Correlogram`].
-#[must_use]
-pub fn correlogram_by_sum<S: Sample>(window: &[S], weights: &[f64]) -> Vec<f64> {
-    let energy: f64 = weights.iter().map(|h| h * h).sum();
-    let weighted: Vec<_> = window.iter().zip(weights).map(|(sample, h)| sample.to_complex() * h).collect();
-    let mut numbers = Vec::with_capacity(S::KIND.lag_numbers(weighted.len()));
-    for m in 0..weighted.len() {
-        let lag = weighted[m..]
-            .iter()
-            .zip(&weighted)
-            .map(|(ahead, behind)| ahead * behind.conj())
-            .sum::<num_complex::Complex<f64>>()
-            / energy;
-        numbers.push(lag.re);
-        if S::KIND == SignalKind::Complex {
-            numbers.push(lag.im);
-        }
-    }
-    numbers
 }

@@ -34,22 +34,9 @@ impl LagSpectrum {
         Ok(Self { kind, lags, inverse })
     }
 
-    /// Kind of the samples behind the correlogram.
-    #[must_use]
-    pub fn kind(&self) -> SignalKind {
-        self.kind
-    }
-
-    /// Number of lags, lag 0 included.
-    #[must_use]
-    pub fn lags(&self) -> usize {
-        self.lags
-    }
-
-    /// Number of frequencies M.
-    #[must_use]
-    pub fn padded_samples(&self) -> usize {
-        self.inverse.len()
+    /// Numbers of a correlogram with the planned number of lags.
+    pub(crate) fn numbers(&self) -> usize {
+        self.kind.lag_numbers(self.lags)
     }
 
     /// Densities S(k F_s / M), k = 0 .. M-1 (k > M/2 are the negative frequencies), in signal units squared.
@@ -57,16 +44,14 @@ impl LagSpectrum {
     /// # Errors
     /// [`Error::Length`] if `correlogram` does not hold the planned number of lags.
     pub fn density<'s>(&self, correlogram: &[f64], scratch: &'s mut Scratch) -> Result<&'s [f64], Error> {
-        length("correlogram", self.kind.lag_numbers(self.lags), correlogram.len())?;
+        length("correlogram", self.numbers(), correlogram.len())?;
         let padded = self.inverse.len();
         let half = padded / 2 + 1;
         scratch.half.clear();
         scratch.half.resize(half, Complex::ZERO);
         scratch.density.resize(padded, 0.0);
         let inner = self.inverse.get_scratch_len();
-        if scratch.transform.len() < inner {
-            scratch.transform.resize(inner, Complex::ZERO);
-        }
+        scratch.transform.resize(inner.max(scratch.transform.len()), Complex::ZERO);
         // The transform has the sign exp(+i), so the lags go in conjugated; lags beyond M/2 fold back.
         let mut deposit = |index: usize, value: Complex<f64>| {
             if index < half {

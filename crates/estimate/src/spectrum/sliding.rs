@@ -10,6 +10,7 @@ use std::marker::PhantomData;
 
 use crate::error::Error;
 use crate::estimators::Statistic;
+use crate::spectrum::correlogram::unweighted_lags;
 use crate::window::{Sample, Scratch, SignalKind};
 
 /// The first `lags` lags of the biased correlogram of unweighted windows.
@@ -36,22 +37,12 @@ impl<S: Sample> ShortCorrelogram<S> {
         Ok(Self { window_samples, lags, sample: PhantomData })
     }
 
-    /// Number of lags, lag 0 included.
-    #[must_use]
-    pub fn lags(&self) -> usize {
-        self.lags
-    }
-
-    /// Kind of the samples.
-    #[must_use]
-    pub fn kind(&self) -> SignalKind {
-        S::KIND
-    }
-
     /// Weights of the lags of white data, 1 - m / N.
     #[must_use]
     pub fn lag_weights(&self) -> Vec<f64> {
-        (0..self.lags).map(|m| 1.0 - m as f64 / self.window_samples as f64).collect()
+        let mut weights = unweighted_lags(self.window_samples);
+        weights.truncate(self.lags);
+        weights
     }
 
     /// The sums of products of one window, not divided by N.
@@ -75,13 +66,12 @@ impl<S: Sample> ShortCorrelogram<S> {
     fn sums_of_all(&self, record: &[S], first_sample: usize, step: usize, out: &mut [f64]) {
         let numbers = S::KIND.lag_numbers(self.lags);
         let per_lag = S::KIND.lag_numbers(1);
-        let mut parts = [Vec::new(), Vec::new()];
-        let mut running = Running::default();
+        let (mut products, mut running) = (Vec::new(), Running::default());
         for m in 0..self.lags {
             let length = self.window_samples - m;
-            S::products(&record[m..], record, &mut parts);
-            for (part, products) in parts.iter().take(per_lag).enumerate() {
-                running.form(products, first_sample % length, length);
+            for part in 0..per_lag {
+                form_products(&record[m..], record, part, &mut products);
+                running.form(&products, first_sample % length, length);
                 for (gate, sums) in out.chunks_mut(numbers).enumerate() {
                     sums[per_lag * m + part] = running.of(gate * step, first_sample % length, length);
                 }
@@ -133,6 +123,17 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
             mean.iter_mut().for_each(|value| *value *= share);
             each(gate, mean);
         }
+    }
+}
+
+/// Real parts (`part` 0) or imaginary parts of the products `ahead[k]` conj `behind[k]`.
+fn form_products<S: Sample>(ahead: &[S], behind: &[S], part: usize, products: &mut Vec<f64>) {
+    let pairs = ahead.iter().zip(behind).map(|(a, b)| (a.to_complex(), b.to_complex()));
+    products.clear();
+    match (S::KIND, part) {
+        (SignalKind::Real, _) => products.extend(pairs.map(|(a, b)| a.re * b.re)),
+        (SignalKind::Complex, 0) => products.extend(pairs.map(|(a, b)| a.re * b.re + a.im * b.im)),
+        (SignalKind::Complex, _) => products.extend(pairs.map(|(a, b)| a.im * b.re - a.re * b.im)),
     }
 }
 

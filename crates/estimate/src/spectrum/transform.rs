@@ -1,69 +1,51 @@
-//! Power spectrum of one weighted, zero-padded window: the transform behind periodogram and correlogram.
+//! Power spectrum of zero-padded samples and its way back to lags: the transform behind every correlogram.
 //!
-//! Computes |sum h(n) s(n) exp(-2 pi i k n / M)|^2. Check: against the sum written out (in `periodogram`).
+//! Computes |sum s(n) exp(-2 pi i k n / M)|^2 of weighted samples s. Check: correlograms and spectra against the sums written out.
 
-use std::marker::PhantomData;
 use std::sync::Arc;
 
 use num_complex::Complex;
 use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use rustfft::{Fft, FftPlanner};
 
-use crate::window::{Sample, Scratch, SignalKind};
+use crate::window::{Scratch, SignalKind};
 
 /// Forward and inverse transforms of one length, for real or complex samples.
 #[derive(Clone)]
 enum Plans {
     Real(Arc<dyn RealToComplex<f64>>, Arc<dyn ComplexToReal<f64>>),
-    Complex(Arc<dyn Fft<f64>>, Arc<dyn Fft<f64>>),
+    Complex([Arc<dyn Fft<f64>>; 2]),
 }
 
-impl Plans {
-    /// Not generic, so that the planner is compiled once, with this crate, and not again by each program that names a sample type.
-    fn new(kind: SignalKind, padded: usize) -> Self {
-        match kind {
-            SignalKind::Real => {
-                let mut planner = RealFftPlanner::new();
-                Self::Real(planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded))
-            }
-            SignalKind::Complex => {
-                let [forward, inverse] = complex_transforms(padded);
-                Self::Complex(forward, inverse)
-            }
-        }
-    }
-}
-
-/// The forward and the inverse transform of complex numbers; not generic either.
+/// The forward and the inverse transform of complex numbers.
 pub(crate) fn complex_transforms(length: usize) -> [Arc<dyn Fft<f64>>; 2] {
     let mut planner = FftPlanner::new();
     [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
 }
 
-/// Zero-padded transform of length `padded` for samples of type `S`.
+/// Zero-padded transform of length `padded`.
 #[derive(Clone)]
-pub(crate) struct WindowTransform<S> {
+pub(crate) struct WindowTransform {
     plans: Plans,
     padded: usize,
     inner: usize,
-    sample: PhantomData<fn(S)>,
 }
 
-impl<S: Sample> WindowTransform<S> {
-    pub(crate) fn new(padded: usize) -> Self {
-        let plans = Plans::new(S::KIND, padded);
-        let inner = match &plans {
-            Plans::Real(forward, inverse) => forward.get_scratch_len().max(inverse.get_scratch_len()),
-            Plans::Complex(forward, inverse) => {
-                forward.get_inplace_scratch_len().max(inverse.get_inplace_scratch_len())
+impl WindowTransform {
+    pub(crate) fn new(kind: SignalKind, padded: usize) -> Self {
+        match kind {
+            SignalKind::Real => {
+                let mut planner = RealFftPlanner::new();
+                let (forward, inverse) = (planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded));
+                let inner = forward.get_scratch_len().max(inverse.get_scratch_len());
+                Self { plans: Plans::Real(forward, inverse), padded, inner }
             }
-        };
-        Self { plans, padded, inner, sample: PhantomData }
-    }
-
-    /// Transform length.
-    pub(crate) fn padded(&self) -> usize {
-        self.padded
+            SignalKind::Complex => {
+                let both = complex_transforms(padded);
+                let inner = both[0].get_inplace_scratch_len().max(both[1].get_inplace_scratch_len());
+                Self { plans: Plans::Complex(both), padded, inner }
+            }
+        }
     }
 
     /// Clears `scratch.power` to the number of distinct frequencies: half if real, all if complex.
@@ -74,28 +56,25 @@ impl<S: Sample> WindowTransform<S> {
         };
         scratch.power.clear();
         scratch.power.resize(bins, 0.0);
-        if scratch.transform.len() < self.inner {
-            scratch.transform.resize(self.inner, Complex::ZERO);
-        }
+        scratch.transform.resize(self.inner.max(scratch.transform.len()), Complex::ZERO);
     }
 
-    /// Adds `factor` times the power spectrum of `weights` times `window` to `scratch.power`.
-    pub(crate) fn add_power(&self, window: &[S], weights: &[f64], factor: f64, scratch: &mut Scratch) {
-        let weighted = window.iter().zip(weights);
+    /// Adds `factor` times the power spectrum of `samples` to `scratch.power`; real transforms take the real parts.
+    pub(crate) fn add_power(&self, samples: impl Iterator<Item = Complex<f64>>, factor: f64, scratch: &mut Scratch) {
         let inner = &mut scratch.transform[..self.inner];
         let spectrum = match &self.plans {
             Plans::Real(forward, _) => {
                 scratch.real.clear();
-                scratch.real.extend(weighted.map(|(sample, h)| sample.to_complex().re * h));
+                scratch.real.extend(samples.map(|sample| sample.re));
                 scratch.real.resize(self.padded, 0.0);
                 scratch.half.resize(self.padded / 2 + 1, Complex::ZERO);
                 // the lengths fit by construction, the only error that the transform knows
                 let _ = forward.process_with_scratch(&mut scratch.real, &mut scratch.half, inner);
                 &scratch.half
             }
-            Plans::Complex(forward, _) => {
+            Plans::Complex([forward, _]) => {
                 scratch.complex.clear();
-                scratch.complex.extend(weighted.map(|(sample, h)| sample.to_complex() * h));
+                scratch.complex.extend(samples);
                 scratch.complex.resize(self.padded, Complex::ZERO);
                 forward.process_with_scratch(&mut scratch.complex, inner);
                 &scratch.complex
@@ -116,16 +95,14 @@ impl<S: Sample> WindowTransform<S> {
                 scratch.half.extend(scaled);
                 scratch.real.resize(self.padded, 0.0);
                 let _ = inverse.process_with_scratch(&mut scratch.half, &mut scratch.real, inner);
-                let lags = out.len();
-                out.copy_from_slice(&scratch.real[..lags]);
+                out.copy_from_slice(&scratch.real[..out.len()]);
             }
-            Plans::Complex(_, inverse) => {
+            Plans::Complex([_, inverse]) => {
                 scratch.complex.clear();
                 scratch.complex.extend(scaled);
                 inverse.process_with_scratch(&mut scratch.complex, inner);
-                for (pair, lag) in out.chunks_exact_mut(2).zip(&scratch.complex) {
-                    pair[0] = lag.re;
-                    pair[1] = lag.im;
+                for (pair, lag) in out.as_chunks_mut::<2>().0.iter_mut().zip(&scratch.complex) {
+                    *pair = [lag.re, lag.im];
                 }
             }
         }

@@ -43,18 +43,6 @@ impl ZoomSpectrum {
         Ok(Self { kind, lags, frequencies: frequency_hz.len(), cos, sin })
     }
 
-    /// Number of lags, lag 0 included.
-    #[must_use]
-    pub fn lags(&self) -> usize {
-        self.lags
-    }
-
-    /// Number of frequencies.
-    #[must_use]
-    pub fn frequencies(&self) -> usize {
-        self.frequencies
-    }
-
     /// Writes the densities in signal units squared, in the order of the frequencies; resizes `out`.
     ///
     /// # Errors
@@ -133,7 +121,7 @@ mod tests {
                     numbers[1] = 0.0;
                 }
                 let zoom = ZoomSpectrum::new(kind, lags, &sampling, &frequency_hz).unwrap();
-                assert_eq!((zoom.lags(), zoom.frequencies()), (lags, 91));
+                assert_eq!((zoom.lags, zoom.frequencies), (lags, 91));
                 let mut density = Vec::new();
                 zoom.density_into(&numbers, &mut density).unwrap();
                 assert_eq!(density.len(), 91);

@@ -56,7 +56,7 @@ impl MissingSamples {
 #[derive(Debug, Clone)]
 pub struct SampleSizes {
     counts: Vec<usize>,
-    /// The largest sample of each order.
+    /// The largest sample of each binary order, as exponents are stored.
     largest: Vec<f64>,
 }
 
@@ -70,7 +70,7 @@ impl SampleSizes {
     /// Counts a sample by the size of its largest part; 0 and what is not finite are none.
     pub fn add(&mut self, size: f64) {
         if size > 0.0 && size.is_finite() {
-            let order = order(size);
+            let order = (size.to_bits() >> 52) as usize;
             self.counts[order] += 1;
             self.largest[order] = self.largest[order].max(size);
         }
@@ -79,7 +79,19 @@ impl SampleSizes {
     /// Size from which on samples are missing ([`MissingSamples::outsized`]); infinite if none is.
     #[must_use]
     pub fn outsized(&self) -> f64 {
-        limit(&self.counts)
+        let all: usize = self.counts.iter().sum();
+        let (mut above, mut last, mut limit) = (0, None, f64::INFINITY);
+        for (order, count) in self.counts.iter().enumerate().rev().filter(|(_, count)| **count > 0) {
+            if let Some(last) = last
+                && last - order > GAP
+                && 2 * above < all
+            {
+                limit = f64::from_bits((last as u64) << 52);
+            }
+            above += count;
+            last = Some(order);
+        }
+        limit
     }
 
     /// The largest sample below `limit`; 0 if there is none.
@@ -105,15 +117,10 @@ impl Rule<'_> {
         sample.is_finite() && sample.largest_part() < self.limit && !self.fill.iter().any(|fill| sample.has_part(*fill))
     }
 
-    /// Power of two next to the largest part of the measured samples; 1 if there is none above 0.
+    /// Power of two next to the largest part of the measured samples; `None` if there is none above 0.
     ///
     /// Dividing by it is exact and brings the samples to order one, so that squares neither overflow nor vanish.
-    pub(crate) fn binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> f64 {
-        self.largest_binary_scale(samples).unwrap_or(1.0)
-    }
-
-    /// The same; `None` if there is no sample above 0.
-    pub(crate) fn largest_binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Option<f64> {
+    pub(crate) fn binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Option<f64> {
         let measured = samples.filter(|sample| self.is_measured(*sample));
         let largest = measured.fold(0.0_f64, |largest, sample| largest.max(sample.largest_part()));
         // clamped so that the scale and its inverse are both normal numbers
@@ -136,28 +143,6 @@ pub(crate) fn invalid_windows<S: Sample>(
         bad.get(next).is_some_and(|index| *index < start + gates.window_samples)
     };
     (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
-}
-
-/// Binary order of magnitude of a number from 0 on, as its exponent is stored.
-fn order(value: f64) -> usize {
-    (value.to_bits() >> 52) as usize & 0x7ff
-}
-
-/// Size from which on samples are outsized; `counts` holds how many there are of each order.
-fn limit(counts: &[usize]) -> f64 {
-    let all: usize = counts.iter().sum();
-    let (mut above, mut last, mut limit) = (0, None, f64::INFINITY);
-    for (order, count) in counts.iter().enumerate().rev().filter(|(_, count)| **count > 0) {
-        if let Some(last) = last
-            && last - order > GAP
-            && 2 * above < all
-        {
-            limit = f64::from_bits((last as u64) << 52);
-        }
-        above += count;
-        last = Some(order);
-    }
-    limit
 }
 
 #[cfg(test)]
@@ -201,7 +186,7 @@ mod tests {
     fn scale_is_a_power_of_two_next_to_the_largest_sample() {
         fn scale<S: Sample>(samples: &[S]) -> f64 {
             let missing = MissingSamples::default();
-            missing.rule(samples.iter().copied()).binary_scale(samples.iter().copied())
+            missing.rule(samples.iter().copied()).binary_scale(samples.iter().copied()).unwrap_or(1.0)
         }
         assert_eq!(scale(&[0.3, -5.0, f64::NAN, 1e300, 2.0]), 4.0);
         assert_eq!(scale(&[Complex::new(0.0, 0.25)]), 0.25);

@@ -24,6 +24,14 @@ impl SignalKind {
         }
     }
 
+    /// Share of its power that a signal has at its own frequencies: real samples carry half of it at the negative ones.
+    pub(crate) fn one_sided_share(self) -> f64 {
+        match self {
+            Self::Real => 0.5,
+            Self::Complex => 1.0,
+        }
+    }
+
     /// Lag `index` out of a stored correlogram.
     pub(crate) fn lag(self, numbers: &[f64], index: usize) -> Complex<f64> {
         match self {

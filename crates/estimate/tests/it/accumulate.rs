@@ -1,6 +1,6 @@
 //! Accumulation against the plain mean of the windows, its invariances, and missing samples.
 
-use crate::fixtures::table_2;
+use crate::fixtures::{correlogram_by_sum, table_2};
 use approx::assert_abs_diff_eq;
 use ndarray::{Array2, Axis, s};
 use num_complex::Complex;
@@ -229,7 +229,7 @@ fn maps<S: Sample>(records: &Array2<S>) -> Vec<MapPoint> {
     };
     let whole = PeriodogramPlan::<S>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
     let short = ShortCorrelogram::<S>::new(64, 17).unwrap();
-    let model = AutoregressivePeak::new(&sampling, S::KIND, 17, 16, 512, Refinement::Parabola).unwrap();
+    let model = ModelPeak::new(ModelReading::Spectrum, &sampling, S::KIND, 17, 16, 512, Refinement::Parabola).unwrap();
     let scans: [(Scan, &dyn Estimator); 2] = [
         (Scan::new(&whole.statistic, &sampling, &gates(), &elevation_rad, records.view()).unwrap(), &whole.estimator),
         (Scan::new(&short, &sampling, &gates(), &elevation_rad, records.view()).unwrap(), &model),

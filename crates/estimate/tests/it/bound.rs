@@ -189,26 +189,19 @@ fn any_covariance_is_accepted_and_impossible_ones_are_refused() {
     let identity = Array2::<Complex<f64>>::eye(3);
     let zero = Array2::<Complex<f64>>::zeros((3, 3));
     // nothing depends on velocity
-    assert!(bound_complex_m_s(identity.view(), zero.view(), 1.0).is_err());
+    let [complex, real] = [SignalKind::Complex, SignalKind::Real];
+    assert!(bound_m_s(complex, &identity, &zero, 1.0).is_err());
     // singular
-    assert!(bound_complex_m_s(zero.view(), identity.view(), 1.0).is_err());
+    assert!(bound_m_s(complex, &zero, &identity, 1.0).is_err());
     // scale: R = I, dR = s I gives 1 / (s sqrt(n))
     let scaled = identity.mapv(|value| value * 2.0);
-    assert_relative_eq!(
-        bound_complex_m_s(identity.view(), scaled.view(), 1.0).unwrap(),
-        1.0 / 12.0_f64.sqrt(),
-        max_relative = 1e-14
-    );
-    let real = Array2::<f64>::eye(3);
-    assert_relative_eq!(
-        bound_real_m_s(real.view(), (2.0 * &real).view(), 1.0).unwrap(),
-        1.0 / 6.0_f64.sqrt(),
-        max_relative = 1e-14
-    );
-    assert!(bound_real_m_s(real.view(), real.view(), 0.0).is_err());
-    let mut skew = real.clone();
-    skew[[0, 1]] = 0.5;
-    assert!(bound_real_m_s(skew.view(), real.view(), 1.0).is_err());
+    let found_m_s = |kind| bound_m_s(kind, &identity, &scaled, 1.0).unwrap();
+    assert_relative_eq!(found_m_s(complex), 1.0 / 12.0_f64.sqrt(), max_relative = 1e-14);
+    assert_relative_eq!(found_m_s(real), 1.0 / 6.0_f64.sqrt(), max_relative = 1e-14);
+    assert!(bound_m_s(real, &identity, &identity, 0.0).is_err());
+    let mut skew = identity.clone();
+    skew[[0, 1]] = Complex::from(0.5);
+    assert!(bound_m_s(real, &skew, &identity, 1.0).is_err());
     let sampling = table_2();
     assert!(WindowModel::gaussian_pulse(&sampling, 0, 1e-7, Noise::White).is_err());
     assert!(WindowModel::gaussian_pulse(&sampling, 8, f64::NAN, Noise::White).is_err());
@@ -293,6 +286,6 @@ fn bound_beside_a_cloud_is_that_of_the_sum_over_its_layers() {
     let whole = Array2::from_shape_fn((24, 24), |(n, m)| Complex::from(signal(n, m) + if n == m { 5.0 } else { 0.0 }));
     let derivative =
         Array2::from_shape_fn((24, 24), |(n, m)| Complex::new(0.0, slope * (n as f64 - m as f64) * signal(n, m)));
-    let expected_m_s = bound_complex_m_s(whole.view(), derivative.view(), 1.0).unwrap();
+    let expected_m_s = bound_m_s(SignalKind::Complex, &whole, &derivative, 1.0).unwrap();
     assert_relative_eq!(found.sqrt().recip(), expected_m_s, max_relative = 1e-6);
 }

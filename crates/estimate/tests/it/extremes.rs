@@ -17,9 +17,10 @@ fn estimators() -> Vec<Named> {
     let (s, kind, refinement) = (&table_2(), SignalKind::Real, Refinement::Parabola);
     let rectangular = || Box::new(Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap());
     let model = WindowModel::gaussian_pulse(s, 64, sigma_s(200e-9), Noise::White).unwrap();
-    let peak = || SpectralPeak::new(s, kind, 64, 1024, refinement).unwrap();
+    let peak_of = |weights: &[f64]| SpectralPeak::new(s, kind, weights, 1024, refinement).unwrap();
+    let peak = || peak_of(&unweighted_lags(64));
     let tapered = Correlogram::<f64>::with_tapers(likelihood_tapers(&model, 10.0).unwrap()).unwrap();
-    let of_tapers = peak().with_lag_weights(&tapered.lag_weights()).unwrap();
+    let of_tapers = peak_of(&tapered.lag_weights());
     let gradient = GradientModel::new(s, 64, sigma_s(200e-9), Noise::White).unwrap();
     let joint = GradientLikelihood::<f64>::new(&gradient, 10.0, &[0.0], 1024).unwrap();
     let short = ShortCorrelogram::<f64>::new(64, 17).unwrap();
@@ -27,12 +28,28 @@ fn estimators() -> Vec<Named> {
         ("periodogram", rectangular(), Box::new(peak())),
         ("likelihood", Box::new(tapered), Box::new(of_tapers)),
         ("likelihood with gradient", Box::new(joint.statistic), Box::new(joint.estimator)),
-        ("first moment", rectangular(), Box::new(FirstMoment::new(s, kind, 64, 512, 2.5).unwrap())),
-        ("lag window", rectangular(), Box::new(LagWindowPeak::new(s, kind, 64, 16, 1024, refinement).unwrap())),
-        ("pulse pair", rectangular(), Box::new(PulsePair::new(s, kind, 64).unwrap())),
-        ("AR", Box::new(short), Box::new(AutoregressivePeak::new(s, kind, 17, 16, 2048, refinement).unwrap())),
-        ("AR pole", rectangular(), Box::new(AutoregressivePole::new(s, kind, 64, 16, 2048, refinement).unwrap())),
-        ("Capon", rectangular(), Box::new(CaponPeak::new(s, kind, 64, 16, 2048, refinement).unwrap())),
+        ("first moment", rectangular(), Box::new(FirstMoment::new(s, kind, &unweighted_lags(64), 512, 2.5).unwrap())),
+        (
+            "lag window",
+            rectangular(),
+            Box::new(LagWindowPeak::new(s, kind, &unweighted_lags(64), 16, 1024, refinement).unwrap()),
+        ),
+        ("pulse pair", rectangular(), Box::new(PulsePair::new(s, kind, &unweighted_lags(64)).unwrap())),
+        (
+            "AR",
+            Box::new(short),
+            Box::new(ModelPeak::new(ModelReading::Spectrum, s, kind, 17, 16, 2048, refinement).unwrap()),
+        ),
+        (
+            "AR pole",
+            rectangular(),
+            Box::new(ModelPeak::new(ModelReading::Pole, s, kind, 64, 16, 2048, refinement).unwrap()),
+        ),
+        (
+            "Capon",
+            rectangular(),
+            Box::new(ModelPeak::new(ModelReading::Capon, s, kind, 64, 16, 2048, refinement).unwrap()),
+        ),
     ]
 }
 
@@ -195,12 +212,12 @@ fn windows_longer_than_the_record_and_orders_as_long_as_the_window_are_errors() 
     let error = Gates::new(64, 1, 0.0).unwrap().count(63).unwrap_err();
     assert_eq!(error, Error::WindowLongerThanRecord { window_samples: 64, record_samples: 63 });
     let (kind, refinement) = (SignalKind::Real, Refinement::None);
-    assert!(AutoregressivePeak::new(&table_2(), kind, 64, 64, 1024, refinement).is_err());
-    assert!(AutoregressivePole::new(&table_2(), kind, 64, 65, 1024, refinement).is_err());
-    assert!(CaponPeak::new(&table_2(), kind, 64, 64, 1024, refinement).is_err());
+    assert!(ModelPeak::new(ModelReading::Spectrum, &table_2(), kind, 64, 64, 1024, refinement).is_err());
+    assert!(ModelPeak::new(ModelReading::Pole, &table_2(), kind, 64, 65, 1024, refinement).is_err());
+    assert!(ModelPeak::new(ModelReading::Capon, &table_2(), kind, 64, 64, 1024, refinement).is_err());
     assert!(Autoregression::yule_walker(&[1.0; 16], kind, 16).is_err());
     assert!(Autoregression::burg(&[Complex::new(1.0, 0.0); 8], 8).is_err());
-    assert!(FirstMoment::new(&table_2(), kind, 64, 512, 0.0).is_err());
+    assert!(FirstMoment::new(&table_2(), kind, &unweighted_lags(64), 512, 0.0).is_err());
 }
 
 #[test]
@@ -215,7 +232,8 @@ fn following_accumulation_undoes_the_change_from_line_to_line() {
     let gates = Gates::new(64, 1, 2e-6).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let scan = Scan::new(&statistic, &table_2(), &gates, &elevation_rad, records.view()).unwrap();
-    let peak = SpectralPeak::new(&table_2(), SignalKind::Complex, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&table_2(), SignalKind::Complex, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let point = PolarPoint { range_m: 370.0, elevation_rad: 0.0042 };
     let radius = Radius::Fixed { radius_m: 1.6 };
     let guess = |place: PolarPoint| wind(place.elevation_rad);

@@ -1,9 +1,9 @@
-//! Table 2 of the chapter, noise and tones.
+//! Table 2 of the chapter, noise and tones; the correlogram written out.
 
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wakescope_estimate::Sampling;
+use wakescope_estimate::{Sampling, SignalKind, window::Sample};
 
 /// Sampling and band of Table 2: real samples at an intermediate frequency.
 pub(crate) fn table_2() -> Sampling {
@@ -35,4 +35,16 @@ pub(crate) fn noise(count: usize, seed: u64) -> Vec<f64> {
 pub(crate) fn tone(velocity_m_s: f64, phase_rad: f64) -> Vec<f64> {
     let turn = std::f64::consts::TAU * table_2().frequency_hz(velocity_m_s) / 250e6;
     (0..64).map(|n| (turn * n as f64 + phase_rad).cos()).collect()
+}
+
+/// The biased correlogram written out as a double sum.
+pub(crate) fn correlogram_by_sum<S: Sample>(window: &[S], weights: &[f64]) -> Vec<f64> {
+    let energy: f64 = weights.iter().map(|h| h * h).sum();
+    let weighted: Vec<_> = window.iter().zip(weights).map(|(sample, h)| sample.to_complex() * h).collect();
+    let lag = |m: usize| {
+        let products = weighted[m..].iter().zip(&weighted).map(|(ahead, behind)| ahead * behind.conj());
+        let lag = products.sum::<num_complex::Complex<f64>>() / energy;
+        [lag.re, lag.im].into_iter().take(if S::KIND == SignalKind::Real { 1 } else { 2 })
+    };
+    (0..weighted.len()).flat_map(lag).collect()
 }

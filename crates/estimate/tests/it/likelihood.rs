@@ -111,7 +111,8 @@ fn likelihood_estimates_reach_the_bound_of_twenty_windows() {
         let snr = 10.0_f64.powf(snr_db / 10.0);
         let tapers = likelihood_tapers(&model(200e-9), snr).unwrap();
         let correlogram = Correlogram::<Complex<f64>>::with_tapers(tapers).unwrap();
-        let peak = SpectralPeak::new(&baseband(), SignalKind::Complex, 64, 1024, Refinement::Exact).unwrap();
+        let peak =
+            SpectralPeak::new(&baseband(), SignalKind::Complex, &unweighted_lags(64), 1024, Refinement::Exact).unwrap();
         let (mut scratch, mut one) = (Scratch::new(), vec![0.0; 128]);
         let trials = 800;
         let mut sum = 0.0;

@@ -1,7 +1,7 @@
 //! Order choice, poles and Capon's spectrum against their definitions; the unbiased correlogram and why it is not used.
 
 use crate::draw::Windows;
-use crate::fixtures::{baseband, noise, sigma_s, table_2};
+use crate::fixtures::{baseband, correlogram_by_sum, noise, sigma_s, table_2};
 use approx::assert_abs_diff_eq;
 use ndarray::Array2;
 use num_complex::Complex;
@@ -25,7 +25,8 @@ fn description_length_finds_the_order_of_a_process_and_akaike_rarely_less() {
     for seed in 0..50 {
         let x = second_order(samples, seed);
         let lags = correlogram_by_sum(&x, &vec![1.0; samples]);
-        let order = |choice| Autoregression::of_chosen_order(&lags, SignalKind::Real, 16, choice).unwrap().order();
+        let full = Autoregression::yule_walker(&lags, SignalKind::Real, 16).unwrap();
+        let order = |choice: OrderChoice| choice.order(&full.reflection).unwrap();
         let samples = samples as f64;
         right += usize::from(order(OrderChoice::DescriptionLength { samples }) == 2);
         akaike_below += usize::from(order(OrderChoice::Akaike { samples }) < 2);
@@ -81,7 +82,8 @@ fn nearest_pole_is_that_of_the_line_in_the_band() {
     let (frequency_hz, modulus) = model.nearest_pole(&table_2()).unwrap().unwrap();
     assert!((frequency_hz - 83e6).abs() < 0.3e6 && (0.95..0.99).contains(&modulus), "{frequency_hz} {modulus}");
     assert_eq!(model.poles().unwrap().len(), 16);
-    let pole = AutoregressivePole::new(&table_2(), SignalKind::Real, 64, 16, 2048, Refinement::Parabola).unwrap();
+    let pole =
+        ModelPeak::new(ModelReading::Pole, &table_2(), SignalKind::Real, 64, 16, 2048, Refinement::Parabola).unwrap();
     let found = pole.estimate(&lags, &mut Scratch::new());
     assert_abs_diff_eq!(found.velocity_m_s, table_2().velocity_m_s(frequency_hz), epsilon = 1e-9);
     let narrow = Sampling { band_hz: (60e6, 62e6), ..table_2() };
@@ -128,7 +130,8 @@ fn capon_peak_is_that_of_the_inverted_covariance() {
             if m < 0 { value.conj() } else { value }
         };
         for order in [2, 9, 16] {
-            let capon = CaponPeak::new(&sampling, kind, 64, order, 2048, Refinement::Parabola).unwrap();
+            let capon =
+                ModelPeak::new(ModelReading::Capon, &sampling, kind, 64, order, 2048, Refinement::Parabola).unwrap();
             let found = capon.estimate(&lags, &mut Scratch::new());
             let density =
                 |f_hz: f64| capon_by_inversion(lag, order, std::f64::consts::TAU * f_hz / sampling.sample_rate_hz);
@@ -144,7 +147,7 @@ fn capon_peak_is_that_of_the_inverted_covariance() {
         3.0,
         epsilon = 1e-12
     );
-    assert!(CaponPeak::new(&table_2(), SignalKind::Real, 16, 16, 1024, Refinement::None).is_err());
+    assert!(ModelPeak::new(ModelReading::Capon, &table_2(), SignalKind::Real, 16, 16, 1024, Refinement::None).is_err());
 }
 
 fn band_noise_model() -> Array2<Complex<f64>> {
@@ -161,7 +164,7 @@ fn unbiased_correlogram_has_the_mean_of_the_covariance_but_no_model_of_order_16(
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
     let weights = statistic.lag_weights();
     let kind = SignalKind::Real;
-    let ca = AutoregressivePeak::new(&table_2(), kind, 64, 16, 2048, Refinement::Parabola).unwrap();
+    let ca = ModelPeak::new(ModelReading::Spectrum, &table_2(), kind, 64, 16, 2048, Refinement::Parabola).unwrap();
     let unbiased = Unbiased::new(ca.clone(), kind, &weights).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(11);
     let (mut scratch, mut one) = (Scratch::new(), vec![0.0; 64]);
@@ -174,8 +177,7 @@ fn unbiased_correlogram_has_the_mean_of_the_covariance_but_no_model_of_order_16(
             statistic.evaluate(&windows.draw(&mut rng), &mut scratch, &mut one);
             average.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / 8.0);
         }
-        let lags = unbiased_correlogram(&average, kind, &weights).unwrap();
-        for (m, value) in lags.iter().enumerate() {
+        for (m, value) in average.iter().zip(&weights).map(|(value, weight)| value / weight).enumerate() {
             mean[m] += value / f64::from(trials);
             square[m] += value * value / f64::from(trials);
         }
@@ -187,6 +189,6 @@ fn unbiased_correlogram_has_the_mean_of_the_covariance_but_no_model_of_order_16(
         assert!((mean[m] - covariance[[m, 0]].re).abs() < 4.5 * error, "lag {m}");
     }
     assert!(failed > trials / 2, "{failed} of {trials}");
-    assert!(unbiased_correlogram(&one, kind, &weights[1..]).is_err());
+    assert!(Unbiased::new(ca.clone(), kind, &weights[1..]).is_err());
     assert!(Unbiased::new(ca, kind, &[0.0; 64]).is_err());
 }

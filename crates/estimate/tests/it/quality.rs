@@ -10,12 +10,18 @@ use wakescope_estimate::{bound::*, estimators::*, spectrum::*, window::*};
 fn estimators(sampling: &Sampling, kind: SignalKind) -> Vec<(&'static str, Box<dyn Estimator>)> {
     let refinement = Refinement::Parabola;
     vec![
-        ("periodogram", Box::new(SpectralPeak::new(sampling, kind, 64, 1024, refinement).unwrap())),
-        ("lag window", Box::new(LagWindowPeak::new(sampling, kind, 64, 16, 1024, refinement).unwrap())),
-        ("pulse pair", Box::new(PulsePair::new(sampling, kind, 64).unwrap())),
-        ("AR peak", Box::new(AutoregressivePeak::new(sampling, kind, 64, 16, 2048, refinement).unwrap())),
-        ("AR pole", Box::new(AutoregressivePole::new(sampling, kind, 64, 16, 2048, refinement).unwrap())),
-        ("Capon", Box::new(CaponPeak::new(sampling, kind, 64, 16, 2048, refinement).unwrap())),
+        ("periodogram", Box::new(SpectralPeak::new(sampling, kind, &unweighted_lags(64), 1024, refinement).unwrap())),
+        (
+            "lag window",
+            Box::new(LagWindowPeak::new(sampling, kind, &unweighted_lags(64), 16, 1024, refinement).unwrap()),
+        ),
+        ("pulse pair", Box::new(PulsePair::new(sampling, kind, &unweighted_lags(64)).unwrap())),
+        (
+            "AR peak",
+            Box::new(ModelPeak::new(ModelReading::Spectrum, sampling, kind, 64, 16, 2048, refinement).unwrap()),
+        ),
+        ("AR pole", Box::new(ModelPeak::new(ModelReading::Pole, sampling, kind, 64, 16, 2048, refinement).unwrap())),
+        ("Capon", Box::new(ModelPeak::new(ModelReading::Capon, sampling, kind, 64, 16, 2048, refinement).unwrap())),
     ]
 }
 
@@ -88,16 +94,15 @@ fn width_ratio(
 fn methods_of_widths(n: usize, full_width_s: f64, snr: f64) -> Vec<(String, Correlogram<f64>, Box<dyn Estimator>)> {
     let (s, kind, refinement) = (table_2(), SignalKind::Real, Refinement::Parabola);
     let peak = |statistic: &Correlogram<f64>| -> Box<dyn Estimator> {
-        let peak = SpectralPeak::new(&s, kind, n, 1024, refinement).unwrap();
-        Box::new(peak.with_lag_weights(&statistic.lag_weights()).unwrap())
+        Box::new(SpectralPeak::new(&s, kind, &statistic.lag_weights(), 1024, refinement).unwrap())
     };
     let of = |weighting: Weighting| Correlogram::<f64>::new(weighting, n).unwrap();
     let weightings = [Weighting::Rectangular, Weighting::Hann, Weighting::default()];
     let mut all: Vec<_> = weightings.map(|own| (format!("{own:?}"), of(own), peak(&of(own)))).into();
     let weights = of(Weighting::default()).lag_weights();
-    let lags = LagWindowPeak::new(&s, kind, n, 12, 1024, refinement).unwrap().with_lag_weights(&weights).unwrap();
-    let moment = FirstMoment::new(&s, kind, n, 1024, 2.0).unwrap().with_lag_weights(&weights).unwrap();
-    let pair = PulsePair::new(&s, kind, n).unwrap().with_lag_weights(&weights).unwrap();
+    let lags = LagWindowPeak::new(&s, kind, &weights, 12, 1024, refinement).unwrap();
+    let moment = FirstMoment::new(&s, kind, &weights, 1024, 2.0).unwrap();
+    let pair = PulsePair::new(&s, kind, &weights).unwrap();
     all.push(("lag window".into(), of(Weighting::default()), Box::new(lags)));
     all.push(("first moment".into(), of(Weighting::default()), Box::new(moment)));
     all.push(("pulse pair".into(), of(Weighting::default()), Box::new(pair)));
@@ -171,8 +176,7 @@ fn a_line_has_no_width_in_any_weighting_and_a_short_window_none_at_all() {
     let tone: Vec<f64> = (0..64).map(|n| (std::f64::consts::TAU * 0.3 * f64::from(n)).cos()).collect();
     for weighting in [Weighting::Rectangular, Weighting::Hann, Weighting::default()] {
         let statistic = Correlogram::<f64>::new(weighting, 64).unwrap();
-        let pair = PulsePair::new(&table_2(), SignalKind::Real, 64).unwrap();
-        let pair = pair.with_lag_weights(&statistic.lag_weights()).unwrap();
+        let pair = PulsePair::new(&table_2(), SignalKind::Real, &statistic.lag_weights()).unwrap();
         let found = estimate_window(&statistic, &pair, &tone, &mut Scratch::new()).unwrap();
         assert!(found.spread_m2_s2.abs() < 0.1 * found.resolution_m2_s2, "{weighting:?}: {found:?}");
     }
@@ -241,7 +245,8 @@ fn threshold_tells_bad_estimates_from_good_ones() {
     // the signal has power 1, the noise ten times that in a fifth of the frequencies: so much is its density
     let test = NoiseTest::new(&baseband(), &gates, &[taper], None, 1024, Noise::White).unwrap();
     let threshold = 50.0 * test.threshold(&test.region([(1, 20)].into_iter()), 0.01).unwrap();
-    let peak = SpectralPeak::new(&baseband(), SignalKind::Complex, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&baseband(), SignalKind::Complex, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let trials = 1000;
     let (mut bad, mut kept, mut kept_bad) = (0, 0, 0);
     for _ in 0..trials {
@@ -290,8 +295,7 @@ fn tested<S: Sample>(s: &Sampling, Region { window: n, step, noise, .. }: Region
     let of = |tapers: &[Taper]| Box::new(Correlogram::<S>::with_tapers(tapers.to_vec()).unwrap());
     let mean = |weights: &[f64]| noise.expected_correlogram(s, kind, 1.0, weights).unwrap();
     let peak = |tapers: &[Taper], padded, refinement| {
-        let peak = SpectralPeak::new(s, kind, n, padded, refinement).unwrap();
-        Box::new(peak.with_lag_weights(&of(tapers).lag_weights()).unwrap())
+        Box::new(SpectralPeak::new(s, kind, &of(tapers).lag_weights(), padded, refinement).unwrap())
     };
     let (lag_window, order_8) = (model_lag_weights(15), model_lag_weights(8));
     let short = ShortCorrelogram::<S>::new(n, 16).unwrap();
@@ -305,7 +309,7 @@ fn tested<S: Sample>(s: &Sampling, Region { window: n, step, noise, .. }: Region
                 ("padded twice", peak(&flat, 2 * n, refinement), test(&flat, None, 2 * n)),
                 (
                     "lag window",
-                    Box::new(LagWindowPeak::new(s, kind, n, 16, padded, refinement).unwrap()),
+                    Box::new(LagWindowPeak::new(s, kind, &unweighted_lags(n), 16, padded, refinement).unwrap()),
                     test(&flat, Some(&lag_window), padded),
                 ),
             ],
@@ -331,19 +335,23 @@ fn tested<S: Sample>(s: &Sampling, Region { window: n, step, noise, .. }: Region
             estimators: vec![
                 (
                     "Capon",
-                    Box::new(CaponPeak::new(s, kind, 16, 8, padded, refinement).unwrap()),
+                    Box::new(ModelPeak::new(ModelReading::Capon, s, kind, 16, 8, padded, refinement).unwrap()),
                     test(&flat, Some(&order_8), padded),
                 ),
                 (
                     "autoregressive",
-                    Box::new(AutoregressivePeak::new(s, kind, 16, 8, padded, refinement).unwrap()),
+                    Box::new(ModelPeak::new(ModelReading::Spectrum, s, kind, 16, 8, padded, refinement).unwrap()),
                     test(&flat, Some(&order_8), padded),
                 ),
             ],
         },
     ];
     if kind == SignalKind::Real {
-        all[0].estimators.push(("pulse pair", Box::new(PulsePair::new(s, kind, n).unwrap()), test(&flat, None, 4 * n)));
+        all[0].estimators.push((
+            "pulse pair",
+            Box::new(PulsePair::new(s, kind, &unweighted_lags(n)).unwrap()),
+            test(&flat, None, 4 * n),
+        ));
     }
     if gradient {
         let model = GradientModel::new(s, n, sigma_s(200e-9), Noise::White).unwrap();
@@ -491,15 +499,14 @@ fn lines_outside_the_band_are_flagged_and_weak_ones_inside_and_noise_are_not() {
     let (kind, refinement) = (SignalKind::Complex, Refinement::Parabola);
     let flat = |n| Correlogram::<Complex<f64>>::new(Weighting::Rectangular, n).unwrap();
     let peak = |s: &Sampling, statistic: &Correlogram<Complex<f64>>| {
-        let peak = SpectralPeak::new(s, kind, statistic.lags(), 1024, refinement).unwrap();
-        peak.with_lag_weights(&statistic.lag_weights()).unwrap()
+        SpectralPeak::new(s, kind, &statistic.lag_weights(), 1024, refinement).unwrap()
     };
     let edge_m_s = |s: &Sampling| s.velocity_limits_m_s().1;
     // the first sidelobe of a line 3 m/s beyond the band is a peak within it
     let (short, long) = (flat(24), flat(64));
     let beyond = (edge_m_s(&narrow()) + 3.0, 100.0, 0.0);
     assert_eq!(unflagged(&narrow(), (&short, &peak(&narrow(), &short)), beyond, 1), [0.0; 2]);
-    let moment = FirstMoment::new(&narrow(), kind, 24, 1024, 3.5).unwrap();
+    let moment = FirstMoment::new(&narrow(), kind, &unweighted_lags(24), 1024, 3.5).unwrap();
     assert_eq!(unflagged(&narrow(), (&short, &moment), beyond, 1), [0.0; 2]);
     // so is the skirt of broad tapers
     let model = WindowModel::gaussian_pulse(&baseband(), 64, sigma_s(200e-9), Noise::White).unwrap();
@@ -508,7 +515,7 @@ fn lines_outside_the_band_are_flagged_and_weak_ones_inside_and_noise_are_not() {
     assert_eq!(unflagged(&baseband(), (&tapered, &peak(&baseband(), &tapered)), beyond, 1), [0.0; 2]);
     // and a model splits the line that a weighted window has broadened
     let hann = Correlogram::<Complex<f64>>::new(Weighting::Hann, 64).unwrap();
-    let model = AutoregressivePeak::new(&baseband(), kind, 64, 16, 1024, refinement).unwrap();
+    let model = ModelPeak::new(ModelReading::Spectrum, &baseband(), kind, 64, 16, 1024, refinement).unwrap();
     for by_m_s in [0.5, 1.0] {
         let beyond = (edge_m_s(&baseband()) + by_m_s, 100.0, 0.0);
         assert_eq!(unflagged(&baseband(), (&hann, &model), beyond, 1), [0.0; 2], "{by_m_s}");
@@ -530,7 +537,8 @@ fn lines_outside_the_band_are_flagged_and_weak_ones_inside_and_noise_are_not() {
 fn poles_away_from_the_peak_of_their_model_are_flagged() {
     let statistic = Correlogram::<Complex<f64>>::new(Weighting::Rectangular, 24).unwrap();
     for (order, snr) in [(8, 30.0), (12, 30.0), (12, 2.0)] {
-        let pole = AutoregressivePole::new(&narrow(), SignalKind::Complex, 24, order, 1024, Refinement::Parabola);
+        let pole =
+            ModelPeak::new(ModelReading::Pole, &narrow(), SignalKind::Complex, 24, order, 1024, Refinement::Parabola);
         let [good, off] = unflagged(&narrow(), (&statistic, &pole.unwrap()), (13.0, snr, 4.0), 1);
         assert!(good > 0.5 && off < 0.01, "order {order}, ratio {snr}: {good} {off}");
     }

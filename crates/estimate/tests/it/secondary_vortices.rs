@@ -7,12 +7,15 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::retrieval::*;
 use wakescope_estimate::vortex_fit::*;
-use wakescope_estimate::{Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise};
+use wakescope_estimate::{
+    Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise, spectrum::unweighted_lags,
+};
 
 /// A map of peaks with noise, of a pair with these secondary vortices, fitted without and with such vortices.
 fn fits_near_the_ground(secondary: Option<[Vortex; 2]>, seed: u64) -> (MapFit, Option<(MapFit, [Vortex; 2])>) {
     let sampling = table_2();
-    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();

@@ -7,7 +7,9 @@ use ndarray::Array2;
 use rand::SeedableRng;
 use wakescope_estimate::retrieval::*;
 use wakescope_estimate::vortex_fit::*;
-use wakescope_estimate::{Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise};
+use wakescope_estimate::{
+    Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise, spectrum::unweighted_lags,
+};
 
 fn axes() -> (Vec<f64>, Vec<f64>) {
     ((0..54).map(|i| 0.02 + 0.0035 * f64::from(i)).collect(), (0..24).map(|i| 324.0 + 7.0 * f64::from(i)).collect())
@@ -20,7 +22,8 @@ fn fitted<T>(
     fit: impl Fn(&VelocityMap<'_>, &EstimatorResponse<'_>) -> T,
 ) -> T {
     let sampling = table_2();
-    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let new = || EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
@@ -98,7 +101,8 @@ fn vortices_that_move_while_they_are_scanned_are_found_where_they_are_in_the_mid
 #[test]
 fn cores_that_shrink_on_the_way_are_fitted_where_it_ends() {
     let sampling = table_2();
-    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();

@@ -1,6 +1,6 @@
 //! The sliding correlogram against the sum written out: missing samples, bursts, steps, complex samples.
 
-use crate::fixtures::noise;
+use crate::fixtures::{correlogram_by_sum, noise};
 use num_complex::Complex;
 use wakescope_estimate::{Radius, Scan, estimators::*, polar_points, spectrum::*, window::*};
 
@@ -96,7 +96,10 @@ fn a_scan_of_short_correlograms_maps_like_one_of_all_lags() {
         Scan::new(&all, &sampling, &gates, &elevation_rad, records.view()).unwrap(),
         Scan::new(&short, &sampling, &gates, &elevation_rad, records.view()).unwrap(),
     );
-    let ca = |lags| AutoregressivePeak::new(&sampling, SignalKind::Real, lags, 16, 2048, Refinement::Parabola).unwrap();
+    let ca = |lags| {
+        ModelPeak::new(ModelReading::Spectrum, &sampling, SignalKind::Real, lags, 16, 2048, Refinement::Parabola)
+            .unwrap()
+    };
     let points = polar_points(&elevation_rad, &scans.0.geometry().gate_ranges_m());
     let radius = Radius::Fixed { radius_m: 2.5 };
     let maps =

@@ -13,7 +13,7 @@ use wakescope_estimate::vortex_fit::{
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, Sampling, SignalKind, SpectralPeak, Weighting, bound::Noise,
-    window::SPEED_OF_LIGHT_M_S,
+    spectrum::unweighted_lags, window::SPEED_OF_LIGHT_M_S,
 };
 
 pub(crate) const SIGMA_S: f64 = 120.112e-9;
@@ -89,7 +89,8 @@ fn exact_maps_give_the_wake_back_without_prior_knowledge() {
 #[test]
 fn exact_maps_of_peaks_give_the_wake_back_where_means_mislead() {
     let sampling = table_2();
-    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let shown = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 1.0), 2.0).unwrap();
@@ -117,7 +118,8 @@ fn exact_maps_of_peaks_give_the_wake_back_where_means_mislead() {
 #[test]
 fn a_core_that_the_regions_do_not_resolve_keeps_the_least_radius_and_says_so() {
     let sampling = table_2();
-    let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+    let peak =
+        SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let shown = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 1.0), 4.0).unwrap();

@@ -11,8 +11,8 @@ use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::bound::{GradientModel, Noise, RecordModel, WindowModel};
 use wakescope_estimate::estimators::{
-    AutoregressivePeak, AutoregressivePole, CaponPeak, FirstMoment, LagWindowPeak, NoiseTest, PulsePair, Unbiased,
-    likelihood_tapers, model_lag_weights,
+    FirstMoment, LagWindowPeak, ModelPeak, ModelReading, NoiseTest, PulsePair, Unbiased, likelihood_tapers,
+    model_lag_weights,
 };
 use wakescope_estimate::spectrum::{ShortCorrelogram, Taper};
 use wakescope_estimate::{self as estimate, Correlogram, Estimator, Scratch, SignalKind, SpectralPeak, Statistic};
@@ -337,7 +337,7 @@ impl ExpectedBias {
 pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error> {
     let (e, sampling, kind) = (&scene.estimator, sampling(scene)?, signal_kind(scene));
     let weights = Correlogram::<f64>::new(weighting(scene), e.window_samples)?.lag_weights();
-    let peak = SpectralPeak::new(&sampling, kind, weights.len(), e.padded_samples, e.refinement)?;
+    let peak = SpectralPeak::new(&sampling, kind, &weights, e.padded_samples, e.refinement)?;
     let step_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / e.padded_samples as f64;
     let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
     let off_m_s = |part: i32| {
@@ -413,37 +413,28 @@ fn of_correlogram(
     // Divided by their weights, all lags count alike.
     let alike = vec![1.0; lags];
     let seen = if e.correlogram == CorrelogramForm::Unbiased { &alike } else { lag_weights };
+    let model = |reading, model: ModelOrder| -> Result<Box<dyn Estimator>, Error> {
+        let peak = ModelPeak::new(reading, &sampling, kind, lags, model.order, padded, refine)?;
+        finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
+    };
     match e.method {
         Method::Periodogram {}
         | Method::PeriodogramAccumulation {}
         | Method::Likelihood(_)
         | Method::GradientLikelihood(_) => {
-            let peak = SpectralPeak::new(&sampling, kind, lags, padded, refine)?;
-            finish(e, kind, lag_weights, peak.with_lag_weights(seen)?)
+            finish(e, kind, lag_weights, SpectralPeak::new(&sampling, kind, seen, padded, refine)?)
         }
-        Method::Autoregressive(model) => {
-            let peak = AutoregressivePeak::new(&sampling, kind, lags, model.order, padded, refine)?;
-            finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
-        }
-        Method::AutoregressivePole(model) => {
-            let pole = AutoregressivePole::new(&sampling, kind, lags, model.order, padded, refine)?;
-            finish(e, kind, lag_weights, pole.choosing(order_choice(e, &model, known)))
-        }
-        Method::Capon(model) => {
-            let peak = CaponPeak::new(&sampling, kind, lags, model.order, padded, refine)?;
-            finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
-        }
+        Method::Autoregressive(own) => model(ModelReading::Spectrum, own),
+        Method::AutoregressivePole(own) => model(ModelReading::Pole, own),
+        Method::Capon(own) => model(ModelReading::Capon, own),
         Method::LagWindow(window) => {
-            let peak = LagWindowPeak::new(&sampling, kind, lags, window.lag_window_lags, padded, refine)?;
-            finish(e, kind, lag_weights, peak.with_lag_weights(seen)?)
+            let peak = LagWindowPeak::new(&sampling, kind, seen, window.lag_window_lags, padded, refine)?;
+            finish(e, kind, lag_weights, peak)
         }
-        Method::PulsePair {} => {
-            let pair = PulsePair::new(&sampling, kind, lags)?;
-            finish(e, kind, lag_weights, pair.with_lag_weights(seen)?)
-        }
+        Method::PulsePair {} => finish(e, kind, lag_weights, PulsePair::new(&sampling, kind, seen)?),
         Method::FirstMoment(own) => {
-            let moment = FirstMoment::new(&sampling, kind, lags, padded, own.moment_reach)?;
-            finish(e, kind, lag_weights, moment.with_lag_weights(seen)?)
+            let moment = FirstMoment::new(&sampling, kind, seen, padded, own.moment_reach)?;
+            finish(e, kind, lag_weights, moment)
         }
     }
 }

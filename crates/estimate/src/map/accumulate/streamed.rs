@@ -99,7 +99,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     /// The same with the scale of samples up to `largest`: parts of a scan that are summed apart have the bits of the whole.
     #[must_use]
     pub fn scaled_for(mut self, largest: f64) -> Self {
-        self.scale = Rule::NOT_FINITE.largest_binary_scale(std::iter::once(largest));
+        self.scale = Rule::NOT_FINITE.binary_scale(std::iter::once(largest));
         self
     }
 
@@ -140,7 +140,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
 
     /// The scale for these records and those before; the sums are brought to it.
     fn rescale(&mut self, records: ArrayView2<'_, S>) -> f64 {
-        let here = self.rule.largest_binary_scale(records.iter().copied());
+        let here = self.rule.binary_scale(records.iter().copied());
         let scale = match (self.scale, here) {
             (Some(before), Some(here)) if here > before => {
                 let share = (before / here).powi(2);

@@ -256,6 +256,7 @@ mod tests {
     use crate::bound::Noise;
     use crate::estimators::{Refinement, SpectralPeak};
     use crate::spectrum::Correlogram;
+    use crate::spectrum::unweighted_lags;
     use crate::vortex_fit::PulseShape;
     use crate::window::{Sampling, SignalKind, Weighting};
 
@@ -263,7 +264,8 @@ mod tests {
     #[test]
     fn slopes_from_few_places_are_near_those_of_all() {
         let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
-        let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+        let peak =
+            SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
         let pulse = PulseShape::gaussian(120e-9).unwrap();
         let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 1.0), 2.0).unwrap();

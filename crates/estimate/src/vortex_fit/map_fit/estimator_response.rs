@@ -387,6 +387,7 @@ fn add_seen(lags: &mut [f64], weights: &[f64], phasors: &[f64], share: f64) {
 mod tests {
     use super::*;
     use crate::estimators::{LagWindowPeak, PulsePair, Refinement, SpectralPeak};
+    use crate::spectrum::unweighted_lags;
     use crate::window::Weighting;
 
     const SIGMA_S: f64 = 120.112e-9;
@@ -415,7 +416,8 @@ mod tests {
     fn uniform_wind_is_shown_as_it_is() {
         let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 6.0, 0.0]);
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let peak = SpectralPeak::new(&sampling(), SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+        let peak =
+            SpectralPeak::new(&sampling(), SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
         let shown = response(&statistic, &peak, (Noise::White, 1.0), 2.0)
             .map(&WakeModel::default(), &calm, &LINES_RAD, &RANGES_M)
             .unwrap();
@@ -429,7 +431,7 @@ mod tests {
     fn a_pulse_pair_of_complex_samples_shows_the_mean_over_the_gate() {
         let sampling = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
         let statistic = Correlogram::<num_complex::Complex<f64>>::new(Weighting::Rectangular, 64).unwrap();
-        let pair = PulsePair::new(&sampling, SignalKind::Complex, 64).unwrap();
+        let pair = PulsePair::new(&sampling, SignalKind::Complex, &unweighted_lags(64)).unwrap();
         let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
         let response = EstimatorResponse::new(&statistic, &pair, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
         let weak = Wake::from_array(&[96.0, 104.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
@@ -448,8 +450,11 @@ mod tests {
     fn velocities_are_those_of_the_mean_correlogram_of_thin_layers() {
         let (model, sampling) = (WakeModel::default(), sampling());
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let lags = LagWindowPeak::new(&sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
-        let peak = SpectralPeak::new(&sampling, SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
+        let lags =
+            LagWindowPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 16, 1024, Refinement::Parabola)
+                .unwrap();
+        let peak =
+            SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
         let (snr, radius_m) = (2.0, 1.5);
         let h = &statistic.tapers()[0].weights;
         let correlogram = |line: usize, range_m: f64| -> Vec<f64> {
@@ -502,8 +507,10 @@ mod tests {
     #[test]
     fn what_does_not_match_is_refused() {
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let peak = SpectralPeak::new(&sampling(), SignalKind::Real, 64, 1024, Refinement::Parabola).unwrap();
-        let short = SpectralPeak::new(&sampling(), SignalKind::Real, 32, 1024, Refinement::Parabola).unwrap();
+        let peak =
+            SpectralPeak::new(&sampling(), SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
+        let short =
+            SpectralPeak::new(&sampling(), SignalKind::Real, &unweighted_lags(32), 1024, Refinement::Parabola).unwrap();
         let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
         let new = |estimator: &SpectralPeak, snr, radius_m| {
             let noise = (Noise::White, snr);
