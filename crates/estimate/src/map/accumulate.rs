@@ -120,7 +120,7 @@ impl Scan {
         length("elevation_rad", rays, elevation_rad.len())?;
         let geometry = ScanGeometry::new(sampling, gates, elevation_rad, samples)?;
         let rule = missing.rule(records.iter().copied());
-        let mut sums = ScanSums::with_rule(statistic, gates, geometry, samples, rule)?;
+        let mut sums = ScanSums::new(statistic, gates, geometry, samples)?.with_rule(rule);
         sums.add(0, records)?;
         Ok(sums.finish())
     }

@@ -76,7 +76,7 @@ impl ScanGeometry {
     }
 
     /// Geometry of lines of sight at `elevation_rad`, increasing, each with `rays_per_line` records that stand together, one
-    /// line after the other. It takes no memory for the rays.
+    /// line after the other. It takes no memory for each ray.
     ///
     /// # Errors
     /// As [`ScanGeometry::new`]; [`Error::OutOfRange`] for angles that do not increase or lines without rays.
@@ -90,7 +90,8 @@ impl ScanGeometry {
         check_angles(elevation_rad)?;
         increasing("elevation_rad", elevation_rad)?;
         at_least_one("rays_per_line", rays_per_line)?;
-        Self::of(elevation_rad.to_vec(), Rays::Regular { per_line: rays_per_line }, sampling, gates, record_samples)
+        let bounds = (0..=elevation_rad.len()).map(|line| line * rays_per_line).collect();
+        Self::of(elevation_rad.to_vec(), Rays::in_order(bounds), sampling, gates, record_samples)
     }
 
     /// Geometry of lines of sight in any direction: unit vectors, one for each line. Their `elevation_rad` in points and maps is
@@ -121,7 +122,7 @@ impl ScanGeometry {
         let shared = parts.flat_map(|range| range.clone().map(move |_| range.clone()));
         let sphere = direction.iter().copied().zip(shared).collect();
         let numbers = (0..lines).map(|line| line as f64).collect();
-        let rays = Rays::Bounds(first_ray.to_vec());
+        let rays = Rays::in_order(first_ray.to_vec());
         Ok(Self { sphere: Some(sphere), ..Self::of(numbers, rays, sampling, gates, record_samples)? })
     }
 
@@ -334,35 +335,14 @@ impl WindowCorrelation {
     /// # Errors
     /// [`Error::OutOfRange`] if gamma(0) is not 1 or another is beyond 0 .. 1.
     pub fn from_gate_lags(gamma: &[f64]) -> Result<Self, Error> {
-        if gamma.first().is_none_or(|first| (first - 1.0).abs() > 1e-9) {
-            return Err(Error::OutOfRange {
-                field: "gamma[0]",
-                value: gamma.first().copied().unwrap_or(f64::NAN),
-                allowed: "1",
-            });
+        let first = gamma.first().copied().unwrap_or(f64::NAN);
+        if gamma.is_empty() || (first - 1.0).abs() > 1e-9 {
+            return Err(Error::OutOfRange { field: "gamma[0]", value: first, allowed: "1" });
         }
-        for &value in gamma {
-            if !(0.0..=1.0 + 1e-9).contains(&value) {
-                return Err(Error::OutOfRange { field: "gamma", value, allowed: "between 0 and 1" });
-            }
+        if let Some(&value) = gamma.iter().find(|value| !(0.0..=1.0 + 1e-9).contains(*value)) {
+            return Err(Error::OutOfRange { field: "gamma", value, allowed: "between 0 and 1" });
         }
         Ok(Self { squared: gamma.iter().map(|value| value * value).collect() })
-    }
-
-    /// From the covariance of the samples of one pulse (phase of the carrier removed) and the weights of the window.
-    ///
-    /// `covariance(lag_samples)` need not be normalised. gamma(k) = |sum over n, m of h_n h_m c(k step + n - m)| over
-    /// the same at k = 0: the correlation of the two windows' Fourier coefficients at the peak.
-    ///
-    /// # Errors
-    /// [`Error::Empty`] without weights, [`Error::OutOfRange`] if the window's power is not above 0.
-    pub fn from_covariance(
-        weights: &[f64],
-        step_samples: usize,
-        gates: usize,
-        covariance: impl Fn(usize) -> f64,
-    ) -> Result<Self, Error> {
-        WindowCovariance::new(weights, step_samples, gates, covariance, |_| 0.0)?.correlation(f64::INFINITY)
     }
 
     /// For a Gaussian pulse, |f|^2 ~ exp(-t^2 / sigma^2), in uniform wind with white noise.
@@ -372,7 +352,7 @@ impl WindowCorrelation {
     /// two frequencies (5 / SNR when the band is a fifth of the rate).
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a pulse or noise that is not positive, and as [`WindowCorrelation::from_covariance`].
+    /// [`Error::OutOfRange`] for a pulse or noise that is not positive, and as [`WindowCovariance::new`].
     pub fn gaussian_pulse(
         weights: &[f64],
         gates: &Gates,
@@ -385,11 +365,12 @@ impl WindowCorrelation {
         positive("sample_rate_hz", sample_rate_hz)?;
         not_negative("noise_to_signal", noise_to_signal)?;
         length("weights", gates.window_samples, weights.len())?;
-        Self::from_covariance(weights, gates.step_samples, count, |lag_samples| {
+        let covariance = |lag_samples: usize| {
             let lag = lag_samples as f64 / (sample_rate_hz * pulse_sigma_s);
             let noise = if lag_samples == 0 { noise_to_signal } else { 0.0 };
             (-0.25 * lag * lag).exp() + noise
-        })
+        };
+        WindowCovariance::new(weights, gates.step_samples, count, covariance, |_| 0.0)?.correlation(f64::INFINITY)
     }
 
     /// gamma^2 of two windows of one pulse `gates` apart.
@@ -557,6 +538,6 @@ mod tests {
         assert!(ScanGeometry::new(&sampling(), &gates, &[0.0], 63).is_err());
         assert!(WindowCorrelation::from_gate_lags(&[0.5]).is_err());
         assert!(WindowCorrelation::from_gate_lags(&[1.0, f64::NAN]).is_err());
-        assert!(WindowCorrelation::from_covariance(&[], 1, 5, |_| 1.0).is_err());
+        assert!(WindowCovariance::new(&[], 1, 5, |_| 1.0, |_| 0.0).is_err());
     }
 }

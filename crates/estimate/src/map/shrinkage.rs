@@ -94,55 +94,33 @@ pub fn shrink_to_guess(
     positive("line_step", options.line_step as f64)?;
     positive("gate_step", options.gate_step as f64)?;
     not_negative("factor", options.factor)?;
-    let mut residual = Layer::new(&measured_m_s - &seen_m_s);
-    let mut noise = Layer::new(half_difference_m_s.to_owned());
+    let (mut residual, mut noise) = (&measured_m_s - &seen_m_s, half_difference_m_s.to_owned());
     let mut correction = Array2::zeros(measured_m_s.dim());
-    let (mut line_step, mut gate_step) = (options.line_step, options.gate_step);
+    let mut steps = [options.line_step, options.gate_step];
     for _ in 0..options.scales {
-        let (smooth, quiet) = (residual.smoothed(line_step, gate_step), noise.smoothed(line_step, gate_step));
-        let (detail, noise_detail) = (residual.less(&smooth), noise.less(&quiet));
-        let energy = |layer: &Layer| layer.squared().smoothed(line_step, gate_step);
+        let (smooth, quiet) = (smoothed(&residual, steps), smoothed(&noise, steps));
+        let (detail, noise_detail) = (&residual - &smooth, &noise - &quiet);
+        let energy = |detail: &Array2<f64>| smoothed(&detail.mapv(|value| value * value), steps);
         let (total, own) = (energy(&detail), energy(&noise_detail));
-        for ((place, sum), detail) in correction.indexed_iter_mut().zip(&detail.values) {
-            let share = 1.0 - options.factor * own.values[place] / total.values[place];
+        for ((place, sum), detail) in correction.indexed_iter_mut().zip(&detail) {
+            let share = 1.0 - options.factor * own[place] / total[place];
             // no noise known or nothing there: 0/0 and what has no weight count as noise
             if share > 0.0 && detail.is_finite() {
                 *sum += share * detail;
             }
         }
         (residual, noise) = (smooth, quiet);
-        (line_step, gate_step) = (2 * line_step, 2 * gate_step);
+        steps = steps.map(|step| 2 * step);
     }
-    correction += &residual.values;
+    correction += &residual;
     Ok(ShrunkMap { velocity_m_s: &wanted_m_s + &correction, correction_m_s: correction })
 }
 
-/// A map with missing places: NaN there.
-struct Layer {
-    values: Array2<f64>,
-}
-
-impl Layer {
-    fn new(values: Array2<f64>) -> Self {
-        Self { values }
-    }
-
-    fn less(&self, other: &Self) -> Self {
-        Self::new(&self.values - &other.values)
-    }
-
-    fn squared(&self) -> Self {
-        Self::new(self.values.mapv(|value| value * value))
-    }
-
-    /// Mean with the weights of the spline, whose taps are the steps apart, over the places that are there.
-    fn smoothed(&self, line_step: usize, gate_step: usize) -> Self {
-        let sums = self.values.mapv(|value| if value.is_finite() { value } else { 0.0 });
-        let weights = self.values.mapv(|value| f64::from(u8::from(value.is_finite())));
-        let both = |map: Array2<f64>| along_gates(&along_lines(&map, line_step), gate_step);
-        let (sums, weights) = (both(sums), both(weights));
-        Self::new(&sums / &weights)
-    }
+/// Mean of a map with the weights of the spline, whose taps are the steps over lines and gates apart, over the places that are not NaN.
+fn smoothed(map: &Array2<f64>, [line_step, gate_step]: [usize; 2]) -> Array2<f64> {
+    let both = |map: Array2<f64>| along_gates(&along_lines(&map, line_step), gate_step);
+    let sums = both(map.mapv(|value| if value.is_finite() { value } else { 0.0 }));
+    sums / both(map.mapv(|value| f64::from(u8::from(value.is_finite()))))
 }
 
 /// Sums over lines with the weights of the spline; what lies outside the map is left out.

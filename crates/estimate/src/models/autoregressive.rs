@@ -44,18 +44,15 @@ impl OrderChoice {
     /// # Errors
     /// [`Error::OutOfRange`] if the number of samples is not above 0, [`Error::Empty`] without stages.
     pub fn order(&self, reflection: &[Complex<f64>]) -> Result<usize, Error> {
+        if reflection.is_empty() {
+            return Err(Error::Empty { field: "reflection" });
+        }
         let (samples, penalty) = match *self {
-            Self::Fixed => (1.0, f64::NEG_INFINITY),
+            Self::Fixed => return Ok(reflection.len()),
             Self::Akaike { samples } => (samples, 2.0),
             Self::DescriptionLength { samples } => (samples, samples.ln()),
         };
         positive("samples", samples)?;
-        if reflection.is_empty() {
-            return Err(Error::Empty { field: "reflection" });
-        }
-        if *self == Self::Fixed {
-            return Ok(reflection.len());
-        }
         let (mut best, mut least, mut value) = (1, f64::INFINITY, 0.0);
         for (stage, k) in reflection.iter().enumerate() {
             // a pure line leaves no error: the logarithm stays finite

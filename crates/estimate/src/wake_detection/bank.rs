@@ -96,13 +96,13 @@ impl Bank {
             height_m,
             core_radius_m: self.core_m,
         };
-        Wake {
-            left: of(0.0, lateral_position_m - 1.0),
-            right: of(1.0, lateral_position_m),
-            lateral_wind_m_s: 0.0,
-            wind_shear_per_s: 0.0,
-        }
+        calm(of(0.0, lateral_position_m - 1.0), of(1.0, lateral_position_m))
     }
+}
+
+/// Two vortices without wind.
+pub(super) fn calm(left: Vortex, right: Vortex) -> Wake {
+    Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
 }
 
 /// What a wake shows in each cell \[m/s\].

@@ -16,7 +16,7 @@ use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::DetectorOptions;
 use crate::wake_detection::background::Background;
-use crate::wake_detection::bank::{Bank, Sector, Template, shown};
+use crate::wake_detection::bank::{Bank, Sector, Template, calm, shown};
 use crate::wake_detection::cells::Cells;
 
 /// One part in so many of the cells may be missing in a scan.
@@ -42,8 +42,8 @@ pub struct WakeDetector {
     shapes: Array2<f64>,
     /// For each wake of the bank, the reciprocal of its length.
     reciprocal_length: Vec<f64>,
-    /// Lower factor of the covariance of the products with an empty scan.
-    factor: Array2<f64>,
+    /// Lower factor of the covariance of the products of an empty scan with all places.
+    pub(super) factor: Array2<f64>,
 }
 
 /// The test of one scan.
@@ -185,10 +185,10 @@ impl WakeDetector {
     /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake, each with its error.
     fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> [(f64, f64); 2] {
         let mut grid = Array2::from_elem((self.cells.elevation_rad.len(), self.cells.range_m.len()), f64::NAN);
-        let far = |a: (f64, f64), b: (f64, f64)| (a.0 - b.0).hypot(a.1 - b.1) > WAKE_M;
         for (cell, number) in self.cells.cells.iter().zip(numbers) {
-            let centres = [template.left, template.right].into_iter().flatten();
-            if centres.map(|place| self.bank.places_m[place]).all(|centre| far(centre, cell.place_m)) {
+            let mut centres =
+                [template.left, template.right].into_iter().flatten().map(|place| self.bank.places_m[place]);
+            if centres.all(|(y, z)| (y - cell.place_m.0).hypot(z - cell.place_m.1) > WAKE_M) {
                 grid[[cell.line, cell.gate]] = *number;
             }
         }
@@ -230,47 +230,27 @@ impl WakeDetector {
         self.best(products).0
     }
 
-    /// Factor of the covariance of the products of an empty scan with all places.
-    pub(super) fn factor(&self) -> &Array2<f64> {
-        &self.factor
-    }
-
     /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its
     /// circulations, were places and cores known.
     pub(super) fn products_of(&self, wake: &Wake) -> (Array1<f64>, f64) {
-        let calm = Wake { lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0, ..*wake };
-        let shown = shown(&calm, &self.cells, &self.model, &self.kernel, &mut Default::default());
+        let shown =
+            shown(&calm(wake.left, wake.right), &self.cells, &self.model, &self.kernel, &mut Default::default());
         let white = self.white(shown);
         (self.shapes.dot(&white), white.dot(&white).sqrt())
     }
 
     fn wake(&self, template: &Template, circulation_m2_s: f64) -> Wake {
-        let spacing_m = match template {
-            Template { left: Some(_), right: Some(_) } => 0.0,
-            _ => self.bank.step_m.0,
-        };
         let other = template.left.or(template.right).unwrap_or(0);
         let vortex = |place: Option<usize>, sense: f64| {
             let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
             Vortex {
                 circulation_m2_s: if place.is_some() { circulation_m2_s } else { 0.0 },
-                lateral_position_m: lateral_m + if place.is_some() { 0.0 } else { sense * spacing_m },
+                lateral_position_m: lateral_m + if place.is_some() { 0.0 } else { sense * self.bank.step_m.0 },
                 height_m,
                 core_radius_m: self.bank.core_m,
             }
         };
-        Wake {
-            left: vortex(template.left, -1.0),
-            right: vortex(template.right, 1.0),
-            lateral_wind_m_s: 0.0,
-            wind_shear_per_s: 0.0,
-        }
-    }
-
-    /// Velocities of the map that count as one cell, at most: large maps are thinned.
-    #[must_use]
-    pub fn cells(&self) -> usize {
-        self.cells.cells.len()
+        calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
     }
 
     /// Where wakes may be, and how far apart the vortices of a pair.

@@ -53,7 +53,7 @@ impl WakeDetector {
 
     /// Products of empty scans with all places: scans by places.
     pub(super) fn empty_products<R: Rng>(&self, scans: usize, stream: impl Fn(u64) -> R + Sync + Send) -> Array2<f64> {
-        let places = self.factor().nrows();
+        let places = self.factor.nrows();
         let batches = map_indexed(
             scans.div_ceil(BATCH),
             || (),
@@ -65,7 +65,7 @@ impl WakeDetector {
                     let mut generator = stream((first + scan) as u64);
                     row.mapv_inplace(|_| StandardNormal.sample(&mut generator));
                 }
-                lower_product(&normal, self.factor())
+                lower_product(&normal, &self.factor)
             },
         );
         let views: Vec<_> = batches.iter().map(|batch| batch.view()).collect();

@@ -45,7 +45,10 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     /// # Errors
     /// [`Error::Length`] if statistic and gates have windows of different lengths; as [`Gates::count`].
     pub fn new(statistic: &'s T, gates: &Gates, geometry: ScanGeometry, record_samples: usize) -> Result<Self, Error> {
-        Self::with_rule(statistic, gates, geometry, record_samples, Rule::NOT_FINITE)
+        let held = 0..geometry.gates();
+        let sums = Self::of_gates(statistic, gates, geometry, held)?;
+        length("windows of a record", sums.geometry.gates(), gates.count(record_samples)?)?;
+        Ok(Self { record_samples, ..sums })
     }
 
     /// The same for some gates of the records, whose samples [`Gates::samples`] tells: regions hold windows of these gates alone.
@@ -64,36 +67,16 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             let allowed = "behind their start, at most the gates of a record";
             return Err(Error::OutOfRange { field: "end of the gates", value: held.end as f64, allowed });
         }
-        let record_samples = gates.samples(&held).len();
-        Ok(Self::held(statistic, gates, geometry, held, record_samples, Rule::NOT_FINITE))
+        let (record_samples, numbers) = (gates.samples(&held).len(), statistic.statistic_len());
+        let rows = vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers];
+        let (invalid, gates, scale, sample) = (BTreeMap::new(), *gates, None, PhantomData);
+        let rule = Rule::NOT_FINITE;
+        Ok(Self { statistic, gates, geometry, held, record_samples, numbers, rows, rule, invalid, scale, sample })
     }
 
     /// The same with a rule for missing samples.
-    pub(super) fn with_rule(
-        statistic: &'s T,
-        gates: &Gates,
-        geometry: ScanGeometry,
-        record_samples: usize,
-        rule: Rule<'s>,
-    ) -> Result<Self, Error> {
-        length("window", statistic.window_samples(), gates.window_samples)?;
-        length("windows of a record", geometry.gates(), gates.count(record_samples)?)?;
-        let held = 0..geometry.gates();
-        Ok(Self::held(statistic, gates, geometry, held, record_samples, rule))
-    }
-
-    fn held(
-        statistic: &'s T,
-        gates: &Gates,
-        geometry: ScanGeometry,
-        held: Range<usize>,
-        record_samples: usize,
-        rule: Rule<'s>,
-    ) -> Self {
-        let numbers = statistic.statistic_len();
-        let rows = vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers];
-        let (invalid, gates, scale, sample) = (BTreeMap::new(), *gates, None, PhantomData);
-        Self { statistic, gates, geometry, held, record_samples, numbers, rows, rule, invalid, scale, sample }
+    pub(super) fn with_rule(self, rule: Rule<'s>) -> Self {
+        Self { rule, ..self }
     }
 
     /// The same with the scale of samples up to `largest`: parts of a scan that are summed apart have the bits of the whole.
@@ -185,10 +168,8 @@ fn valid_before(geometry: &ScanGeometry, gates: usize, invalid: &BTreeMap<usize,
     let lines = geometry.line_elevation_rad().len();
     let mut counts = Vec::with_capacity(lines * (gates + 1));
     for line in 0..lines {
-        let broken: Vec<&Vec<bool>> = match invalid.is_empty() {
-            true => Vec::new(),
-            false => geometry.line_rays(line).filter_map(|ray| invalid.get(&ray)).collect(),
-        };
+        let rays_with_invalid = geometry.line_rays(line).take_while(|_| !invalid.is_empty());
+        let broken: Vec<&Vec<bool>> = rays_with_invalid.filter_map(|ray| invalid.get(&ray)).collect();
         let rays = geometry.rays.count(line);
         let mut before = 0;
         counts.push(0);

@@ -10,8 +10,8 @@ use ndarray::Array2;
 use crate::error::Error;
 use crate::linalg::dot;
 use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
-use crate::vortex_fit::wake::free_parameters::{gathered, moved};
-use crate::vortex_fit::{Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
+use crate::vortex_fit::signal_fit::likelihood::groups;
+use crate::vortex_fit::{PARAMETERS, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// A wake and the powers of signal and noise.
 pub(crate) type State = (Wake, Powers);
@@ -36,45 +36,36 @@ pub(crate) struct Ascent<'a> {
 }
 
 impl Ascent<'_> {
-    /// Number of free numbers: those of the wake, then the logarithms of the powers.
-    fn order(&self) -> usize {
-        self.options.free.groups().len() + if self.options.fit_powers { 2 } else { 0 }
+    fn groups(&self) -> Vec<Vec<usize>> {
+        groups(&self.options.free, self.options.fit_powers)
     }
 
     /// The state after a step of the free numbers.
-    pub(crate) fn stepped(&self, (wake, powers): &State, step: &[f64]) -> State {
-        let mut powers = *powers;
-        if self.options.fit_powers {
-            powers.log_signal += step[step.len() - 2];
-            powers.log_noise += step[step.len() - 1];
+    pub(crate) fn stepped(&self, state: &State, step: &[f64]) -> State {
+        let mut numbers = numbers(state);
+        for (places, by) in self.groups().iter().zip(step) {
+            places.iter().for_each(|&place| numbers[place] += by);
         }
-        (moved(&self.options.free.groups(), wake, step), powers)
+        let [wake @ .., log_signal, log_noise] = numbers;
+        (Wake::from_array(&wake), Powers { log_signal, log_noise })
     }
 
     /// The free numbers of `to`, counted from `from`.
-    pub(crate) fn steps(&self, (from, from_powers): &State, (to, powers): &State) -> Vec<f64> {
-        let (a, b) = (from.to_array(), to.to_array());
-        let mut steps: Vec<f64> = self.options.free.groups().iter().map(|group| b[group[0]] - a[group[0]]).collect();
-        if self.options.fit_powers {
-            steps.extend([powers.log_signal - from_powers.log_signal, powers.log_noise - from_powers.log_noise]);
-        }
-        steps
+    pub(crate) fn steps(&self, from: &State, to: &State) -> Vec<f64> {
+        let (a, b) = (numbers(from), numbers(to));
+        self.groups().iter().map(|group| b[group[0]] - a[group[0]]).collect()
     }
 
     /// ln p and its gradient by the free numbers; nothing where the model does not exist.
     pub(crate) fn value(&self, state: &State) -> Option<(f64, Vec<f64>)> {
         let value = self.model.log_likelihood(self.signals, &state.0, state.1)?;
-        let groups = self.options.free.groups();
-        let mut gradient = vec![0.0; self.order()];
-        gathered(&groups, &value.by_wake, &mut gradient);
-        if self.options.fit_powers {
-            gradient[groups.len()] = value.by_log_signal;
-            gradient[groups.len() + 1] = value.by_log_noise;
-        }
+        let slopes: Vec<f64> = value.by_wake.into_iter().chain(value.by_powers).collect();
+        let gathered = |group: &Vec<usize>| group.iter().map(|&place| slopes[place]).sum();
+        let mut gradient: Vec<f64> = self.groups().iter().map(gathered).collect();
         let mut log_likelihood = value.log_likelihood;
         if let Some(others) = &self.others {
             let away = self.steps(&others.about, state);
-            let pull: Vec<f64> = others.information.rows().into_iter().map(|row| dot(&row.to_vec(), &away)).collect();
+            let pull = times(&others.information, &away);
             log_likelihood += dot(&others.gradient, &away) - 0.5 * dot(&pull, &away);
             gradient.iter_mut().zip(&others.gradient).zip(&pull).for_each(|((g, o), p)| *g += o - p);
         }
@@ -98,6 +89,7 @@ impl Ascent<'_> {
     /// [`Error::NotConverged`]; [`Error::Linalg`] if a covariance is not positive definite.
     pub(crate) fn climb(&self, start: State, evaluations: &mut usize) -> Result<(State, f64), Error> {
         let mut curvature = self.information(&start, self.options.information_stride)?;
+        let origin = vec![0.0; curvature.nrows()];
         let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
         let evaluate = |x: &Vec<f64>| {
             *evaluations += 1;
@@ -113,16 +105,28 @@ impl Ascent<'_> {
         let step = |x: &Vec<f64>, step: &[f64]| x.iter().zip(step).map(|(x, s)| x + s).collect();
         let (iterations, sigmas) = (self.options.max_iterations, self.options.tolerance_sigmas);
         let stop = Stop { iterations, sigmas, learns: true };
-        let (end, normal, _) = descend(vec![0.0; self.order()], stop, evaluate, step)?;
+        let (end, normal, _) = descend(origin, stop, evaluate, step)?;
         Ok((self.stepped(&start, &end), -normal.cost))
     }
+}
+
+/// The parameters of the wake and the logarithms of the powers.
+fn numbers((wake, powers): &State) -> [f64; PARAMETERS + 2] {
+    let mut numbers = [powers.log_noise; PARAMETERS + 2];
+    numbers[..PARAMETERS].copy_from_slice(&wake.to_array());
+    numbers[PARAMETERS] = powers.log_signal;
+    numbers
+}
+
+/// A matrix times a vector.
+pub(crate) fn times(matrix: &Array2<f64>, vector: &[f64]) -> Vec<f64> {
+    matrix.rows().into_iter().map(|row| dot(&row.to_vec(), vector)).collect()
 }
 
 /// Corrects the curvature so that it explains the change `y` of the gradient over the step `s`: the update of Broyden, Fletcher,
 /// Goldfarb and Shanno, damped after Powell (1978) so that it stays positive definite.
 fn learn(curvature: &mut Array2<f64>, s: &[f64], y: &[f64]) {
-    let n = s.len();
-    let hs: Vec<f64> = (0..n).map(|i| dot(curvature.row(i).as_slice().unwrap_or(&[]), s)).collect();
+    let hs = times(curvature, s);
     let (shs, sy) = (dot(s, &hs), dot(s, y));
     if shs <= 0.0 {
         return;

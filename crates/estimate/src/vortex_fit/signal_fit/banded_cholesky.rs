@@ -43,6 +43,11 @@ impl Banded {
         column * (self.width + 1) + down
     }
 
+    /// Multiplies all entries.
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.re.iter_mut().chain(&mut self.im).for_each(|entry| *entry *= factor);
+    }
+
     /// Entries of a column below and on the diagonal.
     fn height(&self, column: usize) -> usize {
         (self.width + 1).min(self.order - column)

@@ -15,12 +15,11 @@ use crate::parallel::map_indexed;
 use crate::vortex_fit::signal_fit::banded_cholesky::Banded;
 use crate::vortex_fit::signal_fit::line_covariance::Work;
 use crate::vortex_fit::signal_fit::scan_model::Line;
-use crate::vortex_fit::wake::free_parameters::gathered;
 use crate::vortex_fit::{FreeParameters, PARAMETERS, ScanModel, Wake};
 use crate::window::Sample;
 
-/// Powers of signal and noise relative to the model.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Powers of signal and noise relative to the model; by default as it states.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Powers {
     /// Natural logarithm of the signal power over the SNR of the model times its unit noise power.
     pub log_signal: f64,
@@ -28,24 +27,15 @@ pub struct Powers {
     pub log_noise: f64,
 }
 
-impl Default for Powers {
-    /// As the model states.
-    fn default() -> Self {
-        Self { log_signal: 0.0, log_noise: 0.0 }
-    }
-}
-
 /// Log-likelihood and its derivatives.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct LikelihoodValue {
     /// Log-likelihood, but for a constant.
     pub log_likelihood: f64,
     /// Derivatives in the order of [`Parameter`](crate::vortex_fit::Parameter).
     pub by_wake: [f64; PARAMETERS],
-    /// Derivative with respect to the logarithm of the signal power.
-    pub by_log_signal: f64,
-    /// Derivative with respect to the logarithm of the noise power.
-    pub by_log_noise: f64,
+    /// Derivatives with respect to the logarithms of signal and noise power.
+    pub by_powers: [f64; 2],
 }
 
 /// The records of a scan in complex baseband, in units of the root of the noise power.
@@ -107,15 +97,13 @@ impl ScanModel {
         let lines = map_indexed(self.lines.len(), Space::default, |space, index| {
             self.line_likelihood(&self.lines[index], signals, wake, powers, space)
         });
-        let mut sum =
-            LikelihoodValue { log_likelihood: 0.0, by_wake: [0.0; PARAMETERS], by_log_signal: 0.0, by_log_noise: 0.0 };
+        let mut sum = LikelihoodValue::default();
         // in the order of the lines, whoever computed them
         for line in lines {
             let line = line?;
             sum.log_likelihood += line.log_likelihood;
             sum.by_wake.iter_mut().zip(line.by_wake).for_each(|(s, l)| *s += l);
-            sum.by_log_signal += line.by_log_signal;
-            sum.by_log_noise += line.by_log_noise;
+            sum.by_powers.iter_mut().zip(line.by_powers).for_each(|(s, l)| *s += l);
         }
         sum.log_likelihood.is_finite().then_some(sum)
     }
@@ -128,8 +116,7 @@ impl ScanModel {
         powers: Powers,
         space: &mut Space,
     ) -> Option<LikelihoodValue> {
-        let mut value =
-            LikelihoodValue { log_likelihood: 0.0, by_wake: [0.0; PARAMETERS], by_log_signal: 0.0, by_log_noise: 0.0 };
+        let mut value = LikelihoodValue::default();
         let rays: Vec<&Vec<Complex<f64>>> = line.rays.iter().filter_map(|&ray| signals.rays[ray].as_ref()).collect();
         if rays.is_empty() {
             return Some(value);
@@ -140,7 +127,7 @@ impl ScanModel {
         space.factor.inverse_into(&mut space.inverse);
         // the inverse becomes the weight of the gradient: sum of x x^H - R^-1, off the diagonal for both triangles
         let Space { work, signal, factor, inverse: weight } = space;
-        weight.re.iter_mut().chain(&mut weight.im).for_each(|v| *v *= -count);
+        weight.scale(-count);
         for z in rays {
             let x = solve(factor, z);
             let quadratic: f64 = x.iter().zip(z).map(|(x, z)| x.re * z.re + x.im * z.im).sum();
@@ -149,9 +136,8 @@ impl ScanModel {
         }
         double_off_diagonal(weight);
         let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
-        value.by_log_signal = signal_power * product(weight, signal);
-        value.by_log_noise = noise_power * self.noise_product(weight);
-        weight.re.iter_mut().chain(&mut weight.im).for_each(|v| *v *= signal_power);
+        value.by_powers = [signal_power * product(weight, signal), noise_power * self.noise_product(weight)];
+        weight.scale(signal_power);
         self.pull_back(line, weight, work, &mut value.by_wake);
         Some(value)
     }
@@ -162,8 +148,7 @@ impl ScanModel {
         self.wind_into(line, wake, work);
         self.signal_into(line, work, signal);
         factor.clone_from(signal);
-        let power = powers.log_signal.exp();
-        factor.re.iter_mut().chain(&mut factor.im).for_each(|v| *v *= power);
+        factor.scale(powers.log_signal.exp());
         let noise_power = powers.log_noise.exp();
         for column in 0..factor.order {
             for lag in 0..=factor.width.min(factor.order - 1 - column) {
@@ -196,13 +181,12 @@ impl ScanModel {
     ) -> Result<Array2<f64>, Error> {
         wake.validate()?;
         positive("stride", stride as f64)?;
-        let groups = free.groups();
+        let groups = groups(free, powers_free);
         let lines: Vec<&Line> = self.lines.iter().step_by(stride).collect();
         let parts = map_indexed(lines.len(), Space::default, |space, index| {
-            self.line_information(lines[index], wake, powers, &groups, powers_free, space)
+            self.line_information(lines[index], wake, powers, &groups, space)
         });
-        let order = groups.len() + if powers_free { 2 } else { 0 };
-        let mut sum = Array2::zeros((order, order));
+        let mut sum = Array2::zeros((groups.len(), groups.len()));
         for part in parts {
             sum += &part?;
         }
@@ -216,7 +200,6 @@ impl ScanModel {
         wake: &Wake,
         powers: Powers,
         groups: &[Vec<usize>],
-        powers_free: bool,
         space: &mut Space,
     ) -> Result<Array2<f64>, Error> {
         self.covariance_into(line, wake, powers, space);
@@ -224,27 +207,25 @@ impl ScanModel {
         let indefinite =
             Error::Linalg { what: "covariance of a line of sight", order, reason: "is not positive definite" };
         space.factor.factorize().ok_or(indefinite)?;
-        let signal_power = powers.log_signal.exp();
+        let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
         let mut whitened = Vec::new();
         for group in groups {
             let change = &mut space.inverse;
-            let slope = |slopes: &[f64; PARAMETERS]| {
-                let mut sum = [0.0];
-                gathered(std::slice::from_ref(group), slopes, &mut sum);
-                signal_power * sum[0]
-            };
-            self.change_into(line, &mut space.work, slope, change);
-            whitened.push(whiten(&space.factor, change));
-        }
-        if powers_free {
-            let change = &mut space.inverse;
-            change.clone_from(&space.signal);
-            change.re.iter_mut().chain(&mut change.im).for_each(|v| *v *= signal_power);
-            whitened.push(whiten(&space.factor, change));
-            change.reset(order, space.signal.width);
-            let noise_power = powers.log_noise.exp();
-            for column in change.re.chunks_exact_mut(self.noise.len().min(order)) {
-                column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c = noise_power * n);
+            match group[0] {
+                SIGNAL => {
+                    change.clone_from(&space.signal);
+                    change.scale(signal_power);
+                }
+                NOISE => {
+                    change.reset(order, space.signal.width);
+                    for column in change.re.chunks_exact_mut(self.noise.len().min(order)) {
+                        column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c = noise_power * n);
+                    }
+                }
+                _ => {
+                    let slope = |slopes: &[f64; PARAMETERS]| group.iter().map(|&place| slopes[place]).sum::<f64>();
+                    self.change_into(line, &mut space.work, |slopes| signal_power * slope(slopes), change);
+                }
             }
             whitened.push(whiten(&space.factor, change));
         }
@@ -259,6 +240,17 @@ impl ScanModel {
         }
         Ok(information)
     }
+}
+
+/// Places of the logarithms of the powers behind the parameters of the wake.
+const SIGNAL: usize = PARAMETERS;
+const NOISE: usize = PARAMETERS + 1;
+
+/// The places that change together with each free number; with `powers_free` the powers stand behind the wake.
+pub(crate) fn groups(free: &FreeParameters, powers_free: bool) -> Vec<Vec<usize>> {
+    let mut groups = free.groups();
+    groups.extend([SIGNAL, NOISE].into_iter().filter(|_| powers_free).map(|place| vec![place]));
+    groups
 }
 
 /// R^-1 z from the factor of R.

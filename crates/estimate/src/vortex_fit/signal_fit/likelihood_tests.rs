@@ -121,7 +121,7 @@ fn gradient_is_the_difference_quotient_of_the_likelihood() {
         let error = (value.by_wake[index] - quotient).abs();
         assert!(error < 1e-5 * quotient.abs() + 1e-6 / h, "{index}: {} {quotient}", value.by_wake[index]);
     }
-    for (which, found) in [value.by_log_signal, value.by_log_noise].into_iter().enumerate() {
+    for (which, found) in value.by_powers.into_iter().enumerate() {
         let at = |by: f64| {
             let mut moved = powers;
             *(if which == 0 { &mut moved.log_signal } else { &mut moved.log_noise }) += by;

@@ -53,7 +53,7 @@ impl ScanModel {
     }
 
     /// m T d omega / dv of each place.
-    pub(crate) fn lag_phase_slopes(&self) -> Vec<f64> {
+    fn lag_phase_slopes(&self) -> Vec<f64> {
         let per_lag = self.baseband.turn_per_velocity_rad_m() * self.baseband.interval_s();
         self.weights.lag_of_place().map(|lag| lag as f64 * per_lag).collect()
     }

@@ -12,13 +12,13 @@ use crate::error::{Error, finite, not_negative, positive};
 use crate::vortex_fit::signal_fit::baseband::PowerGain;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::pulse::PairWeights;
-use crate::vortex_fit::{Baseband, CoreProfile, PulseShape, Wake, WakeModel};
+use crate::vortex_fit::{Baseband, CoreProfile, PulseShape, Vortex, Wake, WakeModel};
 use crate::window::{SPEED_OF_LIGHT_M_S, Sampling, SignalKind};
 
 /// Covariances below this part of the noise are left out.
 const CUT: f64 = 1e-6;
 /// The layers stay thin enough while the vortices are within this distance of the guess \[m\].
-pub(crate) const MARGIN_M: f64 = 5.0;
+const MARGIN_M: f64 = 5.0;
 /// The most layers between two nodes.
 const MOST_LAYERS: f64 = 64.0;
 
@@ -161,14 +161,11 @@ impl ScanModel {
 
     /// Whether the layers are still thin enough for a wake.
     pub(crate) fn covers(&self, wake: &Wake) -> bool {
-        let near = |a: &crate::vortex_fit::wake::pair::Vortex, b: &crate::vortex_fit::wake::pair::Vortex| {
-            (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) <= MARGIN_M
-        };
         // steeper cores are those smaller than the third to spare
-        let wide = |a: &crate::vortex_fit::wake::pair::Vortex, b: &crate::vortex_fit::wake::pair::Vortex| {
-            a.core_radius_m >= b.core_radius_m * 2.0 / 3.0
+        let covers = |a: &Vortex, b: &Vortex| {
+            (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) <= MARGIN_M
+                && a.core_radius_m >= b.core_radius_m * 2.0 / 3.0
         };
-        let covers = |a, b| near(a, b) && wide(a, b);
         covers(&wake.left, &self.guess.left) && covers(&wake.right, &self.guess.right)
     }
 
@@ -185,8 +182,7 @@ impl ScanModel {
 
     /// Distance at which a line passes the nearer vortex \[m\].
     pub(crate) fn passes_m(&self, line: &Line, wake: &Wake) -> f64 {
-        let to = |vortex: &crate::vortex_fit::wake::pair::Vortex| self.wake.passes_m(line.ray, vortex);
-        to(&wake.left).min(to(&wake.right))
+        self.wake.passes_m(line.ray, &wake.left).min(self.wake.passes_m(line.ray, &wake.right))
     }
 }
 

@@ -10,8 +10,8 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::linalg::dot;
-use crate::vortex_fit::damped_newton::solve;
-use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State};
+use crate::vortex_fit::damped_newton::{inverse, solve};
+use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State, times};
 use crate::vortex_fit::{Parameter, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// Core radii that are tried, over the spacing of the vortices.
@@ -102,8 +102,7 @@ pub(crate) fn near_lines(model: &ScanModel, wake: &Wake) -> ScanModel {
 /// Whether two states are the same top.
 pub(crate) fn same(ascent: &Ascent<'_>, information: &Array2<f64>, a: &State, b: &State) -> bool {
     let apart = ascent.steps(a, b);
-    let image: Vec<f64> = information.rows().into_iter().map(|row| dot(&row.to_vec(), &apart)).collect();
-    dot(&image, &apart) < SAME_SIGMAS * SAME_SIGMAS
+    dot(&times(information, &apart), &apart) < SAME_SIGMAS * SAME_SIGMAS
 }
 
 /// The free numbers that move heights, and those that move core radii.
@@ -118,7 +117,8 @@ fn axes(options: &SignalFitOptions) -> (Vec<usize>, Vec<usize>) {
 /// Places to climb from, the most promising first: no two of them are neighbours.
 fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluations: &mut usize) -> Vec<State> {
     let (heights, cores) = axes(ascent.options);
-    let Some(deviations) = deviations(information) else { return Vec::new() };
+    let Ok(covariance) = inverse("information on the wake", information) else { return Vec::new() };
+    let deviations: Vec<f64> = covariance.diag().iter().map(|variance| variance.max(0.0).sqrt()).collect();
     let core_m = |k: usize| CORES_OVER_SPACING[k] * top.0.spacing_m();
     let rows = if cores.is_empty() { 1 } else { CORES_OVER_SPACING.len() };
     let quick: Vec<usize> = (0..information.nrows()).filter(|i| !heights.contains(i) && !cores.contains(i)).collect();
@@ -192,16 +192,6 @@ fn chosen(mut scores: Vec<(f64, usize, Vec<i32>, State)>) -> Vec<State> {
         }
     }
     taken.into_iter().map(|(_, _, state)| state).collect()
-}
-
-/// Standard deviations of the free numbers.
-fn deviations(information: &Array2<f64>) -> Option<Vec<f64>> {
-    let n = information.nrows();
-    let variance = |i: usize| {
-        let unit: Vec<f64> = (0..n).map(|j| if i == j { 1.0 } else { 0.0 }).collect();
-        solve(information, &unit).map(|column| column[i].max(0.0).sqrt())
-    };
-    (0..n).map(variance).collect()
 }
 
 /// The step of Newton of the numbers `quick` alone, at most 3 standard deviations long, with the ln p that it promises.
