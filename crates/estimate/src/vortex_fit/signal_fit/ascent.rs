@@ -11,6 +11,7 @@ use crate::error::Error;
 use crate::linalg::dot;
 use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
 use crate::vortex_fit::signal_fit::likelihood::groups;
+use crate::vortex_fit::wake::free_parameters::{gathered, stepped};
 use crate::vortex_fit::{PARAMETERS, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// A wake and the powers of signal and noise.
@@ -42,12 +43,9 @@ impl Ascent<'_> {
 
     /// The state after a step of the free numbers.
     pub(crate) fn stepped(&self, state: &State, step: &[f64]) -> State {
-        let mut numbers = numbers(state);
-        for (places, by) in self.groups().iter().zip(step) {
-            places.iter().for_each(|&place| numbers[place] += by);
-        }
-        let [wake @ .., log_signal, log_noise] = numbers;
-        (Wake::from_array(&wake), Powers { log_signal, log_noise })
+        let numbers = stepped(&self.groups(), &numbers(state), step);
+        let powers = Powers { log_signal: numbers[PARAMETERS], log_noise: numbers[PARAMETERS + 1] };
+        (Wake::from_list(&numbers), powers)
     }
 
     /// The free numbers of `to`, counted from `from`.
@@ -60,8 +58,9 @@ impl Ascent<'_> {
     pub(crate) fn value(&self, state: &State) -> Option<(f64, Vec<f64>)> {
         let value = self.model.log_likelihood(self.signals, &state.0, state.1)?;
         let slopes: Vec<f64> = value.by_wake.into_iter().chain(value.by_powers).collect();
-        let gathered = |group: &Vec<usize>| group.iter().map(|&place| slopes[place]).sum();
-        let mut gradient: Vec<f64> = self.groups().iter().map(gathered).collect();
+        let groups = self.groups();
+        let mut gradient = vec![0.0; groups.len()];
+        gathered(&groups, &slopes, &mut gradient);
         let mut log_likelihood = value.log_likelihood;
         if let Some(others) = &self.others {
             let away = self.steps(&others.about, state);
@@ -111,11 +110,8 @@ impl Ascent<'_> {
 }
 
 /// The parameters of the wake and the logarithms of the powers.
-fn numbers((wake, powers): &State) -> [f64; PARAMETERS + 2] {
-    let mut numbers = [powers.log_noise; PARAMETERS + 2];
-    numbers[..PARAMETERS].copy_from_slice(&wake.to_array());
-    numbers[PARAMETERS] = powers.log_signal;
-    numbers
+fn numbers((wake, powers): &State) -> Vec<f64> {
+    wake.to_array().into_iter().chain([powers.log_signal, powers.log_noise]).collect()
 }
 
 /// A matrix times a vector.

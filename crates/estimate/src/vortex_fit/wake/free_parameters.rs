@@ -112,11 +112,6 @@ impl FreeParameters {
     }
 }
 
-/// The wake after a step of the free numbers.
-pub(crate) fn moved(groups: &[Vec<usize>], wake: &Wake, step: &[f64]) -> Wake {
-    Wake::from_list(&stepped(groups, &wake.to_array(), step))
-}
-
 /// Parameters after a step of the free numbers.
 pub(crate) fn stepped(groups: &[Vec<usize>], p: &[f64], step: &[f64]) -> Vec<f64> {
     let mut p = p.to_vec();
