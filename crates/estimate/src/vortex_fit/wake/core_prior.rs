@@ -90,7 +90,7 @@ pub(crate) fn is_core(group: &[usize]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::vortex_fit::wake::free_parameters::moved;
+    use crate::vortex_fit::wake::free_parameters::stepped;
     use crate::vortex_fit::{FreeParameters, Sharing};
 
     #[test]
@@ -105,7 +105,9 @@ mod tests {
                 for (number, slope) in slope.iter().enumerate() {
                     let at = |by: f64| {
                         let step: Vec<f64> = (0..groups.len()).map(|i| if i == number { by } else { 0.0 }).collect();
-                        CorePrior::TYPICAL.terms(&moved(&groups, &wake, &step), &groups)[index].0
+                        CorePrior::TYPICAL.terms(&Wake::from_list(&stepped(&groups, &wake.to_array(), &step)), &groups)
+                            [index]
+                            .0
                     };
                     assert!((slope - (at(1e-4) - at(-1e-4)) / 2e-4).abs() < 1e-7, "{number}");
                 }

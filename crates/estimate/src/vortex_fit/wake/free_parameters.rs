@@ -158,12 +158,11 @@ mod tests {
         };
         let groups = free.groups();
         assert_eq!(groups.len(), 6);
-        let origin = Wake::from_array(&[0.0; PARAMETERS]);
         let step: Vec<f64> = (0..6).map(|i| 1.0 + i as f64).collect();
         let slope: [f64; PARAMETERS] = std::array::from_fn(|i| (i as f64 * 1.7).sin());
         let mut gradient = vec![0.0; 6];
         gathered(&groups, &slope, &mut gradient);
-        let spread_step = moved(&groups, &origin, &step).to_array();
+        let spread_step = stepped(&groups, &[0.0; PARAMETERS], &step);
         let a: f64 = spread_step.iter().zip(&slope).map(|(x, y)| x * y).sum();
         let b: f64 = step.iter().zip(&gradient).map(|(x, y)| x * y).sum();
         assert!((a - b).abs() < 1e-12);
