@@ -1,7 +1,7 @@
 //! How a scan is retrieved.
 
 use crate::error::{Error, not_negative, positive};
-use crate::vortex_fit::{CorePrior, FreeParameters, Loss, RangeKernel, Vortex, Wake, WakeModel, WindFit};
+use crate::vortex_fit::{CorePrior, FreeParameters, Loss, RangeKernel, Secondary, Vortex, Wake, WakeModel, WindFit};
 
 /// What a velocity of the map is of the air about its range.
 #[derive(Debug, Clone, PartialEq)]
@@ -81,6 +81,8 @@ pub struct RetrievalOptions {
     pub core_prior: Option<CorePrior>,
     /// What residuals cost.
     pub loss: Loss,
+    /// Whether secondary vortices are fitted.
+    pub secondary: Secondary,
     /// Correlated velocities to be whitened.
     pub turbulence: Option<Turbulence>,
     /// How the covariance is made.
@@ -130,6 +132,7 @@ impl Default for RetrievalOptions {
             core_radius_m: None,
             core_prior: None,
             loss: Loss::Cauchy { width: 2.385 },
+            secondary: Secondary::Auto,
             turbulence: None,
             covariance: Covariance::Sandwich,
             movement: Movement::Auto,

@@ -119,7 +119,7 @@ pub enum Flag {
     AtEdge,
     /// A vortex is lower than half the spacing, where the ground makes secondary vortices.
     NearGround,
-    /// Secondary vortices were fitted beside the pair.
+    /// The scan shows secondary vortices beside the pair; whether they were fitted is in the options.
     SecondaryVortices,
     /// The vortices were taken as standing still although the scan lasted, or its times are unknown.
     MotionIgnored,

@@ -11,7 +11,8 @@ use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter};
 
 /// What [`fit_scan`] finds with secondary vortices in the model, and the options with them, if the scan shows them beside the pair that it has
-/// `found`. Looked for are those in velocities whose errors are independent. The deviations count what is not known of them.
+/// `found` or [`RetrievalOptions::secondary`] wants them anyway; with [`Secondary::Never`] what was found, flagged. Looked for are those in
+/// velocities whose errors are independent. The deviations count what is not known of them.
 ///
 /// # Errors
 /// As [`fit_scan`].
@@ -31,6 +32,7 @@ pub fn with_secondary_vortices(
         free: options.free,
         core_prior: options.core_prior,
         loss: options.loss,
+        secondary: options.secondary,
         correlated_lines: map.elevation_rad.len(),
         ..MapFitOptions::default()
     };
@@ -46,16 +48,24 @@ pub fn with_secondary_vortices(
         least_core_m: 0.0,
     };
     let Some(four) = setting.with_secondary(&pair) else { return Ok(None) };
+    if !four.secondary.fitted {
+        let mut result = found.clone();
+        result.flags.push(Flag::SecondaryVortices);
+        result.flags.sort();
+        return Ok(Some((result, options.clone())));
+    }
     // what another profile would do was free in the search
     let mut options = RetrievalOptions { other_profile: false, ..options.clone() };
-    options.model.secondary = Some(four.secondary);
+    options.model.secondary = Some(four.secondary.vortices);
     options.start = Some(four.wake);
     let mut result = fit_scan(map, &options)?;
     if result.vortices.len() < 2 {
         return Ok(None);
     }
-    result.flags.push(Flag::SecondaryVortices);
-    result.flags.sort();
+    if four.secondary.shown {
+        result.flags.push(Flag::SecondaryVortices);
+        result.flags.sort();
+    }
     widen(&mut result, map, &four.covariance, &options);
     Ok(Some((result, options)))
 }

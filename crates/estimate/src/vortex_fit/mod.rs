@@ -37,9 +37,10 @@ pub(crate) mod map_fit;
 mod signal_fit;
 pub(crate) mod wake;
 
-pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, VelocityMap};
+pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, Secondary, VelocityMap};
 pub use map_fit::estimates::{fit_map, fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator};
 pub use map_fit::estimator_response::EstimatorResponse;
+pub use map_fit::secondary::SecondaryVortices;
 pub use signal_fit::baseband::Baseband;
 pub use signal_fit::fit::{SignalFit, fit_signals};
 pub use signal_fit::likelihood::{LikelihoodValue, Powers, ScanSignals};

@@ -12,7 +12,11 @@ use wakescope_estimate::{
 };
 
 /// A map of peaks with noise, of a pair with these secondary vortices, fitted without and with such vortices.
-fn fits_near_the_ground(secondary: Option<[Vortex; 2]>, seed: u64) -> (MapFit, Option<(MapFit, [Vortex; 2])>) {
+fn fits_near_the_ground(
+    shown: Option<[Vortex; 2]>,
+    seed: u64,
+    secondary: Secondary,
+) -> (MapFit, Option<(Option<MapFit>, SecondaryVortices)>) {
     let sampling = table_2();
     let peak =
         SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
@@ -21,7 +25,7 @@ fn fits_near_the_ground(secondary: Option<[Vortex; 2]>, seed: u64) -> (MapFit, O
     let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
     let (elevation_rad, range_m): (Vec<f64>, Vec<f64>) =
         ((0..90).map(|i| 0.02 + 0.002 * f64::from(i)).collect(), (0..34).map(|i| 296.0 + 6.0 * f64::from(i)).collect());
-    let truth = WakeModel { secondary, ..Default::default() };
+    let truth = WakeModel { secondary: shown, ..Default::default() };
     let mut velocity_m_s = response.map(&truth, &grounded(), &elevation_rad, &range_m).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     velocity_m_s.mapv_inplace(|v| v + 0.2 * normal(&mut rng));
@@ -31,7 +35,8 @@ fn fits_near_the_ground(secondary: Option<[Vortex; 2]>, seed: u64) -> (MapFit, O
         velocity_m_s: velocity_m_s.view(),
         standard_deviation_m_s: None,
     };
-    let (model, options) = (WakeModel::default(), MapFitOptions { correlated_lines: 2, ..Default::default() });
+    let (model, options) =
+        (WakeModel::default(), MapFitOptions { correlated_lines: 2, secondary, ..Default::default() });
     let pair = fit_map_of_estimator(&map, &model, &response, &options).unwrap();
     let four = fit_secondary_vortices(&map, &model, &response, &pair.wake, &options).unwrap();
     (pair, four)
@@ -58,8 +63,9 @@ fn secondary_vortices_are_found_beside_their_vortices() {
     let truth = grounded().to_array();
     let (mut missed, mut worst) = (0.0_f64, 0.0_f64);
     for seed in 0..2 {
-        let (pair, four) = fits_near_the_ground(Some(secondary_of_grounded()), seed);
+        let (pair, four) = fits_near_the_ground(Some(secondary_of_grounded()), seed, Secondary::Auto);
         let (fit, secondary) = four.expect("secondary vortices");
+        let (fit, secondary) = (fit.expect("a fit with them"), secondary.vortices);
         // circulations and places
         for (place, truth) in truth.iter().enumerate().take(6) {
             let away = |fit: &MapFit, of: &MapFit| {
@@ -78,8 +84,25 @@ fn secondary_vortices_are_found_beside_their_vortices() {
 #[test]
 fn a_pair_alone_has_no_secondary_vortices() {
     for seed in 0..4 {
-        assert!(fits_near_the_ground(None, seed).1.is_none(), "{seed}");
+        assert!(fits_near_the_ground(None, seed, Secondary::Auto).1.is_none(), "{seed}");
     }
+}
+
+/// Fitted or not, the flag says what the residuals of the pair look like.
+#[test]
+fn secondary_vortices_are_fitted_never_or_always_and_told_where_the_map_shows_them() {
+    let shown = Some(secondary_of_grounded());
+    let (pair, never) = fits_near_the_ground(shown, 0, Secondary::Never);
+    let (fit, secondary) = never.expect("secondary vortices");
+    assert!(fit.is_none() && secondary.shown && !secondary.fitted, "{secondary:?}");
+    let (fit, secondary) = fits_near_the_ground(None, 0, Secondary::Always).1.expect("secondary vortices");
+    assert!(fit.is_some_and(|fit| fit.wake != pair.wake) && !secondary.shown && secondary.fitted, "{secondary:?}");
+    let case = case("b");
+    let options = |secondary: Secondary| RetrievalOptions { secondary, ..case.options.clone() };
+    let pair = fit_scan(&case.map, &case.options).unwrap();
+    assert!(with_secondary_vortices(&case.map, &options(Secondary::Never), &pair).unwrap().is_none());
+    let (four, with) = with_secondary_vortices(&case.map, &options(Secondary::Always), &pair).unwrap().unwrap();
+    assert!(with.model.secondary.is_some() && !four.has(Flag::SecondaryVortices), "{four:?}");
 }
 
 /// Pairs with secondary vortices beside them, and the same scans without.

@@ -14,7 +14,7 @@ use clap::{ArgAction, Args};
 use serde_json::json;
 use std::path::PathBuf;
 use wakescope_estimate::retrieval::{Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track};
-use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Loss, Sharing, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Loss, Secondary, Sharing, Wake, WakeModel};
 
 /// Words of `wakescope retrieve`.
 #[derive(Debug, Args)]
@@ -48,6 +48,9 @@ pub(super) struct RetrieveWords {
     /// Core radius that is kept, m; fitted without it.
     #[arg(long, value_name = "M", value_parser = positive)]
     core: Option<f64>,
+    /// Whether secondary vortices are fitted beside a pair: where a scan shows them, never, or always; of the scene without it, else auto.
+    #[arg(long, value_enum)]
+    secondary: Option<Secondary>,
     /// What residuals cost: cauchy bears outliers, squares does not.
     #[arg(long = "loss", action = ArgAction::Set, default_value = "cauchy", value_parser = switch(["cauchy", "squares"]))]
     bears_outliers: bool,
@@ -81,6 +84,7 @@ impl RetrieveWords {
             Flow::VortexPair(pair) => Some(pair.profile),
             _ => None,
         });
+        let wanted = of_scene.and_then(|scene| scene.retrieval.as_ref());
         let height_m = self.lidar_height.or(of_scene.map(|scene| scene.scan.lidar_height_m));
         // Long gates do not show cores: without what is known of them they run away with the circulation.
         let is_long = match &gate {
@@ -99,6 +103,7 @@ impl RetrieveWords {
             },
             gate,
             core_radius_m: self.core,
+            secondary: self.secondary.or(wanted.map(|wanted| wanted.secondary)).unwrap_or_default(),
             turbulence: self.air.turbulence,
             covariance: self.covariance,
             movement: self.motion,

@@ -99,6 +99,7 @@ impl OwnScene {
                 free: options.free,
                 core_radius_m: options.core_radius_m,
                 loss: options.loss,
+                secondary: options.secondary,
                 correlated_lines: self.response.correlated_lines(spacing_m(&map.elevation_rad), range_m),
                 ..MapFitOptions::default()
             },
@@ -167,11 +168,14 @@ impl Fits<'_> {
         let (mut fit, moves) = self.best(None)?;
         let (model, shown) = (&options.model, self.shown(moves));
         let four = fit_secondary_vortices(&self.view, model, shown, &fit.wake, &self.map_options).ok().flatten();
-        if let Some((with_secondary, vortices)) = four {
+        let are_shown = four.as_ref().is_some_and(|(_, secondary)| secondary.shown);
+        if let Some((Some(with_secondary), secondary)) = four {
             fit = with_secondary;
-            options.model.secondary = Some(vortices);
+            options.model.secondary = Some(secondary.vortices);
         }
-        Some((of_fit(found, self.scan, &options, &fit, moves), options))
+        let mut result = of_fit(found, self.scan, &options, &fit, moves);
+        set(&mut result.flags, Flag::SecondaryVortices, are_shown);
+        Some((result, options))
     }
 
     /// The one vortex that is found; another may be there beyond the scan.
@@ -194,7 +198,6 @@ fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &M
     let mut result = retold(found, map, options, (fit.wake, fit.covariance.clone()), tops, moves);
     (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
     set(&mut result.flags, Flag::Outliers, 10 * fit.outliers > fit.used);
-    set(&mut result.flags, Flag::SecondaryVortices, options.model.secondary.is_some());
     result
 }
 

@@ -114,6 +114,7 @@ fn options(scene: &Scene, wanted: &Retrieval) -> Result<RetrievalOptions, Error>
         model: WakeModel { profile, lidar_height_m: scene.scan.lidar_height_m, ..WakeModel::default() },
         gate: gate_of(None, None, Some(scene))?.0,
         core_radius_m: wanted.core_radius_m,
+        secondary: wanted.secondary,
         core_prior: Some(CorePrior::TYPICAL),
         other_profile: !matches!(scene.flow, Flow::VortexPair(_)),
         ..RetrievalOptions::default()

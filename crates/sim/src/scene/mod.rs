@@ -34,7 +34,7 @@ pub use read::SceneFile;
 pub use receiver::*;
 pub use retrieval::*;
 pub use wakescope_estimate::Refinement;
-pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope};
+pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope, Secondary};
 pub use wakescope_optics::{RadiusDefinition, air::OuterScaleConvention, plan::Receiver as ReceiverPath};
 pub use wakescope_signal::{NoiseModel, sampled::Resampling};
 
@@ -52,6 +52,7 @@ crate::keys::foreign_choices! {
     ReceiverPath: "monostatic" | "bistatic",
     Refinement: "parabola" | "exact" | "none",
     Resampling: "cubic_spline" | "band_limited" | "linear",
+    Secondary: "auto" | "never" | "always",
 }
 
 /// The commented scene that `wakescope init` writes: every key with its default.
@@ -244,6 +245,7 @@ mod tests {
         check::<ReceiverPath>(2);
         check::<Refinement>(3);
         check::<Resampling>(3);
+        check::<Secondary>(3);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use super::{Flow, NoiseModel, Pattern, PulseShape, Scan, Scene, Weighting};
 use crate::keys::{Checker, Is, keys};
 use crate::setup::beams::direction::sin_cos_of_turn;
-use wakescope_estimate::vortex_fit::LiftSlope;
+use wakescope_estimate::vortex_fit::{LiftSlope, Secondary};
 
 keys! {
     /// How circulations are found.
@@ -32,6 +32,8 @@ keys! {
         ),
         /// Core radius that fits keep, m; fitted if absent.
         core_radius_m: Option<f64> = None => 1e-3..=1e3,
+        /// Whether secondary vortices are fitted beside a pair.
+        secondary: Secondary = Secondary::Auto,
         /// Rate of false alarms of a scan at which the maps are tested for a wake; absent: no test.
         false_alarm: Option<f64> = None => 1e-9..=0.5,
         /// The aircraft that follows; absent: none.
@@ -119,6 +121,7 @@ mod tests {
     #[test]
     fn retrievals_are_held_to_their_limits_and_need_vortices() {
         for text in [
+            "[retrieval]\nsecondary = \"never\"\n",
             "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"envelope\", \"integral\"]\nfalse_alarm = 0.01\n",
             "[retrieval]\n[scan]\nazimuth_rad = 1.0\n[scan.head]\nsweeps = 3\ndirection = \"alternate\"\n",
             "[retrieval]\n[scan]\nazimuth_rad = 2.0\n[scan.lidar]\nflight_azimuth_rad = 0.42920367320510344\n",
@@ -134,6 +137,7 @@ mod tests {
             ("[retrieval]\nmethods = [\"signals\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
             ("[retrieval]\nfalse_alarm = 0.9\n", "retrieval.false_alarm"),
             ("[retrieval]\ncore_radius_m = 0.0\n", "retrieval.core_radius_m"),
+            ("[retrieval]\nsecondary = \"sometimes\"\n", "retrieval.secondary"),
             ("[retrieval]\n[retrieval.follower]\nspan_m = -1.0\n", "retrieval.follower.span_m"),
             ("[retrieval]\n[flow]\nkind = \"calm\"\n", "retrieval"),
             ("[retrieval]\n[scan.pattern]\nkind = \"stare\"\n", "retrieval"),

@@ -40,3 +40,26 @@ pub(crate) fn products(weights: &[f64], columns: &[Vec<f64>]) -> Array2<f64> {
     }
     out
 }
+
+/// Orthonormal basis of columns of numbers, twice by Gram and Schmidt; columns that depend on those before have none.
+pub(crate) fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut basis: Vec<Vec<f64>> = Vec::new();
+    for column in columns {
+        let (mut rest, before) = (column.clone(), dot(column, column));
+        (0..2).for_each(|_| remove(&basis, &mut rest));
+        let norm = dot(&rest, &rest);
+        if norm > 1e-12 * before {
+            rest.iter_mut().for_each(|x| *x /= norm.sqrt());
+            basis.push(rest);
+        }
+    }
+    basis
+}
+
+/// Takes the part of numbers along an orthonormal basis away.
+pub(crate) fn remove(basis: &[Vec<f64>], numbers: &mut [f64]) {
+    for direction in basis {
+        let part = dot(direction, numbers);
+        numbers.iter_mut().zip(direction).for_each(|(number, d)| *number -= part * d);
+    }
+}

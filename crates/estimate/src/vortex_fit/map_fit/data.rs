@@ -117,6 +117,21 @@ pub struct MapTop {
     pub log_likelihood: f64,
 }
 
+/// Whether secondary vortices, which the boundary layer at the ground rolls up into, are fitted beside a pair. A map shows them if they explain its
+/// residuals far better than chance, and stand where such vortices do.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+pub enum Secondary {
+    /// Where the map shows them.
+    #[default]
+    Auto,
+    /// Never.
+    Never,
+    /// The best ones, whether the map shows them or not.
+    Always,
+}
+
 /// How a map is fitted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapFitOptions {
@@ -128,6 +143,8 @@ pub struct MapFitOptions {
     pub core_prior: Option<CorePrior>,
     /// What residuals cost.
     pub loss: Loss,
+    /// Whether secondary vortices are fitted.
+    pub secondary: Secondary,
     /// Neighbouring lines that share windows: 2 rho over their distance for an accumulated map, 0 for independent lines.
     pub correlated_lines: usize,
 }
@@ -140,6 +157,7 @@ impl Default for MapFitOptions {
             core_radius_m: None,
             core_prior: Some(CorePrior::TYPICAL),
             loss: Loss::Cauchy { width: 2.385 },
+            secondary: Secondary::Auto,
             correlated_lines: 8,
         }
     }

@@ -16,8 +16,8 @@ use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::map_fit::starts::{best_of, distinct, starts, with_typical_core};
 use crate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, Sharing, VelocityMap, Vortex, Wake,
-    WakeModel,
+    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices, Sharing, VelocityMap,
+    Wake, WakeModel,
 };
 
 /// The least core radius over a region's radius, or over the distance of lines.
@@ -122,8 +122,9 @@ pub fn refine_map_fit_of_estimator(
     all.with_slopes_at(for_slopes.as_ref(), response)?.setting().refined(guess, NEAR_SIGMAS)
 }
 
-/// The pair of a fit with secondary vortices beside it, if the map shows them: both are fitted at once, then the pair once more with the others
-/// as they are. The covariance counts what is not known of them.
+/// Secondary vortices beside the pair of a fit, if the map shows them or the options want them anyway, and that pair with them: both are fitted at
+/// once, then the pair once more with the others as they are. The covariance counts what is not known of them. Nothing but what the map shows is
+/// told where they are not fitted.
 ///
 /// # Errors
 /// As [`refine_map_fit_of_estimator`].
@@ -133,7 +134,7 @@ pub fn fit_secondary_vortices(
     response: &EstimatorResponse<'_>,
     pair: &Wake,
     options: &MapFitOptions,
-) -> Result<Option<(MapFit, [Vortex; 2])>, Error> {
+) -> Result<Option<(Option<MapFit>, SecondaryVortices)>, Error> {
     map.validate()?;
     pair.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
@@ -144,9 +145,12 @@ pub fn fit_secondary_vortices(
         None => all.setting().with_secondary(pair),
     };
     let Some(found) = found else { return Ok(None) };
-    let model = WakeModel { secondary: Some(found.secondary), ..*model };
+    if !found.secondary.fitted {
+        return Ok(Some((None, found.secondary)));
+    }
+    let model = WakeModel { secondary: Some(found.secondary.vortices), ..*model };
     let fit = refine_map_fit_of_estimator(map, &model, response, &found.wake, options)?;
-    Ok(Some((MapFit { covariance: found.covariance, ..fit }, found.secondary)))
+    Ok(Some((Some(MapFit { covariance: found.covariance, ..fit }), found.secondary)))
 }
 
 /// A map, and what an estimator shows at its places.

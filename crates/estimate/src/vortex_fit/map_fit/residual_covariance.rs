@@ -29,7 +29,7 @@ use std::sync::Arc;
 
 use crate::linalg::dot;
 use crate::spectrum::transform::complex_transforms;
-use crate::vortex_fit::map_fit::cells::{Cell, products};
+use crate::vortex_fit::map_fit::cells::{Cell, orthonormal, products};
 
 /// Cells with their weighted residuals and, by free number, slopes, over the same deviations.
 #[derive(Clone, Copy)]
@@ -241,26 +241,6 @@ impl<'a> Correlogram<'a> {
         }
         best
     }
-}
-
-/// Orthonormal basis of the columns, twice by Gram and Schmidt.
-fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    for column in columns {
-        let (mut rest, before) = (column.clone(), dot(column, column));
-        for _ in 0..2 {
-            for other in &basis {
-                let part = dot(other, &rest);
-                rest.iter_mut().zip(other).for_each(|(rest, other)| *rest -= part * other);
-            }
-        }
-        let norm = dot(&rest, &rest);
-        if norm > 1e-20 * before {
-            rest.iter_mut().for_each(|x| *x /= norm.sqrt());
-            basis.push(rest);
-        }
-    }
-    basis
 }
 
 /// B, and the number of cells that count as one, from the correlogram of the residuals over at most so many `lines`; `bread` is A^-1.

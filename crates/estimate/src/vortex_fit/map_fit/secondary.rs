@@ -16,7 +16,7 @@ use crate::vortex_fit::map_fit::least_squares::Scores;
 use crate::vortex_fit::map_fit::setting::{Linear, Setting};
 use crate::vortex_fit::wake::core_prior::secondary_ratios;
 use crate::vortex_fit::wake::pair::SECONDARY_CORE_OVER_HEIGHT;
-use crate::vortex_fit::{PARAMETERS, Vortex, Wake, WakeModel};
+use crate::vortex_fit::{PARAMETERS, Secondary, Vortex, Wake, WakeModel};
 
 /// What is allowed in the search, and in the end of any opposite circulation, of the circulation over that of the vortex and of the distance over
 /// its height.
@@ -32,10 +32,21 @@ const NUMBERS: usize = 6;
 /// What is left of the last step in standard deviations.
 const NEAR_SIGMAS: f64 = 0.3;
 
-/// Four vortices that explain a map better than two.
+/// Secondary vortices, of the left and of the right vortex, that were found beside a pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SecondaryVortices {
+    /// The best ones.
+    pub vortices: [Vortex; 2],
+    /// Whether the map shows them.
+    pub shown: bool,
+    /// Whether they are fitted: they are where the map shows them, unless the options say [`Secondary::Never`] or [`Secondary::Always`].
+    pub fitted: bool,
+}
+
+/// Four vortices in place of a pair.
 pub(crate) struct Found {
     pub(crate) wake: Wake,
-    pub(crate) secondary: [Vortex; 2],
+    pub(crate) secondary: SecondaryVortices,
     /// Of the wake alone \[10, 10\], whatever the secondary vortices are.
     pub(crate) covariance: Array2<f64>,
 }
@@ -59,8 +70,8 @@ fn is_near(distance: f64) -> bool {
 }
 
 impl Setting<'_, '_> {
-    /// The best wake with secondary vortices, if there are any beside those of a fit without them and the fit of all comes to an end. Without
-    /// a ground there are none.
+    /// The best wake with secondary vortices, if the map shows any or they are fitted anyway, and the fit of all comes to an end. Without a ground
+    /// there are none.
     pub(crate) fn with_secondary(&self, pair: &Wake) -> Option<Found> {
         let possible = |vortex: &Vortex| vortex.circulation_m2_s > 0.0 && vortex.height_m > 0.0;
         if !self.model.images || !possible(&pair.left) || !possible(&pair.right) {
@@ -71,7 +82,8 @@ impl Setting<'_, '_> {
         let alone = self.linear(&two, &groups, None).ok()?.0;
         let counted = self.about(&alone, 1.0).alike(&two, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
-        if gain / counted < LEAST_SEARCHED {
+        let always = self.options.secondary == Secondary::Always;
+        if gain / counted < LEAST_SEARCHED && !always {
             return None;
         }
         let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m];
@@ -87,12 +99,15 @@ impl Setting<'_, '_> {
         let gain = (four.log_likelihood(p, &settled.groups) - of_two - of_profile) / counted;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
-        if gain < LEAST_GAIN || !secondary_ratios(p).into_iter().all(stands) {
+        let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
+        let fitted = always || shown && self.options.secondary == Secondary::Auto;
+        if !shown && !fitted {
             return None;
         }
         let (model, wake) = self.model.with(p);
         let uncertainty = four.uncertainty(p, &settled.groups, Scores::OfNeighbours { lines }).ok()?;
-        Some(Found { wake, secondary: model.secondary?, covariance: uncertainty.covariance(|_| true).ok()? })
+        let secondary = SecondaryVortices { vortices: model.secondary?, shown, fitted };
+        Some(Found { wake, secondary, covariance: uncertainty.covariance(|_| true).ok()? })
     }
 
     /// The vortices of the other sense, one beside each of the pair, that explain most of its residuals by their means over gates if the pair

@@ -6,9 +6,7 @@
 use ndarray::Array2;
 
 use crate::error::{Error, finite, not_negative};
-use crate::parallel::map_indexed;
-use crate::vortex_fit::wake::pair::Ray;
-use crate::vortex_fit::wake::range_kernel::LineScratch;
+use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
 
 impl WakeModel {
@@ -30,14 +28,9 @@ impl WakeModel {
         elevation_rad.iter().try_for_each(|value| finite("elevation_rad", *value))?;
         range_m.iter().try_for_each(|value| finite("range_m", *value))?;
         not_negative("radius_m", radius_m)?;
-        let rows = map_indexed(elevation_rad.len(), LineScratch::default, |scratch, line| {
-            let ray = Ray::new(elevation_rad[line]);
-            let mut velocities = vec![0.0; range_m.len()];
-            kernel.apply((self, wake, ray), range_m, false, scratch, |gate, velocity, _| velocities[gate] = velocity);
-            velocities
-        });
+        let rows = Gates::at_rest(self, kernel.clone(), (elevation_rad, range_m)).velocities(wake);
         Ok(Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
-            region(elevation_rad, line, range_m[gate], radius_m).map(|(other, share)| share * rows[other][gate]).sum()
+            region(elevation_rad, line, range_m[gate], radius_m).map(|(other, share)| share * rows[[other, gate]]).sum()
         }))
     }
 }
