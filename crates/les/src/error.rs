@@ -14,7 +14,13 @@ pub struct Place {
 }
 
 /// A kinetic energy that nothing can have given.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[error(
+    "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most \
+     {allowed_m5_s2:.6e} can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, \
+     most in {} near cell {:?}, x, y, z = {:?} m: {cause}",
+    place.component, place.cell, place.position_m
+)]
 pub struct EnergyGrowth {
     /// Number of the step.
     pub step: u64,
@@ -30,19 +36,6 @@ pub struct EnergyGrowth {
     pub place: Place,
     /// The likeliest cause, and what to do.
     pub cause: String,
-}
-
-impl std::fmt::Display for EnergyGrowth {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { step, time_s, energy_m5_s2, allowed_m5_s2, rate_per_s, place, cause } = self;
-        let Place { component, cell, position_m } = place;
-        write!(
-            f,
-            "step {step} (t = {time_s:?} s): the kinetic energy has grown to {energy_m5_s2:.6e} m^5/s^2, at most \
-             {allowed_m5_s2:.6e} can have come from the start, a force or walls that move; it grows at {rate_per_s:.3e} 1/s, \
-             most in {component} near cell {cell:?}, x, y, z = {position_m:?} m: {cause}"
-        )
-    }
 }
 
 /// Why a wind could not be built or sampled, or a flow not simulated. Every variant carries the values and what is allowed.
@@ -327,34 +320,24 @@ pub enum Error {
 
 /// Why a pressure solver went no further.
 #[non_exhaustive]
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PressureFailure {
     /// The last digit of the solution leaves as much: waves much longer than the cells are high make it large against its
     /// differences.
+    #[error(
+        "round-off of so large a solution leaves about {attainable:.0e}, so ask for a tolerance above that, or for a \
+         mesh that is shorter in units of its finest cell"
+    )]
     RoundOff {
         /// Relative residual that round-off of the solution leaves, about.
         attainable: f64,
     },
     /// The iteration no longer reduces the residual.
+    #[error("the residual no longer falls; take the direct solver, or a mesh whose cells are less flat")]
     Stalled,
     /// The right side holds a value that is not finite.
+    #[error("the right side holds a value that is not finite")]
     NotFinite,
-}
-
-impl std::fmt::Display for PressureFailure {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::RoundOff { attainable } => write!(
-                f,
-                "round-off of so large a solution leaves about {attainable:.0e}, so ask for a tolerance above that, or for a \
-                 mesh that is shorter in units of its finest cell"
-            ),
-            Self::Stalled => {
-                write!(f, "the residual no longer falls; take the direct solver, or a mesh whose cells are less flat")
-            }
-            Self::NotFinite => write!(f, "the right side holds a value that is not finite"),
-        }
-    }
 }
 
 /// Residuals, one after the other.

@@ -127,7 +127,7 @@ mod tests {
                 assert_eq!(density.len(), 91);
                 for (found, &f_hz) in density.iter().zip(&frequency_hz) {
                     let exact = density_at(&numbers, kind, f_hz, &sampling)[0];
-                    assert!((found - exact).abs() < 2e-13 * lags as f64, "{kind} {lags} {f_hz}: {found} {exact}");
+                    assert!((found - exact).abs() < 2e-13 * lags as f64, "{kind:?} {lags} {f_hz}: {found} {exact}");
                 }
             }
         }

@@ -3,7 +3,6 @@
 //! Check: in the tests of the statistics, for both kinds of samples.
 
 use num_complex::Complex;
-use std::fmt;
 
 /// Whether samples are real (intermediate frequency) or complex (analytic signal or baseband).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -38,14 +37,5 @@ impl SignalKind {
             Self::Real => Complex::new(numbers[index], 0.0),
             Self::Complex => Complex::new(numbers[2 * index], numbers[2 * index + 1]),
         }
-    }
-}
-
-impl fmt::Display for SignalKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Real => "real",
-            Self::Complex => "complex",
-        })
     }
 }

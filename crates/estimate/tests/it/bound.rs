@@ -26,7 +26,11 @@ fn bound_of_a_200_ns_pulse_is_the_stored_curve_from_minus_40_to_60_db() {
             // the curve is printed with 8 digits
             let digit = 10.0_f64.powf(expected_m_s.log10().floor() - 7.0);
             let error = (found_m_s - expected_m_s).abs();
-            assert!(error <= 1e-8 * expected_m_s + 0.5 * digit, "{} dB {kind}: {found_m_s} {expected_m_s}", fields[0]);
+            assert!(
+                error <= 1e-8 * expected_m_s + 0.5 * digit,
+                "{} dB {kind:?}: {found_m_s} {expected_m_s}",
+                fields[0]
+            );
         }
         rows += 1;
     }
@@ -97,7 +101,7 @@ fn bounds_with_little_noise_outside_the_band_are_right_or_refused() {
         for refused in [1e-15, 0.0] {
             let error = with_floor(refused, kind).unwrap_err();
             let Error::NoiseFloor { floor, window_samples: 64, least, .. } = error else {
-                panic!("{kind} {refused}: {error}");
+                panic!("{kind:?} {refused}: {error}");
             };
             assert!(floor == refused && (1e-15..1e-13).contains(&least), "{error}");
             assert!(error.to_string().contains(&format!("floor = {refused:?}")), "{error}");

@@ -70,7 +70,7 @@ fn windows_are_worth_what_the_variance_of_their_mean_periodogram_says_in_noise_o
             SignalKind::Real => worth::<f64>(&record, &weights, cycles, 10_000),
             SignalKind::Complex => worth::<Complex<f64>>(&record, &weights, cycles, 10_000),
         };
-        assert!((found - foretold).abs() < 3.5 * error, "{window} {band} {kind}: {foretold}, {found} +- {error}");
-        assert!((found - wrong).abs() > 3.5 * error, "{window} {band} {kind}: {wrong}, {found} +- {error}");
+        assert!((found - foretold).abs() < 3.5 * error, "{window} {band} {kind:?}: {foretold}, {found} +- {error}");
+        assert!((found - wrong).abs() > 3.5 * error, "{window} {band} {kind:?}: {wrong}, {found} +- {error}");
     }
 }

@@ -57,7 +57,7 @@ impl Flow {
             let (first, weights) = axis.stencil(x_m).ok_or_else(refused)?;
             taps = std::array::from_fn(|i| (source(&axis, first + i), weights[i]));
         } else if x_m.is_finite() {
-            taps = [1.0, 0.0, 0.0, 0.0].map(|weight| (Source::Node(0), weight));
+            taps = [1.0, 0.0, 0.0, 0.0].map(|weight| (Ghost::Copy(0), weight));
         } else {
             return Err(refused());
         }
@@ -69,12 +69,8 @@ impl Flow {
                 let node = |i: usize| centred.each_ref().map(|field| field[row * nx + i]);
                 let mut sum = [0.0; 3];
                 for (source, weight) in taps {
-                    let value = match source {
-                        Source::Node(i) => node(i),
-                        Source::Ghost(ghost) => std::array::from_fn(|c| ghost_value(ghost, 0, c, |i| node(i)[c])),
-                    };
-                    for (sum, value) in sum.iter_mut().zip(value) {
-                        *sum += weight * value;
+                    for (c, sum) in sum.iter_mut().enumerate() {
+                        *sum += weight * ghost_value(source, 0, c, |i| node(i)[c]);
                     }
                 }
                 sum
@@ -124,17 +120,9 @@ impl Flow {
 }
 
 /// Where the value of a padded node comes from.
-#[derive(Debug, Clone, Copy)]
-enum Source {
-    Node(usize),
-    Ghost(Ghost),
-}
-
-fn source(axis: &Axis, padded: usize) -> Source {
-    match ghost_places(axis).find(|(place, _)| *place == padded) {
-        Some((_, ghost)) => Source::Ghost(ghost),
-        None => Source::Node(padded - GHOSTS),
-    }
+fn source(axis: &Axis, padded: usize) -> Ghost {
+    let ghost = ghost_places(axis).find(|(place, _)| *place == padded);
+    ghost.map_or_else(|| Ghost::Copy(padded - GHOSTS), |(_, ghost)| ghost)
 }
 
 /// Walls and periods of a direction of the mesh as those of a snapshot.

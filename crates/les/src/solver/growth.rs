@@ -33,7 +33,11 @@ const HALVINGS: usize = 40;
 const MOST_COURANT: f64 = 4.0;
 
 /// Waves of the mesh that grow because the time scheme gives them more than viscosity takes.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+#[error(
+    "short waves grow at {rate_per_s:.2e} 1/s, as viscosity is too small to damp them (cell Reynolds number \
+     {cell_reynolds:.3e} at Courant number {courant:.2}; all decay below {damped_courant:.2})"
+)]
 pub struct UndampedGrowth {
     /// `h^2 sum |u_i|/h_i/nu` of the cell whose waves grow most, `h` its length along the largest term; infinite without viscosity.
     pub cell_reynolds: f64,
@@ -44,17 +48,6 @@ pub struct UndampedGrowth {
     pub damped_courant: f64,
     /// Rate at which the amplitude of the worst wave grows \[1/s\].
     pub rate_per_s: f64,
-}
-
-impl std::fmt::Display for UndampedGrowth {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { cell_reynolds, courant, damped_courant, rate_per_s } = self;
-        write!(
-            f,
-            "short waves grow at {rate_per_s:.2e} 1/s, as viscosity is too small to damp them (cell Reynolds number \
-             {cell_reynolds:.3e} at Courant number {courant:.2}; all decay below {damped_courant:.2})"
-        )
-    }
 }
 
 /// How fast the cells of a mesh carry and damp the waves of a flow.

@@ -155,7 +155,7 @@ impl FlowSettings {
     /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity, [`Error::TooManyRanks`].
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
-        subgrid::check_constants(self.subgrid)?;
+        subgrid::formula_and_order(self.subgrid)?;
         Layout::new(mesh).shared(self.ranks.clone())?;
         refuse_sticking_without_viscosity(mesh, self.viscosity_m2_s)
     }

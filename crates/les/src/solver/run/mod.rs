@@ -109,8 +109,7 @@ pub trait RunObserver {
     ///
     /// # Errors
     /// A reason to stop.
-    fn step(&mut self, flow: &Flow, record: &StepRecord) -> Result<(), String> {
-        let _ = (flow, record);
+    fn step(&mut self, _flow: &Flow, _record: &StepRecord) -> Result<(), String> {
         Ok(())
     }
 
@@ -118,15 +117,12 @@ pub trait RunObserver {
     ///
     /// # Errors
     /// A reason to stop, such as an output that cannot be written.
-    fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        let _ = (flow, index);
+    fn output(&mut self, _flow: &Flow, _index: usize) -> Result<(), String> {
         Ok(())
     }
 
     /// When something deserves attention.
-    fn warning(&mut self, warning: &RunWarning) {
-        let _ = warning;
-    }
+    fn warning(&mut self, _warning: &RunWarning) {}
 
     /// Bytes that the next checkpoint keeps; they come back from [`Run::resume`].
     fn user_data(&self) -> Vec<u8> {

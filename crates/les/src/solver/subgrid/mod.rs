@@ -39,7 +39,7 @@ use crate::error::check;
 use crate::solver::aligned::Aligned;
 use filter::{Filter, HIGHEST_ORDER};
 use operators::Operators;
-use stress::Stress;
+use stress::{add_divergence_row, update_stress};
 pub(crate) use viscosity::Largest;
 use viscosity::{Formula, eddy_viscosity};
 
@@ -96,7 +96,8 @@ pub(crate) struct Subgrid {
     /// At the centres \[m^2/s\].
     viscosity: Aligned,
     largest: Largest,
-    stress: Stress,
+    /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\]: what the divergence needs of the stress.
+    across: [Aligned; 3],
     slabs: Slabs,
 }
 
@@ -114,7 +115,7 @@ impl Subgrid {
             small: order.map(|order| (Filter::new(layout, order), [0, 1].map(|_| Aligned::zeros(cells)))),
             viscosity: Aligned::zeros(cells),
             largest: Largest::default(),
-            stress: Stress::new(cells),
+            across: [0, 1, 2].map(|_| Aligned::zeros(cells)),
             slabs: layout.slabs.clone(),
         }))
     }
@@ -132,7 +133,7 @@ impl Subgrid {
         in_plane: &mut [Aligned; 3],
         free: &mut [f64],
     ) -> Result<(), Error> {
-        let Self { operators, formula, viscosity, small, slabs, .. } = self;
+        let Self { operators, formula, viscosity, small, slabs, across, .. } = self;
         let largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
         let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
         self.largest = Largest { viscosity_m2_s, decay_per_s };
@@ -150,15 +151,17 @@ impl Subgrid {
                 velocity_m_s
             }
         };
-        self.stress.update(operators, viscosity, strained, in_plane);
-        let [a, b, c] = self.stress.across.each_mut().map(Aligned::as_mut_slice);
+        update_stress(operators, viscosity, strained, across, in_plane);
+        let [a, b, c] = across.each_mut().map(Aligned::as_mut_slice);
         slabs.halos(&mut [a, b, c], operators.reach)
     }
 
     /// Adds the rest of the divergence of the stress to the acceleration of row `(j, k)` of one component, which has that in
     /// planes \[m/s^2\]. Rows of walls get nothing.
     pub(crate) fn add_divergence_row(&self, component: usize, j: usize, k: usize, out_m_s2: &mut [f64]) {
-        self.stress.add_divergence_row(&self.operators, component, [j, k], out_m_s2);
+        let Operators { to_cells, to_faces, .. } = &self.operators;
+        let operator = if component == 2 { &to_faces[2] } else { &to_cells[2] };
+        add_divergence_row(operator, &self.across[component], [j, k], out_m_s2);
     }
 
     /// The largest viscosity and decay rate of the last update.
@@ -172,16 +175,11 @@ impl Subgrid {
     }
 }
 
-/// Refuses what [`Subgrid::new`] would refuse.
+/// The formula of a model, and the order of its filter if it has one.
 ///
 /// # Errors
-/// As there.
-pub(super) fn check_constants(model: SubgridModel) -> Result<(), Error> {
-    formula_and_order(model).map(drop)
-}
-
-/// The formula of a model, and the order of its filter if it has one.
-fn formula_and_order(model: SubgridModel) -> Result<Option<(Formula, Option<usize>)>, Error> {
+/// As [`Subgrid::new`].
+pub(super) fn formula_and_order(model: SubgridModel) -> Result<Option<(Formula, Option<usize>)>, Error> {
     Ok(match model {
         SubgridModel::None => None,
         SubgridModel::Smagorinsky { constant } => Some((Formula::Smagorinsky { square: square(constant)? }, None)),

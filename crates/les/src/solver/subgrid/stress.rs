@@ -18,13 +18,6 @@ use super::super::rows::{HALO, cut_rows, pad};
 use super::operators::{Operators, Row};
 use crate::solver::aligned::Aligned;
 
-/// What the divergence needs of the stress.
-#[derive(Debug, Clone)]
-pub(super) struct Stress {
-    /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\].
-    pub(super) across: [Aligned; 3],
-}
-
 #[derive(Debug)]
 struct Scratch {
     /// `tau_01` of a plane.
@@ -36,47 +29,37 @@ struct Scratch {
     padded: Vec<f64>,
 }
 
-impl Stress {
-    pub(super) fn new(cells: usize) -> Self {
-        Self { across: [0, 1, 2].map(|_| Aligned::zeros(cells)) }
-    }
-
-    /// The stress by the viscosity at the centres and the strain of `velocity`. `in_plane` gets the acceleration of each component by
-    /// the stresses whose divergence is taken along the axes 0 and 1 \[m/s^2\].
-    pub(super) fn update(
-        &mut self,
-        operators: &Operators,
-        viscosity: &[f64],
-        velocity: [&[f64]; 3],
-        in_plane: &mut [Aligned; 3],
-    ) {
-        let shape = operators.shape;
-        let (n, plane) = (shape.n[0], shape.plane());
-        let [a0, a1, a2] = in_plane.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
-        let [t0, t1, t2] = self.across.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
-        (a0, a1, a2, t0, t1, t2, shape.own()).into_par_iter().for_each_init(
-            || Scratch {
-                shear: vec![0.0; plane],
-                normal: vec![0.0; plane],
-                row: vec![0.0; n],
-                viscosity: vec![0.0; n],
-                padded: vec![0.0; n + 2 * HALO],
-            },
-            |scratch, (a0, a1, a2, t0, t1, t2, k)| {
-                stress_plane(operators, (viscosity, velocity), k, [a0, a1, a2], [t0, t1, t2], scratch);
-            },
-        );
-    }
-
-    /// Adds the divergence of the stresses across the planes to the acceleration of the row `at` of `component` \[m/s^2\].
-    pub(super) fn add_divergence_row(&self, operators: &Operators, component: usize, at: [usize; 2], out: &mut [f64]) {
-        let operator = if component == 2 { &operators.to_faces[2] } else { &operators.to_cells[2] };
-        add_divergence_row(operator, &self.across[component], at, out);
-    }
+/// The stress by the viscosity at the centres and the strain of `velocity`: `across` gets `tau_02`, `tau_12` at the edges and `tau_22`
+/// at the centres \[m^2/s^2\], `in_plane` the acceleration of each component by the stresses whose divergence is taken along the axes
+/// 0 and 1 \[m/s^2\].
+pub(super) fn update_stress(
+    operators: &Operators,
+    viscosity: &[f64],
+    velocity: [&[f64]; 3],
+    across: &mut [Aligned; 3],
+    in_plane: &mut [Aligned; 3],
+) {
+    let shape = operators.shape;
+    let (n, plane) = (shape.n[0], shape.plane());
+    let [a0, a1, a2] = in_plane.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
+    let [t0, t1, t2] = across.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
+    (a0, a1, a2, t0, t1, t2, shape.own()).into_par_iter().for_each_init(
+        || Scratch {
+            shear: vec![0.0; plane],
+            normal: vec![0.0; plane],
+            row: vec![0.0; n],
+            viscosity: vec![0.0; n],
+            padded: vec![0.0; n + 2 * HALO],
+        },
+        |scratch, (a0, a1, a2, t0, t1, t2, k)| {
+            stress_plane(operators, (viscosity, velocity), k, [a0, a1, a2], [t0, t1, t2], scratch);
+        },
+    );
 }
 
+/// Adds the divergence of the stresses `across` the planes to the acceleration of the row `at` of a component \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn add_divergence_row(operator: &RowOperator, across: &[f64], at: [usize; 2], out: &mut [f64]) {
+pub(super) fn add_divergence_row(operator: &RowOperator, across: &[f64], at: [usize; 2], out: &mut [f64]) {
     operator.add_across(out, across, at);
 }
 

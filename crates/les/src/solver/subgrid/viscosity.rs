@@ -13,7 +13,7 @@ use super::operators::{Operators, Row};
 
 /// Which formula gives the eddy viscosity, with the square of its constant.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Formula {
+pub(in crate::solver) enum Formula {
     /// `(C Delta)^2 sqrt(2 S:S)`.
     Smagorinsky { square: f64 },
     /// `(C Delta)^2 (Sd:Sd)^(3/2)/[(S:S)^(5/2) + (Sd:Sd)^(5/4)]`.
