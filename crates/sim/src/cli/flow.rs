@@ -56,13 +56,12 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
     }
     // The words were checked: without an example there is a case.
     let Some(case) = &words.case else { return Ok(()) };
-    simulate(&CaseFile::read(case)?, &words.run, cli, ranks)
+    simulate(CaseFile::read(case)?, &words.run, cli, ranks)
 }
 
 /// Runs a case and says what came of it, on rank 0.
-pub(super) fn simulate(file: &CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
+pub(super) fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     let is_first = ranks.rank() == 0;
-    let mut file = file.clone();
     if let Some(end) = words.end {
         file = file.with_end(end)?;
     }

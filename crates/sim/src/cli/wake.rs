@@ -35,7 +35,7 @@ pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
         let file = cli.seed.map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
         return if ranks.rank() == 0 { print(&file.toml) } else { Ok(()) };
     }
-    simulate(&file, &words.run, cli, ranks)
+    simulate(file, &words.run, cli, ranks)
 }
 
 fn case_file(words: &WakeWords) -> Result<CaseFile, Error> {

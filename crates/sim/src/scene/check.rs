@@ -37,7 +37,9 @@ impl Scene {
         self.check_head(&mut c);
         check_estimator(self, &mut c);
         check_retrieval(self, &mut c);
-        self.check_outputs(&mut c);
+        let o = &self.outputs;
+        let allowed = "true, or else one of csv, netcdf, hpl, svg and png: nothing would be written";
+        c.require(o.csv || o.netcdf || o.hpl || o.svg || o.png, "outputs.csv", o.csv, allowed);
         // Limits between keys make sense only once each key does.
         if c.is_good() {
             self.check_between(&mut c);

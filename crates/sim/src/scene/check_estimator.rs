@@ -1,6 +1,6 @@
 //! What the estimator of a scene may say.
 
-use super::{CorrelogramForm, Estimator, Method, PulseShape, RegionRadius, Scene};
+use super::{CorrelogramForm, Method, PulseShape, RegionRadius, Scene};
 use crate::keys::Checker;
 
 /// Every limit of the estimator's keys, and those between them.
@@ -15,11 +15,6 @@ pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
     if let Some(model) = e.method.order() {
         beside_window("estimator.method.order", model.order, "below");
     }
-    check_radius(e, c);
-    check_combinations(scene, c);
-}
-
-fn check_radius(e: &Estimator, c: &mut Checker<'_>) {
     if let RegionRadius::OfRange { range_m, radius_m } = &e.radius {
         c.require(
             radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r)),
@@ -34,11 +29,7 @@ fn check_radius(e: &Estimator, c: &mut Checker<'_>) {
         "periodogram",
         "another one with estimator.radius: \"periodogram\" has no region",
     );
-}
-
-/// Methods that exclude a knob.
-fn check_combinations(scene: &Scene, c: &mut Checker<'_>) {
-    let e = &scene.estimator;
+    // Methods that exclude a knob.
     let likelihood = matches!(e.method, Method::Likelihood(_) | Method::GradientLikelihood(_));
     c.require(
         e.correlogram == CorrelogramForm::Biased || !(likelihood || matches!(e.method, Method::FirstMoment(_))),
@@ -65,6 +56,7 @@ fn check_combinations(scene: &Scene, c: &mut Checker<'_>) {
 mod tests {
     use super::super::{FirstMoment, GradientLikelihood, LagWindow, Likelihood, ModelOrder};
     use super::*;
+    use crate::scene::Estimator;
 
     fn keys(change: impl FnOnce(&mut Estimator)) -> Vec<String> {
         let mut scene = Scene::default();

@@ -1,18 +1,36 @@
 //! What the winds of a scene may say, that of `[flow]` and those that are added to it.
 //! Check: each limit is broken once.
 
-use super::{FieldFlow, Flow, SimulatedFlow, VortexLines, VortexMotion};
+use super::{Flow, VortexLines, VortexMotion};
 use crate::keys::{Checker, Problem};
 
 /// The limits of a wind whose table is at `at`.
 pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
+    let key = |name: &str| format!("{at}.{name}");
     match flow {
         Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => {}
         Flow::VortexLines(lines) => check_lines(lines, at, c),
-        Flow::Simulated(flow) => check_simulated(flow, at, c),
-        Flow::Fields(flow) => check_fields(flow, at, c),
+        Flow::Simulated(flow) => {
+            if flow.planes.is_empty() {
+                let allowed = "a file of cross-planes, or the beginning of the names of numbered ones";
+                c.refuse(&key("planes"), Problem::ABSENT, allowed);
+            }
+            if let Some(time_s) = flow.time_s {
+                c.require(flow.age_tau.is_none(), &key("time_s"), time_s, "absent beside flow.age_tau");
+            }
+        }
+        Flow::Fields(flow) => {
+            if flow.files.is_empty() {
+                let allowed = "a file of fields, or the beginning of the names of numbered ones";
+                c.refuse(&key("files"), Problem::ABSENT, allowed);
+            }
+            if flow.backscatter.as_ref().is_some_and(|carried| carried.name.is_empty()) {
+                let allowed = "the name of a variable of the file over (time, z, y, x)";
+                c.refuse(&key("backscatter.name"), Problem::ABSENT, allowed);
+            }
+        }
         Flow::VortexPair(p) => {
-            let key = format!("{at}.age_tau");
+            let key = key("age_tau");
             let allowed = "0 for a pair at rest; an age needs flow.motion = \"inviscid\"";
             c.require(p.age_tau == 0.0 || p.motion == VortexMotion::Inviscid, &key, p.age_tau, allowed);
             let allowed = format!("0 with {at}.aircraft, which says how old the wake is at each place");
@@ -36,27 +54,5 @@ fn check_lines(lines: &VortexLines, at: &str, c: &mut Checker<'_>) {
         && let Err(e) = crate::setup::wind::vortex_lines(lines)
     {
         c.refuse(&key("nodes_m"), "", e.to_string());
-    }
-}
-
-fn check_simulated(flow: &SimulatedFlow, at: &str, c: &mut Checker<'_>) {
-    let key = |name: &str| format!("{at}.{name}");
-    if flow.planes.is_empty() {
-        let allowed = "a file of cross-planes, or the beginning of the names of numbered ones";
-        c.refuse(&key("planes"), Problem::ABSENT, allowed);
-    }
-    if let Some(time_s) = flow.time_s {
-        c.require(flow.age_tau.is_none(), &key("time_s"), time_s, "absent beside flow.age_tau");
-    }
-}
-
-fn check_fields(flow: &FieldFlow, at: &str, c: &mut Checker<'_>) {
-    let key = |name: &str| format!("{at}.{name}");
-    if flow.files.is_empty() {
-        c.refuse(&key("files"), Problem::ABSENT, "a file of fields, or the beginning of the names of numbered ones");
-    }
-    if flow.backscatter.as_ref().is_some_and(|carried| carried.name.is_empty()) {
-        let allowed = "the name of a variable of the file over (time, z, y, x)";
-        c.refuse(&key("backscatter.name"), Problem::ABSENT, allowed);
     }
 }

@@ -5,13 +5,6 @@ use super::Scene;
 use crate::keys::Checker;
 
 impl Scene {
-    pub(super) fn check_outputs(&self, c: &mut Checker<'_>) {
-        let o = &self.outputs;
-        let any = o.csv || o.netcdf || o.hpl || o.svg || o.png;
-        let allowed = "true, or else one of csv, netcdf, hpl, svg and png: nothing would be written";
-        c.require(any, "outputs.csv", o.csv, allowed);
-    }
-
     /// A HALO raw file counts gates from the lidar and knows their length alone.
     pub(super) fn check_hpl(&self, c: &mut Checker<'_>) {
         let e = &self.estimator;

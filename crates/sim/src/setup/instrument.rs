@@ -3,8 +3,9 @@
 use crate::Error;
 use crate::scene::{
     AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseDefinition, PulseShape,
-    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence,
+    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
 };
+use crate::setup::efficiency_model::turbulence as turbulence_of;
 use num_complex::Complex;
 use std::sync::Arc;
 use wakescope_optics as optics;
@@ -60,10 +61,7 @@ impl Instrument {
                 Some(signal::digitise::Digitiser::new(bits, full_scale_a)?)
             }
         };
-        let turbulence = match &scene.atmosphere.turbulence {
-            Turbulence::Refractive(t) if t.cn2_m_m23 > 0.0 => Some(turbulence(t)?),
-            _ => None,
-        };
+        let turbulence = turbulence_of(scene).map(|t| turbulence(&t)).transpose()?;
         Ok(Self {
             telescope,
             pulse: pulse(&Pulse { energy_j: scene.pulse_energy_j(), ..scene.pulse.clone() })?,
