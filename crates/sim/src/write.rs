@@ -13,7 +13,7 @@ use crate::Error;
 use crate::io::OutputError;
 #[cfg(feature = "plots")]
 use crate::io::own::refuse_foreign;
-use crate::io::signals::{LineVelocities, RawSignals, Recording};
+use crate::io::signals::{RawSignals, Recording};
 use crate::io::{Existing, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
 use crate::measure::profile::RangeProfile;
@@ -166,10 +166,8 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
     let first_pulse_s = plan.wind.start_s;
     Some(RawSignals {
         recording: recording(plan),
-        truth: LineVelocities {
-            range_m: g.layer_range_m().collect(),
-            radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
-        },
+        range_m: g.layer_range_m().collect(),
+        radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
         pulse_time_s: all().map(|at| first_pulse_s + beam(at).time_s).collect(),
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),

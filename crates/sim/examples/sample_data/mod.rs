@@ -2,9 +2,7 @@
 #![allow(dead_code, reason = "each example uses a part")]
 
 use ndarray::{Array2, Array3};
-use wakescope_sim::io::{
-    CrossPlanes, Field, FieldKind, OPEN_EDGES, Provenance, PulseInfo, Ray, Site, Sweep, Unit, VelocityMap,
-};
+use wakescope_sim::io::{CrossPlanes, Field, OPEN_EDGES, Provenance, PulseInfo, Ray, Site, Sweep, Unit, VelocityMap};
 
 /// Origin written into the sample files.
 pub(crate) fn origin() -> Provenance {
@@ -81,16 +79,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         Field::float("radial_velocity", speed, &format!("estimated radial velocity, {away}"), mean),
         Field::float("velocity_standard_deviation", speed, "standard deviation of the estimate", spread),
         Field::float("signal_to_noise_ratio", Unit::Decibel, "signal-to-noise ratio", snr),
-        Field {
-            name: "quality_flag".into(),
-            unit: Unit::One,
-            long_name: "quality of the estimate".into(),
-            standard_name: None,
-            cell_methods: None,
-            ancillary: Vec::new(),
-            values: flag,
-            kind: FieldKind::Flag { meanings: vec![(0, "good".into()), (1, "missing".into())] },
-        },
+        Field::float("quality_flag", Unit::One, "1 where the estimate is missing", flag),
     ];
     map
 }

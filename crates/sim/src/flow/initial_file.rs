@@ -21,13 +21,13 @@ type Taps = Vec<(usize, f64)>;
 /// # Errors
 /// A file that cannot be read, without the variables, or that does not cover the mesh.
 pub(super) fn read(path: &Path, mesh: &Mesh) -> Result<[Vec<f64>; 3], Error> {
-    let mut file = open(path)?;
-    let mut component = |axis: usize| velocity(&mut file, mesh, axis).map_err(|reason| file.refuse(reason));
+    let file = open(path)?;
+    let component = |axis: usize| velocity(&file, mesh, axis).map_err(|reason| file.refuse(reason));
     Ok([component(0)?, component(1)?, component(2)?])
 }
 
 /// One component, brought to the faces of the mesh.
-fn velocity(file: &mut NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, String> {
+fn velocity(file: &NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, String> {
     let name = ["u", "v", "w"][axis];
     let dims = axes(file, name)?;
     let mut values = file.velocities(name, &dims, None)?;

@@ -24,8 +24,8 @@ pub struct FieldInSpace {
 /// # Errors
 /// A file that cannot be read, without the variable, or with other dimensions.
 pub fn read_field(path: &Path, variable: &str) -> Result<FieldInSpace, Error> {
-    let mut file = open(path)?;
-    let mut read = || -> Result<FieldInSpace, String> {
+    let file = open(path)?;
+    let read = || -> Result<FieldInSpace, String> {
         let dims = file.roles(variable, [TIME, Z, Y, X])?;
         let [time, z, y, x] = &dims;
         let times_s = file.coordinate(time)?;

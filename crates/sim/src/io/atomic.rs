@@ -114,20 +114,38 @@ impl FileGroup {
     /// # Errors
     /// The first refusal of the system. The folder is then as it was before.
     pub(crate) fn put(&self, stage: &Stage) -> OutputResult<Vec<PathBuf>> {
-        let mut swapped: Vec<Swap> = Vec::new();
         for (place, (name, _)) in self.files.iter().enumerate() {
             // After the last one nothing can fail, so that what it replaces need not be kept: in one step, for others may do the same.
-            let is_last = place + 1 == self.files.len();
-            match Swap::into_place(stage, &self.folder, name, is_last) {
-                Ok(swap) => swapped.push(swap),
-                Err(error) => {
-                    swapped.iter().rev().for_each(Swap::undo);
-                    return Err(error);
+            if let Err(error) = self.put_one(stage, name, place + 1 == self.files.len()) {
+                for (name, _) in self.files[..place].iter().rev() {
+                    let (target, kept) = (self.folder.join(name), stage.old.join(name));
+                    let was_there = kept.symlink_metadata().is_ok();
+                    drop(if was_there { fs::rename(kept, target) } else { fs::remove_file(target) });
                 }
+                return Err(error);
             }
         }
         sync_folder(&self.folder);
-        Ok(swapped.into_iter().map(|s| s.target).collect())
+        Ok(self.files.iter().map(|(name, _)| self.folder.join(name)).collect())
+    }
+
+    /// Puts one file into place; an older one waits in the stage, but for the last file.
+    fn put_one(&self, stage: &Stage, name: &str, is_last: bool) -> OutputResult<()> {
+        let (target, kept) = (self.folder.join(name), stage.old.join(name));
+        if target.is_dir() {
+            let source = std::io::Error::new(ErrorKind::IsADirectory, "a folder of that name is in the way");
+            return Err(io_error("write", &target, source));
+        }
+        let keeps = !is_last && target.symlink_metadata().is_ok();
+        if keeps {
+            fs::rename(&target, &kept).map_err(|e| io_error("replace", &target, e))?;
+        }
+        fs::rename(stage.new.join(name), &target).map_err(|source| {
+            if keeps {
+                drop(fs::rename(&kept, &target));
+            }
+            io_error("write", &target, source)
+        })
     }
 }
 
@@ -153,44 +171,6 @@ pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()
 /// The refusal of the system.
 pub(crate) fn try_folder(folder: &Path) -> OutputResult<()> {
     Stage::make(folder).map(drop)
-}
-
-/// One renamed file, and where the older file of that name waits.
-struct Swap {
-    target: PathBuf,
-    backup: Option<PathBuf>,
-}
-
-impl Swap {
-    fn into_place(stage: &Stage, folder: &Path, name: &str, is_last: bool) -> OutputResult<Self> {
-        let target = folder.join(name);
-        if target.is_dir() {
-            let source = std::io::Error::new(std::io::ErrorKind::IsADirectory, "a folder of that name is in the way");
-            return Err(io_error("write", &target, source));
-        }
-        let mut backup = None;
-        if !is_last && target.symlink_metadata().is_ok() {
-            let kept = stage.old.join(name);
-            fs::rename(&target, &kept).map_err(|e| io_error("replace", &target, e))?;
-            backup = Some(kept);
-        }
-        let swap = Self { target, backup };
-        if let Err(source) = fs::rename(stage.new.join(name), &swap.target) {
-            let error = io_error("write", &swap.target, source);
-            if let Some(kept) = &swap.backup {
-                drop(fs::rename(kept, &swap.target));
-            }
-            return Err(error);
-        }
-        Ok(swap)
-    }
-
-    fn undo(&self) {
-        match &self.backup {
-            Some(kept) => drop(fs::rename(kept, &self.target)),
-            None => drop(fs::remove_file(&self.target)),
-        }
-    }
 }
 
 /// Hidden folder for the new and the replaced files; removed when dropped.

@@ -27,7 +27,7 @@ pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> Ou
     }
     variables.extend(recording(signals));
     variables.extend(truth(signals));
-    let (lines, ranges) = signals.truth.radial_velocity_m_s.dim();
+    let (lines, ranges) = signals.radial_velocity_m_s.dim();
     let dims = vec![("ray", rays), ("time", samples), ("line", lines), ("range", ranges)];
     Layout::cf("Raw heterodyne signals", dims, variables, provenance).into_bytes(provenance)
 }
@@ -104,11 +104,11 @@ fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
 fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
     let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
     vec![
-        variable("range", &["range"], Data::f64(signals.truth.range_m.clone()), "m")
+        variable("range", &["range"], Data::f64(signals.range_m.clone()), "m")
             .text("long_name", "range of the true velocities"),
         variable("line_elevation", &["line"], Data::f64(elevation.copied()), "rad")
             .text("long_name", "elevation of the line of sight above the horizon"),
-        variable("radial_velocity", &["line", "range"], Data::filled(signals.truth.radial_velocity_m_s), "m s-1")
+        variable("radial_velocity", &["line", "range"], Data::filled(signals.radial_velocity_m_s), "m s-1")
             .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")
             .text("long_name", "true radial velocity of the air on the line of sight, positive away from the lidar")
             .attr("_FillValue", Data::f32([FILL])),

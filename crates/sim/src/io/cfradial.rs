@@ -4,7 +4,7 @@
 //! Check: the tests read the bytes back with an independent reader and hold them to the list that the clients need.
 
 use super::error::{OutputError, OutputResult};
-use super::map::{Field, FieldKind, Unit, VelocityMap};
+use super::map::{Field, Unit, VelocityMap};
 use super::netcdf::{Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
 use super::site::MAX_TIME_S;
@@ -308,11 +308,7 @@ fn instrument_of(scene_toml: &str) -> String {
 
 fn field_variable(field: &Field) -> Variable {
     const DIMS: &[&str] = &["time", "range"];
-    let data = match &field.kind {
-        FieldKind::Float => Data::filled(&field.values),
-        FieldKind::Flag { .. } => Data::i8(field.values.iter().map(|v| *v as i8)),
-    };
-    let mut out = Variable::new(&field.name, DIMS, data)
+    let mut out = Variable::new(&field.name, DIMS, Data::filled(&field.values))
         .text("long_name", &field.long_name)
         .text("units", field.unit.udunits())
         .text("coordinates", "elevation azimuth range");
@@ -325,14 +321,7 @@ fn field_variable(field: &Field) -> Variable {
     if !field.ancillary.is_empty() {
         out = out.text("ancillary_variables", &field.ancillary.join(" "));
     }
-    match &field.kind {
-        FieldKind::Float => out.attr("_FillValue", Data::f32([FILL])),
-        // A fill value would make xarray turn the flags into floats.
-        FieldKind::Flag { meanings } => {
-            let words: Vec<&str> = meanings.iter().map(|(_, m)| m.as_str()).collect();
-            out.attr("flag_values", Data::i8(meanings.iter().map(|(c, _)| *c))).text("flag_meanings", &words.join(" "))
-        }
-    }
+    out.attr("_FillValue", Data::f32([FILL]))
 }
 
 fn single(values: &[f64]) -> Data {

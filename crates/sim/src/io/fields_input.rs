@@ -31,8 +31,8 @@ pub(crate) struct FieldPlace {
 /// # Errors
 /// A file that cannot be read or lacks the variable `name`; a time without values.
 pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> {
-    let mut file = open(path)?;
-    times(&mut file, name)
+    let file = open(path)?;
+    times(&file, name)
         .map(|times| {
             let of = |(place, time_s): (Option<usize>, f64)| FieldPlace { path: path.to_owned(), place, time_s };
             times.into_iter().map(of).collect()
@@ -40,7 +40,7 @@ pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> 
         .map_err(|reason| file.refuse(reason))
 }
 
-fn times(file: &mut NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
+fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
     let Some(dim) = file.dim_of(name, TIME) else {
         // A field on its own: its time is a number beside it.
         let time = if file.has("time") { file.seconds("time")?.first().copied() } else { None };
@@ -61,9 +61,8 @@ fn times(file: &mut NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>,
 /// # Errors
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
 pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<[VolumeComponent; 3], Error> {
-    let mut file = open(&field.path)?;
-    let mut component =
-        |name: &str| component(&mut file, name, field.place, true).map_err(|reason| file.refuse(reason));
+    let file = open(&field.path)?;
+    let component = |name: &str| component(&file, name, field.place, true).map_err(|reason| file.refuse(reason));
     Ok([component(&names[0])?, component(&names[1])?, component(&names[2])?])
 }
 
@@ -84,8 +83,8 @@ pub(crate) fn periods_m(field: &FieldPlace, name: &str) -> Result<[Option<f64>; 
 /// # Errors
 /// As [`read`]; a negative value.
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
-    let mut file = open(&field.path)?;
-    let scalar = component(&mut file, name, field.place, false).map_err(|reason| file.refuse(reason))?;
+    let file = open(&field.path)?;
+    let scalar = component(&file, name, field.place, false).map_err(|reason| file.refuse(reason))?;
     match scalar.values.iter().position(|v| *v < 0.0) {
         Some(at) => {
             Err(file.refuse(format!("{name} is {:?} at place {at}: it must not be negative", scalar.values[at])))
@@ -95,7 +94,7 @@ pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeCompon
 }
 
 fn component(
-    file: &mut NetcdfFile,
+    file: &NetcdfFile,
     name: &str,
     place: Option<usize>,
     is_velocity: bool,
@@ -120,7 +119,7 @@ fn component(
 }
 
 /// Places of the nodes along a dimension: its coordinate, or what WRF has instead.
-fn nodes(file: &mut NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
+fn nodes(file: &NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
     if file.has(dim) {
         return file.coordinate_m(dim);
     }
@@ -140,7 +139,7 @@ fn nodes(file: &mut NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f
 }
 
 /// Heights of WRF's levels above the ground, from the geopotential, if they are level.
-fn levels(file: &mut NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
+fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
     let both = ["PH", "PHB"].map(|name| {
         let dims = file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x]);
         dims.or_else(|_| file.roles(name, [Z, Y, X])).and_then(|dims| {

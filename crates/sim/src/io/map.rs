@@ -22,35 +22,29 @@ pub enum Unit {
 }
 
 impl Unit {
+    /// Tag of a CSV column name, text in NetCDF, text for people.
+    fn texts(self) -> [&'static str; 3] {
+        match self {
+            Self::One => ["", "1", ""],
+            Self::MetrePerSecond => ["m_s", "m s-1", "m/s"],
+            Self::Decibel => ["db", "dB", "dB"],
+        }
+    }
+
     /// Tag that ends a CSV column name; empty for a dimensionless one.
     pub fn tag(self) -> &'static str {
-        match self {
-            Self::One => "",
-            Self::MetrePerSecond => "m_s",
-            Self::Decibel => "db",
-        }
+        self.texts()[0]
     }
 
     /// Text of the NetCDF attribute `units`.
     pub fn udunits(self) -> &'static str {
-        match self {
-            Self::One => "1",
-            Self::MetrePerSecond => "m s-1",
-            Self::Decibel => "dB",
-        }
+        self.texts()[1]
     }
-}
 
-/// How the values of a field are stored in binary formats.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum FieldKind {
-    /// 32-bit float; NaN is missing.
-    Float,
-    /// 8-bit flag; every value must be one of these codes, none may be missing.
-    Flag {
-        /// Code and its meaning (one word, underscores allowed).
-        meanings: Vec<(i8, String)>,
-    },
+    /// Text for people; empty for a dimensionless one.
+    pub fn label(self) -> &'static str {
+        self.texts()[2]
+    }
 }
 
 /// One quantity over all rays and gates.
@@ -70,12 +64,10 @@ pub struct Field {
     pub ancillary: Vec<String>,
     /// Values `[ray, gate]`; NaN = missing. Infinite values are refused.
     pub values: Array2<f64>,
-    /// Storage type.
-    pub kind: FieldKind,
 }
 
 impl Field {
-    /// A float field.
+    /// A field of that name with what its name says of it.
     pub fn float(name: &str, unit: Unit, long_name: &str, values: Array2<f64>) -> Self {
         Self {
             name: name.into(),
@@ -85,7 +77,6 @@ impl Field {
             cell_methods: None,
             ancillary: Vec::new(),
             values,
-            kind: FieldKind::Float,
         }
     }
 
@@ -285,7 +276,7 @@ impl VelocityMap {
     ///
     /// # Errors
     /// The first rule that is broken: no rays or sweeps, times or ranges that do not increase, sweeps that do not tile the
-    /// rays in order, a field of another shape, a repeated field name, an infinite value, a flag without meaning.
+    /// rays in order, a field of another shape, a repeated field name, an infinite value.
     pub fn check(&self) -> OutputResult<()> {
         increasing("range_m", &self.range_m)?;
         let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
@@ -334,12 +325,6 @@ impl VelocityMap {
         same_length(&field.name, gates, "range_m", self.range_m.len())?;
         if let Some(bad) = field.values.iter().find(|v| v.is_infinite()) {
             return Err(OutputError::value(&field.name, bad, "must be finite, or NaN where missing"));
-        }
-        if let FieldKind::Flag { meanings } = &field.kind {
-            let known = |v: f64| meanings.iter().any(|(code, _)| f64::from(*code) == v);
-            if let Some(bad) = field.values.iter().find(|v| !known(**v)) {
-                return Err(OutputError::value(&field.name, bad, "must be one of the flag's codes"));
-            }
         }
         Ok(())
     }

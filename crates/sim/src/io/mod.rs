@@ -18,7 +18,7 @@
 //! | [`tables`] | a map or planes as a table | - |
 //! | [`parts`] | (data) files in parts, for ranks that write them together | - |
 //! | [`atomic`] | files to disk, all or none | - |
-//! | `text_file`, `netcdf_header`, `netcdf_input`, `netcdf4_input`, `planes_input`, `fields_input`, `units` | (readers) texts, NetCDF, cross-planes and fields in it, units | `netcdf` or `netcdf4` but for texts |
+//! | `text_file`, `netcdf_input` (`netcdf4_input`), `planes_input`, `fields_input`, `units` | (readers) texts, NetCDF, cross-planes and fields in it, units | `netcdf` or `netcdf4` but for texts |
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`) | classic NetCDF | `netcdf` |
@@ -28,7 +28,6 @@ pub mod atomic;
 pub(crate) mod fields_input;
 #[cfg(feature = "netcdf4")]
 pub(crate) mod netcdf4_input;
-pub(crate) mod netcdf_header;
 pub(crate) mod netcdf_input;
 pub(crate) mod planes_input;
 pub(crate) mod text_file;
@@ -67,7 +66,7 @@ pub use csv::Table;
 pub(crate) use error::same_length;
 pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
-pub use map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use own::Existing;
 pub use parts::{FileParts, Share};
 pub use provenance::Provenance;

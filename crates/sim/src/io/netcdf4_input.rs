@@ -1,141 +1,34 @@
-//! NetCDF-4 (HDF5) files as the readers of classic ones see them: a header, and variables as `f64`, whole or one place of the
-//! slowest dimension at a time.
+//! What NetCDF-4 (HDF5) must not be before the library follows it: groups in circles and without end.
 //!
-//! Check: a field that another program compressed in chunks gives the wind that it was sampled from; groups in circles and values
-//! that no file of that length holds are refused.
+//! Check: groups in circles and values that no file of that length holds are refused; a field that another program compressed in chunks
+//! gives the wind that it was sampled from.
 
-use crate::io::netcdf_header::{Attribute, Header, Variable, is_default_fill};
-use crate::io::number::NumberType;
-use crate::machine;
+use super::netcdf_input::UNSOUND_HDF5;
 use hdf5_reader::Hdf5File;
-use netcdf_reader::{NcAttribute, NcFile, NcSliceInfo, NcSliceInfoElem, NcType};
 use std::path::Path;
-
-/// What is said of a file that the library does not read, and what may help.
-const UNREADABLE: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k cdf2 in.nc out.nc makes classic \
-                          NetCDF of it";
 
 /// Groups within groups, and groups of one depth, that anybody makes.
 const DEEPEST: usize = 32;
 const MOST_GROUPS: usize = 10_000;
-/// Deflate makes no more than so many bytes of one.
-const MOST_EXPANDED: f64 = 1032.0;
 
-/// A file whose groups are sound, and how long it is.
-pub(super) struct Nc4File {
-    file: NcFile,
-    bytes: u64,
-}
-
-impl Nc4File {
-    /// Opens a file.
-    ///
-    /// # Errors
-    /// A file that is not sound or of a kind that is not read; groups that hold each other, or are nested too deep: the library
-    /// would follow them until its stack ends.
-    pub(super) fn open(path: &Path) -> Result<Self, String> {
-        // What the library says would tell bytes of a file that may be anything.
-        let damaged = |_: hdf5_reader::error::Error| UNREADABLE.to_owned();
-        let root = Hdf5File::open(path).and_then(|file| file.root_group()).map_err(damaged)?;
-        let mut groups = vec![root];
-        for depth in 0.. {
-            let below: Result<Vec<_>, _> = groups.iter().map(|group| group.groups()).collect();
-            groups = below.map_err(damaged)?.into_iter().flatten().collect();
-            if groups.is_empty() {
-                break;
-            }
-            if depth == DEEPEST || groups.len() > MOST_GROUPS {
-                return Err(format!("its groups hold each other, or are nested more than {DEEPEST} deep"));
-            }
+/// Refuses a file whose groups hold each other, or are nested too deep: the library would follow them until its stack ends.
+///
+/// # Errors
+/// What is wrong with it; a damaged file.
+pub(super) fn check_groups(path: &Path) -> Result<(), &'static str> {
+    let damaged = |_: hdf5_reader::error::Error| UNSOUND_HDF5;
+    let mut groups = vec![Hdf5File::open(path).and_then(|file| file.root_group()).map_err(damaged)?];
+    for _ in 0..=DEEPEST {
+        let below: Result<Vec<_>, _> = groups.iter().map(|group| group.groups()).collect();
+        groups = below.map_err(damaged)?.into_iter().flatten().collect();
+        if groups.is_empty() {
+            return Ok(());
         }
-        let bytes = std::fs::metadata(path).map_err(|e| e.to_string())?.len();
-        Ok(Self { file: NcFile::open(path).map_err(|_| UNREADABLE.to_owned())?, bytes })
-    }
-
-    /// Names of the root, which is empty, and of the groups in it.
-    ///
-    /// # Errors
-    /// A damaged file.
-    pub(super) fn groups(&self) -> Result<Vec<String>, String> {
-        let root = self.file.root_group().map_err(|_| UNREADABLE.to_owned())?;
-        Ok(std::iter::once(String::new()).chain(root.groups.iter().map(|group| group.name.clone())).collect())
-    }
-
-    /// Dimensions and variables of a group, with the attributes of the root.
-    ///
-    /// # Errors
-    /// A damaged file, no such group.
-    pub(super) fn header(&self, group: &str) -> Result<Header, String> {
-        let root = self.file.root_group().map_err(|_| UNREADABLE.to_owned())?;
-        let own = if group.is_empty() { Some(root) } else { root.groups.iter().find(|own| own.name == group) };
-        let mut header = Header { attributes: attributes(&root.attributes), ..Header::default() };
-        for variable in &own.ok_or(UNREADABLE)?.variables {
-            let mut dims = Vec::new();
-            for dim in variable.dimensions() {
-                let known = header.dims.iter().position(|(name, size)| *name == dim.name && *size == dim.size);
-                dims.push(known.unwrap_or_else(|| {
-                    header.dims.push((dim.name.clone(), dim.size));
-                    header.dims.len() - 1
-                }));
-            }
-            let number = match variable.dtype() {
-                NcType::Byte | NcType::Short | NcType::Int | NcType::Float | NcType::Double => NumberType::F64,
-                NcType::UByte | NcType::UShort | NcType::UInt | NcType::Int64 | NcType::UInt64 => NumberType::F64,
-                _ => NumberType::Text,
-            };
-            let run = variable.shape().iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
-            header.variables.push(Variable {
-                name: variable.name().to_owned(),
-                dims,
-                attributes: attributes(variable.attributes()),
-                number,
-                begin: 0,
-                run: run.ok_or("a variable has more values than can be counted")?,
-                runs: 1,
-            });
+        if groups.len() > MOST_GROUPS {
+            break;
         }
-        Ok(header)
     }
-
-    /// Values of a variable of a group, unpacked and NaN where they are missing: all, or those at one place of its slowest dimension.
-    ///
-    /// # Errors
-    /// A variable that is damaged, packed in a way that is not read, or larger than the file and the memory can hold.
-    pub(super) fn read(
-        &self,
-        group: &str,
-        name: &str,
-        shape: &[u64],
-        place: Option<usize>,
-    ) -> Result<Vec<f64>, String> {
-        let path = if group.is_empty() { name.to_owned() } else { format!("{group}/{name}") };
-        let place = place.filter(|_| !shape.is_empty());
-        let numbers: f64 = shape[usize::from(place.is_some())..].iter().map(|length| *length as f64).product();
-        if numbers > MOST_EXPANDED * self.bytes as f64 {
-            return Err(format!("variable {name} has {numbers} values, more than {} bytes can hold", self.bytes));
-        }
-        // As they are in the file, as the library and as this program hands them on.
-        machine::holds(&format!("variable {name}"), 32.0 * numbers)?;
-        let values = match place {
-            Some(place) => {
-                let mut part = NcSliceInfo::all(shape.len());
-                part.selections[0] = NcSliceInfoElem::Index(place as u64);
-                self.file.read_variable_slice_unpacked_masked(&path, &part)
-            }
-            None => self.file.read_variable_unpacked_masked(&path),
-        };
-        let values = values.map_err(|_| format!("variable {name} cannot be read: {UNREADABLE}"))?;
-        // The library knows fills that the file states, not those of values that were never written.
-        Ok(values.into_iter().map(|value| if is_default_fill(value) { f64::NAN } else { value }).collect())
-    }
-}
-
-fn attributes(list: &[NcAttribute]) -> Vec<(String, Attribute)> {
-    let of = |a: &NcAttribute| {
-        let number = a.value.as_f64().map(Attribute::Number);
-        Some((a.name.clone(), a.value.as_string().map(Attribute::Text).or(number)?))
-    };
-    list.iter().filter_map(of).collect()
+    Err("its groups hold each other, or are nested more than 32 deep")
 }
 
 /// Small files for tests, made byte by byte.
@@ -212,15 +105,12 @@ pub(crate) mod made {
 #[cfg(test)]
 mod tests {
     use super::made::{array, empty_group, file, object};
-    use super::*;
+    use crate::io::netcdf_input::{NetcdfFile, open};
 
-    fn opened(bytes: &[u8]) -> Result<(Nc4File, Header), String> {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x.nc");
-        std::fs::write(&path, bytes).unwrap();
-        let file = Nc4File::open(&path)?;
-        let header = file.header("")?;
-        Ok((file, header))
+    fn opened(bytes: &[u8]) -> Result<NetcdfFile, String> {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), bytes).unwrap();
+        open(file.path()).map_err(|e| e.to_string())
     }
 
     #[test]
@@ -241,9 +131,9 @@ mod tests {
         // Never written: a fill value stands for all of them.
         let read = |count: u64| {
             let root = object(&[("g", 96 + object(&[("g", 0)], &[]).len() as u64)], &[]);
-            let (file, header) = opened(&file(&[root, array(&[count], u64::MAX)])).unwrap();
-            assert_eq!(header.variables[0].run, count);
-            file.read("", "g", &[count], None)
+            let file = opened(&file(&[root, array(&[count], u64::MAX)])).unwrap();
+            assert_eq!(file.shape("g"), Some(vec![count]));
+            file.floats("g")
         };
         assert_eq!(read(5).map(|values| values.len()), Ok(5));
         let refused = read(1 << 24).unwrap_err();

@@ -2,22 +2,38 @@
 //! wanted order.
 //!
 //! Dimensions are found by what they are for: by the attribute `axis` of their coordinate, or by their name. Values are
-//! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Check: the readers of initial fields and of cross-planes read
-//! back what the writers wrote; files of another hand and damaged ones in the tests below.
+//! unpacked (`scale_factor`, `add_offset`), missing ones are NaN. Nothing of a file is repeated in a message but names that may be
+//! shown. Check: the readers of initial fields and of cross-planes read back what the writers wrote; files of another hand, damaged
+//! ones, and each word of a good header replaced by large and negative counts in the tests below.
 
-use crate::io::netcdf_header::{self as header, Attribute, Header, Variable, is_default_fill};
-use crate::io::number::{ByteOrder, NumberType};
 use crate::io::units::Quantity;
 use crate::{Error, io::text_file, machine};
-use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use netcdf_reader::{
+    NcAttrValue, NcAttribute, NcFile, NcFormat, NcGroup, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
+};
+use std::io::Read;
+use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
+#[cfg(feature = "netcdf4")]
+use std::sync::Arc;
 
-/// Longest header that is read \[bytes\].
-const LONGEST_HEADER_BYTES: u64 = 16 << 20;
+/// Deflate makes no more than so many bytes of one.
+const MOST_EXPANDED: f64 = 1032.0;
 
-/// Largest variable that is read \[bytes\].
-const LARGEST_VARIABLE_BYTES: u64 = 4 << 30;
+/// What the library of NetCDF stores where no float was written.
+pub(crate) const DEFAULT_FILL: f64 = 9.969_209_968_386_869e36;
+
+const OTHER: &str = "it is no NetCDF file; classic NetCDF is needed, from xarray with to_netcdf(\"out.nc\", \
+                     format=\"NETCDF3_64BIT\")";
+/// What is said of a file that the library does not read: its own words would tell bytes of a file that may be anything.
+const UNSOUND: &str = "it is no sound NetCDF file: its header is damaged, or counts more than the file holds";
+pub(super) const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k cdf2 in.nc out.nc makes classic \
+                            NetCDF of it";
+/// How NetCDF-4 becomes classic, for programs that do not read it.
+#[cfg_attr(feature = "netcdf4", allow(dead_code))]
+const CONVERT: &str = "it is NetCDF-4 (HDF5), classic NetCDF is needed: nccopy -k cdf2 in.nc out.nc, or in xarray \
+                       to_netcdf(\"out.nc\", format=\"NETCDF3_64BIT\")";
 
 /// What a dimension is for: its name here, its letter in the attribute `axis`, and other names for it.
 #[derive(Debug, Clone, Copy)]
@@ -55,27 +71,23 @@ pub(crate) const Z: Role = Role {
 };
 
 /// A NetCDF file, open, or a group of one.
+#[derive(Clone)]
 pub(crate) struct NetcdfFile {
     path: PathBuf,
-    numbers: Numbers,
-    header: Header,
+    file: Rc<NcFile>,
+    /// Length of the file.
+    bytes: u64,
+    /// Name of the group; empty for the root.
+    group: String,
+    variables: Vec<NcVariable>,
+    /// Attributes of the root.
+    attributes: Vec<NcAttribute>,
 }
 
-/// What the numbers of a file are read from.
-enum Numbers {
-    Classic(File),
-    /// A group of a NetCDF-4 file, whose name is empty for the root.
-    #[cfg(feature = "netcdf4")]
-    Hdf5(std::rc::Rc<super::netcdf4_input::Nc4File>, String),
-}
-
-/// Where the numbers of a variable are.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct NumbersInFile {
-    pub(crate) number: NumberType,
-    pub(crate) begin: u64,
-    /// Bytes from one record of the file to the next, where the variable grows with them.
-    pub(crate) stride: Option<u64>,
+impl std::fmt::Debug for NetcdfFile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{} {}", self.path.display(), self.group)
+    }
 }
 
 /// Opens a NetCDF file and reads its header, in NetCDF-4 that of its root.
@@ -84,28 +96,35 @@ pub(crate) struct NumbersInFile {
 /// What the system says; a file of another kind, or one whose header does not fit its length.
 pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
     let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
-    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-    let (mut file, length) = text_file::open(path).map_err(unreadable)?;
+    let refuse = |reason: &str| Error::Input { path: path.to_owned(), reason: reason.to_owned() };
+    let (file, bytes) = text_file::open(path).map_err(unreadable)?;
     let mut beginning = Vec::new();
-    Read::by_ref(&mut file).take(4).read_to_end(&mut beginning).map_err(unreadable)?;
-    #[cfg(feature = "netcdf4")]
-    if beginning == b"\x89HDF" {
-        let file = std::rc::Rc::new(super::netcdf4_input::Nc4File::open(path).map_err(refuse)?);
-        return of_group(path, &file, String::new()).map_err(refuse);
+    file.take(4).read_to_end(&mut beginning).map_err(unreadable)?;
+    match &beginning[..] {
+        b"CDF\x01" | b"CDF\x02" | b"CDF\x05" => {}
+        #[cfg(feature = "netcdf4")]
+        b"\x89HDF" => super::netcdf4_input::check_groups(path).map_err(refuse)?,
+        #[cfg(not(feature = "netcdf4"))]
+        b"\x89HDF" => return Err(refuse(CONVERT)),
+        _ => return Err(refuse(OTHER)),
     }
-    Read::by_ref(&mut file).take(LONGEST_HEADER_BYTES).read_to_end(&mut beginning).map_err(unreadable)?;
-    let header = header::read(&beginning, length).map_err(|reason| refuse(reason.into()))?;
-    Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Classic(file), header })
-}
-
-#[cfg(feature = "netcdf4")]
-fn of_group(
-    path: &Path,
-    file: &std::rc::Rc<super::netcdf4_input::Nc4File>,
-    name: String,
-) -> Result<NetcdfFile, String> {
-    let header = file.header(&name)?;
-    Ok(NetcdfFile { path: path.to_owned(), numbers: Numbers::Hdf5(std::rc::Rc::clone(file), name), header })
+    let unsound = || refuse(if beginning[0] == b'C' { UNSOUND } else { UNSOUND_HDF5 });
+    // By places: a file that is mapped to memory would end the program where it becomes shorter.
+    #[cfg(feature = "netcdf4")]
+    let file = hdf5_reader::FileStorage::open(path).ok().and_then(|file| NcFile::from_storage(Arc::new(file)).ok());
+    #[cfg(not(feature = "netcdf4"))]
+    let file = NcFile::open(path).ok();
+    let file = file.ok_or_else(unsound)?;
+    let root = file.root_group().map_err(|_| unsound())?;
+    // The library holds only records against the length of the file.
+    let end_of =
+        |v: &NcVariable| v.data_offset.checked_add(v.num_elements().ok()?.checked_mul(v.dtype.size().ok()? as u64)?);
+    let is_cut = |v: &NcVariable| !v.is_record_var && end_of(v).is_none_or(|end| end > bytes);
+    if beginning[0] == b'C' && root.variables.iter().any(is_cut) {
+        return Err(unsound());
+    }
+    let (variables, attributes) = (root.variables.clone(), root.attributes.clone());
+    Ok(NetcdfFile { path: path.to_owned(), file: Rc::new(file), bytes, group: String::new(), variables, attributes })
 }
 
 /// Opens the root of a file and the groups in it, as far as they have the variable `needed`, with their names; attributes of the file
@@ -115,19 +134,16 @@ fn of_group(
 /// As [`open`]; a file without that variable.
 pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<(String, NetcdfFile)>, Error> {
     let root = open(path)?;
-    let mut found = match &root.numbers {
-        #[cfg(feature = "netcdf4")]
-        Numbers::Hdf5(file, _) => {
-            let named = |name: String| Ok((name.clone(), of_group(path, file, name)?));
-            let all: Result<Vec<_>, String> = file.groups().and_then(|names| names.into_iter().map(named).collect());
-            all.map_err(|reason| root.refuse(reason))?
-        }
-        Numbers::Classic(_) => vec![(String::new(), root)],
+    let groups = root.file.root_group().map_or(&[][..], |group| &group.groups);
+    let of_group = |group: &NcGroup| {
+        let (name, variables) = (group.name.clone(), group.variables.clone());
+        (name.clone(), NetcdfFile { group: name, variables, ..root.clone() })
     };
+    let mut found = vec![(String::new(), root.clone())];
+    found.extend(groups.iter().map(of_group));
     found.retain(|(_, group)| group.has(needed));
     if found.is_empty() {
-        let reason = format!("neither it nor one of its groups has a variable {needed}");
-        return Err(Error::Input { path: path.to_owned(), reason });
+        return Err(root.refuse(format!("neither it nor one of its groups has a variable {needed}")));
     }
     Ok(found)
 }
@@ -138,8 +154,8 @@ impl NetcdfFile {
         Error::Input { path: self.path.clone(), reason }
     }
 
-    fn variable(&self, name: &str) -> Option<&Variable> {
-        self.header.variables.iter().find(|variable| variable.name == name)
+    fn variable(&self, name: &str) -> Option<&NcVariable> {
+        self.variables.iter().find(|variable| variable.name == name)
     }
 
     /// Whether it has a variable of this name.
@@ -149,126 +165,101 @@ impl NetcdfFile {
 
     /// Names of all variables.
     pub(crate) fn names(&self) -> impl Iterator<Item = &str> {
-        self.header.variables.iter().map(|variable| variable.name.as_str())
+        self.variables.iter().map(|variable| variable.name.as_str())
     }
 
     /// Lengths of the dimensions of a variable, slowest first.
     pub(crate) fn shape(&self, name: &str) -> Option<Vec<u64>> {
-        Some(self.variable(name)?.dims.iter().map(|dim| self.header.dims[*dim].1).collect())
+        Some(self.variable(name)?.shape())
     }
 
-    /// Where the numbers of a variable are.
-    pub(crate) fn layout(&self, name: &str) -> Option<NumbersInFile> {
-        let variable = self.variable(name)?;
-        let stride = (variable.runs != 1).then_some(self.header.record_bytes);
-        Some(NumbersInFile { number: variable.number, begin: variable.begin, stride })
-    }
-
-    /// The numbers that stand for a missing one, and factor and offset of the others.
-    pub(crate) fn packing(&self, name: &str) -> (Vec<f64>, f64, f64) {
-        let fills = ["_FillValue", "missing_value"].iter().filter_map(|fill| self.number(name, fill)).collect();
-        let scale = self.number(name, "scale_factor").unwrap_or(1.0);
-        (fills, scale, self.number(name, "add_offset").unwrap_or(0.0))
-    }
-
-    /// A text attribute of the file.
-    pub(crate) fn global_text(&self, name: &str) -> Option<&str> {
-        of_name(&self.header.attributes, name)?.text()
-    }
-
-    /// The open file, for who reads places of it.
-    pub(crate) fn handle(&self) -> std::io::Result<File> {
-        match &self.numbers {
-            Numbers::Classic(file) => file.try_clone(),
-            #[cfg(feature = "netcdf4")]
-            Numbers::Hdf5(..) => Err(std::io::ErrorKind::Unsupported.into()),
-        }
+    /// How the numbers of a variable are stored.
+    pub(crate) fn kind(&self, name: &str) -> Option<&NcType> {
+        Some(&self.variable(name)?.dtype)
     }
 
     /// Names of the dimensions of a variable, slowest first; none if there is no such variable.
     pub(crate) fn dims(&self, name: &str) -> Option<Vec<&str>> {
-        let dims = &self.variable(name)?.dims;
-        Some(dims.iter().map(|dim| self.header.dims[*dim].0.as_str()).collect())
+        Some(self.variable(name)?.dimensions.iter().map(|dim| dim.name.as_str()).collect())
     }
 
-    /// A text attribute of a variable.
-    pub(crate) fn text(&self, variable: &str, name: &str) -> Option<&str> {
-        of_name(&self.variable(variable)?.attributes, name)?.text()
-    }
-
-    fn number(&self, variable: &str, name: &str) -> Option<f64> {
-        of_name(&self.variable(variable)?.attributes, name)?.number()
+    /// A text attribute of the file.
+    pub(crate) fn global_text(&self, name: &str) -> Option<&str> {
+        text(&self.attributes.iter().find(|own| own.name == name)?.value)
     }
 
     /// A number among the attributes of the whole file.
     pub(crate) fn global_number(&self, name: &str) -> Option<f64> {
-        of_name(&self.header.attributes, name)?.number()
+        self.attributes.iter().find(|own| own.name == name)?.value.as_f64()
+    }
+
+    /// A text attribute of a variable.
+    pub(crate) fn text(&self, variable: &str, name: &str) -> Option<&str> {
+        text(&self.variable(variable)?.attribute(name)?.value)
+    }
+
+    /// A number among the attributes of a variable.
+    pub(crate) fn number(&self, variable: &str, name: &str) -> Option<f64> {
+        self.variable(variable)?.attribute(name)?.value.as_f64()
     }
 
     /// A variable as `f64`, whatever its type of number; NaN where a value is missing.
     ///
     /// # Errors
     /// A variable that is not there, not made of numbers, too large, or not readable.
-    pub(crate) fn floats(&mut self, name: &str) -> Result<Vec<f64>, String> {
-        self.part(name, None)
+    pub(crate) fn floats(&self, name: &str) -> Result<Vec<f64>, String> {
+        self.part(name, &[])
     }
 
-    /// The values at one place of the slowest dimension of a variable, or all of them.
-    fn part(&mut self, name: &str, place: Option<usize>) -> Result<Vec<f64>, String> {
+    /// The values of a variable in these ranges of its first dimensions and all along the others, the last one fastest.
+    ///
+    /// # Errors
+    /// As [`Self::floats`]; a range beyond its dimension.
+    pub(crate) fn part(&self, name: &str, ranges: &[Range<u64>]) -> Result<Vec<f64>, String> {
         let Some(variable) = self.variable(name) else {
             return Err(format!("it has no variable {name}"));
         };
-        if variable.number == NumberType::Text {
+        let is_number = matches!(
+            variable.dtype,
+            NcType::Byte
+                | NcType::Short
+                | NcType::Int
+                | NcType::Int64
+                | NcType::Float
+                | NcType::Double
+                | NcType::UByte
+                | NcType::UShort
+                | NcType::UInt
+                | NcType::UInt64
+        );
+        if !is_number {
             return Err(format!("variable {name} is not made of numbers"));
         }
-        let (number, mut begin, mut runs) = (variable.number, variable.begin, variable.runs);
-        let (mut run_bytes, mut first) = (variable.run_bytes(), 0);
-        if let Some(place) = place {
-            let places = variable.dims.first().map_or(1, |dim| self.header.dims[*dim].1).max(1);
-            if place as u64 >= places {
-                return Err(format!("variable {name} has no place {place}"));
+        let (mut lengths, mut part) = (variable.shape(), NcSliceInfo::all(variable.ndim()));
+        for (at, range) in ranges.iter().enumerate() {
+            match lengths.get_mut(at) {
+                Some(length) if range.end <= *length => *length = range.end - range.start,
+                _ => return Err(format!("variable {name} has no place {}", range.end.saturating_sub(1))),
             }
-            if runs == places && places > 1 {
-                (first, runs) = (place as u64, 1);
-            } else {
-                run_bytes = run_bytes * runs / places;
-                (begin, runs) = (begin + place as u64 * run_bytes, 1);
-            }
+            part.selections[at] = NcSliceInfoElem::Slice { start: range.start, end: range.end, step: 1 };
         }
-        let bytes = run_bytes.saturating_mul(runs);
-        if bytes > LARGEST_VARIABLE_BYTES {
-            return Err(format!("variable {name} has more than {LARGEST_VARIABLE_BYTES} bytes: use one file per time"));
+        let count: f64 = lengths.iter().map(|length| *length as f64).product();
+        if count > MOST_EXPANDED * self.bytes as f64 {
+            return Err(format!("variable {name} has {count} values, more than {} bytes can hold", self.bytes));
         }
-        // As they are in the file and as they are handed on, perhaps in another order.
-        machine::holds(&format!("variable {name}"), 3.0 * 8.0 * (bytes / number.bytes()) as f64)?;
-        #[cfg(feature = "netcdf4")]
-        if let Numbers::Hdf5(file, group) = &self.numbers {
-            return file.read(group, name, &self.shape(name).unwrap_or_default(), place);
-        }
-        let (fills, scale, offset) = self.packing(name);
-        let packed = scale != 1.0 || offset != 0.0;
-        let unpack = |value: f64| {
-            let missing = fills.contains(&value) || is_default_fill(value);
-            match (missing, packed) {
-                (true, _) => f64::NAN,
-                (_, true) => value * scale + offset,
-                (_, false) => value,
-            }
+        // As they are in the file, as the library and as this program hands them on.
+        machine::holds(&format!("variable {name}"), 32.0 * count)?;
+        let path = if self.group.is_empty() { name.to_owned() } else { format!("{}/{name}", self.group) };
+        let values = match ranges {
+            [] => self.file.read_variable_unpacked_masked(&path),
+            _ => self.file.read_variable_slice_unpacked_masked(&path, &part),
         };
-        let mut values = Vec::new();
-        values.try_reserve_exact((bytes / number.bytes()) as usize).map_err(|e| format!("variable {name}: {e}"))?;
-        let mut file = self.handle().map_err(|e| format!("variable {name} cannot be read: {e}"))?;
-        let mut raw = vec![0; run_bytes as usize];
-        for run in first..first + runs {
-            let at = SeekFrom::Start(begin + run * self.header.record_bytes);
-            file.seek(at)
-                .and_then(|_| file.read_exact(&mut raw))
-                .map_err(|e| format!("variable {name} cannot be read: {e}"))?;
-            values.extend(
-                raw.chunks_exact(number.bytes() as usize).map(|bytes| unpack(number.value(bytes, ByteOrder::Big))),
-            );
-        }
-        Ok(values)
+        let is_hdf5 = matches!(self.file.format(), NcFormat::Nc4 | NcFormat::Nc4Classic);
+        let unsound = if is_hdf5 { UNSOUND_HDF5 } else { UNSOUND };
+        let values = values.map_err(|_| format!("variable {name} cannot be read: {unsound}"))?;
+        // The library knows fills that the file states, not those of values that were never written.
+        let is_unwritten = |value: f64| (value / DEFAULT_FILL - 1.0).abs() < 1e-6;
+        Ok(values.into_iter().map(|value| if is_unwritten(value) { f64::NAN } else { value }).collect())
     }
 
     /// The dimension of `variable` that has a role.
@@ -322,14 +313,15 @@ impl NetcdfFile {
 
     /// Length of a dimension.
     pub(crate) fn length(&self, dim: &str) -> Option<u64> {
-        self.header.dims.iter().find(|(name, _)| name == dim).map(|(_, length)| *length)
+        let all = self.variables.iter().flat_map(|variable| &variable.dimensions);
+        all.filter(|own| own.name == dim).map(|own| own.size).next()
     }
 
     /// The coordinate of a dimension.
     ///
     /// # Errors
     /// There is none, or it has another length.
-    pub(crate) fn coordinate(&mut self, dim: &str) -> Result<Vec<f64>, String> {
+    pub(crate) fn coordinate(&self, dim: &str) -> Result<Vec<f64>, String> {
         let shown = presentable(dim).unwrap_or("a dimension").to_owned();
         if !self.has(dim) {
             return Err(format!("{shown} has no coordinate: a variable of that name with its positions is needed"));
@@ -356,7 +348,7 @@ impl NetcdfFile {
     ///
     /// # Errors
     /// As [`Self::coordinate`]; a unit that is no length.
-    pub(crate) fn coordinate_m(&mut self, dim: &str) -> Result<Vec<f64>, String> {
+    pub(crate) fn coordinate_m(&self, dim: &str) -> Result<Vec<f64>, String> {
         let unit_m = self.unit(dim, Quantity::Length)?;
         Ok(scaled(self.coordinate(dim)?, unit_m))
     }
@@ -365,7 +357,7 @@ impl NetcdfFile {
     ///
     /// # Errors
     /// As [`Self::floats`]; a unit that is no time.
-    pub(crate) fn seconds(&mut self, name: &str) -> Result<Vec<f64>, String> {
+    pub(crate) fn seconds(&self, name: &str) -> Result<Vec<f64>, String> {
         // Plain numbers are taken for seconds.
         let is_plain = self.text(name, "units") == Some("1");
         let unit_s = if is_plain { 1.0 } else { self.unit(name, Quantity::Time)? };
@@ -376,12 +368,7 @@ impl NetcdfFile {
     ///
     /// # Errors
     /// As there; a unit that is no velocity.
-    pub(crate) fn velocities(
-        &mut self,
-        name: &str,
-        order: &[String],
-        place: Option<usize>,
-    ) -> Result<Vec<f64>, String> {
+    pub(crate) fn velocities(&self, name: &str, order: &[String], place: Option<usize>) -> Result<Vec<f64>, String> {
         let unit_m_s = self.unit(name, Quantity::Velocity)?;
         Ok(scaled(self.ordered(name, order, place)?, unit_m_s))
     }
@@ -391,12 +378,15 @@ impl NetcdfFile {
     ///
     /// # Errors
     /// As [`Self::floats`].
-    pub(crate) fn ordered(&mut self, name: &str, order: &[String], place: Option<usize>) -> Result<Vec<f64>, String> {
+    pub(crate) fn ordered(&self, name: &str, order: &[String], place: Option<usize>) -> Result<Vec<f64>, String> {
         let mut dims: Vec<String> = self.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
         if place.is_some() && !dims.is_empty() {
             dims.remove(0);
         }
-        let values = self.part(name, place)?;
+        let values = match place {
+            Some(place) => self.part(name, std::slice::from_ref(&(place as u64..place as u64 + 1)))?,
+            None => self.floats(name)?,
+        };
         if dims == order {
             return Ok(values);
         }
@@ -419,8 +409,12 @@ impl NetcdfFile {
     }
 }
 
-fn of_name<'a>(attributes: &'a [(String, Attribute)], name: &str) -> Option<&'a Attribute> {
-    attributes.iter().find(|(own, _)| own == name).map(|(_, value)| value)
+fn text(value: &NcAttrValue) -> Option<&str> {
+    match value {
+        NcAttrValue::Chars(text) => Some(text),
+        NcAttrValue::Strings(texts) if texts.len() == 1 => Some(&texts[0]),
+        _ => None,
+    }
 }
 
 /// The values in another unit; with the same bits in the same.

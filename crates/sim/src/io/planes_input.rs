@@ -43,11 +43,11 @@ pub(crate) fn files(planes: &Path) -> Result<Vec<PathBuf>, Error> {
 /// # Errors
 /// A file that cannot be read, lacks a variable, or has values that are missing.
 pub(crate) fn read(path: &Path) -> Result<CrossPlanes, Error> {
-    let mut file = open(path)?;
-    planes(&mut file).map_err(|reason| file.refuse(reason))
+    let file = open(path)?;
+    planes(&file).map_err(|reason| file.refuse(reason))
 }
 
-fn planes(file: &mut NetcdfFile) -> Result<CrossPlanes, String> {
+fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
     let dims = file.roles("v", [TIME, Z, Y])?;
     let others = file.roles("w", [TIME, Z, Y])?;
     if dims != others {
@@ -63,7 +63,7 @@ fn planes(file: &mut NetcdfFile) -> Result<CrossPlanes, String> {
         }
     }
     let shape = (tau.len(), z_m.len(), y_m.len());
-    let mut component = |name: &str| -> Result<Array3<f64>, String> {
+    let component = |name: &str| -> Result<Array3<f64>, String> {
         let values = file.velocities(name, &dims, None)?;
         if let Some(place) = values.iter().position(|v| !v.is_finite()) {
             return Err(format!("{name} is missing or not finite at place {place}"));
@@ -78,10 +78,10 @@ fn planes(file: &mut NetcdfFile) -> Result<CrossPlanes, String> {
 }
 
 /// Ages and times \[s\] of the planes: each from the variable of its name, or else from the coordinate of the planes.
-fn times(file: &mut NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
+fn times(file: &NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
     let count = file.coordinate(dim)?.len();
     let is_age = ["tau", "age"].contains(&dim.to_ascii_lowercase().as_str());
-    let mut values = |name: &str| -> Result<Vec<f64>, String> {
+    let values = |name: &str| -> Result<Vec<f64>, String> {
         if name == "time" && is_age && !file.has(name) {
             return Err("it has no variable time, the times of the planes in s".into());
         }

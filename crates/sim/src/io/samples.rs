@@ -1,6 +1,6 @@
 //! Small made-up results for the tests of the writers: two sweeps, missing values, a stretched mesh.
 
-use super::map::{CrossPlanes, Field, FieldKind, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+use super::map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 use super::site::Site;
 use ndarray::{Array2, Array3};
 
@@ -72,16 +72,6 @@ pub(crate) fn map() -> VelocityMap {
             Field::float("level", Unit::One, "accumulation level", positive(3.0)),
             Field::float("n_eff", Unit::One, "effective number of independent spectra", positive(2.0)),
             Field::float("signal_to_noise_ratio", Unit::Decibel, "signal-to-noise ratio", wave(1.0)),
-            Field {
-                name: "quality_flag".into(),
-                unit: Unit::One,
-                long_name: "quality of the estimate".into(),
-                standard_name: None,
-                cell_methods: None,
-                ancillary: Vec::new(),
-                values: Array2::from_shape_fn(shape, |(r, g)| ((r + g) % 2) as f64),
-                kind: FieldKind::Flag { meanings: vec![(0, "good".into()), (1, "low_signal".into())] },
-            },
         ],
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,

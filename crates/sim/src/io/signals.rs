@@ -24,22 +24,15 @@ pub struct Recording {
     pub noise_power_a2: f64,
 }
 
-/// The air along the lines of sight: what an estimate is to be held against.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LineVelocities<'a> {
-    /// Ranges, m, increasing.
-    pub range_m: Vec<f64>,
-    /// Radial velocity `[line, range]`, m/s, positive away from the lidar; NaN where nothing returns light.
-    pub radial_velocity_m_s: ArrayView2<'a, f64>,
-}
-
 /// The signals of a scan, pulse by pulse, one realisation after the other; the large arrays are borrowed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawSignals<'a> {
     /// How they were recorded.
     pub recording: Recording,
-    /// The air along the lines.
-    pub truth: LineVelocities<'a>,
+    /// Ranges of the air along the lines of sight, which an estimate is to be held against, m, increasing.
+    pub range_m: Vec<f64>,
+    /// Radial velocity of that air `[line, range]`, m/s, positive away from the lidar; NaN where nothing returns light.
+    pub radial_velocity_m_s: ArrayView2<'a, f64>,
     /// Time of each pulse of one realisation from the start of the flow, s.
     pub pulse_time_s: Vec<f64>,
     /// Current of the detector `[pulse, sample]`, A.
@@ -74,9 +67,9 @@ impl RawSignals<'_> {
             same_length("quadrature_a", quadrature.nrows(), "current_a", self.current_a.nrows())?;
             same_length("quadrature_a", quadrature.ncols(), "time_s", self.time_s.len())?;
         }
-        increasing("range_m", &self.truth.range_m)?;
-        let (lines, ranges) = self.truth.radial_velocity_m_s.dim();
-        same_length("radial_velocity_m_s", ranges, "range_m", self.truth.range_m.len())?;
+        increasing("range_m", &self.range_m)?;
+        let (lines, ranges) = self.radial_velocity_m_s.dim();
+        same_length("radial_velocity_m_s", ranges, "range_m", self.range_m.len())?;
         same_length("radial_velocity_m_s", lines, "the lines", self.first_pulse.len())?;
         match self.current_a.iter().chain(self.quadrature_a.iter().flatten()).find(|a| !a.is_finite()) {
             Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
@@ -132,10 +125,8 @@ pub(crate) fn example() -> RawSignals<'static> {
             pulse_sigma_s: 1.2e-7,
             noise_power_a2: 3e-13,
         },
-        truth: LineVelocities {
-            range_m: vec![100.0, 130.0],
-            radial_velocity_m_s: ndarray::aview2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
-        },
+        range_m: vec![100.0, 130.0],
+        radial_velocity_m_s: ndarray::aview2(&[[1.5, -2.5], [f64::NAN, 0.5]]),
         pulse_time_s: vec![8.0, 8.0025, 8.005, 8.0075],
         current_a: ndarray::aview2(&CURRENT_A),
         quadrature_a: None,

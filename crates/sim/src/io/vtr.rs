@@ -1,32 +1,27 @@
 //! Cross-planes and whole fields as VTK rectilinear grids (`.vtr`, one per age) and their collection (`.pvd`), for ParaView and
 //! PyVista.
 //! Point vectors `velocity` = (u, v, w) in m/s, in planes with u = 0 on one x point; names in VTK carry no units.
-//! Check: a test reads the file back with the VTK parser.
+//! Check: tests read the file back with the VTK parser, and compare its bytes with those of another encoder.
 
-use super::error::{OutputError, OutputResult};
+use super::error::OutputResult;
 use super::fields::VelocityField;
 use super::map::CrossPlanes;
 use super::parts::FileParts;
 use super::provenance::Provenance;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
-use vtkio::model::{
-    Attribute, Attributes, ByteOrder, Coordinates, DataSet, Extent, RectilinearGridPiece, Version, Vtk,
-};
+use ndarray::{Array3, Axis};
 
 /// The files of a series: `STEM_0001.vtr`, ... and `STEM.pvd`, whose time steps are the ages tau.
 ///
 /// # Errors
-/// What [`CrossPlanes::check`] finds, or a refusal of the encoder.
+/// What [`CrossPlanes::check`] finds.
 pub fn vtr_series(planes: &CrossPlanes, stem: &str, provenance: &Provenance) -> OutputResult<Vec<(String, Vec<u8>)>> {
     planes.check()?;
-    let mut files = Vec::new();
-    let mut entries = String::new();
-    for (i, tau) in planes.tau.iter().enumerate() {
-        let name = format!("{stem}_{:04}.vtr", i + 1);
-        files.push((name.clone(), plane_bytes(planes, i, provenance)?));
-        entries += &format!("    <DataSet timestep=\"{tau:?}\" part=\"0\" file=\"{name}\"/>\n");
-    }
-    files.push((format!("{stem}.pvd"), collection(&entries, provenance)));
+    let name = |i: usize| format!("{stem}_{:04}.vtr", i + 1);
+    let mut files: Vec<_> = (0..planes.tau.len()).map(|i| (name(i), plane_bytes(planes, i, provenance))).collect();
+    let members = planes.tau.iter().copied().zip(files.iter().map(|(name, _)| name.as_str()));
+    let collection = pvd_bytes(members, provenance);
+    files.push((format!("{stem}.pvd"), collection));
     Ok(files)
 }
 
@@ -35,10 +30,6 @@ pub fn pvd_bytes<'a>(members: impl IntoIterator<Item = (f64, &'a str)>, provenan
     let entry =
         |(time, name): (f64, &str)| format!("    <DataSet timestep=\"{time:?}\" part=\"0\" file=\"{name}\"/>\n");
     let entries: String = members.into_iter().map(entry).collect();
-    collection(&entries, provenance)
-}
-
-fn collection(entries: &str, provenance: &Provenance) -> Vec<u8> {
     format!(
         "<?xml version=\"1.0\"?>\n{}<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n{entries}  </Collection>\n</VTKFile>\n",
         comment(provenance)
@@ -51,86 +42,21 @@ fn collection(entries: &str, provenance: &Provenance) -> Vec<u8> {
 /// the cell behind the last one that is here, in the order of [`VelocityField::named`]: digits of the encoding hold bytes of both.
 ///
 /// # Errors
-/// What [`VelocityField::check`] finds, or a refusal of the encoder.
+/// What [`VelocityField::check`] finds.
 pub fn field_parts(field: &VelocityField, behind: Option<&[f64]>, provenance: &Provenance) -> OutputResult<FileParts> {
     field.check()?;
     let cells = field.x_m.len() * field.y_m.len() * field.z_m.len();
-    let empty = Vec::<f32>::new;
-    let mut point = vec![
-        Attribute::vectors("velocity").with_data(empty()),
-        Attribute::scalars("pressure_m2_s2", 1).with_data(empty()),
-    ];
-    if field.vorticity_per_s.is_some() {
-        point.push(Attribute::scalars("vorticity_magnitude", 1).with_data(empty()));
-    }
-    // The encoder writes all but the values, for which there is a mark each; they stand before the coordinates.
-    let arrays = point.len();
-    let frame = grid_text(&field.title, [&field.x_m, &field.y_m, &field.z_m], point)?;
     let named: Vec<&[f64]> = field.named().map(|(_, values)| values).collect();
-    let mut texts = frame.splitn(arrays + 1, NO_VALUES).map(str::to_owned);
-    let mut file = FileParts::default();
-    let mut next_text = || texts.next().ok_or_else(|| OutputError::encode("VTK", "an array is missing"));
-    let add_text = |file: &mut FileParts, text: String| {
-        let start = file.length;
-        file.length += text.len() as u64;
-        if field.share.is_first {
-            file.parts.push((start, text.into_bytes()));
-        }
+    let array = |name: &'static str, columns: std::ops::Range<usize>| Array {
+        name,
+        values: named[columns.clone()].to_vec(),
+        behind: behind.map_or(&[], |values| &values[columns]),
+        cells,
+        first: field.first(),
     };
-    add_text(&mut file, with_comment(&next_text()?, provenance)?);
-    let groups = std::iter::once(0..3).chain((3..named.len()).map(|i| i..i + 1));
-    for group in groups {
-        let array = Array { components: group.len(), cells, first: field.first() };
-        let (start, text) = array.encoded(&named[group.clone()], behind.map(|values| &values[group]));
-        file.parts.push((file.length + start, text));
-        file.length += array.length();
-        add_text(&mut file, next_text()?);
-    }
-    Ok(file)
-}
-
-/// What the encoder makes of an array without values: eight bytes for its length.
-const NO_VALUES: &str = "AAAAAAAAAAA=";
-
-/// An array of 32-bit floats as it stands in a file, in base64 with its length before it.
-struct Array {
-    components: usize,
-    /// Of the whole array.
-    cells: usize,
-    /// The first cell that is here.
-    first: usize,
-}
-
-impl Array {
-    /// Bytes before the values of a cell.
-    fn before(&self, cell: usize) -> usize {
-        8 + 4 * self.components * cell
-    }
-
-    /// Digits of the whole array.
-    fn length(&self) -> u64 {
-        4 * self.before(self.cells).div_ceil(3) as u64
-    }
-
-    /// The digits that begin here, and the place of the first of them.
-    fn encoded(&self, values: &[&[f64]], behind: Option<&[f64]>) -> (u64, Vec<u8>) {
-        let cells = values.first().map_or(0, |values| values.len());
-        let end = self.first + cells;
-        let mut bytes = Vec::with_capacity(4 * self.components * (cells + 1) + 8);
-        if self.first == 0 {
-            bytes.extend((self.before(self.cells) as u64 - 8).to_le_bytes());
-        }
-        for cell in 0..cells {
-            bytes.extend(values.iter().flat_map(|values| (values[cell] as f32).to_le_bytes()));
-        }
-        bytes.extend(behind.unwrap_or_default().iter().flat_map(|value| (*value as f32).to_le_bytes()));
-        // Three bytes make four digits, which belong to who has the first of these.
-        let from = if self.first == 0 { 0 } else { self.before(self.first).next_multiple_of(3) };
-        let to = if end == self.cells { self.before(end) } else { self.before(end).next_multiple_of(3) };
-        let here = if self.first == 0 { 0 } else { self.before(self.first) };
-        let own = bytes.get(from - here..to - here).filter(|_| cells > 0).unwrap_or_default();
-        ((from / 3 * 4) as u64, BASE64_STANDARD.encode(own).into_bytes())
-    }
+    let mut arrays = vec![array("velocity", 0..3), array("pressure_m2_s2", 3..4)];
+    arrays.extend(field.vorticity_per_s.is_some().then(|| array("vorticity_magnitude", 4..5)));
+    Ok(grid([&field.x_m, &field.y_m, &field.z_m], &arrays, field.share.is_first, provenance))
 }
 
 /// The first plane alone.
@@ -139,51 +65,103 @@ impl Array {
 /// As [`vtr_series`].
 pub fn plane_file(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    plane_bytes(planes, 0, provenance)
+    Ok(plane_bytes(planes, 0, provenance))
 }
 
-fn plane_bytes(planes: &CrossPlanes, index: usize, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    let (ny, nz) = (planes.y_m.len(), planes.z_m.len());
-    // x runs fastest and has one point, then y, then z: the order of the arrays; the vector is interleaved.
-    let mut velocity = Vec::with_capacity(3 * ny * nz);
-    for z in 0..nz {
-        for y in 0..ny {
-            let cell = [index, z, y];
-            velocity.extend([0.0, planes.v_m_s[cell] as f32, planes.w_m_s[cell] as f32]);
+/// x has one point.
+fn plane_bytes(planes: &CrossPlanes, index: usize, provenance: &Provenance) -> Vec<u8> {
+    let of = |field: &Array3<f64>| field.index_axis(Axis(0), index).iter().copied().collect::<Vec<f64>>();
+    let [v, w] = [of(&planes.v_m_s), of(&planes.w_m_s)];
+    let u = vec![0.0; v.len()];
+    let velocity = Array { name: "velocity", values: vec![&u, &v, &w], behind: &[], cells: v.len(), first: 0 };
+    grid([&[0.0], &planes.y_m, &planes.z_m], &[velocity], true, provenance).into_bytes()
+}
+
+/// A grid with its arrays at the points of these axes, the first one fastest: all of it, or what a rank has that has `is_first` or not.
+fn grid(axes: [&[f64]; 3], arrays: &[Array<'_>], is_first: bool, provenance: &Provenance) -> FileParts {
+    let extent = axes.map(|axis| format!("0 {}", axis.len() - 1)).join(" ");
+    let scalars = arrays.iter().find(|array| array.values.len() == 1);
+    let scalars = scalars.map_or_else(String::new, |array| format!("Scalars=\"{}\" ", array.name));
+    let mut file = FileParts::default();
+    let add = |file: &mut FileParts, text: String| {
+        let start = file.length;
+        file.length += text.len() as u64;
+        if is_first {
+            file.parts.push((start, text.into_bytes()));
         }
+    };
+    // The provenance goes as a comment before the root element.
+    let mut text = format!(
+        "{}<VTKFile type=\"RectilinearGrid\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\
+         <RectilinearGrid WholeExtent=\"{extent}\"><Piece Extent=\"{extent}\" NumberOfPoints=\"0\" NumberOfLines=\"0\" \
+         NumberOfStrips=\"0\" NumberOfPolys=\"0\" NumberOfVerts=\"0\"><PointData {scalars}Vectors=\"velocity\">",
+        comment(provenance)
+    );
+    for array in arrays {
+        let (name, components) = (array.name, array.values.len());
+        text += &format!(
+            "<DataArray type=\"Float32\" Name=\"{name}\" format=\"binary\" NumberOfComponents=\"{components}\">"
+        );
+        add(&mut file, text);
+        let (start, digits) = array.encoded();
+        file.parts.push((file.length + start, digits));
+        file.length += array.length();
+        text = "</DataArray>".into();
     }
-    let point = vec![Attribute::vectors("velocity").with_data(velocity)];
-    grid_bytes(&planes.title, [&[0.0], &planes.y_m, &planes.z_m], point, provenance)
+    text += "</PointData><CellData/><Coordinates>";
+    for axis in axes {
+        let length = (8 * axis.len() as u64).to_le_bytes();
+        let bytes: Vec<u8> = length.into_iter().chain(axis.iter().flat_map(|value| value.to_le_bytes())).collect();
+        let digits = BASE64_STANDARD.encode(bytes);
+        text += &format!("<DataArray type=\"Float64\" format=\"binary\" NumberOfComponents=\"1\">{digits}</DataArray>");
+    }
+    add(&mut file, text + "</Coordinates></Piece></RectilinearGrid></VTKFile>");
+    file
 }
 
-fn grid_bytes(title: &str, axes: [&[f64]; 3], point: Vec<Attribute>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    with_comment(&grid_text(title, axes, point)?, provenance).map(String::into_bytes)
+/// An array of 32-bit floats as it stands in a file, in base64 with its length before it.
+struct Array<'a> {
+    name: &'static str,
+    /// The values that are here, of each component.
+    values: Vec<&'a [f64]>,
+    /// The values of the cell behind the last one that is here.
+    behind: &'a [f64],
+    /// Of the whole array.
+    cells: usize,
+    /// The first cell that is here.
+    first: usize,
 }
 
-fn grid_text(title: &str, axes: [&[f64]; 3], point: Vec<Attribute>) -> OutputResult<String> {
-    let [x, y, z] = axes.map(<[f64]>::to_vec);
-    let range = |axis: &[f64]| 0..=(axis.len() as i32 - 1);
-    let grid = RectilinearGridPiece {
-        extent: Extent::Ranges([range(&x), range(&y), range(&z)]),
-        coords: Coordinates { x: x.into(), y: y.into(), z: z.into() },
-        data: Attributes { point, cell: vec![] },
-    };
-    let file = Vtk {
-        version: Version::new((1, 0)),
-        title: title.to_owned(),
-        byte_order: ByteOrder::LittleEndian,
-        data: DataSet::inline(grid),
-        file_path: None,
-    };
-    let mut bytes = Vec::new();
-    file.write_xml(&mut bytes).map_err(|e| OutputError::encode("VTK", e))?;
-    String::from_utf8(bytes).map_err(|e| OutputError::encode("VTK", e))
-}
+impl Array<'_> {
+    /// Bytes before the values of a cell.
+    fn before(&self, cell: usize) -> usize {
+        8 + 4 * self.values.len() * cell
+    }
 
-/// The provenance goes as a comment before the root element.
-fn with_comment(text: &str, provenance: &Provenance) -> OutputResult<String> {
-    let root = text.find("<VTKFile").ok_or_else(|| OutputError::encode("VTK", "no root element"))?;
-    Ok([&text[..root], &comment(provenance), &text[root..]].concat())
+    /// Digits of the whole array.
+    fn length(&self) -> u64 {
+        4 * self.before(self.cells).div_ceil(3) as u64
+    }
+
+    /// The digits that begin here, and the place of the first of them.
+    fn encoded(&self) -> (u64, Vec<u8>) {
+        let cells = self.values.first().map_or(0, |values| values.len());
+        let end = self.first + cells;
+        let mut bytes = Vec::with_capacity(4 * self.values.len() * (cells + 1) + 8);
+        if self.first == 0 {
+            bytes.extend((self.before(self.cells) as u64 - 8).to_le_bytes());
+        }
+        for cell in 0..cells {
+            bytes.extend(self.values.iter().flat_map(|values| (values[cell] as f32).to_le_bytes()));
+        }
+        bytes.extend(self.behind.iter().flat_map(|value| (*value as f32).to_le_bytes()));
+        // Three bytes make four digits, which belong to who has the first of these.
+        let from = if self.first == 0 { 0 } else { self.before(self.first).next_multiple_of(3) };
+        let to = if end == self.cells { self.before(end) } else { self.before(end).next_multiple_of(3) };
+        let here = if self.first == 0 { 0 } else { self.before(self.first) };
+        let own = bytes.get(from - here..to - here).filter(|_| cells > 0).unwrap_or_default();
+        ((from / 3 * 4) as u64, BASE64_STANDARD.encode(own).into_bytes())
+    }
 }
 
 fn comment(provenance: &Provenance) -> String {
@@ -197,7 +175,30 @@ mod tests {
     use super::super::provenance::example;
     use super::super::samples;
     use super::*;
-    use vtkio::model::Piece;
+    use vtkio::model::{
+        Attribute, Attributes, ByteOrder, Coordinates, DataSet, Extent, Piece, RectilinearGridPiece, Version, Vtk,
+    };
+
+    /// What another encoder makes of a grid.
+    fn encoded(axes: [&[f64]; 3], point: Vec<Attribute>) -> Vec<u8> {
+        let [x, y, z] = axes.map(<[f64]>::to_vec);
+        let range = |axis: &[f64]| 0..=(axis.len() as i32 - 1);
+        let grid = RectilinearGridPiece {
+            extent: Extent::Ranges([range(&x), range(&y), range(&z)]),
+            coords: Coordinates { x: x.into(), y: y.into(), z: z.into() },
+            data: Attributes { point, cell: vec![] },
+        };
+        let file = Vtk {
+            version: Version::new((1, 0)),
+            title: String::new(),
+            byte_order: ByteOrder::LittleEndian,
+            data: DataSet::inline(grid),
+            file_path: None,
+        };
+        let mut bytes = comment(&example()).into_bytes();
+        file.write_xml(&mut bytes).unwrap();
+        bytes
+    }
 
     #[test]
     fn a_plane_reads_back_with_its_nodes_and_vectors() {
@@ -215,6 +216,8 @@ mod tests {
         let (ny, z, y) = (planes.y_m.len(), 2, 3);
         let vector = &velocity[3 * (z * ny + y)..][..3];
         assert_eq!(vector, [0.0, planes.v_m_s[[1, z, y]] as f32, planes.w_m_s[[1, z, y]] as f32]);
+        let point = vec![Attribute::vectors("velocity").with_data(velocity.clone())];
+        assert!(files[1].1 == encoded([&[0.0], &planes.y_m, &planes.z_m], point));
     }
 
     #[test]
@@ -249,7 +252,7 @@ mod tests {
                     .as_ref()
                     .map(|w| Attribute::scalars("vorticity_magnitude", 1).with_data(floats(w))),
             );
-            let expected = grid_bytes(&field.title, [&field.x_m, &field.y_m, &field.z_m], point, &example()).unwrap();
+            let expected = encoded([&field.x_m, &field.y_m, &field.z_m], point);
             assert!(field_parts(&field, None, &example()).unwrap().into_bytes() == expected);
             let ranks: Vec<VelocityField> = super::super::fields::example_on_ranks().into_iter().map(keep).collect();
             let mut file = FileParts::default();

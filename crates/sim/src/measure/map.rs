@@ -74,102 +74,51 @@ pub struct VelocityEstimates {
     pub law: Option<ErrorLaw>,
 }
 
-/// Sums over the realisations of what an estimator says beside the velocity.
-struct Figures {
-    flagged: Array2<f64>,
-    count: Array2<f64>,
+/// Accumulates the errors of realisation after realisation.
+struct Mapper<S> {
+    estimator: MapEstimator<S>,
+    places: ScanGeometry,
+    points: Vec<PolarPoint>,
+    noise: NoiseAtPoints,
+    /// The truth, the first realisation, what is counted, and the errors of each realisation.
+    map: VelocityEstimates,
+    errors: ErrorMap<ndarray::Ix2>,
     /// Sum and number of the finite values: power in the band, its gain, quality, resolution.
     sums: [Array2<(f64, f64)>; 4],
     /// Number, sum and sum of squares of the spreads that are known.
     spreads: Array2<[f64; 3]>,
-}
-
-impl Figures {
-    fn new(shape: (usize, usize)) -> Self {
-        let sums = || Array2::from_elem(shape, (0.0, 0.0));
-        Self {
-            flagged: Array2::zeros(shape),
-            count: Array2::zeros(shape),
-            sums: [sums(), sums(), sums(), sums()],
-            spreads: Array2::from_elem(shape, [0.0; 3]),
-        }
-    }
-
-    fn add(&mut self, place: (usize, usize), point: &MapPoint, is_flagged: bool, gain: f64) {
-        let e = &point.estimate;
-        self.flagged[place] += f64::from(u8::from(is_flagged));
-        self.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
-        let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
-        for (sums, value) in self.sums.iter_mut().zip([power_a2, gain, e.quality, e.resolution_m2_s2]) {
-            if value.is_finite() {
-                sums[place].0 += value;
-                sums[place].1 += 1.0;
-            }
-        }
-        let spread = e.spread_m2_s2;
-        if spread.is_finite() && !is_flagged {
-            self.spreads[place].iter_mut().zip([1.0, spread, spread * spread]).for_each(|(sum, term)| *sum += term);
-        }
-    }
-
-    fn means(&self) -> [Array2<f64>; 4] {
-        self.sums.each_ref().map(|sums| sums.mapv(|(sum, count)| if count > 0.0 { sum / count } else { f64::NAN }))
-    }
-}
-
-/// Accumulates the errors of realisation after realisation.
-pub(crate) struct Mapper<S> {
-    estimator: MapEstimator<S>,
-    places: ScanGeometry,
-    points: Vec<PolarPoint>,
-    shape: (usize, usize),
-    /// Real numbers that the converter sees in one realisation.
-    samples_of_realisation: f64,
-    noise: NoiseAtPoints,
-    truth: Truth,
-    first_m_s: Array2<f64>,
-    errors: ErrorMap<ndarray::Ix2>,
-    figures: Figures,
-    level: Array2<f64>,
-    n_eff: Array2<f64>,
     clipped: Clipped,
-    samples: f64,
-    realisations: usize,
-    /// The errors of each realisation.
-    scans: Vec<ScanErrors>,
-}
-
-struct Truth {
-    spread_m_s: Option<Array2<f64>>,
-    exact_m_s: Array2<f64>,
-    pulse_m_s: Array2<f64>,
-    gate_m_s: Array2<f64>,
 }
 
 impl<S: Sample> Mapper<S> {
-    pub(crate) fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+    fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
         let points = polar_points(places.line_elevation_rad(), &g.gate_range_m);
+        let (zeros, none) = (Array2::zeros(shape), Array2::from_elem(shape, (0.0, 0.0)));
+        let radius_m = g.gate_range_m.iter().map(|range_m| estimator.radius_m(*range_m));
+        let map = VelocityEstimates {
+            elevation_rad: g.elevation_rad.clone(),
+            range_m: g.gate_range_m.clone(),
+            radius_m: radius_m.collect::<Result<_, _>>()?,
+            level: zeros.clone(),
+            n_eff: zeros.clone(),
+            flagged: zeros.clone(),
+            count: zeros,
+            ..truth(plan, scanner, shape)?
+        };
         Ok(Self {
             noise: estimator.noise(&places, &points)?,
             estimator,
             places,
             points,
-            shape,
-            samples_of_realisation: (scanner.pulses() * g.samples * S::KIND.lag_numbers(1)) as f64,
-            truth: truth(plan, scanner)?,
-            first_m_s: Array2::from_elem(shape, f64::NAN),
+            map,
             errors: ErrorMap::new(ndarray::Dim(shape)),
-            figures: Figures::new(shape),
-            level: Array2::zeros(shape),
-            n_eff: Array2::zeros(shape),
+            sums: [none.clone(), none.clone(), none.clone(), none],
+            spreads: Array2::from_elem(shape, [0.0; 3]),
             clipped: Clipped::default(),
-            samples: 0.0,
-            realisations: 0,
-            scans: Vec::new(),
         })
     }
 
@@ -179,105 +128,99 @@ impl<S: Sample> Mapper<S> {
     }
 
     /// Estimates the velocities of one realisation and adds their errors; returns the velocities, m/s.
-    pub(crate) fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<Array2<f64>, Error> {
-        let map = self.estimator.map(scan, &self.points)?;
-        let columns = self.shape.1;
-        let velocity = Array2::from_shape_fn(self.shape, |(i, j)| map[i * columns + j].estimate.velocity_m_s);
-        self.errors.add(velocity.view(), self.truth.pulse_m_s.view())?;
-        if self.realisations == 0 {
+    fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<Array2<f64>, Error> {
+        let (found, map) = (self.estimator.map(scan, &self.points)?, &mut self.map);
+        let (shape, gates) = (map.count.dim(), map.range_m.len());
+        let velocity = Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
+        self.errors.add(velocity.view(), map.v_pulse_m_s.view())?;
+        if map.scans.is_empty() {
             let known = |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
-            self.first_m_s = ndarray::Zip::from(&velocity).and(&self.truth.pulse_m_s).map_collect(known);
+            map.v_scan_m_s = ndarray::Zip::from(&velocity).and(&map.v_pulse_m_s).map_collect(known);
         }
-        let mut flagged = Array2::from_elem(self.shape, false);
-        for (index, point) in map.iter().enumerate() {
-            let place = (index / columns, index % columns);
-            flagged[place] = self.noise.flags(index, &point.estimate);
-            self.figures.add(place, point, flagged[place], self.estimator.gain(point.estimate.velocity_m_s));
+        let mut flagged = Array2::from_elem(shape, false);
+        for (index, MapPoint { estimate: e, level, n_eff, .. }) in found.iter().enumerate() {
+            let place = (index / gates, index % gates);
+            flagged[place] = self.noise.flags(index, e);
+            map.flagged[place] += f64::from(u8::from(flagged[place]));
+            map.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
             // The level is the same for all realisations: a matter of geometry.
-            (self.level[place], self.n_eff[place]) = (point.level as f64, point.n_eff);
+            (map.level[place], map.n_eff[place]) = (*level as f64, *n_eff);
+            let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
+            let values = [power_a2, self.estimator.gain(e.velocity_m_s), e.quality, e.resolution_m2_s2];
+            for (sums, value) in self.sums.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
+                sums[place].0 += value;
+                sums[place].1 += 1.0;
+            }
+            let spread = e.spread_m2_s2;
+            if spread.is_finite() && !flagged[place] {
+                self.spreads[place].iter_mut().zip([1.0, spread, spread * spread]).for_each(|(sum, term)| *sum += term);
+            }
         }
-        self.scans.push(ScanErrors { error_m_s: &velocity - &self.truth.pulse_m_s, flagged });
+        map.scans.push(ScanErrors { error_m_s: &velocity - &map.v_pulse_m_s, flagged });
         self.clipped += clipped;
-        self.samples += self.samples_of_realisation;
-        self.realisations += 1;
         Ok(velocity)
     }
 
-    pub(crate) fn finish(self, plan: &Plan) -> Result<VelocityEstimates, Error> {
+    /// `samples` are the real numbers that the converter sees in one realisation.
+    fn finish(self, plan: &Plan, samples: usize) -> Result<VelocityEstimates, Error> {
+        let Self { mut map, noise, .. } = self;
         let statistics = self.errors.statistics();
-        let bias_m_s = statistics.mapv(|s| s.bias_m_s);
-        let [power_a2, gain, quality, resolution] = self.figures.means();
-        let law = ErrorLaw::new(&self.scans, shared_cells(plan)?);
-        let noise_a2 = self.estimator.noise_power_a2();
-        let mut snr_db = power_a2;
-        for (index, (place, power)) in snr_db.indexed_iter_mut().enumerate() {
-            let (ratio, deviation) = (*power / noise_a2, self.noise.deviation(index));
-            *power = map_estimator::snr_db(ratio, gain[place], deviation, self.figures.count[place]);
+        let mean = |sums: &Array2<(f64, f64)>| sums.mapv(|(sum, n)| if n > 0.0 { sum / n } else { f64::NAN });
+        let [power_a2, gain, quality, resolution_m2_s2] = self.sums.each_ref().map(mean);
+        let (noise_a2, realisations) = (self.estimator.noise_power_a2(), map.scans.len() as f64);
+        (map.snr_db, map.width_m_s, map.quality) = (power_a2, resolution_m2_s2, quality);
+        for (index, (place, power)) in map.snr_db.indexed_iter_mut().enumerate() {
+            let (ratio, deviation) = (*power / noise_a2, noise.deviation(index));
+            *power = map_estimator::snr_db(ratio, gain[place], deviation, map.count[place]);
         }
-        let mut width_m_s = resolution;
-        for (place, width) in width_m_s.indexed_iter_mut() {
-            let kept = self.realisations as f64 - self.figures.flagged[place];
-            *width = match self.figures.spreads[place] {
+        for (place, width) in map.width_m_s.indexed_iter_mut() {
+            let kept = realisations - map.flagged[place];
+            *width = match self.spreads[place] {
                 // what only some of the estimates show is not the mean of all
                 [count, sum, squares] if count > 0.9 * kept => {
                     let mean = sum / count;
                     let variance = (squares / count - mean * mean).max(0.0) / (count - 1.0).max(1.0);
-                    let snr = if noise_a2.is_nan() { f64::INFINITY } else { 10f64.powf(0.1 * snr_db[place]) };
+                    let snr = if noise_a2.is_nan() { f64::INFINITY } else { 10f64.powf(0.1 * map.snr_db[place]) };
                     map_estimator::width_m_s(mean, variance.sqrt(), *width, snr)
                 }
                 _ => f64::NAN,
             };
         }
-        let radius_m = plan.geometry.gate_range_m.iter().map(|range_m| self.estimator.radius_m(*range_m));
-        Ok(VelocityEstimates {
-            elevation_rad: plan.geometry.elevation_rad.clone(),
-            range_m: plan.geometry.gate_range_m.clone(),
-            radius_m: radius_m.collect::<Result<_, _>>()?,
-            v_scan_m_s: self.first_m_s,
-            v_mean_m_s: &self.truth.pulse_m_s + &bias_m_s,
-            bias_m_s,
-            std_m_s: statistics.mapv(|s| s.std_m_s),
-            rms_m_s: statistics.mapv(|s| s.rms_m_s),
-            standard_error_m_s: law
-                .as_ref()
-                .map_or(Array2::from_elem(self.shape, f64::NAN), ErrorLaw::rms_standard_errors),
-            v_exact_m_s: self.truth.exact_m_s,
-            v_pulse_m_s: self.truth.pulse_m_s,
-            v_gate_m_s: self.truth.gate_m_s,
-            v_spread_m_s: self.truth.spread_m_s,
-            level: self.level,
-            n_eff: self.n_eff,
-            flagged: self.figures.flagged / self.realisations.max(1) as f64,
-            count: self.figures.count,
-            width_m_s,
-            snr_db,
-            quality,
-            clipped_fraction: self.clipped.total() as f64 / self.samples.max(1.0),
-            scans: self.scans,
-            law,
-        })
+        map.flagged /= realisations.max(1.0);
+        map.bias_m_s = statistics.mapv(|s| s.bias_m_s);
+        map.v_mean_m_s = &map.v_pulse_m_s + &map.bias_m_s;
+        map.std_m_s = statistics.mapv(|s| s.std_m_s);
+        map.rms_m_s = statistics.mapv(|s| s.rms_m_s);
+        map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?);
+        let unknown = || Array2::from_elem(map.count.dim(), f64::NAN);
+        map.standard_error_m_s = map.law.as_ref().map_or_else(unknown, ErrorLaw::rms_standard_errors);
+        map.clipped_fraction = self.clipped.total() as f64 / (realisations * samples as f64).max(1.0);
+        Ok(map)
     }
 }
 
-fn truth(plan: &Plan, scanner: &Scanner<'_>) -> Result<Truth, Error> {
+/// The air at the gates, \[line, gate\], and nothing else yet.
+fn truth(plan: &Plan, scanner: &Scanner<'_>, shape: (usize, usize)) -> Result<VelocityEstimates, Error> {
     let g = &plan.geometry;
-    let shape = (g.elevation_rad.len(), g.gate_range_m.len());
-    let zeros = || Array2::zeros(shape);
-    let spread_m_s = scanner.spread_m_s().cloned();
-    let mut truth = Truth { spread_m_s, exact_m_s: zeros(), pulse_m_s: zeros(), gate_m_s: zeros() };
-    let pulse = &plan.instrument.pulse;
-    let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
+    let [mut exact_m_s, mut pulse_m_s, mut gate_m_s] = [(); 3].map(|()| Array2::zeros(shape));
+    let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
     let by_gate = range_filter(plan)?;
     for i in 0..scanner.lines().len() {
-        let exact_m_s = radial_velocity_m_s(plan, i, &g.gate_range_m)?;
-        truth.exact_m_s.row_mut(i).assign(&ArrayView1::from(&exact_m_s));
+        exact_m_s.row_mut(i).assign(&ArrayView1::from(&radial_velocity_m_s(plan, i, &g.gate_range_m)?));
         let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
-        for (filter, cells) in [(&by_pulse, &mut truth.pulse_m_s), (&by_gate, &mut truth.gate_m_s)] {
+        for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
             scanner.seen_into(filter, g, i, &mut filtered_m_s)?;
             cells.row_mut(i).assign(&ArrayView1::from(&filtered_m_s));
         }
     }
-    Ok(truth)
+    Ok(VelocityEstimates {
+        v_exact_m_s: exact_m_s,
+        v_pulse_m_s: pulse_m_s,
+        v_gate_m_s: gate_m_s,
+        v_spread_m_s: scanner.spread_m_s().cloned(),
+        v_scan_m_s: Array2::from_elem(shape, f64::NAN),
+        ..VelocityEstimates::default()
+    })
 }
 
 /// Runs the estimates of all realisations, of several plans that differ in their estimators alone: the signals of each are made
@@ -288,6 +231,29 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
     scanner: &Scanner<'_>,
     observer: &dyn Observer,
     mut kept: impl FnMut(ArrayView2<'_, S>),
+    seen: impl FnMut(usize, &Array2<f64>),
+) -> Result<Vec<VelocityEstimates>, Error> {
+    let kept_realisations = plans.first().map_or(0, |plan| plan.kept_realisations());
+    let simulated = |realisation: usize, add: AddRecords<'_, S>| {
+        scanner.in_pieces(realisation, observer, |first, records| {
+            if realisation < kept_realisations {
+                kept(records);
+            }
+            add(first, records)
+        })
+    };
+    of_records(plans, scanner, observer, simulated, seen)
+}
+
+/// What takes the records of pulses from a number on.
+pub(crate) type AddRecords<'a, S> = &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
+
+/// The same of records that `read` hands over for each realisation, piece after piece; it says how many samples were clipped.
+pub(crate) fn of_records<S: Sample>(
+    plans: &[&Plan],
+    scanner: &Scanner<'_>,
+    observer: &dyn Observer,
+    mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<Clipped, Error>,
     mut seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else { return Ok(Vec::new()) };
@@ -295,10 +261,7 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
         let mut sums = mappers.iter().map(Mapper::sums).collect::<Result<Vec<_>, _>>()?;
-        let clipped = scanner.in_pieces(realisation, observer, |first, records| {
-            if realisation < plan.kept_realisations() {
-                kept(records);
-            }
+        let clipped = read(realisation, &mut |first, records| {
             Ok(sums.iter_mut().try_for_each(|sums| sums.add(first, records))?)
         })?;
         let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
@@ -307,7 +270,8 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
         }
     }
     observer.end();
-    mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan)).collect()
+    let samples = scanner.pulses() * plan.geometry.samples * S::KIND.lag_numbers(1);
+    mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan, samples)).collect()
 }
 
 /// The radial velocities \[line, gate\], m/s, of each realisation of a plan: what whole scans show, one after the other. Efficiency and
@@ -337,23 +301,4 @@ pub(crate) fn of_plans(
         DetectorSignal::IntermediateFrequency => estimates::<f64>(plans, scanner, observer, |_| (), seen),
         DetectorSignal::Baseband => estimates::<Complex<f64>>(plans, scanner, observer, |_| (), seen),
     }
-}
-
-/// What takes the records of pulses from a number on.
-pub(crate) type AddRecords<'a, S> = &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
-
-/// The estimates of a plan from records that `read` hands over for each realisation, piece after piece.
-pub(crate) fn of_records<S: Sample>(
-    plan: &Plan,
-    scanner: &Scanner<'_>,
-    mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<(), Error>,
-) -> Result<VelocityEstimates, Error> {
-    let mut mapper = Mapper::<S>::new(plan, scanner)?;
-    for realisation in 0..plan.realisations() {
-        let mut sums = mapper.sums()?;
-        read(realisation, &mut |first, records| Ok(sums.add(first, records)?))?;
-        let scan = sums.finish();
-        mapper.add(&scan, Clipped::default())?;
-    }
-    mapper.finish(plan)
 }

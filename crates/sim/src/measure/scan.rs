@@ -27,8 +27,6 @@ use wakescope_signal::{LineOfSight, Pulse, RangeFilter, Record, Scan, Shot, Simu
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
     plan: &'a Plan,
-    scene: &'a Scene,
-    instrument: &'a Instrument,
     simulator: Simulator,
     returns: Returns,
     /// The air of each line: that of its middle, or the mean of the airs of its pulses.
@@ -90,18 +88,7 @@ impl<'a> Scanner<'a> {
             DetectorSignal::Baseband => Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?,
         };
         let previous = previous_air(plan, &lines)?;
-        Ok(Self {
-            plan,
-            scene,
-            instrument,
-            simulator,
-            returns,
-            lines,
-            backscatter_per_m_sr,
-            spread_m_s,
-            efficiency,
-            previous,
-        })
+        Ok(Self { plan, simulator, returns, lines, backscatter_per_m_sr, spread_m_s, efficiency, previous })
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
@@ -113,7 +100,7 @@ impl<'a> Scanner<'a> {
             let mean = |layer: usize| self.lines.iter().map(|line| line.weight_per_m[layer]).sum::<f64>() / count;
             line.weight_per_m = (0..line.layers()).map(mean).collect();
         }
-        layer_snr(self.scene, self.instrument, &line)
+        layer_snr(&self.plan.scene.scene, &self.plan.instrument, &line)
     }
 
     /// The same without any wind, for records that were not made here.
@@ -129,13 +116,13 @@ impl<'a> Scanner<'a> {
 
     /// Whether signals are (15) and noise: no phases of the laser, reflex of the telescope or echo of the pulse before.
     fn is_plain(&self) -> bool {
-        let front = &self.instrument.receiver.front_end;
+        let front = &self.plan.instrument.receiver.front_end;
         front.linewidth_hz == 0.0 && front.reflection == 0.0 && self.previous.is_none()
     }
 
     /// The pulse that is sent along them.
     pub fn pulse(&self) -> &Pulse {
-        &self.instrument.pulse
+        &self.plan.instrument.pulse
     }
 
     /// What a filter sees of a line at the gates of a geometry, m/s: that of this scan, or of one with the same layers whose
@@ -233,13 +220,16 @@ impl<'a> Scanner<'a> {
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
                 let is_plain = self.is_plain();
-                let impairment_seed =
-                    if is_plain { 0 } else { stream(self.scene.seed, "asides", index(key) as u64).next_u64() };
+                let impairment_seed = if is_plain {
+                    0
+                } else {
+                    stream(self.plan.scene.scene.seed, "asides", index(key) as u64).next_u64()
+                };
                 let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
                 Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, impairment_seed }
             },
-            generator: |key| stream(self.scene.seed, "signal", index(key) as u64),
-            digitiser: self.instrument.digitiser,
+            generator: |key| stream(self.plan.scene.scene.seed, "signal", index(key) as u64),
+            digitiser: self.plan.instrument.digitiser,
         };
         Ok(scan.collect()?)
     }
@@ -249,7 +239,7 @@ impl<'a> Scanner<'a> {
         if self.spread_m_s.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
-        let (schedule, of) = (&self.plan.geometry.schedule, self.scene.scan.wind_of_pulses);
+        let (schedule, of) = (&self.plan.geometry.schedule, self.plan.scene.scene.scan.wind_of_pulses);
         let mut wanted: Vec<(usize, usize)> = Vec::new();
         let air_of = pulses
             .clone()

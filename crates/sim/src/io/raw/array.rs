@@ -9,17 +9,6 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 
-/// Where the parts of complex samples are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Parts {
-    /// Samples are real.
-    Real,
-    /// Both parts of a sample stand together.
-    Together,
-    /// The second parts are an array of their own, which begins here; of NetCDF alone.
-    Apart(u64),
-}
-
 /// Which index of an array runs fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
@@ -39,12 +28,11 @@ pub(super) struct ArrayInFile {
     pub(super) file: File,
     pub(super) number: NumberType,
     pub(super) byte_order: ByteOrder,
-    pub(super) parts: Parts,
+    /// Whether samples are pairs of numbers, the first quadrature before the second.
+    pub(super) are_pairs: bool,
     pub(super) order: Order,
     /// Where the first number is.
     pub(super) begin: u64,
-    /// Bytes from one record to the next where there is something else between them.
-    pub(super) stride: Option<u64>,
     pub(super) records: usize,
     pub(super) samples: usize,
     /// Pulses of a line, for [`Order::PulseMajor`].
@@ -52,7 +40,6 @@ pub(super) struct ArrayInFile {
     /// Stand for a missing number.
     pub(super) fills: Vec<f64>,
     pub(super) scale: f64,
-    pub(super) offset: f64,
 }
 
 impl ArrayInFile {
@@ -67,32 +54,20 @@ impl ArrayInFile {
             file,
             number,
             byte_order: format.byte_order,
-            parts: if format.complex { Parts::Together } else { Parts::Real },
+            are_pairs: format.complex,
             order: format.order,
             begin: format.header_bytes,
-            stride: None,
             records,
             samples,
             pulses_per_line,
             fills: Vec::new(),
             scale: format.scale,
-            offset: 0.0,
         }
-    }
-
-    /// Bytes from one record to the next where samples run fastest.
-    pub(super) fn record_bytes(&self) -> u64 {
-        self.stride.unwrap_or(self.samples as u64 * self.sample_bytes())
-    }
-
-    /// Numbers of a sample.
-    fn numbers(&self) -> usize {
-        if self.parts == Parts::Together { 2 } else { 1 }
     }
 
     /// Bytes of a sample.
     pub(super) fn sample_bytes(&self) -> u64 {
-        self.number.bytes() * self.numbers() as u64
+        self.number.bytes * if self.are_pairs { 2 } else { 1 }
     }
 
     /// Place in the file of a record in the order of lines and their pulses.
@@ -108,76 +83,41 @@ impl ArrayInFile {
 
     /// Some samples of some records, one record after the other.
     pub(super) fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
-        let mut out = vec![Complex::new(0.0, 0.0); records.len() * samples.len()];
-        let places = (records, samples);
-        self.read_part(&places, self.begin, &mut out, |sample, numbers| {
-            *sample = Complex::new(numbers[0], numbers.get(1).copied().unwrap_or(0.0));
-        })?;
-        if let Parts::Apart(begin) = self.parts {
-            self.read_part(&places, begin, &mut out, |sample, numbers| sample.im = numbers[0])?;
+        let count = samples.len();
+        let mut out = vec![Complex::new(0.0, 0.0); records.len() * count];
+        if self.order == Order::SampleMajor {
+            for (place, sample) in samples.enumerate() {
+                let row = self.run(sample as u64 * self.records as u64 + records.start as u64, records.len())?;
+                out.iter_mut().skip(place).step_by(count).zip(row).for_each(|(out, sample)| *out = sample);
+            }
+            return Ok(out);
+        }
+        // Records without a gap between them are read at once.
+        let together = match self.order == Order::LineMajor && count == self.samples {
+            true => records.len().max(1),
+            false => 1,
+        };
+        for (first, out) in records.step_by(together).zip(out.chunks_mut((together * count).max(1))) {
+            let at = self.row(first) * self.samples as u64 + samples.start as u64;
+            out.copy_from_slice(&self.run(at, out.len())?);
         }
         Ok(out)
     }
 
-    fn read_part(
-        &mut self,
-        (records, samples): &(Range<usize>, Range<usize>),
-        begin: u64,
-        out: &mut [Complex<f64>],
-        put: impl Fn(&mut Complex<f64>, &[f64]),
-    ) -> std::io::Result<()> {
-        let (count, sample_bytes) = (samples.len(), self.sample_bytes());
-        let mut raw = Vec::new();
-        if self.order == Order::SampleMajor {
-            for (place, sample) in samples.clone().enumerate() {
-                let at = begin + (sample as u64 * self.records as u64 + records.start as u64) * sample_bytes;
-                self.bytes(at, records.len() as u64 * sample_bytes, &mut raw)?;
-                let places = out.iter_mut().skip(place).step_by(count);
-                self.decode(&raw, places, &put);
-            }
-            return Ok(());
-        }
-        let row_bytes = count as u64 * sample_bytes;
-        // Records without a gap between them are read at once.
-        let together = match self.order == Order::LineMajor && self.record_bytes() == row_bytes {
-            true => records.len().max(1),
-            false => 1,
-        };
-        let firsts = records.clone().step_by(together);
-        for (first, out) in firsts.zip(out.chunks_mut(together * count)) {
-            let length = row_bytes * (out.len() / count.max(1)) as u64;
-            let at = self.row(first) * self.record_bytes() + samples.start as u64 * sample_bytes;
-            self.bytes(begin + at, length, &mut raw)?;
-            self.decode(&raw, out.iter_mut(), &put);
-        }
-        Ok(())
-    }
-
-    fn bytes(&mut self, at: u64, length: u64, raw: &mut Vec<u8>) -> std::io::Result<()> {
-        raw.resize(length as usize, 0);
-        self.file.seek(SeekFrom::Start(at))?;
-        self.file.read_exact(raw)
-    }
-
-    fn decode<'o>(
-        &self,
-        raw: &[u8],
-        out: impl Iterator<Item = &'o mut Complex<f64>>,
-        put: &impl Fn(&mut Complex<f64>, &[f64]),
-    ) {
-        let bytes = self.number.bytes() as usize;
-        let value = |bytes: &[u8]| {
+    /// Samples that follow each other in the file, from one of them on.
+    fn run(&mut self, first: u64, count: usize) -> std::io::Result<Vec<Complex<f64>>> {
+        let mut raw = vec![0; count * self.sample_bytes() as usize];
+        self.file.seek(SeekFrom::Start(self.begin + first * self.sample_bytes()))?;
+        self.file.read_exact(&mut raw)?;
+        let number = |bytes: &[u8]| {
             let stored = self.number.value(bytes, self.byte_order);
-            if self.fills.contains(&stored) { f64::NAN } else { stored * self.scale + self.offset }
+            if self.fills.contains(&stored) { f64::NAN } else { stored * self.scale }
         };
-        let mut numbers = [0.0; 2];
-        let numbers = &mut numbers[..self.numbers()];
-        for (sample, raw) in out.zip(raw.chunks_exact(bytes * numbers.len())) {
-            for (number, raw) in numbers.iter_mut().zip(raw.chunks_exact(bytes)) {
-                *number = value(raw);
-            }
-            put(sample, numbers);
-        }
+        let sample = |bytes: &[u8]| {
+            let (first, second) = bytes.split_at(self.number.bytes as usize);
+            Complex::new(number(first), if self.are_pairs { number(second) } else { 0.0 })
+        };
+        Ok(raw.chunks_exact(self.sample_bytes() as usize).map(sample).collect())
     }
 }
 
@@ -199,18 +139,16 @@ mod tests {
     fn array(numbers: &[f64], order: Order) -> ArrayInFile {
         ArrayInFile {
             file: file(numbers, ByteOrder::Big),
-            number: NumberType::I16,
+            number: NumberType::named("i16").unwrap(),
             byte_order: ByteOrder::Big,
-            parts: Parts::Real,
+            are_pairs: false,
             order,
             begin: 0,
-            stride: None,
             records: 4,
             samples: 3,
             pulses_per_line: 2,
             fills: vec![-1.0],
             scale: 2.0,
-            offset: 1.0,
         }
     }
 
@@ -219,7 +157,7 @@ mod tests {
         // Records of two lines with two pulses: hundreds count lines, tens pulses, ones samples.
         let of = |line: usize, pulse: usize, sample: usize| (100 * line + 10 * pulse + sample) as f64;
         let wanted: Vec<f64> =
-            (0..12).map(|i| if i == 5 { f64::NAN } else { 2.0 * of(i / 6, i / 3 % 2, i % 3) + 1.0 }).collect();
+            (0..12).map(|i| if i == 5 { f64::NAN } else { 2.0 * of(i / 6, i / 3 % 2, i % 3) }).collect();
         let with = |places: &dyn Fn(usize) -> (usize, usize, usize)| -> Vec<f64> {
             let value = |place: (usize, usize, usize)| {
                 if place == (0, 1, 2) { -1.0 } else { of(place.0, place.1, place.2) }
@@ -247,14 +185,11 @@ mod tests {
     }
 
     #[test]
-    fn complex_samples_may_stand_together_or_apart() {
+    fn the_parts_of_complex_samples_stand_together() {
         let mut together = ArrayInFile { samples: 3, records: 2, ..array(&[], Order::LineMajor) };
         together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
-        (together.parts, together.scale, together.offset) = (Parts::Together, 1.0, 0.0);
+        (together.are_pairs, together.scale) = (true, 1.0);
         let found = together.read(1..2, 0..3).unwrap();
         assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
-        let mut apart = ArrayInFile { parts: Parts::Apart(12), ..together };
-        let found = apart.read(0..2, 0..3).unwrap();
-        assert!(found.iter().enumerate().all(|(i, z)| *z == Complex::new(i as f64, i as f64 + 6.0)), "{found:?}");
     }
 }

@@ -21,7 +21,7 @@ use crate::Error;
 use crate::io::number::{ByteOrder, NumberType};
 use crate::io::text_file;
 use crate::machine;
-use array::{ArrayInFile, Parts};
+use array::ArrayInFile;
 use num_complex::Complex;
 use numpy::NumpyArray;
 use std::fs::File;
@@ -119,26 +119,7 @@ pub struct RawRecords {
 enum Store {
     Array(ArrayInFile),
     Text(TextRecords),
-    /// Of files whose numbers lie in compressed pieces.
-    Whole(WholeRecords),
-}
-
-/// Records that are in memory, one after the other.
-#[derive(Debug)]
-struct WholeRecords {
-    values: Vec<Complex<f64>>,
-    samples: usize,
-    is_complex: bool,
-}
-
-impl Store {
-    fn records(&self) -> usize {
-        match self {
-            Store::Array(array) => array.records,
-            Store::Text(text) => text.records(),
-            Store::Whole(all) => all.values.len() / all.samples.max(1),
-        }
-    }
+    Netcdf(netcdf::NetcdfRecords),
 }
 
 impl RawRecords {
@@ -158,7 +139,7 @@ impl RawRecords {
             [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf::read(path, format)?,
             [0x93, b'N', b'U', b'M', ..] => {
                 let array = NumpyArray::read(&mut file, 0, length).map_err(refuse)?;
-                (of_numpy(file, &array, format, shape).map_err(refuse)?, About::default())
+                (Store::Array(of_numpy(file, &array, format, shape).map_err(refuse)?), About::default())
             }
             [b'P', b'K', 3, 4, ..] => of_archive(file, length, format, shape).map_err(refuse)?,
             _ if ["csv", "txt"].contains(&extension.as_str()) => {
@@ -176,10 +157,10 @@ impl RawRecords {
         };
         let mut records = Self { path: path.to_owned(), store, outsized: f64::INFINITY, about };
         // Of a converter's codes each may be a sample.
-        if let Store::Array(array) = &mut records.store
-            && array.number.is_float()
-        {
-            array.fills.extend(MissingSamples::default().fill);
+        match &mut records.store {
+            Store::Array(array) if array.number.is_float() => array.fills.extend(MissingSamples::default().fill),
+            Store::Netcdf(found) if !found.are_integers => found.fills.extend(MissingSamples::default().fill),
+            _ => {}
         }
         if records.records() == 0 || records.samples() == 0 {
             return Err(refuse("it holds no records".into()));
@@ -189,7 +170,11 @@ impl RawRecords {
 
     /// Number of records.
     pub fn records(&self) -> usize {
-        self.store.records()
+        match &self.store {
+            Store::Array(array) => array.records,
+            Store::Text(text) => text.records(),
+            Store::Netcdf(found) => found.records(),
+        }
     }
 
     /// Samples of a record.
@@ -197,29 +182,34 @@ impl RawRecords {
         match &self.store {
             Store::Array(array) => array.samples,
             Store::Text(text) => text.samples,
-            Store::Whole(all) => all.samples,
+            Store::Netcdf(found) => found.samples,
         }
     }
 
     /// Whether samples are complex.
     pub fn is_complex(&self) -> bool {
         match &self.store {
-            Store::Array(array) => array.parts != Parts::Real,
+            Store::Array(array) => array.are_pairs,
             Store::Text(text) => text.is_complex,
-            Store::Whole(all) => all.is_complex,
+            Store::Netcdf(found) => found.is_complex(),
         }
     }
 
     /// Whether the numbers are codes of a converter.
     pub fn is_of_integers(&self) -> bool {
-        matches!(&self.store, Store::Array(array) if !array.number.is_float())
+        match &self.store {
+            Store::Array(array) => !array.number.is_float(),
+            Store::Text(_) => false,
+            Store::Netcdf(found) => found.are_integers,
+        }
     }
 
     /// What the numbers of the file were multiplied with.
     pub fn scale(&self) -> f64 {
         match &self.store {
             Store::Array(array) => array.scale,
-            Store::Text(_) | Store::Whole(_) => 1.0,
+            Store::Text(_) => 1.0,
+            Store::Netcdf(found) => found.scale(),
         }
     }
 
@@ -253,10 +243,7 @@ impl RawRecords {
                 _ => e.to_string(),
             }),
             Store::Text(text) => text.read(records, samples),
-            Store::Whole(all) => {
-                let of = |record: usize| &all.values[record * all.samples..][samples.clone()];
-                Ok(records.flat_map(of).copied().collect())
-            }
+            Store::Netcdf(found) => found.read(records, samples),
         };
         let mut found = found.map_err(|reason| self.refuse(reason))?;
         for sample in found.iter_mut().filter(|sample| sample.re.abs().max(sample.im.abs()) >= self.outsized) {
@@ -272,7 +259,7 @@ fn binary(file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Re
     let number =
         NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
     let mut array = ArrayInFile::new(file, number, [0, shape.samples], (format, shape.pulses_per_line));
-    let record_bytes = array.record_bytes();
+    let record_bytes = shape.samples as u64 * array.sample_bytes();
     let data = length.checked_sub(format.header_bytes);
     let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
     let rest = data.checked_rem(record_bytes).unwrap_or(data);
@@ -289,7 +276,7 @@ fn binary(file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Re
     Ok(Store::Array(array))
 }
 
-fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordShape) -> Result<Store, String> {
+fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordShape) -> Result<ArrayInFile, String> {
     let mut lengths = found.shape.clone();
     let pairs = format.complex && !found.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
     if pairs {
@@ -308,15 +295,14 @@ fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordSha
         _ => lengths.pop(),
     };
     let samples = samples.ok_or("it holds a single number, no records")?;
-    let parts = if found.is_complex || pairs { Parts::Together } else { Parts::Real };
     let places = [lengths.iter().product::<u64>() as usize, samples as usize];
-    Ok(Store::Array(ArrayInFile {
+    Ok(ArrayInFile {
         byte_order: found.byte_order,
-        parts,
+        are_pairs: found.is_complex || pairs,
         order,
         begin: found.begin,
         ..ArrayInFile::new(file, found.number, places, (format, shape.pulses_per_line))
-    }))
+    })
 }
 
 fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<(Store, About), String> {
@@ -329,7 +315,7 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
     };
     let (_, signals) =
         chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
-    let records = of_numpy(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?.records();
+    let records = of_numpy(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?.records;
     let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
         let Some((name, array)) = arrays.iter().find(|(name, _)| names.contains(&name.as_str())) else {
             return Ok(None);
@@ -342,7 +328,7 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
         machine::holds(name, 40.0 * records as f64)?;
         let own = file.try_clone().map_err(|e| e.to_string())?;
         // A row of numbers is one record.
-        let Store::Array(mut array) = of_numpy(own, array, &RawFormat::default(), shape)? else { return Ok(None) };
+        let mut array = of_numpy(own, array, &RawFormat::default(), shape)?;
         let read = array.read(0..array.records, 0..array.samples).map_err(|e| e.to_string())?;
         Ok(Some(read.into_iter().map(|value| value.re).collect()))
     };
@@ -351,5 +337,5 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
         time_s: values(["time_s", "pulse_time"])?,
         ..About::default()
     };
-    Ok((of_numpy(file, signals, format, shape)?, about))
+    Ok((Store::Array(of_numpy(file, signals, format, shape)?), about))
 }

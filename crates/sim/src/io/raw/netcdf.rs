@@ -1,14 +1,13 @@
-//! Raw signals in NetCDF: `signals.nc`, or a variable of one's own with the samples of a record running fastest. Those of classic files
-//! are read piece by piece, those of NetCDF-4 at once.
+//! Raw signals in NetCDF: `signals.nc`, or a variable of one's own with the samples of a record running fastest, read piece by piece.
 //!
 //! Check: signals of a run come back; constants of the recording that the scene contradicts are named.
 
-use super::array::{ArrayInFile, Order, Parts};
-use super::{About, RawFormat, Store, WholeRecords};
+use super::{About, RawFormat, Store};
 use crate::Error;
 use crate::io::netcdf_input::{NetcdfFile, open};
-use crate::io::number::ByteOrder;
+use netcdf_reader::NcType;
 use num_complex::Complex;
+use std::ops::Range;
 use std::path::Path;
 
 /// Constants of a recording: the name of the variable, and the key of a scene that says the same.
@@ -21,86 +20,137 @@ const CONSTANTS: [(&str, &str); 6] = [
     ("pulse_sigma", "pulse"),
 ];
 
+/// Records of samples in a NetCDF file.
+#[derive(Debug)]
+pub(super) struct NetcdfRecords {
+    file: NetcdfFile,
+    /// The variable, and that of the second quadratures.
+    name: String,
+    second: Option<String>,
+    /// Whether the numbers are pairs of both quadratures.
+    are_pairs: bool,
+    /// Lengths of the dimensions, slowest first, whose places are the records.
+    lengths: Vec<u64>,
+    pub(super) samples: usize,
+    pub(super) are_integers: bool,
+    /// Stand for a missing number.
+    pub(super) fills: Vec<f64>,
+    /// Factors of the file and of the user.
+    scale: [f64; 2],
+}
+
 /// Opens the signals of a file.
 pub(super) fn read(path: &Path, format: &RawFormat) -> Result<(Store, About), Error> {
-    let mut file = open(path)?;
-    let found = signals(&mut file, format);
+    let file = open(path)?;
+    let found = signals(&file, format).and_then(|found| {
+        let about = about(&file, found.records())?;
+        Ok((Store::Netcdf(found), about))
+    });
     found.map_err(|reason| file.refuse(reason))
 }
 
-fn signals(file: &mut NetcdfFile, format: &RawFormat) -> Result<(Store, About), String> {
+fn signals(file: &NetcdfFile, format: &RawFormat) -> Result<NetcdfRecords, String> {
     let name = match &format.variable {
         Some(name) => name.clone(),
         None if file.has("current_a") => "current_a".to_owned(),
         None => return Err("it has no variable current_a: --variable names the one that holds the samples".into()),
     };
-    let mut shape = file.shape(&name).ok_or_else(|| format!("it has no variable {name}"))?;
-    let second = match &format.quadrature {
-        Some(name) => Some(name.clone()),
-        None => (name == "current_a" && file.has("quadrature_a")).then(|| "quadrature_a".to_owned()),
-    };
-    let mut parts = Parts::Real;
-    if let Some(second) = &second {
-        if file.shape(second) != Some(shape.clone()) {
-            return Err(format!("variable {second} has not the dimensions of {name}"));
-        }
-        parts = Parts::Apart(file.layout(second).ok_or("it has no second quadrature")?.begin);
-    } else if format.complex && shape.last() == Some(&2) {
-        shape.pop();
-        parts = Parts::Together;
+    let mut lengths = file.shape(&name).ok_or_else(|| format!("it has no variable {name}"))?;
+    let of_current = || (name == "current_a" && file.has("quadrature_a")).then(|| "quadrature_a".to_owned());
+    let second = format.quadrature.clone().or_else(of_current);
+    if let Some(second) = second.as_ref().filter(|second| file.shape(second).as_ref() != Some(&lengths)) {
+        return Err(format!("variable {second} has not the dimensions of {name}"));
     }
-    let (Some(samples), true) = (shape.pop(), shape.iter().all(|length| *length > 0)) else {
+    let are_pairs = second.is_none() && format.complex && lengths.last() == Some(&2);
+    if are_pairs {
+        lengths.pop();
+    }
+    let (Some(samples), true) = (lengths.pop(), lengths.iter().all(|length| *length > 0)) else {
         return Err(format!("variable {name} has no dimension: records with samples are needed"));
     };
-    let records = shape.iter().product::<u64>() as usize;
-    if file.handle().is_err() {
-        let whole = whole(file, &name, second.as_deref(), parts)?;
-        let values = whole.into_iter().map(|value| value * format.scale).collect();
-        let (samples, is_complex) = (samples as usize, parts != Parts::Real);
-        let store = Store::Whole(WholeRecords { values, samples, is_complex });
-        return Ok((store, about(file, records)?));
-    }
-    let layout = file.layout(&name).ok_or("it has no such variable")?;
-    // The dimension that grows is the first; one record of the file must be one of the signals.
-    if layout.stride.is_some() && shape.len() > 1 {
-        return Err(format!("variable {name} grows along a dimension and has two more: nccopy -u makes it fixed"));
-    }
-    let (mut fills, scale, offset) = file.packing(&name);
-    if fills.is_empty() {
-        // What stands where nothing was written.
-        fills.extend(layout.number.netcdf_fill());
-    }
-    let handle = file.handle().map_err(|e| e.to_string())?;
-    let array = ArrayInFile {
-        byte_order: ByteOrder::Big,
-        parts,
-        order: Order::LineMajor,
-        begin: layout.begin,
-        stride: layout.stride,
-        fills,
-        scale: scale * format.scale,
-        offset: offset * format.scale,
-        ..ArrayInFile::new(handle, layout.number, [records, samples as usize], (format, 1))
+    let number = |attribute: &str| file.number(&name, attribute);
+    let scale = number("scale_factor").unwrap_or(1.0);
+    let is_filled = number("_FillValue").or(number("missing_value")).is_some();
+    // What stands where nothing was written; every byte may be a number.
+    let (are_integers, fill) = match file.kind(&name) {
+        Some(NcType::Float | NcType::Double) => (false, None),
+        Some(NcType::Short) => (true, Some(-32767.0)),
+        Some(NcType::Int) => (true, Some(-2_147_483_647.0)),
+        _ => (true, None),
     };
-    let about = about(file, records)?;
-    Ok((Store::Array(array), about))
-}
-
-/// All samples of a file.
-fn whole(file: &mut NetcdfFile, name: &str, second: Option<&str>, parts: Parts) -> Result<Vec<Complex<f64>>, String> {
-    let numbers = file.floats(name)?;
-    Ok(match (parts, second) {
-        (Parts::Together, _) => numbers.chunks_exact(2).map(|pair| Complex::new(pair[0], pair[1])).collect(),
-        (_, Some(second)) => {
-            numbers.into_iter().zip(file.floats(second)?).map(|(re, im)| Complex::new(re, im)).collect()
-        }
-        (_, None) => numbers.into_iter().map(|re| Complex::new(re, 0.0)).collect(),
+    let fill = fill.filter(|_| !is_filled).map(|fill| fill * scale + number("add_offset").unwrap_or(0.0));
+    Ok(NetcdfRecords {
+        file: file.clone(),
+        name: name.clone(),
+        second,
+        are_pairs,
+        lengths,
+        samples: samples as usize,
+        are_integers,
+        fills: fill.into_iter().collect(),
+        scale: [scale, format.scale],
     })
 }
 
-fn about(file: &mut NetcdfFile, records: usize) -> Result<About, String> {
+impl NetcdfRecords {
+    pub(super) fn records(&self) -> usize {
+        self.lengths.iter().product::<u64>() as usize
+    }
+
+    pub(super) fn is_complex(&self) -> bool {
+        self.are_pairs || self.second.is_some()
+    }
+
+    pub(super) fn scale(&self) -> f64 {
+        self.scale[0] * self.scale[1]
+    }
+
+    /// Some samples of some records, one record after the other.
+    pub(super) fn read(&self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+        let mut out = Vec::with_capacity(records.len() * samples.len());
+        let number = |value: f64| if self.fills.contains(&value) { f64::NAN } else { value * self.scale[1] };
+        for mut part in blocks(&self.lengths, records.start as u64..records.end as u64) {
+            part.push(samples.start as u64..samples.end as u64);
+            let first = self.file.part(&self.name, &part)?.into_iter().map(number);
+            match &self.second {
+                Some(second) => {
+                    let second = self.file.part(second, &part)?.into_iter().map(number);
+                    out.extend(first.zip(second).map(|(re, im)| Complex::new(re, im)));
+                }
+                None if self.are_pairs => {
+                    let numbers: Vec<f64> = first.collect();
+                    out.extend(numbers.chunks_exact(2).map(|pair| Complex::new(pair[0], pair[1])));
+                }
+                None => out.extend(first.map(|re| Complex::new(re, 0.0))),
+            }
+        }
+        Ok(out)
+    }
+}
+
+/// Some places in the order of an array, as ranges of its dimensions: whole rows together.
+fn blocks(lengths: &[u64], places: Range<u64>) -> Vec<Vec<Range<u64>>> {
+    let Some((_, inner)) = lengths.split_first() else { return vec![Vec::new()] };
+    let row = inner.iter().product::<u64>();
+    let (mut at, mut out) = (places.start, Vec::new());
+    while at < places.end {
+        let (first, rows) = (at / row, (places.end - at) / row);
+        if at % row == 0 && rows > 0 {
+            out.push(std::iter::once(first..first + rows).chain(inner.iter().map(|length| 0..*length)).collect());
+            at += rows * row;
+        } else {
+            let end = places.end.min((first + 1) * row);
+            let within = blocks(inner, at % row..at % row + end - at).into_iter();
+            out.extend(within.map(|part| std::iter::once(first..first + 1).chain(part).collect::<Vec<_>>()));
+            at = end;
+        }
+    }
+    out
+}
+
+fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
     let mut about = About { scene_toml: file.global_text("scene").map(str::to_owned), ..About::default() };
-    let mut of_records = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
+    let of_records = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
         let Some(name) = names.into_iter().find(|name| file.has(name)) else { return Ok(None) };
         let units = file.text(name, "units").unwrap_or_default().to_ascii_lowercase();
         let values = file.floats(name)?;
@@ -125,25 +175,56 @@ fn about(file: &mut NetcdfFile, records: usize) -> Result<About, String> {
 }
 
 #[cfg(test)]
-#[cfg(feature = "netcdf4")]
 mod tests {
     use super::super::{RawFormat, RawRecords, RecordShape};
-    use crate::io::netcdf4_input::made::of_arrays;
+    use crate::io::netcdf::{Data, Layout, Variable};
     use num_complex::Complex;
 
+    fn opened(bytes: Vec<u8>, format: &RawFormat) -> RawRecords {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        std::fs::write(file.path(), bytes).unwrap();
+        RawRecords::open(file.path(), format, RecordShape { samples: 4, pulses_per_line: 3 }).unwrap()
+    }
+
+    #[test]
+    fn any_part_of_the_records_is_read_with_what_the_file_says_of_its_numbers() {
+        const DIMS: &[&str] = &["line", "pulse", "sample"];
+        let numbers = |from: i32| Data::i32((0..24).map(|i| if i == 5 { -1 } else { from + i }));
+        let packed = |name: &str, from: i32| {
+            let with = [("scale_factor", 2.0), ("add_offset", 1.0), ("_FillValue", -1.0)];
+            let variable = Variable::new(name, DIMS, numbers(from));
+            with.into_iter().fold(variable, |variable, (name, value)| variable.attr(name, Data::f64([value])))
+        };
+        let variables = vec![packed("current_a", 0), packed("quadrature_a", 100)];
+        let layout = Layout { dims: vec![("line", 2), ("pulse", 3), ("sample", 4)], globals: Vec::new(), variables };
+        let mut found = opened(layout.into_bytes(&crate::io::provenance::example()).unwrap(), &RawFormat::default());
+        assert_eq!((found.records(), found.samples(), found.is_complex(), found.scale()), (6, 4, true, 2.0));
+        assert!(found.is_of_integers());
+        for records in (0..6).flat_map(|first| (first + 1..=6).map(move |end| first..end)) {
+            for samples in [0..4, 1..3, 3..4] {
+                let part = found.read_samples(records.clone(), samples.clone()).unwrap();
+                let places = records.clone().flat_map(|record| samples.clone().map(move |sample| 4 * record + sample));
+                let wanted = places.map(|i| (2.0 * i as f64 + 1.0, 2.0 * (100 + i) as f64 + 1.0, i == 5));
+                let is_same = |(sample, (re, im, missing)): (&Complex<f64>, (f64, f64, bool))| match missing {
+                    true => sample.re.is_nan() && sample.im.is_nan(),
+                    false => *sample == Complex::new(re, im),
+                };
+                assert_eq!(part.len(), records.len() * samples.len());
+                assert!(part.iter().zip(wanted).all(is_same), "{records:?} {samples:?}: {part:?}");
+            }
+        }
+    }
+
     /// Lines with pulses with samples, and what stands beside them, as another program may have stored a `signals.nc` again.
+    #[cfg(feature = "netcdf4")]
     #[test]
     fn signals_in_netcdf4_are_those_of_the_array() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("x.nc");
+        use crate::io::netcdf4_input::made::of_arrays;
         let numbers = |from: f64| (0..24).map(|i| from + f64::from(i)).collect::<Vec<f64>>();
         let real = ("current_a", &[2, 3, 4][..], numbers(0.5));
         let second = ("quadrature_a", &[2, 3, 4][..], numbers(100.0));
         let lines = ("ray_line", &[6][..], vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-        let open = |arrays: &[(&str, &[u64], Vec<f64>)], format: &RawFormat| {
-            std::fs::write(&path, of_arrays(arrays)).unwrap();
-            RawRecords::open(&path, format, RecordShape { samples: 4, pulses_per_line: 3 }).unwrap()
-        };
+        let open = |arrays: &[(&str, &[u64], Vec<f64>)], format: &RawFormat| opened(of_arrays(arrays), format);
         let twice = RawFormat { scale: 2.0, ..RawFormat::default() };
         let mut found = open(&[real.clone(), lines], &twice);
         assert_eq!((found.records(), found.samples(), found.is_complex()), (6, 4, false));

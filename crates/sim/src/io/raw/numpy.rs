@@ -42,7 +42,7 @@ impl NumpyArray {
         let text = bytes.get(head..head + length as usize).ok_or(NO_ARRAY)?;
         let found = Self::of_text(&String::from_utf8_lossy(text), at + head as u64 + u64::from(length))?;
         let numbers = found.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
-        let bytes = numbers.and_then(|n| n.checked_mul(found.number.bytes() * if found.is_complex { 2 } else { 1 }));
+        let bytes = numbers.and_then(|n| n.checked_mul(found.number.bytes * if found.is_complex { 2 } else { 1 }));
         let over = bytes.and_then(|bytes| bytes.checked_add(found.begin)).ok_or(TRUNCATED)?;
         match over {
             over if over > end => Err(format!("{TRUNCATED} by {} bytes", over - end)),
@@ -79,35 +79,41 @@ impl NumpyArray {
 
 /// The arrays of an archive, by name.
 pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, NumpyArray)>, String> {
-    let mut found = Vec::new();
-    for entry in entries(file, length)? {
-        let Some(name) = entry.name.strip_suffix(".npy") else { continue };
-        if entry.method != 0 {
+    let (table, count) = contents(file, length)?;
+    let (mut rest, mut found) = (&table[..], Vec::new());
+    for _ in 0..count {
+        if rest.len() < 46 || !rest.starts_with(b"PK\x01\x02") {
+            return Err(NO_ARCHIVE.into());
+        }
+        let lengths = [number(rest, 28, 2), number(rest, 30, 2), number(rest, 32, 2)].map(|n| n as usize);
+        let (own, after) = rest.split_at_checked(46 + lengths.iter().sum::<usize>()).ok_or(NO_ARCHIVE)?;
+        rest = after;
+        let (name, extra) = own[46..].split_at(lengths[0]);
+        let mut wide = wide_numbers(&extra[..lengths[1]]).into_iter();
+        let mut of = |short: u64| if short == u64::from(u32::MAX) { wide.next() } else { Some(short) };
+        let (bytes, _, at) = (of(number(own, 24, 4)), of(number(own, 20, 4)), of(number(own, 42, 4)));
+        let (bytes, at) = (bytes.ok_or(NO_ARCHIVE)?, at.ok_or(NO_ARCHIVE)?);
+        let name = String::from_utf8_lossy(name);
+        let Some(name) = name.strip_suffix(".npy") else { continue };
+        if number(own, 10, 2) != 0 {
             return Err(
                 "its arrays are compressed: numpy.savez writes them as they are, savez_compressed does not".into()
             );
         }
         // The name and the extra field stand there again, and may differ in length.
-        let head = bytes_at(file, entry.at, 30)?;
+        let head = bytes_at(file, at, 30)?;
         if !head.starts_with(b"PK\x03\x04") {
             return Err(NO_ARCHIVE.into());
         }
-        let begin = entry.at + 30 + number(&head, 26, 2) + number(&head, 28, 2);
-        let end = begin.checked_add(entry.bytes).filter(|end| *end <= length).ok_or(TRUNCATED)?;
+        let begin = at + 30 + number(&head, 26, 2) + number(&head, 28, 2);
+        let end = begin.checked_add(bytes).filter(|end| *end <= length).ok_or(TRUNCATED)?;
         found.push((name.to_owned(), NumpyArray::read(file, begin, end)?));
     }
     Ok(found)
 }
 
-struct Entry {
-    name: String,
-    method: u64,
-    bytes: u64,
-    at: u64,
-}
-
-/// The table of contents, of files beyond 4 GiB too.
-fn entries(file: &mut File, length: u64) -> Result<Vec<Entry>, String> {
+/// The table of contents and the number of its entries, of files beyond 4 GiB too.
+fn contents(file: &mut File, length: u64) -> Result<(Vec<u8>, u64), String> {
     let tail_at = length.saturating_sub(66_000);
     let tail = bytes_at(file, tail_at, length - tail_at)?;
     let last = tail.windows(4).rposition(|w| w == b"PK\x05\x06").filter(|at| at + 22 <= tail.len()).ok_or(TRUNCATED)?;
@@ -121,25 +127,7 @@ fn entries(file: &mut File, length: u64) -> Result<Vec<Entry>, String> {
     if size > LONGEST_HEADER_BYTES {
         return Err(NO_ARCHIVE.into());
     }
-    let table = bytes_at(file, at, size)?;
-    let mut rest = &table[..];
-    let mut found = Vec::new();
-    for _ in 0..count {
-        if rest.len() < 46 || !rest.starts_with(b"PK\x01\x02") {
-            return Err(NO_ARCHIVE.into());
-        }
-        let lengths = [number(rest, 28, 2), number(rest, 30, 2), number(rest, 32, 2)].map(|n| n as usize);
-        let whole = 46 + lengths.iter().sum::<usize>();
-        let (own, after) = rest.split_at_checked(whole).ok_or(NO_ARCHIVE)?;
-        let name = String::from_utf8_lossy(&own[46..46 + lengths[0]]).into_owned();
-        let mut wide = wide_numbers(&own[46 + lengths[0]..46 + lengths[0] + lengths[1]]).into_iter();
-        let mut of = |short: u64| if short == u64::from(u32::MAX) { wide.next() } else { Some(short) };
-        let (bytes, _, at) = (of(number(own, 24, 4)), of(number(own, 20, 4)), of(number(own, 42, 4)));
-        let (bytes, at) = (bytes.ok_or(NO_ARCHIVE)?, at.ok_or(NO_ARCHIVE)?);
-        found.push(Entry { name, method: number(own, 10, 2), bytes, at });
-        rest = after;
-    }
-    Ok(found)
+    Ok((bytes_at(file, at, size)?, count))
 }
 
 /// The numbers of eight bytes of an extra field.

@@ -32,8 +32,8 @@ impl TextRecords {
         let (reader, fills) = (BufReader::new(file), MissingSamples::default().fill);
         let mut out = Self { reader, records: Vec::new(), samples: 0, is_complex, columns: None, fills };
         let (mut at, mut line, mut text) = (0, 0, String::new());
-        // Column of the long table that numbers the records, the last number there, and how many rows have had it.
-        let (mut key, mut last, mut rows) = (0, String::new(), 0);
+        // Column of the long table that numbers the records, the last number there, and the samples that the record has so far.
+        let (mut key, mut last, mut samples) = (0, String::new(), 0);
         loop {
             text.clear();
             let some = Read::by_ref(&mut out.reader).take(LONGEST_LINE_BYTES).read_line(&mut text);
@@ -48,14 +48,9 @@ impl TextRecords {
             line += 1;
             let begin = at;
             at += read as u64;
-            let content = text.trim_start_matches('\u{feff}').trim();
-            if content.is_empty() || content.starts_with('#') {
-                continue;
-            }
-            if out.records.is_empty()
-                && out.columns.is_none()
-                && cells(content).any(|cell| cell.parse::<f64>().is_err())
-            {
+            let Some(content) = content(&text) else { continue };
+            let is_first = out.records.is_empty();
+            if is_first && out.columns.is_none() && cells(content).any(|cell| cell.parse::<f64>().is_err()) {
                 let header: Vec<&str> = cells(content).collect();
                 let place = |name: &str| header.iter().position(|cell| *cell == name);
                 key = place("ray").ok_or("its header names no column ray: rows of numbers have none")?;
@@ -65,27 +60,15 @@ impl TextRecords {
                 out.columns = Some([Some(value), quadrature].into_iter().flatten().collect());
                 continue;
             }
-            match &out.columns {
-                None => {
-                    out.records.push((begin, line));
-                    out.check_samples(cells(content).count() / out.numbers(), line)?;
-                }
-                Some(_) => {
-                    let ray = cells(content).nth(key).unwrap_or_default();
-                    if out.records.is_empty() || ray != last {
-                        if !out.records.is_empty() {
-                            out.check_samples(rows, line - 1)?;
-                        }
-                        out.records.push((begin, line));
-                        (last, rows) = (ray.to_owned(), 0);
-                    }
-                    rows += 1;
-                }
+            let ray = cells(content).nth(key).unwrap_or_default();
+            if is_first || out.columns.is_none() || ray != last {
+                out.check_samples(samples)?;
+                out.records.push((begin, line));
+                (last, samples) = (ray.to_owned(), 0);
             }
+            samples += if out.columns.is_some() { 1 } else { cells(content).count() / out.numbers() };
         }
-        if out.columns.is_some() {
-            out.check_samples(rows, line)?;
-        }
+        out.check_samples(samples)?;
         Ok(out)
     }
 
@@ -93,13 +76,16 @@ impl TextRecords {
         if self.is_complex { 2 } else { 1 }
     }
 
-    fn check_samples(&mut self, samples: usize, line: usize) -> Result<(), String> {
-        if self.samples == 0 {
+    /// Holds the samples of the last record against those of the first.
+    fn check_samples(&mut self, samples: usize) -> Result<(), String> {
+        if self.records.len() == 1 {
             self.samples = samples;
         }
-        match samples == self.samples {
-            true => Ok(()),
-            false => Err(format!("line {line}: the record has {samples} samples, those before it {}", self.samples)),
+        match self.records.last() {
+            Some((_, line)) if samples != self.samples => {
+                Err(format!("line {line}: the record has {samples} samples, those before it {}", self.samples))
+            }
+            _ => Ok(()),
         }
     }
 
@@ -114,17 +100,14 @@ impl TextRecords {
         for record in records {
             let Some((begin, mut line)) = self.records.get(record).copied() else { break };
             self.reader.seek(SeekFrom::Start(begin)).map_err(|e| e.to_string())?;
-            let rows = if self.columns.is_some() { self.samples } else { 1 };
-            let (mut row, begun) = (0, out.len());
-            while row < rows {
+            let begun = out.len();
+            while out.len() < begun + self.samples {
                 text.clear();
                 if self.reader.read_line(&mut text).map_err(|e| e.to_string())? == 0 {
                     return Err("it became shorter while it was read".into());
                 }
-                let content = text.trim_start_matches('\u{feff}').trim();
-                if !content.is_empty() && !content.starts_with('#') {
+                if let Some(content) = content(&text) {
                     self.push(content, line, &mut out)?;
-                    row += 1;
                 }
                 line += 1;
             }
@@ -157,6 +140,12 @@ impl TextRecords {
         }
         Ok(())
     }
+}
+
+/// What a line holds beside blanks; nothing of a comment.
+fn content(line: &str) -> Option<&str> {
+    let content = line.trim_start_matches('\u{feff}').trim();
+    (!content.is_empty() && !content.starts_with('#')).then_some(content)
 }
 
 /// Cells of a row: between commas or semicolons, or between blanks.

@@ -35,7 +35,7 @@ const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
 
 /// The scans of a file or a group, and what was left out; `sweep` is the number of its first sweep.
 pub(super) fn scans(
-    file: &mut NetcdfFile,
+    file: &NetcdfFile,
     path: &Path,
     format: &ScanFormat,
     sweep: usize,
@@ -167,7 +167,7 @@ enum GateLayout {
 }
 
 impl GateLayout {
-    fn new(file: &mut NetcdfFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
+    fn new(file: &NetcdfFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
         let shape = file.shape(name).unwrap_or_default();
         let dims = shape.len();
         match (dims, &shape[..]) {
@@ -176,7 +176,7 @@ impl GateLayout {
                 Err(format!("variable {name} is {} x {}; {rays} rays x {gates} ranges are needed", shape[0], shape[1]))
             }
             (1, _) if file.has("ray_start_index") && file.has("ray_n_gates") => {
-                let whole = |name: &str, file: &mut NetcdfFile| -> Result<Vec<usize>, String> {
+                let whole = |name: &str, file: &NetcdfFile| -> Result<Vec<usize>, String> {
                     let values = file.floats(name)?;
                     let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
                     match bad || values.len() != rays {
@@ -197,7 +197,7 @@ impl GateLayout {
     }
 
     /// The values \[ray, gate\], one ray after the other.
-    fn read(&self, file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
+    fn read(&self, file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
         let values = file.floats(name)?;
         match self {
             Self::Full { rays, gates } if values.len() == rays * gates => Ok(values),
@@ -217,7 +217,7 @@ impl GateLayout {
     }
 
     /// The first of some variables that is there.
-    fn optional(&self, file: &mut NetcdfFile, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
+    fn optional(&self, file: &NetcdfFile, names: &[&str]) -> Result<Option<Vec<f64>>, String> {
         match names.iter().find(|name| file.has(name)) {
             Some(name) => self.read(file, name).map(Some),
             None => Ok(None),
@@ -226,7 +226,7 @@ impl GateLayout {
 }
 
 /// An angle of each ray, rad.
-fn angles(file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
+fn angles(file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
     let units = file.text(name, "units").unwrap_or_default().to_ascii_lowercase();
     let values = file.floats(name)?;
     match values.iter().position(|value| !value.is_finite()) {
@@ -237,7 +237,7 @@ fn angles(file: &mut NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
 }
 
 /// Ranges of the centres of the gates, m.
-fn ranges(file: &mut NetcdfFile) -> Result<Vec<f64>, String> {
+fn ranges(file: &NetcdfFile) -> Result<Vec<f64>, String> {
     let unit_m = file.unit("range", Quantity::Length)?;
     // One row for each ray where gates differ.
     if file.shape("range").is_some_and(|shape| shape.len() > 1) {
@@ -247,7 +247,7 @@ fn ranges(file: &mut NetcdfFile) -> Result<Vec<f64>, String> {
 }
 
 /// Times of the rays in s, and the date from which they count.
-fn times(file: &mut NetcdfFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
+fn times(file: &NetcdfFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>), String> {
     if !file.has("time") {
         return Ok((vec![f64::NAN; count], None));
     }
@@ -268,7 +268,7 @@ fn times(file: &mut NetcdfFile, count: usize) -> Result<(Vec<f64>, Option<UtcTim
 }
 
 /// The rays of each sweep.
-fn sweeps(file: &mut NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
+fn sweeps(file: &NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>, String> {
     let (start, end) = ("sweep_start_ray_index", "sweep_end_ray_index");
     if !(file.has(start) && file.has(end)) {
         return Ok(std::iter::once(0..count).collect());
@@ -289,7 +289,7 @@ fn sweeps(file: &mut NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usi
 }
 
 /// The largest velocity that can be told apart, m/s: that of the file's first ray.
-fn nyquist(file: &mut NetcdfFile) -> Result<Option<f64>, String> {
+fn nyquist(file: &NetcdfFile) -> Result<Option<f64>, String> {
     const NAME: &str = "nyquist_velocity";
     let is_mirrored = file.text(NAME, "folding").is_some_and(|folding| folding == MIRRORED);
     // Mirrored velocities are no multiple away from those of the air.
@@ -297,7 +297,7 @@ fn nyquist(file: &mut NetcdfFile) -> Result<Option<f64>, String> {
 }
 
 /// The first value of a variable, if it is above 0.
-fn first(file: &mut NetcdfFile, name: &str) -> Result<Option<f64>, String> {
+fn first(file: &NetcdfFile, name: &str) -> Result<Option<f64>, String> {
     Ok(file.floats(name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
 }
 
@@ -370,7 +370,7 @@ mod tests {
     }
 
     fn read(made: &Made) -> Result<(Vec<ReadScan>, Vec<String>), String> {
-        scans(&mut made.open(), Path::new("x.nc"), &ScanFormat::default(), 0)
+        scans(&made.open(), Path::new("x.nc"), &ScanFormat::default(), 0)
     }
 
     #[test]

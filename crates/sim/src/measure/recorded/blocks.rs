@@ -89,7 +89,7 @@ impl<'p, S: FromParts> Blocks<'p, S> {
         places: &ScanGeometry,
     ) -> Result<ScanCells, Error> {
         let shape = (lines.elevation_rad.len(), self.plan.geometry.gate_range_m.len());
-        let mut cells = Array2::from_elem(shape, Cell::NONE);
+        let mut cells = Array2::from_elem(shape, Cell::none());
         let mut spectra = self.spectra.as_ref().map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]);
         let tiling = Tiling::new(estimator, places, &self.plan.geometry.gate_range_m, self.block_bytes)?;
         for tile in tiling.tiles(&lines) {
@@ -131,22 +131,14 @@ impl<'p, S: FromParts> Blocks<'p, S> {
             for gate in tile.gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
                 let (e, radius_m) = (&found[at].estimate, estimator.radius_m(points[at].range_m)?);
+                let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
                 cells[[line, gate]] = Cell {
-                    velocity_m_s: e.velocity_m_s,
-                    power_ratio: if e.velocity_m_s.is_finite() {
-                        e.power / estimator.noise_power_a2()
-                    } else {
-                        f64::NAN
-                    },
+                    found: found[at],
+                    power_ratio: power_a2 / estimator.noise_power_a2(),
                     gain: estimator.gain(e.velocity_m_s),
                     detection_ratio: noise.detection_ratio(at, e),
                     deviation: noise.deviation(at),
                     lines: places.chords(points[at], radius_m).count() as f64,
-                    spread: (e.spread_m2_s2, e.resolution_m2_s2),
-                    quality: e.quality,
-                    level: found[at].level as f64,
-                    n_eff: found[at].n_eff,
-                    is_good: e.is_good(),
                 };
                 if let (Some(spectra), Some(of_gate)) = (&mut spectra, &self.spectra) {
                     let one = of_gate.density(&scan, points[at], radius_m, estimator.noise_density_a2())?;

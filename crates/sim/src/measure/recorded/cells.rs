@@ -2,12 +2,14 @@
 
 use super::lines::ScanLines;
 use ndarray::Array2;
-use wakescope_estimate::map::ScanGeometry;
+use wakescope_estimate::GateVelocity;
+use wakescope_estimate::estimators::Quality;
+use wakescope_estimate::map::{MapPoint, ScanGeometry};
 
 /// What is known of one gate before the noise is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Cell {
-    pub(super) velocity_m_s: f64,
+    pub(super) found: MapPoint,
     /// Mean power in the band over that of the scene's noise.
     pub(super) power_ratio: f64,
     /// Signal-to-noise ratio over the excess of that ratio over 1.
@@ -18,29 +20,15 @@ pub(super) struct Cell {
     pub(super) deviation: f64,
     /// Lines of sight that its region reaches.
     pub(super) lines: f64,
-    /// Variance of the velocities in the spectrum, and what the method adds to it, m^2/s^2.
-    pub(super) spread: (f64, f64),
-    pub(super) quality: f64,
-    pub(super) level: f64,
-    pub(super) n_eff: f64,
-    pub(super) is_good: bool,
 }
 
 impl Cell {
     /// A gate of which nothing is known yet.
-    pub(super) const NONE: Self = Self {
-        velocity_m_s: f64::NAN,
-        power_ratio: f64::NAN,
-        gain: f64::NAN,
-        detection_ratio: f64::NAN,
-        deviation: f64::NAN,
-        lines: 0.0,
-        spread: (f64::NAN, f64::NAN),
-        quality: f64::NAN,
-        level: 0.0,
-        n_eff: 0.0,
-        is_good: false,
-    };
+    pub(super) fn none() -> Self {
+        let found = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
+        let [power_ratio, gain, detection_ratio, deviation] = [f64::NAN; 4];
+        Self { found, power_ratio, gain, detection_ratio, deviation, lines: 0.0 }
+    }
 }
 
 /// The gates of a scan.

@@ -21,7 +21,7 @@ pub use spectra::Spectra;
 
 use crate::Error;
 use crate::io::raw::{RawRecords, RecordShape};
-use crate::measure::map::{self, VelocityEstimates};
+use crate::measure::map::{self, AddRecords, VelocityEstimates};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
 use crate::scene::{DetectorSignal, Digitiser, Estimator, Outputs, Scene, SceneFile, Site};
@@ -31,6 +31,7 @@ use crate::setup::sizes::records_at_once;
 use num_complex::Complex;
 use std::ops::Range;
 use wakescope_estimate::window::{Sample, SampleSizes};
+use wakescope_signal::digitise::Clipped;
 
 /// The power of the noise that velocities are held against.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -242,20 +243,18 @@ fn of_run<S: FromParts>(
     observer: &dyn Observer,
 ) -> Result<Box<VelocityEstimates>, Error> {
     let scanner = Scanner::new(plan, observer)?;
-    let lines = plan.geometry.elevation_rad.len() as u64;
-    let pulses = scanner.pulses();
-    observer.begin(Stage::Estimates, lines * plan.realisations() as u64);
-    let estimates = map::of_records::<S>(plan, &scanner, |realisation, add| {
+    let (lines, pulses) = (plan.geometry.elevation_rad.len() as u64, scanner.pulses());
+    let read = |realisation: usize, add: AddRecords<'_, S>| {
         let scan = realisation * pulses..(realisation + 1) * pulses;
         for piece in pieces(scan.clone(), records.samples()) {
             let samples = samples::<S>(records, piece.clone(), 0..records.samples())?;
             add(piece.start - scan.start, samples.view())?;
         }
         observer.advance(lines);
-        Ok(())
-    })?;
-    observer.end();
-    Ok(Box::new(estimates))
+        Ok(Clipped::default())
+    };
+    let maps = map::of_records(&[plan], &scanner, observer, read, |_, _| ())?;
+    Ok(maps.into_iter().map(Box::new).next().unwrap_or_default())
 }
 
 /// Pieces of a range of records of some ten megabytes.

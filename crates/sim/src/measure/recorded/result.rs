@@ -50,35 +50,36 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
         NoiseLevel::Given(power) => power / plan.instrument.receiver.noise_variance_a2(),
         NoiseLevel::Quietest => quietest(&cells),
     };
-    let n_eff: Vec<f64> = cells.iter().map(|cell| cell.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
+    let n_eff: Vec<f64> = cells.iter().map(|cell| cell.found.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
     let n_eff = n_eff.iter().sum::<f64>() / n_eff.len().max(1) as f64;
     let predicted = PredictedError::new(plan, places, radius_m.iter().copied().fold(0.0, f64::max), n_eff)?;
     let ratio = |cell: &Cell| snr_db(cell.power_ratio / factor, cell.gain, cell.deviation, 1.0);
     let is_flagged = |cell: &Cell| match cell.detection_ratio.is_nan() {
-        true => !cell.is_good,
-        false => !(cell.is_good && cell.detection_ratio > factor),
+        true => !cell.found.estimate.is_good(),
+        false => !(cell.found.estimate.is_good() && cell.detection_ratio > factor),
     };
     let mut predicted_m_s = Array2::from_elem(cells.dim(), f64::NAN);
     let mut bias_m_s = predicted_m_s.clone();
     for (predicted, ((line, gate), cell)) in predicted.iter().cycle().zip(cells.indexed_iter()) {
         let point = PolarPoint { range_m: plan.geometry.gate_range_m[gate], elevation_rad: lines.elevation_rad[line] };
-        predicted_m_s[[line, gate]] = predicted.deviation_m_s(point, radius_m[gate], cell.level, ratio(cell));
-        bias_m_s[[line, gate]] = predicted.bias_m_s(cell.velocity_m_s, ratio(cell));
+        predicted_m_s[[line, gate]] =
+            predicted.deviation_m_s(point, radius_m[gate], cell.found.level as f64, ratio(cell));
+        bias_m_s[[line, gate]] = predicted.bias_m_s(cell.found.estimate.velocity_m_s, ratio(cell));
     }
     Ok(MeasuredScan {
-        velocity_m_s: cells.map(|cell| cell.velocity_m_s),
+        velocity_m_s: cells.map(|cell| cell.found.estimate.velocity_m_s),
         predicted_m_s,
         bias_m_s,
-        level: cells.map(|cell| cell.level),
-        n_eff: cells.map(|cell| cell.n_eff),
+        level: cells.map(|cell| cell.found.level as f64),
+        n_eff: cells.map(|cell| cell.found.n_eff),
         flagged: cells.map(|cell| f64::from(u8::from(is_flagged(cell)))),
-        width_m_s: cells.map(|cell| match (is_flagged(cell), cell.power_ratio.is_nan()) {
-            (true, _) => f64::NAN,
-            (_, true) => width_m_s(cell.spread.0, 0.0, cell.spread.1, f64::INFINITY),
-            _ => width_m_s(cell.spread.0, 0.0, cell.spread.1, 10f64.powf(0.1 * ratio(cell))),
+        width_m_s: cells.map(|cell| {
+            let e = &cell.found.estimate;
+            let snr = if cell.power_ratio.is_nan() { f64::INFINITY } else { 10f64.powf(0.1 * ratio(cell)) };
+            if is_flagged(cell) { f64::NAN } else { width_m_s(e.spread_m2_s2, 0.0, e.resolution_m2_s2, snr) }
         }),
         snr_db: cells.map(ratio),
-        quality: cells.map(|cell| cell.quality),
+        quality: cells.map(|cell| cell.found.estimate.quality),
         lines,
     })
 }
