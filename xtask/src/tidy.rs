@@ -27,7 +27,7 @@ const WITH_THREADS: [&str; 3] = ["wakescope-optics", "wakescope-signal", "wakesc
 const MAX_CODE_LINES: usize = 500;
 
 /// Files and folders that may stand at the top.
-const TOP_LEVEL: &str = ".cargo .ci .gitignore CHANGELOG.md CITATION.cff Cargo.lock Cargo.toml LICENSE README.md clippy.toml crates \
+const TOP_LEVEL: &str = ".cargo .ci .gitignore CHANGELOG.md CITATION.cff CONTRIBUTING.md Cargo.lock Cargo.toml LICENSE README.md clippy.toml crates \
     docs rustfmt.toml tests xtask";
 
 /// File types that may stand anywhere below.
