@@ -52,7 +52,7 @@ impl SceneNoise {
     /// What the crates refuse.
     pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Self, Error> {
         let mut scene = plan.scene.scene.clone();
-        (scene.flow, scene.retrieval) = (Flow::Calm {}, None);
+        (scene.flow, scene.added_flows, scene.retrieval) = (Flow::Calm {}, Vec::new(), None);
         scene.seed ^= SEED_BIT;
         let middle_rad = 0.5 * (scene.scan.elevation_min_rad + scene.scan.elevation_max_rad);
         let half_rad = 0.5 * LINES * scene.scan.elevation_step_rad;
@@ -236,6 +236,10 @@ mod tests {
         (scene.scan.pulses_per_line, scene.scan.realisations) = (1, 8);
         let plan = |scene: &Scene| Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Map).unwrap();
         let noise = SceneNoise::new(&plan(&scene), &Silent).unwrap();
+        // the air is still, whatever winds the scene adds up
+        scene.added_flows = vec![Flow::Uniform { lateral_m_s: 4.0, vertical_m_s: 1.0 }];
+        assert_eq!(SceneNoise::new(&plan(&scene), &Silent).unwrap(), noise);
+        scene.added_flows.clear();
         (scene.flow, scene.retrieval, scene.scan.realisations) = (Flow::Calm {}, None, 100);
         let std_m_s = run(&plan(&scene), &Silent).unwrap().map.unwrap().std_m_s;
         let of_run = (std_m_s.iter().map(|std| std * std).sum::<f64>() / std_m_s.len() as f64).sqrt();
