@@ -5,7 +5,6 @@
 use num_complex::Complex;
 use twofloat::TwoFloat;
 
-use crate::bound::window_model::phase_slope;
 use crate::window::{Sampling, SignalKind};
 
 /// A number of some 31 digits.
@@ -36,7 +35,7 @@ pub(super) fn information(
         return None;
     }
     let (sigma, cycles) = (sigma_s * rate_hz, sampling.frequency_hz(velocity_m_s) / rate_hz);
-    let slope = phase_slope(sampling);
+    let slope = sampling.phase_slope();
     let phasor = |cycles: TwoFloat, size: TwoFloat| {
         let (sine, cosine) = (twofloat::consts::TAU * (cycles - cycles.round())).sin_cos();
         Long::new(cosine * size, sine * size)

@@ -9,7 +9,7 @@
 use ndarray::{Array2, s};
 
 use super::Noise;
-use super::window_model::{LEAST_CONDITION, phase_slope, turned};
+use super::window_model::{LEAST_CONDITION, turned};
 use crate::error::{Error, at_least_one};
 use crate::linalg::cholesky::{cholesky, forward};
 use crate::window::{Gates, Sampling, SignalKind};
@@ -95,7 +95,7 @@ impl RecordModel {
     fn matrices(&self, places: &[f64], snr: impl Fn(f64) -> f64) -> [Array2<f64>; 2] {
         let sampling = &self.sampling;
         let cycles = sampling.intermediate_frequency_hz * sampling.period_s();
-        let slope = phase_slope(sampling);
+        let slope = sampling.phase_slope();
         let density = sampling.sample_rate_hz / (sampling.band_hz.1 - sampling.band_hz.0);
         // Two samples of a Gaussian pulse share the air in the middle between them: ratios at every half sample.
         let [first, last] = [f64::min, f64::max].map(|of| places.iter().copied().fold(places[0], of));

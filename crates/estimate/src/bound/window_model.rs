@@ -201,11 +201,6 @@ pub(crate) fn turned(cycles: f64, lag: f64) -> f64 {
     std::f64::consts::TAU * (product - product.round() + rest)
 }
 
-/// Derivative of the phase from sample to sample with respect to velocity \[rad per m/s\].
-pub(crate) fn phase_slope(sampling: &Sampling) -> f64 {
-    -4.0 * std::f64::consts::PI * sampling.period_s() / sampling.wavelength_m
-}
-
 /// Carrier of a velocity and noise at the lags of a window: what makes the covariance of its samples from the envelope of the signal.
 pub(crate) struct Carrier {
     window_samples: usize,
@@ -238,7 +233,7 @@ impl Carrier {
             [Complex::from_polar(1.0, turned(cycles, lag)), noise.covariance(sampling, lag, kind) * density]
         };
         let lags = (-longest..=longest).map(of_lag).collect();
-        Ok(Self { window_samples, lags, phase_slope: phase_slope(sampling) })
+        Ok(Self { window_samples, lags, phase_slope: sampling.phase_slope() })
     }
 
     fn at(&self, (n, m): (usize, usize)) -> &[Complex<f64>; 2] {

@@ -84,6 +84,11 @@ impl Sampling {
         1.0 / self.sample_rate_hz
     }
 
+    /// Derivative of the phase from sample to sample with respect to velocity \[rad per m/s\].
+    pub(crate) fn phase_slope(&self) -> f64 {
+        -4.0 * std::f64::consts::PI * self.period_s() / self.wavelength_m
+    }
+
     /// Radial velocity \[m/s\], positive away from the lidar, of a beat frequency \[Hz\]: (30).
     #[must_use]
     pub fn velocity_m_s(&self, frequency_hz: f64) -> f64 {

@@ -4,33 +4,10 @@
 
 use multiversion::multiversion;
 
+use super::flux_cache::{FluxCache, SLOTS};
 use super::momentum::{Momentum, Scratch};
 use super::rows::{HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad, round, rows_from};
 use super::transport::{MEAN, Transport};
-
-/// Fluxes along one axis that act on one row.
-const SLOTS: usize = 4;
-
-/// Fluxes along the axes 1 and 2 of one component of one velocity field: each acts on four rows and is computed once, as long as rows
-/// are asked for in the order of memory.
-#[derive(Debug, Default)]
-pub(super) struct FluxCache {
-    /// For each axis the last four rows of each place across it.
-    values: [Vec<f64>; 2],
-    /// Offset in the field of each row that is cached, `usize::MAX` of none.
-    offsets: [Vec<usize>; 2],
-}
-
-impl FluxCache {
-    /// Room on a mesh of `n` cells.
-    #[inline(always)]
-    fn fit(&mut self, n: [usize; 3]) {
-        for (axis, places) in [SLOTS, SLOTS * n[1]].into_iter().enumerate() {
-            self.offsets[axis].resize(places, usize::MAX);
-            self.values[axis].resize(places * n[0], 0.0);
-        }
-    }
-}
 
 /// The row that is computed: indices `j` and `k` along the axes 1 and 2.
 struct Row<'a> {

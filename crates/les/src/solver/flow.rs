@@ -12,7 +12,6 @@ use rayon::prelude::*;
 
 mod project;
 
-use super::control::{implicit_axes, viscous_rates_per_s};
 use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
@@ -22,6 +21,7 @@ use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{Powers, StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
 use super::slabs::WHOLE;
+use super::stiffness::{implicit_axes, viscous_rates_per_s};
 use super::subgrid::Subgrid;
 use crate::Error;
 use crate::solver::aligned::Aligned;

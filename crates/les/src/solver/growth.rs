@@ -16,10 +16,10 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 use rayon::prelude::*;
 
-use super::control::{Stiffness, implicit_axes, metrics, viscous_rates_per_s};
 use super::flow::Flow;
 use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, ROUND_OFF, TimeScheme, TimeStep};
+use super::stiffness::{Stiffness, implicit_axes, metrics, viscous_rates_per_s};
 use crate::Error;
 
 /// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes without no-slip walls and of

@@ -10,6 +10,7 @@ mod control;
 mod convection;
 mod fields;
 pub(crate) mod flow;
+mod flux_cache;
 mod growth;
 mod implicit;
 mod layout;
@@ -33,6 +34,7 @@ pub(crate) mod slabs;
 #[cfg(test)]
 mod slabs_tests;
 mod stage;
+mod stiffness;
 mod subgrid;
 mod transport;
 

@@ -8,7 +8,7 @@
 
 use multiversion::multiversion;
 
-use super::convection::FluxCache;
+use super::flux_cache::FluxCache;
 use super::layout::{Layout, Shape};
 use super::operators_1d::{DIFFERENCE, Taps};
 use super::row_operator::RowOperator;

@@ -15,6 +15,8 @@ use super::mesh::{Direction, Ends};
 /// One weighted sum: indices and coefficients.
 pub(crate) type Taps = Vec<(usize, f64)>;
 
+/// Largest symbol of the Laplacian times the square of the spacing.
+pub(crate) const LAPLACIAN_SYMBOL: f64 = 49.0 / 9.0;
 /// Weighted divergence of the first three cells at a no-slip wall over the faces 0 to 4.
 const WALL_DIVERGENCE: [[f64; 5]; 3] = [
     [-79.0 / 72.0, 9.0 / 8.0, -1.0 / 24.0, 1.0 / 72.0, 0.0],

@@ -3,7 +3,6 @@
 //! Check: groups in circles and values that no file of that length holds are refused; a field that another program compressed in chunks
 //! gives the wind that it was sampled from.
 
-use super::netcdf_input::UNSOUND_HDF5;
 use hdf5_reader::Hdf5File;
 use std::path::Path;
 
@@ -11,12 +10,13 @@ use std::path::Path;
 const DEEPEST: usize = 32;
 const MOST_GROUPS: usize = 10_000;
 
-/// Refuses a file whose groups hold each other, or are nested too deep: the library would follow them until its stack ends.
+/// Refuses a file whose groups hold each other, or are nested too deep: the library would follow them until its stack ends; a damaged one in
+/// the words given.
 ///
 /// # Errors
 /// What is wrong with it; a damaged file.
-pub(super) fn check_groups(path: &Path) -> Result<(), &'static str> {
-    let damaged = |_: hdf5_reader::error::Error| UNSOUND_HDF5;
+pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<(), &'static str> {
+    let damaged = |_: hdf5_reader::error::Error| unsound;
     let mut groups = vec![Hdf5File::open(path).and_then(|file| file.root_group()).map_err(damaged)?];
     for _ in 0..=DEEPEST {
         let below: Result<Vec<_>, _> = groups.iter().map(|group| group.groups()).collect();

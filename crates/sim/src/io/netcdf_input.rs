@@ -28,7 +28,7 @@ const OTHER: &str = "it is no NetCDF file; classic NetCDF is needed, from xarray
                      format=\"NETCDF3_64BIT\")";
 /// What is said of a file that the library does not read: its own words would tell bytes of a file that may be anything.
 const UNSOUND: &str = "it is no sound NetCDF file: its header is damaged, or counts more than the file holds";
-pub(super) const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k cdf2 in.nc out.nc makes classic \
+const UNSOUND_HDF5: &str = "it is NetCDF-4 (HDF5), but damaged or of a kind that is not read: nccopy -k cdf2 in.nc out.nc makes classic \
                             NetCDF of it";
 /// How NetCDF-4 becomes classic, for programs that do not read it.
 #[cfg_attr(feature = "netcdf4", allow(dead_code))]
@@ -103,7 +103,7 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
     match &beginning[..] {
         b"CDF\x01" | b"CDF\x02" | b"CDF\x05" => {}
         #[cfg(feature = "netcdf4")]
-        b"\x89HDF" => super::netcdf4_input::check_groups(path).map_err(refuse)?,
+        b"\x89HDF" => super::netcdf4_input::check_groups(path, UNSOUND_HDF5).map_err(refuse)?,
         #[cfg(not(feature = "netcdf4"))]
         b"\x89HDF" => return Err(refuse(CONVERT)),
         _ => return Err(refuse(OTHER)),
