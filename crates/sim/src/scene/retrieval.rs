@@ -137,7 +137,6 @@ mod tests {
             ("[retrieval]\nmethods = [\"signals\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
             ("[retrieval]\nfalse_alarm = 0.9\n", "retrieval.false_alarm"),
             ("[retrieval]\ncore_radius_m = 0.0\n", "retrieval.core_radius_m"),
-            ("[retrieval]\nsecondary = \"sometimes\"\n", "retrieval.secondary"),
             ("[retrieval]\n[retrieval.follower]\nspan_m = -1.0\n", "retrieval.follower.span_m"),
             ("[retrieval]\n[flow]\nkind = \"calm\"\n", "retrieval"),
             ("[retrieval]\n[scan.pattern]\nkind = \"stare\"\n", "retrieval"),
@@ -147,6 +146,9 @@ mod tests {
         ] {
             assert_eq!(keys(text), [key], "{text}");
         }
+        let refused =
+            SceneFile::without_limits("[retrieval]\nsecondary = \"sometimes\"\n", Path::new("s.toml")).unwrap_err();
+        assert!(refused.to_string().contains("retrieval.secondary"), "{refused}");
     }
 
     #[test]
