@@ -70,7 +70,7 @@ impl RayInformation {
         }
         // The samples of a window are centred half a sample before its range.
         let seen = |samples: f64| self.seen_snr(range_m + (samples - 0.5) * self.spacing_m);
-        let snr = |samples: f64| seen(samples).map_or(f64::NAN, |snr| snr.min(*SNR.end()));
+        let snr = |samples: f64| seen(samples).map_or(f64::NAN, |snr| snr.clamp(0.0, *SNR.end()));
         Ok(self.model.information(&self.gates, count, snr)?)
     }
 
