@@ -13,6 +13,8 @@ use crate::setup::ray_information::RayInformation;
 use crate::setup::region::{places, region_radius};
 use crate::setup::table::of_table;
 use crate::{Error, scene::NoiseModel};
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use wakescope_estimate::{
     Radius,
     map::{PolarPoint, ScanGeometry, WindowCovariance},
@@ -75,40 +77,54 @@ impl Setting {
     /// At a range, with the scene's own signal-to-noise ratios about it.
     fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
         let ((layer_m, snr), radius_m) = (&self.layer_snr, self.radius.at_m(range_m)?);
-        let mut by_gates = self.of_rays.at(self.middle_m(range_m, radius_m), self.places.most_gates(radius_m))?;
-        // One window is about the range itself.
-        by_gates[0] = self.of_rays.at(range_m, 1)?[0];
-        self.point(range_m, of_table(layer_m, snr, range_m), self.of_rays.snr_at(range_m)?, &by_gates)
-    }
-
-    /// Range in the middle of the longest chord of a region, which the ends of the scan may cut, m.
-    fn middle_m(&self, range_m: f64, radius_m: f64) -> f64 {
-        let gates_m = self.places.gate_ranges_m();
-        let chords = self.places.chords(PolarPoint { range_m, elevation_rad: self.elevation_rad }, radius_m);
-        let longest = chords.max_by_key(|chord| chord.gates());
-        longest.map_or(range_m, |chord| 0.5 * (gates_m[chord.first] + gates_m[chord.last]))
+        let (gates_m, most) = (self.places.gate_ranges_m(), self.places.most_gates(radius_m));
+        // Each record is about its own middle: ends of the scan cut chords. Most chords share one.
+        let (mut about, mut of_region) = (BTreeMap::new(), 0.0);
+        for chord in self.places.chords(self.point(range_m), radius_m) {
+            let by_gates = match about.entry(chord.first + chord.last) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => {
+                    let middle_m = 0.5 * (gates_m[chord.first] + gates_m[chord.last]);
+                    place.insert(self.of_rays.at(middle_m, most)?)
+                }
+            };
+            let rays = self.places.line_rays(chord.line).count();
+            of_region += rays as f64 * by_gates[chord.gates().min(most) - 1];
+        }
+        let ratios = [of_table(layer_m, snr, range_m), self.of_rays.snr_at(range_m)?];
+        self.told(range_m, ratios, [self.of_rays.at(range_m, 1)?[0], of_region])
     }
 
     /// At a range, all samples having one signal-to-noise ratio.
     fn of_snr(&self, range_m: f64, snr: f64) -> Result<BoundPoint, Error> {
-        let by_gates = self.of_rays.of_snr(snr, self.places.most_gates(self.radius.at_m(range_m)?))?;
-        self.point(range_m, snr, snr, &by_gates)
+        let radius_m = self.radius.at_m(range_m)?;
+        let by_gates = self.of_rays.of_snr(snr, self.places.most_gates(radius_m))?;
+        let of_region = self.places.information(self.point(range_m), radius_m, &by_gates);
+        self.told(range_m, [snr; 2], [by_gates[0], of_region])
     }
 
-    /// From the ratio of the air at the range, that of a sample there, and the information of a pulse in 1, 2, .. windows.
-    fn point(&self, range_m: f64, snr: f64, seen_snr: f64, by_gates: &[f64]) -> Result<BoundPoint, Error> {
-        let (point, radius_m) = (PolarPoint { range_m, elevation_rad: self.elevation_rad }, self.radius.at_m(range_m)?);
+    fn point(&self, range_m: f64) -> PolarPoint {
+        PolarPoint { range_m, elevation_rad: self.elevation_rad }
+    }
+
+    /// From the ratio of the air at the range and that of a sample there, and the information of a window and of the region.
+    fn told(
+        &self,
+        range_m: f64,
+        [snr, seen_snr]: [f64; 2],
+        [of_window, of_region]: [f64; 2],
+    ) -> Result<BoundPoint, Error> {
         let correlation = self.covariance.correlation(seen_snr)?;
-        let (level, n_eff) = self.places.level(point, radius_m, &correlation);
+        let (level, n_eff) = self.places.level(self.point(range_m), self.radius.at_m(range_m)?, &correlation);
         // Without any return there is no information.
         let bound_m_s = |information: f64| if information > 0.0 { information.sqrt().recip() } else { f64::NAN };
         Ok(BoundPoint {
             range_m,
             snr_db: if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN },
-            window_m_s: bound_m_s(by_gates[0]),
+            window_m_s: bound_m_s(of_window),
             level,
             n_eff,
-            region_m_s: bound_m_s(self.places.information(point, radius_m, by_gates)),
+            region_m_s: bound_m_s(of_region),
         })
     }
 }
