@@ -263,14 +263,17 @@ impl Ratios {
             ((scan.sample_m[0] - reach_m).max(30.0), scan.sample_m[scan.sample_m.len() - 1] + reach_m);
         let count = 4 + ((far_m - near_m) / step_m) as usize;
         let range_m: Vec<f64> = (0..count).map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64).collect();
-        // Away from a focus the ratio is smooth; near the lidar, where next to nothing of the pulse is, its quadrature is long.
+        // Away from a focus the efficiency over the square of the range is smooth; near the lidar, where next to nothing of the pulse is, its
+        // quadrature is long. What the air returns may have kinks anywhere.
         let is_focused = (0.5 * near_m..2.0 * far_m).contains(&s.f("telescope.focus_m"));
         let is_dense = |r: f64| is_focused && r > 0.7 * scan.sample_m[0];
         let last = range_m.len() - 1;
         let known = range_m.iter().enumerate().filter(|&(i, &r)| is_dense(r) || i % 8 == 0 || i == last);
         let known_m: Vec<f64> = known.map(|(_, &r)| r).collect();
-        let known: Vec<f64> = known_m.iter().map(|&r| 10_f64.powf(0.1 * free_space_snr_db(s, r))).collect();
-        let snr = range_m.iter().map(|&r| straight(&known_m, &known, r)).collect();
+        let is_fixed = s.s("detector.snr.reference") == "fixed";
+        let smooth = |&r: &f64| if is_fixed { 1.0 } else { free_space_efficiency(s, r) / r.powi(2) };
+        let known: Vec<f64> = known_m.iter().map(smooth).collect();
+        let snr = range_m.iter().map(|&r| snr(s, r, straight(&known_m, &known, r) * r.powi(2))).collect();
         Self { pulse, range_m, snr }
     }
 
