@@ -224,7 +224,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         if let Some(at_truth) = at_truth {
             let less = at_truth.log_likelihood - found.log_likelihood;
-            let tops: Vec<f64> = found.tops.iter().map(|top| top.log_likelihood - found.log_likelihood).collect();
+            let tops: Vec<f64> = found.tops.iter().map(|top| -0.5 * top.chi2 - found.log_likelihood).collect();
             println!("scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {tops:.2?}");
             below.push(less);
         }

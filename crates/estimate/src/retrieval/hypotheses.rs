@@ -10,6 +10,7 @@ use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::Search;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Minimum};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
+use crate::vortex_fit::top::SAME_SIGMAS;
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
@@ -25,8 +26,6 @@ const BROAD: f64 = 0.1;
 /// A core is not resolved if its deviation is more than this part of it, or if it is more than that part of the spacing.
 const RESOLVED: f64 = 0.5;
 const LARGEST: f64 = 0.5;
-/// Ends closer than this many standard deviations in every parameter are one.
-const SAME_SIGMAS: f64 = 0.3;
 /// So near they are one even where there is no noise.
 const SAME: f64 = 1e-4;
 
@@ -174,7 +173,7 @@ impl<'a> Stage<'a> {
             let single = search.single(sense);
             starts.extend(single.map(|(circulation_m2_s, lateral_position_m, height_m)| {
                 let vortex = Vortex { circulation_m2_s, lateral_position_m, height_m, core_radius_m: LONE_CORE_M };
-                (kind, kind.of(&Wake { left: vortex, right: vortex, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }))
+                (kind, kind.of(&Wake::calm(vortex, vortex)))
             }));
         }
         Ok(starts)

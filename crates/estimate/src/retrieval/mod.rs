@@ -40,13 +40,14 @@ mod secondary;
 mod track;
 mod whitening;
 
+pub use crate::vortex_fit::Top;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
 pub use expected_map::expected_velocities;
 pub use fit::fit_scan;
 pub use integral::{ProfilePoint, circulation_profile};
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;
-pub use result::{Flag, Measured, ScanResult, Side, Top, VortexResult};
+pub use result::{Flag, Measured, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
 pub use secondary::with_secondary_vortices;
 pub use track::{Track, TrackOptions, TrackPoint, TrackedVortex, track};

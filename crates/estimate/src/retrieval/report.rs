@@ -6,10 +6,10 @@ use ndarray::{Array1, Array2, Axis};
 
 use crate::error::Error;
 use crate::retrieval::hypotheses::{End, Kind, Stage, best, least, tops};
-use crate::retrieval::{Covariance, Flag, Measured, ScanResult, Side, Top, VortexResult};
+use crate::retrieval::{Covariance, Flag, Measured, ScanResult, Side, VortexResult};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::map_fit::least_squares::{Scores, Uncertainty};
-use crate::vortex_fit::{Parameter, Wake};
+use crate::vortex_fit::{Parameter, Top, Wake};
 
 /// Velocities with larger residuals, in their deviations, are outliers.
 pub(crate) const OUTLIER: f64 = 4.0;

@@ -4,7 +4,7 @@ use ndarray::Array2;
 
 use crate::retrieval::ScanMap;
 use crate::vortex_fit::wake::motion::Motion;
-use crate::vortex_fit::{PARAMETERS, Parameter, Wake, WakeModel};
+use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
 
 /// A number with its standard deviation; NaN where that is not known.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -157,15 +157,6 @@ impl Flag {
             Self::NotConverged => "not_converged",
         }
     }
-}
-
-/// An end of the fit.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Top {
-    /// The wake there, at the reference time.
-    pub wake: Wake,
-    /// Its chi-square: twice the cost of the loss.
-    pub chi2: f64,
 }
 
 /// Outcome of a retrieval from one scan.

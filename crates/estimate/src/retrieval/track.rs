@@ -107,7 +107,7 @@ impl Track {
             })
         };
         let (left, right) = (vortex(Side::Left)?, vortex(Side::Right)?);
-        let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+        let wake = Wake::calm(left, right);
         wake.validate().is_ok().then_some(wake)
     }
 }

@@ -5,6 +5,7 @@
 //! | `wake` | `pair`: the vortices with their images and the wind, derivatives; `motion`; `free_parameters`: which a fit may change; `core_prior`: what is known before; `range_kernel`, `wake_map`: what a range gate and a region see in the mean; `pulse` |
 //! | `map_fit` | `data`, `cells`: the map; `prediction`: what is expected of it, by `gates` at rest or in motion or by an estimator (`estimator_response`); `least_squares`: what is minimised and what is known at the minimum; `residual_covariance`; `setting`: both ways to the minimum; `guess`, `starts`, `estimates`: fits of our own maps; `secondary`: four vortices |
 //! | `signal_fit` | `baseband`, `scan_model`: signals at the rate of the detector band, lines cut into layers; `line_covariance`, `banded_cholesky`, `likelihood`: covariance of a line, its factor and derivatives, Fisher information; `fit`, `ascent`, `tops`: the fit and the tops of its likelihood |
+//! | `top` | the ends of fits from several starts |
 //! | `damped_newton` | the iteration of Levenberg and Marquardt that both fits share |
 //!
 //! A map is fitted first, without prior knowledge ([`fit_map_of_estimator`]; [`fit_map`] if its velocities are means
@@ -35,9 +36,10 @@
 pub(crate) mod damped_newton;
 pub(crate) mod map_fit;
 mod signal_fit;
+pub(crate) mod top;
 pub(crate) mod wake;
 
-pub use map_fit::data::{Loss, MapFit, MapFitOptions, MapTop, Secondary, VelocityMap};
+pub use map_fit::data::{Loss, MapFit, MapFitOptions, Secondary, VelocityMap};
 pub use map_fit::estimates::{fit_map, fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator};
 pub use map_fit::estimator_response::EstimatorResponse;
 pub use map_fit::secondary::SecondaryVortices;
@@ -46,7 +48,7 @@ pub use signal_fit::fit::{SignalFit, fit_signals};
 pub use signal_fit::likelihood::{LikelihoodValue, Powers, ScanSignals};
 pub use signal_fit::options::{SignalFitOptions, Starts};
 pub use signal_fit::scan_model::{ScanModel, ScanSetup};
-pub use signal_fit::tops::LikelihoodTop;
+pub use top::Top;
 pub use wake::core_prior::CorePrior;
 pub use wake::free_parameters::{FreeParameters, Sharing, WindFit};
 pub use wake::pair::{CoreProfile, PARAMETERS, Parameter, Vortex, Wake, WakeModel};

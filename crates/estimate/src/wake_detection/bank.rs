@@ -7,7 +7,7 @@ use ndarray::Array2;
 use crate::parallel::map_indexed;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
-use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
+use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
 use crate::wake_detection::DetectorOptions;
 use crate::wake_detection::cells::Cells;
 
@@ -82,27 +82,11 @@ impl Bank {
     /// What an anticlockwise vortex of unit circulation at each place shows: cells by places.
     pub(super) fn shapes(&self, cells: &Cells, model: &WakeModel, kernel: &RangeKernel) -> Array2<f64> {
         let columns = map_indexed(self.places_m.len(), LineScratch::default, |scratch, place| {
-            shown(&self.vortex(place), cells, model, kernel, scratch)
+            let wake = Wake::of_unit_vortex(self.places_m[place], self.core_m);
+            shown(&wake, cells, model, kernel, scratch)
         });
         Array2::from_shape_fn((cells.cells.len(), columns.len()), |(cell, place)| columns[place][cell])
     }
-
-    /// An anticlockwise vortex alone.
-    fn vortex(&self, place: usize) -> Wake {
-        let (lateral_position_m, height_m) = self.places_m[place];
-        let of = |circulation_m2_s, lateral_position_m| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m: self.core_m,
-        };
-        calm(of(0.0, lateral_position_m - 1.0), of(1.0, lateral_position_m))
-    }
-}
-
-/// Two vortices without wind.
-pub(super) fn calm(left: Vortex, right: Vortex) -> Wake {
-    Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
 }
 
 /// What a wake shows in each cell \[m/s\].

@@ -16,7 +16,7 @@ use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::DetectorOptions;
 use crate::wake_detection::background::Background;
-use crate::wake_detection::bank::{Bank, Sector, Template, calm, shown};
+use crate::wake_detection::bank::{Bank, Sector, Template, shown};
 use crate::wake_detection::cells::Cells;
 
 /// One part in so many of the cells may be missing in a scan.
@@ -234,7 +234,7 @@ impl WakeDetector {
     /// circulations, were places and cores known.
     pub(super) fn products_of(&self, wake: &Wake) -> (Array1<f64>, f64) {
         let shown =
-            shown(&calm(wake.left, wake.right), &self.cells, &self.model, &self.kernel, &mut Default::default());
+            shown(&Wake::calm(wake.left, wake.right), &self.cells, &self.model, &self.kernel, &mut Default::default());
         let white = self.white(shown);
         (self.shapes.dot(&white), white.dot(&white).sqrt())
     }
@@ -250,7 +250,7 @@ impl WakeDetector {
                 core_radius_m: self.bank.core_m,
             }
         };
-        calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
+        Wake::calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
     }
 
     /// Where wakes may be, and how far apart the vortices of a pair.

@@ -10,7 +10,6 @@ use rand::{Rng, RngExt};
 use crate::error::{Error, positive};
 use crate::vortex_fit::{Vortex, Wake};
 use crate::wake_detection::WakeDetector;
-use crate::wake_detection::bank::calm;
 
 /// The 0.9 quantile of a normal number.
 const NINE_OF_TEN: f64 = 1.281_551_565_544_600_4;
@@ -67,7 +66,7 @@ impl WakeDetector {
                     };
                     let (left, right) = (vortex(left_m), vortex(left_m + spacing_m));
                     let seen = [left, right].iter().all(|v| sector.holds((v.lateral_position_m, v.height_m)));
-                    seen.then_some(calm(left, right))
+                    seen.then_some(Wake::calm(left, right))
                 })
             })
         };

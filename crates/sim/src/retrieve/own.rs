@@ -150,9 +150,9 @@ impl Fits<'_> {
         if self.options.movement != Movement::Auto || self.scan.lasts_s() == 0.0 {
             return Some((first, moves));
         }
-        let top = |fit: &MapFit| fit.tops.first().map_or(f64::NEG_INFINITY, |top| top.log_likelihood);
+        let chi2 = |fit: &MapFit| fit.tops.first().map_or(f64::INFINITY, |top| top.chi2);
         let other = refine_map_fit_of_estimator(view, model, self.shown(!moves), &first.wake, options).ok();
-        match other.filter(|other| 2.0 * (top(other) - top(&first)) > RetrievalOptions::MOVES) {
+        match other.filter(|other| chi2(&first) - chi2(other) > RetrievalOptions::MOVES) {
             Some(other) => Some((other, !moves)),
             None => Some((first, moves)),
         }
@@ -194,8 +194,7 @@ fn ends(axis: &[f64]) -> Option<std::ops::RangeInclusive<f64>> {
 
 /// The result of a fit to a map that tells other vortices than the means did.
 fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &MapFit, moves: bool) -> ScanResult {
-    let tops = fit.tops.iter().map(|top| Top { wake: top.wake, chi2: -2.0 * top.log_likelihood }).collect();
-    let mut result = retold(found, map, options, (fit.wake, fit.covariance.clone()), tops, moves);
+    let mut result = retold(found, map, options, (fit.wake, fit.covariance.clone()), fit.tops.clone(), moves);
     (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
     set(&mut result.flags, Flag::Outliers, 10 * fit.outliers > fit.used);
     result
@@ -254,8 +253,8 @@ impl OwnScene {
             fit => fit.map_err(|error| refused(&scan, &error))?,
         };
         let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
-        let best = tops.iter().map(|top| top.log_likelihood).fold(f64::NEG_INFINITY, f64::max);
-        let tops = tops.iter().map(|top| Top { wake: top.wake, chi2: 2.0 * (best - top.log_likelihood) }).collect();
+        let least = tops.iter().map(|top| top.chi2).fold(f64::INFINITY, f64::min);
+        let tops = tops.iter().map(|top| Top { chi2: top.chi2 - least, ..*top }).collect();
         let mut result = retold(&result, &scan.map, &options, (wake, covariance), tops, false);
         result.statistic = 2.0 * log_likelihood_gain;
         (result.cells_used, result.cells_rejected) = (used_rays, setup.elevation_rad.len() - used_rays);

@@ -5,7 +5,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, finite, increasing, length, positive};
-use crate::vortex_fit::{CorePrior, FreeParameters, Parameter, Wake};
+use crate::vortex_fit::{CorePrior, FreeParameters, Parameter, Top, Wake};
 
 /// A map of radial velocities, such as accumulation gives.
 #[derive(Debug, Clone, Copy)]
@@ -107,16 +107,6 @@ impl Loss {
     }
 }
 
-/// An end of the fit of a map.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct MapTop {
-    /// The wake there.
-    pub wake: Wake,
-    /// Logarithm of the likelihood that the loss stands for, but for a constant; velocities that say the same as their neighbours
-    /// are counted once. With what is known of the cores.
-    pub log_likelihood: f64,
-}
-
 /// Whether secondary vortices, which the boundary layer at the ground rolls up into, are fitted beside a pair. A map shows them if they explain its
 /// residuals far better than chance, and stand where such vortices do.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -184,10 +174,8 @@ pub struct MapFit {
     pub residual_scale: f64,
     /// Part of the robust cost of the best wind without vortices that the vortices take away: near 1 for a good fit.
     pub explained_fraction: f64,
-    /// Evaluations of the map in the last round; steps of Gauss and Newton for the map of an estimator.
-    pub iterations: usize,
     /// All ends of the fit from its starts that are not the same, the best (the fitted wake) first.
-    pub tops: Vec<MapTop>,
+    pub tops: Vec<Top>,
 }
 
 impl MapFit {

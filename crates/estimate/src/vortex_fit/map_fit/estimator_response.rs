@@ -272,23 +272,21 @@ impl Prepared<'_> {
     /// Variance of the velocities \[m^2/s^2\] of the air that each place of the map sees.
     pub(crate) fn variances(&self, wake: &Wake) -> Array2<f64> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
-        let nodes = self.weights.len() / self.numbers;
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
         let wakes = self.wakes(self.model, wake);
-        let moments = map_indexed(lines, Vec::new, |velocities: &mut Vec<f64>, line| {
-            let ray = Ray::new(self.elevation_rad[line]);
-            velocities.clear();
-            let mut one = |range_m: &f64| {
-                let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
-                while velocities.len() < index + nodes {
-                    let at_m = nearest_m + self.first_offset_m + velocities.len() as f64 * self.spacing_m;
-                    velocities.push(self.model.velocity_on(&wakes[line], at_m, ray));
-                }
-                let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
-                seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
-            };
-            self.range_m.iter().map(&mut one).collect::<Vec<[f64; 2]>>()
-        });
+        let moments = map_indexed(
+            lines,
+            || (),
+            |(), line| {
+                let velocities = self.velocities_on((self.model, &wakes[line]), Ray::new(self.elevation_rad[line]));
+                let one = |range_m: &f64| {
+                    let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
+                    let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
+                    seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
+                };
+                self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
+            },
+        );
         Array2::from_shape_fn((lines, gates), |(line, gate)| {
             let [mean, square] = self.region(line, gate).iter().fold([0.0, 0.0], |[mean, square], &(other, share)| {
                 let [m, s] = moments[other][gate];
@@ -298,21 +296,24 @@ impl Prepared<'_> {
         })
     }
 
-    /// Expected correlograms of the signal at all gates of a line, of power 1.
-    fn line(&self, (model, wake): (&WakeModel, &Wake), ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
-        let sampling = &self.response.sampling;
+    /// Velocities of the air at the nodes of a line that its gates see.
+    fn velocities_on(&self, (model, wake): (&WakeModel, &Wake), ray: Ray) -> Vec<f64> {
         let (Some(&nearest_m), Some(&farthest_m)) = (self.range_m.first(), self.range_m.last()) else {
             return Vec::new();
         };
         let nodes = self.weights.len() / self.numbers;
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
-        let turn = |point: usize| {
-            let at_m = nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
-            let cycles = sampling.frequency_hz(model.velocity_on(wake, at_m, ray)) * sampling.period_s();
-            (TAU * cycles).sin_cos()
-        };
-        let turns: Vec<(f64, f64)> = (0..points).map(turn).collect();
-        phasors.resize(points * self.numbers, 0.0);
+        let at_m = |point: usize| nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
+        (0..points).map(|point| model.velocity_on(wake, at_m(point), ray)).collect()
+    }
+
+    /// Expected correlograms of the signal at all gates of a line, of power 1.
+    fn line(&self, air: (&WakeModel, &Wake), ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
+        let sampling = &self.response.sampling;
+        let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
+        let turn = |velocity: f64| (TAU * (sampling.frequency_hz(velocity) * sampling.period_s())).sin_cos();
+        let turns: Vec<(f64, f64)> = self.velocities_on(air, ray).into_iter().map(turn).collect();
+        phasors.resize(turns.len() * self.numbers, 0.0);
         fill_powers(phasors, &turns, self.response.kind);
         let mut lags = vec![0.0; self.range_m.len() * self.numbers];
         for (range_m, lags) in self.range_m.iter().zip(lags.chunks_exact_mut(self.numbers)) {

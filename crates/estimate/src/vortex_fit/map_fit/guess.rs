@@ -159,12 +159,7 @@ impl Search {
             height_m,
             core_radius_m,
         };
-        Wake {
-            left: vortex(left, pair.strength.0),
-            right: vortex(right, pair.strength.1),
-            lateral_wind_m_s: 0.0,
-            wind_shear_per_s: 0.0,
-        }
+        Wake::calm(vortex(left, pair.strength.0), vortex(right, pair.strength.1))
     }
 }
 
@@ -178,25 +173,14 @@ fn places(thinned: &Thinned, model: &WakeModel, kernel: &RangeKernel) -> Vec<((f
     let kernel = kernel.coarser(4);
     map_indexed(PLACES * PLACES, LineScratch::default, |scratch, index| {
         let range_m = step(near_m, far_m, index / PLACES);
-        let (lateral_m, height_m) = model.position_m(range_m, step(first_rad, last_rad, index % PLACES));
-        let alone = |circulation_m2_s, lateral_position_m| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m: core_m.max(1.0),
-        };
-        let wake = Wake {
-            left: alone(0.0, lateral_m - 1.0),
-            right: alone(1.0, lateral_m),
-            lateral_wind_m_s: 0.0,
-            wind_shear_per_s: 0.0,
-        };
+        let place_m = model.position_m(range_m, step(first_rad, last_rad, index % PLACES));
+        let wake = Wake::of_unit_vortex(place_m, core_m.max(1.0));
         let mut shape = Vec::with_capacity(thinned.velocity.len());
         for &elevation_rad in &thinned.elevation_rad {
             let ray = Ray::new(elevation_rad);
             kernel.apply((model, &wake, ray), &thinned.range_m, false, scratch, |_, velocity, _| shape.push(velocity));
         }
-        ((lateral_m, height_m), shape)
+        (place_m, shape)
     })
     .into_iter()
     .filter(|((_, height_m), _)| !model.images || *height_m > 0.0)

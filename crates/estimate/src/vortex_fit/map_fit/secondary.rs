@@ -160,7 +160,7 @@ impl Setting<'_, '_> {
         let plain = WakeModel { secondary: None, ..*self.model };
         let nowhere = Vortex { circulation_m2_s: 0.0, ..own };
         let (left, right) = if side == 0 { (vortex, nowhere) } else { (nowhere, vortex) };
-        let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+        let wake = Wake::calm(left, right);
         let places = (self.map.elevation_rad, self.map.range_m);
         let shown = Gates::at_rest(&plain, self.kernel.clone(), places).velocities(&wake);
         let cells = free.linear.cells.iter();

@@ -16,9 +16,7 @@ use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Minimum, Scores};
 use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
 use crate::vortex_fit::wake::core_prior::is_core;
-use crate::vortex_fit::{
-    CorePrior, MapFit, MapFitOptions, MapTop, Parameter, RangeKernel, VelocityMap, Wake, WakeModel,
-};
+use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Parameter, RangeKernel, Top, VelocityMap, Wake, WakeModel};
 
 /// Most evaluations in a descent, and the step that is left at its end \[standard deviations\].
 const DESCENT: Stop = Stop { iterations: 200, sigmas: 1e-2, learns: false };
@@ -53,7 +51,6 @@ pub(crate) struct Settled {
     pub(crate) groups: Vec<Vec<usize>>,
     /// Velocities that count as one.
     pub(crate) counted: f64,
-    steps: usize,
 }
 
 impl Setting<'_, '_> {
@@ -83,7 +80,6 @@ impl Setting<'_, '_> {
         let mut groups = self.groups(start)?;
         let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
         let mut p = self.options.free.start(start).to_array().to_vec();
-        let mut iterations = 0;
         let scaled = |p: &[f64]| {
             let squares = self.squares(self.prediction, cells(self.map), 1.0);
             let scale = squares.residual_scale(p);
@@ -108,10 +104,10 @@ impl Setting<'_, '_> {
                 groups.clone_from(&coreless);
                 end = converged(squares.minimum(&p, &groups, stop));
             }
-            Minimum { p, iterations, .. } = end?;
+            p = end?.p;
         }
         let (squares, scale) = scaled(&p)?;
-        self.outcome(&squares, &p, &groups, (scale, iterations))
+        self.outcome(&squares, &p, &groups, scale)
     }
 
     /// The fit by steps of Gauss and Newton from a start on, until the step that is left is below `near_sigmas`, with neighbours that are alike
@@ -121,8 +117,7 @@ impl Setting<'_, '_> {
         let start = self.options.free.start(start).to_array().to_vec();
         let settled = self.settled(start, &groups, near_sigmas, None)?;
         let squares = self.about(&settled.linear, settled.counted);
-        let told = (settled.linear.scale, settled.steps);
-        self.outcome(&squares, &settled.linear.tangent.at, &settled.groups, told)
+        self.outcome(&squares, &settled.linear.tangent.at, &settled.groups, settled.linear.scale)
     }
 
     /// Steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
@@ -161,7 +156,7 @@ impl Setting<'_, '_> {
                     (groups, released, most) = (all, true, steps + STEPS);
                     continue;
                 }
-                return Ok(Settled { linear, groups: groups.to_vec(), counted: alike, steps });
+                return Ok(Settled { linear, groups: groups.to_vec(), counted: alike });
             }
             let there = halved(share.min(linear.tangent.reach(&next)), |part| {
                 let trial: Vec<f64> = p.iter().zip(&way).map(|(p, way)| p + part * way).collect();
@@ -210,7 +205,7 @@ impl Setting<'_, '_> {
         squares: &LeastSquares<'_>,
         p: &[f64],
         groups: &[Vec<usize>],
-        (scale, iterations): (f64, usize),
+        scale: f64,
     ) -> Result<MapFit, Error> {
         let from = Scores::OfNeighbours { lines: self.options.correlated_lines };
         let uncertainty = squares.uncertainty(p, groups, from)?;
@@ -233,8 +228,7 @@ impl Setting<'_, '_> {
             outliers: residuals.iter().filter(|r| r.abs() > 3.0).count(),
             residual_scale: scale,
             explained_fraction: 1.0 - cost / calm.map_or(f64::NAN, |calm| calm.cost),
-            iterations,
-            tops: vec![MapTop { wake, log_likelihood: squares.log_likelihood(p, groups) / uncertainty.alike }],
+            tops: vec![Top { wake, chi2: -2.0 * squares.log_likelihood(p, groups) / uncertainty.alike }],
         })
     }
 }

@@ -4,6 +4,7 @@
 //! not the best add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
 
 use crate::error::Error;
+use crate::vortex_fit::top::SAME_SIGMAS;
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
@@ -13,8 +14,6 @@ const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
 /// A typical core is known to this part of itself, after at most so many rounds.
 const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
-/// Ends closer than this many standard deviations in every parameter are one.
-const SAME_SIGMAS: f64 = 0.3;
 /// Ends of rough fits that are closer lead to one.
 const ONE_SIGMAS: f64 = 1.0;
 
@@ -63,9 +62,9 @@ pub(crate) fn with_typical_core(
     Ok(end)
 }
 
-/// Logarithm of the likelihood of an end.
-fn height(end: &MapFit) -> f64 {
-    end.tops.first().map_or(f64::NEG_INFINITY, |top| top.log_likelihood)
+/// Chi-square of an end.
+fn chi2(end: &MapFit) -> f64 {
+    end.tops.first().map_or(f64::INFINITY, |top| top.chi2)
 }
 
 /// Distance of two ends by parameter, and whether they are closer than so many errors of the first.
@@ -77,7 +76,7 @@ fn apart(a: &MapFit, b: &MapFit, sigmas: f64) -> (Vec<f64>, bool) {
 
 /// The wakes of those ends of rough fits that lead to different ends, the best first.
 pub(crate) fn distinct(mut ends: Vec<MapFit>) -> Vec<Wake> {
-    ends.sort_by(|a, b| height(b).total_cmp(&height(a)));
+    ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
     let mut kept: Vec<MapFit> = Vec::new();
     for end in ends {
         if !kept.iter().any(|better| apart(better, &end, ONE_SIGMAS).1) {
@@ -89,16 +88,16 @@ pub(crate) fn distinct(mut ends: Vec<MapFit>) -> Vec<Wake> {
 
 /// The best of some ends with the others as its competing tops.
 fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
-    ends.sort_by(|a, b| height(b).total_cmp(&height(a)));
+    ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
     let mut ends = ends.into_iter();
     let mut best = ends.next()?;
-    let (alone, highest, mut weights) = (best.clone(), height(&best), 1.0);
+    let (alone, least, mut weights) = (best.clone(), chi2(&best), 1.0);
     for end in ends {
         let (apart, same) = apart(&alone, &end, SAME_SIGMAS);
         if same {
             continue;
         }
-        let weight = (height(&end) - highest).exp();
+        let weight = (0.5 * (least - chi2(&end))).exp();
         weights += weight;
         for ((i, j), c) in best.covariance.indexed_iter_mut() {
             *c += weight * (end.covariance[[i, j]] + apart[i] * apart[j]);

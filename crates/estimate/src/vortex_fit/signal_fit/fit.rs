@@ -13,8 +13,8 @@ use crate::vortex_fit::signal_fit::ascent::{Ascent, State};
 use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines, other_tops, same};
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{
-    FreeParameters, LikelihoodTop, PARAMETERS, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing,
-    SignalFitOptions, Starts, Wake,
+    FreeParameters, PARAMETERS, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing, SignalFitOptions,
+    Starts, Top, Wake,
 };
 use crate::window::Sample;
 
@@ -41,7 +41,7 @@ pub struct SignalFit {
     pub bound: Array2<f64>,
     /// All tops that were found within 6 of the highest (the fitted wake), which is the first. Those that the lines near the
     /// vortices put more than 2 below it are theirs: ln p to some tenths.
-    pub tops: Vec<LikelihoodTop>,
+    pub tops: Vec<Top>,
     /// Log-likelihood, but for a constant.
     pub log_likelihood: f64,
     /// How much of it the vortices give: the difference to the same wind without vortices.
@@ -219,11 +219,7 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
             bound.get_or_insert(within);
         }
         covariance /= weights;
-        let top = |top: &&Settled| LikelihoodTop {
-            wake: top.state.0,
-            powers: top.state.1,
-            log_likelihood: top.log_likelihood,
-        };
+        let top = |top: &&Settled| Top { wake: top.state.0, chi2: -2.0 * top.log_likelihood };
         Ok(SignalFit {
             wake,
             powers,

@@ -12,7 +12,8 @@ use crate::error::Error;
 use crate::linalg::dot;
 use crate::vortex_fit::damped_newton::{inverse, solve};
 use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State, times};
-use crate::vortex_fit::{Parameter, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
+use crate::vortex_fit::top::SAME_SIGMAS;
+use crate::vortex_fit::{Parameter, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// Core radii that are tried, over the spacing of the vortices.
 pub(crate) const CORES_OVER_SPACING: [f64; 5] = [0.015, 0.025, 0.042, 0.07, 0.12];
@@ -30,19 +31,6 @@ const FAR_BELOW: f64 = 6.0;
 const MOST: usize = 6;
 /// Tops of the near lines within this of the best are climbed with all lines; the others keep what the near lines say.
 const CLOSE_BELOW: f64 = 2.0;
-/// Tops closer than this many standard deviations are one.
-const SAME_SIGMAS: f64 = 0.3;
-
-/// A top of the likelihood.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LikelihoodTop {
-    /// The wake there.
-    pub wake: Wake,
-    /// The powers there, relative to the model.
-    pub powers: Powers,
-    /// Log-likelihood, but for the constant of the fit.
-    pub log_likelihood: f64,
-}
 
 /// Another top, judged by the near lines.
 pub(crate) struct Candidate {

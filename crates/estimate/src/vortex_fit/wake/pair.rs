@@ -117,6 +117,22 @@ impl Wake {
         }
     }
 
+    /// Two vortices without wind.
+    pub(crate) fn calm(left: Vortex, right: Vortex) -> Self {
+        Self { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
+    }
+
+    /// An anticlockwise vortex of unit circulation alone, at that lateral position and height.
+    pub(crate) fn of_unit_vortex((lateral_position_m, height_m): (f64, f64), core_radius_m: f64) -> Self {
+        let of = |circulation_m2_s, lateral_position_m| Vortex {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m,
+        };
+        Self::calm(of(0.0, lateral_position_m - 1.0), of(1.0, lateral_position_m))
+    }
+
     /// The wake of a list of parameters that begins with those of a wake.
     pub(crate) fn from_list(p: &[f64]) -> Self {
         Self::from_array(&std::array::from_fn(|i| p[i]))
