@@ -5,7 +5,7 @@ use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, e
 use wakescope_estimate::vortex_fit::CorePrior;
 use wakescope_sim::Silent;
 use wakescope_sim::io::scans::ReadScan;
-use wakescope_sim::retrieve::{Method, OwnScene, RetrievedScan, Velocities, figure, gate_of, retrieve_map};
+use wakescope_sim::retrieve::{Method, RetrievedScan, SceneResponse, Velocities, figure, gate_of, retrieve_map};
 use wakescope_sim::scene::SnrReference;
 
 const TRUE_M2_S: f64 = 500.0;
@@ -32,7 +32,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         core_prior: Some(CorePrior::TYPICAL),
         ..RetrievalOptions::default()
     };
-    let own = OwnScene::new(&plan.scene, &Silent)?;
+    let own = SceneResponse::of_scene(&plan.scene, &Silent)?;
     let found = retrieve_map(scan, Method::Fit, options, own.as_ref().map_or(Velocities::Unknown, Velocities::Shown))?;
     let origin = plan.scene.provenance();
     let mut out = Rendered::new(&table(&found)?, &figure(&found, 1)?, &origin)?;

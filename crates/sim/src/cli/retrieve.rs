@@ -7,7 +7,7 @@ use crate::io::Provenance;
 use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
 use crate::plan::Stage;
-use crate::retrieve::{self, Method, OwnScene, RetrievedScan, StatedEstimator, Velocities, gate_of};
+use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, StatedEstimator, Velocities, gate_of};
 use crate::scene::{Flow, SceneFile};
 use crate::setup::progress::{Observer, Silent};
 use clap::{ArgAction, Args};
@@ -221,7 +221,7 @@ fn of_map(
     };
     let of_gate = instrument.as_ref().or(scene).map(|file| &file.scene);
     let (gate, remark) = gate_of(Some(&scan), words.air.gate_std, of_gate)?;
-    let own = instrument.as_ref().map(|scene| OwnScene::new(scene, &Silent)).transpose()?.flatten();
+    let own = instrument.as_ref().map(|scene| SceneResponse::of_scene(scene, &Silent)).transpose()?.flatten();
     let velocities = match &own {
         Some(own) if is_likely => Velocities::LikelyShown(own),
         Some(own) => Velocities::Shown(own),
@@ -247,7 +247,7 @@ fn of_signals(
 ) -> Result<(), Error> {
     let maps: Vec<ReadScan> = (0..signals.scans.len()).map(|sweep| signals.map(sweep)).collect();
     let Signals { path, mut records, plan, scans, spectra } = signals;
-    let own = OwnScene::new(&plan.scene, &Silent)?;
+    let own = SceneResponse::of_scene(&plan.scene, &Silent)?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
     for (scan, measured) in maps.into_iter().zip(&scans) {

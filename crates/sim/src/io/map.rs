@@ -180,7 +180,7 @@ impl PulseInfo {
 }
 
 /// A scanned map: fields over (ray, gate), in the geometry of the lidar.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct VelocityMap {
     /// Title, such as `Early wake, 200 ns, N = 32`.
     pub title: String,

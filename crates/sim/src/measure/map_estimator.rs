@@ -34,6 +34,16 @@ pub(crate) struct MapEstimator<S> {
     rate: f64,
 }
 
+/// Where the windows of records at some elevations, rad, are in a plane.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
+    let (scene, samples) = (&plan.scene.scene, plan.geometry.samples);
+    let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
+    Ok(ScanGeometry::new(&sampling, &gates, record_elevation_rad, samples)?)
+}
+
 impl<S: Sample> MapEstimator<S> {
     /// For the lines of `places`; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of a line.
     ///

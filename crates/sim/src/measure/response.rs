@@ -3,10 +3,11 @@
 //! Check: circulations fitted to maps and signals of a pair, in the tests of sweeps and retrievals.
 
 use crate::Error;
-use crate::measure::scan::median_snr;
-use crate::plan::Plan;
-use crate::scene::{NoiseModel, PulseShape as Shape, Scene};
+use crate::measure::scan::{Scanner, median_snr};
+use crate::plan::{Plan, Target};
+use crate::scene::{NoiseModel, PulseShape as Shape, Scene, SceneFile};
 use crate::setup::estimators::{Response, response, sampling, signal_kind};
+use crate::setup::progress::Observer;
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::{places, region_radius};
 use ndarray::{Array2, Axis};
@@ -15,15 +16,27 @@ use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};
 
 /// Pulse, noise and signal-to-noise ratio of a scene's signals, and the estimator of its maps.
-pub(crate) struct SceneResponse {
+pub struct SceneResponse {
+    pub(crate) scene: Scene,
     response: Option<Response>,
-    pub(crate) pulse: PulseShape,
-    pub(crate) noise: Noise,
+    pulse: PulseShape,
+    noise: Noise,
+    /// Mean square of a sample of noise, A^2.
+    pub(crate) noise_power_a2: f64,
     layer_snr: Vec<(f64, f64)>,
     radius: Radius,
 }
 
 impl SceneResponse {
+    /// That of a scene in still air, so that no flow is opened; nothing without noise, or where the pulse is no Gaussian without chirp.
+    ///
+    /// # Errors
+    /// What the efficiency refuses; a checked scene gives none.
+    pub fn of_scene(scene: &SceneFile, observer: &dyn Observer) -> Result<Option<Self>, Error> {
+        let plan = Plan::new(scene.in_still_air()?, Target::Map)?;
+        Self::new(&plan, Scanner::expected_layer_snr(&plan, observer)?)
+    }
+
     /// Nothing where there is no noise, or the pulse is no Gaussian without chirp. `layer_snr` holds range, m, and expected
     /// signal-to-noise ratio of the layers of a line.
     ///
@@ -44,7 +57,8 @@ impl SceneResponse {
         let radius = region_radius(scene, &of_rays, &places(scene, &plan.geometry)?)?;
         let response = response(scene, pulse, median_snr(&layer_snr)).ok().flatten();
         let pulse = PulseShape::gaussian(pulse.sigma_s())?;
-        Ok(Some(Self { response, pulse, noise, layer_snr, radius }))
+        let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
+        Ok(Some(Self { scene: scene.clone(), response, pulse, noise, noise_power_a2, layer_snr, radius }))
     }
 
     /// Expected signal-to-noise ratio of the layer nearest to a range, a power ratio.
@@ -55,10 +69,10 @@ impl SceneResponse {
 
     /// What the estimator shows of a wake about a range; nothing for complex signals, for the likelihood of gradients, and for lines
     /// that are shifted.
-    pub(crate) fn shown(&self, scene: &Scene, range_m: f64) -> Option<EstimatorResponse<'_>> {
+    pub(crate) fn shown(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
         let Response { correlogram, estimator } = self.response.as_ref()?;
         let noise = (self.noise, self.snr_at(range_m));
-        let sampling = sampling(scene).ok()?;
+        let sampling = sampling(&self.scene).ok()?;
         let of_lines = EstimatorResponse::new(correlogram, &**estimator, &sampling, &self.pulse, noise, 0.0).ok()?;
         Some(of_lines.with_radius(|range_m| self.radius_m(range_m)))
     }
@@ -73,8 +87,20 @@ impl SceneResponse {
         (2.0 * self.radius_m(range_m) / (step_rad * range_m)) as usize
     }
 
+    /// Ranges, m, and velocities \[line, gate\] of a map at every so-manyth gate: neighbours that share most of their window say
+    /// the same.
+    pub(crate) fn independent_gates(&self, range_m: &[f64], velocity_m_s: &Array2<f64>) -> (Vec<f64>, Array2<f64>) {
+        let period_s = 1.0 / self.scene.detector.sampling_hz;
+        let apart_m = 0.25 * self.scene.estimator.window_samples as f64 * 0.5 * crate::SPEED_OF_LIGHT_M_S * period_s;
+        // files round their ranges
+        let step = ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1);
+        let gates: Vec<usize> = (0..range_m.len()).step_by(step).collect();
+        (gates.iter().map(|gate| range_m[*gate]).collect(), velocity_m_s.select(Axis(1), &gates))
+    }
+
     /// How the records of lines at elevations, rad, were taken.
-    pub(crate) fn setup(&self, scene: &Scene, wake: WakeModel, elevation_rad: Vec<f64>) -> Result<ScanSetup, Error> {
+    pub(crate) fn setup(&self, wake: WakeModel, elevation_rad: Vec<f64>) -> Result<ScanSetup, Error> {
+        let scene = &self.scene;
         Ok(ScanSetup {
             sampling: sampling(scene)?,
             kind: signal_kind(scene),
@@ -88,17 +114,6 @@ impl SceneResponse {
     }
 }
 
-/// Ranges, m, and velocities \[line, gate\] of a scene's map at every so-manyth gate: neighbours that share most of their window say
-/// the same.
-pub(crate) fn independent_gates(scene: &Scene, range_m: &[f64], velocity_m_s: &Array2<f64>) -> (Vec<f64>, Array2<f64>) {
-    let period_s = 1.0 / scene.detector.sampling_hz;
-    let apart_m = 0.25 * scene.estimator.window_samples as f64 * 0.5 * crate::SPEED_OF_LIGHT_M_S * period_s;
-    // files round their ranges
-    let step = ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1);
-    let gates: Vec<usize> = (0..range_m.len()).step_by(step).collect();
-    (gates.iter().map(|gate| range_m[*gate]).collect(), velocity_m_s.select(Axis(1), &gates))
-}
-
 /// Mean distance of ranges, m.
 pub(crate) fn spacing_m(range_m: &[f64]) -> f64 {
     let length_m = range_m.last().copied().unwrap_or(0.0) - range_m.first().copied().unwrap_or(0.0);
@@ -108,8 +123,7 @@ pub(crate) fn spacing_m(range_m: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plan::Target;
-    use crate::scene::{RegionRadius, SceneFile};
+    use crate::scene::RegionRadius;
     use wakescope_estimate::vortex_fit::Wake;
 
     #[test]
@@ -122,7 +136,7 @@ mod tests {
             let response = SceneResponse::new(&plan, snr).unwrap().unwrap();
             let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
             let lines: Vec<f64> = (0..20).map(|line| 0.1 + 2.5e-3 * f64::from(line)).collect();
-            let shown = response.shown(&plan.scene.scene, 400.0).unwrap();
+            let shown = response.shown(400.0).unwrap();
             let map = shown.map(&WakeModel::default(), &wake, &lines, &[376.5, 423.5]).unwrap();
             (map, response.correlated_lines(2.5e-3, 400.0))
         };

@@ -114,12 +114,6 @@ impl<'a> Scanner<'a> {
         Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line))
     }
 
-    /// Whether signals are (15) and noise: no phases of the laser, reflex of the telescope or echo of the pulse before.
-    fn is_plain(&self) -> bool {
-        let front = &self.plan.instrument.receiver.front_end;
-        front.linewidth_hz == 0.0 && front.reflection == 0.0 && self.previous.is_none()
-    }
-
     /// The pulse that is sent along them.
     pub fn pulse(&self) -> &Pulse {
         &self.plan.instrument.pulse
@@ -219,12 +213,7 @@ impl<'a> Scanner<'a> {
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
-                let is_plain = self.is_plain();
-                let impairment_seed = if is_plain {
-                    0
-                } else {
-                    stream(self.plan.scene.scene.seed, "asides", index(key) as u64).next_u64()
-                };
+                let impairment_seed = stream(self.plan.scene.scene.seed, "asides", index(key) as u64).next_u64();
                 let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
                 Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, impairment_seed }
             },

@@ -31,7 +31,7 @@ pub use gate::gate_of;
 pub use instrument::{StatedEstimator, scene_of, stated_scene};
 pub use one_scan::{Velocities, retrieve_map};
 pub use others::{envelope_table, envelopes, profile_table};
-pub use own::{OwnScene, retrieve_signals, scan_of_signals};
+pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::figure;
 pub use realisations::{RetrievalRow, SceneRetrieval};
@@ -43,4 +43,5 @@ pub use tracks::track_figure;
 pub use tracks::{track_of, track_table};
 pub use truth::TrueVortex;
 
+pub use crate::measure::response::SceneResponse;
 pub use crate::scene::RetrievalMethod as Method;

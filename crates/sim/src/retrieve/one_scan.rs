@@ -1,9 +1,10 @@
 //! Retrieval of one map.
 
-use super::own::{OwnScene, retold, set};
+use super::own::{retold, set};
 use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::scans::ReadScan;
+use crate::measure::response::SceneResponse;
 use crate::scene::RetrievalMethod as Method;
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
@@ -19,9 +20,9 @@ pub enum Velocities<'s> {
     /// Nobody knows: they are taken for means.
     Unknown,
     /// What the estimator of a scene shows.
-    Shown(&'s OwnScene),
+    Shown(&'s SceneResponse),
     /// Most likely what the estimator of such a scene shows: the difference to means counts as an error.
-    LikelyShown(&'s OwnScene),
+    LikelyShown(&'s SceneResponse),
 }
 
 /// Retrieves one map.

@@ -5,7 +5,7 @@
 use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::Table;
-use crate::measure::recorded::Spectra;
+use crate::measure::recorded::{Spectra, upward};
 use crate::plan::Plan;
 use crate::scene::PulseShape;
 use crate::setup::estimators;
@@ -53,9 +53,7 @@ pub fn envelopes(
         scene.detector.bandwidth_hz,
     )?;
     let (gates, cells) = (spectra.range_m.len(), spectra.velocity_m_s.len());
-    // Lines by increasing elevation.
-    let mut order: Vec<usize> = lines.collect();
-    order.sort_by(|a, b| spectra.elevation_rad[*a].total_cmp(&spectra.elevation_rad[*b]));
+    let order = upward(lines, &spectra.elevation_rad);
     let power = Array3::from_shape_fn((order.len(), gates, cells), |(line, gate, cell)| {
         f64::from(spectra.density[(order[line] * gates + gate) * cells + cell])
     });

@@ -6,12 +6,10 @@ use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::io::scans::ReadScan;
-use crate::measure::recorded::{FromParts, MeasuredScan};
-use crate::measure::response::{SceneResponse, independent_gates, spacing_m};
-use crate::measure::scan::Scanner;
-use crate::plan::{Plan, Target};
-use crate::scene::{DetectorSignal, Scene, SceneFile};
-use crate::setup::progress::Observer;
+use crate::measure::recorded::{MeasuredScan, samples, upward};
+use crate::measure::response::{SceneResponse, spacing_m};
+use crate::plan::Plan;
+use crate::scene::DetectorSignal;
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{
@@ -28,39 +26,12 @@ const COMPETES: f64 = 9.0;
 /// A vortex that means do not show is one if its circulation is that many of its deviations.
 const CERTAIN_SIGMAS: f64 = 3.0;
 
-/// The scene of a map or of signals.
-pub struct OwnScene {
-    scene: Scene,
-    response: SceneResponse,
-    noise_power_a2: f64,
-}
-
-impl OwnScene {
-    /// Nothing for a scene without noise, or with a pulse that is no Gaussian without chirp. No flow is opened.
-    ///
-    /// # Errors
-    /// What the efficiency refuses; a checked scene gives none.
-    pub fn new(scene: &SceneFile, observer: &dyn Observer) -> Result<Option<Self>, Error> {
-        let plan = Plan::new(scene.in_still_air()?, Target::Map)?;
-        let layers = Scanner::expected_layer_snr(&plan, observer)?;
-        Self::with(&plan, layers)
-    }
-
-    /// The same for a plan whose lines are there.
-    pub(super) fn of_scanner(plan: &Plan, scanner: &Scanner<'_>) -> Result<Option<Self>, Error> {
-        Self::with(plan, scanner.layer_snr())
-    }
-
-    fn with(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
-        let (scene, noise_power_a2) = (plan.scene.scene.clone(), plan.instrument.receiver.noise_variance_a2());
-        let response = SceneResponse::new(plan, layer_snr)?;
-        Ok(response.map(|response| Self { scene, response, noise_power_a2 }))
-    }
-
+impl SceneResponse {
     /// Expected signal-to-noise ratio in the band at the middle of a wake, a power ratio.
     pub fn snr_of(&self, wake: &Wake) -> f64 {
-        let (y_m, z_m) = middle_m(wake);
-        self.response.snr_at(y_m.hypot(z_m - self.scene.scan.lidar_height_m))
+        let y_m = 0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m);
+        let z_m = 0.5 * (wake.left.height_m + wake.right.height_m);
+        self.snr_at(y_m.hypot(z_m - self.scene.scan.lidar_height_m))
     }
 
     /// The fit to what the estimator of the scene shows, for a map in which `found` has a wake: of a pair, as means may show but one of its
@@ -82,7 +53,7 @@ impl OwnScene {
             0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
             count => found.vortices.iter().map(|vortex| place(vortex).0).sum::<f64>() / count as f64,
         };
-        let (ranges_m, velocity_m_s) = independent_gates(&self.scene, &map.range_m, &map.velocity_m_s);
+        let (ranges_m, velocity_m_s) = self.independent_gates(&map.range_m, &map.velocity_m_s);
         let fits = Fits {
             scan: map,
             // Maps of one scan know no deviation, and those of a few scans hardly any.
@@ -92,15 +63,15 @@ impl OwnScene {
                 velocity_m_s: velocity_m_s.view(),
                 standard_deviation_m_s: None,
             },
-            still: self.response.shown(&self.scene, range_m)?,
-            moving: self.response.shown(&self.scene, range_m)?.moving(&map.elevation_rad, &map.after_middle_s()),
+            still: self.shown(range_m)?,
+            moving: self.shown(range_m)?.moving(&map.elevation_rad, &map.after_middle_s()),
             options,
             map_options: MapFitOptions {
                 free: options.free,
                 core_radius_m: options.core_radius_m,
                 loss: options.loss,
                 secondary: options.secondary,
-                correlated_lines: self.response.correlated_lines(spacing_m(&map.elevation_rad), range_m),
+                correlated_lines: self.correlated_lines(spacing_m(&map.elevation_rad), range_m),
                 ..MapFitOptions::default()
             },
         };
@@ -205,29 +176,23 @@ fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &M
 /// # Errors
 /// What the system says of the file, and what the fits refuse.
 pub fn retrieve_signals(
-    own: &OwnScene,
+    own: &SceneResponse,
     records: &mut RawRecords,
     measured: &MeasuredScan,
     found: RetrievedScan,
 ) -> Result<RetrievedScan, Error> {
+    let ((range, elevation_rad), all) = (measured.lines.all_records(), 0..records.samples());
     match own.scene.detector.signal {
-        DetectorSignal::IntermediateFrequency => of_samples::<f64>(own, records, measured, found),
-        DetectorSignal::Baseband => of_samples::<Complex<f64>>(own, records, measured, found),
+        DetectorSignal::IntermediateFrequency => {
+            own.of_records(samples::<f64>(records, range, all)?.view(), elevation_rad, found)
+        }
+        DetectorSignal::Baseband => {
+            own.of_records(samples::<Complex<f64>>(records, range, all)?.view(), elevation_rad, found)
+        }
     }
 }
 
-fn of_samples<S: FromParts>(
-    own: &OwnScene,
-    records: &mut RawRecords,
-    measured: &MeasuredScan,
-    found: RetrievedScan,
-) -> Result<RetrievedScan, Error> {
-    let (range, elevation_rad) = measured.lines.all_records();
-    let samples: Array2<S> = crate::measure::recorded::samples(records, range, 0..records.samples())?;
-    own.of_records(samples.view(), elevation_rad, found)
-}
-
-impl OwnScene {
+impl SceneResponse {
     /// The fit to the records of lines at those elevations, rad; the wake of their map starts it.
     ///
     /// # Errors
@@ -240,8 +205,8 @@ impl OwnScene {
     ) -> Result<RetrievedScan, Error> {
         let Some(guess) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(found) };
         let RetrievedScan { scan, options, result } = found;
-        let setup = self.response.setup(&self.scene, options.model, elevation_rad)?;
-        let snr = |range_m: f64, _: f64| self.response.snr_at(range_m);
+        let setup = self.setup(options.model, elevation_rad)?;
+        let snr = |range_m: f64, _: f64| self.snr_at(range_m);
         let fit_options = SignalFitOptions { free: options.free, ..SignalFitOptions::default() };
         let fit = match fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options) {
             // what the map shows is what was found
@@ -261,14 +226,6 @@ impl OwnScene {
         result.chi2_per_dof = f64::NAN;
         Ok(RetrievedScan { scan, options, result })
     }
-}
-
-/// The middle of both vortices, m.
-fn middle_m(wake: &Wake) -> (f64, f64) {
-    (
-        0.5 * (wake.left.lateral_position_m + wake.right.lateral_position_m),
-        0.5 * (wake.left.height_m + wake.right.height_m),
-    )
 }
 
 /// A result with another wake: the vortices that it has, each when the line of sight passes it.
@@ -326,9 +283,7 @@ pub(super) fn set(flags: &mut Vec<Flag>, flag: Flag, is_set: bool) {
 
 /// A scan of recorded signals as a map for a retrieval.
 pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: &MeasuredScan) -> ReadScan {
-    // Lines by increasing elevation.
-    let mut order: Vec<usize> = (0..scan.lines.elevation_rad.len()).collect();
-    order.sort_by(|a, b| scan.lines.elevation_rad[*a].total_cmp(&scan.lines.elevation_rad[*b]));
+    let order = upward(0..scan.lines.elevation_rad.len(), &scan.lines.elevation_rad);
     let mut velocity_m_s = scan.velocity_m_s.select(Axis(0), &order);
     let flagged = scan.flagged.select(Axis(0), &order);
     velocity_m_s.zip_mut_with(&flagged, |velocity, flagged| {

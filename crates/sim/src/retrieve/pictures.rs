@@ -4,7 +4,7 @@
 
 use super::RetrievedScan;
 use crate::Error;
-use crate::io::{Field, PulseInfo, Ray, Site, Sweep, Unit, VelocityMap};
+use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Figure, MapPlot};
 use wakescope_estimate::retrieval::{Flag, Side, expected_velocities};
 
@@ -29,22 +29,16 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         azimuth_rad: 0.0,
     });
     let shown = VelocityMap {
-        title: String::new(),
         rays: rays.collect(),
         range_m: map.range_m.clone(),
         sweeps: vec![Sweep::rhi(f64::NAN, 0.0)],
-        pulse: PulseInfo::default(),
         fields: fields
             .iter()
             .map(|(name, text, values)| Field::float(name, Unit::MetrePerSecond, text, values.clone()))
             .collect(),
         lidar_y_m: scan.options.model.lidar_lateral_position_m,
         lidar_height_m: scan.options.model.lidar_height_m,
-        site: Site::default(),
-        flight: None,
-        ray_pulses: None,
-        carrier: None,
-        is_simulated: false,
+        ..VelocityMap::default()
     };
     let centres_m: Vec<(f64, f64)> =
         scan.result.vortices.iter().map(|v| (v.lateral_position_m.value, v.height_m.value)).collect();

@@ -5,13 +5,13 @@
 use super::gate::gate_of;
 use super::one_scan::{Velocities, retrieve_map};
 use super::others::envelopes;
-use super::own::OwnScene;
 use super::retrieved_scan::RetrievedScan;
 use super::truth::{TrueVortex, true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
 use crate::io::scans::ReadScan;
-use crate::measure::recorded::Spectra;
+use crate::measure::recorded::{Spectra, upward};
+use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::{Flow, FollowingAircraft, Retrieval, RetrievalMethod as Method, Scene};
@@ -72,7 +72,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     let Some(wanted) = &scene.retrieval else { return Ok(None) };
     let sweeps = upward_sweeps(plan);
     let truths = sweeps.iter().map(|lines| true_vortices(plan, lines)).collect::<Result<Vec<_>, _>>()?;
-    let own = OwnScene::of_scanner(plan, scanner)?;
+    let own = SceneResponse::new(plan, scanner.layer_snr())?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let options = options(scene, wanted)?;
     let mut tests = Vec::new();
@@ -130,9 +130,7 @@ fn upward_sweeps(plan: &Plan) -> Vec<Vec<usize>> {
     let g = &plan.geometry;
     let of_sweep = |sweep: usize| {
         let own = |line: &usize| g.schedule.lines[*line].sweep == sweep;
-        let mut lines: Vec<usize> = (0..g.schedule.lines.len()).filter(own).collect();
-        lines.sort_by(|a, b| g.elevation_rad[*a].total_cmp(&g.elevation_rad[*b]));
-        lines
+        upward((0..g.schedule.lines.len()).filter(own), &g.elevation_rad)
     };
     (0..g.schedule.sweeps.len()).map(of_sweep).collect()
 }
@@ -157,7 +155,7 @@ fn read_scan(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadSc
 fn of_signals<S: Sample + wakescope_signal::Sample>(
     plan: &Plan,
     scanner: &Scanner<'_>,
-    (method, own): (Method, &OwnScene),
+    (method, own): (Method, &SceneResponse),
     (realisation, lines): (usize, &[usize]),
     mut of_map: RetrievedScan,
 ) -> Result<Option<RetrievedScan>, Error> {

@@ -3,7 +3,7 @@
 //! The fit keeps the core of `[retrieval] core_radius_m`, or one of 4.5 % of the spacing; the bound is for known cores. Check: against the truth
 //! of the scene, and the bound of Table 2's scan against the stored one.
 
-use crate::measure::response::{SceneResponse, independent_gates};
+use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::scene::{Flow, VortexPair};
@@ -48,14 +48,14 @@ impl<'p> Retrieval<'p> {
 
     /// Fits the velocities of a map, m/s; nothing where it is not known what the estimator shows of a wake.
     pub(super) fn add(&mut self, velocity_m_s: &Array2<f64>) {
-        let shown = self.response.shown(&self.plan.scene.scene, self.pair.lateral_position_m);
+        let shown = self.response.shown(self.pair.lateral_position_m);
         let found = shown.map(|shown| self.fit(velocity_m_s, &shown).unwrap_or(f64::NAN));
         self.circulations_m2_s.extend(found);
     }
 
     fn fit(&self, velocity_m_s: &Array2<f64>, shown: &EstimatorResponse<'_>) -> Option<f64> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
-        let (range_m, velocity_m_s) = independent_gates(scene, &g.gate_range_m, velocity_m_s);
+        let (range_m, velocity_m_s) = self.response.independent_gates(&g.gate_range_m, velocity_m_s);
         let map = VelocityMap {
             elevation_rad: &g.elevation_rad,
             range_m: &range_m,
@@ -89,7 +89,7 @@ impl<'p> Retrieval<'p> {
         };
         let rays = |line: &f64| std::iter::repeat_n(*line, scene.scan.pulses_per_line);
         let elevation_rad = g.elevation_rad.iter().flat_map(rays).collect();
-        let setup = self.response.setup(scene, self.model(), elevation_rad)?;
+        let setup = self.response.setup(self.model(), elevation_rad)?;
         let model = ScanModel::new(&setup, |range_m, _| self.response.snr_at(range_m), &truth)?;
         let bound = model.bound(&truth, Powers::default(), &free(), true)?;
         Ok(bound[[Parameter::LeftCirculation as usize; 2]].sqrt())

@@ -1,6 +1,7 @@
 //! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
 
 use super::digits::{digits, si};
+use crate::measure::error_law::range_filter;
 use crate::plan::Plan;
 use crate::scene::Weighting;
 use crate::setup::described::sampled_velocities_m_s;
@@ -125,11 +126,9 @@ impl Limits {
 
     fn resolution(&mut self, plan: &Plan) -> Result<(), Error> {
         let scene = &plan.scene.scene;
-        let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-        let (pulse, thickness_m) = (&plan.instrument.pulse, plan.geometry.layer_thickness_m);
-        let gate = RangeFilter::gate(pulse, &window, scene.detector.sampling_hz, thickness_m)?;
-        let gate_m = gate.full_width_half_maximum_m();
-        let pulse_m = RangeFilter::pulse(pulse, thickness_m)?.full_width_half_maximum_m();
+        let gate_m = range_filter(plan)?.full_width_half_maximum_m();
+        let pulse = RangeFilter::pulse(&plan.instrument.pulse, plan.geometry.layer_thickness_m)?;
+        let pulse_m = pulse.full_width_half_maximum_m();
         let weighting = match scene.estimator.weighting {
             Weighting::Gaussian => "Gaussian",
             Weighting::Rectangular => "rectangular",
@@ -138,7 +137,7 @@ impl Limits {
         self.values.extend([("pulse_resolution_m", pulse_m), ("gate_resolution_m", gate_m)]);
         self.lines.push(format!(
             "resolution: pulse {pulse_m:.1} m, gate (pulse and {weighting} window of {}) {gate_m:.1} m, full width at half maximum",
-            window.len()
+            scene.estimator.window_samples
         ));
         Ok(())
     }

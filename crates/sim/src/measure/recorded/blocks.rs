@@ -3,117 +3,126 @@
 //! The samples of all tiles have one scale, a region sums its lines in their order, and windows have the same numbers in parts of a
 //! record, so that tiles change no bit.
 
-use super::cells::{Cell, ScanCells};
-use super::lines::ScanLines;
+use super::lines::{ScanLines, upward};
 use super::spectra::GateSpectra;
-use super::tiles::{Tile, Tiling};
+use super::tiles::{Tile, tiles};
 use super::{FromParts, RecordedOptions, pieces, samples};
 use crate::Error;
 use crate::io::raw::RawRecords;
-use crate::measure::map_estimator::MapEstimator;
+use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::setup::estimators;
 use crate::setup::progress::Observer;
 use ndarray::Array2;
-use std::ops::Range;
-use wakescope_estimate::map::{ScanGeometry, polar_points};
-use wakescope_estimate::{Gates, Sampling};
+use wakescope_estimate::GateVelocity;
+use wakescope_estimate::estimators::Quality;
+use wakescope_estimate::map::{MapPoint, ScanGeometry, polar_points};
 
 /// Most bytes of the sums of a tile.
 const BLOCK_BYTES: usize = 256 << 20;
 
-pub(super) struct Blocks<'p, S> {
-    plan: &'p Plan,
-    largest: f64,
-    block_bytes: usize,
-    observer: &'p dyn Observer,
-    sampling: Sampling,
-    gates: Gates,
-    /// Expected signal-to-noise ratio of the layers of a line.
-    layer_snr: Vec<(f64, f64)>,
-    spectra: Option<GateSpectra>,
-    sample: std::marker::PhantomData<fn(S)>,
+/// What is known of one gate before the noise is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Cell {
+    pub(super) found: MapPoint,
+    /// Mean power in the band over that of the scene's noise.
+    pub(super) power_ratio: f64,
+    /// Signal-to-noise ratio over the excess of that ratio over 1.
+    pub(super) gain: f64,
+    /// Density of the peak over what the scene's noise exceeds with the rate of false alarms; NaN without a test.
+    pub(super) detection_ratio: f64,
+    /// Standard deviation of the power ratio of noise.
+    pub(super) deviation: f64,
+    /// Lines of sight that its region reaches.
+    pub(super) lines: f64,
 }
 
-impl<'p, S: FromParts> Blocks<'p, S> {
-    pub(super) fn new(
-        plan: &'p Plan,
-        largest: f64,
-        options: &RecordedOptions,
-        observer: &'p dyn Observer,
-    ) -> Result<Self, Error> {
-        let scene = &plan.scene.scene;
-        let spectra = if options.spectra { Some(GateSpectra::new(plan, S::KIND)?) } else { None };
-        spectra.iter().try_for_each(|spectra| spectra.fit_a_file(plan))?;
-        Ok(Self {
-            plan,
-            largest,
-            block_bytes: options.block_bytes.unwrap_or(BLOCK_BYTES),
-            observer,
-            sampling: estimators::sampling(scene)?,
-            gates: estimators::gates(scene)?,
-            layer_snr: Scanner::expected_layer_snr(plan, observer)?,
-            spectra,
-            sample: std::marker::PhantomData,
-        })
+impl Cell {
+    /// A gate of which nothing is known yet.
+    fn none() -> Self {
+        let found = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
+        let [power_ratio, gain, detection_ratio, deviation] = [f64::NAN; 4];
+        Self { found, power_ratio, gain, detection_ratio, deviation, lines: 0.0 }
     }
+}
 
-    /// All scans, one after the other.
-    pub(super) fn scans(&self, records: &mut RawRecords, scans: Vec<ScanLines>) -> Result<Vec<ScanCells>, Error> {
-        let mut out = Vec::with_capacity(scans.len());
-        let mut known: Option<(Vec<f64>, MapEstimator<S>, ScanGeometry)> = None;
-        for lines in scans {
-            // Repetitions of a scan share what was made for the first.
-            if known.as_ref().is_none_or(|(angles, ..)| *angles != lines.elevation_rad) {
-                let places = self.places(&lines, &(0..lines.elevation_rad.len()))?;
-                let estimator = MapEstimator::new(self.plan, &self.layer_snr, &places)?;
-                known = Some((lines.elevation_rad.clone(), estimator, places));
-            }
-            let Some((_, estimator, places)) = &known else { continue };
-            out.push(self.scan(records, lines, estimator, places)?);
+/// The gates of a scan before they are held against the noise.
+pub(super) struct ScanCells {
+    pub(super) lines: ScanLines,
+    pub(super) cells: Array2<Cell>,
+    /// Where the windows of the lines are, and the radius of the regions of each gate, m.
+    pub(super) regions: (ScanGeometry, Vec<f64>),
+    /// Spectra of the gates over the noise of the scene, where they were asked for.
+    pub(super) spectra: Option<Vec<f32>>,
+}
+
+/// The gates of all scans, one after the other; `largest` is the largest part of a sample.
+pub(super) fn scans<S: FromParts>(
+    plan: &Plan,
+    records: &mut RawRecords,
+    largest: f64,
+    scans: &[ScanLines],
+    options: &RecordedOptions,
+    observer: &dyn Observer,
+) -> Result<Vec<ScanCells>, Error> {
+    let spectra = options.spectra.then(|| GateSpectra::new(plan, S::KIND)).transpose()?;
+    spectra.iter().try_for_each(|spectra| spectra.fit_a_file(plan))?;
+    let layer_snr = Scanner::expected_layer_snr(plan, observer)?;
+    let (range_m, most_bytes) = (&plan.geometry.gate_range_m, options.block_bytes.unwrap_or(BLOCK_BYTES));
+    let mut out = Vec::with_capacity(scans.len());
+    // Repetitions of a scan share what was made for the first.
+    for alike in scans.chunk_by(|a, b| a.elevation_rad == b.elevation_rad) {
+        let places = places_of(plan, &alike[0].all_records().1)?;
+        let estimator = MapEstimator::<S>::new(plan, &layer_snr, &places)?;
+        let tiles = tiles(&estimator, &places, &alike[0].elevation_rad, range_m, most_bytes)?;
+        let blocks = Blocks { plan, largest, observer, estimator, places, tiles, spectra: spectra.as_ref() };
+        for lines in alike {
+            out.push(blocks.scan(records, lines)?);
         }
-        Ok(out)
     }
+    Ok(out)
+}
 
-    fn places(&self, lines: &ScanLines, some: &Range<usize>) -> Result<ScanGeometry, Error> {
-        let angles = lines.record_elevation_rad(some);
-        Ok(ScanGeometry::new(&self.sampling, &self.gates, &angles, self.plan.geometry.samples)?)
-    }
+/// What scans with the same lines share.
+struct Blocks<'p, S> {
+    plan: &'p Plan,
+    largest: f64,
+    observer: &'p dyn Observer,
+    estimator: MapEstimator<S>,
+    places: ScanGeometry,
+    tiles: Vec<Tile>,
+    spectra: Option<&'p GateSpectra>,
+}
 
-    fn scan(
-        &self,
-        records: &mut RawRecords,
-        lines: ScanLines,
-        estimator: &MapEstimator<S>,
-        places: &ScanGeometry,
-    ) -> Result<ScanCells, Error> {
-        let shape = (lines.elevation_rad.len(), self.plan.geometry.gate_range_m.len());
+impl<S: FromParts> Blocks<'_, S> {
+    fn scan(&self, records: &mut RawRecords, lines: &ScanLines) -> Result<ScanCells, Error> {
+        let range_m = &self.plan.geometry.gate_range_m;
+        let shape = (lines.elevation_rad.len(), range_m.len());
         let mut cells = Array2::from_elem(shape, Cell::none());
-        let mut spectra = self.spectra.as_ref().map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]);
-        let tiling = Tiling::new(estimator, places, &self.plan.geometry.gate_range_m, self.block_bytes)?;
-        for tile in tiling.tiles(&lines) {
-            self.tile(records, &lines, (estimator, places), &tile, (&mut cells, spectra.as_deref_mut()))?;
+        let mut spectra = self.spectra.map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]);
+        for tile in &self.tiles {
+            self.tile(records, lines, tile, (&mut cells, spectra.as_deref_mut()))?;
             if tile.gates.end == shape.1 {
                 self.observer.advance(tile.lines.len() as u64);
             }
         }
-        let radius_m = self.plan.geometry.gate_range_m.iter().map(|range_m| estimator.radius_m(*range_m));
-        let regions = (places.clone(), radius_m.collect::<Result<_, _>>()?);
-        Ok(ScanCells { lines, cells, regions, spectra })
+        let radius_m = range_m.iter().map(|range_m| self.estimator.radius_m(*range_m)).collect::<Result<_, _>>()?;
+        Ok(ScanCells { lines: lines.clone(), cells, regions: (self.places.clone(), radius_m), spectra })
     }
 
     fn tile(
         &self,
         records: &mut RawRecords,
         lines: &ScanLines,
-        (estimator, places): (&MapEstimator<S>, &ScanGeometry),
         tile: &Tile,
         (cells, mut spectra): (&mut Array2<Cell>, Option<&mut [f32]>),
     ) -> Result<(), Error> {
-        let (read, held) = &tile.windows;
-        let (of_records, of_samples) = (lines.records(read), self.gates.samples(held));
-        let mut sums = estimator.sums_of(self.places(lines, read)?, held.clone())?.scaled_for(self.largest);
+        let (plan, estimator, (read, held)) = (self.plan, &self.estimator, &tile.windows);
+        let of_records = lines.records(read);
+        let of_samples = estimators::gates(&plan.scene.scene)?.samples(held);
+        let places = places_of(plan, &lines.record_elevation_rad(read))?;
+        let mut sums = estimator.sums_of(places, held.clone())?.scaled_for(self.largest);
         for piece in pieces(of_records.clone(), of_samples.len()) {
             let samples = samples::<S>(records, piece.clone(), of_samples.clone())?;
             sums.add(piece.start - of_records.start, samples.view())?;
@@ -121,12 +130,11 @@ impl<'p, S: FromParts> Blocks<'p, S> {
         let scan = sums.finish();
         // The estimator takes lines by increasing elevation.
         let (guessed, gates) = &tile.guessed;
-        let mut order: Vec<usize> = guessed.clone().collect();
-        order.sort_by(|a, b| lines.elevation_rad[*a].total_cmp(&lines.elevation_rad[*b]));
+        let order = upward(guessed.clone(), &lines.elevation_rad);
         let angles: Vec<f64> = order.iter().map(|line| lines.elevation_rad[*line]).collect();
-        let points = polar_points(&angles, &self.plan.geometry.gate_range_m[gates.clone()]);
+        let points = polar_points(&angles, &plan.geometry.gate_range_m[gates.clone()]);
         let found = estimator.map(&scan, &points)?;
-        let noise = estimator.noise(places, &points)?;
+        let noise = estimator.noise(&self.places, &points)?;
         for (row, line) in order.into_iter().enumerate().filter(|(_, line)| tile.lines.contains(line)) {
             for gate in tile.gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
@@ -138,9 +146,9 @@ impl<'p, S: FromParts> Blocks<'p, S> {
                     gain: estimator.gain(e.velocity_m_s),
                     detection_ratio: noise.detection_ratio(at, e),
                     deviation: noise.deviation(at),
-                    lines: places.chords(points[at], radius_m).count() as f64,
+                    lines: self.places.chords(points[at], radius_m).count() as f64,
                 };
-                if let (Some(spectra), Some(of_gate)) = (&mut spectra, &self.spectra) {
+                if let (Some(spectra), Some(of_gate)) = (&mut spectra, self.spectra) {
                     let one = of_gate.density(&scan, points[at], radius_m, estimator.noise_density_a2())?;
                     let place = (line * cells.ncols() + gate) * one.len();
                     spectra[place..place + one.len()].copy_from_slice(&one);

@@ -80,6 +80,13 @@ impl ScanLines {
     }
 }
 
+/// Some lines in the order of their elevations, rad.
+pub(crate) fn upward(lines: impl IntoIterator<Item = usize>, elevation_rad: &[f64]) -> Vec<usize> {
+    let mut order: Vec<usize> = lines.into_iter().collect();
+    order.sort_by(|a, b| elevation_rad[*a].total_cmp(&elevation_rad[*b]));
+    order
+}
+
 /// Records of a file by scan and line: by the table, by what the file says, or as the scene has them. A file that numbers the lines
 /// of its records is believed; else the records of a line have one elevation.
 ///
@@ -102,11 +109,10 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
             "an elevation is {bad} rad: from -pi/2 to pi/2 are allowed; degrees need the unit degrees, or a column elevation_deg"
         )));
     }
-    if elevation_rad.len() != count {
-        return Err(records.refuse(format!("it has {count} records and {} elevations", elevation_rad.len())));
-    }
-    if time_s.len() != count {
-        return Err(records.refuse(format!("it has {count} records and {} times", time_s.len())));
+    for (name, found) in [("elevations", elevation_rad.len()), ("times", time_s.len())] {
+        if found != count {
+            return Err(records.refuse(format!("it has {count} records and {found} {name}")));
+        }
     }
     if let Some(bad) = time_s.iter().find(|time| !time.is_finite()) {
         return Err(records.refuse(format!("the time of a record is {bad}: each must be finite")));

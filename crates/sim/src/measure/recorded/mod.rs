@@ -7,13 +7,13 @@
 //! Check: maps of a run's own signals have the bytes of the run, from every format, whole or in blocks.
 
 mod blocks;
-mod cells;
 mod lines;
 mod predicted;
 mod result;
 mod spectra;
 mod tiles;
 
+pub(crate) use lines::upward;
 pub use lines::{RayTable, ScanLines};
 pub use predicted::predicted_table;
 pub use result::{MeasuredScan, measured_map};
@@ -226,7 +226,7 @@ fn of_samples<S: FromParts>(
     }
     let scans = lines::scans(plan, records, options.rays.as_ref())?;
     observer.begin(Stage::Estimates, scans.iter().map(|scan| scan.elevation_rad.len() as u64).sum());
-    let found = blocks::Blocks::<S>::new(plan, largest, options, observer)?.scans(records, scans)?;
+    let found = blocks::scans::<S>(plan, records, largest, &scans, options, observer)?;
     observer.end();
     let spectra = found.iter().any(|scan| scan.spectra.is_some()).then(|| Spectra::of(plan, &found)).transpose()?;
     if is_run {

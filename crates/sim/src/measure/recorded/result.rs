@@ -3,7 +3,7 @@
 //! Check: flags and ratios of measured signals are those of a run of the same signals.
 
 use super::NoiseLevel;
-use super::cells::{Cell, ScanCells};
+use super::blocks::{Cell, ScanCells};
 use super::lines::ScanLines;
 use super::predicted::PredictedError;
 use crate::Error;
@@ -58,14 +58,15 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
         true => !cell.found.estimate.is_good(),
         false => !(cell.found.estimate.is_good() && cell.detection_ratio > factor),
     };
-    let mut predicted_m_s = Array2::from_elem(cells.dim(), f64::NAN);
-    let mut bias_m_s = predicted_m_s.clone();
-    for (predicted, ((line, gate), cell)) in predicted.iter().cycle().zip(cells.indexed_iter()) {
+    let of_cell = |of: &dyn Fn(&PredictedError, (usize, usize), &Cell) -> f64| {
+        let predicted = predicted.as_ref();
+        Array2::from_shape_fn(cells.dim(), |at| predicted.map_or(f64::NAN, |predicted| of(predicted, at, &cells[at])))
+    };
+    let predicted_m_s = of_cell(&|predicted, (line, gate), cell| {
         let point = PolarPoint { range_m: plan.geometry.gate_range_m[gate], elevation_rad: lines.elevation_rad[line] };
-        predicted_m_s[[line, gate]] =
-            predicted.deviation_m_s(point, radius_m[gate], cell.found.level as f64, ratio(cell));
-        bias_m_s[[line, gate]] = predicted.bias_m_s(cell.found.estimate.velocity_m_s, ratio(cell));
-    }
+        predicted.deviation_m_s(point, radius_m[gate], cell.found.level as f64, ratio(cell))
+    });
+    let bias_m_s = of_cell(&|predicted, _, cell| predicted.bias_m_s(cell.found.estimate.velocity_m_s, ratio(cell)));
     Ok(MeasuredScan {
         velocity_m_s: cells.map(|cell| cell.found.estimate.velocity_m_s),
         predicted_m_s,
@@ -154,12 +155,8 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
             )?,
             field("quality", Unit::One, "density of the peak over the mean density in the band", |s| &s.quality)?,
         ],
-        lidar_y_m: 0.0,
         lidar_height_m: scene.scan.lidar_height_m,
         site: site(scene),
-        flight: None,
-        ray_pulses: None,
-        carrier: None,
-        is_simulated: false,
+        ..VelocityMap::default()
     })
 }

@@ -2,15 +2,15 @@
 //!
 //! Check: the highest density of a spectrum is where the velocity of its gate is.
 
-use super::cells::ScanCells;
+use super::blocks::ScanCells;
 use crate::Error;
 use crate::io::OutputError;
-use crate::measure::map_estimator::MapEstimator;
+use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::plan::Plan;
 use crate::scene::{Method, Scene, Weighting};
 use crate::setup::estimators;
 use ndarray::ArrayView2;
-use wakescope_estimate::map::{PolarPoint, ScanGeometry};
+use wakescope_estimate::map::PolarPoint;
 use wakescope_estimate::spectrum::LagSpectrum;
 use wakescope_estimate::window::Sample;
 use wakescope_estimate::{Scan, Scratch, SignalKind};
@@ -54,9 +54,7 @@ impl Spectra {
         pulse_elevation_rad: &[f64],
         samples: ArrayView2<'_, S>,
     ) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
-        let places = ScanGeometry::new(&sampling, &gates, pulse_elevation_rad, g.samples)?;
+        let (g, places) = (&plan.geometry, places_of(plan, pulse_elevation_rad)?);
         let estimator = MapEstimator::<S>::new(plan, layer_snr, &places)?;
         let mut sums = estimator.sums(places)?;
         sums.add(0, samples)?;

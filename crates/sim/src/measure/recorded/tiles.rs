@@ -3,7 +3,6 @@
 //!
 //! Check: tiles hold each gate once; for records of a million samples they are no larger than for short ones.
 
-use super::lines::ScanLines;
 use crate::Error;
 use crate::measure::map_estimator::MapEstimator;
 use std::ops::Range;
@@ -42,103 +41,96 @@ impl Reach {
     }
 }
 
-/// How the scans of a map are cut.
-pub(super) struct Tiling {
-    reach: Vec<Reach>,
-    window_bytes: usize,
-    most_bytes: usize,
+/// How far each gate of a map at `range_m` reaches.
+fn reaches<S: Sample>(
+    estimator: &MapEstimator<S>,
+    places: &ScanGeometry,
+    range_m: &[f64],
+) -> Result<Vec<Reach>, Error> {
+    let own = range_m.iter().enumerate().map(|(gate, range_m)| {
+        let radius_m = estimator.radius_m(*range_m)?;
+        let windows = places.gates_between(range_m - radius_m, range_m + radius_m);
+        let windows_rad = estimator.reach_rad(*range_m)?;
+        Ok(Reach { guessed_rad: 0.0, guessed: gate..gate + 1, windows_rad, windows })
+    });
+    let reach = own.collect::<Result<Vec<Reach>, Error>>()?;
+    if !estimator.follows_wind() {
+        return Ok(reach);
+    }
+    let followed = reach.iter().zip(range_m).map(|(own, at_m)| {
+        // The gates between which the wind is interpolated.
+        let radius_m = estimator.radius_m(*at_m)?;
+        let start = range_m.partition_point(|range_m| *range_m <= at_m - radius_m).saturating_sub(1);
+        let end = range_m.partition_point(|range_m| *range_m < at_m + radius_m) + 1;
+        let guessed = start..end.min(range_m.len());
+        let others = reach[guessed.clone()].iter().fold(own.clone(), |all, one| all.and(one));
+        let windows_rad = own.windows_rad + others.windows_rad;
+        Ok(Reach { guessed_rad: own.windows_rad, guessed, windows_rad, windows: others.windows })
+    });
+    followed.collect()
 }
 
-impl Tiling {
-    /// For gates at `range_m`; the sums of a tile take `most_bytes` at most, or it is one gate of one line.
-    pub(super) fn new<S: Sample>(
-        estimator: &MapEstimator<S>,
-        places: &ScanGeometry,
-        range_m: &[f64],
-        most_bytes: usize,
-    ) -> Result<Self, Error> {
-        let own = range_m.iter().enumerate().map(|(gate, range_m)| {
-            let radius_m = estimator.radius_m(*range_m)?;
-            let windows = places.gates_between(range_m - radius_m, range_m + radius_m);
-            let windows_rad = estimator.reach_rad(*range_m)?;
-            Ok(Reach { guessed_rad: 0.0, guessed: gate..gate + 1, windows_rad, windows })
-        });
-        let mut reach = own.collect::<Result<Vec<Reach>, Error>>()?;
-        if estimator.follows_wind() {
-            let followed = reach.iter().zip(range_m).map(|(own, at_m)| {
-                // The gates between which the wind is interpolated.
-                let radius_m = estimator.radius_m(*at_m)?;
-                let start = range_m.partition_point(|range_m| *range_m <= at_m - radius_m).saturating_sub(1);
-                let end = range_m.partition_point(|range_m| *range_m < at_m + radius_m) + 1;
-                let guessed = start..end.min(range_m.len());
-                let others = reach[guessed.clone()].iter().fold(own.clone(), |all, one| all.and(one));
-                let windows_rad = own.windows_rad + others.windows_rad;
-                Ok(Reach { guessed_rad: own.windows_rad, guessed, windows_rad, windows: others.windows })
+/// The tiles of a scan with lines at some elevations, rad, and gates at `range_m`: gates by increasing range and for each the lines
+/// in their order. The sums of a tile take `most_bytes` at most, or it is one gate of one line.
+pub(super) fn tiles<S: Sample>(
+    estimator: &MapEstimator<S>,
+    places: &ScanGeometry,
+    elevation_rad: &[f64],
+    range_m: &[f64],
+    most_bytes: usize,
+) -> Result<Vec<Tile>, Error> {
+    let reaches = reaches(estimator, places, range_m)?;
+    // Sums of windows, and those of eight of them.
+    let window_bytes = estimator.numbers() * size_of::<f64>() * 9 / 8;
+    let step_rad = elevation_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(f64::INFINITY, f64::min);
+    let bytes = |lines: usize, reach: &Reach| lines.saturating_mul(reach.windows.len()) * window_bytes;
+    let mut tiles = Vec::new();
+    let mut gates = 0..0;
+    while let Some(first) = reaches.get(gates.end) {
+        gates = gates.end..gates.end + 1;
+        let mut reach = first.clone();
+        // As many gates as leave half of the bytes to more lines than one.
+        while let Some(next) = reaches.get(gates.end) {
+            let wider = reach.and(next);
+            let near = 1.0 + 2.0 * (wider.windows_rad / step_rad).floor();
+            // Infinite or NaN where lines coincide: a cast takes it.
+            if 2 * bytes((near as usize).min(elevation_rad.len()).max(1), &wider) > most_bytes {
+                break;
+            }
+            (reach, gates.end) = (wider, gates.end + 1);
+        }
+        let mut some = 0..0;
+        while some.end < elevation_rad.len() {
+            some = some.end..some.end + 1;
+            let read = |end: usize| within(elevation_rad, &(some.start..end), reach.windows_rad);
+            let fits = |end: &usize| bytes(read(*end).len(), &reach) <= most_bytes;
+            some.end += (some.end + 1..=elevation_rad.len()).take_while(fits).count();
+            tiles.push(Tile {
+                lines: some.clone(),
+                gates: gates.clone(),
+                guessed: (within(elevation_rad, &some, reach.guessed_rad), reach.guessed.clone()),
+                windows: (within(elevation_rad, &some, reach.windows_rad), reach.windows.clone()),
             });
-            reach = followed.collect::<Result<_, Error>>()?;
         }
-        // Sums of windows, and those of eight of them.
-        let window_bytes = estimator.numbers() * size_of::<f64>() * 9 / 8;
-        Ok(Self { reach, window_bytes, most_bytes })
     }
-
-    /// The tiles of a scan, gates by increasing range and for each the lines in their order.
-    pub(super) fn tiles(&self, lines: &ScanLines) -> Vec<Tile> {
-        let angles = &lines.elevation_rad;
-        let step_rad = angles.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(f64::INFINITY, f64::min);
-        let bytes = |lines: usize, reach: &Reach| lines.saturating_mul(reach.windows.len()) * self.window_bytes;
-        let mut tiles = Vec::new();
-        let mut gates = 0..0;
-        while let Some(first) = self.reach.get(gates.end) {
-            gates = gates.end..gates.end + 1;
-            let mut reach = first.clone();
-            // As many gates as leave half of the bytes to more lines than one.
-            while let Some(next) = self.reach.get(gates.end) {
-                let wider = reach.and(next);
-                let near = 1.0 + 2.0 * (wider.windows_rad / step_rad).floor();
-                // Infinite or NaN where lines coincide: a cast takes it.
-                if 2 * bytes((near as usize).min(angles.len()).max(1), &wider) > self.most_bytes {
-                    break;
-                }
-                (reach, gates.end) = (wider, gates.end + 1);
-            }
-            let mut some = 0..0;
-            while some.end < angles.len() {
-                some = some.end..some.end + 1;
-                while some.end < angles.len()
-                    && bytes(within(lines, &(some.start..some.end + 1), reach.windows_rad).len(), &reach)
-                        <= self.most_bytes
-                {
-                    some.end += 1;
-                }
-                tiles.push(Tile {
-                    lines: some.clone(),
-                    gates: gates.clone(),
-                    guessed: (within(lines, &some, reach.guessed_rad), reach.guessed.clone()),
-                    windows: (within(lines, &some, reach.windows_rad), reach.windows.clone()),
-                });
-            }
-        }
-        tiles
-    }
+    Ok(tiles)
 }
 
 /// The lines around some lines that are at most so far from one of them; the lines of a scan go up or down.
-fn within(lines: &ScanLines, some: &Range<usize>, reach_rad: f64) -> Range<usize> {
-    let angles = &lines.elevation_rad;
+fn within(elevation_rad: &[f64], some: &Range<usize>, reach_rad: f64) -> Range<usize> {
     // A millionth of the reach for rounding.
-    let near = |line: usize, end: usize| (angles[line] - angles[end]).abs() <= reach_rad * (1.0 + 1e-6);
+    let near = |line: usize, end: usize| (elevation_rad[line] - elevation_rad[end]).abs() <= reach_rad * (1.0 + 1e-6);
     let before = (0..some.start).rev().take_while(|line| near(*line, some.start)).count();
-    let after = (some.end..angles.len()).take_while(|line| near(*line, some.end - 1)).count();
+    let after = (some.end..elevation_rad.len()).take_while(|line| near(*line, some.end - 1)).count();
     some.start - before..some.end + after
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::map_estimator::places_of;
     use crate::plan::{Plan, Target};
     use crate::scene::SceneFile;
-    use crate::setup::estimators;
     use wakescope_estimate::map::PolarPoint;
 
     /// Lines a milliradian apart, records of so many samples.
@@ -158,18 +150,14 @@ mod tests {
         for (samples, words) in [(5_000, ""), (5_000, "follow_wind = true"), (1_000_000, "gate_step_samples = 100")] {
             let plan = scene(samples, words);
             let elevation_rad = plan.geometry.elevation_rad.clone();
-            let (sampling, gates) =
-                (estimators::sampling(&plan.scene.scene).unwrap(), estimators::gates(&plan.scene.scene).unwrap());
-            let places = ScanGeometry::new(&sampling, &gates, &elevation_rad, plan.geometry.samples).unwrap();
+            let places = places_of(&plan, &elevation_rad).unwrap();
             assert_eq!(plan.geometry.samples, samples);
             let layer_snr: Vec<(f64, f64)> = plan.geometry.layer_range_m().map(|range_m| (range_m, 1.0)).collect();
             let estimator = MapEstimator::<f64>::new(&plan, &layer_snr, &places).unwrap();
             let range_m = &plan.geometry.gate_range_m;
-            let lines = ScanLines { elevation_rad, ..ScanLines::default() };
             let most_bytes = 16 << 20;
-            let tiling = Tiling::new(&estimator, &places, range_m, most_bytes).unwrap();
-            let mut held = vec![0_u8; lines.elevation_rad.len() * range_m.len()];
-            for tile in tiling.tiles(&lines) {
+            let mut held = vec![0_u8; elevation_rad.len() * range_m.len()];
+            for tile in tiles(&estimator, &places, &elevation_rad, range_m, most_bytes).unwrap() {
                 let (read, windows) = &tile.windows;
                 let bytes = read.len() * windows.len() * estimator.numbers() * 9;
                 assert!(bytes <= most_bytes, "{samples} samples: {bytes} bytes for {tile:?}");
@@ -180,17 +168,15 @@ mod tests {
                 let (guessed, guesses) = &tile.guessed;
                 for line in [guessed.start, guessed.end - 1] {
                     for gate in [guesses.start, guesses.end - 1] {
-                        let point = PolarPoint { range_m: range_m[gate], elevation_rad: lines.elevation_rad[line] };
+                        let point = PolarPoint { range_m: range_m[gate], elevation_rad: elevation_rad[line] };
                         for chord in places.chords(point, 5.0) {
                             assert!(read.contains(&chord.line), "{point:?} {chord:?} {tile:?}");
                             assert!(windows.start <= chord.first && chord.last < windows.end, "{point:?} {tile:?}");
                         }
                     }
                 }
-                let own = PolarPoint {
-                    range_m: range_m[tile.gates.start],
-                    elevation_rad: lines.elevation_rad[tile.lines.start],
-                };
+                let own =
+                    PolarPoint { range_m: range_m[tile.gates.start], elevation_rad: elevation_rad[tile.lines.start] };
                 let reached = places.chords(own, 5.0).map(|chord| chord.line);
                 assert!(!estimator.follows_wind() || reached.into_iter().all(|line| guessed.contains(&line)));
             }
