@@ -25,12 +25,15 @@ const TRANSFORM_POINT_S: f64 = 4.2e-10;
 const SLIDING_LAG_S: f64 = 2e-9;
 const GRADIENT_PAIR_S: f64 = 7e-10;
 const SUMMED_NUMBER_S: f64 = 5e-9;
+/// Of a covariance that is decomposed, for each sample cubed.
+const DECOMPOSED_NUMBER_S: f64 = 4e-8;
 const SPECTRUM_LAG_S: f64 = 6e-11;
 const SPECTRUM_POINT_S: f64 = 6e-9;
+/// Of the square of a model's order.
+const POLE_S: f64 = 7.5e-8;
 const TRUTH_LAYER_S: f64 = 5e-10;
 const FITTED_CELL_S: f64 = 2e-4;
 const RV_CELL_S: f64 = 2e-5;
-const ENVELOPE_CELL_S: f64 = 3e-5;
 const FITTED_SAMPLE_S: f64 = 3e-4;
 /// Of the test for a wake: scans of still air, empty scans.
 const TEST_S: f64 = 3.0;
@@ -66,20 +69,14 @@ pub(super) fn stages(
 /// Vortices of every realisation, if the scene asks for them.
 fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let wanted = scene.retrieval.as_ref().filter(|_| target == Target::Run)?;
-    let record_s = record_s(n);
-    let of_method = |method: &RetrievalMethod| match method {
-        RetrievalMethod::Fit | RetrievalMethod::Integral => 0.0,
-        RetrievalMethod::Envelope => n.records * record_s + n.cells * ENVELOPE_CELL_S,
-        RetrievalMethod::Rv => n.cells * RV_CELL_S,
-        RetrievalMethod::Signals => n.records * (record_s + n.samples * FITTED_SAMPLE_S),
-    };
-    // the fit of the map is made once for all that need it
-    let of_map = wanted.methods.iter().any(|method| *method != RetrievalMethod::Rv);
-    let map_s = if of_map { n.cells * FITTED_CELL_S } else { 0.0 };
-    let scan_s = map_s + wanted.methods.iter().map(of_method).sum::<f64>();
+    let has = |method| wanted.methods.contains(&method);
+    // The fit of the map is made once for all that need it.
+    let cell_s = if wanted.methods[..] == [RetrievalMethod::Rv] { RV_CELL_S } else { FITTED_CELL_S };
+    let fitted_s = if has(RetrievalMethod::Signals) { n.records * n.samples * FITTED_SAMPLE_S } else { 0.0 };
+    let made_anew = has(RetrievalMethod::Signals) || has(RetrievalMethod::Envelope);
+    let (signals_s, signals) = if made_anew { (n.records * record_s(n), 3.0) } else { (0.0, 0.0) };
+    let scan_s = n.cells * cell_s + signals_s + fitted_s;
     let test_s = if wanted.false_alarm.is_some() { TEST_S } else { 0.0 };
-    let of_signals = [RetrievalMethod::Signals, RetrievalMethod::Envelope];
-    let signals = if of_signals.iter().any(|method| wanted.methods.contains(method)) { 3.0 } else { 0.0 };
     let working =
         n.cells * 8.0 * (n.realisations + RETRIEVED_NUMBERS) + signals * n.records * n.samples * n.parts * 8.0;
     let names: Vec<&str> = wanted.methods.iter().map(|method| method.name()).collect();
@@ -141,8 +138,8 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
         "{} x {} records of {} samples, {} layers each",
         n.realisations, n.records, g.samples, g.layers_per_sample
     );
-    let kept =
-        n.kept * n.records * n.samples * n.parts * 8.0 + if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
+    let kept_line_bytes = if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
+    let kept_bytes = n.kept * n.records * n.samples * n.parts * 8.0 + kept_line_bytes;
     // The echo of the pulse before is a record of its own, made of lines of its own.
     let (trips, more) = if scene.scan.second_trip.is_some() { (2.0, 16.0 * n.layers * n.lines) } else { (1.0, 0.0) };
     // Pulses with airs of their own: the wind again, and a piece of airs.
@@ -152,12 +149,8 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     } else {
         (0.0, more)
     };
-    run(
-        Stage::Signals,
-        reason,
-        n.realisations * n.records * record_s(n) * trips + wind_s,
-        [scan_bytes(g, n) + more, kept],
-    )
+    let core_s = n.realisations * n.records * record_s(n) * trips + wind_s;
+    run(Stage::Signals, reason, core_s, [scan_bytes(g, n) + more, kept_bytes])
 }
 
 /// Time of one record, s.
@@ -197,12 +190,8 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let seeking = air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES * maps;
     let at_work = adding.max(seeking) + points_bytes + planned_bytes;
     let working = at_work.max(air + planning_bytes);
-    run(
-        Stage::Estimates,
-        reason,
-        n.realisations * realisation_s + planning_s,
-        [working, n.cells * MAP_FIELDS * 8.0 + scans_bytes],
-    )
+    let core_s = n.realisations * realisation_s + planning_s;
+    run(Stage::Estimates, reason, core_s, [working, n.cells * MAP_FIELDS * 8.0 + scans_bytes])
 }
 
 /// Of a point of the map: sums over the realisations, truth, thresholds.
@@ -217,18 +206,13 @@ fn window_s(scene: &Scene, n: &Sizes) -> f64 {
     let e = &scene.estimator;
     let transform_s = n.parts * TRANSFORM_POINT_S * 2.0 * n.window * (2.0 * n.window).log2();
     match e.method {
-        Method::GradientLikelihood(g) => {
-            g.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window + n.numbers * SUMMED_NUMBER_S
-        }
+        Method::GradientLikelihood(g) => g.gradients as f64 * GRADIENT_PAIR_S * n.window * n.window,
         // As many tapers as a window has independent parts, about.
         Method::Likelihood(_) => {
             let parts = (n.window / (scene.detector.sampling_hz * scene.pulse_sigma_s())).min(n.window);
             transform_s * (2.0 + 0.5 * parts)
         }
-        _ if keeps_few_lags(scene) => {
-            let pairs = (2.0 * e.window_step_samples as f64).min(n.window);
-            pairs * n.numbers * SLIDING_LAG_S
-        }
+        _ if keeps_few_lags(scene) => (2.0 * e.window_step_samples as f64).min(n.window) * n.numbers * SLIDING_LAG_S,
         _ => transform_s,
     }
 }
@@ -236,13 +220,11 @@ fn window_s(scene: &Scene, n: &Sizes) -> f64 {
 /// Time of the velocity at one point of the map, s.
 fn point_s(scene: &Scene, n: &Sizes) -> f64 {
     let e = &scene.estimator;
-    let order = e.method.order().map_or(0.0, |model| model.order as f64);
-    let lags = n.numbers.min(n.parts * n.window);
-    let spectrum_s = n.frequencies * (lags * SPECTRUM_LAG_S + SPECTRUM_POINT_S);
+    let spectrum_s = n.frequencies * (n.numbers.min(n.parts * n.window) * SPECTRUM_LAG_S + SPECTRUM_POINT_S);
     let estimate_s = match e.method {
         Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * spectrum_s,
-        Method::AutoregressivePole(_) => order * order * 7.5e-8,
-        Method::PulsePair {} => 1e-7,
+        Method::AutoregressivePole(model) => (model.order as f64).powi(2) * POLE_S,
+        Method::PulsePair {} => 0.0,
         _ => spectrum_s,
     };
     let region_s = n.chords * (n.numbers * SUMMED_NUMBER_S + scene.scan.pulses_per_line as f64 * 1e-9);
@@ -250,42 +232,42 @@ fn point_s(scene: &Scene, n: &Sizes) -> f64 {
     (region_s + estimate_s) * if e.follow_wind { 2.5 } else { 1.0 }
 }
 
-/// What is prepared once: tapers from a covariance, weights of the lags, correlation of the windows. Its time, s, the memory
-/// of what comes of it, and that which it takes, bytes.
+/// What is prepared once: tapers from a covariance, weights of the lags. Its time, s, which only covariances make long, the
+/// memory of what comes of it, and that which it takes, bytes.
 fn planning(scene: &Scene, n: &Sizes) -> (f64, f64, f64) {
-    let (squared, cubed) = (n.window.powi(2), n.window.powi(3));
-    let (core_s, kept_matrices, matrices) = match scene.estimator.method {
-        Method::Likelihood(_) => (3.5e-8 * cubed, 1.0, 8.0),
+    let matrix_bytes = n.window.powi(2) * 8.0;
+    let (models, kept_matrices, matrices) = match scene.estimator.method {
+        Method::Likelihood(_) => (1.0, 1.0, 8.0),
         Method::GradientLikelihood(g) => {
             let gradients = g.gradients as f64;
-            (2.5e-7 * cubed * gradients, 2.0 * gradients, 2.0 * gradients + 24.0)
+            (7.0 * gradients, 2.0 * gradients, 2.0 * gradients + 24.0)
         }
-        // The windows of a record that share samples or the pulse.
-        _ => (n.window * (n.window + 2.0 * n.layers_per_sample).min(n.samples) * 2e-9, 0.0, 0.0),
+        _ => (0.0, 0.0, 0.0),
     };
-    let (model_s, model_matrices) = match scene.estimator.radius {
-        RegionRadius::Target { .. } => (5e-8 * n.chord.powi(3), BOUND_MATRICES * (n.chord / n.window).powi(2)),
+    let (bounds, bound_bytes) = match scene.estimator.radius {
+        RegionRadius::Target { .. } => (1.0, bound_bytes(n)),
         _ => (0.0, 0.0),
     };
-    let kept_bytes = kept_matrices * squared * 8.0 + n.frequencies * 32.0;
-    (core_s + model_s, kept_bytes, kept_bytes + matrices.max(model_matrices) * squared * 8.0)
+    let core_s = DECOMPOSED_NUMBER_S * (models * n.window.powi(3) + bounds * n.chord.powi(3));
+    let kept_bytes = kept_matrices * matrix_bytes + n.frequencies * 32.0;
+    (core_s, kept_bytes, kept_bytes + bound_bytes.max(matrices * matrix_bytes))
 }
 
 /// Matrices of the bound of a record: the signal, the covariance and its derivative, its factor, a turned copy.
-const BOUND_MATRICES: f64 = 6.0;
+fn bound_bytes(n: &Sizes) -> f64 {
+    6.0 * 8.0 * n.chord.powi(2)
+}
 
 /// What is held for the Cramer-Rao bound in place of a run of these stages: that of the air and the matrices of a record.
 pub(super) fn of_bound(stages: &[PlannedStage], n: &Sizes) -> Vec<PlannedStage> {
     let first = [Stage::PhaseScreens, Stage::Efficiency, Stage::LinesOfSight];
     let mut out: Vec<PlannedStage> = stages.iter().filter(|s| first.contains(&s.stage)).cloned().collect();
-    let matrices_bytes = 8.0 * BOUND_MATRICES * n.chord.powi(2);
-    out.push(run(Stage::Estimates, String::new(), 0.0, [air_bytes(n) + matrices_bytes, 0.0]));
+    out.push(run(Stage::Estimates, String::new(), 0.0, [air_bytes(n) + bound_bytes(n), 0.0]));
     out
 }
 
 fn errors(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let reason = format!("against v_pulse (28) and v_gate over {} realisations", n.realisations);
     let seen = 3.0 * n.layers_per_sample + n.window * g.sample_spacing_m / g.layer_thickness_m;
-    let core_s = n.cells * (seen * TRUTH_LAYER_S + wind_point_s(scene));
-    run(Stage::Errors, reason, core_s, [0.0, 0.0])
+    run(Stage::Errors, reason, n.cells * (seen * TRUTH_LAYER_S + wind_point_s(scene)), [0.0, 0.0])
 }
