@@ -35,8 +35,14 @@ fn main() -> OutputResult<()> {
         files.add("exact.csv", map_table(&exact)?.to_csv(&origin)?)?;
     }
     #[cfg(feature = "vtk")]
-    for (name, bytes) in wakescope_sim::io::vtr::vtr_series(&wind, "wake", &origin)? {
-        files.add(&name, bytes)?;
+    {
+        use wakescope_sim::io::vtr::{plane_bytes, pvd_bytes};
+        let names: Vec<String> = (1..=wind.tau.len()).map(|number| format!("wake_{number:04}.vtr")).collect();
+        for (age, name) in names.iter().enumerate() {
+            files.add(name, plane_bytes(&wind, age, &origin)?)?;
+        }
+        let members = wind.tau.iter().copied().zip(names.iter().map(String::as_str));
+        files.add("wake.pvd", pvd_bytes(members, &origin))?;
     }
     files.commit()?;
     Ok(())

@@ -248,7 +248,7 @@ impl Files {
             }
             (Holds::Plane(at), "nc", _) => whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[at], origin)?),
             #[cfg(feature = "vtk")]
-            (Holds::Plane(at), "vtr", _) => whole(vtr::plane_file(&shown.planes[at], origin)?),
+            (Holds::Plane(at), "vtr", _) => whole(vtr::plane_bytes(&shown.planes[at], 0, origin)?),
             #[cfg(feature = "vtk")]
             (Holds::Collection { of_planes }, ..) => whole(self.collection(file, of_planes)),
             _ => None,

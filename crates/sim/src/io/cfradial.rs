@@ -319,7 +319,7 @@ fn field_variable(field: &Field) -> Variable {
         out = out.text("cell_methods", methods);
     }
     if !field.ancillary.is_empty() {
-        out = out.text("ancillary_variables", &field.ancillary.join(" "));
+        out = out.text("ancillary_variables", &field.ancillary);
     }
     out.attr("_FillValue", Data::f32([FILL]))
 }

@@ -173,7 +173,7 @@ fn a_time_beyond_every_calendar_is_refused() {
 fn fields_say_what_they_are_and_which_others_judge_them() {
     let mut map = samples::map();
     let velocity = map.fields.iter_mut().find(|f| f.name == "radial_velocity").unwrap();
-    *velocity = velocity.clone().over_realisations("mean").with_ancillary(&["rms", "n_eff"]);
+    *velocity = velocity.clone().over_realisations("mean").with_ancillary("rms n_eff");
     let (_temp, file) = reopened(&map);
     let text = |name: &str, attribute: &str| file.data_set().get_var_attr_as_string(name, attribute);
     assert_eq!(text("radial_velocity", "ancillary_variables").as_deref(), Some("rms n_eff"));

@@ -34,11 +34,12 @@ impl Column {
         }
     }
 
-    fn push_cell(&self, row: usize, out: &mut String) {
+    /// The text of a cell, floats in the form given.
+    fn cell(&self, row: usize, float: fn(f64) -> String) -> String {
         match self {
-            Self::Float(v) => out.push_str(&float_text(v[row])),
-            Self::Int(v) => out.push_str(&v[row].to_string()),
-            Self::Text(v) => out.push_str(&quoted(&v[row])),
+            Self::Float(v) => float(v[row]),
+            Self::Int(v) => v[row].to_string(),
+            Self::Text(v) => v[row].clone(),
         }
     }
 }
@@ -150,11 +151,9 @@ impl Table {
 
     /// The table for people: columns side by side, floats as `digits` has them.
     pub fn aligned(&self) -> String {
-        let cell = |(name, column): &(String, Column), line: usize| match (line.checked_sub(1), column) {
-            (None, _) => name.clone(),
-            (Some(row), Column::Float(v)) => digits(v[row]),
-            (Some(row), Column::Int(v)) => v[row].to_string(),
-            (Some(row), Column::Text(v)) => v[row].clone(),
+        let cell = |(name, column): &(String, Column), line: usize| match line.checked_sub(1) {
+            None => name.clone(),
+            Some(row) => column.cell(row, digits),
         };
         let lines = || 0..=self.len();
         let width = |column| lines().map(|line| cell(column, line).chars().count()).max().unwrap_or(0);
@@ -174,7 +173,7 @@ impl Table {
     pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
         self.check()?;
         let mut out = provenance.comment_lines();
-        let header: Vec<String> = self.columns.iter().map(|(n, _)| quoted(n)).collect();
+        let header: Vec<String> = self.columns.iter().map(|(name, _)| quoted(name.clone())).collect();
         out.push_str(&header.join(","));
         out.push('\n');
         self.push_rows(&mut out);
@@ -201,7 +200,7 @@ impl Table {
                 if i > 0 {
                     out.push(',');
                 }
-                column.push_cell(row, out);
+                out.push_str(&quoted(column.cell(row, float_text)));
             }
             out.push('\n');
         }
@@ -246,10 +245,10 @@ pub(crate) fn digits(value: f64) -> String {
     }
 }
 
-fn quoted(text: &str) -> String {
+fn quoted(text: String) -> String {
     // A leading '#' is quoted too: readers drop lines that begin with it.
     let plain = !text.contains([',', '"', '\n', '\r']) && !text.starts_with('#');
-    if plain { text.to_owned() } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+    if plain { text } else { format!("\"{}\"", text.replace('"', "\"\"")) }
 }
 
 #[cfg(test)]

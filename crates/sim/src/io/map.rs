@@ -60,8 +60,8 @@ pub struct Field {
     pub standard_name: Option<String>,
     /// How the value was made of several realisations, in the words of CF.
     pub cell_methods: Option<String>,
-    /// Names of the fields that say how good this one is.
-    pub ancillary: Vec<String>,
+    /// Names of the fields that say how good this one is, with blanks between them.
+    pub ancillary: String,
     /// Values `[ray, gate]`; NaN = missing. Infinite values are refused.
     pub values: Array2<f64>,
 }
@@ -75,7 +75,7 @@ impl Field {
             long_name: long_name.into(),
             standard_name: standard_name_of(name).map(str::to_owned),
             cell_methods: None,
-            ancillary: Vec::new(),
+            ancillary: String::new(),
             values,
         }
     }
@@ -89,9 +89,8 @@ impl Field {
 
     /// The same field with the names of those that say how good it is.
     #[must_use]
-    pub fn with_ancillary(mut self, names: &[&str]) -> Self {
-        self.ancillary = names.iter().map(|name| (*name).to_owned()).collect();
-        self
+    pub fn with_ancillary(self, names: &str) -> Self {
+        Self { ancillary: names.into(), ..self }
     }
 
     /// Column name in a CSV table: name and unit tag, with the short names `v_mean_m_s` and `std_m_s` of the estimate and `snr_db`.

@@ -8,10 +8,10 @@
 
 use crate::io::units::Quantity;
 use crate::{Error, io::text_file, machine};
+use ndarray::ArrayD;
 use netcdf_reader::{
     NcAttrValue, NcAttribute, NcFile, NcFormat, NcGroup, NcSliceInfo, NcSliceInfoElem, NcType, NcVariable,
 };
-use std::io::Read;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::rc::Rc;
@@ -40,35 +40,20 @@ const CONVERT: &str = "it is NetCDF-4 (HDF5), classic NetCDF is needed: nccopy -
 pub(crate) struct Role {
     name: &'static str,
     axis: &'static str,
-    others: &'static [&'static str],
+    /// Words between blanks.
+    others: &'static str,
 }
 
 /// Time, or the age of a wake.
-pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: &["tau", "t", "age", "xtime"] };
+pub(crate) const TIME: Role = Role { name: "time", axis: "T", others: "tau t age xtime" };
 /// Along the flight.
-pub(crate) const X: Role =
-    Role { name: "x", axis: "X", others: &["x_face", "xc", "xf", "xu", "west_east", "west_east_stag"] };
+pub(crate) const X: Role = Role { name: "x", axis: "X", others: "x_face xc xf xu west_east west_east_stag" };
 /// Across the flight.
 pub(crate) const Y: Role =
-    Role { name: "y", axis: "Y", others: &["y_face", "yc", "yf", "yv", "lateral", "south_north", "south_north_stag"] };
+    Role { name: "y", axis: "Y", others: "y_face yc yf yv lateral south_north south_north_stag" };
 /// Up.
-pub(crate) const Z: Role = Role {
-    name: "z",
-    axis: "Z",
-    others: &[
-        "z_face",
-        "zc",
-        "zf",
-        "zw",
-        "height",
-        "altitude",
-        "zu",
-        "zu_3d",
-        "zw_3d",
-        "bottom_top",
-        "bottom_top_stag",
-    ],
-};
+pub(crate) const Z: Role =
+    Role { name: "z", axis: "Z", others: "z_face zc zf zw height altitude zu zu_3d zw_3d bottom_top bottom_top_stag" };
 
 /// A NetCDF file, open, or a group of one.
 #[derive(Clone)]
@@ -95,17 +80,14 @@ impl std::fmt::Debug for NetcdfFile {
 /// # Errors
 /// What the system says; a file of another kind, or one whose header does not fit its length.
 pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
-    let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
     let refuse = |reason: &str| Error::Input { path: path.to_owned(), reason: reason.to_owned() };
-    let (file, bytes) = text_file::open(path).map_err(unreadable)?;
-    let mut beginning = Vec::new();
-    file.take(4).read_to_end(&mut beginning).map_err(unreadable)?;
+    let (_, bytes, beginning) = text_file::begin(path)?;
     match &beginning[..] {
-        b"CDF\x01" | b"CDF\x02" | b"CDF\x05" => {}
+        [b'C', b'D', b'F', 1 | 2 | 5, ..] => {}
         #[cfg(feature = "netcdf4")]
-        b"\x89HDF" => super::netcdf4_input::check_groups(path, UNSOUND_HDF5).map_err(refuse)?,
+        [0x89, b'H', b'D', b'F', ..] => super::netcdf4_input::check_groups(path, UNSOUND_HDF5).map_err(refuse)?,
         #[cfg(not(feature = "netcdf4"))]
-        b"\x89HDF" => return Err(refuse(CONVERT)),
+        [0x89, b'H', b'D', b'F', ..] => return Err(refuse(CONVERT)),
         _ => return Err(refuse(OTHER)),
     }
     let unsound = || refuse(if beginning[0] == b'C' { UNSOUND } else { UNSOUND_HDF5 });
@@ -267,7 +249,7 @@ impl NetcdfFile {
         let of_axis = |dim: &&str| self.text(dim, "axis").is_some_and(|axis| axis.eq_ignore_ascii_case(role.axis));
         let of_name = |dim: &&str| {
             let dim = dim.to_ascii_lowercase();
-            dim == role.name || role.others.contains(&dim.as_str())
+            dim == role.name || role.others.split(' ').any(|other| other == dim)
         };
         dims.iter().position(of_name).or_else(|| dims.iter().position(of_axis))
     }
@@ -379,7 +361,7 @@ impl NetcdfFile {
     /// # Errors
     /// As [`Self::floats`].
     pub(crate) fn ordered(&self, name: &str, order: &[String], place: Option<usize>) -> Result<Vec<f64>, String> {
-        let mut dims: Vec<String> = self.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
+        let mut dims = self.dims(name).unwrap_or_default();
         if place.is_some() && !dims.is_empty() {
             dims.remove(0);
         }
@@ -391,21 +373,14 @@ impl NetcdfFile {
             return Ok(values);
         }
         let lengths: Vec<usize> = dims.iter().map(|dim| self.length(dim).unwrap_or(1) as usize).collect();
-        let stride = |dim: &String| {
-            let place = dims.iter().position(|d| d == dim);
-            place.map_or((1, 0), |i| (lengths[i], lengths[i + 1..].iter().product::<usize>()))
-        };
-        let axes: Vec<(usize, usize)> = order.iter().map(stride).collect();
-        let mut out = Vec::with_capacity(values.len());
-        for at in 0..values.len() {
-            let (mut rest, mut from) = (at, 0);
-            for (length, step) in axes.iter().rev() {
-                from += rest % length * step;
-                rest /= length;
-            }
-            out.extend(values.get(from));
-        }
-        Ok(out)
+        // What is left over has one place.
+        let (mut axes, spare): (Vec<usize>, Vec<usize>) =
+            (0..dims.len()).partition(|at| order.iter().any(|own| own == dims[*at]));
+        axes.sort_by_key(|at| order.iter().position(|own| own == dims[*at]));
+        axes.extend(spare);
+        let stored = ArrayD::from_shape_vec(lengths, values)
+            .map_err(|_| format!("{name} has not the lengths of its dimensions"))?;
+        Ok(stored.permuted_axes(axes).iter().copied().collect())
     }
 }
 

@@ -123,7 +123,10 @@ mod tests {
             files.push(("map.svg".into(), figure.svg(&origin).unwrap().into_bytes()));
         }
         #[cfg(feature = "vtk")]
-        files.extend(super::super::vtr::vtr_series(&samples::planes(), "plane", &origin).unwrap());
+        files.extend([
+            ("plane.vtr".into(), super::super::vtr::plane_bytes(&samples::planes(), 0, &origin).unwrap()),
+            ("plane.pvd".into(), super::super::vtr::pvd_bytes([(2.5, "plane.vtr")], &origin)),
+        ]);
         for (name, bytes) in &files {
             std::fs::write(folder.join(name), bytes).unwrap();
         }

@@ -25,6 +25,19 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
     Ok((File::open(path)?, about.len()))
 }
 
+/// Opens a regular file; it comes with its length \[bytes\] and its first eight bytes, by which formats are known.
+///
+/// # Errors
+/// As [`open`].
+pub(crate) fn begin(path: &Path) -> std::result::Result<(File, u64, Vec<u8>), crate::Error> {
+    let opened = open(path).and_then(|(mut file, length)| {
+        let mut first = Vec::new();
+        Read::by_ref(&mut file).take(8).read_to_end(&mut first)?;
+        Ok((file, length, first))
+    });
+    opened.map_err(crate::Error::io("read", path))
+}
+
 /// The text of a scene or case file.
 ///
 /// # Errors

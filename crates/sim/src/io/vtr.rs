@@ -11,20 +11,6 @@ use super::provenance::Provenance;
 use base64::prelude::{BASE64_STANDARD, Engine as _};
 use ndarray::{Array3, Axis};
 
-/// The files of a series: `STEM_0001.vtr`, ... and `STEM.pvd`, whose time steps are the ages tau.
-///
-/// # Errors
-/// What [`CrossPlanes::check`] finds.
-pub fn vtr_series(planes: &CrossPlanes, stem: &str, provenance: &Provenance) -> OutputResult<Vec<(String, Vec<u8>)>> {
-    planes.check()?;
-    let name = |i: usize| format!("{stem}_{:04}.vtr", i + 1);
-    let mut files: Vec<_> = (0..planes.tau.len()).map(|i| (name(i), plane_bytes(planes, i, provenance))).collect();
-    let members = planes.tau.iter().copied().zip(files.iter().map(|(name, _)| name.as_str()));
-    let collection = pvd_bytes(members, provenance);
-    files.push((format!("{stem}.pvd"), collection));
-    Ok(files)
-}
-
 /// The collection of a series of files: members with their times, in this order.
 pub fn pvd_bytes<'a>(members: impl IntoIterator<Item = (f64, &'a str)>, provenance: &Provenance) -> Vec<u8> {
     let entry =
@@ -59,22 +45,17 @@ pub fn field_parts(field: &VelocityField, behind: Option<&[f64]>, provenance: &P
     Ok(grid([&field.x_m, &field.y_m, &field.z_m], &arrays, field.share.is_first, provenance))
 }
 
-/// The first plane alone.
+/// The plane of one age, at one point of x.
 ///
 /// # Errors
-/// As [`vtr_series`].
-pub fn plane_file(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+/// What [`CrossPlanes::check`] finds.
+pub fn plane_bytes(planes: &CrossPlanes, age: usize, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    Ok(plane_bytes(planes, 0, provenance))
-}
-
-/// x has one point.
-fn plane_bytes(planes: &CrossPlanes, index: usize, provenance: &Provenance) -> Vec<u8> {
-    let of = |field: &Array3<f64>| field.index_axis(Axis(0), index).iter().copied().collect::<Vec<f64>>();
+    let of = |field: &Array3<f64>| field.index_axis(Axis(0), age).iter().copied().collect::<Vec<f64>>();
     let [v, w] = [of(&planes.v_m_s), of(&planes.w_m_s)];
     let u = vec![0.0; v.len()];
     let velocity = Array { name: "velocity", values: vec![&u, &v, &w], behind: &[], cells: v.len(), first: 0 };
-    grid([&[0.0], &planes.y_m, &planes.z_m], &[velocity], true, provenance).into_bytes()
+    Ok(grid([&[0.0], &planes.y_m, &planes.z_m], &[velocity], true, provenance).into_bytes())
 }
 
 /// A grid with its arrays at the points of these axes, the first one fastest: all of it, or what a rank has that has `is_first` or not.
@@ -203,10 +184,8 @@ mod tests {
     #[test]
     fn a_plane_reads_back_with_its_nodes_and_vectors() {
         let planes = samples::planes();
-        let files = vtr_series(&planes, "wake", &example()).unwrap();
-        let names: Vec<&str> = files.iter().map(|f| f.0.as_str()).collect();
-        assert_eq!(names, ["wake_0001.vtr", "wake_0002.vtr", "wake.pvd"]);
-        let vtk = Vtk::parse_xml(files[1].1.as_slice()).unwrap();
+        let file = plane_bytes(&planes, 1, &example()).unwrap();
+        let vtk = Vtk::parse_xml(file.as_slice()).unwrap();
         let DataSet::RectilinearGrid { pieces, .. } = vtk.data else { panic!("no rectilinear grid") };
         let Piece::Inline(grid) = &pieces[0] else { panic!("no inline piece") };
         assert_eq!(grid.coords.y.clone().cast_into::<f64>().unwrap(), planes.y_m);
@@ -217,15 +196,17 @@ mod tests {
         let vector = &velocity[3 * (z * ny + y)..][..3];
         assert_eq!(vector, [0.0, planes.v_m_s[[1, z, y]] as f32, planes.w_m_s[[1, z, y]] as f32]);
         let point = vec![Attribute::vectors("velocity").with_data(velocity.clone())];
-        assert!(files[1].1 == encoded([&[0.0], &planes.y_m, &planes.z_m], point));
+        assert!(file == encoded([&[0.0], &planes.y_m, &planes.z_m], point));
     }
 
     #[test]
     fn the_collection_lists_the_members_and_the_provenance() {
-        let files = vtr_series(&samples::planes(), "wake", &example()).unwrap();
-        let pvd = String::from_utf8(files[2].1.clone()).unwrap();
+        let planes = samples::planes();
+        let collection = pvd_bytes([(2.5, "wake_0001.vtr"), (5.0, "wake_0002.vtr")], &example());
+        let pvd = String::from_utf8(collection.clone()).unwrap();
         assert!(pvd.contains("timestep=\"2.5\" part=\"0\" file=\"wake_0001.vtr\""));
-        for (_, bytes) in &files {
+        let members = [0, 1].map(|age| plane_bytes(&planes, age, &example()).unwrap());
+        for bytes in members.iter().chain([&collection]) {
             let text = String::from_utf8_lossy(bytes);
             assert!(text.contains("18446744073709551615"), "seed in every file");
         }

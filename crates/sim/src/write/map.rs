@@ -9,17 +9,8 @@ use crate::setup::described::{pulse_info, site};
 use std::f64::consts::FRAC_PI_2;
 
 /// Fields that say how good the mean estimate is.
-const JUDGES: [&str; 9] = [
-    "velocity_standard_deviation",
-    "rms",
-    "standard_error",
-    "level",
-    "n_eff",
-    "flagged",
-    "count",
-    "signal_to_noise_ratio",
-    "quality",
-];
+const JUDGES: &str =
+    "velocity_standard_deviation rms standard_error level n_eff flagged count signal_to_noise_ratio quality";
 
 /// The map of a run in the form that files and pictures take.
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
@@ -66,7 +57,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             speed("v_gate", away("radial velocity weighted with pulse and window"), &e.v_gate_m_s),
             speed("radial_velocity", away("mean estimated radial velocity"), &e.v_mean_m_s)
                 .over_realisations("mean")
-                .with_ancillary(&JUDGES),
+                .with_ancillary(JUDGES),
             speed("velocity_standard_deviation", "standard deviation of one estimate".into(), &e.std_m_s)
                 .over_realisations("standard_deviation"),
             speed("rms", "root mean square error against v_pulse".into(), &e.rms_m_s),

@@ -25,7 +25,7 @@ use array::ArrayInFile;
 use num_complex::Complex;
 use numpy::NumpyArray;
 use std::fs::File;
-use std::io::Read;
+use std::io::Seek as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use text::TextRecords;
@@ -123,16 +123,13 @@ enum Store {
 }
 
 impl RawRecords {
-    /// Opens a file; nothing but its header is read, and the lines of a text are counted.
+    /// Opens a file; nothing but its header is read, or a whole text.
     ///
     /// # Errors
     /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks.
     pub fn open(path: &Path, format: &RawFormat, shape: RecordShape) -> Result<Self, Error> {
-        let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
         let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-        let (mut file, length) = text_file::open(path).map_err(unreadable)?;
-        let mut magic = Vec::new();
-        Read::by_ref(&mut file).take(8).read_to_end(&mut magic).map_err(unreadable)?;
+        let (mut file, length, magic) = text_file::begin(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let (store, about) = match &magic[..] {
             _ if format.number.is_some() => (binary(file, length, format, shape).map_err(refuse)?, About::default()),
@@ -143,8 +140,8 @@ impl RawRecords {
             }
             [b'P', b'K', 3, 4, ..] => of_archive(file, length, format, shape).map_err(refuse)?,
             _ if ["csv", "txt"].contains(&extension.as_str()) => {
-                let file = File::open(path).map_err(unreadable)?;
-                let text = TextRecords::open(file, format.complex).map_err(refuse)?;
+                file.rewind().map_err(Error::io("read", path))?;
+                let text = TextRecords::read(file, length, format.complex).map_err(refuse)?;
                 (Store::Text(text), About::default())
             }
             _ => {
@@ -172,7 +169,7 @@ impl RawRecords {
     pub fn records(&self) -> usize {
         match &self.store {
             Store::Array(array) => array.records,
-            Store::Text(text) => text.records(),
+            Store::Text(text) => text.records.len(),
             Store::Netcdf(found) => found.records(),
         }
     }
@@ -181,7 +178,7 @@ impl RawRecords {
     pub fn samples(&self) -> usize {
         match &self.store {
             Store::Array(array) => array.samples,
-            Store::Text(text) => text.samples,
+            Store::Text(text) => text.samples(),
             Store::Netcdf(found) => found.samples,
         }
     }
@@ -242,7 +239,10 @@ impl RawRecords {
                 std::io::ErrorKind::UnexpectedEof => "it became shorter while it was read".to_owned(),
                 _ => e.to_string(),
             }),
-            Store::Text(text) => text.read(records, samples),
+            Store::Text(text) => {
+                let own = text.records.get(records).unwrap_or_default().iter();
+                Ok(own.flat_map(|record| record.get(samples.clone()).unwrap_or_default()).copied().collect())
+            }
             Store::Netcdf(found) => found.read(records, samples),
         };
         let mut found = found.map_err(|reason| self.refuse(reason))?;

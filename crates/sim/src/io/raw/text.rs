@@ -1,144 +1,89 @@
 //! Records as text: a row of numbers for each record, or the long table `ray, time_s, current_a` of `signals.csv`.
 //!
-//! The first pass finds where each record begins, so that any of them can be read without the others. Check: both forms give
-//! the same records; rows of different lengths and words are refused with their line.
+//! A text is read as a whole: whoever has more than the memory holds has them as NPY or NetCDF. Check: both forms give the same
+//! records; rows of different lengths and words are refused with their line.
 
+use crate::machine;
 use num_complex::Complex;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read, Seek, SeekFrom};
-use std::ops::Range;
+use std::io::{BufRead, BufReader, Read};
 use wakescope_estimate::window::MissingSamples;
 
 /// Longest line that is read \[bytes\].
 const LONGEST_LINE_BYTES: u64 = 64 << 20;
 
-/// Records in a text file.
-#[derive(Debug)]
+/// Records of a text file.
+#[derive(Debug, Default)]
 pub(super) struct TextRecords {
-    reader: BufReader<File>,
-    /// Where the text of each record begins, and its line, from 1.
-    records: Vec<(u64, usize)>,
-    pub(super) samples: usize,
+    pub(super) records: Vec<Vec<Complex<f64>>>,
     pub(super) is_complex: bool,
-    /// Columns of both parts in the long table.
-    columns: Option<Vec<usize>>,
-    /// Stand for a missing number.
-    fills: Vec<f64>,
 }
 
 impl TextRecords {
-    /// Finds the records; numbers of a row are pairs of both parts where `is_complex` says so.
-    pub(super) fn open(file: File, is_complex: bool) -> Result<Self, String> {
-        let (reader, fills) = (BufReader::new(file), MissingSamples::default().fill);
-        let mut out = Self { reader, records: Vec::new(), samples: 0, is_complex, columns: None, fills };
-        let (mut at, mut line, mut text) = (0, 0, String::new());
-        // Column of the long table that numbers the records, the last number there, and the samples that the record has so far.
-        let (mut key, mut last, mut samples) = (0, String::new(), 0);
-        loop {
+    /// Reads a file of so many bytes; numbers of a row are pairs of both parts where `is_complex` says so.
+    pub(super) fn read(file: File, bytes: u64, is_complex: bool) -> Result<Self, String> {
+        let (mut reader, fills) = (BufReader::new(file), MissingSamples::default().fill);
+        let mut out = Self { is_complex, ..Self::default() };
+        // Of the long table: columns of the number of the record and of the parts of a sample, and the last number.
+        let (mut table, mut last) = (None::<(usize, Vec<usize>)>, String::new());
+        // Where each record begins.
+        let (mut lines, mut text) = (Vec::new(), String::new());
+        for line in 1.. {
             text.clear();
-            let some = Read::by_ref(&mut out.reader).take(LONGEST_LINE_BYTES).read_line(&mut text);
-            let read = some.map_err(|_| format!("line {} is no text", line + 1))?;
+            let some = Read::by_ref(&mut reader).take(LONGEST_LINE_BYTES).read_line(&mut text);
+            let read = some.map_err(|_| format!("line {line} is no text"))?;
             if read == 0 {
                 break;
             }
             if read as u64 == LONGEST_LINE_BYTES && !text.ends_with('\n') {
                 let most = LONGEST_LINE_BYTES >> 20;
-                return Err(format!("line {} is longer than {most} MiB: each record is a line of its own", line + 1));
+                return Err(format!("line {line} is longer than {most} MiB: each record is a line of its own"));
             }
-            line += 1;
-            let begin = at;
-            at += read as u64;
             let Some(content) = content(&text) else { continue };
-            let is_first = out.records.is_empty();
-            if is_first && out.columns.is_none() && cells(content).any(|cell| cell.parse::<f64>().is_err()) {
-                let header: Vec<&str> = cells(content).collect();
-                let place = |name: &str| header.iter().position(|cell| *cell == name);
-                key = place("ray").ok_or("its header names no column ray: rows of numbers have none")?;
-                let value = place("current_a").ok_or("its header names no column current_a")?;
-                let quadrature = place("quadrature_a");
-                out.is_complex = quadrature.is_some();
-                out.columns = Some([Some(value), quadrature].into_iter().flatten().collect());
-                continue;
-            }
-            let ray = cells(content).nth(key).unwrap_or_default();
-            if is_first || out.columns.is_none() || ray != last {
-                out.check_samples(samples)?;
-                out.records.push((begin, line));
-                (last, samples) = (ray.to_owned(), 0);
-            }
-            samples += if out.columns.is_some() { 1 } else { cells(content).count() / out.numbers() };
-        }
-        out.check_samples(samples)?;
-        Ok(out)
-    }
-
-    fn numbers(&self) -> usize {
-        if self.is_complex { 2 } else { 1 }
-    }
-
-    /// Holds the samples of the last record against those of the first.
-    fn check_samples(&mut self, samples: usize) -> Result<(), String> {
-        if self.records.len() == 1 {
-            self.samples = samples;
-        }
-        match self.records.last() {
-            Some((_, line)) if samples != self.samples => {
-                Err(format!("line {line}: the record has {samples} samples, those before it {}", self.samples))
-            }
-            _ => Ok(()),
-        }
-    }
-
-    pub(super) fn records(&self) -> usize {
-        self.records.len()
-    }
-
-    /// Some samples of some records, one record after the other.
-    pub(super) fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
-        let mut out = Vec::with_capacity(records.len() * samples.len());
-        let mut text = String::new();
-        for record in records {
-            let Some((begin, mut line)) = self.records.get(record).copied() else { break };
-            self.reader.seek(SeekFrom::Start(begin)).map_err(|e| e.to_string())?;
-            let begun = out.len();
-            while out.len() < begun + self.samples {
-                text.clear();
-                if self.reader.read_line(&mut text).map_err(|e| e.to_string())? == 0 {
-                    return Err("it became shorter while it was read".into());
+            let cells: Vec<&str> = cells(content).collect();
+            if lines.is_empty() && table.is_none() {
+                // A sample takes sixteen bytes, and in the text as many as it has digits.
+                machine::holds("its table", 3.0 * bytes as f64)?;
+                if cells.iter().any(|cell| cell.parse::<f64>().is_err()) {
+                    let place = |name: &str| cells.iter().position(|cell| *cell == name);
+                    let key = place("ray").ok_or("its header names no column ray: rows of numbers have none")?;
+                    let value = place("current_a").ok_or("its header names no column current_a")?;
+                    let quadrature = place("quadrature_a");
+                    out.is_complex = quadrature.is_some();
+                    table = Some((key, [Some(value), quadrature].into_iter().flatten().collect()));
+                    continue;
                 }
-                if let Some(content) = content(&text) {
-                    self.push(content, line, &mut out)?;
-                }
-                line += 1;
             }
-            out.truncate(begun + samples.end);
-            out.drain(begun..begun + samples.start);
+            let number = |cell: &str| match cell {
+                "" => Ok(f64::NAN),
+                cell => cell.parse().map_err(|_| format!("line {line}: {cell:?} is no number")),
+            };
+            let known = |value: f64| if fills.contains(&value) { f64::NAN } else { value };
+            let cell = |at: &usize| cells.get(*at).copied().unwrap_or_default();
+            let ray = table.as_ref().map(|(key, _)| cell(key));
+            if lines.is_empty() || ray.is_none_or(|ray| ray != last) {
+                out.records.push(Vec::new());
+                lines.push(line);
+                last = ray.unwrap_or_default().to_owned();
+            }
+            let own: Vec<&str> = table.as_ref().map_or(cells.clone(), |(_, parts)| parts.iter().map(cell).collect());
+            let parts = own.into_iter().map(|cell| number(cell).map(known)).collect::<Result<Vec<f64>, String>>()?;
+            let samples = parts.chunks_exact(if out.is_complex { 2 } else { 1 });
+            let samples = samples.map(|parts| Complex::new(parts[0], parts.get(1).copied().unwrap_or(0.0)));
+            out.records.last_mut().map(|record| record.extend(samples));
         }
-        Ok(out)
+        let whole = out.samples();
+        match out.records.iter().zip(lines).find(|(record, _)| record.len() != whole) {
+            Some((record, line)) => {
+                Err(format!("line {line}: the record has {} samples, those before it {whole}", record.len()))
+            }
+            None => Ok(out),
+        }
     }
 
-    fn push(&self, content: &str, line: usize, out: &mut Vec<Complex<f64>>) -> Result<(), String> {
-        let number = |cell: &str| -> Result<f64, String> {
-            if cell.is_empty() {
-                return Ok(f64::NAN);
-            }
-            let value = cell.parse().map_err(|_| format!("line {line}: {cell:?} is no number"))?;
-            Ok(if self.fills.contains(&value) { f64::NAN } else { value })
-        };
-        match &self.columns {
-            Some(columns) => {
-                let cells: Vec<&str> = cells(content).collect();
-                let mut parts = columns.iter().map(|column| number(cells.get(*column).copied().unwrap_or_default()));
-                let re = parts.next().transpose()?.unwrap_or(f64::NAN);
-                out.push(Complex::new(re, parts.next().transpose()?.unwrap_or(0.0)));
-            }
-            None => {
-                let numbers = cells(content).map(number).collect::<Result<Vec<f64>, String>>()?;
-                let sample = |parts: &[f64]| Complex::new(parts[0], parts.get(1).copied().unwrap_or(0.0));
-                out.extend(numbers.chunks_exact(self.numbers()).map(sample));
-            }
-        }
-        Ok(())
+    /// Samples of a record.
+    pub(super) fn samples(&self) -> usize {
+        self.records.first().map_or(0, Vec::len)
     }
 }
 

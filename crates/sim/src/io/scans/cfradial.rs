@@ -158,25 +158,25 @@ impl Field {
     }
 }
 
-/// How the gates of the rays stand in a variable.
-enum GateLayout {
-    /// \[time, range\].
-    Full { rays: usize, gates: usize },
-    /// One ray after the other, each with its own number of gates.
-    Ragged { starts: Vec<usize>, counts: Vec<usize>, gates: usize },
+/// How the gates of the rays stand in a variable: \[time, range\], or one ray after the other, each with its own number of gates.
+struct GateLayout {
+    /// Where each ray begins, and its gates.
+    rays: Vec<(usize, usize)>,
+    gates: usize,
+    /// Whether all rays have all gates.
+    is_full: bool,
 }
 
 impl GateLayout {
     fn new(file: &NetcdfFile, name: &str, rays: usize, gates: usize) -> Result<Self, String> {
         let shape = file.shape(name).unwrap_or_default();
-        let dims = shape.len();
-        match (dims, &shape[..]) {
-            (2, [a, b]) if (*a, *b) == (rays as u64, gates as u64) => Ok(Self::Full { rays, gates }),
-            (2, _) => {
-                Err(format!("variable {name} is {} x {}; {rays} rays x {gates} ranges are needed", shape[0], shape[1]))
+        match &shape[..] {
+            [a, b] if (*a, *b) == (rays as u64, gates as u64) => {
+                Ok(Self { rays: (0..rays).map(|ray| (ray * gates, gates)).collect(), gates, is_full: true })
             }
-            (1, _) if file.has("ray_start_index") && file.has("ray_n_gates") => {
-                let whole = |name: &str, file: &NetcdfFile| -> Result<Vec<usize>, String> {
+            [a, b] => Err(format!("variable {name} is {a} x {b}; {rays} rays x {gates} ranges are needed")),
+            [_] if file.has("ray_start_index") && file.has("ray_n_gates") => {
+                let whole = |name: &str| -> Result<Vec<usize>, String> {
                     let values = file.floats(name)?;
                     let bad = values.iter().any(|v| !(*v >= 0.0 && *v < 1e9));
                     match bad || values.len() != rays {
@@ -184,36 +184,31 @@ impl GateLayout {
                         false => Ok(values.into_iter().map(|v| v as usize).collect()),
                     }
                 };
-                let (starts, counts) = (whole("ray_start_index", file)?, whole("ray_n_gates", file)?);
-                if let Some(count) = counts.iter().find(|count| **count > gates) {
+                let own: Vec<_> = whole("ray_start_index")?.into_iter().zip(whole("ray_n_gates")?).collect();
+                if let Some((_, count)) = own.iter().find(|(_, count)| *count > gates) {
                     return Err(format!("a ray has {count} gates, range {gates} values"));
                 }
                 // Velocities, what stands beside them, and the lines of the map.
                 machine::holds(&format!("{rays} rays x {gates} ranges"), 40.0 * rays as f64 * gates as f64)?;
-                Ok(Self::Ragged { starts, counts, gates })
+                Ok(Self { rays: own, gates, is_full: false })
             }
-            _ => Err(format!("variable {name} has {dims} dimensions; [time, range] are needed")),
+            _ => Err(format!("variable {name} has {} dimensions; [time, range] are needed", shape.len())),
         }
     }
 
     /// The values \[ray, gate\], one ray after the other.
     fn read(&self, file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
-        let values = file.floats(name)?;
-        match self {
-            Self::Full { rays, gates } if values.len() == rays * gates => Ok(values),
-            Self::Full { rays, gates } => {
-                Err(format!("variable {name} has {} values; {rays} rays x {gates} ranges are needed", values.len()))
-            }
-            Self::Ragged { starts, counts, gates } => {
-                let mut out = vec![f64::NAN; starts.len() * gates];
-                for (ray, (start, count)) in starts.iter().zip(counts).enumerate() {
-                    let own = values.get(*start..start + count);
-                    let own = own.ok_or_else(|| format!("variable {name} ends before the gates of ray {ray}"))?;
-                    out[ray * gates..ray * gates + count].copy_from_slice(own);
-                }
-                Ok(out)
-            }
+        let (values, rays, gates) = (file.floats(name)?, self.rays.len(), self.gates);
+        if self.is_full && values.len() != rays * gates {
+            return Err(format!("variable {name} has {} values; {rays} rays x {gates} ranges are needed", values.len()));
         }
+        let mut out = vec![f64::NAN; rays * gates];
+        for (ray, (start, count)) in self.rays.iter().enumerate() {
+            let own = values.get(*start..start + count);
+            let own = own.ok_or_else(|| format!("variable {name} ends before the gates of ray {ray}"))?;
+            out[ray * gates..ray * gates + count].copy_from_slice(own);
+        }
+        Ok(out)
     }
 
     /// The first of some variables that is there.

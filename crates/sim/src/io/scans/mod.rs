@@ -16,7 +16,6 @@ mod table;
 use crate::Error;
 use crate::io::{UtcTime, text_file};
 use crate::machine;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::ScanMap;
 
@@ -98,11 +97,8 @@ impl ReadScan {
 /// # Errors
 /// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing.
 pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
-    let unreadable = |source| Error::Io { action: "read", path: path.to_owned(), source };
     let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-    let (file, length) = text_file::open(path).map_err(unreadable)?;
-    let mut magic = Vec::new();
-    file.take(8).read_to_end(&mut magic).map_err(unreadable)?;
+    let (_, length, magic) = text_file::begin(path)?;
     match &magic[..] {
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
             let (mut out, mut left_out) = (Vec::new(), Vec::new());
@@ -126,7 +122,7 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
             if length > LARGEST_TEXT_BYTES {
                 return Err(refuse(format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read")));
             }
-            let bytes = std::fs::read(path).map_err(unreadable)?;
+            let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
             // The text, and a text of its own for each cell.
             let cells = bytes.iter().filter(|byte| matches!(byte, b',' | b'\n' | b' ' | b'\t')).count();
             machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64).map_err(refuse)?;

@@ -127,15 +127,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
             field("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| {
                 &s.velocity_m_s
             })?
-            .with_ancillary(&[
-                "velocity_standard_deviation",
-                "bias",
-                "level",
-                "n_eff",
-                "flagged",
-                "signal_to_noise_ratio",
-                "quality",
-            ]),
+            .with_ancillary("velocity_standard_deviation bias level n_eff flagged signal_to_noise_ratio quality"),
             field(
                 "velocity_standard_deviation",
                 speed,
