@@ -200,7 +200,10 @@ impl GateLayout {
     fn read(&self, file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
         let (values, rays, gates) = (file.floats(name)?, self.rays.len(), self.gates);
         if self.is_full && values.len() != rays * gates {
-            return Err(format!("variable {name} has {} values; {rays} rays x {gates} ranges are needed", values.len()));
+            return Err(format!(
+                "variable {name} has {} values; {rays} rays x {gates} ranges are needed",
+                values.len()
+            ));
         }
         let mut out = vec![f64::NAN; rays * gates];
         for (ray, (start, count)) in self.rays.iter().enumerate() {
