@@ -2,20 +2,19 @@
 //!
 //! Check: the tests of `flow` interrupt runs, kill them and let two of them meet in one folder.
 
-use super::files::{CASE, Files, checkpoint_paths};
+use super::files::{Files, checkpoint_paths};
 use super::forecast::{FlowForecast, refuse_too_large};
 use super::setup::{Setup, WakeSetup};
 use super::shared::agree;
-use super::steps::StepTable;
 use super::wake::{Schedule, WakeRun};
-use super::writer::{DIVISIONS, Writer, growth_note, kept};
+use super::writer::{DIVISIONS, Writer, growth_note};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, age_tau};
+use crate::io::Existing;
 use crate::io::lock::FolderLock;
-use crate::io::{Existing, write_atomic};
 use crate::keys::Problem;
 use crate::setup::progress::{Observer, Stage};
 use crate::{Error, machine};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 use wakescope_les::ranks::{Ranks, Single, all_gather};
 use wakescope_les::solver::{CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan, check_checkpoint};
@@ -97,7 +96,7 @@ pub fn run_on(
     let number = all_gather(&**ranks, number).map_err(Error::Flow)?[0] as usize;
     let checkpoint = number.checked_sub(1).and_then(|place| checkpoint_paths(folder).into_iter().nth(place));
     let tau_per_s = setup.tau_per_s;
-    let meter = setup.wake.take().map(|wake| (wake.meter, wake.circulation_radii_m));
+    let wake = setup.wake.take();
     let (mut run, kept) = match &checkpoint {
         None => {
             let (flow, start) = setup.start()?;
@@ -124,23 +123,21 @@ pub fn run_on(
         warnings.iter().for_each(|text| observer.warn(text));
         observer.begin(Stage::FlowSimulation, DIVISIONS as u64);
     }
-    let wake = meter.map(|meter| WakeRun::new(meter, run.flow(), (folder.to_owned(), file.provenance()), is_first));
-    let begun = begin_files(file, folder, &files, wake, (checkpoint.is_some(), &kept), is_first);
-    let (wake, steps, written) = agree(ranks, begun)?;
-    let start_s = reached_s;
     let mut writer = Writer {
         ranks: ranks.clone(),
         files,
-        steps,
-        wake,
-        written,
+        steps: None,
+        wake: wake.map(|wake| WakeRun::new(wake, run.flow())),
+        written: Vec::new(),
         warnings,
         observer,
         done: 0,
-        start_s,
+        start_s: reached_s,
         end_s,
         error: None,
     };
+    let begun = writer.begin(file, checkpoint, &kept);
+    agree(ranks, begun)?;
     let result = run.to_end(&mut writer);
     // Also of a run that failed: its last row is what one wants to see.
     let finished = writer.finish();
@@ -186,40 +183,6 @@ fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(Fold
         },
     };
     Ok((lock, number))
-}
-
-/// The files that grow with a run, and the paths of all that were begun.
-type Begun = (Option<WakeRun>, Option<StepTable>, Vec<PathBuf>);
-
-/// Begins the files of a run, or continues them from what a checkpoint kept; ranks other than the first have none.
-fn begin_files(
-    file: &CaseFile,
-    folder: &Path,
-    files: &Files,
-    mut wake: Option<WakeRun>,
-    (continues, bytes): (bool, &[u8]),
-    is_first: bool,
-) -> Result<Begun, Error> {
-    let (row, history) = kept(bytes, wake.is_some());
-    if let (Some(wake), true) = (&mut wake, continues) {
-        let ([path, _], what) = (checkpoint_paths(folder), "its history of the wake is not that of this case");
-        wake.restore(history).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
-    }
-    if !is_first {
-        return Ok((wake, None, Vec::new()));
-    }
-    let case_toml = folder.join(CASE);
-    write_atomic(&case_toml, format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
-    let steps_path = files.steps_path();
-    let steps = match (files.output.steps, continues) {
-        (false, _) => None,
-        (true, true) => Some(StepTable::resume(&steps_path, &files.origin, row)?),
-        (true, false) => Some(StepTable::begin(&steps_path, &files.origin)?),
-    };
-    let mut written = vec![case_toml];
-    written.extend(steps.is_some().then_some(steps_path));
-    written.extend(wake.iter().flat_map(WakeRun::paths));
-    Ok((wake, steps, written))
 }
 
 /// Refuses a folder that holds a run that is not to be overwritten, that cannot be written to, or that is in use.

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::flow::WakePreset;
+use crate::flow::files::CASE;
 use crate::setup::progress::Silent;
 use std::fs;
 

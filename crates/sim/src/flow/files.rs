@@ -140,7 +140,7 @@ impl Files {
         let mut out = vec![CASE.to_owned()];
         out.extend(self.output.steps.then(|| STEPS.to_owned()));
         if self.is_wake {
-            out.extend(wake::file_names().into_iter().map(str::to_owned));
+            out.extend(wake::HISTORIES.map(str::to_owned));
             #[cfg(feature = "plots")]
             out.extend(wake::PICTURES.map(str::to_owned));
         }

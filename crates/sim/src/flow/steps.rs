@@ -26,14 +26,9 @@ pub(super) struct StepTable {
 }
 
 impl StepTable {
-    /// An empty table in place of an older one.
-    pub(super) fn begin(path: &Path, origin: &Provenance) -> Result<Self, Error> {
-        write_atomic(path, format!("{}{HEADER}\n", origin.comment_lines()))?;
-        Self::open(path, None)
-    }
-
-    /// The table of a run that continues with the row that its checkpoint kept; later rows are taken off.
-    pub(super) fn resume(path: &Path, origin: &Provenance, kept: &[u8]) -> Result<Self, Error> {
+    /// The table of a run that continues with the row that its checkpoint kept, later rows taken off; an empty one where nothing was
+    /// kept.
+    pub(super) fn open(path: &Path, origin: &Provenance, kept: &[u8]) -> Result<Self, Error> {
         let waiting = (!kept.is_empty()).then(|| String::from_utf8_lossy(kept).into_owned());
         let step_of = |row: &str| row.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
         let next = waiting.as_deref().and_then(step_of).unwrap_or(0);
@@ -42,10 +37,6 @@ impl StepTable {
         let rows = old.lines().filter(|line| step_of(line).is_some_and(|step| step < next));
         let rows: String = rows.map(|line| format!("{line}\n")).collect();
         write_atomic(path, format!("{}{HEADER}\n{rows}", origin.comment_lines()))?;
-        Self::open(path, waiting)
-    }
-
-    fn open(path: &Path, waiting: Option<String>) -> Result<Self, Error> {
         let file = OpenOptions::new().append(true).open(path).map_err(Error::io("write", path))?;
         Ok(Self { path: path.to_owned(), file, waiting })
     }

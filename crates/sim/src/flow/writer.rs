@@ -2,11 +2,13 @@
 //!
 //! Check: the tests of `flow` interrupt runs and compare the bytes.
 
-use super::files::Files;
+use super::CaseFile;
+use super::files::{CASE, Files};
 use super::shared::agree;
 use super::steps::StepTable;
-use super::wake::WakeRun;
+use super::wake::{HISTORIES, WakeRun};
 use crate::Error;
+use crate::io::write_atomic;
 use crate::setup::progress::Observer;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,7 +18,7 @@ use wakescope_les::solver::{RunObserver, RunWarning, StepRecord, UndampedGrowth}
 
 /// What a checkpoint keeps for the files: the row of the table of the steps that waits, and the history of a wake, whose bytes begin
 /// with the length of the row.
-pub(super) fn kept(bytes: &[u8], is_wake: bool) -> (&[u8], &[u8]) {
+fn parted(bytes: &[u8], is_wake: bool) -> (&[u8], &[u8]) {
     if !is_wake {
         return (bytes, &[]);
     }
@@ -54,11 +56,35 @@ impl Writer<'_> {
         })
     }
 
+    /// Begins the files of a run, or continues them from what a checkpoint kept; ranks other than the first have none.
+    pub(super) fn begin(&mut self, file: &CaseFile, checkpoint: Option<PathBuf>, kept: &[u8]) -> Result<(), Error> {
+        let (row, history) = parted(kept, self.wake.is_some());
+        if let (Some(wake), Some(path)) = (&mut self.wake, checkpoint) {
+            let what = "its history of the wake is not that of this case";
+            wake.restore(history).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
+        }
+        if self.ranks.rank() > 0 {
+            return Ok(());
+        }
+        let folder = &self.files.folder;
+        self.written.push(folder.join(CASE));
+        write_atomic(&folder.join(CASE), format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
+        if self.files.output.steps {
+            let path = self.files.steps_path();
+            self.steps = Some(StepTable::open(&path, &self.files.origin, row)?);
+            self.written.push(path);
+        }
+        self.written.extend(self.wake.iter().flat_map(|_| HISTORIES.map(|name| folder.join(name))));
+        Ok(())
+    }
+
     /// Completes the tables.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
         let steps = self.steps.as_mut().map_or(Ok(()), StepTable::finish);
-        let wake = self.wake.as_ref().map_or(Ok(()), WakeRun::finish);
-        steps.and(wake)
+        match &self.wake {
+            Some(wake) if self.ranks.rank() == 0 => steps.and(wake.finish(&self.files.folder, &self.files.origin)),
+            _ => steps,
+        }
     }
 }
 
@@ -86,8 +112,13 @@ impl RunObserver for Writer<'_> {
 
     fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
         let due = self.files.schedule.due.get(index).copied().unwrap_or_default();
-        if due.record {
-            let recorded = self.wake.as_mut().map_or(Ok(()), |wake| wake.record(flow));
+        if due.record
+            && let Some(wake) = &mut self.wake
+        {
+            let mut recorded = wake.record(flow);
+            if self.ranks.rank() == 0 {
+                recorded = recorded.and_then(|()| wake.write_tables(&self.files.folder, &self.files.origin));
+            }
             let recorded = agree(&self.ranks, recorded);
             self.keep(recorded)?;
         }

@@ -4,25 +4,17 @@
 
 use std::fmt;
 
-/// An arithmetic expression.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Expression {
-    text: String,
-    root: Node,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-enum Node {
-    Number(f64),
-    Name(String),
-    Minus(Box<Node>),
-    Two(Box<Node>, char, Box<Node>),
-}
+/// Values of the names in an expression.
+type Values<'v> = &'v dyn Fn(&str) -> Result<f64, String>;
 
 /// Deepest nesting of an expression.
 const DEEPEST: usize = 100;
-/// Most operators of an expression, each of which is a step deeper for those that follow it.
+/// Most operators of an expression.
 const MOST_OPERATORS: usize = 1000;
+
+/// The text of an arithmetic expression, which can be read.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Expression(String);
 
 impl Expression {
     /// Reads an expression.
@@ -30,57 +22,52 @@ impl Expression {
     /// # Errors
     /// What is wrong, and where.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
-        let mut parser = Parser { rest: text, text, depth: 0, operators: 0 };
-        let root = parser.sum()?;
-        parser.skip();
-        if !parser.rest.is_empty() {
-            return Err(parser.wrong("an operator, one of + - * / ^"));
-        }
-        Ok(Self { text: text.trim().into(), root })
+        Parser { rest: text, text, depth: 0, operators: 0, values: None }.whole()?;
+        Ok(Self(text.trim().into()))
     }
 
     /// The value, with those of its names.
     ///
     /// # Errors
-    /// What `value_of` says of a name; a division by zero; numbers that give none. What is missing (NaN) stays so.
-    pub(crate) fn value(&self, value_of: &dyn Fn(&str) -> Result<f64, String>) -> Result<f64, String> {
-        self.root.value(value_of).map_err(|reason| format!("\"{}\": {reason}", self.text))
+    /// What `values` says of a name; a division by zero; numbers that give none. What is missing (NaN) stays so.
+    pub(crate) fn value(&self, values: Values<'_>) -> Result<f64, String> {
+        let parser = Parser { rest: &self.0, text: &self.0, depth: 0, operators: 0, values: Some(values) };
+        parser.whole().map_err(|reason| format!("\"{self}\": {reason}"))
     }
 }
 
-impl Node {
-    fn value(&self, value_of: &dyn Fn(&str) -> Result<f64, String>) -> Result<f64, String> {
-        Ok(match self {
-            Self::Number(value) => *value,
-            Self::Name(name) => value_of(name)?,
-            Self::Minus(node) => -node.value(value_of)?,
-            Self::Two(left, operator, right) => {
-                let (a, b) = (left.value(value_of)?, right.value(value_of)?);
-                let value = match operator {
-                    '+' => a + b,
-                    '-' => a - b,
-                    '*' => a * b,
-                    '/' if b == 0.0 => return Err("it divides by zero".into()),
-                    '/' => a / b,
-                    _ => a.powf(b),
-                };
-                if value.is_nan() && !a.is_nan() && !b.is_nan() {
-                    return Err(format!("{a:?} {operator} {b:?} is no number"));
-                }
-                value
-            }
-        })
+/// Two values and the operator between them.
+fn combined(a: f64, operator: char, b: f64) -> Result<f64, String> {
+    let value = match operator {
+        '+' => a + b,
+        '-' => a - b,
+        '*' => a * b,
+        '/' if b == 0.0 => return Err("it divides by zero".into()),
+        '/' => a / b,
+        _ => a.powf(b),
+    };
+    if value.is_nan() && !a.is_nan() && !b.is_nan() {
+        return Err(format!("{a:?} {operator} {b:?} is no number"));
     }
+    Ok(value)
 }
 
+/// Computes while it reads. Without values all numbers are missing, and nothing but the text can be wrong.
 struct Parser<'t> {
     rest: &'t str,
     text: &'t str,
     depth: usize,
     operators: usize,
+    values: Option<Values<'t>>,
 }
 
 impl Parser<'_> {
+    fn whole(mut self) -> Result<f64, String> {
+        let value = self.sum()?;
+        self.skip();
+        if self.rest.is_empty() { Ok(value) } else { Err(self.wrong("an operator, one of + - * / ^")) }
+    }
+
     fn skip(&mut self) {
         self.rest = self.rest.trim_start();
     }
@@ -99,76 +86,71 @@ impl Parser<'_> {
         format!("\"{}\" cannot be read {place}, character {}: {wanted} is needed", self.text.trim(), at + 1)
     }
 
-    fn chain(&mut self, operators: &[char], part: fn(&mut Self) -> Result<Node, String>) -> Result<Node, String> {
+    fn chain(&mut self, operators: &[char], part: fn(&mut Self) -> Result<f64, String>) -> Result<f64, String> {
         let mut left = part(self)?;
         while let Some(operator) = self.take(operators) {
             self.operators += 1;
             if self.operators > MOST_OPERATORS {
                 return Err(format!("it has more than {MOST_OPERATORS} operators"));
             }
-            left = Node::Two(Box::new(left), operator, Box::new(part(self)?));
+            left = combined(left, operator, part(self)?)?;
         }
         Ok(left)
     }
 
-    fn sum(&mut self) -> Result<Node, String> {
+    fn sum(&mut self) -> Result<f64, String> {
         self.chain(&['+', '-'], Self::product)
     }
 
-    fn product(&mut self) -> Result<Node, String> {
+    fn product(&mut self) -> Result<f64, String> {
         self.chain(&['*', '/'], Self::signed)
     }
 
-    fn signed(&mut self) -> Result<Node, String> {
+    fn signed(&mut self) -> Result<f64, String> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(self.wrong("less nesting"));
         }
-        let node = match self.take(&['+', '-']) {
-            Some('-') => Node::Minus(Box::new(self.signed()?)),
+        let value = match self.take(&['+', '-']) {
+            Some('-') => -self.signed()?,
             Some(_) => self.signed()?,
             None => self.power()?,
         };
         self.depth -= 1;
-        Ok(node)
+        Ok(value)
     }
 
-    fn power(&mut self) -> Result<Node, String> {
+    fn power(&mut self) -> Result<f64, String> {
         let base = self.primary()?;
-        Ok(match self.take(&['^']) {
-            Some(operator) => Node::Two(Box::new(base), operator, Box::new(self.signed()?)),
-            None => base,
-        })
+        match self.take(&['^']) {
+            Some(operator) => combined(base, operator, self.signed()?),
+            None => Ok(base),
+        }
     }
 
-    fn primary(&mut self) -> Result<Node, String> {
+    fn primary(&mut self) -> Result<f64, String> {
         if self.take(&['(']).is_some() {
             let inner = self.sum()?;
             return self.take(&[')']).map(|_| inner).ok_or_else(|| self.wrong("a closing bracket"));
         }
-        let bytes = self.rest.as_bytes();
-        let mut end = 0;
+        let (here, bytes) = (self.rest, self.rest.as_bytes());
+        let split = |belongs: &dyn Fn(usize, u8) -> bool| {
+            let end = bytes.iter().enumerate().position(|(i, b)| !belongs(i, *b));
+            here.split_at(end.unwrap_or(bytes.len()))
+        };
         if bytes.first().is_some_and(|b| b.is_ascii_digit() || *b == b'.') {
-            while let Some(b) = bytes.get(end) {
-                let exponent = end > 0 && matches!(bytes[end - 1], b'e' | b'E');
-                if !(b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'E') || (exponent && matches!(b, b'+' | b'-'))) {
-                    break;
-                }
-                end += 1;
-            }
-            let number = self.rest[..end].parse().map_err(|_| self.wrong("a number, e.g. 1.5e-6,"))?;
-            self.rest = &self.rest[end..];
-            return Ok(Node::Number(number));
+            let is_sign = |i: usize, b: u8| i > 0 && matches!(bytes[i - 1], b'e' | b'E') && matches!(b, b'+' | b'-');
+            let (number, rest) = split(&|i, b| b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'E') || is_sign(i, b));
+            let value = number.parse().map_err(|_| self.wrong("a number, e.g. 1.5e-6,"))?;
+            self.rest = rest;
+            return Ok(if self.values.is_some() { value } else { f64::NAN });
         }
-        while bytes.get(end).is_some_and(|b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.')) {
-            end += 1;
-        }
-        if end == 0 {
+        let (name, rest) = split(&|_, b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.'));
+        if name.is_empty() {
             return Err(self.wrong("a number, a key or a bracket"));
         }
-        let name = self.rest[..end].to_owned();
-        self.rest = &self.rest[end..];
-        Ok(Node::Name(name))
+        self.rest = rest;
+        self.values.map_or(Ok(f64::NAN), |values| values(name))
     }
 }
 
@@ -197,8 +179,8 @@ impl Condition {
     ///
     /// # Errors
     /// As [`Expression::value`].
-    pub(crate) fn holds(&self, value_of: &dyn Fn(&str) -> Result<f64, String>) -> Result<bool, String> {
-        let (left, right) = (self.left.value(value_of)?, self.right.value(value_of)?);
+    pub(crate) fn holds(&self, values: Values<'_>) -> Result<bool, String> {
+        let (left, right) = (self.left.value(values)?, self.right.value(values)?);
         Ok(match self.operator {
             "<=" => left <= right,
             ">=" => left >= right,
@@ -210,7 +192,7 @@ impl Condition {
 
 impl fmt::Display for Expression {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
+        f.write_str(&self.0)
     }
 }
 

@@ -19,9 +19,9 @@ use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 
 /// Cells within this part of the spacing of a pair from a centre are inside its vortices: 8 m of 47.
-const INSIDE: f64 = 8.0 / 47.0;
+const INSIDE_PART: f64 = 8.0 / 47.0;
 /// Cells beyond this part from both are outside: 30 m of 47.
-const OUTSIDE: f64 = 30.0 / 47.0;
+const OUTSIDE_PART: f64 = 30.0 / 47.0;
 
 /// Estimates so many widths of a peak away from the air are no estimates of it.
 const BEYOND_WIDTHS: f64 = 3.0;
@@ -116,7 +116,7 @@ impl Collected<'_> {
         let bound_m_s = if has_bound { bound_in_the_middle(plan, scanner)?.region_m_s } else { f64::NAN };
         let filter = range_filter(plan)?;
         let mut out = vec![middle.snr_db, filter.full_width_half_maximum_m(), filter.standard_deviation_m(), bound_m_s];
-        for part in [Part::All, Part::Inside, Part::Outside] {
+        for part in [ALL, INSIDE, OUTSIDE] {
             out.extend(self.cells.averages(map, part));
         }
         out.extend(flagged_fraction(map));
@@ -145,13 +145,11 @@ fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
     Ok([(beyond / share).min(1.0), error_of_fraction(beyond, of) / share])
 }
 
-/// Cells about which a column speaks.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Part {
-    All,
-    Inside,
-    Outside,
-}
+/// Whether a cell at a distance of a centre, over the spacing, is among those about which a column speaks.
+type Part = fn(f64) -> bool;
+const ALL: Part = |_| true;
+const INSIDE: Part = |distance| distance < INSIDE_PART;
+const OUTSIDE: Part = |distance| distance > OUTSIDE_PART;
 
 /// The cells of a map by their distance from the vortices.
 struct Cells {
@@ -185,18 +183,13 @@ impl Cells {
     }
 
     fn of(&self, part: Part) -> Vec<(usize, usize)> {
-        let belongs = |distance: f64| match part {
-            Part::All => true,
-            Part::Inside => distance < INSIDE,
-            Part::Outside => distance > OUTSIDE,
-        };
-        self.distance.indexed_iter().filter(|(_, distance)| belongs(**distance)).map(|(cell, _)| cell).collect()
+        self.distance.indexed_iter().filter(|(_, distance)| part(**distance)).map(|(cell, _)| cell).collect()
     }
 
     /// Cells outside the vortices, all where these are not known, so far apart that they share no window.
     fn apart(&self) -> Vec<(usize, usize)> {
         let [lines, gates] = self.shared.map(|cells| cells.ceil() as usize);
-        let cells = if self.of(Part::Outside).is_empty() { self.of(Part::All) } else { self.of(Part::Outside) };
+        let cells = if self.of(OUTSIDE).is_empty() { self.of(ALL) } else { self.of(OUTSIDE) };
         cells.into_iter().filter(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates)).collect()
     }
 

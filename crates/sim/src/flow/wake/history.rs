@@ -4,11 +4,12 @@
 //!
 //! Check: tests of `flow` interrupt runs and compare the bytes; rows against the record they came from.
 
+use super::super::setup::WakeSetup;
 use crate::Error;
 use crate::io::{Provenance, Table, write_atomic};
-use std::path::PathBuf;
+use std::path::Path;
 use wakescope_les::Flow;
-use wakescope_les::analysis::{VortexRecord, WakeMeter, WakeRecord, WakeScales};
+use wakescope_les::analysis::{VortexRecord, WakeRecord, WakeScales};
 
 /// What a number is.
 #[derive(Debug)]
@@ -76,10 +77,8 @@ const TABLE: &str = "wake.csv";
 const SCALED_TABLE: &str = "wake_scaled.csv";
 const NETCDF: &str = "wake.nc";
 
-/// Names of the files of a history.
-pub(in super::super) fn file_names() -> Vec<&'static str> {
-    vec![TABLE, SCALED_TABLE, NETCDF]
-}
+/// All of them.
+pub(in super::super) const HISTORIES: [&str; 3] = [TABLE, SCALED_TABLE, NETCDF];
 
 /// A number of all records.
 struct Column {
@@ -91,113 +90,63 @@ struct Column {
     values: Vec<f64>,
 }
 
-/// Lengths of the lists of a record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Lengths {
-    radii: usize,
-    slices: usize,
-    modes: usize,
-}
-
-impl Lengths {
-    /// Where the lists begin in a row: circulations, centres, modes, and its length.
-    fn starts(self) -> [usize; 4] {
-        let gamma = 1 + 2 * VORTEX.len() + FLOW.len();
-        let slices = gamma + 2 * self.radii;
-        let modes = slices + 4 * self.slices;
-        [gamma, slices, modes, modes + self.modes]
-    }
-}
-
-/// The meter of a run, what it has found, and its files.
-#[derive(Debug)]
+/// The meter of a run and what it has found.
 pub(in super::super) struct WakeRun {
-    meter: WakeMeter,
-    scales: WakeScales,
-    /// Between which the circulation of a vortex is averaged.
-    circulation_radii_m: [f64; 2],
+    setup: WakeSetup,
     radius_m: Vec<f64>,
-    lengths: Lengths,
     x_m: Vec<f64>,
     /// Rows of numbers in SI units.
     rows: Vec<Vec<f64>>,
-    folder: PathBuf,
-    origin: Provenance,
-    /// Of several ranks, which measure together, the first one writes.
-    writes: bool,
 }
 
 impl WakeRun {
     /// An empty history of flows on the mesh of `flow`.
-    pub(in super::super) fn new(
-        (meter, circulation_radii_m): (WakeMeter, [f64; 2]),
-        flow: &Flow,
-        (folder, origin): (PathBuf, Provenance),
-        writes: bool,
-    ) -> Self {
-        let (scales, radius_m, x_m) = (*meter.scales(), meter.radii_m(), flow.mesh().centre_m(0));
-        let lengths = Lengths { radii: radius_m.len(), slices: x_m.len(), modes: x_m.len() / 2 + 1 };
-        Self { meter, scales, circulation_radii_m, radius_m, lengths, x_m, rows: Vec::new(), folder, origin, writes }
+    pub(in super::super) fn new(setup: WakeSetup, flow: &Flow) -> Self {
+        Self { radius_m: setup.meter.radii_m(), x_m: flow.mesh().centre_m(0), rows: Vec::new(), setup }
+    }
+
+    /// Axial modes of a record.
+    fn modes(&self) -> usize {
+        self.x_m.len() / 2 + 1
+    }
+
+    /// Where the lists begin in a row: circulations, centres, modes, and its length.
+    fn starts(&self) -> [usize; 4] {
+        let gamma = 1 + 2 * VORTEX.len() + FLOW.len();
+        let slices = gamma + 2 * self.radius_m.len();
+        let modes = slices + 4 * self.x_m.len();
+        [gamma, slices, modes, modes + self.modes()]
     }
 
     /// Takes back what [`Self::kept`] gave.
     pub(in super::super) fn restore(&mut self, bytes: &[u8]) -> Option<()> {
         let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
         let (state, rows) = numbers.split_first_chunk::<12>()?;
-        let [.., length] = self.lengths.starts();
+        let [.., length] = self.starts();
         if rows.len() % length != 0 || !bytes.len().is_multiple_of(8) {
             return None;
         }
-        self.meter.restore(*state);
+        self.setup.meter.restore(*state);
         self.rows = rows.chunks(length).map(<[f64]>::to_vec).collect();
         Some(())
     }
 
     /// What a checkpoint must keep.
     pub(in super::super) fn kept(&self) -> Vec<u8> {
-        let state = self.meter.state();
+        let state = self.setup.meter.state();
         state.iter().chain(self.rows.iter().flatten()).flat_map(|x| x.to_le_bytes()).collect()
     }
 
-    /// Measures the flow, for which all ranks must ask together, and writes the table anew.
+    /// Measures the flow, for which all ranks must ask together.
     pub(in super::super) fn record(&mut self, flow: &Flow) -> Result<(), Error> {
-        let record = self.meter.measure(flow).map_err(Error::Flow)?;
-        let row = self.row(&record);
-        self.rows.push(row);
-        if self.writes { self.write_table() } else { Ok(()) }
-    }
-
-    /// The files of the history.
-    pub(in super::super) fn paths(&self) -> Vec<PathBuf> {
-        file_names().into_iter().map(|name| self.folder.join(name)).collect()
-    }
-
-    /// Writes the files of the whole history.
-    pub(in super::super) fn finish(&self) -> Result<(), Error> {
-        if !self.writes {
-            return Ok(());
-        }
-        self.write_table()?;
-        write_atomic(&self.folder.join(NETCDF), self.netcdf()?)?;
+        let record = self.setup.meter.measure(flow).map_err(Error::Flow)?;
+        self.rows.push(row(&record));
         Ok(())
-    }
-
-    fn row(&self, record: &WakeRecord) -> Vec<f64> {
-        let vortices = [&record.left, &record.right];
-        let mut row = vec![record.time_s];
-        row.extend(vortices.iter().flat_map(|v| VORTEX.map(|(_, _, _, of)| of(v))));
-        row.extend(FLOW.map(|(_, _, _, of)| of(record)));
-        row.extend(vortices.iter().flat_map(|v| v.gamma_m2_s.iter()));
-        for c in 0..2 {
-            row.extend(vortices.iter().flat_map(|v| v.slices_m.iter().map(move |slice| slice[c])));
-        }
-        row.extend(&record.mode_energy_m4_s2);
-        row
     }
 
     /// The numbers that tables have, those over their first value first.
     fn columns(&self) -> Vec<Column> {
-        let [from, to] = self.circulation_radii_m;
+        let [from, to] = self.setup.circulation_radii_m;
         let radii = [format!("_{from}_{to}").replace('.', "p"), format!(" from {from:?} to {to:?} m")];
         let mut out = Vec::new();
         let mut add = |name: String, kind, text: String, values| out.push(Column { name, kind, text, values });
@@ -217,8 +166,8 @@ impl WakeRun {
         for (i, (name, kind, text, _)) in FLOW.iter().enumerate() {
             add((*name).into(), kind, (*text).into(), self.column(1 + 2 * VORTEX.len() + i));
         }
-        let [.., modes, _] = self.lengths.starts();
-        for mode in 0..self.lengths.modes.min(TABLE_MODES + 1) {
+        let [.., modes, _] = self.starts();
+        for mode in 0..self.modes().min(TABLE_MODES + 1) {
             let text = format!("kinetic energy of axial mode {mode}, per length of x");
             add(format!("energy_mode_{mode}"), ENERGY, text, self.column(modes + mode));
         }
@@ -230,7 +179,7 @@ impl WakeRun {
     }
 
     fn tau(&self) -> Vec<f64> {
-        let time_unit_s = self.scales.time_unit_s();
+        let time_unit_s = self.setup.scales.time_unit_s();
         self.rows.iter().map(|row| super::super::age_tau(row[0], 1.0 / time_unit_s)).collect()
     }
 
@@ -245,39 +194,40 @@ impl WakeRun {
     fn scaled_table(&self) -> Table {
         let table = Table::new().float("tau", self.tau());
         self.columns().iter().skip(SIDES.len()).fold(table, |table, column| {
-            let unit = (column.kind.unit)(&self.scales);
+            let unit = (column.kind.unit)(&self.setup.scales);
             table.float(&column.name, column.values.iter().map(|value| value / unit))
         })
     }
 
-    fn write_table(&self) -> Result<(), Error> {
-        write_atomic(&self.folder.join(TABLE), self.table().to_csv(&self.origin)?)?;
-        Ok(write_atomic(&self.folder.join(SCALED_TABLE), self.scaled_table().to_csv(&self.origin)?)?)
+    /// Writes the tables of the history so far.
+    pub(in super::super) fn write_tables(&self, folder: &Path, origin: &Provenance) -> Result<(), Error> {
+        write_atomic(&folder.join(TABLE), self.table().to_csv(origin)?)?;
+        Ok(write_atomic(&folder.join(SCALED_TABLE), self.scaled_table().to_csv(origin)?)?)
+    }
+
+    /// Writes all files of the whole history.
+    pub(in super::super) fn finish(&self, folder: &Path, origin: &Provenance) -> Result<(), Error> {
+        self.write_tables(folder, origin)?;
+        Ok(write_atomic(&folder.join(NETCDF), self.netcdf(origin)?)?)
     }
 
     /// All columns of the table and all lists over their axes, in SI units.
-    fn netcdf(&self) -> Result<Vec<u8>, Error> {
+    fn netcdf(&self, origin: &Provenance) -> Result<Vec<u8>, Error> {
         use crate::io::netcdf::{Data, Layout, Variable};
-        let [gamma, slices, modes, end] = self.lengths.starts();
+        let [gamma, slices, modes, end] = self.starts();
         let part =
             |from: usize, to: usize| self.rows.iter().flat_map(|row| row[from..to].to_vec()).collect::<Vec<f64>>();
         let lists = |name: &str, dims: &'static [&'static str], values: Vec<f64>, units: &str, long_name: &str| {
             Variable::new(name, dims, Data::f64(values)).text("units", units).text("long_name", long_name)
         };
-        let middle = slices + 2 * self.lengths.slices;
+        let middle = slices + 2 * self.x_m.len();
         let mut variables = vec![
             lists("tau", &["tau"], self.tau(), "1", "age of the wake, t Gamma0 / (2 pi b0^2)"),
             lists("time", &["tau"], self.column(0), "s", "time since the start of the flow"),
             lists("radius", &["radius"], self.radius_m.clone(), "m", "radius of a circle about the centre of a vortex"),
             lists("x", &["x"], self.x_m.clone(), "m", "position along the flight direction"),
             lists("vortex", &["vortex"], vec![0.0, 1.0], "1", "0: began at smaller y; 1: at larger y"),
-            lists(
-                "mode",
-                &["mode"],
-                (0..self.lengths.modes).map(|m| m as f64).collect(),
-                "1",
-                "waves along x in the box",
-            ),
+            lists("mode", &["mode"], (0..self.modes()).map(|m| m as f64).collect(), "1", "waves along x in the box"),
             lists(
                 "gamma",
                 &["tau", "vortex", "radius"],
@@ -304,15 +254,29 @@ impl WakeRun {
             ("vortex", 2),
             ("radius", self.radius_m.len()),
             ("x", self.x_m.len()),
-            ("mode", self.lengths.modes),
+            ("mode", self.modes()),
         ];
         let globals = vec![
             ("Conventions", "CF-1.10".into()),
             ("title", "History of a simulated wake".into()),
-            ("history", format!("written by {}", self.origin.program)),
-            ("spacing_m", format!("{:?}", self.scales.spacing_m)),
-            ("circulation_m2_s", format!("{:?}", self.scales.circulation_m2_s)),
+            ("history", format!("written by {}", origin.program)),
+            ("spacing_m", format!("{:?}", self.setup.scales.spacing_m)),
+            ("circulation_m2_s", format!("{:?}", self.setup.scales.circulation_m2_s)),
         ];
-        Ok(Layout { dims, globals, variables }.into_bytes(&self.origin)?)
+        Ok(Layout { dims, globals, variables }.into_bytes(origin)?)
     }
+}
+
+/// A record as a row of numbers in SI units.
+fn row(record: &WakeRecord) -> Vec<f64> {
+    let vortices = [&record.left, &record.right];
+    let mut row = vec![record.time_s];
+    row.extend(vortices.iter().flat_map(|v| VORTEX.map(|(_, _, _, of)| of(v))));
+    row.extend(FLOW.map(|(_, _, _, of)| of(record)));
+    row.extend(vortices.iter().flat_map(|v| v.gamma_m2_s.iter()));
+    for c in 0..2 {
+        row.extend(vortices.iter().flat_map(|v| v.slices_m.iter().map(move |slice| slice[c])));
+    }
+    row.extend(&record.mode_energy_m4_s2);
+    row
 }

@@ -18,7 +18,7 @@ mod space;
 
 pub use case::{PairScale, WakeFlow, WakeProfile};
 pub use finished::{FinishedWake, table};
-pub(super) use history::{WakeRun, file_names};
+pub(super) use history::{HISTORIES, WakeRun};
 pub use output::WakeOutput;
 #[cfg(feature = "plots")]
 pub(super) use pictures::PICTURES;
