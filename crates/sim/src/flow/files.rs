@@ -20,7 +20,7 @@ use wakescope_les::solver::Ends;
 /// The case with every default.
 pub(super) const CASE: &str = "case.toml";
 /// The table of the steps.
-const STEPS: &str = "steps.csv";
+pub(super) const STEPS: &str = "steps.csv";
 
 /// What a file of an output holds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -329,11 +329,6 @@ impl Files {
             y_edges: plane.y_edges,
             z_edges: plane.z_edges,
         })
-    }
-
-    /// The table of the steps.
-    pub(super) fn steps_path(&self) -> PathBuf {
-        self.folder.join(STEPS)
     }
 }
 

@@ -31,23 +31,22 @@ fn velocity(file: &NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, Str
     let name = ["u", "v", "w"][axis];
     let dims = axes(file, name)?;
     let mut values = file.velocities(name, &dims, None)?;
-    let mut shape = [0; 3];
+    // Values of the directions that are done, which are those of the mesh.
+    let mut inner = 1;
     // x is the fastest: direction 0 is the last dimension.
     for (direction, dim) in dims.iter().rev().enumerate() {
         let coordinate_m = file.coordinate_m(dim)?;
-        shape[direction] = coordinate_m.len();
         let target_m = if direction == axis { mesh.face_m(direction) } else { mesh.centre_m(direction) };
         let along = &mesh.directions()[direction];
         let letter = ["x", "y", "z"][direction];
         let taps =
             taps(&coordinate_m, &target_m[..along.cells], along).map_err(|e| format!("{letter} of {name}: {e}"))?;
         let count: usize = values.len() / coordinate_m.len().max(1);
-        let inner = shape[..direction].iter().product();
         if count * coordinate_m.len() != values.len() {
             return Err(format!("{name} is not of the size of its dimensions"));
         }
         values = apply(&taps, &values, inner, coordinate_m.len());
-        shape[direction] = along.cells;
+        inner *= along.cells;
     }
     match values.iter().position(|v| !v.is_finite()) {
         Some(place) => Err(format!("{name} is missing or not finite at the mesh's face {place}")),

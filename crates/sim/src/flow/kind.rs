@@ -3,6 +3,7 @@
 use super::free::Free;
 use super::named::{
     Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
+    check_pair,
 };
 use super::setup::Setup;
 use super::wake::WakeFlow;
@@ -57,7 +58,7 @@ impl CaseKind {
                 let allowed = "this key is for case.kind = \"poiseuille\" or \"couette\"";
                 p.require(c.initial_share == 0.0, "case.initial_share", c.initial_share, allowed);
             }
-            Self::VortexPair(c) => c.check(p),
+            Self::VortexPair(c) => check_pair(p, (c.height, c.size), ("case.cross_wind", c.cross_wind), c.slip_sides),
             Self::Wake(c) => c.check(p),
             Self::Free(c) => c.check(p),
             _ => {}

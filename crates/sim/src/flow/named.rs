@@ -133,14 +133,6 @@ impl Dipole {
 }
 
 impl VortexPairFlow {
-    pub(super) fn check(&self, p: &mut Checker<'_>) {
-        let height = self.height;
-        p.require(height > 0.0 && height < self.size[2], "case.height", height, "above 0 and below the top");
-        let still = self.cross_wind == 0.0;
-        let wind = self.cross_wind.is_finite() && (still || !self.slip_sides);
-        p.require(wind, "case.cross_wind", self.cross_wind, "finite, and 0 between frictionless sides");
-    }
-
     pub(super) fn case(&self) -> Result<Case, wakescope_les::Error> {
         let Self { cells, size, ground_stretch, height, core_radius, reynolds, .. } = *self;
         let profile = crate::setup::wind::circulation_profile(self.profile);
@@ -160,4 +152,16 @@ impl VortexPairFlow {
         }
         .case(VortexPairCase::steps(0.02))
     }
+}
+
+/// Limits of a vortex pair in a box of this size, whose cross wind the key `wind` has.
+pub(super) fn check_pair(
+    p: &mut Checker<'_>,
+    (height, size): (f64, [f64; 3]),
+    (key, wind): (&str, f64),
+    slip_sides: bool,
+) {
+    p.require(height > 0.0 && height < size[2], "case.height", height, "above 0 and below the top");
+    let fits = wind.is_finite() && (wind == 0.0 || !slip_sides);
+    p.require(fits, key, wind, "finite, and 0 between frictionless sides");
 }

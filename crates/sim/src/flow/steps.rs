@@ -66,17 +66,13 @@ impl StepTable {
         Ok(())
     }
 
-    /// Writes the last row, whose budget stays open.
-    pub(super) fn finish(&mut self) -> Result<(), Error> {
-        self.write_waiting(None)
-    }
-
     /// What a checkpoint must keep.
     pub(super) fn kept(&self) -> Vec<u8> {
         self.waiting.clone().unwrap_or_default().into_bytes()
     }
 
-    fn write_waiting(&mut self, budget: Option<EnergyBudget>) -> Result<(), Error> {
+    /// Writes the row that waits with its budget, which stays open of the last one.
+    pub(super) fn write_waiting(&mut self, budget: Option<EnergyBudget>) -> Result<(), Error> {
         let Some(row) = self.waiting.take() else { return Ok(()) };
         let [rate, residual] = budget.map_or([f64::NAN; 2], |b| [b.rate_m5_s3, b.residual_m5_s3()]);
         let line = format!("{row},{},{}\n", float_text(rate), float_text(residual));

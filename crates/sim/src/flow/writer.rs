@@ -3,7 +3,7 @@
 //! Check: the tests of `flow` interrupt runs and compare the bytes.
 
 use super::CaseFile;
-use super::files::{CASE, Files};
+use super::files::{CASE, Files, STEPS};
 use super::shared::agree;
 use super::steps::StepTable;
 use super::wake::{HISTORIES, WakeRun};
@@ -70,7 +70,7 @@ impl Writer<'_> {
         self.written.push(folder.join(CASE));
         write_atomic(&folder.join(CASE), format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
         if self.files.output.steps {
-            let path = self.files.steps_path();
+            let path = folder.join(STEPS);
             self.steps = Some(StepTable::open(&path, &self.files.origin, row)?);
             self.written.push(path);
         }
@@ -80,7 +80,7 @@ impl Writer<'_> {
 
     /// Completes the tables.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
-        let steps = self.steps.as_mut().map_or(Ok(()), StepTable::finish);
+        let steps = self.steps.as_mut().map_or(Ok(()), |steps| steps.write_waiting(None));
         match &self.wake {
             Some(wake) if self.ranks.rank() == 0 => steps.and(wake.finish(&self.files.folder, &self.files.origin)),
             _ => steps,

@@ -45,21 +45,15 @@ pub struct Request {
 /// A key that varies.
 #[derive(Debug, Clone, PartialEq)]
 struct Column {
-    /// As the user wrote it.
-    name: String,
+    shown: VaryingKey,
     key: SceneKey,
-    /// Whether others determine it.
-    tied: bool,
 }
 
 impl Column {
     /// The key that a word names; `value` is what it is to be.
     fn named(word: &str, value: &str, tied: bool) -> Result<Self, Problem> {
-        Ok(Self { name: word.trim().into(), key: resolve(word.trim(), value.trim())?, tied })
-    }
-
-    fn described(&self) -> VaryingKey {
-        VaryingKey { name: self.name.clone(), holds: Holds::of(&self.key.kind), tied: self.tied }
+        let key = resolve(word.trim(), value.trim())?;
+        Ok(Self { shown: VaryingKey { name: word.trim().into(), holds: Holds::of(&key.kind), tied }, key })
     }
 }
 
@@ -108,7 +102,7 @@ impl Sweep {
         // What is wrong without the sweep is told with its line.
         let cases = grid.cases().map_err(of_scene)?;
         let seed = request.independent.then(|| Column::named("seed", "", true)).and_then(Result::ok);
-        let keys: Vec<VaryingKey> = grid.columns().chain(&seed).map(Column::described).collect();
+        let keys: Vec<VaryingKey> = grid.columns().chain(&seed).map(|column| column.shown.clone()).collect();
         let origin = grid.origin(&keys, &cases);
         Ok(Self { keys, cases, origin })
     }
@@ -182,7 +176,7 @@ impl<'a> Grid<'a> {
         let again = |(i, column): &(usize, &&Column)| columns[..*i].iter().any(|c| c.key.path == column.key.path);
         if let Some((_, column)) = columns.iter().enumerate().find(again) {
             let why = "each key varies once, by --vary, --cases or --let";
-            return Err(refused("sweep", problem(&column.name, "", why)));
+            return Err(refused("sweep", problem(&column.shown.name, "", why)));
         }
         if request.independent && columns.iter().any(|column| column.key.path == "seed") {
             let why = "with --independent each case has a seed of its own: leave one of the two out";
@@ -212,7 +206,7 @@ impl<'a> Grid<'a> {
         }
         let others = refusals.len().saturating_sub(1);
         if let Some((combination, values, error)) = refusals.into_iter().next() {
-            let names = self.columns().map(|column| column.name.as_str());
+            let names = self.columns().map(|column| column.shown.name.as_str());
             return Err(failed(combination, described(names, &values), others, error));
         }
         if cases.is_empty() {
@@ -245,7 +239,7 @@ impl<'a> Grid<'a> {
             set(&mut table, &column.key.path, value.clone());
         }
         for (column, expression) in &self.lets {
-            let refused = |why: String| refused("--let", problem(&column.name, &expression.to_string(), why));
+            let refused = |why: String| refused("--let", problem(&column.shown.name, &expression.to_string(), why));
             let whole = self.whole(&table)?;
             let number = expression.value(&|name| value_of(&whole, name)).map_err(refused)?;
             let value = column.key.of_number(number).map_err(|problem| refused(problem.allowed))?;
@@ -350,7 +344,7 @@ fn binding(word: &str) -> Result<(Column, Expression), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
     let (name, text) = word.split_once('=').ok_or_else(|| problem("--let", word, example))?;
     let column = Column::named(name, text, true)?;
-    let refuse = |why: String| problem(&column.name, text.trim(), why);
+    let refuse = |why: String| problem(&column.shown.name, text.trim(), why);
     if !column.key.is_numeric() {
         return Err(refuse("an expression is a number, and this key takes none".into()));
     }

@@ -3,7 +3,7 @@
 //! Check: tables by hand; columns and conditions that cannot be are refused.
 
 use super::expression::Condition;
-use super::pareto::{NEAR, Objective, Place, Sense, front};
+use super::pareto::{NEAR, Objective, Place, front};
 use super::results::standard_error_of;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, Table};
@@ -57,12 +57,13 @@ impl FrontTable {
             kept.retain(|row| held[*row]);
         }
         let column = |place: usize| kept.iter().map(|row| table.number(*row, place)).collect::<Vec<f64>>();
-        let small = wanted.min.iter().map(|name| (name, Sense::Min));
-        let mut objectives = Vec::new();
-        for (name, sense) in small.chain(wanted.max.iter().map(|name| (name, Sense::Max))) {
+        let objective = |name: &String, of: fn(Vec<f64>, Vec<f64>) -> Objective| -> Result<Objective, String> {
             let standard_errors = standard_error_of(name, known()).map(place).transpose()?.map_or(Vec::new(), column);
-            objectives.push(Objective { sense, values: column(place(name)?), standard_errors });
-        }
+            Ok(of(column(place(name)?), standard_errors))
+        };
+        let small = wanted.min.iter().map(|name| objective(name, Objective::small));
+        let large = wanted.max.iter().map(|name| objective(name, Objective::large));
+        let objectives = small.chain(large).collect::<Result<Vec<_>, String>>()?;
         if objectives.is_empty() {
             return Err("no column is to be small or large: at least one --min COLUMN or --max COLUMN is needed".into());
         }

@@ -3,42 +3,34 @@
 //! a dominates b if it is nowhere worse and somewhere better. Equal points all stay; what is not finite is never on the front
 //! and dominates nothing. Check: the stored fronts, and every pair of 1000 random points.
 
-/// Whether small or large values are better.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Sense {
-    /// Small ones.
-    Min,
-    /// Large ones.
-    Max,
-}
-
 /// Standard errors of the difference within which a point counts as nearly dominated.
 pub const NEAR: f64 = 2.0;
 
 /// A column that is to be small or large.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Objective {
-    /// What is better.
-    pub sense: Sense,
-    /// Value of each point.
-    pub values: Vec<f64>,
-    /// Standard error of each, in the same unit: empty where all are exact, NaN where it is not known, as of one realisation.
-    pub standard_errors: Vec<f64>,
+    /// What is to be small of each point.
+    costs: Vec<f64>,
+    /// Standard error of each.
+    standard_errors: Vec<f64>,
 }
 
 impl Objective {
-    /// A column known exactly.
-    pub fn exact(sense: Sense, values: Vec<f64>) -> Self {
-        Self { sense, values, standard_errors: Vec::new() }
+    /// A column of which small values are better. Standard errors are in the same unit: none where all values are exact, NaN where one
+    /// is not known, as of one realisation.
+    pub fn small(values: Vec<f64>, standard_errors: Vec<f64>) -> Self {
+        Self { costs: values, standard_errors }
+    }
+
+    /// A column of which large values are better, with standard errors as of a small one.
+    pub fn large(values: Vec<f64>, standard_errors: Vec<f64>) -> Self {
+        Self::small(values.into_iter().map(|value| -value).collect(), standard_errors)
     }
 
     /// By how much point `a` is better than `b`; NaN for what is not there.
     fn gain(&self, a: usize, b: usize) -> f64 {
-        let value = |i: usize| self.values.get(i).copied().unwrap_or(f64::NAN);
-        match self.sense {
-            Sense::Min => value(b) - value(a),
-            Sense::Max => value(a) - value(b),
-        }
+        let cost = |i: usize| self.costs.get(i).copied().unwrap_or(f64::NAN);
+        cost(b) - cost(a)
     }
 
     /// Standard error of the difference of two points; without end where one is not known.
@@ -62,8 +54,8 @@ pub enum Place {
 /// The place of each point.
 #[must_use]
 pub fn front(objectives: &[Objective]) -> Vec<Place> {
-    let points = objectives.iter().map(|o| o.values.len()).min().unwrap_or(0);
-    let is_finite = |i: &usize| objectives.iter().all(|o| o.values[*i].is_finite());
+    let points = objectives.iter().map(|o| o.costs.len()).min().unwrap_or(0);
+    let is_finite = |i: &usize| objectives.iter().all(|o| o.costs[*i].is_finite());
     let finite: Vec<usize> = (0..points).filter(is_finite).collect();
     let dominates = |a: usize, b: usize, lenience: f64| {
         let luck = |o: &Objective| if lenience > 0.0 { lenience * o.error(a, b) } else { 0.0 };

@@ -3,7 +3,7 @@
 //! Check: by eye; a test of the program compares the names of the files.
 
 use super::key_path::Holds;
-use super::pareto::{Objective, Place, Sense, front};
+use super::pareto::{Objective, Place, front};
 use super::results::{RESULTS, standard_error_of};
 use super::stored::{Definition, Row};
 use crate::Error;
@@ -99,8 +99,8 @@ fn of_front(rows: &[Row]) -> CurvePlot {
     let column = |name: &str| rows.iter().map(|row| row.result(name)).collect::<Vec<_>>();
     let (resolution_m, std_m_s, error_m_s) =
         (column("resolution_m"), column("std_m_s"), column("std_standard_error_m_s"));
-    let precision = Objective { sense: Sense::Min, values: std_m_s.clone(), standard_errors: error_m_s.clone() };
-    let places = front(&[Objective::exact(Sense::Min, resolution_m.clone()), precision]);
+    let precision = Objective::small(std_m_s.clone(), error_m_s.clone());
+    let places = front(&[Objective::small(resolution_m.clone(), Vec::new()), precision]);
     let all = || resolution_m.iter().copied().zip(std_m_s.iter().copied());
     let mut best: Vec<(f64, f64)> = all().zip(&places).filter(|(_, p)| **p != Place::Off).map(|(xy, _)| xy).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -1,6 +1,6 @@
 //! The parts of a sweep against stored tables, and what cases share.
 
-use super::pareto::{Objective, Place, Sense, front};
+use super::pareto::{Objective, Place, front};
 use super::*;
 use crate::plan::Stage;
 use crate::scene::{Scene, SceneFile, Weighting};
@@ -118,7 +118,8 @@ fn fronts_are_the_stored_ones() {
         let senses: Vec<&str> = rows[0][3].split(' ').collect();
         let objective = |(i, sense): (usize, &&str)| {
             let values = rows.iter().map(|row| row[4 + i].parse().unwrap()).collect();
-            Objective::exact(if *sense == "max" { Sense::Max } else { Sense::Min }, values)
+            let of = if *sense == "max" { Objective::large } else { Objective::small };
+            of(values, Vec::new())
         };
         let objectives: Vec<Objective> = senses.iter().enumerate().map(objective).collect();
         for (row, place) in rows.iter().zip(front(&objectives)) {
@@ -137,10 +138,12 @@ fn the_front_of_1000_random_points_is_that_of_every_pair() {
         n => n as f64,
     };
     let points: Vec<[f64; 3]> = (0..1000).map(|_| [number(), number(), number()]).collect();
-    let senses = [Sense::Min, Sense::Max, Sense::Min];
     let column = |k: usize| points.iter().map(|p| p[k]).collect();
-    let objectives: Vec<Objective> = (0..3).map(|k| Objective::exact(senses[k], column(k))).collect();
-    let places = front(&objectives);
+    let places = front(&[
+        Objective::small(column(0), Vec::new()),
+        Objective::large(column(1), Vec::new()),
+        Objective::small(column(2), Vec::new()),
+    ]);
     // As costs, of which less is better.
     let cost = |p: &[f64; 3]| [p[0], -p[1], p[2]];
     let mut on = 0;
@@ -160,8 +163,8 @@ fn the_front_of_1000_random_points_is_that_of_every_pair() {
 #[test]
 fn members_within_two_standard_errors_of_being_beaten_are_doubtful() {
     let with = |errors: [f64; 3]| {
-        let precision = Objective { sense: Sense::Min, values: vec![1.0, 1.2, 2.0], standard_errors: errors.to_vec() };
-        front(&[Objective::exact(Sense::Min, vec![20.0, 10.0, 30.0]), precision])
+        let precision = Objective::small(vec![1.0, 1.2, 2.0], errors.to_vec());
+        front(&[Objective::small(vec![20.0, 10.0, 30.0], Vec::new()), precision])
     };
     assert_eq!(with([0.0; 3]), [Place::On, Place::On, Place::Off]);
     // 0.2 apart: 2 sqrt(2) 0.08 is more, 2 sqrt(2) 0.07 less.

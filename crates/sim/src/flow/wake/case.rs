@@ -1,6 +1,6 @@
 //! The wake of an aircraft near the ground: the keys of its case, their limits, the case of the solver.
 
-use super::super::named::STRETCH;
+use super::super::named::{STRETCH, check_pair};
 use super::super::setup::{Setup, WakeSetup};
 use crate::Error;
 use crate::keys::{ABOVE_ZERO, Checker, Is, ZERO_OR_MORE, keys};
@@ -118,12 +118,8 @@ keys! {
 
 impl WakeFlow {
     pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
-        let height = self.height;
-        p.require(height > 0.0 && height < self.size[2], "case.height", height, "above 0 and below the top");
-        let open = !self.slip_sides;
-        let still = self.cross_wind_m_s == 0.0;
-        let wind = self.cross_wind_m_s.is_finite() && (still || open);
-        p.require(wind, "case.cross_wind_m_s", self.cross_wind_m_s, "finite, and 0 between frictionless sides");
+        let wind = ("case.cross_wind_m_s", self.cross_wind_m_s);
+        check_pair(p, (self.height, self.size), wind, self.slip_sides);
         if let Err(error) = self.pair.scales().and_then(|scales| scales.validate()) {
             p.require(false, "case.pair", self.pair, error.to_string());
         }
