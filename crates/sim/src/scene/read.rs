@@ -62,14 +62,6 @@ impl SceneFile {
         &KEYS
     }
 
-    /// The table of a text with every default written out, whatever the limits of its values.
-    ///
-    /// # Errors
-    /// Keys that do not exist, values of the wrong kind.
-    pub(crate) fn whole_table(text: &str, path: &Path) -> Result<toml::Table, SceneError> {
-        Ok(toml::Table::try_from(Self::without_limits(text, path)?).unwrap_or_default())
-    }
-
     /// The scene of a text, whatever the limits of its values.
     ///
     /// # Errors

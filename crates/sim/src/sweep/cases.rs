@@ -8,7 +8,7 @@ use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text, text_file};
-use crate::keys::{Located, Problem, SceneError};
+use crate::keys::{Located, Problem, SceneError, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
 use crate::setup::streams::stream;
 use rand_xoshiro::rand_core::Rng;
@@ -266,8 +266,9 @@ impl<'a> Grid<'a> {
     }
 
     /// A table with all defaults.
-    fn whole(&self, table: &Table) -> Result<Table, Error> {
-        Ok(SceneFile::whole_table(&text_of(table), self.path)?)
+    fn whole(&self, table: &Table) -> Result<Value, Error> {
+        let scene = SceneFile::without_limits(&text_of(table), self.path)?;
+        Ok(Value::Table(Table::try_from(scene).unwrap_or_default()))
     }
 
     fn origin(&self, keys: &[VaryingKey], cases: &[Case]) -> Provenance {
@@ -397,12 +398,9 @@ fn set(table: &mut Table, path: &str, value: Value) {
 }
 
 /// The number that a name in an expression stands for.
-fn value_of(whole: &Table, name: &str) -> Result<f64, String> {
+fn value_of(whole: &Value, name: &str) -> Result<f64, String> {
     let key = resolve(name, "").map_err(|problem| problem.to_string())?;
-    let mut names = key.path.split('.');
-    let first = names.next().and_then(|name| whole.get(name));
-    let value = names.fold(first, |value, name| value?.get(name));
-    match value {
+    match value_at(whole, &key.path) {
         Some(Value::Float(number)) => Ok(*number),
         Some(Value::Integer(number)) => Ok(*number as f64),
         Some(other) => Err(format!("{name} is {other}, and only numbers can be computed with")),
