@@ -27,9 +27,8 @@ impl Simulator {
         self.illuminate(shot.line, &[], scratch)?;
         let gain = self.amplitude_gain_a_sqrt_s(shot.line).powi(2);
         for (k, out) in out_a2.iter_mut().enumerate() {
-            let (first, _) = scratch.window.layers_at(k);
             let lit = scratch.window.amplitudes_at(self.pulse(), shot.line.layer_thickness_m, k);
-            let layers = (first..).zip(lit.amplitudes()).filter(|(layer, _)| !shot.line.is_masked(*layer));
+            let layers = lit.amplitudes().filter(|(layer, _)| !shot.line.is_masked(*layer));
             *out = gain * layers.map(|(layer, f)| f.norm_sqr() * shot.weight_per_m(layer)).sum::<f64>();
         }
         check_overflow("out_a2", out_a2.iter().map(|power| power.is_finite()))
@@ -63,7 +62,6 @@ impl Simulator {
         let gain = self.amplitude_gain_a_sqrt_s(line);
         let mut responses = Vec::with_capacity(samples);
         for k in 0..samples {
-            let (first, _) = scratch.window.layers_at(k);
             let lit = scratch.window.amplitudes_at(self.pulse(), line.layer_thickness_m, k);
             let response = |(layer, envelope): (usize, Complex<f64>)| {
                 if line.is_masked(layer) {
@@ -72,7 +70,7 @@ impl Simulator {
                 let phase_rad = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]) * self.time_s(k);
                 envelope * Complex::cis(phase_rad) * (gain * shot.weight_per_m(layer).sqrt())
             };
-            responses.push((first, (first..).zip(lit.amplitudes()).map(response).collect::<Vec<_>>()));
+            responses.push((lit.first, lit.amplitudes().map(response).collect::<Vec<_>>()));
         }
         let mut covariance = Array2::zeros((samples, samples));
         for (m, (first_m, row)) in responses.iter().enumerate() {

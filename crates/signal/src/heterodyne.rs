@@ -223,9 +223,8 @@ impl Simulator {
             let start = block * RENEWAL_SAMPLES;
             self.renew(shot, speckle, window, phasors, start..start + outs.len());
             for (k, out) in (start..).zip(outs) {
-                let (first, _) = window.layers_at(k);
                 let envelope = window.amplitudes_at(&self.pulse, line.layer_thickness_m, k);
-                let (re, im) = phasors.sum_and_rotate(first, envelope);
+                let (re, im) = phasors.sum_and_rotate(envelope);
                 *out = Complex::new(re, im);
             }
         }

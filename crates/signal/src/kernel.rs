@@ -30,8 +30,8 @@ impl Phasors {
 
     /// `sum_l envelope[l - first] phasor[l]` over the layers of `envelope`, then rotates these phasors by one sampling
     /// interval.
-    pub(crate) fn sum_and_rotate(&mut self, first: usize, envelope: Lit<'_>) -> (f64, f64) {
-        let window = first..first + envelope.re.len();
+    pub(crate) fn sum_and_rotate(&mut self, envelope: Lit<'_>) -> (f64, f64) {
+        let window = envelope.first..envelope.first + envelope.re.len();
         let phasors = (&mut self.re[window.clone()], &mut self.im[window.clone()]);
         sum_and_rotate(envelope, phasors, (&self.rotation_re[window.clone()], &self.rotation_im[window]))
     }

@@ -49,30 +49,27 @@ pub(crate) struct Window {
     step: f64,
     /// Whole number of layers per sample, if it is one over the whole record.
     aligned_step: Option<i64>,
-    /// Amplitudes of the layers from `-near` to `far` about the nearest one.
-    amplitude: Amplitude,
+    /// Real parts of the amplitudes of the layers from `-near` to `far` about the nearest one, and imaginary parts unless
+    /// the envelope is real.
+    re: Vec<f64>,
+    im: Vec<f64>,
     /// Factors `exp(j phase)` on them, the phase of the laser while it sent the pulse; empty for a quiet laser.
     turns: Vec<Complex<f64>>,
 }
 
-/// Real and imaginary parts; the latter is empty if the envelope is real.
-#[derive(Debug, Default)]
-struct Amplitude {
-    re: Vec<f64>,
-    im: Vec<f64>,
-}
-
-/// Amplitudes of some layers: real parts, and imaginary parts unless the envelope is real.
+/// Amplitudes of the layers from `first` on: real parts, and imaginary parts unless the envelope is real.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Lit<'a> {
+    pub(crate) first: usize,
     pub(crate) re: &'a [f64],
     pub(crate) im: &'a [f64],
 }
 
 impl Lit<'_> {
-    /// The amplitudes as complex numbers.
-    pub(crate) fn amplitudes(&self) -> impl Iterator<Item = Complex<f64>> {
-        self.re.iter().enumerate().map(|(j, re)| Complex::new(*re, self.im.get(j).copied().unwrap_or(0.0)))
+    /// The layers and their amplitudes as complex numbers.
+    pub(crate) fn amplitudes(&self) -> impl Iterator<Item = (usize, Complex<f64>)> {
+        let amplitude = |(j, re): (usize, &f64)| Complex::new(*re, self.im.get(j).copied().unwrap_or(0.0));
+        (self.first..).zip(self.re.iter().enumerate().map(amplitude))
     }
 }
 
@@ -97,8 +94,8 @@ impl Window {
         turns.clone_into(&mut self.turns);
         let count = lit_layers((self.near, self.far));
         let real = pulse.is_real() && turns.is_empty();
-        self.amplitude.re.resize(count, 0.0);
-        self.amplitude.im.resize(if real { 0 } else { count }, 0.0);
+        self.re.resize(count, 0.0);
+        self.im.resize(if real { 0 } else { count }, 0.0);
         if aligned {
             self.fill_amplitudes(pulse, thickness_m, self.start - self.start.round());
         }
@@ -117,11 +114,11 @@ impl Window {
         let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
         let near = self.near as f64;
         let at = |j: usize| -> Complex<f64> { pulse.envelope_per_sqrt_s((offset + near - j as f64) * layer_s) };
-        if self.amplitude.im.is_empty() {
-            self.amplitude.re.iter_mut().enumerate().for_each(|(j, re)| *re = at(j).re);
+        if self.im.is_empty() {
+            self.re.iter_mut().enumerate().for_each(|(j, re)| *re = at(j).re);
             return;
         }
-        for (j, (re, im)) in self.amplitude.re.iter_mut().zip(&mut self.amplitude.im).enumerate() {
+        for (j, (re, im)) in self.re.iter_mut().zip(&mut self.im).enumerate() {
             let turn = self.turns.get(j).copied().unwrap_or(Complex::ONE);
             Complex { re: *re, im: *im } = at(j) * turn;
         }
@@ -151,11 +148,10 @@ impl Window {
         }
         let (first, end) = self.layers_at(k);
         if first == end {
-            return Lit { re: &[], im: &[] };
+            return Lit { first, re: &[], im: &[] };
         }
         let shift = (first as i64 - (self.centre(k) - self.near)) as usize;
         let lit = shift..shift + (end - first);
-        let im = if self.amplitude.im.is_empty() { &[] } else { &self.amplitude.im[lit.clone()] };
-        Lit { re: &self.amplitude.re[lit], im }
+        Lit { first, re: &self.re[lit.clone()], im: self.im.get(lit).unwrap_or(&[]) }
     }
 }

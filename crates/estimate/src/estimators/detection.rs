@@ -129,85 +129,28 @@ impl NoiseTest {
         let (padded, band) =
             (padded_samples as f64, (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz);
         let within = if bins.cyclic { 1.0 } else { bins.bins.saturating_sub(2) as f64 / padded };
-        let lags = lag_weights.map_or(samples, |weights| weights.len().min(samples));
-        // Every so many samples stand for all. Where the lags reach not far, a shorter window of like tapers, too: so many times less independent.
-        let every = lags.div_ceil(SAMPLES);
-        let shorter = (samples / (every * SAMPLES.max(8 * lags / every))).max(1);
-        let size = samples.div_ceil(every * shorter);
-        let form = Array2::from_shape_fn((size, size), |(i, j)| {
-            let lag = i.abs_diff(j) * every;
-            let weight = if lag < lags { lag_weights.map_or(1.0, |weights| weights[lag]) } else { 0.0 };
-            let product = |h: &Vec<C64>| h[i * every * shorter] * h[j * every * shorter].conj();
-            tapers.iter().map(product).sum::<C64>() * weight
-        });
-        positive("power of the tapers", form.diag().iter().map(|q| q.re).sum())?;
-        let middle = 0.5 * (sampling.band_hz.0 + sampling.band_hz.1) / sampling.sample_rate_hz;
-        // Covariance of the noise in places, as it is so far from the middle of the band.
-        let covariance = |size: usize, offset: f64| {
-            let white = match noise {
-                Noise::Band { floor } if band * (every as f64) < 1.0 => floor,
-                _ => 1.0,
-            };
-            let lag = |lag: usize| {
-                let own = if lag == 0 { white } else { 0.0 };
-                let apart = (lag * every) as f64;
-                let within = if white < 1.0 {
-                    noise.covariance(sampling, apart, SignalKind::Complex) - own
-                } else {
-                    Complex::ZERO
-                };
-                within * every as f64 * Complex::from_polar(1.0, -TAU * (middle + offset) * apart) + own
-            };
-            let lags: Vec<C64> = (0..size).map(lag).collect();
-            Array2::from_shape_fn((size, size), |(i, j)| if i >= j { lags[i - j] } else { lags[j - i].conj() })
-        };
-        let seen = |offset: f64| {
-            let product = covariance(size, offset).dot(&form);
-            (product.diag().iter().map(|q| q.re).sum::<f64>(), trace(&product, &product).sqrt())
-        };
-        let (mean, deviation) = seen(0.0);
+        let form = Form::new(sampling, tapers, lag_weights, noise)?;
+        let (mean, deviation) = form.seen(0.0);
         positive("power of the weights of the lags", deviation)?;
         let part = |part: usize| {
-            let (own_mean, own_deviation) = seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
+            let (own_mean, own_deviation) = form.seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
             (own_mean / mean, own_deviation / deviation)
         };
         // Windows see noise of their own where they are so far apart that even noise of the band alone has forgotten: sinc(20)^2 is below
         // 3e-4. Beyond that a wider step changes nothing but the size of the covariance.
         let forgotten = (20.0 / band).min(8.0 * samples as f64) as usize;
         let step = gates.step_samples.min(samples + forgotten.max(samples));
-        let start = |gate: usize| (gate * step) as f64 / (every * shorter) as f64;
-        let moments = |gates: usize| {
-            let length = size + start(gates - 1).round() as usize;
-            let mut sum = Array2::<C64>::zeros((length, length));
-            for at in (0..gates).map(|gate| start(gate).round() as usize) {
-                let mut part = sum.slice_mut(ndarray::s![at..at + size, at..at + size]);
-                part += &form;
-            }
-            let turned = Array2::from_shape_fn((length, length), |(i, j)| {
-                sum[[i, j]] * Complex::new(0.0, TAU * every as f64 * (i as f64 - j as f64))
-            });
-            let covariance = covariance(length, 0.0);
-            let (once, turned) = (covariance.dot(&sum), covariance.dot(&turned));
-            let twice = once.dot(&once);
-            let (unit, less) = (mean.recip(), shorter as f64);
-            let [second, third] = [unit * unit / less, (unit / less).powi(2) * unit];
-            [
-                trace(&once, &once) * second,
-                trace(&twice, &once) * third,
-                trace(&twice, &twice) * third * unit / less,
-                0.5 * trace(&turned, &turned) * second,
-            ]
-        };
-        let in_band = form.indexed_iter().map(|((i, j), q)| {
-            let turn = PI * band * (i.abs_diff(j) * every) as f64;
+        let rows = lengths(2 * samples / gates.step_samples + 2).into_iter();
+        let in_band = form.matrix.indexed_iter().map(|((i, j), q)| {
+            let turn = PI * band * (i.abs_diff(j) * form.every) as f64;
             q.norm_sqr() * if i == j { 1.0 } else { (turn.sin() / turn).powi(2) }
         });
-        let power: f64 = form.diag().iter().map(|q| q.re).sum();
+        let power: f64 = form.matrix.diag().iter().map(|q| q.re).sum();
         Ok(Self {
-            band_variance: in_band.sum::<f64>() / (power * power * shorter as f64),
+            band_variance: in_band.sum::<f64>() / (power * power * form.shorter as f64),
             band: (band, within),
             padded,
-            moments: lengths(2 * samples / gates.step_samples + 2).into_iter().map(|row| (row, moments(row))).collect(),
+            moments: rows.map(|gates| (gates, form.moments(gates, step, mean))).collect(),
             profile: (0..PARTS).map(part).collect(),
         })
     }
@@ -299,6 +242,95 @@ impl NoiseTest {
         }
         let [low, high] = bisected(low, high, 60, |level| self.false_alarm(region, level) > rate);
         Ok(if region.n_eff > 0.0 { 0.5 * (low + high) } else { f64::NAN })
+    }
+}
+
+/// The quadratic form A of one window, in every so many of its samples, and the noise it looks at.
+struct Form<'a> {
+    matrix: Array2<C64>,
+    /// Every so many samples stand for all. Where the lags reach not far, a shorter window of like tapers, too: so many times less independent.
+    every: usize,
+    shorter: usize,
+    sampling: &'a Sampling,
+    noise: Noise,
+}
+
+impl<'a> Form<'a> {
+    /// Of tapers of one length that is not 0.
+    fn new(
+        sampling: &'a Sampling,
+        tapers: &[Vec<C64>],
+        lag_weights: Option<&[f64]>,
+        noise: Noise,
+    ) -> Result<Self, Error> {
+        let samples = tapers[0].len();
+        let lags = lag_weights.map_or(samples, |weights| weights.len().min(samples));
+        let every = lags.div_ceil(SAMPLES);
+        let shorter = (samples / (every * SAMPLES.max(8 * lags / every))).max(1);
+        let size = samples.div_ceil(every * shorter);
+        let matrix = Array2::from_shape_fn((size, size), |(i, j)| {
+            let lag = i.abs_diff(j) * every;
+            let weight = if lag < lags { lag_weights.map_or(1.0, |weights| weights[lag]) } else { 0.0 };
+            let product = |h: &Vec<C64>| h[i * every * shorter] * h[j * every * shorter].conj();
+            tapers.iter().map(product).sum::<C64>() * weight
+        });
+        positive("power of the tapers", matrix.diag().iter().map(|q| q.re).sum())?;
+        Ok(Self { matrix, every, shorter, sampling, noise })
+    }
+
+    /// Covariance C of the noise in `size` places, as it is `offset` cycles per sample from the middle of the band.
+    fn covariance(&self, size: usize, offset: f64) -> Array2<C64> {
+        let Self { every, sampling, noise, .. } = *self;
+        let (low_hz, high_hz) = sampling.band_hz;
+        let band = (high_hz - low_hz) / sampling.sample_rate_hz;
+        let middle = 0.5 * (low_hz + high_hz) / sampling.sample_rate_hz;
+        let white = match noise {
+            Noise::Band { floor } if band * (every as f64) < 1.0 => floor,
+            _ => 1.0,
+        };
+        let lag = |lag: usize| {
+            let own = if lag == 0 { white } else { 0.0 };
+            if white >= 1.0 {
+                return Complex::from(own);
+            }
+            let apart = (lag * every) as f64;
+            let within = noise.covariance(sampling, apart, SignalKind::Complex) - own;
+            within * every as f64 * Complex::from_polar(1.0, -TAU * (middle + offset) * apart) + own
+        };
+        let lags: Vec<C64> = (0..size).map(lag).collect();
+        Array2::from_shape_fn((size, size), |(i, j)| if i >= j { lags[i - j] } else { lags[j - i].conj() })
+    }
+
+    /// Mean tr CA and deviation of the density of one window so far from the middle of the band.
+    fn seen(&self, offset: f64) -> (f64, f64) {
+        let product = self.covariance(self.matrix.nrows(), offset).dot(&self.matrix);
+        (product.diag().iter().map(|q| q.re).sum(), trace(&product, &product).sqrt())
+    }
+
+    /// The traces of [`NoiseTest`] for that many windows in a row, `step` samples apart, where a window has the mean `mean`.
+    fn moments(&self, gates: usize, step: usize, mean: f64) -> [f64; 4] {
+        let (size, every) = (self.matrix.nrows(), self.every);
+        let start = |gate: usize| ((gate * step) as f64 / (every * self.shorter) as f64).round() as usize;
+        let length = size + start(gates - 1);
+        let mut sum = Array2::<C64>::zeros((length, length));
+        for at in (0..gates).map(start) {
+            let mut part = sum.slice_mut(ndarray::s![at..at + size, at..at + size]);
+            part += &self.matrix;
+        }
+        let turned = Array2::from_shape_fn((length, length), |(i, j)| {
+            sum[[i, j]] * Complex::new(0.0, TAU * every as f64 * (i as f64 - j as f64))
+        });
+        let covariance = self.covariance(length, 0.0);
+        let (once, turned) = (covariance.dot(&sum), covariance.dot(&turned));
+        let twice = once.dot(&once);
+        let (unit, less) = (mean.recip(), self.shorter as f64);
+        let [second, third] = [unit * unit / less, (unit / less).powi(2) * unit];
+        [
+            trace(&once, &once) * second,
+            trace(&twice, &once) * third,
+            trace(&twice, &twice) * third * unit / less,
+            0.5 * trace(&turned, &turned) * second,
+        ]
     }
 }
 

@@ -47,17 +47,10 @@ impl<S: Sample> ShortCorrelogram<S> {
 
     /// The sums of products of one window, not divided by N.
     fn sums(&self, window: &[S], out: &mut [f64]) {
-        out.fill(0.0);
-        for m in 0..self.lags {
-            let sum: num_complex::Complex<f64> = window[m..]
-                .iter()
-                .zip(window)
-                .map(|(ahead, behind)| ahead.to_complex() * behind.to_complex().conj())
-                .sum();
-            match S::KIND {
-                SignalKind::Real => out[m] = sum.re,
-                SignalKind::Complex => out[2 * m..2 * m + 2].copy_from_slice(&[sum.re, sum.im]),
-            }
+        for (m, parts) in out.chunks_mut(S::KIND.lag_numbers(1)).enumerate() {
+            let products = window[m..].iter().zip(window).map(|(a, b)| a.to_complex() * b.to_complex().conj());
+            let sum: num_complex::Complex<f64> = products.sum();
+            parts.copy_from_slice(&[sum.re, sum.im][..parts.len()]);
         }
     }
 
