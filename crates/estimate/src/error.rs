@@ -120,40 +120,45 @@ pub enum Error {
     },
 }
 
+/// Refuses a number that is not as `allowed` tells.
+pub(crate) fn check(field: &'static str, value: f64, allowed: &'static str, is_allowed: bool) -> Result<(), Error> {
+    if is_allowed { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed }) }
+}
+
 /// Checks that a number is finite and positive.
 pub(crate) fn positive(field: &'static str, value: f64) -> Result<(), Error> {
-    if value.is_finite() && value > 0.0 {
-        Ok(())
-    } else {
-        Err(Error::OutOfRange { field, value, allowed: "finite and above 0" })
-    }
+    check(field, value, "finite and above 0", value.is_finite() && value > 0.0)
 }
 
 /// Checks that a number is finite.
 pub(crate) fn finite(field: &'static str, value: f64) -> Result<(), Error> {
-    if value.is_finite() { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed: "finite" }) }
+    check(field, value, "finite", value.is_finite())
 }
 
 /// Checks that a number is finite and not negative.
 pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<(), Error> {
-    if value.is_finite() && value >= 0.0 {
-        Ok(())
-    } else {
-        Err(Error::OutOfRange { field, value, allowed: "finite and at least 0" })
-    }
+    check(field, value, "finite and at least 0", value.is_finite() && value >= 0.0)
 }
 
 /// Checks that there is at least one.
 pub(crate) fn at_least_one(field: &'static str, count: usize) -> Result<(), Error> {
-    if count > 0 { Ok(()) } else { Err(Error::OutOfRange { field, value: 0.0, allowed: "at least 1" }) }
+    check(field, 0.0, "at least 1", count > 0)
+}
+
+/// Checks that a number is the chance of something that may happen or not.
+pub(crate) fn probability(field: &'static str, value: f64) -> Result<(), Error> {
+    check(field, value, "between 0 and 1", value > 0.0 && value < 1.0)
+}
+
+/// Checks that an argument has elements.
+pub(crate) fn not_empty(field: &'static str, count: usize) -> Result<(), Error> {
+    if count > 0 { Ok(()) } else { Err(Error::Empty { field }) }
 }
 
 /// Checks that finite numbers increase.
 pub(crate) fn increasing(field: &'static str, numbers: &[f64]) -> Result<(), Error> {
-    match numbers.windows(2).find(|pair| pair[1] <= pair[0]) {
-        Some(pair) => Err(Error::OutOfRange { field, value: pair[1], allowed: "increasing" }),
-        None => Ok(()),
-    }
+    let late = numbers.windows(2).find(|pair| pair[1] <= pair[0]);
+    late.map_or(Ok(()), |pair| check(field, pair[1], "increasing", false))
 }
 
 /// Checks the length of an array.

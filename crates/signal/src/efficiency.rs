@@ -2,7 +2,7 @@
 //!
 //! Check: straight lines between the points; each pulse gets its realisation; the mean over them is the curve.
 
-use crate::error::check_length;
+use crate::error::{check_any, check_length};
 use crate::table::{check_ranges, check_values, locate, value};
 use crate::{Error, LineOfSight};
 
@@ -22,9 +22,7 @@ impl EfficiencyTable {
     /// efficiency that is negative or not finite; [`Error::LengthMismatch`] for a realisation of another length.
     pub fn new<E: AsRef<[f64]>>(range_m: Vec<f64>, realisations: &[E]) -> Result<Self, Error> {
         check_ranges(&range_m)?;
-        if realisations.is_empty() {
-            return Err(Error::Empty { field: "realisations" });
-        }
+        check_any("realisations", realisations.len())?;
         let mut efficiency = Vec::with_capacity(range_m.len() * realisations.len());
         for realisation in realisations {
             check_values("efficiency", realisation.as_ref(), range_m.len())?;
@@ -51,9 +49,7 @@ impl EfficiencyTable {
             locate(&self.range_m, value).ok_or(Error::OutOfRange { field, value, allowed })
         };
         let places = (0..line.layers()).map(place).collect::<Result<Vec<_>, _>>()?;
-        if places.is_empty() {
-            return Err(Error::Empty { field: "radial_velocity_m_s" });
-        }
+        check_any("radial_velocity_m_s", places.len())?;
         let rows = self.efficiency.chunks_exact(self.range_m.len());
         let efficiency = rows.flat_map(|row| places.iter().map(|&place| value(row, place))).collect();
         Ok(LayerEfficiency { layers: places.len(), efficiency })

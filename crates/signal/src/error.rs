@@ -85,6 +85,11 @@ pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -
     if found == expected { Ok(()) } else { Err(Error::LengthMismatch { field, found, expected }) }
 }
 
+/// As many elements as there must be of what needs one, or [`Error::Empty`].
+pub(crate) fn check_any(field: &'static str, found: usize) -> Result<(), Error> {
+    if found > 0 { Ok(()) } else { Err(Error::Empty { field }) }
+}
+
 /// Elements that `accept` holds for, or [`Error::ElementOutOfRange`] with the first of which it does not.
 pub(crate) fn check_each(
     field: &'static str,
@@ -96,6 +101,13 @@ pub(crate) fn check_each(
         Some(index) => Err(Error::ElementOutOfRange { field, index, value: values[index], allowed }),
         None => Ok(()),
     }
+}
+
+/// Finite elements of which each is larger than the one before, or [`Error::ElementOutOfRange`].
+pub(crate) fn check_increasing(field: &'static str, values: &[f64], allowed: &'static str) -> Result<(), Error> {
+    check_each(field, values, "finite", f64::is_finite)?;
+    let late = values.windows(2).position(|pair| pair[1] <= pair[0]).map(|before| before + 1);
+    late.map_or(Ok(()), |index| Err(Error::ElementOutOfRange { field, index, value: values[index], allowed }))
 }
 
 /// [`Error::Overflow`] at the first element of a result that is not finite.

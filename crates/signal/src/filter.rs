@@ -9,7 +9,7 @@
 //! Check: a constant is kept to round-off, a linear profile is kept (seen `c T_s/4` before R through a gate), and the
 //! discrete weights agree with a fine quadrature.
 
-use crate::error::{check, check_each, check_length, check_positive};
+use crate::error::{check, check_any, check_each, check_length, check_positive};
 use crate::{Error, Pulse, SPEED_OF_LIGHT_M_S};
 
 /// Ranges are placed between layers to this many parts of a layer, so that equal positions share their weights
@@ -55,9 +55,7 @@ impl RangeFilter {
         layer_thickness_m: f64,
     ) -> Result<Self, Error> {
         check_positive("sample_rate_hz", sample_rate_hz)?;
-        if window.is_empty() {
-            return Err(Error::Empty { field: "window" });
-        }
+        check_any("window", window.len())?;
         check_each("window", window, "finite", f64::is_finite)?;
         let largest = window.iter().fold(0.0_f64, |largest, h| largest.max(h.abs()));
         check_each("window", &window[..1], "not zero in every place", |_| largest > 0.0)?;
@@ -153,9 +151,7 @@ impl RangeFilter {
     ) -> Result<(), Error> {
         check("first_range_m", first_range_m, "finite", |_| true)?;
         check_length("out_m_s", out_m_s.len(), range_m.len())?;
-        if radial_velocity_m_s.is_empty() {
-            return Err(Error::Empty { field: "radial_velocity_m_s" });
-        }
+        check_any("radial_velocity_m_s", radial_velocity_m_s.len())?;
         let mut between = (0.0, self.centred.clone());
         for (index, (&range_m, out)) in range_m.iter().zip(out_m_s).enumerate() {
             if !range_m.is_finite() {

@@ -3,7 +3,7 @@
 //!
 //! Check: the thickness divides the range step of one sample and obeys the rule of the steepest gradient.
 
-use crate::error::{check, check_amounts, check_each, check_length, check_positive};
+use crate::error::{check, check_amounts, check_any, check_each, check_length, check_positive};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 
 /// The air along one line of sight, cut into layers of equal thickness.
@@ -30,9 +30,7 @@ impl LineOfSight {
     pub fn validate(&self) -> Result<(), Error> {
         check("first_range_m", self.first_range_m, "finite", |_| true)?;
         check_positive("layer_thickness_m", self.layer_thickness_m)?;
-        if self.radial_velocity_m_s.is_empty() {
-            return Err(Error::Empty { field: "radial_velocity_m_s" });
-        }
+        check_any("radial_velocity_m_s", self.radial_velocity_m_s.len())?;
         check_length("weight_per_m", self.weight_per_m.len(), self.radial_velocity_m_s.len())?;
         let allowed = "finite, or NaN where there are no scatterers";
         check_each("radial_velocity_m_s", &self.radial_velocity_m_s, allowed, |v| !v.is_infinite())?;

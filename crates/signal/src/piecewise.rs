@@ -83,8 +83,7 @@ impl Piecewise {
         let index = index.min(end);
         let start = self.knots_s[index];
         let u = (time_s - start) / (self.knots_s[index + 1] - start);
-        let [c0, c1, c2, c3] = self.pieces[index];
-        c0 + (c1 + (c2 + c3 * u) * u) * u
+        at(&self.pieces[index], u)
     }
 
     /// Multiplies the function.
@@ -100,9 +99,7 @@ impl Piecewise {
     /// Energy of each piece.
     fn energies(&self) -> Vec<f64> {
         let energy = |(piece, knots): (&[Complex<f64>; 4], &[f64])| {
-            let [c0, c1, c2, c3] = *piece;
-            let at = |u: f64| (c0 + (c1 + (c2 + c3 * u) * u) * u).norm_sqr();
-            (knots[1] - knots[0]) * GAUSS.iter().map(|&(u, weight)| weight * at(u)).sum::<f64>()
+            (knots[1] - knots[0]) * GAUSS.iter().map(|&(u, weight)| weight * at(piece, u).norm_sqr()).sum::<f64>()
         };
         self.pieces.iter().zip(self.knots_s.windows(2)).map(energy).collect()
     }
@@ -133,10 +130,10 @@ impl Piecewise {
         let (mut mean_hz, mut square_hz2, mut cross) = (0.0, 0.0, 0.0);
         for (piece, knots) in self.pieces.iter().zip(self.knots_s.windows(2)) {
             let step_s = knots[1] - knots[0];
-            let [c0, c1, c2, c3] = *piece;
+            let [_, c1, c2, c3] = *piece;
             for (u, weight) in GAUSS {
                 let (time_s, weight) = (knots[0] + u * step_s, weight * step_s);
-                let f = c0 + (c1 + (c2 + c3 * u) * u) * u;
+                let f = at(piece, u);
                 let slope = (c1 + (c2 * 2.0 + c3 * (3.0 * u)) * u) / (2.0 * PI * step_s);
                 let (power, turning) = (weight * f.norm_sqr(), weight * (f.conj() * slope).im);
                 energy += power;
@@ -156,6 +153,11 @@ impl Piecewise {
             cross: cross / energy,
         }
     }
+}
+
+/// Value of a piece at the part `u` of its length.
+fn at([c0, c1, c2, c3]: &[Complex<f64>; 4], u: f64) -> Complex<f64> {
+    c0 + (c1 + (c2 + c3 * u) * u) * u
 }
 
 fn is_even(knots_s: &[f64]) -> bool {

@@ -8,7 +8,7 @@ use num_complex::Complex;
 use rustfft::FftPlanner;
 
 use crate::Error;
-use crate::error::{check, check_amounts, check_each, check_length, check_positive};
+use crate::error::{check, check_amounts, check_increasing, check_length, check_positive};
 use crate::piecewise::{Moments, Piecewise};
 
 /// Energy cut off at each end, as a part of the whole.
@@ -112,11 +112,7 @@ impl SampledPulse {
 fn check_samples(time_s: &[f64], amplitude: &[Complex<f64>]) -> Result<f64, Error> {
     check("samples of the envelope", time_s.len() as f64, "2 or more", |n| n >= 2.0)?;
     check_length("amplitude", amplitude.len(), time_s.len())?;
-    let bad_time = |index, allowed| Error::ElementOutOfRange { field: "time_s", index, value: time_s[index], allowed };
-    check_each("time_s", time_s, "finite", f64::is_finite)?;
-    if let Some(before) = time_s.windows(2).position(|t| t[1] <= t[0]) {
-        return Err(bad_time(before + 1, "later than the time before"));
-    }
+    check_increasing("time_s", time_s, "later than the time before")?;
     let bad_value = |index, value, allowed| Error::ElementOutOfRange { field: "amplitude", index, value, allowed };
     if let Some((index, a)) = amplitude.iter().enumerate().find(|(_, a)| !a.is_finite()) {
         return Err(bad_value(index, if a.re.is_finite() { a.im } else { a.re }, "finite"));

@@ -3,21 +3,12 @@
 //! Check: the tests of `medium` and `efficiency`.
 
 use crate::Error;
-use crate::error::{check_amounts, check_each, check_length};
+use crate::error::{check_amounts, check_any, check_increasing, check_length};
 
 /// Ranges that are finite and increase, at least one.
 pub(crate) fn check_ranges(range_m: &[f64]) -> Result<(), Error> {
-    if range_m.is_empty() {
-        return Err(Error::Empty { field: "range_m" });
-    }
-    check_each("range_m", range_m, "finite", f64::is_finite)?;
-    match range_m.windows(2).position(|r| r[1] <= r[0]) {
-        Some(before) => {
-            let (index, allowed) = (before + 1, "larger than the range before");
-            Err(Error::ElementOutOfRange { field: "range_m", index, value: range_m[index], allowed })
-        }
-        None => Ok(()),
-    }
+    check_any("range_m", range_m.len())?;
+    check_increasing("range_m", range_m, "larger than the range before")
 }
 
 /// One value per range, finite and not negative.

@@ -10,7 +10,7 @@ use ndarray::{Array2, s};
 
 use super::Noise;
 use super::window_model::{LEAST_CONDITION, turned};
-use crate::error::{Error, at_least_one};
+use crate::error::{Error, at_least_one, not_empty};
 use crate::linalg::cholesky::{cholesky, forward};
 use crate::window::{Gates, Sampling, SignalKind};
 
@@ -45,9 +45,7 @@ impl RecordModel {
     ) -> Result<Self, Error> {
         sampling.validate_for(kind)?;
         noise.validate()?;
-        if correlation.is_empty() {
-            return Err(Error::Empty { field: "correlation" });
-        }
+        not_empty("correlation", correlation.len())?;
         Ok(Self { sampling: *sampling, kind, noise, correlation, is_gaussian })
     }
 

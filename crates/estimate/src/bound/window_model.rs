@@ -12,7 +12,7 @@ use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
 
 use super::extended;
-use crate::error::{Error, finite, length, positive};
+use crate::error::{Error, check, finite, length, not_empty, positive};
 use crate::linalg;
 use crate::window::{Sampling, SignalKind};
 
@@ -65,11 +65,8 @@ fn traces<T: Scalar<Real = f64> + Lapack>(
     length(what, order, covariance.ncols())?;
     let difference = |((i, j), value): ((usize, usize), &T)| (*value - covariance[[j, i]].conj()).abs();
     let value = covariance.indexed_iter().map(difference).fold(0.0, f64::max);
-    // more than rounding
-    if value > 1e-10 * covariance.iter().map(|value| value.abs()).fold(0.0, f64::max) {
-        let allowed = "0 up to rounding";
-        return Err(Error::OutOfRange { field: "covariance minus its adjoint", value, allowed });
-    }
+    let rounding = 1e-10 * covariance.iter().map(|value| value.abs()).fold(0.0, f64::max);
+    check("covariance minus its adjoint", value, "0 up to rounding", value <= rounding)?;
     let least = LEAST_CONDITION * order as f64;
     let refused = |reciprocal_condition| Error::IllConditioned { what, order, reciprocal_condition, least };
     let factors = match linalg::Factors::new(what, covariance.view()) {
@@ -142,12 +139,8 @@ pub enum Noise {
 impl Noise {
     /// Checks the floor.
     pub(crate) fn validate(self) -> Result<(), Error> {
-        match self {
-            Self::Band { floor } if !(0.0..=1.0).contains(&floor) => {
-                Err(Error::OutOfRange { field: "floor", value: floor, allowed: "between 0 and 1" })
-            }
-            _ => Ok(()),
-        }
+        let Self::Band { floor } = self else { return Ok(()) };
+        check("floor", floor, "between 0 and 1", (0.0..=1.0).contains(&floor))
     }
 
     /// Covariance of the noise, complex and for two-sided density 1 in the band, at a lag \[samples\].
@@ -310,9 +303,7 @@ impl WindowModel {
     /// [`Error::Empty`], [`Error::Length`], [`Error::Band`] or [`Error::OutOfRange`] for impossible input.
     pub fn with_envelope(sampling: &Sampling, envelope: Array2<f64>, noise: Noise) -> Result<Self, Error> {
         sampling.validate()?;
-        if envelope.is_empty() {
-            return Err(Error::Empty { field: "envelope" });
-        }
+        not_empty("envelope", envelope.len())?;
         length("envelope", envelope.nrows(), envelope.ncols())?;
         positive("mean of the envelope's diagonal", envelope.diag().mean().unwrap_or(0.0))?;
         noise.validate()?;

@@ -11,7 +11,7 @@
 //!
 //! Check: stored tables; draws.
 
-use crate::error::{Error, not_negative, positive};
+use crate::error::{Error, check, not_negative, positive, probability};
 use crate::estimators::tails::{beta_below, gamma_tail};
 
 /// Most cells of noise, over all windows, for which the beta law is accurate.
@@ -91,8 +91,8 @@ impl CellTest {
     pub fn needed_snr(&self, false_alarm: f64, detection: f64) -> Result<f64, Error> {
         probability("detection", detection)?;
         let snr = self.threshold(false_alarm)? / self.threshold(detection)? - 1.0;
-        let allowed = "above the false alarm";
-        if snr > 0.0 { Ok(snr) } else { Err(Error::OutOfRange { field: "detection", value: detection, allowed }) }
+        check("detection", detection, "above the false alarm", snr > 0.0)?;
+        Ok(snr)
     }
 
     /// Probability that the best of `cells` independent cells of noise is a false alarm, each of which is one with `false_alarm`.
@@ -104,9 +104,4 @@ impl CellTest {
         positive("cells", cells)?;
         Ok(-(cells * (-false_alarm).ln_1p()).exp_m1())
     }
-}
-
-fn probability(field: &'static str, value: f64) -> Result<(), Error> {
-    let inside = value > 0.0 && value < 1.0;
-    if inside { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed: "between 0 and 1" }) }
 }

@@ -35,7 +35,7 @@ use statrs::function::erf::erf;
 use statrs::function::gamma::ln_gamma;
 
 use crate::bound::Noise;
-use crate::error::{Error, length, positive};
+use crate::error::{Error, length, not_empty, positive, probability};
 use crate::estimators::tails::{bisected, gamma_tail};
 use crate::map::{PolarPoint, ScanGeometry};
 use crate::spectrum::Taper;
@@ -118,13 +118,9 @@ impl NoiseTest {
     ) -> Result<Self, Error> {
         let samples = tapers.first().map_or(0, Vec::len);
         gates.validate()?;
-        if samples == 0 {
-            return Err(Error::Empty { field: "tapers" });
-        }
+        not_empty("tapers", samples)?;
         tapers.iter().try_for_each(|taper| length("tapers", samples, taper.len()))?;
-        if lag_weights.is_some_and(<[f64]>::is_empty) {
-            return Err(Error::Empty { field: "lag_weights" });
-        }
+        not_empty("lag_weights", lag_weights.map_or(samples, <[f64]>::len))?;
         let bins = Band::new(sampling, SignalKind::Complex, padded_samples)?;
         let (padded, band) =
             (padded_samples as f64, (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz);
@@ -233,9 +229,7 @@ impl NoiseTest {
     /// # Errors
     /// [`Error::OutOfRange`] unless `rate` is between 0 and 1.
     pub fn threshold(&self, region: &RegionNoise, rate: f64) -> Result<f64, Error> {
-        if !(rate > 0.0 && rate < 1.0) {
-            return Err(Error::OutOfRange { field: "false_alarm", value: rate, allowed: "between 0 and 1" });
-        }
+        probability("false_alarm", rate)?;
         let (mut low, mut high) = (0.0, 2.0);
         while self.false_alarm(region, high) > rate && high < f64::MAX {
             (low, high) = (high, 2.0 * high);

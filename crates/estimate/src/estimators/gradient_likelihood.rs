@@ -17,7 +17,7 @@ use ndarray::Array2;
 use num_complex::Complex;
 
 use crate::bound::{GradientModel, Noise};
-use crate::error::{Error, finite, increasing, length, positive};
+use crate::error::{Error, finite, increasing, length, not_empty, positive};
 use crate::estimators::gradient_tapers::{LagWeights, Tapers, band_lag, tapers};
 use crate::estimators::search::{PeakSearch, unusable};
 use crate::estimators::{Estimator, GateVelocity, NoiseTest, Quality, Refinement, Statistic};
@@ -84,9 +84,7 @@ impl<S: Sample> GradientLikelihood<S> {
     /// gradients, [`Error::Band`] for an impossible band, [`Error::Linalg`] if the covariance cannot be diagonalised.
     pub fn new(model: &GradientModel, snr: f64, gradient_per_s: &[f64], padded_samples: usize) -> Result<Self, Error> {
         positive("snr", snr)?;
-        if gradient_per_s.is_empty() {
-            return Err(Error::Empty { field: "gradient_per_s" });
-        }
+        not_empty("gradient_per_s", gradient_per_s.len())?;
         gradient_per_s.iter().try_for_each(|&g| finite("gradient_per_s", g))?;
         increasing("gradient_per_s", gradient_per_s)?;
         let (sampling, n) = (&model.sampling, model.window_samples);

@@ -15,7 +15,7 @@ mod openblas;
 use ndarray::{Array1, Array2, ArrayView2, OwnedRepr, ShapeBuilder};
 use ndarray_linalg::{Eigh, FactorizeInto, LUFactorized, Lapack, Scalar, Solve, UPLO};
 
-use crate::error::{Error, length};
+use crate::error::{Error, length, not_empty};
 
 /// Residual allowed per unit of the matrix's norm and order.
 const RESIDUAL: f64 = 1e-12;
@@ -29,9 +29,7 @@ const POWER_STEPS: usize = 12;
 /// Column-major copy of a square, finite matrix that is not empty.
 fn columns<T: Scalar<Real = f64> + Lapack>(field: &'static str, a: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
     let (rows, order) = a.dim();
-    if order == 0 {
-        return Err(Error::Empty { field });
-    }
+    not_empty(field, order)?;
     length(field, order, rows)?;
     if a.iter().any(|value| !value.abs().is_finite()) {
         return Err(Error::Linalg { what: field, order, reason: "holds a value that is not finite" });

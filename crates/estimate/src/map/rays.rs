@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, finite};
+use crate::error::{Error, check, finite, not_empty};
 
 /// The rays of each line, increasing: those that stand from one bound to the next.
 #[derive(Debug, Clone)]
@@ -62,16 +62,11 @@ impl Rays {
 
 /// Refuses angles that are none of a line of sight.
 pub(crate) fn check_angles(elevation_rad: &[f64]) -> Result<(), Error> {
-    if elevation_rad.is_empty() {
-        return Err(Error::Empty { field: "elevation_rad" });
-    }
-    for &value in elevation_rad {
+    not_empty("elevation_rad", elevation_rad.len())?;
+    elevation_rad.iter().try_for_each(|&value| {
         finite("elevation_rad", value)?;
-        if value.abs() > std::f64::consts::PI {
-            return Err(Error::OutOfRange { field: "elevation_rad", value, allowed: "between -pi and pi" });
-        }
-    }
-    Ok(())
+        check("elevation_rad", value, "between -pi and pi", value.abs() <= std::f64::consts::PI)
+    })
 }
 
 #[cfg(test)]

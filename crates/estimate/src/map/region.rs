@@ -6,7 +6,7 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, at_least_one, increasing, length, not_negative, positive};
+use crate::error::{Error, at_least_one, check, increasing, length, not_empty, not_negative, positive};
 use crate::map::rays::{Rays, check_angles};
 use crate::window::{Gates, Sampling};
 
@@ -109,9 +109,7 @@ impl ScanGeometry {
         record_samples: usize,
     ) -> Result<Self, Error> {
         let lines = direction.len();
-        if lines == 0 {
-            return Err(Error::Empty { field: "direction" });
-        }
+        not_empty("direction", lines)?;
         length("group", lines, group.len())?;
         length("first_ray", lines + 1, first_ray.len())?;
         let parts = group.chunk_by(|a, b| a == b).scan(0, |start, part| {
@@ -280,9 +278,7 @@ impl WindowCovariance {
         signal: impl Fn(usize) -> f64,
         noise: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
-        if weights.is_empty() {
-            return Err(Error::Empty { field: "weights" });
-        }
+        not_empty("weights", weights.len())?;
         let overlap: Vec<f64> =
             (0..weights.len()).map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum()).collect();
         let at = |covariance: &dyn Fn(usize) -> f64, gate: usize| -> f64 {
@@ -336,12 +332,9 @@ impl WindowCorrelation {
     /// [`Error::OutOfRange`] if gamma(0) is not 1 or another is beyond 0 .. 1.
     pub fn from_gate_lags(gamma: &[f64]) -> Result<Self, Error> {
         let first = gamma.first().copied().unwrap_or(f64::NAN);
-        if gamma.is_empty() || (first - 1.0).abs() > 1e-9 {
-            return Err(Error::OutOfRange { field: "gamma[0]", value: first, allowed: "1" });
-        }
-        if let Some(&value) = gamma.iter().find(|value| !(0.0..=1.0 + 1e-9).contains(*value)) {
-            return Err(Error::OutOfRange { field: "gamma", value, allowed: "between 0 and 1" });
-        }
+        check("gamma[0]", first, "1", (first - 1.0).abs() <= 1e-9)?;
+        let correlation = |&value: &f64| check("gamma", value, "between 0 and 1", (0.0..=1.0 + 1e-9).contains(&value));
+        gamma.iter().try_for_each(correlation)?;
         Ok(Self { squared: gamma.iter().map(|value| value * value).collect() })
     }
 

@@ -17,7 +17,7 @@
 
 use ndarray::{Array2, ArrayView2};
 
-use crate::error::{Error, length, not_negative, positive};
+use crate::error::{Error, length, not_empty, not_negative, positive};
 
 /// Cubic B-spline at the integers.
 const SPLINE: [f64; 5] = [1.0 / 16.0, 0.25, 0.375, 0.25, 1.0 / 16.0];
@@ -88,9 +88,7 @@ pub fn shrink_to_guess(
         length(field, measured_m_s.nrows(), map.nrows())?;
         length(field, measured_m_s.ncols(), map.ncols())?;
     }
-    if measured_m_s.is_empty() {
-        return Err(Error::Empty { field: "measured_m_s" });
-    }
+    not_empty("measured_m_s", measured_m_s.len())?;
     positive("line_step", options.line_step as f64)?;
     positive("gate_step", options.gate_step as f64)?;
     not_negative("factor", options.factor)?;

@@ -11,7 +11,7 @@
 
 use num_complex::Complex;
 
-use crate::error::{Error, positive};
+use crate::error::{Error, check, not_empty, positive};
 use crate::models::levinson::reflect;
 use crate::models::poles::roots;
 use crate::window::missing::Rule;
@@ -44,9 +44,7 @@ impl OrderChoice {
     /// # Errors
     /// [`Error::OutOfRange`] if the number of samples is not above 0, [`Error::Empty`] without stages.
     pub fn order(&self, reflection: &[Complex<f64>]) -> Result<usize, Error> {
-        if reflection.is_empty() {
-            return Err(Error::Empty { field: "reflection" });
-        }
+        not_empty("reflection", reflection.len())?;
         let (samples, penalty) = match *self {
             Self::Fixed => return Ok(reflection.len()),
             Self::Akaike { samples } => (samples, 2.0),
@@ -260,13 +258,6 @@ fn unstable(size: f64) -> Error {
 
 /// An order needs at least one lag more than itself.
 pub(crate) fn check_order(order: usize, lags: usize) -> Result<(), Error> {
-    if (1..lags).contains(&order) {
-        Ok(())
-    } else {
-        Err(Error::OutOfRange {
-            field: "order",
-            value: order as f64,
-            allowed: "at least 1 and below the number of samples of the window",
-        })
-    }
+    let allowed = "at least 1 and below the number of samples of the window";
+    check("order", order as f64, allowed, (1..lags).contains(&order))
 }

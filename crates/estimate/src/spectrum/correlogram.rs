@@ -8,7 +8,7 @@
 
 use std::marker::PhantomData;
 
-use crate::error::{Error, length, positive};
+use crate::error::{Error, length, not_empty, positive};
 use crate::estimators::Statistic;
 use crate::spectrum::transform::WindowTransform;
 use crate::window::{Sample, Scratch, Weighting};
@@ -63,9 +63,7 @@ impl<S: Sample> Correlogram<S> {
     /// [`Error::Empty`] without tapers or samples, [`Error::Length`] if their lengths differ.
     pub fn with_tapers(tapers: Vec<Taper>) -> Result<Self, Error> {
         let window_samples = tapers.first().map_or(0, |taper| taper.weights.len());
-        if window_samples == 0 {
-            return Err(Error::Empty { field: "tapers" });
-        }
+        not_empty("tapers", window_samples)?;
         for taper in &tapers {
             length("taper", window_samples, taper.weights.len())?;
         }

@@ -8,7 +8,7 @@
 
 use std::marker::PhantomData;
 
-use crate::error::Error;
+use crate::error::{Error, check};
 use crate::estimators::Statistic;
 use crate::spectrum::correlogram::unweighted_lags;
 use crate::window::{Sample, Scratch, SignalKind};
@@ -27,13 +27,8 @@ impl<S: Sample> ShortCorrelogram<S> {
     /// # Errors
     /// [`Error::OutOfRange`] unless 1 <= `lags` <= `window_samples`.
     pub fn new(window_samples: usize, lags: usize) -> Result<Self, Error> {
-        if lags == 0 || lags > window_samples {
-            return Err(Error::OutOfRange {
-                field: "lags",
-                value: lags as f64,
-                allowed: "at least 1 and at most the number of samples of the window",
-            });
-        }
+        let allowed = "at least 1 and at most the number of samples of the window";
+        check("lags", lags as f64, allowed, (1..=window_samples).contains(&lags))?;
         Ok(Self { window_samples, lags, sample: PhantomData })
     }
 

@@ -1,6 +1,6 @@
 //! Doppler beam swinging: the wind from four slanted beams a quarter turn apart, as wind profilers take it.
 
-use crate::error::Error;
+use crate::error::{Error, check};
 
 /// The wind from four beams.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -21,9 +21,7 @@ pub struct SwungWind {
 pub fn swing(elevation_rad: f64, [north, east, south, west]: [f64; 4]) -> Result<SwungWind, Error> {
     let (sin, cos) = elevation_rad.sin_cos();
     let slanted = elevation_rad > 0.0 && elevation_rad < std::f64::consts::FRAC_PI_2;
-    if !slanted {
-        return Err(Error::OutOfRange { field: "elevation_rad", value: elevation_rad, allowed: "between 0 and pi/2" });
-    }
+    check("elevation_rad", elevation_rad, "between 0 and pi/2", slanted)?;
     Ok(SwungWind {
         horizontal_m_s: [0.5 * (north - south) / cos, 0.5 * (east - west) / cos],
         vertical_m_s: 0.25 * (north + east + south + west) / sin,

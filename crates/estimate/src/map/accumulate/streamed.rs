@@ -11,7 +11,7 @@ use std::ops::Range;
 use ndarray::ArrayView2;
 
 use super::{BLOCK, Scan, add};
-use crate::error::{Error, length};
+use crate::error::{Error, check, length};
 use crate::estimators::Statistic;
 use crate::map::ScanGeometry;
 use crate::parallel::{for_each_chunk, map_indexed};
@@ -63,10 +63,9 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         held: Range<usize>,
     ) -> Result<Self, Error> {
         length("window", statistic.window_samples(), gates.window_samples)?;
-        if held.is_empty() || held.end > geometry.gates() {
-            let allowed = "behind their start, at most the gates of a record";
-            return Err(Error::OutOfRange { field: "end of the gates", value: held.end as f64, allowed });
-        }
+        let allowed = "behind their start, at most the gates of a record";
+        let are_there = !held.is_empty() && held.end <= geometry.gates();
+        check("end of the gates", held.end as f64, allowed, are_there)?;
         let (record_samples, numbers) = (gates.samples(&held).len(), statistic.statistic_len());
         let rows = vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers];
         let (invalid, gates, scale, sample) = (BTreeMap::new(), *gates, None, PhantomData);
