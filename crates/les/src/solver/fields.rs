@@ -174,7 +174,7 @@ impl Flow {
         Self::at_rest(mesh, settings)?.with_faces(velocity_m_s)
     }
 
-    /// RowOffsets from these velocities.
+    /// Starts from these velocities.
     pub(super) fn with_faces(self, velocity_m_s: [&[f64]; 3]) -> Result<(Self, super::StartReport), Error> {
         let ([nx, ny, nz], direction) = (self.mesh.cells(), self.layout.direction);
         for values in velocity_m_s {

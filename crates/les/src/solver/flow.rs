@@ -80,13 +80,13 @@ impl Flow {
         Self::at_rest(mesh, settings)?.filled(initial)
     }
 
-    /// RowOffsets from `initial`.
+    /// Starts from `initial`.
     pub(super) fn filled(self, initial: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Result<(Self, StartReport), Error> {
         let (direction, at_m) = (self.layout.direction, [0, 1, 2].map(|axis| self.face_position_m(axis)));
         self.started(|axis, index| initial(at_m[axis](index))[direction[axis]])
     }
 
-    /// RowOffsets from the velocity along each memory axis at the indices of its faces; nothing flows through walls.
+    /// Starts from the velocity along each memory axis at the indices of its faces; nothing flows through walls.
     pub(super) fn started(
         mut self,
         velocity_m_s: impl Fn(usize, [usize; 3]) -> f64 + Sync,

@@ -133,31 +133,42 @@ impl Operators1d {
     /// Laplacian of a field at the centres that sticks to the no-slip walls: rows over the cells, and for each row the
     /// coefficients of the velocities of the low and of the high wall.
     pub(crate) fn laplacian_at_cells(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
-        let adjoint = self.adjoint();
-        let sticks = self.no_slip();
-        let last = self.cells;
-        let mut walls = vec![[0.0; 2]; self.cells];
-        let mut rows = vec![Taps::new(); self.cells];
-        for (cell, faces) in self.divergence.iter().enumerate() {
-            let mut sums = vec![0.0; self.cells];
-            for &(face, coefficient) in faces {
+        let scaled = |(row, mass): (&Taps, &f64)| {
+            row.iter().map(|&(face, c)| (face, c / (mass * self.face_mass_m[face]))).collect::<Taps>()
+        };
+        self.sums_of_gradients(self.divergence.iter().zip(&self.cell_mass_m).map(scaled))
+    }
+
+    /// Half the mean of the gradients at the two faces of each cell of such a field, in the same form. At a slip wall the gradient of
+    /// what flows along it is zero.
+    pub(crate) fn half_mean_gradient(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
+        let face = |face: usize| if self.is_periodic() { face % self.cells } else { face };
+        let both = |cell: usize| [cell, cell + 1].map(face).map(|face| (face, 0.25 / self.face_mass_m[face])).to_vec();
+        self.sums_of_gradients((0..self.cells).map(both))
+    }
+
+    /// For each cell the sum of factors times the weighted gradients at faces.
+    fn sums_of_gradients(&self, faces: impl Iterator<Item = Taps>) -> (Vec<Taps>, Vec<[f64; 2]>) {
+        let (adjoint, sticks, last) = (self.adjoint(), self.no_slip(), self.cells);
+        let of_cell = |faces: Taps| {
+            let (mut sums, mut walls) = (vec![0.0; self.cells], [0.0; 2]);
+            for (face, factor) in faces {
+                let side = usize::from(face == last);
                 let at_wall = !self.is_periodic() && (face == 0 || face == last);
-                if at_wall && !sticks[usize::from(face == last)] {
+                if at_wall && !sticks[side] {
                     continue;
                 }
-                let factor = coefficient / (self.cell_mass_m[cell] * self.face_mass_m[face]);
                 for &(other, weight) in &adjoint[face] {
                     sums[other] -= factor * weight;
                 }
                 if at_wall {
                     // The gradient at the wall sees the wall's velocity with weight -1 at the low and +1 at the high end.
-                    let side = usize::from(face == last);
-                    walls[cell][side] += factor * if side == 0 { -1.0 } else { 1.0 };
+                    walls[side] += factor * if side == 0 { -1.0 } else { 1.0 };
                 }
             }
-            rows[cell] = nonzero(&sums);
-        }
-        (rows, walls)
+            (nonzero(&sums), walls)
+        };
+        faces.map(of_cell).unzip()
     }
 
     /// Laplacian of the normal velocity at the stored faces, zero at the walls.

@@ -10,15 +10,14 @@
 //! | `along_flight` | the pair, older the farther it is behind the aircraft |
 //! | `linear` | [`Linear`]: linear in place and time |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
-//! | `series` | [`GridSeries`]: snapshots at several times, a wind that moves |
-//! | `volume`, `volume_series` | fields in three dimensions, read slice by slice as time goes on |
+//! | `volume` | fields in three dimensions |
+//! | `series` | [`Series`]: fields at several times, a wind that moves |
 //! | `axis` | one direction of a mesh: stretching, walls, periods |
 //! | `strain` | the largest line gradient of a velocity gradient |
 //! | `kernel` | the M'4 kernel, (27) |
 
 mod along_flight;
 pub(crate) mod axis;
-mod between_times;
 pub(crate) mod grid_wind;
 mod kernel;
 mod linear;
@@ -27,7 +26,6 @@ mod series;
 mod strain;
 mod two_scale;
 mod volume;
-mod volume_series;
 mod vortex;
 mod vortex_line;
 mod wind;
@@ -38,10 +36,9 @@ pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use linear::Linear;
 pub use profile::CirculationProfile;
-pub use series::GridSeries;
+pub use series::Series;
 pub use two_scale::TwoScale;
 pub use volume::{VolumeComponent, VolumeSnapshot};
-pub use volume_series::VolumeSeries;
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use vortex_line::{VortexLine, VortexLines};
 pub use wind::{Calm, Sum, Uniform, Wind};

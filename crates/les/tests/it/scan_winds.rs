@@ -1,7 +1,7 @@
 //! Winds in three dimensions against tables of independent origin, and against closed forms on meshes.
 
 use wakescope_les::winds::{
-    AlongFlight, Calm, Edges, Linear, Side, Sum, VolumeComponent, VolumeSeries, VolumeSnapshot, VortexLine, VortexLines,
+    AlongFlight, Calm, Edges, Linear, Series, Side, Sum, VolumeComponent, VolumeSnapshot, VortexLine, VortexLines,
 };
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 
@@ -195,7 +195,7 @@ fn linear_fields_are_exact_in_place_and_time_on_staggered_stretched_meshes() {
         let (point, time_s) = (triple(["x_m", "y_m", "z_m"]), row("time_s"));
         let expected = triple(["u_m_s", "v_m_s", "w_m_s"]);
         near(at(&wind, point, time_s), expected);
-        let series = VolumeSeries::new(vec![0.0, 4.0, 10.0], 0.0, move |i| {
+        let series = Series::read(vec![0.0, 4.0, 10.0], 0.0, move |i| {
             Ok(staggered(9, |p| at(&wind, p, [0.0, 4.0, 10.0][i])))
         })
         .unwrap();
@@ -245,7 +245,7 @@ fn a_linear_scalar_is_exact_in_place_and_time_flat_at_walls_and_the_first_of_a_s
         VolumeComponent { nodes_m, values }
     };
     let series = move |offset: f64| {
-        VolumeSeries::new(vec![0.0, 4.0, 10.0], 0.0, move |i| {
+        Series::read(vec![0.0, 4.0, 10.0], 0.0, move |i| {
             staggered(9, |_| [1.0; 3]).with_scalar(&scalar(&|p| offset + amount(p, [0.0, 4.0, 10.0][i])), [OPEN; 3])
         })
         .unwrap()
@@ -272,7 +272,7 @@ fn a_series_reads_each_field_once_and_keeps_two() {
     let read = Arc::new(AtomicUsize::new(0));
     let counter = Arc::clone(&read);
     let times_s: Vec<f64> = (0..12).map(f64::from).collect();
-    let series = VolumeSeries::new(times_s, 0.0, move |i| {
+    let series = Series::read(times_s, 0.0, move |i| {
         counter.fetch_add(1, Ordering::Relaxed);
         Ok(staggered(4, |_| [i as f64; 3]))
     })

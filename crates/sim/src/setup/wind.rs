@@ -261,7 +261,7 @@ mod planes {
     use crate::scene::SimulatedFlow;
     use crate::setup::wind::SceneWind;
     use crate::{Error, scene::SceneFile};
-    use wakescope_les::winds::{Edges, GridSeries, OutsidePolicy, PlaneMesh, Side};
+    use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Series, Side};
     use wakescope_les::{Error as LesError, GridSnapshot};
 
     /// From the units and the place of the flow to those of the scene.
@@ -325,7 +325,7 @@ mod planes {
             );
         }
         let count = snapshots.len();
-        let series = GridSeries::new(snapshots).map_err(|e| refuse(format!("the times of the planes: {e}")))?;
+        let series = Series::new(snapshots).map_err(|e| refuse(format!("the times of the planes: {e}")))?;
         let (start_s, tau) = start(flow, &times).map_err(&refuse)?;
         let (first_s, last_s) = (times[0].1, times[count - 1].1);
         let source = format!("{count} planes of {first_s:.4} to {last_s:.4} s from {}", path.display());

@@ -219,34 +219,20 @@ impl WakeMeter {
         let flat = self.edge_plane(Vec::new());
         let is_beside = |j: usize| flat.lateral_m(about.centre_m[0], self.face_m[0][j]).abs() < 2.0 * radius_m;
         let beside: Vec<usize> = (0..ny).filter(|j| is_beside(*j)).collect();
-        // What each rank finds in its planes across z, and seeks in which across x.
-        let ranks = &seen.slabs.ranks;
-        let (rank, count) = (ranks.rank(), ranks.count());
-        let found = |rank: usize| self.curl.own_faces(seen.faces.shape.planes_of(rank, count)).filter(near);
-        let sought = |rank: usize| nx * rank / count..nx * (rank + 1) / count;
-        let rows: Vec<[usize; 2]> = found(rank).flat_map(|k| beside.iter().map(move |j| [*j, k])).collect();
+        // Each rank gives the vorticity of its planes across z to all, and seeks in some planes across x.
+        let own = self.curl.own_faces(seen.faces.shape.own()).filter(near);
+        let rows: Vec<[usize; 2]> = own.flat_map(|k| beside.iter().map(move |j| [*j, k])).collect();
         let mut values = vec![0.0; rows.len() * nx];
         values.par_chunks_mut(nx).zip(&rows).for_each(|(row, [j, k])| self.curl.row(&seen.faces, 0, *j, *k, row));
-        let size = |found_by: usize, sought_by: usize| found(found_by).count() * beside.len() * sought(sought_by).len();
-        let to: Vec<usize> = (0..count).map(|other| size(rank, other)).collect();
-        let from: Vec<usize> = (0..count).map(|other| size(other, rank)).collect();
-        let give = |other: usize| sought(other).flat_map(|i| values.iter().skip(i).step_by(nx));
-        let send: Vec<f64> = (0..count).flat_map(give).copied().collect();
-        drop(values);
-        let mut came = vec![0.0; from.iter().sum()];
-        ranks.all_to_all(&send, &to, &mut came, &from)?;
-        let own: Vec<[f64; 2]> = sought(rank)
+        let values = seen.slabs.all_gather(values)?;
+        let places: Vec<usize> = (0..nz).filter(near).flat_map(|k| beside.iter().map(move |j| k * ny + j)).collect();
+        let (rank, count) = (seen.slabs.ranks.rank(), seen.slabs.ranks.count());
+        let own: Vec<[f64; 2]> = (nx * rank / count..nx * (rank + 1) / count)
             .into_par_iter()
             .map(|i| {
                 let mut plane = vec![0.0; ny * nz];
-                let (mut start, at) = (0, i - sought(rank).start);
-                for (other, length) in from.iter().enumerate() {
-                    let rows = length / sought(rank).len();
-                    let values = &came[start + at * rows..start + (at + 1) * rows];
-                    let places = found(other).flat_map(|k| beside.iter().map(move |j| k * ny + j));
-                    places.zip(values).for_each(|(place, value)| plane[place] = *value);
-                    start += length;
-                }
+                let column = values.iter().skip(i).step_by(nx);
+                places.iter().zip(column).for_each(|(place, value)| plane[*place] = *value);
                 let core = self.edge_plane(plane).core(about.centre_m, sign, radius_m);
                 core.map_or([f64::NAN; 2], |core| core.centre_m)
             })

@@ -214,28 +214,9 @@ fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> 
 
 /// The numbers of the state, eight bytes each.
 fn scalars(state: &State) -> Vec<u8> {
-    let State {
-        velocity: _,
-        previous_terms: _,
-        pressure: _,
-        time_s,
-        step,
-        last_step_s,
-        courant_per_s,
-        energy,
-        implicit,
-    } = state;
-    let numbers = [
-        time_s.to_bits(),
-        *step,
-        last_step_s.to_bits(),
-        courant_per_s.to_bits(),
-        energy.to_bits(),
-        u64::from(implicit[0]),
-        u64::from(implicit[1]),
-        u64::from(implicit[2]),
-    ];
-    numbers.into_iter().flat_map(u64::to_le_bytes).collect()
+    let [last_step, courant, energy] = [state.last_step_s, state.courant_per_s, state.energy].map(f64::to_bits);
+    let numbers = [state.time_s.to_bits(), state.step, last_step, courant, energy];
+    numbers.into_iter().chain(state.implicit.map(u64::from)).flat_map(u64::to_le_bytes).collect()
 }
 
 fn read_scalars(bytes: &[u8], state: &mut State) -> Option<()> {

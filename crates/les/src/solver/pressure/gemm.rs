@@ -25,35 +25,12 @@ type Group = Vec<[f64; ROWS]>;
 #[derive(Debug)]
 pub(crate) struct Left {
     n: usize,
-    before: Pairs,
+    /// Rows that are replaced by their sum and their difference before the product, one pair after the other.
+    before: Vec<[usize; 2]>,
     /// First row of each block on the diagonal, rows, and groups.
     blocks: Vec<(usize, usize, Vec<Group>)>,
-    after: Pairs,
-}
-
-/// Rows that are replaced by their sum and their difference.
-#[derive(Debug)]
-struct Pairs {
-    /// Those that are taken while rows are copied, and the rows that are only copied.
-    outer: Vec<[usize; 2]>,
-    alone: Vec<usize>,
-    /// The others, one after the other.
-    inner: Vec<[usize; 2]>,
-}
-
-impl Pairs {
-    /// Of `n` rows, the outer pairs first.
-    fn new(n: usize, pairs: &[[usize; 2]]) -> Self {
-        let mut alone: Vec<usize> = (0..n).collect();
-        let is_outer = |pair: &&[usize; 2]| {
-            let before = alone.len();
-            alone.retain(|row| !pair.contains(row));
-            alone.len() + 2 == before
-        };
-        let outer: Vec<[usize; 2]> = pairs.iter().take_while(is_outer).copied().collect();
-        let alone = (0..n).filter(|row| outer.iter().all(|pair| !pair.contains(row))).collect();
-        Self { inner: pairs[outer.len()..].to_vec(), outer, alone }
-    }
+    /// The same after it, in the opposite order.
+    after: Vec<[usize; 2]>,
 }
 
 /// Space for one packed operand.
@@ -84,7 +61,7 @@ impl Left {
             (*start, n, (0..n).step_by(ROWS).map(group).collect())
         };
         let n = fold.columns.len();
-        let [before, after] = pairs.map(|pairs| Pairs::new(n, pairs));
+        let [before, after] = pairs.map(<[_]>::to_vec);
         Self { n, before, blocks: fold.blocks.iter().map(pack).collect(), after }
     }
 
@@ -158,53 +135,33 @@ fn panels(f: &[&mut [f64]]) -> impl Iterator<Item = [usize; 2]> + use<> {
     (0..width).step_by(COLUMNS).map(move |start| [start, width.min(start + COLUMNS)])
 }
 
-/// Copies some columns of `f`, with sums and differences of pairs of rows in their places.
+/// Copies some columns of `f` and puts sums and differences of pairs of rows in their places.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn take(pairs: &Pairs, f: &[&mut [f64]], [start, end]: [usize; 2], panel: &mut [TileRow]) {
-    for &row in &pairs.alone {
-        copy(&f[row][start..end], &mut panel[row]);
+fn take(pairs: &[[usize; 2]], f: &[&mut [f64]], [start, end]: [usize; 2], panel: &mut [TileRow]) {
+    for (row, packed) in f.iter().zip(&mut *panel) {
+        copy(&row[start..end], packed);
     }
-    for &[low, high] in &pairs.outer {
-        let (a, b) = (&f[low][start..end], &f[high][start..end]);
-        if let Ok([low, high]) = panel.get_disjoint_mut([low, high]) {
-            sum_and_difference(a, b, &mut low[..end - start], &mut high[..end - start]);
-        }
-    }
-    for &[low, high] in &pairs.inner {
-        let (a, b) = (panel[low], panel[high]);
-        if let Ok([low, high]) = panel.get_disjoint_mut([low, high]) {
-            sum_and_difference(&a, &b, low, high);
-        }
+    for pair in pairs {
+        sum_and_difference(*pair, panel);
     }
 }
 
 /// The other way round.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn give(pairs: &Pairs, product: &mut [TileRow], f: &mut [&mut [f64]], [start, end]: [usize; 2]) {
-    for &[low, high] in pairs.inner.iter().rev() {
-        let (a, b) = (product[low], product[high]);
-        if let Ok([low, high]) = product.get_disjoint_mut([low, high]) {
-            sum_and_difference(&a, &b, low, high);
-        }
+fn give(pairs: &[[usize; 2]], product: &mut [TileRow], f: &mut [&mut [f64]], [start, end]: [usize; 2]) {
+    for pair in pairs.iter().rev() {
+        sum_and_difference(*pair, product);
     }
-    for &[low, high] in &pairs.outer {
-        let (a, b) = (&product[low][..end - start], &product[high][..end - start]);
-        if let Ok([low, high]) = f.get_disjoint_mut([low, high]) {
-            sum_and_difference(a, b, &mut low[start..end], &mut high[start..end]);
-        }
-    }
-    for &row in &pairs.alone {
-        paste(&product[row], &mut f[row][start..end]);
+    for (row, packed) in f.iter_mut().zip(product) {
+        paste(packed, &mut row[start..end]);
     }
 }
 
 #[inline(always)]
-fn sum_and_difference(a: &[f64], b: &[f64], sum: &mut [f64], difference: &mut [f64]) {
-    let n = sum.len();
-    let (a, b, difference) = (&a[..n], &b[..n], &mut difference[..n]);
-    for l in 0..n {
-        sum[l] = a[l] + b[l];
-        difference[l] = a[l] - b[l];
+fn sum_and_difference(pair: [usize; 2], rows: &mut [TileRow]) {
+    let Ok([low, high]) = rows.get_disjoint_mut(pair) else { return };
+    for l in 0..COLUMNS {
+        (low[l], high[l]) = (low[l] + high[l], low[l] - high[l]);
     }
 }
 

@@ -48,9 +48,9 @@ impl Operators {
             periodic: std::array::from_fn(|axis| layout.line[axis].is_periodic()),
             to_cells,
             to_faces,
-            half_mean_gradient: std::array::from_fn(|axis| operator(axis, half_mean_gradient(&layout.line[axis]).0)),
+            half_mean_gradient: std::array::from_fn(|axis| operator(axis, layout.line[axis].half_mean_gradient().0)),
             wall_source: std::array::from_fn(|axis| {
-                let walls = half_mean_gradient(&layout.line[axis]).1;
+                let walls = layout.line[axis].half_mean_gradient().1;
                 std::array::from_fn(|component| {
                     let [low, high] = layout.wall_velocity_m_s(axis, component);
                     walls.iter().map(|wall| wall[0] * low + wall[1] * high).collect()
@@ -93,35 +93,4 @@ fn divergence(line: &Operators1d) -> Vec<Taps> {
         }
     }
     rows
-}
-
-/// Half the mean of the gradients at the two faces of each cell: rows over the cells, and the coefficients of the velocities
-/// of the low and of the high wall. At a slip wall the gradient of what flows along it is zero.
-fn half_mean_gradient(line: &Operators1d) -> (Vec<Taps>, Vec<[f64; 2]>) {
-    let n = line.cells;
-    let adjoint = line.adjoint();
-    let sticks = line.no_slip();
-    let mut rows = vec![Taps::new(); n];
-    let mut walls = vec![[0.0; 2]; n];
-    for (cell, row) in rows.iter_mut().enumerate() {
-        let mut sums = vec![0.0; n];
-        for face in [cell, cell + 1] {
-            let face = if line.is_periodic() { face % n } else { face };
-            let side = usize::from(face == n);
-            let factor = -0.25 / line.face_mass_m[face];
-            let at_wall = !line.is_periodic() && (face == 0 || face == n);
-            if at_wall && !sticks[side] {
-                continue;
-            }
-            for &(other, weight) in &adjoint[face] {
-                sums[other] += factor * weight;
-            }
-            if at_wall {
-                // As in the Laplacian: the wall's velocity has weight -1 at the low and +1 at the high end.
-                walls[cell][side] += factor * if side == 0 { 1.0 } else { -1.0 };
-            }
-        }
-        row.extend(sums.into_iter().enumerate().filter(|(_, c)| *c != 0.0));
-    }
-    (rows, walls)
 }

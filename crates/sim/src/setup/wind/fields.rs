@@ -8,7 +8,7 @@ use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
 use crate::setup::beams::direction::sin_cos_of_turn;
 use crate::setup::wind::SceneWind;
-use wakescope_les::winds::{Edges, Side, VolumeComponent, VolumeSeries, VolumeSnapshot};
+use wakescope_les::winds::{Edges, Series, Side, VolumeComponent, VolumeSnapshot};
 use wakescope_les::{Error as LesError, Wind};
 
 /// A wind in axes of its own.
@@ -143,7 +143,7 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         };
         snapshot(field, &own).map_err(unreadable)
     };
-    let series = VolumeSeries::new(times_s.clone(), steepest_per_s, reader)
+    let series = Series::read(times_s.clone(), steepest_per_s, reader)
         .map_err(|e| refuse(format!("the times of the fields: {e}")))?;
     let found = SceneWind::of_files(Box::new(series), flow.motion, [start_s, last_s], source);
     let (sin, cos) = sin_cos_of_turn(flow.rotation_rad);
