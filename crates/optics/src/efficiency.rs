@@ -9,8 +9,8 @@ use std::f64::consts::SQRT_2;
 
 /// eta_s(R) of (19): what the rest of a simulation needs to know about optics and turbulence.
 ///
-/// All four lists have the same length; `range_m` increases strictly.
-#[derive(Debug, Clone, PartialEq)]
+/// All four lists have the same length; `range_m` increases strictly. The default has no ranges, which nothing accepts.
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct EfficiencyProfile {
     /// Ranges \[m\].
     pub range_m: Vec<f64>,
@@ -38,13 +38,6 @@ impl EfficiencyProfile {
             mean,
         }
         .validated()
-    }
-
-    /// A profile without ranges, to which they are added one by one.
-    #[cfg(feature = "screens")]
-    pub(crate) fn nowhere() -> Self {
-        let none = Vec::new;
-        Self { range_m: none(), mean: none(), standard_deviation: none(), standard_error: none() }
     }
 
     /// Adds a range with its mean, standard deviation and standard error.

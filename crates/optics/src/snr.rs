@@ -5,7 +5,7 @@
 
 use crate::Error;
 use crate::beam::Telescope;
-use crate::error::{finite, not_negative, positive};
+use crate::error::{finite, not_negative, positive, within};
 use crate::quadrature::GaussLegendre;
 use std::f64::consts::PI;
 
@@ -70,13 +70,8 @@ impl SnrModel {
         positive("bandwidth_hz", self.bandwidth_hz)?;
         not_negative("backscatter_per_m_sr", self.backscatter_per_m_sr)?;
         not_negative("extinction_per_m", self.extinction_per_m)?;
-        if !(self.quantum_efficiency > 0.0 && self.quantum_efficiency <= 1.0) {
-            return Err(Error::OutOfRange {
-                field: "quantum_efficiency",
-                value: self.quantum_efficiency,
-                allowed: "above 0, at most 1",
-            });
-        }
+        let quantum = self.quantum_efficiency;
+        within("quantum_efficiency", quantum, quantum > 0.0 && quantum <= 1.0, "above 0, at most 1")?;
         Ok(self)
     }
 
@@ -140,27 +135,14 @@ impl SnrModel {
         let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * positive("pulse_sigma_s", pulse_sigma_s)?;
         let centre_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
         let low_m = centre_m - 6.0 * sigma_m;
-        if low_m <= 0.0 {
-            return Err(Error::OutOfRange {
-                field: "time_s",
-                value: time_s,
-                allowed: "beyond 6 pulse_sigma_s, so that the whole pulse has left the telescope",
-            });
-        }
-        let rule = GaussLegendre::new(16);
-        let panels = 6;
-        let width_m = 12.0 * sigma_m / f64::from(panels);
+        let whole = "beyond 6 pulse_sigma_s, so that the whole pulse has left the telescope";
+        within("time_s", time_s, low_m > 0.0, whole)?;
         let mut sum = 0.0;
-        for panel in 0..panels {
-            let a = low_m + width_m * f64::from(panel);
-            for (range_m, weight_m) in rule.mapped(a, a + width_m) {
-                let x = (range_m - centre_m) / sigma_m;
-                let pulse_per_s = (-x * x).exp() / (PI.sqrt() * pulse_sigma_s);
-                sum += weight_m
-                    * pulse_per_s
-                    * model.backscatter_factor_per_m(range_m)
-                    * not_negative("efficiency", efficiency(range_m)?)?;
-            }
+        for (range_m, weight_m) in GaussLegendre::new(16).on_panels(low_m, low_m + 12.0 * sigma_m, 6) {
+            let x = (range_m - centre_m) / sigma_m;
+            let pulse_per_s = (-x * x).exp() / (PI.sqrt() * pulse_sigma_s);
+            let efficiency = not_negative("efficiency", efficiency(range_m)?)?;
+            sum += weight_m * pulse_per_s * model.backscatter_factor_per_m(range_m) * efficiency;
         }
         Ok(model.photon_factor() * sum)
     }

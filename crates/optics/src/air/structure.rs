@@ -6,7 +6,7 @@
 use crate::Error;
 use crate::air::spectrum::Spectrum;
 use crate::error::not_negative;
-use crate::quadrature::GaussLegendre;
+use crate::quadrature::{GaussLegendre, lagrange};
 use std::f64::consts::PI;
 
 /// Beyond this argument the oscillating part of the integral is below 1e-10 of the whole.
@@ -76,6 +76,8 @@ impl StructureTable {
     const PER_DECADE: f64 = 16.0;
     const SMALLEST_M: f64 = 1e-5;
     const LARGEST_M: f64 = 10.0;
+    /// Of the interpolation, in steps.
+    const NODES: [f64; 6] = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0];
 
     /// Table of `spectrum` for separations of 0.01 mm to 10 m; power laws continue it at both ends.
     pub fn new(spectrum: &dyn Spectrum) -> Self {
@@ -106,18 +108,8 @@ impl StructureTable {
             return (self.ln_value[n - 1] + (t - (n - 1) as f64) * slope).exp();
         }
         let start = (t as usize).saturating_sub(2).min(n - 6);
-        let u = t - start as f64;
-        let mut sum = 0.0;
-        for i in 0..6 {
-            let mut weight = 1.0;
-            for j in 0..6 {
-                if j != i {
-                    weight *= (u - j as f64) / (i as f64 - j as f64);
-                }
-            }
-            sum += weight * self.ln_value[start + i];
-        }
-        sum.exp()
+        let near = self.ln_value[start..start + 6].iter().enumerate();
+        near.map(|(i, value)| lagrange(&Self::NODES, i, t - start as f64) * value).sum::<f64>().exp()
     }
 }
 

@@ -78,10 +78,10 @@ mod tests {
                 .unwrap()
         };
         let tried = |spacing_m: f64, off: f64, error: f64, samples: usize, lost: f64| {
-            let mut bistatic = EfficiencyProfile::nowhere();
+            let mut bistatic = EfficiencyProfile::default();
             bistatic.push(600.0, [(1.0 + off) * exact, 0.0, error * exact]);
             let found = EfficiencyEstimate {
-                monostatic: EfficiencyProfile::nowhere(),
+                monostatic: EfficiencyProfile::default(),
                 bistatic: Some(bistatic),
                 monostatic_realisations: Vec::new(),
                 bistatic_realisations: Vec::new(),

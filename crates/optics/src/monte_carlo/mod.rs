@@ -194,7 +194,7 @@ impl MonteCarlo {
         Ok(Prepared {
             transfers: path.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?,
             screens: (!path.strength.is_empty()).then(generator).transpose()?,
-            folding: if displaced { Folding::none(&self.grid) } else { Folding::onto_quadrant(&self.grid) },
+            folding: Folding::new(&self.grid, !displaced),
             scale: self.range_m.iter().map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel).collect(),
             power: start[0].iter().map(|e| e.norm_sqr().wide()).sum::<f64>() * pixel,
             path,
@@ -253,7 +253,7 @@ impl MonteCarlo {
         };
         let exact = |&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r);
         let mut out = EfficiencyEstimate {
-            monostatic: EfficiencyProfile::nowhere(),
+            monostatic: EfficiencyProfile::default(),
             bistatic: None,
             monostatic_realisations: Vec::new(),
             bistatic_realisations: Vec::new(),
@@ -263,7 +263,7 @@ impl MonteCarlo {
             exact_free_space: self.range_m.iter().map(exact).collect::<Result<_, _>>()?,
             lost_power_fraction: Vec::new(),
         };
-        let mut pairs = EfficiencyProfile::nowhere();
+        let mut pairs = EfficiencyProfile::default();
         for (i, (at, &range_m)) in ranges.iter().zip(&self.range_m).enumerate() {
             let (fraction, _) = mean_and_variance(at.samples.iter().map(|s| s.lost));
             if fraction.is_nan() || fraction > 0.05 {

@@ -10,6 +10,7 @@ use crate::error::{positive, within};
 use crate::screens::grid::Grid;
 use crate::theory::ScreenStrength;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// Ends of the layers along the path \[m\]; the first layer begins at the telescope.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,9 +56,9 @@ impl Layers {
         Self { end_m }
     }
 
-    /// Start and end of layer i \[m\].
-    pub(crate) fn bounds_m(&self, i: usize) -> (f64, f64) {
-        (if i == 0 { 0.0 } else { self.end_m[i - 1] }, self.end_m[i])
+    /// Start and end of each layer \[m\].
+    pub(crate) fn bounds_m(&self) -> impl Iterator<Item = (f64, f64)> {
+        std::iter::once(0.0).chain(self.end_m.iter().copied()).zip(self.end_m.iter().copied())
     }
 
     /// The screens that a field arriving at `range_m` has crossed, for the exact bistatic theory of a simulated path.
@@ -66,8 +67,7 @@ impl Layers {
     /// What [`Cn2Path::mean`] returns.
     pub fn screens_to(&self, range_m: f64, cn2: &Cn2Path) -> Result<Vec<ScreenStrength>, Error> {
         let mut screens = Vec::new();
-        for i in 0..self.end_m.len() {
-            let (start, end) = self.bounds_m(i);
+        for (start, end) in self.bounds_m() {
             if start >= range_m || cn2.is_none() {
                 break;
             }
@@ -96,13 +96,13 @@ pub(crate) struct Leg {
     pub(crate) distance: usize,
     pub(crate) times: usize,
     /// Ranges at the end.
-    pub(crate) outputs: Vec<usize>,
+    pub(crate) outputs: Range<usize>,
 }
 
 impl Leg {
     /// Ranges that the leg reaches: index, and whether it is one on the way.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (usize, bool)> {
-        let at_the_end = self.outputs.iter().map(|&output| (output, false));
+        let at_the_end = self.outputs.clone().map(|output| (output, false));
         self.tap.iter().map(|&(output, _)| (output, true)).chain(at_the_end)
     }
 }
@@ -119,13 +119,6 @@ pub(crate) struct Path {
     known: BTreeMap<i64, usize>,
 }
 
-/// A place on the path with a screen or ranges.
-struct Stop {
-    at_m: f64,
-    screen: Option<usize>,
-    outputs: Vec<usize>,
-}
-
 impl Path {
     /// The path to ranges in increasing order, at which layers end. Without turbulence there are no screens.
     pub(crate) fn new(
@@ -140,59 +133,53 @@ impl Path {
             positive("range_m", r)?;
             within("range_m", r, r <= last || same(r, last), "within the layers of the path")?;
         }
-        let mut path = Self::default();
-        let mut stops: Vec<Stop> = Vec::new();
-        let mut output = 0;
+        let (mut path, largest_step_m) = (Self::default(), grid.largest_step_m(wavelength_m));
         let furthest = range_m.last().copied().unwrap_or_default();
-        for (start, end) in (0..layers.end_m.len()).map(|i| layers.bounds_m(i)) {
-            if start >= furthest || same(start, furthest) {
-                break;
-            }
+        // Places with the screen that stands there, or the ranges.
+        let mut stops: Vec<(f64, Option<usize>, Range<usize>)> = Vec::new();
+        let mut reached = 0;
+        for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < furthest && !same(*start, furthest)) {
             if !cn2.is_none() {
                 let cn2_thickness = cn2.mean(start, end)? * (end - start);
-                let screen = Some(path.strength.len());
+                stops.push((0.5 * (start + end), Some(path.strength.len()), reached..reached));
                 path.strength.push(2.0 * std::f64::consts::PI / wavelength_m * cn2_thickness.sqrt());
-                stops.push(Stop { at_m: 0.5 * (start + end), screen, outputs: Vec::new() });
             }
-            while let Some(&r) = range_m.get(output).filter(|r| **r < end || same(**r, end)) {
-                match stops.last_mut().filter(|stop| same(stop.at_m, r)) {
-                    Some(stop) => stop.outputs.push(output),
-                    None => stops.push(Stop {
-                        at_m: if same(r, end) && !cn2.is_none() { end } else { r },
-                        screen: None,
-                        outputs: vec![output],
-                    }),
-                }
-                output += 1;
+            let here = range_m[reached..].iter().take_while(|r| **r < end || same(**r, end)).count();
+            if here > 0 {
+                let at_m = if cn2.is_none() { range_m[reached] } else { end };
+                stops.push((at_m, None, reached..reached + here));
             }
+            reached += here;
         }
-        path.lay(stops, grid.largest_step_m(wavelength_m));
+        let (mut from_m, mut screen, mut legs) = (0.0, None, Vec::new());
+        for (at_m, next_screen, outputs) in stops {
+            let times = ((at_m - from_m) / largest_step_m - 1e-9).ceil().max(1.0);
+            let distance = path.step((at_m - from_m) / times);
+            legs.push(Leg { screen, tap: None, distance, times: times as usize, outputs });
+            (from_m, screen) = (at_m, next_screen);
+        }
+        path.join(legs, largest_step_m);
         Ok(path)
     }
 
-    /// Legs from stop to stop; two become one with a tap where one step reaches past a range.
-    fn lay(&mut self, stops: Vec<Stop>, largest_step_m: f64) {
-        let mut legs: Vec<Leg> = Vec::new();
-        let mut from = Stop { at_m: 0.0, screen: None, outputs: Vec::new() };
-        for mut stop in stops {
-            let length_m = stop.at_m - from.at_m;
-            let times = (length_m / largest_step_m - 1e-9).ceil().max(1.0);
-            let (distance, outputs) = (self.step(length_m / times), std::mem::take(&mut stop.outputs));
-            legs.push(Leg { screen: from.screen, tap: None, distance, times: times as usize, outputs });
-            from = stop;
-        }
+    /// Takes the legs over; two become one with a tap where one step reaches past a range.
+    fn join(&mut self, legs: Vec<Leg>, largest_step_m: f64) {
         for leg in legs {
-            match self.legs.pop() {
-                Some(Leg { screen, tap: None, distance, times: 1, outputs })
-                    if outputs.len() == 1
-                        && (leg.screen, leg.times) == (None, 1)
-                        && self.distance_m[distance] + self.distance_m[leg.distance] <= largest_step_m =>
-                {
-                    let whole = self.step(self.distance_m[distance] + self.distance_m[leg.distance]);
-                    self.legs.push(Leg { screen, tap: Some((outputs[0], distance)), distance: whole, ..leg });
-                }
-                before => self.legs.extend(before.into_iter().chain([leg])),
-            }
+            let whole_m = |before: &Leg| self.distance_m[before.distance] + self.distance_m[leg.distance];
+            let passes = |before: &mut Leg| {
+                (before.tap, before.outputs.len(), before.times) == (None, 1, 1)
+                    && (leg.screen, leg.times) == (None, 1)
+                    && whole_m(before) <= largest_step_m
+            };
+            let joined = self.legs.pop_if(passes).map(|before| {
+                let tap = Some((before.outputs.start, before.distance));
+                (whole_m(&before), before.screen, tap)
+            });
+            let leg = match joined {
+                Some((whole_m, screen, tap)) => Leg { screen, tap, distance: self.step(whole_m), ..leg },
+                None => leg,
+            };
+            self.legs.push(leg);
         }
     }
 
@@ -238,7 +225,7 @@ mod tests {
                     seen += 1;
                 }
                 at += p.distance_m[leg.distance] * leg.times as f64;
-                for &output in &leg.outputs {
+                for output in leg.outputs.clone() {
                     assert!((at - range_m[output]).abs() < 1e-9);
                     seen += 1;
                 }

@@ -15,47 +15,30 @@ const RING: f64 = 2.0;
 /// Folding of a grid onto the quadrant x, y >= 0 (or no folding for displaced beams), and rings about the axis.
 #[derive(Debug)]
 pub(crate) struct Folding {
-    nx: usize,
-    ny: usize,
+    grid: Grid,
     folded: bool,
     /// Points of the folded grid along x and y.
-    pub(crate) size: [usize; 2],
+    size: [usize; 2],
     /// Ring of each folded point.
     ring: Vec<u16>,
-    pub(crate) rings: usize,
     /// Points of the full grid in each ring.
-    pub(crate) ring_points: Vec<f64>,
+    ring_points: Vec<f64>,
 }
 
 impl Folding {
-    /// Onto the quadrant: for beams symmetric about both axes.
-    pub(crate) fn onto_quadrant(grid: &Grid) -> Self {
-        Self::of_size(grid, [grid.nx / 2 + 1, grid.ny / 2 + 1], true)
-    }
-
-    /// The grid as it is: for displaced beams.
-    pub(crate) fn none(grid: &Grid) -> Self {
-        Self::of_size(grid, [grid.nx, grid.ny], false)
-    }
-
-    fn of_size(grid: &Grid, size: [usize; 2], folded: bool) -> Self {
-        let (nx, ny) = (grid.nx, grid.ny);
-        let unit = RING * grid.dx_m.min(grid.dy_m);
-        let largest = 0.5 * grid.smallest_width_m();
-        let rings = (largest / unit).ceil() as usize + 1;
-        let mut ring = Vec::with_capacity(size[0] * size[1]);
-        for y in 0..size[1] {
-            for x in 0..size[0] {
-                let px = if folded { x as f64 * grid.dx_m } else { Grid::offset_m(nx, grid.dx_m, x) };
-                let py = if folded { y as f64 * grid.dy_m } else { Grid::offset_m(ny, grid.dy_m, y) };
-                ring.push(((px.hypot(py) / unit) as usize).min(rings - 1) as u16);
-            }
-        }
-        let mut this = Self { nx, ny, folded, size, ring, rings, ring_points: vec![0.0; rings] };
-        for y in 0..size[1] {
-            for x in 0..size[0] {
-                this.ring_points[usize::from(this.ring[y * size[0] + x])] += this.multiplicity(x, y);
-            }
+    /// Onto the quadrant, for beams symmetric about both axes, or the grid as it is, for displaced beams.
+    pub(crate) fn new(grid: &Grid, folded: bool) -> Self {
+        let Grid { nx, ny, dx_m, dy_m } = *grid;
+        let size = if folded { [nx / 2 + 1, ny / 2 + 1] } else { [nx, ny] };
+        let unit = RING * dx_m.min(dy_m);
+        let rings = (0.5 * grid.smallest_width_m() / unit).ceil() as usize + 1;
+        let mut this = Self { grid: *grid, folded, size, ring: Vec::new(), ring_points: vec![0.0; rings] };
+        let place_m = |n, spacing_m, i| if folded { i as f64 * spacing_m } else { Grid::offset_m(n, spacing_m, i) };
+        for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
+            let radius_m = place_m(nx, dx_m, x).hypot(place_m(ny, dy_m, y));
+            let ring = ((radius_m / unit) as usize).min(rings - 1);
+            this.ring.push(ring as u16);
+            this.ring_points[ring] += this.multiplicity(x, y);
         }
         this
     }
@@ -70,7 +53,7 @@ impl Folding {
             return 1.0;
         }
         let along = |i: usize, n: usize| if i > 0 && i < n.div_ceil(2) { 2.0 } else { 1.0 };
-        along(x, self.nx) * along(y, self.ny)
+        along(x, self.grid.nx) * along(y, self.grid.ny)
     }
 
     /// Adds row `y` of the full grid to the folded plane.
@@ -83,9 +66,9 @@ impl Folding {
             }
             return;
         }
-        let fy = y.abs_diff(self.ny / 2);
+        let fy = y.abs_diff(self.grid.ny / 2);
         let target = &mut plane[fy * width..(fy + 1) * width];
-        let centre = self.nx / 2;
+        let centre = self.grid.nx / 2;
         for (t, r) in target.iter_mut().zip(&row[centre..]) {
             *t = *t + *r;
         }
@@ -109,7 +92,7 @@ impl Folding {
             // Most columns stand for two; the first and, for even sizes, the last stand for one.
             let mut line = 0.5 * whole + 0.5 * (a[0] * b[0]).wide();
             let last = width - 1;
-            if self.nx.is_multiple_of(2) {
+            if self.grid.nx.is_multiple_of(2) {
                 line += 0.5 * (a[last] * b[last]).wide();
             }
             sum += line / self.multiplicity(0, y);
@@ -119,7 +102,7 @@ impl Folding {
 
     /// Sums of a folded plane over the rings.
     pub(crate) fn ring_sums<T: Real>(&self, plane: &[T]) -> Vec<f64> {
-        let mut sums = vec![0.0; self.rings];
+        let mut sums = vec![0.0; self.ring_points.len()];
         for (value, &ring) in plane.iter().zip(&self.ring) {
             sums[usize::from(ring)] += value.wide();
         }
@@ -164,7 +147,7 @@ pub(crate) fn bistatic(samples: &[Sample], total: f64, folding: &Folding, scale:
     if samples.len() < 3 {
         return (mean, f64::NAN);
     }
-    let mut sums = [vec![0.0; folding.rings], vec![0.0; folding.rings]];
+    let mut sums = [(); 2].map(|()| vec![0.0; folding.ring_points.len()]);
     for sample in samples {
         for (sum, rings) in sums.iter_mut().zip(&sample.rings) {
             for (s, r) in sum.iter_mut().zip(rings) {
@@ -218,7 +201,7 @@ mod tests {
             let grid = Grid { nx, ny, dx_m: 1.0, dy_m: 1.0 };
             let (a, b) = (plane(&grid, 6.0, 1.0), plane(&grid, 9.0, 2.0));
             let exact: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
-            for folding in [Folding::onto_quadrant(&grid), Folding::none(&grid)] {
+            for folding in [Folding::new(&grid, true), Folding::new(&grid, false)] {
                 let mut planes = [vec![0.0; folding.points()], vec![0.0; folding.points()]];
                 for (full, plane) in [&a, &b].iter().zip(&mut planes) {
                     for y in 0..ny {
@@ -235,7 +218,7 @@ mod tests {
     #[test]
     fn pairs_and_jackknife_agree_with_the_double_sums() {
         let grid = Grid { nx: 48, ny: 48, dx_m: 1.0, dy_m: 1.0 };
-        let folding = Folding::onto_quadrant(&grid);
+        let folding = Folding::new(&grid, true);
         let planes: Vec<Vec<f64>> =
             (0..7).map(|i| plane(&grid, 9.0 + 0.7 * f64::from(i), 1.0 + 0.2 * f64::from(i % 3))).collect();
         let mut total = vec![0.0; folding.points()];
@@ -279,7 +262,7 @@ mod tests {
     #[test]
     fn few_realisations_with_bright_speckles_state_their_error() {
         let grid = Grid { nx: 48, ny: 48, dx_m: 1.0, dy_m: 1.0 };
-        let folding = Folding::none(&grid);
+        let folding = Folding::new(&grid, false);
         let speckled = |i: usize| {
             let (height, angle) = (3 * i % 7, 2.4 * i as f64);
             let a = height as f64 / 7.0;

@@ -53,11 +53,9 @@ pub(super) fn worst_rytov(cn2: &Cn2Path, wavelength_m: f64, layers: &Layers, fur
         return Ok(0.0);
     }
     let mut worst = 0f64;
-    for (start, end) in (0..layers.end_m().len()).map(|i| layers.bounds_m(i)) {
-        if start < furthest_m {
-            let end = end.min(furthest_m);
-            worst = worst.max(rytov_variance(cn2.mean(start, end)?, wavelength_m, end - start)?);
-        }
+    for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < furthest_m) {
+        let end = end.min(furthest_m);
+        worst = worst.max(rytov_variance(cn2.mean(start, end)?, wavelength_m, end - start)?);
     }
     Ok(worst)
 }
@@ -164,19 +162,12 @@ impl<'a> Gaps<'a> {
             for gap in &large {
                 let errors = self.weight_errors(&layers, gap.range_m)?;
                 let worst = errors.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-                if let Some((i, _)) = worst {
-                    cut[i] = true;
-                }
+                worst.into_iter().for_each(|(layer, _)| cut[layer] = true);
             }
-            let mut end_m = Vec::new();
-            for (i, cut) in cut.into_iter().enumerate() {
-                let (start, end) = layers.bounds_m(i);
-                if cut {
-                    end_m.push(0.5 * (start + end));
-                }
-                end_m.push(end);
-            }
-            layers = Layers::new(end_m)?;
+            let parts = layers.bounds_m().zip(cut);
+            let ends =
+                parts.flat_map(|((start, end), cut)| cut.then_some(0.5 * (start + end)).into_iter().chain([end]));
+            layers = Layers::new(ends.collect())?;
         }
     }
 
@@ -185,12 +176,8 @@ impl<'a> Gaps<'a> {
         let rule = GaussLegendre::new(6);
         let weight = |z: f64| (1.0 - z / range_m).max(0.0).powf(5.0 / 3.0);
         let mut errors = Vec::new();
-        for i in 0..layers.end_m().len() {
-            let (start, end) = layers.bounds_m(i);
+        for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < range_m) {
             let end = end.min(range_m);
-            if start >= end {
-                break;
-            }
             let mut exact = 0.0;
             for (z, dz) in rule.mapped(start, end) {
                 exact += self.cn2.at(z)? * weight(z) * dz;

@@ -15,7 +15,7 @@ use crate::Error;
 use crate::air::spectrum::Spectrum;
 use crate::air::turbulence::{Turbulence, path_rytov_variance};
 use crate::beam::{Misalignment, Telescope};
-use crate::quadrature::{GaussLegendre, cubic};
+use crate::quadrature::{GaussLegendre, cubic, lagrange};
 use crate::theory::exact::bistatic_efficiency;
 use crate::theory::hankel::Aperture;
 use crate::theory::overlap::fresnel_number;
@@ -123,14 +123,11 @@ impl DisplacedOverlaps {
             return [0.0; 3];
         }
         let start = (t as usize).saturating_sub(2).min(self.values.len() - 6);
+        let squares: [f64; 6] = std::array::from_fn(|i| ((start + i) as f64).powi(2));
         let mut out = [0.0; 3];
-        for i in start..start + 6 {
-            let mut weight = 1.0;
-            for j in (start..start + 6).filter(|j| *j != i) {
-                let (i, j) = (i as f64, j as f64);
-                weight *= (t * t - j * j) / (i * i - j * j);
-            }
-            out.iter_mut().zip(&self.values[i]).for_each(|(o, v)| *o += weight * v);
+        for (i, values) in self.values[start..start + 6].iter().enumerate() {
+            let weight = lagrange(&squares, i, t * t);
+            out.iter_mut().zip(values).for_each(|(o, v)| *o += weight * v);
         }
         out
     }
