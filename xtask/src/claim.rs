@@ -97,11 +97,7 @@ impl Claim {
     pub(crate) fn judged(id: &str, parts: &[Part]) -> Self {
         let verdict = |part: &&Part| part.3.verdict(&part.1);
         let mut told: Vec<&Part> = parts.iter().collect();
-        told.sort_by_key(|part| match verdict(part) {
-            Verdict::Fail => 0,
-            Verdict::Open => 1,
-            Verdict::Pass => 2,
-        });
+        told.sort_by_key(|part| std::cmp::Reverse(verdict(part)));
         let words = told.iter().map(|(name, found, unit, _)| {
             let name = if name.is_empty() { String::new() } else { format!("{name}: ") };
             format!("{name}{}{unit}", found.words())
@@ -109,12 +105,23 @@ impl Claim {
         let open = parts.iter().filter(|part| verdict(part) == Verdict::Open);
         let times = open.map(|part| part.3.times_the_data(&part.1)).fold(0.0, f64::max);
         let claim = Self {
-            verdict: Verdict::of_all(parts.iter().map(|part| verdict(&part))),
+            verdict: told.first().map_or(Verdict::Pass, verdict),
             standard_error: parts.iter().map(|part| part.1.standard_error).fold(0.0, f64::max),
             ..Self::exact(id, words.collect::<Vec<_>>().join("; "), false)
         };
         let more = if times < 100.0 { format!("about {times:.1} times the data") } else { "no sample in reach".into() };
         if claim.verdict == Verdict::Open { claim.open(&more) } else { claim }
+    }
+
+    /// The same of one part, which needs no name.
+    pub(crate) fn judged_alone(id: &str, found: Estimate, unit: &'static str, bar: Bar) -> Self {
+        Self::judged(id, &[(String::new(), found, unit, bar)])
+    }
+
+    /// The claim, which fails if a fit failed, with their number beside it.
+    pub(crate) fn of_fits(self, failures: usize, words: &str) -> Self {
+        let verdict = if failures > 0 { Verdict::Fail } else { self.verdict };
+        Self { verdict, ..self }.beside(words)
     }
 
     fn listed(&self) -> Option<&'static Listed> {

@@ -11,14 +11,13 @@ use crate::claim::{Claim, Kind};
 use crate::cost::{cpu_s, thread_cpu_s};
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{self, Figure, Lane};
-use crate::profile::Profile;
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPool;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use wakescope_sim::io::{FileGroup, Table, write_atomic};
+use wakescope_sim::io::{Table, write_atomic};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -26,27 +25,14 @@ pub(crate) struct Options {
     /// Numbers of the figures to draw, such as 1,5; the default is all.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     only: Vec<u32>,
-    /// Resolution and sample counts.
-    #[arg(long, value_enum, default_value_t = Profile::Quick)]
-    profile: Profile,
     /// Folder to write to.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Seed of every random number.
-    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
-    seed: u64,
     /// Threads to compute with; the default is one for each core. Results do not depend on it.
     #[arg(long, default_value_t = 0, value_name = "N")]
     threads: usize,
-    /// Draw everything anew.
-    #[arg(long)]
-    no_cache: bool,
-    /// Folder of a finished `wakescope wake` that figures 6 to 14 show, instead of the run of the profile.
-    #[arg(long, value_name = "DIR")]
-    wake: Option<PathBuf>,
-    /// Figures 10 to 14 on the analytic pair instead of the simulated wake.
-    #[arg(long)]
-    analytic: bool,
+    #[command(flatten)]
+    context: Context,
 }
 
 /// Runs the task.
@@ -57,20 +43,13 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let chosen = choose(&options.only)?;
     let out = options.out.clone().unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out).map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
-    let context = Context {
-        profile: options.profile,
-        seed: options.seed,
-        stages: cache::folder().join("stages"),
-        anew: options.no_cache,
-        wake: options.wake.clone(),
-        analytic: options.analytic,
-    };
+    let context = &options.context;
     let bar = progress_bar(chosen.len() as u64);
     let start = Instant::now();
     let draw = |lane: Lane| -> Result<Vec<(&'static Figure, Rendered)>, Failure> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(options.threads).build()?;
         let of_lane = chosen.iter().filter(|figure| figure.lane() == lane);
-        of_lane.map(|figure| Ok((*figure, drawn(figure, options, &context, (&pool, &bar, &out))?))).collect()
+        of_lane.map(|figure| Ok((*figure, drawn(figure, context, (&pool, &bar, &out))?))).collect()
     };
     let (of_wake, others) = if options.threads == 0 {
         std::thread::scope(|scope| {
@@ -87,21 +66,20 @@ pub(crate) fn run(options: &Options) -> Outcome {
     done.extend(draw(Lane::Alone)?);
     done.sort_by_key(|(figure, _)| figures::ALL.iter().position(|of| of.id == figure.id));
     bar.finish_and_clear();
-    finish(&out, &context, &done, start.elapsed().as_secs_f64())
+    finish(&out, context, &done, start.elapsed().as_secs_f64())
 }
 
 /// One figure, from the cache or made by the threads of the pool, and written.
 fn drawn(
     figure: &'static Figure,
-    options: &Options,
     context: &Context,
     (pool, bar, out): (&ThreadPool, &ProgressBar, &Path),
 ) -> Result<Rendered, Failure> {
     bar.set_message(figure.id);
     // The key of the cache knows nothing of a wake from elsewhere.
-    let is_other = options.wake.is_some();
+    let is_other = context.wake.is_some();
     let place = cache::Place::new(figure.id, context)?;
-    let cached = if options.no_cache || is_other { None } else { place.load() };
+    let cached = if context.anew || is_other { None } else { place.load() };
     let from_cache = cached.is_some();
     let rendered = match cached {
         Some(rendered) => rendered,
@@ -114,15 +92,14 @@ fn drawn(
             let (before_s, start) = (used_s(), Instant::now());
             let mut rendered = pool.install(|| (figure.make)(context))?;
             rendered.claims.iter_mut().for_each(|claim| claim.figure = figure.id.into());
-            let wall_s = start.elapsed().as_secs_f64();
-            rendered.timings.push(("total".into(), [wall_s, used_s() - before_s]));
+            rendered.took_s = [start.elapsed().as_secs_f64(), used_s() - before_s];
             if !is_other {
                 place.store(&rendered)?;
             }
             rendered
         }
     };
-    write_figure(out, figure, &rendered)?;
+    rendered.files_in(out, figure.id)?.commit()?;
     bar.inc(1);
     bar.println(format!("{}{}: {}", figure.id, if from_cache { " (cached)" } else { "" }, figure.title));
     Ok(rendered)
@@ -144,26 +121,15 @@ fn progress_bar(length: u64) -> ProgressBar {
     bar
 }
 
-fn write_figure(out: &Path, figure: &Figure, rendered: &Rendered) -> Outcome {
-    let mut group = FileGroup::new(out);
-    for (extension, bytes) in &rendered.files {
-        group.add(&format!("{}.{extension}", figure.id), bytes.clone())?;
-    }
-    group.commit()?;
-    Ok(())
-}
-
 /// Writes the tables over all figures and the report, and says what the claims came to.
 fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f64) -> Outcome {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     write_atomic(&out.join("claims.csv"), claims_table(&claims).to_csv(&context.provenance_of_run())?)?;
-    let timings: Vec<(&str, &str, [f64; 2])> =
-        done.iter().flat_map(|(f, r)| r.timings.iter().map(|(stage, s)| (f.id, stage.as_str(), *s))).collect();
     let table = Table::new()
-        .text("figure", timings.iter().map(|t| t.0))
-        .text("stage", timings.iter().map(|t| t.1))
-        .float("wall_s", timings.iter().map(|t| t.2[0]))
-        .float("core_s", timings.iter().map(|t| t.2[1]));
+        .text("figure", done.iter().map(|(figure, _)| figure.id))
+        .text("stage", done.iter().map(|_| report::STAGE))
+        .float("wall_s", done.iter().map(|(_, r)| r.took_s[0]))
+        .float("core_s", done.iter().map(|(_, r)| r.took_s[1]));
     write_atomic(&out.join("timings.csv"), table.to_csv(&context.provenance_of_run())?)?;
     write_atomic(&out.join("index.html"), report::html(context, done, run_s)?)?;
     for claim in &claims {

@@ -12,29 +12,20 @@ pub(crate) const BATCHES: usize = 8;
 /// Share of a level below which two levels do not differ.
 pub(crate) const NO_DIFFERENCE: f64 = 0.03;
 
-/// How a claim came out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// How a claim came out; of parts that must all hold it is the largest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
     Pass,
-    Fail,
     /// The uncertainty, or the resolution of the profile, does not allow a verdict.
     Open,
+    Fail,
 }
 
 impl Verdict {
     /// Pass or fail.
     pub(crate) fn of(pass: bool) -> Self {
         if pass { Self::Pass } else { Self::Fail }
-    }
-
-    /// Of a statement whose parts must all hold.
-    pub(crate) fn of_all(mut parts: impl Iterator<Item = Self> + Clone) -> Self {
-        match (parts.clone().any(|part| part == Self::Fail), parts.all(|part| part == Self::Pass)) {
-            (true, _) => Self::Fail,
-            (_, true) => Self::Pass,
-            _ => Self::Open,
-        }
     }
 
     pub(crate) fn name(self) -> &'static str {

@@ -1,9 +1,9 @@
 //! What every figure takes, and what it gives.
 
-use crate::workspace::provenance;
+use crate::workspace::{provenance, root};
 use serde::{Deserialize, Serialize};
-use std::path::PathBuf;
-use wakescope_sim::io::Provenance;
+use std::path::{Path, PathBuf};
+use wakescope_sim::io::{FileGroup, Provenance};
 
 // What nearly every figure is made of.
 pub(super) use crate::claim::Claim;
@@ -15,21 +15,35 @@ pub(super) use wakescope_sim::plan::{Plan, Target};
 pub(super) use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 pub(super) use wakescope_sim::scene::{Scene, SceneFile};
 
-/// What a figure may depend on.
-#[derive(Debug, Clone)]
+/// What a figure may depend on, as options of a task.
+#[derive(Debug, Clone, clap::Args)]
 pub(crate) struct Context {
+    /// Resolution and sample counts.
+    #[arg(long, value_enum, default_value_t = Profile::Quick)]
     pub(crate) profile: Profile,
+    /// Seed of every random number.
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub(crate) seed: u64,
-    /// Folder for runs that several figures share, and whether they are made anew.
-    pub(crate) stages: PathBuf,
+    /// Draw everything anew.
+    #[arg(long = "no-cache")]
     pub(crate) anew: bool,
-    /// Folder of a wake that is to be shown instead of that of the profile.
+    /// Folder of a finished `wakescope wake` that figures 6 to 14 show, instead of the run of the profile.
+    #[arg(long, value_name = "DIR")]
     pub(crate) wake: Option<PathBuf>,
-    /// Whether figures 10 to 14 look at the analytic pair instead of the simulated wake.
+    /// Figures 10 to 14 on the analytic pair instead of the simulated wake.
+    #[arg(long)]
     pub(crate) analytic: bool,
+    /// Folder for runs that several figures share.
+    #[arg(skip = Context::cache().join("stages"))]
+    pub(crate) stages: PathBuf,
 }
 
 impl Context {
+    /// Folder of the figures and of the stages that several share.
+    pub(crate) fn cache() -> PathBuf {
+        root().join("target/figures-cache")
+    }
+
     /// The scene of a figure as a checked file, with this run's seed.
     pub(crate) fn scene_file(&self, mut scene: Scene) -> Result<SceneFile, Failure> {
         scene.seed = self.seed;
@@ -62,8 +76,8 @@ pub(crate) struct Rendered {
     pub(crate) words: String,
     /// Claims measured on the data of the run.
     pub(crate) claims: Vec<Claim>,
-    /// Stage, wall-clock time and processor time, s.
-    pub(crate) timings: Vec<(String, [f64; 2])>,
+    /// Wall-clock time and processor time that it took, s.
+    pub(crate) took_s: [f64; 2],
 }
 
 impl Rendered {
@@ -85,6 +99,15 @@ impl Rendered {
     pub(crate) fn add(&mut self, name: &str, table: &Table, origin: &Provenance) -> Result<(), Failure> {
         self.files.push((name.into(), table.to_csv(origin)?.into_bytes()));
         Ok(())
+    }
+
+    /// Its files, to be written into a folder.
+    pub(crate) fn files_in(&self, folder: &Path, id: &str) -> Result<FileGroup, Failure> {
+        let mut group = FileGroup::new(folder);
+        for (extension, bytes) in &self.files {
+            group.add(&format!("{id}.{extension}"), bytes.clone())?;
+        }
+        Ok(group)
     }
 
     pub(crate) fn file(&self, extension: &str) -> Option<&[u8]> {

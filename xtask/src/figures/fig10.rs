@@ -42,9 +42,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     );
     let beside =
         found.iter().map(|(name, rms, std)| format!("{name}: {}, of the standard deviation {std:.2}", rms.words()));
-    let chapter = found.iter().filter(|of| of.0 == "chapter").map(|of| (String::new(), of.1, "", Bar::Above(0.0)));
-    let claim = Claim::judged("F10", &chapter.collect::<Vec<_>>());
-    out.claims.push(claim.beside(&beside.collect::<Vec<_>>().join("; ")));
+    let beside = beside.collect::<Vec<_>>().join("; ");
+    let chapter = found.iter().filter(|of| of.0 == "chapter");
+    out.claims = chapter.map(|of| Claim::judged_alone("F10", of.1, "", Bar::Above(0.0)).beside(&beside)).collect();
     Ok(out)
 }
 

@@ -176,9 +176,7 @@ fn root_mean_square(of: &[f64], about: impl Fn(Option<usize>) -> f64) -> Estimat
 }
 
 fn claims(fits: &[Fits], [known_m2_s, fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
-    let at_most = |id: &str, bar: f64, unit: &'static str, found: Estimate| {
-        Claim::judged(id, &[(String::new(), found, unit, Bar::Below(bar))])
-    };
+    let at_most = |id: &str, bar: f64, unit, found: Estimate| Claim::judged_alone(id, found, unit, Bar::Below(bar));
     let [map, resolved, known, fitted] = [0, 1, 2, 3].map(|method| errors(fits, method));
     let per_cent = 100.0 / CIRCULATION_M2_S;
     let rms = |of: &[f64]| root_mean_square(of, |_| 0.0).times(per_cent);

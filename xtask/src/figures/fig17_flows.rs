@@ -6,6 +6,7 @@ use crate::statistics::mean;
 use crate::wakes;
 use rayon::prelude::*;
 use std::path::Path;
+use wakescope_estimate::retrieval::{Side, VortexResult};
 use wakescope_sim::Silent;
 use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::retrieve::{Method, RetrievalRow};
@@ -111,9 +112,7 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
     let float = |get: &dyn Fn(&RetrievalRow) -> Option<f64>| -> Vec<f64> {
         rows.iter().map(|(_, row)| get(row).unwrap_or(f64::NAN)).collect()
     };
-    let found = |get: fn(&wakescope_estimate::retrieval::VortexResult) -> f64| {
-        float(&move |row: &RetrievalRow| row.found.as_ref().map(get))
-    };
+    let found = |get: fn(&VortexResult) -> f64| float(&move |row: &RetrievalRow| row.found.as_ref().map(get));
     Table::new()
         .text("flow", rows.iter().map(|((flow, _), _)| flow.name()))
         .int("scan", rows.iter().map(|(_, row)| row.realisation as i64))
@@ -121,19 +120,9 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
         .float("gamma_true_m2_s", float(&|row| Some(row.truth.circulation_5_15_m2_s)))
         .float("gamma_m2_s", found(|v| v.circulation_5_15_m2_s.value))
         .float("gamma_std_m2_s", found(|v| v.circulation_5_15_m2_s.std))
-        .float(
-            "y_error_m",
-            float(&|row| Some(row.found.as_ref()?.lateral_position_m.value - row.truth.lateral_position_m)),
-        )
-        .float("z_error_m", float(&|row| Some(row.found.as_ref()?.height_m.value - row.truth.height_m)))
-        .text(
-            "vortex",
-            rows.iter().map(
-                |(_, row)| {
-                    if row.side == wakescope_estimate::retrieval::Side::Left { "left" } else { "right" }
-                },
-            ),
-        )
+        .float("y_error_m", float(&|row| Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m)))
+        .float("z_error_m", float(&|row| Some(row.found?.height_m.value - row.truth.height_m)))
+        .text("vortex", rows.iter().map(|(_, row)| if row.side == Side::Left { "left" } else { "right" }))
         .float("y_std_m", found(|v| v.lateral_position_m.std))
         .float("z_std_m", found(|v| v.height_m.std))
         .float("snr_db", rows.iter().map(|_| SNR_DB))
@@ -169,8 +158,6 @@ fn claim(id: &str, flow: &OfFlow) -> Claim {
         format!("{name} {} %, scatter {scatter:.1} %, {failures} failed", flow.bias(name).words())
     });
     let failures = flow.known(JUDGED).1;
-    let part = (String::new(), flow.bias(JUDGED), " %", Bar::Between(-5.0, 5.0));
-    let claim = Claim::judged(id, &[part]);
-    let claim = if failures > 0 { Claim { verdict: Verdict::Fail, ..claim } } else { claim };
-    claim.beside(&format!("{failures} failed; {}", told.collect::<Vec<_>>().join("; ")))
+    let words = format!("{failures} failed; {}", told.collect::<Vec<_>>().join("; "));
+    Claim::judged_alone(id, flow.bias(JUDGED), " %", Bar::Between(-5.0, 5.0)).of_fits(failures, &words)
 }

@@ -158,7 +158,7 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
         rows.iter().filter(of)
     };
     let at_most = |id: &str, bar: f64, (value, error): (f64, f64)| {
-        Claim::judged(id, &[(String::new(), Estimate::stated(value, error), "", Bar::Below(bar))])
+        Claim::judged_alone(id, Estimate::stated(value, error), "", Bar::Below(bar))
     };
     let near = mean_ratio(likelihood(20, 0.0, 15.0));
     let wide = mean_ratio(likelihood(20, -5.0, 20.0));

@@ -170,7 +170,7 @@ fn claims(cases: &[Case], (alarms, [rate, error]): (Share, [f64; 2])) -> Vec<Cla
     let far = betas.iter().fold(2.0_f64, |far, b| if (b - 2.0).abs() > (far - 2.0).abs() { *b } else { far });
     // a test that would pass twice the rate tells nothing
     let alarms = Estimate::stated(alarms.value, error);
-    let rates = Claim::judged("F19c", &[(String::new(), alarms, "", Bar::Between(0.5 * rate, 2.0 * rate))]);
+    let rates = Claim::judged_alone("F19c", alarms, "", Bar::Between(0.5 * rate, 2.0 * rate));
     vec![
         Claim::exact("F19a", format!("{worst:.3}"), (0.75..1.25).contains(&worst)),
         Claim::exact("F19b", format!("{far:.2}"), (1.6..2.5).contains(&far)),

@@ -270,14 +270,12 @@ fn claims(views: &[View]) -> Vec<Claim> {
     for (id, name, method) in [("F21b", "rhi", "fit"), ("F21c", "axial", "means")] {
         out.extend(of(name, method).map(|(found, failures)| {
             let bar = Bar::Between(0.9 * true_m2_s(), 1.1 * true_m2_s());
-            let claim = Claim::judged(id, &[(String::new(), found, " m²/s", bar)]);
-            let claim = if failures > 0 { Claim { verdict: Verdict::Fail, ..claim } } else { claim };
-            claim.beside(&format!("{failures} fits failed"))
+            Claim::judged_alone(id, found, " m²/s", bar).of_fits(failures, &format!("{failures} fits failed"))
         }));
     }
     for (id, name) in [("F21d", "rhi"), ("F21e", "ppi")] {
-        let low = |found| Claim::judged(id, &[(String::new(), found, " m²/s", Bar::Below(0.85 * true_m2_s()))]);
-        out.extend(of(name, "means").map(|(found, _)| low(found)));
+        let low = Bar::Below(0.85 * true_m2_s());
+        out.extend(of(name, "means").map(|(found, _)| Claim::judged_alone(id, found, " m²/s", low)));
     }
     out
 }

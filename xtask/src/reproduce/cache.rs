@@ -9,15 +9,9 @@ use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
-use wakescope_sim::io::FileGroup;
 
 /// What figures come from.
 const DRAWN_BY: [&str; 4] = ["crates", "xtask", "tests/reference", "Cargo.lock"];
-
-/// Folder of the figures and of the stages that several share.
-pub(super) fn folder() -> PathBuf {
-    root().join("target/figures-cache")
-}
 
 /// Where one figure is kept.
 pub(super) struct Place {
@@ -35,7 +29,7 @@ impl Place {
     pub(super) fn new(id: &'static str, context: &Context) -> Result<Self, Failure> {
         let (root, seed, flow) = (root(), context.seed.to_string(), if context.analytic { "analytic" } else { "" });
         let key = cause(&root, &[id, context.profile.name(), &seed, flow], &DRAWN_BY)?;
-        Ok(Self { id, folder: folder().join(format!("{id}-{key}")) })
+        Ok(Self { id, folder: Context::cache().join(format!("{id}-{key}")) })
     }
 
     /// The figure, if it was made before and can be read.
@@ -49,10 +43,7 @@ impl Place {
     }
 
     pub(super) fn store(&self, rendered: &Rendered) -> Outcome {
-        let mut group = FileGroup::new(&self.folder);
-        for (extension, bytes) in &rendered.files {
-            group.add(&format!("{}.{extension}", self.id), bytes.clone())?;
-        }
+        let mut group = rendered.files_in(&self.folder, self.id)?;
         let extensions = rendered.files.iter().map(|(extension, _)| extension.clone()).collect();
         group.add("index.toml", toml::to_string(&Index { extensions, rendered: rendered.clone() })?)?;
         group.commit()?;
@@ -72,7 +63,7 @@ mod tests {
         let mut rendered = Rendered { caption: "a caption".into(), ..Rendered::default() };
         rendered.files.push(("csv".into(), b"a\n1\n".to_vec()));
         rendered.claims.push(Claim { standard_error: 0.25, ..Claim::exact("F5", "2".into(), false) });
-        rendered.timings.push(("total".into(), [1.5, 2.5]));
+        rendered.took_s = [1.5, 2.5];
         assert!(place.load().is_none());
         place.store(&rendered).unwrap();
         assert_eq!(place.load(), Some(rendered));

@@ -11,6 +11,9 @@ use crate::statistics::{Verdict, two_digits};
 use fixtures::failure::Failure;
 use wakescope_sim::plot::escape;
 
+/// What run times are of: figures have no stages of their own.
+pub(super) const STAGE: &str = "total";
+
 /// Figures with what they gave.
 type Done<'a> = [(&'a Figure, Rendered)];
 
@@ -58,7 +61,7 @@ pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<Str
     for (heading, of_chapter, verdict) in FINDINGS {
         let here = |c: &&Claim| c.verdict == verdict && (c.kind() == Kind::Chapter) == of_chapter;
         let of = |(_, r): &(_, Rendered)| {
-            r.claims.iter().filter(here).map(|claim| finding(class, claim, core_s(r))).collect::<String>()
+            r.claims.iter().filter(here).map(|claim| finding(class, claim, r.took_s[1])).collect::<String>()
         };
         let list: String = done.iter().map(of).collect();
         if !list.is_empty() {
@@ -102,7 +105,7 @@ pub(super) fn counted(kind: Kind, claims: &[&Claim]) -> String {
 /// How many claims hold, what the figures say in words, and what it took.
 fn found(context: &Context, done: &Done<'_>, run_s: f64) -> String {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
-    let core_s: f64 = done.iter().map(|(_, r)| core_s(r)).sum();
+    let core_s: f64 = done.iter().map(|(_, r)| r.took_s[1]).sum();
     let words: Vec<&str> = done.iter().map(|(_, r)| r.words.as_str()).filter(|words| !words.is_empty()).collect();
     format!(
         "The chapter's {}; the program's own {} (profile {}). {} {} figures and tables took {core_s:.0} s of processor time; this \
@@ -113,11 +116,6 @@ fn found(context: &Context, done: &Done<'_>, run_s: f64) -> String {
         words.join(" "),
         done.len()
     )
-}
-
-/// Processor time that a figure took, s.
-fn core_s(rendered: &Rendered) -> f64 {
-    rendered.timings.iter().map(|(_, [_, core_s])| core_s).sum()
 }
 
 /// A claim that does not hold or is not decided, and why.
@@ -178,11 +176,12 @@ fn claims(done: &Done<'_>) -> Result<String, Failure> {
 }
 
 fn timings(done: &Done<'_>) -> Result<String, Failure> {
-    let row = |title: &str, (stage, [wall_s, core_s]): &(String, [f64; 2])| {
-        vec![title.to_owned(), stage.clone(), format!("{wall_s:.1}"), format!("{core_s:.1}")]
+    let row = |(figure, rendered): &(&Figure, Rendered)| {
+        let [wall_s, core_s] = rendered.took_s.map(|time_s| format!("{time_s:.1}"));
+        vec![figure.title.to_owned(), STAGE.to_owned(), wall_s, core_s]
     };
     let header = ["figure", "stage", "wall-clock time [s]", "processor time [s]"];
-    table("timings", &header, done.iter().flat_map(|(f, r)| r.timings.iter().map(|t| row(f.title, t))))
+    table("timings", &header, done.iter().map(row))
 }
 
 /// A table; on a narrow screen each row becomes a block of named cells. The words of verdicts are coloured.
@@ -228,7 +227,7 @@ mod tests {
             marks: vec![WILD.into()],
             words: WILD.into(),
             claims: vec![claim(WILD)],
-            timings: vec![(WILD.into(), [1.0, 2.0])],
+            took_s: [1.0, 2.0],
         };
         let picture = "<svg xmlns=\"http://www.w3.org/2000/svg\"></svg>\n";
         let rows = format!("# head\n{WILD}\n{WILD}\n");
@@ -242,9 +241,9 @@ mod tests {
     fn every_text_is_escaped_and_nothing_is_fetched() {
         let page = page(|_| {}).unwrap();
         assert!(!page.contains("<script"), "{page}");
-        // Of both: words; link, heading, caption, mark; figure, title and stage of the run times; of the claims six in the finding, four in
+        // Of both: words; link, heading, caption, mark; title of the run times; of the claims six in the finding, four in
         // the table; names and two cells of the table of rows.
-        assert_eq!(page.matches("&lt;script&gt;").count(), 2 * (1 + 4 + 2 + 6 + 4) + 3);
+        assert_eq!(page.matches("&lt;script&gt;").count(), 2 * (1 + 4 + 1 + 6 + 4) + 3);
         assert!(page.contains("<td class=\"open\" data-label="));
         // What does not hold stands before the figures, and an empty list has no heading.
         assert!(page.find("class=\"finding first\"").unwrap() < page.find("<figure").unwrap());
