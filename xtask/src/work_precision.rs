@@ -20,8 +20,8 @@ use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 #[derive(Debug, clap::Args)]
 pub(crate) struct Options {
     /// Group to measure; the default is all.
-    #[arg(long, value_enum)]
-    group: Option<Group>,
+    #[arg(long, value_parser = GROUPS.map(|group| group.0))]
+    group: Option<String>,
     /// Folder to write to.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -30,24 +30,14 @@ pub(crate) struct Options {
     quick: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Group {
-    Optics,
-    Les,
-    Signal,
-    Estimate,
-    /// The whole chain.
-    Chain,
-}
-
-/// What is measured: the groups, their names, and the rows of each, few and coarse ones if asked.
+/// What is measured: the groups and the rows of each, few and coarse ones if asked.
 type Rows = fn(bool) -> Result<Vec<Row>, Failure>;
-const GROUPS: [(Group, &str, Rows); 5] = [
-    (Group::Optics, "optics", physics::optics),
-    (Group::Les, "les", physics::les),
-    (Group::Signal, "signal", physics::signal),
-    (Group::Estimate, "estimate", estimate::rows),
-    (Group::Chain, "chain", chain::rows),
+const GROUPS: [(&str, Rows); 5] = [
+    ("optics", physics::optics),
+    ("les", physics::les),
+    ("signal", physics::signal),
+    ("estimate", estimate::rows),
+    ("chain", chain::rows),
 ];
 
 /// Relative errors for which the cheapest settings are sought.
@@ -106,10 +96,10 @@ fn few<T>(values: &[T], quick: bool) -> &[T] {
 }
 
 /// The rows of a group or of all, on one thread; each case at a stretch, judged among its own.
-pub(crate) fn measure(wanted: Option<Group>, quick: bool) -> Result<Vec<Row>, Failure> {
+pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut all = Vec::new();
-    for (_, name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
+    for (name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
         let mut rows = pool.install(|| rows(quick))?;
         rows.sort_by_key(|row| row.knob.case);
         for of_case in rows.chunk_by_mut(|a, b| a.knob.case == b.knob.case) {
@@ -172,7 +162,7 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
 /// # Errors
 /// What a crate refuses, or an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
-    let rows = measure(options.group, options.quick)?;
+    let rows = measure(options.group.as_deref(), options.quick)?;
     println!("{:<28} {:<34} {:<34} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
     for Row { knob, value, error, standard_error, cost, .. } in &rows {
         let Knob { case, method, knob, metric, reference } = knob;

@@ -115,8 +115,14 @@ impl Rendered {
     }
 }
 
-/// A table of numbers, row by row.
-pub(super) fn numbers_table<const N: usize>(names: [&str; N], rows: &[[f64; N]]) -> Table {
-    let columns = names.into_iter().enumerate();
+/// A curve of points with the error of each.
+pub(super) fn banded(label: &str, style: Style, points: impl IntoIterator<Item = (f64, Estimate)>) -> Series {
+    let (points, errors): (Vec<_>, Vec<_>) = points.into_iter().map(|(x, y)| ((x, y.value), y.standard_error)).unzip();
+    Series::new(label, style, points).with_band(&errors)
+}
+
+/// A table of numbers, row by row, with the names of its columns between spaces.
+pub(super) fn numbers_table<const N: usize>(names: &str, rows: &[[f64; N]]) -> Table {
+    let columns = names.split(' ').enumerate();
     columns.fold(Table::new(), |table, (k, name)| table.float(name, rows.iter().map(|row| row[k])))
 }

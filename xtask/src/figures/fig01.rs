@@ -28,7 +28,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let w_m_s: Vec<f64> = velocity_m_s.iter().map(|v| v[2]).collect();
 
     let rows: Vec<[f64; 3]> = y_m.iter().zip(&w_m_s).map(|(y, w)| [*y, *w, potential_m_s(*y)]).collect();
-    let table = numbers_table(["y_m", "w_m_s", "w_potential_m_s"], &rows);
+    let table = numbers_table("y_m w_m_s w_potential_m_s", &rows);
     let parameters =
         format!("circulation_m2_s = {GAMMA_M2_S:?}\nspacing_m = {SPACING_M:?}\ncore_radius_m = {CORE_M:?}\n");
     let origin = context.provenance_of_formula(&parameters);

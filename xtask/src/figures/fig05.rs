@@ -31,7 +31,7 @@ fn errors(nodes: &[[f64; 3]], target: (f64, f64)) -> [f64; 9] {
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let nodes = stencil(TARGET_M);
-    let table = numbers_table(["y_m", "z_m", "weight"], &nodes);
+    let table = numbers_table("y_m z_m weight", &nodes);
     let parameters =
         format!("spacing_m = {SPACING_M:?}\ntarget_y_m = {:?}\ntarget_z_m = {:?}\n", TARGET_M.0, TARGET_M.1);
     let origin = context.provenance_of_formula(&parameters);

@@ -14,7 +14,7 @@ const SIDES: [&str; 2] = ["left", "right"];
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
     let origin = context.provenance_of_formula(&wake.case_toml);
-    let figure = Figure::side_by_side([circulation(&wake)?, paths(&wake)?]);
+    let figure = Figure::side_by_side([beside(&wake, wake.circulation_plot()?, [[0, 1], [0, 2]])?, paths(&wake)?]);
     let figure = Figure { width: 1200.0, ..figure };
     let mut out = Rendered::new(&table(&wake)?, &figure, &origin)?;
     out.caption = format!(
@@ -49,25 +49,19 @@ fn reference(wake: &FinishedWake) -> Result<Vec<Vec<f64>>, Failure> {
     numbers(if narrow { "wake_3d_ground_re5000_coarse_box4_cans.csv" } else { "wake_3d_ground_re5000_cans.csv" })
 }
 
-fn circulation(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
+/// A plot with two columns of the independent simulation for each vortex.
+fn beside(wake: &FinishedWake, plot: CurvePlot, columns: [[usize; 2]; 2]) -> Result<CurvePlot, Failure> {
     let stored = reference(wake)?;
-    let mut plot = wake.circulation_plot()?;
-    for (place, side) in SIDES.iter().enumerate() {
-        let points = stored.iter().step_by(4).map(|r| (r[0], r[1 + place]));
-        plot = plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place));
-    }
-    Ok(plot)
+    Ok(SIDES.iter().zip(columns).enumerate().fold(plot, |plot, (place, (side, [x, y]))| {
+        let points = stored.iter().step_by(4).map(|r| (r[x], r[y]));
+        plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place))
+    }))
 }
 
 fn paths(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
-    let mut plot = wake.path_plot()?;
-    let stored = reference(wake)?;
-    for (place, side) in SIDES.iter().enumerate() {
-        let points = stored.iter().step_by(4).map(|r| (r[3 + 2 * place], r[4 + 2 * place]));
-        plot = plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place));
-    }
+    let mut plot = beside(wake, wake.path_plot()?, [[3, 4], [5, 6]])?;
+    let hyperbola = inviscid()?;
     for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
-        let hyperbola = inviscid()?;
         let path = hyperbola.iter().filter(|r| r[1] <= 2.0).map(|r| (sign * r[1], r[2]));
         plot = plot.with(Series::new(name, Style::Dash, path.collect::<Vec<_>>()));
     }

@@ -12,32 +12,25 @@ use wakescope_sim::write;
 /// Air about the centre of a vortex that belongs to it, in spacings: half of the way between the two at the start.
 const REACH: f64 = 0.5;
 
-/// A sector from the ground up, as a lidar on the ground scans it.
-struct Sector {
-    range_m: [f64; 2],
-    elevation_max_rad: f64,
-}
-
-impl Sector {
-    /// The smallest about the boxes that reach `reach_m` beyond the centres of vortices, (y, z).
-    fn about(cores: &[(f64, f64)], reach_m: f64) -> Self {
-        let extreme = |of: fn(&(f64, f64)) -> f64, pick: fn(f64, f64) -> f64| cores.iter().map(of).fold(f64::NAN, pick);
-        let near_m = extreme(|core| core.0, f64::min) - reach_m;
-        let far_m = extreme(|core| core.0, f64::max) + reach_m;
-        let top_m = extreme(|core| core.1, f64::max) + reach_m;
-        // The far upper corner is a range away, not a distance along the ground.
-        Self { range_m: [near_m, far_m.hypot(top_m)], elevation_max_rad: top_m.atan2(near_m) }
-    }
+/// Ranges and highest elevation of the smallest sector from the ground up about the boxes that reach `reach_m` beyond the centres of
+/// vortices, (y, z).
+fn sector(cores: &[(f64, f64)], reach_m: f64) -> ([f64; 2], f64) {
+    let extreme = |of: fn(&(f64, f64)) -> f64, pick: fn(f64, f64) -> f64| cores.iter().map(of).fold(f64::NAN, pick);
+    let near_m = extreme(|core| core.0, f64::min) - reach_m;
+    let far_m = extreme(|core| core.0, f64::max) + reach_m;
+    let top_m = extreme(|core| core.1, f64::max) + reach_m;
+    // The far upper corner is a range away, not a distance along the ground.
+    ([near_m, far_m.hypot(top_m)], top_m.atan2(near_m))
 }
 
 /// A scan of both vortices whole at both ages, with the same sector: air beyond the box of the flow is masked.
-fn scene(context: &Context, sector: &Sector) -> Scene {
+fn scene(context: &Context, (range_m, elevation_max_rad): ([f64; 2], f64)) -> Scene {
     let mut scene = Scene { seed: 0, ..Scene::default() };
     // Gates begin and end half a window inside the samples.
     let half_window_m = 0.5 * scene.estimator.window_samples as f64 * scene.sample_spacing_m();
-    scene.scan.range_min_m = sector.range_m[0] - half_window_m;
-    scene.scan.range_max_m = sector.range_m[1] + half_window_m;
-    scene.scan.elevation_max_rad = sector.elevation_max_rad;
+    scene.scan.range_min_m = range_m[0] - half_window_m;
+    scene.scan.range_max_m = range_m[1] + half_window_m;
+    scene.scan.elevation_max_rad = elevation_max_rad;
     (scene.scan.pulses_per_line, scene.scan.realisations) = (1, context.profile.choose(4, 32, 128));
     scene.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
     scene.estimator.gate_step_samples = context.profile.choose(5, 2, 1);
@@ -48,7 +41,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
     let (words, reach_m) = (wake.words(), REACH * wake.flow.pair.scales()?.spacing_m);
     let (early, late) = (Sight::of_wake(&wake, EARLY_TAU)?, Sight::of_wake(&wake, LATE_TAU)?);
-    let scene = scene(context, &Sector::about(&[&early.cores[..], &late.cores[..]].concat(), reach_m));
+    let scene = scene(context, sector(&[&early.cores[..], &late.cores[..]].concat(), reach_m));
     let (mut panels, mut tables, mut extremes) = (Vec::new(), Vec::new(), Vec::new());
     let mut colours: Option<ColourMap> = None;
     let mut origin = None;
@@ -106,14 +99,15 @@ mod tests {
         // The coarse wake: the late vortices are 1.2 spacings from the middle, the early ones 0.9 and lower.
         for (extent_m, reach_m) in [([-56.0, 57.0, 45.0], 23.5), ([-80.0, 75.0, 30.0], 30.0)] {
             let [low_m, high_m, top_m]: [f64; 3] = extent_m;
-            let sector = Sector::about(&[(400.0 + low_m, top_m), (400.0 + high_m, 0.5 * top_m)], reach_m);
+            let ([near_m, far_m], highest_rad) =
+                sector(&[(400.0 + low_m, top_m), (400.0 + high_m, 0.5 * top_m)], reach_m);
             for (y_m, z_m) in [low_m, high_m].into_iter().flat_map(|y_m| [(y_m, 0.5 * top_m), (y_m, top_m)]) {
                 for (dy, dz) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
                     let corner = (400.0 + y_m + dy * reach_m, (z_m + dz * reach_m).max(0.0));
                     let (range_m, elevation_rad) = (corner.0.hypot(corner.1), corner.1.atan2(corner.0));
                     let slack = 1e-9;
-                    assert!(range_m > sector.range_m[0] - slack && range_m < sector.range_m[1] + slack, "{corner:?}");
-                    assert!(elevation_rad < sector.elevation_max_rad + slack, "{corner:?}");
+                    assert!(range_m > near_m - slack && range_m < far_m + slack, "{corner:?}");
+                    assert!(elevation_rad < highest_rad + slack, "{corner:?}");
                 }
             }
         }

@@ -70,9 +70,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         plot.series = chosen
             .zip(styles)
             .map(|(c, style)| {
-                let points = c.over_lines.iter().map(|zone| (zone.range_m, zone.rms_m_s(None)));
-                let band: Vec<f64> = c.over_lines.iter().map(|zone| zone.rms().standard_error).collect();
-                Series::new(&format!("{:.0} \u{b5}J", 1e6 * c.energy_j), style, points).with_band(&band)
+                let points = c.over_lines.iter().map(|zone| (zone.range_m, zone.rms()));
+                banded(&format!("{:.0} \u{b5}J", 1e6 * c.energy_j), style, points)
             })
             .collect();
         plot

@@ -150,9 +150,9 @@ fn picture(fits: &[Fits]) -> [CurvePlot; 3] {
             if fitted.is_empty() {
                 continue;
             }
-            let points = fitted.iter().map(|(scan, found)| (*scan as f64 + 0.12 * (k as f64 - 1.5), found.0));
-            let errors: Vec<f64> = fitted.iter().map(|(_, found)| found.1).collect();
-            plot = plot.with(Series::new(method, Style::Markers, points).with_band(&errors).in_colour(k));
+            let place = |scan: usize| scan as f64 + 0.12 * (k as f64 - 1.5);
+            let points = fitted.into_iter().map(|(scan, (found, std))| (place(scan), Estimate::stated(found, std)));
+            plot = plot.with(banded(method, Style::Markers, points).in_colour(k));
         }
         let exact = truth().to_array()[parameter as usize];
         let ends = [(-0.5, exact), (first.len() as f64 - 0.5, exact)];

@@ -135,12 +135,12 @@ pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
     for (k, name) in names().enumerate() {
         let known = flows.iter().map(|flow| (flow.tau.unwrap_or(0.0), flow.known(name).0));
         let points: Vec<(f64, Vec<f64>)> = known.filter(|(_, errors)| !errors.is_empty()).collect();
-        let stds: Vec<f64> = points.iter().map(|(_, errors)| Estimate::deviation(errors)).collect();
-        let means = points.iter().map(|(tau, errors)| (tau + 0.05 * (k as f64 - 2.0), mean(errors, None)));
         if points.is_empty() {
             continue;
         }
-        plot = plot.with(Series::new(name, Style::Markers, means).with_band(&stds).in_colour(k));
+        let scatter = |errors: &[f64]| Estimate::stated(mean(errors, None), Estimate::deviation(errors));
+        let points = points.iter().map(|(tau, errors)| (tau + 0.05 * (k as f64 - 2.0), scatter(errors)));
+        plot = plot.with(banded(name, Style::Markers, points).in_colour(k));
     }
     plot.with(Series::new("", Style::Dash, [(-0.2, 0.0), (4.2, 0.0)]).in_colour(6))
 }

@@ -106,11 +106,11 @@ fn table(rows: &[Row]) -> Table {
 
 fn picture(rows: &[Row]) -> Figure {
     let mut panels = Vec::new();
-    type Read = fn(&GoodAndBad) -> (f64, f64);
+    type Read = fn(&GoodAndBad) -> [f64; 2];
     let kinds: [(&str, Axis, Read); 3] = [
-        ("good estimates", Axis::log("std [m/s]").between(0.03, 4.0), |m| (m.std_good_m_s, m.std_good_error_m_s)),
-        ("bad estimates", Axis::linear("fraction").between(0.0, 1.0), |m| (m.bad_fraction, m.bad_fraction_error)),
-        ("bias", Axis::linear("bias [m/s]").between(-0.4, 0.4), |m| (m.bias_m_s, m.bias_error_m_s)),
+        ("good estimates", Axis::log("std [m/s]").between(0.03, 4.0), |m| [m.std_good_m_s, m.std_good_error_m_s]),
+        ("bad estimates", Axis::linear("fraction").between(0.0, 1.0), |m| [m.bad_fraction, m.bad_fraction_error]),
+        ("bias", Axis::linear("bias [m/s]").between(-0.4, 0.4), |m| [m.bias_m_s, m.bias_error_m_s]),
     ];
     for (title, y, read) in kinds {
         for (noise, name) in NOISES {
@@ -119,12 +119,14 @@ fn picture(rows: &[Row]) -> Figure {
             let mut plot = CurvePlot::new(&title, Axis::linear("SNR [dB]"), y.clone());
             plot.shape = 0.62;
             for (k, method) in DRAWN.into_iter().enumerate() {
-                let of: Vec<&Row> = rows.iter().filter(here).filter(|r| r.method == method).collect();
-                let points = of.iter().map(|r| (r.snr_db, read(&r.found).0));
-                let errors: Vec<f64> = of.iter().map(|r| read(&r.found).1).collect();
+                let point = |r: &Row| {
+                    let [value, error] = read(&r.found);
+                    (r.snr_db, Estimate::stated(value, error))
+                };
+                let points = rows.iter().filter(here).filter(|r| r.method == method).map(point);
                 // one legend is enough
                 let label = if noise == NoiseModel::White && title.starts_with("bad") { method } else { "" };
-                plot = plot.with(Series::new(label, Style::LineMarkers, points).with_band(&errors).in_colour(k));
+                plot = plot.with(banded(label, Style::LineMarkers, points).in_colour(k));
             }
             if title.starts_with("good") {
                 let bound = rows.iter().filter(here).filter(|r| r.method == DRAWN[0]).map(|r| (r.snr_db, r.bound_m_s));
@@ -133,10 +135,7 @@ fn picture(rows: &[Row]) -> Figure {
             panels.push(plot);
         }
     }
-    let mut figure = Figure::stacked(panels);
-    figure.columns = 2;
-    figure.width = 1300.0;
-    figure
+    Figure { columns: 2, width: 1300.0, ..Figure::stacked(panels) }
 }
 
 /// Mean of a ratio to the bound over rows, and its standard error.

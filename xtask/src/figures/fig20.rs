@@ -58,17 +58,8 @@ fn table(found: &RetrievedScan) -> Result<Table, Failure> {
         let residual_m_s = velocity_m_s - model_m_s;
         [range_m, elevation_rad, *velocity_m_s, model_m_s, residual_m_s, left[0], left[1], right[0], right[1]]
     };
-    let names = [
-        "range_m",
-        "elevation_rad",
-        "velocity_m_s",
-        "model_m_s",
-        "residual_m_s",
-        "gamma_left_m2_s",
-        "gamma_left_std_m2_s",
-        "gamma_right_m2_s",
-        "gamma_right_std_m2_s",
-    ];
+    let names = "range_m elevation_rad velocity_m_s model_m_s residual_m_s gamma_left_m2_s gamma_left_std_m2_s gamma_right_m2_s \
+                 gamma_right_std_m2_s";
     Ok(numbers_table(names, &map.velocity_m_s.indexed_iter().map(row).collect::<Vec<_>>()))
 }
 

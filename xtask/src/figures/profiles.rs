@@ -196,14 +196,14 @@ pub(super) fn batches_table<'p>(all: impl Iterator<Item = (String, &'p Profiles)
 
 /// Curves of some profiles, less their evolution with range.
 pub(super) fn plot(title: &str, profiles: &[Profiles]) -> CurvePlot {
-    let axes = ["range from the vortex centre [m]", "rms less its evolution [m/s]"].map(Axis::linear);
-    let [x, y] = axes;
+    let [x, y] = ["range from the vortex centre [m]", "rms less its evolution [m/s]"].map(Axis::linear);
     let mut plot = CurvePlot::new(title, x, y);
     for (place, p) in profiles.iter().enumerate() {
         let style = [Style::Line, Style::Dash, Style::DashDot][place % METHODS.len()];
-        let band: Vec<f64> = p.across.iter().map(|(_, zone)| zone.rms().standard_error).collect();
+        let excess = |zone: &Zone| Estimate { value: p.excess_m_s(zone, None), ..zone.rms() };
         let label = format!("{}, {:.0} ns", p.method, 1e9 * p.pulse_s);
-        plot = plot.with(Series::new(&label, style, p.across_m_s(None)).with_band(&band).in_colour(place));
+        let points = p.across.iter().map(|(range_m, zone)| (*range_m, excess(zone)));
+        plot = plot.with(banded(&label, style, points).in_colour(place));
     }
     plot
 }

@@ -2,6 +2,7 @@
 //! and Green, a channel.
 
 use super::Shown;
+use super::runs::{Curve, table_of};
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::{numbers, read};
@@ -36,10 +37,7 @@ pub(super) fn order(profile: Profile) -> Result<Shown, Failure> {
         Claim::at_least("order inside, both directions stretched", order(&inside), 3.9),
         Claim::at_least("order between no-slip walls", order(&walls), 2.8),
     ];
-    let table = Table::new()
-        .float("cells", inside.iter().map(|p| p.0))
-        .float("error_vortices_m_s", inside.iter().map(|p| p.1))
-        .float("error_layer_m_s", walls.iter().map(|p| p.1));
+    let table = table_of("cells", &[("error_vortices_m_s", &inside), ("error_layer_m_s", &walls)]);
     let first = inside[0];
     let slope = |power: i32| sizes.iter().map(move |&n| (n as f64, first.1 * (first.0 / n as f64).powi(power)));
     let plot = CurvePlot::new("Largest error", Axis::log("cells in each direction"), Axis::log("error [m/s]"))
@@ -103,8 +101,7 @@ pub(super) fn waves(profile: Profile) -> Result<Shown, Failure> {
             [(WAVE_FROM_S, 0.0), (WAVE_TO_S, expected * (WAVE_TO_S - WAVE_FROM_S))],
         ))
         .with(Series::new("64 x 128", Style::Markers, coarse.iter().copied().step_by(10)));
-    let mut table =
-        Table::new().float("time_s", coarse.iter().map(|p| p.0)).float("log_amplitude_64", coarse.iter().map(|p| p.1));
+    let mut table = table_of("time_s", &[("log_amplitude_64", &coarse)]);
     if profile != Profile::Quick {
         let fine = amplitudes([128, 256], 0.005)?;
         checks.push(Claim::relative("growth rate on 128 x 256 [1/s]", rate(&fine), expected, 0.002));
@@ -176,7 +173,7 @@ pub(super) fn dipole(reynolds: f64, profile: Profile) -> Result<Shown, Failure> 
             }
         }
     }
-    let (first, second) = literature(reynolds)?;
+    let [first, second] = literature(reynolds)?;
     let share = if profile == Profile::Quick { 0.1 } else { 0.01 };
     let peak = |i: usize| peaks.get(i).copied().unwrap_or((f64::NAN, f64::NAN));
     let checks = vec![
@@ -204,11 +201,8 @@ pub(super) fn dipole(reynolds: f64, profile: Profile) -> Result<Shown, Failure> 
     Ok(Shown { checks, table, figure: Figure::stacked([curve, wall]) })
 }
 
-/// Time and value of each of the two maxima.
-type Maxima = ((f64, f64), (f64, f64));
-
 /// Times and values of the two maxima in the literature.
-fn literature(reynolds: f64) -> Result<Maxima, Failure> {
+fn literature(reynolds: f64) -> Result<[(f64, f64); 2], Failure> {
     let text = read("tests/reference/les/dipole_wall_normal.csv")?;
     let rows = text.lines().filter(|line| line.ends_with("C&B2006"));
     let cells = rows.map(|line| line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect::<Vec<f64>>());
@@ -216,7 +210,7 @@ fn literature(reynolds: f64) -> Result<Maxima, Failure> {
         if let [found, t1, omega1, t2, omega2] = row[..]
             && found == reynolds
         {
-            return Ok(((t1, omega1), (t2, omega2)));
+            return Ok([(t1, omega1), (t2, omega2)]);
         }
     }
     Err(Failure::new(format!("no row of Reynolds number {reynolds}")))
@@ -257,10 +251,7 @@ pub(super) fn cavity(profile: Profile) -> Result<Shown, Failure> {
     }
     let stored = numbers("ghia_cavity_u.csv")?;
     let ghia: Vec<(f64, f64)> = stored.iter().map(|r| (r[0], r[3])).collect();
-    let table = Table::new()
-        .float("position_m", column.iter().map(|p| p.0))
-        .float("u_on_vertical_m_s", column.iter().map(|p| p.1))
-        .float("v_on_horizontal_m_s", row.iter().map(|p| p.1));
+    let table = table_of("position_m", &[("u_on_vertical_m_s", &column), ("v_on_horizontal_m_s", &row)]);
     let plot = CurvePlot::new("Centre lines", Axis::linear("position [m]"), Axis::linear("velocity [m/s]"))
         .with(Series::new("u, vertical line", Style::Line, column))
         .with(Series::new("v, horizontal line", Style::Dash, row))
@@ -369,9 +360,7 @@ pub(super) fn channel() -> Result<Shown, Failure> {
     let stored: Vec<(f64, f64)> = numbers("channel_retau180_mean.csv")?.iter().map(|r| (r[0], r[1])).collect();
     let worst = stored.iter().map(|p| (value_at(&profile, p.0) / p.1 - 1.0).abs()).fold(0.0, f64::max);
     let checks = vec![Claim::at_most("largest error of the mean velocity, relative", worst, 0.05)];
-    let table = Table::new()
-        .float("z_plus", profile.iter().map(|p| p.0))
-        .float("mean_velocity_plus", profile.iter().map(|p| p.1));
+    let table = table_of("z_plus", &[("mean_velocity_plus", &profile)]);
     let plot = CurvePlot::new("Mean velocity, Re_tau 178", Axis::log("z+"), Axis::linear("U+"))
         .with(Series::new("48 x 48 x 64, multiscale model", Style::Line, profile))
         .with(Series::new("Moser, Kim and Mansour", Style::Markers, stored));

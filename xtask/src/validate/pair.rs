@@ -2,7 +2,7 @@
 
 use super::Shown;
 use super::flows::advance;
-use super::runs::{Curve, apart, relative, run, stored_curve, worst};
+use super::runs::{Curve, apart, relative, run, stored_curve, table_of, worst};
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::numbers;
@@ -12,7 +12,6 @@ use wakescope_les::CirculationProfile;
 use wakescope_les::analysis::{WakeRecord, WakeScales};
 use wakescope_les::cases::VortexPairCase;
 use wakescope_sim::flow::{Subgrid, WakePreset, WakeProfile};
-use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 const END: f64 = 3.0;
@@ -60,13 +59,8 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
         ),
         Claim::at_most("left against right, y", asymmetry, 1e-9),
     ];
-    let table = Table::new()
-        .float("tau", y.iter().map(|p| p.0))
-        .float("y", y.iter().map(|p| p.1))
-        .float("z", z.iter().map(|p| p.1))
-        .float("gamma", gamma.iter().map(|p| p.1))
-        .float("energy", energy.iter().map(|p| p.1))
-        .float("enstrophy", enstrophy.iter().map(|p| p.1));
+    let columns = [("y", &y), ("z", &z), ("gamma", &gamma), ("energy", &energy), ("enstrophy", &enstrophy)];
+    let table = table_of("tau", &columns);
     let path = CurvePlot::new("Path", Axis::linear("y / b₀"), Axis::linear("z / b₀"))
         .with(Series::new("this solver", Style::Line, y.iter().zip(&z).map(|(y, z)| (y.1, z.1))))
         .with(Series::new("spectral code", Style::Markers, stored.iter().map(|r| (r[1], r[2]))));
@@ -100,10 +94,7 @@ pub(super) fn show_hyperbola(profile: Profile) -> Result<Shown, Failure> {
         Claim::at_most("largest error of z to tau = 4, b₀", off[1], 0.01),
         Claim::at_most("energy lost, relative", lost.abs(), 1e-3),
     ];
-    let table = Table::new()
-        .float("tau", y.iter().map(|p| p.0))
-        .float("y", y.iter().map(|p| p.1))
-        .float("z", z.iter().map(|p| p.1));
+    let table = table_of("tau", &[("y", &y), ("z", &z)]);
     let path = CurvePlot::new("Path over a frictionless ground", Axis::linear("y / b₀"), Axis::linear("z / b₀"))
         .with(Series::new("this solver", Style::Line, y.iter().zip(&z).map(|(y, z)| (y.1, z.1))))
         .with(Series::new("point vortices", Style::Dash, stored.iter().filter(|r| r[0] <= 4.0).map(|r| (r[1], r[2]))));

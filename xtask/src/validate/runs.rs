@@ -5,6 +5,7 @@ use crate::workspace::root;
 use fixtures::failure::Failure;
 use wakescope_les::analysis::decay::value_at;
 use wakescope_sim::flow::{CaseKind, FinishedWake, Subgrid, WakeFlow, WakePreset};
+use wakescope_sim::io::Table;
 
 /// Points of a curve.
 pub(super) type Curve = Vec<(f64, f64)>;
@@ -34,6 +35,12 @@ pub(super) fn run(
 /// The same flow on one cell along the flight.
 pub(super) fn plane(flow: &mut WakeFlow) {
     flow.cells[0] = 1;
+}
+
+/// A table of curves at the same places, a column for each.
+pub(super) fn table_of(places: &str, curves: &[(&str, &Curve)]) -> Table {
+    let table = Table::new().float(places, curves[0].1.iter().map(|p| p.0));
+    curves.iter().fold(table, |table, (name, curve)| table.float(name, curve.iter().map(|p| p.1)))
 }
 
 /// A column of stored rows against the first.

@@ -14,7 +14,7 @@ use crate::Error;
 use crate::air::spectrum::Spectrum;
 use crate::quadrature::GaussLegendre;
 use crate::screens::grid::{Fft2, FftScratch, Grid};
-use crate::screens::kernel::{self, LowRow, Real};
+use crate::screens::kernel::{self, Real};
 use crate::screens::low_frequency::{LowFrequencies, unit};
 use rand::Rng;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -236,11 +236,10 @@ impl<T: Real> ScreenGenerator<T> {
         self.fft.inverse_x(field, scratch, |y, block| {
             for (i, line) in block.chunks_exact(nx).enumerate() {
                 let y = y + i;
-                let coefficient = self.low.row(&low, y);
-                let low =
-                    LowRow { coefficient: &coefficient, basis: &self.low.basis[0], ramp: shifted(ny, shift[1], y) };
+                let (phase, low) = ((shifted(ny, shift[1], y), &ramp[..]), self.low.row(&low, y));
                 let span = y * nx..(y + 1) * nx;
-                kernel::finish_screen(line, ramp, &low, [&mut first[span.clone()], &mut second[span]]);
+                let screens = [&mut first[span.clone()], &mut second[span]];
+                kernel::finish_screen(line, phase, (&self.low.basis[0], &low), screens);
             }
         });
         Ok(())

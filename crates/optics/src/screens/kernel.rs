@@ -50,17 +50,6 @@ pub trait Real: sealed::Scalar + FftNum + Default + PartialOrd {
     fn wide(self) -> f64;
 }
 
-/// Low-frequency part of one row: coefficients times the polynomials sampled along the row.
-#[derive(Debug)]
-pub(crate) struct LowRow<'a, T> {
-    /// Coefficients of the real and of the imaginary part.
-    pub(crate) coefficient: &'a [[T; 2]; LOW_ORDER],
-    /// `LOW_ORDER` polynomials, each sampled along the row.
-    pub(crate) basis: &'a [Vec<T>],
-    /// Factor of the row in the linear phase of the frequency shift.
-    pub(crate) ramp: Complex<T>,
-}
-
 /// field *= exp(j scale phase).
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn multiply_cis<T: Real>(field: &mut [Complex<T>], phase: &[T], scale: T) {
@@ -141,20 +130,20 @@ pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
     sum.iter().map(|s| s.wide()).sum()
 }
 
-/// Real and imaginary part of row * ramp + the low-frequency polynomial, into two rows.
+/// Real and imaginary part of row * factor * ramp + the low-frequency part, into two rows: the phase of the frequency shift is linear, and
+/// `low` are the polynomials, each sampled along the row, with the coefficients of either part.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn finish_screen<T: Real>(
     row: &[Complex<T>],
-    ramp: &[Complex<T>],
-    low: &LowRow<'_, T>,
+    (factor, ramp): (Complex<T>, &[Complex<T>]),
+    low: (&[Vec<T>], &[[T; 2]; LOW_ORDER]),
     [first, second]: [&mut [T]; 2],
 ) {
-    let factor = low.ramp;
     for start in (0..row.len()).step_by(BLOCK) {
         let end = (start + BLOCK).min(row.len());
         let mut re = [T::zero(); BLOCK];
         let mut im = [T::zero(); BLOCK];
-        for (basis, &[cre, cim]) in low.basis.iter().zip(low.coefficient) {
+        for (basis, &[cre, cim]) in low.0.iter().zip(low.1) {
             for ((&p, re), im) in basis[start..end].iter().zip(&mut re).zip(&mut im) {
                 *re = *re + cre * p;
                 *im = *im + cim * p;
