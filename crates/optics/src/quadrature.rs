@@ -4,6 +4,8 @@
 //! closed forms to its tolerance.
 
 use crate::Error;
+use std::iter::Sum;
+use std::ops::Mul;
 
 /// Gauss-Legendre rule on \[-1, 1\].
 #[derive(Debug, Clone)]
@@ -134,12 +136,13 @@ pub(crate) fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
     node.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, z)| (x - z) / (node[j] - z)).product()
 }
 
-/// Cubic interpolation in a table of `count` values at 0, 1, 2, ...: the first of four neighbours of `t`, and their weights.
-pub(crate) fn cubic(t: f64, count: usize) -> (usize, [f64; 4]) {
-    let at = (t as usize).clamp(1, count - 3);
+/// Cubic interpolation at `t` between the four neighbours in a table of values at 0, 1, 2, ...
+pub(crate) fn cubic<T: Copy + Mul<f64, Output = T> + Sum>(t: f64, table: &[T]) -> T {
+    let at = (t as usize).clamp(1, table.len() - 3);
     let u = t - at as f64;
     let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
-    (at - 1, [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0])
+    let weight = [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0];
+    weight.iter().zip(&table[at - 1..]).map(|(w, v)| *v * *w).sum()
 }
 
 #[cfg(test)]

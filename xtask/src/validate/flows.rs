@@ -2,7 +2,7 @@
 //! and Green, a channel.
 
 use super::Shown;
-use super::runs::{Curve, table_of};
+use super::runs::table_of;
 use crate::claim::Claim;
 use crate::profile::Profile;
 use crate::workspace::{numbers, read};

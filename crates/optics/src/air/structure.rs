@@ -27,18 +27,16 @@ pub fn structure_function_m53(spectrum: &dyn Spectrum, separation_m: f64) -> Res
     // Without an outer scale the integrand falls as kappa^(-2/3) dkappa towards 0: 1e-39 of the scale is 1e-13 of it.
     let start = if outer > 0.0 { 1e-8 * outer.min(1.0 / r).min(end) } else { 1e-39 / r };
     let smooth_end = (4.0 / r).min(end);
-    let mut sum = logarithmic(&rule, start, smooth_end, |kappa| {
-        kappa * spectrum.density_per_cn2(kappa) * one_minus_j0(kappa * r)
-    });
+    let density = |kappa: f64| kappa * spectrum.density_per_cn2(kappa);
+    let integrand = |kappa: f64| density(kappa) * one_minus_j0(kappa * r);
+    let mut sum = logarithmic(&rule, start, smooth_end, integrand);
     let wave_end = (LAST_OSCILLATION / r).min(end);
     if wave_end > smooth_end {
         let panels = 1 + ((wave_end - smooth_end) * r / 6.0) as usize;
-        sum += rule.composite(smooth_end, wave_end, panels, |kappa| {
-            kappa * spectrum.density_per_cn2(kappa) * one_minus_j0(kappa * r)
-        });
+        sum += rule.composite(smooth_end, wave_end, panels, integrand);
     }
     if end > wave_end {
-        sum += logarithmic(&rule, wave_end, end, |kappa| kappa * spectrum.density_per_cn2(kappa));
+        sum += logarithmic(&rule, wave_end, end, density);
     }
     Ok(8.0 * PI * PI * sum)
 }
@@ -84,13 +82,8 @@ impl StructureTable {
         let step_ln = std::f64::consts::LN_10 / Self::PER_DECADE;
         let first_ln = Self::SMALLEST_M.ln();
         let n = ((Self::LARGEST_M / Self::SMALLEST_M).ln() / step_ln).round() as usize + 1;
-        let ln_value = (0..n)
-            .map(|i| {
-                let r = (first_ln + step_ln * i as f64).exp();
-                structure_function_m53(spectrum, r).unwrap_or(f64::NAN).ln()
-            })
-            .collect();
-        Self { first_ln, step_ln, ln_value }
+        let ln_value = |r: f64| structure_function_m53(spectrum, r).unwrap_or(f64::NAN).ln();
+        Self { first_ln, step_ln, ln_value: (0..n).map(|i| ln_value((first_ln + step_ln * i as f64).exp())).collect() }
     }
 
     /// G(r) \[m^(5/3)\] at `separation_m` >= 0.

@@ -18,39 +18,20 @@ use std::f64::consts::PI;
 /// light just below Nyquist does: 0 leaves the chapter's efficiency 0.2 % too small at 100 m, 1 makes it 0.3 % too large.
 const RESTORED: f64 = 0.4;
 
-/// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr \[m\], tabulated.
-struct Transform {
-    step_rad_m: f64,
-    value: Vec<f64>,
-}
-
-impl Transform {
-    fn new(telescope: &Telescope, largest_rad_m: f64) -> Self {
-        let (a, b) = (telescope.aperture_radius_m, telescope.obscuration_radius_m);
-        let a = a.min((9.0 * telescope.intensity_radius_m()).max(b));
-        let step_rad_m = 0.02 / a;
-        let rule = GaussLegendre::new(16);
-        let panels = 2 + (largest_rad_m * (a - b) / 8.0) as usize;
-        let peak = telescope.peak_irradiance_per_m2().sqrt();
-        let nodes: Vec<(f64, f64)> = rule
-            .on_panels(b, a, panels)
-            .map(|(r, w)| (r, 2.0 * PI * w * r * peak * telescope.relative_irradiance(r).sqrt()))
-            .collect();
-        let count = (largest_rad_m / step_rad_m) as usize + 4;
-        let value = (0..count)
-            .map(|i| {
-                let kappa = step_rad_m * i as f64;
-                nodes.iter().map(|(r, w)| w * libm::j0(kappa * r)).sum()
-            })
-            .collect();
-        Self { step_rad_m, value }
-    }
-
-    /// Cubic interpolation; the step is 1/50 of the finest structure.
-    fn at(&self, kappa_rad_m: f64) -> f64 {
-        let (first, weight) = cubic(kappa_rad_m / self.step_rad_m, self.value.len());
-        weight.iter().zip(&self.value[first..]).map(|(w, v)| w * v).sum()
-    }
+/// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr \[m\], by a table of steps of 1/50 of its finest
+/// structure.
+fn transform(telescope: &Telescope, largest_rad_m: f64) -> impl Fn(f64) -> f64 {
+    let (a, b) = (telescope.aperture_radius_m, telescope.obscuration_radius_m);
+    let a = a.min((9.0 * telescope.intensity_radius_m()).max(b));
+    let step_rad_m = 0.02 / a;
+    let panels = 2 + (largest_rad_m * (a - b) / 8.0) as usize;
+    let peak = telescope.peak_irradiance_per_m2().sqrt();
+    let weight = |r: f64, w: f64| 2.0 * PI * w * r * peak * telescope.relative_irradiance(r).sqrt();
+    let nodes: Vec<_> = GaussLegendre::new(16).on_panels(b, a, panels).map(|(r, w)| (r, weight(r, w))).collect();
+    let value = |kappa: f64| nodes.iter().map(|(r, w)| w * libm::j0(kappa * r)).sum();
+    let count = (largest_rad_m / step_rad_m) as usize + 4;
+    let table: Vec<f64> = (0..count).map(|i| value(step_rad_m * i as f64)).collect();
+    move |kappa_rad_m| cubic(kappa_rad_m / step_rad_m, &table)
 }
 
 /// Field of the telescope on the grid, `[y][x]`, for unit power before truncation; `misalignment` displaces and tilts it.
@@ -61,7 +42,7 @@ pub(crate) fn aperture_field<T: Real>(
 ) -> Vec<Complex<T>> {
     let [dkx, dky] = [2.0 * PI / (grid.nx as f64 * grid.dx_m), 2.0 * PI / (grid.ny as f64 * grid.dy_m)];
     let nyquist = [PI / grid.dx_m, PI / grid.dy_m];
-    let transform = Transform::new(telescope, nyquist[0].hypot(nyquist[1]) * 1.001);
+    let transform = transform(telescope, nyquist[0].hypot(nyquist[1]) * 1.001);
     // Power in the band, and how it grows with the weight given to its upper half.
     let mut spectrum = vec![Complex::<f64>::default(); grid.points()];
     let mut edge = vec![0.0; grid.points()];
@@ -71,7 +52,7 @@ pub(crate) fn aperture_field<T: Real>(
         let kx = Grid::frequency_index(grid.nx, ix) * dkx;
         for iy in 0..grid.ny {
             let ky = Grid::frequency_index(grid.ny, iy) * dky;
-            let value = transform.at(kx.hypot(ky));
+            let value = transform(kx.hypot(ky));
             // Only the corners of the band, between one and sqrt 2 times Nyquist, take light from beyond.
             let t = (((kx / nyquist[0]).hypot(ky / nyquist[1]) - 1.0) / 0.4).clamp(0.0, 1.0);
             let at = ix * grid.ny + iy;

@@ -17,7 +17,7 @@ use crate::air::turbulence::{Turbulence, path_rytov_variance};
 use crate::beam::{Misalignment, Telescope};
 use crate::quadrature::{GaussLegendre, cubic, lagrange};
 use crate::theory::exact::bistatic_efficiency;
-use crate::theory::hankel::Aperture;
+use crate::theory::hankel::field_per_m;
 use crate::theory::overlap::fresnel_number;
 use num_complex::Complex;
 use std::f64::consts::PI;
@@ -179,17 +179,11 @@ impl DisplacedOverlaps {
 fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Vec<Complex<f64>> {
     const FINER: f64 = 8.0;
     let end_m = step_m * (reach + 1) as f64 * std::f64::consts::SQRT_2;
-    let aperture = Aperture::new(telescope, range_m, end_m);
+    let field_per_m = field_per_m(telescope, range_m, end_m);
     let count = (end_m / step_m * FINER) as usize + 4;
-    let radial: Vec<Complex<f64>> = (0..count).map(|i| aperture.field_per_m(step_m / FINER * i as f64)).collect();
-    let mut out = Vec::with_capacity((reach + 1) * (reach + 1));
-    for i in 0..=reach {
-        for j in 0..=reach {
-            let (first, weight) = cubic(FINER * (i as f64).hypot(j as f64), count);
-            out.push(weight.iter().zip(&radial[first..]).map(|(w, v)| v * w).sum());
-        }
-    }
-    out
+    let radial: Vec<Complex<f64>> = (0..count).map(|i| field_per_m(step_m / FINER * i as f64)).collect();
+    let steps = (0..=reach).flat_map(|i| (0..=reach).map(move |j| (i as f64).hypot(j as f64)));
+    steps.map(|steps| cubic(FINER * steps, &radial)).collect()
 }
 
 #[cfg(test)]
