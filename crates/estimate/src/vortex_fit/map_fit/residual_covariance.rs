@@ -47,9 +47,26 @@ const BEYOND_CHANCE: f64 = 12.0;
 const COARSE: f64 = 1.8;
 const FINE: f64 = 1.15;
 
-/// Sums over all pairs of cells that are so far apart, by Fourier transforms on a grid with as much room again.
+/// The least length from `least` on without prime factors but 2, 3 and 5, whose transforms are quick.
+fn fast_length(least: usize) -> usize {
+    let is_fast = |length: &usize| {
+        let mut rest = *length;
+        for factor in [2, 3, 5] {
+            while rest.is_multiple_of(factor) {
+                rest /= factor;
+            }
+        }
+        rest == 1
+    };
+    (least.max(1)..).find(is_fast).unwrap_or(least)
+}
+
+/// Sums over all pairs of cells that are so far apart, by Fourier transforms on a grid with at least as much room again.
 struct Plane<'a> {
     cells: &'a [Cell],
+    /// Lines and gates of the cells.
+    extent: (usize, usize),
+    /// And of the grid.
     lines: usize,
     gates: usize,
     along: [Arc<dyn Fft<f64>>; 2],
@@ -58,9 +75,10 @@ struct Plane<'a> {
 
 impl<'a> Plane<'a> {
     fn new(cells: &'a [Cell]) -> Self {
-        let most = |of: fn(&Cell) -> usize| 2 * (cells.iter().map(of).max().unwrap_or(0) + 1);
-        let (lines, gates) = (most(|cell| cell.line), most(|cell| cell.gate));
-        Self { cells, lines, gates, along: complex_transforms(gates), across: complex_transforms(lines) }
+        let most = |of: fn(&Cell) -> usize| cells.iter().map(of).max().unwrap_or(0) + 1;
+        let extent = (most(|cell| cell.line), most(|cell| cell.gate));
+        let (lines, gates) = (fast_length(2 * extent.0), fast_length(2 * extent.1));
+        Self { cells, extent, lines, gates, along: complex_transforms(gates), across: complex_transforms(lines) }
     }
 
     fn transform(&self, grid: &mut [Complex<f64>], inverse: usize) {
@@ -87,6 +105,20 @@ impl<'a> Plane<'a> {
     fn back(&self, mut grid: Vec<Complex<f64>>) -> Vec<f64> {
         self.transform(&mut grid, 1);
         grid.into_iter().map(|value| value.re).collect()
+    }
+
+    /// Distances (lines, gates) beyond which pairs of cells are few.
+    fn half(&self) -> (f64, f64) {
+        (0.5 * self.extent.0 as f64, 0.5 * self.extent.1 as f64)
+    }
+
+    /// Sum of a function of the distance over all distances of cells, with either sign.
+    fn sum(&self, function: &[f64]) -> f64 {
+        let is_within = |i: usize, extent: usize, size: usize| i <= extent || i > size - extent;
+        let rows = function.chunks_exact(self.gates).enumerate();
+        let rows = rows.filter(|(line, _)| is_within(*line, self.extent.0, self.lines));
+        let near = rows.flat_map(|(_, row)| row.iter().enumerate());
+        near.filter(|(gate, _)| is_within(*gate, self.extent.1, self.gates)).map(|(_, value)| value).sum()
     }
 
     /// A function of the distances (lines, gates) on the grid.
@@ -162,7 +194,7 @@ impl<'a> Correlogram<'a> {
             white.iter_mut().zip(plane.power(column)).for_each(|(white, taken)| *white -= taken);
         }
         // far cells are few and have little to say
-        let (most_lines, most_gates) = (plane.lines as f64 / 4.0, plane.gates as f64 / 4.0);
+        let (most_lines, most_gates) = plane.half();
         let near = plane.of_distance(|i, j| if i <= most_lines && j <= most_gates { 1.0 } else { 0.0 });
         let mut weights: Vec<f64> =
             near.iter().zip(&pairs).map(|(near, pairs)| if *pairs > 0.5 { near / pairs } else { 0.0 }).collect();
@@ -221,7 +253,7 @@ impl<'a> Correlogram<'a> {
 
     fn fit(&self) -> Fitted {
         let alone = self.white_alone();
-        let longest = (self.plane.lines as f64 / 4.0, self.plane.gates as f64 / 4.0);
+        let longest = self.plane.half();
         let better = |a: Fitted, b: Fitted| if b.left < a.left { b } else { a };
         let parts = (0..).map(|i| COARSE.powi(-i)).take_while(|part| longest.0.max(longest.1) * part > 0.4);
         let best = parts.map(|part| self.at((longest.0 * part, longest.1 * part))).fold(alone, better);
@@ -282,8 +314,8 @@ fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<
     }
     let last =
         |most: usize, of: &dyn Fn(usize) -> f64| (1..=most).find(|k| of(*k) < LEAST * variance).map_or(most, |k| k - 1);
-    let last_line = last(lines.min(plane.lines / 6), &|line| mean(line, 0));
-    let last_gate = last(plane.gates / 6, &|gate| mean(0, gate));
+    let last_line = last(lines.min(plane.extent.0 / 3), &|line| mean(line, 0));
+    let last_gate = last(plane.extent.1 / 3, &|gate| mean(0, gate));
     let (mut at, short) = (vec![0.0; sums.len()], |i: usize, of: usize| i.min(of - i));
     for (line, gate) in (0..plane.lines).flat_map(|line| (0..plane.gates).map(move |gate| (line, gate))) {
         let correlation = mean(line, gate) / variance;
@@ -315,7 +347,7 @@ pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array
         return (white, 1.0);
     }
     let correlation = exponential(&plane, found.lengths);
-    let alike = 1.0 + found.correlated / (found.white + found.correlated) * (correlation.iter().sum::<f64>() - 1.0);
+    let alike = 1.0 + found.correlated / (found.white + found.correlated) * (plane.sum(&correlation) - 1.0);
     (white + plane.quadratic(&slopes, &correlation) * found.correlated, alike)
 }
 
