@@ -19,8 +19,8 @@ impl<'a> Gates<'a> {
         Self::on_grid(map, options, COARSER)
     }
 
-    /// For the way to the end of a fit: the points of a Gaussian weight lie on one grid with the gates, which is quick, `coarser` times as far
-    /// apart as in the end at most.
+    /// For the way to the end of a fit: the points of a weight lie on one grid with the gates, which is quick, about `coarser` times as
+    /// far apart as in the end.
     pub(crate) fn on_grid(map: &'a ScanMap, options: &'a RetrievalOptions, coarser: usize) -> Result<Self, Error> {
         options.gate.validate(&map.range_m)?;
         let step_m = uniform_step_m(&map.range_m);
@@ -30,7 +30,9 @@ impl<'a> Gates<'a> {
                 let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
                 gaussian(*std_m, spacing_m, (REACH * std_m / spacing_m).ceil() as usize)?
             }
-            Gate::Kernel(kernel) => kernel.coarser(coarser),
+            Gate::Kernel(kernel) => {
+                step_m.map_or_else(|| kernel.coarser(coarser), |step_m| kernel.dividing(step_m, coarser))
+            }
             Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
         };
         let moves = options.movement != Movement::Frozen && map.lasts_s() > 0.0;

@@ -12,6 +12,9 @@ use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::{PARAMETERS, Wake, WakeModel};
 use crate::window::SPEED_OF_LIGHT_M_S;
 
+/// Gates closer than this part of the distance of points stay between them: a grid that they fall on would have many points more.
+const CLOSE: f64 = 0.75;
+
 /// Weights of the air about the range of a gate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeKernel {
@@ -84,6 +87,24 @@ impl RangeKernel {
             spacing_m: factor as f64 * self.spacing_m,
             weights,
         }
+    }
+
+    /// The same kernel on a grid about `factor` times as coarse that divides `step_m`: gates so far apart fall on its points. Weights are shared
+    /// by the two points about them, which keeps their sum and their mean offset. Gates that are closer than its points stay between them.
+    pub(crate) fn dividing(&self, step_m: f64, factor: usize) -> Self {
+        let parts = step_m / (factor as f64 * self.spacing_m);
+        if parts < CLOSE {
+            return self.coarser(factor);
+        }
+        let spacing_m = step_m / parts.round().max(1.0);
+        let ratio = self.spacing_m / spacing_m;
+        let mut weights = vec![0.0; ((self.weights.len() - 1) as f64 * ratio) as usize + 2];
+        for (i, weight) in self.weights.iter().enumerate() {
+            let (place, part) = ((i as f64 * ratio) as usize, (i as f64 * ratio).fract());
+            weights[place] += (1.0 - part) * weight;
+            weights[place + 1] += part * weight;
+        }
+        Self { first_offset_m: self.first_offset_m, spacing_m, weights }
     }
 }
 
@@ -185,6 +206,16 @@ mod tests {
         assert_relative_eq!(gate().width_m(), expected, max_relative = 2e-2);
         assert_relative_eq!(gate().coarser(4).width_m(), expected, max_relative = 3e-2);
         assert!(gate().coarser(4).weights.len() < gate().weights.len() / 3);
+        for (step_m, factor) in [(6.0, 1), (5.9, 2), (2.9, 4)] {
+            let dividing = gate().dividing(step_m, factor);
+            assert_relative_eq!(dividing.width_m(), expected, max_relative = 3e-2);
+            assert_relative_eq!(dividing.middle().first_offset_m, gate().middle().first_offset_m, epsilon = 1e-9);
+            assert_relative_eq!(dividing.weights.iter().sum::<f64>(), 1.0, max_relative = 1e-12);
+            let parts = step_m / dividing.spacing_m;
+            assert!(
+                (parts - parts.round()).abs() < 1e-9 && dividing.spacing_m < 1.5 * factor as f64 * gate().spacing_m
+            );
+        }
     }
 
     #[test]
