@@ -195,10 +195,9 @@ fn linear_fields_are_exact_in_place_and_time_on_staggered_stretched_meshes() {
         let (point, time_s) = (triple(["x_m", "y_m", "z_m"]), row("time_s"));
         let expected = triple(["u_m_s", "v_m_s", "w_m_s"]);
         near(at(&wind, point, time_s), expected);
-        let series = Series::read(vec![0.0, 4.0, 10.0], 0.0, move |i| {
-            Ok(staggered(9, |p| at(&wind, p, [0.0, 4.0, 10.0][i])))
-        })
-        .unwrap();
+        let series =
+            Series::read(vec![0.0, 4.0, 10.0], 0.0, move |i| Ok(staggered(9, |p| at(&wind, p, [0.0, 4.0, 10.0][i]))))
+                .unwrap();
         near(at(&series, point, time_s), expected);
     });
 }
