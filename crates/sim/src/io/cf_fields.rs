@@ -49,7 +49,7 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
         variables.push(data("vorticity_magnitude", vorticity, "s-1", "magnitude of the vorticity"));
     }
     let dims = vec![("time", 1), ("z", field.z_m.len()), ("y", field.y_m.len()), ("x", field.x_m.len())];
-    file(&field.title, dims, variables, provenance, &field.share)
+    Layout::cf(&field.title, dims, variables, provenance).into_parts(provenance, field.share.is_first)
 }
 
 /// Velocity components at the low faces of the cells.
@@ -102,32 +102,15 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
                 .text("units", "m s-1");
         variables.push(variable);
     }
-    file(&faces.title, dims, variables, provenance, &faces.share)
+    Layout::cf(&faces.title, dims, variables, provenance).into_parts(provenance, faces.share.is_first)
 }
 
 fn axis(name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str) -> Variable {
-    let letter = if name.starts_with('x') {
-        "X"
-    } else if name.starts_with('y') {
-        "Y"
-    } else {
-        "Z"
-    };
     let variable = Variable::new(name, dims, Data::f64(values.iter().copied()))
         .text("long_name", long_name)
         .text("units", "m")
-        .text("axis", letter);
+        .text("axis", &name[..1].to_uppercase());
     if name == "z" { variable.text("standard_name", "height") } else { variable }
-}
-
-fn file(
-    title: &str,
-    dims: Vec<(&'static str, usize)>,
-    variables: Vec<Variable>,
-    provenance: &Provenance,
-    share: &Share,
-) -> OutputResult<FileParts> {
-    Layout::cf(title, dims, variables, provenance).into_parts(provenance, share.is_first)
 }
 
 #[cfg(test)]

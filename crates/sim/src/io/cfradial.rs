@@ -69,7 +69,7 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         true => ("simulation, no institution", SIMULATED, "true"),
         false => ("", MEASURED, "false"),
     };
-    let fixed = [
+    let entries = [
         ("Conventions", "CF-1.7 CF/Radial instrument_parameters"),
         ("version", "1.4"),
         ("institution", institution),
@@ -81,14 +81,11 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
         ("simulated", simulated),
+        ("title", &map.title),
+        ("site_name", &map.site.name),
+        ("history", &format!("written by {}", provenance.program)),
     ];
-    let made = [
-        ("title", map.title.clone()),
-        ("site_name", map.site.name.clone()),
-        ("history", format!("written by {}", provenance.program)),
-    ];
-    let fixed = fixed.map(|(name, text)| (name, text.to_owned()));
-    fixed.into_iter().chain(made).collect()
+    entries.map(|(name, text)| (name, text.to_owned())).into()
 }
 
 fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {

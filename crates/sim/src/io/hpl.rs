@@ -9,6 +9,7 @@ use super::map::VelocityMap;
 use super::site::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::setup::beams::SweepMode;
+use ndarray::Array2;
 use std::fmt::Write as _;
 
 /// No instrument has the number 0: with the file's own name it is all by which this program's files can be told, for readers
@@ -24,14 +25,15 @@ pub(super) const SYSTEM_ID: &str = "System ID:\t0";
 /// that overlap or leave gaps, or do not start a whole number of gates from the lidar (the format derives the range
 /// from the gate number); a sweep across midnight UTC.
 pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
-    map.check()?;
-    let (first, last) = rays_of(map, sweep)?;
+    let ((first, last), [velocity, snr_db]) = swept(map, sweep)?;
     let (gate_m, before) = gate_grid(&map.range_m)?;
     within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.site.start)?;
-    let (velocity, snr_db) = (&need(map, "radial_velocity")?.values, &need(map, "signal_to_noise_ratio")?.values);
     let mut out = header(map, file_name, gate_m, before + map.range_m.len(), (first, last));
     for ray in first..=last {
-        push_ray_line(map, ray, &mut out);
+        let hours = second_of_day(map, ray) / 3600.0;
+        let azimuth_deg = map.rays[ray].azimuth_rad.rem_euclid(std::f64::consts::TAU).to_degrees();
+        let elevation_deg = map.rays[ray].elevation_rad.to_degrees();
+        out += &format!("{hours:11.8} {azimuth_deg:6.2} {elevation_deg:6.2} {:.2} {:.2}\r\n", 0.0, 0.0);
         for gate in 0..before {
             push_gate(gate, f64::NAN, f64::NAN, &mut out);
         }
@@ -49,9 +51,7 @@ pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResu
 /// # Errors
 /// As [`hpl_bytes`].
 pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
-    map.check()?;
-    let (first, last) = rays_of(map, sweep)?;
-    let (velocity, snr_db) = (&need(map, "radial_velocity")?.values, &need(map, "signal_to_noise_ratio")?.values);
+    let ((first, last), [velocity, snr_db]) = swept(map, sweep)?;
     let all = (first..=last).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate)));
     let cells: Vec<(usize, usize)> = all.filter(|cell| velocity[*cell].is_finite()).collect();
     let of_ray = |get: &dyn Fn(usize) -> f64| cells.iter().map(|c| get(c.0)).collect::<Vec<_>>();
@@ -65,16 +65,19 @@ pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
         .int("ray", cells.iter().map(|c| (c.0 - first) as i64)))
 }
 
-fn rays_of(map: &VelocityMap, sweep: usize) -> OutputResult<(usize, usize)> {
+/// First and last ray of a sweep, velocities and signal-to-noise ratios of all.
+fn swept(map: &VelocityMap, sweep: usize) -> OutputResult<((usize, usize), [&Array2<f64>; 2])> {
+    map.check()?;
     let bounds = map.sweep_bounds();
-    bounds.get(sweep).copied().ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))
-}
-
-fn need<'a>(map: &'a VelocityMap, name: &str) -> OutputResult<&'a super::map::Field> {
-    map.field(name).ok_or_else(|| OutputError::Missing {
-        what: format!("field {name}"),
-        needed: "an .hpl file holds velocity and intensity".into(),
-    })
+    let rays = bounds.get(sweep).copied();
+    let rays = rays.ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))?;
+    let need = |name: &str| {
+        map.field(name).map(|field| &field.values).ok_or_else(|| OutputError::Missing {
+            what: format!("field {name}"),
+            needed: "an .hpl file holds velocity and intensity".into(),
+        })
+    };
+    Ok((rays, [need("radial_velocity")?, need("signal_to_noise_ratio")?]))
 }
 
 /// The format counts hours of one day.
@@ -170,20 +173,12 @@ fn start_time(map: &VelocityMap, ray: usize) -> String {
     format!("{year:04}{month:02}{day:02} {h:02}:{m:02}:{rest:05.2}")
 }
 
-fn push_ray_line(map: &VelocityMap, ray: usize, out: &mut String) {
-    let r = &map.rays[ray];
-    let hours = second_of_day(map, ray) / 3600.0;
-    let azimuth = r.azimuth_rad.rem_euclid(std::f64::consts::TAU).to_degrees();
-    let elevation = r.elevation_rad.to_degrees();
-    // Writing to a String cannot fail.
-    let _ = write!(out, "{hours:11.8} {azimuth:6.2} {elevation:6.2} {:.2} {:.2}\r\n", 0.0, 0.0);
-}
-
 fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {
     let velocity = if velocity_m_s.is_nan() { 0.0 } else { velocity_m_s };
     let has_ratio = velocity_m_s.is_finite() && snr_db.is_finite();
     let intensity = if has_ratio { 1.0 + 10_f64.powf(snr_db / 10.0) } else { 1.0 };
     let backscatter = format!("{:.6E}", 0.0);
+    // Writing to a String cannot fail.
     let _ = write!(out, "{gate:3} {velocity:.4} {intensity:.6} {backscatter:>13}\r\n");
 }
 

@@ -201,19 +201,7 @@ impl NetcdfFile {
         let Some(variable) = self.variable(name) else {
             return Err(format!("it has no variable {name}"));
         };
-        let is_number = matches!(
-            variable.dtype,
-            NcType::Byte
-                | NcType::Short
-                | NcType::Int
-                | NcType::Int64
-                | NcType::Float
-                | NcType::Double
-                | NcType::UByte
-                | NcType::UShort
-                | NcType::UInt
-                | NcType::UInt64
-        );
+        let is_number = variable.dtype.is_primitive() && !matches!(variable.dtype, NcType::Char | NcType::String);
         if !is_number {
             return Err(format!("variable {name} is not made of numbers"));
         }

@@ -56,12 +56,6 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
     let [time, z, y] = &dims;
     let (z_m, y_m) = (file.coordinate_m(z)?, file.coordinate_m(y)?);
     let [tau, time_s] = times(file, time)?;
-    for (name, values) in [("tau", &tau), ("time", &time_s), ("z", &z_m), ("y", &y_m)] {
-        let increases = values.windows(2).all(|pair| pair[1] > pair[0]) && values.iter().all(|v| v.is_finite());
-        if !increases || values.is_empty() {
-            return Err(format!("{name} must have at least one value, be finite and increase from value to value"));
-        }
-    }
     let shape = (tau.len(), z_m.len(), y_m.len());
     let component = |name: &str| -> Result<Array3<f64>, String> {
         let values = file.velocities(name, &dims, None)?;

@@ -24,7 +24,7 @@ const COLUMNS: &str = "time_s, azimuth_rad, azimuth_deg, elevation_rad, elevatio
 /// # Errors
 /// A file that cannot be read; an empty list; the first row that does not fit, with column, value and what is allowed.
 pub fn read(path: &Path) -> Result<Vec<Stop>, Error> {
-    let text = text_file::read(path).map_err(|source| Error::Io { action: "read", path: path.to_owned(), source })?;
+    let text = text_file::read(path).map_err(Error::io("read", path))?;
     parse(&text).map_err(|reason| Error::Input { path: path.to_owned(), reason })
 }
 

@@ -2,7 +2,6 @@
 //!
 //! Check: every order of an array gives the same records.
 
-use super::RawFormat;
 use crate::io::number::{ByteOrder, NumberType};
 use num_complex::Complex;
 use std::fs::File;
@@ -43,30 +42,8 @@ pub(super) struct ArrayInFile {
 }
 
 impl ArrayInFile {
-    /// Records with so many samples, as a user states them for a file of nothing but numbers.
-    pub(super) fn new(
-        file: File,
-        number: NumberType,
-        [records, samples]: [usize; 2],
-        (format, pulses_per_line): (&RawFormat, usize),
-    ) -> Self {
-        Self {
-            file,
-            number,
-            byte_order: format.byte_order,
-            are_pairs: format.complex,
-            order: format.order,
-            begin: format.header_bytes,
-            records,
-            samples,
-            pulses_per_line,
-            fills: Vec::new(),
-            scale: format.scale,
-        }
-    }
-
     /// Bytes of a sample.
-    pub(super) fn sample_bytes(&self) -> u64 {
+    fn sample_bytes(&self) -> u64 {
         self.number.bytes * if self.are_pairs { 2 } else { 1 }
     }
 

@@ -23,7 +23,7 @@ use crate::io::text_file;
 use crate::machine;
 use array::ArrayInFile;
 use num_complex::Complex;
-use numpy::NumpyArray;
+use numpy::StoredArray;
 use std::fs::File;
 use std::io::Seek as _;
 use std::ops::Range;
@@ -132,11 +132,14 @@ impl RawRecords {
         let (mut file, length, magic) = text_file::begin(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
         let (store, about) = match &magic[..] {
-            _ if format.number.is_some() => (binary(file, length, format, shape).map_err(refuse)?, About::default()),
+            _ if format.number.is_some() => {
+                let array = binary(length, format, shape).map_err(refuse)?;
+                (Store::Array(in_file(file, &array, format, shape).map_err(refuse)?), About::default())
+            }
             [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf::read(path, format)?,
             [0x93, b'N', b'U', b'M', ..] => {
-                let array = NumpyArray::read(&mut file, 0, length).map_err(refuse)?;
-                (Store::Array(of_numpy(file, &array, format, shape).map_err(refuse)?), About::default())
+                let array = StoredArray::read(&mut file, 0, length).map_err(refuse)?;
+                (Store::Array(in_file(file, &array, format, shape).map_err(refuse)?), About::default())
             }
             [b'P', b'K', 3, 4, ..] => of_archive(file, length, format, shape).map_err(refuse)?,
             _ if ["csv", "txt"].contains(&extension.as_str()) => {
@@ -254,29 +257,38 @@ impl RawRecords {
 }
 
 /// A file of nothing but numbers behind a header.
-fn binary(file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<Store, String> {
+fn binary(length: u64, format: &RawFormat, shape: RecordShape) -> Result<StoredArray, String> {
     let name = format.number.as_deref().unwrap_or_default();
     let number =
         NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
-    let mut array = ArrayInFile::new(file, number, [0, shape.samples], (format, shape.pulses_per_line));
-    let record_bytes = shape.samples as u64 * array.sample_bytes();
+    let sample_bytes = number.bytes * if format.complex { 2 } else { 1 };
+    let record_bytes = shape.samples as u64 * sample_bytes;
     let data = length.checked_sub(format.header_bytes);
     let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
     let rest = data.checked_rem(record_bytes).unwrap_or(data);
     if rest != 0 {
         return Err(format!(
-            "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {} bytes: {rest} \
+            "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {sample_bytes} bytes: {rest} \
              are left over; scan.range_min_m and range_max_m say how many samples a record has",
-            format.header_bytes,
-            shape.samples,
-            array.sample_bytes()
+            format.header_bytes, shape.samples
         ));
     }
-    array.records = (data / record_bytes) as usize;
-    Ok(Store::Array(array))
+    let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), shape.samples as u64];
+    if format.order == Order::SampleMajor {
+        lengths.reverse();
+    }
+    Ok(StoredArray {
+        number,
+        byte_order: format.byte_order,
+        is_complex: format.complex,
+        fortran_order: false,
+        shape: lengths,
+        begin: format.header_bytes,
+    })
 }
 
-fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordShape) -> Result<ArrayInFile, String> {
+/// An array, its records and their samples.
+fn in_file(file: File, found: &StoredArray, format: &RawFormat, shape: RecordShape) -> Result<ArrayInFile, String> {
     let mut lengths = found.shape.clone();
     let pairs = format.complex && !found.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
     if pairs {
@@ -295,19 +307,24 @@ fn of_numpy(file: File, found: &NumpyArray, format: &RawFormat, shape: RecordSha
         _ => lengths.pop(),
     };
     let samples = samples.ok_or("it holds a single number, no records")?;
-    let places = [lengths.iter().product::<u64>() as usize, samples as usize];
     Ok(ArrayInFile {
+        file,
+        number: found.number,
         byte_order: found.byte_order,
         are_pairs: found.is_complex || pairs,
         order,
         begin: found.begin,
-        ..ArrayInFile::new(file, found.number, places, (format, shape.pulses_per_line))
+        records: lengths.iter().product::<u64>() as usize,
+        samples: samples as usize,
+        pulses_per_line: shape.pulses_per_line,
+        fills: Vec::new(),
+        scale: format.scale,
     })
 }
 
 fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<(Store, About), String> {
     let arrays = numpy::archive(&mut file, length)?;
-    let large: Vec<&(String, NumpyArray)> = arrays.iter().filter(|(_, array)| array.shape.len() > 1).collect();
+    let large: Vec<&(String, StoredArray)> = arrays.iter().filter(|(_, array)| array.shape.len() > 1).collect();
     let chosen = match (&format.variable, &large[..]) {
         (Some(name), _) => arrays.iter().find(|(own, _)| own == name),
         (None, [one]) => Some(*one),
@@ -315,7 +332,8 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
     };
     let (_, signals) =
         chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
-    let records = of_numpy(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?.records;
+    let signals = in_file(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?;
+    let records = signals.records;
     let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
         let Some((name, array)) = arrays.iter().find(|(name, _)| names.contains(&name.as_str())) else {
             return Ok(None);
@@ -328,7 +346,7 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
         machine::holds(name, 40.0 * records as f64)?;
         let own = file.try_clone().map_err(|e| e.to_string())?;
         // A row of numbers is one record.
-        let mut array = of_numpy(own, array, &RawFormat::default(), shape)?;
+        let mut array = in_file(own, array, &RawFormat::default(), shape)?;
         let read = array.read(0..array.records, 0..array.samples).map_err(|e| e.to_string())?;
         Ok(Some(read.into_iter().map(|value| value.re).collect()))
     };
@@ -337,5 +355,5 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
         time_s: values(["time_s", "pulse_time"])?,
         ..About::default()
     };
-    Ok((Store::Array(of_numpy(file, signals, format, shape)?), about))
+    Ok((Store::Array(signals), about))
 }

@@ -6,9 +6,9 @@ use crate::io::number::{ByteOrder, NumberType};
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
-/// An array and its place in a file.
+/// An array as a header or a user states it, and its place in a file.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct NumpyArray {
+pub(super) struct StoredArray {
     pub(super) number: NumberType,
     pub(super) byte_order: ByteOrder,
     pub(super) is_complex: bool,
@@ -24,7 +24,7 @@ const NO_ARCHIVE: &str = "it is no sound NPZ file: its table of contents is dama
 /// Longest header that is read \[bytes\].
 const LONGEST_HEADER_BYTES: u64 = 1 << 20;
 
-impl NumpyArray {
+impl StoredArray {
     /// Reads the header of an array that begins at `at` and ends at `end`.
     pub(super) fn read(file: &mut File, at: u64, end: u64) -> Result<Self, String> {
         let mut bytes = Vec::new();
@@ -78,7 +78,7 @@ impl NumpyArray {
 }
 
 /// The arrays of an archive, by name.
-pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, NumpyArray)>, String> {
+pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, StoredArray)>, String> {
     let (table, count) = contents(file, length)?;
     let (mut rest, mut found) = (&table[..], Vec::new());
     for _ in 0..count {
@@ -107,7 +107,7 @@ pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, Numpy
         }
         let begin = at + 30 + number(&head, 26, 2) + number(&head, 28, 2);
         let end = begin.checked_add(bytes).filter(|end| *end <= length).ok_or(TRUNCATED)?;
-        found.push((name.to_owned(), NumpyArray::read(file, begin, end)?));
+        found.push((name.to_owned(), StoredArray::read(file, begin, end)?));
     }
     Ok(found)
 }
