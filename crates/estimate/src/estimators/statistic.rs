@@ -55,6 +55,16 @@ pub trait Estimator: Sync {
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity;
 }
 
+impl Estimator for Box<dyn Estimator> {
+    fn statistic_len(&self) -> usize {
+        (**self).statistic_len()
+    }
+
+    fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
+        (**self).estimate(mean, scratch)
+    }
+}
+
 /// Velocity of a single window, without accumulation; [`Quality::Invalid`] if it holds a missing sample
 /// ([`MissingSamples::default`]).
 ///

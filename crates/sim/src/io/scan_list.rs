@@ -8,8 +8,7 @@
 use super::csv_input::TextTable;
 use super::text_file;
 use crate::Error;
-use crate::setup::beams::SweepMode;
-use crate::setup::beams::schedule::Stop;
+use crate::setup::beams::{Stop, SweepMode};
 use std::path::Path;
 
 /// Most rows that are read.
@@ -43,7 +42,7 @@ pub fn parse(text: &str) -> Result<Vec<Stop>, String> {
                 let angles_rad = step_stare(line.trim()).ok_or_else(|| {
                     format!("line {}: azimuth and elevation in degrees as 340.004090.000 are needed", i + 1)
                 })?;
-                Ok(stop(angles_rad))
+                Ok(Stop::new(SweepMode::Pointing, angles_rad))
             })
             .collect::<Result<Vec<_>, String>>()?,
         _ => table(&TextTable::parse(text)?)?,
@@ -52,10 +51,6 @@ pub fn parse(text: &str) -> Result<Vec<Stop>, String> {
         return Err(format!("{} lines of sight: from 1 to {MOST_ROWS} are allowed", stops.len()));
     }
     Ok(stops)
-}
-
-fn stop(angles_rad: [f64; 2]) -> Stop {
-    Stop { time_s: None, angles_rad, pulses: None, sweep: 0, mode: SweepMode::Pointing, carrier: None }
 }
 
 /// Angles, rad, of a line such as `340.004090.000`.
@@ -104,7 +99,8 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
     for row in 0..table.rows.len() {
         let up = 90f64.to_radians() / unit;
         let turns = 720f64.to_radians() / unit;
-        let mut stop = stop([number(row, azimuth, -turns, turns)? * unit, number(row, elevation, -up, up)? * unit]);
+        let angles_rad = [number(row, azimuth, -turns, turns)? * unit, number(row, elevation, -up, up)? * unit];
+        let mut stop = Stop::new(SweepMode::Pointing, angles_rad);
         let of_column = |name: &str, low, high| column(name).map(|at| number(row, at, low, high)).transpose();
         stop.time_s = of_column("time_s", 0.0, 1e9)?;
         if let Some(pulses) = of_column("pulses", 1.0, 1e6)? {
@@ -123,6 +119,7 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
             let names = SweepMode::ALL.map(SweepMode::name).join(", ");
             let known = SweepMode::ALL.into_iter().find(|mode| mode.name() == name);
             stop.mode = known.ok_or_else(|| format!("row {}: mode = {name:?}: one of {names}", row + 1))?;
+            stop.apart = stop.mode.is_pointing();
             if before.is_some_and(|b| b.sweep == stop.sweep && b.mode != stop.mode) {
                 return Err(format!("row {}: mode = {name:?}: the rows of a sweep have one mode", row + 1));
             }

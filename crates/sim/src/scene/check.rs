@@ -108,10 +108,7 @@ impl Scene {
             PulseShape::Sampled(_) => {
                 crate::setup::instrument::pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s())
             }
-            PulseShape::Gaussian(shape) => match shape.definition {
-                super::PulseDefinition::Fwhm => shape.duration_s / (2.0 * std::f64::consts::LN_2.sqrt()),
-                super::PulseDefinition::OneOverEHalfWidth => shape.duration_s,
-            },
+            PulseShape::Gaussian(shape) => shape.duration().sigma_s(),
         }
     }
 

@@ -5,8 +5,8 @@ use super::receiver::{AmplifierFibre, FrontEnd, LaserAmplifier, is_nothing_db};
 use crate::keys::{NothingOr, Number, ZERO_OR_MORE, keys};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
-use wakescope_signal::NoiseModel;
 use wakescope_signal::sampled::Resampling;
+use wakescope_signal::{NoiseModel, PulseDuration};
 
 keys! {
     /// The laser source.
@@ -47,6 +47,16 @@ impl PulseShape {
     /// The Gaussian of a full width at half maximum \[s\].
     pub fn gaussian(duration_s: f64) -> Self {
         Self::Gaussian(GaussianShape { duration_s, ..GaussianShape::default() })
+    }
+}
+
+impl GaussianShape {
+    /// Its duration as signals have it.
+    pub(crate) fn duration(&self) -> PulseDuration {
+        match self.definition {
+            PulseDefinition::Fwhm => PulseDuration::FullWidthHalfMaximum(self.duration_s),
+            PulseDefinition::OneOverEHalfWidth => PulseDuration::OneOverEHalfWidth(self.duration_s),
+        }
     }
 }
 

@@ -111,6 +111,30 @@ fn correlogram<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Corr
     Ok(Correlogram::with_tapers(likelihood_tapers(&model, snr)?)?)
 }
 
+/// The statistic of a scene whose method knows correlograms, with the weights that its windows give the lags and their tapers: models
+/// of windows without weighting need few lags.
+fn statistic<S: Sample>(
+    scene: &Scene,
+    pulse: &Pulse,
+    snr: f64,
+) -> Result<(Box<dyn Statistic<S>>, Vec<f64>, Vec<Taper>), Error> {
+    let e = &scene.estimator;
+    if let Some(model) = e.method.order().filter(|_| e.weighting == Weighting::Rectangular) {
+        let few = ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
+        let (weights, taper) = (few.lag_weights(), Taper::unit(vec![1.0; e.window_samples])?);
+        return Ok((Box::new(few), weights, vec![taper]));
+    }
+    let all = correlogram::<S>(scene, pulse, snr)?;
+    let (weights, tapers) = (all.lag_weights(), all.tapers().to_vec());
+    Ok((Box::new(all), weights, tapers))
+}
+
+/// Whether the velocity comes from the mean correlogram of lines as they are: not by the likelihood of gradients, which knows none, and
+/// not of lines that are shifted.
+fn is_of_correlogram(scene: &Scene) -> bool {
+    !scene.estimator.follow_wind && !matches!(scene.estimator.method, Method::GradientLikelihood(_))
+}
+
 /// Signal-to-noise ratio for which a likelihood is planned: as the scene states it, else as it is.
 fn planned_snr(scene: &Scene, snr: f64) -> f64 {
     scene.estimator.method.likelihood_snr_db().map_or(snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8)
@@ -188,8 +212,6 @@ pub struct Toolkit<S> {
     pub test: Option<NoiseTest>,
     /// What the estimator finds in the mean statistic of the scene's noise.
     pub noise: Option<NoiseSeen>,
-    /// Weights that the windows give the lags; empty where the statistic is no correlogram.
-    lag_weights: Vec<f64>,
 }
 
 /// What an estimator finds in the mean statistic of the scene's noise, and of signals beside it.
@@ -245,47 +267,28 @@ impl<S: Sample> Toolkit<S> {
     /// # Errors
     /// What the estimators refuse, such as a covariance that cannot be diagonalised.
     pub fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Self, Error> {
-        let e = &scene.estimator;
-        if let Method::GradientLikelihood(own) = e.method {
-            return gradient_likelihood(scene, instrument, &own, planned_snr(scene, known.snr));
+        let snr = planned_snr(scene, known.snr);
+        if let Method::GradientLikelihood(own) = scene.estimator.method {
+            return gradient_likelihood(scene, instrument, &own, snr);
         }
-        if let Some(model) = e.method.order().filter(|_| e.weighting == Weighting::Rectangular) {
-            let statistic = ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
-            let weights = statistic.lag_weights();
-            let taper = Taper::unit(vec![1.0; e.window_samples])?;
-            return Self::planned(scene, instrument, Box::new(statistic), &weights, &[taper], known);
-        }
-        let statistic = correlogram::<S>(scene, &instrument.pulse, planned_snr(scene, known.snr))?;
-        let (weights, tapers) = (statistic.lag_weights(), statistic.tapers().to_vec());
-        Self::planned(scene, instrument, Box::new(statistic), &weights, &tapers, known)
-    }
-
-    fn planned(
-        scene: &Scene,
-        instrument: &Instrument,
-        statistic: Box<dyn Statistic<S>>,
-        lag_weights: &[f64],
-        tapers: &[Taper],
-        known: &WindowStatistics,
-    ) -> Result<Self, Error> {
-        let estimator = of_correlogram(scene, S::KIND, lag_weights, known)?;
-        let following = match scene.estimator.follow_wind {
-            true => Some(of_correlogram(scene, SignalKind::Complex, lag_weights, known)?),
-            false => None,
-        };
+        let (statistic, lag_weights, tapers) = statistic::<S>(scene, &instrument.pulse, snr)?;
+        let estimator = of_correlogram(scene, S::KIND, &lag_weights, known)?;
+        let follows = scene.estimator.follow_wind;
+        let complex = || of_correlogram(scene, SignalKind::Complex, &lag_weights, known);
+        let following = follows.then(complex).transpose()?;
         let per_lag = S::KIND.lag_numbers(1);
         // Lines that are shifted have complex lags, whatever the samples.
-        let parts = if following.is_some() { 2 } else { per_lag };
+        let parts = if follows { 2 } else { per_lag };
         let seen = |lags: Vec<f64>| {
             let weighted = lags
                 .chunks(per_lag)
-                .zip(lag_weights)
+                .zip(&lag_weights)
                 .map(|(lag, weight)| [lag[0] * weight, lag.get(1).copied().unwrap_or(0.0) * weight]);
             Ok(weighted.flat_map(|lag| lag.into_iter().take(parts)).collect())
         };
         let noise = NoiseSeen::new(scene, instrument, following.as_deref().unwrap_or(&*estimator), seen)?;
-        let test = noise_test(scene, tapers, lag_weights)?;
-        Ok(Self { statistic, estimator, following, test, noise, lag_weights: lag_weights.to_vec() })
+        let test = noise_test(scene, &tapers, &lag_weights)?;
+        Ok(Self { statistic, estimator, following, test, noise })
     }
 }
 
@@ -306,19 +309,14 @@ impl ExpectedBias {
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
     pub(crate) fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Option<Self>, Error> {
-        let (kind, sampling) = (signal_kind(scene), sampling(scene)?);
-        let (estimator, lag_weights) = match kind {
-            SignalKind::Real => Toolkit::<f64>::new(scene, instrument, known).map(|t| (t.estimator, t.lag_weights))?,
-            SignalKind::Complex => {
-                Toolkit::<Complex<f64>>::new(scene, instrument, known).map(|t| (t.estimator, t.lag_weights))?
-            }
-        };
-        let Some(noise) = noise_kind(scene).filter(|_| !lag_weights.is_empty() && !scene.estimator.follow_wind) else {
-            return Ok(None);
-        };
+        let (kind, sampling, pulse) = (signal_kind(scene), sampling(scene)?, &instrument.pulse);
+        let Some(noise) = noise_kind(scene).filter(|_| is_of_correlogram(scene)) else { return Ok(None) };
+        // Real and complex samples have the same weights of lags.
+        let (_, lag_weights, _) = statistic::<f64>(scene, pulse, planned_snr(scene, known.snr))?;
+        let estimator = of_correlogram(scene, kind, &lag_weights, known)?;
         let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
-        let correlation = pulse_correlation(scene, &instrument.pulse);
-        let signal = lag_weights.iter().zip(correlation).map(|(weight, lag)| weight * lag).collect();
+        let lags = lag_weights.iter().zip(pulse_correlation(scene, pulse));
+        let signal = lags.map(|(weight, lag)| weight * lag).collect();
         Ok(Some(Self { estimator, sampling, kind, signal, noise }))
     }
 
@@ -361,8 +359,7 @@ pub(crate) struct Response {
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<Response>, Error> {
-    let e = &scene.estimator;
-    if signal_kind(scene) == SignalKind::Complex || e.follow_wind || matches!(e.method, Method::GradientLikelihood(_)) {
+    if signal_kind(scene) == SignalKind::Complex || !is_of_correlogram(scene) {
         return Ok(None);
     }
     let correlogram = correlogram(scene, pulse, planned_snr(scene, snr))?;
@@ -413,41 +410,26 @@ fn of_correlogram(
     // Divided by their weights, all lags count alike.
     let alike = vec![1.0; lags];
     let seen = if e.correlogram == CorrelogramForm::Unbiased { &alike } else { lag_weights };
-    let model = |reading, model: ModelOrder| -> Result<Box<dyn Estimator>, Error> {
+    let model = |reading, model: ModelOrder| {
         let peak = ModelPeak::new(reading, &sampling, kind, lags, model.order, padded, refine)?;
-        finish(e, kind, lag_weights, peak.choosing(order_choice(e, &model, known)))
+        Ok::<_, Error>(Box::new(peak.choosing(order_choice(e, &model, known))))
     };
-    match e.method {
+    let estimator: Box<dyn Estimator> = match e.method {
         Method::Periodogram {}
         | Method::PeriodogramAccumulation {}
         | Method::Likelihood(_)
-        | Method::GradientLikelihood(_) => {
-            finish(e, kind, lag_weights, SpectralPeak::new(&sampling, kind, seen, padded, refine)?)
-        }
-        Method::Autoregressive(own) => model(ModelReading::Spectrum, own),
-        Method::AutoregressivePole(own) => model(ModelReading::Pole, own),
-        Method::Capon(own) => model(ModelReading::Capon, own),
+        | Method::GradientLikelihood(_) => Box::new(SpectralPeak::new(&sampling, kind, seen, padded, refine)?),
+        Method::Autoregressive(own) => model(ModelReading::Spectrum, own)?,
+        Method::AutoregressivePole(own) => model(ModelReading::Pole, own)?,
+        Method::Capon(own) => model(ModelReading::Capon, own)?,
         Method::LagWindow(window) => {
-            let peak = LagWindowPeak::new(&sampling, kind, seen, window.lag_window_lags, padded, refine)?;
-            finish(e, kind, lag_weights, peak)
+            Box::new(LagWindowPeak::new(&sampling, kind, seen, window.lag_window_lags, padded, refine)?)
         }
-        Method::PulsePair {} => finish(e, kind, lag_weights, PulsePair::new(&sampling, kind, seen)?),
-        Method::FirstMoment(own) => {
-            let moment = FirstMoment::new(&sampling, kind, seen, padded, own.moment_reach)?;
-            finish(e, kind, lag_weights, moment)
-        }
-    }
-}
-
-/// The estimator itself, or on the unbiased correlogram.
-fn finish<E: Estimator + 'static>(
-    words: &Words,
-    kind: SignalKind,
-    lag_weights: &[f64],
-    estimator: E,
-) -> Result<Box<dyn Estimator>, Error> {
-    Ok(match words.correlogram {
-        CorrelogramForm::Biased => Box::new(estimator),
+        Method::PulsePair {} => Box::new(PulsePair::new(&sampling, kind, seen)?),
+        Method::FirstMoment(own) => Box::new(FirstMoment::new(&sampling, kind, seen, padded, own.moment_reach)?),
+    };
+    Ok(match e.correlogram {
+        CorrelogramForm::Biased => estimator,
         CorrelogramForm::Unbiased => Box::new(Unbiased::new(estimator, kind, lag_weights)?),
     })
 }
@@ -479,5 +461,5 @@ fn gradient_likelihood<S: Sample>(
     let test = noise_kind(scene).map(|noise| plan.noise_test(&gates, noise)).transpose()?;
     let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| Ok(plan.mean_statistic(&lags)?))?;
     let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
-    Ok(Toolkit { statistic, estimator, following: None, test, noise, lag_weights: Vec::new() })
+    Ok(Toolkit { statistic, estimator, following: None, test, noise })
 }

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::scene::{
-    AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseDefinition, PulseShape,
-    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
+    AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseShape, RefractiveTurbulence, Scene,
+    ScreenSampling, SnrReference, SpectrumKind,
 };
 use crate::setup::efficiency_model::turbulence as turbulence_of;
 use num_complex::Complex;
@@ -218,13 +218,7 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
 /// What the signal simulation refuses, such as samples that are no pulse.
 pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
     let pulse = match &p.shape {
-        PulseShape::Gaussian(shape) => {
-            let duration = match shape.definition {
-                PulseDefinition::Fwhm => signal::PulseDuration::FullWidthHalfMaximum(shape.duration_s),
-                PulseDefinition::OneOverEHalfWidth => signal::PulseDuration::OneOverEHalfWidth(shape.duration_s),
-            };
-            signal::Pulse::from(signal::GaussianPulse::new(duration, p.energy_j)?)
-        }
+        PulseShape::Gaussian(shape) => signal::Pulse::from(signal::GaussianPulse::new(shape.duration(), p.energy_j)?),
         PulseShape::Sampled(shape) => {
             let resampling = shape.resampling;
             let sampled = if shape.phase_rad.is_empty() {

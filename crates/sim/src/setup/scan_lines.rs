@@ -5,10 +5,11 @@ use crate::Error;
 use crate::io::scan_list;
 use crate::keys::Problem;
 use crate::scene::{HeadMotion, Outside, Pattern, Scene, SceneFile, SweepDirection, Towards};
-use crate::setup::beams::path::{self, SweepPath};
+use crate::setup::beams::path::{self, Stop};
 use crate::setup::beams::schedule::{Pace, Schedule};
 use crate::setup::beams::{Head, Mount};
 use std::f64::consts::{FRAC_PI_2, PI};
+use std::path::PathBuf;
 
 /// The lines of sight of a checked scene; a list is looked for relative to the folder of the scene.
 ///
@@ -23,18 +24,19 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
         head: Head { rate_rad_s: head.rate_rad_s, acceleration_rad_s2: head.acceleration_rad_s2 },
         dead_time_s: head.dead_time_s,
     };
-    let scan = match &s.pattern {
+    let of_key = Error::of_key("scan.pattern.file");
+    let (stops, path) = match &s.pattern {
         Pattern::List { file: list } => {
-            let of_key = Error::of_key("scan.pattern.file");
             let path = file.folder.join(list);
-            let stops = scan_list::read(&path).map_err(of_key)?;
-            Schedule::of_stops(&stops, &pace, mount(scene)).map_err(|(i, reason)| {
-                let time_s = stops.get(i).and_then(|stop| stop.time_s).unwrap_or(0.0);
-                of_key(Error::Input { path, reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1) })
-            })?
+            (scan_list::read(&path).map_err(of_key)?, path)
         }
-        _ => Schedule::new(&sweeps(scene), &pace, mount(scene)),
+        // Only a list asks for times, which may be too early.
+        _ => (stops(scene), PathBuf::new()),
     };
+    let scan = Schedule::new(&stops, &pace, mount(scene)).map_err(|(i, reason)| {
+        let time_s = stops.get(i).and_then(|stop| stop.time_s).unwrap_or(0.0);
+        of_key(Error::Input { path, reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1) })
+    })?;
     above_ground(file, &scan)?;
     Ok(scan)
 }
@@ -57,8 +59,8 @@ fn mount(scene: &Scene) -> Mount {
     }
 }
 
-/// The sweeps of a pattern, repeated as often as the scene says.
-fn sweeps(scene: &Scene) -> Vec<SweepPath> {
+/// The stops of a pattern, whose sweeps are repeated as often as the scene says.
+fn stops(scene: &Scene) -> Vec<Stop> {
     let s = &scene.scan;
     let moving = s.head.motion == HeadMotion::Continuous;
     let rows = || path::steps(s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad);
@@ -81,11 +83,15 @@ fn sweeps(scene: &Scene) -> Vec<SweepPath> {
         }
         Pattern::List { .. } => Vec::new(),
     };
-    let all = (0..s.head.sweeps).flat_map(|_| once.iter().cloned());
-    let back = |i: usize| s.head.direction == SweepDirection::Alternate && i % 2 == 1;
-    all.enumerate()
-        .map(|(i, sweep)| if back(i) { SweepPath { path: sweep.path.reversed(), ..sweep } } else { sweep })
-        .collect()
+    let mut all = Vec::new();
+    for sweep in 0..s.head.sweeps * once.len() {
+        let mut stops = once[sweep % once.len()].clone();
+        if s.head.direction == SweepDirection::Alternate && sweep % 2 == 1 {
+            path::reverse(&mut stops);
+        }
+        all.extend(stops.into_iter().map(|stop| Stop { sweep, ..stop }));
+    }
+    all
 }
 
 /// Refuses beams below the ground.

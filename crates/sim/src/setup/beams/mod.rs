@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`direction`] | unit vectors from azimuth and elevation; the radial velocity that a moving lidar sees |
 //! | [`head`] | how long the head takes from angle to angle |
-//! | [`path`] | sweeps: the angles of their lines, still or moving, of each kind of scan |
+//! | [`path`] | sweeps: the stops of the head, or its ways, of each kind of scan |
 //! | [`schedule`] | the lines of a scan on the clock of the pulses; their beams, jitter included |
 
 pub mod direction;
@@ -21,5 +21,5 @@ mod tests;
 
 pub use direction::Direction;
 pub use head::Head;
-pub use path::{Path, SweepMode, SweepPath};
+pub use path::{Stop, SweepMode};
 pub use schedule::{Beam, Line, Mount, Schedule};

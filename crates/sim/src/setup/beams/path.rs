@@ -34,50 +34,53 @@ impl SweepMode {
             Self::Pointing => "pointing",
         }
     }
+
+    /// Whether it is made of directions, not of a way of the head.
+    pub(crate) fn is_pointing(self) -> bool {
+        matches!(self, Self::VerticalPointing | Self::Pointing)
+    }
 }
 
 /// Azimuth and elevation, rad.
 pub type Angles = [f64; 2];
 
-/// The way of the head in one sweep.
+/// A line of sight that a scan or a file asks for, or all those of a way of the head.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Path {
-    /// Still during each line: the angles of the lines.
-    Stepped(Vec<Angles>),
-    /// Moving at its rate from one end to the other.
-    Moving {
-        /// Where the sweep begins.
-        from: Angles,
-        /// Where it ends.
-        to: Angles,
-    },
+pub struct Stop {
+    /// Time of its first pulse from the start of the scan, s; as soon as the head is there if absent.
+    pub time_s: Option<f64>,
+    /// Azimuth and elevation, rad.
+    pub angles_rad: Angles,
+    /// Where the head moves to from there at its rate, line after line, rad; it stands still during one line if absent.
+    pub to_rad: Option<Angles>,
+    /// Pulses of a line, if not as many as for others.
+    pub pulses: Option<usize>,
+    /// Number of its sweep, from 0.
+    pub sweep: usize,
+    /// The kind of its sweep.
+    pub mode: SweepMode,
+    /// Whether it sees air that has nothing to do with that of the others: other times, other places.
+    pub apart: bool,
+    /// Place of the lidar, m, and its velocity, m/s, if not those of the mount.
+    pub carrier: Option<([f64; 3], [f64; 3])>,
 }
 
-impl Path {
-    /// The same way from its end to its beginning.
-    #[must_use]
-    pub fn reversed(self) -> Self {
-        match self {
-            Self::Stepped(mut lines) => {
-                lines.reverse();
-                Self::Stepped(lines)
-            }
-            Self::Moving { from, to } => Self::Moving { from: to, to: from },
-        }
+impl Stop {
+    /// One line of the first sweep, as soon as the head is there; directions are apart.
+    pub fn new(mode: SweepMode, angles_rad: Angles) -> Self {
+        let apart = mode.is_pointing();
+        Self { time_s: None, angles_rad, to_rad: None, pulses: None, sweep: 0, mode, apart, carrier: None }
     }
 }
 
-/// One sweep.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SweepPath {
-    /// Its kind.
-    pub mode: SweepMode,
-    /// The angle that stays: azimuth of an RHI, else elevation, rad.
-    pub fixed_angle_rad: f64,
-    /// Its angles.
-    pub path: Path,
-    /// Whether its lines see air that has nothing to do with that of each other: other times, other places.
-    pub apart: bool,
+/// Turns a sweep round: from its end to its beginning.
+pub fn reverse(sweep: &mut [Stop]) {
+    sweep.reverse();
+    for stop in sweep {
+        if let Some(to_rad) = &mut stop.to_rad {
+            std::mem::swap(to_rad, &mut stop.angles_rad);
+        }
+    }
 }
 
 /// Angles from `low` in steps, up to `high` at most.
@@ -86,27 +89,26 @@ pub fn steps(low_rad: f64, high_rad: f64, step_rad: f64) -> Vec<f64> {
     (0..lines).map(|i| low_rad + i as f64 * step_rad).collect()
 }
 
+/// From one angle to another: at a rate, or in steps.
+fn sweep(mode: SweepMode, ends_rad: [f64; 2], step_rad: f64, moving: bool, at: impl Fn(f64) -> Angles) -> Vec<Stop> {
+    let [low_rad, high_rad] = ends_rad;
+    if moving {
+        return vec![Stop { to_rad: Some(at(high_rad)), ..Stop::new(mode, at(low_rad)) }];
+    }
+    steps(low_rad, high_rad, step_rad).into_iter().map(|angle_rad| Stop::new(mode, at(angle_rad))).collect()
+}
+
 /// Upwards at one azimuth.
-pub fn rhi(azimuth_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, moving: bool) -> SweepPath {
-    let path = if moving {
-        Path::Moving { from: [azimuth_rad, low_rad], to: [azimuth_rad, high_rad] }
-    } else {
-        Path::Stepped(steps(low_rad, high_rad, step_rad).into_iter().map(|el| [azimuth_rad, el]).collect())
-    };
-    SweepPath { mode: SweepMode::Rhi, fixed_angle_rad: azimuth_rad, path, apart: false }
+pub fn rhi(azimuth_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, moving: bool) -> Vec<Stop> {
+    sweep(SweepMode::Rhi, [low_rad, high_rad], step_rad, moving, |elevation_rad| [azimuth_rad, elevation_rad])
 }
 
 /// Round at one elevation; a full turn has no line twice.
-pub fn ppi(elevation_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, moving: bool) -> SweepPath {
+pub fn ppi(elevation_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, moving: bool) -> Vec<Stop> {
     let full = is_full_turn(high_rad - low_rad);
-    let path = if moving {
-        Path::Moving { from: [low_rad, elevation_rad], to: [high_rad, elevation_rad] }
-    } else {
-        let last_rad = if full { high_rad - 1e-3 * step_rad } else { high_rad };
-        Path::Stepped(steps(low_rad, last_rad, step_rad).into_iter().map(|az| [az, elevation_rad]).collect())
-    };
+    let last_rad = if full && !moving { high_rad - 1e-3 * step_rad } else { high_rad };
     let mode = if full { SweepMode::AzimuthSurveillance } else { SweepMode::Sector };
-    SweepPath { mode, fixed_angle_rad: elevation_rad, path, apart: false }
+    sweep(mode, [low_rad, last_rad], step_rad, moving, |azimuth_rad| [azimuth_rad, elevation_rad])
 }
 
 /// Whether an angle is a full turn, or several.
@@ -115,34 +117,34 @@ pub fn is_full_turn(angle_rad: f64) -> bool {
 }
 
 /// One turn of evenly spaced beams on a cone.
-pub fn vad(elevation_rad: f64, beams: usize) -> SweepPath {
-    let lines = (0..beams).map(|k| [TAU * k as f64 / beams as f64, elevation_rad]).collect();
-    let mode = SweepMode::AzimuthSurveillance;
-    SweepPath { mode, fixed_angle_rad: elevation_rad, path: Path::Stepped(lines), apart: true }
+pub fn vad(elevation_rad: f64, beams: usize) -> Vec<Stop> {
+    let of_turn = |k: usize| Stop::new(SweepMode::AzimuthSurveillance, [TAU * k as f64 / beams as f64, elevation_rad]);
+    (0..beams).map(|k| Stop { apart: true, ..of_turn(k) }).collect()
 }
 
 /// North, east, south, west and straight up, one cycle.
-pub fn dbs(elevation_rad: f64) -> SweepPath {
+pub fn dbs(elevation_rad: f64) -> Vec<Stop> {
     let slanted = (0..4).map(|k| [f64::from(k) * FRAC_PI_2, elevation_rad]);
-    let lines = slanted.chain([[0.0, FRAC_PI_2]]).collect();
-    SweepPath { mode: SweepMode::Pointing, fixed_angle_rad: elevation_rad, path: Path::Stepped(lines), apart: true }
+    slanted.chain([[0.0, FRAC_PI_2]]).map(|angles_rad| Stop::new(SweepMode::Pointing, angles_rad)).collect()
 }
 
 /// One direction, line after line.
-pub fn stare(azimuth_rad: f64, elevation_rad: f64, lines: usize) -> SweepPath {
+pub fn stare(azimuth_rad: f64, elevation_rad: f64, lines: usize) -> Vec<Stop> {
     let up = (elevation_rad - FRAC_PI_2).abs() < 1e-9;
     let mode = if up { SweepMode::VerticalPointing } else { SweepMode::Pointing };
-    let path = Path::Stepped(vec![[azimuth_rad, elevation_rad]; lines]);
-    SweepPath { mode, fixed_angle_rad: elevation_rad, path, apart: true }
+    vec![Stop::new(mode, [azimuth_rad, elevation_rad]); lines]
 }
 
 /// Rows of elevation, each a sweep over azimuths about `axis_rad`, back and forth.
-pub fn raster(axis_rad: f64, rows_rad: &[f64], columns_rad: [f64; 3], moving: bool) -> Vec<SweepPath> {
+pub fn raster(axis_rad: f64, rows_rad: &[f64], columns_rad: [f64; 3], moving: bool) -> Vec<Vec<Stop>> {
     let [low_rad, high_rad, step_rad] = columns_rad;
     let row = |(i, &elevation_rad): (usize, &f64)| {
-        let sweep = ppi(elevation_rad, axis_rad + low_rad, axis_rad + high_rad, step_rad, moving);
-        let path = if i % 2 == 1 { sweep.path.reversed() } else { sweep.path };
-        SweepPath { mode: SweepMode::Sector, path, ..sweep }
+        let mut row = ppi(elevation_rad, axis_rad + low_rad, axis_rad + high_rad, step_rad, moving);
+        row.iter_mut().for_each(|stop| stop.mode = SweepMode::Sector);
+        if i % 2 == 1 {
+            reverse(&mut row);
+        }
+        row
     };
     rows_rad.iter().enumerate().map(row).collect()
 }

@@ -6,7 +6,7 @@
 
 use super::direction::Direction;
 use super::head::Head;
-use super::path::{Angles, Path, SweepMode, SweepPath};
+use super::path::{Angles, Stop, SweepMode};
 use crate::setup::streams::stream;
 use rand_xoshiro::rand_core::Rng;
 use std::f64::consts::TAU;
@@ -86,23 +86,6 @@ impl Beam {
     }
 }
 
-/// A stop that a file asks for.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Stop {
-    /// Time of its first pulse from the start of the scan, s; as soon as the head is there if absent.
-    pub time_s: Option<f64>,
-    /// Azimuth and elevation, rad.
-    pub angles_rad: Angles,
-    /// Pulses, if not as many as for others.
-    pub pulses: Option<usize>,
-    /// Number of its sweep, from 0, and the kind of that.
-    pub sweep: usize,
-    /// The kind of its sweep.
-    pub mode: SweepMode,
-    /// Place of the lidar, m, and its velocity, m/s, if not those of the mount.
-    pub carrier: Option<([f64; 3], [f64; 3])>,
-}
-
 /// A whole scan.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Schedule {
@@ -128,84 +111,63 @@ impl Schedule {
         modes
     }
 
-    /// The lines of sweeps one after the other.
-    pub fn new(paths: &[SweepPath], pace: &Pace, mount: Mount) -> Self {
+    /// The lines of stops and ways, one after the other.
+    ///
+    /// # Errors
+    /// The index of a stop that the head cannot reach in the time that it asks for, and why.
+    pub fn new(stops: &[Stop], pace: &Pace, mount: Mount) -> Result<Self, (usize, String)> {
         let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s: pace.prt_s, mount };
         // When and where the head has done its last line, and the way it then moves.
         let mut last: Option<(f64, Angles, Angles)> = None;
-        for (sweep, SweepPath { mode, fixed_angle_rad, path, apart }) in paths.iter().enumerate() {
-            scan.sweeps.push((*mode, *fixed_angle_rad));
-            match path {
-                Path::Stepped(stops) => {
-                    for stop in stops {
-                        let wait_s =
-                            last.map_or(0.0, |(_, at, _)| pace.head.time_s(apart_rad(at, *stop)).max(pace.dead_time_s));
-                        let tick = last.map_or(0.0, |(end, ..)| scan.next_tick(end, wait_s));
-                        let group = if *apart { scan.lines.len() } else { sweep };
-                        scan.push(sweep, group, tick, pace.pulses, *stop, [0.0; 2]);
-                        last = Some((tick + pace.pulses as f64, *stop, [0.0; 2]));
-                    }
-                }
-                Path::Moving { from, to } => {
-                    let length_rad = difference(*from, *to).iter().fold(0.0_f64, |most, d| most.max(d.abs()));
-                    let rate_rad_s = difference(*from, *to).map(|d| d / length_rad * pace.head.rate_rad_s);
-                    let tick = last.map_or(0.0, |(end, at, moving)| {
-                        let turns = moving.iter().zip(rate_rad_s).any(|(before, now)| before * now < 0.0);
-                        let turn_s = if turns { pace.head.turn_round_s() } else { 0.0 };
-                        scan.next_tick(end, pace.head.time_s(apart_rad(at, *from)).max(turn_s))
-                    });
-                    let sweep_s = length_rad / pace.head.rate_rad_s;
-                    let line_s = pace.pulses as f64 * pace.prt_s;
-                    for line in 0..(sweep_s / line_s + 1e-9) as usize {
-                        let before = (line * pace.pulses) as f64;
-                        let at = std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * pace.prt_s));
-                        scan.push(sweep, sweep, tick + before, pace.pulses, at, rate_rad_s);
-                    }
-                    last = Some((tick + sweep_s / pace.prt_s, *to, rate_rad_s));
-                }
-            }
-        }
-        scan
-    }
-
-    /// The lines of stops, in the order of time.
-    ///
-    /// # Errors
-    /// The index of a stop that the head cannot reach in time, and why.
-    pub fn of_stops(stops: &[Stop], pace: &Pace, mount: Mount) -> Result<Self, (usize, String)> {
-        let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s: pace.prt_s, mount };
-        let mut last: Option<(f64, Angles)> = None;
         for (i, stop) in stops.iter().enumerate() {
-            let wait_s = last.map_or(0.0, |(_, at)| pace.head.time_s(apart_rad(at, stop.angles_rad)));
-            let earliest = last.map_or(f64::NEG_INFINITY, |(end, _)| end + wait_s / pace.prt_s);
-            let tick = match stop.time_s {
-                Some(time_s) if time_s / pace.prt_s < earliest - 1e-6 => {
-                    let (end_s, early_s) = (last.map_or(0.0, |(end, _)| end * pace.prt_s), earliest * pace.prt_s);
-                    let reason = if time_s < end_s {
-                        format!("at least {end_s:?} s, the end of the line before")
-                    } else {
-                        format!("at least {early_s:?} s: the head needs {wait_s:.3} s from the angles before")
+            let (from, pulses) = (stop.angles_rad, stop.pulses.unwrap_or(pace.pulses));
+            let (lines, periods, rate_rad_s) = way(stop, pulses, pace);
+            let head_s = last.map_or(0.0, |(_, at, _)| pace.head.time_s(apart_rad(at, from)));
+            let tick = match (stop.time_s, last) {
+                (None, None) => 0.0,
+                (None, Some((end, _, moving))) => {
+                    let turns = moving.iter().zip(rate_rad_s).any(|(before, now)| before * now < 0.0);
+                    let least_s = match stop.to_rad {
+                        None => pace.dead_time_s,
+                        Some(_) if turns => pace.head.turn_round_s(),
+                        Some(_) => 0.0,
                     };
-                    return Err((i, reason));
+                    scan.next_tick(end, head_s.max(least_s))
                 }
-                Some(time_s) => time_s / pace.prt_s,
-                None => last.map_or(0.0, |(end, _)| scan.next_tick(end, wait_s.max(pace.dead_time_s))),
+                (Some(time_s), last) => {
+                    let end = last.map_or(f64::NEG_INFINITY, |(end, ..)| end);
+                    scan.in_time(time_s, end, head_s).map_err(|reason| (i, reason))?
+                }
             };
             if scan.sweeps.len() <= stop.sweep {
-                let [azimuth_rad, elevation_rad] = stop.angles_rad;
-                let fixed_rad = if stop.mode == SweepMode::Rhi { azimuth_rad } else { elevation_rad };
-                scan.sweeps.push((stop.mode, fixed_rad));
+                scan.sweeps.push((stop.mode, if stop.mode == SweepMode::Rhi { from[0] } else { from[1] }));
             }
-            let pulses = stop.pulses.unwrap_or(pace.pulses);
-            let stays = matches!(stop.mode, SweepMode::Pointing | SweepMode::VerticalPointing);
-            let group = if stays { stops.len() + i } else { stop.sweep };
-            scan.push(stop.sweep, group, tick, pulses, stop.angles_rad, [0.0; 2]);
-            if let (Some(line), Some((position_m, velocity_m_s))) = (scan.lines.last_mut(), stop.carrier) {
-                (line.position_m, line.velocity_m_s) = (position_m, velocity_m_s);
+            let group = if stop.apart { stops.len() + i } else { stop.sweep };
+            for line in 0..lines {
+                let before = (line * pulses) as f64;
+                let at = std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * pace.prt_s));
+                scan.push(stop.sweep, group, tick + before, pulses, at, rate_rad_s);
+                if let (Some(line), Some(carrier)) = (scan.lines.last_mut(), stop.carrier) {
+                    (line.position_m, line.velocity_m_s) = carrier;
+                }
             }
-            last = Some((tick + pulses as f64, stop.angles_rad));
+            last = Some((tick + periods, stop.to_rad.unwrap_or(from), rate_rad_s));
         }
         Ok(scan)
+    }
+
+    /// The tick of a time at which the head must be there, `head_s` after the line that ends at the tick `end`; or what is allowed.
+    fn in_time(&self, time_s: f64, end: f64, head_s: f64) -> Result<f64, String> {
+        let (tick, earliest) = (time_s / self.prt_s, end + head_s / self.prt_s);
+        if tick >= earliest - 1e-6 {
+            return Ok(tick);
+        }
+        let (end_s, early_s) = (end * self.prt_s, earliest * self.prt_s);
+        Err(if time_s < end_s {
+            format!("at least {end_s:?} s, the end of the line before")
+        } else {
+            format!("at least {early_s:?} s: the head needs {head_s:.3} s from the angles before")
+        })
     }
 
     /// The first pulse of the clock that is not before a wait after `tick`.
@@ -315,6 +277,16 @@ impl Schedule {
         };
         self.sweeps.iter().all(|(mode, _)| *mode == SweepMode::Rhi) && self.lines.iter().all(alike)
     }
+}
+
+/// Lines of a stop or a way, how many periods of the pulses the head is on it, and its rate, rad/s.
+fn way(stop: &Stop, pulses: usize, pace: &Pace) -> (usize, f64, Angles) {
+    let Some(to) = stop.to_rad else { return (1, pulses as f64, [0.0; 2]) };
+    let turn_rad = difference(stop.angles_rad, to);
+    let length_rad = turn_rad.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
+    let way_s = length_rad / pace.head.rate_rad_s;
+    let lines = (way_s / (pulses as f64 * pace.prt_s) + 1e-9) as usize;
+    (lines, way_s / pace.prt_s, turn_rad.map(|d| d / length_rad * pace.head.rate_rad_s))
 }
 
 /// From one pair of angles to another, rad; azimuths as they are given.

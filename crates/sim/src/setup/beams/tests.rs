@@ -1,7 +1,7 @@
 //! Beams against tables of independent origin.
 
-use super::path::{self, Angles, SweepMode, SweepPath};
-use super::schedule::{Mount, Pace, Schedule, Stop};
+use super::path::{self, Angles, Stop, SweepMode};
+use super::schedule::{Mount, Pace, Schedule};
 use super::{Direction, Head};
 use crate::io::csv_input::TextTable;
 use wakescope_les::winds::{Linear, Uniform};
@@ -80,13 +80,10 @@ fn a_lidar_that_flies_sees_its_own_speed() {
         };
         let stop = Stop {
             time_s: Some(row("time_s")),
-            angles_rad: [row("azimuth_rad"), row("elevation_rad")],
             pulses: Some(1),
-            sweep: 0,
-            mode: SweepMode::Pointing,
-            carrier: None,
+            ..Stop::new(SweepMode::Pointing, [row("azimuth_rad"), row("elevation_rad")])
         };
-        let scan = Schedule::of_stops(&[stop], &pace(400.0, 1, f64::INFINITY, f64::INFINITY), mount).unwrap();
+        let scan = Schedule::new(&[stop], &pace(400.0, 1, f64::INFINITY, f64::INFINITY), mount).unwrap();
         let beam = scan.beam_of_pulse(0, 0);
         near(beam.position_m[0], -1500.0 + 70.0 * row("time_s"));
         let mut v = [[0.0; 3]];
@@ -106,13 +103,20 @@ fn the_head_takes_the_time_of_the_table() {
     assert_eq!((jumps.time_s(1.0), jumps.turn_round_s()), (0.0, 0.0));
 }
 
+/// The stops of sweeps one after the other.
+fn numbered<const N: usize>(sweeps: [Vec<Stop>; N]) -> Vec<Stop> {
+    let sweeps = sweeps.into_iter().enumerate();
+    sweeps.flat_map(|(sweep, stops)| stops.into_iter().map(move |stop| Stop { sweep, ..stop })).collect()
+}
+
 #[test]
 fn sweeps_back_and_forth_have_the_pulses_of_the_table() {
     for row in rows("back_and_forth") {
         let pace = pace(row("prf_hz"), row("pulses_per_line") as usize, row("rate_rad_s"), row("acceleration_rad_s2"));
         let up = path::rhi(1.0, row("low_rad"), row("high_rad"), 1.0, true);
-        let down = SweepPath { path: up.path.clone().reversed(), ..up.clone() };
-        let scan = Schedule::new(&[up.clone(), down, up], &pace, HERE);
+        let mut down = up.clone();
+        path::reverse(&mut down);
+        let scan = Schedule::new(&numbered([up.clone(), down, up]), &pace, HERE).unwrap();
         let sweep = row("sweep") as usize;
         let lines: Vec<usize> = (0..scan.lines.len()).filter(|line| scan.lines[*line].sweep == sweep).collect();
         assert_eq!(lines.len() as f64, row("lines_per_sweep"));
@@ -136,13 +140,8 @@ fn smeared(
     let speed = rate[0].abs().max(rate[1].abs());
     let long = 2.0 * pulses as f64 / prf_hz;
     let to: Angles = std::array::from_fn(|d| from[d] + rate[d] * long);
-    let sweep = SweepPath {
-        mode: SweepMode::Sector,
-        fixed_angle_rad: 0.0,
-        path: path::Path::Moving { from, to },
-        apart: false,
-    };
-    let scan = Schedule::new(&[sweep], &pace(prf_hz, pulses, speed, f64::INFINITY), mount);
+    let sweep = Stop { to_rad: Some(to), ..Stop::new(SweepMode::Sector, from) };
+    let scan = Schedule::new(&[sweep], &pace(prf_hz, pulses, speed, f64::INFINITY), mount).unwrap();
     let seen: Vec<f64> = (0..pulses)
         .map(|pulse| {
             let beam = scan.beam_of_pulse(0, pulse);
@@ -210,7 +209,7 @@ fn jitter_has_its_mean_and_spread_within_three_standard_errors() {
     for row in rows("jitter") {
         let mount = Mount { jitter_rad: [row("azimuth_sd_rad"), row("elevation_sd_rad")], ..HERE };
         let stare = path::stare(row("azimuth_rad"), row("elevation_rad"), 1);
-        let scan = Schedule::new(&[stare], &pace(1e4, PULSES, f64::INFINITY, f64::INFINITY), mount);
+        let scan = Schedule::new(&stare, &pace(1e4, PULSES, f64::INFINITY, f64::INFINITY), mount).unwrap();
         let wind = [row("wind_x_m_s"), 0.0, 0.0];
         let seen: Vec<f64> = (0..PULSES)
             .map(|pulse| scan.beam_of_pulse(0, pulse).direction.radial_velocity_m_s(wind, [0.0; 3]))
@@ -228,20 +227,15 @@ fn jitter_has_its_mean_and_spread_within_three_standard_errors() {
 #[test]
 fn each_kind_of_scan_has_its_lines_in_order() {
     let ppi = path::ppi(0.1, 0.0, std::f64::consts::TAU, std::f64::consts::TAU / 8.0, false);
-    let path::Path::Stepped(lines) = &ppi.path else { panic!("stepped") };
-    assert_eq!((lines.len(), ppi.mode), (8, SweepMode::AzimuthSurveillance), "no line twice");
+    assert_eq!((ppi.len(), ppi[0].mode), (8, SweepMode::AzimuthSurveillance), "no line twice");
     let sector = path::ppi(0.1, 0.2, 0.6, 0.1, false);
-    let path::Path::Stepped(lines) = &sector.path else { panic!("stepped") };
-    assert_eq!((lines.len(), sector.mode, lines[0]), (5, SweepMode::Sector, [0.2, 0.1]));
+    assert_eq!((sector.len(), sector[0].mode, sector[0].angles_rad), (5, SweepMode::Sector, [0.2, 0.1]));
     let rows = path::raster(1.0, &[0.0, 0.1], [-0.1, 0.1, 0.1], false);
-    let ends = |sweep: &SweepPath| match &sweep.path {
-        path::Path::Stepped(lines) => (lines[0][0], lines[2][0]),
-        path::Path::Moving { from, to } => (from[0], to[0]),
-    };
+    let ends = |sweep: &[Stop]| (sweep[0].angles_rad[0], sweep[2].angles_rad[0]);
     let (first, second) = (ends(&rows[0]), ends(&rows[1]));
     assert!(first.0 < first.1 && second.0 > second.1, "{first:?} {second:?}");
-    let cycles = [path::dbs(1.0), path::dbs(1.0)];
-    let dbs = Schedule::new(&cycles, &pace(1000.0, 100, 1.0, f64::INFINITY), HERE);
+    let cycles = numbered([path::dbs(1.0), path::dbs(1.0)]);
+    let dbs = Schedule::new(&cycles, &pace(1000.0, 100, 1.0, f64::INFINITY), HERE).unwrap();
     assert_eq!(dbs.lines.len(), 10);
     // A quarter turn at 1 rad/s between slanted beams: 1571 periods after the 100 pulses of the first.
     assert_eq!(dbs.lines[1].tick, 1671.0);
@@ -255,14 +249,10 @@ fn each_kind_of_scan_has_its_lines_in_order() {
 fn stops_that_the_head_cannot_reach_are_named() {
     let stop = |time_s: f64, azimuth_rad: f64| Stop {
         time_s: Some(time_s),
-        angles_rad: [azimuth_rad, 0.1],
-        pulses: None,
-        sweep: 0,
-        mode: SweepMode::Sector,
-        carrier: None,
+        ..Stop::new(SweepMode::Sector, [azimuth_rad, 0.1])
     };
     let pace = pace(100.0, 50, 1.0, f64::INFINITY);
-    let scan = |stops: &[Stop]| Schedule::of_stops(stops, &pace, HERE);
+    let scan = |stops: &[Stop]| Schedule::new(stops, &pace, HERE);
     assert_eq!(scan(&[stop(0.0, 0.0), stop(1.0, 0.5)]).unwrap().lines[1].tick, 100.0);
     let (row, reason) = scan(&[stop(0.0, 0.0), stop(0.2, 0.0)]).unwrap_err();
     assert!(row == 1 && reason.contains("the end of the line before"), "{reason}");
