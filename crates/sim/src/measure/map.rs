@@ -2,7 +2,8 @@
 
 use crate::Error;
 use crate::measure::error_law::{ErrorLaw, ScanErrors, range_filter, shared_cells};
-use crate::measure::map_estimator::{self, MapEstimator, NoiseAtPoints};
+use crate::measure::gate_estimates::GateSums;
+use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::DetectorSignal;
@@ -12,8 +13,8 @@ use crate::setup::region::places;
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use num_complex::Complex;
 use wakescope_estimate::{
-    Scan, Statistic,
-    map::{ErrorMap, MapPoint, PolarPoint, ScanGeometry, ScanSums},
+    Scan,
+    map::{ErrorMap, PolarPoint, ScanGeometry, ScanSums},
     polar_points,
     window::Sample,
 };
@@ -80,14 +81,10 @@ struct Mapper<S> {
     places: ScanGeometry,
     points: Vec<PolarPoint>,
     noise: NoiseAtPoints,
-    /// The truth, the first realisation, what is counted, and the errors of each realisation.
+    /// The truth, the first realisation, and the errors of each.
     map: VelocityEstimates,
     errors: ErrorMap<ndarray::Ix2>,
-    /// Sum and number of the finite values: power in the band, its gain, quality, resolution.
-    sums: [Array2<(f64, f64)>; 4],
-    /// Number, sum and sum of squares of the spreads that are known.
-    spreads: Array2<[f64; 3]>,
-    clipped: Clipped,
+    gates: Array2<GateSums>,
 }
 
 impl<S: Sample> Mapper<S> {
@@ -97,16 +94,11 @@ impl<S: Sample> Mapper<S> {
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
         let points = polar_points(places.line_elevation_rad(), &g.gate_range_m);
-        let (zeros, none) = (Array2::zeros(shape), Array2::from_elem(shape, (0.0, 0.0)));
         let radius_m = g.gate_range_m.iter().map(|range_m| estimator.radius_m(*range_m));
         let map = VelocityEstimates {
             elevation_rad: g.elevation_rad.clone(),
             range_m: g.gate_range_m.clone(),
             radius_m: radius_m.collect::<Result<_, _>>()?,
-            level: zeros.clone(),
-            n_eff: zeros.clone(),
-            flagged: zeros.clone(),
-            count: zeros,
             ..truth(plan, scanner, shape)?
         };
         Ok(Self {
@@ -116,77 +108,39 @@ impl<S: Sample> Mapper<S> {
             points,
             map,
             errors: ErrorMap::new(ndarray::Dim(shape)),
-            sums: [none.clone(), none.clone(), none.clone(), none],
-            spreads: Array2::from_elem(shape, [0.0; 3]),
-            clipped: Clipped::default(),
+            gates: Array2::default(shape),
         })
     }
 
-    /// The sums of a realisation, still without any record.
-    fn sums(&self) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
-        self.estimator.sums(self.places.clone())
-    }
-
     /// Estimates the velocities of one realisation and adds their errors; returns the velocities, m/s.
-    fn add(&mut self, scan: &Scan, clipped: Clipped) -> Result<Array2<f64>, Error> {
-        let (found, map) = (self.estimator.map(scan, &self.points)?, &mut self.map);
-        let (shape, gates) = (map.count.dim(), map.range_m.len());
-        let velocity = Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
+    fn add(&mut self, scan: &Scan) -> Result<Array2<f64>, Error> {
+        let found = self.estimator.gates(scan, &self.points, &self.noise)?;
+        let (map, shape) = (&mut self.map, self.gates.dim());
+        let velocity = Array2::from_shape_fn(shape, |(i, j)| found[i * shape.1 + j].found.estimate.velocity_m_s);
         self.errors.add(velocity.view(), map.v_pulse_m_s.view())?;
         if map.scans.is_empty() {
             let known = |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
             map.v_scan_m_s = ndarray::Zip::from(&velocity).and(&map.v_pulse_m_s).map_collect(known);
         }
         let mut flagged = Array2::from_elem(shape, false);
-        for (index, MapPoint { estimate: e, level, n_eff, .. }) in found.iter().enumerate() {
-            let place = (index / gates, index % gates);
-            flagged[place] = self.noise.flags(index, e);
-            map.flagged[place] += f64::from(u8::from(flagged[place]));
-            map.count[place] += f64::from(u8::from(e.velocity_m_s.is_finite()));
-            // The level is the same for all realisations: a matter of geometry.
-            (map.level[place], map.n_eff[place]) = (*level as f64, *n_eff);
-            let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
-            let values = [power_a2, self.estimator.gain(e.velocity_m_s), e.quality, e.resolution_m2_s2];
-            for (sums, value) in self.sums.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
-                sums[place].0 += value;
-                sums[place].1 += 1.0;
-            }
-            let spread = e.spread_m2_s2;
-            if spread.is_finite() && !flagged[place] {
-                self.spreads[place].iter_mut().zip([1.0, spread, spread * spread]).for_each(|(sum, term)| *sum += term);
-            }
+        for ((sums, flagged), found) in self.gates.iter_mut().zip(&mut flagged).zip(&found) {
+            *flagged = sums.add(found, 1.0);
         }
         map.scans.push(ScanErrors { error_m_s: &velocity - &map.v_pulse_m_s, flagged });
-        self.clipped += clipped;
         Ok(velocity)
     }
 
-    /// `samples` are the real numbers that the converter sees in one realisation.
-    fn finish(self, plan: &Plan, samples: usize) -> Result<VelocityEstimates, Error> {
-        let Self { mut map, noise, .. } = self;
-        let statistics = self.errors.statistics();
-        let mean = |sums: &Array2<(f64, f64)>| sums.mapv(|(sum, n)| if n > 0.0 { sum / n } else { f64::NAN });
-        let [power_a2, gain, quality, resolution_m2_s2] = self.sums.each_ref().map(mean);
-        let (noise_a2, realisations) = (self.estimator.noise_power_a2(), map.scans.len() as f64);
-        (map.snr_db, map.width_m_s, map.quality) = (power_a2, resolution_m2_s2, quality);
-        for (index, (place, power)) in map.snr_db.indexed_iter_mut().enumerate() {
-            let (ratio, deviation) = (*power / noise_a2, noise.deviation(index));
-            *power = map_estimator::snr_db(ratio, gain[place], deviation, map.count[place]);
-        }
-        for (place, width) in map.width_m_s.indexed_iter_mut() {
-            let kept = realisations - map.flagged[place];
-            *width = match self.spreads[place] {
-                // what only some of the estimates show is not the mean of all
-                [count, sum, squares] if count > 0.9 * kept => {
-                    let mean = sum / count;
-                    let variance = (squares / count - mean * mean).max(0.0) / (count - 1.0).max(1.0);
-                    let snr = if noise_a2.is_nan() { f64::INFINITY } else { 10f64.powf(0.1 * map.snr_db[place]) };
-                    map_estimator::width_m_s(mean, variance.sqrt(), *width, snr)
-                }
-                _ => f64::NAN,
-            };
-        }
-        map.flagged /= realisations.max(1.0);
+    /// `clipped_fraction` is that of the samples that the converter clipped.
+    fn finish(self, plan: &Plan, clipped_fraction: f64) -> Result<VelocityEstimates, Error> {
+        let Self { mut map, gates, .. } = self;
+        let (statistics, noise_a2) = (self.errors.statistics(), self.estimator.noise_power_a2());
+        map.level = gates.map(|gate| gate.level);
+        map.n_eff = gates.map(|gate| gate.n_eff);
+        map.count = gates.map(|gate| gate.count);
+        map.flagged = gates.map(GateSums::flagged);
+        map.quality = gates.map(GateSums::quality);
+        map.snr_db = gates.map(|gate| gate.snr_db(noise_a2, 1.0));
+        map.width_m_s = gates.map(|gate| gate.width_m_s(noise_a2, 1.0));
         map.bias_m_s = statistics.mapv(|s| s.bias_m_s);
         map.v_mean_m_s = &map.v_pulse_m_s + &map.bias_m_s;
         map.std_m_s = statistics.mapv(|s| s.std_m_s);
@@ -194,7 +148,7 @@ impl<S: Sample> Mapper<S> {
         map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?);
         let unknown = || Array2::from_elem(map.count.dim(), f64::NAN);
         map.standard_error_m_s = map.law.as_ref().map_or_else(unknown, ErrorLaw::rms_standard_errors);
-        map.clipped_fraction = self.clipped.total() as f64 / (realisations * samples as f64).max(1.0);
+        map.clipped_fraction = clipped_fraction;
         Ok(map)
     }
 }
@@ -258,20 +212,24 @@ pub(crate) fn of_records<S: Sample>(
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else { return Ok(Vec::new()) };
     let mut mappers: Vec<Mapper<S>> = plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
+    let mut clipped = Clipped::default();
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
-        let mut sums = mappers.iter().map(Mapper::sums).collect::<Result<Vec<_>, _>>()?;
-        let clipped = read(realisation, &mut |first, records| {
+        let sums = mappers.iter().map(|mapper| mapper.estimator.sums(mapper.places.clone()));
+        let mut sums = sums.collect::<Result<Vec<_>, _>>()?;
+        clipped += read(realisation, &mut |first, records| {
             Ok(sums.iter_mut().try_for_each(|sums| sums.add(first, records))?)
         })?;
         let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
         for (i, (mapper, scan)) in mappers.iter_mut().zip(&scans).enumerate() {
-            seen(i, &mapper.add(scan, clipped)?);
+            seen(i, &mapper.add(scan)?);
         }
     }
     observer.end();
-    let samples = scanner.pulses() * plan.geometry.samples * S::KIND.lag_numbers(1);
-    mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan, samples)).collect()
+    // The real numbers that the converter sees.
+    let samples = plan.realisations() * scanner.pulses() * plan.geometry.samples * S::KIND.lag_numbers(1);
+    let clipped_fraction = clipped.total() as f64 / (samples as f64).max(1.0);
+    mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan, clipped_fraction)).collect()
 }
 
 /// The radial velocities \[line, gate\], m/s, of each realisation of a plan: what whole scans show, one after the other. Efficiency and

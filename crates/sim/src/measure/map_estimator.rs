@@ -4,6 +4,7 @@
 //! Check: maps of simulated records have the same bits whether they come from memory or from a file, whole or in blocks.
 
 use crate::Error;
+use crate::measure::gate_estimates::GateEstimate;
 use crate::measure::scan::median_snr;
 use crate::plan::Plan;
 use crate::setup::estimators::{self, Toolkit, WindowStatistics};
@@ -15,7 +16,7 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::ops::Range;
 use wakescope_estimate::{
-    GateVelocity, Gates, Radius, Sampling, Scan, Statistic,
+    Gates, Radius, Sampling, Scan, Statistic,
     estimators::{NoiseTest, RegionNoise},
     map::{MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCovariance},
     window::Sample,
@@ -112,19 +113,18 @@ impl<S: Sample> MapEstimator<S> {
         self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.power_a2)
     }
 
-    /// Signal-to-noise ratio of a signal of that velocity over the excess of its power over that of the noise, both over
-    /// [`MapEstimator::noise_power_a2`].
-    pub(crate) fn gain(&self, velocity_m_s: f64) -> f64 {
-        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.gain(velocity_m_s))
-    }
-
     /// Density, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
     pub(crate) fn noise_density_a2(&self) -> f64 {
         self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.density_a2)
     }
 
-    /// Velocities at points, the gates of a line together and lines by increasing elevation.
-    pub(crate) fn map(&self, scan: &Scan, points: &[PolarPoint]) -> Result<Vec<MapPoint>, Error> {
+    /// Estimates at points, the gates of a line together and lines by increasing elevation, held against the noise there.
+    pub(crate) fn gates(
+        &self,
+        scan: &Scan,
+        points: &[PolarPoint],
+        noise: &NoiseAtPoints,
+    ) -> Result<Vec<GateEstimate>, Error> {
         let Toolkit { estimator, following, .. } = &self.tools;
         let mut found = scan.map(points, &self.radius, None, &**estimator)?;
         let gates = points.iter().take_while(|p| p.elevation_rad == points[0].elevation_rad).count().max(1);
@@ -140,11 +140,17 @@ impl<S: Sample> MapEstimator<S> {
             Ok((self.radius.at_m(point.range_m)?, self.covariance.correlation(snr)?))
         };
         let of_gates = points.iter().take(gates).map(of_gate).collect::<Result<Vec<_>, Error>>()?;
-        found.par_iter_mut().zip(points).enumerate().for_each(|(index, (found, point))| {
-            let (radius_m, correlation) = &of_gates[index % gates];
-            found.n_eff = scan.n_eff(*point, *radius_m, correlation);
-        });
-        Ok(found)
+        let held = |(index, (found, point)): (usize, (MapPoint, &PolarPoint))| {
+            let ((radius_m, correlation), e) = (&of_gates[index % gates], &found.estimate);
+            GateEstimate {
+                found: MapPoint { n_eff: scan.n_eff(*point, *radius_m, correlation), ..found },
+                power_a2: if e.velocity_m_s.is_finite() { e.power } else { f64::NAN },
+                gain: self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.gain(e.velocity_m_s)),
+                detection_ratio: noise.threshold.as_ref().map_or(f64::NAN, |of| e.detection / of[index]),
+                deviation: noise.deviation[index],
+            }
+        };
+        Ok(found.into_par_iter().zip(points).enumerate().map(held).collect())
     }
 
     /// What noise gives at points of a scan.
@@ -168,40 +174,6 @@ pub(crate) struct NoiseAtPoints {
     threshold: Option<Vec<f64>>,
     /// Standard deviation of the power in the band over its mean.
     deviation: Vec<f64>,
-}
-
-impl NoiseAtPoints {
-    /// Whether an estimate does not stand out of noise, or is flagged by itself.
-    pub(crate) fn flags(&self, point: usize, estimate: &GateVelocity) -> bool {
-        match &self.threshold {
-            Some(threshold) => !estimate.exceeds(threshold[point]),
-            None => !estimate.is_good(),
-        }
-    }
-
-    /// Density of the peak over what noise exceeds with the rate of the scene; NaN without a test.
-    pub(crate) fn detection_ratio(&self, point: usize, estimate: &GateVelocity) -> f64 {
-        self.threshold.as_ref().map_or(f64::NAN, |threshold| estimate.detection / threshold[point])
-    }
-
-    /// Standard deviation of the power of noise in the band over its mean.
-    pub(crate) fn deviation(&self, point: usize) -> f64 {
-        self.deviation[point]
-    }
-}
-
-/// Signal-to-noise ratio, dB, of a mean power over that of noise in `count` maps, the excess times `gain`; NaN where the excess is below
-/// twice its standard deviation, of one map `deviation`.
-pub(crate) fn snr_db(power_ratio: f64, gain: f64, deviation: f64, count: f64) -> f64 {
-    let excess = power_ratio - 1.0;
-    if excess > 2.0 * deviation / count.sqrt() { 10.0 * (excess * gain).log10() } else { f64::NAN }
-}
-
-/// Spectral width, m/s, of a mean spread with its standard error, both m^2/s^2; NaN where it does not stand out of that, nor of what the
-/// shape of the floor beneath it may add: a part of the variance `resolution` of a line, measured for all methods.
-pub(crate) fn width_m_s(spread: f64, error: f64, resolution: f64, snr: f64) -> f64 {
-    let least = resolution * (0.05 + 0.12 / snr);
-    if spread > least.max(2.0 * error) { spread.sqrt() } else { f64::NAN }
 }
 
 /// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.

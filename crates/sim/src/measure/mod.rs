@@ -6,7 +6,7 @@
 //! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | the records of the lines of sight |
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
-//! | [`map`], `map_estimator` | estimates and their errors against the truth |
+//! | [`map`], `map_estimator`, `gate_estimates` | estimates and their errors against the truth |
 //! | [`error_law`], [`cell_average`] | the law of these errors, averages of them over cells, their standard errors |
 //! | [`recorded`] | the same from the records of a file, measured or simulated |
 //! | [`mod@bound`] | the Cramer-Rao bound for a scene |
@@ -19,6 +19,7 @@ pub mod budget;
 pub mod cell_average;
 pub(crate) mod efficiencies;
 pub mod error_law;
+pub(crate) mod gate_estimates;
 pub mod map;
 pub(crate) mod map_estimator;
 pub(crate) mod plane;

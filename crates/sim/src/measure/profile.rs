@@ -10,7 +10,7 @@ use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, hash
 use crate::setup::efficiency_model::{OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
 use crate::setup::instrument::Instrument;
 use crate::setup::progress::Observer;
-use crate::setup::table::{of_table, spaced};
+use crate::setup::table::of_table;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_optics::air::StructureTable;
@@ -35,20 +35,11 @@ pub struct RangeProfile {
     pub lost_power_fraction: Option<f64>,
 }
 
-/// The profile that the scene's outputs ask for: with turbulence, theory and Monte Carlo side by side.
+/// The profile at some ranges, m, increasing: with turbulence, theory and Monte Carlo side by side.
 ///
 /// # Errors
-/// What the optics refuse, such as a grid too small for the beam.
-pub fn range_profile(plan: &Plan, observer: &dyn Observer) -> Result<RangeProfile, Error> {
-    let o = &plan.scene.scene.outputs;
-    let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
-    profile_at(plan, &Efficiencies::default(), &range_m, observer)
-}
-
-/// The profile at some ranges, m, increasing.
-///
-/// # Errors
-/// As [`range_profile`]; in turbulence that phase screens cross, ranges beyond the signals and the profile of the scene.
+/// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
+/// the profile of the scene.
 pub(crate) fn profile_at(
     plan: &Plan,
     known: &Efficiencies,

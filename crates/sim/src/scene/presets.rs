@@ -53,8 +53,8 @@ pub fn preset_toml(name: &str) -> Option<String> {
 mod tests {
     use super::*;
     use crate::measure::budget::{Budget, scan_ranges_m};
-    use crate::measure::profile::range_profile;
     use crate::plan::{Plan, Target};
+    use crate::run::run;
     use crate::scene::{Scene, SceneFile};
     use crate::setup::progress::Silent;
     use std::path::Path;
@@ -88,7 +88,7 @@ mod tests {
             (at.outputs.profile_range_min_m, at.outputs.profile_range_max_m) = (ranges_m[0], ranges_m[2]);
             at.outputs.profile_points = 3;
             let plan = Plan::new(SceneFile::new(at).unwrap(), Target::Efficiency).unwrap();
-            let profile = range_profile(&plan, &Silent).unwrap();
+            let profile = run(&plan, &Silent).unwrap().profile.unwrap();
             for (sum, snr_db) in budget.snr_db().iter().zip(&profile.snr_db) {
                 assert!((sum - snr_db).abs() < 1e-9, "{}: {sum} {snr_db}", row[0]);
             }

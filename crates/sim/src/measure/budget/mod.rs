@@ -284,8 +284,8 @@ fn second_trip_db(scene: &Scene, instrument: &Instrument, range_m: f64) -> Resul
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::measure::profile::range_profile;
     use crate::plan::Target;
+    use crate::run::run;
     use crate::scene::{ReceiverPath, RefractiveTurbulence, SceneFile, SecondTrip, Turbulence};
     use crate::setup::progress::Silent;
 
@@ -366,7 +366,7 @@ mod tests {
             scene.outputs.profile_points = 3;
             change(&mut scene);
             let plan = Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Efficiency).unwrap();
-            let profile = range_profile(&plan, &Silent).unwrap();
+            let profile = run(&plan, &Silent).unwrap().profile.unwrap();
             let found = Budget::new(&plan, &profile.efficiency.range_m, &Silent).unwrap();
             let sums: Vec<f64> = (0..3)
                 .map(|at| found.rows.iter().filter(|row| !row.name.starts_with('=')).map(|row| row.db[at]).sum())

@@ -9,6 +9,7 @@ use super::tiles::{Tile, tiles};
 use super::{FromParts, RecordedOptions, pieces, samples};
 use crate::Error;
 use crate::io::raw::RawRecords;
+use crate::measure::gate_estimates::GateEstimate;
 use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
@@ -22,35 +23,12 @@ use wakescope_estimate::map::{MapPoint, ScanGeometry, polar_points};
 /// Most bytes of the sums of a tile.
 const BLOCK_BYTES: usize = 256 << 20;
 
-/// What is known of one gate before the noise is.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Cell {
-    pub(super) found: MapPoint,
-    /// Mean power in the band over that of the scene's noise.
-    pub(super) power_ratio: f64,
-    /// Signal-to-noise ratio over the excess of that ratio over 1.
-    pub(super) gain: f64,
-    /// Density of the peak over what the scene's noise exceeds with the rate of false alarms; NaN without a test.
-    pub(super) detection_ratio: f64,
-    /// Standard deviation of the power ratio of noise.
-    pub(super) deviation: f64,
-    /// Lines of sight that its region reaches.
-    pub(super) lines: f64,
-}
-
-impl Cell {
-    /// A gate of which nothing is known yet.
-    fn none() -> Self {
-        let found = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
-        let [power_ratio, gain, detection_ratio, deviation] = [f64::NAN; 4];
-        Self { found, power_ratio, gain, detection_ratio, deviation, lines: 0.0 }
-    }
-}
-
 /// The gates of a scan before they are held against the noise.
 pub(super) struct ScanCells {
     pub(super) lines: ScanLines,
-    pub(super) cells: Array2<Cell>,
+    pub(super) gates: Array2<GateEstimate>,
+    /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
+    pub(super) noise_a2: f64,
     /// Where the windows of the lines are, and the radius of the regions of each gate, m.
     pub(super) regions: (ScanGeometry, Vec<f64>),
     /// Spectra of the gates over the noise of the scene, where they were asked for.
@@ -99,16 +77,20 @@ impl<S: FromParts> Blocks<'_, S> {
     fn scan(&self, records: &mut RawRecords, lines: &ScanLines) -> Result<ScanCells, Error> {
         let range_m = &self.plan.geometry.gate_range_m;
         let shape = (lines.elevation_rad.len(), range_m.len());
-        let mut cells = Array2::from_elem(shape, Cell::none());
+        let none = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
+        let [power_a2, gain, detection_ratio, deviation] = [f64::NAN; 4];
+        let mut gates =
+            Array2::from_elem(shape, GateEstimate { found: none, power_a2, gain, detection_ratio, deviation });
         let mut spectra = self.spectra.map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]);
         for tile in &self.tiles {
-            self.tile(records, lines, tile, (&mut cells, spectra.as_deref_mut()))?;
+            self.tile(records, lines, tile, (&mut gates, spectra.as_deref_mut()))?;
             if tile.gates.end == shape.1 {
                 self.observer.advance(tile.lines.len() as u64);
             }
         }
         let radius_m = range_m.iter().map(|range_m| self.estimator.radius_m(*range_m)).collect::<Result<_, _>>()?;
-        Ok(ScanCells { lines: lines.clone(), cells, regions: (self.places.clone(), radius_m), spectra })
+        let noise_a2 = self.estimator.noise_power_a2();
+        Ok(ScanCells { lines: lines.clone(), gates, noise_a2, regions: (self.places.clone(), radius_m), spectra })
     }
 
     fn tile(
@@ -116,7 +98,7 @@ impl<S: FromParts> Blocks<'_, S> {
         records: &mut RawRecords,
         lines: &ScanLines,
         tile: &Tile,
-        (cells, mut spectra): (&mut Array2<Cell>, Option<&mut [f32]>),
+        (cells, mut spectra): (&mut Array2<GateEstimate>, Option<&mut [f32]>),
     ) -> Result<(), Error> {
         let (plan, estimator, (read, held)) = (self.plan, &self.estimator, &tile.windows);
         let of_records = lines.records(read);
@@ -133,22 +115,13 @@ impl<S: FromParts> Blocks<'_, S> {
         let order = upward(guessed.clone(), &lines.elevation_rad);
         let angles: Vec<f64> = order.iter().map(|line| lines.elevation_rad[*line]).collect();
         let points = polar_points(&angles, &plan.geometry.gate_range_m[gates.clone()]);
-        let found = estimator.map(&scan, &points)?;
-        let noise = estimator.noise(&self.places, &points)?;
+        let found = estimator.gates(&scan, &points, &estimator.noise(&self.places, &points)?)?;
         for (row, line) in order.into_iter().enumerate().filter(|(_, line)| tile.lines.contains(line)) {
             for gate in tile.gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
-                let (e, radius_m) = (&found[at].estimate, estimator.radius_m(points[at].range_m)?);
-                let power_a2 = if e.velocity_m_s.is_finite() { e.power } else { f64::NAN };
-                cells[[line, gate]] = Cell {
-                    found: found[at],
-                    power_ratio: power_a2 / estimator.noise_power_a2(),
-                    gain: estimator.gain(e.velocity_m_s),
-                    detection_ratio: noise.detection_ratio(at, e),
-                    deviation: noise.deviation(at),
-                    lines: self.places.chords(points[at], radius_m).count() as f64,
-                };
+                cells[[line, gate]] = found[at];
                 if let (Some(spectra), Some(of_gate)) = (&mut spectra, self.spectra) {
+                    let radius_m = estimator.radius_m(points[at].range_m)?;
                     let one = of_gate.density(&scan, points[at], radius_m, estimator.noise_density_a2())?;
                     let place = (line * cells.ncols() + gate) * one.len();
                     spectra[place..place + one.len()].copy_from_slice(&one);

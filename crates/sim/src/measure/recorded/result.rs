@@ -3,12 +3,12 @@
 //! Check: flags and ratios of measured signals are those of a run of the same signals.
 
 use super::NoiseLevel;
-use super::blocks::{Cell, ScanCells};
+use super::blocks::ScanCells;
 use super::lines::ScanLines;
 use super::predicted::PredictedError;
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
-use crate::measure::map_estimator::{snr_db, width_m_s};
+use crate::measure::gate_estimates::GateSums;
 use crate::plan::Plan;
 use crate::setup::described::{pulse_info, site};
 use ndarray::{Array2, Axis, concatenate};
@@ -43,61 +43,67 @@ pub struct MeasuredScan {
 
 /// Holds the gates of a scan against the noise.
 pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Result<MeasuredScan, Error> {
-    let ScanCells { lines, cells, regions: (places, radius_m), .. } = scan;
     // The noise over that of the scene.
     let factor = match noise {
         NoiseLevel::OfScene => 1.0,
         NoiseLevel::Given(power) => power / plan.instrument.receiver.noise_variance_a2(),
-        NoiseLevel::Quietest => quietest(&cells),
+        NoiseLevel::Quietest => quietest(plan, &scan),
     };
-    let n_eff: Vec<f64> = cells.iter().map(|cell| cell.found.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
+    let ScanCells { lines, gates, noise_a2, regions: (places, radius_m), .. } = scan;
+    let n_eff: Vec<f64> = gates.iter().map(|gate| gate.found.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
     let n_eff = n_eff.iter().sum::<f64>() / n_eff.len().max(1) as f64;
     let predicted = PredictedError::new(plan, places, radius_m.iter().copied().fold(0.0, f64::max), n_eff)?;
-    let ratio = |cell: &Cell| snr_db(cell.power_ratio / factor, cell.gain, cell.deviation, 1.0);
-    let is_flagged = |cell: &Cell| match cell.detection_ratio.is_nan() {
-        true => !cell.found.estimate.is_good(),
-        false => !(cell.found.estimate.is_good() && cell.detection_ratio > factor),
-    };
-    let of_cell = |of: &dyn Fn(&PredictedError, (usize, usize), &Cell) -> f64| {
-        let predicted = predicted.as_ref();
-        Array2::from_shape_fn(cells.dim(), |at| predicted.map_or(f64::NAN, |predicted| of(predicted, at, &cells[at])))
-    };
-    let predicted_m_s = of_cell(&|predicted, (line, gate), cell| {
-        let point = PolarPoint { range_m: plan.geometry.gate_range_m[gate], elevation_rad: lines.elevation_rad[line] };
-        predicted.deviation_m_s(point, radius_m[gate], cell.found.level as f64, ratio(cell))
+    let velocity_m_s = gates.map(|gate| gate.found.estimate.velocity_m_s);
+    let sums = gates.map(|gate| {
+        let mut sums = GateSums::default();
+        sums.add(gate, factor);
+        sums
     });
-    let bias_m_s = of_cell(&|predicted, _, cell| predicted.bias_m_s(cell.found.estimate.velocity_m_s, ratio(cell)));
+    let snr_db = sums.map(|gate| gate.snr_db(noise_a2, factor));
+    let of_gate = |of: &dyn Fn(&PredictedError, (usize, usize)) -> f64| {
+        Array2::from_shape_fn(sums.dim(), |at| predicted.as_ref().map_or(f64::NAN, |predicted| of(predicted, at)))
+    };
+    let predicted_m_s = of_gate(&|predicted, at| {
+        let point = point(plan, &lines, at);
+        predicted.deviation_m_s(point, radius_m[at.1], sums[at].level, snr_db[at])
+    });
+    let bias_m_s = of_gate(&|predicted, at| predicted.bias_m_s(velocity_m_s[at], snr_db[at]));
     Ok(MeasuredScan {
-        velocity_m_s: cells.map(|cell| cell.found.estimate.velocity_m_s),
         predicted_m_s,
         bias_m_s,
-        level: cells.map(|cell| cell.found.level as f64),
-        n_eff: cells.map(|cell| cell.found.n_eff),
-        flagged: cells.map(|cell| f64::from(u8::from(is_flagged(cell)))),
-        width_m_s: cells.map(|cell| {
-            let e = &cell.found.estimate;
-            let snr = if cell.power_ratio.is_nan() { f64::INFINITY } else { 10f64.powf(0.1 * ratio(cell)) };
-            if is_flagged(cell) { f64::NAN } else { width_m_s(e.spread_m2_s2, 0.0, e.resolution_m2_s2, snr) }
-        }),
-        snr_db: cells.map(ratio),
-        quality: cells.map(|cell| cell.found.estimate.quality),
+        level: sums.map(|gate| gate.level),
+        n_eff: sums.map(|gate| gate.n_eff),
+        flagged: sums.map(GateSums::flagged),
+        width_m_s: sums.map(|gate| gate.width_m_s(noise_a2, factor)),
+        quality: sums.map(GateSums::quality),
+        velocity_m_s,
+        snr_db,
         lines,
     })
 }
 
+/// The place of a gate of a line.
+fn point(plan: &Plan, lines: &ScanLines, (line, gate): (usize, usize)) -> PolarPoint {
+    PolarPoint { range_m: plan.geometry.gate_range_m[gate], elevation_rad: lines.elevation_rad[line] }
+}
+
 /// Power of the gates without a signal over that of the scene's noise, from the means over the lines.
-fn quietest(cells: &Array2<Cell>) -> f64 {
-    let known = |of: fn(&Cell) -> f64| {
-        let mean = move |gate: ndarray::ArrayView1<'_, Cell>| {
-            let values = || gate.iter().filter(|cell| cell.power_ratio.is_finite()).map(of);
-            values().sum::<f64>() / values().count() as f64
+fn quietest(plan: &Plan, scan: &ScanCells) -> f64 {
+    let ScanCells { lines, gates, noise_a2, regions: (places, radius_m), .. } = scan;
+    let ratio = gates.map(|gate| gate.power_a2 / noise_a2);
+    let mean_of_lines = |of: &dyn Fn((usize, usize)) -> f64| {
+        let mean = |gate: usize| {
+            let known = || (0..gates.nrows()).map(|line| (line, gate)).filter(|at| ratio[*at].is_finite());
+            known().map(of).sum::<f64>() / known().count() as f64
         };
-        cells.axis_iter(Axis(1)).map(mean).filter(|value| value.is_finite()).collect::<Vec<f64>>()
+        (0..gates.ncols()).map(mean).filter(|value| value.is_finite()).collect::<Vec<f64>>()
     };
     // Regions that reach over several lines share their windows.
-    let variances = known(|cell| cell.deviation.powi(2) * cell.lines);
-    let variance = variances.iter().sum::<f64>() / (variances.len() * cells.nrows()) as f64;
-    noise_floor(&known(|cell| cell.power_ratio), variance.sqrt())
+    let variances = mean_of_lines(&|at| {
+        gates[at].deviation.powi(2) * places.chords(point(plan, lines, at), radius_m[at.1]).count() as f64
+    });
+    let variance = variances.iter().sum::<f64>() / (variances.len() * gates.nrows()) as f64;
+    noise_floor(&mean_of_lines(&|at| ratio[at]), variance.sqrt())
 }
 
 /// The map of the scans, each a sweep, in the form that files and pictures take.
