@@ -66,7 +66,9 @@ pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
 }
 
 /// First and last ray of a sweep, velocities and signal-to-noise ratios of all.
-fn swept(map: &VelocityMap, sweep: usize) -> OutputResult<((usize, usize), [&Array2<f64>; 2])> {
+type Swept<'m> = ((usize, usize), [&'m Array2<f64>; 2]);
+
+fn swept(map: &VelocityMap, sweep: usize) -> OutputResult<Swept<'_>> {
     map.check()?;
     let bounds = map.sweep_bounds();
     let rays = bounds.get(sweep).copied();

@@ -111,13 +111,11 @@ fn correlogram<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Corr
     Ok(Correlogram::with_tapers(likelihood_tapers(&model, snr)?)?)
 }
 
-/// The statistic of a scene whose method knows correlograms, with the weights that its windows give the lags and their tapers: models
-/// of windows without weighting need few lags.
-fn statistic<S: Sample>(
-    scene: &Scene,
-    pulse: &Pulse,
-    snr: f64,
-) -> Result<(Box<dyn Statistic<S>>, Vec<f64>, Vec<Taper>), Error> {
+/// A statistic, with the weights that its windows give the lags and their tapers.
+type Weighted<S> = (Box<dyn Statistic<S>>, Vec<f64>, Vec<Taper>);
+
+/// The statistic of a scene whose method knows correlograms: models of windows without weighting need few lags.
+fn statistic<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Weighted<S>, Error> {
     let e = &scene.estimator;
     if let Some(model) = e.method.order().filter(|_| e.weighting == Weighting::Rectangular) {
         let few = ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;

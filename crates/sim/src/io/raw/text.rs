@@ -70,7 +70,9 @@ impl TextRecords {
             let parts = own.into_iter().map(|cell| number(cell).map(known)).collect::<Result<Vec<f64>, String>>()?;
             let samples = parts.chunks_exact(if out.is_complex { 2 } else { 1 });
             let samples = samples.map(|parts| Complex::new(parts[0], parts.get(1).copied().unwrap_or(0.0)));
-            out.records.last_mut().map(|record| record.extend(samples));
+            if let Some(record) = out.records.last_mut() {
+                record.extend(samples);
+            }
         }
         let whole = out.samples();
         match out.records.iter().zip(lines).find(|(record, _)| record.len() != whole) {
