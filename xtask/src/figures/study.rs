@@ -215,7 +215,7 @@ impl Study {
             }
         }
         let range_m = cells.iter().map(|cell| self.map.range_m[cell.1]).sum::<f64>() / cells.len() as f64;
-        Zone { range_m, of_batch, average: CellAverage::over(&self.map, cells) }
+        Zone { range_m, of_batch, average: CellAverage::without_errors(&self.map, cells) }
     }
 }
 

@@ -35,29 +35,51 @@ impl CellAverage {
     /// Over the cells (line, gate) of a map that have an estimate. Standard errors are NaN for one realisation.
     #[must_use]
     pub fn over(map: &VelocityEstimates, cells: &[(usize, usize)]) -> Self {
-        let has_estimate = |cell: &(usize, usize)| map.rms_m_s.get(*cell).is_some_and(|rms| rms.is_finite());
-        let known: Vec<(usize, usize)> = cells.iter().copied().filter(has_estimate).collect();
-        // A cell with one estimate has an error, but no scatter.
-        let scattered: Vec<_> = known.iter().copied().filter(|cell| map.std_m_s[*cell].is_finite()).collect();
-        let mean = |cells: &[(usize, usize)], field: &Array2<f64>, power: i32| {
-            cells.iter().map(|c| field[*c].powi(power)).sum::<f64>() / cells.len() as f64
-        };
-        let (bias_m_s, square) = (mean(&known, &map.bias_m_s, 1), mean(&known, &map.rms_m_s, 2));
-        let variance = mean(&scattered, &map.std_m_s, 2);
-        let errors = map.law.as_ref().filter(|_| !known.is_empty()).map(|law| {
-            let error = |scan: &ScanErrors, cell| scan.error_m_s[cell];
-            let squared = |scan: &ScanErrors, cell| scan.error_m_s[cell].powi(2);
-            let (unseen, of_bias) = law.unseen(&known);
-            [
-                (variance_of_mean(map, law, &known, error, about_mean) + of_bias).sqrt(),
-                error_of_root(variance, variance_of_mean(map, law, &scattered, error, of_variance), unseen),
-                error_of_root(square, variance_of_mean(map, law, &known, squared, about_mean), unseen),
-            ]
-        });
-        let [bias_standard_error_m_s, std_standard_error_m_s, standard_error_m_s] = errors.unwrap_or([f64::NAN; 3]);
-        let (std_m_s, rms_m_s) = (variance.sqrt(), square.sqrt());
-        Self { bias_m_s, bias_standard_error_m_s, std_m_s, std_standard_error_m_s, rms_m_s, standard_error_m_s }
+        let [known, scattered] = with_estimates(map, cells);
+        let means = Self::without_errors(map, cells);
+        let Some(law) = map.law.as_ref().filter(|_| !known.is_empty()) else { return means };
+        let error = |scan: &ScanErrors, cell| scan.error_m_s[cell];
+        let squared = |scan: &ScanErrors, cell| scan.error_m_s[cell].powi(2);
+        let (unseen, of_bias) = law.unseen(&known);
+        let [variance, square] = [mean(&scattered, &map.std_m_s, 2), mean(&known, &map.rms_m_s, 2)];
+        let of_variance = variance_of_mean(map, law, &scattered, error, of_variance);
+        let of_square = variance_of_mean(map, law, &known, squared, about_mean);
+        Self {
+            bias_standard_error_m_s: (variance_of_mean(map, law, &known, error, about_mean) + of_bias).sqrt(),
+            std_standard_error_m_s: error_of_root(variance, of_variance, unseen),
+            standard_error_m_s: error_of_root(square, of_square, unseen),
+            ..means
+        }
     }
+
+    /// The same with NaN for the standard errors, which take most of the time.
+    #[must_use]
+    pub fn without_errors(map: &VelocityEstimates, cells: &[(usize, usize)]) -> Self {
+        let [known, scattered] = with_estimates(map, cells);
+        Self {
+            bias_m_s: mean(&known, &map.bias_m_s, 1),
+            bias_standard_error_m_s: f64::NAN,
+            std_m_s: mean(&scattered, &map.std_m_s, 2).sqrt(),
+            std_standard_error_m_s: f64::NAN,
+            rms_m_s: mean(&known, &map.rms_m_s, 2).sqrt(),
+            standard_error_m_s: f64::NAN,
+        }
+    }
+}
+
+/// The cells that have an estimate, and those of them that have several: a cell with one has an error, but no scatter.
+fn with_estimates(map: &VelocityEstimates, cells: &[(usize, usize)]) -> [Vec<(usize, usize)>; 2] {
+    let are_finite = |field: &Array2<f64>, cells: &[(usize, usize)]| {
+        cells.iter().copied().filter(|cell| field.get(*cell).is_some_and(|value| value.is_finite())).collect::<Vec<_>>()
+    };
+    let known = are_finite(&map.rms_m_s, cells);
+    let scattered = are_finite(&map.std_m_s, &known);
+    [known, scattered]
+}
+
+/// Mean of a power of a field over some cells.
+fn mean(cells: &[(usize, usize)], field: &Array2<f64>, power: i32) -> f64 {
+    cells.iter().map(|c| field[*c].powi(power)).sum::<f64>() / cells.len() as f64
 }
 
 /// Part of the estimates of all cells and scans that is flagged, and its standard error: not 0 where none or all are.
@@ -142,11 +164,12 @@ fn weighted_sums(values: &Array2<f64>, shared: [f64; 2]) -> Array2<f64> {
     let along = |values: Array2<f64>, axis: usize| {
         let mut sums = Array2::zeros(values.dim());
         let reach = REACH * shared[axis];
+        let weight = |away: usize| (1.0 - (away as f64 / reach).powi(4)).max(0.0);
+        let weights: Vec<f64> = (0..values.len_of(Axis(axis))).map(weight).collect();
         for (mut to, from) in sums.lanes_mut(Axis(axis)).into_iter().zip(values.lanes(Axis(axis))) {
             for (at, sum) in to.indexed_iter_mut() {
                 let near = at.saturating_sub(reach as usize)..(at + reach as usize + 1).min(from.len());
-                let weight = |other: usize| (1.0 - (at.abs_diff(other) as f64 / reach).powi(4)).max(0.0);
-                *sum = near.map(|other| weight(other) * from[other]).sum::<f64>();
+                *sum = near.map(|other| weights[at.abs_diff(other)] * from[other]).sum::<f64>();
             }
         }
         sums
