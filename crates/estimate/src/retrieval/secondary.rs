@@ -11,8 +11,8 @@ use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFitOptions, Parameter};
 
 /// What [`fit_scan`] finds with secondary vortices in the model, and the options with them, if the scan shows them beside the pair that it has
-/// `found` or [`RetrievalOptions::secondary`] wants them anyway; with [`Secondary::Never`](crate::vortex_fit::Secondary::Never) what was found, flagged. Looked for are those in
-/// velocities whose errors are independent. The deviations count what is not known of them.
+/// `found` or [`RetrievalOptions::secondary`] wants them anyway; with [`Secondary::Never`](crate::vortex_fit::Secondary::Never) what was
+/// found, flagged. Looked for are those in velocities whose errors are independent. The deviations count what is not known of them.
 ///
 /// # Errors
 /// As [`fit_scan`].

@@ -15,7 +15,7 @@
 //! all directions if one of them has a no-slip wall, whose closure belongs to the pairs: a vortex that turns is to meet the
 //! same errors in all directions.
 //!
-//! Check: the tables are the solution of their conditions (`wall_closure`); skewness, row sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
+//! Check: the tables are the solution of their conditions (`wall_closure_tests`); skewness, row sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
 
 // The tables are written as they were derived, with all digits.
 #![allow(clippy::excessive_precision)]
@@ -230,7 +230,7 @@ fn interior_products(stencil: Stencil, m: isize) -> impl Iterator<Item = (isize,
 }
 
 #[cfg(test)]
-mod wall_closure;
+mod wall_closure_tests;
 
 #[cfg(test)]
 mod tests {

@@ -11,7 +11,7 @@
 
 mod against_theory;
 #[cfg(test)]
-mod mutation;
+mod mutation_tests;
 pub(crate) mod path;
 mod statistics;
 mod walk;

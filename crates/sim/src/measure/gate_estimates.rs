@@ -88,8 +88,8 @@ impl GateSums {
         if is_seen { 10.0 * (excess * gain).log10() } else { f64::NAN }
     }
 
-    /// Spectral width, m/s; NaN where it does not stand out of its standard error, nor of what the shape of the floor beneath it may add: a
-    /// part of the variance of a line, measured for all methods.
+    /// Spectral width, m/s; NaN where it does not stand out of its standard error or of what the shape of the floor beneath it may add, a part
+    /// of the variance of a line that was measured for all methods, and where the signal-to-noise ratio that tells this is not known.
     pub(crate) fn width_m_s(&self, noise_a2: f64, noise_factor: f64) -> f64 {
         let [count, sum, squares] = self.spreads;
         // what only some of the estimates show is not the mean of all
@@ -100,6 +100,34 @@ impl GateSums {
         let variance = (squares / count - spread * spread).max(0.0) / (count - 1.0).max(1.0);
         let snr_db = if noise_a2.is_nan() { f64::INFINITY } else { self.snr_db(noise_a2, noise_factor) };
         let least = self.means()[3] * (0.05 + 0.12 / 10f64.powf(0.1 * snr_db));
-        if spread > least.max(2.0 * variance.sqrt()) { spread.sqrt() } else { f64::NAN }
+        // A comparison that an unknown ratio fails: `max` would leave it out.
+        if spread > least && spread > 2.0 * variance.sqrt() { spread.sqrt() } else { f64::NAN }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use wakescope_estimate::GateVelocity;
+    use wakescope_estimate::estimators::Quality;
+
+    /// Sums of three maps with so much power over that of noise, a spread of 4 m^2/s^2 and a line of 1 m^2/s^2.
+    fn sums(power: f64) -> GateSums {
+        let none = GateVelocity::none(Quality::Good);
+        let estimate = GateVelocity { velocity_m_s: 1.0, spread_m2_s2: 4.0, resolution_m2_s2: 1.0, ..none };
+        let found = MapPoint { estimate, level: 9, left_out: 0, n_eff: 3.0 };
+        let gate = GateEstimate { found, power_a2: power, gain: 1.0, detection_ratio: f64::NAN, deviation: 0.1 };
+        let mut sums = GateSums::default();
+        (0..3).for_each(|_| drop(sums.add(&gate, 1.0)));
+        sums
+    }
+
+    #[test]
+    fn a_width_is_told_where_the_ratio_is_known_that_says_what_the_floor_adds() {
+        let (strong, weak) = (sums(2.0), sums(1.05));
+        assert!(strong.snr_db(1.0, 1.0).abs() < 1e-12 && (strong.width_m_s(1.0, 1.0) - 2.0).abs() < 1e-12);
+        assert!(weak.snr_db(1.0, 1.0).is_nan() && weak.width_m_s(1.0, 1.0).is_nan());
+        // without noise there is no floor
+        assert!((weak.width_m_s(f64::NAN, 1.0) - 2.0).abs() < 1e-12);
     }
 }
