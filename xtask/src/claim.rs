@@ -103,9 +103,11 @@ impl Claim {
             format!("{name}{}{unit}", found.words())
         });
         let open = parts.iter().filter(|part| verdict(part) == Verdict::Open);
-        let times = open.map(|part| part.3.times_the_data(&part.1)).fold(0.0, f64::max);
+        // Of nothing, no sample tells anything.
+        let least = if parts.is_empty() { f64::INFINITY } else { 0.0 };
+        let times = open.map(|part| part.3.times_the_data(&part.1)).fold(least, f64::max);
         let claim = Self {
-            verdict: told.first().map_or(Verdict::Pass, verdict),
+            verdict: told.first().map_or(Verdict::Open, verdict),
             standard_error: parts.iter().map(|part| part.1.standard_error).fold(0.0, f64::max),
             ..Self::exact(id, words.collect::<Vec<_>>().join("; "), false)
         };
@@ -231,6 +233,7 @@ mod tests {
         assert_eq!(claim.measured, "p: 2.00 ± 0.10 m/s; p: 1.10 ± 0.10 m/s; p: 0.50 ± 0.10 m/s");
         assert_eq!(of(&[0.9]).decided_by, "about 3.8 times the data");
         assert_eq!(of(&[f64::NAN]).decided_by, "no sample in reach");
+        assert_eq!((of(&[]).verdict, of(&[]).decided_by.as_str()), (Verdict::Open, "no sample in reach"));
     }
 
     #[test]
