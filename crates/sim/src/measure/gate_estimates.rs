@@ -118,7 +118,9 @@ mod tests {
         let found = MapPoint { estimate, level: 9, left_out: 0, n_eff: 3.0 };
         let gate = GateEstimate { found, power_a2: power, gain: 1.0, detection_ratio: f64::NAN, deviation: 0.1 };
         let mut sums = GateSums::default();
-        (0..3).for_each(|_| drop(sums.add(&gate, 1.0)));
+        for _ in 0..3 {
+            assert!(!sums.add(&gate, 1.0));
+        }
         sums
     }
 
