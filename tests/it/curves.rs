@@ -2,7 +2,7 @@
 
 #[test]
 fn every_stored_curve_is_computed_within_its_tolerance() {
-    for curve in &fixtures::curves::ALL {
+    for curve in &wakescope_tests::curves::ALL {
         let found = curve.compare().unwrap();
         let (error, worst) = (found.worst_error, found.x[found.worst]);
         assert!(

@@ -1,6 +1,6 @@
 //! Stiff and extreme cases of every crate: each ends as it must, with a number within bounds or a refusal in stated words.
 
-use fixtures::extreme::rows;
+use wakescope_tests::extreme::rows;
 
 /// The cases of one crate that take no more than a few seconds; `cargo xtask stability` runs the others, too.
 fn all_end_as_they_must(part: &str) {

@@ -4,9 +4,9 @@
 
 use crate::wakes;
 use crate::workspace::root;
-use fixtures::curves::{ALL, Origin};
 use fixtures::failure::{Failure, Outcome};
 use wakescope_sim::io::write_atomic;
+use wakescope_tests::curves::{ALL, Origin};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]

@@ -2,10 +2,10 @@
 //! `tests/reference/`, as a table of name, error, tolerance, run time and verdict.
 
 use crate::workspace::{provenance, root};
-use fixtures::curves::{ALL, Comparison, Curve};
 use fixtures::failure::{Failure, Outcome};
 use std::time::Instant;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_tests::curves::{ALL, Comparison, Curve};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]

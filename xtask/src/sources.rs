@@ -3,10 +3,9 @@
 use proc_macro2::{Delimiter, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Whether a source file holds nothing but tests.
+/// Whether a source file of a crate holds nothing but tests.
 pub(crate) fn is_test_file(file: &str) -> bool {
-    let of_tests = file.contains("/tests/") || file.starts_with("tests/");
-    file.ends_with(".rs") && of_tests || file.ends_with("/tests.rs") || file.ends_with("_tests.rs")
+    file.ends_with(".rs") && file.contains("/tests/") || file.ends_with("/tests.rs") || file.ends_with("_tests.rs")
 }
 
 /// A file of a crate: its folder and the path of its module.

@@ -6,12 +6,12 @@
 use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::{provenance, root};
-use fixtures::extreme::{Ended, PARTS, Row, rows};
 use fixtures::failure::{Failure, Outcome};
 use std::path::PathBuf;
 use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_tests::extreme::{Ended, PARTS, Row, rows};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -106,7 +106,7 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fixtures::extreme::Extreme;
+    use wakescope_tests::extreme::Extreme;
 
     #[test]
     fn a_case_that_is_missed_stands_in_the_table_and_in_the_picture() {

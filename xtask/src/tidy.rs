@@ -10,13 +10,14 @@ use std::collections::BTreeSet;
 use std::path::Path;
 
 /// Crates of the workspace that each crate may depend on.
-const MAY_DEPEND_ON: [(&str, &[&str]); 7] = [
+const MAY_DEPEND_ON: [(&str, &[&str]); 8] = [
     ("crates/optics", &[]),
     ("crates/les", &[]),
     ("crates/signal", &[]),
     ("crates/estimate", &[]),
     ("crates/sim", &["optics", "les", "signal", "estimate"]),
     ("xtask", &["optics", "les", "signal", "estimate", "sim", "tests"]),
+    ("xtask/fixtures", &["optics", "les", "signal", "estimate", "sim"]),
     ("tests", &["optics", "les", "signal", "estimate", "sim"]),
 ];
 

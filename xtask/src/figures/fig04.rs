@@ -180,7 +180,7 @@ fn claims(curves: &[Curve; 5], screens: &EfficiencyProfile, [few, many]: [usize;
 
 /// The crate's quadrature against the stored curve of independent origin.
 fn free_space_claim() -> Result<Claim, Failure> {
-    let curve = fixtures::curves::ALL
+    let curve = wakescope_tests::curves::ALL
         .iter()
         .find(|c| c.name == "optics/eta_intensity_radius")
         .ok_or_else(|| Failure::new("the stored curve of the efficiency is gone".into()))?;

@@ -2,7 +2,7 @@
 
 use super::context::*;
 use crate::stability;
-use fixtures::extreme::rows;
+use wakescope_tests::extreme::rows;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows = rows(|_, case| !(case.long && context.profile == Profile::Quick));

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What figures come from.
-const DRAWN_BY: [&str; 4] = ["crates", "xtask", "tests/reference", "Cargo.lock"];
+const DRAWN_BY: [&str; 6] = ["crates", "xtask", "tests/curves", "tests/extreme", "tests/reference", "Cargo.lock"];
 
 /// Where one figure is kept.
 pub(super) struct Place {
