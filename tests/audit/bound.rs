@@ -151,7 +151,7 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
             ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), f64::NAN, 0.0);
             continue;
         }
-        let here = if is_of_range { ratios.at_gate(scan.gate_m[gate], air) } else { air };
+        let here = if is_of_range { ratios.of_window(s, scan, gate) } else { air };
         let right = independent(s, &pulse, &windows, scan.pulses, here);
         ledger.equal("bound: n_eff", f("n_eff"), right, 1e-3 * right);
         let longest = windows.iter().filter_map(|w| Some(w.last()? - w.first()? + n)).max().unwrap_or(n);

@@ -284,10 +284,11 @@ impl Ratios {
         sum * (self.range_m[1] - self.range_m[0])
     }
 
-    /// Ratio at a gate where the air has one: that which its samples see where this is more than twice or less than half of it.
-    pub(crate) fn at_gate(&self, r: f64, air: f64) -> f64 {
-        let seen = self.seen(r);
-        if (0.5..=2.0).contains(&(seen / air)) { air } else { seen }
+    /// Mean ratio of the window of a gate: of its samples, with h^2.
+    pub(crate) fn of_window(&self, s: &Scene, scan: &Scan, gate: usize) -> f64 {
+        let h2 = window_powers(s);
+        let samples = scan.sample_m[scan.gate_start[gate]..].iter().zip(&h2);
+        samples.map(|(&m, h2)| h2 * self.seen(m)).sum::<f64>() / h2.iter().sum::<f64>()
     }
 }
 

@@ -67,8 +67,7 @@ pub(crate) fn hold_map(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
             ledger.equal("map.csv: n_eff", n_eff[row], 0.0, 0.0);
             continue;
         }
-        let air = 10_f64.powf(0.1 * free_space_snr_db(s, scan.gate_m[gate]));
-        let right = independent(s, &pulse, &windows, scan.pulses, ratios.at_gate(scan.gate_m[gate], air));
+        let right = independent(s, &pulse, &windows, scan.pulses, ratios.of_window(s, scan, gate));
         ledger.equal("map.csv: n_eff", n_eff[row], right, 2e-3 * right);
     }
 }

@@ -51,8 +51,8 @@ impl RecordModel {
 
     /// Fisher information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows in a row about a place.
     ///
-    /// `snr` is the expected signal-to-noise ratio in the detector band of a sample so many samples behind the middle of the row.
-    /// Records far longer than windows and pulse are continued by the growth at their end. A floor of the noise outside its band
+    /// `snr` is the expected signal-to-noise ratio in the detector band of a sample so many samples behind the middle of the innermost window, from
+    /// which the row grows by one behind it and one before it in turn. Records far longer than windows and pulse are continued by the growth at their end. A floor of the noise outside its band
     /// that is too small for double precision is raised to the least that is not.
     ///
     /// # Errors

@@ -78,20 +78,18 @@ impl Setting {
     fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
         let ((layer_m, snr), radius_m) = (&self.layer_snr, self.radius.at_m(range_m)?);
         let (gates_m, most) = (self.places.gate_ranges_m(), self.places.most_gates(radius_m));
-        // Each record is about its own middle: ends of the scan cut chords. Most chords share one.
+        // Each record is about its innermost window, with which rows of windows begin: ends of the scan cut chords. Most chords share one.
         let (mut about, mut of_region) = (BTreeMap::new(), 0.0);
         for chord in self.places.chords(self.point(range_m), radius_m) {
-            let by_gates = match about.entry(chord.first + chord.last) {
+            let innermost = (chord.first + chord.last) / 2;
+            let by_gates = match about.entry(innermost) {
                 Entry::Occupied(known) => known.into_mut(),
-                Entry::Vacant(place) => {
-                    let middle_m = 0.5 * (gates_m[chord.first] + gates_m[chord.last]);
-                    place.insert(self.of_rays.at(middle_m, most)?)
-                }
+                Entry::Vacant(place) => place.insert(self.of_rays.at(gates_m[innermost], most)?),
             };
             let rays = self.places.line_rays(chord.line).count();
             of_region += rays as f64 * by_gates[chord.gates().min(most) - 1];
         }
-        let ratios = [of_table(layer_m, snr, range_m), self.of_rays.snr_at(range_m)?];
+        let ratios = [of_table(layer_m, snr, range_m), self.of_rays.of_windows(&[range_m])?[0]];
         self.told(range_m, ratios, [self.of_rays.at(range_m, 1)?[0], of_region])
     }
 
@@ -107,7 +105,7 @@ impl Setting {
         PolarPoint { range_m, elevation_rad: self.elevation_rad }
     }
 
-    /// From the ratio of the air at the range and that of a sample there, and the information of a window and of the region.
+    /// From the ratio of the air at the range and that of a window there, and the information of a window and of the region.
     fn told(
         &self,
         range_m: f64,
@@ -182,6 +180,7 @@ impl SceneBound {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SPEED_OF_LIGHT_M_S;
     use crate::plan::Target;
     use crate::scene::{DetectorSignal, NoiseModel, Scene, SceneFile, SnrReference};
     use crate::setup::progress::Silent;
@@ -334,6 +333,27 @@ mod tests {
             assert!(rise.iter().all(|rise| *rise > 1.05), "{rise:?}");
             assert!(rise.windows(2).all(|rise| rise[1] < 1.01 * rise[0]), "{rise:?}");
         }
+    }
+
+    #[test]
+    fn two_windows_behind_a_focus_have_the_bound_of_the_record_that_they_cover() {
+        let at = |estimator: &str, radius_m: f64, range_m: f64| {
+            let scene = plan(&format!(
+                "[telescope]\nfocus_m = 254.0\naperture_radius_m = 0.086\nbeam_radius_m = 0.068\n[pulse]\nenergy_j = 3.4e-5\n\
+                 [pulse.shape]\nduration_s = 300e-9\n[atmosphere]\nbackscatter_per_m_sr = 1e-6\n[scan]\nelevation_min_rad = 0.1\n\
+                 elevation_max_rad = 0.1\nrange_min_m = 300.0\nrange_max_m = 460.0\n[estimator]\n{estimator}\nradius_m = {radius_m:?}\n"
+            ));
+            Setting::new(&scene, &Scanner::new(&scene, &Silent).unwrap()).unwrap().at(range_m).unwrap()
+        };
+        // Two windows of 24 samples, 8 samples apart, and one of 32 between them.
+        let step_m = 4.0 * SPEED_OF_LIGHT_M_S / 250e6;
+        let gates = plan("[estimator]\nwindow_samples = 24\nwindow_step_samples = 8\n[scan]\nrange_min_m = 300.0\n");
+        let gate_m = places(&gates.scene.scene, &gates.geometry).unwrap().gate_ranges_m()[10];
+        let middle_m = gate_m + 0.5 * step_m;
+        let two = at("window_samples = 24\nwindow_step_samples = 8", 0.6 * step_m, middle_m);
+        let one = at("window_samples = 32", 0.0, middle_m);
+        assert_eq!(two.level, 32);
+        assert!((two.region_m_s / (one.window_m_s / 4.0) - 1.0).abs() < 1e-9, "{two:?} {one:?}");
     }
 
     #[test]

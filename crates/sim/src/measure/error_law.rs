@@ -6,10 +6,10 @@
 
 use crate::Error;
 use crate::plan::Plan;
-use crate::setup::{estimators, region::largest_radius_m};
+use crate::setup::ray_information::range_filter;
+use crate::setup::region::largest_radius_m;
 use ndarray::Array2;
 use std::collections::BTreeMap;
-use wakescope_signal::RangeFilter;
 
 /// Degrees of freedom of a pooled variance of Gaussian errors, for each unit of the variance of their squares.
 const FREEDOM: f64 = 6.0;
@@ -21,14 +21,6 @@ const FREEDOM_OF_SCATTER: f64 = 120.0;
 const ALIKE: f64 = 0.25;
 /// Outliers are beyond so many medians of the errors about them: four standard deviations of Gaussian ones.
 const OUTLIER: f64 = 6.0;
-
-/// Weight of the air about the range of a gate: of the pulse and of the window.
-pub(crate) fn range_filter(plan: &Plan) -> Result<RangeFilter, Error> {
-    let scene = &plan.scene.scene;
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    let thickness_m = plan.geometry.layer_thickness_m;
-    Ok(RangeFilter::gate(&plan.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
-}
 
 /// Neighbouring lines and gates of a plan's map that share windows.
 ///

@@ -1,7 +1,7 @@
 //! The radial-velocity map: estimates of every realisation, and their errors against the truth.
 
 use crate::Error;
-use crate::measure::error_law::{ErrorLaw, ScanErrors, range_filter, shared_cells};
+use crate::measure::error_law::{ErrorLaw, ScanErrors, shared_cells};
 use crate::measure::gate_estimates::GateSums;
 use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
 use crate::measure::scan::Scanner;
@@ -9,6 +9,7 @@ use crate::plan::{Plan, Stage};
 use crate::scene::DetectorSignal;
 use crate::setup::air::radial_velocity_m_s;
 use crate::setup::progress::Observer;
+use crate::setup::ray_information::range_filter;
 use crate::setup::region::places;
 use ndarray::{Array2, ArrayView1, ArrayView2};
 use num_complex::Complex;

@@ -58,7 +58,7 @@ impl<S: Sample> MapEstimator<S> {
         let lines = places.line_elevation_rad();
         let middle =
             PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };
-        let correlation = covariance.correlation(of_rays.snr_at(middle.range_m)?)?;
+        let correlation = covariance.correlation(of_rays.of_windows(&[middle.range_m])?[0])?;
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
         let known = WindowStatistics { snr: median_snr(layer_snr), n_eff };
         Ok(Self {
@@ -135,11 +135,11 @@ impl<S: Sample> MapEstimator<S> {
             found = scan.map_following(points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
         }
         // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.
-        let of_gate = |point: &PolarPoint| {
-            let snr = self.of_rays.snr_at(point.range_m)?;
-            Ok((self.radius.at_m(point.range_m)?, self.covariance.correlation(snr)?))
-        };
-        let of_gates = points.iter().take(gates).map(of_gate).collect::<Result<Vec<_>, Error>>()?;
+        let range_m: Vec<f64> = points.iter().take(gates).map(|point| point.range_m).collect();
+        let of_gate =
+            |(range_m, snr): (&f64, f64)| Ok((self.radius.at_m(*range_m)?, self.covariance.correlation(snr)?));
+        let ratios = self.of_rays.of_windows(&range_m)?;
+        let of_gates = range_m.iter().zip(ratios).map(of_gate).collect::<Result<Vec<_>, Error>>()?;
         let held = |(index, (found, point)): (usize, (MapPoint, &PolarPoint))| {
             let ((radius_m, correlation), e) = (&of_gates[index % gates], &found.estimate);
             GateEstimate {

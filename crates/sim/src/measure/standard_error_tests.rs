@@ -305,3 +305,21 @@ fn cells_with_one_estimate_have_no_scatter_and_widen_that_of_the_bias() {
         assert!((0.55..0.95).contains(&one) && two > 0.9 && (0.8..1.7).contains(&size), "{name}: {one} {two} {size}");
     }
 }
+
+#[test]
+fn two_exact_deviations_hold_fewer_than_95_in_a_hundred_of_rare_outliers() {
+    // Of Poisson numbers whose mean is known; those of estimates are known less well.
+    let share = |expected: f64| {
+        let mut part = (-expected).exp();
+        let mut sum = 0.0;
+        for number in 0..50 {
+            let apart = (f64::from(number) - expected).abs();
+            sum += if apart <= 2.0 * expected.sqrt() { part } else { 0.0 };
+            part *= expected / f64::from(number + 1);
+        }
+        sum
+    };
+    for (expected, right) in [(0.1, 0.905), (0.17, 0.844), (0.5, 0.910), (3.0, 0.966)] {
+        assert!((share(expected) - right).abs() < 1e-3, "{expected}: {}", share(expected));
+    }
+}

@@ -5,7 +5,6 @@
 use crate::scene::NoiseModel;
 use crate::setup::Setup;
 use crate::setup::estimators;
-use crate::setup::table::of_table;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_estimate::{Gates, bound::RecordModel};
 use wakescope_signal::RangeFilter;
@@ -13,9 +12,12 @@ use wakescope_signal::RangeFilter;
 /// Signal-to-noise ratios of which a bound is made: no noise is as little as the last.
 const SNR: std::ops::RangeInclusive<f64> = 1e-8..=1e6;
 
-/// Whether ratios are within a factor of two of each other.
-fn alike(a: f64, b: f64) -> bool {
-    b <= 2.0 * a && a <= 2.0 * b
+/// Weight of the air about the range of a gate: of the pulse and of the window.
+pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
+    let scene = &setup.scene.scene;
+    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+    let thickness_m = setup.geometry.layer_thickness_m;
+    Ok(RangeFilter::gate(&setup.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
 }
 
 /// Signal-to-noise ratio of the samples of a scene's records, and the information in windows of them.
@@ -24,7 +26,8 @@ pub(crate) struct RayInformation {
     gates: Gates,
     /// Range between samples, m.
     spacing_m: f64,
-    filter: RangeFilter,
+    by_pulse: RangeFilter,
+    by_gate: RangeFilter,
     layer_m: Vec<f64>,
     layer_snr: Vec<f64>,
     is_noisy: bool,
@@ -42,24 +45,25 @@ impl RayInformation {
             model: estimators::record_model(scene, pulse)?,
             gates: estimators::gates(scene)?,
             spacing_m: 0.5 * SPEED_OF_LIGHT_M_S / scene.detector.sampling_hz,
-            filter: RangeFilter::pulse(pulse, g.layer_thickness_m)?,
+            by_pulse: RangeFilter::pulse(pulse, g.layer_thickness_m)?,
+            by_gate: range_filter(setup)?,
             layer_m,
             layer_snr,
             is_noisy: scene.detector.noise != NoiseModel::None,
         })
     }
 
-    /// Signal-to-noise ratio at a range, a power ratio: that of the air there, or the mean of what the pulse lights beside it where
-    /// that is of another order, as beside a cloud.
-    pub(crate) fn snr_at(&self, range_m: f64) -> Result<f64, Error> {
-        let (here, seen) = (of_table(&self.layer_m, &self.layer_snr, range_m), self.seen_snr(range_m)?);
-        Ok(if alike(here, seen) { here } else { seen })
+    /// Signal-to-noise ratios of the windows about some ranges, power ratios: means over what pulse and window see.
+    pub(crate) fn of_windows(&self, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+        let mut snr = vec![0.0; range_m.len()];
+        self.by_gate.apply_into(self.layer_m[0], &self.layer_snr, range_m, &mut snr)?;
+        Ok(snr)
     }
 
     /// Mean ratio of a sample that sees a range: the pulse lights layers before and behind it.
     fn seen_snr(&self, range_m: f64) -> Result<f64, Error> {
         let mut snr = [0.0];
-        self.filter.apply_into(self.layer_m[0], &self.layer_snr, &[range_m], &mut snr)?;
+        self.by_pulse.apply_into(self.layer_m[0], &self.layer_snr, &[range_m], &mut snr)?;
         Ok(snr[0])
     }
 
@@ -78,5 +82,37 @@ impl RayInformation {
     pub(crate) fn of_snr(&self, snr: f64, count: usize) -> Result<Vec<f64>, Error> {
         let snr = snr.clamp(*SNR.start(), *SNR.end());
         Ok(self.model.information(&self.gates, count, |_| snr)?)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Plan, Target};
+    use crate::scene::SceneFile;
+
+    #[test]
+    fn a_window_has_the_ratio_that_pulse_and_window_see_where_it_falls_steeply() {
+        let text = "[pulse.shape]\nduration_s = 200e-9\n[estimator]\nwindow_samples = 48\nweighting = \"hann\"\n";
+        let plan = Plan::new(SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(), Target::Map).unwrap();
+        // By e in 20 m, as behind a focus: exp(v/(2 * 20^2)) more through a pulse of the variance v.
+        let (fall_m, thickness_m) = (20.0, plan.geometry.layer_thickness_m);
+        let of_air = |range_m: f64| 3.0 * (-(range_m - 400.0) / fall_m).exp();
+        let layers: Vec<(f64, f64)> =
+            (0..4000).map(|i| 200.0 + f64::from(i) * thickness_m).map(|range_m| (range_m, of_air(range_m))).collect();
+        let found = RayInformation::new(&plan, &layers).unwrap().of_windows(&[350.0, 401.3]).unwrap();
+        let variance_m2 = 0.5 * plan.instrument.pulse.sigma_m().powi(2);
+        let spacing_m = 0.5 * SPEED_OF_LIGHT_M_S / 250e6;
+        for (found, range_m) in found.into_iter().zip([350.0, 401.3]) {
+            let (mut sum, mut total) = (0.0, 0.0);
+            for n in 0..48 {
+                let h2 = (std::f64::consts::PI * (f64::from(n) - 23.5) / 48.0).cos().powi(4);
+                sum += h2 * of_air(range_m + (f64::from(n) - 24.0) * spacing_m);
+                total += h2;
+            }
+            let right = sum / total * (0.5 * variance_m2 / fall_m.powi(2)).exp();
+            assert!((found / right - 1.0).abs() < 1e-5, "{found} {right}");
+            assert!(right > 1.15 * of_air(range_m), "{right}");
+        }
     }
 }

@@ -6,7 +6,7 @@ use super::circulation::Retrieval;
 use crate::Error;
 use crate::measure::bound::bound_in_the_middle;
 use crate::measure::cell_average::{CellAverage, error_of_fraction, flagged_fraction};
-use crate::measure::error_law::{range_filter, shared_cells};
+use crate::measure::error_law::shared_cells;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
@@ -15,6 +15,7 @@ use crate::run::ScanMiddle;
 use crate::scene::{Flow, Method, NoiseModel, Scene};
 use crate::setup::estimators;
 use crate::setup::progress::Observer;
+use crate::setup::ray_information::range_filter;
 use crate::setup::wind::vortex_pair;
 use ndarray::Array2;
 
