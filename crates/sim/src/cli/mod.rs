@@ -278,14 +278,13 @@ fn plan_json(plan: &Plan) -> Value {
         .map(|s| {
             json!({
                 "stage": s.stage.name(), "runs": s.cost.is_some(), "reason": s.reason,
-                "core_s": s.cost.map(|c| c.core_s), "memory_bytes": s.cost.map(|c| c.memory_bytes()),
+                "memory_bytes": s.cost.map(|c| c.memory_bytes()),
                 "kept_bytes": s.cost.map(|c| c.kept_bytes),
             })
         })
         .collect();
-    let total = plan.total();
     json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
-        "scan": plan.schedule(), "stages": stages, "core_s": total.core_s, "memory_bytes": total.memory_bytes, "warnings": plan.warnings,
+        "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s, "memory_bytes": plan.total().memory_bytes, "warnings": plan.warnings,
     })
 }

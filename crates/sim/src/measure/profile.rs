@@ -7,7 +7,7 @@ use crate::Error;
 use crate::measure::efficiencies::Known;
 use crate::plan::{Plan, Stage};
 use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, hash_of};
-use crate::setup::efficiency_model::{OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
+use crate::setup::efficiency_model::{MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
 use crate::setup::instrument::Instrument;
 use crate::setup::progress::Observer;
 use crate::setup::table::of_table;
@@ -119,8 +119,6 @@ pub(crate) fn efficiency_by_theory(instrument: &Instrument, range_m: &[f64]) -> 
     })
 }
 
-/// Most ranges at which a quadrature is done for each.
-const MOST_QUADRATURES: usize = 256;
 /// A quadrature at each range, or at as many as the curvature asks for where there are more.
 fn of_theory(
     instrument: &Instrument,

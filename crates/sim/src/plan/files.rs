@@ -9,11 +9,6 @@ use crate::scene::Scene;
 use crate::setup::geometry::Geometry;
 use crate::setup::progress::Stage;
 
-// Unit costs on one core, s: of a byte of a file, of a picture, of a point of its rasters.
-const BYTE_S: f64 = 4.5e-9;
-const PICTURE_S: f64 = 2.5e-2;
-const RASTER_PIXEL_S: f64 = 2.5e-7;
-
 /// Columns of the table of a map.
 const MAP_COLUMNS: f64 = 25.0;
 /// A number of a table, and its text.
@@ -24,10 +19,9 @@ const DRAWING_BYTES: f64 = 7e5;
 /// Pixels of the picture of a profile.
 const PROFILE_PIXELS: f64 = 1344.0 * 520.0;
 
-/// Files that are made one after the other: their time, the memory of what is there already, and the most that was held.
+/// Files that are made one after the other: the memory of what is there already, and the most that was held, bytes.
 #[derive(Default)]
 struct Written {
-    core_s: f64,
     done_bytes: f64,
     most_bytes: f64,
 }
@@ -36,7 +30,6 @@ impl Written {
     /// A file, and what is held beside it until it is there.
     fn add(&mut self, wanted: bool, file_bytes: f64, beside_bytes: f64) {
         if wanted {
-            self.core_s += file_bytes * BYTE_S;
             self.most_bytes = self.most_bytes.max(self.done_bytes + file_bytes + beside_bytes);
             self.done_bytes += file_bytes;
         }
@@ -58,7 +51,6 @@ impl Written {
         let held_bytes = raster_pixels * 4.0 * 1.5 + DRAWING_BYTES;
         for (wanted, file_bytes, painted) in [(svg, raster_pixels * 0.5, 0.0), (png, pixels * 0.2, 4.0 + mask)] {
             self.add(wanted, file_bytes, held_bytes + pixels * painted);
-            self.core_s += if wanted { raster_pixels * RASTER_PIXEL_S + PICTURE_S } else { 0.0 };
         }
     }
 }
@@ -67,7 +59,7 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
     let o = &scene.outputs;
     let (netcdf, plots) = (o.netcdf, cfg!(feature = "plots"));
     let pictures = [o.svg && plots, o.png && plots];
-    let mut written = Written { core_s: 5e-3, ..Written::default() };
+    let mut written = Written::default();
     if matches!(target, Target::Run | Target::Efficiency) {
         written.table(o.csv, o.profile_points as f64, 10.0);
         written.picture(pictures, PROFILE_PIXELS, 0.0);
@@ -95,7 +87,7 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
     }
     let kinds = [(o.csv, "CSV"), (o.netcdf, "NetCDF"), (o.svg, "SVG"), (o.png, "PNG")];
     let kinds: Vec<&str> = kinds.into_iter().filter(|k| k.0).map(|k| k.1).collect();
-    run(Stage::Files, kinds.join(", "), written.core_s, [written.most_bytes, 0.0])
+    run(Stage::Files, kinds.join(", "), [written.most_bytes, 0.0])
 }
 
 /// Panels of the picture of a map, the pixels of their rasters and those of the whole: three panels side by side, each as high

@@ -25,6 +25,7 @@ mod schedule;
 mod sizes;
 mod stage;
 mod stages;
+mod time;
 pub(crate) mod units;
 
 pub use crate::setup::progress::Stage;
@@ -40,6 +41,8 @@ pub struct Plan {
     pub target: Target,
     /// All stages, in the order in which they run.
     pub stages: Vec<PlannedStage>,
+    /// Computing time on one core, s, to a factor of two.
+    pub core_s: f64,
     /// Largest radial velocity of the air on the lines of sight, seen from the lidar, m/s.
     pub fastest_m_s: f64,
     /// What the user should know before the run.
@@ -72,10 +75,13 @@ impl Plan {
         let mut warnings = warnings(scene)?;
         warnings.extend(ambiguity::warning(scene, &setup.instrument.pulse));
         warnings.extend(hardware::warnings(scene, &setup.instrument));
-        let optics = optics::stages(&setup.scene, &setup.instrument, target, &setup.geometry, &mut warnings)?;
-        let stages = stages::stages(scene, target, &setup.geometry, &setup.wind, optics);
+        let (optics, optics_s) =
+            optics::stages(&setup.scene, &setup.instrument, target, &setup.geometry, &mut warnings)?;
+        let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
+        let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
+        let core_s = time::core_s(scene, target, &sizes, optics_s);
         let fastest_m_s = fastest::fastest_m_s(&setup)?;
-        let mut plan = Self { setup, target, stages, fastest_m_s, warnings };
+        let mut plan = Self { setup, target, stages, core_s, fastest_m_s, warnings };
         plan.warnings.splice(0..0, plan.of_fast_air());
         if plan.runs(Stage::Estimates) {
             plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);
@@ -99,7 +105,7 @@ impl Plan {
         })
     }
 
-    /// Forecast of the whole, with the threads of the pool in which it was planned.
+    /// Memory of the whole, with the threads of the pool in which it was planned.
     pub fn total(&self) -> Forecast {
         stage::total(&self.stages)
     }
@@ -161,21 +167,11 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.scene.seed)?;
         for s in &self.stages {
-            match s.cost {
-                Some(c) => {
-                    let (time, memory) = (units::seconds(c.core_s), units::bytes(c.memory_bytes()));
-                    writeln!(f, "  run   {:<16} {time:>10} {memory:>10}   {}", s.stage.name(), s.reason)?;
-                }
-                None => writeln!(f, "  skip  {:<16} {:>10} {:>10}   {}", s.stage.name(), "", "", s.reason)?,
-            }
+            let (word, memory) = s.cost.map_or(("skip", String::new()), |c| ("run", units::bytes(c.memory_bytes())));
+            writeln!(f, "  {word:<5} {:<16} {memory:>10}   {}", s.stage.name(), s.reason)?;
         }
-        let Forecast { core_s, memory_bytes, .. } = self.total();
-        let (time, memory) = (units::seconds(core_s), units::bytes(memory_bytes));
-        writeln!(
-            f,
-            "  total {:<16} {time:>10} {memory:>10}   at once; forecast, times of one core to an order of magnitude",
-            ""
-        )?;
+        let (time, memory) = (units::seconds(self.core_s), units::bytes(self.total().memory_bytes));
+        writeln!(f, "  total {:<16} {memory:>10}   at once; some {time} of one core, to a factor of two", "")?;
         if self.target != Target::Efficiency {
             writeln!(f, "  scan  {}", self.schedule())?;
         }
@@ -225,8 +221,8 @@ mod tests {
 
     #[test]
     fn forecasts_grow_with_the_work() {
-        let once = plan(Target::Map, |s| s.scan.realisations = 100).total().core_s;
-        let twice = plan(Target::Map, |s| s.scan.realisations = 200).total().core_s;
+        let once = plan(Target::Map, |s| s.scan.realisations = 100).core_s;
+        let twice = plan(Target::Map, |s| s.scan.realisations = 200).core_s;
         assert!((1.9..2.0).contains(&(twice / once)), "{}", twice / once);
     }
 

@@ -3,7 +3,9 @@
 use super::stage::{PlannedStage, Target, run, skip};
 use crate::Error;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
-use crate::setup::efficiency_model::{OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence};
+use crate::setup::efficiency_model::{
+    MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence,
+};
 use crate::setup::geometry::Geometry;
 use crate::setup::instrument::Instrument;
 use crate::setup::progress::Stage;
@@ -11,7 +13,7 @@ use crate::setup::table::spaced;
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, curved_ranges_m, theory};
 
-/// Phase screens and efficiency; adds what is doubtful about the screens to `warnings`.
+/// Phase screens and efficiency, and their time on one core, s; adds what is doubtful about the screens to `warnings`.
 ///
 /// # Errors
 /// Screens that cannot resolve the scene, with every limit and what would do; a beam that no quadrature follows.
@@ -21,7 +23,7 @@ pub(super) fn stages(
     target: Target,
     geometry: &Geometry,
     warnings: &mut Vec<String>,
-) -> Result<[PlannedStage; 2], Error> {
+) -> Result<([PlannedStage; 2], f64), Error> {
     let scene = &file.scene;
     let fixed = match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Some(snr_db),
@@ -43,9 +45,10 @@ pub(super) fn stages(
     // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
     let places = if turbulence(scene).is_some() { 16 } else { 0 };
     let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(telescope, places, r)).sum();
-
-    let screens = match turbulence(scene) {
-        None => skip(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence"),
+    // Of more ranges than this a curve is made.
+    let quadratures_s = quadratures_s * (MOST_QUADRATURES as f64 / ranges_m.len().max(1) as f64).min(1.0);
+    let (screens, screens_s) = match turbulence(scene) {
+        None => (skip(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence"), 0.0),
         Some(t) => {
             let drawn = layers.filter(|_| signals_cross_screens(scene));
             let mut across: Vec<f64> = table.iter().chain(&drawn).flatten().copied().collect();
@@ -56,9 +59,9 @@ pub(super) fn stages(
             match (runs.is_empty(), model) {
                 (false, _) => screens(file, instrument, &t, &runs, warnings)?,
                 (true, Model::ExactBistatic) => {
-                    skip(Stage::PhaseScreens, "the bistatic efficiency has an exact theory")
+                    (skip(Stage::PhaseScreens, "the bistatic efficiency has an exact theory"), 0.0)
                 }
-                (true, _) => skip(Stage::PhaseScreens, "not asked for"),
+                (true, _) => (skip(Stage::PhaseScreens, "not asked for"), 0.0),
             }
         }
     };
@@ -76,10 +79,10 @@ pub(super) fn stages(
             let models = if turbulence(scene).is_some() { 5.0 } else { 1.0 };
             let kept_bytes = ranges_m.len() as f64 * (16.0 + 24.0 * models);
             let reason = format!("{how}, at {} ranges", ranges_m.len());
-            run(Stage::Efficiency, reason, quadratures_s, [0.0, kept_bytes])
+            run(Stage::Efficiency, reason, [0.0, kept_bytes])
         }
     };
-    Ok([screens, efficiency])
+    Ok(([screens, efficiency], quadratures_s + screens_s))
 }
 
 /// Refuses a beam whose Fresnel number is too large for the quadratures, in the words of the scene.
@@ -112,14 +115,14 @@ fn refuse_fresnel_numbers(file: &SceneFile, telescope: &Telescope, ranges_m: &[f
     Err(file.located(vec![problem]).into())
 }
 
-/// The phase screens of all runs, each for its own ranges.
+/// The phase screens of all runs, each for its own ranges, and their time, s.
 fn screens(
     file: &SceneFile,
     instrument: &Instrument,
     t: &RefractiveTurbulence,
     runs: &[Vec<f64>],
     warnings: &mut Vec<String>,
-) -> Result<PlannedStage, Error> {
+) -> Result<(PlannedStage, f64), Error> {
     let (mut core_s, mut working_bytes) = (0.0, 0.0_f64);
     let mut what = Vec::new();
     let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
@@ -155,7 +158,7 @@ fn screens(
         }
     }
     let reason = format!("{} realisations of {}", t.realisations, what.join("; "));
-    Ok(run(Stage::PhaseScreens, reason, core_s, [working_bytes, 0.0]))
+    Ok((run(Stage::PhaseScreens, reason, [working_bytes, 0.0]), core_s))
 }
 
 /// A refusal of the optics in the keys of the scene; the strongest limit of each key is named.

@@ -29,11 +29,9 @@ pub struct PlannedStage {
     pub cost: Option<Cost>,
 }
 
-/// Forecast of one stage.
+/// Memory of one stage.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cost {
-    /// Computing time on one core, s.
-    pub core_s: f64,
     /// Memory held while the stage runs and free after it, bytes.
     pub working_bytes: f64,
     /// Memory of its results, held to the end of the run, bytes.
@@ -47,20 +45,18 @@ impl Cost {
     }
 }
 
-/// Forecast of a whole run.
+/// Memory of a whole run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Forecast {
-    /// Computing time on one core, s.
-    pub core_s: f64,
     /// Largest memory held at once, bytes.
     pub memory_bytes: f64,
     /// The stage in which it is held.
     pub largest: Option<Stage>,
 }
 
-/// A stage that runs: its time, and the memory that it works with and keeps.
-pub(super) fn run(stage: Stage, reason: String, core_s: f64, [working_bytes, kept_bytes]: [f64; 2]) -> PlannedStage {
-    PlannedStage { stage, reason, cost: Some(Cost { core_s, working_bytes, kept_bytes }) }
+/// A stage that runs, and the memory that it works with and keeps.
+pub(super) fn run(stage: Stage, reason: String, [working_bytes, kept_bytes]: [f64; 2]) -> PlannedStage {
+    PlannedStage { stage, reason, cost: Some(Cost { working_bytes, kept_bytes }) }
 }
 
 /// A stage that is left out.
@@ -68,12 +64,11 @@ pub(super) fn skip(stage: Stage, reason: &str) -> PlannedStage {
     PlannedStage { stage, reason: reason.into(), cost: None }
 }
 
-/// Forecast of stages that run one after another.
+/// Memory of stages that run one after another.
 pub(super) fn total(stages: &[PlannedStage]) -> Forecast {
-    let mut forecast = Forecast { core_s: 0.0, memory_bytes: 0.0, largest: None };
+    let mut forecast = Forecast { memory_bytes: 0.0, largest: None };
     let mut kept_bytes = 0.0;
     for (stage, cost) in stages.iter().filter_map(|s| Some((s.stage, s.cost?))) {
-        forecast.core_s += cost.core_s;
         if kept_bytes + cost.memory_bytes() > forecast.memory_bytes {
             (forecast.memory_bytes, forecast.largest) = (kept_bytes + cost.memory_bytes(), Some(stage));
         }
@@ -88,22 +83,22 @@ mod tests {
 
     #[test]
     fn memory_is_the_largest_of_what_is_held_at_once() {
-        let planned = |stage, cost: Option<[f64; 3]>| PlannedStage {
+        let planned = |stage, cost: Option<[f64; 2]>| PlannedStage {
             stage,
             reason: String::new(),
-            cost: cost.map(|[core_s, working_bytes, kept_bytes]| Cost { core_s, working_bytes, kept_bytes }),
+            cost: cost.map(|[working_bytes, kept_bytes]| Cost { working_bytes, kept_bytes }),
         };
         let stages = [
             planned(Stage::FlowSimulation, None),
-            planned(Stage::CrossPlane, Some([1.0, 50.0, 10.0])),
-            planned(Stage::Signals, Some([2.0, 40.0, 30.0])),
-            planned(Stage::Files, Some([4.0, 35.0, 0.0])),
+            planned(Stage::CrossPlane, Some([50.0, 10.0])),
+            planned(Stage::Signals, Some([40.0, 30.0])),
+            planned(Stage::Files, Some([35.0, 0.0])),
         ];
         let of = |count: usize| total(&stages[..count]);
         assert_eq!((of(1).memory_bytes, of(1).largest), (0.0, None));
         assert_eq!((of(2).memory_bytes, of(2).largest), (60.0, Some(Stage::CrossPlane)));
         // 10 kept before, 40 at work and 30 of its own; the files then find 40 kept.
         assert_eq!((of(3).memory_bytes, of(3).largest), (80.0, Some(Stage::Signals)));
-        assert_eq!((of(4).memory_bytes, of(4).core_s), (80.0, 7.0));
+        assert_eq!((of(4).memory_bytes, of(4).largest), (80.0, Some(Stage::Signals)));
     }
 }

@@ -32,6 +32,8 @@ pub(crate) fn drawn_turbulence(scene: &Scene) -> Option<RefractiveTurbulence> {
 
 /// How close the ranges of quadratures are where there are more: what is joined between them is within 0.005 dB.
 pub(crate) const OF_QUADRATURES: f64 = 12.0;
+/// Most ranges at which a quadrature is done for each.
+pub(crate) const MOST_QUADRATURES: usize = 256;
 /// How close those of phase screens are: ratios to theory bend less.
 pub(crate) const OF_SCREENS: f64 = 1.0;
 

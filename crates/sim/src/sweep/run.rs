@@ -120,7 +120,7 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
     let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
     observer.begin(Stage::Cases, due.len() as u64);
     let of_due_s = due.iter().filter_map(|case| core_s.get(case.index)).sum();
-    observer.reach(&format!("forecast: {} of one core, an order of magnitude", seconds(of_due_s)));
+    observer.reach(&format!("forecast: {} of one core, to a factor of two", seconds(of_due_s)));
     let known = Efficiencies::default();
     let (mut signals, mut walls) = (0, Vec::new());
     for group in groups(due.iter().map(|case| &case.scene)) {
@@ -179,7 +179,7 @@ fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<V
         if !allow_large {
             plan.fits()?;
         }
-        Ok(plan.total().core_s)
+        Ok(plan.core_s)
     };
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
     let others = found.iter().filter(|found| found.is_err()).count().saturating_sub(1);
