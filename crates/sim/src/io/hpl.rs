@@ -167,12 +167,12 @@ fn second_of_day(map: &VelocityMap, ray: usize) -> f64 {
 }
 
 fn start_time(map: &VelocityMap, ray: usize) -> String {
-    let (year, month, day) = map.site.start.after_s(map.rays[ray].time_s).date();
+    let date = map.site.start.after_s(map.rays[ray].time_s).date();
     let s = second_of_day(map, ray);
     let (h, m) = ((s / 3600.0) as u32, (s / 60.0) as u32 % 60);
     // Hundredths are cut, not rounded: 59.999 s must not become 60.00.
     let rest = ((s % 60.0) * 100.0).floor() / 100.0;
-    format!("{year:04}{month:02}{day:02} {h:02}:{m:02}:{rest:05.2}")
+    format!("{:04}{:02}{:02} {h:02}:{m:02}:{rest:05.2}", date.year(), date.month(), date.day())
 }
 
 fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {

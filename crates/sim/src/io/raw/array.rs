@@ -2,10 +2,11 @@
 //!
 //! Check: every order of an array gives the same records.
 
+use super::Source;
 use crate::io::number::{ByteOrder, NumberType};
 use num_complex::Complex;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{ErrorKind, Read, Seek, SeekFrom};
 use std::ops::Range;
 
 /// Which index of an array runs fastest.
@@ -36,9 +37,15 @@ pub(super) struct ArrayInFile {
     pub(super) samples: usize,
     /// Pulses of a line, for [`Order::PulseMajor`].
     pub(super) pulses_per_line: usize,
-    /// Stand for a missing number.
-    pub(super) fills: Vec<f64>,
-    pub(super) scale: f64,
+}
+
+impl Source for ArrayInFile {
+    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+        self.part(records, samples).map_err(|e| match e.kind() {
+            ErrorKind::UnexpectedEof => "it became shorter while it was read".into(),
+            _ => e.to_string(),
+        })
+    }
 }
 
 impl ArrayInFile {
@@ -59,7 +66,7 @@ impl ArrayInFile {
     }
 
     /// Some samples of some records, one record after the other.
-    pub(super) fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
+    fn part(&mut self, records: Range<usize>, samples: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
         let count = samples.len();
         let mut out = vec![Complex::new(0.0, 0.0); records.len() * count];
         if self.order == Order::SampleMajor {
@@ -86,10 +93,7 @@ impl ArrayInFile {
         let mut raw = vec![0; count * self.sample_bytes() as usize];
         self.file.seek(SeekFrom::Start(self.begin + first * self.sample_bytes()))?;
         self.file.read_exact(&mut raw)?;
-        let number = |bytes: &[u8]| {
-            let stored = self.number.value(bytes, self.byte_order);
-            if self.fills.contains(&stored) { f64::NAN } else { stored * self.scale }
-        };
+        let number = |bytes: &[u8]| self.number.value(bytes, self.byte_order);
         let sample = |bytes: &[u8]| {
             let (first, second) = bytes.split_at(self.number.bytes as usize);
             Complex::new(number(first), if self.are_pairs { number(second) } else { 0.0 })
@@ -100,8 +104,10 @@ impl ArrayInFile {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{RawRecords, Stored};
     use super::*;
     use std::io::Write;
+    use std::path::Path;
 
     fn file(numbers: &[f64], order: ByteOrder) -> File {
         let mut file = tempfile::tempfile().unwrap();
@@ -124,8 +130,6 @@ mod tests {
             records: 4,
             samples: 3,
             pulses_per_line: 2,
-            fills: vec![-1.0],
-            scale: 2.0,
         }
     }
 
@@ -146,10 +150,11 @@ mod tests {
             (Order::PulseMajor, with(&|i| (i / 3 % 2, i / 6, i % 3))),
             (Order::SampleMajor, with(&|i| (i / 2 % 2, i % 2, i / 4))),
         ] {
-            let mut array = array(&numbers, order);
+            let stored = Stored::of_array(array(&numbers, order), vec![-1.0], 2.0);
+            let mut array = RawRecords::new(Path::new("x"), stored);
             for records in [0..4, 1..3, 3..4] {
                 for samples in [0..3, 1..2, 1..3] {
-                    let found = array.read(records.clone(), samples.clone()).unwrap();
+                    let found = array.read_samples(records.clone(), samples.clone()).unwrap();
                     let wanted: Vec<f64> =
                         records.clone().flat_map(|record| &wanted[3 * record..][samples.clone()]).copied().collect();
                     let same =
@@ -165,7 +170,7 @@ mod tests {
     fn the_parts_of_complex_samples_stand_together() {
         let mut together = ArrayInFile { samples: 3, records: 2, ..array(&[], Order::LineMajor) };
         together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
-        (together.are_pairs, together.scale) = (true, 1.0);
+        together.are_pairs = true;
         let found = together.read(1..2, 0..3).unwrap();
         assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
     }

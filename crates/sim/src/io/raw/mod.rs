@@ -108,18 +108,48 @@ pub struct About {
 #[derive(Debug)]
 pub struct RawRecords {
     path: PathBuf,
-    store: Store,
+    stored: Stored,
     /// Samples of this size and above are missing.
     outsized: f64,
     /// What the file says of them.
     pub about: About,
 }
 
+/// Where samples come from.
+trait Source: std::fmt::Debug {
+    /// Some samples of some records as they stand there, one record after the other.
+    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String>;
+}
+
+/// Records as they stand in a file.
 #[derive(Debug)]
-enum Store {
-    Array(ArrayInFile),
-    Text(TextRecords),
-    Netcdf(netcdf::NetcdfRecords),
+struct Stored {
+    source: Box<dyn Source>,
+    records: usize,
+    samples: usize,
+    is_complex: bool,
+    /// Whether the numbers are codes of a converter.
+    are_integers: bool,
+    /// Stand for a missing number.
+    fills: Vec<f64>,
+    /// Factors that the numbers of the source have had, and that they still get.
+    scale: [f64; 2],
+    about: About,
+}
+
+impl Stored {
+    fn of_array(array: ArrayInFile, fills: Vec<f64>, scale: f64) -> Self {
+        Self {
+            records: array.records,
+            samples: array.samples,
+            is_complex: array.are_pairs,
+            are_integers: !array.number.is_float(),
+            fills,
+            scale: [1.0, scale],
+            about: About::default(),
+            source: Box::new(array),
+        }
+    }
 }
 
 impl RawRecords {
@@ -131,86 +161,58 @@ impl RawRecords {
         let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
         let (mut file, length, magic) = text_file::begin(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let (store, about) = match &magic[..] {
+        let stored = match &magic[..] {
             _ if format.number.is_some() => {
-                let array = binary(length, format, shape).map_err(refuse)?;
-                (Store::Array(in_file(file, &array, format, shape).map_err(refuse)?), About::default())
+                binary(length, format, shape).and_then(|array| in_file(file, &array, format, shape))
             }
-            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => netcdf::read(path, format)?,
+            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => Ok(netcdf::read(path, format)?),
             [0x93, b'N', b'U', b'M', ..] => {
-                let array = StoredArray::read(&mut file, 0, length).map_err(refuse)?;
-                (Store::Array(in_file(file, &array, format, shape).map_err(refuse)?), About::default())
+                StoredArray::read(&mut file, 0, length).and_then(|array| in_file(file, &array, format, shape))
             }
-            [b'P', b'K', 3, 4, ..] => of_archive(file, length, format, shape).map_err(refuse)?,
+            [b'P', b'K', 3, 4, ..] => of_archive(file, length, format, shape),
             _ if ["csv", "txt"].contains(&extension.as_str()) => {
                 file.rewind().map_err(Error::io("read", path))?;
-                let text = TextRecords::read(file, length, format.complex).map_err(refuse)?;
-                (Store::Text(text), About::default())
+                TextRecords::open(file, length, format.complex)
             }
-            _ => {
-                return Err(refuse(
-                    "it is neither NetCDF, NPY, NPZ nor a text whose name ends with .csv or .txt: of a binary file, --format \
-                     states the numbers, e.g. --format i16 --byte-order little"
-                        .into(),
-                ));
-            }
+            _ => Err("it is neither NetCDF, NPY, NPZ nor a text whose name ends with .csv or .txt: of a binary file, --format \
+                      states the numbers, e.g. --format i16 --byte-order little"
+                .into()),
         };
-        let mut records = Self { path: path.to_owned(), store, outsized: f64::INFINITY, about };
-        // Of a converter's codes each may be a sample.
-        match &mut records.store {
-            Store::Array(array) if array.number.is_float() => array.fills.extend(MissingSamples::default().fill),
-            Store::Netcdf(found) if !found.are_integers => found.fills.extend(MissingSamples::default().fill),
-            _ => {}
-        }
-        if records.records() == 0 || records.samples() == 0 {
+        let stored = stored.map_err(refuse)?;
+        if stored.records == 0 || stored.samples == 0 {
             return Err(refuse("it holds no records".into()));
         }
-        Ok(records)
+        Ok(Self::new(path, stored))
+    }
+
+    fn new(path: &Path, mut stored: Stored) -> Self {
+        let about = std::mem::take(&mut stored.about);
+        Self { path: path.to_owned(), stored, outsized: f64::INFINITY, about }
     }
 
     /// Number of records.
     pub fn records(&self) -> usize {
-        match &self.store {
-            Store::Array(array) => array.records,
-            Store::Text(text) => text.records.len(),
-            Store::Netcdf(found) => found.records(),
-        }
+        self.stored.records
     }
 
     /// Samples of a record.
     pub fn samples(&self) -> usize {
-        match &self.store {
-            Store::Array(array) => array.samples,
-            Store::Text(text) => text.samples(),
-            Store::Netcdf(found) => found.samples,
-        }
+        self.stored.samples
     }
 
     /// Whether samples are complex.
     pub fn is_complex(&self) -> bool {
-        match &self.store {
-            Store::Array(array) => array.are_pairs,
-            Store::Text(text) => text.is_complex,
-            Store::Netcdf(found) => found.is_complex(),
-        }
+        self.stored.is_complex
     }
 
     /// Whether the numbers are codes of a converter.
     pub fn is_of_integers(&self) -> bool {
-        match &self.store {
-            Store::Array(array) => !array.number.is_float(),
-            Store::Text(_) => false,
-            Store::Netcdf(found) => found.are_integers,
-        }
+        self.stored.are_integers
     }
 
     /// What the numbers of the file were multiplied with.
     pub fn scale(&self) -> f64 {
-        match &self.store {
-            Store::Array(array) => array.scale,
-            Store::Text(_) => 1.0,
-            Store::Netcdf(found) => found.scale(),
-        }
+        self.stored.scale[0] * self.stored.scale[1]
     }
 
     /// An error of this file.
@@ -237,20 +239,14 @@ impl RawRecords {
     /// # Errors
     /// As [`RawRecords::read`].
     pub fn read_samples(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
-        let found = match &mut self.store {
-            Store::Array(array) => array.read(records, samples).map_err(|e| match e.kind() {
-                std::io::ErrorKind::UnexpectedEof => "it became shorter while it was read".to_owned(),
-                _ => e.to_string(),
-            }),
-            Store::Text(text) => {
-                let own = text.records.get(records).unwrap_or_default().iter();
-                Ok(own.flat_map(|record| record.get(samples.clone()).unwrap_or_default()).copied().collect())
+        let mut found = self.stored.source.read(records, samples).map_err(|reason| self.refuse(reason))?;
+        let Stored { is_complex, fills, scale, .. } = &self.stored;
+        let number = |stored: f64| if fills.contains(&stored) { f64::NAN } else { stored * scale[1] };
+        for sample in &mut found {
+            *sample = Complex::new(number(sample.re), if *is_complex { number(sample.im) } else { 0.0 });
+            if sample.re.abs().max(sample.im.abs()) >= self.outsized {
+                sample.re = f64::NAN;
             }
-            Store::Netcdf(found) => found.read(records, samples),
-        };
-        let mut found = found.map_err(|reason| self.refuse(reason))?;
-        for sample in found.iter_mut().filter(|sample| sample.re.abs().max(sample.im.abs()) >= self.outsized) {
-            sample.re = f64::NAN;
         }
         Ok(found)
     }
@@ -288,7 +284,7 @@ fn binary(length: u64, format: &RawFormat, shape: RecordShape) -> Result<StoredA
 }
 
 /// An array, its records and their samples.
-fn in_file(file: File, found: &StoredArray, format: &RawFormat, shape: RecordShape) -> Result<ArrayInFile, String> {
+fn in_file(file: File, found: &StoredArray, format: &RawFormat, shape: RecordShape) -> Result<Stored, String> {
     let mut lengths = found.shape.clone();
     let pairs = format.complex && !found.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
     if pairs {
@@ -307,7 +303,9 @@ fn in_file(file: File, found: &StoredArray, format: &RawFormat, shape: RecordSha
         _ => lengths.pop(),
     };
     let samples = samples.ok_or("it holds a single number, no records")?;
-    Ok(ArrayInFile {
+    // Of a converter's codes each may be a sample.
+    let fills = if found.number.is_float() { MissingSamples::default().fill } else { Vec::new() };
+    let array = ArrayInFile {
         file,
         number: found.number,
         byte_order: found.byte_order,
@@ -317,12 +315,11 @@ fn in_file(file: File, found: &StoredArray, format: &RawFormat, shape: RecordSha
         records: lengths.iter().product::<u64>() as usize,
         samples: samples as usize,
         pulses_per_line: shape.pulses_per_line,
-        fills: Vec::new(),
-        scale: format.scale,
-    })
+    };
+    Ok(Stored::of_array(array, fills, format.scale))
 }
 
-fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<(Store, About), String> {
+fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShape) -> Result<Stored, String> {
     let arrays = numpy::archive(&mut file, length)?;
     let large: Vec<&(String, StoredArray)> = arrays.iter().filter(|(_, array)| array.shape.len() > 1).collect();
     let chosen = match (&format.variable, &large[..]) {
@@ -332,7 +329,7 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
     };
     let (_, signals) =
         chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
-    let signals = in_file(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?;
+    let mut signals = in_file(file.try_clone().map_err(|e| e.to_string())?, signals, format, shape)?;
     let records = signals.records;
     let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
         let Some((name, array)) = arrays.iter().find(|(name, _)| names.contains(&name.as_str())) else {
@@ -347,13 +344,10 @@ fn of_archive(mut file: File, length: u64, format: &RawFormat, shape: RecordShap
         let own = file.try_clone().map_err(|e| e.to_string())?;
         // A row of numbers is one record.
         let mut array = in_file(own, array, &RawFormat::default(), shape)?;
-        let read = array.read(0..array.records, 0..array.samples).map_err(|e| e.to_string())?;
+        let read = array.source.read(0..array.records, 0..array.samples)?;
         Ok(Some(read.into_iter().map(|value| value.re).collect()))
     };
-    let about = About {
-        elevation_rad: values(["elevation_rad", "elevation"])?,
-        time_s: values(["time_s", "pulse_time"])?,
-        ..About::default()
-    };
-    Ok((Store::Array(signals), about))
+    signals.about.elevation_rad = values(["elevation_rad", "elevation"])?;
+    signals.about.time_s = values(["time_s", "pulse_time"])?;
+    Ok(signals)
 }

@@ -2,13 +2,14 @@
 //!
 //! Check: signals of a run come back; constants of the recording that the scene contradicts are named.
 
-use super::{About, RawFormat, Store};
+use super::{About, RawFormat, Source, Stored};
 use crate::Error;
 use crate::io::netcdf_input::{NetcdfFile, open};
 use netcdf_reader::NcType;
 use num_complex::Complex;
 use std::ops::Range;
 use std::path::Path;
+use wakescope_estimate::window::MissingSamples;
 
 /// Constants of a recording: the name of the variable, and the key of a scene that says the same.
 const CONSTANTS: [(&str, &str); 6] = [
@@ -22,7 +23,7 @@ const CONSTANTS: [(&str, &str); 6] = [
 
 /// Records of samples in a NetCDF file.
 #[derive(Debug)]
-pub(super) struct NetcdfRecords {
+struct NetcdfRecords {
     file: NetcdfFile,
     /// The variable, and that of the second quadratures.
     name: String,
@@ -31,25 +32,15 @@ pub(super) struct NetcdfRecords {
     are_pairs: bool,
     /// Lengths of the dimensions, slowest first, whose places are the records.
     lengths: Vec<u64>,
-    pub(super) samples: usize,
-    pub(super) are_integers: bool,
-    /// Stand for a missing number.
-    pub(super) fills: Vec<f64>,
-    /// Factors of the file and of the user.
-    scale: [f64; 2],
 }
 
 /// Opens the signals of a file.
-pub(super) fn read(path: &Path, format: &RawFormat) -> Result<(Store, About), Error> {
+pub(super) fn read(path: &Path, format: &RawFormat) -> Result<Stored, Error> {
     let file = open(path)?;
-    let found = signals(&file, format).and_then(|found| {
-        let about = about(&file, found.records())?;
-        Ok((Store::Netcdf(found), about))
-    });
-    found.map_err(|reason| file.refuse(reason))
+    signals(&file, format).map_err(|reason| file.refuse(reason))
 }
 
-fn signals(file: &NetcdfFile, format: &RawFormat) -> Result<NetcdfRecords, String> {
+fn signals(file: &NetcdfFile, format: &RawFormat) -> Result<Stored, String> {
     let name = match &format.variable {
         Some(name) => name.clone(),
         None if file.has("current_a") => "current_a".to_owned(),
@@ -78,50 +69,40 @@ fn signals(file: &NetcdfFile, format: &RawFormat) -> Result<NetcdfRecords, Strin
         Some(NcType::Int) => (true, Some(-2_147_483_647.0)),
         _ => (true, None),
     };
-    let fill = fill.filter(|_| !is_filled).map(|fill| fill * scale + number("add_offset").unwrap_or(0.0));
-    Ok(NetcdfRecords {
-        file: file.clone(),
-        name: name.clone(),
-        second,
-        are_pairs,
-        lengths,
+    let mut fills: Vec<f64> = fill.into_iter().filter(|_| !is_filled).collect();
+    fills.iter_mut().for_each(|fill| *fill = *fill * scale + number("add_offset").unwrap_or(0.0));
+    // Of a converter's codes each may be a sample.
+    if !are_integers {
+        fills.extend(MissingSamples::default().fill);
+    }
+    let records = lengths.iter().product::<u64>() as usize;
+    Ok(Stored {
+        records,
         samples: samples as usize,
+        is_complex: are_pairs || second.is_some(),
         are_integers,
-        fills: fill.into_iter().collect(),
+        fills,
         scale: [scale, format.scale],
+        about: about(file, records)?,
+        source: Box::new(NetcdfRecords { file: file.clone(), name, second, are_pairs, lengths }),
     })
 }
 
-impl NetcdfRecords {
-    pub(super) fn records(&self) -> usize {
-        self.lengths.iter().product::<u64>() as usize
-    }
-
-    pub(super) fn is_complex(&self) -> bool {
-        self.are_pairs || self.second.is_some()
-    }
-
-    pub(super) fn scale(&self) -> f64 {
-        self.scale[0] * self.scale[1]
-    }
-
-    /// Some samples of some records, one record after the other.
-    pub(super) fn read(&self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+impl Source for NetcdfRecords {
+    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
         let mut out = Vec::with_capacity(records.len() * samples.len());
-        let number = |value: f64| if self.fills.contains(&value) { f64::NAN } else { value * self.scale[1] };
         for mut part in blocks(&self.lengths, records.start as u64..records.end as u64) {
             part.push(samples.start as u64..samples.end as u64);
-            let first = self.file.part(&self.name, &part)?.into_iter().map(number);
+            let first = self.file.part(&self.name, &part)?;
             match &self.second {
                 Some(second) => {
-                    let second = self.file.part(second, &part)?.into_iter().map(number);
-                    out.extend(first.zip(second).map(|(re, im)| Complex::new(re, im)));
+                    let second = self.file.part(second, &part)?;
+                    out.extend(first.into_iter().zip(second).map(|(re, im)| Complex::new(re, im)));
                 }
                 None if self.are_pairs => {
-                    let numbers: Vec<f64> = first.collect();
-                    out.extend(numbers.chunks_exact(2).map(|pair| Complex::new(pair[0], pair[1])));
+                    out.extend(first.chunks_exact(2).map(|pair| Complex::new(pair[0], pair[1])));
                 }
-                None => out.extend(first.map(|re| Complex::new(re, 0.0))),
+                None => out.extend(first.into_iter().map(|re| Complex::new(re, 0.0))),
             }
         }
         Ok(out)

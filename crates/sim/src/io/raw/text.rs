@@ -3,10 +3,12 @@
 //! A text is read as a whole: whoever has more than the memory holds has them as NPY or NetCDF. Check: both forms give the same
 //! records; rows of different lengths and words are refused with their line.
 
+use super::{About, Source, Stored};
 use crate::machine;
 use num_complex::Complex;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
+use std::ops::Range;
 use wakescope_estimate::window::MissingSamples;
 
 /// Longest line that is read \[bytes\].
@@ -15,14 +17,21 @@ const LONGEST_LINE_BYTES: u64 = 64 << 20;
 /// Records of a text file.
 #[derive(Debug, Default)]
 pub(super) struct TextRecords {
-    pub(super) records: Vec<Vec<Complex<f64>>>,
-    pub(super) is_complex: bool,
+    records: Vec<Vec<Complex<f64>>>,
+    is_complex: bool,
+}
+
+impl Source for TextRecords {
+    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+        let own = self.records.get(records).unwrap_or_default().iter();
+        Ok(own.flat_map(|record| record.get(samples.clone()).unwrap_or_default()).copied().collect())
+    }
 }
 
 impl TextRecords {
     /// Reads a file of so many bytes; numbers of a row are pairs of both parts where `is_complex` says so.
-    pub(super) fn read(file: File, bytes: u64, is_complex: bool) -> Result<Self, String> {
-        let (mut reader, fills) = (BufReader::new(file), MissingSamples::default().fill);
+    pub(super) fn open(file: File, bytes: u64, is_complex: bool) -> Result<Stored, String> {
+        let mut reader = BufReader::new(file);
         let mut out = Self { is_complex, ..Self::default() };
         // Of the long table: columns of the number of the record and of the parts of a sample, and the last number.
         let (mut table, mut last) = (None::<(usize, Vec<usize>)>, String::new());
@@ -58,7 +67,6 @@ impl TextRecords {
                 "" => Ok(f64::NAN),
                 cell => cell.parse().map_err(|_| format!("line {line}: {cell:?} is no number")),
             };
-            let known = |value: f64| if fills.contains(&value) { f64::NAN } else { value };
             let cell = |at: &usize| cells.get(*at).copied().unwrap_or_default();
             let ray = table.as_ref().map(|(key, _)| cell(key));
             if lines.is_empty() || ray.is_none_or(|ray| ray != last) {
@@ -67,25 +75,29 @@ impl TextRecords {
                 last = ray.unwrap_or_default().to_owned();
             }
             let own: Vec<&str> = table.as_ref().map_or(cells.clone(), |(_, parts)| parts.iter().map(cell).collect());
-            let parts = own.into_iter().map(|cell| number(cell).map(known)).collect::<Result<Vec<f64>, String>>()?;
+            let parts = own.into_iter().map(number).collect::<Result<Vec<f64>, String>>()?;
             let samples = parts.chunks_exact(if out.is_complex { 2 } else { 1 });
             let samples = samples.map(|parts| Complex::new(parts[0], parts.get(1).copied().unwrap_or(0.0)));
             if let Some(record) = out.records.last_mut() {
                 record.extend(samples);
             }
         }
-        let whole = out.samples();
+        let whole = out.records.first().map_or(0, Vec::len);
         match out.records.iter().zip(lines).find(|(record, _)| record.len() != whole) {
             Some((record, line)) => {
                 Err(format!("line {line}: the record has {} samples, those before it {whole}", record.len()))
             }
-            None => Ok(out),
+            None => Ok(Stored {
+                records: out.records.len(),
+                samples: whole,
+                is_complex: out.is_complex,
+                are_integers: false,
+                fills: MissingSamples::default().fill,
+                scale: [1.0; 2],
+                about: About::default(),
+                source: Box::new(out),
+            }),
         }
-    }
-
-    /// Samples of a record.
-    pub(super) fn samples(&self) -> usize {
-        self.records.first().map_or(0, Vec::len)
     }
 }
 
