@@ -60,7 +60,7 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         is_simulated: true,
     };
     let exact = Array2::from_shape_fn((map.rays.len(), gates), |(r, g)| {
-        let (v, w) = wind(map.y_m(r, g), map.z_m(r, g), map.sweeps[map.rays[r].sweep].tau);
+        let (v, w) = wind(map.place_m(r, g)[1], map.place_m(r, g)[2], map.sweeps[map.rays[r].sweep].tau);
         let angle = map.rays[r].elevation_rad;
         v * angle.cos() + w * angle.sin()
     });

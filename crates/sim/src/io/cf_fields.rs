@@ -10,6 +10,9 @@ use super::parts::{FileParts, Share};
 use super::provenance::Provenance;
 use wakescope_les::winds::Edges;
 
+/// Names and unit of the time.
+const SINCE_START: [&str; 3] = ["", "time since the start of the flow", "s"];
+
 /// The field at the centres as a file, or what one of several ranks has of it.
 ///
 /// # Errors
@@ -20,8 +23,7 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
     let [u, v, w] = &field.velocity_m_s;
     let data = |name: &str, values: &[f64], units: &str, long_name: &str| {
         Variable::part(name, DIMS, Data::filled(values), field.first())
-            .text("long_name", long_name)
-            .text("units", units)
+            .named(["", long_name, units])
             .attr("_FillValue", Data::f32([FILL]))
     };
     // By which readers close a period of cells that are not equal.
@@ -34,9 +36,7 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
     };
     let [x_period_m, y_period_m] = field.period_m;
     let mut variables = vec![
-        Variable::new("time", &["time"], Data::f64([field.time_s]))
-            .text("long_name", "time since the start of the flow")
-            .text("units", "s"),
+        Variable::new("time", &["time"], Data::f64([field.time_s])).named(SINCE_START),
         axis("z", &["z"], &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
         across("y", &["y"], &field.y_m, "position of the cell centre across the flight direction", y_period_m),
         across("x", &["x"], &field.x_m, "position of the cell centre along the flight direction", x_period_m),
@@ -81,11 +81,7 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
     ];
     const DIMS: [&[&str]; 3] = [&["z", "y", "x_face"], &["z", "y_face", "x"], &["z_face", "y", "x"]];
     let mut dims = Vec::new();
-    let mut variables = vec![
-        Variable::new("time", &[], Data::f64([faces.time_s]))
-            .text("long_name", "time since the start of the flow")
-            .text("units", "s"),
-    ];
+    let mut variables = vec![Variable::new("time", &[], Data::f64([faces.time_s])).named(SINCE_START)];
     for (d, (name, own, face, own_face)) in NAMES.into_iter().enumerate() {
         same_length(face, faces.face_m[d].len(), name, faces.centre_m[d].len())?;
         dims.extend([(name, faces.centre_m[d].len()), (face, faces.face_m[d].len())]);
@@ -95,21 +91,20 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
     let plane = faces.centre_m[0].len() * faces.centre_m[1].len();
     for (d, (name, values)) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s).enumerate() {
         same_length(name, values.len(), "z x y x x", faces.share.planes.len() * plane)?;
-        let variable =
-            Variable::part(name, DIMS[d], Data::f64(values.iter().copied()), faces.share.planes.start * plane)
-                .text("standard_name", ["x_wind", "y_wind", "upward_air_velocity"][d])
-                .text("long_name", ["wind along the flight direction", "horizontal wind across it", "vertical wind"][d])
-                .text("units", "m s-1");
-        variables.push(variable);
+        let names = [
+            ["x_wind", "wind along the flight direction", "m s-1"],
+            ["y_wind", "horizontal wind across it", "m s-1"],
+            ["upward_air_velocity", "vertical wind", "m s-1"],
+        ];
+        let (data, first) = (Data::f64(values.iter().copied()), faces.share.planes.start * plane);
+        variables.push(Variable::part(name, DIMS[d], data, first).named(names[d]));
     }
     Layout::cf(&faces.title, dims, variables, provenance).into_parts(provenance, faces.share.is_first)
 }
 
 fn axis(name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str) -> Variable {
-    let variable = Variable::new(name, dims, Data::f64(values.iter().copied()))
-        .text("long_name", long_name)
-        .text("units", "m")
-        .text("axis", &name[..1].to_uppercase());
+    let variable = Variable::new(name, dims, Data::f64(values.iter().copied())).named(["", long_name, "m"]);
+    let variable = variable.text("axis", &name[..1].to_uppercase());
     if name == "z" { variable.text("standard_name", "height") } else { variable }
 }
 

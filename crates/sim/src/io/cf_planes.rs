@@ -15,27 +15,21 @@ use ndarray::Array3;
 /// What [`CrossPlanes::check`] finds, or a result too large for one file.
 pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    let axis = |name: &str, dims: &'static [&'static str], values: &[f64]| {
-        Variable::new(name, dims, Data::f64(values.iter().copied()))
+    let axis = |name: &str, dims: &'static [&'static str], values: &[f64], names: [&str; 3]| {
+        Variable::new(name, dims, Data::f64(values.iter().copied())).named(names)
     };
+    let across = "horizontal position of the cell centre across the flight direction";
     let variables = vec![
-        axis("tau", &["tau"], &planes.tau)
-            .text("long_name", "age of the wake, t Gamma0 / (2 pi b0^2)")
-            .text("units", "1"),
-        axis("z", &["z"], &planes.z_m)
-            .text("standard_name", "height")
-            .text("long_name", "height of the cell centre above the ground")
-            .text("units", "m")
+        axis("tau", &["tau"], &planes.tau, ["", "age of the wake, t Gamma0 / (2 pi b0^2)", "1"]),
+        axis("z", &["z"], &planes.z_m, ["height", "height of the cell centre above the ground", "m"])
             .text("positive", "up")
             .text("edges", &edges::to_text(planes.z_edges))
             .text("axis", "Z"),
-        axis("y", &["y"], &planes.y_m)
-            .text("long_name", "horizontal position of the cell centre across the flight direction")
-            .text("units", "m")
+        axis("y", &["y"], &planes.y_m, ["", across, "m"])
             .text("edges", &edges::to_text(planes.y_edges))
             .text("axis", "Y"),
         // Not "seconds since": the run has no date.
-        axis("time", &["tau"], &planes.time_s).text("long_name", "time since the start of the flow").text("units", "s"),
+        axis("time", &["tau"], &planes.time_s, ["", "time since the start of the flow", "s"]),
         wind("v", &planes.v_m_s, "horizontal wind across the flight direction").text("standard_name", "y_wind"),
         wind("w", &planes.w_m_s, "vertical wind").text("standard_name", "upward_air_velocity"),
     ];
@@ -45,8 +39,7 @@ pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputR
 
 fn wind(name: &str, values: &Array3<f64>, long_name: &str) -> Variable {
     Variable::new(name, &["tau", "z", "y"], Data::filled(values))
-        .text("long_name", long_name)
-        .text("units", "m s-1")
+        .named(["", long_name, "m s-1"])
         .text("coordinates", "time")
         .attr("_FillValue", Data::f32([FILL]))
 }

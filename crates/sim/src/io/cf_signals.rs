@@ -14,17 +14,18 @@ use super::signals::RawSignals;
 pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
-    let mut variables = vec![
-        variable("time", &["time"], Data::f64(signals.time_s.clone()), "s")
-            .text("standard_name", "time")
-            .text("long_name", "time after the middle of the pulse left the telescope"),
-    ];
+    let time = Variable::new("time", &["time"], Data::f64(signals.time_s.clone())).text("units", "s");
+    let time = time.text("standard_name", "time");
+    let mut variables = vec![time.text("long_name", "time after the middle of the pulse left the telescope")];
     variables.extend(of_rays(signals, rays));
-    variables.push(current("current_a", signals.current_a.iter(), "heterodyne current of the detector"));
-    if let Some(quadrature) = &signals.quadrature_a {
-        let text = "second quadrature of the baseband signal; the first is current_a";
-        variables.push(current("quadrature_a", quadrature.iter(), text));
-    }
+    let second = "second quadrature of the baseband signal; the first is current_a";
+    let currents = [
+        ("current_a", Some(&signals.current_a), "heterodyne current of the detector"),
+        ("quadrature_a", signals.quadrature_a.as_ref(), second),
+    ];
+    variables.extend(currents.into_iter().filter_map(|(name, values, text)| {
+        Some(Variable::in_units(name, &["ray", "time"], Data::f64(values?.iter().copied()), "A", text))
+    }));
     variables.extend(recording(signals));
     variables.extend(truth(signals));
     let (lines, ranges) = signals.radial_velocity_m_s.dim();
@@ -38,14 +39,6 @@ pub(crate) fn data_bytes([pulses, samples, quadratures]: [f64; 3], [lines, range
     8.0 * pulses * samples * quadratures + 28.0 * pulses + 4.0 * lines * ranges
 }
 
-fn variable(name: &str, dims: &'static [&'static str], data: Data, units: &str) -> Variable {
-    Variable::new(name, dims, data).text("units", units)
-}
-
-fn current<'a>(name: &str, values: impl Iterator<Item = &'a f64>, long_name: &str) -> Variable {
-    variable(name, &["ray", "time"], Data::f64(values.copied()), "A").text("long_name", long_name)
-}
-
 /// Which line, pulse and realisation each record belongs to.
 fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
     let scan = signals.elevation_rad.len().max(1);
@@ -53,11 +46,11 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
     let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
     let number = |name: &str, of: &dyn Fn(usize) -> usize, text: &str| {
         let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX));
-        variable(name, &["ray"], Data::i32(values), "1").text("long_name", text)
+        Variable::in_units(name, &["ray"], Data::i32(values), "1", text)
     };
     let value = |name: &str, of: &[f64], units: &str, text: &str| {
         let values = (0..rays).map(|ray| of[ray % scan]);
-        variable(name, &["ray"], Data::f64(values), units).text("long_name", text)
+        Variable::in_units(name, &["ray"], Data::f64(values), units, text)
     };
     let azimuth = (!signals.azimuth_rad.is_empty())
         .then(|| value("azimuth", &signals.azimuth_rad, "rad", "azimuth of the line of sight, clockwise from north"));
@@ -76,39 +69,37 @@ fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
 
 fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
     let r = &signals.recording;
-    let scalar = |name: &str, value: f64, units: &str, text: &str| {
-        variable(name, &[], Data::f64([value]), units).text("long_name", text)
+    let at_rest = "frequency of air at rest; a velocity v away from the lidar lowers it by 2 v/wavelength";
+    let scalars = [
+        ("sampling_frequency", r.sampling_hz, "Hz", "sampling frequency"),
+        ("intermediate_frequency", r.intermediate_frequency_hz, "Hz", at_rest),
+        ("bandwidth", r.bandwidth_hz, "Hz", "width of the detector band about the intermediate frequency"),
+        ("wavelength", r.wavelength_m, "m", "wavelength of the laser"),
+        ("pulse_repetition_frequency", r.pulse_repetition_hz, "Hz", "pulses per second"),
+        ("pulse_sigma", r.pulse_sigma_s, "s", "half width of the power of the pulse at 1/e of its largest"),
+        ("noise_power", r.noise_power_a2, "A2", "mean square of the shot noise of a sample, both quadratures together"),
+    ];
+    let scalar = |(name, value, units, text)| {
+        let variable = Variable::in_units(name, &[], Data::f64([value]), units, text);
+        if name == "wavelength" { variable.text("standard_name", "radiation_wavelength") } else { variable }
     };
-    vec![
-        scalar("sampling_frequency", r.sampling_hz, "Hz", "sampling frequency"),
-        scalar(
-            "intermediate_frequency",
-            r.intermediate_frequency_hz,
-            "Hz",
-            "frequency of air at rest; a velocity v away from the lidar lowers it by 2 v/wavelength",
-        ),
-        scalar("bandwidth", r.bandwidth_hz, "Hz", "width of the detector band about the intermediate frequency"),
-        scalar("wavelength", r.wavelength_m, "m", "wavelength of the laser")
-            .text("standard_name", "radiation_wavelength"),
-        scalar("pulse_repetition_frequency", r.pulse_repetition_hz, "Hz", "pulses per second"),
-        scalar("pulse_sigma", r.pulse_sigma_s, "s", "half width of the power of the pulse at 1/e of its largest"),
-        scalar(
-            "noise_power",
-            r.noise_power_a2,
-            "A2",
-            "mean square of the shot noise of a sample, both quadratures together",
-        ),
-    ]
+    scalars.into_iter().map(scalar).collect()
 }
 
 fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
+    let above_horizon = "elevation of the line of sight above the horizon";
     let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
     vec![
-        variable("range", &["range"], Data::f64(signals.range_m.clone()), "m")
-            .text("long_name", "range of the true velocities"),
-        variable("line_elevation", &["line"], Data::f64(elevation.copied()), "rad")
-            .text("long_name", "elevation of the line of sight above the horizon"),
-        variable("radial_velocity", &["line", "range"], Data::filled(signals.radial_velocity_m_s), "m s-1")
+        Variable::in_units(
+            "range",
+            &["range"],
+            Data::f64(signals.range_m.clone()),
+            "m",
+            "range of the true velocities",
+        ),
+        Variable::in_units("line_elevation", &["line"], Data::f64(elevation.copied()), "rad", above_horizon),
+        Variable::new("radial_velocity", &["line", "range"], Data::filled(signals.radial_velocity_m_s))
+            .text("units", "m s-1")
             .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")
             .text("long_name", "true radial velocity of the air on the line of sight, positive away from the lidar")
             .attr("_FillValue", Data::f32([FILL])),

@@ -96,27 +96,19 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
     let degrees = |angle: fn(&super::map::Ray) -> f64| Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32));
     vec![
         Variable::new("time", &["time"], Data::f64(times))
-            .text("standard_name", "time")
-            .text("long_name", "time since the start of the flow")
-            .text("units", &format!("seconds since {}", map.site.start))
+            .named(["time", "time since the start of the flow", &format!("seconds since {}", map.site.start)])
             .text("calendar", "gregorian"),
         Variable::new("range", &["range"], single(gates))
-            .text("standard_name", "projection_range_coordinate")
-            .text("long_name", "range to centre of measurement volume")
-            .text("units", "meters")
+            .named(["projection_range_coordinate", "range to centre of measurement volume", "meters"])
             .text("spacing_is_constant", if constant { "true" } else { "false" })
             .attr("meters_to_center_of_first_gate", Data::f32([gates[0] as f32]))
             .attr("meters_between_gates", Data::f32([spacing as f32]))
             .text("axis", "radial_range_coordinate"),
         Variable::new("azimuth", &["time"], degrees(|r| turn(r.azimuth_rad)))
-            .text("standard_name", "ray_azimuth_angle")
-            .text("long_name", "azimuth angle from true north")
-            .text("units", "degrees")
+            .named(["ray_azimuth_angle", "azimuth angle from true north", "degrees"])
             .text("axis", "radial_azimuth_coordinate"),
         Variable::new("elevation", &["time"], degrees(|r| r.elevation_rad))
-            .text("standard_name", "ray_elevation_angle")
-            .text("long_name", "elevation angle from horizontal plane")
-            .text("units", "degrees")
+            .named(["ray_elevation_angle", "elevation angle from horizontal plane", "degrees"])
             .text("axis", "radial_elevation_coordinate"),
     ]
 }
@@ -154,12 +146,10 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
     let dims = if map.carrier.is_some() { EACH } else { ONE };
     let values = |d: usize| Data::f64(places.iter().map(|p| p[d]));
     let mut out = vec![
-        Variable::new("latitude", dims, values(0)).text("standard_name", "latitude").text("units", "degrees_north"),
-        Variable::new("longitude", dims, values(1)).text("standard_name", "longitude").text("units", "degrees_east"),
+        Variable::new("latitude", dims, values(0)).named(["latitude", "", "degrees_north"]),
+        Variable::new("longitude", dims, values(1)).named(["longitude", "", "degrees_east"]),
         Variable::new("altitude", dims, values(2))
-            .text("standard_name", "altitude")
-            .text("long_name", "height of the telescope above the sea")
-            .text("units", "meters")
+            .named(["altitude", "height of the telescope above the sea", "meters"])
             .text("positive", "up"),
     ];
     if let Some(carrier) = &map.carrier {
@@ -187,7 +177,7 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
             ("vertical_velocity", METRES, "upward velocity of the platform", each(&|i| carrier[i].1[2] as f32)),
         ];
         out.extend(motion.map(|(name, units, long_name, values)| {
-            Variable::new(name, EACH, Data::f32(values)).text("long_name", long_name).text("units", units)
+            Variable::new(name, EACH, Data::f32(values)).named(["", long_name, units])
         }));
     }
     out
@@ -203,25 +193,22 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
         angle_rad.to_degrees()
     });
     let fixed_name = if is_rhi { "azimuth of the scan plane" } else { "angle that stays during the sweep" };
-    let mut out = vec![
-        Variable::new("volume_number", &[], Data::i32([0])).text("long_name", "volume number"),
-        Variable::new("sweep_number", &["sweep"], ints(&mut (0..bounds.len())))
-            .text("long_name", "sweep number, from 0"),
-        Variable::new("fixed_angle", &["sweep"], fixed).text("long_name", fixed_name).text("units", "degrees"),
-        Variable::new("sweep_start_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.0)))
-            .text("long_name", "index of the first ray of the sweep"),
-        Variable::new("sweep_end_ray_index", &["sweep"], ints(&mut bounds.iter().map(|b| b.1)))
-            .text("long_name", "index of the last ray of the sweep, inclusive"),
+    let (first, last) = (ints(&mut bounds.iter().map(|b| b.0)), ints(&mut bounds.iter().map(|b| b.1)));
+    let each = |(name, values, long_name, units): (&str, Data, &str, &str)| {
+        Variable::new(name, &["sweep"], values).named(["", long_name, units])
+    };
+    let mut of_sweeps = vec![
+        ("sweep_number", ints(&mut (0..bounds.len())), "sweep number, from 0", ""),
+        ("fixed_angle", fixed, fixed_name, "degrees"),
+        ("sweep_start_ray_index", first, "index of the first ray of the sweep", ""),
+        ("sweep_end_ray_index", last, "index of the last ray of the sweep, inclusive", ""),
     ];
     // Nobody knows the age of a measured wake.
     if map.sweeps.iter().all(|sweep| sweep.tau.is_finite()) {
-        out.push(
-            Variable::new("wake_age", &["sweep"], floats(|s| s.tau))
-                .text("long_name", "age of the wake, t Gamma0 / (2 pi b0^2)")
-                .text("units", "1"),
-        );
+        of_sweeps.push(("wake_age", floats(|s| s.tau), "age of the wake, t Gamma0 / (2 pi b0^2)", "1"));
     }
-    out
+    let volume = Variable::new("volume_number", &[], Data::i32([0])).text("long_name", "volume number");
+    std::iter::once(volume).chain(of_sweeps.into_iter().map(each)).collect()
 }
 
 fn texts(map: &VelocityMap) -> Vec<Variable> {
@@ -306,17 +293,15 @@ fn instrument_of(scene_toml: &str) -> String {
 fn field_variable(field: &Field) -> Variable {
     const DIMS: &[&str] = &["time", "range"];
     let mut out = Variable::new(&field.name, DIMS, Data::filled(&field.values))
-        .text("long_name", &field.long_name)
-        .text("units", field.unit.udunits())
+        .named(["", &field.long_name, field.unit.udunits()])
         .text("coordinates", "elevation azimuth range");
-    if let Some(name) = &field.standard_name {
-        out = out.text("standard_name", name);
-    }
-    if let Some(methods) = &field.cell_methods {
-        out = out.text("cell_methods", methods);
-    }
-    if !field.ancillary.is_empty() {
-        out = out.text("ancillary_variables", &field.ancillary);
+    let further = [
+        ("standard_name", field.standard_name.as_deref()),
+        ("cell_methods", field.cell_methods.as_deref()),
+        ("ancillary_variables", Some(field.ancillary.as_str()).filter(|names| !names.is_empty())),
+    ];
+    for (name, text) in further.into_iter().filter_map(|(name, text)| Some((name, text?))) {
+        out = out.text(name, text);
     }
     out.attr("_FillValue", Data::f32([FILL]))
 }

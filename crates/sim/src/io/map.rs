@@ -210,32 +210,13 @@ pub struct VelocityMap {
 }
 
 impl VelocityMap {
-    /// Horizontal position of a gate across the flight, m.
-    pub fn y_m(&self, ray: usize, gate: usize) -> f64 {
-        self.place_m(ray)[1] + self.range_m[gate] * self.direction(ray)[1]
-    }
-
-    /// Position of a gate along the flight, m.
-    pub fn x_m(&self, ray: usize, gate: usize) -> f64 {
-        self.place_m(ray)[0] + self.range_m[gate] * self.direction(ray)[0]
-    }
-
-    /// Where the lidar is at a ray, m.
-    fn place_m(&self, ray: usize) -> [f64; 3] {
+    /// Position of a gate along the flight, across it and above the ground, m.
+    pub fn place_m(&self, ray: usize, gate: usize) -> [f64; 3] {
         let here = [self.flight.map_or(0.0, |(x_m, _)| x_m), self.lidar_y_m, self.lidar_height_m];
-        self.carrier.as_ref().and_then(|carrier| carrier.get(ray)).map_or(here, |(place_m, _)| *place_m)
-    }
-
-    /// Direction of a ray in the axes of the flow.
-    fn direction(&self, ray: usize) -> [f64; 3] {
+        let from_m = self.carrier.as_ref().and_then(|carrier| carrier.get(ray)).map_or(here, |(place_m, _)| *place_m);
         let Ray { azimuth_rad, elevation_rad, .. } = self.rays[ray];
         let from_x_rad = self.flight.map_or(FRAC_PI_2, |(_, x_rad)| azimuth_rad - x_rad);
-        Direction::new(from_x_rad, elevation_rad).0
-    }
-
-    /// Height of a gate above the ground, m.
-    pub fn z_m(&self, ray: usize, gate: usize) -> f64 {
-        self.place_m(ray)[2] + self.range_m[gate] * self.rays[ray].elevation_rad.sin()
+        Direction::new(from_x_rad, elevation_rad).at_range_m(from_m, self.range_m[gate])
     }
 
     /// The sweeps of one kind alone.

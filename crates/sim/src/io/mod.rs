@@ -63,7 +63,7 @@ pub mod vtr;
 pub use atomic::{FileGroup, write_atomic};
 pub use csv::Table;
 #[cfg(feature = "plots")]
-pub(crate) use error::same_length;
+pub(crate) use error::{increasing, same_length};
 pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};

@@ -88,6 +88,17 @@ impl Variable {
         Self { first: Some(first), ..Self::new(name, dims, data) }
     }
 
+    /// Its unit, and what it is.
+    pub(crate) fn in_units(name: &str, dims: &'static [&'static str], data: Data, units: &str, what: &str) -> Self {
+        Self::new(name, dims, data).text("units", units).text("long_name", what)
+    }
+
+    /// Adds its standard name, its long name and its unit, in this order; an empty one is none.
+    pub(crate) fn named(self, [standard_name, long_name, units]: [&str; 3]) -> Self {
+        let names = [("standard_name", standard_name), ("long_name", long_name), ("units", units)];
+        names.into_iter().filter(|(_, text)| !text.is_empty()).fold(self, |own, (name, text)| own.text(name, text))
+    }
+
     /// Adds a text attribute.
     pub(crate) fn text(self, name: &'static str, value: &str) -> Self {
         self.attr(name, Data::text(value))

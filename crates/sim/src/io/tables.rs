@@ -19,13 +19,13 @@ pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
         .float("tau", per_ray(&|r| map.sweeps[map.rays[r].sweep].tau))
         .float("range_m", cells().map(|(_, g)| map.range_m[g]))
         .float("elevation_rad", per_ray(&|r| map.rays[r].elevation_rad))
-        .float("y_m", cells().map(|(r, g)| map.y_m(r, g)))
-        .float("z_m", cells().map(|(r, g)| map.z_m(r, g)));
+        .float("y_m", cells().map(|(r, g)| map.place_m(r, g)[1]))
+        .float("z_m", cells().map(|(r, g)| map.place_m(r, g)[2]));
     for field in &map.fields {
         table = table.float(&field.column(), field.values.iter().copied());
     }
     if map.flight.is_some() {
-        table = table.float("x_m", cells().map(|(r, g)| map.x_m(r, g)));
+        table = table.float("x_m", cells().map(|(r, g)| map.place_m(r, g)[0]));
     }
     Ok(table
         .float("azimuth_rad", per_ray(&|r| map.rays[r].azimuth_rad))

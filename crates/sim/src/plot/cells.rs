@@ -137,7 +137,7 @@ mod tests {
         let cells = Cells::of_sweep(&map, 1, false, |r, g| field.values[[r, g]]);
         for ray in 6..12 {
             for gate in 0..map.range_m.len() {
-                let found = cells.at(map.y_m(ray, gate), map.z_m(ray, gate)).unwrap();
+                let found = cells.at(map.place_m(ray, gate)[1], map.place_m(ray, gate)[2]).unwrap();
                 let expected = field.values[[ray, gate]];
                 assert!(found == expected || (found.is_nan() && expected.is_nan()));
             }
@@ -155,7 +155,7 @@ mod tests {
         let cells = Cells::of_sweep(&map, 0, true, |r, g| (10 * r + g) as f64);
         for (ray, gate) in (0..6).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate))) {
             assert_eq!(
-                cells.at(map.y_m(ray, gate), map.x_m(ray, gate)),
+                cells.at(map.place_m(ray, gate)[1], map.place_m(ray, gate)[0]),
                 Some((10 * ray + gate) as f64),
                 "{ray} {gate}"
             );

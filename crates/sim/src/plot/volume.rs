@@ -6,7 +6,7 @@
 //! Check: the interpolant is exact for products of lines; a sphere is met at its radius with its own normal; small steps along
 //! a ray find no other crossings.
 
-use crate::io::{OutputError, OutputResult};
+use crate::io::{OutputError, OutputResult, increasing, same_length};
 
 /// A field on a rectilinear mesh.
 #[derive(Debug, Clone, PartialEq)]
@@ -39,15 +39,12 @@ impl Volume {
     /// Axes with fewer than two points or that do not increase, another number of values than points.
     pub fn new(axis_m: [Vec<f64>; 3], values: Vec<f32>) -> OutputResult<Self> {
         for (name, axis) in ["x axis", "y axis", "z axis"].into_iter().zip(&axis_m) {
-            let increasing = axis.windows(2).all(|w| w[0] < w[1]) && axis.iter().all(|a| a.is_finite());
-            if axis.len() < 2 || !increasing {
-                return Err(OutputError::value(name, axis.len(), "at least two finite, increasing positions"));
+            increasing(name, axis)?;
+            if axis.len() < 2 {
+                return Err(OutputError::value(name, axis.len(), "at least two positions"));
             }
         }
-        let points = axis_m.iter().map(Vec::len).product::<usize>();
-        if values.len() != points {
-            return Err(OutputError::value("values", values.len(), format!("one for each of the {points} points")));
-        }
+        same_length("values", values.len(), "the points", axis_m.iter().map(Vec::len).product())?;
         Ok(Self { axis_m, values })
     }
 
@@ -130,13 +127,9 @@ impl Volume {
             let corners = self.corners(cell).map(f64::from);
             let is_crossed = |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
             if levels.iter().any(is_crossed) {
-                let place = |step: u32| start + f64::from(step) / f64::from(STEPS) * (leaves.0 - start);
-                for step in 0..STEPS {
-                    let crossings = self.crossings(cell, on_ray, [place(step), place(step + 1)], levels);
-                    for (at_m, level) in crossings {
-                        if !met(Crossing { at_m, level, normal: self.normal(on_ray(at_m)) }) {
-                            return;
-                        }
+                for (at_m, level) in self.crossings(cell, on_ray, (start, leaves.0), levels) {
+                    if !met(Crossing { at_m, level, normal: self.normal(on_ray(at_m)) }) {
+                        return;
                     }
                 }
             }
@@ -150,28 +143,30 @@ impl Volume {
         }
     }
 
-    /// Crossings of the levels in a short part of a ray in a cell, in order.
+    /// Crossings of the levels in the part of a ray in a cell, in order.
     fn crossings(
         &self,
         cell: [usize; 3],
         on_ray: impl Fn(f64) -> [f64; 3],
-        span: [f64; 2],
+        (start, end): (f64, f64),
         levels: &[f64],
     ) -> Vec<(f64, usize)> {
         let is_below = |t: f64, wanted: f64| self.within(cell, on_ray(t)) < wanted;
-        let mut found = Vec::new();
-        for (level, &wanted) in levels.iter().enumerate() {
-            let below = is_below(span[0], wanted);
-            if below == is_below(span[1], wanted) {
-                continue;
+        let place = |step: u32| start + f64::from(step) / f64::from(STEPS) * (end - start);
+        let steps = (0..STEPS).flat_map(|step| levels.iter().enumerate().map(move |level| (step, level)));
+        let crossing = |(step, (level, &wanted)): (u32, (usize, &f64))| {
+            let (mut low, mut high) = (place(step), place(step + 1));
+            let below = is_below(low, wanted);
+            if below == is_below(high, wanted) {
+                return None;
             }
-            let [mut low, mut high] = span;
             for _ in 0..BISECTIONS {
                 let middle = 0.5 * (low + high);
                 if is_below(middle, wanted) == below { low = middle } else { high = middle }
             }
-            found.push((0.5 * (low + high), level));
-        }
+            Some((0.5 * (low + high), level))
+        };
+        let mut found: Vec<(f64, usize)> = steps.filter_map(crossing).collect();
         found.sort_by(|a, b| a.0.total_cmp(&b.0));
         found
     }
