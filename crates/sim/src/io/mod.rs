@@ -62,9 +62,9 @@ pub mod vtr;
 
 pub use atomic::{FileGroup, write_atomic};
 pub use csv::Table;
+pub use error::{OutputError, OutputResult};
 #[cfg(feature = "plots")]
 pub(crate) use error::{increasing, same_length};
-pub use error::{OutputError, OutputResult};
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use own::Existing;

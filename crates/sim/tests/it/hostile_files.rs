@@ -51,6 +51,8 @@ fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>, u64)]) {
     let size = table.len() as u64;
     file.write_all(&table).unwrap();
     let mut end = b"PK\x06\x06".to_vec();
+    // Bytes of the record behind this number.
+    end.extend(44_u64.to_le_bytes());
     end.resize(32, 0);
     end.extend([arrays.len() as u64, size, at].iter().flat_map(|n| n.to_le_bytes()));
     end.extend(b"PK\x06\x07\0\0\0\0");
