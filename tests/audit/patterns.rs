@@ -2,6 +2,7 @@
 
 use super::air::velocity_m_s;
 use super::draw;
+use super::fields;
 use super::ledger::Ledger;
 use super::numerics::average_and_error;
 use super::program::Bench;
@@ -26,8 +27,35 @@ fn lines(s: &Scene) -> Vec<(f64, f64)> {
         "dbs" => {
             (0..4).map(|i| (FRAC_PI_2 * f64::from(i), f("elevation_rad"))).chain([(f64::NAN, FRAC_PI_2)]).collect()
         }
+        "axial" => {
+            let ahead = flight_rad(s) + if s.s("scan.pattern.towards") == "minus_x" { PI } else { 0.0 };
+            let elevations = steps(s, "scan.elevation");
+            let row = |(i, e): (usize, f64)| {
+                let mut row: Vec<_> =
+                    steps(s, "scan.pattern.azimuth").into_iter().map(|beside| (ahead + beside, e)).collect();
+                if i % 2 == 1 {
+                    row.reverse();
+                }
+                row
+            };
+            elevations.into_iter().enumerate().flat_map(row).collect()
+        }
         _ => vec![(s.f("scan.azimuth_rad"), f("elevation_rad")); f("lines") as usize],
     }
+}
+
+/// From the lowest to the highest value of three keys.
+fn steps(s: &Scene, stem: &str) -> Vec<f64> {
+    let [low, high, step] = ["min", "max", "step"].map(|end| s.f(&format!("{stem}_{end}_rad")));
+    (0..=((high - low) / step + 1e-9).floor() as usize).map(|i| low + i as f64 * step).collect()
+}
+
+/// Lines of a list, which are written to `l.csv`.
+fn listed(r: &mut Random, bench: &Bench) -> Vec<(f64, f64)> {
+    let lines: Vec<_> = (0..r.whole(2, 8)).map(|_| (r.between(0.0, 6.2), r.between(0.05, 1.5))).collect();
+    let rows: String = lines.iter().map(|(azimuth, elevation)| format!("{azimuth:?},{elevation:?}\n")).collect();
+    bench.write("l.csv", &format!("azimuth_rad,elevation_rad\n{rows}"));
+    lines
 }
 
 pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
@@ -44,7 +72,7 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         let list = format!("[{:?}, {:?}, {:?}]", g(), g(), g());
         s.set(&format!("flow.{key}"), list);
     }
-    let kind = r.pick(&["ppi", "vad", "dbs", "stare"]);
+    let kind = r.pick(&["ppi", "vad", "dbs", "stare", "axial", "list"]);
     s.word("scan.pattern.kind", kind);
     match kind {
         "ppi" => s
@@ -54,10 +82,20 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
             .number("scan.pattern.azimuth_step_rad", 0.02),
         "vad" => s.number("scan.pattern.elevation_rad", r.between(0.6, 1.3)).set("scan.pattern.beams", r.whole(4, 12)),
         "dbs" => s.number("scan.pattern.elevation_rad", r.between(0.9, 1.3)),
+        "axial" => s
+            .number("scan.elevation_min_rad", 0.06)
+            .number("scan.elevation_max_rad", 0.2)
+            .number("scan.elevation_step_rad", 0.06)
+            .number("scan.pattern.azimuth_min_rad", -0.04)
+            .number("scan.pattern.azimuth_max_rad", 0.03)
+            .number("scan.pattern.azimuth_step_rad", 0.02)
+            .word("scan.pattern.towards", r.pick(&["plus_x", "minus_x"])),
+        "list" => s.word("scan.pattern.file", "l.csv"),
         _ => s.number("scan.pattern.elevation_rad", r.between(0.05, 1.2)).set("scan.pattern.lines", 5),
     };
     s.number("site.latitude_deg", r.between(-60.0, 60.0)).number("site.longitude_deg", r.between(-170.0, 170.0));
-    let (place, flies) = (r.chance(0.5), ["ppi", "stare"].contains(&kind) && r.chance(0.5));
+    let lines = if kind == "list" { listed(r, bench) } else { lines(&s) };
+    let (place, flies) = (r.chance(0.5), ["ppi", "stare", "list"].contains(&kind) && r.chance(0.5));
     if place {
         s.number("scan.lidar.x_m", r.between(-3000.0, 3000.0)).number("scan.lidar.y_m", r.between(-800.0, 800.0));
     }
@@ -65,11 +103,13 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         s.set("scan.lidar.velocity_m_s", format!("[70.0, {:?}, 1.0]", r.between(-8.0, 8.0)));
         s.number("scan.lidar.flight_azimuth_rad", r.between(0.0, 3.0));
     }
-    bench.write("s.toml", &s.text());
+    // The same wind from a file.
+    let is_stored = !place && !flies && r.chance(0.5);
+    bench.write("s.toml", &if is_stored { fields::stored(r, bench, &s) } else { s.clone() }.text());
     if !bench.run(&["check", "s.toml"]).is_good || bench.must(ledger, &["run", "s.toml", "--out", "o"]).is_none() {
         return;
     }
-    hold_map(ledger, bench, &s);
+    hold_map(ledger, bench, &s, &lines);
     if ["vad", "dbs"].contains(&kind) {
         hold_wind(ledger, bench, &s);
     } else {
@@ -97,10 +137,9 @@ fn lidar(s: &Scene, line: usize) -> (f64, [f64; 3]) {
     (t, std::array::from_fn(|i| at[i] + v[i] * t))
 }
 
-fn hold_map(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
+fn hold_map(ledger: &mut Ledger, bench: &Bench, s: &Scene, lines: &[(f64, f64)]) {
     let map = bench.csv(ledger, "o/map.csv");
     let f = |name: &str| map.f(name);
-    let lines = lines(s);
     let gates = map.len() / lines.len();
     ledger.equal("map.csv: rows of a pattern", map.len() as f64, (gates * lines.len()) as f64, 0.0);
     let (azimuth, elevation, range, time) = (f("azimuth_rad"), f("elevation_rad"), f("range_m"), f("time_s"));

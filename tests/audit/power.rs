@@ -150,6 +150,15 @@ pub(crate) fn free_space_efficiency(s: &Scene, range_m: f64) -> f64 {
     Beam::new(s).efficiency(range_m, |_| 0.0)
 }
 
+/// eta_s over independent paths through even turbulence without scales (P3), of spherical waves (P4).
+pub(crate) fn independent_efficiency(s: &Scene, range_m: f64) -> f64 {
+    let beam = Beam::new(s);
+    // Structure function of a plane wave over k^2 C_n^2 R rho^(5/3).
+    const PLANE: f64 = 2.914_381;
+    let of_path = 0.375 * PLANE * beam.k.powi(2) * s.f("atmosphere.turbulence.cn2_m_m23") * range_m;
+    beam.efficiency(range_m, |rho| of_path * rho.powf(5.0 / 3.0))
+}
+
 /// K^2 beta at a range: backscatter, and extinction out and back.
 fn air(s: &Scene, range_m: f64) -> (f64, f64) {
     if !s.has("atmosphere.profile") {
@@ -223,6 +232,18 @@ fn losses(s: &Scene) -> f64 {
     10_f64.powf(-0.1 * (s.f("telescope.optics_loss_db") + s.f("telescope.polarisation_loss_db")))
 }
 
+/// Photons that a detector counts of a whole pulse, over the bandwidth, s.
+fn photons(s: &Scene) -> f64 {
+    let h = if s.s("detector.snr.reference") == "chapter" { H_J_S / (2.0 * PI) } else { H_J_S };
+    let nu = C_M_S / s.f("laser.wavelength_m");
+    s.f("detector.quantum_efficiency") * s.f("pulse.energy_j") / (h * nu * s.f("detector.bandwidth_hz"))
+}
+
+/// Signal-to-noise ratio of the reflex (R7) over |f(t)|^2, s.
+fn reflex_s(s: &Scene) -> f64 {
+    photons(s) * 10_f64.powf(0.1 * s.f("telescope.reflection_db")) * Receiver::new(s).gain()
+}
+
 /// (O10) with the receiver's noises, given the efficiency.
 pub(crate) fn snr(s: &Scene, range_m: f64, efficiency: f64) -> f64 {
     if s.s("detector.snr.reference") == "fixed" {
@@ -231,12 +252,9 @@ pub(crate) fn snr(s: &Scene, range_m: f64, efficiency: f64) -> f64 {
     if range_m < s.f("telescope.blind_range_m") {
         return 0.0;
     }
-    let h = if s.s("detector.snr.reference") == "chapter" { H_J_S / (2.0 * PI) } else { H_J_S };
-    let nu = C_M_S / s.f("laser.wavelength_m");
-    let photons = s.f("detector.quantum_efficiency") * s.f("pulse.energy_j") / (h * nu * s.f("detector.bandwidth_hz"));
     let (beta, k2) = air(s, range_m);
     let beam = Beam::new(s);
-    photons * 0.5 * C_M_S * k2 * beta * beam.area_m2() / range_m.powi(2)
+    photons(s) * 0.5 * C_M_S * k2 * beta * beam.area_m2() / range_m.powi(2)
         * efficiency
         * losses(s)
         * Receiver::new(s).gain()
@@ -426,6 +444,9 @@ fn hold_limits(ledger: &mut Ledger, s: &Scene, limits: &Value) {
         hold("peak_power_w", s.f("pulse.energy_j") * pulse.power(0.0), 1e-9);
         hold("pulse_resolution_m", 0.5 * C_M_S * pulse.fwhm_s(), 1e-6);
         hold("gate_resolution_m", gate_fwhm_m(s, &pulse), 1e-5);
+        // Where (R7) falls to -20 dB.
+        let above = (reflex_s(s) * pulse.power(0.0) / 0.01).ln().max(0.0);
+        hold("reflex_range_m", pulse.scale_m() * above.sqrt(), 1e-9);
     }
 }
 
@@ -477,7 +498,7 @@ pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: 
         let at = p * samples + k;
         current[at].powi(2) + quadrature.get(at).map_or(0.0, |q| q * q)
     };
-    let ratios = Ratios::new(s, pulse, scan, 6.0);
+    let (ratios, reflex) = (Ratios::new(s, pulse, scan, 6.0), reflex_s(s));
     const BINS: usize = 6;
     for bin in 0..BINS {
         let ks: Vec<usize> = (bin * samples / BINS..(bin + 1) * samples / BINS).collect();
@@ -486,6 +507,8 @@ pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: 
         let (mean, error) = average_and_error(&of_pulse);
         let expected = ks.iter().step_by(4).map(|&k| ratios.seen(scan.sample_m[k])).sum::<f64>()
             / ks.iter().step_by(4).count() as f64;
+        let of_reflex = |&k: &usize| reflex * pulse.power(2.0 * scan.sample_m[k] / C_M_S);
+        let expected = expected + ks.iter().map(of_reflex).sum::<f64>() / ks.len() as f64;
         let right = receiver.noise_a2 * expected + noise_a2;
         // A converter clips what is as strong as its full scale.
         let full_scale = if s.s("detector.digitiser.kind") == "quantised" {
