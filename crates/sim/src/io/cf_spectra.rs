@@ -11,16 +11,15 @@ use crate::measure::recorded::Spectra;
 /// # Errors
 /// A result too large for one file.
 pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputResult<Vec<u8>> {
-    let axes: [(&str, &[&str], &[f64], &str, &str); 4] = [
+    let axes = [
         ("velocity", &["velocity"], &spectra.velocity_m_s, "m s-1", "radial velocity, positive away from the lidar"),
         ("range", &["range"], &spectra.range_m, "m", "range to the centre of the window"),
         ("elevation", &["line"], &spectra.elevation_rad, "rad", "elevation of the line of sight above the horizon"),
         ("time", &["line"], &spectra.time_s, "s", "time of the line"),
     ];
-    let axis = |(name, dims, values, units, text): (_, _, &[f64], _, _)| {
+    let mut variables = Vec::from(axes.map(|(name, dims, values, units, text)| {
         Variable::in_units(name, dims, Data::f64(values.iter().copied()), units, text)
-    };
-    let mut variables: Vec<Variable> = axes.into_iter().map(axis).collect();
+    }));
     let density = Data::f32(spectra.density.iter().copied());
     let text = "mean power density of the region of a gate over that of noise";
     variables.push(Variable::in_units("density", &["line", "range", "velocity"], density, "1", text));
