@@ -67,6 +67,13 @@ impl Layout {
             }),
         }
     }
+
+    /// What the velocity of the walls of memory axis `axis` adds to an operator along it on a component, from the operator's coefficients of
+    /// the two walls.
+    pub(crate) fn wall_source(&self, axis: usize, component: usize, walls: &[[f64; 2]]) -> Vec<f64> {
+        let [low, high] = self.wall_velocity_m_s(axis, component);
+        walls.iter().map(|wall| wall[0] * low + wall[1] * high).collect()
+    }
 }
 
 /// The best order of the directions in memory.

@@ -89,20 +89,20 @@ impl Momentum {
         let inverse = |x: &f64| 1.0 / x;
         let inverse_face_mass =
             (0..n[axis]).map(|face| if face < own.first_face() { 0.0 } else { 1.0 / own.face_mass_m[face] }).collect();
-        let mut wall_source: [Vec<f64>; 3] =
-            std::array::from_fn(|b| vec![0.0; if line[b].is_fourier() { 0 } else { n[b] }]);
         let laplacian = std::array::from_fn(|b| {
             let per_h2 = line[b].cell_mass_m[0].powi(-2);
             let pairs = line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
-            if b == axis {
-                return RowOperator::new(layout, b, line[b].laplacian_at_faces()).with_pairs(pairs);
-            }
-            let (rows, walls) = line[b].laplacian_at_cells();
-            let [low, high] = layout.wall_velocity_m_s(b, axis);
-            for (source, wall) in wall_source[b].iter_mut().zip(walls) {
-                *source = wall[0] * low + wall[1] * high;
-            }
+            let rows = if b == axis { line[b].laplacian_at_faces() } else { line[b].laplacian_at_cells().0 };
             RowOperator::new(layout, b, rows).with_pairs(pairs)
+        });
+        let wall_source = std::array::from_fn(|b| {
+            if line[b].is_fourier() {
+                Vec::new()
+            } else if b == axis {
+                vec![0.0; n[b]]
+            } else {
+                layout.wall_source(b, axis, &line[b].laplacian_at_cells().1)
+            }
         });
         let stencil = Stencil::of(line);
         Self {

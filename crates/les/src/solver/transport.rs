@@ -166,15 +166,8 @@ impl Operators1d {
                 }
             }
         }
-        for (a, b, c) in WALL_PAIRS {
-            if sticks[0] {
-                rows[a].push((3, b, c));
-                rows[b].push((3, a, -c));
-            }
-            if sticks[1] {
-                rows[n - 1 - a].push((n - 3, n - 1 - b, -c));
-                rows[n - 1 - b].push((n - 3, n - 1 - a, c));
-            }
+        for entry in WALL_PAIRS {
+            add_closure(&mut rows, sticks, [n, n - 1], 3, entry);
         }
         Transport { rows, regular: regular(3, n.saturating_sub(3)), stencil }
     }
@@ -199,19 +192,32 @@ impl Operators1d {
             }
         }
         for (i, table) in WALL_SKEW.iter().enumerate() {
-            for &(a, b, c) in table.iter().filter(|entry| entry.0 > 0) {
-                if sticks[0] {
-                    rows[a].push((i + 1, b, c));
-                    rows[b].push((i + 1, a, -c));
-                }
-                if sticks[1] {
-                    rows[n - a].push((n - i - 1, n - b, -c));
-                    rows[n - b].push((n - i - 1, n - a, c));
-                }
+            for entry in table.iter().filter(|entry| entry.0 > 0) {
+                add_closure(&mut rows, sticks, [n, n], i + 1, *entry);
             }
         }
         let margin = |sticks: bool| if sticks { WALL_ROWS + 1 } else { 3 };
         Transport { rows, regular: regular(margin(sticks[0]), n.saturating_sub(margin(sticks[1]))), stencil }
+    }
+}
+
+/// Adds the skew entry `(a, b, c)` of the flux through `face` at each end that sticks, places counted from there; the last face and the
+/// last place of a value are `last`.
+fn add_closure(
+    rows: &mut [Vec<Product>],
+    sticks: [bool; 2],
+    last: [usize; 2],
+    face: usize,
+    (a, b, c): (usize, usize, f64),
+) {
+    if sticks[0] {
+        rows[a].push((face, b, c));
+        rows[b].push((face, a, -c));
+    }
+    if sticks[1] {
+        let [face, a, b] = [last[0] - face, last[1] - a, last[1] - b];
+        rows[a].push((face, b, -c));
+        rows[b].push((face, a, c));
     }
 }
 

@@ -51,10 +51,7 @@ impl Operators {
             half_mean_gradient: std::array::from_fn(|axis| operator(axis, layout.line[axis].half_mean_gradient().0)),
             wall_source: std::array::from_fn(|axis| {
                 let walls = layout.line[axis].half_mean_gradient().1;
-                std::array::from_fn(|component| {
-                    let [low, high] = layout.wall_velocity_m_s(axis, component);
-                    walls.iter().map(|wall| wall[0] * low + wall[1] * high).collect()
-                })
+                std::array::from_fn(|component| layout.wall_source(axis, component, &walls))
             }),
             width: std::array::from_fn(|axis| {
                 layout.line[axis].cell_metric_m.iter().map(|h| h.powf(2.0 / 3.0)).collect()
