@@ -60,33 +60,13 @@ pub enum Error {
         /// Length of the output slice.
         out: usize,
     },
-    /// A mesh has too few nodes in one direction for the four-point stencil.
-    #[error("the {axis} axis has {nodes} nodes: at least {needed} are needed")]
-    TooFewNodes {
-        /// `"y"` or `"z"`.
-        axis: &'static str,
-        /// Number of nodes found.
-        nodes: usize,
-        /// Smallest number allowed.
-        needed: usize,
-    },
-    /// Node coordinates are not finite or do not increase.
-    #[error("{axis}_m[{index}] = {value_m:?} m: node coordinates must be finite and strictly increasing")]
-    NodesNotIncreasing {
-        /// `"y"` or `"z"`.
-        axis: &'static str,
-        /// Index of the node that breaks the order.
-        index: usize,
-        /// Its coordinate.
-        value_m: f64,
-    },
-    /// A direction of the flow's mesh that the schemes cannot take.
+    /// A direction of a mesh that cannot be interpolated, or that the schemes of a flow cannot take.
     #[error("{axis} direction: {what} = {value:?}: must be {allowed}")]
     BadDirection {
         /// `"x"`, `"y"` or `"z"`.
         axis: &'static str,
         /// What is wrong.
-        what: &'static str,
+        what: String,
         /// The value found.
         value: f64,
         /// The values that are allowed, in words.
@@ -217,50 +197,6 @@ pub enum Error {
         /// Time at which the run was to end \[s\].
         end_s: f64,
     },
-    /// Two neighbouring cells differ so much that the index coordinate is not monotone between them.
-    #[error(
-        "the cells beside node {index} of the {axis} axis differ by a factor {ratio:?}: at most {allowed} is allowed"
-    )]
-    StretchTooAbrupt {
-        /// `"y"` or `"z"`.
-        axis: &'static str,
-        /// Index of the node between the two cells.
-        index: usize,
-        /// Width of the wider cell over that of the narrower.
-        ratio: f64,
-        /// Largest ratio allowed there: 5, or 2.5 towards an open end.
-        allowed: f64,
-    },
-    /// The number of velocities is not the number of nodes.
-    #[error("{found} velocities for a mesh of {nodes_y} x {nodes_z} nodes: one per node is needed")]
-    WrongNodeCount {
-        /// Number of velocities found.
-        found: usize,
-        /// Nodes in y.
-        nodes_y: usize,
-        /// Nodes in z.
-        nodes_z: usize,
-    },
-    /// A boundary lies inside the mesh, or too far from it.
-    #[error("{boundary} of the {axis} axis at {value_m:?} m: must be {allowed}")]
-    MisplacedBoundary {
-        /// `"y"` or `"z"`.
-        axis: &'static str,
-        /// Which boundary.
-        boundary: &'static str,
-        /// Position of the wall or length of the period.
-        value_m: f64,
-        /// The values that are allowed, in words.
-        allowed: &'static str,
-    },
-    /// A field does not have one value for each cell.
-    #[error("a field of {values} values for a mesh of {} x {} x {} cells: one per cell is needed", cells[0], cells[1], cells[2])]
-    WrongFieldLength {
-        /// Number of values found.
-        values: usize,
-        /// Cells of the mesh, in the order of the field's axes.
-        cells: [usize; 3],
-    },
     /// The pressure equation was not solved to the tolerance asked for.
     #[error(
         "the {method} did not reach the tolerance {tolerance:.1e} of the pressure equation: {reason}; \
@@ -369,7 +305,7 @@ mod tests {
         for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
             let error = Error::OutOfRange { field: "a_m", value, allowed: "positive" };
             assert_eq!(error.to_string(), format!("a_m = {text}: must be positive"));
-            let error = Error::BadDirection { axis: "y", what: "length_m", value, allowed: "positive" };
+            let error = Error::BadDirection { axis: "y", what: "length_m".into(), value, allowed: "positive" };
             assert_eq!(error.to_string(), format!("y direction: length_m = {text}: must be positive"));
         }
     }

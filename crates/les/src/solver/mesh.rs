@@ -8,6 +8,7 @@
 
 pub use super::mapping::{Mapping, MappingFn};
 use crate::Error;
+use crate::winds::axis::{self, jump_at};
 
 /// What bounds a direction at one of its ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -163,19 +164,18 @@ impl Direction {
         let centres: Vec<f64> = metric.iter().skip(1).step_by(2).copied().collect();
         let ratio = |i: usize| (centres[i + 1] / centres[i]).max(centres[i] / centres[i + 1]);
         let worst = (0..centres.len().saturating_sub(1)).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
-        let Some(index) = worst.filter(|&index| ratio(index) > MAX_NEIGHBOUR_RATIO) else { return Ok(()) };
-        let (axis, allowed) = (AXIS_NAMES[axis], MAX_NEIGHBOUR_RATIO);
-        Err(Error::StretchTooAbrupt { axis, index, ratio: ratio(index), allowed })
+        let Some(index) = worst.filter(|&index| ratio(index) > MAX_NEIGHBOUR_RATIO.0) else { return Ok(()) };
+        Err(refused(axis, jump_at(index), ratio(index), MAX_NEIGHBOUR_RATIO.1))
     }
 }
 
 /// What is wrong with direction `axis` (0, 1, 2 for x, y, z).
-pub(crate) fn refused(axis: usize, what: &'static str, value: f64, allowed: &'static str) -> Error {
-    Error::BadDirection { axis: AXIS_NAMES[axis], what, value, allowed }
+pub(crate) fn refused(axis: usize, what: impl Into<String>, value: f64, allowed: &'static str) -> Error {
+    axis::refused(AXIS_NAMES[axis], what, value, allowed)
 }
 
 /// Largest ratio of neighbouring cells.
-const MAX_NEIGHBOUR_RATIO: f64 = 1.5;
+const MAX_NEIGHBOUR_RATIO: (f64, &str) = (1.5, "at most 1.5");
 
 /// Names of the three directions in messages and files.
 pub(crate) const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
@@ -188,7 +188,7 @@ pub struct Mesh {
 
 impl Mesh {
     /// # Errors
-    /// [`Error::BadDirection`] or [`Error::StretchTooAbrupt`] for a direction that the schemes cannot take.
+    /// [`Error::BadDirection`] for a direction that the schemes cannot take.
     pub fn new(x: Direction, y: Direction, z: Direction) -> Result<Self, Error> {
         let directions = [x, y, z];
         for (axis, direction) in directions.iter().enumerate() {

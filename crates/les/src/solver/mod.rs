@@ -42,7 +42,7 @@ pub use checkpoint::check_checkpoint;
 pub use flow::Flow;
 pub use growth::{Stability, UndampedGrowth};
 pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
-pub use pressure::{PressureEquation, PressureMethod, Solved as PressureSolved};
+pub use pressure::PressureMethod;
 pub use report::{StartReport, StepReport};
 pub use run::{
     CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunSummary, RunWarning, Silent,

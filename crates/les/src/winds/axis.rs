@@ -53,10 +53,10 @@ pub(crate) const GHOSTS: usize = 2;
 
 /// Largest ratio of neighbouring cells: up to 5 the slopes at the nodes are at most 3 times that of the cell, which makes
 /// the interpolated position monotone (Fritsch and Carlson 1980).
-const MAX_CELL_RATIO: f64 = 5.0;
+const MAX_CELL_RATIO: (f64, &str) = (5.0, "at most 5");
 
 /// Largest ratio of the second cell to the first at an open end: from 3 on the slope of the parabola turns round.
-const MAX_OPEN_RATIO: f64 = 2.5;
+const MAX_OPEN_RATIO: (f64, &str) = (2.5, "at most 2.5 towards an open end");
 
 /// Where the value of a ghost node comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -88,18 +88,19 @@ impl Axis {
     pub(crate) fn new(name: &'static str, node_m: &[f64], edges: Edges) -> Result<Self, Error> {
         let nodes = node_m.len();
         if nodes < 4 {
-            return Err(Error::TooFewNodes { axis: name, nodes, needed: 4 });
+            return Err(refused(name, "number of nodes", nodes as f64, "at least 4"));
         }
         for (index, &value_m) in node_m.iter().enumerate() {
             if !value_m.is_finite() || (index > 0 && value_m <= node_m[index - 1]) {
-                return Err(Error::NodesNotIncreasing { axis: name, index, value_m });
+                let what = format!("position of node {index}");
+                return Err(refused(name, what, value_m, "finite and above that of the node before"));
             }
         }
         let high_is_open = matches!(edges, Edges::Bounded { high: Side::Open, .. });
         let (ghosts, below, above, span_m, period_m) = match edges {
             Edges::Periodic { period_m } => {
                 if !(period_m.is_finite() && period_m > node_m[nodes - 1] - node_m[0]) {
-                    return Err(misplaced(name, "period", period_m, "longer than the mesh from first to last node"));
+                    return Err(refused(name, "period", period_m, "longer than the mesh from first to last node"));
                 }
                 let ghosts = [[Ghost::Copy(nodes - 1), Ghost::Copy(nodes - 2)], [Ghost::Copy(0), Ghost::Copy(1)]];
                 let below = [node_m[nodes - 1] - period_m, node_m[nodes - 2] - period_m];
@@ -125,9 +126,9 @@ impl Axis {
     /// Neighbouring cells differ by no more than the inversion of the index coordinate allows.
     fn check_stretch(&self, edges: Edges) -> Result<(), Error> {
         let cell_m = |i: usize| self.position_m[i + 1] - self.position_m[i];
-        let refuse = |node: usize, ratio: f64, allowed: f64| {
+        let refuse = |node: usize, ratio: f64, allowed: &'static str| {
             let index = node.saturating_sub(GHOSTS).min(self.nodes() - 1);
-            Err(Error::StretchTooAbrupt { axis: self.name, index, ratio, allowed })
+            Err(refused(self.name, jump_at(index), ratio, allowed))
         };
         let (low_is_open, high_is_open) = match edges {
             Edges::Periodic { .. } => (false, false),
@@ -136,15 +137,15 @@ impl Axis {
         let first = if low_is_open { GHOSTS } else { 1 };
         for i in first..self.last_cell {
             let ratio = cell_m(i).max(cell_m(i + 1)) / cell_m(i).min(cell_m(i + 1));
-            if ratio > MAX_CELL_RATIO {
-                return refuse(i + 1, ratio, MAX_CELL_RATIO);
+            if ratio > MAX_CELL_RATIO.0 {
+                return refuse(i + 1, ratio, MAX_CELL_RATIO.1);
             }
         }
         let ends = [(low_is_open, GHOSTS, GHOSTS + 1), (high_is_open, self.last_cell, self.last_cell - 1)];
         for (_, end, inner) in ends.into_iter().filter(|end| end.0) {
             let ratio = cell_m(inner) / cell_m(end);
-            if ratio > MAX_OPEN_RATIO {
-                return refuse(end.max(inner), ratio, MAX_OPEN_RATIO);
+            if ratio > MAX_OPEN_RATIO.0 {
+                return refuse(end.max(inner), ratio, MAX_OPEN_RATIO.1);
             }
         }
         Ok(())
@@ -214,8 +215,14 @@ fn fraction(nodes_m: [f64; 4], x_m: f64) -> f64 {
     s
 }
 
-fn misplaced(axis: &'static str, boundary: &'static str, value_m: f64, allowed: &'static str) -> Error {
-    Error::MisplacedBoundary { axis, boundary, value_m, allowed }
+/// What a jump from one cell to the next is called.
+pub(crate) fn jump_at(index: usize) -> String {
+    format!("cells beside node {index} differ by a factor")
+}
+
+/// A direction that cannot be taken.
+pub(crate) fn refused(axis: &'static str, what: impl Into<String>, value: f64, allowed: &'static str) -> Error {
+    Error::BadDirection { axis, what: what.into(), value, allowed }
 }
 
 /// The ghosts of one bounded end, nearest first.
@@ -249,7 +256,7 @@ impl End {
         let gap_m = if is_high { wall_m - at(0) } else { at(0) - wall_m };
         let cell_m = (at(1) - at(0)).abs();
         if !(0.0..cell_m).contains(&gap_m) {
-            return Err(misplaced(axis, boundary, wall_m, "at the last node or less than a cell beyond it"));
+            return Err(refused(axis, boundary, wall_m, "at the last node or less than a cell beyond it"));
         }
         // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
         let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };

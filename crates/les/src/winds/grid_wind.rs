@@ -54,15 +54,13 @@ impl GridSnapshot {
     /// A field with the velocity `velocity_m_s[i_z * y_m.len() + i_y]` = `(u, v, w)` at each node.
     ///
     /// # Errors
-    /// [`Error::TooFewNodes`], [`Error::NodesNotIncreasing`], [`Error::StretchTooAbrupt`],
-    /// [`Error::MisplacedBoundary`] for a mesh that cannot be interpolated; [`Error::WrongNodeCount`];
-    /// [`Error::OutOfRange`] for a velocity that is not finite.
+    /// [`Error::BadDirection`] for a mesh that cannot be interpolated; [`Error::OutOfRange`] for a velocity that is not finite and
+    /// for a number of them that is not that of the nodes.
     pub fn new(mesh: &PlaneMesh, velocity_m_s: &[[f64; 3]]) -> Result<Self, Error> {
         let y = Axis::new("y", &mesh.y_m, mesh.y_edges)?;
         let z = Axis::new("z", &mesh.z_m, mesh.z_edges)?;
-        if velocity_m_s.len() != y.nodes() * z.nodes() {
-            return Err(Error::WrongNodeCount { found: velocity_m_s.len(), nodes_y: y.nodes(), nodes_z: z.nodes() });
-        }
+        let nodes = (y.nodes() * z.nodes()) as f64;
+        check("number of velocities", velocity_m_s.len() as f64, "one for each node", |n| n == nodes)?;
         for &component in velocity_m_s.iter().flatten() {
             check("velocity_m_s", component, "finite", |_| true)?;
         }

@@ -19,6 +19,14 @@ pub struct Linear {
 }
 
 impl Linear {
+    /// The same velocity `(u, v, w)` everywhere and always.
+    ///
+    /// # Errors
+    /// As [`Self::validated`].
+    pub fn uniform(velocity_m_s: [f64; 3]) -> Result<Self, Error> {
+        Self { velocity_m_s, gradient_per_s: [[0.0; 3]; 3], acceleration_m_s2: [0.0; 3] }.validated()
+    }
+
     /// Says what is wrong with the wind, if anything.
     ///
     /// # Errors

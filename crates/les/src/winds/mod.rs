@@ -2,13 +2,13 @@
 //!
 //! | file | what is in it |
 //! |---|---|
-//! | `wind` | the trait [`Wind`]; [`Calm`], [`Uniform`], [`Sum`] |
+//! | `wind` | the trait [`Wind`]; [`Sum`] |
 //! | `profile` | circulation against radius of one vortex, (3), (4) |
 //! | `two_scale` | the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `vortex_line` | vortices of any axis, polylines of them, and their images |
 //! | `along_flight` | the pair, older the farther it is behind the aircraft |
-//! | `linear` | [`Linear`]: linear in place and time |
+//! | `linear` | [`Linear`]: uniform, or linear in place and time |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
 //! | `volume` | fields in three dimensions |
 //! | `series` | [`Series`]: fields at several times, a wind that moves |
@@ -41,4 +41,4 @@ pub use two_scale::TwoScale;
 pub use volume::{VolumeComponent, VolumeSnapshot};
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
 pub use vortex_line::{VortexLine, VortexLines};
-pub use wind::{Calm, Sum, Uniform, Wind};
+pub use wind::{Sum, Wind};

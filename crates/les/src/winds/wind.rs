@@ -6,7 +6,7 @@
 //! every wind.
 
 use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::check_lengths;
 
 /// The velocity field of the air.
 ///
@@ -39,61 +39,7 @@ pub trait Wind: Send + Sync {
     }
 }
 
-/// Air at rest.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Calm;
-
-impl Wind for Calm {
-    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
-        check_lengths(points_m.len(), out_m_s.len())?;
-        out_m_s.fill([0.0; 3]);
-        Ok(())
-    }
-
-    /// Exactly zero.
-    fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
-        0.0
-    }
-}
-
-/// The same velocity everywhere and always.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Uniform {
-    velocity_m_s: [f64; 3],
-}
-
-impl Uniform {
-    /// A uniform wind of `velocity_m_s` = `(u, v, w)`.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] if a component is not finite.
-    pub fn new(velocity_m_s: [f64; 3]) -> Result<Self, Error> {
-        for component in velocity_m_s {
-            check("velocity_m_s", component, "finite", |_| true)?;
-        }
-        Ok(Self { velocity_m_s })
-    }
-
-    /// The velocity `(u, v, w)` \[m/s\].
-    pub fn velocity_m_s(&self) -> [f64; 3] {
-        self.velocity_m_s
-    }
-}
-
-impl Wind for Uniform {
-    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
-        check_lengths(points_m.len(), out_m_s.len())?;
-        out_m_s.fill(self.velocity_m_s);
-        Ok(())
-    }
-
-    /// Exactly zero.
-    fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
-        0.0
-    }
-}
-
-/// The sum of several winds, such as a vortex pair in a cross wind. An empty sum is calm air.
+/// The sum of several winds, such as a vortex pair in a cross wind. An empty sum is air at rest.
 #[derive(Default)]
 pub struct Sum {
     /// The winds that are added, in this order.
@@ -148,11 +94,12 @@ impl Wind for Sum {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::winds::Linear;
 
     #[test]
     fn sum_adds_velocities_and_gradients_over_more_than_one_batch() {
-        let uniform = |v| Box::new(Uniform::new(v).unwrap()) as Box<dyn Wind>;
-        let sum = Sum { winds: vec![uniform([1.0, 2.0, 3.0]), Box::new(Calm), uniform([0.5, -4.0, 0.25])] };
+        let uniform = |v| Box::new(Linear::uniform(v).unwrap()) as Box<dyn Wind>;
+        let sum = Sum { winds: vec![uniform([1.0, 2.0, 3.0]), Box::<Sum>::default(), uniform([0.5, -4.0, 0.25])] };
         let points = vec![[0.0; 3]; 2 * BATCH + 7];
         let mut out = vec![[9.0; 3]; points.len()];
         sum.velocity_into(&points, 0.0, &mut out).unwrap();
@@ -169,8 +116,7 @@ mod tests {
 
     #[test]
     fn every_wind_refuses_slices_of_different_length() {
-        let winds: [Box<dyn Wind>; 3] =
-            [Box::new(Calm), Box::new(Uniform::new([1.0; 3]).unwrap()), Box::new(Sum::default())];
+        let winds: [Box<dyn Wind>; 2] = [Box::new(Linear::uniform([1.0; 3]).unwrap()), Box::<Sum>::default()];
         for wind in &winds {
             let result = wind.velocity_into(&[[0.0; 3]; 3], 0.0, &mut [[0.0; 3]; 2]);
             assert_eq!(result, Err(Error::LengthMismatch { points: 3, out: 2 }));
@@ -179,6 +125,6 @@ mod tests {
 
     #[test]
     fn a_wind_that_is_not_finite_is_refused() {
-        assert!(matches!(Uniform::new([0.0, f64::NAN, 0.0]), Err(Error::OutOfRange { field: "velocity_m_s", .. })));
+        assert!(matches!(Linear::uniform([0.0, f64::NAN, 0.0]), Err(Error::OutOfRange { field: "linear wind", .. })));
     }
 }

@@ -1,7 +1,7 @@
 //! Winds in three dimensions against tables of independent origin, and against closed forms on meshes.
 
 use wakescope_les::winds::{
-    AlongFlight, Calm, Edges, Linear, Series, Side, Sum, VolumeComponent, VolumeSnapshot, VortexLine, VortexLines,
+    AlongFlight, Edges, Linear, Series, Side, Sum, VolumeComponent, VolumeSnapshot, VortexLine, VortexLines,
 };
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 
@@ -252,8 +252,8 @@ fn a_linear_scalar_is_exact_in_place_and_time_flat_at_walls_and_the_first_of_a_s
     let point = [12.0, 377.0, 41.0];
     assert!((carried(&series(0.0), point, 5.5) - amount(point, 5.5)).abs() < 1e-12);
     assert!(carried(&series(0.0), [200.0, 377.0, 41.0], 5.5).is_nan());
-    assert!(carried(&staggered(9, |_| [1.0; 3]), point, 0.0).is_nan() && carried(&Calm, point, 0.0).is_nan());
-    let sum = Sum { winds: vec![Box::new(Calm), Box::new(series(3.0)), Box::new(series(0.0))] };
+    assert!(carried(&staggered(9, |_| [1.0; 3]), point, 0.0).is_nan() && carried(&Sum::default(), point, 0.0).is_nan());
+    let sum = Sum { winds: vec![Box::<Sum>::default(), Box::new(series(3.0)), Box::new(series(0.0))] };
     assert!((carried(&sum, point, 5.5) - amount(point, 5.5) - 3.0).abs() < 1e-12);
     // Below the lowest node, 5 m up, a wall mirrors it, with or without friction; the velocity sticks to one of them.
     for low in [Side::SlipWall { position_m: 0.0 }, Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] }] {

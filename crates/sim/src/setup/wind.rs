@@ -170,9 +170,9 @@ impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
 /// What the wind refuses; a checked scene gives none.
 fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
     Ok(match flow {
-        Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => Box::new(les::winds::Calm),
+        Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => Box::<les::winds::Sum>::default(),
         Flow::Uniform { lateral_m_s, vertical_m_s } => {
-            Box::new(les::winds::Uniform::new([0.0, *lateral_m_s, *vertical_m_s])?)
+            Box::new(les::winds::Linear::uniform([0.0, *lateral_m_s, *vertical_m_s])?)
         }
         Flow::Linear(wind) => {
             let linear = les::winds::Linear {
@@ -191,7 +191,7 @@ fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
-            let cross = Box::new(les::winds::Uniform::new([0.0, pair.cross_wind_m_s, 0.0])?);
+            let cross = Box::new(les::winds::Linear::uniform([0.0, pair.cross_wind_m_s, 0.0])?);
             Box::new(les::winds::Sum { winds: vec![vortices, cross] })
         }
     })

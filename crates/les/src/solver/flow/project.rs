@@ -46,17 +46,10 @@ impl Flow {
                 if left > tolerance * size && self.measure_divergence()? > tolerance {
                     return solved;
                 }
-                Ok(Solved {
-                    residual: left / size,
-                    iterations: (*iterations).max(history.len()),
-                    factor: None,
-                    imbalance: 0.0,
-                })
+                Ok(Solved { residual: left / size, iterations: (*iterations).max(history.len()), factor: None })
             }
             // The step names the place where the velocity is not finite.
-            PressureFailure::NotFinite => {
-                Ok(Solved { residual: f64::NAN, iterations: 0, factor: None, imbalance: f64::NAN })
-            }
+            PressureFailure::NotFinite => Ok(Solved { residual: f64::NAN, iterations: 0, factor: None }),
             PressureFailure::Stalled => solved,
         }
     }

@@ -29,15 +29,12 @@ pub(crate) struct Operator {
     periodic: bool,
     /// `Dw_b f_b^-1 Dw_b^T` of the other two axes by rows, without the diagonals.
     across: [Vec<Taps>; 2],
-    /// Ratio of the largest eigenvalue to the smallest that is not zero, about.
-    condition: f64,
 }
 
 impl Operator {
     /// The operator of a mesh.
     pub(crate) fn new(layout: &Layout) -> Self {
         let rows: [Vec<Taps>; 3] = std::array::from_fn(|b| stiffness(&layout.line[b]));
-        let condition = condition(layout, &rows);
         let periodic = layout.line[0].is_periodic();
         let neighbours = |rows: &[Taps]| -> Vec<Taps> {
             let others = |(i, row): (usize, &Taps)| row.iter().copied().filter(|tap| tap.0 != i).collect();
@@ -51,7 +48,6 @@ impl Operator {
             even: even(&layout.line[0], &rows[0]),
             periodic,
             across: [neighbours(&rows[1]), neighbours(&rows[2])],
-            condition,
         }
     }
 
@@ -63,12 +59,6 @@ impl Operator {
     /// What the ranks exchange of its fields.
     pub(crate) fn slabs(&self) -> &Slabs {
         &self.slabs
-    }
-
-    /// Ratio of the largest eigenvalue to the smallest that is not zero, about: what round-off of the solution is multiplied
-    /// by in the residual of the longest waves.
-    pub(crate) fn condition(&self) -> f64 {
-        self.condition
     }
 
     /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`.
@@ -99,34 +89,32 @@ impl Operator {
         self.slabs.sums(squares.collect()).map(|[squares]| squares.sqrt())
     }
 
-    /// Copies the right side `from` to `to`; returns its 2-norm and its sum over the sum of its moduli. If the sum, which
-    /// nothing can balance, is more than `share` of the norm, it is taken out of the copy.
+    /// Copies the right side `from` to `to`; returns its 2-norm. If its sum, which no pressure can balance, is more than `share` of
+    /// the norm, it is taken out of the copy.
     ///
     /// # Errors
     /// Those of the exchange between ranks.
-    pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> Result<[f64; 2], Error> {
+    pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> Result<f64, Error> {
         let (plane, own) = (self.shape.plane(), self.shape.own_places());
-        let parts: Vec<[f64; 3]> = to[own.clone()]
+        let parts: Vec<[f64; 2]> = to[own.clone()]
             .par_chunks_mut(plane)
             .zip(from[own].par_chunks(plane))
             .map(|(to, from)| {
                 to.copy_from_slice(from);
-                let [sum, moduli] = kernel::sum_and_moduli(to);
-                [sum, moduli, kernel::dot(to, to)]
+                [kernel::sum(to), kernel::dot(to, to)]
             })
             .collect();
-        let [sum, moduli, squares] = self.slabs.sums(parts)?;
-        let imbalance = if moduli > 0.0 { sum / moduli } else { 0.0 };
+        let [sum, squares] = self.slabs.sums(parts)?;
         let (mut volume, mut mass) = (1.0, 1.0);
         for axis in &self.mass_m {
             volume *= axis.iter().sum::<f64>();
             mass *= kernel::dot(axis, axis).sqrt();
         }
         if (sum / volume).abs() * mass <= share * squares.sqrt() {
-            return Ok([squares.sqrt(), imbalance]);
+            return Ok(squares.sqrt());
         }
         self.each_mass(to, sum / volume, |g, mass| *g -= mass);
-        Ok([norm(&self.slabs, to)?, imbalance])
+        norm(&self.slabs, to)
     }
 
     /// 2-norm of what the last digit of `phi` leaves.
@@ -155,23 +143,8 @@ impl Operator {
         self.slabs.sums(squares.collect()).map(|[squares]| 0.5 * f64::EPSILON * squares.sqrt())
     }
 
-    /// 2-norm of the residual over that of the right side `g`.
-    ///
-    /// # Errors
-    /// Those of the exchange between ranks.
-    pub(crate) fn relative_residual(&self, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
-        let left = self.residual_norm(g, phi)?;
-        let size = norm(&self.slabs, g)?;
-        Ok(if size > 0.0 { left / size } else { 0.0 })
-    }
-
-    /// Multiplies each value by the mass of its cell.
-    pub(crate) fn weigh(&self, field: &mut [f64]) {
-        self.each_mass(field, 1.0, |value, mass| *value *= mass);
-    }
-
     /// Gives each value that is owned, with `scale` times the mass of its cell, to `act`.
-    fn each_mass(&self, field: &mut [f64], scale: f64, act: impl Fn(&mut f64, f64) + Sync) {
+    pub(super) fn each_mass(&self, field: &mut [f64], scale: f64, act: impl Fn(&mut f64, f64) + Sync) {
         let (n0, shape) = (self.shape.n[0], self.shape);
         field[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
             for (row, m1) in plane.chunks_mut(n0).zip(&self.mass_m[1]) {
@@ -271,19 +244,6 @@ fn even(line: &Operators1d, rows: &[Taps]) -> Option<[f64; 3]> {
     let middle = line.cells / 2;
     let at = |offset: usize| rows[middle].iter().find(|tap| tap.0 == middle + offset).map_or(0.0, |tap| tap.1);
     (line.is_fourier() && line.cells >= 8).then(|| [at(1), at(2), at(3)])
-}
-
-/// Largest over smallest eigenvalue: bounds of the rows' sums of moduli over the masses, and the longest wave of the longest axis.
-fn condition(layout: &Layout, rows: &[Vec<Taps>; 3]) -> f64 {
-    let (mut largest, mut longest_m) = (0.0, 0.0_f64);
-    for (line, rows) in layout.line.iter().zip(rows).filter(|(line, _)| !line.is_thin()) {
-        let moduli =
-            rows.iter().zip(&line.cell_mass_m).map(|(row, mass)| row.iter().map(|tap| tap.1.abs()).sum::<f64>() / mass);
-        largest += moduli.fold(0.0, f64::max);
-        let length_m = line.cell_mass_m.iter().sum::<f64>();
-        longest_m = longest_m.max(if line.is_periodic() { 0.5 * length_m } else { length_m });
-    }
-    (largest * (longest_m / std::f64::consts::PI).powi(2)).max(1.0)
 }
 
 /// Rows of `Dw F^-1 Dw^T`.

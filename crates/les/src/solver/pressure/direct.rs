@@ -17,7 +17,6 @@
 use rayon::prelude::*;
 
 use super::super::layout::{Layout, Shape};
-use super::super::mesh::AXIS_NAMES;
 use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::kernel;
 use super::lines::pencils;
@@ -37,7 +36,6 @@ enum Along {
 #[derive(Debug)]
 pub(crate) struct Direct {
     slabs: Slabs,
-    direction: [usize; 3],
     rows: RowTransform,
     along: [Along; 2],
     /// Eigenvalues of the three axes; empty for the factorised one.
@@ -65,7 +63,7 @@ impl Direct {
             Along::Transformed(transform)
         };
         let along = [along(1), along(2)];
-        Self { slabs: layout.slabs.clone(), direction: layout.direction, rows, along, value, scale: -factor }
+        Self { slabs: layout.slabs.clone(), rows, along, value, scale: -factor }
     }
 
     /// What is done along the axes 1 and 2 of the places from `first` on of axis 0.
@@ -156,18 +154,6 @@ impl Method for Direct {
         self.slabs.transposed(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
         self.rows(Way::Back, own);
         Ok(0)
-    }
-
-    fn describe(&self, condition: f64) -> String {
-        let along = |which: usize| match &self.along[which] {
-            Along::Transformed(transform) => transform.name(),
-            Along::Factorised(_) => "banded",
-        };
-        let names = [self.rows.name(), along(0), along(1)];
-        let parts: Vec<String> =
-            (0..3).map(|axis| format!("{} {}", AXIS_NAMES[self.direction[axis]], names[axis])).collect();
-        let round_off = f64::EPSILON * condition;
-        format!("direct: {}; of long waves round-off may leave {round_off:.0e} before refinement", parts.join(", "))
     }
 }
 

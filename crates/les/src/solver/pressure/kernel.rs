@@ -53,17 +53,16 @@ pub(crate) fn rotate(a: &mut [f64], b: &mut [f64], c: f64, s: f64) {
     }
 }
 
-/// Sum of the values and of their moduli.
+/// Sum of the values.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn sum_and_moduli(values: &[f64]) -> [f64; 2] {
-    let mut sums = [[0.0; LANES]; 2];
+pub(crate) fn sum(values: &[f64]) -> f64 {
+    let mut sum = [0.0; LANES];
     for values in values.chunks(LANES) {
-        for (l, value) in values.iter().enumerate() {
-            sums[0][l] += value;
-            sums[1][l] += value.abs();
+        for (sum, value) in sum.iter_mut().zip(values) {
+            *sum += value;
         }
     }
-    sums.map(total)
+    total(sum)
 }
 
 /// `values *= scale / (shift + shifts)`, and zero where the divisor is.

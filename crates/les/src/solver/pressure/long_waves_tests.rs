@@ -24,7 +24,7 @@ fn right_side(layout: &Layout, divergence: impl Fn([f64; 3]) -> f64) -> Vec<f64>
     let fraction = |p: usize| std::array::from_fn(|b| (layout.shape.index(p)[b] as f64 + 0.5) / n[b] as f64);
     let mut g: Vec<f64> = (0..layout.shape.len()).map(|p| divergence(fraction(p))).collect();
     let operator = Operator::new(layout);
-    operator.weigh(&mut g);
+    tests::weigh(&operator, &mut g);
     let mut balanced = g.clone();
     operator.copy_balanced(&g, &mut balanced, 0.0).unwrap();
     balanced

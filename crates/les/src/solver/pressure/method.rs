@@ -13,7 +13,4 @@ pub(super) trait Method: Send + std::fmt::Debug {
     /// # Errors
     /// Those of the exchange between ranks.
     fn solve(&self, own: &mut [f64], size: f64, tolerance: f64) -> Result<usize, Error>;
-
-    /// The method and what it is made of, for the log; `condition` is that of the operator.
-    fn describe(&self, condition: f64) -> String;
 }

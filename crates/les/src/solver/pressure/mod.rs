@@ -8,7 +8,6 @@ mod banded_cholesky;
 mod cost;
 mod direct;
 mod eigen;
-mod equation;
 mod fold;
 mod gemm;
 mod kernel;
@@ -25,7 +24,5 @@ mod tests;
 
 pub(crate) use apply::norm;
 pub use cost::PressureMethod;
-pub use equation::PressureEquation;
 pub(crate) use lines::{Pencil, pencils};
-pub use solver::Solved;
-pub(crate) use solver::{PressureSolver, unless_stalled};
+pub(crate) use solver::{PressureSolver, Solved, unless_stalled};

@@ -16,7 +16,6 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::Layout;
-use super::super::mesh::AXIS_NAMES;
 use super::super::operators_1d::{Operators1d, Taps};
 use super::super::slabs::Slabs;
 use super::apply::stiffness;
@@ -49,7 +48,6 @@ const PROPORTIONAL: f64 = 0.99;
 #[derive(Debug)]
 pub(crate) struct Multigrid {
     slabs: Slabs,
-    direction: [usize; 3],
     rows: RowTransform,
     /// Eigenvalue of each mode, in units of the mean cell; groups are filled up with ones.
     mode: Vec<Wide>,
@@ -135,7 +133,6 @@ impl Multigrid {
         let finest = std::array::from_fn(|a| Axis::finest(lines[a], unit_m, &stiffness[a]));
         Self {
             slabs: layout.slabs.clone(),
-            direction: layout.direction,
             mode: lanes(&|m| value[m] * unit_m * unit_m),
             weight: lanes(&|m| rows.weight(m, mean(&layout.line[0]))),
             rows,
@@ -256,11 +253,6 @@ impl Method for Multigrid {
         self.transform(Way::Back, own);
         let [most] = self.slabs.largest([most.unwrap_or(0) as f64])?;
         Ok(most as usize)
-    }
-
-    fn describe(&self, _: f64) -> String {
-        let [x, y, z] = self.direction.map(|d| AXIS_NAMES[d]);
-        format!("multigrid: {x} {}, {} meshes in {y} and {z}", self.rows.name(), self.levels.len())
     }
 }
 

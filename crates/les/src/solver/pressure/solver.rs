@@ -10,7 +10,7 @@ use super::method::Method;
 use super::multigrid::Multigrid;
 use crate::error::{Error, PressureFailure, check};
 use crate::solver::aligned::Aligned;
-use crate::solver::layout::{Layout, Shape};
+use crate::solver::layout::Layout;
 use crate::solver::slabs::WHOLE;
 
 /// Solves after which the residual no longer falls.
@@ -26,15 +26,13 @@ const BALANCED: f64 = 0.01;
 
 /// What a solve did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Solved {
-    /// 2-norm of the residual over that of the right side less its imbalance, measured on the solution.
-    pub residual: f64,
+pub(crate) struct Solved {
+    /// 2-norm of the residual over that of the right side less what no pressure can balance, measured on the solution.
+    pub(crate) residual: f64,
     /// Iterations, 0 for a direct solve.
-    pub iterations: usize,
+    pub(crate) iterations: usize,
     /// Mean factor by which an iteration reduced the residual.
-    pub factor: Option<f64>,
-    /// Sum of the right side over the sum of its moduli: what no pressure can balance, and was removed.
-    pub imbalance: f64,
+    pub(crate) factor: Option<f64>,
 }
 
 /// A solver of the pressure equation of one mesh.
@@ -57,11 +55,6 @@ impl PressureSolver {
         Self { operator: Operator::new(layout), method, right: Aligned::default(), left: Aligned::default() }
     }
 
-    /// The method and what it does in each direction.
-    pub(crate) fn describe(&self) -> String {
-        self.method.describe(self.operator.condition())
-    }
-
     /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos included.
     ///
     /// # Errors
@@ -69,14 +62,13 @@ impl PressureSolver {
     /// the last solution found.
     pub(crate) fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
         let Self { operator, method, right, left } = self;
-        check_length(operator.shape(), field)?;
         check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)?;
         // The methods ignore what no pressure can balance; only the residual must not hold it against them.
         right.fit(field.len());
-        let [size, imbalance] = operator.copy_balanced(field, right, BALANCED * tolerance)?;
+        let size = operator.copy_balanced(field, right, BALANCED * tolerance)?;
         if size == 0.0 {
             field.fill(0.0);
-            return Ok(Solved { residual: 0.0, iterations: 0, factor: None, imbalance });
+            return Ok(Solved { residual: 0.0, iterations: 0, factor: None });
         }
         let own = operator.shape().own_places();
         let (mut iterations, mut history, mut last, mut attainable) = (0, Vec::new(), 1.0, 0.0);
@@ -93,7 +85,7 @@ impl PressureSolver {
             history.push(residual);
             if residual <= tolerance {
                 let factor = (iterations > 0).then(|| residual.powf(1.0 / iterations as f64));
-                return Ok(Solved { residual, iterations, factor, imbalance });
+                return Ok(Solved { residual, iterations, factor });
             }
             if residual.is_nan() {
                 break PressureFailure::NotFinite;
@@ -122,14 +114,5 @@ pub(crate) fn unless_stalled(solved: Result<Solved, Error>) -> Result<(), Error>
         Err(Error::PressureNotSolved { reason: PressureFailure::Stalled, .. }) => solved.map(drop),
         Err(Error::PressureNotSolved { .. }) => Ok(()),
         other => other.map(drop),
-    }
-}
-
-/// Refuses a field of another size.
-pub(super) fn check_length(shape: Shape, field: &[f64]) -> Result<(), Error> {
-    if field.len() == shape.len() {
-        Ok(())
-    } else {
-        Err(Error::WrongFieldLength { values: field.len(), cells: shape.n })
     }
 }

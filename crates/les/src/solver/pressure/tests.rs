@@ -7,6 +7,17 @@ use crate::error::{Error, PressureFailure};
 use apply::Operator;
 use rayon::prelude::*;
 
+/// 2-norm of the residual over that of the right side `g`.
+fn relative_residual(operator: &Operator, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
+    let (left, size) = (operator.residual_norm(g, phi)?, norm(operator.slabs(), g)?);
+    Ok(if size > 0.0 { left / size } else { 0.0 })
+}
+
+/// Multiplies each value by the mass of its cell.
+pub(super) fn weigh(operator: &Operator, field: &mut [f64]) {
+    operator.each_mass(field, 1.0, |value, mass| *value *= mass);
+}
+
 /// The weighted divergence of a flow with eddies of all sizes and one per cent of noise at the grid scale: what the time step
 /// asks the solvers for.
 pub(super) fn turbulent_right_side(layout: &Layout) -> Vec<f64> {
@@ -124,7 +135,7 @@ fn layout([x, y, z]: [Direction; 3]) -> Layout {
 fn mean_of(layout: &Layout, phi: &[f64]) -> f64 {
     let operator = Operator::new(layout);
     let mut weighted = phi.to_vec();
-    operator.weigh(&mut weighted);
+    weigh(&operator, &mut weighted);
     weighted.iter().sum::<f64>() / weighted.iter().map(|value| value.abs()).sum::<f64>().max(f64::MIN_POSITIVE)
 }
 
@@ -136,10 +147,11 @@ fn the_direct_solver_leaves_round_off_on_every_mesh() {
         let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
         let g = turbulent_right_side(&layout);
         let mut phi = g.clone();
-        let solved = solver.solve(&mut phi, 1e-6).unwrap();
-        let residual = operator.relative_residual(&g, &phi).unwrap();
-        assert!(residual <= allowed, "{name}: residual {residual:e}, {}", solver.describe());
-        assert!(solved.imbalance.abs() < 1e-14, "{name}");
+        solver.solve(&mut phi, 1e-6).unwrap();
+        let residual = relative_residual(&operator, &g, &phi).unwrap();
+        assert!(residual <= allowed, "{name}: residual {residual:e}");
+        let moduli: f64 = g.iter().map(|g| g.abs()).sum();
+        assert!(kernel::sum(&g).abs() <= 1e-14 * moduli, "{name}");
         let mean = mean_of(&layout, &phi);
         assert!(mean.abs() <= 1e-13, "{name}: mean {mean:e}");
     }
@@ -207,10 +219,10 @@ fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
     let g = turbulent_right_side(&layout);
     let mut once = g.clone();
     solver.solve(&mut once, 1e-6).unwrap();
-    let once = operator.relative_residual(&g, &once).unwrap();
+    let once = relative_residual(&operator, &g, &once).unwrap();
     let mut phi = g.clone();
     let solved = solver.solve(&mut phi, 0.5 * once).unwrap();
-    let refined = operator.relative_residual(&g, &phi).unwrap();
+    let refined = relative_residual(&operator, &g, &phi).unwrap();
     assert!(refined < 0.5 * once && (solved.residual / refined - 1.0).abs() < 0.2, "{once:e} {refined:e}");
     match solver.solve(&mut g.clone(), 1e-17).unwrap_err() {
         Error::PressureNotSolved { history, tolerance, .. } => {
@@ -221,7 +233,7 @@ fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
 }
 
 #[test]
-fn what_no_pressure_balances_is_removed_and_reported() {
+fn what_no_pressure_balances_is_removed() {
     for directions in
         [[waves(16), slip(12), ground(14)], [slip(8), ground(40), closed(20)], [waves(8), waves(6), waves(5)]]
     {
@@ -230,14 +242,17 @@ fn what_no_pressure_balances_is_removed_and_reported() {
         let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
         let balanced = turbulent_right_side(&layout);
         let mut mass = vec![1.0; balanced.len()];
-        operator.weigh(&mut mass);
+        weigh(&operator, &mut mass);
         let moduli: f64 = balanced.iter().map(|g| g.abs()).sum();
         let excess = 0.1 * moduli / mass.iter().sum::<f64>();
         let mut phi: Vec<f64> = balanced.iter().zip(&mass).map(|(g, m)| g + excess * m).collect();
-        let total: f64 = phi.iter().map(|g| g.abs()).sum();
-        let solved = solver.solve(&mut phi, 1e-6).unwrap();
-        assert!((solved.imbalance - 0.1 * moduli / total).abs() < 1e-12, "{}", solved.imbalance);
-        let residual = operator.relative_residual(&balanced, &phi).unwrap();
+        let mut copy = phi.clone();
+        operator.copy_balanced(&phi, &mut copy, 1e-8).unwrap();
+        let left = copy.iter().sum::<f64>() / moduli;
+        let removed = phi.iter().zip(&copy).map(|(phi, copy)| phi - copy).sum::<f64>() / moduli;
+        assert!(left.abs() < 1e-12 && (removed - 0.1).abs() < 1e-12, "{left:e} {removed}");
+        solver.solve(&mut phi, 1e-6).unwrap();
+        let residual = relative_residual(&operator, &balanced, &phi).unwrap();
         assert!(residual < 1e-12, "{residual:e}");
     }
 }
@@ -291,10 +306,9 @@ fn a_scale_of_the_mesh_scales_the_solution() {
 }
 
 #[test]
-fn fields_and_tolerances_that_make_no_sense_are_refused() {
+fn tolerances_that_make_no_sense_are_refused() {
     let layout = layout([waves(8), waves(8), waves(8)]);
     let mut solver = PressureSolver::new(&layout, PressureMethod::Auto);
-    assert!(solver.solve(&mut [0.0; 511], 1e-6).unwrap_err().to_string().contains("511"));
     for tolerance in [0.0, 1.0, f64::NAN] {
         assert!(solver.solve(&mut [0.0; 512], tolerance).unwrap_err().to_string().contains("tolerance"));
     }
@@ -312,7 +326,7 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
         let mut multigrid = PressureSolver::new(&layout, PressureMethod::Multigrid);
         let mut phi = g.clone();
         let solved = multigrid.solve(&mut phi, 1e-6).unwrap();
-        let (factor, residual) = (solved.factor.unwrap_or(0.0), operator.relative_residual(&g, &phi).unwrap());
+        let (factor, residual) = (solved.factor.unwrap_or(0.0), relative_residual(&operator, &g, &phi).unwrap());
         let found = format!("{name}: {} iterations, factor {factor:.3}, residual {residual:.1e}", solved.iterations);
         assert!(residual <= 1e-6 && (solved.residual - residual).abs() <= 1e-6 * residual + 1e-14, "{found}");
         assert!(solved.iterations <= 6 && factor <= 0.1, "{found}");

@@ -46,7 +46,11 @@ pub(crate) enum RowTransform {
 
 impl fmt::Debug for RowTransform {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        f.write_str(match self {
+            Self::Thin => "Thin",
+            Self::Fourier { .. } => "Fourier",
+            Self::Dense(_) => "Dense",
+        })
     }
 }
 
@@ -136,15 +140,6 @@ impl RowTransform {
             Self::Dense(_) => mass_m,
         }
     }
-
-    /// What it is, for the log.
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            Self::Thin => "one cell",
-            Self::Fourier { .. } => "Fourier",
-            Self::Dense(_) => "dense",
-        }
-    }
 }
 
 /// A length that does not fit the plan cannot occur; if it did, it must not go unseen.
@@ -207,14 +202,6 @@ impl LineTransform {
             Self::Dense(ways) => Left::there_and_back(ways, rows, &mut work.packed, act),
         }
     }
-
-    /// What it is, for the log.
-    pub(crate) fn name(&self) -> &'static str {
-        match self {
-            Self::Thin(_) => "one cell",
-            Self::Dense(_) => "dense",
-        }
-    }
 }
 
 fn scale_rows(rows: &mut [&mut [f64]], scale: f64) {
@@ -244,7 +231,7 @@ mod tests {
         for n in [4, 16, 27, 60] {
             let line = Operators1d::new(&Direction::periodic(n, 0.0, 3.0));
             let (transform, value, factor) = RowTransform::new(&line);
-            assert_eq!(transform.name(), "Fourier");
+            assert_eq!(format!("{transform:?}"), "Fourier");
             let basis = Basis::new(&line);
             assert_eq!(value, basis.value);
             let row: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sqrt().sin()).collect();

@@ -4,7 +4,7 @@ use super::path::{self, Angles, Stop, SweepMode};
 use super::schedule::{Mount, Pace, Schedule};
 use super::{Direction, Head};
 use crate::io::csv_input::TextTable;
-use wakescope_les::winds::{Linear, Uniform};
+use wakescope_les::winds::Linear;
 use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 
 /// The rows of a table by the names of their columns.
@@ -157,7 +157,7 @@ fn smeared(
 #[test]
 fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
     for row in rows("smear_uniform") {
-        let wind = Uniform::new([row("wind_x_m_s"), 0.0, 0.0]).unwrap();
+        let wind = Linear::uniform([row("wind_x_m_s"), 0.0, 0.0]).unwrap();
         let angles = [[row("centre_azimuth_rad"), row("elevation_rad")], [row("azimuth_rate_rad_s"), 0.0]];
         let (mean, spread) = smeared(&wind, angles, (row("pulses") as usize, row("prf_hz")), (HERE, 100.0));
         near(mean, row("mean_m_s"));
