@@ -8,9 +8,16 @@ use super::named::TaylorGreenPlane;
 use super::wake::WakeOutput;
 use crate::keys::{ABOVE_ZERO, Checker, Declared as _, FINITE, Is, Problem, keys};
 use std::fmt::Debug;
+use wakescope_les::TimeScheme;
+use wakescope_les::solver::PressureMethod;
 
 /// The version of the case format that this program reads and writes.
 pub const FORMAT: u32 = 1;
+
+crate::keys::foreign_choices! {
+    TimeScheme: "adams_bashforth2" | "runge_kutta3",
+    PressureMethod: "auto" | "direct" | "multigrid",
+}
 
 /// Most output times of a run.
 const MAX_OUTPUTS: usize = 9999;
@@ -34,14 +41,6 @@ keys! {
         wake: Option<WakeOutput> = None,
     }
 
-    /// Time integration of convection.
-    choice Scheme {
-        /// Adams-Bashforth of second order, one pressure solve per step.
-        AdamsBashforth2 = "adams_bashforth2",
-        /// Runge-Kutta of three stages, three pressure solves per step and longer steps.
-        RungeKutta3 = "runge_kutta3",
-    }
-
     /// Time: the end, the scheme, the step.
     #[derive(Copy)]
     table Time {
@@ -49,7 +48,7 @@ keys! {
         end_s: Option<f64> = None => ABOVE_ZERO,
         /// Time integration of convection; if absent that of the case, or Runge-Kutta where viscosity is too small to damp what
         /// Adams-Bashforth feeds.
-        scheme: Option<Scheme> = None,
+        scheme: Option<TimeScheme> = None,
         /// Fixed time step \[s\]; if absent, a Courant number controls it.
         step_s: Option<f64> = None => ABOVE_ZERO,
         /// Courant number; that of the case or the scheme if absent.
@@ -60,16 +59,6 @@ keys! {
         damped_steps: u64 = 0,
         /// The run pauses after so many steps; it continues with `--restart` when this is raised or taken out.
         pause_after_steps: Option<u64> = None,
-    }
-
-    /// How the pressure equation is solved.
-    choice Pressure {
-        /// The faster one for the mesh.
-        Auto = "auto",
-        /// Transforms and a banded factorisation.
-        Direct = "direct",
-        /// Multigrid behind the transform of one direction.
-        Multigrid = "multigrid",
     }
 
     /// The subgrid model; constants that are left out are the model's own.
@@ -96,13 +85,10 @@ keys! {
         },
     }
 
-}
-
-keys! {
     /// How the equations are solved.
     table Solver {
         /// How the pressure equation is solved.
-        pressure: Pressure = Pressure::Auto,
+        pressure: PressureMethod = PressureMethod::Auto,
         /// Relative residual at which it counts as solved.
         pressure_tolerance: f64 = 1e-10 => 1e-15..=0.1,
         /// The subgrid model.

@@ -6,7 +6,7 @@
 //!
 //! Check: memory against the arrays of a run, sizes that fit, cases too large are refused at once.
 
-use super::case::{FileFormat, FlowCase, Scheme, Subgrid};
+use super::case::{FileFormat, FlowCase, Subgrid};
 use super::files::{FileForecast, Files};
 use super::setup::Setup;
 use super::{CaseFile, CaseKind, WakeOutput};
@@ -24,7 +24,7 @@ pub struct FlowForecast {
     /// Cells along x, y, z.
     pub cells: [usize; 3],
     /// Time integration.
-    pub scheme: Scheme,
+    pub scheme: TimeScheme,
     /// Why, where it is not that of the case.
     pub scheme_reason: Option<String>,
     /// Courant number of the first steps.
@@ -62,10 +62,8 @@ impl FlowForecast {
         let to_end = steps_to(plan.end_s, step_s, setup).ceil();
         let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
         let cells = setup.mesh.cells();
-        let (scheme, passes) = match setup.settings.scheme {
-            TimeScheme::AdamsBashforth2 => (Scheme::AdamsBashforth2, 1.0),
-            TimeScheme::RungeKutta3 => (Scheme::RungeKutta3, 3.0),
-        };
+        let scheme = setup.settings.scheme;
+        let passes = if scheme == TimeScheme::RungeKutta3 { 3.0 } else { 1.0 };
         let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
         let start_s: f64 = dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum();
         let cell_s = CELL_S[usize::from(setup.settings.pressure.is_multigrid(&setup.mesh))];
@@ -109,7 +107,7 @@ impl fmt::Display for FlowForecast {
         let age =
             if self.end_tau == self.end_s { String::new() } else { format!(", tau = {:?}", rounded(self.end_tau)) };
         writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s))?;
-        let scheme = self.scheme.name();
+        let scheme = if self.scheme == TimeScheme::RungeKutta3 { "runge_kutta3" } else { "adams_bashforth2" };
         let reason = self.scheme_reason.as_ref().map_or(String::new(), |reason| format!(", {reason}"));
         writeln!(f, "  steps    about {:.0} of {:.3e} s, {scheme}{reason}", self.steps, self.step_s)?;
         if self.damped_courant.is_finite() {

@@ -1,10 +1,10 @@
 //! From a case file to the setup of its simulation: the flow, and how the case has it integrated.
 
-use super::case::{FlowCase, Pressure, Scheme, Subgrid};
+use super::case::{FlowCase, Subgrid};
 use super::setup::Setup;
 use crate::Error;
 use std::path::Path;
-use wakescope_les::{SubgridModel, TimeScheme, TimeStep, solver::PressureMethod};
+use wakescope_les::{SubgridModel, TimeScheme, TimeStep};
 
 impl Setup {
     /// The setup of a case whose file lies in `folder`.
@@ -12,16 +12,11 @@ impl Setup {
         let mut setup = case.case.setup(folder)?;
         let (s, solver) = (&mut setup.settings, &case.solver);
         s.damped_steps = case.time.damped_steps;
-        s.pressure = match solver.pressure {
-            Pressure::Auto => PressureMethod::Auto,
-            Pressure::Direct => PressureMethod::Direct,
-            Pressure::Multigrid => PressureMethod::Multigrid,
-        };
+        s.pressure = solver.pressure;
         s.pressure_tolerance = solver.pressure_tolerance;
         s.subgrid = subgrid(solver.subgrid);
         match case.time.scheme {
-            Some(Scheme::AdamsBashforth2) => setup.integrate(case, TimeScheme::AdamsBashforth2),
-            Some(Scheme::RungeKutta3) => setup.integrate(case, TimeScheme::RungeKutta3),
+            Some(scheme) => setup.integrate(case, scheme),
             None => {
                 setup.integrate(case, setup.settings.scheme);
                 // What a model will take is not known at the start.
