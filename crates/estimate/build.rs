@@ -25,7 +25,7 @@ fn openblas_links() -> bool {
         return false;
     };
     let source = out.join("probe.c");
-    let program = "void dgetrf_(void);\nint main(void) { dgetrf_(); return 0; }\n";
+    let program = "void dsyev_(void);\nint main(void) { dsyev_(); return 0; }\n";
     if std::fs::write(&source, program).is_err() {
         return false;
     }

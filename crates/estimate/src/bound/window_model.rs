@@ -13,7 +13,7 @@ use num_complex::Complex;
 
 use super::extended;
 use crate::error::{Error, check, finite, length, not_empty, positive};
-use crate::linalg;
+use crate::linalg::hermitian_eigen;
 use crate::window::{Sampling, SignalKind};
 
 /// Bound on the standard deviation of velocity \[m/s\] from one or more independent Gaussian windows.
@@ -69,16 +69,23 @@ fn traces<T: Scalar<Real = f64> + Lapack>(
     check("covariance minus its adjoint", value, "0 up to rounding", value <= rounding)?;
     let least = LEAST_CONDITION * order as f64;
     let refused = |reciprocal_condition| Error::IllConditioned { what, order, reciprocal_condition, least };
-    let factors = match linalg::Factors::new(what, covariance.view()) {
-        Err(Error::Linalg { reason: linalg::SINGULAR, .. }) => return Err(refused(0.0)),
-        other => other?,
-    };
-    let reciprocal_condition = factors.reciprocal_condition();
+    // in its eigenvectors the inverse is a division by each eigenvalue
+    let (values, vectors) = hermitian_eigen(what, covariance.view())?;
+    let reciprocal_condition = (values[0] / values[order - 1]).max(0.0);
     if reciprocal_condition < least {
         return Err(refused(reciprocal_condition));
     }
-    let x = derivatives.iter().map(|derivative| factors.solve(derivative.view())).collect::<Result<Vec<_>, _>>()?;
-    let trace = |(i, j): (usize, usize)| x[i].indexed_iter().map(|((n, m), value)| (*value * x[j][[m, n]]).re()).sum();
+    let adjoint = vectors.t().mapv(|value| value.conj());
+    let turned = |derivative: &Array2<T>| {
+        length("derivative", order, derivative.nrows())?;
+        length("derivative", order, derivative.ncols())?;
+        Ok(adjoint.dot(derivative).dot(&vectors))
+    };
+    let x = derivatives.iter().map(turned).collect::<Result<Vec<_>, Error>>()?;
+    let trace = |(i, j): (usize, usize)| {
+        let of_pair = |((n, m), value): ((usize, usize), &T)| (*value * x[j][[m, n]]).re() / (values[n] * values[m]);
+        x[i].indexed_iter().map(of_pair).sum()
+    };
     Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
 }
 

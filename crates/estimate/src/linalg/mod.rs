@@ -1,4 +1,4 @@
-//! Dense linear algebra for covariances: solve, condition and Hermitian eigenproblem, with residual checks.
+//! Dense linear algebra for covariances: the Hermitian eigenproblem, with a check of its residual, and a real Cholesky factor.
 //!
 //! The only module that meets ndarray-linalg. Each result is checked against its matrix before it is handed out. In
 //! particular ndarray-linalg returns the eigenvectors of the conjugate for complex row-major matrices, whatever the
@@ -6,25 +6,19 @@
 
 pub(crate) mod cholesky;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
-mod dense;
+mod jacobi;
 #[cfg(all(feature = "bundled-lapack", not(feature = "openblas-system")))]
 mod lapack;
 #[cfg(feature = "openblas-system")]
 mod openblas;
 
-use ndarray::{Array1, Array2, ArrayView2, OwnedRepr, ShapeBuilder};
-use ndarray_linalg::{Eigh, FactorizeInto, LUFactorized, Lapack, Scalar, Solve, UPLO};
+use ndarray::{Array1, Array2, ArrayView2, ShapeBuilder};
+use ndarray_linalg::{Eigh, Lapack, Scalar, UPLO};
 
 use crate::error::{Error, length, not_empty};
 
 /// Residual allowed per unit of the matrix's norm and order.
 const RESIDUAL: f64 = 1e-12;
-
-/// Why a matrix has no factors.
-pub(crate) const SINGULAR: &str = "is singular";
-
-/// Steps of the power method for a condition number.
-const POWER_STEPS: usize = 12;
 
 /// Column-major copy of a square, finite matrix that is not empty.
 fn columns<T: Scalar<Real = f64> + Lapack>(field: &'static str, a: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
@@ -41,94 +35,6 @@ fn columns<T: Scalar<Real = f64> + Lapack>(field: &'static str, a: ArrayView2<'_
 
 fn norm<T: Scalar<Real = f64>>(a: &ArrayView2<'_, T>) -> f64 {
     a.iter().map(|value| value.square()).sum::<f64>().sqrt()
-}
-
-/// LU factors of a square matrix, and how far the matrix is from a singular one.
-pub(crate) struct Factors<'a, T: Scalar<Real = f64> + Lapack> {
-    field: &'static str,
-    matrix: ArrayView2<'a, T>,
-    lu: LUFactorized<OwnedRepr<T>>,
-}
-
-impl<'a, T: Scalar<Real = f64> + Lapack> Factors<'a, T> {
-    /// Factorises `a`.
-    ///
-    /// # Errors
-    /// [`Error::Linalg`] if it is singular or not finite, [`Error::Length`] unless it is square.
-    pub(crate) fn new(field: &'static str, a: ArrayView2<'a, T>) -> Result<Self, Error> {
-        let columns = columns(field, a)?;
-        let order = columns.nrows();
-        let lu = columns.factorize_into().map_err(|_| Error::Linalg { what: field, order, reason: SINGULAR })?;
-        Ok(Self { field, matrix: a, lu })
-    }
-
-    fn column(&self, b: &Array1<T>) -> Result<Array1<T>, Error> {
-        let (what, order) = (self.field, self.matrix.nrows());
-        self.lu.solve(b).map_err(|_| Error::Linalg { what, order, reason: "cannot be solved with" })
-    }
-
-    /// X = A^-1 B.
-    ///
-    /// # Errors
-    /// [`Error::Linalg`] if A is singular to working precision, [`Error::Length`] if the shapes differ.
-    pub(crate) fn solve(&self, b: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
-        let (a, order) = (&self.matrix, self.matrix.nrows());
-        length("right-hand side", order, b.nrows())?;
-        let mut x = Array2::zeros(b.raw_dim());
-        for (target, column) in x.columns_mut().into_iter().zip(b.columns()) {
-            let mut target: ndarray::ArrayViewMut1<'_, T> = target;
-            target.assign(&self.column(&column.to_owned())?);
-        }
-        let residual = norm(&(a.dot(&x) - b).view());
-        let size = norm(a) * norm(&x.view()) + norm(&b);
-        if residual <= RESIDUAL * order as f64 * size {
-            return Ok(x);
-        }
-        Err(Error::Linalg { what: self.field, order, reason: "is singular to working precision" })
-    }
-
-    /// Smallest over largest eigenvalue by absolute value of a Hermitian matrix, each by steps of the power method.
-    ///
-    /// The steps approach both from the safe side: the smallest from above by a per cent or so, which is plenty.
-    pub(crate) fn reciprocal_condition(&self) -> f64 {
-        let largest = growth(self.matrix.nrows(), |x| Some(self.matrix.dot(x)));
-        let inverse = growth(self.matrix.nrows(), |x| self.column(x).ok());
-        let ratio = (largest * inverse).recip();
-        if ratio.is_finite() { ratio } else { 0.0 }
-    }
-}
-
-/// How much a matrix stretches the vector that it stretches most, nearly; infinite where it cannot be told.
-fn growth<T: Scalar<Real = f64> + Lapack>(order: usize, times: impl Fn(&Array1<T>) -> Option<Array1<T>>) -> f64 {
-    let size = |x: &Array1<T>| x.iter().map(|value| value.square()).sum::<f64>().sqrt();
-    // no eigenvector of a covariance is orthogonal to numbers without order
-    let mut x: Array1<T> = (0..order).map(|k| T::from_real((1.0 + (k * k) as f64 * 0.7).sin())).collect();
-    let mut stretch = 0.0;
-    for _ in 0..POWER_STEPS {
-        let before = size(&x);
-        let Some(y) = times(&x.mapv(|value| value.div_real(before))) else {
-            return f64::INFINITY;
-        };
-        stretch = size(&y);
-        if !(stretch.is_finite() && stretch > 0.0) {
-            return f64::INFINITY;
-        }
-        x = y;
-    }
-    stretch
-}
-
-/// X = A^-1 B for a square A.
-///
-/// # Errors
-/// As [`Factors::new`] and [`Factors::solve`].
-#[cfg(test)]
-pub(crate) fn solve<T: Scalar<Real = f64> + Lapack>(
-    field: &'static str,
-    a: ArrayView2<'_, T>,
-    b: ArrayView2<'_, T>,
-) -> Result<Array2<T>, Error> {
-    Factors::new(field, a)?.solve(b)
 }
 
 /// Eigenvalues, increasing, and eigenvectors (columns) of a Hermitian matrix; its lower triangle is read.
@@ -153,6 +59,14 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     } else {
         Err(failed("is not Hermitian, or its eigenvectors are those of the conjugate"))
     }
+}
+
+/// The inverse of a Hermitian matrix from its eigenvectors.
+#[cfg(test)]
+pub(crate) fn inverse(a: ArrayView2<'_, num_complex::Complex<f64>>) -> Array2<num_complex::Complex<f64>> {
+    let (values, vectors) = hermitian_eigen("test", a).unwrap();
+    let scaled = &vectors / &values.mapv(num_complex::Complex::from);
+    scaled.dot(&vectors.t().mapv(|value| value.conj()))
 }
 
 /// Scalar product, in eight partial sums that the compiler keeps in vector registers: those of the function that calls it.
@@ -207,43 +121,25 @@ mod tests {
     }
 
     #[test]
-    fn solutions_agree_with_the_product_in_both_memory_orders() {
+    fn eigenvalues_are_those_of_the_matrix_in_both_memory_orders_and_solve_with_it() {
         let a = hermitian(16) + Array2::<C64>::eye(16);
         let x = Array2::from_shape_fn((16, 3), |(i, j)| C64::new(i as f64, j as f64 - 1.0));
         let b = a.dot(&x);
-        for found in
-            [solve("test", a.view(), b.view()).unwrap(), solve("test", a.t().to_owned().t(), b.view()).unwrap()]
-        {
-            assert!(norm(&(found - &x).view()) < 1e-10);
+        for inverse in [inverse(a.view()), inverse(a.t().to_owned().t())] {
+            assert!(norm(&(inverse.dot(&b) - &x).view()) < 1e-10);
         }
     }
 
     #[test]
-    fn reciprocal_condition_is_the_ratio_of_the_extreme_eigenvalues() {
-        for floor in [1.0, 1e-3, 1e-9] {
-            let a = hermitian(24) + Array2::<C64>::eye(24) * C64::from(floor);
-            let (values, _) = hermitian_eigen("test", a.view()).unwrap();
-            let ratio = Factors::new("test", a.view()).unwrap().reciprocal_condition() / (values[0] / values[23]);
-            assert!((0.98..1.5).contains(&ratio), "{floor}: {ratio}");
-        }
-        // singular to working precision: nothing but rounding is left of the smallest
-        let found = Factors::new("test", hermitian(64).view()).map_or(0.0, |factors| factors.reciprocal_condition());
-        assert!(found < 1e-14, "{found}");
-    }
-
-    #[test]
-    fn singular_and_malformed_matrices_are_errors() {
-        let singular = array![[1.0, 2.0], [2.0, 4.0]];
-        let unit = Array2::<f64>::eye(2);
-        let error = solve("covariance", singular.view(), unit.view()).unwrap_err();
-        assert!(error.to_string().contains("covariance") && error.to_string().contains("singular"));
-        assert!(solve("a", Array2::<f64>::zeros((2, 3)).view(), unit.view()).is_err());
-        assert!(solve("a", Array2::<f64>::zeros((0, 0)).view(), unit.view()).is_err());
-        assert!(solve("a", array![[f64::NAN]].view(), array![[1.0]].view()).is_err());
-        assert!(solve("a", unit.view(), array![[1.0]].view()).is_err());
+    fn malformed_matrices_are_errors() {
+        assert!(hermitian_eigen("a", Array2::<f64>::zeros((2, 3)).view()).is_err());
+        assert!(hermitian_eigen("a", Array2::<f64>::zeros((0, 0)).view()).is_err());
+        assert!(hermitian_eigen("a", array![[f64::NAN]].view()).is_err());
         let skew = array![[0.0, 1.0], [-1.0, 0.0]];
-        assert!(hermitian_eigen("skew", skew.view()).is_err());
+        let error = hermitian_eigen("skew", skew.view()).unwrap_err();
+        assert!(error.to_string().contains("skew of order 2"), "{error}");
         assert!(hermitian_eigen("empty", Array2::<C64>::zeros((0, 0)).view()).is_err());
-        assert_eq!(solve("one", array![[4.0]].view(), array![[2.0]].view()).unwrap(), array![[0.5]]);
+        let (values, _) = hermitian_eigen("singular", array![[1.0, 2.0], [2.0, 4.0]].view()).unwrap();
+        assert!(values[0].abs() < 1e-15 && (values[1] - 5.0).abs() < 1e-14);
     }
 }

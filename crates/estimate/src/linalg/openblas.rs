@@ -7,9 +7,9 @@
 
 // SAFETY: declared only to be named below, never called through this declaration
 unsafe extern "C" {
-    fn dgetrf_();
+    fn dsyev_();
     fn zheev_();
 }
 
 #[used]
-static NEEDED: [unsafe extern "C" fn(); 2] = [dgetrf_, zheev_];
+static NEEDED: [unsafe extern "C" fn(); 2] = [dsyev_, zheev_];

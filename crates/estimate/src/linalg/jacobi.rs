@@ -1,72 +1,9 @@
-//! Dense kernels behind the bundled LAPACK symbols: LU with partial pivoting and Hermitian Jacobi rotations.
+//! The dense kernel behind the bundled LAPACK symbols: Hermitian Jacobi rotations.
 //!
 //! Real and complex alike, for orders up to a few hundred. Check: residuals of the routines in `lapack`, on singular, tiny, empty
 //! and padded matrices.
 
-use ndarray::{ArrayView2, ArrayViewMut2};
 use ndarray_linalg::Scalar;
-
-/// P A = L U in place; `pivots` from 1. Returns 0, or the first (from 1) pivot that is exactly 0.
-pub(crate) fn factor<T: Scalar<Real = f64>>(mut a: ArrayViewMut2<'_, T>, pivots: &mut [i32]) -> i32 {
-    let (rows, columns) = a.dim();
-    let mut info = 0;
-    for k in 0..rows.min(columns) {
-        let pivot = (k..rows).fold(k, |best, row| if a[(row, k)].abs() > a[(best, k)].abs() { row } else { best });
-        pivots[k] = pivot as i32 + 1;
-        if a[(pivot, k)] == T::zero() {
-            info = if info == 0 { k as i32 + 1 } else { info };
-            continue;
-        }
-        if pivot != k {
-            (0..columns).for_each(|column| a.swap((k, column), (pivot, column)));
-        }
-        let diagonal = a[(k, k)];
-        for row in k + 1..rows {
-            a[(row, k)] /= diagonal;
-        }
-        for column in k + 1..columns {
-            let above = a[(k, column)];
-            for row in k + 1..rows {
-                let multiplier = a[(row, k)];
-                a[(row, column)] -= multiplier * above;
-            }
-        }
-    }
-    info
-}
-
-/// Solves A x = b in place from the factors of [`factor`]; with `adjoint` A^T x = b or A^H x = b, as it takes elements or conjugates.
-pub(crate) fn solve<T: Scalar>(a: ArrayView2<'_, T>, pivots: &[i32], adjoint: Option<fn(&T) -> T>, b: &mut [T]) {
-    let order = b.len();
-    let swaps = |b: &mut [T], k: usize| b.swap(k, pivots[k] as usize - 1);
-    let Some(part) = adjoint else {
-        (0..order).for_each(|k| swaps(b, k));
-        for k in 0..order {
-            let value = b[k];
-            (k + 1..order).for_each(|row| b[row] -= a[(row, k)] * value);
-        }
-        for k in (0..order).rev() {
-            b[k] /= a[(k, k)];
-            let value = b[k];
-            (0..k).for_each(|row| b[row] -= a[(row, k)] * value);
-        }
-        return;
-    };
-    for k in 0..order {
-        for row in 0..k {
-            let term = part(&a[(row, k)]) * b[row];
-            b[k] -= term;
-        }
-        b[k] /= part(&a[(k, k)]);
-    }
-    for k in (0..order).rev() {
-        for row in k + 1..order {
-            let term = part(&a[(row, k)]) * b[row];
-            b[k] -= term;
-        }
-    }
-    (0..order).rev().for_each(|k| swaps(b, k));
-}
 
 /// Sweeps after which the rotations have converged for any matrix met in practice (8 are usual).
 const SWEEPS: usize = 60;
