@@ -1,7 +1,7 @@
 //! The power of the simulated signal against (14), through all crates that have a part in it.
 
+use wakescope_optics::EfficiencyProfile;
 use wakescope_optics::theory::free_space_efficiency;
-use wakescope_optics::{EfficiencyProfile, snr::SPEED_OF_LIGHT_M_S};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run;
 use wakescope_sim::scene::{Flow, NoiseModel, Scene, SceneFile};
@@ -14,6 +14,18 @@ fn plan(change: impl Fn(&mut Scene)) -> Plan {
     scene.scan.pulses_per_line = 300;
     change(&mut scene);
     Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap()
+}
+
+const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
+
+/// (14) as it is written, for a return that changes slowly over the pulse, in even air.
+fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
+    let (scene, air) = (&plan.scene.scene, &plan.scene.scene.atmosphere);
+    let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
+    let photons = scene.detector.quantum_efficiency * scene.pulse_energy_j() / photon_j;
+    let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
+    let seen = (-2.0 * air.extinction_per_m * range_m).exp() * area_m2 / (range_m * range_m) * efficiency;
+    photons / scene.detector.bandwidth_hz * 0.5 * SPEED_OF_LIGHT_M_S * air.backscatter_per_m_sr * seen
 }
 
 /// Mean square of the current and its standard error over the pulses, A^2.
@@ -31,12 +43,12 @@ fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
     let plan = plan(|s| s.detector.noise = NoiseModel::None);
     let (power_a2, error_a2) = mean_square_a2(&plan);
     let noise_a2 = plan.instrument.receiver.noise_variance_a2();
-    let (model, telescope) = (&plan.instrument.snr, &plan.instrument.telescope);
+    let telescope = &plan.instrument.telescope;
     // The mean over the samples of the record.
     let g = &plan.geometry;
     let expected = (0..g.samples)
         .map(|k| g.first_range_m + k as f64 * g.sample_spacing_m)
-        .map(|r| model.snr(r, free_space_efficiency(telescope, r).unwrap()).unwrap())
+        .map(|r| of_14(&plan, r, free_space_efficiency(telescope, r).unwrap()))
         .sum::<f64>()
         / g.samples as f64;
     let (snr, error) = (power_a2 / noise_a2, error_a2 / noise_a2);
@@ -103,10 +115,15 @@ fn power_through_a_near_focus_is_14_over_the_pulse() {
         let (first_m, last_m) = (at_m - 120.0, at_m + 120.0);
         let metres: Vec<f64> = (0..=240).map(|i| first_m + f64::from(i) * (last_m - first_m) / 240.0).collect();
         let eta = EfficiencyProfile::from_theory(&metres, |r| free_space_efficiency(telescope, r)).unwrap();
-        let sigma_s = plan.instrument.pulse.sigma_s();
+        // (14) as it is written: the mean over the pulse, in steps of a fifth of a metre.
+        let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * plan.instrument.pulse.sigma_s();
         let snr = |k: &usize| {
-            let time_s = 2.0 * range_m(*k) / SPEED_OF_LIGHT_M_S;
-            plan.instrument.snr.snr_pulse(time_s, sigma_s, |r| eta.interpolated(r.clamp(first_m, last_m))).unwrap()
+            let weighted = (-500..=500).map(|i| 0.2 * f64::from(i)).map(|offset_m| {
+                let r = range_m(*k) + offset_m;
+                let weight = (-(offset_m / sigma_m).powi(2)).exp() / (std::f64::consts::PI.sqrt() * sigma_m) * 0.2;
+                weight * of_14(&plan, r, eta.interpolated(r.clamp(first_m, last_m)).unwrap())
+            });
+            weighted.sum::<f64>()
         };
         let expected = near.iter().map(snr).sum::<f64>() / near.len() as f64;
         let noise_a2 = plan.instrument.receiver.noise_variance_a2();

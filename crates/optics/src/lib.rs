@@ -4,15 +4,12 @@
 //! local oscillator propagated backwards through the receiver (BPLO), both normalised to unit power before truncation.
 //!
 //! ```
-//! use wakescope_optics::{SnrModel, Telescope, theory};
+//! use wakescope_optics::{Telescope, theory};
 //!
 //! # fn main() -> Result<(), wakescope_optics::Error> {
 //! let telescope = Telescope::table2(); // 1.55 um, 1/e radius 30 mm, aperture radius 50 mm, collimated
 //! let efficiency = theory::free_space_efficiency(&telescope, 400.0)?;
 //! assert!((efficiency - 8.801_813e-3).abs() < 1e-8);
-//!
-//! let snr = SnrModel::table2().snr(400.0, efficiency)?;
-//! assert!((10.0 * snr.log10() + 8.436).abs() < 1e-3);
 //! # Ok(())
 //! # }
 //! ```
@@ -25,7 +22,6 @@
 //!
 //! | equation | where |
 //! |---|---|
-//! | (14), signal-to-noise ratio | [`snr`] |
 //! | (16), a step through a layer | `screens::Propagator`; as written in `literal` |
 //! | (17), spectrum of the refractive index | [`air::VonKarman`], [`air::Spectrum`] |
 //! | (18), a phase screen | `screens::ScreenGenerator`; as written in `literal` |
@@ -37,7 +33,6 @@
 //! | [`air`] | spectrum, Cn2 along the path, structure function, Rytov variance, coherence radius |
 //! | [`theory`] | efficiency without random numbers: free space by two methods, bistatic at any strength, weak turbulence |
 //! | [`efficiency`] | efficiency profile with scatter and error |
-//! | [`snr`] | signal-to-noise ratio (14), corrected |
 //! | `screens` | transverse grid, phase screens, split step, inner loops |
 //! | `monte_carlo` | layers of the path; efficiency by Monte Carlo |
 //! | `plan` | grid, layers, memory, time; refusals that name the limit and what would do |
@@ -59,7 +54,6 @@ pub mod plan;
 mod quadrature;
 #[cfg(feature = "screens")]
 pub mod screens;
-pub mod snr;
 pub mod theory;
 
 pub use air::{Cn2Path, Spectrum, Turbulence, VonKarman};
@@ -70,7 +64,6 @@ pub use error::Error;
 pub use monte_carlo::{Layers, MonteCarlo, Stop};
 #[cfg(feature = "screens")]
 pub use screens::Grid;
-pub use snr::SnrModel;
 
 /// The example of the README is run as a test.
 #[cfg(all(doctest, feature = "screens"))]

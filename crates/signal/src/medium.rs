@@ -46,6 +46,12 @@ impl Medium {
         Ok(Self { uniform: true, ..medium })
     }
 
+    /// The air of the chapter's Table 2: 1e-7 per m and sr, an extinction of 7e-5 per m.
+    pub fn table2() -> Self {
+        let (range_m, depth) = (vec![0.0], vec![0.0]);
+        Self { range_m, backscatter_per_m_sr: vec![1e-7], extinction_per_m: vec![7e-5], depth, uniform: true }
+    }
+
     /// Backscatter `beta` \[1/(m sr)\] and one-way optical depth at a range.
     fn at(&self, range_m: f64) -> Result<(f64, f64), Error> {
         let first_m = self.range_m[0];

@@ -4,7 +4,8 @@ use super::context::*;
 use crate::claim::Part;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::monte_carlo::EfficiencyEstimate;
-use wakescope_optics::{EfficiencyProfile, Layers, Misalignment, MonteCarlo, SnrModel, Telescope, Turbulence, theory};
+use wakescope_optics::{EfficiencyProfile, Layers, Misalignment, MonteCarlo, Telescope, Turbulence, theory};
+use wakescope_signal::{GaussianPulse, Medium, Receiver};
 
 const WEAK_M_M23: f64 = 1e-15;
 const MEDIUM_M_M23: f64 = 1e-13;
@@ -77,8 +78,13 @@ fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<Efficie
 }
 
 fn decibels(profile: &EfficiencyProfile, efficiency: &[f64]) -> Result<Vec<f64>, Failure> {
-    let model = SnrModel::table2();
-    profile.range_m.iter().zip(efficiency).map(|(&r, &e)| Ok(10.0 * model.snr(r, e)?.log10())).collect()
+    let (air, area_m2) = (Medium::table2(), Telescope::table2().aperture_area_m2());
+    let of_range = |(&range_m, &efficiency): (&f64, &f64)| {
+        let weight_per_m = air.return_per_m(range_m, area_m2)? * efficiency;
+        let energy_j = GaussianPulse::table2().energy_j();
+        Ok(10.0 * Receiver::table2().slowly_varying_snr(energy_j, weight_per_m).log10())
+    };
+    profile.range_m.iter().zip(efficiency).map(of_range).collect()
 }
 
 fn table(curves: &[Curve]) -> Result<Table, Failure> {

@@ -1,11 +1,13 @@
 //! Mean power by range against (14), in air that changes with range.
 
+use std::f64::consts::PI;
+
 use approx::assert_relative_eq;
 use wakescope_signal::efficiency::EfficiencyTable;
 use wakescope_signal::scan::pulse_generator;
-use wakescope_signal::{Error, LineOfSight, Medium, NoiseModel, Scan};
+use wakescope_signal::{Error, GaussianPulse, LineOfSight, Medium, NoiseModel, Receiver, Scan, Scratch};
 
-use crate::setup::{C, STEP_M, gaussian, line, mean_power, receiver, simulator};
+use crate::setup::{C, STEP_M, gaussian, line, mean_power, receiver, simulator, weighted_line};
 
 const FIRST_M: f64 = 200.0;
 const SAMPLES: usize = 700;
@@ -73,6 +75,47 @@ fn power_of_a_scene_does_not_change_with_layers_a_quarter_and_four_times_as_thic
             assert_relative_eq!(*found, *expected, max_relative = 1e-3);
         }
     }
+}
+
+#[test]
+fn snr_reproduces_the_stored_curve() {
+    let path = format!("{}/../../tests/reference/optics/eta_freespace_table2.csv", env!("CARGO_MANIFEST_DIR"));
+    let (air, receiver) = (Medium::table2(), Receiver::table2());
+    let ratio = |range_m: f64, efficiency: f64| {
+        let weight_per_m = air.return_per_m(range_m, PI * 0.05 * 0.05).unwrap() * efficiency;
+        receiver.slowly_varying_snr(150e-6, weight_per_m)
+    };
+    let mut rows = 0;
+    for line in std::fs::read_to_string(path).unwrap().lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit())) {
+        let row: Vec<f64> = line.split(',').map(|v| v.parse().unwrap()).collect();
+        let snr = ratio(row[0], row[1]);
+        assert_relative_eq!(snr, row[5], max_relative = 1e-8);
+        assert!((10.0 * snr.log10() - row[6]).abs() < 1e-6);
+        // K^2/R^2 is all that the range changes beside the efficiency.
+        let at_1_m = |range_m: f64| ratio(range_m, 0.01) * range_m * range_m / (-2.0 * 7e-5 * range_m).exp();
+        assert_relative_eq!(at_1_m(row[0]), at_1_m(150.0), max_relative = 1e-12);
+        rows += 1;
+    }
+    assert!(rows > 70, "{rows}");
+}
+
+#[test]
+fn pulse_integral_tends_to_the_narrow_pulse_form() {
+    let (air, range_m, thickness_m) = (Medium::uniform(1e-7, 7e-5).unwrap(), 1000.0, 0.05);
+    let gap = |pulse: GaussianPulse| {
+        let weight_per_m = |r: f64| air.return_per_m(r, AREA_M2).unwrap() * 0.05;
+        let line = weighted_line(900.0, 1100.0, thickness_m, |_| 0.0, weight_per_m);
+        let (simulator, mut snr) = (simulator(pulse, NoiseModel::BandLimited, range_m, 1), [0.0]);
+        simulator.snr_into(&line, &mut Scratch::default(), &mut snr).unwrap();
+        let narrow = receiver(NoiseModel::None).slowly_varying_snr(pulse.energy_j(), weight_per_m(range_m));
+        snr[0] / narrow - 1.0
+    };
+    // Second order in the length: sigma_R^2/4 times the second derivative of K^2/R^2 over itself.
+    let long = gaussian(200e-9);
+    let a = 2.0 * 7e-5;
+    let curvature = 6.0 / (range_m * range_m) + 4.0 * a / range_m + a * a;
+    assert_relative_eq!(gap(long), 0.25 * long.sigma_m().powi(2) * curvature, max_relative = 0.02);
+    assert!(gap(gaussian(2e-9)).abs() < 1e-6);
 }
 
 /// Mean power of the simulated envelopes \[A^2\] at each sample.

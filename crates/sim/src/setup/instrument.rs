@@ -24,10 +24,8 @@ pub struct Instrument {
     pub digitiser: Option<signal::digitise::Digitiser>,
     /// The turbulence, if there is any.
     pub turbulence: Option<optics::Turbulence>,
-    /// Everything of (14) but the efficiency, for air that is the same at every range.
-    pub snr: optics::SnrModel,
-    /// Air that changes with range.
-    pub air: Option<signal::Medium>,
+    /// The air.
+    pub air: signal::Medium,
     /// Part of the return that is left by optics and polarisation, out and back together.
     pub transmission: f64,
     /// Range up to which nothing is seen, m.
@@ -41,19 +39,6 @@ impl Instrument {
     /// What optics or signals refuse, such as samples that are no pulse.
     pub fn new(scene: &Scene) -> Result<Self, Error> {
         let (telescope, receiver) = (telescope(scene).validated()?, receiver(scene));
-        let snr = optics::SnrModel {
-            wavelength_m: scene.laser.wavelength_m,
-            aperture_area_m2: telescope.aperture_area_m2(),
-            pulse_energy_j: scene.pulse_energy_j(),
-            quantum_efficiency: scene.detector.quantum_efficiency,
-            bandwidth_hz: scene.detector.bandwidth_hz,
-            backscatter_per_m_sr: scene.atmosphere.backscatter_per_m_sr,
-            extinction_per_m: scene.atmosphere.extinction_per_m,
-            planck: match scene.detector.snr {
-                SnrReference::Chapter {} => optics::snr::PlanckConvention::Hbar,
-                _ => optics::snr::PlanckConvention::H,
-            },
-        };
         let digitiser = match scene.detector.digitiser {
             Digitiser::None {} => None,
             Digitiser::Quantised { bits, full_scale_over_noise } => {
@@ -68,7 +53,6 @@ impl Instrument {
             receiver,
             digitiser,
             turbulence,
-            snr: snr.validated()?,
             air: medium(&scene.atmosphere)?,
             transmission: 10f64.powf(-0.1 * (scene.telescope.optics_loss_db + scene.telescope.polarisation_loss_db)),
             blind_range_m: scene.telescope.blind_range_m,
@@ -82,11 +66,7 @@ impl Instrument {
     /// What optics or signals refuse of a range.
     pub fn return_per_m(&self, range_m: f64) -> Result<f64, Error> {
         let seen = if range_m < self.blind_range_m { 0.0 } else { self.transmission };
-        Ok(seen
-            * match &self.air {
-                Some(air) => air.return_per_m(range_m, self.snr.aperture_area_m2)?,
-                None => self.snr.return_per_m(range_m)?,
-            })
+        Ok(seen * self.air.return_per_m(range_m, self.telescope.aperture_area_m2())?)
     }
 
     /// Backscatter of the scene's air at a range, 1/(m sr).
@@ -94,10 +74,7 @@ impl Instrument {
     /// # Errors
     /// What signals refuse of a range.
     pub(crate) fn backscatter_per_m_sr(&self, range_m: f64) -> Result<f64, Error> {
-        match &self.air {
-            Some(air) => Ok(air.backscatter_per_m_sr(range_m)?),
-            None => Ok(self.snr.backscatter_per_m_sr),
-        }
+        Ok(self.air.backscatter_per_m_sr(range_m)?)
     }
 
     /// [`Self::return_per_m`] of air with a backscatter of 1/(m sr): K^2 A_R/R^2 less losses, sr.
@@ -105,7 +82,7 @@ impl Instrument {
     /// # Errors
     /// What optics or signals refuse of a range.
     pub(crate) fn return_of_backscatter_sr(&self, range_m: f64) -> Result<f64, Error> {
-        let one = self.air_transmission(range_m)?.powi(2) * self.snr.aperture_area_m2 / (range_m * range_m);
+        let one = self.air_transmission(range_m)?.powi(2) * self.telescope.aperture_area_m2() / (range_m * range_m);
         Ok(if range_m < self.blind_range_m { 0.0 } else { self.transmission * one })
     }
 
@@ -127,10 +104,7 @@ impl Instrument {
     /// # Errors
     /// What signals refuse of a range.
     pub fn air_transmission(&self, range_m: f64) -> Result<f64, Error> {
-        match &self.air {
-            Some(air) => Ok(air.transmission(range_m)?),
-            None => Ok((-self.snr.extinction_per_m * range_m).exp()),
-        }
+        Ok(self.air.transmission(range_m)?)
     }
 
     /// Grid and layers of the phase screens for several runs, each with its ranges, m, increasing; with their cost.
@@ -238,14 +212,16 @@ pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
 ///
 /// # Errors
 /// What the signal simulation refuses, such as ranges that do not increase.
-pub(crate) fn medium(atmosphere: &Atmosphere) -> Result<Option<signal::Medium>, Error> {
-    let Some(profile) = &atmosphere.profile else { return Ok(None) };
+pub(crate) fn medium(atmosphere: &Atmosphere) -> Result<signal::Medium, Error> {
+    let Some(profile) = &atmosphere.profile else {
+        return Ok(signal::Medium::uniform(atmosphere.backscatter_per_m_sr, atmosphere.extinction_per_m)?);
+    };
     let AirProfile { mut range_m, mut backscatter_per_m_sr, mut extinction_per_m } = profile.clone();
     // Beyond the table the air is as at its end, to where the echo of the pulse before may come from at the slowest rate.
     range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e12);
     backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
     extinction_per_m.extend(profile.extinction_per_m.last());
-    Ok(Some(signal::Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)?))
+    Ok(signal::Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)?)
 }
 
 /// The receiver of a scene.
@@ -312,7 +288,7 @@ mod tests {
             backscatter_per_m_sr: vec![1e-7; 2],
             extinction_per_m: vec![1e-9; 2],
         };
-        let air = medium(&Atmosphere { profile: Some(profile), ..Atmosphere::default() }).unwrap().unwrap();
+        let air = medium(&Atmosphere { profile: Some(profile), ..Atmosphere::default() }).unwrap();
         for range_m in [1e4, 3e7, 1.5e11] {
             let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());
             assert!((found - expected).abs() <= 1e-9 * expected, "{range_m} m: {found} {expected}");

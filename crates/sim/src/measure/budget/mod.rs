@@ -193,7 +193,7 @@ fn transmitter_and_path(
     let by_range = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
         range_m.iter().map(|&r| Ok(decibels(of(r)?))).collect()
     };
-    let area_m2 = instrument.snr.aperture_area_m2;
+    let area_m2 = telescope.aperture_area_m2();
     let solid_angle = |r: f64| area_m2 / (r * r);
     let sent = format!("{} / {photon_j:.2e} J", si(energy_j, "J"));
     rows.same("photons sent", "E/(h nu)", sent, decibels(energy_j / photon_j));
