@@ -6,6 +6,7 @@
 mod banded;
 mod map_bound;
 mod posterior;
+mod secondary;
 pub(crate) mod trial;
 
 use crate::cost::measured;
@@ -15,6 +16,7 @@ use fixtures::failure::{Failure, Outcome};
 use fixtures::pair::{PairCase, PairScan};
 use map_bound::{MapBound, MapSetting};
 use ndarray::Array2;
+use std::path::PathBuf;
 use trial::{FitTrial, RADIUS_M};
 use wakescope_estimate::vortex_fit::{
     CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
@@ -58,6 +60,16 @@ pub(crate) struct Options {
     /// Radius of the regions of the maps, m.
     #[arg(long, default_value_t = RADIUS_M)]
     radius_m: f64,
+    /// Of none of these pairs, but of pairs with secondary vortices and without, and of a simulated wake: which scans show such vortices, and how far
+    /// fits with them and without are from the truth.
+    #[arg(long, conflicts_with_all = ["maps_only", "signals_only", "known_core", "widths", "map_bound"])]
+    secondary: bool,
+    /// Folder of a simulated wake, which alone is scanned; without it also the stored one.
+    #[arg(long, requires = "secondary")]
+    wake: Option<PathBuf>,
+    /// Ages of the simulated wake.
+    #[arg(long, requires = "secondary", value_delimiter = ',', default_values_t = [1.0, 2.5, 4.0])]
+    tau: Vec<f64>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -176,6 +188,9 @@ fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation:
 }
 
 pub(crate) fn run(options: &Options) -> Outcome {
+    if options.secondary {
+        return secondary::run(options);
+    }
     let (case, circulation) = match options.case {
         Case::Figures => (PairCase::FIGURES, Sharing::Common),
         Case::Low => (PairCase::LOW, Sharing::Separate),

@@ -1,0 +1,299 @@
+//! Which scans show secondary vortices, and how far fits of a pair and of all four are then from the truth.
+//!
+//! Maps of means over gates with white errors, each with its own pair, with secondary vortices and without; scans of such a pair and of a
+//! simulated wake through the whole chain, whose velocities are peaks of spectra. No rule was chosen on these draws.
+
+use super::Options;
+use crate::statistics::{Estimate, mean};
+use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
+use ndarray::Array2;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rand_xoshiro::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+use std::ops::Range;
+use std::path::Path;
+use wakescope_estimate::retrieval::{
+    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan, with_secondary_vortices,
+};
+use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};
+use wakescope_sim::Silent;
+use wakescope_sim::plan::{Plan, Target};
+use wakescope_sim::retrieve::RetrievalRow;
+use wakescope_sim::scene::{
+    Flow, Outside, Retrieval, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference, VortexLines, VortexPair,
+};
+
+/// The middle of the wakes \[m\].
+const MIDDLE_M: f64 = 400.0;
+/// Standard deviation of the weight of gates that do not show cores \[m\], as `retrieve` has it.
+const LONG_GATE_M: f64 = 3.0;
+
+/// Maps of one kind.
+struct Kind {
+    name: &'static str,
+    profile: CoreProfile,
+    shown: bool,
+    /// Of the vortices, and of their spacing \[m\].
+    height_m: Range<f64>,
+    spacing_m: Range<f64>,
+    /// Standard deviation of the weight of gates, and their distance \[m\].
+    gate_m: (f64, f64),
+    /// Standard deviation of the velocities \[m/s\].
+    noise_m_s: f64,
+    /// How long a scan takes \[s\].
+    lasts_s: f64,
+}
+
+/// Pairs where the ground does not matter, near it, and driven apart by it.
+const STANDING: Kind = Kind {
+    name: "high pairs, points",
+    profile: CoreProfile::Algebraic,
+    shown: false,
+    height_m: 40.0..60.0,
+    spacing_m: 38.0..56.0,
+    gate_m: (0.0, 5.0),
+    noise_m_s: 0.5,
+    lasts_s: 0.0,
+};
+const LOW: Kind = Kind { height_m: 15.0..30.0, spacing_m: 36.0..50.0, noise_m_s: 0.15, ..STANDING };
+const APART: Kind = Kind { height_m: 24.0..42.0, spacing_m: 50.0..90.0, noise_m_s: 0.3, shown: true, ..STANDING };
+const KINDS: [Kind; 9] = [
+    STANDING,
+    Kind { name: "high pairs that move, gates 10 m", gate_m: (10.0, 6.0), lasts_s: 6.0, ..STANDING },
+    Kind { name: "low pairs, gates 4 m", gate_m: (4.0, 6.0), ..LOW },
+    Kind { name: "low Lamb-Oseen pairs, gates 4 m", profile: CoreProfile::LambOseen, gate_m: (4.0, 6.0), ..LOW },
+    Kind { name: "low Lamb-Oseen pairs, gates 14 m", profile: CoreProfile::LambOseen, gate_m: (14.0, 6.0), ..LOW },
+    Kind { name: "secondary vortices, gates 8 m", gate_m: (8.0, 6.0), ..APART },
+    Kind { name: "secondary vortices, gates 14 m", gate_m: (14.0, 6.0), ..APART },
+    Kind { name: "secondary vortices, Lamb-Oseen, 8 m", profile: CoreProfile::LambOseen, gate_m: (8.0, 6.0), ..APART },
+    Kind { name: "secondary vortices that move, 14 m", gate_m: (14.0, 6.0), lasts_s: 6.0, ..APART },
+];
+
+/// What is told of one vortex: errors of the mean circulation \[%\] and in deviations, and of the lateral place \[m\].
+#[derive(Clone, Copy)]
+struct Errors {
+    circulation: f64,
+    deviations: f64,
+    lateral_m: f64,
+}
+
+/// Both vortices of one scan, fitted as a pair, and as the program does with so many.
+struct Scan {
+    shown: bool,
+    /// Fitted as a pair and with secondary vortices, whether the scan shows them or not; empty where a vortex was not found.
+    fits: [Vec<Errors>; 2],
+}
+
+impl Scan {
+    /// What the program gives by itself.
+    fn by_rule(&self) -> &[Errors] {
+        &self.fits[usize::from(self.shown)]
+    }
+}
+
+/// Numbers that are the same for one seed.
+struct Draw(Xoshiro256PlusPlus);
+
+impl Draw {
+    fn within(&mut self, range: &Range<f64>) -> f64 {
+        range.start + (range.end - range.start) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * (1.0 - self.within(&(0.0..1.0))).ln()).sqrt();
+        radius * (TAU * self.within(&(0.0..1.0))).cos()
+    }
+
+    /// A pair, and the secondary vortices that belong to it: outside and above, as the ground makes them.
+    fn air(&mut self, height_m: &Range<f64>, spacing_m: &Range<f64>) -> (Wake, [Vortex; 2]) {
+        let (circulation_m2_s, spacing_m) = (self.within(&(250.0..550.0)), self.within(spacing_m));
+        let (height_m, core_radius_m) = (self.within(height_m), self.within(&(2.0..4.5)));
+        let mut sides = [-1.0, 1.0].map(|side| {
+            let own = Vortex {
+                circulation_m2_s: circulation_m2_s * self.within(&(0.9..1.1)),
+                lateral_position_m: MIDDLE_M + 0.5 * side * spacing_m,
+                height_m: height_m * self.within(&(0.9..1.1)),
+                core_radius_m,
+            };
+            let (away_m, angle) = (own.height_m * self.within(&(0.5..1.1)), self.within(&(0.0..0.4 * PI)));
+            let secondary = Vortex {
+                circulation_m2_s: -own.circulation_m2_s * self.within(&(0.25..0.45)),
+                lateral_position_m: own.lateral_position_m + side * away_m * angle.cos(),
+                height_m: own.height_m + away_m * angle.sin(),
+                core_radius_m: own.height_m * self.within(&(0.08..0.16)),
+            };
+            (own, secondary)
+        });
+        let [(left, a), (right, b)] = &mut sides;
+        let (lateral_wind_m_s, wind_shear_per_s) = (self.within(&(-4.0..4.0)), self.within(&(-0.02..0.02)));
+        (Wake { left: *left, right: *right, lateral_wind_m_s, wind_shear_per_s }, [*a, *b])
+    }
+}
+
+/// One map, fitted as `retrieve` fits that of any instrument. Nothing where it does not show a pair.
+fn of_map(kind: &Kind, seed: u64) -> Result<Option<Scan>, Failure> {
+    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
+    let (truth, secondary) = draw.air(&kind.height_m, &kind.spacing_m);
+    let elevation_rad: Vec<f64> = (0..60).map(|i| 0.01 + 0.003 * f64::from(i)).collect();
+    let range_m: Vec<f64> =
+        (0..).map(|i| MIDDLE_M - 110.0 + kind.gate_m.1 * f64::from(i)).take_while(|r| *r < MIDDLE_M + 110.0).collect();
+    let size = (elevation_rad.len(), range_m.len());
+    let mut map = ScanMap {
+        time_s: (0..size.0).map(|i| kind.lasts_s * i as f64 / (size.0 - 1) as f64).collect(),
+        elevation_rad,
+        range_m,
+        velocity_m_s: Array2::zeros(size),
+        sigma_m_s: Some(Array2::from_elem(size, kind.noise_m_s)),
+        fold_m_s: None,
+    };
+    let gate = if kind.gate_m.0 > 0.0 { Gate::Gaussian { std_m: kind.gate_m.0 } } else { Gate::Point };
+    let core_prior = (kind.gate_m.0 > LONG_GATE_M).then_some(CorePrior::TYPICAL);
+    let options = RetrievalOptions { gate, core_prior, ..RetrievalOptions::default() };
+    let mut air = options.clone();
+    air.model.profile = kind.profile;
+    air.model.secondary = kind.shown.then_some(secondary);
+    map.velocity_m_s = expected_velocities(&map, &air, &truth, kind.lasts_s > 0.0)?;
+    map.velocity_m_s.mapv_inplace(|v| v + kind.noise_m_s * draw.normal());
+    let pair = fit_scan(&map, &options)?;
+    let with = |secondary| with_secondary_vortices(&map, &RetrievalOptions { secondary, ..options.clone() }, &pair);
+    let shown = with(Secondary::Never)?.is_some();
+    let four = with(Secondary::Always)?.map_or_else(|| pair.clone(), |(four, _)| four);
+    let errors = |found: &ScanResult| -> Vec<Errors> {
+        let Some(wake) = found.wake.filter(|_| found.vortices.len() == 2) else { return Vec::new() };
+        let sides = [(&wake.left, &truth.left), (&wake.right, &truth.right)];
+        let of = |(vortex, (fitted, truth)): (&wakescope_estimate::retrieval::VortexResult, (&Vortex, &Vortex))| {
+            let true_m2_s = truth.circulation_m2_s * kind.profile.mean_5_15(truth.core_radius_m).0;
+            let away_m2_s = vortex.circulation_5_15_m2_s.value - true_m2_s;
+            Errors {
+                circulation: 100.0 * away_m2_s / true_m2_s,
+                deviations: away_m2_s / vortex.circulation_5_15_m2_s.std,
+                lateral_m: fitted.lateral_position_m - truth.lateral_position_m,
+            }
+        };
+        found.vortices.iter().zip(sides).map(of).collect()
+    };
+    let fits = [errors(&pair), errors(&four)];
+    Ok(fits.iter().all(|errors| !errors.is_empty()).then_some(Scan { shown, fits }))
+}
+
+/// Scans of a scene: 10 dB, four pulses a line, gates of 38 m every 9 m.
+fn of_scene(flow: Flow, added_flows: Vec<Flow>, folder: &Path, options: &Options) -> Result<Vec<Scan>, Failure> {
+    let by = |secondary| -> Result<Vec<RetrievalRow>, Failure> {
+        let mut scene =
+            Scene { seed: options.seed, flow: flow.clone(), added_flows: added_flows.clone(), ..Scene::default() };
+        scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
+        (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.02, 0.2);
+        (scene.scan.elevation_step_rad, scene.scan.pulses_per_line) = (2.5e-3, 4);
+        (scene.scan.realisations, scene.scan.outside_flow) = (options.scans as usize, Outside::Mask {});
+        scene.estimator.gate_step_samples = 15;
+        (scene.outputs.flow, scene.outputs.signals) = (false, false);
+        scene.retrieval = Some(Retrieval { secondary, ..Retrieval::default() });
+        let file = SceneFile::parse(&scene.to_toml(), &folder.join("scene.toml"))?;
+        let result = wakescope_sim::run(&Plan::new(file, Target::Run)?, &Silent)?;
+        Ok(result.retrieval.ok_or_else(|| Failure::new("a run without retrievals".into()))?.rows)
+    };
+    let (pair, four) = (by(Secondary::Never)?, by(Secondary::Always)?);
+    let errors = |rows: &[RetrievalRow]| -> Vec<Errors> {
+        let of = |row: &RetrievalRow| {
+            let (found, truth) = (row.found?, row.truth);
+            let away_m2_s = found.circulation_5_15_m2_s.value - truth.circulation_5_15_m2_s;
+            Some(Errors {
+                circulation: 100.0 * away_m2_s / truth.circulation_5_15_m2_s,
+                deviations: away_m2_s / found.circulation_5_15_m2_s.std,
+                lateral_m: found.lateral_position_m.value - truth.lateral_position_m,
+            })
+        };
+        rows.iter().map(of).collect::<Option<_>>().unwrap_or_default()
+    };
+    let name = Flag::SecondaryVortices.name();
+    let scans = pair.chunks(2).zip(four.chunks(2)).map(|(pair, four)| Scan {
+        shown: pair[0].flags.split(' ').any(|flag| flag == name),
+        fits: [errors(pair), errors(four)],
+    });
+    Ok(scans.filter(|scan| scan.fits.iter().all(|errors| !errors.is_empty())).collect())
+}
+
+/// A pair of a scene with secondary vortices, or without.
+fn pair_of_scene(shown: bool, seed: u64) -> (Flow, Vec<Flow>) {
+    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
+    let (height_m, spacing_m) = (if shown { &APART } else { &LOW }).place();
+    let (wake, secondary) = draw.air(height_m, spacing_m);
+    let pair = VortexPair {
+        circulation_m2_s: wake.left.circulation_m2_s,
+        spacing_m: wake.spacing_m(),
+        core_radius_m: wake.left.core_radius_m,
+        height_m: wake.left.height_m,
+        profile: CoreProfile::LambOseen,
+        cross_wind_m_s: wake.lateral_wind_m_s,
+        ..VortexPair::default()
+    };
+    // a line towards +x turns the air to larger y above it, as a left vortex does
+    let lines = VortexLines {
+        nodes_m: secondary
+            .iter()
+            .map(|v| [-1.0, 1.0].map(|x| [x, v.lateral_position_m, v.height_m]).to_vec())
+            .collect(),
+        circulation_m2_s: vec![secondary[0].circulation_m2_s, -secondary[1].circulation_m2_s],
+        core_radius_m: secondary[0].core_radius_m,
+        ..VortexLines::default()
+    };
+    (Flow::VortexPair(pair), if shown { vec![Flow::VortexLines(lines)] } else { Vec::new() })
+}
+
+impl Kind {
+    fn place(&self) -> (&Range<f64>, &Range<f64>) {
+        (&self.height_m, &self.spacing_m)
+    }
+}
+
+/// How often secondary vortices are shown, and how far a pair alone, the rule and four vortices are from the truth.
+fn show(name: &str, scans: &[Scan]) {
+    let shown = scans.iter().filter(|scan| scan.shown).count();
+    println!("{name}: shown by {shown} of {} scans", scans.len());
+    if scans.len() < 2 {
+        return;
+    }
+    let rows: [(&str, &dyn Fn(&Scan) -> Vec<Errors>); 3] = [
+        ("a pair alone", &|scan| scan.fits[0].clone()),
+        ("by the rule", &|scan| scan.by_rule().to_vec()),
+        ("always four", &|scan| scan.fits[1].clone()),
+    ];
+    for (what, of) in rows {
+        let each = |get: fn(&Errors) -> f64| -> Vec<f64> {
+            scans.iter().map(|scan| mean(&of(scan).iter().map(get).collect::<Vec<_>>(), None)).collect()
+        };
+        let bias = Estimate::mean(&each(|e| e.circulation));
+        let root = |get: fn(&Errors) -> f64| mean(&each(get), None).sqrt();
+        println!(
+            "  {what}: Gamma_5-15 {:6.1} +- {:.1} %, root mean square {:5.1} %, {:4.1} deviations; {:4.1} m aside",
+            bias.value,
+            bias.standard_error,
+            root(|e| e.circulation * e.circulation),
+            root(|e| e.deviations * e.deviations),
+            root(|e| e.lateral_m * e.lateral_m)
+        );
+    }
+}
+
+pub(super) fn run(options: &Options) -> Outcome {
+    if options.wake.is_none() {
+        for kind in &KINDS {
+            let of = |scan| of_map(kind, options.seed.wrapping_mul(1 << 20) + u64::from(scan));
+            let scans = (0..options.scans).into_par_iter().map(of).collect::<Result<Vec<_>, Failure>>()?;
+            show(kind.name, &scans.into_iter().flatten().collect::<Vec<_>>());
+        }
+        for (name, shown) in [("peaks, low Lamb-Oseen pair", false), ("peaks, secondary vortices", true)] {
+            let (flow, added) = pair_of_scene(shown, options.seed);
+            show(name, &of_scene(flow, added, &root(), options)?);
+        }
+    }
+    let folder = options.wake.clone().unwrap_or_else(|| root().join("tests/reference/wake"));
+    for &tau in &options.tau {
+        let (planes, motion) = ("plane1".into(), SimulatedMotion::Frozen);
+        let flow = Flow::Simulated(SimulatedFlow { planes, motion, age_tau: Some(tau), ..SimulatedFlow::default() });
+        show(&format!("simulated wake, tau = {tau}"), &of_scene(flow, Vec::new(), &folder, options)?);
+    }
+    Ok(())
+}
