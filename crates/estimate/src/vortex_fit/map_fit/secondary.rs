@@ -10,10 +10,10 @@ use ndarray::{Array1, Array2};
 use std::ops::Range;
 
 use crate::vortex_fit::damped_newton::inverse;
-use crate::vortex_fit::map_fit::cells::{products, scaled};
+use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::Scores;
-use crate::vortex_fit::map_fit::setting::{Linear, Setting};
+use crate::vortex_fit::map_fit::setting::{Linear, Setting, Settled};
 use crate::vortex_fit::wake::core_prior::secondary_ratios;
 use crate::vortex_fit::wake::pair::SECONDARY_CORE_OVER_HEIGHT;
 use crate::vortex_fit::{PARAMETERS, Secondary, Vortex, Wake, WakeModel};
@@ -24,9 +24,10 @@ const RATIOS: (f64, f64) = (-0.8, -0.05);
 const DISTANCES: (f64, f64) = (0.25, 1.5);
 /// Distance of the places of the search over the height of the vortex.
 const GRID_OVER_HEIGHT: f64 = 0.12;
-/// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once.
+/// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once: in the end by what is alike in the residuals
+/// of four vortices, in the search by the residuals of the pair, which are alike where it misses vortices.
 const LEAST_GAIN: f64 = 20.0;
-const LEAST_SEARCHED: f64 = 3.0;
+const LEAST_SEARCHED: f64 = 1.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 6;
 /// What is left of the last step in standard deviations.
@@ -83,7 +84,7 @@ impl Setting<'_, '_> {
         let counted = self.about(&alone, 1.0).alike(&two, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
         let always = self.options.secondary == Secondary::Always;
-        if gain / counted < LEAST_SEARCHED && !always {
+        if gain < LEAST_GAIN.max(LEAST_SEARCHED * counted) && !always {
             return None;
         }
         let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m];
@@ -95,8 +96,8 @@ impl Setting<'_, '_> {
         let four = self.about(&settled.linear, counted);
         let counted = four.alike(p, lines).min(counted);
         let four = self.about(&settled.linear, counted);
-        let of_two = self.about(&alone, counted).log_likelihood(&two, &groups[..groups.len() - NUMBERS]);
-        let gain = (four.log_likelihood(p, &settled.groups) - of_two - of_profile) / counted;
+        let gain =
+            self.gain_of_four((&settled, &alone), &groups[..groups.len() - NUMBERS], counted) - of_profile / counted;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
         let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
@@ -108,6 +109,18 @@ impl Setting<'_, '_> {
         let uncertainty = four.uncertainty(p, &settled.groups, Scores::OfNeighbours { lines }).ok()?;
         let secondary = SecondaryVortices { vortices: model.secondary?, shown, fitted };
         Some(Found { wake, secondary, covariance: uncertainty.covariance(|_| true).ok()? })
+    }
+
+    /// What four vortices gain over the pair in the logarithm of the likelihood, so many velocities counted once. Deviations are the same for both,
+    /// those that four vortices leave: a scale that each fit takes from its own residuals changes by chance, and with it the likelihood of all.
+    fn gain_of_four(&self, (four, pair): (&Settled, &Linear), own: &[Vec<usize>], counted: f64) -> f64 {
+        let expected = &pair.tangent.here.velocity_m_s;
+        let cells = four.linear.cells.iter().filter(|cell| expected[[cell.line, cell.gate]].is_finite());
+        let cells: Vec<Cell> = cells.cloned().collect();
+        let of = |linear: &Linear, groups: &[Vec<usize>]| {
+            self.squares(&linear.tangent, cells.clone(), counted).log_likelihood(&linear.tangent.at, groups)
+        };
+        (of(&four.linear, &four.groups) - of(pair, own)) / counted
     }
 
     /// The vortices of the other sense, one beside each of the pair, that explain most of its residuals by their means over gates if the pair

@@ -64,7 +64,12 @@ impl Setting<'_, '_> {
         if found < needed { Err(Error::TooFewVelocities { found, needed }) } else { Ok(groups) }
     }
 
-    fn squares<'s>(&'s self, prediction: &'s dyn Prediction, cells: Vec<Cell>, counted: f64) -> LeastSquares<'s> {
+    pub(crate) fn squares<'s>(
+        &'s self,
+        prediction: &'s dyn Prediction,
+        cells: Vec<Cell>,
+        counted: f64,
+    ) -> LeastSquares<'s> {
         let (loss, prior) = (self.options.loss, self.options.core_prior);
         LeastSquares { prediction, fold_m_s: None, cells, whitening: None, loss, prior, counted }
     }
