@@ -248,6 +248,9 @@ impl Kind {
     }
 }
 
+/// Some fit of a scan.
+type OfScan = fn(&Scan) -> &[Errors];
+
 /// How often secondary vortices are shown, and how far a pair alone, the rule and four vortices are from the truth.
 fn show(name: &str, scans: &[Scan]) {
     let shown = scans.iter().filter(|scan| scan.shown).count();
@@ -255,11 +258,8 @@ fn show(name: &str, scans: &[Scan]) {
     if scans.len() < 2 {
         return;
     }
-    let rows: [(&str, &dyn Fn(&Scan) -> Vec<Errors>); 3] = [
-        ("a pair alone", &|scan| scan.fits[0].clone()),
-        ("by the rule", &|scan| scan.by_rule().to_vec()),
-        ("always four", &|scan| scan.fits[1].clone()),
-    ];
+    let rows: [(&str, OfScan); 3] =
+        [("a pair alone", |scan| &scan.fits[0]), ("by the rule", Scan::by_rule), ("always four", |scan| &scan.fits[1])];
     for (what, of) in rows {
         let each = |get: fn(&Errors) -> f64| -> Vec<f64> {
             scans.iter().map(|scan| mean(&of(scan).iter().map(get).collect::<Vec<_>>(), None)).collect()
