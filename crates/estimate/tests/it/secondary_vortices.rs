@@ -204,29 +204,6 @@ fn chance_in_the_scale_of_the_residuals_is_no_secondary_vortex() {
     }
 }
 
-/// What a pair misses by far looks like noise that hundreds of neighbours share: secondary vortices are sought all the same.
-#[test]
-fn secondary_vortices_that_a_pair_misses_by_far_are_sought() {
-    let truth = Wake::from_array(&[453.0, 488.0, 359.8, 41.3, 440.2, 35.9, 3.6, 3.6, 2.4, 0.0]);
-    let secondary = |circulation_m2_s, lateral_position_m, height_m| Vortex {
-        circulation_m2_s,
-        lateral_position_m,
-        height_m,
-        core_radius_m: 5.0,
-    };
-    let options = of_gates(8.0);
-    let mut air = options.clone();
-    air.model.secondary = Some([secondary(-183.0, 331.0, 60.0), secondary(-175.0, 459.0, 41.0)]);
-    let map = map_of(&air, &truth, 0.3, 0.0, 1);
-    let pair = fit_scan(&map, &options).unwrap();
-    let (four, _) = with_secondary_vortices(&map, &options, &pair).unwrap().expect("secondary vortices");
-    for (side, truth_m2_s) in [(Side::Left, 453.0), (Side::Right, 488.0)] {
-        let of =
-            |result: &ScanResult| (result.vortex(side).unwrap().circulation_m2_s.value / truth_m2_s - 1.0_f64).abs();
-        assert!(of(&four) < 0.1 && four.has(Flag::SecondaryVortices), "{side:?}: {} {}", of(&pair), of(&four));
-    }
-}
-
 /// The stored scans have no secondary vortices.
 #[test]
 fn stored_scans_show_no_secondary_vortices() {
