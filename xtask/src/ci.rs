@@ -56,7 +56,7 @@ fn steps() -> Result<Vec<Step>, Failure> {
     // Whether each crate can be taken by others: its files, its dependencies with versions; built they are above.
     out.push(plain(
         "package",
-        "cargo package --workspace --exclude xtask --exclude wakescope-tests --no-verify --allow-dirty --quiet".into(),
+        "cargo package --workspace --exclude xtask --exclude fixtures --exclude wakescope-tests --no-verify --allow-dirty --quiet".into(),
     ));
     // This very program: in another profile the workspace would be compiled once more.
     let own = std::env::current_exe()?.display().to_string();

@@ -27,7 +27,6 @@ const GRID_OVER_HEIGHT: f64 = 0.12;
 /// Least gain of the logarithm of the likelihood by both, with velocities that say the same counted once: in the end by what is alike in the residuals
 /// of four vortices, in the search by the residuals of the pair, which are alike where it misses vortices.
 const LEAST_GAIN: f64 = 20.0;
-const LEAST_SEARCHED: f64 = 1.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 6;
 /// What is left of the last step in standard deviations.
@@ -84,7 +83,7 @@ impl Setting<'_, '_> {
         let counted = self.about(&alone, 1.0).alike(&two, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
         let always = self.options.secondary == Secondary::Always;
-        if gain < LEAST_GAIN.max(LEAST_SEARCHED * counted) && !always {
+        if gain < LEAST_GAIN.max(counted) && !always {
             return None;
         }
         let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m];
