@@ -52,6 +52,7 @@ pub fn preset_toml(name: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::bound::bound;
     use crate::measure::budget::{Budget, scan_ranges_m};
     use crate::plan::{Plan, Target};
     use crate::run::run;
@@ -97,5 +98,32 @@ mod tests {
         let same = Scene { scan: crate::scene::Scan { elevation_step_rad: 1.25e-3, ..table2.scan }, ..table2 };
         assert_eq!(same, Scene::default());
         assert_eq!(preset_toml("lidar"), None);
+    }
+
+    #[test]
+    fn the_page_tells_how_far_presets_reach() {
+        let page = include_str!("../../../../docs/src/budget.md");
+        for row in rows() {
+            let start = format!("| `{}` |", row[0]);
+            let line = page.lines().rfind(|line| line.starts_with(&start)).unwrap();
+            let cells: Vec<f64> = line.split('|').skip(2).take(3).map(|cell| cell.trim().parse().unwrap()).collect();
+            let mut file = SceneFile::parse(&preset_toml(row[0]).unwrap(), Path::new(row[0])).unwrap();
+            let airs = [(1e-7, 7e-5), (1e-6, 1e-4)];
+            for (reach_km, (backscatter_per_m_sr, extinction_per_m)) in cells[1..].iter().zip(airs) {
+                let air = &mut file.scene.atmosphere;
+                (air.backscatter_per_m_sr, air.extinction_per_m) = (backscatter_per_m_sr, extinction_per_m);
+                let plan = Plan::new(SceneFile::new(file.scene.clone()).unwrap(), Target::Run).unwrap();
+                // The ratio is told to 0.05 dB and the reach to 50 m.
+                let budget = Budget::new(&plan, &[1e3 * reach_km - 51.0, 1e3 * reach_km + 51.0], &Silent).unwrap();
+                let around = budget.snr_db();
+                assert!(around[0] > cells[0] - 0.06 && around[1] < cells[0] + 0.06, "{line}: {around:?}");
+            }
+            let plan = Plan::new(file, Target::Run).unwrap();
+            let root_of_pulses = (plan.scene.scene.scan.pulses_per_line as f64).sqrt();
+            let by_snr = bound(&plan, &Silent).unwrap().by_snr;
+            // The first ratio of whole decibels at which the bound is small enough.
+            let enough = by_snr.iter().find(|p| p.window_m_s <= 0.5 * root_of_pulses).unwrap().snr_db;
+            assert!((enough - 1.06..enough + 0.06).contains(&cells[0]), "{line}: {enough}");
+        }
     }
 }
