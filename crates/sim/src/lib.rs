@@ -34,6 +34,7 @@
 //! | [`retrieve`] | scans of any instrument: circulation, place and core of their vortices |
 //! | [`mod@run`] | running a plan |
 //! | [`mod@write`] | writing the results of a run |
+//! | [`accuracy`] | how accurate a scene's own numbers are, and the cheapest keys for an accuracy |
 //! | [`sweep`] | design studies: many scenes, their results, the Pareto front |
 //! | [`flow`] | simulations of the air: case files, running, outputs |
 //! | [`io`], [`plot`] | file formats, pictures |
@@ -43,6 +44,7 @@
 //! Features, all but the last two on by default: `cli` (the program), `flow` (simulations of the air, with `cli`), `netcdf4` (reading
 //! of NetCDF-4), `plots` (SVG and PNG), `vtk` (fields for ParaView), `mpi` (flows on several machines).
 
+pub mod accuracy;
 pub mod detection;
 #[cfg(feature = "flow")]
 pub mod flow;

@@ -1,8 +1,9 @@
 //! The command line program `wakescope`: words in, files and exit codes out.
 //!
-//! Exit codes: 0 done, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
+//! Exit codes: 0 done, 1 an accuracy that was asked for is out of reach, 2 wrong input or unusable output. Progress, plans and errors go to standard error,
 //! results to standard output; `--json` makes the result one JSON object, and so an error.
 
+mod accuracy;
 mod bound;
 mod budget;
 mod detect;
@@ -89,6 +90,8 @@ enum Command {
     Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
     Sweep(sweep::SweepWords),
+    /// How accurate the numbers of a scene are, and the cheapest keys for an accuracy that is asked for.
+    Accuracy(accuracy::AccuracyWords),
     /// The rows of a table that no other one beats.
     Pareto(sweep::ParetoWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
@@ -140,7 +143,7 @@ pub fn main() -> u8 {
     };
     // All in one pool: forecasts count its threads, and files reuse the memory that the computing freed.
     match with_threads(&cli, || dispatch(&cli)).flatten() {
-        Ok(()) => 0,
+        Ok(code) => code,
         Err(e) => {
             output::complain(&e, cli.json);
             2
@@ -148,8 +151,9 @@ pub fn main() -> u8 {
     }
 }
 
-fn dispatch(cli: &Cli) -> Result<(), Error> {
+fn dispatch(cli: &Cli) -> Result<u8, Error> {
     match &cli.command {
+        Command::Accuracy(words) => return accuracy::accuracy(words, cli),
         Command::Init { scene, force, preset } => init(scene, *force, preset.as_deref(), cli),
         Command::Check(words) => check(words, cli),
         Command::Run(io) => execute(io, Target::Run, cli),
@@ -165,7 +169,8 @@ fn dispatch(cli: &Cli) -> Result<(), Error> {
         Command::Pareto(words) => sweep::pareto(words, cli),
         Command::Flow(words) => ranked::ranked(cli, |ranks| flow::flow(words, cli, ranks)),
         Command::Wake(words) => ranked::ranked(cli, |ranks| wake::wake(words, cli, ranks)),
-    }
+    }?;
+    Ok(0)
 }
 
 fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(), Error> {

@@ -84,6 +84,7 @@ fn is_own_head(name: &str, extension: &str, head: &[u8]) -> bool {
         "png" | "apng" => head.starts_with(b"\x89PNG") && has_source(head),
         "svg" => begins("<svg") && has_source(head),
         "json" => begins("{") && has_source(head),
+        "txt" => begins(NAME),
         "vtr" | "pvd" => begins("<") && has_source(head),
         _ => false,
     }

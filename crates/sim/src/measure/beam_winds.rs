@@ -7,6 +7,7 @@ use crate::io::Table;
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::scene::Pattern;
+use crate::setup::beams::Beam;
 use ndarray::Array2;
 use wakescope_estimate::wind_profile::{fit_wind, swing};
 
@@ -47,8 +48,7 @@ pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<Bea
     let g = &plan.geometry;
     let mut out = Vec::with_capacity(g.schedule.sweeps.len() * map.range_m.len());
     for sweep in 0..g.schedule.sweeps.len() {
-        let lines: Vec<usize> = (0..g.schedule.lines.len()).filter(|i| g.schedule.lines[*i].sweep == sweep).collect();
-        let beams: Vec<_> = lines.iter().map(|line| g.schedule.middle(*line)).collect();
+        let (lines, beams) = beams_of(plan, sweep);
         let direction: Vec<[f64; 3]> = beams.iter().map(|beam| beam.direction.0).collect();
         let count = beams.len().max(1) as f64;
         let after_s = beams.iter().map(|beam| beam.time_s).sum::<f64>() / count;
@@ -78,6 +78,38 @@ pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<Bea
         }
     }
     Ok(Some(out))
+}
+
+/// The lines of a sweep, and the beams in the middle of their pulses.
+fn beams_of(plan: &Plan, sweep: usize) -> (Vec<usize>, Vec<Beam>) {
+    let schedule = &plan.geometry.schedule;
+    let lines = (0..schedule.lines.len()).filter(|i| schedule.lines[*i].sweep == sweep);
+    lines.map(|line| (line, schedule.middle(line))).unzip()
+}
+
+/// Wind (u, v, w) of radial velocities \[line, gate\], m/s, averaged over sweeps and ranges; none of scans whose beams tell none.
+///
+/// # Errors
+/// As [`beam_winds`].
+pub(crate) fn mean_wind_m_s(plan: &Plan, velocity_m_s: &Array2<f64>) -> Result<Option<[f64; 3]>, Error> {
+    let pattern = &plan.scene.scene.scan.pattern;
+    if !matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
+        return Ok(None);
+    }
+    let (mut sum, mut count) = ([0.0; 3], 0.0);
+    for sweep in 0..plan.geometry.schedule.sweeps.len() {
+        let (lines, beams) = beams_of(plan, sweep);
+        let direction: Vec<[f64; 3]> = beams.iter().map(|beam| beam.direction.0).collect();
+        for gate in velocity_m_s.columns() {
+            let seen: Vec<f64> = lines.iter().map(|line| gate[*line]).collect();
+            let (wind, _) = wind_of(pattern, &direction, &seen)?;
+            if wind.iter().all(|part| part.is_finite()) {
+                sum.iter_mut().zip(wind).for_each(|(sum, part)| *sum += part);
+                count += 1.0;
+            }
+        }
+    }
+    Ok(Some(sum.map(|sum| sum / count)))
 }
 
 /// Wind of radial velocities, m/s, and what they tell of its standard deviations.

@@ -40,6 +40,8 @@ pub struct Scanner<'a> {
     efficiency: Option<LayerEfficiency>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
     previous: Option<Vec<LineOfSight>>,
+    /// The realisation of the scene with which it begins.
+    first: usize,
 }
 
 impl<'a> Scanner<'a> {
@@ -88,7 +90,13 @@ impl<'a> Scanner<'a> {
             DetectorSignal::Baseband => Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?,
         };
         let previous = previous_air(plan, &lines)?;
-        Ok(Self { plan, simulator, returns, lines, backscatter_per_m_sr, spread_m_s, efficiency, previous })
+        Ok(Self { plan, simulator, returns, lines, backscatter_per_m_sr, spread_m_s, efficiency, previous, first: 0 })
+    }
+
+    /// The same that begins with a later realisation of the scene: what was made before it is not made again.
+    #[must_use]
+    pub(crate) fn beginning_with(self, first: usize) -> Self {
+        Self { first, ..self }
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
@@ -198,7 +206,7 @@ impl<'a> Scanner<'a> {
         observer: &dyn Observer,
     ) -> Result<(Array2<T>, Clipped), Error> {
         let schedule = &self.plan.geometry.schedule;
-        let index = |key: PulseKey| realisation * self.pulses() + pulses.start + key.pulse;
+        let index = |key: PulseKey| (self.first + realisation) * self.pulses() + pulses.start + key.pulse;
         let (airs, air_of) = self.airs_of_pulses(&pulses)?;
         let scan = Scan {
             simulator: &self.simulator,

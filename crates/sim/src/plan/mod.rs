@@ -13,7 +13,7 @@ use std::ops::Deref;
 use std::sync::Arc;
 
 mod ambiguity;
-mod coverage;
+pub(crate) mod coverage;
 mod fastest;
 mod file_limits;
 mod files;
@@ -25,7 +25,7 @@ mod schedule;
 mod sizes;
 mod stage;
 mod stages;
-mod time;
+pub(crate) mod time;
 pub(crate) mod units;
 
 pub use crate::setup::progress::Stage;
@@ -43,6 +43,8 @@ pub struct Plan {
     pub stages: Vec<PlannedStage>,
     /// Computing time on one core, s, to a factor of two.
     pub core_s: f64,
+    /// The same by what takes it.
+    pub(crate) times: time::Times,
     /// Largest radial velocity of the air on the lines of sight, seen from the lidar, m/s.
     pub fastest_m_s: f64,
     /// What the user should know before the run.
@@ -79,9 +81,9 @@ impl Plan {
             optics::stages(&setup.scene, &setup.instrument, target, &setup.geometry, &mut warnings)?;
         let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
         let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
-        let core_s = time::core_s(scene, target, &sizes, optics_s);
+        let times = time::times(scene, target, &sizes, optics_s);
         let fastest_m_s = fastest::fastest_m_s(&setup)?;
-        let mut plan = Self { setup, target, stages, core_s, fastest_m_s, warnings };
+        let mut plan = Self { setup, target, stages, core_s: times.total_s(), times, fastest_m_s, warnings };
         plan.warnings.splice(0..0, plan.of_fast_air());
         if plan.runs(Stage::Estimates) {
             plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);

@@ -6,8 +6,28 @@ use super::sizes::Sizes;
 use super::stage::Target;
 use crate::scene::{Flow, Method, RegionRadius, RetrievalMethod, Scene};
 
-/// Time of a run whose optics take `optics_s`, s.
-pub(super) fn core_s(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> f64 {
+/// Time of a run by what takes it, s.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Times {
+    /// Phase screens and quadratures.
+    pub(crate) optics_s: f64,
+    /// The records of all realisations.
+    pub(crate) signals_s: f64,
+    /// Estimates, their errors, and the files of them.
+    pub(crate) maps_s: f64,
+    /// Vortices of every realisation.
+    pub(crate) retrieval_s: f64,
+}
+
+impl Times {
+    /// Of the whole, s: at least that of small files.
+    pub(crate) fn total_s(&self) -> f64 {
+        0.01 + self.optics_s + self.signals_s + self.maps_s + self.retrieval_s
+    }
+}
+
+/// Times of a run whose optics take `optics_s`, s.
+pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> Times {
     let wind_of = |flow: &Flow| match flow {
         Flow::Simulated(_) | Flow::Fields(_) => 4e-7,
         Flow::VortexLines(lines) => 4e-8 * lines.nodes_m.len() as f64,
@@ -20,8 +40,7 @@ pub(super) fn core_s(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) ->
     let signals_s = n.realisations * (n.records * record_s + airs * n.layers * wind_s) + kept_s;
     let maps_s = if matches!(target, Target::Run | Target::Map) { maps_s(scene, n) } else { 0.0 };
     let retrieval_s = if target == Target::Run { retrieval_s(scene, n, record_s) } else { 0.0 };
-    // At least that of small files.
-    0.01 + optics_s + signals_s + maps_s + retrieval_s
+    Times { optics_s, signals_s, maps_s, retrieval_s }
 }
 
 /// Estimates, their errors, and the files of them.

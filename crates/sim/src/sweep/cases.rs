@@ -384,7 +384,7 @@ fn text_of(table: &Table) -> String {
 }
 
 /// Sets a key, with the tables above it where they are missing.
-fn set(table: &mut Table, path: &str, value: Value) {
+pub(crate) fn set(table: &mut Table, path: &str, value: Value) {
     let (head, rest) = path.split_once('.').map_or((path, None), |(head, rest)| (head, Some(rest)));
     match rest {
         None => drop(table.insert(head.into(), value)),

@@ -16,7 +16,7 @@ use wakescope_estimate::vortex_fit::{
 };
 
 /// What fits and bound need of a case whose flow is a pair.
-pub(super) struct Retrieval<'p> {
+pub(crate) struct Retrieval<'p> {
     plan: &'p Plan,
     pair: VortexPair,
     response: SceneResponse,
@@ -26,7 +26,7 @@ pub(super) struct Retrieval<'p> {
 impl<'p> Retrieval<'p> {
     /// For a case; nothing where the flow is no pair that turns, or one behind its aircraft, the lines are not one still sweep across
     /// the flight, or the pulse is no Gaussian without chirp.
-    pub(super) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
+    pub(crate) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
         let scene = &plan.scene.scene;
         let Flow::VortexPair(pair) = scene.flow else { return None };
         let lines = &plan.geometry.schedule;
@@ -48,9 +48,14 @@ impl<'p> Retrieval<'p> {
 
     /// Fits the velocities of a map, m/s; nothing where it is not known what the estimator shows of a wake.
     pub(super) fn add(&mut self, velocity_m_s: &Array2<f64>) {
-        let shown = self.response.shown(self.pair.lateral_position_m);
-        let found = shown.map(|shown| self.fit(velocity_m_s, &shown).unwrap_or(f64::NAN));
+        let found = self.circulation_m2_s(velocity_m_s);
         self.circulations_m2_s.extend(found);
+    }
+
+    /// The circulation that the velocities of a map, m/s, have; NaN where the fit came to no end, nothing where none can be tried.
+    pub(crate) fn circulation_m2_s(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
+        let shown = self.response.shown(self.pair.lateral_position_m);
+        shown.map(|shown| self.fit(velocity_m_s, &shown).unwrap_or(f64::NAN))
     }
 
     fn fit(&self, velocity_m_s: &Array2<f64>, shown: &EstimatorResponse<'_>) -> Option<f64> {

@@ -126,7 +126,7 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
     for group in groups(due.iter().map(|case| &case.scene)) {
         let planned = |&place: &usize| {
             let case: &'s Case = due[place];
-            Ok((case, plan(&case.scene, &winds).map_err(|e| sweep.failed(case, 0, e))?))
+            Ok((case, plan(&case.scene, Target::Map, &winds).map_err(|e| sweep.failed(case, 0, e))?))
         };
         for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
             let begun = Instant::now();
@@ -160,12 +160,42 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
 /// # Errors
 /// What a plan refuses; a scene that cannot be run.
 pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
-    let (winds, known) = (Known::default(), Efficiencies::default());
-    let mut out: Vec<(usize, (Plan, VelocityEstimates))> = Vec::with_capacity(scenes.len());
+    measured(scenes, 0, &Common::default(), observer, |_, _, map| Ok(map))
+}
+
+/// Winds and efficiencies that scenes have in common, whenever they are measured.
+#[derive(Debug, Default)]
+pub(crate) struct Common {
+    winds: Known<SceneWind>,
+    efficiencies: Efficiencies,
+}
+
+impl Common {
+    /// The plan of a scene with a wind that others may share.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub(crate) fn plan(&self, scene: &SceneFile, target: Target) -> Result<Plan, Error> {
+        plan(scene, target, &self.winds)
+    }
+}
+
+/// [`maps()`] that begin with the realisation `first` of the scenes, each as `finish` takes it.
+pub(crate) fn measured<T>(
+    scenes: &[SceneFile],
+    first: usize,
+    common: &Common,
+    observer: &dyn Observer,
+    mut finish: impl FnMut(&Plan, &Scanner<'_>, VelocityEstimates) -> Result<T, Error>,
+) -> Result<Vec<(Plan, T)>, Error> {
+    let mut out: Vec<(usize, (Plan, T))> = Vec::with_capacity(scenes.len());
     for places in groups(scenes.iter()) {
-        let plans: Vec<Plan> = places.iter().map(|&i| plan(&scenes[i], &winds)).collect::<Result<_, _>>()?;
-        let scanner = Scanner::with(&plans[0], &known, observer)?;
+        let plans: Vec<Plan> =
+            places.iter().map(|&i| common.plan(&scenes[i], Target::Map)).collect::<Result<_, _>>()?;
+        let scanner = Scanner::with(&plans[0], &common.efficiencies, observer)?.beginning_with(first);
         let found = map::of_plans(&plans.iter().collect::<Vec<_>>(), &scanner, observer, |_, _| ())?;
+        let found = plans.iter().zip(found).map(|(plan, map)| finish(plan, &scanner, map));
+        let found: Vec<T> = found.collect::<Result<_, _>>()?;
         out.extend(places.into_iter().zip(plans.into_iter().zip(found)));
     }
     out.sort_by_key(|(place, _)| *place);
@@ -175,7 +205,7 @@ pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, 
 /// Plans every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
 fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<Vec<f64>, Error> {
     let checked = |case: &Case| -> Result<f64, Error> {
-        let plan = plan(&case.scene, winds)?;
+        let plan = plan(&case.scene, Target::Map, winds)?;
         if !allow_large {
             plan.fits()?;
         }
@@ -187,10 +217,10 @@ fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<V
 }
 
 /// The plan of a scene, with a wind that others may share.
-fn plan(scene: &SceneFile, winds: &Known<SceneWind>) -> Result<Plan, Error> {
+fn plan(scene: &SceneFile, target: Target, winds: &Known<SceneWind>) -> Result<Plan, Error> {
     let cause = hash_of(&format!("{:?}", (&scene.scene.flow, &scene.scene.added_flows, &scene.folder)));
     let wind = winds.of(cause, || SceneWind::new(scene))?;
-    Plan::with_wind(scene.clone(), Target::Map, wind)
+    Plan::with_wind(scene.clone(), target, wind)
 }
 
 /// Places of the scenes with the same signals: those that differ in what is done with the records alone.

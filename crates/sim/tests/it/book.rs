@@ -150,6 +150,7 @@ fn options_that_pages_name_exist() {
     let help = |words: &[&str]| String::from_utf8(wakescope(temp.path(), words).stdout).unwrap();
     let commands = [
         "init",
+        "accuracy",
         "check",
         "run",
         "efficiency",

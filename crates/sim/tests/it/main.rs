@@ -4,6 +4,8 @@
 #![allow(clippy::unwrap_used)]
 
 #[cfg(all(feature = "cli", feature = "plots"))]
+mod accuracy;
+#[cfg(all(feature = "cli", feature = "plots"))]
 mod book;
 #[cfg(feature = "cli")]
 mod cli;

@@ -1,0 +1,178 @@
+//! How accurate a scene's own numbers are, and the cheapest keys for an accuracy that is asked for.
+//!
+//! | module | what is in it |
+//! |---|---|
+//! | [`figures`] | the figures that a run writes, and their shifts between settings |
+//! | [`keys`] | keys that trade error for time |
+//! | [`ladder`] | values of a key from fine to coarse, verdicts, the choice |
+//! | `paths` | what phase screens do to the efficiency |
+//! | `search`, `verify` | the search; the choice as a whole; realisations |
+//! | `report`, `pictures` | the answer as text, table and scene; drawn |
+
+pub mod figures;
+pub mod keys;
+pub mod ladder;
+mod paths;
+#[cfg(feature = "plots")]
+mod pictures;
+mod report;
+mod search;
+mod verify;
+
+use crate::Error;
+use crate::plan::Plan;
+use crate::scene::{Pattern, SceneFile};
+use crate::setup::efficiency_model::model;
+use crate::setup::progress::Observer;
+use figures::{Figure, Shift};
+use ladder::Ladder;
+use wakescope_optics::plan::Model;
+
+/// What is asked for.
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "cli", derive(clap::Args))]
+pub struct Request {
+    /// Largest relative error of each figure, two standard errors included, such as 3%.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "PART", value_parser = part))]
+    pub within: f64,
+    /// Figures to be judged; all that a run of the scene writes without it, circulation where the scene has a retrieval.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "FIGURE,...", value_delimiter = ',', value_enum))]
+    pub of: Vec<Figure>,
+    /// What the search may take, and a run that it proposes: so many times the scene's own run.
+    #[cfg_attr(feature = "cli", arg(long, value_name = "RUNS", default_value = "10", value_parser = budget))]
+    pub budget: f64,
+}
+
+impl Request {
+    /// Of these figures, all where there are none, within a budget of ten runs.
+    #[must_use]
+    pub fn new(within: f64, of: &[Figure]) -> Self {
+        Self { within, of: of.to_vec(), budget: 10.0 }
+    }
+
+    /// The figures that are judged, in the order of tables.
+    ///
+    /// # Errors
+    /// One that the scene does not have.
+    fn figures(&self, own: &Plan) -> Result<Vec<Figure>, Error> {
+        let scene = &own.scene.scene;
+        let tells_winds = matches!(scene.scan.pattern, Pattern::Vad(_) | Pattern::Dbs(_));
+        let is_wind = |figure: &Figure| matches!(figure, Figure::U | Figure::V | Figure::W);
+        if let Some(figure) = self.of.iter().find(|figure| is_wind(figure) && !tells_winds) {
+            let reason = format!("{} is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone", figure.name());
+            return Err(Error::Input { path: "--of".into(), reason });
+        }
+        let has = |figure: &Figure| match figure {
+            Figure::Efficiency => model(scene) == Model::MonteCarlo,
+            Figure::Bias | Figure::Std | Figure::Rms => true,
+            Figure::U | Figure::V | Figure::W => tells_winds,
+            Figure::Circulation => scene.retrieval.is_some() || !self.of.is_empty(),
+        };
+        let is_asked = |figure: &Figure| self.of.is_empty() || self.of.contains(figure);
+        Ok(Figure::ALL.into_iter().filter(|figure| has(figure) && is_asked(figure)).collect())
+    }
+}
+
+/// A relative error, such as 3% or 0.03.
+#[cfg(feature = "cli")]
+fn part(text: &str) -> Result<f64, String> {
+    let number = match text.trim().strip_suffix('%') {
+        Some(percent) => percent.trim().parse::<f64>().map(|percent| 0.01 * percent),
+        None => text.trim().parse(),
+    };
+    let allowed = "from 0.001% to 50%, such as 3% or 0.03";
+    number.ok().filter(|part| (1e-5..=0.5).contains(part)).ok_or_else(|| allowed.into())
+}
+
+#[cfg(feature = "cli")]
+fn budget(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse::<f64>().ok().filter(|runs| (1.0..=1e6).contains(runs));
+    number.ok_or_else(|| "from 1 to 1000000 runs of the scene".into())
+}
+
+/// What the noise of a figure asks for.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Noise {
+    /// The figure.
+    pub figure: Figure,
+    /// The key of the realisations that average it.
+    pub key: &'static str,
+    /// Two standard errors over the value with the scene's own realisations.
+    pub now: f64,
+    /// Realisations that leave the target beside the keys.
+    pub needed: f64,
+    /// Forecast of a run with them, s of one core.
+    pub forecast_s: f64,
+    /// Error that a run for the whole budget has.
+    pub of_budget: f64,
+    /// Whether such a run is within the budget.
+    pub is_reached: bool,
+}
+
+/// The choice as a whole with another seed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Verified {
+    /// The seed.
+    pub seed: u64,
+    /// Predicted and found shift of each figure; none where nothing is coarser than the finest setting.
+    pub rows: Vec<(Figure, f64, Shift)>,
+    /// Whether all are within the target, two standard errors included.
+    pub is_confirmed: bool,
+}
+
+/// The answer.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Accuracy {
+    /// Hash of the scene.
+    pub of_scene: String,
+    /// Target, a relative error.
+    pub within: f64,
+    /// Forecast of the scene's own run without pictures, s of one core.
+    pub own_s: f64,
+    /// Realisations of it.
+    pub own_realisations: usize,
+    /// Forecast of what the search did, s of one core.
+    pub spent_s: f64,
+    /// What it took, s.
+    pub took_s: f64,
+    /// The budget, s of one core.
+    pub allowed_s: f64,
+    /// Realisations of the pilot.
+    pub pilot: usize,
+    /// The figures that are judged.
+    pub figures: Vec<Figure>,
+    /// All keys with their values.
+    pub ladders: Vec<Ladder>,
+    /// Shift of figures of the map for that of the efficiency.
+    pub response: Vec<(Figure, f64)>,
+    /// What noise asks for.
+    pub noises: Vec<Noise>,
+    /// The choice as a whole.
+    pub verified: Verified,
+    /// Whether the budget does not hold what the answer needs.
+    pub is_short: bool,
+    /// What was not done, and why.
+    pub notes: Vec<String>,
+    /// The keys that are chosen.
+    pub values: Vec<(&'static str, f64)>,
+    /// The scene with them.
+    pub scene: SceneFile,
+    /// Forecast of its run without pictures, s of one core.
+    pub run_s: f64,
+}
+
+impl Accuracy {
+    /// The accuracy of a scene.
+    ///
+    /// # Errors
+    /// What the scene refuses; figures that it does not have.
+    pub fn of(file: &SceneFile, request: &Request, observer: &dyn Observer) -> Result<Self, Error> {
+        search::Search::run(file, request, observer)
+    }
+
+    /// Whether a run within the budget has every figure within the target.
+    #[must_use]
+    pub fn is_reached(&self) -> bool {
+        !self.is_short && self.verified.is_confirmed && self.noises.iter().all(|noise| noise.is_reached)
+    }
+}
