@@ -109,13 +109,16 @@ pub struct Noise {
     pub is_reached: bool,
 }
 
+/// A figure with its predicted shift and the one that was found.
+pub type Found = (Figure, f64, Shift);
+
 /// The choice as a whole with another seed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verified {
     /// The seed.
     pub seed: u64,
     /// Predicted and found shift of each figure; none where nothing is coarser than the finest setting.
-    pub rows: Vec<(Figure, f64, Shift)>,
+    pub rows: Vec<Found>,
     /// Whether all are within the target, two standard errors included.
     pub is_confirmed: bool,
 }

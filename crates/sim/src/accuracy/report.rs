@@ -203,7 +203,7 @@ impl Accuracy {
                 section = name.trim_end_matches(']').to_owned();
             }
             let path = line.split_once(" = ").map(|(name, _)| format!("{section}.{name}")).unwrap_or_default();
-            let comment = self.values.iter().find(|(key, _)| *key == path).map(|(key, _)| self.comment(*key));
+            let comment = self.values.iter().find(|(key, _)| *key == path).map(|(key, _)| self.comment(key));
             out += &format!("{line}{}\n", comment.map(|words| format!(" # {words}")).unwrap_or_default());
         }
         Provenance::new(&out, &hash_of(&out), self.scene.scene.seed).scene_file()

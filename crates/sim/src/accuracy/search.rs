@@ -4,12 +4,13 @@
 //! Check: scenes whose keys are known; budgets; the same for any number of threads.
 
 use super::figures::{Figure, Shift, Shown};
-use super::keys::{GRID_POINTS, GRID_SPACING, LAYERS, PADDED, REALISATIONS, WINDOW_STEP, value, with};
+use super::keys::{GRID_POINTS, GRID_SPACING, LAYERS, PADDED, PATHS, REALISATIONS, WINDOW_STEP, value, with};
 use super::ladder::{Ladder, Step, Verdict};
 use super::{Accuracy, Request, paths};
 use crate::Error;
-use crate::plan::{Plan, Target, coverage::empty_gates};
-use crate::scene::{Method, RefractiveTurbulence, Scene, SceneFile, ScreenSampling};
+use crate::measure::efficiencies::Known;
+use crate::plan::{Plan, Target, coverage::empty_gates, time::Times};
+use crate::scene::{Method, RefractiveTurbulence, Scene, SceneFile, ScreenSampling, Turbulence};
 use crate::setup::efficiency_model::{drawn_turbulence, model, signals_cross_screens, turbulence};
 use crate::setup::progress::{Observer, Stage};
 use crate::sweep::{Common, measured};
@@ -29,6 +30,8 @@ pub(super) struct Search<'a> {
     pub(super) request: &'a Request,
     observer: &'a dyn Observer,
     pub(super) common: Common,
+    /// Times of phase screens, s: planning them takes long.
+    screens_s: Known<f64>,
     /// The scene with the finest keys.
     pub(super) fine: SceneFile,
     pub(super) own_s: f64,
@@ -61,6 +64,7 @@ impl<'a> Search<'a> {
             request,
             observer,
             common,
+            screens_s: Known::default(),
             fine: quiet,
             own_s: own.core_s,
             spent_s: 0.0,
@@ -107,15 +111,34 @@ impl<'a> Search<'a> {
         with(&self.fine, &[(key, value)])
     }
 
+    /// The plan of a scene without its phase screens, and the forecast with them: they are planned once for all scenes that have them.
+    pub(super) fn planned(&self, scene: &SceneFile, target: Target) -> Result<(Plan, Times), Error> {
+        let Turbulence::Refractive(screens) = scene.scene.atmosphere.turbulence else {
+            let plan = self.common.plan(scene, target)?;
+            let times = plan.times;
+            return Ok((plan, times));
+        };
+        // In proportion to the realisations.
+        let count = value(&self.fine.scene, PATHS);
+        let one = with(scene, &[(PATHS, count)])?;
+        let cause = format!("{:?}", (one.scene.atmosphere.turbulence, target));
+        let screens_s = self.screens_s.of(cause, || Ok(self.common.plan(&one, target)?.times.optics_s))?;
+        let mut calm = scene.scene.clone();
+        calm.atmosphere.turbulence = Turbulence::None {};
+        let plan = self.common.plan(&scene.with(calm)?, target)?;
+        let times = Times { optics_s: *screens_s * screens.realisations as f64 / count, ..plan.times };
+        Ok((plan, times))
+    }
+
     /// A ladder of scenes with one key changed, until a scene is refused or has gates without windows.
     fn ladder(&self, key: &'static str, now: f64, values: impl IntoIterator<Item = f64>) -> Ladder {
         let mut ladder = Ladder { key, now, steps: Vec::new(), chosen: 0, note: None };
         let mut empty_of_finest = 0.0;
         for value in values {
-            let planned = self.with(key, value).and_then(|scene| self.common.plan(&scene, Target::Run));
-            let found = planned.and_then(|plan| {
+            let planned = self.with(key, value).and_then(|scene| self.planned(&scene, Target::Run));
+            let found = planned.and_then(|(plan, times)| {
                 let empty = empty_gates(&plan.scene.scene, &plan.geometry)? as f64;
-                Ok((plan.core_s, empty / plan.geometry.gate_range_m.len() as f64))
+                Ok((times.total_s(), empty / plan.geometry.gate_range_m.len() as f64))
             });
             let (forecast_s, verdict) = match found {
                 Ok((core_s, lost)) if ladder.steps.is_empty() => {
@@ -172,13 +195,13 @@ impl<'a> Search<'a> {
         let mut sum_s = 0.0;
         let signals = |scene: &Scene| (scene.atmosphere.clone(), scene.pulse_energy_j());
         for (i, scene) in scenes.iter().enumerate() {
-            let plan = self.common.plan(scene, Target::Map)?;
+            let (_, times) = self.planned(scene, Target::Map)?;
             let share = count as f64 / scene.scene.scan.realisations as f64;
             let before = i.checked_sub(1).map(|before| signals(&scenes[before].scene));
             if before != Some(signals(&scene.scene)) {
-                sum_s += share * plan.times.signals_s + if optics { plan.times.optics_s } else { 0.0 };
+                sum_s += share * times.signals_s + if optics { times.optics_s } else { 0.0 };
             }
-            sum_s += share * plan.times.maps_s;
+            sum_s += share * times.maps_s;
         }
         Ok(sum_s)
     }
@@ -234,13 +257,14 @@ impl<'a> Search<'a> {
         let crosses = signals_cross_screens(&self.fine.scene);
         let kept_s = if crosses { self.cost_s(&scenes[..1], LEAST, true)? } else { 0.0 };
         while self.ladders.iter().any(Ladder::is_open) {
-            let more_s = self.cost_s(&scenes, count, false)? + self.cost_s(&scenes[..2], 2 * count, true)?;
+            let half = count / 2;
+            let more_s = self.cost_s(&scenes, half, false)? + self.cost_s(&scenes[..2], count + half, true)?;
             if self.spent_s + more_s + kept_s > self.allowed_s() {
                 break;
             }
-            let more = self.measure(&scenes, count, count)?;
+            let more = self.measure(&scenes, count, half)?;
             shown.iter_mut().zip(more).for_each(|(shown, more)| shown.extend(more));
-            count *= 2;
+            count += half;
             self.judge(&shown, &places);
         }
         Ok(Some(shown.swap_remove(0)))
@@ -290,7 +314,7 @@ impl<'a> Search<'a> {
         }
         let first = pilot.first(LEAST);
         // The screens of the pilot serve.
-        self.spent_s -= self.common.plan(&raised[0], Target::Map)?.times.optics_s;
+        self.spent_s -= self.planned(&raised[0], Target::Map)?.1.optics_s;
         let found = self.measure(&raised, 0, LEAST)?;
         let of = |figure: Figure| (figure, found[0].shift(&first, figure).bound() / RAISED);
         self.response = figures.into_iter().map(of).collect();

@@ -6,7 +6,7 @@ use super::figures::{Figure, Shift, Shown};
 use super::keys::{PATHS, REALISATIONS, value, with};
 use super::ladder::{bound, choose};
 use super::search::Search;
-use super::{Accuracy, Noise, Verified, paths};
+use super::{Accuracy, Found, Noise, Verified, paths};
 use crate::Error;
 use crate::plan::{Plan, Target};
 use crate::scene::{SceneFile, Turbulence};
@@ -30,7 +30,7 @@ impl Search<'_> {
         let (mut of_fine, mut rows) = (None, Vec::new());
         for _ in 0..=BACK {
             // Keys that are good alone may be refused together.
-            while self.chosen(own).and_then(|scene| self.common.plan(&scene, Target::Run)).is_err() {
+            while self.chosen(own).and_then(|scene| self.planned(&scene, Target::Run)).is_err() {
                 let Some((which, place)) = moves.pop() else { break };
                 self.ladders[which].chosen = place;
             }
@@ -56,7 +56,7 @@ impl Search<'_> {
         count: usize,
         seed: u64,
         of_fine: &mut Option<Shown>,
-    ) -> Result<Option<Vec<(Figure, f64, Shift)>>, Error> {
+    ) -> Result<Option<Vec<Found>>, Error> {
         let seeded = |file: &SceneFile| -> Result<SceneFile, Error> {
             Ok(file.with(crate::scene::Scene { seed, ..file.scene.clone() })?)
         };
@@ -137,8 +137,8 @@ impl Search<'_> {
     fn of_paths_s(&self, own: &Plan, count: f64) -> f64 {
         let now = value(&own.scene.scene, PATHS);
         let keys: Vec<(&'static str, f64)> = self.ladders.iter().map(|ladder| (ladder.key, ladder.value())).collect();
-        let planned = with(&self.fine, &keys).and_then(|scene| self.common.plan(&scene, Target::Run));
-        planned.map_or(f64::NAN, |plan| plan.core_s + plan.times.optics_s * (count / now - 1.0))
+        let planned = with(&self.fine, &keys).and_then(|scene| self.planned(&scene, Target::Run));
+        planned.map_or(f64::NAN, |(_, times)| times.total_s() + times.optics_s * (count / now - 1.0))
     }
 
     /// What the noise asks for, and the whole answer.
@@ -150,16 +150,16 @@ impl Search<'_> {
         verified: Verified,
     ) -> Result<Accuracy, Error> {
         let (within, allowed_s) = (self.request.within, self.allowed_s());
-        let chosen = self.common.plan(&self.chosen(&own)?, Target::Run)?;
-        let (now, times) = (chosen.scene.scene.scan.realisations as f64, chosen.times);
+        let chosen = self.chosen(&own)?;
+        let (now, times) = (value(&chosen.scene, REALISATIONS), self.planned(&chosen, Target::Run)?.1);
         let each_s = (times.signals_s + times.maps_s + times.retrieval_s) / now;
-        let fixed_s = chosen.core_s - now * each_s;
+        let fixed_s = times.total_s() - now * each_s;
         let mut noises = Vec::new();
         if let (Some(scatter), true) = (self.scatter, self.figures.contains(&Figure::Efficiency)) {
             let (now, keys) = (value(&own.scene.scene, PATHS), bound(&self.ladders, Figure::Efficiency));
             let needed = (2.0 * scatter / (within - keys)).powi(2).max(paths::LEAST).ceil();
             let forecast_s = self.of_paths_s(&own, needed);
-            let each_s = times.optics_s / value(&chosen.scene.scene, PATHS);
+            let each_s = times.optics_s / value(&chosen.scene, PATHS);
             let most = now + (allowed_s - self.of_paths_s(&own, now)) / each_s;
             noises.push(Noise {
                 figure: Figure::Efficiency,
