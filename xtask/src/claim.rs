@@ -95,7 +95,7 @@ impl Claim {
 
     /// A claim of the list whose parts must all hold by the rule of statistics; those that do not are told first.
     pub(crate) fn judged(id: &str, parts: &[Part]) -> Self {
-        let verdict = |part: &&Part| part.3.verdict(&part.1);
+        let verdict = |part: &&Part| part.3.verdict_among(&part.1, parts.len());
         let mut told: Vec<&Part> = parts.iter().collect();
         told.sort_by_key(|part| std::cmp::Reverse(verdict(part)));
         let words = told.iter().map(|(name, found, unit, _)| {

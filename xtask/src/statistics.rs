@@ -7,8 +7,9 @@
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
-/// Batches into which scans are put, and below which nothing is decided.
+/// Batches below which nothing is decided, and the most into which scans are put: more make Student's factor smaller, to no end.
 pub(crate) const BATCHES: usize = 8;
+pub(crate) const MOST_BATCHES: usize = 24;
 /// Share of a level below which two levels do not differ.
 pub(crate) const NO_DIFFERENCE: f64 = 0.03;
 
@@ -108,12 +109,19 @@ pub(crate) enum Bar {
 
 impl Bar {
     pub(crate) fn verdict(self, of: &Estimate) -> Verdict {
-        let (low, high) = (of.value - of.half_width(), of.value + of.half_width());
+        self.verdict_among(of, 1)
+    }
+
+    /// The same where so many numbers must all hold: each by its own interval, for all holding by chance is rarer than one; that one of
+    /// them fails by chance is not, so it fails by the interval of all.
+    pub(crate) fn verdict_among(self, of: &Estimate, parts: usize) -> Verdict {
+        let ends = |half_width: f64| (of.value - half_width, of.value + half_width);
+        let ((low, high), (lowest, highest)) = (ends(of.half_width()), ends(of.half_width_of(parts)));
         let (holds, fails) = match self {
-            Self::Below(bar) => (high < bar, low > bar),
-            Self::Above(bar) => (low > bar, high < bar),
-            Self::Between(least, most) => (low > least && high < most, high < least || low > most),
-            Self::Less(trifle) => (high < 0.0, low > -trifle),
+            Self::Below(bar) => (high < bar, lowest > bar),
+            Self::Above(bar) => (low > bar, highest < bar),
+            Self::Between(least, most) => (low > least && high < most, highest < least || lowest > most),
+            Self::Less(trifle) => (high < 0.0, lowest > -trifle),
         };
         match (of.freedom + 1.5 > BATCHES as f64, holds, fails) {
             (true, true, _) => Verdict::Pass,
@@ -219,6 +227,9 @@ mod tests {
         for (bar, estimate, verdict) in cases {
             assert_eq!(bar.verdict(&estimate), verdict, "{bar:?} {estimate:?}");
         }
+        // Of four that must hold together one fails beyond the interval of all, and holds beyond its own.
+        let [fails, holds] = [of(1.09, 0.03, 7.0), of(0.92, 0.03, 7.0)].map(|e| Bar::Below(1.0).verdict_among(&e, 4));
+        assert_eq!([fails, holds], [Verdict::Open, Verdict::Pass]);
         // Four times the data halve the interval.
         let estimate = of(0.9, 0.1, 7.0);
         let needed = Bar::Below(1.0).times_the_data(&estimate);

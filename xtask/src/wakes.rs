@@ -26,8 +26,7 @@ const COMPUTED_BY: [&str; 4] = ["crates/les/src", "crates/sim/src/flow", "crates
 pub(crate) const NAME: &str = "wake";
 const STORED: &str = "tests/reference/wake";
 const STORED_TAU: [f64; 4] = [1.0, EARLY_TAU, 4.0, 5.0];
-/// When the claims on surfaces and short waves are decided, and the age that figures 10 to 14 and 25 call early.
-const DECIDED_TAU: f64 = 3.0;
+/// The age that figures 10 to 14 and 25 call early; the claims on surfaces and short waves are decided before.
 const EARLY_TAU: f64 = 2.5;
 /// Folders of the wakes that this process has made: two figures must not run the same one at the same time, nor twice.
 static MADE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
@@ -74,7 +73,7 @@ pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
     let mut case = WakePreset::Coarse.case();
     case.solver.subgrid = Subgrid::MultiscaleWale { constant: None, order: None };
     if let Some(output) = &mut case.wake {
-        (output.end_tau, output.planes_tau) = (DECIDED_TAU, Some(vec![EARLY_TAU]));
+        (output.end_tau, output.planes_tau) = (EARLY_TAU, Some(vec![EARLY_TAU]));
     }
     run(&pictured(case), &context.stages, context.anew)
 }

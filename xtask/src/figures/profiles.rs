@@ -32,7 +32,8 @@ pub(super) struct Profiles {
 }
 
 impl Profiles {
-    pub(super) fn of(method: &'static str, name: &'static str, study: &Study) -> Result<Self, Failure> {
+    /// From a map, with the mean ratio at the vortices.
+    pub(super) fn of(method: &'static str, name: &'static str, snr_db: f64, study: &Study) -> Self {
         let map = &study.map;
         let gate_m = map.range_m[1] - map.range_m[0];
         let bins = (REACH_M / gate_m) as i64;
@@ -57,16 +58,16 @@ impl Profiles {
             across.push((bin as f64 * gate_m, study.zone(&cells)));
         }
         let gates = (0..map.range_m.len()).map(|gate| study.cells(|d, j| d > OUTSIDE_M && j == gate));
-        Ok(Self {
+        Self {
             method,
             name,
             pulse_s: study.plan.scene.scene.pulse_width_s(),
-            snr_db: snr_db(study)?,
+            snr_db,
             inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
             outside: study.zone(&study.cells(|d, _| d > OUTSIDE_M)),
             evolution: gates.filter(|cells| !cells.is_empty()).map(|cells| study.zone(&cells)).collect(),
             across,
-        })
+        }
     }
 
     pub(super) fn title(&self) -> String {
@@ -100,7 +101,7 @@ impl Profiles {
 
     /// How far it is from another method on the same signals in a number that both have.
     pub(super) fn less(&self, other: &Self, of: fn(&Self, Option<usize>) -> f64) -> Estimate {
-        Estimate::of(BATCHES, |without| of(self, without) - of(other, without))
+        Estimate::of(self.inside.batches(), |without| of(self, without) - of(other, without))
     }
 }
 
@@ -113,8 +114,8 @@ fn on_line(points: impl Iterator<Item = [f64; 3]> + Clone, x: f64) -> f64 {
     mean_y + slope * (x - mean_x)
 }
 
-/// Mean signal-to-noise ratio of the scene at the vortices, dB.
-fn snr_db(study: &Study) -> Result<f64, Failure> {
+/// Mean signal-to-noise ratio of the scene at the vortices, dB; the same for all methods on the same signals.
+pub(super) fn snr_db(study: &Study) -> Result<f64, Failure> {
     let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &wakescope_sim::setup::progress::Silent)?;
     let near: Vec<f64> =
         scanner.layer_snr().into_iter().filter(|(r, _)| (350.0..450.0).contains(r)).map(|(_, snr)| snr).collect();

@@ -1,6 +1,7 @@
 //! What figures 10 to 14 and 25 share: scans of the simulated wake or of the analytic pair in batches, regions about the cores.
 
 use super::context::*;
+use crate::statistics::MOST_BATCHES;
 use crate::wakes;
 use std::path::PathBuf;
 use wakescope_les::analysis::decay::value_at;
@@ -207,9 +208,10 @@ impl Study {
 
     /// The errors over some cells.
     pub(super) fn zone(&self, cells: &[(usize, usize)]) -> Zone {
-        let mut of_batch = vec![(0.0, 0.0); BATCHES];
+        let mut of_batch = vec![(0.0, 0.0); self.map.scans.len().min(MOST_BATCHES)];
+        let batches = of_batch.len();
         for (k, scan) in self.map.scans.iter().enumerate() {
-            let (sum, count) = &mut of_batch[k * BATCHES / self.map.scans.len()];
+            let (sum, count) = &mut of_batch[k * batches / self.map.scans.len()];
             for error in cells.iter().map(|cell| scan.error_m_s[*cell]).filter(|error| error.is_finite()) {
                 (*sum, *count) = (*sum + error * error, *count + 1.0);
             }
@@ -236,6 +238,10 @@ impl Zone {
         kept.fold((0.0, 0.0), |sums, (_, of)| (sums.0 + of.0, sums.1 + of.1))
     }
 
+    pub(super) fn batches(&self) -> usize {
+        self.of_batch.len()
+    }
+
     pub(super) fn estimates(&self, without: Option<usize>) -> f64 {
         self.sums(without).1
     }
@@ -247,12 +253,12 @@ impl Zone {
     }
 
     pub(super) fn rms(&self) -> Estimate {
-        Estimate::of(BATCHES, |without| self.rms_m_s(without))
+        Estimate::of(self.batches(), |without| self.rms_m_s(without))
     }
 
     /// How far its error is from that of another on the same scans, as a share of the latter.
     pub(super) fn over(&self, other: &Self) -> Estimate {
-        Estimate::of(BATCHES, |without| self.rms_m_s(without) / other.rms_m_s(without) - 1.0)
+        Estimate::of(self.batches(), |without| self.rms_m_s(without) / other.rms_m_s(without) - 1.0)
     }
 }
 
