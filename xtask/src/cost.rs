@@ -18,10 +18,14 @@ pub(crate) struct Cost {
 }
 
 impl Cost {
-    /// The same for one of `count` equal pieces of work.
-    pub(crate) fn per(self, count: usize) -> Self {
-        let n = count as f64;
-        Self { cpu_s: self.cpu_s / n, wall_s: self.wall_s / n, ..self }
+    /// The same for so much of the work, or for so many times as much.
+    pub(crate) fn scaled(self, factor: f64) -> Self {
+        Self { cpu_s: self.cpu_s * factor, wall_s: self.wall_s * factor, ..self }
+    }
+
+    /// What the rest of it took, beside a part.
+    pub(crate) fn less(self, part: Self) -> Self {
+        Self { cpu_s: self.cpu_s - part.cpu_s, wall_s: self.wall_s - part.wall_s, ..self }
     }
 }
 
@@ -68,7 +72,8 @@ pub(crate) fn fastest<T>(mut work: impl FnMut() -> Result<T, Failure>) -> Result
         return Ok((value, first));
     }
     let times = (TELLABLE_S / first.wall_s.max(1e-6)).ceil().clamp(1.0, 10_000.0) as usize;
-    let mut batch = || measured(|| (0..times).try_for_each(|_| work().map(drop))).map(|((), cost)| cost.per(times));
+    let mut batch =
+        || measured(|| (0..times).try_for_each(|_| work().map(drop))).map(|((), cost)| cost.scaled(1.0 / times as f64));
     let mut cost = if times == 1 { first } else { batch()? };
     for _ in 0..2 {
         let again = batch()?;

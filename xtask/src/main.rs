@@ -14,6 +14,7 @@ mod fit_trials;
 mod forecast;
 mod fuzz_scenes;
 mod histories;
+mod left_out;
 mod process;
 mod profile;
 mod ranks;
@@ -23,6 +24,7 @@ mod regress;
 mod reproduce;
 mod sources;
 mod stability;
+mod stability_maps;
 mod statistics;
 #[cfg(test)]
 #[path = "../../crates/les/src/ranks/threads.rs"]
@@ -56,6 +58,8 @@ enum Task {
     Bless(bless::Options),
     /// Measure error against run time.
     WorkPrecision(work_precision::Options),
+    /// What a scene and a crate do not pay for: runs with and without, crates compiled.
+    LeftOut(left_out::Options),
     /// Fit many scans of a vortex pair: bias, scatter, stated error, bound, competing tops.
     FitTrials(fit_trials::Options),
     /// Run the flows with known answers and draw them beside their references.
@@ -82,6 +86,7 @@ fn main() -> std::process::ExitCode {
         Task::Histories => histories::run(),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
+        Task::LeftOut(options) => left_out::run(&options),
         Task::FitTrials(options) => fit_trials::run(&options),
         Task::Validate(options) => validate::run(&options),
         Task::Forecast(options) => forecast::run(&options),

@@ -1,20 +1,22 @@
-//! `cargo xtask work-precision`: error against run time of solvers, estimators and the whole chain, knob by knob.
+//! `cargo xtask work-precision`: error against run time of solvers, estimators and the whole chain, beside other programs.
 //!
-//! Every row is measured in this run, on one thread; the time is the smallest of three runs, of one beyond 0.2 s. Errors are relative, with their standard
-//! errors; a setting that fails is a row.
+//! Every row of this program is measured in this run, on one thread; the time is the smallest of three runs, of one beyond 0.2 s, and the set-up stands
+//! apart. Errors are relative, with their standard errors; a setting that fails is a row. Other programs come from `docs/peers`.
 
 mod chain;
 mod estimate;
 mod front;
+mod peers;
 mod physics;
+mod report;
 
 use crate::cost::{Cost, machine};
 use crate::workspace::{provenance, root};
 use fixtures::failure::{Failure, Outcome};
 use front::{Measured, cheapest, on_front};
+pub(crate) use report::{picture, text};
 use std::path::PathBuf;
-use wakescope_sim::io::{FileGroup, Table};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_sim::io::{FileGroup, Table, write_atomic};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -28,6 +30,12 @@ pub(crate) struct Options {
     /// Few and coarse settings: a minute instead of many.
     #[arg(long)]
     quick: bool,
+    /// Store the page's text, table and picture in the book.
+    #[arg(long, conflicts_with_all = ["group", "quick"])]
+    store: bool,
+    /// Print only the processor time of the kernel by which times of other machines are scaled.
+    #[arg(long)]
+    kernel: bool,
 }
 
 /// What is measured: the groups and the rows of each, few and coarse ones if asked.
@@ -45,48 +53,71 @@ const TARGETS: [(&str, f64); 3] =
     [("is_cheapest_for_0.1", 0.10), ("is_cheapest_for_0.03", 0.03), ("is_cheapest_for_0.01", 0.01)];
 
 /// What the settings of a knob have in common.
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Knob {
-    case: &'static str,
-    method: &'static str,
+    case: String,
+    method: String,
     knob: &'static str,
     metric: &'static str,
     reference: &'static str,
+}
+
+/// What a setting came to.
+struct Found {
+    /// Relative; NaN where the setting fails.
+    error: f64,
+    /// Zero where the error is exact.
+    standard_error: f64,
+    /// Without the set-up.
+    cost: Cost,
+    /// Processor time of what is done once, whatever the setting \[s\]; zero where it is not told apart.
+    set_up_s: f64,
 }
 
 /// One measurement.
 pub(crate) struct Row {
     knob: Knob,
     value: f64,
-    /// Relative; NaN where the setting fails.
-    error: f64,
-    /// Zero where the error is exact.
-    standard_error: f64,
-    cost: Cost,
+    found: Found,
+    /// Of another program; empty for this one.
+    version: String,
     group: &'static str,
     is_on_front: bool,
     /// For each of the [`TARGETS`].
     is_cheapest: [bool; TARGETS.len()],
 }
 
+impl Found {
+    /// An exact error, all of whose time is told together.
+    fn exact(error: f64, cost: Cost) -> Self {
+        Self { error, standard_error: 0.0, cost, set_up_s: 0.0 }
+    }
+}
+
 impl Knob {
     fn new([case, method, knob, metric, reference]: [&'static str; 5]) -> Self {
-        Self { case, method, knob, metric, reference }
+        Self { case: case.into(), method: method.into(), knob, metric, reference }
     }
 
-    fn row(self, value: f64, (error, standard_error): (f64, f64), cost: Cost) -> Row {
-        Row { knob: self, value, error, standard_error, cost, group: "", is_on_front: false, is_cheapest: [false; 3] }
+    fn row(&self, value: f64, found: Found) -> Row {
+        let version = String::new();
+        Row { knob: self.clone(), value, found, version, group: "", is_on_front: false, is_cheapest: [false; 3] }
     }
 
-    /// A row for each value, the first two alone if `quick`, from the error, its standard error and the cost there.
-    fn rows(
-        self,
-        quick: bool,
-        values: &[f64],
-        measure: impl Fn(f64) -> Result<((f64, f64), Cost), Failure>,
-    ) -> Result<Vec<Row>, Failure> {
-        let one = |value: &f64| measure(*value).map(|(error, cost)| self.row(*value, error, cost));
-        few(values, quick).iter().map(one).collect()
+    /// A row for each value.
+    fn rows(&self, values: &[f64], measure: impl Fn(f64) -> Result<Found, Failure>) -> Result<Vec<Row>, Failure> {
+        values.iter().map(|value| Ok(self.row(*value, measure(*value)?))).collect()
+    }
+}
+
+impl Row {
+    fn is_own(&self) -> bool {
+        self.version.is_empty()
+    }
+
+    fn measured(&self) -> Measured {
+        let Found { error, standard_error, cost, .. } = self.found;
+        Measured { core_s: cost.cpu_s, error, standard_error }
     }
 }
 
@@ -95,19 +126,24 @@ fn few<T>(values: &[T], quick: bool) -> &[T] {
     if quick { &values[..values.len().min(2)] } else { values }
 }
 
-/// The rows of a group or of all, on one thread; each case at a stretch, judged among its own.
+/// The rows of a group or of all, on one thread, with those of other programs; each case at a stretch, this program's judged among their own.
 pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Failure> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
+    let mut others = peers::rows()?;
     let mut all = Vec::new();
     for (name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
         let mut rows = pool.install(|| rows(quick))?;
-        rows.sort_by_key(|row| row.knob.case);
+        let cases: Vec<String> = rows.iter().map(|row| row.knob.case.clone()).collect();
+        rows.extend(others.extract_if(.., |row| cases.contains(&row.knob.case)));
+        // In the order in which they were measured, those of other programs after this program's.
+        rows.sort_by_key(|row| (cases.iter().position(|case| *case == row.knob.case), !row.is_own()));
         for of_case in rows.chunk_by_mut(|a, b| a.knob.case == b.knob.case) {
-            let of = |r: &Row| Measured { core_s: r.cost.cpu_s, error: r.error, standard_error: r.standard_error };
-            let measured: Vec<Measured> = of_case.iter().map(of).collect();
-            of_case.iter_mut().zip(on_front(&measured)).for_each(|(row, is_on)| row.is_on_front = is_on);
+            let own = of_case.iter().filter(|row| row.is_own()).count();
+            let own = &mut of_case[..own];
+            let measured: Vec<Measured> = own.iter().map(Row::measured).collect();
+            own.iter_mut().zip(on_front(&measured)).for_each(|(row, is_on)| row.is_on_front = is_on);
             for (place, (_, target)) in TARGETS.into_iter().enumerate() {
-                cheapest(&measured, target).into_iter().for_each(|best| of_case[best].is_cheapest[place] = true);
+                cheapest(&measured, target).into_iter().for_each(|best| own[best].is_cheapest[place] = true);
             }
         }
         rows.iter_mut().for_each(|row| row.group = name);
@@ -118,43 +154,27 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
 
 /// One row a setting.
 pub(crate) fn table(rows: &[Row]) -> Table {
-    let text = |get: fn(&Knob) -> &'static str| rows.iter().map(move |r| get(&r.knob));
+    let text = |get: fn(&Row) -> &str| rows.iter().map(get);
     let float = |get: fn(&Row) -> f64| rows.iter().map(get);
     let table = Table::new()
-        .text("case", text(|k| k.case))
-        .text("method", text(|k| k.method))
-        .text("knob", text(|k| k.knob))
+        .text("case", text(|r| &r.knob.case))
+        .text("method", text(|r| &r.knob.method))
+        .text("knob", text(|r| r.knob.knob))
         .float("value", float(|r| r.value))
-        .float("error", float(|r| r.error))
-        .text("metric", text(|k| k.metric))
-        .text("reference", text(|k| k.reference))
-        .float("cpu_s", float(|r| r.cost.cpu_s))
-        .float("wall_s", float(|r| r.cost.wall_s))
+        .float("error", float(|r| r.found.error))
+        .text("metric", text(|r| r.knob.metric))
+        .text("reference", text(|r| r.knob.reference))
+        .float("cpu_s", float(|r| r.found.cost.cpu_s))
+        .float("wall_s", float(|r| r.found.cost.wall_s))
         .int("threads", rows.iter().map(|_| 1))
-        .float("peak_mem_bytes", float(|r| r.cost.peak_mem_bytes))
-        .float("standard_error", float(|r| r.standard_error))
-        .text("group", rows.iter().map(|r| r.group))
+        .float("peak_mem_bytes", float(|r| r.found.cost.peak_mem_bytes))
+        .float("standard_error", float(|r| r.found.standard_error))
+        .float("set_up_s", float(|r| r.found.set_up_s))
+        .text("other_version", text(|r| &r.version))
+        .text("group", text(|r| r.group))
         .int("is_on_front", rows.iter().map(|r| r.is_on_front.into()));
     let targets = TARGETS.iter().enumerate();
     targets.fold(table, |table, (k, target)| table.int(target.0, rows.iter().map(|r| r.is_cheapest[k].into())))
-}
-
-/// A panel for each group, in it the front of each case: what no other setting beats in error and in time.
-pub(crate) fn picture(rows: &[Row]) -> Figure {
-    let panel = |of_group: &[Row]| {
-        let axes = (Axis::log("processor time [s]"), Axis::log("relative error"));
-        let mut plot = CurvePlot::new(of_group[0].group, axes.0, axes.1);
-        for of_case in of_group.chunk_by(|a, b| a.knob.case == b.knob.case) {
-            let shown = of_case.iter().filter(|r| r.is_on_front && r.error > 0.0 && r.cost.cpu_s > 0.0);
-            let mut points: Vec<(f64, f64)> = shown.map(|r| (r.cost.cpu_s, r.error)).collect();
-            points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            if !points.is_empty() {
-                plot = plot.with(Series::new(of_case[0].knob.case, Style::LineMarkers, points));
-            }
-        }
-        plot
-    };
-    Figure::stacked(rows.chunk_by(|a, b| a.group == b.group).map(panel))
 }
 
 /// Measures, prints and writes.
@@ -162,20 +182,33 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
 /// # Errors
 /// What a crate refuses, or an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
+    if options.kernel {
+        println!("{:.6}", physics::kernel_s()?);
+        return Ok(());
+    }
     let rows = measure(options.group.as_deref(), options.quick)?;
-    println!("{:<28} {:<34} {:<34} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
-    for Row { knob, value, error, standard_error, cost, .. } in &rows {
+    println!("{:<28} {:<34} {:<24} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
+    for Row { knob, value, found, version, .. } in &rows {
         let Knob { case, method, knob, metric, reference } = knob;
+        let Found { error, standard_error, cost, .. } = found;
         let (error, cost) = (format!("{error:.2e} +- {standard_error:.1e}"), format!("{:.1e} s", cost.cpu_s));
-        println!("{case:<28} {method:<34} {knob:<34} {value:>8} {error:>22} {cost:>10} {metric}, {reference}");
+        let method = format!("{method} {version}");
+        println!("{case:<28} {method:<34} {knob:<24} {value:>8} {error:>22} {cost:>10} {metric}, {reference}");
     }
     let parameters = format!("machine = {:?}\nthreads = 1\nquick = {}\n", machine(), options.quick);
     let origin = provenance(&parameters, physics::SEED);
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
     let mut files = FileGroup::new(&folder);
     files.add("work_precision.csv", table(&rows).to_csv(&origin)?)?;
-    files.add("work_precision.svg", picture(&rows).svg(&origin)?)?;
+    picture(&rows).add_to(&mut files, "work_precision", &origin)?;
     files.commit()?;
-    println!("wrote {}", folder.join("work_precision.csv").display());
+    println!("{}\nwrote {}", text(&rows), folder.join("work_precision.csv").display());
+    if options.store {
+        let book = root().join("docs/src");
+        write_atomic(&book.join("work-precision-results.md"), text(&rows).as_bytes())?;
+        write_atomic(&book.join("images/work_precision.svg"), picture(&rows).svg(&origin)?.as_bytes())?;
+        write_atomic(&book.join("images/work_precision.csv"), table(&rows).to_csv(&origin)?.into_bytes())?;
+        println!("stored the page's text, picture and table in {}", book.display());
+    }
     Ok(())
 }

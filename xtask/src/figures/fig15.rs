@@ -10,8 +10,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = context.provenance_of_formula(&format!("profile = \"{}\"\nthreads = 1\n", context.profile.name()));
     let mut out = Rendered::new(&table(&rows), &picture(&rows), &origin)?;
     out.caption = format!(
-        "Relative error against processor time, one thread of {}, the smallest of three times below 0.2 s: of each case the settings that no other \
-         beats in both{}. All settings, also those that fail, are in the table (fig15.csv); times differ from run to run.",
+        "Relative error against processor time, one thread of {}, the smallest of three times below 0.2 s, the set-up apart; other programs as measured by the scripts of \
+         docs/peers, their times scaled by what a transform takes here{}. All settings, also those that fail, are in the table (fig15.csv); times differ from run to run.",
         machine(),
         if quick { "; a few settings, the whole is `cargo xtask work-precision`" } else { "" }
     );

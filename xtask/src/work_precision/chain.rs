@@ -2,7 +2,7 @@
 //!
 //! The scene: half of Table 2's scan about the nearer vortex at 10 dB, four pulses a line, two realisations.
 
-use super::{Knob, Row, few};
+use super::{Found, Knob, Row, few};
 use crate::cost::fastest;
 use crate::statistics::{Estimate, mean};
 use fixtures::failure::Failure;
@@ -13,18 +13,19 @@ use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 use wakescope_sim::setup::progress::Silent;
 
+pub(super) const CASE: &str = "one whole map";
+
 /// Relative distance of a map from that of the reference.
 type Distance = fn(&VelocityEstimates, &VelocityEstimates) -> f64;
 
 const MAPS: (&str, Distance) = ("mean map, norm of the difference over the norm", of_maps);
 const ERRORS: (&str, Distance) = ("root mean square error over the map, relative", of_errors);
 
-/// A case, how its key is set, its values, that of the reference, and what is compared.
-type Key = (&'static str, &'static str, fn(&mut Scene, usize), &'static [f64], usize, (&'static str, Distance));
+/// A key, how it is set, its values, that of the reference, and what is compared.
+type Key = (&'static str, fn(&mut Scene, usize), &'static [f64], usize, (&'static str, Distance));
 
 const KEYS: [Key; 3] = [
     (
-        "scene, padding",
         "estimator.padded_samples",
         |scene, value| scene.estimator.padded_samples = value,
         &[128.0, 256.0, 512.0, 1024.0, 2048.0],
@@ -32,39 +33,30 @@ const KEYS: [Key; 3] = [
         MAPS,
     ),
     (
-        "scene, spacing of windows",
         "estimator.window_step_samples",
         |scene, value| scene.estimator.window_step_samples = value,
         &[16.0, 8.0, 4.0, 2.0],
         1,
         MAPS,
     ),
-    (
-        "scene, realisations",
-        "scan.realisations",
-        |scene, value| scene.scan.realisations = value,
-        &[2.0, 4.0, 8.0, 16.0, 32.0],
-        128,
-        ERRORS,
-    ),
+    ("scan.realisations", |scene, value| scene.scan.realisations = value, &[2.0, 4.0, 8.0, 16.0, 32.0], 128, ERRORS),
 ];
 
 /// All measurements; few keys, values and seeds if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let seeds = if quick { 2 } else { 5 };
     let mut rows = Vec::new();
-    for &(case, key, set, values, finest, (metric, distance)) in few(&KEYS, quick) {
+    for &(key, set, values, finest, (metric, distance)) in few(&KEYS, quick) {
         let fine = (0..seeds).map(|seed| map(seed, set, finest)).collect::<Result<Vec<_>, _>>()?;
-        let knob =
-            Knob { case, method: key, knob: key, metric, reference: "the finest setting of the key, same seeds" };
-        rows.extend(knob.rows(quick, values, |value| {
+        let knob = Knob::new([CASE, key, "", metric, "the finest setting of the key, same seeds"]);
+        rows.extend(knob.rows(few(values, quick), |value| {
             let (first, cost) = fastest(|| map(0, set, value as usize))?;
             let mut errors = vec![distance(&first, &fine[0])];
             for (seed, fine) in fine.iter().enumerate().skip(1) {
                 errors.push(distance(&map(seed as u64, set, value as usize)?, fine));
             }
             let found = Estimate::mean(&errors);
-            Ok(((found.value, found.standard_error), cost))
+            Ok(Found { error: found.value, standard_error: found.standard_error, cost, set_up_s: 0.0 })
         })?);
     }
     Ok(rows)

@@ -3,7 +3,7 @@
 //! In a uniform wind the error is by how much the standard deviation of the good estimates exceeds the Cramer-Rao bound; a method of
 //! which more than a fifth of the estimates are bad has no number.
 
-use super::{Knob, Row, physics::SEED};
+use super::{Found, Knob, Row, physics::SEED};
 use crate::cost::fastest;
 use fixtures::failure::Failure;
 use fixtures::methods::{Known, Methods};
@@ -18,17 +18,20 @@ use wakescope_estimate::{
 };
 use wakescope_signal::NoiseModel;
 
+/// The case that is drawn.
+pub(super) const WHITE: &str = "0 dB, white";
+
 /// Windows of one estimate.
 const WINDOWS: usize = 20;
 
 /// All measurements; few trials if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let cases = [
-        ("0 dB, white", NoiseModel::White, 0.0),
+        (WHITE, NoiseModel::White, 0.0),
         ("0 dB, band", NoiseModel::BandLimited, 0.0),
         ("20 dB, band", NoiseModel::BandLimited, 20.0),
     ];
-    let (cases, trials) = if quick { (&cases[..1], 60) } else { (&cases[..], 600) };
+    let (cases, trials) = if quick { (&cases[..1], 2000) } else { (&cases[..], 6000) };
     let mut rows = Vec::new();
     for &(case, noise, snr_db) in cases {
         rows.extend(Uniform::new(case, noise, snr_db, trials)?.rows(quick)?);
@@ -95,8 +98,9 @@ impl Uniform {
             "standard deviation of good estimates over the bound, less one; no number if a fifth is bad",
             "Cramer-Rao bound in white noise",
         ]);
-        let error = (excess, found.std_good_error_m_s / self.bound_m_s);
-        Ok(knob.row(value, error, cost.per(self.trials.len())))
+        let (standard_error, cost) =
+            (found.std_good_error_m_s / self.bound_m_s, cost.scaled(1.0 / self.trials.len() as f64));
+        Ok(knob.row(value, Found { error: excess, standard_error, cost, set_up_s: 0.0 }))
     }
 
     fn rows(&self, quick: bool) -> Result<Vec<Row>, Failure> {

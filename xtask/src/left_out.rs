@@ -1,0 +1,152 @@
+//! `cargo xtask left-out`: what a scene does not pay for, and what a crate does not pull in.
+//!
+//! A scene that has everything is run whole and without one thing at a time, each run a process of its own with one thread; the crates behind
+//! each of ours, alone and with its features, are counted by cargo.
+
+use crate::process::{program, watch};
+use crate::workspace::root;
+use fixtures::failure::{Failure, Outcome};
+use serde::Deserialize;
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use toml::{Table, Value};
+
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// The program to run, instead of the release build.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
+    /// Store both tables in the book.
+    #[arg(long)]
+    store: bool,
+}
+
+/// The scene that has everything, and what is taken out.
+#[derive(Deserialize)]
+struct Scenes {
+    whole: Table,
+    without: Vec<Without>,
+    package: Vec<Package>,
+}
+
+/// What is taken out of the scene, and by which keys: a word with dots and its value; the text "absent" takes the key out.
+#[derive(Deserialize)]
+struct Without {
+    name: String,
+    keys: Table,
+}
+
+/// A crate with some of its features and without the default ones.
+#[derive(Deserialize)]
+struct Package {
+    name: String,
+    features: String,
+    gives: String,
+}
+
+pub(crate) fn run(options: &Options) -> Outcome {
+    let Scenes { whole, without, package } = toml::from_str(include_str!("left_out.toml"))?;
+    let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-left-out"));
+    std::fs::create_dir_all(&folder)?;
+    let mut text = String::from("| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n");
+    let all = Without { name: "whole".into(), keys: Table::new() };
+    for Without { name, keys } in std::iter::once(&all).chain(&without) {
+        let mut scene = whole.clone();
+        keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value))?;
+        let [seconds, peak, files] = measured(&program, &folder, &toml::to_string(&scene)?)?;
+        let name = if keys.is_empty() { name.clone() } else { format!("without {name}") };
+        let _ = writeln!(text, "| {name} | {seconds:.2} | {:.1} | {:.2} |", peak / 1e6, files / 1e6);
+    }
+    text.push_str("\n| crate | features | gives | crates compiled |\n|---|---|---|---|\n");
+    for Package { name, features, gives } in &package {
+        let _ = writeln!(
+            text,
+            "| `{name}` | {} | {gives} | {} |",
+            if features.is_empty() { "none" } else { features },
+            crates(name, features)?
+        );
+    }
+    print!("{text}");
+    if options.store {
+        wakescope_sim::io::write_atomic(&root().join("docs/src/left-out-results.md"), text.as_bytes())?;
+    }
+    Ok(())
+}
+
+/// Sets a key by its word with dots, or takes it out.
+fn set(scene: &mut Table, key: &str, value: &Value) -> Outcome {
+    let Some((table, rest)) = key.split_once('.') else {
+        match value.as_str() {
+            Some("absent") => scene.remove(key),
+            _ => scene.insert(key.into(), value.clone()),
+        };
+        return Ok(());
+    };
+    let inner = scene.entry(table).or_insert_with(|| Value::Table(Table::new()));
+    set(inner.as_table_mut().ok_or_else(|| Failure::new(format!("{table} is no table")))?, rest, value)
+}
+
+/// Processor time \[s\], largest memory and bytes written of a run.
+fn measured(program: &Path, folder: &Path, scene: &str) -> Result<[f64; 3], Failure> {
+    std::fs::write(folder.join("scene.toml"), scene)?;
+    let out = folder.join("out");
+    if out.exists() {
+        std::fs::remove_dir_all(&out)?;
+    }
+    let words = ["run", "scene.toml", "--out", "out", "--threads", "1", "--quiet"];
+    let run = watch(program, &words, folder, 600.0)?;
+    if run.code != Some(0) {
+        return Err(Failure::new(format!("a scene did not run: {}", run.stderr)));
+    }
+    let sizes = std::fs::read_dir(&out)?
+        .map(|file| Ok(file?.metadata()?.len()))
+        .collect::<Result<Vec<u64>, std::io::Error>>()?;
+    Ok([run.cpu_s, run.peak_bytes, sizes.iter().sum::<u64>() as f64])
+}
+
+/// How many crates cargo compiles for a library, itself among them, without those that only build it.
+fn crates(package: &str, features: &str) -> Result<usize, Failure> {
+    let out = Command::new(env!("CARGO"))
+        .args([
+            "tree",
+            "--package",
+            package,
+            "--edges",
+            "normal",
+            "--prefix",
+            "none",
+            "--no-default-features",
+            "--features",
+            features,
+        ])
+        .current_dir(root())
+        .output()?;
+    if !out.status.success() {
+        return Err(Failure::new(format!("cargo tree: {}", String::from_utf8_lossy(&out.stderr))));
+    }
+    let text = String::from_utf8_lossy(&out.stdout);
+    let mut names: Vec<&str> =
+        text.lines().filter_map(|line| line.split(" (").next()).filter(|name| !name.is_empty()).collect();
+    names.sort_unstable();
+    names.dedup();
+    Ok(names.len())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_of_the_list_passes_the_check_of_keys() {
+        let Scenes { whole, without, .. } = toml::from_str(include_str!("left_out.toml")).unwrap();
+        for Without { name, keys } in &without {
+            let mut scene = whole.clone();
+            keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value)).unwrap();
+            let text = toml::to_string(&scene).unwrap();
+            let read = wakescope_sim::scene::SceneFile::parse(&text, Path::new("scene.toml"));
+            assert!(read.is_ok(), "{name}: {:?}", read.err());
+        }
+    }
+}

@@ -1,0 +1,395 @@
+//! Maps of what is stable: measured points of the flow and of the propagation on the lines of their theory.
+//!
+//! Waves on a periodic line of equal cells show the amplification of the time schemes, their limits and what stiff viscosity leaves; eddies on flat cells the
+//! pressure solvers; a flow without viscosity the energy that the steps lose; vortices at Reynolds numbers up to 1e12 what models hold; a focused beam
+//! the grid that it needs.
+
+use fixtures::failure::Failure;
+use num_complex::Complex;
+use std::f64::consts::{PI, TAU};
+use wakescope_les::solver::PressureMethod;
+use wakescope_les::{Direction, Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep, Wall};
+use wakescope_optics::{Focus, Grid, Layers, MonteCarlo, Telescope, theory};
+use wakescope_sim::io::Table;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_tests::extreme::les::{energy_drift, energy_left};
+
+/// A point of a panel.
+pub(crate) struct Point {
+    panel: &'static str,
+    curve: String,
+    x: f64,
+    measured: f64,
+    /// NaN where no theory is drawn.
+    theory: f64,
+}
+
+const GROWTH: &str = "growth of a wave in a step";
+const LIMITS: &str = "largest stable Courant number";
+const STIFF: &str = "what a step leaves of a stiff wave";
+const PRESSURE: &str = "pressure solvers on flat cells";
+const DRIFT: &str = "energy lost without viscosity";
+const REYNOLDS: &str = "energy of turbulent vortices";
+const FOCUS: &str = "grid of a focused beam";
+const ROUNDING: &str = "f32 beside f64";
+
+/// Of a wave of which a step leaves less the solver's round-off is left.
+const ROUND_OFF: f64 = 1e-9;
+
+const SCHEMES: [(&str, TimeScheme); 2] =
+    [("Adams-Bashforth 2", TimeScheme::AdamsBashforth2), ("Runge-Kutta 3", TimeScheme::RungeKutta3)];
+
+/// All points, in the order of the panels.
+pub(crate) fn measure() -> Result<Vec<Point>, Failure> {
+    let panels = [growth, limits, stiff, pressure, drift, reynolds, focus, rounding];
+    let points = panels.into_iter().map(|panel| panel()).collect::<Result<Vec<_>, Failure>>()?;
+    Ok(points.into_iter().flatten().collect())
+}
+
+/// Cells of the periodic line.
+const CELLS: usize = 48;
+
+/// A line of equal cells along y, one metre long, with a stream of 1 m/s along it and a small wind across.
+fn line(
+    scheme: TimeScheme,
+    viscosity_m2_s: f64,
+    step_s: f64,
+    across: impl Fn(f64) -> f64 + Sync,
+) -> Result<Flow, Failure> {
+    let mesh = Mesh::new(Direction::thin(1.0), Direction::periodic(CELLS, 0.0, 1.0), Direction::thin(1.0))?;
+    let settings = FlowSettings { scheme, ..FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s }) };
+    Ok(Flow::new(mesh, settings, |[_, y, _]| [1e-3 * across(y), 1.0, 0.0])?.0)
+}
+
+/// Amplitude of a wave of the wind across.
+fn amplitude(flow: &Flow, wave: usize) -> f64 {
+    let at = |(j, u): (usize, &f64)| u * Complex::cis(-TAU * (wave * j) as f64 / CELLS as f64);
+    flow.face_velocity_m_s(0).iter().enumerate().map(at).sum::<Complex<f64>>().norm()
+}
+
+/// Growth of the amplitude in a step, of a wave that turns by `angle` in a step, against the larger root of the scheme.
+fn growth() -> Result<Vec<Point>, Failure> {
+    const WAVE: usize = 14;
+    let theta = TAU * WAVE as f64 / CELLS as f64;
+    let symbol = 1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0;
+    let mut points = Vec::new();
+    for (name, scheme) in SCHEMES {
+        let angles: &[f64] = match scheme {
+            TimeScheme::AdamsBashforth2 => &[0.0733, 0.1, 0.1467, 0.2, 0.2933, 0.4, 0.5133, 0.5456],
+            TimeScheme::RungeKutta3 => &[0.2, 0.2933, 0.4, 0.5133, 0.7, 1.0132, 1.3, 1.5753, 1.7],
+        };
+        for &angle in angles {
+            let step_s = angle / symbol / CELLS as f64;
+            let mut flow = line(scheme, 0.0, step_s, |y| (TAU * WAVE as f64 * y).sin())?;
+            (0..20).try_for_each(|_| flow.step().map(drop))?;
+            let before = amplitude(&flow, WAVE);
+            (0..40).try_for_each(|_| flow.step().map(drop))?;
+            let measured = ((amplitude(&flow, WAVE) / before).powf(1.0 / 40.0) - 1.0).abs();
+            points.push(Point {
+                panel: GROWTH,
+                curve: name.into(),
+                x: angle,
+                measured,
+                theory: (root(scheme, Complex::new(0.0, angle), 0.0) - 1.0).abs(),
+            });
+        }
+    }
+    Ok(points)
+}
+
+/// The largest Courant number, to a thousandth, at which a step is not refused and no wave grows, against the root of the scheme. Waves of all lengths
+/// start alike.
+fn limits() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for (name, scheme) in SCHEMES {
+        for viscous in [1e-3, 1e-2, 3e-2, 1e-1, 3e-1] {
+            // nu = viscous h^2/dt, with dt = courant h.
+            let holds = |courant: f64| -> Result<bool, Failure> {
+                let (h, step_s) = (1.0 / CELLS as f64, courant / CELLS as f64);
+                let spike = |y: f64| if (y * CELLS as f64).floor() == 7.0 { 1.0 } else { 0.0 };
+                let mut flow = line(scheme, viscous * h * h / step_s, step_s, spike)?;
+                let mut largest = || -> Result<Option<f64>, Failure> {
+                    for _ in 0..600 {
+                        // A refusal is an answer.
+                        let Ok(_) = flow.step() else { return Ok(None) };
+                    }
+                    Ok(Some((1..=CELLS / 2).map(|wave| amplitude(&flow, wave)).fold(0.0, f64::max)))
+                };
+                let (first, last) = (largest()?, largest()?);
+                Ok(matches!((first, last), (Some(first), Some(last)) if last <= first))
+            };
+            let (mut low, mut high) = (0.05, 2.0);
+            while high - low > 5e-4 * low {
+                let middle = 0.5 * (low + high);
+                if holds(middle)? { low = middle } else { high = middle }
+            }
+            points.push(Point {
+                panel: LIMITS,
+                curve: name.into(),
+                x: viscous,
+                measured: low,
+                theory: limit(scheme, viscous),
+            });
+        }
+    }
+    Ok(points)
+}
+
+/// Decay of the shortest wave in a step up to which the solver takes viscosity explicitly.
+const EXPLICIT: f64 = 0.1;
+
+/// The Courant number up to which every wave decays, with `viscous = nu dt/h^2` explicit where it is small and by Crank-Nicolson else.
+fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
+    let decays = |courant: f64| {
+        (1..=180).all(|k| {
+            let theta = PI * f64::from(k) / 180.0;
+            let symbol = 1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0;
+            let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
+            let decay = viscous * kappa * kappa;
+            let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT { [0.0, decay] } else { [decay, 0.0] };
+            root(scheme, Complex::new(-explicit, courant * symbol), implicit) <= 1.0
+        })
+    };
+    let (mut low, mut high) = (0.0, 2.5);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if decays(middle) { low = middle } else { high = middle }
+    }
+    low
+}
+
+/// Amplification of `du/dt = (z u - d u)/dt` in a step, the decay `d` by Crank-Nicolson, in each stage of Wray's Runge-Kutta.
+fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
+    match scheme {
+        TimeScheme::AdamsBashforth2 => {
+            let (a, z) = ((1.0 - 0.5 * d) / (1.0 + 0.5 * d), z / (1.0 + 0.5 * d));
+            let b = a + 1.5 * z;
+            let root = (b * b - 2.0 * z).sqrt();
+            (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm())
+        }
+        TimeScheme::RungeKutta3 => {
+            let stages = [(8.0 / 15.0, 0.0), (5.0 / 12.0, -17.0 / 60.0), (3.0 / 4.0, -5.0 / 12.0)];
+            let (mut u, mut before) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
+            for (now, last) in stages {
+                let (rate, half) = (z * u, 0.5 * d * (now + last));
+                u = (u * (1.0 - half) + now * rate + last * before) / (1.0 + half);
+                before = rate;
+            }
+            u.norm()
+        }
+    }
+}
+
+/// Square of kappa h of a wave of two cells.
+const KAPPA2: f64 = 49.0 / 9.0;
+
+/// What the first step leaves of the shortest wave, stiff along one direction or two, by Crank-Nicolson and by backward Euler.
+fn stiff() -> Result<Vec<Point>, Failure> {
+    const N: usize = 16;
+    let mut points = Vec::new();
+    for (name, damped_steps, both) in [
+        ("Crank-Nicolson, one direction", 0, false),
+        ("Crank-Nicolson, two directions", 0, true),
+        ("backward Euler, one direction", 1, false),
+        ("backward Euler, two directions", 1, true),
+    ] {
+        for viscous in [1e1, 1e2, 1e3, 1e4, 1e5, 1e6] {
+            let periodic = || Direction::periodic(N, 0.0, 1.0);
+            let mesh =
+                Mesh::new(Direction::thin(1.0), periodic(), if both { periodic() } else { Direction::thin(1.0) })?;
+            let step_s = 1e-3;
+            let settings = FlowSettings {
+                damped_steps,
+                scheme: TimeScheme::AdamsBashforth2,
+                ..FlowSettings::new(viscous / (N * N) as f64 / step_s, TimeStep::Fixed { step_s })
+            };
+            let short = |a: f64| if (a * N as f64) as usize % 2 == 0 { 1.0 } else { -1.0 };
+            let mut flow =
+                Flow::new(mesh, settings, |[_, y, z]| [short(y) * if both { short(z) } else { 1.0 }, 0.0, 0.0])?.0;
+            flow.step()?;
+            let measured = flow.face_velocity_m_s(0)[0].abs();
+            let (d, directions) = (viscous * KAPPA2, if both { 2.0 } else { 1.0 });
+            let theory = match damped_steps {
+                0 => (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs(),
+                _ => (1.0 + d).powf(-directions),
+            };
+            points.push(Point { panel: STIFF, curve: name.into(), x: viscous, measured, theory });
+        }
+    }
+    Ok(points)
+}
+
+/// The residual that an iteration of multigrid leaves, and what the direct solver leaves, on cells longer along y, or along x and y.
+fn pressure() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for (name, pressure, both) in [
+        ("multigrid, cells long along y", PressureMethod::Multigrid, false),
+        ("multigrid, cells long along x and y", PressureMethod::Multigrid, true),
+        ("direct, what it leaves, long along y", PressureMethod::Direct, false),
+        ("direct, what it leaves, long along x and y", PressureMethod::Direct, true),
+    ] {
+        for aspect in [1.0, 1e1, 1e2, 1e3, 1e4, 1e5] {
+            let slip = |cells, length_m| Direction::between(cells, 0.0, length_m, Wall::Slip, Wall::Slip);
+            let [length_m, width_m] = [if both { aspect } else { 1.0 }, aspect];
+            let mesh = Mesh::new(Direction::periodic(8, 0.0, length_m / 6.0), slip(48, width_m), slip(48, 1.0))?;
+            let settings = FlowSettings {
+                pressure,
+                pressure_tolerance: 1e-10,
+                ..FlowSettings::new(1e-4, TimeStep::Courant { courant: 0.3, longest_s: 1e-3 })
+            };
+            let eddies = move |[x, y, z]: [f64; 3]| {
+                let (a, b, c) = (TAU * 6.0 * x / length_m, TAU * y / width_m + 0.3, TAU * z + 0.5);
+                [
+                    0.2 * a.cos() * b.sin(),
+                    b.cos() * c.sin() + 0.3 * (5.0 * b).cos() * c.cos(),
+                    b.sin() * c.cos() + 0.1 * a.sin(),
+                ]
+            };
+            let mut flow = Flow::new(mesh, settings, eddies)?.0;
+            let mut worst = f64::NAN;
+            for _ in 0..3 {
+                let report = flow.step()?;
+                let of =
+                    if pressure == PressureMethod::Direct { report.pressure_residual } else { report.pressure_factor };
+                worst = worst.max(of.unwrap_or(f64::NAN));
+            }
+            points.push(Point { panel: PRESSURE, curve: name.into(), x: aspect, measured: worst, theory: f64::NAN });
+        }
+    }
+    Ok(points)
+}
+
+/// Energy that a flow without viscosity gains or loses in half a second, against a cube through the shortest step.
+fn drift() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for (name, scheme) in SCHEMES {
+        let steps_s = [0.02, 0.01, 0.005, 0.0025, 0.00125];
+        let found = steps_s
+            .iter()
+            .map(|&step_s| Ok((step_s, energy_drift(scheme, step_s).ok())))
+            .collect::<Result<Vec<_>, Failure>>()?;
+        let last = found.last().and_then(|found| found.1).unwrap_or(f64::NAN);
+        points.extend(found.into_iter().filter_map(|(step_s, drift)| {
+            let theory = last * (step_s / steps_s[4]).powi(3);
+            Some(Point { panel: DRIFT, curve: name.into(), x: step_s, measured: drift?, theory })
+        }));
+    }
+    Ok(points)
+}
+
+/// Energy of Taylor and Green's vortices on 16 cells a side after 150 steps, over that of the start.
+fn reynolds() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for (name, subgrid) in [
+        ("no model", SubgridModel::None),
+        ("WALE", SubgridModel::WALE),
+        ("multiscale WALE", SubgridModel::MULTISCALE_WALE),
+    ] {
+        for reynolds in [1e3, 1e5, 1e8, 1e12] {
+            let measured = energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?;
+            points.push(Point { panel: REYNOLDS, curve: name.into(), x: reynolds, measured, theory: f64::NAN });
+        }
+    }
+    Ok(points)
+}
+
+/// Error of the free-space efficiency in the focus against the spacing of the grid over lambda F/(4 a), which the spectrum of the focused field asks for.
+fn focus() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for focus_m in [150.0, 300.0, 600.0] {
+        let telescope = Telescope { focus: Focus::At(focus_m), ..Telescope::table2() };
+        let exact = theory::free_space_efficiency(&telescope, focus_m)?;
+        let asked_m = telescope.wavelength_m * focus_m / (4.0 * telescope.aperture_radius_m);
+        for share in [0.5, 0.6, 0.7, 0.8, 0.9, 0.99] {
+            let grid = Grid::square(512, share * asked_m)?;
+            let screens = MonteCarlo {
+                telescope: telescope.clone(),
+                layers: Layers::equal(5, focus_m)?,
+                range_m: vec![focus_m],
+                grid,
+                ..MonteCarlo::table2(1e-13, 1)?
+            };
+            let measured = (screens.grid_free_space::<f64>()?[0] / exact - 1.0).abs();
+            points.push(Point {
+                panel: FOCUS,
+                curve: format!("focus {focus_m} m"),
+                x: share,
+                measured,
+                theory: f64::NAN,
+            });
+        }
+    }
+    Ok(points)
+}
+
+/// What single precision changes in the free-space efficiency, by the number of layers.
+fn rounding() -> Result<Vec<Point>, Failure> {
+    [1, 3, 10, 30, 100, 300, 1000]
+        .into_iter()
+        .map(|layers| {
+            let (grid, layers_m) = (Grid::square(128, 8e-3)?, Layers::equal(layers, 1000.0)?);
+            let screens = MonteCarlo { layers: layers_m, range_m: vec![1000.0], grid, ..MonteCarlo::table2(1e-13, 1)? };
+            let (single, double) = (screens.grid_free_space::<f32>()?[0], screens.grid_free_space::<f64>()?[0]);
+            let (x, measured) = (layers as f64, (single / double - 1.0).abs());
+            Ok(Point { panel: ROUNDING, curve: "128 points a side".into(), x, measured, theory: f64::NAN })
+        })
+        .collect()
+}
+
+/// Largest distance of a point from the line of its theory, relative, of the panels whose theory is exact and above what round-off leaves.
+pub(crate) fn furthest(points: &[Point]) -> f64 {
+    let exact = points.iter().filter(|p| [GROWTH, LIMITS, STIFF].contains(&p.panel) && p.theory > ROUND_OFF);
+    exact.map(|p| (p.measured / p.theory - 1.0).abs()).fold(0.0, f64::max)
+}
+
+/// One row a point.
+pub(crate) fn table(points: &[Point]) -> Table {
+    Table::new()
+        .text("panel", points.iter().map(|p| p.panel))
+        .text("curve", points.iter().map(|p| p.curve.clone()))
+        .float("x", points.iter().map(|p| p.x))
+        .float("measured", points.iter().map(|p| p.measured))
+        .float("theory", points.iter().map(|p| p.theory))
+}
+
+/// A panel each: points measured, lines of theory in the same colour, and the limits that the program keeps, dashed.
+pub(crate) fn panels(points: &[Point]) -> Figure {
+    let axes = |panel: &str| match panel {
+        GROWTH => ("angle in a step [rad]", "||G| − 1|", None),
+        LIMITS => ("ν Δt/h²", "Courant number", None),
+        STIFF => ("ν Δt/h²", "share of the wave", None),
+        PRESSURE => ("aspect of the cells", "residual left", Some(("at most 0.10 an iteration", 0.1, true))),
+        DRIFT => ("step [s]", "energy lost, relative", None),
+        REYNOLDS => ("Reynolds number", "energy over that of the start", None),
+        ROUNDING => ("layers", "change of the efficiency, relative", None),
+        _ => ("spacing over λF/(4a)", "error of the efficiency", Some(("largest spacing accepted", 1.0, false))),
+    };
+    let drawn = points.chunk_by(|a, b| a.panel == b.panel).map(|of_panel| {
+        let (x_label, y_label, bar) = axes(of_panel[0].panel);
+        let mut plot =
+            CurvePlot { shape: 0.7, ..CurvePlot::new(of_panel[0].panel, Axis::log(x_label), Axis::log(y_label)) };
+        for (colour, of_curve) in of_panel.chunk_by(|a, b| a.curve == b.curve).enumerate() {
+            let theory = of_curve.iter().map(|p| (p.x, p.theory)).filter(|p| p.1 > 1e-12);
+            let measured = of_curve.iter().map(|p| (p.x, p.measured)).filter(|p| p.1 > 1e-17);
+            plot = plot.with(Series::new(&of_curve[0].curve, Style::Markers, measured).in_colour(colour));
+            plot = plot.with(Series::new("", Style::Line, theory).in_colour(colour));
+        }
+        if let Some((name, at, is_level)) = bar {
+            let (low, high) = (
+                of_panel.iter().map(|p| p.x).fold(f64::INFINITY, f64::min),
+                of_panel.iter().map(|p| p.x).fold(0.0, f64::max),
+            );
+            let errors = of_panel.iter().map(|p| p.measured);
+            let line = if is_level {
+                [(low, at), (high, at)]
+            } else {
+                [(at, errors.clone().fold(1.0, f64::min)), (at, errors.fold(0.0, f64::max))]
+            };
+            plot = plot.with(Series::new(name, Style::Dash, line).in_colour(6));
+        }
+        plot
+    });
+    let mut figure = Figure::stacked(drawn);
+    (figure.columns, figure.width) = (2, 1300.0);
+    figure
+}

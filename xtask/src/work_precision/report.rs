@@ -1,0 +1,213 @@
+//! The panels of error against run time, this program beside others, and what they say in words.
+
+use super::physics::{BISTATIC, FREE_SPACE, SCREENS, VORTICES};
+use super::{Row, TARGETS, chain, estimate};
+use std::fmt::Write as _;
+use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+
+/// What a panel shows, and what is compared with what.
+struct Panel {
+    case: &'static str,
+    title: &'static str,
+    compared: &'static str,
+    guide: Option<Guide>,
+}
+
+/// A slope through the first point of this program.
+struct Guide {
+    label: &'static str,
+    power: f64,
+}
+
+const PANELS: [Panel; 6] = [
+    Panel {
+        case: SCREENS,
+        title: "Phase screens, 128, 256, 512 points a side",
+        compared: "The expected structure function of von Karman screens (inner scale 1 cm, κ₀ 1 rad/m, 2 mm between points), worst from two spacings \
+                   to half the grid, against quadrature, which is right to 1e-9; the time is that of one screen.",
+        guide: None,
+    },
+    Panel {
+        case: FREE_SPACE,
+        title: "Free-space propagation, 128 to 1024 points a side",
+        compared: "The efficiency of Table 2's beam after 1000 m against the exact one (quadrature, to 1e-10): this program in ten steps, as with screens, \
+                   the others in one.",
+        guide: None,
+    },
+    Panel {
+        case: BISTATIC,
+        title: "Bistatic efficiency, Cn² 1e-13, 1000 m, five screens, 256 points",
+        compared: "Bias and standard error, the root of their squares, of 50 to 51 200 realisations, against exact theory of the continuous path; the \
+                   bias is that of five layers and, of the others, of their screens.",
+        guide: Some(Guide { label: "t^{−1/2}", power: -0.5 }),
+    },
+    Panel {
+        case: VORTICES,
+        title: "Taylor-Green vortices, Re 200, 16 points a side and more",
+        compared: "The rate at which the vortices lose energy until t = 10, root mean square error over its peak, against a Fourier solution on 96 points \
+                   a side.",
+        guide: Some(Guide { label: "fourth order, t^{−1}", power: -1.0 }),
+    },
+    Panel {
+        case: estimate::WHITE,
+        title: "Velocity of 20 windows, 0 dB: scatter over the bound, less one",
+        compared: "By how much the standard deviation of good estimates exceeds the Cramer-Rao bound in white noise; smaller than two standard errors of \
+                   the trials nothing can be told.",
+        guide: None,
+    },
+    Panel {
+        case: chain::CASE,
+        title: "A whole map, key by key",
+        compared: "Half of Table 2's scan about the nearer vortex at 10 dB with one key changed, against the finest value of that key with the same seeds.",
+        guide: None,
+    },
+];
+
+/// Rows of a panel in the order of their times, those that failed left out.
+fn drawn<'r>(rows: &'r [Row], panel: &Panel) -> Vec<&'r Row> {
+    let good = |row: &&Row| row.knob.case == panel.case && row.found.error > 0.0 && row.found.cost.cpu_s > 0.0;
+    let mut found: Vec<&Row> = rows.iter().filter(good).collect();
+    found.sort_by(|a, b| a.found.cost.cpu_s.total_cmp(&b.found.cost.cpu_s));
+    found
+}
+
+/// The six panels: a curve for each method, one colour for each program.
+pub(crate) fn picture(rows: &[Row]) -> Figure {
+    let panels = PANELS.iter().map(|panel| (panel, drawn(rows, panel))).filter(|(_, rows)| !rows.is_empty());
+    let mut figure = Figure::stacked(panels.map(|(panel, rows)| curves(panel, &rows)));
+    (figure.columns, figure.width) = (2, 1300.0);
+    figure
+}
+
+fn curves(panel: &Panel, rows: &[&Row]) -> CurvePlot {
+    let point = |row: &&Row| (row.found.cost.cpu_s, row.found.error);
+    let (x_range, y_range) =
+        (widened(rows, |row| row.found.cost.cpu_s, 1.0), widened(rows, |row| row.found.error, 2.0));
+    let x = Axis { range: Some(x_range), ..Axis::log("processor time, one thread [s]") };
+    let y = Axis { range: Some(y_range), ..Axis::log("relative error") };
+    let mut plot = CurvePlot { shape: 0.78, ..CurvePlot::new(panel.title, x, y) };
+    let mut methods: Vec<(bool, &str)> = rows.iter().map(|row| (!row.is_own(), row.knob.method.as_str())).collect();
+    methods.sort_unstable();
+    methods.dedup();
+    for (colour, (other, method)) in methods.iter().enumerate() {
+        let of: Vec<&&Row> = rows.iter().filter(|row| row.knob.method == *method && row.is_own() != *other).collect();
+        let points: Vec<(f64, f64)> = of.iter().map(|row| point(row)).collect();
+        let name = if *other { (*method).to_owned() } else { format!("wakescope {method}") };
+        let style = if points.len() > 1 { Style::LineMarkers } else { Style::Markers };
+        let errors: Vec<f64> = of.iter().map(|row| row.found.standard_error.min(0.9 * row.found.error)).collect();
+        plot = plot.with(Series::new(&name, style, points.clone()).in_colour(colour));
+        if errors.iter().any(|error| *error > 0.0) {
+            plot = plot.with(Series::new("", Style::Markers, points).with_band(&errors).in_colour(colour));
+        }
+    }
+    if let (Some(Guide { label, power }), Some(first)) = (&panel.guide, rows.iter().find(|row| row.is_own())) {
+        let (start_s, error) = point(first);
+        let last_s = rows.iter().filter(|row| row.is_own()).map(|row| row.found.cost.cpu_s).fold(start_s, f64::max);
+        let line = [start_s, last_s].map(|t| (t, 0.7 * error * (t / start_s).powf(*power)));
+        plot = plot.with(Series::new(label, Style::Dash, line).in_colour(6));
+    }
+    plot
+}
+
+/// A logarithmic range with an eighth to spare at both ends, of so many decades at least.
+fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
+    let logarithms = rows.iter().map(|row| value(row).log10());
+    let (low, high) = logarithms.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let spare = (0.12 * (high - low)).max(0.5 * (decades - (high - low))).max(0.1);
+    (10_f64.powf(low - spare), 10_f64.powf(high + spare))
+}
+
+/// Under each panel: what is compared, what this program costs, what others cost at their errors.
+pub(crate) fn text(rows: &[Row]) -> String {
+    let mut out = String::new();
+    for panel in &PANELS {
+        let of = drawn(rows, panel);
+        if of.is_empty() {
+            continue;
+        }
+        let (own, others): (Vec<&Row>, Vec<&Row>) = of.into_iter().partition(|row| row.is_own());
+        let _ = writeln!(out, "**{}.** {}\n", panel.title, panel.compared);
+        let costs = TARGETS.iter().enumerate().map(|(place, (_, target))| {
+            let best = own.iter().find(|row| row.is_cheapest[place]);
+            let cost = best
+                .map_or("by no setting".into(), |row| format!("{} ({})", seconds(row.found.cost.cpu_s), setting(row)));
+            format!("{} % {cost}", 100.0 * target)
+        });
+        let _ = writeln!(out, "This program reaches {}.\n", costs.collect::<Vec<_>>().join(", "));
+        if others.is_empty() {
+            continue;
+        }
+        let told = others.iter().map(|row| {
+            let reached = format!("{} {} at {:.2e}", row.knob.method, row.version, row.found.error);
+            match ratio(&own, row) {
+                Some(ratio) => format!("{reached}: {ratio:.2}"),
+                None => format!("{reached}: this program has no setting so near"),
+            }
+        });
+        let _ = writeln!(
+            out,
+            "Time of others over this program's at their errors: {}.\n",
+            told.collect::<Vec<_>>().join("; ")
+        );
+        let better = others.iter().filter(|row| ratio(&own, row).is_none_or(|ratio| ratio < 1.0));
+        let better: Vec<String> = better.map(|row| format!("{} at {:.1e}", row.knob.method, row.found.error)).collect();
+        let better = if better.is_empty() { "none of them".into() } else { better.join(", ") };
+        let _ = writeln!(out, "The better buy: {better}.\n");
+    }
+    out
+}
+
+fn setting(row: &Row) -> String {
+    format!("{}, {} {}", row.knob.method, row.value, row.knob.knob).trim_end().to_owned()
+}
+
+fn seconds(s: f64) -> String {
+    match s {
+        s if s < 1e-3 => format!("{:.3} µs", 1e6 * s),
+        s if s < 1.0 => format!("{:.3} ms", 1e3 * s),
+        s => format!("{s:.2} s"),
+    }
+}
+
+/// Time of another program over this one's at the same error: on the line through the settings that no other beats, the setting of the same size
+/// beyond its dearer errors, or the cheapest; none if no setting is so good.
+fn ratio(own: &[&Row], other: &Row) -> Option<f64> {
+    let front: Vec<&&Row> = own.iter().filter(|row| row.is_on_front).collect();
+    let error = other.found.error;
+    let better = front.iter().position(|row| row.found.error <= error)?;
+    let own_s = if better == 0 {
+        let same = front.iter().find(|row| row.value == other.value);
+        same.unwrap_or(&front[0]).found.cost.cpu_s
+    } else {
+        let [a, b] = [front[better - 1], front[better]].map(|row| (row.found.error.ln(), row.found.cost.cpu_s.ln()));
+        (a.1 + (b.1 - a.1) * (error.ln() - a.0) / (b.0 - a.0)).exp()
+    };
+    Some(other.found.cost.cpu_s / own_s)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Found, Knob};
+    use super::*;
+    use crate::cost::Cost;
+
+    fn rows(settings: &[(f64, f64, f64)]) -> Vec<Row> {
+        let knob = Knob::new(["case", "method", "points", "", ""]);
+        let row = |&(value, error, cpu_s): &(f64, f64, f64)| {
+            let mut row = knob.row(value, Found::exact(error, Cost { cpu_s, wall_s: 0.0, peak_mem_bytes: 0.0 }));
+            row.is_on_front = true;
+            row
+        };
+        settings.iter().map(row).collect()
+    }
+
+    #[test]
+    fn ratios_are_taken_at_equal_errors() {
+        let own = rows(&[(16.0, 1e-1, 1.0), (32.0, 1e-3, 100.0)]);
+        let own: Vec<&Row> = own.iter().collect();
+        let others = rows(&[(1.0, 1e-2, 20.0), (32.0, 0.5, 300.0), (7.0, 0.5, 3.0), (1.0, 1e-4, 1.0)]);
+        let found: Vec<Option<f64>> = others.iter().map(|other| ratio(&own, other)).collect();
+        assert!((found[0].unwrap() - 2.0).abs() < 1e-12);
+        assert_eq!(found[1..], [Some(3.0), Some(3.0), None], "the same size; the cheapest; nothing so good");
+    }
+}
