@@ -375,7 +375,7 @@ def bad(pulses):
 
 
 def f16b():
-    exact = ("growth of a wave in a step", "largest stable Courant number", "what a step leaves of a stiff wave")
+    exact = ("growth of a wave in a step", "largest stable Courant number", "what the first step leaves of a stiff wave")
     points = [row for row in rows("fig16.maps") if row["panel"] in exact and row["theory"] > 1e-9]
     return [f"at most {100 * max(abs(row['measured'] / row['theory'] - 1) for row in points):.2f} %"]
 

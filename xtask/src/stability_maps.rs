@@ -26,12 +26,11 @@ pub(crate) struct Point {
 
 const GROWTH: &str = "growth of a wave in a step";
 const LIMITS: &str = "largest stable Courant number";
-const STIFF: &str = "what a step leaves of a stiff wave";
+const STIFF: &str = "what the first step leaves of a stiff wave";
 const PRESSURE: &str = "pressure solvers on flat cells";
 const DRIFT: &str = "energy lost without viscosity";
 const REYNOLDS: &str = "energy of turbulent vortices";
 const FOCUS: &str = "grid of a focused beam";
-const ROUNDING: &str = "f32 beside f64";
 
 /// Of a wave of which a step leaves less the solver's round-off is left.
 const ROUND_OFF: f64 = 1e-9;
@@ -41,7 +40,7 @@ const SCHEMES: [(&str, TimeScheme); 2] =
 
 /// All points, in the order of the panels.
 pub(crate) fn measure() -> Result<Vec<Point>, Failure> {
-    let panels = [growth, limits, stiff, pressure, drift, reynolds, focus, rounding];
+    let panels = [growth, limits, stiff, pressure, drift, reynolds, focus];
     let points = panels.into_iter().map(|panel| panel()).collect::<Result<Vec<_>, Failure>>()?;
     Ok(points.into_iter().flatten().collect())
 }
@@ -158,6 +157,9 @@ fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
     low
 }
 
+/// Shares of a step that Wray's stages give the present rate and the one before.
+const STAGES: [(f64, f64); 3] = [(8.0 / 15.0, 0.0), (5.0 / 12.0, -17.0 / 60.0), (3.0 / 4.0, -5.0 / 12.0)];
+
 /// Amplification of `du/dt = (z u - d u)/dt` in a step, the decay `d` by Crank-Nicolson, in each stage of Wray's Runge-Kutta.
 fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
     match scheme {
@@ -168,9 +170,8 @@ fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
             (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm())
         }
         TimeScheme::RungeKutta3 => {
-            let stages = [(8.0 / 15.0, 0.0), (5.0 / 12.0, -17.0 / 60.0), (3.0 / 4.0, -5.0 / 12.0)];
             let (mut u, mut before) = (Complex::new(1.0, 0.0), Complex::new(0.0, 0.0));
-            for (now, last) in stages {
+            for (now, last) in STAGES {
                 let (rate, half) = (z * u, 0.5 * d * (now + last));
                 u = (u * (1.0 - half) + now * rate + last * before) / (1.0 + half);
                 before = rate;
@@ -200,7 +201,6 @@ fn stiff() -> Result<Vec<Point>, Failure> {
             let step_s = 1e-3;
             let settings = FlowSettings {
                 damped_steps,
-                scheme: TimeScheme::AdamsBashforth2,
                 ..FlowSettings::new(viscous / (N * N) as f64 / step_s, TimeStep::Fixed { step_s })
             };
             let short = |a: f64| if (a * N as f64) as usize % 2 == 0 { 1.0 } else { -1.0 };
@@ -209,10 +209,12 @@ fn stiff() -> Result<Vec<Point>, Failure> {
             flow.step()?;
             let measured = flow.face_velocity_m_s(0)[0].abs();
             let (d, directions) = (viscous * KAPPA2, if both { 2.0 } else { 1.0 });
-            let theory = match damped_steps {
-                0 => (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs(),
-                _ => (1.0 + d).powf(-directions),
-            };
+            // The first step of either scheme is one of Runge-Kutta.
+            let theory =
+                STAGES.iter().map(|(now, last)| (now + last) * d).fold(1.0, |left: f64, d| match damped_steps {
+                    0 => left * (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs(),
+                    _ => left * (1.0 + d).powf(-directions),
+                });
             points.push(Point { panel: STIFF, curve: name.into(), x: viscous, measured, theory });
         }
     }
@@ -322,20 +324,6 @@ fn focus() -> Result<Vec<Point>, Failure> {
     Ok(points)
 }
 
-/// What single precision changes in the free-space efficiency, by the number of layers.
-fn rounding() -> Result<Vec<Point>, Failure> {
-    [1, 3, 10, 30, 100, 300, 1000]
-        .into_iter()
-        .map(|layers| {
-            let (grid, layers_m) = (Grid::square(128, 8e-3)?, Layers::equal(layers, 1000.0)?);
-            let screens = MonteCarlo { layers: layers_m, range_m: vec![1000.0], grid, ..MonteCarlo::table2(1e-13, 1)? };
-            let (single, double) = (screens.grid_free_space::<f32>()?[0], screens.grid_free_space::<f64>()?[0]);
-            let (x, measured) = (layers as f64, (single / double - 1.0).abs());
-            Ok(Point { panel: ROUNDING, curve: "128 points a side".into(), x, measured, theory: f64::NAN })
-        })
-        .collect()
-}
-
 /// Largest distance of a point from the line of its theory, relative, of the panels whose theory is exact and above what round-off leaves.
 pub(crate) fn furthest(points: &[Point]) -> f64 {
     let exact = points.iter().filter(|p| [GROWTH, LIMITS, STIFF].contains(&p.panel) && p.theory > ROUND_OFF);
@@ -361,7 +349,6 @@ pub(crate) fn panels(points: &[Point]) -> Figure {
         PRESSURE => ("aspect of the cells", "residual left", Some(("at most 0.10 an iteration", 0.1, true))),
         DRIFT => ("step [s]", "energy lost, relative", None),
         REYNOLDS => ("Reynolds number", "energy over that of the start", None),
-        ROUNDING => ("layers", "change of the efficiency, relative", None),
         _ => ("spacing over λF/(4a)", "error of the efficiency", Some(("largest spacing accepted", 1.0, false))),
     };
     let drawn = points.chunk_by(|a, b| a.panel == b.panel).map(|of_panel| {

@@ -121,9 +121,9 @@ impl Row {
     }
 }
 
-/// The first two of the values if `quick`.
+/// The first three of the values if `quick`.
 fn few<T>(values: &[T], quick: bool) -> &[T] {
-    if quick { &values[..values.len().min(2)] } else { values }
+    if quick { &values[..values.len().min(3)] } else { values }
 }
 
 /// The rows of a group or of all, on one thread, with those of other programs; each case at a stretch, this program's judged among their own.

@@ -110,14 +110,14 @@ impl Uniform {
             self.row(method.name, ("none", 0.0), statistic, method.estimators[0].as_ref())
         });
         let mut rows = of.collect::<Result<Vec<_>, _>>()?;
-        if quick {
-            return Ok(rows);
-        }
         let (s, kind) = (sampling()?, SignalKind::Real);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
         for padded in [64, 128, 256, 1024, 4096] {
             let peak = SpectralPeak::new(&s, kind, &unweighted_lags(WINDOW), padded, Refinement::Parabola)?;
             rows.push(self.row("PA by padding", ("padded_samples", padded as f64), &plain, &peak)?);
+        }
+        if quick {
+            return Ok(rows);
         }
         for order in [4, 8, 16, 32] {
             let knob = ("order", order as f64);

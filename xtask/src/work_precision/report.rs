@@ -63,6 +63,9 @@ const PANELS: [Panel; 6] = [
     },
 ];
 
+/// Of more methods than these a panel shows the best settings.
+const MOST_METHODS: usize = 4;
+
 /// Rows of a panel in the order of their times, those that failed left out.
 fn drawn<'r>(rows: &'r [Row], panel: &Panel) -> Vec<&'r Row> {
     let good = |row: &&Row| row.knob.case == panel.case && row.found.error > 0.0 && row.found.cost.cpu_s > 0.0;
@@ -86,16 +89,31 @@ fn curves(panel: &Panel, rows: &[&Row]) -> CurvePlot {
     let x = Axis { range: Some(x_range), ..Axis::log("processor time, one thread [s]") };
     let y = Axis { range: Some(y_range), ..Axis::log("relative error") };
     let mut plot = CurvePlot { shape: 0.78, ..CurvePlot::new(panel.title, x, y) };
-    let mut methods: Vec<(bool, &str)> = rows.iter().map(|row| (!row.is_own(), row.knob.method.as_str())).collect();
+    let mut own: Vec<&str> = rows.iter().filter(|row| row.is_own()).map(|row| row.knob.method.as_str()).collect();
+    own.sort_unstable();
+    own.dedup();
+    // Of many methods only the settings that no other beats are drawn.
+    let name = |row: &Row| match row.is_own() {
+        true if own.len() > MOST_METHODS => {
+            if row.is_on_front {
+                "wakescope, its best settings".into()
+            } else {
+                String::new()
+            }
+        }
+        true => format!("wakescope, {}", row.knob.method),
+        false => row.knob.method.clone(),
+    };
+    let mut methods: Vec<(bool, String)> = rows.iter().map(|row| (!row.is_own(), name(row))).collect();
     methods.sort_unstable();
     methods.dedup();
-    for (colour, (other, method)) in methods.iter().enumerate() {
-        let of: Vec<&&Row> = rows.iter().filter(|row| row.knob.method == *method && row.is_own() != *other).collect();
+    methods.retain(|(_, name)| !name.is_empty());
+    for (colour, (_, method)) in methods.iter().enumerate() {
+        let of: Vec<&&Row> = rows.iter().filter(|row| name(row) == *method).collect();
         let points: Vec<(f64, f64)> = of.iter().map(|row| point(row)).collect();
-        let name = if *other { (*method).to_owned() } else { format!("wakescope {method}") };
         let style = if points.len() > 1 { Style::LineMarkers } else { Style::Markers };
         let errors: Vec<f64> = of.iter().map(|row| row.found.standard_error.min(0.9 * row.found.error)).collect();
-        plot = plot.with(Series::new(&name, style, points.clone()).in_colour(colour));
+        plot = plot.with(Series::new(method, style, points.clone()).in_colour(colour));
         if errors.iter().any(|error| *error > 0.0) {
             plot = plot.with(Series::new("", Style::Markers, points).with_band(&errors).in_colour(colour));
         }
@@ -137,22 +155,16 @@ pub(crate) fn text(rows: &[Row]) -> String {
         if others.is_empty() {
             continue;
         }
-        let told = others.iter().map(|row| {
-            let reached = format!("{} {} at {:.2e}", row.knob.method, row.version, row.found.error);
-            match ratio(&own, row) {
-                Some(ratio) => format!("{reached}: {ratio:.2}"),
-                None => format!("{reached}: this program has no setting so near"),
-            }
-        });
-        let _ = writeln!(
-            out,
-            "Time of others over this program's at their errors: {}.\n",
-            told.collect::<Vec<_>>().join("; ")
-        );
+        out.push_str("| other program | error | its time over this program's at that error |\n|---|---|---|\n");
+        for row in &others {
+            let ratio =
+                ratio(&own, row).map_or("this program has no setting so near".into(), |ratio| format!("{ratio:.2}"));
+            let _ = writeln!(out, "| {} {} | {:.2e} | {ratio} |", row.knob.method, row.version, row.found.error);
+        }
         let better = others.iter().filter(|row| ratio(&own, row).is_none_or(|ratio| ratio < 1.0));
         let better: Vec<String> = better.map(|row| format!("{} at {:.1e}", row.knob.method, row.found.error)).collect();
         let better = if better.is_empty() { "none of them".into() } else { better.join(", ") };
-        let _ = writeln!(out, "The better buy: {better}.\n");
+        let _ = writeln!(out, "\nThe better buy: {better}.\n");
     }
     out
 }
@@ -163,8 +175,8 @@ fn setting(row: &Row) -> String {
 
 fn seconds(s: f64) -> String {
     match s {
-        s if s < 1e-3 => format!("{:.3} µs", 1e6 * s),
-        s if s < 1.0 => format!("{:.3} ms", 1e3 * s),
+        s if s < 1e-3 => format!("{:.0} µs", 1e6 * s),
+        s if s < 1.0 => format!("{:.1} ms", 1e3 * s),
         s => format!("{s:.2} s"),
     }
 }
