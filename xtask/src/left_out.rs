@@ -137,16 +137,19 @@ fn crates(package: &str, features: &str) -> Result<usize, Failure> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use wakescope_sim::plan::{Plan, Target};
+    use wakescope_sim::scene::SceneFile;
 
     #[test]
-    fn every_scene_of_the_list_passes_the_check_of_keys() {
+    fn every_scene_of_the_list_passes_the_check() {
         let Scenes { whole, without, .. } = toml::from_str(include_str!("left_out.toml")).unwrap();
         for Without { name, keys } in &without {
             let mut scene = whole.clone();
             keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value)).unwrap();
             let text = toml::to_string(&scene).unwrap();
-            let read = wakescope_sim::scene::SceneFile::parse(&text, Path::new("scene.toml"));
-            assert!(read.is_ok(), "{name}: {:?}", read.err());
+            let read = SceneFile::parse(&text, Path::new("scene.toml")).unwrap();
+            let plan = Plan::new(read, Target::Run);
+            assert!(plan.is_ok(), "{name}: {:?}", plan.err());
         }
     }
 }

@@ -187,9 +187,9 @@ fn ratio(own: &[&Row], other: &Row) -> Option<f64> {
     let front: Vec<&&Row> = own.iter().filter(|row| row.is_on_front).collect();
     let error = other.found.error;
     let better = front.iter().position(|row| row.found.error <= error)?;
+    let same = own.iter().filter(|row| row.value == other.value).map(|row| row.found.cost.cpu_s);
     let own_s = if better == 0 {
-        let same = front.iter().find(|row| row.value == other.value);
-        same.unwrap_or(&front[0]).found.cost.cpu_s
+        same.min_by(f64::total_cmp).unwrap_or(front[0].found.cost.cpu_s)
     } else {
         let [a, b] = [front[better - 1], front[better]].map(|row| (row.found.error.ln(), row.found.cost.cpu_s.ln()));
         (a.1 + (b.1 - a.1) * (error.ln() - a.0) / (b.0 - a.0)).exp()
@@ -215,9 +215,10 @@ mod tests {
 
     #[test]
     fn ratios_are_taken_at_equal_errors() {
-        let own = rows(&[(16.0, 1e-1, 1.0), (32.0, 1e-3, 100.0)]);
+        let mut own = rows(&[(16.0, 1e-1, 1.0), (32.0, 1e-3, 100.0), (64.0, 2e-1, 150.0)]);
+        own[2].is_on_front = false;
         let own: Vec<&Row> = own.iter().collect();
-        let others = rows(&[(1.0, 1e-2, 20.0), (32.0, 0.5, 300.0), (7.0, 0.5, 3.0), (1.0, 1e-4, 1.0)]);
+        let others = rows(&[(1.0, 1e-2, 20.0), (64.0, 0.5, 450.0), (7.0, 0.5, 3.0), (1.0, 1e-4, 1.0)]);
         let found: Vec<Option<f64>> = others.iter().map(|other| ratio(&own, other)).collect();
         assert!((found[0].unwrap() - 2.0).abs() < 1e-12);
         assert_eq!(found[1..], [Some(3.0), Some(3.0), None], "the same size; the cheapest; nothing so good");
