@@ -56,7 +56,7 @@ class Zones:
     """Zones of a table of batches: rms of (case, zone, place) without one batch."""
 
     def __init__(self, name):
-        self.sums, self.range_m = {}, {}
+        self.sums, self.range_m, self.lines = {}, {}, {}
         for row in rows(name):
             key = (row["case"], row["zone"], None if row["place"] != row["place"] else row["place"])
             self.sums.setdefault(key, []).append((row["sum_of_squares_m2_s2"], row["estimates"]))
@@ -68,6 +68,12 @@ class Zones:
         return math.sqrt(sum(of[0] for of in kept) / estimates) if estimates else NAN
 
     def evolution(self, case, range_m, without):
+        if (case, without) not in self.lines:
+            self.lines[case, without] = self.line(case, without)
+        x, y, slope = self.lines[case, without]
+        return y + slope * (range_m - x)
+
+    def line(self, case, without):
         """The straight line through what a case errs outside, each gate with the weight of its estimates."""
         gates = [key for key in self.sums if key[:2] == (case, "evolution")]
         points = []
@@ -78,7 +84,7 @@ class Zones:
         weight = sum(p[2] for p in points)
         x, y = (sum(p[2] * p[k] for p in points) / weight for k in (0, 1))
         slope = sum(p[2] * (p[0] - x) * (p[1] - y) for p in points) / sum(p[2] * (p[0] - x) ** 2 for p in points)
-        return y + slope * (range_m - x)
+        return x, y, slope
 
     def excess(self, key, without=None):
         return self.rms(key, without) - self.evolution(key[0], self.range_m[key], without)
