@@ -41,16 +41,7 @@ impl Figure {
     /// Its word on the command line and in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::Efficiency => "efficiency",
-            Self::Bias => "bias",
-            Self::Std => "std",
-            Self::Rms => "rms",
-            Self::U => "u",
-            Self::V => "v",
-            Self::W => "w",
-            Self::Circulation => "circulation",
-        }
+        ["efficiency", "bias", "std", "rms", "u", "v", "w", "circulation"][self as usize]
     }
 }
 
@@ -71,42 +62,42 @@ impl Shift {
     }
 }
 
-/// A value of all realisations, and of all but each.
+/// A value of all realisations, followed by those of all but each.
 #[derive(Debug, Clone)]
-pub(super) struct Values {
-    whole: f64,
-    without: Vec<f64>,
-}
+pub(super) struct Values(Vec<f64>);
 
 impl Values {
     /// Mean of numbers that are independent; what is no number is left out.
     pub(super) fn mean(numbers: &[f64]) -> Self {
-        let finite: Vec<f64> = numbers.iter().copied().filter(|x| x.is_finite()).collect();
-        let (sum, n) = (finite.iter().sum::<f64>(), finite.len() as f64);
-        Self { whole: sum / n, without: finite.iter().map(|x| (sum - x) / (n - 1.0)).collect() }
+        let finite = || numbers.iter().filter(|x| x.is_finite());
+        let (sum, n) = (finite().sum::<f64>(), finite().count() as f64);
+        Self([sum / n].into_iter().chain(finite().map(|x| (sum - x) / (n - 1.0))).collect())
+    }
+
+    fn whole(&self) -> f64 {
+        self.0[0]
     }
 
     /// Standard error of the whole.
-    pub(super) fn error(&self) -> f64 {
-        let n = self.without.len() as f64;
-        let mean = self.without.iter().sum::<f64>() / n;
-        ((n - 1.0) / n * self.without.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
+    fn error(&self) -> f64 {
+        let (without, n) = (&self.0[1..], self.0.len() as f64 - 1.0);
+        let mean = without.iter().sum::<f64>() / n;
+        ((n - 1.0) / n * without.iter().map(|x| (x - mean).powi(2)).sum::<f64>()).sqrt()
     }
 
     /// The same over the whole.
     pub(super) fn relative_error(&self) -> f64 {
-        self.error() / self.whole
+        self.error() / self.whole()
     }
 
     fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
-        let without = self.without.iter().zip(&other.without).map(|(a, b)| of(*a, *b)).collect();
-        Self { whole: of(self.whole, other.whole), without }
+        Self(self.0.iter().zip(&other.0).map(|(a, b)| of(*a, *b)).collect())
     }
 
     /// How far this is from `fine`, over a scale.
     pub(super) fn shift(&self, fine: &Self, scale: &Self) -> Shift {
         let over = self.with(fine, |a, b| a - b).with(scale, |apart, scale| apart / scale);
-        Shift { shift: over.whole, error: over.error() }
+        Shift { shift: over.whole(), error: over.error() }
     }
 }
 
@@ -151,27 +142,8 @@ impl Shown {
         self.circulation_m2_s.extend(more.circulation_m2_s);
     }
 
-    /// Its first realisations alone.
-    pub(super) fn first(&self, count: usize) -> Self {
-        let mut out = self.clone();
-        out.error_m_s.truncate(count);
-        out.wind_m_s.truncate(count);
-        out.circulation_m2_s.truncate(count);
-        out
-    }
-
     pub(super) fn realisations(&self) -> usize {
         self.error_m_s.len()
-    }
-
-    /// Whether it has a figure.
-    pub(super) fn has(&self, figure: Figure) -> bool {
-        match figure {
-            Figure::Efficiency => false,
-            Figure::Bias | Figure::Std | Figure::Rms => true,
-            Figure::U | Figure::V | Figure::W => !self.wind_m_s.is_empty(),
-            Figure::Circulation => self.circulation_m2_s.iter().filter(|found| found.is_finite()).count() > 2,
-        }
     }
 
     /// Cells with an estimate in every realisation.
@@ -196,7 +168,7 @@ impl Shown {
     /// Relative standard error of a figure with these realisations.
     pub(super) fn noise(&self, figure: Figure) -> f64 {
         let known = self.known();
-        self.values(figure, &known).error() / self.scale(figure, &known).whole
+        self.values(figure, &known).error() / self.scale(figure, &known).whole()
     }
 
     /// What a figure is compared with: itself, but for a bias that does not stand out of its error the root mean square error, and for a
@@ -205,7 +177,7 @@ impl Shown {
         let own = self.values(figure, cells);
         let rms = || self.values(Figure::Rms, cells);
         match figure {
-            Figure::Bias if own.whole < 4.0 * own.error() => rms(),
+            Figure::Bias if own.whole() < 4.0 * own.error() => rms(),
             Figure::U | Figure::V | Figure::W => {
                 let part = |of| self.values(of, cells);
                 let speed = part(Figure::U).with(&part(Figure::V), f64::hypot).with(&part(Figure::W), f64::hypot);
@@ -228,8 +200,8 @@ impl Shown {
 
     /// Root means over cells, from the sums over realisations of each cell.
     fn of_map(&self, figure: Figure, cells: &[bool]) -> Values {
-        let all = self.error_m_s.len();
-        let (mut whole, mut without, mut count) = (0.0, vec![0.0; all], 0.0);
+        let all = self.error_m_s.len() as f64;
+        let (mut sums, mut count) = (vec![0.0; self.error_m_s.len() + 1], 0.0);
         let square = |n: f64, sum: f64, squares: f64, off: f64| {
             let variance = (squares - sum * sum / n) / (n - 1.0);
             match figure {
@@ -241,14 +213,13 @@ impl Shown {
         for cell in (0..cells.len()).filter(|cell| cells[*cell]) {
             let errors = || self.error_m_s.iter().map(|scan| scan[cell]);
             let (sum, squares) = errors().fold((0.0, 0.0), |(sum, squares), e| (sum + e, squares + e * e));
-            whole += square(all as f64, sum, squares, self.off_m_s[cell]);
             count += 1.0;
-            for (out, e) in without.iter_mut().zip(errors()) {
-                *out += square(all as f64 - 1.0, sum - e, squares - e * e, self.off_m_s[cell]);
+            sums[0] += square(all, sum, squares, self.off_m_s[cell]);
+            for (out, e) in sums[1..].iter_mut().zip(errors()) {
+                *out += square(all - 1.0, sum - e, squares - e * e, self.off_m_s[cell]);
             }
         }
-        let root = |sum: f64| (sum / count).max(0.0).sqrt();
-        Values { whole: root(whole), without: without.into_iter().map(root).collect() }
+        Values(sums.into_iter().map(|sum| (sum / count).max(0.0).sqrt()).collect())
     }
 }
 
@@ -276,11 +247,15 @@ mod tests {
         let of = |figure| own.values(figure, &all);
         // sqrt(2/(M - 1)/cells)/2 of a standard deviation
         let expected = (0.5 / ((m - 1) as f64 * n as f64)).sqrt();
-        assert!((of(Figure::Std).whole - 1.0).abs() < 4.0 * expected, "{:?}", of(Figure::Std).whole);
+        assert!((of(Figure::Std).whole() - 1.0).abs() < 4.0 * expected, "{:?}", of(Figure::Std).whole());
         assert!((own.noise(Figure::Std) / expected - 1.0).abs() < 0.6, "{} {expected}", own.noise(Figure::Std));
         // The mean error is 1 against the pulse's velocity and 1.5 against the gate's.
-        assert!((of(Figure::Bias).whole - 1.5).abs() < 4.0 * of(Figure::Bias).error(), "{:?}", of(Figure::Bias).whole);
-        assert!((of(Figure::Rms).whole - 2f64.sqrt()).abs() < 4.0 * of(Figure::Rms).error());
+        assert!(
+            (of(Figure::Bias).whole() - 1.5).abs() < 4.0 * of(Figure::Bias).error(),
+            "{:?}",
+            of(Figure::Bias).whole()
+        );
+        assert!((of(Figure::Rms).whole() - 2f64.sqrt()).abs() < 4.0 * of(Figure::Rms).error());
     }
 
     #[test]

@@ -5,24 +5,26 @@
 //! | [`figures`] | the figures that a run writes, and their shifts between settings |
 //! | [`keys`] | keys that trade error for time |
 //! | [`ladder`] | values of a key from fine to coarse, verdicts, the choice |
-//! | `paths` | what phase screens do to the efficiency |
-//! | `search`, `verify` | the search; the choice as a whole; realisations |
+//! | `search` | the search: what it plans, measures and spends |
+//! | `pilot`, `screens` | keys of the estimator, measured on maps; keys of phase screens |
+//! | `verify` | the choice as a whole; realisations |
 //! | `report`, `pictures` | the answer as text, table and scene; drawn |
 
 pub mod figures;
 pub mod keys;
 pub mod ladder;
-mod paths;
 #[cfg(feature = "plots")]
 mod pictures;
+mod pilot;
 mod report;
+mod screens;
 mod search;
 mod verify;
 
 use crate::Error;
 use crate::plan::Plan;
 use crate::scene::{Pattern, SceneFile};
-use crate::setup::efficiency_model::model;
+use crate::setup::efficiency_model::{drawn_turbulence, model};
 use crate::setup::progress::Observer;
 use figures::{Figure, Shift};
 use ladder::Ladder;
@@ -63,7 +65,7 @@ impl Request {
             return Err(Error::Input { path: "--of".into(), reason });
         }
         let has = |figure: &Figure| match figure {
-            Figure::Efficiency => model(scene) == Model::MonteCarlo,
+            Figure::Efficiency => model(scene) == Model::MonteCarlo && drawn_turbulence(scene).is_none(),
             Figure::Bias | Figure::Std | Figure::Rms => true,
             Figure::U | Figure::V | Figure::W => tells_winds,
             Figure::Circulation => scene.retrieval.is_some() || !self.of.is_empty(),
@@ -113,7 +115,7 @@ pub struct Noise {
 pub type Found = (Figure, f64, Shift);
 
 /// The choice as a whole with another seed.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Verified {
     /// The seed.
     pub seed: u64,
@@ -132,8 +134,6 @@ pub struct Accuracy {
     pub within: f64,
     /// Forecast of the scene's own run without pictures, s of one core.
     pub own_s: f64,
-    /// Realisations of it.
-    pub own_realisations: usize,
     /// Forecast of what the search did, s of one core.
     pub spent_s: f64,
     /// What it took, s.
@@ -152,13 +152,9 @@ pub struct Accuracy {
     pub noises: Vec<Noise>,
     /// The choice as a whole.
     pub verified: Verified,
-    /// Whether the budget does not hold what the answer needs.
-    pub is_short: bool,
     /// What was not done, and why.
     pub notes: Vec<String>,
-    /// The keys that are chosen.
-    pub values: Vec<(&'static str, f64)>,
-    /// The scene with them.
+    /// The scene with the keys that are chosen.
     pub scene: SceneFile,
     /// Forecast of its run without pictures, s of one core.
     pub run_s: f64,
@@ -176,6 +172,7 @@ impl Accuracy {
     /// Whether a run within the budget has every figure within the target.
     #[must_use]
     pub fn is_reached(&self) -> bool {
-        !self.is_short && self.verified.is_confirmed && self.noises.iter().all(|noise| noise.is_reached)
+        let reached = |figure: &Figure| self.noises.iter().any(|noise| noise.figure == *figure && noise.is_reached);
+        self.verified.is_confirmed && self.figures.iter().all(reached)
     }
 }

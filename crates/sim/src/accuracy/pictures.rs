@@ -25,8 +25,7 @@ impl Accuracy {
         for (colour, ladder) in self.ladders.iter().enumerate() {
             let mut points = Vec::new();
             for (place, step) in ladder.steps.iter().enumerate() {
-                let found = step.shifts.iter().find(|(of, _)| *of == figure);
-                let point = found.map(|(_, own)| (step.forecast_s, (100.0 * own.bound()).max(FLOOR)));
+                let point = step.shift(figure).map(|own| (step.forecast_s, (100.0 * own.bound()).max(FLOOR)));
                 points.extend(point);
                 chosen.extend(point.filter(|_| place == ladder.chosen));
             }

@@ -3,7 +3,6 @@
 //! | module | what is in it |
 //! |---|---|
 //! | [`profile`] | efficiency and signal-to-noise ratio against range |
-//! | `efficiencies` | efficiency curves that several scans share |
 //! | [`scan`] | the records of the lines of sight |
 //! | [`beam_winds`] | winds from the beams of VAD and DBS scans |
 //! | [`map`], `map_estimator`, `gate_estimates` | estimates and their errors against the truth |
@@ -17,7 +16,6 @@ pub mod beam_winds;
 pub mod bound;
 pub mod budget;
 pub mod cell_average;
-pub(crate) mod efficiencies;
 pub mod error_law;
 pub(crate) mod gate_estimates;
 pub mod map;

@@ -4,11 +4,11 @@
 //! focus (`every_output_has_the_same_ratio_through_a_focus`).
 
 use crate::Error;
-use crate::measure::efficiencies::Known;
 use crate::plan::{Plan, Stage};
 use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, hash_of};
 use crate::setup::efficiency_model::{MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
 use crate::setup::instrument::Instrument;
+use crate::setup::known::Known;
 use crate::setup::progress::Observer;
 use crate::setup::table::of_table;
 use std::ops::ControlFlow;
@@ -197,7 +197,7 @@ impl Screens {
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
         // Single precision: its rounding is far below the error of any number of realisations.
-        let estimate = instrument.monte_carlo(t, &range_m, scene.seed)?.run_in::<f32>(
+        let estimate = instrument.monte_carlo(t, &range_m, scene.seed)?.0.run_in::<f32>(
             Stop::after(t.realisations),
             |progress| {
                 observer.advance((progress.done - seen) as u64);

@@ -11,7 +11,12 @@ use wakescope_estimate::map::PolarPoint;
 /// A warning if a line has gates without a window. Regions as large as a standard deviation asks for are not looked at.
 pub(super) fn warning(scene: &Scene, g: &Geometry) -> Result<Option<String>, Error> {
     let e = &scene.estimator;
-    let (empty, places) = (empty_gates(scene, g)?, places(scene, g)?);
+    let places = places(scene, g)?;
+    let elevation_rad = places.line_elevation_rad()[0];
+    let is_empty = |range_m: f64| {
+        places.chords(PolarPoint { range_m, elevation_rad }, largest_radius_m(scene, range_m)).next().is_none()
+    };
+    let empty = g.gate_range_m.iter().filter(|range_m| is_empty(**range_m)).count();
     let step_m = e.window_step_samples as f64 * scene.sample_spacing_m();
     let windows_m = places.gate_ranges_m();
     let nearest_m = |gate_m: &f64| windows_m.iter().map(|at_m| (at_m - gate_m).abs()).fold(f64::INFINITY, f64::min);
@@ -28,16 +33,6 @@ pub(super) fn warning(scene: &Scene, g: &Geometry) -> Result<Option<String>, Err
             (1000.0 * farthest_m).ceil() / 1000.0,
         )
     }))
-}
-
-/// How many gates of a line have no window in their region.
-pub(crate) fn empty_gates(scene: &Scene, g: &Geometry) -> Result<usize, Error> {
-    let places = places(scene, g)?;
-    let elevation_rad = places.line_elevation_rad()[0];
-    let is_empty = |range_m: f64| {
-        places.chords(PolarPoint { range_m, elevation_rad }, largest_radius_m(scene, range_m)).next().is_none()
-    };
-    Ok(g.gate_range_m.iter().filter(|range_m| is_empty(**range_m)).count())
 }
 
 #[cfg(test)]

@@ -7,13 +7,15 @@ use crate::Error;
 use crate::scene::{Method, Scene, SceneFile, Weighting};
 use crate::setup::Setup;
 use crate::setup::estimators::grid_step_and_bias_m_s;
+use crate::setup::known::Known;
 use crate::setup::wind::SceneWind;
 use std::fmt;
 use std::ops::Deref;
 use std::sync::Arc;
+use wakescope_optics::plan::Plan as ScreenPlan;
 
 mod ambiguity;
-pub(crate) mod coverage;
+mod coverage;
 mod fastest;
 mod file_limits;
 mod files;
@@ -45,6 +47,8 @@ pub struct Plan {
     pub core_s: f64,
     /// The same by what takes it.
     pub(crate) times: time::Times,
+    /// Phase screens of each stretch of range that has its own.
+    pub(crate) screens: optics::ScreenPlans,
     /// Largest radial velocity of the air on the lines of sight, seen from the lidar, m/s.
     pub fastest_m_s: f64,
     /// What the user should know before the run.
@@ -59,31 +63,40 @@ impl Plan {
     /// such as phase screens too coarse for the turbulence; results that a file cannot hold.
     pub fn new(scene: SceneFile, target: Target) -> Result<Self, Error> {
         let wind = Arc::new(SceneWind::new(&scene)?);
-        Self::with_wind(scene, target, wind)
+        Self::sharing(scene, target, wind, &Known::default())
     }
 
-    /// Plans a run with the wind of the scene, which others may share.
+    /// Plans a run with the wind of the scene, and phase screens that were planned before, which others may share.
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub(crate) fn with_wind(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
+    pub(crate) fn sharing(
+        scene: SceneFile,
+        target: Target,
+        wind: Arc<SceneWind>,
+        planned: &Known<Vec<ScreenPlan>>,
+    ) -> Result<Self, Error> {
         let file = scene.clone();
-        Self::made(scene, target, wind).map_err(|error| file.of_key(error))
+        Self::made(scene, target, wind, planned).map_err(|error| file.of_key(error))
     }
 
-    fn made(scene: SceneFile, target: Target, wind: Arc<SceneWind>) -> Result<Self, Error> {
+    fn made(
+        scene: SceneFile,
+        target: Target,
+        wind: Arc<SceneWind>,
+        planned: &Known<Vec<ScreenPlan>>,
+    ) -> Result<Self, Error> {
         let setup = Setup::new(scene, wind)?;
         let scene = &setup.scene.scene;
         let mut warnings = warnings(scene)?;
         warnings.extend(ambiguity::warning(scene, &setup.instrument.pulse));
         warnings.extend(hardware::warnings(scene, &setup.instrument));
-        let (optics, optics_s) =
-            optics::stages(&setup.scene, &setup.instrument, target, &setup.geometry, &mut warnings)?;
+        let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
         let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
         let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
         let times = time::times(scene, target, &sizes, optics_s);
         let fastest_m_s = fastest::fastest_m_s(&setup)?;
-        let mut plan = Self { setup, target, stages, core_s: times.total_s(), times, fastest_m_s, warnings };
+        let mut plan = Self { setup, target, stages, core_s: times.total_s(), times, screens, fastest_m_s, warnings };
         plan.warnings.splice(0..0, plan.of_fast_air());
         if plan.runs(Stage::Estimates) {
             plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);

@@ -3,27 +3,33 @@
 use super::stage::{PlannedStage, Target, run, skip};
 use crate::Error;
 use crate::scene::{Problem, RefractiveTurbulence, SceneFile, ScreenSampling, SnrReference};
+use crate::setup::Setup;
 use crate::setup::efficiency_model::{
     MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, signals_cross_screens, stretches, turbulence,
 };
-use crate::setup::geometry::Geometry;
-use crate::setup::instrument::Instrument;
+use crate::setup::known::Known;
 use crate::setup::progress::Stage;
 use crate::setup::table::spaced;
+use std::sync::Arc;
+use wakescope_optics::plan::Plan as ScreenPlan;
 use wakescope_optics::plan::{Limit, Model, SetUp, Violation, Warning};
 use wakescope_optics::{Focus, Telescope, curved_ranges_m, theory};
 
-/// Phase screens and efficiency, and their time on one core, s; adds what is doubtful about the screens to `warnings`.
+/// Plans of the phase screens of all stretches of range.
+pub(crate) type ScreenPlans = Arc<Vec<ScreenPlan>>;
+
+/// Phase screens and efficiency, their time on one core, s, and the plans of the screens; adds what is doubtful about the screens to
+/// `warnings`.
 ///
 /// # Errors
 /// Screens that cannot resolve the scene, with every limit and what would do; a beam that no quadrature follows.
 pub(super) fn stages(
-    file: &SceneFile,
-    instrument: &Instrument,
+    setup: &Setup,
     target: Target,
-    geometry: &Geometry,
+    planned: &Known<Vec<ScreenPlan>>,
     warnings: &mut Vec<String>,
-) -> Result<([PlannedStage; 2], f64), Error> {
+) -> Result<([PlannedStage; 2], f64, ScreenPlans), Error> {
+    let Setup { scene: file, instrument, geometry, .. } = setup;
     let scene = &file.scene;
     let fixed = match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Some(snr_db),
@@ -47,8 +53,9 @@ pub(super) fn stages(
     let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(telescope, places, r)).sum();
     // Of more ranges than this a curve is made.
     let quadratures_s = quadratures_s * (MOST_QUADRATURES as f64 / ranges_m.len().max(1) as f64).min(1.0);
-    let (screens, screens_s) = match turbulence(scene) {
-        None => (skip(Stage::PhaseScreens, "no turbulence: atmosphere.turbulence"), 0.0),
+    let skipped = |why| (skip(Stage::PhaseScreens, why), 0.0, Arc::default());
+    let (screens, screens_s, plans) = match turbulence(scene) {
+        None => skipped("no turbulence: atmosphere.turbulence"),
         Some(t) => {
             let drawn = layers.filter(|_| signals_cross_screens(scene));
             let mut across: Vec<f64> = table.iter().chain(&drawn).flatten().copied().collect();
@@ -57,11 +64,9 @@ pub(super) fn stages(
                 |([from_m, to_m], _): ([f64; 2], &[f64])| curved_ranges_m(telescope, from_m, to_m, OF_SCREENS);
             let runs: Vec<Vec<f64>> = stretches(scene, geometry, &across).into_iter().map(of_stretch).collect();
             match (runs.is_empty(), model) {
-                (false, _) => screens(file, instrument, &t, &runs, warnings)?,
-                (true, Model::ExactBistatic) => {
-                    (skip(Stage::PhaseScreens, "the bistatic efficiency has an exact theory"), 0.0)
-                }
-                (true, _) => (skip(Stage::PhaseScreens, "not asked for"), 0.0),
+                (false, _) => screens(setup, &t, &runs, planned, warnings)?,
+                (true, Model::ExactBistatic) => skipped("the bistatic efficiency has an exact theory"),
+                (true, _) => skipped("not asked for"),
             }
         }
     };
@@ -82,7 +87,7 @@ pub(super) fn stages(
             run(Stage::Efficiency, reason, [0.0, kept_bytes])
         }
     };
-    Ok(([screens, efficiency], quadratures_s + screens_s))
+    Ok(([screens, efficiency], quadratures_s + screens_s, plans))
 }
 
 /// Refuses a beam whose Fresnel number is too large for the quadratures, in the words of the scene.
@@ -115,19 +120,20 @@ fn refuse_fresnel_numbers(file: &SceneFile, telescope: &Telescope, ranges_m: &[f
     Err(file.located(vec![problem]).into())
 }
 
-/// The phase screens of all runs, each for its own ranges, and their time, s.
+/// The phase screens of all runs, each for its own ranges, their time, s, and their plans.
 fn screens(
-    file: &SceneFile,
-    instrument: &Instrument,
+    setup: &Setup,
     t: &RefractiveTurbulence,
     runs: &[Vec<f64>],
+    planned: &Known<Vec<ScreenPlan>>,
     warnings: &mut Vec<String>,
-) -> Result<(PlannedStage, f64), Error> {
+) -> Result<(PlannedStage, f64, ScreenPlans), Error> {
     let (mut core_s, mut working_bytes) = (0.0, 0.0_f64);
     let mut what = Vec::new();
     let lists: Vec<&[f64]> = runs.iter().map(Vec::as_slice).collect();
-    let plans = instrument.screen_plans(t, &lists).map_err(|e| refused(file, t, e))?;
-    for (range_m, plan) in runs.iter().zip(plans) {
+    let plan = || setup.instrument.screen_plans(t, &lists).map_err(|e| refused(&setup.scene, t, e));
+    let plans = planned.of(format!("{:?}", (setup.instrument.telescope, t, runs)), plan)?;
+    for (range_m, plan) in runs.iter().zip(plans.iter()) {
         core_s += plan.realisation_cpu_s * t.realisations as f64;
         let memory_bytes = plan.memory_bytes_of(t.realisations, rayon::current_num_threads());
         working_bytes = working_bytes.max(memory_bytes as f64);
@@ -158,7 +164,7 @@ fn screens(
         }
     }
     let reason = format!("{} realisations of {}", t.realisations, what.join("; "));
-    Ok((run(Stage::PhaseScreens, reason, [working_bytes, 0.0]), core_s))
+    Ok((run(Stage::PhaseScreens, reason, [working_bytes, 0.0]), core_s, plans))
 }
 
 /// A refusal of the optics in the keys of the scene; the strongest limit of each key is named.

@@ -132,7 +132,7 @@ impl Instrument {
         }
     }
 
-    /// The Monte Carlo of the turbulence for given ranges, m, increasing.
+    /// The Monte Carlo of the turbulence for given ranges, m, increasing, and the time of a realisation on one core, s.
     ///
     /// # Errors
     /// As [`Instrument::screen_plans`]; air without turbulence.
@@ -141,12 +141,12 @@ impl Instrument {
         t: &RefractiveTurbulence,
         range_m: &[f64],
         seed: u64,
-    ) -> Result<optics::MonteCarlo, Error> {
+    ) -> Result<(optics::MonteCarlo, f64), Error> {
         let plan = self.screen_plans(t, &[range_m])?.pop();
         let (Some(plan), Some(turbulence)) = (plan, &self.turbulence) else {
             return Err(optics::Error::Length { field: "range_m", found: 0, expected: 1 }.into());
         };
-        Ok(optics::MonteCarlo {
+        let run = optics::MonteCarlo {
             telescope: self.telescope,
             misalignment: optics::Misalignment::NONE,
             turbulence: turbulence.clone(),
@@ -155,7 +155,8 @@ impl Instrument {
             range_m: range_m.to_vec(),
             seed,
             sampling: optics::monte_carlo::Sampling::Antithetic,
-        })
+        };
+        Ok((run, plan.realisation_cpu_s))
     }
 }
 

@@ -9,7 +9,7 @@
 //! | `efficiency_model` | the cheapest model of the efficiency that is valid, and the ranges at which it is computed |
 //! | `region`, `ray_information` | the radius of regions; what a pulse tells of the velocity about a range |
 //! | `described` | pulse and site as files carry them |
-//! | `table` | tables of numbers and straight lines between them |
+//! | `table`, `known` | tables of numbers and straight lines between them; what several scenes share |
 //! | [`progress`], [`streams`] | stages of a run and who is told of them; one random stream for each pulse |
 
 pub(crate) mod air;
@@ -19,6 +19,7 @@ pub(crate) mod efficiency_model;
 pub mod estimators;
 pub mod geometry;
 pub mod instrument;
+pub(crate) mod known;
 pub mod progress;
 pub(crate) mod ray_information;
 pub(crate) mod region;

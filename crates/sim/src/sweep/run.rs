@@ -7,19 +7,20 @@ use super::results::rows;
 use super::stored::{Definition, SWEEP};
 use super::tables;
 use crate::io::{Existing, Table};
-use crate::measure::efficiencies::Known;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
 use crate::plan::units::seconds;
 use crate::plan::{Plan, Target};
 use crate::scene::{Estimator, Outputs, Scene, SceneFile, Site, WindOfPulses, hash_of};
+use crate::setup::known::Known;
 use crate::setup::progress::{Observer, Stage};
 use crate::setup::wind::SceneWind;
 use crate::{Error, machine, outputs};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use wakescope_optics::plan::Plan as ScreenPlan;
 
 /// Part of the memory that is available which cases that are measured together may take.
 const SHARE: f64 = 0.5;
@@ -126,7 +127,7 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
     for group in groups(due.iter().map(|case| &case.scene)) {
         let planned = |&place: &usize| {
             let case: &'s Case = due[place];
-            Ok((case, plan(&case.scene, Target::Map, &winds).map_err(|e| sweep.failed(case, 0, e))?))
+            Ok((case, plan(&case.scene, Target::Map, &winds, &Known::default()).map_err(|e| sweep.failed(case, 0, e))?))
         };
         for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
             let begun = Instant::now();
@@ -163,20 +164,26 @@ pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, 
     measured(scenes, 0, &Common::default(), observer, |_, _, map| Ok(map))
 }
 
-/// Winds and efficiencies that scenes have in common, whenever they are measured.
+/// Winds, plans of phase screens and efficiencies that scenes have in common, whenever they are measured.
 #[derive(Debug, Default)]
 pub(crate) struct Common {
     winds: Known<SceneWind>,
+    screens: Known<Vec<ScreenPlan>>,
     efficiencies: Efficiencies,
 }
 
 impl Common {
-    /// The plan of a scene with a wind that others may share.
+    /// The plan of a scene with a wind and phase screens that others may share.
     ///
     /// # Errors
     /// As [`Plan::new`].
     pub(crate) fn plan(&self, scene: &SceneFile, target: Target) -> Result<Plan, Error> {
-        plan(scene, target, &self.winds)
+        plan(scene, target, &self.winds, &self.screens)
+    }
+
+    /// How often phase screens were planned.
+    pub(crate) fn planned(&self) -> usize {
+        self.screens.len()
     }
 }
 
@@ -205,7 +212,7 @@ pub(crate) fn measured<T>(
 /// Plans every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
 fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<Vec<f64>, Error> {
     let checked = |case: &Case| -> Result<f64, Error> {
-        let plan = plan(&case.scene, Target::Map, winds)?;
+        let plan = plan(&case.scene, Target::Map, winds, &Known::default())?;
         if !allow_large {
             plan.fits()?;
         }
@@ -216,11 +223,16 @@ fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<V
     sweep.cases.iter().zip(found).map(|(case, found)| found.map_err(|e| sweep.failed(case, others, e))).collect()
 }
 
-/// The plan of a scene, with a wind that others may share.
-fn plan(scene: &SceneFile, target: Target, winds: &Known<SceneWind>) -> Result<Plan, Error> {
+/// The plan of a scene, with a wind and phase screens that others may share.
+fn plan(
+    scene: &SceneFile,
+    target: Target,
+    winds: &Known<SceneWind>,
+    screens: &Known<Vec<ScreenPlan>>,
+) -> Result<Plan, Error> {
     let cause = hash_of(&format!("{:?}", (&scene.scene.flow, &scene.scene.added_flows, &scene.folder)));
     let wind = winds.of(cause, || SceneWind::new(scene))?;
-    Plan::with_wind(scene.clone(), target, wind)
+    Plan::sharing(scene.clone(), target, wind, screens)
 }
 
 /// Places of the scenes with the same signals: those that differ in what is done with the records alone.

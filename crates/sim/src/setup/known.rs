@@ -1,4 +1,4 @@
-//! Values that several scans share, each computed once: known by the hash of what they depend on.
+//! Values that several scenes share, each computed once: known by the hash of what they depend on.
 
 use crate::Error;
 use std::collections::HashMap;
