@@ -203,7 +203,7 @@ fn stiff() -> Result<Vec<Point>, Failure> {
                 damped_steps,
                 ..FlowSettings::new(viscous / (N * N) as f64 / step_s, TimeStep::Fixed { step_s })
             };
-            let short = |a: f64| if (a * N as f64) as usize % 2 == 0 { 1.0 } else { -1.0 };
+            let short = |a: f64| if ((a * N as f64) as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
             let mut flow =
                 Flow::new(mesh, settings, |[_, y, z]| [short(y) * if both { short(z) } else { 1.0 }, 0.0, 0.0])?.0;
             flow.step()?;
@@ -305,7 +305,7 @@ fn focus() -> Result<Vec<Point>, Failure> {
         for share in [0.5, 0.6, 0.7, 0.8, 0.9, 0.99] {
             let grid = Grid::square(512, share * asked_m)?;
             let screens = MonteCarlo {
-                telescope: telescope.clone(),
+                telescope,
                 layers: Layers::equal(5, focus_m)?,
                 range_m: vec![focus_m],
                 grid,
