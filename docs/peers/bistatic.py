@@ -23,7 +23,6 @@ MEASURED, DRAWN = 250, (50, 200, 800, 3200, 12800, 51200)
 k, dz = 2 * np.pi / WAVELENGTH_M, RANGE_M / LAYERS
 thin = k * k * CN2 * dz
 middles_m = (np.arange(LAYERS) + 0.5) * dz
-# Relative bias of five layers against the continuous path, by `theory::bistatic_efficiency_screens` and by this quadrature alike.
 legendre = np.polynomial.legendre.leggauss
 
 
@@ -67,7 +66,7 @@ def of_screens(middles_m, thickness_m):
 
 free, exact = efficiency(0), efficiency(of_screens(middles_m, dz))
 continuous = efficiency(of_screens((np.arange(400) + 0.5) * RANGE_M / 400, RANGE_M / 400))
-layers_bias = exact / continuous - 1
+layers_bias = exact / continuous - 1  # of five layers against the continuous path
 
 
 def scheme_bias(levels):

@@ -139,7 +139,9 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
         rows.sort_by_key(|row| (cases.iter().position(|case| *case == row.knob.case), !row.is_own()));
         for of_case in rows.chunk_by_mut(|a, b| a.knob.case == b.knob.case) {
             let own = of_case.iter().filter(|row| row.is_own()).count();
-            let own = &mut of_case[..own];
+            let (own, others) = of_case.split_at_mut(own);
+            let (metric, reference) = (own[0].knob.metric, own[0].knob.reference);
+            others.iter_mut().for_each(|row| (row.knob.metric, row.knob.reference) = (metric, reference));
             let measured: Vec<Measured> = own.iter().map(Row::measured).collect();
             own.iter_mut().zip(on_front(&measured)).for_each(|(row, is_on)| row.is_on_front = is_on);
             for (place, (_, target)) in TARGETS.into_iter().enumerate() {

@@ -31,11 +31,12 @@ fn row(line: &str, scale: f64) -> Option<Row> {
     else {
         return None;
     };
-    let (named, version) = before.rsplit_once(',')?;
+    let (named, version) = before.rsplit_once(',').filter(|(_, version)| !version.is_empty())?;
     let (case, method) = named.split_once(',')?;
     let (case, method) = if case.starts_with('"') { named.split_once("\",")? } else { (case, method) };
     let plain = |text: &str| text.trim_matches('"').to_owned();
-    let knob = Knob { case: plain(case), method: plain(method), knob: "", metric: "as above", reference: "as above" };
+    // What is measured, and against what, is as in the rows of this program.
+    let knob = Knob { case: plain(case), method: plain(method), knob: "", metric: "", reference: "" };
     let cost = Cost { cpu_s: cpu_s * scale, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
     let mut row = knob.row(value, Found { error, standard_error, cost, set_up_s: f64::NAN });
     row.version = version.to_owned();
@@ -51,6 +52,6 @@ mod tests {
         let found = row("\"0 dB, white\",\"numpy, PA\",2.4.6,128,0.15,0.02,4e-6", 0.5).unwrap();
         assert_eq!((found.knob.case.as_str(), found.knob.method.as_str()), ("0 dB, white", "numpy, PA"));
         assert_eq!((found.version.as_str(), found.value, found.found.cost.cpu_s), ("2.4.6", 128.0, 2e-6));
-        assert!(row("a,b,c", 1.0).is_none());
+        assert!(row("a,b,c", 1.0).is_none() && row("screens,numpy,,128,0.15,0.02,4e-6", 1.0).is_none());
     }
 }

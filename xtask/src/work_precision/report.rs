@@ -2,6 +2,7 @@
 
 use super::physics::{BISTATIC, FREE_SPACE, SCREENS, VORTICES};
 use super::{Row, TARGETS, chain, estimate};
+use crate::cost::machine;
 use std::fmt::Write as _;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
@@ -24,13 +25,13 @@ const PANELS: [Panel; 6] = [
         case: SCREENS,
         title: "Phase screens, 128, 256, 512 points a side",
         compared: "The expected structure function of von Karman screens (inner scale 1 cm, κ₀ 1 rad/m, 2 mm between points), worst from two spacings \
-                   to half the grid, against quadrature, which is right to 1e-9; the time is that of one screen.",
+                   to half the grid, against quadrature; the time is that of one screen.",
         guide: None,
     },
     Panel {
         case: FREE_SPACE,
         title: "Free-space propagation, 128 to 1024 points a side",
-        compared: "The efficiency of Table 2's beam after 1000 m against the exact one (quadrature, to 1e-10): this program in ten steps, as with screens, \
+        compared: "The efficiency of Table 2's beam after 1000 m against the exact one, by quadrature: this program in ten steps, as with screens, \
                    the others in one.",
         guide: None,
     },
@@ -137,7 +138,7 @@ fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
 
 /// Under each panel: what is compared, what this program costs, what others cost at their errors.
 pub(crate) fn text(rows: &[Row]) -> String {
-    let mut out = String::new();
+    let mut out = format!("Measured on {}.\n\n", machine());
     for panel in &PANELS {
         let of = drawn(rows, panel);
         if of.is_empty() {

@@ -159,8 +159,15 @@ impl Shown {
         count(&|cell| all[cell] && !own[cell]) / count(&|cell| all[cell]).max(1.0)
     }
 
-    /// Shift of a figure from the finest setting, over cells that both know.
+    /// Shift of a figure from the finest setting, over cells that both know, of circulations over the maps that both have one of.
     pub(super) fn shift(&self, fine: &Self, figure: Figure) -> Shift {
+        if figure == Figure::Circulation {
+            let pairs = self.circulation_m2_s.iter().zip(&fine.circulation_m2_s);
+            let both = pairs.filter(|(own, fine)| own.is_finite() && fine.is_finite());
+            let (own, fine): (Vec<f64>, Vec<f64>) = both.unzip();
+            let fine = Values::mean(&fine);
+            return Values::mean(&own).shift(&fine, &fine);
+        }
         let both: Vec<bool> = self.known().iter().zip(fine.known()).map(|(a, b)| *a && b).collect();
         self.values(figure, &both).shift(&fine.values(figure, &both), &fine.scale(figure, &both))
     }
@@ -272,6 +279,16 @@ mod tests {
         let still = Shown { off_m_s: vec![0.0; 500], ..shown(8, 500, |e| e) };
         let (noise, rms) = (still.noise(Figure::Bias), still.noise(Figure::Rms));
         assert!(noise.is_finite() && noise < 0.2 && rms < 0.05, "{noise} {rms}");
+    }
+
+    #[test]
+    fn a_fit_that_came_to_no_end_leaves_the_others_in_their_pairs() {
+        let fine = Shown { circulation_m2_s: vec![480.0, 530.0, 470.0, 515.0, 490.0], ..Shown::default() };
+        let mut coarse = fine.clone();
+        coarse.circulation_m2_s.iter_mut().for_each(|circulation| *circulation *= 1.02);
+        coarse.circulation_m2_s[1] = f64::NAN;
+        let found = coarse.shift(&fine, Figure::Circulation);
+        assert!((found.shift - 0.02).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
     }
 
     #[test]

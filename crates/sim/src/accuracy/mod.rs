@@ -64,6 +64,11 @@ impl Request {
             let reason = format!("{} is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone", figure.name());
             return Err(Error::Input { path: "--of".into(), reason });
         }
+        if self.of.contains(&Figure::Efficiency) && drawn_turbulence(scene).is_some() {
+            let reason = "efficiency is one for each pulse with atmosphere.turbulence.efficiency = \"realisation\"; it has a mean \
+                          to judge with \"mean\"";
+            return Err(Error::Input { path: "--of".into(), reason: reason.into() });
+        }
         let has = |figure: &Figure| match figure {
             Figure::Efficiency => model(scene) == Model::MonteCarlo && drawn_turbulence(scene).is_none(),
             Figure::Bias | Figure::Std | Figure::Rms => true,

@@ -8,6 +8,7 @@ use super::ladder::{Ladder, Step, Verdict};
 use super::{Accuracy, Noise};
 use crate::Error;
 use crate::io::{Provenance, Table, csv::float_text};
+#[cfg(feature = "cli")]
 use crate::outputs::Outputs;
 use crate::plan::units::seconds;
 use crate::scene::hash_of;
@@ -43,6 +44,7 @@ fn names<'f>(figures: impl Iterator<Item = &'f Figure>) -> String {
 
 impl Accuracy {
     /// The files of the answer.
+    #[cfg(feature = "cli")]
     pub(crate) fn list(own: Option<&Self>, files: &mut Outputs) -> Result<(), Error> {
         files.add("accuracy.txt", own, |own, _| Ok(own.text()))?;
         files.table("accuracy", own, |own| Ok(own.table()))?;
@@ -165,8 +167,8 @@ impl Accuracy {
         out
     }
 
-    /// The scene with the chosen keys, each with a comment.
-    fn scene_text(&self) -> String {
+    /// The scene with the chosen keys, each with a comment, as TOML.
+    pub fn scene_text(&self) -> String {
         let (mut out, mut section) = (String::new(), "");
         for line in self.scene.toml.lines() {
             if let Some(name) = line.strip_prefix('[') {
