@@ -1,49 +1,15 @@
-//! Maps of what is stable: measured points of the flow and of the propagation on the lines of their theory.
-//!
-//! Waves on a periodic line of equal cells show the amplification of the time schemes, their limits and what stiff viscosity leaves; eddies on flat cells the
-//! pressure solvers; a flow without viscosity the energy that the steps lose; vortices at Reynolds numbers up to 1e12 what models hold; a focused beam
-//! the grid that it needs.
+//! What is stable of flows: time schemes, stiff viscosity, pressure solvers, energy.
 
+use super::{DRIFT, FED, GROWTH, LIMITS, PRESSURE, Point, REYNOLDS, STIFF};
 use fixtures::failure::Failure;
 use num_complex::Complex;
 use std::f64::consts::{PI, TAU};
-use wakescope_les::solver::PressureMethod;
-use wakescope_les::{Direction, Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep, Wall};
-use wakescope_optics::{Focus, Grid, Layers, MonteCarlo, Telescope, theory};
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_les::solver::{PressureMethod, StepReport};
+use wakescope_les::{Direction, Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases};
 use wakescope_tests::extreme::les::{energy_drift, energy_left};
-
-/// A point of a panel.
-pub(crate) struct Point {
-    panel: &'static str,
-    curve: String,
-    x: f64,
-    measured: f64,
-    /// NaN where no theory is drawn.
-    theory: f64,
-}
-
-const GROWTH: &str = "growth of a wave in a step";
-const LIMITS: &str = "largest stable Courant number";
-const STIFF: &str = "what the first step leaves of a stiff wave";
-const PRESSURE: &str = "pressure solvers on flat cells";
-const DRIFT: &str = "energy lost without viscosity";
-const REYNOLDS: &str = "energy of turbulent vortices";
-const FOCUS: &str = "grid of a focused beam";
-
-/// Of a wave of which a step leaves less the solver's round-off is left.
-const ROUND_OFF: f64 = 1e-9;
 
 const SCHEMES: [(&str, TimeScheme); 2] =
     [("Adams-Bashforth 2", TimeScheme::AdamsBashforth2), ("Runge-Kutta 3", TimeScheme::RungeKutta3)];
-
-/// All points, in the order of the panels.
-pub(crate) fn measure() -> Result<Vec<Point>, Failure> {
-    let panels = [growth, limits, stiff, pressure, drift, reynolds, focus];
-    let points = panels.into_iter().map(|panel| panel()).collect::<Result<Vec<_>, Failure>>()?;
-    Ok(points.into_iter().flatten().collect())
-}
 
 /// Cells of the periodic line.
 const CELLS: usize = 48;
@@ -67,7 +33,7 @@ fn amplitude(flow: &Flow, wave: usize) -> f64 {
 }
 
 /// Growth of the amplitude in a step, of a wave that turns by `angle` in a step, against the larger root of the scheme.
-fn growth() -> Result<Vec<Point>, Failure> {
+pub(super) fn growth() -> Result<Vec<Point>, Failure> {
     const WAVE: usize = 14;
     let theta = TAU * WAVE as f64 / CELLS as f64;
     let symbol = 1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0;
@@ -98,7 +64,7 @@ fn growth() -> Result<Vec<Point>, Failure> {
 
 /// The largest Courant number, to a thousandth, at which a step is not refused and no wave grows, against the root of the scheme. Waves of all lengths
 /// start alike.
-fn limits() -> Result<Vec<Point>, Failure> {
+pub(super) fn limits() -> Result<Vec<Point>, Failure> {
     let mut points = Vec::new();
     for (name, scheme) in SCHEMES {
         for viscous in [1e-3, 1e-2, 3e-2, 1e-1, 3e-1] {
@@ -185,7 +151,7 @@ fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
 const KAPPA2: f64 = 49.0 / 9.0;
 
 /// What the first step leaves of the shortest wave, stiff along one direction or two, by Crank-Nicolson and by backward Euler.
-fn stiff() -> Result<Vec<Point>, Failure> {
+pub(super) fn stiff() -> Result<Vec<Point>, Failure> {
     const N: usize = 16;
     let mut points = Vec::new();
     for (name, damped_steps, both) in [
@@ -222,7 +188,7 @@ fn stiff() -> Result<Vec<Point>, Failure> {
 }
 
 /// The residual that an iteration of multigrid leaves, and what the direct solver leaves, on cells longer along y, or along x and y.
-fn pressure() -> Result<Vec<Point>, Failure> {
+pub(super) fn pressure() -> Result<Vec<Point>, Failure> {
     let mut points = Vec::new();
     for (name, pressure, both) in [
         ("multigrid, cells long along y", PressureMethod::Multigrid, false),
@@ -255,14 +221,14 @@ fn pressure() -> Result<Vec<Point>, Failure> {
                     if pressure == PressureMethod::Direct { report.pressure_residual } else { report.pressure_factor };
                 worst = worst.max(of.unwrap_or(f64::NAN));
             }
-            points.push(Point { panel: PRESSURE, curve: name.into(), x: aspect, measured: worst, theory: f64::NAN });
+            points.push(Point::measured(PRESSURE, name.into(), aspect, worst));
         }
     }
     Ok(points)
 }
 
 /// Energy that a flow without viscosity gains or loses in half a second, against a cube through the shortest step.
-fn drift() -> Result<Vec<Point>, Failure> {
+pub(super) fn drift() -> Result<Vec<Point>, Failure> {
     let mut points = Vec::new();
     for (name, scheme) in SCHEMES {
         let steps_s = [0.02, 0.01, 0.005, 0.0025, 0.00125];
@@ -279,8 +245,42 @@ fn drift() -> Result<Vec<Point>, Failure> {
     Ok(points)
 }
 
+/// Energy that steps feed beyond the powers of viscosity and subgrid stress, over what these take, as vortices break up into turbulence.
+pub(super) fn fed() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for (scheme_name, scheme) in SCHEMES {
+        for (model_name, subgrid) in
+            [("no model", SubgridModel::None), ("multiscale WALE", SubgridModel::MULTISCALE_WALE)]
+        {
+            for courant in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0] {
+                // Where steps are refused there is no point.
+                if let Ok(measured) = fed_over_taken(scheme, subgrid, courant) {
+                    points.push(Point::measured(FED, format!("{scheme_name}, {model_name}"), courant, measured));
+                }
+            }
+        }
+    }
+    Ok(points)
+}
+
+fn fed_over_taken(scheme: TimeScheme, subgrid: SubgridModel, courant: f64) -> Result<f64, Failure> {
+    let mut case = cases::taylor_green_3d(16, 1e4)?;
+    let time_step = TimeStep::Courant { courant, longest_s: 1.0 };
+    (case.settings.scheme, case.settings.subgrid, case.settings.time_step) = (scheme, subgrid, time_step);
+    let (mut flow, start) = case.start()?;
+    let mut steps = Vec::new();
+    while flow.time_s() < 5.0 {
+        steps.push(flow.step()?);
+    }
+    // Powers are those at the start of a step: at its end they are those of the next one.
+    let power = |step: &StepReport| step.viscous_power_m5_s3 + step.subgrid_power_m5_s3;
+    let taken: f64 = steps.windows(2).map(|pair| -0.5 * pair[0].step_s * (power(&pair[0]) + power(&pair[1]))).sum();
+    let last = steps.len().saturating_sub(2);
+    Ok((steps[last].kinetic_energy_m5_s2 - start.kinetic_energy_m5_s2 + taken) / taken)
+}
+
 /// Energy of Taylor and Green's vortices on 16 cells a side after 150 steps, over that of the start.
-fn reynolds() -> Result<Vec<Point>, Failure> {
+pub(super) fn reynolds() -> Result<Vec<Point>, Failure> {
     let mut points = Vec::new();
     for (name, subgrid) in [
         ("no model", SubgridModel::None),
@@ -289,94 +289,8 @@ fn reynolds() -> Result<Vec<Point>, Failure> {
     ] {
         for reynolds in [1e3, 1e5, 1e8, 1e12] {
             let measured = energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?;
-            points.push(Point { panel: REYNOLDS, curve: name.into(), x: reynolds, measured, theory: f64::NAN });
+            points.push(Point::measured(REYNOLDS, name.into(), reynolds, measured));
         }
     }
     Ok(points)
-}
-
-/// Error of the free-space efficiency in the focus against the spacing of the grid over lambda F/(4 a), which the spectrum of the focused field asks for.
-fn focus() -> Result<Vec<Point>, Failure> {
-    let mut points = Vec::new();
-    for focus_m in [150.0, 300.0, 600.0] {
-        let telescope = Telescope { focus: Focus::At(focus_m), ..Telescope::table2() };
-        let exact = theory::free_space_efficiency(&telescope, focus_m)?;
-        let asked_m = telescope.wavelength_m * focus_m / (4.0 * telescope.aperture_radius_m);
-        for share in [0.5, 0.6, 0.7, 0.8, 0.9, 0.99] {
-            let grid = Grid::square(512, share * asked_m)?;
-            let screens = MonteCarlo {
-                telescope,
-                layers: Layers::equal(5, focus_m)?,
-                range_m: vec![focus_m],
-                grid,
-                ..MonteCarlo::table2(1e-13, 1)?
-            };
-            let measured = (screens.grid_free_space::<f64>()?[0] / exact - 1.0).abs();
-            points.push(Point {
-                panel: FOCUS,
-                curve: format!("focus {focus_m} m"),
-                x: share,
-                measured,
-                theory: f64::NAN,
-            });
-        }
-    }
-    Ok(points)
-}
-
-/// Largest distance of a point from the line of its theory, relative, of the panels whose theory is exact and above what round-off leaves.
-pub(crate) fn furthest(points: &[Point]) -> f64 {
-    let exact = points.iter().filter(|p| [GROWTH, LIMITS, STIFF].contains(&p.panel) && p.theory > ROUND_OFF);
-    exact.map(|p| (p.measured / p.theory - 1.0).abs()).fold(0.0, f64::max)
-}
-
-/// One row a point.
-pub(crate) fn table(points: &[Point]) -> Table {
-    Table::new()
-        .text("panel", points.iter().map(|p| p.panel))
-        .text("curve", points.iter().map(|p| p.curve.clone()))
-        .float("x", points.iter().map(|p| p.x))
-        .float("measured", points.iter().map(|p| p.measured))
-        .float("theory", points.iter().map(|p| p.theory))
-}
-
-/// A panel each: points measured, lines of theory in the same colour, and the limits that the program keeps, dashed.
-pub(crate) fn panels(points: &[Point]) -> Figure {
-    let axes = |panel: &str| match panel {
-        GROWTH => ("angle in a step [rad]", "||G| − 1|", None),
-        LIMITS => ("ν Δt/h²", "Courant number", None),
-        STIFF => ("ν Δt/h²", "share of the wave", None),
-        PRESSURE => ("aspect of the cells", "residual left", Some(("at most 0.10 an iteration", 0.1, true))),
-        DRIFT => ("step [s]", "energy lost, relative", None),
-        REYNOLDS => ("Reynolds number", "energy over that of the start", None),
-        _ => ("spacing over λF/(4a)", "error of the efficiency", Some(("largest spacing accepted", 1.0, false))),
-    };
-    let drawn = points.chunk_by(|a, b| a.panel == b.panel).map(|of_panel| {
-        let (x_label, y_label, bar) = axes(of_panel[0].panel);
-        let mut plot =
-            CurvePlot { shape: 0.7, ..CurvePlot::new(of_panel[0].panel, Axis::log(x_label), Axis::log(y_label)) };
-        for (colour, of_curve) in of_panel.chunk_by(|a, b| a.curve == b.curve).enumerate() {
-            let theory = of_curve.iter().map(|p| (p.x, p.theory)).filter(|p| p.1 > 1e-12);
-            let measured = of_curve.iter().map(|p| (p.x, p.measured)).filter(|p| p.1 > 1e-17);
-            plot = plot.with(Series::new(&of_curve[0].curve, Style::Markers, measured).in_colour(colour));
-            plot = plot.with(Series::new("", Style::Line, theory).in_colour(colour));
-        }
-        if let Some((name, at, is_level)) = bar {
-            let (low, high) = (
-                of_panel.iter().map(|p| p.x).fold(f64::INFINITY, f64::min),
-                of_panel.iter().map(|p| p.x).fold(0.0, f64::max),
-            );
-            let errors = of_panel.iter().map(|p| p.measured);
-            let line = if is_level {
-                [(low, at), (high, at)]
-            } else {
-                [(at, errors.clone().fold(1.0, f64::min)), (at, errors.fold(0.0, f64::max))]
-            };
-            plot = plot.with(Series::new(name, Style::Dash, line).in_colour(6));
-        }
-        plot
-    });
-    let mut figure = Figure::stacked(drawn);
-    (figure.columns, figure.width) = (2, 1300.0);
-    figure
 }

@@ -1,0 +1,214 @@
+//! What is stable of optics, signals, estimators and fits.
+
+use super::{BASINS, BOUND, FOCUS, LAYERS, ORDERS, OUTLIERS, PHASORS, Point};
+use fixtures::failure::Failure;
+use fixtures::methods::Known;
+use fixtures::uniform::{Air, BAND_M_S, errors};
+use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
+use num_complex::Complex;
+use rayon::prelude::*;
+use std::f64::consts::{PI, TAU};
+use std::ops::ControlFlow;
+use wakescope_estimate::bound::{Noise, WindowModel};
+use wakescope_estimate::estimators::{ModelPeak, ModelReading};
+use wakescope_estimate::map::good_and_bad;
+use wakescope_estimate::spectrum::unweighted_lags;
+use wakescope_estimate::vortex_fit::{
+    EstimatorResponse, MapFitOptions, PulseShape, VelocityMap, Wake, WakeModel, refine_map_fit_of_estimator,
+};
+use wakescope_estimate::{Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Statistic, Weighting};
+use wakescope_optics::{Focus, Grid, Layers, MonteCarlo, Stop, Telescope, theory};
+use wakescope_signal::literal::literal_envelope;
+use wakescope_signal::{
+    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
+};
+
+const SEED: u64 = 1;
+const PULSE_S: f64 = 200e-9;
+
+/// Error of the free-space efficiency in the focus against the spacing of the grid over lambda F/(4 a), which the spectrum of the focused field asks for.
+pub(super) fn focus() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for focus_m in [150.0, 300.0, 600.0] {
+        let telescope = Telescope { focus: Focus::At(focus_m), ..Telescope::table2() };
+        let exact = theory::free_space_efficiency(&telescope, focus_m)?;
+        let asked_m = telescope.wavelength_m * focus_m / (4.0 * telescope.aperture_radius_m);
+        for share in [0.5, 0.6, 0.7, 0.8, 0.9, 0.99] {
+            let grid = Grid::square(512, share * asked_m)?;
+            let screens = MonteCarlo {
+                telescope,
+                layers: Layers::equal(5, focus_m)?,
+                range_m: vec![focus_m],
+                grid,
+                ..MonteCarlo::table2(1e-13, SEED)?
+            };
+            let measured = (screens.grid_free_space::<f64>()?[0] / exact - 1.0).abs();
+            points.push(Point::measured(FOCUS, format!("focus {focus_m} m"), share, measured));
+        }
+    }
+    Ok(points)
+}
+
+/// What single precision changes of the efficiency of a pair of paths at 1500 m, in turbulence that is cut into ever more layers.
+pub(super) fn layers() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for (name, cn2_m_m23) in [("Cn² 1e-15 m^(-2/3)", 1e-15), ("Cn² 1e-13 m^(-2/3)", 1e-13)] {
+        for layers in [1, 10, 100, 1000] {
+            let set_up = MonteCarlo {
+                grid: Grid::square(128, 4e-3)?,
+                layers: Layers::equal(layers, 1500.0)?,
+                range_m: vec![1500.0],
+                ..MonteCarlo::table2(cn2_m_m23, SEED)?
+            };
+            let double = set_up.run_in::<f64>(Stop::after(2), |_| ControlFlow::Continue(()))?;
+            let measured = (set_up.run(2)?.monostatic.mean[0] / double.monostatic.mean[0] - 1.0).abs();
+            points.push(Point::measured(LAYERS, name.into(), layers as f64, measured));
+        }
+    }
+    Ok(points)
+}
+
+/// Largest difference of the last samples of a record from the sum as it is written, over their root mean square. Theory: the last digit of the phase.
+pub(super) fn phasors() -> Result<Vec<Point>, Failure> {
+    const LAST: usize = 50;
+    let receiver = receiver(NoiseModel::None);
+    let step_m = 0.5 * SPEED_OF_LIGHT_M_S / receiver.sample_rate_hz;
+    let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(PULSE_S), ENERGY_J)?;
+    let first_m = 400.0;
+    let mut points = Vec::new();
+    for velocity_m_s in [1.0, 30.0] {
+        for samples in [100, 1000, 10_000, 100_000, 1_000_000] {
+            let at = |from: usize, samples| {
+                let time_of_first_sample_s = 2.0 * first_m / SPEED_OF_LIGHT_M_S + from as f64 / receiver.sample_rate_hz;
+                Simulator::new(pulse, receiver, Record { time_of_first_sample_s, samples })
+            };
+            let air = |from: usize, layers| LineOfSight {
+                first_range_m: first_m - 300.0 + from as f64 * step_m,
+                layer_thickness_m: step_m,
+                radial_velocity_m_s: vec![velocity_m_s; layers],
+                weight_per_m: vec![1e-9; layers],
+            };
+            let layers = samples + 1000;
+            let speckle: Vec<Complex<f64>> = (0..layers).map(|l| Complex::cis(0.7 * (l * l % 997) as f64)).collect();
+            let mut found = vec![Complex::ZERO; samples];
+            at(0, samples)?.envelope_of_speckle_into(&air(0, layers), &speckle, &mut Scratch::default(), &mut found)?;
+            // The layers that the last samples see.
+            let from = samples - LAST;
+            let exact = literal_envelope(&at(from, LAST)?, &air(from, 1000), &speckle[from..from + 1000])?;
+            let rms = (exact.iter().map(Complex::norm_sqr).sum::<f64>() / LAST as f64).sqrt();
+            let apart = found[from..].iter().zip(&exact).map(|(a, b)| (a - b).norm()).fold(0.0, f64::max);
+            let phase_rad = 4.0 * PI * velocity_m_s * at(samples, 1)?.time_s(0) / receiver.wavelength_m;
+            points.push(Point {
+                theory: f64::EPSILON * phase_rad,
+                ..Point::measured(PHASORS, format!("{velocity_m_s} m/s"), samples as f64, apart / rms)
+            });
+        }
+    }
+    Ok(points)
+}
+
+/// Methods that are drawn.
+const METHODS: [&str; 4] = ["PA", "CA, AR(16)", "pulse pair", "likelihood"];
+/// Windows that are accumulated, of so many trials.
+const WINDOWS: usize = 20;
+const TRIALS: usize = 200;
+
+/// Standard deviation of good estimates over the Cramer-Rao bound, and the share of bad ones, in white noise.
+pub(super) fn ratios() -> Result<Vec<Point>, Failure> {
+    let mut points = Vec::new();
+    for snr_db in [-20.0, -15.0, -10.0, 0.0, 20.0, 40.0, 70.0, 100.0] {
+        let air = Air::new(NoiseModel::White, PULSE_S, snr_db, SEED)?;
+        let known = Known { noise: NoiseModel::White, sigma_s: air.sigma_s(), snr: 10f64.powf(0.1 * snr_db) };
+        let bound_m_s = bound_m_s(&air, known.snr)?;
+        for of in errors(&air, &known, &[WINDOWS], TRIALS)?.iter().filter(|of| METHODS.contains(&of.method)) {
+            let found = good_and_bad(&of.errors_m_s, BAND_M_S);
+            points.push(Point::measured(BOUND, of.method.into(), snr_db, found.std_good_m_s / bound_m_s));
+            points.push(Point::measured(OUTLIERS, of.method.into(), snr_db, found.bad_fraction));
+        }
+    }
+    points.sort_by_key(|p| (p.panel != BOUND, METHODS.iter().position(|m| *m == p.curve)));
+    Ok(points)
+}
+
+fn bound_m_s(air: &Air, snr: f64) -> Result<f64, Failure> {
+    let model = WindowModel::gaussian_pulse(&sampling()?, WINDOW, air.sigma_s(), Noise::White)?;
+    Ok(model.bound_m_s(0.0, snr, SignalKind::Real, WINDOWS as f64)?)
+}
+
+/// Standard deviation over the bound of autoregressive models of all orders, where noise does not help the matrix.
+pub(super) fn orders() -> Result<Vec<Point>, Failure> {
+    let s = sampling()?;
+    let mut points = Vec::new();
+    for snr_db in [0.0, 40.0, 100.0] {
+        let air = Air::new(NoiseModel::White, PULSE_S, snr_db, SEED)?;
+        let bound_m_s = bound_m_s(&air, 10f64.powf(0.1 * snr_db))?;
+        let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
+        let (mut scratch, mut signal) = (wakescope_estimate::Scratch::new(), Scratch::default());
+        let (mut window, mut one) = (vec![0.0; WINDOW], vec![0.0; statistic.statistic_len()]);
+        let mut means = Vec::new();
+        for trial in 0..TRIALS {
+            let (line, velocity_m_s) = air.line(trial, TRIALS);
+            let mut mean = vec![0.0; one.len()];
+            for pulse in 0..WINDOWS {
+                air.window(&line, trial, pulse, &mut signal, &mut window)?;
+                statistic.evaluate(&window, &mut scratch, &mut one);
+                mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / WINDOWS as f64);
+            }
+            means.push((velocity_m_s, mean));
+        }
+        for order in [1, 2, 4, 8, 16, 32, 48, WINDOW - 1] {
+            let reading = ModelReading::Spectrum;
+            let model = ModelPeak::new(reading, &s, SignalKind::Real, WINDOW, order, 2048, Refinement::Parabola)?;
+            let errors_m_s: Vec<f64> = means
+                .iter()
+                .map(|(velocity_m_s, mean)| model.estimate(mean, &mut scratch).velocity_m_s - velocity_m_s)
+                .collect();
+            let ratio = good_and_bad(&errors_m_s, BAND_M_S).std_good_m_s / bound_m_s;
+            points.push(Point::measured(ORDERS, format!("{snr_db} dB"), order as f64, ratio));
+        }
+    }
+    Ok(points)
+}
+
+/// Share of fits to an exact map of peaks that end at the true pair, from starts whose vortices are so far from theirs, in all directions alike.
+pub(super) fn basins() -> Result<Vec<Point>, Failure> {
+    const DIRECTIONS: usize = 4;
+    let s = sampling()?;
+    let peak = SpectralPeak::new(&s, SignalKind::Real, &unweighted_lags(WINDOW), 1024, Refinement::Parabola)?;
+    let statistic = Correlogram::<f64>::new(Weighting::default(), WINDOW)?;
+    let sigma_s = Air::new(NoiseModel::White, PULSE_S, 10.0, SEED)?.sigma_s();
+    let pulse = PulseShape::gaussian(sigma_s)?;
+    let response = EstimatorResponse::new(&statistic, &peak, &s, &pulse, (Noise::White, 10.0), 2.0)?;
+    let elevation_rad: Vec<f64> = (0..26).map(|i| 0.02 + 0.007 * f64::from(i)).collect();
+    let range_m: Vec<f64> = (0..13).map(|i| 320.0 + 13.0 * f64::from(i)).collect();
+    let model = WakeModel::default();
+    let mut points = Vec::new();
+    for core_m in [2.35] {
+        let truth = [500.0, 500.0, 376.5, 47.0, 423.5, 47.0, core_m, core_m, 0.0, 0.0];
+        let shown = response.map(&model, &Wake::from_array(&truth), &elevation_rad, &range_m)?;
+        let map = VelocityMap {
+            elevation_rad: &elevation_rad,
+            range_m: &range_m,
+            velocity_m_s: shown.view(),
+            standard_deviation_m_s: None,
+        };
+        for away_m in [10.0, 20.0, 30.0, 40.0, 60.0] {
+            let ends = (0..DIRECTIONS).into_par_iter().filter(|&k| {
+                let turn = TAU * k as f64 / DIRECTIONS as f64;
+                let mut start = truth;
+                // The other vortex is off to another side.
+                for (place, angle) in [(2, turn), (4, 2.6 * turn + 1.0)] {
+                    start[place] += away_m * angle.cos();
+                    start[place + 1] += away_m * angle.sin();
+                }
+                let options = MapFitOptions::default();
+                let found = refine_map_fit_of_estimator(&map, &model, &response, &Wake::from_array(&start), &options);
+                let is_near = |wake: [f64; 10]| [0, 1].iter().all(|&k| (wake[k] / truth[k] - 1.0).abs() < 0.02);
+                found.is_ok_and(|fit| is_near(fit.wake.to_array()))
+            });
+            let share = ends.count() as f64 / DIRECTIONS as f64;
+            points.push(Point::measured(BASINS, format!("core {core_m} m"), away_m, share));
+        }
+    }
+    Ok(points)
+}
