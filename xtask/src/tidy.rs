@@ -28,11 +28,12 @@ const WITH_THREADS: [&str; 3] = ["wakescope-optics", "wakescope-signal", "wakesc
 const MAX_CODE_LINES: usize = 500;
 
 /// Files and folders that may stand at the top.
-const TOP_LEVEL: &str = ".cargo .ci .gitignore CHANGELOG.md CITATION.cff CONTRIBUTING.md Cargo.lock Cargo.toml LICENSE README.md clippy.toml crates \
-    docs rustfmt.toml tests xtask";
+const TOP_LEVEL: &str = ".cargo .ci .gitignore CHANGELOG.md CITATION.cff CODE_OF_CONDUCT.md CONTRIBUTING.md Cargo.lock Cargo.toml LICENSE README.md \
+    SECURITY.md clippy.toml codemeta.json crates docs python rustfmt.toml tests xtask";
 
 /// File types that may stand anywhere below.
-const EXTENSIONS: [&str; 11] = ["rs", "toml", "csv", "md", "svg", "png", "lock", "cff", "css", "json", "py"];
+const EXTENSIONS: [&str; 13] =
+    ["rs", "toml", "csv", "md", "svg", "png", "lock", "cff", "css", "json", "py", "pyi", "ipynb"];
 
 /// What only a machine knows must not stand in the repository.
 const PRIVATE: [&str; 5] = ["/home/", "/root/", "/work/", "/tmp/", "C:\\Users"];
@@ -112,7 +113,16 @@ fn check_place(file: &str, found: &mut Vec<String>) {
     let path = Path::new(file);
     let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
     // The template of presets is no TOML until its braces are filled.
-    let named = ["LICENSE", ".gitignore", ".ci/run", "crates/sim/src/scene/preset.txt"].contains(&file);
+    let named = [
+        "LICENSE",
+        ".gitignore",
+        ".ci/run",
+        "crates/sim/src/scene/preset.txt",
+        "python/LICENSE",
+        "python/check",
+        "python/python/wakescope/py.typed",
+    ]
+    .contains(&file);
     // Files that other programs wrote, for readers to be held against.
     let of_others = file.starts_with("tests/reference/") && ["nc", "npz"].contains(&extension);
     if !named && !of_others && !EXTENSIONS.contains(&extension) {

@@ -123,6 +123,9 @@ pub enum Error {
         /// What would take less: keys, for a flow with values that would fit.
         remedy: String,
     },
+    /// The one who was told of its progress has stopped the run.
+    #[error("stopped")]
+    Stopped,
     /// The number of threads cannot be had.
     #[error("--threads {threads}: {reason}")]
     Threads {

@@ -1,5 +1,5 @@
 //! The program `wakescope`; everything is in the library.
 
 fn main() -> std::process::ExitCode {
-    wakescope_sim::cli::main().into()
+    wakescope_sim::cli::main(std::env::args_os()).into()
 }

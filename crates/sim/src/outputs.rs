@@ -45,16 +45,29 @@ impl Outputs {
         (formats, origin): (Formats, Provenance),
         list: impl FnOnce(&mut Self) -> Result<(), Error>,
     ) -> Result<Vec<PathBuf>, Error> {
+        put(Self::made(folder, (formats, origin), list)?, folder, existing)
+    }
+
+    /// Makes the files of a list and keeps them: their names and contents.
+    ///
+    /// # Errors
+    /// What the makers find.
+    #[cfg(feature = "cli")]
+    pub(crate) fn contents(
+        of: (Formats, Provenance),
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
+    ) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        Ok(Self::made(Path::new(""), of, list)?.into_contents())
+    }
+
+    fn made(
+        folder: &Path,
+        (formats, origin): (Formats, Provenance),
+        list: impl FnOnce(&mut Self) -> Result<(), Error>,
+    ) -> Result<FileGroup, Error> {
         let mut files = Self { formats, names: Vec::new(), made: Some((FileGroup::new(folder), origin)) };
         list(&mut files)?;
-        let Some((group, _)) = files.made else { return Ok(Vec::new()) };
-        let there = folder.exists();
-        let lock = there.then(|| FolderLock::take(folder)).transpose()?;
-        // Again: a file may have come while the run computed.
-        refuse_foreign(folder, group.names(), existing)?;
-        let written = group.commit()?;
-        drop(lock);
-        Ok(written)
+        Ok(files.made.map_or_else(|| FileGroup::new(folder), |(group, _)| group))
     }
 
     /// Adds a file that is made of `of`; where that is absent, its name alone.
@@ -125,6 +138,31 @@ impl Outputs {
         }
         Ok(())
     }
+}
+
+/// Puts files that are made into their folder, all or none; returns their paths.
+///
+/// # Errors
+/// A file in the way that may not be replaced; another run that writes there; what the system says.
+fn put(group: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let there = folder.exists();
+    let lock = there.then(|| FolderLock::take(folder)).transpose()?;
+    // Again: a file may have come while the run computed.
+    refuse_foreign(folder, group.names(), existing)?;
+    let written = group.commit()?;
+    drop(lock);
+    Ok(written)
+}
+
+/// Writes files whose contents are there, such as those of a [`crate::cli::Answer`], to a folder, all or none; returns their paths.
+///
+/// # Errors
+/// Names that are not plain; a file in the way that may not be replaced; another run that writes there; what the system says.
+#[cfg(feature = "cli")]
+pub fn write_contents(folder: &Path, files: Vec<(String, Vec<u8>)>, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let mut group = FileGroup::new(folder);
+    files.into_iter().try_for_each(|(name, content)| group.add(&name, content))?;
+    put(group, folder, existing)
 }
 
 /// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace. `alone`: no other

@@ -6,7 +6,9 @@ mod pictures;
 mod recorded;
 
 pub use map::velocity_map;
-pub use recorded::{recorded_names, write_recorded};
+#[cfg(feature = "cli")]
+pub(crate) use recorded::list_recorded;
+pub use recorded::recorded_names;
 
 use crate::Error;
 #[cfg(feature = "plots")]
@@ -43,7 +45,7 @@ pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing)
 }
 
 /// The files of a run.
-fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Result<(), Error> {
+pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Result<(), Error> {
     files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
     if matches!(plan.target, Target::Run | Target::Efficiency) {
         let profile = result.profile.as_ref();

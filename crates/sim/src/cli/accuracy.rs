@@ -1,7 +1,7 @@
 //! `wakescope accuracy`: how accurate the numbers of a scene are, and the cheapest keys for an accuracy.
 
 use super::words::FolderWords;
-use super::{Cli, load, paths, say};
+use super::{Cli, paths};
 use crate::Error;
 use crate::accuracy::{Accuracy, Request};
 use clap::Args;
@@ -21,16 +21,16 @@ pub(super) struct AccuracyWords {
 
 /// Returns the exit code: 1 where the accuracy is out of reach.
 pub(super) fn accuracy(words: &AccuracyWords, cli: &Cli) -> Result<u8, Error> {
-    let file = load(&words.scene, cli)?;
-    words.folder.prepare(|files| Accuracy::list(None, files))?;
+    let file = cli.scene(&words.scene)?;
+    words.folder.prepare(cli, |files| Accuracy::list(None, files))?;
     let found = Accuracy::of(&file, &words.request, &*cli.observer())?;
-    let files = words.folder.write(file.provenance(), |files| Accuracy::list(Some(&found), files))?;
+    let files = words.folder.write_all(cli, file.provenance(), |files| Accuracy::list(Some(&found), files))?;
     let text = format!("{}search took {:.1} s\n{}", found.text(), found.took_s, words.folder.wrote(&files));
     let object = json!({
         "version": crate::VERSION, "scene_hash": found.of_scene, "is_reached": found.is_reached(), "took_s": found.took_s,
         "is_confirmed": found.verified.is_confirmed, "own_s": found.own_s, "search_s": found.spent_s, "run_s": found.run_s,
         "rows": found.table().objects(), "notes": found.notes, "files": paths(&files),
     });
-    say(cli.json, &object, &text)?;
+    cli.say(&object, &text)?;
     Ok(u8::from(!found.is_reached()))
 }

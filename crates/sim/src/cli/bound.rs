@@ -1,7 +1,7 @@
 //! `wakescope bound`: the Cramer-Rao bound for a scene.
 
+use super::Cli;
 use super::words::TableWords;
-use super::{Cli, load, say};
 use crate::Error;
 use crate::measure::bound::{bound as of_plan, points};
 use crate::plan::{Plan, Target};
@@ -23,18 +23,18 @@ pub(super) struct BoundWords {
 }
 
 pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
-    let plan = Plan::new(load(&words.scene, cli)?, Target::Map)?;
+    let plan = Plan::new(cli.scene(&words.scene)?, Target::Map)?;
     if !words.allow_large {
         plan.bound_fits()?;
     }
-    words.table.prepare()?;
+    words.table.prepare(cli)?;
     let found = of_plan(&plan, &Silent)?;
     let mut text = found.text();
-    let file = words.table.write(&found.table(), &plan.scene.provenance(), &mut text)?;
+    let file = words.table.write(cli, &found.table(), &plan.scene.provenance(), &mut text)?;
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr).objects(),
         "by_range": points(&found.by_range).objects(),
         "files": file,
     });
-    say(cli.json, &object, &text)
+    cli.say(&object, &text)
 }

@@ -1,10 +1,10 @@
 //! `wakescope budget`: the power budget of a scene.
 
 use super::words::range;
-use super::{Cli, load, paths, say};
+use super::{Cli, paths};
 use crate::io::Existing;
 use crate::measure::budget::{Budget, scan_ranges_m};
-use crate::outputs::{Outputs, prepare};
+use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
 use crate::{Error, scene};
 use clap::Args;
@@ -29,10 +29,10 @@ pub(super) struct BudgetWords {
 }
 
 pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
-    let plan = Plan::new(load(&words.scene, cli)?, Target::Efficiency)?;
+    let plan = Plan::new(cli.scene(&words.scene)?, Target::Efficiency)?;
     let existing = Existing::with_overwrite(words.overwrite);
     if let Some(folder) = &words.out {
-        prepare(folder, &["budget.csv".into()], existing, true)?;
+        cli.prepare(folder, &["budget.csv".into()], existing)?;
     }
     let ranges_m = if words.range.is_empty() { scan_ranges_m(&plan.scene.scene) } else { words.range.clone() };
     let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
@@ -40,14 +40,13 @@ pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
     let mut files = Vec::new();
     if let Some(folder) = &words.out {
         let of = (scene::Outputs::default(), plan.scene.provenance());
-        files = Outputs::write(folder, existing, of, |files| {
-            files.table("budget", Some(&found), |found| Ok(found.table()))
-        })?;
+        let list = |files: &mut Outputs| files.table("budget", Some(&found), |found| Ok(found.table()));
+        files = cli.write(folder, existing, of, list)?;
         text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "range_m": found.range_m, "rows": found.rows,
         "limits": found.limits.values.iter().copied().collect::<BTreeMap<_, _>>(), "warnings": found.warnings, "files": paths(&files),
     });
-    say(cli.json, &object, &text)
+    cli.say(&object, &text)
 }

@@ -1,7 +1,7 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
 use super::words::{AirWords, FolderWords, ScanWords, Scans, finite, rate, spacing, stride};
-use super::{Cli, load, paths, say};
+use super::{Cli, paths};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
@@ -82,7 +82,7 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let power = calibration.map(|known| known.power(&task.settings)).transpose()?;
     let none = || Provenance::new("", "", task.settings.seed);
     let origin = task.scene.as_ref().map_or_else(none, SceneFile::provenance);
-    let files = words.folder.write(origin, |files| {
+    let files = words.folder.write_all(cli, origin, |files| {
         list(words, task.plan.as_ref(), Some((&task.scans, &found, power.as_ref())), &*observer, files)
     })?;
     let has_sigma = found.iter().all(|scan| scan.assumed_sigma_m_s.is_none());
@@ -101,13 +101,13 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
         "notes": task.notes, "files": paths(&files),
     });
-    say(cli.json, &object, &text.join("\n"))
+    cli.say(&object, &text.join("\n"))
 }
 
 impl Task {
     fn new(words: &DetectWords, cli: &Cli, observer: &dyn Observer) -> Result<Self, Error> {
         let (mut scans, mut notes) = (Vec::new(), Vec::new());
-        let scene = words.scene.as_deref().map(|path| load(path, cli)).transpose()?;
+        let scene = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
         for path in &words.data {
             match words.scans.read(path, scene.as_ref(), false)? {
                 Scans::Signals(signals) => scans.extend((0..signals.scans.len()).map(|sweep| signals.map(sweep))),
@@ -124,7 +124,7 @@ impl Task {
         };
         let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
         let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
-        words.folder.prepare(|files| list(words, plan.as_ref(), None, observer, files))?;
+        words.folder.prepare(cli, |files| list(words, plan.as_ref(), None, observer, files))?;
         let mut settings = DetectionSettings {
             false_alarm: words.false_alarm,
             options: DetectorOptions {

@@ -1,7 +1,7 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
 use super::words::{FolderWords, noise, positive};
-use super::{Cli, load, paths, say};
+use super::{Cli, paths};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape};
@@ -38,21 +38,25 @@ pub(super) struct EstimateWords {
 }
 
 pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
-    let scene = load(&words.scene, cli)?;
+    let scene = cli.scene(&words.scene)?;
     let format = RawFormat { scale: words.scale, ..words.format.clone() };
-    let mut records = RawRecords::open(&words.data, &format, record_shape(&scene.scene))?;
+    let mut records = match cli.signals(&words.data) {
+        Some(array) => RawRecords::of_array(array, words.scale)?,
+        None => RawRecords::open(&words.data, &format, record_shape(&scene.scene))?,
+    };
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let (plan, is_own) = recorded::plan(scene, &records)?;
-    words.folder.prepare_names(&write::recorded_names(&plan)?)?;
+    words.folder.prepare_names(cli, &write::recorded_names(&plan)?)?;
     let options = RecordedOptions { rays, noise: words.noise, spectra: words.spectra, block_bytes: None };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
     let (text, results) = told(&plan, &found, records.records());
-    let files = write::write_recorded(&plan, found, &words.folder.out, words.folder.existing())?;
+    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    let files = words.folder.write(cli, of, |files| write::list_recorded(&plan, found, files))?;
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results,
         "files": paths(&files),
     });
-    say(cli.json, &object, &(text + &words.folder.wrote(&files)))
+    cli.say(&object, &(text + &words.folder.wrote(&files)))
 }
 
 /// The result in a few numbers.

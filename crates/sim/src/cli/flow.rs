@@ -1,8 +1,6 @@
 //! `wakescope flow`: simulations from case files.
 
-use super::output::print;
-use super::progress::Quiet;
-use super::{Cli, paths, say};
+use super::{Cli, paths};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
@@ -52,11 +50,11 @@ pub(super) struct RunWords {
 
 pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     if let Some(text) = words.example.as_deref().and_then(example) {
-        return if ranks.rank() == 0 { print(text) } else { Ok(()) };
+        return if ranks.rank() == 0 { cli.print(text) } else { Ok(()) };
     }
     // The words were checked: without an example there is a case.
     let Some(case) = &words.case else { return Ok(()) };
-    simulate(CaseFile::read(case)?, &words.run, cli, ranks)
+    simulate(cli.case(case, None)?, &words.run, cli, ranks)
 }
 
 /// Runs a case and says what came of it, on rank 0.
@@ -79,15 +77,15 @@ pub(super) fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &
             return Ok(());
         }
         let forecast = check_on(ranks, &file, words.out.as_deref(), options)?;
-        forecast.notes.iter().for_each(|text| Quiet.warn(text));
+        forecast.notes.iter().for_each(|text| cli.observer().warn(text));
         let mut object = json!(forecast);
         object["version"] = crate::VERSION.into();
-        return say(cli.json, &object, &format!("good\n{forecast}"));
+        return cli.say(&object, &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
         return Err(Error::Input { path: "--out DIR".into(), reason: "a run needs a folder to write to".into() });
     };
-    let observer: Box<dyn Observer> = if is_first { cli.observer() } else { Box::new(Silent) };
+    let observer: Arc<dyn Observer> = if is_first { cli.observer() } else { Arc::new(Silent) };
     #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
     let mut outcome = run_on(ranks, &file, out, options, &*observer)?;
     if !is_first {
@@ -100,7 +98,7 @@ pub(super) fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &
             // The run is done all the same.
             Err(error) => {
                 let text = format!("the wake is not drawn: {error}");
-                Quiet.warn(&text);
+                cli.observer().warn(&text);
                 outcome.warnings.push(text);
             }
         }
@@ -127,5 +125,5 @@ pub(super) fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &
         outcome.files.len(),
         out.display()
     );
-    say(cli.json, &object, &text)
+    cli.say(&object, &text)
 }

@@ -9,6 +9,7 @@ mod budget;
 mod detect;
 mod estimate;
 mod flow;
+mod host;
 mod output;
 mod progress;
 mod ranked;
@@ -21,21 +22,24 @@ use crate::io::Existing;
 use crate::io::csv::digits;
 use crate::measure::budget::{scan_ranges_m, snr_without_screens_db};
 use crate::plan::{Plan, Stage, Target};
-use crate::scene::{Scene, SceneFile, TABLE2_TOML, preset_names, preset_toml};
+use crate::scene::{SceneFile, TABLE2_TOML, preset_names, preset_toml};
 use crate::setup::efficiency_model::model;
-use crate::setup::progress::Observer;
-use crate::{Error, outputs, run, write};
+use crate::{Error, run, write};
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand};
-use output::{paths, say};
+use output::paths;
 use serde_json::{Value, json};
+use std::ffi::OsString;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use wakescope_optics::plan::Model;
 use words::FolderWords;
 
+pub use host::{Answer, Host, Refusal, call, refusal};
+
 /// Simulator of coherent Doppler lidar measurements of aircraft wake vortices.
-#[derive(Debug, Parser)]
+#[derive(Parser)]
 #[command(name = "wakescope", version)]
 struct Cli {
     #[command(subcommand)]
@@ -52,6 +56,9 @@ struct Cli {
     /// Print the result as one JSON object, and an error as one on standard error.
     #[arg(long, global = true)]
     json: bool,
+    /// The program that runs the command, and what it gets.
+    #[arg(skip)]
+    call: Option<Arc<host::Call>>,
 }
 
 #[derive(Debug, Subcommand)]
@@ -128,18 +135,12 @@ struct CheckWords {
     picture: Option<PathBuf>,
 }
 
-impl Cli {
-    /// Who is told of the progress: bars, unless quiet was asked for.
-    fn observer(&self) -> Box<dyn Observer> {
-        if self.quiet { Box::new(progress::Quiet) } else { Box::new(progress::Bars::new()) }
-    }
-}
-
-/// Runs the program with the words of the command line; returns its exit code.
-pub fn main() -> u8 {
-    let cli = match Cli::try_parse() {
+/// Runs the program with the words of its command line, of which the first is its name; returns its exit code.
+pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
+    let words: Vec<OsString> = words.into_iter().collect();
+    let cli = match Cli::try_parse_from(&words) {
         Ok(cli) => cli,
-        Err(e) => return output::explain(&e),
+        Err(e) => return output::explain(&e, words.iter().any(|word| word == "--json")),
     };
     // All in one pool: forecasts count its threads, and files reuse the memory that the computing freed.
     match with_threads(&cli, || dispatch(&cli)).flatten() {
@@ -184,8 +185,7 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
         return Err(Error::Io { action: "write", path: path.to_owned(), source });
     }
     crate::io::write_atomic(path, text.as_bytes())?;
-    say(
-        cli.json,
+    cli.say(
         &json!({ "scene": path.to_string_lossy() }),
         &format!("wrote {}\nnext: wakescope check {0}", path.display()),
     )
@@ -195,7 +195,7 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let plan = planned(&words.scene, Target::Run, words.allow_large, cli)?;
     if let Some(folder) = &words.out {
         // What is in the way of a run is in the way of it here, too.
-        outputs::prepare(folder, &write::names(&plan)?, Existing::Own, true)?;
+        cli.prepare(folder, &write::names(&plan)?, Existing::Own)?;
     }
     #[cfg(feature = "plots")]
     if let Some(path) = &words.picture {
@@ -223,12 +223,12 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
         joined(ranges_m.iter().map(f64::to_string).collect()),
         joined(snr_db.iter().map(|db| format!("{db:.2}")).collect())
     );
-    say(cli.json, &object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
+    cli.say(&object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory.
 fn planned(scene: &Path, target: Target, allow_large: bool, cli: &Cli) -> Result<Plan, Error> {
-    let plan = Plan::new(load(scene, cli)?, target)?;
+    let plan = Plan::new(cli.scene(scene)?, target)?;
     if !allow_large {
         plan.fits()?;
     }
@@ -237,12 +237,13 @@ fn planned(scene: &Path, target: Target, allow_large: bool, cli: &Cli) -> Result
 
 fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     let plan = planned(&io.scene, target, io.allow_large, cli)?;
-    io.folder.prepare_names(&write::names(&plan)?)?;
+    io.folder.prepare_names(cli, &write::names(&plan)?)?;
     if !cli.quiet {
         let _ = write!(std::io::stderr(), "{plan}");
     }
     let outcome = run::run(&plan, &*cli.observer())?;
-    let files = write::write(&plan, &outcome, &io.folder.out, io.folder.existing())?;
+    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    let files = io.folder.write(cli, of, |files| write::list(&plan, &outcome, files))?;
     let summary = outcome.summary();
     let mut text: String = summary.iter().map(|line| format!("{:<44} {}\n", line.text, digits(line.value))).collect();
     let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
@@ -256,15 +257,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         object["retrieval"] = json!({ "errors": errors.objects(), "detected": detected });
     }
     object["files"] = json!(paths(&files));
-    say(cli.json, &object, &(text + &io.folder.wrote(&files)))
-}
-
-fn load(path: &Path, cli: &Cli) -> Result<SceneFile, Error> {
-    let file = SceneFile::read(path)?;
-    match cli.seed {
-        Some(seed) => Ok(file.with(Scene { seed, ..file.scene.clone() })?),
-        None => Ok(file),
-    }
+    cli.say(&object, &(text + &io.folder.wrote(&files)))
 }
 
 fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {

@@ -2,6 +2,7 @@
 
 use crate::Error;
 use crate::scene::{Problem, SceneError};
+use clap::error::ContextKind;
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write as _};
 use std::path::Path;
@@ -24,14 +25,6 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
     }
 }
 
-/// Prints a result: as the object, or as the text.
-///
-/// # Errors
-/// As [`print()`].
-pub(super) fn say(as_json: bool, object: &Value, text: &str) -> Result<(), Error> {
-    print(&if as_json { format!("{object:#}\n") } else { format!("{}\n", text.trim_end()) })
-}
-
 /// Paths for an object, whatever bytes their names are of.
 pub(super) fn paths<P: AsRef<Path>>(paths: &[P]) -> Vec<String> {
     paths.iter().map(|path| path.as_ref().display().to_string()).collect()
@@ -44,12 +37,9 @@ pub(super) fn complain(error: &Error, as_json: bool) {
 }
 
 /// Words that the command line does not know, or help; returns the exit code.
-pub(super) fn explain(error: &clap::Error) -> u8 {
-    let as_json = error.use_stderr() && std::env::args_os().any(|word| word == "--json");
-    let printed = if as_json {
-        let text = error.render().to_string();
-        let object = json!({ "error": text.trim_end().trim_start_matches("error: "), "problems": [] });
-        writeln!(std::io::stderr(), "{object:#}")
+pub(super) fn explain(error: &clap::Error, as_json: bool) -> u8 {
+    let printed = if error.use_stderr() && as_json {
+        writeln!(std::io::stderr(), "{:#}", explained(error))
     } else {
         // Help and version are no errors and go to standard output; clap knows which is which.
         error.print()
@@ -60,8 +50,20 @@ pub(super) fn explain(error: &clap::Error) -> u8 {
     }
 }
 
+/// Words that the command line does not know, as an object.
+pub(super) fn explained(error: &clap::Error) -> Value {
+    let text = error.render().to_string();
+    let word = |kind| error.get(kind).map(ToString::to_string);
+    let problem = word(ContextKind::InvalidArg).map(|key| {
+        let allowed = text.trim_end().trim_start_matches("error: ");
+        json!({ "file": null, "line": null, "key": key, "value": word(ContextKind::InvalidValue), "allowed": allowed })
+    });
+    let problems: Vec<Value> = problem.into_iter().collect();
+    json!({ "error": text.trim_end().trim_start_matches("error: "), "problems": problems })
+}
+
 /// An error as an object: the whole message, and each problem with its file, line, key, value and what is allowed.
-fn as_object(error: &Error) -> Value {
+pub(super) fn as_object(error: &Error) -> Value {
     json!({ "error": error.to_string(), "problems": problems(error) })
 }
 

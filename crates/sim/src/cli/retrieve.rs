@@ -1,7 +1,7 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
 use super::words::{AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch};
-use super::{Cli, load, paths, say};
+use super::{Cli, paths};
 use crate::Error;
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
@@ -132,7 +132,7 @@ struct Found {
 }
 
 pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
-    let stated = words.scene.as_deref().map(|path| load(path, cli)).transpose()?;
+    let stated = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
     let observer = cli.observer();
     let (mut inputs, mut count) = (Vec::new(), 0);
     for path in &words.data {
@@ -151,7 +151,7 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         }
         inputs.push(scans);
     }
-    words.folder.prepare(|files| list(words.method, count, None, files))?;
+    words.folder.prepare(cli, |files| list(words.method, count, None, files))?;
     let mut found = Found::default();
     observer.begin(Stage::Retrieval, count as u64);
     for input in inputs {
@@ -171,12 +171,13 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     observer.end();
     same_origin(&mut found.scans);
     found.track = retrieve::track_of(&found.scans)?;
-    let files = words.folder.write(found.provenance(), |files| list(words.method, count, Some(&found), files))?;
+    let files =
+        words.folder.write_all(cli, found.provenance(), |files| list(words.method, count, Some(&found), files))?;
     let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": paths(&files) });
     let is_of_signals =
         words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
     let note = if is_of_signals { HEIGHTS } else { "" };
-    say(cli.json, &object, &format!("{}{note}{}", text(&found.scans), words.folder.wrote(&files)))
+    cli.say(&object, &format!("{}{note}{}", text(&found.scans), words.folder.wrote(&files)))
 }
 
 /// Where the track of the scans so far says that the wake is, to start from beside the blind search.

@@ -1,11 +1,11 @@
 //! `wakescope sweep` and `wakescope pareto`: design studies.
 
 use super::words::TableWords;
-use super::{Cli, paths, say};
+use super::{Cli, paths};
 use crate::io::Existing;
 use crate::io::csv_input::TextTable;
 use crate::sweep::front_table::{FrontTable, Wanted};
-use crate::sweep::{Request, Settings, Sweep, merge, run};
+use crate::sweep::{Request, Settings, merge, run};
 use crate::{Error, sweep};
 use clap::Args;
 use serde_json::json;
@@ -31,12 +31,12 @@ pub(super) struct SweepWords {
 
 pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
     let request = Request { seed: cli.seed, ..words.request.clone() };
-    let sweep = words.scene.as_deref().map(|scene| Sweep::new(scene, &request)).transpose()?;
+    let sweep = words.scene.as_deref().map(|scene| cli.sweep(scene, &request)).transpose()?;
     let Some(sweep) = sweep.as_ref().filter(|_| words.merge.is_empty()) else {
         let existing = Existing::with_overwrite(words.settings.overwrite);
         let files = merge(&words.merge, sweep.as_ref(), &words.out, existing)?;
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
-        return say(cli.json, &json!({ "version": crate::VERSION, "files": paths(&files) }), &text);
+        return cli.say(&json!({ "version": crate::VERSION, "files": paths(&files) }), &text);
     };
     let summary = run(sweep, &words.out, words.settings, &*cli.observer())?;
     let sweep::Summary { run: ran, kept, shared, files } = &summary;
@@ -54,7 +54,7 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         "kept": kept, "flows": shared.flows, "efficiencies": shared.efficiencies, "signals": shared.signals,
         "files": paths(files),
     });
-    say(cli.json, &object, &text)
+    cli.say(&object, &text)
 }
 
 /// Words of `wakescope pareto`.
@@ -69,10 +69,10 @@ pub(super) struct ParetoWords {
 }
 
 pub(super) fn pareto(words: &ParetoWords, cli: &Cli) -> Result<(), Error> {
-    words.front.prepare()?;
+    words.front.prepare(cli)?;
     let refuse = |reason| Error::Input { path: words.table.clone(), reason };
     let found = FrontTable::new(TextTable::read(&words.table)?, &words.wanted).map_err(refuse)?;
     let mut text = found.text();
-    words.front.write(&found.rows(), &found.origin(), &mut text)?;
-    say(cli.json, &found.json(), &text)
+    words.front.write(cli, &found.rows(), &found.origin(), &mut text)?;
+    cli.say(&found.json(), &text)
 }

@@ -2,7 +2,6 @@
 
 use super::Cli;
 use super::flow::{RunWords, simulate};
-use super::output::print;
 use crate::Error;
 use crate::flow::{CaseFile, CaseKind, WakePreset};
 use clap::Args;
@@ -26,22 +25,21 @@ pub(super) struct WakeWords {
 }
 
 pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
-    let file = case_file(words)?;
+    let file = case_file(words, cli)?;
     if !matches!(file.case.case, CaseKind::Wake(_)) {
         let path = words.case.clone().unwrap_or_default();
         return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
     }
     if words.print {
         let file = cli.seed.map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
-        return if ranks.rank() == 0 { print(&file.toml) } else { Ok(()) };
+        return if ranks.rank() == 0 { cli.print(&file.toml) } else { Ok(()) };
     }
     simulate(file, &words.run, cli, ranks)
 }
 
-fn case_file(words: &WakeWords) -> Result<CaseFile, Error> {
+fn case_file(words: &WakeWords, cli: &Cli) -> Result<CaseFile, Error> {
     let Some(path) = &words.case else {
         return Ok(CaseFile::preset(words.preset.unwrap_or(WakePreset::Coarse))?);
     };
-    let Some(preset) = words.preset else { return CaseFile::read(path) };
-    CaseFile::read_over(preset, path)
+    cli.case(path, words.preset)
 }

@@ -1,13 +1,14 @@
 //! What words of several commands have in common: where files go, scans that are read, and how numbers are written.
 
+use super::Cli;
 use super::output::paths;
 use crate::io::netcdf_input;
 use crate::io::own::refuse_foreign;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
-use crate::io::{Existing, Provenance, Table, write_atomic};
+use crate::io::{Existing, Provenance, Table};
 use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
-use crate::outputs::{self, Outputs};
+use crate::outputs::Outputs;
 use crate::plan::Plan;
 use crate::scene::SceneFile;
 use crate::setup::progress::Silent;
@@ -36,22 +37,33 @@ impl FolderWords {
     }
 
     /// Finds out whether the files of a list can be written.
-    pub(super) fn prepare(&self, list: impl FnOnce(&mut Outputs) -> Result<(), Error>) -> Result<(), Error> {
-        self.prepare_names(&Outputs::names(scene::Outputs::default(), list)?)
+    pub(super) fn prepare(&self, cli: &Cli, list: impl FnOnce(&mut Outputs) -> Result<(), Error>) -> Result<(), Error> {
+        self.prepare_names(cli, &Outputs::names(scene::Outputs::default(), list)?)
     }
 
     /// Finds out whether files of these names can be written.
-    pub(super) fn prepare_names(&self, names: &[String]) -> Result<(), Error> {
-        outputs::prepare(&self.out, names, self.existing(), true)
+    pub(super) fn prepare_names(&self, cli: &Cli, names: &[String]) -> Result<(), Error> {
+        cli.prepare(&self.out, names, self.existing())
     }
 
-    /// Writes the files of a list in every format.
+    /// Writes the files of a list.
     pub(super) fn write(
         &self,
+        cli: &Cli,
+        of: (scene::Outputs, Provenance),
+        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
+    ) -> Result<Vec<PathBuf>, Error> {
+        cli.write(&self.out, self.existing(), of, list)
+    }
+
+    /// The same in every format.
+    pub(super) fn write_all(
+        &self,
+        cli: &Cli,
         origin: Provenance,
         list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
     ) -> Result<Vec<PathBuf>, Error> {
-        Outputs::write(&self.out, self.existing(), (scene::Outputs::default(), origin), list)
+        self.write(cli, (scene::Outputs::default(), origin), list)
     }
 
     /// The last line of a text.
@@ -73,16 +85,22 @@ pub(super) struct TableWords {
 
 impl TableWords {
     /// Finds out whether the file can be written.
-    pub(super) fn prepare(&self) -> Result<(), Error> {
-        let Some(path) = &self.out else { return Ok(()) };
+    pub(super) fn prepare(&self, cli: &Cli) -> Result<(), Error> {
+        let Some(path) = self.out.as_ref().filter(|_| !cli.keeps_files()) else { return Ok(()) };
         let name = path.file_name().and_then(|name| name.to_str());
         Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, Existing::with_overwrite(self.overwrite))?)
     }
 
     /// Writes the file, if there is to be one, and says so in the text; returns its path for an object.
-    pub(super) fn write(&self, table: &Table, origin: &Provenance, text: &mut String) -> Result<Value, Error> {
+    pub(super) fn write(
+        &self,
+        cli: &Cli,
+        table: &Table,
+        origin: &Provenance,
+        text: &mut String,
+    ) -> Result<Value, Error> {
         let Some(path) = &self.out else { return Ok(Value::Null) };
-        write_atomic(path, table.to_csv(origin)?)?;
+        cli.write_one(path, table.to_csv(origin)?)?;
         *text += &format!("wrote {}\n", path.display());
         Ok(json!(paths(&[path])[0]))
     }

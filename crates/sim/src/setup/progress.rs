@@ -1,4 +1,7 @@
-//! The stages of a run, and who is told where it is.
+//! The stages of a run, who is told where it is, and how one who is told stops it.
+
+use crate::Error;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 /// A part of the measurement that can run alone or be left out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -49,7 +52,7 @@ impl Stage {
     }
 }
 
-/// Told of the progress of a run, from any thread. A stage may be part of another one.
+/// Told of the progress of a run, from any thread. A stage may be part of another one. Each call may [`stop`] the run.
 pub trait Observer: Sync {
     /// What will be done, before it begins.
     fn forecast(&self, _text: &str) {}
@@ -70,3 +73,57 @@ pub trait Observer: Sync {
 pub struct Silent;
 
 impl Observer for Silent {}
+
+struct Stopped;
+
+/// Ends the run from within an [`Observer`]: [`stoppable`], around the run, gives [`Error::Stopped`]. Nothing is printed.
+pub fn stop() -> ! {
+    resume_unwind(Box::new(Stopped))
+}
+
+/// Runs work whose observer may [`stop`] it.
+///
+/// # Errors
+/// [`Error::Stopped`] where it was stopped; those of the work.
+pub fn stoppable<T>(work: impl FnOnce() -> Result<T, Error>) -> Result<T, Error> {
+    // What the work was about to change is gone with it: files are put into place as wholes.
+    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|cause| match cause.is::<Stopped>() {
+        true => Err(Error::Stopped),
+        false => resume_unwind(cause),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plan::{Plan, Target};
+    use crate::run::run;
+    use crate::scene::{Scene, SceneFile};
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    /// Stops the run after so many steps.
+    struct Impatient(AtomicU64, u64);
+
+    impl Observer for Impatient {
+        fn advance(&self, steps: u64) {
+            if self.0.fetch_add(steps, Ordering::Relaxed) + steps > self.1 {
+                stop();
+            }
+        }
+    }
+
+    #[test]
+    fn a_run_that_is_stopped_says_so_and_the_next_one_is_as_if_it_had_not_been() {
+        let mut scene = Scene::default();
+        (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad, scene.scan.pulses_per_line) = (0.1, 0.11, 1);
+        let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap();
+        let whole = run(&plan, &Silent).unwrap();
+        for steps in [0, 4, 12] {
+            let observer = Impatient(AtomicU64::new(0), steps);
+            let stopped = stoppable(|| run(&plan, &observer));
+            assert!(matches!(stopped, Err(Error::Stopped)), "after {steps} steps");
+        }
+        let patient = Impatient(AtomicU64::new(0), u64::MAX);
+        assert_eq!(stoppable(|| run(&plan, &patient)).unwrap(), whole);
+    }
+}

@@ -5,12 +5,11 @@
 use super::pictures;
 use super::{list, list_map};
 use crate::Error;
-use crate::io::{Existing, VelocityMap};
+use crate::io::VelocityMap;
 use crate::measure::recorded::{Recorded, Spectra, measured_map, predicted_table};
 use crate::outputs::Outputs;
 use crate::plan::Plan;
 use crate::run::RunResult;
-use std::path::{Path, PathBuf};
 
 /// Names of the files that estimates from records may have.
 ///
@@ -23,12 +22,9 @@ pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
     Ok(names)
 }
 
-/// Writes what records gave; returns the paths of the files.
-///
-/// # Errors
-/// As [`super::write`].
-pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    Outputs::write(folder, existing, (plan.scene.scene.outputs, plan.scene.provenance()), |files| match found {
+/// The files of what records gave.
+pub(crate) fn list_recorded(plan: &Plan, found: Recorded, files: &mut Outputs) -> Result<(), Error> {
+    match found {
         Recorded::OfRun { map, spectra } => {
             of_run(plan, &RunResult { map: Some(*map), ..RunResult::default() }, spectra, files)
         }
@@ -38,7 +34,7 @@ pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Exi
             measured(plan, &map, files)?;
             list_spectra(spectra, files)
         }
-    })
+    }
 }
 
 /// Of signals whose truth is known: what a run gives, and what is predicted of its errors.

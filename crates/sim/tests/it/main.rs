@@ -14,6 +14,8 @@ mod detection;
 #[cfg(feature = "cli")]
 mod estimate;
 #[cfg(feature = "cli")]
+mod host;
+#[cfg(feature = "cli")]
 mod hostile_files;
 #[cfg(feature = "cli")]
 mod messages;

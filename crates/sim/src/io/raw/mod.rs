@@ -116,9 +116,29 @@ pub struct RawRecords {
 }
 
 /// Where samples come from.
-trait Source: std::fmt::Debug {
-    /// Some samples of some records as they stand there, one record after the other.
+pub trait Source: std::fmt::Debug {
+    /// Some samples of some records as they stand there, one record after the other; the second parts of real ones are of no matter.
+    ///
+    /// # Errors
+    /// Why they cannot be read.
     fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String>;
+}
+
+/// Signals in the memory of a program.
+#[derive(Debug)]
+pub struct SampleArray {
+    /// What stands for it in words and messages.
+    pub name: PathBuf,
+    /// What reads it.
+    pub source: Box<dyn Source + Send>,
+    /// Number of records.
+    pub records: usize,
+    /// Samples of a record.
+    pub samples: usize,
+    /// Whether samples are complex.
+    pub is_complex: bool,
+    /// Whether the numbers are codes of a converter.
+    pub are_integers: bool,
 }
 
 /// Records as they stand in a file.
@@ -183,6 +203,21 @@ impl RawRecords {
             return Err(refuse("it holds no records".into()));
         }
         Ok(Self::new(path, stored))
+    }
+
+    /// Records of an array in memory, whose numbers are multiplied with `scale`.
+    ///
+    /// # Errors
+    /// An array without a sample.
+    pub fn of_array(array: SampleArray, scale: f64) -> Result<Self, Error> {
+        let SampleArray { name, source, records, samples, is_complex, are_integers } = array;
+        if records == 0 || samples == 0 {
+            return Err(Error::Input { path: name, reason: "it holds no records".into() });
+        }
+        // Of a converter's codes each may be a sample.
+        let fills = if are_integers { Vec::new() } else { MissingSamples::default().fill };
+        let (scale, about) = ([1.0, scale], About::default());
+        Ok(Self::new(&name, Stored { source, records, samples, is_complex, are_integers, fills, scale, about }))
     }
 
     fn new(path: &Path, mut stored: Stored) -> Self {

@@ -1,0 +1,199 @@
+//! Another program that runs commands in its own process, with their words: it is told what a terminal would show, may keep the files
+//! in memory, and gives scenes as texts and signals as arrays.
+//!
+//! Check: the files that are kept are those that the command writes, byte for byte.
+
+use super::output::{as_object, explained, print};
+use super::progress::{Bars, Quiet};
+use super::{Cli, dispatch, with_threads};
+use crate::Error;
+use crate::flow::{CaseFile, WakePreset};
+use crate::io::raw::SampleArray;
+use crate::io::{Existing, Provenance, write_atomic};
+use crate::keys::{Located, Problem, SceneError};
+use crate::outputs::{self, Outputs};
+use crate::scene::{Outputs as Formats, SceneFile};
+use crate::setup::progress::{Observer, stoppable};
+use crate::sweep::{Request, Sweep};
+use clap::Parser;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What a program gives to a command that it runs.
+pub struct Host {
+    /// Who is told of the progress and warned; it may stop the run.
+    pub observer: Arc<dyn Observer + Send>,
+    /// Texts of scenes and cases, by the words that stand for their files.
+    pub texts: BTreeMap<PathBuf, String>,
+    /// Signals, whose name stands for a file.
+    pub signals: Mutex<Option<SampleArray>>,
+    /// Whether files of `--out` stay in memory; those of flows, wakes and sweeps, which can be continued, are written.
+    pub keeps_files: bool,
+}
+
+/// What a command gives to the program that runs it.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Answer {
+    /// The exit code: 1 where an accuracy that was asked for is out of reach.
+    pub code: u8,
+    /// The object that `--json` prints; null for a command that prints a text alone.
+    pub object: Value,
+    /// What a person would read.
+    pub text: String,
+    /// Names and contents of the files, where they are kept.
+    pub files: Vec<(String, Vec<u8>)>,
+}
+
+/// Why a command failed: the object that `--json` prints, with the whole text as `error`, and `problems`, each with its `file`,
+/// `line`, `key`, `value` and what is `allowed`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Refusal(pub Value);
+
+impl Refusal {
+    /// For a value that is not allowed.
+    pub fn of(problem: Problem) -> Self {
+        refusal(
+            SceneError::Invalid { path: "scene".into(), problems: vec![Located { problem, line: None }] }.into(),
+            true,
+        )
+    }
+}
+
+/// The refusal of an error; without `lines` where nobody wrote the text that has them.
+pub fn refusal(mut error: Error, lines: bool) -> Refusal {
+    if let (Error::Scene(SceneError::Invalid { problems, .. }), false) = (&mut error, lines) {
+        problems.iter_mut().for_each(|located| located.line = None);
+    }
+    Refusal(as_object(&error))
+}
+
+/// A [`Host`] and its answer while a command runs.
+pub(super) struct Call {
+    host: Host,
+    answer: Mutex<Answer>,
+}
+
+/// Runs a command in this process, with its words as after `wakescope`.
+///
+/// # Errors
+/// Words that the command line does not know, and whatever the command refuses; [`Error::Stopped`] where the observer stopped it.
+pub fn call(words: &[OsString], host: Host) -> Result<Answer, Refusal> {
+    let words = [OsString::from("wakescope")].into_iter().chain(words.iter().cloned());
+    let mut cli = Cli::try_parse_from(words).map_err(|error| Refusal(explained(&error)))?;
+    let call = Arc::new(Call { host, answer: Mutex::default() });
+    (cli.quiet, cli.json, cli.call) = (true, true, Some(call.clone()));
+    let done = stoppable(|| with_threads(&cli, || dispatch(&cli)).flatten());
+    let code = done.map_err(|error| refusal(error, call.host.texts.is_empty()))?;
+    Ok(Answer { code, ..std::mem::take(&mut *call.answer()) })
+}
+
+impl Call {
+    fn answer(&self) -> std::sync::MutexGuard<'_, Answer> {
+        self.answer.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Where commands read and write.
+impl Cli {
+    /// Who is told of the progress: the program that called, else bars, unless quiet was asked for.
+    pub(super) fn observer(&self) -> Arc<dyn Observer + Send> {
+        match &self.call {
+            Some(call) => call.host.observer.clone(),
+            None if self.quiet => Arc::new(Quiet),
+            None => Arc::new(Bars::new()),
+        }
+    }
+
+    /// Gives a result: as the object, or as the text.
+    pub(super) fn say(&self, object: &Value, text: &str) -> Result<(), Error> {
+        match &self.call {
+            Some(call) => {
+                let mut answer = call.answer();
+                (answer.object, answer.text) = (object.clone(), text.to_owned());
+                Ok(())
+            }
+            None if self.json => print(&format!("{object:#}\n")),
+            None => print(&format!("{}\n", text.trim_end())),
+        }
+    }
+
+    /// Gives a text as it is.
+    pub(super) fn print(&self, text: &str) -> Result<(), Error> {
+        let Some(call) = &self.call else { return print(text) };
+        text.clone_into(&mut call.answer().text);
+        Ok(())
+    }
+
+    fn text(&self, path: &Path) -> Option<&str> {
+        self.call.as_ref().and_then(|call| call.host.texts.get(path)).map(String::as_str)
+    }
+
+    /// The scene of a path, with the seed of the command line.
+    pub(super) fn scene(&self, path: &Path) -> Result<SceneFile, Error> {
+        let file = self.text(path).map_or_else(|| SceneFile::read(path), |text| SceneFile::parse(text, path))?;
+        match self.seed {
+            Some(seed) => Ok(file.with(crate::scene::Scene { seed, ..file.scene.clone() })?),
+            None => Ok(file),
+        }
+    }
+
+    /// The cases of a sweep over the scene of a path.
+    pub(super) fn sweep(&self, path: &Path, request: &Request) -> Result<Sweep, Error> {
+        self.text(path).map_or_else(|| Sweep::new(path, request), |text| Sweep::parse(text, path, request))
+    }
+
+    /// The flow case of a path; keys that it lacks are those of the preset, if there is one.
+    pub(super) fn case(&self, path: &Path, preset: Option<WakePreset>) -> Result<CaseFile, Error> {
+        match (self.text(path), preset) {
+            (None, None) => CaseFile::read(path),
+            (None, Some(preset)) => CaseFile::read_over(preset, path),
+            (Some(text), None) => Ok(CaseFile::parse(text, path)?),
+            (Some(text), Some(preset)) => Ok(CaseFile::parse_over(preset, text, path)?),
+        }
+    }
+
+    /// The signals that a path stands for, where the program that called gave them.
+    pub(super) fn signals(&self, path: &Path) -> Option<SampleArray> {
+        let mut held = self.call.as_ref()?.host.signals.lock().unwrap_or_else(PoisonError::into_inner);
+        held.take_if(|array| array.name == path)
+    }
+
+    fn keeper(&self) -> Option<&Call> {
+        self.call.as_deref().filter(|call| call.host.keeps_files)
+    }
+
+    /// Finds out whether files of these names can be written to a folder.
+    pub(super) fn prepare(&self, folder: &Path, names: &[String], existing: Existing) -> Result<(), Error> {
+        if self.keeper().is_some() { Ok(()) } else { outputs::prepare(folder, names, existing, true) }
+    }
+
+    /// Writes the files of a list to a folder, or keeps them; returns their paths.
+    pub(super) fn write(
+        &self,
+        folder: &Path,
+        existing: Existing,
+        of: (Formats, Provenance),
+        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
+    ) -> Result<Vec<PathBuf>, Error> {
+        let Some(call) = self.keeper() else { return Outputs::write(folder, existing, of, list) };
+        let files = Outputs::contents(of, list)?;
+        let names = files.iter().map(|(name, _)| name.into()).collect();
+        call.answer().files.extend(files);
+        Ok(names)
+    }
+
+    /// Writes a file, or keeps it.
+    pub(super) fn write_one(&self, path: &Path, content: String) -> Result<(), Error> {
+        let Some(call) = self.keeper() else { return Ok(write_atomic(path, content)?) };
+        call.answer().files.push((path.display().to_string(), content.into()));
+        Ok(())
+    }
+
+    /// Whether files stay in memory.
+    pub(super) fn keeps_files(&self) -> bool {
+        self.keeper().is_some()
+    }
+}

@@ -1,0 +1,166 @@
+"""Each command gives what the program writes; arrays and datasets go in without files of one's own."""
+
+import subprocess
+import sys
+
+import numpy
+import pytest
+import xarray
+from conftest import small
+
+import wakescope
+
+
+@pytest.fixture(scope="module")
+def scan():
+    """A whole plane with a wake."""
+    return wakescope.run(wakescope.scene(**{"scan.elevation_step_rad": 0.004, "outputs.svg": False, "outputs.png": False}))
+
+
+def test_tables_are_those_of_the_program(program, tmp_path):
+    scene = small()
+    wakescope.run(scene).write(tmp_path)
+    program("bound", tmp_path / "scene.toml", "--out", tmp_path / "bound.csv")
+    lines = [line for line in (tmp_path / "bound.csv").read_text().splitlines() if not line.startswith("#")]
+    bound = wakescope.bound(scene)
+    assert list(bound) == lines[0].split(",") and bound.sizes["index"] == len(lines) - 1
+    for column, name in enumerate(bound):
+        kind = type(bound[name].values[0].item())
+        assert [kind(line.split(",")[column]) for line in lines[1:]] == bound[name].values.tolist(), name
+    budget = wakescope.budget(scene, range=[280, 400])
+    assert set(budget.range_m.values) == {280.0, 400.0} and budget.attrs["ambiguous_range_m"] > 1e5
+    efficiency = wakescope.efficiency(scene)
+    assert efficiency.snr_db.dims == ("range_m",)
+    numpy.testing.assert_array_equal(efficiency.snr_db, wakescope.run(scene).profile.snr_db)
+
+
+def test_a_dataset_is_retrieved_as_its_file(scan, tmp_path):
+    scan.write(tmp_path)
+    of_file = wakescope.retrieve(tmp_path / "map.nc")
+    of_dataset = wakescope.retrieve(scan.map)
+    xarray.testing.assert_allclose(of_dataset.drop_vars("file"), of_file.drop_vars("file"), rtol=1e-6)
+    assert list(of_file.side.values) == ["left", "right"] and (of_file.gamma_std_m2_s > 0).all()
+    covariance = of_file.covariance[0].values
+    numpy.testing.assert_allclose(covariance, covariance.T)
+    at = list(of_file.parameter.values).index("gamma_left_m2_s")
+    assert float(of_file.wake[0, at]) == pytest.approx(float(of_file.gamma_m2_s[0]), rel=1e-6)
+
+
+def test_detection_with_and_without_a_scan(scan):
+    found = wakescope.detect(scan.map, empty_scans=2000, stride=(2, 4))
+    assert int(found.wake[0]) == 1 and found.attrs["smallest_detectable_m2_s"] > 0
+    power = wakescope.detect(scene=small(), empty_scans=2000)
+    assert power.detection.dims == ("gamma_m2_s",) and float(power.detection[-1]) > 0.9
+
+
+def test_a_sweep_is_a_dataset_over_cases(tmp_path):
+    found = wakescope.sweep(small(), vary={"pulse.energy_j": [1e-4, 2e-4]}, no_circulation=True)
+    assert found.sizes["case"] == 2
+    assert float(found.snr_db[1] - found.snr_db[0]) == pytest.approx(10 * numpy.log10(2), abs=0.02)
+    again = wakescope.sweep(small(), vary=["pulse.energy_j=1e-4,2e-4"], no_circulation=True, out=tmp_path / "sweep")
+    xarray.testing.assert_equal(found.snr_db, again.snr_db)
+    assert (tmp_path / "sweep/results.nc").exists()
+
+
+def test_accuracy_gives_the_scene_that_it_found():
+    found = wakescope.accuracy(small(**{"scan.realisations": 4}), within=0.5, of=["std"])
+    assert found.attrs["is_reached"] in (0, 1) and "[scan]" in found.attrs["scene"] and "verdict" in found
+
+
+def test_a_flow_and_a_wake_tell_their_progress(tmp_path):
+    case = wakescope.case("taylor_green_plane")
+    case["case"]["cells"] = 8
+    told = []
+    result = wakescope.flow(case, end=0.05, progress=lambda *step: told.append(step))
+    assert result.answer["is_complete"] and told and told[-1][0] == "flow simulation"
+    assert result.steps.sizes["index" if "index" in result.steps.dims else list(result.steps.dims)[0]] >= 1
+    wake = wakescope.case("coarse")
+    wake["case"]["cells"] = [4, 16, 12]
+    wake["wake"] = {"end_tau": 0.02, "fields_tau": [0.02], "planes_tau": [0.0, 0.02]}
+    written = wakescope.wake(wake, out=tmp_path)
+    assert written.answer["is_complete"] and (tmp_path / "case.toml").exists()
+    assert all(path.parent == tmp_path for path in written.files.values())
+
+
+@pytest.mark.parametrize("kind", ["f4", "f8", "c8", "c16", "i2", "u2"])
+def test_signals_of_every_kind_of_number(kind):
+    scene = small(**{"outputs.signals": True})
+    signals = wakescope.run(scene).signals.current_a.values
+    exact = wakescope.estimate(signals, scene).map
+    if kind[0] == "c":
+        scene = small(**{"detector.signal": "baseband", "outputs.signals": True})
+        own = wakescope.run(scene).signals
+        signals = own.current_a.values + 1j * own.quadrature_a.values
+        exact = wakescope.estimate(signals, scene).map
+    scale = 1.0
+    if kind[0] in "iu":
+        scale = float(numpy.abs(signals).max()) / 30000
+        offset = 32768 if kind[0] == "u" else 0
+        found = wakescope.estimate((numpy.rint(signals / scale) + offset).astype(kind), scene, scale=scale, noise="scene").map
+    else:
+        found = wakescope.estimate(signals.astype(kind), scene, noise="scene").map
+        exact = wakescope.estimate(signals, scene, noise="scene").map
+    if kind[0] != "u":
+        assert float(abs(found.radial_velocity - exact.radial_velocity).median()) < 0.05
+    # A view of an array that another program holds, [line, pulse, sample].
+    lines = signals.reshape(9, 2, -1)
+    assert wakescope.estimate(lines, scene, noise="scene").map.radial_velocity.size == found.radial_velocity.size
+    with pytest.raises(ValueError, match="ascontiguousarray"):
+        wakescope.estimate(lines[:, :, ::2], scene)
+
+
+MEMORY = """
+import resource, numpy, wakescope
+from math import inf
+scene = SCENE
+few = numpy.random.default_rng(1).normal(size=(18, 401)).astype("f4")
+wakescope.estimate(few, {**scene, "scan": {**scene["scan"], "pulses_per_line": 2}})
+signals = numpy.random.default_rng(1).normal(size=(RECORDS, 401)).astype("f4")
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+wakescope.estimate(signals, scene, threads=1)
+print(signals.nbytes, 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before))
+"""
+
+
+def test_a_large_array_is_not_copied():
+    # 100 MB: lines of many pulses.
+    scene = small(**{"scan.pulses_per_line": 7000})
+    text = MEMORY.replace("SCENE", repr(scene)).replace("RECORDS", str(9 * 7000))
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True)
+    assert not done.stderr, done.stderr
+    size, more = map(int, done.stdout.split())
+    assert size > 1e8 and more < 0.1 * size, (size, more)
+
+
+def test_another_openblas_in_the_process_changes_no_value():
+    text = """
+import sys
+if sys.argv[1] == "before":
+    import ctypes, glob, numpy, os
+    numpy.linalg.eigh(numpy.eye(3))
+    names = glob.glob(os.path.join(os.path.dirname(numpy.__file__), "..", "numpy.libs", "*openblas*"))
+    [ctypes.CDLL(name, mode=ctypes.RTLD_GLOBAL) for name in names]
+import hashlib, wakescope
+scene = wakescope.scene(**{"scan.elevation_step_rad": 0.02, "estimator.method": {"kind": "autoregressive", "order": 8}})
+print(hashlib.sha256(wakescope.run(scene).files["map.nc"]).hexdigest())
+"""
+    words = [sys.executable, "-c", text]
+    found = [subprocess.run([*words, order], capture_output=True, text=True, check=True).stdout for order in ("before", "without")]
+    assert found[0] == found[1] and len(found[0]) > 60
+
+
+def test_names_of_linear_algebra_stay_inside_the_module():
+    from wakescope import _wakescope
+
+    listed = subprocess.run(["nm", "-D", "--defined-only", _wakescope.__file__], capture_output=True, text=True)
+    if listed.returncode != 0:
+        pytest.skip("no nm")
+    names = {line.split()[-1] for line in listed.stdout.splitlines() if line.split()[-2] in "TDBRVW"}
+    assert names == {"PyInit__wakescope"}, names
+
+
+def test_a_large_module_is_loaded_in_little_time():
+    text = "import time; begun = time.perf_counter(); import wakescope; print(time.perf_counter() - begun, 'xarray' in __import__('sys').modules)"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True).stdout.split()
+    # Timing never decides: what takes long is not imported.
+    assert done[1] == "False"
