@@ -156,7 +156,9 @@ def test_names_of_linear_algebra_stay_inside_the_module():
     if listed.returncode != 0:
         pytest.skip("no nm")
     names = {line.split()[-1] for line in listed.stdout.splitlines() if line.split()[-2] in "TDBRVW"}
-    assert names == {"PyInit__wakescope"}, names
+    # What the stub is made from lies there, too.
+    others = {name for name in names if not name.startswith("PYO3_INTROSPECTION_")}
+    assert others == {"PyInit__wakescope"}, others
 
 
 def test_a_large_module_is_loaded_in_little_time():

@@ -35,6 +35,8 @@ Path_ = Union[str, "os.PathLike[str]"]
 Scene = Union[Mapping[str, Any], Path_]
 #: Called with the name of a stage, the part of it that is done, and a text; True shows them on standard error.
 Progress = Union[Callable[[str, float, str], object], bool, None]
+#: Dictionaries of scenes and cases by the words that stand for them.
+Texts = dict[Union[str, "os.PathLike[str]"], dict[str, Any]]
 #: A map of a scan, or the path of one.
 Scan = Union["xarray.Dataset", Path_]
 
@@ -201,7 +203,7 @@ def _show(stage: str, part: float, text: str) -> None:
     sys.stderr.flush()
 
 
-def _text(scene: Scene, word: str, texts: dict[str, Mapping[str, Any]]) -> str:
+def _text(scene: Scene, word: str, texts: Texts) -> str:
     """The word for a scene: its path, or one that stands for its dictionary."""
     if not isinstance(scene, Mapping):
         return _path(scene)
@@ -220,7 +222,7 @@ def _command(
     **options: Any,
 ) -> Result:
     """Runs a command; its files are kept in memory unless `out` says where they go, in a folder on the way if they must."""
-    texts: dict[str, Mapping[str, Any]] = {}
+    texts: Texts = {}
     word = "case" if command in ("flow", "wake") else "scene"
     words = [command, *(_text(each, word, texts) for each in inputs if each is not None)]
     if given is not None:
