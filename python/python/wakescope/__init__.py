@@ -142,10 +142,11 @@ def sweep(scene: Scene, vary: Mapping[str, Any] | Sequence[str] = (), **options:
 
 
 def accuracy(scene: Scene, within: float, **options: Any) -> xarray.Dataset:
-    """How far the figures of a scene shift with each key, and the cheapest keys for an error `within`; the scene that has them is the
-    attribute `scene`."""
+    """How far the figures of a scene, or of the case of a flow, shift with each key, and the cheapest keys for an error `within`; the
+    scene or case that has them is the attribute `scene` or `case`."""
     result = _command("accuracy", scene, within=within, **options)
-    return attributes(result["accuracy"], {**result.answer, "scene": result.read("scene_accuracy.toml").decode()})
+    kind = "case" if "case_hash" in result.answer else "scene"
+    return attributes(result["accuracy"], {**result.answer, kind: result.read(f"{kind}_accuracy.toml").decode()})
 
 
 def flow(case: Scene, out: Path_ | None = None, progress: Progress = None, **options: Any) -> Result:

@@ -29,19 +29,38 @@ pub enum Figure {
     V,
     /// Wind along z.
     W,
-    /// Circulation fitted to each map.
+    /// Circulation fitted to each map; of a simulated wake that of its history.
     Circulation,
+    /// Height of the vortices of a simulated wake.
+    Height,
+    /// Kinetic energy of a flow.
+    Energy,
+    /// What viscosity and subgrid model take from it.
+    Dissipation,
 }
 
 impl Figure {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 8] =
-        [Self::Efficiency, Self::Bias, Self::Std, Self::Rms, Self::U, Self::V, Self::W, Self::Circulation];
+    pub const ALL: [Self; 11] = [
+        Self::Efficiency,
+        Self::Bias,
+        Self::Std,
+        Self::Rms,
+        Self::U,
+        Self::V,
+        Self::W,
+        Self::Circulation,
+        Self::Height,
+        Self::Energy,
+        Self::Dissipation,
+    ];
 
     /// Its word on the command line and in tables.
     #[must_use]
     pub fn name(self) -> &'static str {
-        ["efficiency", "bias", "std", "rms", "u", "v", "w", "circulation"][self as usize]
+        const NAMES: [&str; 11] =
+            ["efficiency", "bias", "std", "rms", "u", "v", "w", "circulation", "height", "energy", "dissipation"];
+        NAMES[self as usize]
     }
 }
 

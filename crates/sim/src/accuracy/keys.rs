@@ -20,6 +20,8 @@ pub const GRID_POINTS: &str = "atmosphere.turbulence.grid_points";
 pub const GRID_SPACING: &str = "atmosphere.turbulence.grid_spacing_m";
 /// Realisations of the path.
 pub const PATHS: &str = "atmosphere.turbulence.realisations";
+/// Cells of a flow along each direction.
+pub const CELLS: &str = "case.cells";
 /// Realisations of the scan.
 pub const REALISATIONS: &str = "scan.realisations";
 

@@ -53,8 +53,10 @@ impl Verdict {
 /// A value of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {
-    /// The value.
+    /// The value; of a mesh the number of its cells.
     pub value: f64,
+    /// Cells of a mesh along x, y, z.
+    pub cells: Option<[usize; 3]>,
     /// Forecast of a run with it and the finest values of the others, s of one core.
     pub forecast_s: f64,
     /// What it shifts.
@@ -70,7 +72,8 @@ impl Step {
         self.shifts.iter().find(|(of, _)| *of == figure).map(|(_, own)| *own)
     }
 
-    fn bound(&self, figure: Figure) -> f64 {
+    /// What it shifts a figure at most; nothing where that is not known.
+    pub(super) fn bound(&self, figure: Figure) -> f64 {
         self.shift(figure).map_or(0.0, Shift::bound)
     }
 }
@@ -88,6 +91,8 @@ pub struct Ladder {
     pub chosen: usize,
     /// Why it was not varied.
     pub note: Option<String>,
+    /// Order of the error of each figure of a flow; none where it does not converge at these values.
+    pub orders: Vec<(Figure, Option<f64>)>,
 }
 
 impl Ladder {
@@ -149,10 +154,10 @@ mod tests {
         let step = |(i, &(value, forecast_s, shift, error)): (usize, &(f64, f64, f64, f64))| {
             let shifts = vec![(Figure::Rms, Shift { shift, error })];
             let verdict = if i == 0 { Verdict::Finest } else { Verdict::of(&shifts, 0.015) };
-            Step { value, forecast_s, shifts, verdict }
+            Step { value, cells: None, forecast_s, shifts, verdict }
         };
         let steps = steps.iter().enumerate().map(step).collect();
-        Ladder { key, now: 1.0, steps, chosen: 0, note: None }
+        Ladder { key, now: 1.0, steps, chosen: 0, note: None, orders: Vec::new() }
     }
 
     #[test]

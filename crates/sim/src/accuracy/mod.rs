@@ -1,4 +1,4 @@
-//! How accurate a scene's own numbers are, and the cheapest keys for an accuracy that is asked for.
+//! How accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy that is asked for.
 //!
 //! | module | what is in it |
 //! |---|---|
@@ -8,11 +8,16 @@
 //! | `search` | the search: what it plans, measures and spends |
 //! | `pilot`, `screens` | keys of the estimator, measured on maps; keys of phase screens |
 //! | `verify` | the choice as a whole; realisations |
+//! | `flows`, `order` | meshes and steps of the case of a flow; the order of errors |
 //! | `report`, `pictures` | the answer as text, table and scene; drawn |
 
 pub mod figures;
+#[cfg(feature = "flow")]
+mod flows;
 pub mod keys;
 pub mod ladder;
+#[cfg(feature = "flow")]
+mod order;
 #[cfg(feature = "plots")]
 mod pictures;
 mod pilot;
@@ -22,6 +27,7 @@ mod search;
 mod verify;
 
 use crate::Error;
+use crate::io::Provenance;
 use crate::plan::Plan;
 use crate::scene::{Pattern, SceneFile};
 use crate::setup::efficiency_model::{drawn_turbulence, model};
@@ -64,6 +70,11 @@ impl Request {
             let reason = format!("{} is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone", figure.name());
             return Err(Error::Input { path: "--of".into(), reason });
         }
+        let is_of_flow = |figure: &Figure| matches!(figure, Figure::Height | Figure::Energy | Figure::Dissipation);
+        if let Some(figure) = self.of.iter().find(|figure| is_of_flow(figure)) {
+            let reason = format!("{} is a figure of the case of a flow, and this is a scene", figure.name());
+            return Err(Error::Input { path: "--of".into(), reason });
+        }
         if self.of.contains(&Figure::Efficiency) && drawn_turbulence(scene).is_some() {
             let reason = "efficiency is one for each pulse with atmosphere.turbulence.efficiency = \"realisation\"; it has a mean \
                           to judge with \"mean\"";
@@ -74,6 +85,7 @@ impl Request {
             Figure::Bias | Figure::Std | Figure::Rms => true,
             Figure::U | Figure::V | Figure::W => tells_winds,
             Figure::Circulation => scene.retrieval.is_some() || !self.of.is_empty(),
+            Figure::Height | Figure::Energy | Figure::Dissipation => false,
         };
         let is_asked = |figure: &Figure| self.of.is_empty() || self.of.contains(figure);
         Ok(Figure::ALL.into_iter().filter(|figure| has(figure) && is_asked(figure)).collect())
@@ -130,14 +142,41 @@ pub struct Verified {
     pub is_confirmed: bool,
 }
 
+/// What an answer is about: a scene, or the case of a flow.
+pub trait Subject {
+    /// In a word.
+    const NAME: &'static str;
+    /// Whether its figures are of random signals.
+    const IS_NOISY: bool;
+
+    /// All of its keys as TOML.
+    fn toml(&self) -> &str;
+
+    /// What its files say of where they come from, its seed among them.
+    fn provenance(&self) -> Provenance;
+}
+
+impl Subject for SceneFile {
+    const NAME: &'static str = "scene";
+    const IS_NOISY: bool = true;
+
+    fn toml(&self) -> &str {
+        &self.toml
+    }
+
+    fn provenance(&self) -> Provenance {
+        Self::provenance(self)
+    }
+}
+
 /// The answer.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Accuracy {
-    /// Hash of the scene.
+pub struct Accuracy<S = SceneFile> {
+    /// Hash of the scene or case.
     pub of_scene: String,
     /// Target, a relative error.
     pub within: f64,
-    /// Forecast of the scene's own run without pictures, s of one core.
+    /// Forecast of its own run without pictures, s of one core.
     pub own_s: f64,
     /// Forecast of what the search did, s of one core.
     pub spent_s: f64,
@@ -159,8 +198,8 @@ pub struct Accuracy {
     pub verified: Verified,
     /// What was not done, and why.
     pub notes: Vec<String>,
-    /// The scene with the keys that are chosen.
-    pub scene: SceneFile,
+    /// The scene or case with the keys that are chosen.
+    pub scene: S,
     /// Forecast of its run without pictures, s of one core.
     pub run_s: f64,
 }
@@ -173,11 +212,13 @@ impl Accuracy {
     pub fn of(file: &SceneFile, request: &Request, observer: &dyn Observer) -> Result<Self, Error> {
         search::Search::run(file, request, observer)
     }
+}
 
+impl<S: Subject> Accuracy<S> {
     /// Whether a run within the budget has every figure within the target.
     #[must_use]
     pub fn is_reached(&self) -> bool {
         let reached = |figure: &Figure| self.noises.iter().any(|noise| noise.figure == *figure && noise.is_reached);
-        self.verified.is_confirmed && self.figures.iter().all(reached)
+        self.verified.is_confirmed && (!S::IS_NOISY || self.figures.iter().all(reached))
     }
 }

@@ -2,14 +2,14 @@
 //!
 //! Check: by eye; a test of the program compares the names of the files.
 
-use super::Accuracy;
 use super::figures::Figure;
+use super::{Accuracy, Subject};
 use crate::plot::{Axis, CurvePlot, Figure as Picture, Series, Style};
 
 /// Shifts below this, in percent, are drawn here: a logarithmic axis has no zero.
 const FLOOR: f64 = 1e-3;
 
-impl Accuracy {
+impl<S: Subject> Accuracy<S> {
     /// The picture.
     pub fn picture(&self) -> Picture {
         let panels = self.figures.iter().map(|figure| self.panel(*figure));
@@ -18,7 +18,8 @@ impl Accuracy {
 
     fn panel(&self, figure: Figure) -> CurvePlot {
         let axis = Axis::log("forecast of a run, one core [s]");
-        let mut plot = CurvePlot::new(figure.name(), axis, Axis::log("error, two standard errors [%]"));
+        let error = if S::IS_NOISY { "error, two standard errors [%]" } else { "error [%]" };
+        let mut plot = CurvePlot::new(figure.name(), axis, Axis::log(error));
         plot.shape = 0.7;
         let mut all = Vec::new();
         let mut chosen = Vec::new();

@@ -134,7 +134,7 @@ impl<'a> Search<'a> {
         values: impl IntoIterator<Item = f64>,
         shifts: impl Fn(&Self, &Plan) -> Vec<(Figure, Shift)>,
     ) {
-        let mut ladder = Ladder { key, now, steps: Vec::new(), chosen: 0, note: None };
+        let mut ladder = Ladder { key, now, steps: Vec::new(), chosen: 0, note: None, orders: Vec::new() };
         for value in values {
             if !ladder.steps.is_empty() && !self.affords(0.0, 0.0) {
                 self.out.notes.push(format!("{key}: not all values are looked at, the budget is spent"));
@@ -153,7 +153,7 @@ impl<'a> Search<'a> {
                     (run_s(&plan), shifts, verdict)
                 }
             };
-            ladder.steps.push(Step { value, forecast_s, shifts, verdict });
+            ladder.steps.push(Step { value, cells: None, forecast_s, shifts, verdict });
             if forecast_s.is_nan() {
                 break;
             }

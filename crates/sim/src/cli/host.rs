@@ -145,6 +145,11 @@ impl Cli {
         self.text(path).map_or_else(|| Sweep::new(path, request), |text| Sweep::parse(text, path, request))
     }
 
+    /// Whether a path stands for the case of a flow, by its keys, and not for a scene.
+    pub(super) fn is_case(&self, path: &Path) -> bool {
+        self.text(path).map_or_else(|| CaseFile::is_at(path), CaseFile::is_of)
+    }
+
     /// The flow case of a path; keys that it lacks are those of the preset, if there is one.
     pub(super) fn case(&self, path: &Path, preset: Option<WakePreset>) -> Result<CaseFile, Error> {
         match (self.text(path), preset) {

@@ -97,7 +97,7 @@ enum Command {
     Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
     Sweep(sweep::SweepWords),
-    /// How accurate the numbers of a scene are, and the cheapest keys for an accuracy that is asked for.
+    /// How accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy that is asked for.
     Accuracy(accuracy::AccuracyWords),
     /// The rows of a table that no other one beats.
     Pareto(sweep::ParetoWords),

@@ -5,7 +5,7 @@ use super::flow::{RunWords, simulate};
 use crate::Error;
 use crate::flow::{CaseFile, CaseKind, WakePreset};
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use wakescope_les::ranks::Ranks;
 
@@ -25,7 +25,7 @@ pub(super) struct WakeWords {
 }
 
 pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
-    let file = case_file(words, cli)?;
+    let file = case_file(words.case.as_deref(), words.preset, cli)?;
     if !matches!(file.case.case, CaseKind::Wake(_)) {
         let path = words.case.clone().unwrap_or_default();
         return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
@@ -37,9 +37,10 @@ pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
     simulate(file, &words.run, cli, ranks)
 }
 
-fn case_file(words: &WakeWords, cli: &Cli) -> Result<CaseFile, Error> {
-    let Some(path) = &words.case else {
-        return Ok(CaseFile::preset(words.preset.unwrap_or(WakePreset::Coarse))?);
-    };
-    cli.case(path, words.preset)
+/// A case file, a preset, or the one over the other; the coarse preset without either.
+pub(super) fn case_file(path: Option<&Path>, preset: Option<WakePreset>, cli: &Cli) -> Result<CaseFile, Error> {
+    match path {
+        Some(path) => cli.case(path, preset),
+        None => Ok(CaseFile::preset(preset.unwrap_or(WakePreset::Coarse))?),
+    }
 }

@@ -33,7 +33,7 @@ pub struct RunOptions {
 }
 
 /// All that a run needs, found without computing.
-type Prepared = (Setup, RunPlan, Files, FlowForecast);
+pub(super) type Prepared = (Setup, RunPlan, Files, FlowForecast);
 
 /// What a run on ranks would take, of which one calls this; nothing is written. With the folder that it would write to this is checked, too.
 ///
@@ -196,7 +196,12 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.
-fn prepare(file: &CaseFile, folder: &Path, options: RunOptions, ranks: &Arc<dyn Ranks>) -> Result<Prepared, Error> {
+pub(super) fn prepare(
+    file: &CaseFile,
+    folder: &Path,
+    options: RunOptions,
+    ranks: &Arc<dyn Ranks>,
+) -> Result<Prepared, Error> {
     // Of several ranks each is taken to have a machine of its own.
     let machines = ranks.count() as f64;
     let available = machine::available_memory_bytes().filter(|_| !options.allow_large).map(|bytes| bytes * machines);

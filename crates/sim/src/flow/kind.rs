@@ -97,6 +97,24 @@ impl CaseKind {
         }
     }
 
+    /// The same numbers, to be changed.
+    pub(super) fn cells_mut(&mut self) -> Vec<&mut usize> {
+        match self {
+            Self::TaylorGreenPlane(c) => vec![&mut c.cells],
+            Self::TaylorGreen(c) => vec![&mut c.cells],
+            Self::Poiseuille(c) | Self::Couette(c) | Self::StokesLayer(c) | Self::RayleighPlate(c) => {
+                vec![&mut c.cells]
+            }
+            Self::OrrSommerfeld(c) => c.cells.iter_mut().collect(),
+            Self::Dipole(c) => c.cells.iter_mut().collect(),
+            Self::LidDrivenCavity(c) => vec![&mut c.cells],
+            Self::Channel(c) => c.cells.iter_mut().collect(),
+            Self::VortexPair(c) => c.cells.iter_mut().collect(),
+            Self::Wake(c) => c.cells.iter_mut().collect(),
+            Self::Free(c) => vec![&mut c.x.cells, &mut c.y.cells, &mut c.z.cells],
+        }
+    }
+
     /// Mesh, settings and initial field; `folder` is that of the case file.
     pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
         let steady = |case: Result<Case, wakescope_les::Error>| {

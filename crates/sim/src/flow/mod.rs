@@ -27,6 +27,7 @@ mod text;
 #[cfg(test)]
 #[path = "../../../les/src/ranks/threads.rs"]
 mod thread_ranks;
+pub(crate) mod trial;
 mod wake;
 mod writer;
 
@@ -71,6 +72,16 @@ impl CaseFile {
     /// What the system says; [`SceneError`] names the file, the line, the key, the value and what is allowed.
     pub fn read(path: &Path) -> Result<Self, Error> {
         Ok(Self::parse(&case_text(path)?, path)?)
+    }
+
+    /// Whether a file is a case, by its keys, and no scene.
+    pub fn is_at(path: &Path) -> bool {
+        text_file::read(path).is_ok_and(|text| Self::is_of(&text))
+    }
+
+    /// The same of its text.
+    pub fn is_of(text: &str) -> bool {
+        text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("case"))
     }
 
     /// Checks the text of a case file; `path` serves the messages, and its folder is where files of the case are looked for.
@@ -158,7 +169,7 @@ impl CaseFile {
         self.source.located(vec![problem])
     }
 
-    fn provenance(&self) -> Provenance {
+    pub(crate) fn provenance(&self) -> Provenance {
         // 0 stands for noise by a closed formula, and for none.
         let seed = if let CaseKind::Wake(wake) = &self.case.case { wake.seed.unwrap_or(0) } else { 0 };
         Provenance::new(&self.toml, &self.hash, seed)

@@ -20,6 +20,10 @@ const TURBULENT: &str = "seed = 5\n[scan]\nelevation_min_rad = 0.1\nelevation_ma
                          grid_spacing_m = 0.004\nlayers = 8\nrealisations = 256\n[outputs]\nprofile_points = 2\n\
                          profile_range_min_m = 360.0\nprofile_range_max_m = 400.0\n";
 
+/// A small wake, which cannot be right and is quick.
+const WAKE: &str =
+    "[case]\nkind = \"wake\"\ncells = [8, 24, 24]\ncore_radius = 0.3\n[wake]\nend_tau = 0.1\nevery_tau = 0.02\n";
+
 fn of(scene: &str, request: &Request) -> Accuracy {
     Accuracy::of(&SceneFile::parse(scene, Path::new("s.toml")).unwrap(), request, &Silent).unwrap()
 }
@@ -70,6 +74,7 @@ fn two_layers_of_weak_turbulence_shift_a_collimated_beam_by_less_than_a_fifth_of
 fn files_have_the_same_bytes_for_any_number_of_threads_but_for_times() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SCENE).unwrap();
+    std::fs::write(temp.path().join("c.toml"), WAKE).unwrap();
     let without_times = |folder: &str, file: &str| -> String {
         let bytes = std::fs::read(temp.path().join(folder).join(file)).unwrap();
         let text = String::from_utf8_lossy(&bytes).into_owned();
@@ -85,20 +90,32 @@ fn files_have_the_same_bytes_for_any_number_of_threads_but_for_times() {
             .map(|line| if line.starts_with('#') { vec![line.to_owned()] } else { cells(line) }.join(",") + "\n")
             .collect()
     };
-    for (folder, threads) in [("one", "1"), ("two", "2")] {
+    let tell = |of: &str, figure: &str, [folder, threads]: [&str; 2]| {
         let words =
-            ["accuracy", "s.toml", "--within", "10%", "--of", "rms", "--out", folder, "--threads", threads, "--quiet"];
+            ["accuracy", of, "--within", "10%", "--of", figure, "--out", folder, "--threads", threads, "--quiet"];
         let out = wakescope(temp.path(), &words);
         let text = String::from_utf8_lossy(&out.stdout).into_owned();
-        assert!(matches!(out.status.code(), Some(0 | 1)), "{text}{}", String::from_utf8_lossy(&out.stderr));
-        let written = std::fs::read_to_string(temp.path().join(folder).join("accuracy.txt")).unwrap();
-        assert!(text.starts_with(&written), "the screen shows the file");
+        let written = std::fs::read_to_string(temp.path().join(folder).join("accuracy.txt")).unwrap_or_default();
+        let told = String::from_utf8_lossy(&out.stderr);
+        assert!(!written.is_empty() && text.starts_with(&written), "the screen shows the file: {text}{told}");
+        assert_eq!(out.status.code(), Some(i32::from(written.contains("not reached"))), "{text}{told}");
+        written
+    };
+    for (of, figure, folders) in [("s.toml", "rms", ["one", "two"]), ("c.toml", "height", ["a", "b"])] {
+        tell(of, figure, [folders[0], "1"]);
+        let written = tell(of, figure, [folders[1], "2"]);
+        let is_case = of == "c.toml";
+        assert!(!is_case || written.contains("8 x 24 x 24") && written.contains("4 x 12 x 12"), "{written}");
+        let own = if is_case { "case_accuracy.toml" } else { "scene_accuracy.toml" };
+        let mut files = ["accuracy.csv", "accuracy.png", "accuracy.svg", "accuracy.txt", own];
+        files.sort_unstable();
+        assert_eq!(super::cli::names(&temp.path().join(folders[0])), files);
+        for file in files {
+            assert!(without_times(folders[0], file) == without_times(folders[1], file), "{file}");
+        }
     }
-    let files = ["accuracy.csv", "accuracy.png", "accuracy.svg", "accuracy.txt", "scene_accuracy.toml"];
-    assert_eq!(super::cli::names(&temp.path().join("one")), files);
-    for file in files {
-        assert!(without_times("one", file) == without_times("two", file), "{file}");
-    }
+    let out = wakescope(temp.path(), &["wake", "a/case_accuracy.toml", "--out", "run", "--quiet"]);
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
     // The scene that it wrote is one, and this program's own.
     let out = wakescope(temp.path(), &["check", "one/scene_accuracy.toml", "--quiet"]);
     assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
@@ -115,6 +132,7 @@ fn what_cannot_be_asked_is_refused_with_what_can() {
         (["--within", "3%,4"], "from 0.001% to 50%"),
         (["--of", "colour"], "possible values"),
         (["--of", "u"], "\"vad\" or \"dbs\""),
+        (["--of", "height"], "the case of a flow"),
         (["--budget", "0.5"], "from 1 to 1000000"),
     ] {
         let more: &[&str] = if words[0] == "--within" { &[] } else { &["--within", "3%"] };

@@ -1,0 +1,390 @@
+//! How accurate the case of a flow is: the same flow on three meshes, and with steps half and twice as long.
+//!
+//! An error is that of a figure over the run: root mean square over the output times, relative. Runs are compared in memory; what is run
+//! and chosen depends on forecasts alone. Check: vortices whose decay is a closed form; a triple that does not converge; budgets.
+
+use super::figures::{Figure, Shift};
+use super::keys::CELLS;
+use super::ladder::{Ladder, Step, Verdict};
+use super::order::errors;
+use super::{Accuracy, Request, Subject, Verified};
+use crate::Error;
+use crate::flow::CaseFile;
+use crate::flow::trial::{History, of_history};
+use crate::io::Provenance;
+use crate::plan::units::seconds;
+use crate::setup::progress::{Observer, Stage};
+use std::time::Instant;
+
+/// Lengths of the cells over those of the case.
+const MESHES: [f64; 3] = [1.0, 1.5, 2.0];
+/// Lengths of the steps over those of the case, and which are its own.
+const STEPS: [f64; 3] = [0.5, 1.0, 2.0];
+const OWN_STEP: usize = 1;
+/// The figures, as a history has them.
+const FIGURES: [Figure; 4] = [Figure::Energy, Figure::Dissipation, Figure::Circulation, Figure::Height];
+
+impl Subject for CaseFile {
+    const NAME: &'static str = "case";
+    const IS_NOISY: bool = false;
+
+    fn toml(&self) -> &str {
+        &self.toml
+    }
+
+    fn provenance(&self) -> Provenance {
+        Self::provenance(self)
+    }
+}
+
+/// A run beside others.
+struct Trial {
+    file: CaseFile,
+    /// Length of its cells or steps over that of the case.
+    spacing: f64,
+    /// What stands in tables for it.
+    value: f64,
+    cells: Option<[usize; 3]>,
+    forecast_s: f64,
+    /// Its history, or why there is none.
+    found: Result<History, String>,
+}
+
+impl Trial {
+    fn run(&mut self, observer: &dyn Observer) -> Result<(), Error> {
+        self.found = match of_history(&self.file, observer) {
+            // What one mesh or step does not stand says nothing against the others.
+            Err(error) if self.spacing != 1.0 => Err(error.to_string()),
+            found => Ok(found?),
+        };
+        observer.advance(1);
+        Ok(())
+    }
+}
+
+impl Accuracy<CaseFile> {
+    /// The accuracy of the case of a flow.
+    ///
+    /// # Errors
+    /// What the case refuses, half of its cells too few; figures that it does not have; a budget below that of three meshes.
+    pub fn of_case(file: &CaseFile, request: &Request, observer: &dyn Observer) -> Result<Self, Error> {
+        let begun = Instant::now();
+        let own = file.portable()?;
+        let mut meshes = meshes(&own)?;
+        observer.forecast(&own.forecast()?.to_string());
+        let own_s = meshes[0].forecast_s;
+        let spent_s = meshes.iter().map(|mesh| mesh.forecast_s).sum::<f64>();
+        if spent_s > request.budget * own_s {
+            let least = (10.0 * spent_s / own_s).ceil() / 10.0;
+            let allowed = format!("at least {least:?} runs of this case: three meshes take so many");
+            return Err(own.refuse_word("--budget", &format!("{:?}", request.budget), allowed).into());
+        }
+        let figures = figures(&own, request)?;
+        observer.begin(Stage::Cases, 5);
+        meshes.iter_mut().try_for_each(|mesh| mesh.run(observer))?;
+        let mut out = Self {
+            of_scene: file.hash.clone(),
+            within: request.within,
+            own_s,
+            spent_s,
+            took_s: 0.0,
+            allowed_s: request.budget * own_s,
+            pilot: 0,
+            figures: figures.into_iter().filter(|figure| meshes[0].has(*figure)).collect(),
+            ladders: Vec::new(),
+            response: Vec::new(),
+            noises: Vec::new(),
+            verified: Verified::default(),
+            notes: Vec::new(),
+            scene: own,
+            run_s: own_s,
+        };
+        let cells = meshes[0].value;
+        out.compare((CELLS, cells, own_s), &meshes);
+        out.vary_steps(&meshes, observer)?;
+        observer.end();
+        out.choose(&meshes)?;
+        out.took_s = begun.elapsed().as_secs_f64();
+        Ok(out)
+    }
+
+    /// Adds the ladder of a key whose runs are these, from the finest on.
+    fn compare(&mut self, (key, now, own_s): (&'static str, f64, f64), trials: &[Trial]) {
+        let run: Vec<(f64, &History)> =
+            trials.iter().filter_map(|trial| Some((trial.spacing, trial.found.as_ref().ok()?))).collect();
+        let spacings: Vec<f64> = run.iter().map(|(spacing, _)| *spacing).collect();
+        let of = |figure: Figure| {
+            let series: Vec<&[f64]> = run.iter().map(|(_, history)| history[place(figure)].as_slice()).collect();
+            errors(&spacings, &series)
+        };
+        let found: Vec<_> = self.figures.iter().map(|figure| (*figure, of(*figure))).collect();
+        let (mut place, scale) = (0, self.own_s / own_s);
+        let steps = trials.iter().map(|trial| {
+            let mut step = Step {
+                value: trial.value,
+                cells: trial.cells,
+                forecast_s: f64::NAN,
+                shifts: Vec::new(),
+                verdict: Verdict::Finest,
+            };
+            match &trial.found {
+                Err(why) => step.verdict = Verdict::Refused(why.clone()),
+                Ok(_) => {
+                    let shift = |shift: f64| Shift { shift, error: 0.0 };
+                    step.shifts = found.iter().map(|(figure, (_, errors))| (*figure, shift(errors[place]))).collect();
+                    step.verdict = Verdict::of(&step.shifts, self.within);
+                    step.forecast_s = scale * trial.forecast_s;
+                    place += 1;
+                }
+            }
+            step
+        });
+        let (steps, orders) = (steps.collect(), found.iter().map(|(figure, (order, _))| (*figure, *order)).collect());
+        let chosen = trials.iter().position(|trial| trial.spacing == 1.0).unwrap_or(0);
+        self.ladders.push(Ladder { key, now, steps, chosen, note: None, orders });
+    }
+
+    /// Runs the finest mesh that the budget has room for with other steps, too.
+    fn vary_steps(&mut self, meshes: &[Trial], observer: &dyn Observer) -> Result<(), Error> {
+        for (place, mesh) in meshes.iter().enumerate().filter(|(_, mesh)| mesh.found.is_ok()) {
+            let (mut trials, mut of_key) = (Vec::new(), ("time.courant", f64::NAN));
+            for times in STEPS {
+                let (file, key, value) = mesh.file.with_longer_steps(times)?;
+                let forecast = file.forecast();
+                let found = if times == 1.0 { mesh.found.clone() } else { Err(String::new()) };
+                of_key = if times == 1.0 { (key, value) } else { of_key };
+                let forecast_s = forecast.as_ref().map_or(0.0, |forecast| forecast.core_s);
+                let found = forecast.map_or_else(|error| Err(error.to_string()), |_| found);
+                trials.push(Trial { file, spacing: times, value, cells: None, forecast_s, found });
+            }
+            let more = |trial: &&mut Trial| trial.spacing != 1.0 && trial.forecast_s > 0.0;
+            let more_s: f64 = trials.iter_mut().filter(more).map(|trial| trial.forecast_s).sum();
+            if self.spent_s + more_s > self.allowed_s {
+                continue;
+            }
+            self.spent_s += more_s;
+            trials.iter_mut().filter(more).try_for_each(|trial| trial.run(observer))?;
+            self.compare((of_key.0, of_key.1, mesh.forecast_s), &trials);
+            if place > 0 {
+                let [nx, ny, nz] = mesh.cells.unwrap_or_default();
+                let note = format!("{}: looked at on {nx} x {ny} x {nz} cells, more is beyond the budget", of_key.0);
+                self.notes.push(note);
+            }
+            return Ok(());
+        }
+        self.notes.push("steps: not varied, the budget has no room for it".into());
+        Ok(())
+    }
+
+    /// Takes the cells and steps of least time whose errors together are within the target.
+    fn choose(&mut self, meshes: &[Trial]) -> Result<(), Error> {
+        let steps = self.ladders.get(1).map_or(1, |ladder| ladder.steps.len());
+        let error = |(mesh, step): (usize, usize), figure: Figure| {
+            let of = |ladder: &Ladder, place: usize| ladder.steps.get(place).map_or(f64::NAN, |own| own.bound(figure));
+            of(&self.ladders[0], mesh) + self.ladders.get(1).map_or(0.0, |ladder| of(ladder, step))
+        };
+        let own = (0, OWN_STEP.min(steps - 1));
+        let all = (0..meshes.len()).flat_map(|mesh| (0..steps).map(move |step| (mesh, step)));
+        let is_within = |at: &(usize, usize)| self.figures.iter().all(|figure| error(*at, *figure) <= self.within);
+        let mut good = Vec::new();
+        for (mesh, step) in all.filter(is_within) {
+            let of_key = self.ladders.get(1).filter(|_| step != own.1);
+            if of_key.is_some_and(|ladder| ladder.steps[step].shifts.is_empty()) || meshes[mesh].found.is_err() {
+                continue;
+            }
+            let file = match of_key {
+                Some(_) => meshes[mesh].file.with_longer_steps(STEPS[step])?.0,
+                None => meshes[mesh].file.clone(),
+            };
+            // Steps that are good on one mesh may be refused on another.
+            good.extend(file.forecast().ok().map(|forecast| (forecast.core_s, (mesh, step), file)));
+        }
+        good.sort_by(|a, b| a.0.total_cmp(&b.0));
+        self.verified.is_confirmed = !good.is_empty();
+        let Some((run_s, (mesh, step), file)) = good.into_iter().next() else {
+            let note = self.needed(|figure| error(own, figure));
+            self.notes.push(note);
+            return Ok(());
+        };
+        if mesh > 0 && step != own.1 {
+            self.notes.push("cells and steps were not tried together: their errors are added".into());
+        }
+        (self.run_s, self.scene, self.ladders[0].chosen) = (run_s, file, mesh);
+        if let Some(ladder) = self.ladders.get_mut(1) {
+            ladder.chosen = step;
+        }
+        Ok(())
+    }
+
+    /// How many cells the orders found ask for, where a figure is off by more than the target, and what a run with them takes.
+    fn needed(&self, off: impl Fn(Figure) -> f64) -> String {
+        let (meshes, mut ratio) = (&self.ladders[0], 1.0_f64);
+        let is_beyond = |figure: &&Figure| off(**figure).is_nan() || off(**figure) > self.within;
+        for figure in self.figures.iter().filter(is_beyond) {
+            let of_mesh = meshes.steps[0].bound(*figure);
+            let rest = self.within - (off(*figure) - of_mesh);
+            let order = meshes.orders.iter().find_map(|(of, order)| order.filter(|_| of == figure));
+            let Some(order) = order else {
+                let name = figure.name();
+                return format!(
+                    "{CELLS}: {name} does not converge at these cells, which tells no number that would do: try more"
+                );
+            };
+            if rest <= 0.0 {
+                return format!("{}: the steps alone take it beyond the target; look at shorter ones", figure.name());
+            }
+            ratio = ratio.max((of_mesh / rest).powf(1.0 / order));
+        }
+        let finer = self.scene.coarser(1.0 / ratio).case.case.cells();
+        let more = count(finer) / meshes.now;
+        let directions = finer.iter().filter(|n| **n > 1).count() as f64;
+        let [nx, ny, nz] = finer;
+        let run = seconds(self.own_s * more.powf(1.0 + 1.0 / directions));
+        format!("{CELLS}: by the orders found {nx} x {ny} x {nz} reach it; such a run takes about {run} (forecast)")
+    }
+}
+
+impl Trial {
+    fn has(&self, figure: Figure) -> bool {
+        self.found
+            .as_ref()
+            .is_ok_and(|found| found[place(figure)].iter().any(|value| value.is_finite() && *value != 0.0))
+    }
+}
+
+/// Where a history has a figure.
+fn place(figure: Figure) -> usize {
+    FIGURES.iter().position(|own| *own == figure).unwrap_or(0)
+}
+
+fn count(cells: [usize; 3]) -> f64 {
+    cells.iter().map(|n| *n as f64).product()
+}
+
+/// The case with its cells and with fewer.
+fn meshes(own: &CaseFile) -> Result<Vec<Trial>, Error> {
+    let whole = own.case.case.cells();
+    let directions = whole.iter().filter(|n| **n > 1).count().max(1) as f64;
+    let mut meshes: Vec<Trial> = Vec::new();
+    for ratio in MESHES {
+        let file = if ratio == 1.0 { own.clone() } else { own.coarser(ratio) };
+        let cells = file.case.case.cells();
+        let forecast = file.forecast().map_err(|error| match ratio {
+            1.0 => error,
+            _ => own.refuse_cells(format!("so many that half of them along each direction are enough: {error}")),
+        })?;
+        let (value, spacing) = (count(cells), (count(whole) / count(cells)).powf(1.0 / directions));
+        if meshes.last().is_some_and(|finer| finer.spacing >= spacing) {
+            return Err(
+                own.refuse_cells("enough for three meshes, the coarsest of half as many along each direction".into())
+            );
+        }
+        let found = Err(String::new());
+        meshes.push(Trial { file, spacing, value, cells: Some(cells), forecast_s: forecast.core_s, found });
+    }
+    Ok(meshes)
+}
+
+/// The figures that are judged.
+fn figures(own: &CaseFile, request: &Request) -> Result<Vec<Figure>, Error> {
+    let is_wake = own.case.wake.is_some();
+    let has = |figure: &Figure| FIGURES[..if is_wake { 4 } else { 2 }].contains(figure);
+    if let Some(figure) = request.of.iter().find(|figure| !has(figure)) {
+        let allowed = "energy, dissipation; of case.kind = \"wake\" circulation, height besides";
+        return Err(own.refuse_word("--of", figure.name(), allowed.into()).into());
+    }
+    let is_asked = |figure: &Figure| request.of.is_empty() || request.of.contains(figure);
+    Ok(Figure::ALL.into_iter().filter(|figure| has(figure) && is_asked(figure)).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use std::f64::consts::PI;
+    use std::path::Path;
+
+    fn case(text: &str) -> CaseFile {
+        CaseFile::parse(text, Path::new("c.toml")).unwrap()
+    }
+
+    fn of(text: &str, within: f64, of: &[Figure]) -> Accuracy<CaseFile> {
+        Accuracy::of_case(&case(text), &Request::new(within, of), &Silent).unwrap()
+    }
+
+    const VORTICES: &str = "[case]\nkind = \"taylor_green_plane\"\ncells = 32\nviscosity_m2_s = 0.005\n";
+
+    #[test]
+    fn the_error_of_decaying_vortices_is_that_against_the_closed_form() {
+        let found = of(VORTICES, 0.01, &[]);
+        assert_eq!(found.figures, [Figure::Energy, Figure::Dissipation]);
+        let meshes = &found.ladders[0];
+        // Convection and gradients are of fourth order.
+        for (figure, order) in &meshes.orders {
+            assert!(order.is_some_and(|order| (order - 4.0).abs() < 0.3), "{figure:?} {order:?}");
+        }
+        // Energy exp(-16 pi^2 nu t)/4, of which 16 pi^2 nu is lost in a time; at its start it is that of the mesh.
+        let rate = 16.0 * PI * PI * 0.005;
+        for (place, step) in meshes.steps.iter().enumerate() {
+            let own = case(VORTICES);
+            let file = if place == 0 { own } else { own.coarser(MESHES[place]) };
+            let history = of_history(&file, &Silent).unwrap();
+            for (figure, scale) in [(Figure::Energy, 0.25), (Figure::Dissipation, 0.25 * rate)] {
+                let (mut off, mut all) = (0.0, 0.0);
+                for (i, value) in history[self::place(figure)].iter().enumerate().filter(|(_, v)| v.is_finite()) {
+                    let exact = scale * (-rate * (i + 1) as f64 / 16.0).exp();
+                    off += (value - exact).powi(2);
+                    all += exact.powi(2);
+                }
+                let (closed, found) = (f64::sqrt(off / all), step.bound(figure));
+                assert!(closed > 1e-7 && (found / closed - 1.0).abs() < 0.15, "{place} {figure:?} {found} {closed}");
+            }
+        }
+        // Viscous steps hardly matter, cells neither, at 1 %: the cheapest is taken, and is a case.
+        assert!(found.is_reached() && meshes.chosen == 2 && found.spent_s <= 1.2 * found.allowed_s);
+        assert!(found.scene.forecast().unwrap().core_s < found.own_s);
+        assert_eq!(found.scene.case.case.cells(), [1, 16, 16]);
+    }
+
+    #[test]
+    fn a_target_out_of_reach_is_answered_with_the_cells_that_the_order_asks_for() {
+        let found = of(VORTICES, 2e-6, &[Figure::Energy]);
+        let (off, order) = (found.ladders[0].steps[0].bound(Figure::Energy), found.ladders[0].orders[0].1.unwrap());
+        assert!(!found.is_reached() && off > 2e-6, "{off}");
+        let words = found.notes.iter().find(|note| note.contains("by the orders found")).unwrap();
+        let cells: f64 = words.split(" x ").nth(1).unwrap().parse().unwrap();
+        let expected = 32.0 * (off / 2e-6).powf(1.0 / order);
+        assert!(cells > 32.0 && (cells / expected - 1.0).abs() < 0.1, "{words}: {expected}");
+        assert_eq!(found.scene.case.case.cells(), [1, 32, 32], "the cells stay");
+    }
+
+    #[test]
+    fn cells_that_do_not_converge_say_so_and_are_off_by_the_finest_difference() {
+        let found =
+            of("[case]\nkind = \"taylor_green\"\ncells = 16\nreynolds = 800.0\n[time]\nend_s = 6.0\n", 0.5, &[]);
+        let [finest, middle] = [0, 1].map(|place| found.ladders[0].steps[place].bound(Figure::Dissipation));
+        assert!((middle / finest - 2.0).abs() < 1e-12, "{finest} {middle}");
+        let text = found.text();
+        assert!(text.contains("dissipation not converging at these cells"), "{text}");
+        assert!(found.table().to_csv(&found.scene.provenance()).is_ok());
+    }
+
+    #[test]
+    fn budgets_and_figures_that_a_case_has_not_are_refused() {
+        let refused =
+            |text: &str, request: &Request| Accuracy::of_case(&case(text), request, &Silent).unwrap_err().to_string();
+        let few = refused("[case]\nkind = \"taylor_green\"\ncells = 6\n", &Request::new(0.1, &[]));
+        assert!(few.starts_with("c.toml:3: case.cells = 6 is not allowed: "), "{few}");
+        let none = refused(VORTICES, &Request::new(0.1, &[Figure::Height]));
+        assert!(none.contains("--of = height is not allowed: energy, dissipation"), "{none}");
+        let small = refused(VORTICES, &Request { budget: 1.0, ..Request::new(0.1, &[]) });
+        assert!(small.contains("--budget = 1.0 is not allowed: at least 1."), "{small}");
+        let none =
+            Accuracy::of_case(&case(VORTICES), &Request { budget: 1.8, ..Request::new(0.1, &[]) }, &Silent).unwrap();
+        assert!(
+            none.spent_s <= none.allowed_s && none.notes.iter().any(|note| note.contains("budget")),
+            "{:?}",
+            none.notes
+        );
+    }
+}
