@@ -44,8 +44,9 @@ pub(crate) fn run() -> Outcome {
         println!("skipped: mpicc, mpirun or libclang is missing, and cannot be installed here ({INSTALL})");
         return Ok(());
     }
+    // As one of the workspace, so that everything but the crate itself is that of the tests.
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--package", "wakescope-sim", "--features", "mpi"])
+        .args(["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi"])
         .args(["--bin", "wakescope", "--example", "exchange_times"])
         .current_dir(root())
         .status()?;

@@ -126,7 +126,7 @@ pub(crate) fn panels(points: &[Point]) -> Figure {
             // Below that a stiff wave is round-off.
             let least = if of_curve[0].panel == STIFF { 1e-12 } else { 0.0 };
             let theory = of_curve.iter().map(|p| (p.x, p.theory)).filter(|p| p.1 > least);
-            let measured = of_curve.iter().map(|p| (p.x, p.measured)).filter(|p| p.1.is_finite() && p.1.abs() > 1e-17);
+            let measured = of_curve.iter().map(|p| (p.x, p.measured)).filter(|p| p.1 <= 0.0 || p.1 > 1e-17);
             let style = if of_curve[0].theory.is_nan() { Style::LineMarkers } else { Style::Markers };
             plot = plot.with(Series::new(&of_curve[0].curve, style, measured).in_colour(colour));
             plot = plot.with(Series::new("", Style::Line, theory).in_colour(colour));
