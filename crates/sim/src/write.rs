@@ -8,7 +8,7 @@ mod recorded;
 pub use map::velocity_map;
 #[cfg(feature = "cli")]
 pub(crate) use recorded::list_recorded;
-pub use recorded::recorded_names;
+pub use recorded::{recorded_names, write_recorded};
 
 use crate::Error;
 #[cfg(feature = "plots")]

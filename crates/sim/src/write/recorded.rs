@@ -5,11 +5,12 @@
 use super::pictures;
 use super::{list, list_map};
 use crate::Error;
-use crate::io::VelocityMap;
+use crate::io::{Existing, VelocityMap};
 use crate::measure::recorded::{Recorded, Spectra, measured_map, predicted_table};
 use crate::outputs::Outputs;
 use crate::plan::Plan;
 use crate::run::RunResult;
+use std::path::{Path, PathBuf};
 
 /// Names of the files that estimates from records may have.
 ///
@@ -20,6 +21,15 @@ pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
     // Those that are estimated stay where they are.
     names.retain(|name| !name.starts_with("signals."));
     Ok(names)
+}
+
+/// Writes what records gave; returns the paths of the files.
+///
+/// # Errors
+/// As [`super::write`].
+pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    Outputs::write(folder, existing, of, |files| list_recorded(plan, found, files))
 }
 
 /// The files of what records gave.
