@@ -82,6 +82,11 @@ impl Accuracy<CaseFile> {
         let figures = figures(&own, request)?;
         observer.begin(Stage::Cases, 5);
         meshes.iter_mut().try_for_each(|mesh| mesh.run(observer))?;
+        let (figures, missing): (Vec<_>, Vec<_>) = figures.into_iter().partition(|figure| meshes[0].has(*figure));
+        if let Some(figure) = missing.first().filter(|_| figures.is_empty() || !request.of.is_empty()) {
+            let allowed = "a figure that the run has: air at rest has none, and a wake without vortices no circulation and no height";
+            return Err(own.refuse_word("--of", figure.name(), allowed.into()).into());
+        }
         let mut out = Self {
             of_scene: file.hash.clone(),
             within: request.within,
@@ -90,7 +95,7 @@ impl Accuracy<CaseFile> {
             took_s: 0.0,
             allowed_s: request.budget * own_s,
             pilot: 0,
-            figures: figures.into_iter().filter(|figure| meshes[0].has(*figure)).collect(),
+            figures,
             ladders: Vec::new(),
             response: Vec::new(),
             noises: Vec::new(),
@@ -377,6 +382,11 @@ mod tests {
         assert!(few.starts_with("c.toml:3: case.cells = 6 is not allowed: "), "{few}");
         let none = refused(VORTICES, &Request::new(0.1, &[Figure::Height]));
         assert!(none.contains("--of = height is not allowed: energy, dissipation"), "{none}");
+        // Nothing is judged of air at rest, so that nothing would be within the target.
+        let at_rest = "[case]\nkind = \"free\"\nviscosity_m2_s = 0.01\n[case.y]\ncells = 16\nlow_m = 0.0\nhigh_m = 8.0\n[case.z]\ncells = 16\n\
+            low_m = 0.0\nhigh_m = 8.0\n[case.initial]\nkind = \"uniform\"\nvelocity_m_s = [0.0, 0.0, 0.0]\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
+        let none = refused(at_rest, &Request::new(0.1, &[]));
+        assert!(none.contains("--of = energy is not allowed: a figure that the run has"), "{none}");
         let small = refused(VORTICES, &Request { budget: 1.0, ..Request::new(0.1, &[]) });
         assert!(small.contains("--budget = 1.0 is not allowed: at least 1."), "{small}");
         let none =
