@@ -1,8 +1,9 @@
 //! `cargo xtask left-out`: what a scene does not pay for, and what a crate does not pull in.
 //!
 //! A scene that has everything is run whole and without one thing at a time, each run a process of its own with one thread; the crates behind
-//! each of ours, alone and with its features, are counted by cargo.
+//! each of ours, alone and with its features, are counted by cargo and, if asked, compiled from nothing.
 
+use crate::cost::children_cpu_s;
 use crate::process::{program, watch};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
@@ -18,6 +19,9 @@ pub(crate) struct Options {
     /// The program to run, instead of the release build.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
+    /// Compile each crate with its features from nothing, too: half an hour of two cores.
+    #[arg(long)]
+    compile: bool,
     /// Store both tables in the book.
     #[arg(long)]
     store: bool,
@@ -59,14 +63,21 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let name = if keys.is_empty() { name.clone() } else { format!("without {name}") };
         let _ = writeln!(text, "| {name} | {seconds:.2} | {:.1} | {:.2} |", peak / 1e6, files / 1e6);
     }
-    text.push_str("\n| crate | features | gives | crates compiled |\n|---|---|---|---|\n");
+    let (heads, lines) = if options.compile {
+        (" processor time of compiling [s] | program [MB] |", "---|---|")
+    } else {
+        Default::default()
+    };
+    let _ = writeln!(text, "\n| crate | features | gives | crates compiled |{heads}\n|---|---|---|---|{lines}");
     for Package { name, features, gives } in &package {
-        let _ = writeln!(
-            text,
-            "| `{name}` | {} | {gives} | {} |",
-            if features.is_empty() { "none" } else { features },
-            crates(name, features)?
-        );
+        let named = if features.is_empty() { "none" } else { features };
+        let _ = write!(text, "| `{name}` | {named} | {gives} | {} |", crates(name, features)?);
+        if options.compile {
+            let (seconds, bytes) = compiled(name, features, &folder.join("target"))?;
+            let size = bytes.map_or("none".into(), |bytes| format!("{:.1}", bytes / 1e6));
+            let _ = write!(text, " {seconds:.0} | {size} |");
+        }
+        text.push('\n');
     }
     print!("{text}");
     if options.store {
@@ -104,6 +115,24 @@ fn measured(program: &Path, folder: &Path, scene: &str) -> Result<[f64; 3], Fail
         .map(|file| Ok(file?.metadata()?.len()))
         .collect::<Result<Vec<u64>, std::io::Error>>()?;
     Ok([run.cpu_s, run.peak_bytes, sizes.iter().sum::<u64>() as f64])
+}
+
+/// Processor time of compiling a crate and all that it needs from nothing, s, and the size of its program, bytes.
+fn compiled(package: &str, features: &str, target: &Path) -> Result<(f64, Option<f64>), Failure> {
+    if target.exists() {
+        std::fs::remove_dir_all(target)?;
+    }
+    let before_s = children_cpu_s();
+    let built = Command::new(env!("CARGO"))
+        .args(["build", "--release", "--quiet", "--package", package, "--no-default-features", "--features", features])
+        .env("CARGO_TARGET_DIR", target)
+        .current_dir(root())
+        .status()?;
+    if !built.success() {
+        return Err(Failure::new(format!("{package} does not build with the features {features:?}")));
+    }
+    let program = std::fs::metadata(target.join("release/wakescope")).ok();
+    Ok((children_cpu_s() - before_s, program.map(|file| file.len() as f64)))
 }
 
 /// How many crates cargo compiles for a library, itself among them, without those that only build it.

@@ -74,9 +74,8 @@ pub(crate) fn watch(program: &Path, words: &[&str], folder: &Path, seconds: f64)
 fn sample(child: &Child, cpu_s: &mut f64, peak_bytes: &mut f64) -> bool {
     *peak_bytes = peak_bytes.max(cost::peak_bytes(&child.id().to_string()));
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap_or_default();
-    // Behind the name in brackets: state, then utime and stime at places 11 and 12, in hundredths of a second.
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or("").split_whitespace().collect();
-    let ticks = |place: usize| fields.get(place).and_then(|t| t.parse::<f64>().ok()).unwrap_or(0.0);
-    *cpu_s = cpu_s.max((ticks(11) + ticks(12)) / 100.0);
-    matches!(fields.first(), None | Some(&"Z" | &"X"))
+    // utime and stime.
+    *cpu_s = cpu_s.max(cost::ticks_s(&stat, 11) + cost::ticks_s(&stat, 12));
+    let state = stat.rsplit(')').next().and_then(|fields| fields.split_whitespace().next());
+    matches!(state, None | Some("Z" | "X"))
 }

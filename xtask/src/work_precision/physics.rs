@@ -153,12 +153,13 @@ fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
     let lost = |energy: &[f64]| -> Vec<f64> { energy.windows(3).map(|e| (e[0] - e[2]) / (2.0 * APART_S)).collect() };
     let exact = lost(&reference);
     let peak = exact.iter().copied().fold(0.0, f64::max);
-    // Steps that divide the outputs, at a Courant number of about one half.
-    let cells: &[f64] = if quick { &[16.0, 24.0, 32.0, 48.0] } else { &[16.0, 24.0, 32.0, 48.0, 64.0, 96.0] };
+    // Steps that divide the outputs, at a Courant number of 1 or less: shorter ones leave the same errors.
+    let cells: &[f64] =
+        if quick { &[12.0, 16.0, 24.0, 32.0, 48.0] } else { &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0] };
     let metric = "rate of loss of energy, rms over its peak";
     let knob = Knob::new([VORTICES, "Runge-Kutta 3", "cells a side", metric, "Fourier solution on 96 points a side"]);
     knob.rows(cells, |cells| {
-        let substeps = (cells / 24.0).ceil();
+        let substeps = (cells / 32.0).ceil();
         let mut case = cases::taylor_green_3d(cells as usize, 200.0)?;
         case.settings.scheme = TimeScheme::RungeKutta3;
         case.settings.time_step = TimeStep::Fixed { step_s: APART_S / substeps };
@@ -237,15 +238,22 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
     Ok(rows)
 }
 
+/// How often the kernel is timed: single times scatter by a third, and every time of another machine is scaled by it.
+const KERNEL_RUNS: usize = 20;
+
 /// Processor time of the lines of twenty transforms of 512 x 512 points \[s\]: by it times of another machine are scaled to this one.
 pub(super) fn kernel_s() -> Result<f64, Failure> {
     let fft = FftPlanner::<f64>::new().plan_fft_forward(512);
     let (mut field, mut scratch) = (vec![Complex::new(1.0, 0.0); 512 * 512], vec![Complex::default(); 512]);
     let both_ways = 2 * 20;
-    let ((), cost) = fastest(|| {
-        field.fill(Complex::new(1.0, 0.0));
-        (0..both_ways).for_each(|_| fft.process_with_scratch(&mut field, &mut scratch));
-        Ok(())
-    })?;
-    Ok(cost.cpu_s)
+    let mut least_s = f64::INFINITY;
+    for _ in 0..KERNEL_RUNS {
+        let ((), cost) = fastest(|| {
+            field.fill(Complex::new(1.0, 0.0));
+            (0..both_ways).for_each(|_| fft.process_with_scratch(&mut field, &mut scratch));
+            Ok(())
+        })?;
+        least_s = least_s.min(cost.cpu_s);
+    }
+    Ok(least_s)
 }

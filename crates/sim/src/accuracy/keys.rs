@@ -39,7 +39,7 @@ pub(super) fn value(scene: &Scene, key: &str) -> f64 {
 ///
 /// # Errors
 /// What the scene does not allow.
-pub(super) fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFile, Error> {
+pub fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFile, Error> {
     let mut scene = file.scene.clone();
     for &(key, number) in values {
         let whole = |number: f64| Value::Integer(number.round() as i64);

@@ -7,7 +7,7 @@ use super::keys::{PADDED, WINDOW_STEP, value, with};
 use super::ladder::{Ladder, Verdict};
 use super::search::{LEAST, Search};
 use crate::Error;
-use crate::scene::Method;
+use crate::scene::{Method, SceneFile};
 use crate::setup::efficiency_model::signals_cross_screens;
 
 /// Points of the finest spectrum for each sample of a window.
@@ -25,23 +25,22 @@ impl Search<'_> {
             return Ok(None);
         }
         self.estimator_keys()?;
-        let (mut scenes, mut places) = (vec![self.fine.clone()], Vec::new());
-        for (which, ladder) in self.out.ladders.iter().enumerate() {
-            for (place, step) in ladder.steps.iter().enumerate().filter(|(_, s)| s.verdict == Verdict::NotDecided) {
-                scenes.push(with(&self.fine, &[(ladder.key, step.value)])?);
-                places.push((which, place));
-            }
-        }
         let kept_s = KEPT * self.out.allowed_s;
+        let (mut scenes, mut places) = self.undecided()?;
+        let all = places.len();
+        let needed_s = (self.out.spent_s + self.cost_s(&scenes, LEAST)?) / (1.0 - KEPT);
         let mut found = self.measure(&scenes, 0, LEAST, kept_s)?;
-        if found.is_none() {
-            let needed_s = (self.out.spent_s + self.cost_s(&scenes, LEAST)?) / (1.0 - KEPT);
+        // The coarsest values are the likeliest to be too far.
+        while found.is_none() && !places.is_empty() {
+            let longest = self.out.ladders.iter().map(|ladder| ladder.steps.len()).max().unwrap_or(1);
+            self.out.ladders.iter_mut().for_each(|ladder| ladder.steps.truncate(longest - 1));
+            (scenes, places) = self.undecided()?;
+            found = self.measure(&scenes, 0, LEAST, if places.is_empty() { 0.0 } else { kept_s })?;
+        }
+        if places.len() < all {
             let needed = (needed_s / self.out.own_s).ceil();
-            self.out.notes.push(format!("keys of the estimator are not varied: --budget {needed} would do"));
-            self.out.ladders.iter_mut().for_each(|ladder| ladder.steps.truncate(1));
-            scenes.truncate(1);
-            places.clear();
-            found = self.measure(&scenes, 0, LEAST, 0.0)?;
+            let seen = if places.is_empty() { "are not varied" } else { "are varied but for the coarsest values" };
+            self.out.notes.push(format!("keys of the estimator {seen}: --budget {needed} would do for all"));
         }
         let Some(mut shown) = found else {
             self.out.notes.push(format!("the map is not measured: its pilot takes {LEAST} realisations"));
@@ -57,6 +56,18 @@ impl Search<'_> {
         }
         self.out.pilot = shown[0].realisations();
         Ok(Some(shown.swap_remove(0)))
+    }
+
+    /// The finest setting and those whose value is to be measured, each with the places of its key and value.
+    fn undecided(&self) -> Result<(Vec<SceneFile>, Vec<(usize, usize)>), Error> {
+        let (mut scenes, mut places) = (vec![self.fine.clone()], Vec::new());
+        for (which, ladder) in self.out.ladders.iter().enumerate() {
+            for (place, step) in ladder.steps.iter().enumerate().filter(|(_, s)| s.verdict == Verdict::NotDecided) {
+                scenes.push(with(&self.fine, &[(ladder.key, step.value)])?);
+                places.push((which, place));
+            }
+        }
+        Ok((scenes, places))
     }
 
     /// The keys of the estimator, from the finest values on.
