@@ -134,8 +134,9 @@ fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
     if failed.is_empty() {
         return plot;
     }
-    let at_the_edge = failed.iter().map(|row| (row.found.cost.cpu_s, y_range.1));
-    plot.with(Series::new("fails (at the upper edge)", Style::Markers, at_the_edge).in_colour(7))
+    let edge = y_range.1 * (y_range.0 / y_range.1).powf(0.03);
+    let points = failed.iter().map(|row| (row.found.cost.cpu_s, edge));
+    plot.with(Series::new("fails (at the upper edge)", Style::Markers, points).in_colour(5))
 }
 
 /// A logarithmic range with an eighth to spare at both ends, of so many decades at least.

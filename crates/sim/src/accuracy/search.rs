@@ -183,6 +183,9 @@ impl<'a> Search<'a> {
             }
             let signals = Some((air, scene.pulse_energy_j()));
             sum_s += share * plan.times.maps_s + if before == signals { 0.0 } else { share * plan.times.signals_s };
+            if self.out.figures.contains(&Figure::Circulation) {
+                sum_s += count as f64 * plan.times.fit_s;
+            }
             before = signals;
         }
         Ok(sum_s)

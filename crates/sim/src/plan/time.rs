@@ -17,6 +17,8 @@ pub(crate) struct Times {
     pub(crate) maps_s: f64,
     /// Vortices of every realisation.
     pub(crate) retrieval_s: f64,
+    /// Vortices fitted to one map, whether or not the scene asks for them.
+    pub(crate) fit_s: f64,
 }
 
 impl Times {
@@ -40,7 +42,7 @@ pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> 
     let signals_s = n.realisations * (n.records * record_s + airs * n.layers * wind_s) + kept_s;
     let maps_s = if matches!(target, Target::Run | Target::Map) { maps_s(scene, n) } else { 0.0 };
     let retrieval_s = if target == Target::Run { retrieval_s(scene, n, record_s) } else { 0.0 };
-    Times { optics_s, signals_s, maps_s, retrieval_s }
+    Times { optics_s, signals_s, maps_s, retrieval_s, fit_s: fit_s(n) }
 }
 
 /// Estimates, their errors, and the files of them.
@@ -71,11 +73,15 @@ fn maps_s(scene: &Scene, n: &Sizes) -> f64 {
     n.realisations * n.records * n.windows * window_s + points_s + planned_s + n.cells * 3e-6 + pictures_s
 }
 
+fn fit_s(n: &Sizes) -> f64 {
+    n.cells * 2e-4
+}
+
 /// Vortices of every realisation, and the test for a wake, if the scene asks for them.
 fn retrieval_s(scene: &Scene, n: &Sizes, record_s: f64) -> f64 {
     let Some(wanted) = &scene.retrieval else { return 0.0 };
     // The fit of the map is made once for all that need it.
-    let map_s = n.cells * if wanted.methods[..] == [RetrievalMethod::Rv] { 2e-5 } else { 2e-4 };
+    let map_s = if wanted.methods[..] == [RetrievalMethod::Rv] { n.cells * 2e-5 } else { fit_s(n) };
     let sample_s = if wanted.methods.contains(&RetrievalMethod::Signals) { 3e-4 } else { 0.0 };
     let test_s = if wanted.false_alarm.is_some() { 3.0 } else { 0.0 };
     n.realisations * (map_s + n.records * (n.samples * sample_s + record_s)) + test_s
