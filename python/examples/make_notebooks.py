@@ -1,6 +1,7 @@
-"""Writes the notebooks beside it from the texts here: cells of words begin with #, all others are Python."""
+"""Writes the notebooks beside it, or to the folder that is named, from the texts here: cells of words begin with #, all others are Python."""
 
 import json
+import sys
 from pathlib import Path
 
 FIRST_MAP = """
@@ -23,9 +24,11 @@ result
 ---
 # `result.map` is `map.nc` as a dataset: the estimates, the exact velocities, the errors.
 ---
-figure, axes = plt.subplots(1, 2, figsize=(10, 4), sharey=True)
+by_elevation = result.map.swap_dims(time="elevation")
+figure, axes = plt.subplots(1, 2, figsize=(9, 3.5), sharey=True, layout="constrained")
 for axis, name in zip(axes, ["v_exact", "radial_velocity"]):
-    result.map[name].plot(ax=axis, vmin=-15, vmax=15, cmap="RdBu_r")
+    by_elevation[name].plot(ax=axis, vmin=-15, vmax=15, cmap="RdBu_r", cbar_kwargs={"label": "m/s"})
+    axis.set(title=name, xlabel="range [m]", ylabel="elevation [deg]")
 """
 
 CIRCULATION = """
@@ -40,7 +43,7 @@ import wakescope
 
 folder = Path(tempfile.mkdtemp())
 scene = wakescope.scene(**{"scan.elevation_step_rad": 0.004, "outputs.svg": False, "outputs.png": False})
-wakescope.run(scene).write(folder)
+written = wakescope.run(scene).write(folder)
 ---
 found = wakescope.retrieve(folder / "map.nc")
 found[["side", "gamma_5_15_m2_s", "gamma_5_15_std_m2_s", "y_m", "z_m"]].to_dataframe()
@@ -70,7 +73,7 @@ import matplotlib.pyplot as plt
 
 import wakescope
 
-scene = wakescope.scene(**{"scan.elevation_step_rad": 0.02, "scan.realisations": 8})
+scene = wakescope.scene(**{"scan.elevation_step_rad": 0.04, "scan.realisations": 4})
 vary = {"pulse.energy_j": [5e-5, 1e-4, 2e-4, 4e-4], "pulse.shape.duration_s": [2e-7, 4e-7]}
 results = wakescope.sweep(scene, vary=vary, no_circulation=True)
 results
@@ -79,7 +82,7 @@ for duration_s, group in results.groupby("pulse.shape.duration_s"):
     plt.loglog(group["pulse.energy_j"] * 1e6, group["bound_m_s"], "o-", label=f"{1e9 * duration_s:.0f} ns")
 plt.xlabel("energy of a pulse [µJ]")
 plt.ylabel("Cramér-Rao bound of a velocity [m/s]")
-plt.legend()
+plt.legend();
 ---
 # The bound against the signal-to-noise ratio, and where the light goes:
 ---
@@ -87,7 +90,7 @@ bound = wakescope.bound(scene)
 curve = bound.where(bound.curve == "snr", drop=True)
 plt.semilogy(curve.snr_db, curve.bound_window_m_s)
 plt.xlabel("signal-to-noise ratio [dB]")
-plt.ylabel("bound of one window [m/s]")
+plt.ylabel("bound of one window [m/s]");
 ---
 wakescope.budget(scene, range=[400]).to_dataframe()
 """
@@ -104,7 +107,8 @@ def cell(number: int, text: str) -> dict[str, object]:
     return {"cell_type": "code", "id": f"cell-{number}", "metadata": {}, "source": text, "execution_count": None, "outputs": []}
 
 
+folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent
 for name, text in NOTEBOOKS.items():
     cells = [cell(number, part.strip()) for number, part in enumerate(text.split("\n---\n"))]
     notebook = {"cells": cells, "metadata": KERNEL, "nbformat": 4, "nbformat_minor": 5}
-    Path(__file__).with_name(f"{name}.ipynb").write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    (folder / f"{name}.ipynb").write_text(json.dumps(notebook, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")

@@ -31,6 +31,7 @@ type Answered<'py> = (u8, String, String, Vec<(String, Bound<'py, PyBytes>)>);
 /// `signals` an array for the word "signals". With `keep` the files stay in memory. `progress` is called with the name of a stage,
 /// the part of it that is done and a text. Returns the exit code, an object as JSON, the text and the files.
 #[pyfunction]
+#[pyo3(signature = (words, texts: "dict[str, dict[str, object]]", signals, keep, progress))]
 pub(crate) fn call<'py>(
     py: Python<'py>,
     words: Vec<OsString>,

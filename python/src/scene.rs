@@ -17,6 +17,7 @@ pub(crate) fn presets() -> Vec<&'static str> {
 
 /// The scene of a preset, or the default one, with some keys changed, `{"section.key": value}`: all its keys.
 #[pyfunction]
+#[pyo3(signature = (preset, keys: "dict[str, object]") -> "dict[str, object]")]
 pub(crate) fn scene<'py>(
     py: Python<'py>,
     preset: Option<&str>,
@@ -42,6 +43,7 @@ pub(crate) fn scene<'py>(
 
 /// The keys of a text in the format of scenes and cases.
 #[pyfunction]
+#[pyo3(signature = (text) -> "dict[str, object]")]
 pub(crate) fn table<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyDict>> {
     dict_of(py, toml::from_str(text).map_err(|error| PyTypeError::new_err(error.to_string()))?)
 }

@@ -23,7 +23,8 @@ impl NumpyRecords {
 
 impl Source for NumpyRecords {
     fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
-        Python::attach(|py| self.piece(py, records, samples)).map_err(|error| error.to_string())
+        let piece = Python::try_attach(|py| self.piece(py, records, samples));
+        piece.ok_or("Python has ended")?.map_err(|error| error.to_string())
     }
 }
 

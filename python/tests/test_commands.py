@@ -47,7 +47,7 @@ def test_a_dataset_is_retrieved_as_its_file(scan, tmp_path):
 
 
 def test_detection_with_and_without_a_scan(scan):
-    found = wakescope.detect(scan.map, empty_scans=2000, stride=(2, 4))
+    found = wakescope.detect(scan.map, empty_scans=2000, stride=(4, 6))
     assert int(found.wake[0]) == 1 and found.attrs["smallest_detectable_m2_s"] > 0
     power = wakescope.detect(scene=small(), empty_scans=2000)
     assert power.detection.dims == ("gamma_m2_s",) and float(power.detection[-1]) > 0.9
@@ -123,8 +123,8 @@ print(signals.nbytes, 1024 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
 def test_a_large_array_is_not_copied():
-    # 100 MB: lines of many pulses.
-    scene = small(**{"scan.pulses_per_line": 7000})
+    # 100 MB: lines of many pulses, in few windows.
+    scene = small(**{"scan.pulses_per_line": 7000, "estimator.window_step_samples": 64, "estimator.gate_step_samples": 64})
     text = MEMORY.replace("SCENE", repr(scene)).replace("RECORDS", str(9 * 7000))
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True)
     assert not done.stderr, done.stderr

@@ -77,6 +77,8 @@ fn steps() -> Result<Vec<Step>, Failure> {
     // On the program that the step before has built.
     let sibling = std::env::current_exe()?.with_file_name("wakescope").display().to_string();
     out.push(plain("audit", format!("'{own}' audit --program '{sibling}'")));
+    // Installs what it needs, or says what is lacking and fails.
+    out.push(plain("python", format!("WAKESCOPE_PROGRAM='{sibling}' python/check")));
     // Says so where there is no MPI.
     out.push(plain("mpi", format!("'{own}' ranks")));
     out.push(plain("figures", format!("'{own}' reproduce-figs --profile quick --no-cache --wake {WAKE_OUT}")));

@@ -5,6 +5,7 @@
 
 mod audit;
 mod bless;
+mod book;
 mod cause;
 mod ci;
 mod claim;
@@ -72,6 +73,8 @@ enum Task {
     Stability(stability::Options),
     /// Hold every number that the program writes or prints against its definition, on random scenes and cases.
     Audit(audit::Options),
+    /// Build the book as a static site, with the documentation of the crates beside it.
+    Book,
     /// Check the rules of the house.
     Tidy,
     /// Everything that continuous integration runs.
@@ -93,6 +96,7 @@ fn main() -> std::process::ExitCode {
         Task::FuzzScenes(options) => fuzz_scenes::run(&options),
         Task::Stability(options) => stability::run(&options),
         Task::Audit(options) => audit::run(&options),
+        Task::Book => book::run(),
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };

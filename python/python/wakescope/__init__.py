@@ -36,7 +36,7 @@ Scene = Union[Mapping[str, Any], Path_]
 #: Called with the name of a stage, the part of it that is done, and a text; True shows them on standard error.
 Progress = Union[Callable[[str, float, str], object], bool, None]
 #: Dictionaries of scenes and cases by the words that stand for them.
-Texts = dict[Union[str, "os.PathLike[str]"], dict[str, Any]]
+Texts = dict[str, dict[str, object]]
 #: A map of a scan, or the path of one.
 Scan = Union["xarray.Dataset", Path_]
 

@@ -14,7 +14,7 @@ VERSION: Final[str]
 Version of the program.
 """
 
-def call(words: SupportsGetItem[int, str], texts: dict[str | PathLike[str], dict], signals: Any | None, keep: bool, progress: Any | None) -> tuple[int, str, str, list[tuple[str, bytes]]]:
+def call(words: SupportsGetItem[int, str], texts: "dict[str, dict[str, object]]", signals: Any | None, keep: bool, progress: Any | None) -> tuple[int, str, str, list[tuple[str, bytes]]]:
     """
     Runs a command with the words of its command line. `texts` are dictionaries of scenes and cases by the words that stand for them,
     `signals` an array for the word "signals". With `keep` the files stay in memory. `progress` is called with the name of a stage,
@@ -31,12 +31,12 @@ def presets() -> list[str]:
     Names of the lidars that `scene` knows.
     """
 
-def scene(preset: str | None, keys: dict) -> dict:
+def scene(preset: str | None, keys: "dict[str, object]") -> "dict[str, object]":
     """
     The scene of a preset, or the default one, with some keys changed, `{"section.key": value}`: all its keys.
     """
 
-def table(text: str) -> dict:
+def table(text: str) -> "dict[str, object]":
     """
     The keys of a text in the format of scenes and cases.
     """

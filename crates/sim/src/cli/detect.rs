@@ -71,15 +71,17 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let observer = cli.observer();
     let task = Task::new(words, cli, &*observer)?;
     let maps: Vec<ScanMap> = task.scans.iter().map(|scan| scan.map.clone()).collect();
-    let (found, calibration) = test(&maps, &task.settings).map_err(|error| match &task.scans[..] {
+    let (found, calibration) = test(&maps, &task.settings, &*observer).map_err(|error| match &task.scans[..] {
         [only] => Error::Input { path: only.path.clone(), reason: error.to_string() },
         _ => error,
     })?;
     let calibration = match (calibration, &task.empty) {
-        (None, Some(empty)) => Some(Calibration::new(&strided(empty, task.settings.stride), &task.settings)?),
+        (None, Some(empty)) => {
+            Some(Calibration::new(&strided(empty, task.settings.stride), &task.settings, &*observer)?)
+        }
         (known, _) => known,
     };
-    let power = calibration.map(|known| known.power(&task.settings)).transpose()?;
+    let power = calibration.map(|known| known.power(&task.settings, &*observer)).transpose()?;
     let none = || Provenance::new("", "", task.settings.seed);
     let origin = task.scene.as_ref().map_or_else(none, SceneFile::provenance);
     let files = words.folder.write_all(cli, origin, |files| {

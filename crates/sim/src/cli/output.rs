@@ -53,13 +53,14 @@ pub(super) fn explain(error: &clap::Error, as_json: bool) -> u8 {
 /// Words that the command line does not know, as an object.
 pub(super) fn explained(error: &clap::Error) -> Value {
     let text = error.render().to_string();
+    let text = text.trim_end().trim_start_matches("error: ");
     let word = |kind| error.get(kind).map(ToString::to_string);
     let problem = word(ContextKind::InvalidArg).map(|key| {
-        let allowed = text.trim_end().trim_start_matches("error: ");
+        // What the reader of the value says is less than the whole text.
+        let allowed = std::error::Error::source(error).map_or_else(|| text.to_owned(), ToString::to_string);
         json!({ "file": null, "line": null, "key": key, "value": word(ContextKind::InvalidValue), "allowed": allowed })
     });
-    let problems: Vec<Value> = problem.into_iter().collect();
-    json!({ "error": text.trim_end().trim_start_matches("error: "), "problems": problems })
+    json!({ "error": text, "problems": problem.into_iter().collect::<Vec<Value>>() })
 }
 
 /// An error as an object: the whole message, and each problem with its file, line, key, value and what is allowed.

@@ -21,6 +21,7 @@ pub use scene_noise::SceneNoise;
 pub use tables::{power_table, roc_table, scan_table};
 
 use crate::Error;
+use crate::setup::progress::{Observer, Stage};
 use crate::setup::streams::stream;
 use ndarray::s;
 use wakescope_estimate::retrieval::{Gate, ScanMap, Turbulence};
@@ -138,11 +139,12 @@ pub struct Calibration {
 }
 
 impl Calibration {
-    /// Calibrates the test for scans like `map`. Where it states no deviations, they are those of what its best wake leaves.
+    /// Calibrates the test for scans like `map`. Where it states no deviations, they are those of what its best wake leaves. The observer
+    /// is told of each empty scan that is drawn.
     ///
     /// # Errors
     /// What the test refuses.
-    pub fn new(map: &ScanMap, settings: &DetectionSettings) -> Result<Self, Error> {
+    pub fn new(map: &ScanMap, settings: &DetectionSettings, observer: &dyn Observer) -> Result<Self, Error> {
         let with = |map: &ScanMap| WakeDetector::new(map, &settings.model, &settings.gate, &settings.options);
         let mut map = map.clone();
         let mut assumed_sigma_m_s = None;
@@ -158,7 +160,12 @@ impl Calibration {
             assumed_sigma_m_s = Some(sigma_m_s);
         }
         let detector = with(&map)?;
-        let law = detector.calibrate(settings.empty_scans, |scan| stream(settings.seed, "empty scans", scan))?;
+        observer.begin(Stage::Detection, settings.empty_scans as u64);
+        let law = detector.calibrate(settings.empty_scans, |scan| {
+            observer.advance(1);
+            stream(settings.seed, "empty scans", scan)
+        })?;
+        observer.end();
         let threshold = law.threshold(settings.false_alarm)?;
         Ok(Self { map, detector, law, threshold, assumed_sigma_m_s })
     }
@@ -209,13 +216,18 @@ impl Calibration {
         })
     }
 
-    /// How often pairs anywhere in the scan are found.
+    /// How often pairs anywhere in the scan are found. The observer is told of each scan that is drawn.
     ///
     /// # Errors
     /// What the trials refuse, such as a scan too small for a pair.
-    pub fn power(&self, settings: &DetectionSettings) -> Result<Power, Error> {
+    pub fn power(&self, settings: &DetectionSettings, observer: &dyn Observer) -> Result<Power, Error> {
         let wakes = self.detector.draw_wakes(PLACES, |wake| stream(settings.seed, "wakes to find", wake));
-        let trials = self.detector.trials(&wakes, TRIALS, |trial| stream(settings.seed, "scans with wakes", trial))?;
+        observer.begin(Stage::Detection, TRIALS as u64);
+        let trials = self.detector.trials(&wakes, TRIALS, |trial| {
+            observer.advance(1);
+            stream(settings.seed, "scans with wakes", trial)
+        })?;
+        observer.end();
         let std_m2_s = trials.circulation_std_m2_s();
         let circulations: Vec<f64> = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s).collect();
         let shares = trials.detection(&circulations, self.threshold);
@@ -251,6 +263,7 @@ impl Calibration {
 pub fn detect(
     scans: &[ScanMap],
     settings: &DetectionSettings,
+    observer: &dyn Observer,
 ) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
     let (mut found, mut calibrations) = (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
     for scan in scans {
@@ -258,7 +271,7 @@ pub fn detect(
         if !calibrations.last().is_some_and(|known| known.is_for(&map)) {
             // the first is kept for its curves, the last for the next scan
             calibrations.truncate(1);
-            calibrations.push(Calibration::new(&map, settings)?);
+            calibrations.push(Calibration::new(&map, settings, observer)?);
         }
         if let Some(calibration) = calibrations.last() {
             found.push(calibration.test(&map, (outliers, velocities))?);
@@ -310,6 +323,7 @@ pub fn background(settings: &DetectionSettings, has_sigma: bool) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::setup::progress::Silent;
     use ndarray::Array2;
     use rand_xoshiro::rand_core::Rng;
     use wakescope_estimate::vortex_fit::Wake;
@@ -338,7 +352,7 @@ mod tests {
         let scans = [map(1, 0.0), map(2, 60.0), map(3, 0.0)];
         let run = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| detect(&scans, &settings()).unwrap().0)
+            pool.install(|| detect(&scans, &settings(), &Silent).unwrap().0)
         };
         let found = run(1);
         assert_eq!(found, run(3));
@@ -349,14 +363,14 @@ mod tests {
         assert!((wake.left.lateral_position_m - 379.0).abs() < 8.0 && (wake.right.height_m - 46.0).abs() < 5.0);
         // a scan that states no deviations is told by its residuals
         let unstated = ScanMap { sigma_m_s: None, ..scans[1].clone() };
-        let (found, _) = detect(&[unstated], &settings()).unwrap();
+        let (found, _) = detect(&[unstated], &settings(), &Silent).unwrap();
         assert!(found[0].is_wake() && (found[0].assumed_sigma_m_s.unwrap() / 0.5 - 1.0).abs() < 0.1, "{found:?}");
     }
 
     #[test]
     fn shares_grow_with_circulation_and_rate_and_reach_the_smallest_that_is_found() {
-        let (_, calibration) = detect(&[map(1, 0.0)], &settings()).unwrap();
-        let power = calibration.unwrap().power(&settings()).unwrap();
+        let (_, calibration) = detect(&[map(1, 0.0)], &settings(), &Silent).unwrap();
+        let power = calibration.unwrap().power(&settings(), &Silent).unwrap();
         assert!(power.found.windows(2).all(|pair| pair[1].1.value >= pair[0].1.value - 0.01));
         assert!(power.found[0].1.value < 0.03 && power.found[20].1.value > 0.99, "{power:?}");
         let (measured, foretold) = power.smallest_m2_s;
@@ -374,16 +388,16 @@ mod tests {
             let last = (line + 3).min(44);
             *v = from.slice(s![line..last, gate]).mean().unwrap() * 3f64.sqrt();
         }
-        let (found, _) = detect(std::slice::from_ref(&smooth), &settings()).unwrap();
+        let (found, _) = detect(std::slice::from_ref(&smooth), &settings(), &Silent).unwrap();
         assert!(found[0].is_correlated(), "{found:?}");
         let parted = DetectionSettings { stride: (3, 1), ..settings() };
-        assert!(!detect(&[smooth], &parted).unwrap().0[0].is_correlated());
+        assert!(!detect(&[smooth], &parted, &Silent).unwrap().0[0].is_correlated());
     }
 
     #[test]
     fn correlation_of_a_few_neighbours_is_held_against_its_own_error() {
         let scans: Vec<ScanMap> = (100..250).map(|seed| map(seed, 0.0)).collect();
-        let (found, _) = detect(&scans, &DetectionSettings { stride: (6, 4), ..settings() }).unwrap();
+        let (found, _) = detect(&scans, &DetectionSettings { stride: (6, 4), ..settings() }, &Silent).unwrap();
         let beyond = |limit: f64| found.iter().filter(|f| f.statistic.neighbour_correlation.0 > limit).count();
         // a fifth is chance among so few
         assert!(beyond(0.2) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1, "{}", beyond(0.2));

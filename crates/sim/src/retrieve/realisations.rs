@@ -253,7 +253,7 @@ fn tests(
         ..DetectionSettings::default()
     };
     let empty = noise.empty_scan(plan);
-    let calibration = Calibration::new(&strided(&empty, settings.stride), &settings)?;
+    let calibration = Calibration::new(&strided(&empty, settings.stride), &settings, observer)?;
     maps.iter()
         .map(|map| {
             let scan = ScanMap { velocity_m_s: map.clone(), ..empty.clone() };

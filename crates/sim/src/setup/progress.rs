@@ -26,6 +26,8 @@ pub enum Stage {
     Errors,
     /// Vortices from maps and signals.
     Retrieval,
+    /// Scans that are drawn for thresholds and shares of wakes that are found.
+    Detection,
     /// Tables and pictures.
     Files,
     /// Cases of a sweep.
@@ -46,6 +48,7 @@ impl Stage {
             Stage::Estimates => "estimates",
             Stage::Errors => "errors",
             Stage::Retrieval => "retrieval",
+            Stage::Detection => "detection",
             Stage::Files => "files",
             Stage::Cases => "cases",
         }
