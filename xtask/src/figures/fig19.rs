@@ -69,8 +69,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         let noise = SceneNoise::new(&plan, &Silent)?;
         for (background, turbulence) in [("still air", None), ("turbulence", Some(AIR))] {
             let settings = settings(&plan, &noise, turbulence, FALSE_ALARM)?;
-            let power =
-                Calibration::new(&strided(&noise.empty_scan(&plan), settings.stride), &settings)?.power(&settings)?;
+            let power = Calibration::new(&strided(&noise.empty_scan(&plan), settings.stride), &settings, &Silent)?
+                .power(&settings, &Silent)?;
             cases.push(Case { background, range_m, snr_db, power });
         }
         if range_m == ALARM_RANGE_M {
@@ -107,7 +107,7 @@ fn alarms(plan: &Plan, noise: &SceneNoise, (scans, rate): (usize, f64)) -> Resul
     let shown_m_s = velocities(&Plan::new(file, Target::Map)?, &Silent)?;
     let maps: Vec<_> =
         shown_m_s.into_iter().map(|velocity_m_s| ScanMap { velocity_m_s, ..noise.empty_scan(plan) }).collect();
-    let (found, _) = detect(&maps, &settings)?;
+    let (found, _) = detect(&maps, &settings, &Silent)?;
     let error = (rate * (1.0 - rate) / maps.len() as f64).sqrt();
     Ok((Share::of(found.iter().filter(|scan| scan.is_wake()).count(), maps.len()), [rate, error]))
 }
