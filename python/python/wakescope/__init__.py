@@ -13,6 +13,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Union
 
@@ -231,7 +232,7 @@ def _command(
     stays = options.get("out") is not None or command == "check"
     if progress is True:
         progress = _show
-    with tempfile.TemporaryDirectory() if in_folder and not stays else _Nowhere() as folder:
+    with tempfile.TemporaryDirectory() if in_folder and not stays else nullcontext() as folder:
         if not stays:
             options["out"] = folder or keep
         words += _options(options)
@@ -242,16 +243,6 @@ def _command(
     if progress is _show:
         sys.stderr.write("\n")
     return result
-
-
-class _Nowhere:
-    """No folder."""
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, *_: object) -> None:
-        return None
 
 
 def _of_scans(command: str, data: Scan | Sequence[Scan], scene: Scene | None, options: dict[str, Any]) -> Result:
