@@ -46,6 +46,11 @@ def test_a_dataset_is_retrieved_as_its_file(scan, tmp_path):
     assert float(of_file.wake[0, at]) == pytest.approx(float(of_file.gamma_m2_s[0]), rel=1e-6)
 
 
+def test_a_scan_without_a_wake_has_no_circulation_but_a_column_of_numbers():
+    found = wakescope.retrieve(wakescope.run(small(**{"flow.circulation_m2_s": 1.0})).map)
+    assert found.gamma_m2_s.dtype == float and found.gamma_m2_s.isnull().all() and "no_wake" in str(found["flags"].values[0])
+
+
 def test_detection_with_and_without_a_scan(scan):
     found = wakescope.detect(scan.map, empty_scans=2000, stride=(4, 6))
     assert int(found.wake[0]) == 1 and found.attrs["smallest_detectable_m2_s"] > 0

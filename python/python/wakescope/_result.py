@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 
     import numpy
     import xarray
+
+
+# The unit at the end of a name: what has one is a number, also where no row has it.
+UNIT = re.compile(r"_(m2_s|m_s|per_s|per_m|m|s|rad|db|hz|j|tau|b0)$")
 
 
 class Result:
@@ -87,14 +92,14 @@ def dataset(name: str, content: bytes) -> xarray.Dataset:
     if name.endswith(".nc"):
         return xarray.open_dataset(io.BytesIO(content), engine="scipy").load()
     rows = list(csv.reader(line for line in content.decode().splitlines() if not line.startswith("#")))
-    columns = {name: numbers([row[place] for row in rows[1:]]) for place, name in enumerate(rows[0])}
+    columns = {name: numbers(name, [row[place] for row in rows[1:]]) for place, name in enumerate(rows[0])}
     first, values = next(iter(columns.items()))
     is_axis = values.dtype.kind == "f" and len(set(values.tolist())) == len(values) > 0
     axis = first if is_axis else "index"
     return xarray.Dataset({column: (axis, cells) for column, cells in columns.items()})
 
 
-def numbers(cells: Sequence[str]) -> numpy.ndarray[Any, Any]:
+def numbers(name: str, cells: Sequence[str]) -> numpy.ndarray[Any, Any]:
     """The cells of a column as whole numbers, numbers or texts, whichever comes first."""
     import numpy
 
@@ -103,9 +108,9 @@ def numbers(cells: Sequence[str]) -> numpy.ndarray[Any, Any]:
     except ValueError:
         pass
     try:
-        # An empty cell is a number that is not there, unless no cell has one.
+        # An empty cell is a number that is not there, unless no cell has one and the name tells of none.
         values = numpy.array([float(cell) if cell else numpy.nan for cell in cells])
-        if any(cells):
+        if any(cells) or UNIT.search(name):
             return values
     except ValueError:
         pass
