@@ -24,14 +24,16 @@ impl<'a> Gates<'a> {
     pub(crate) fn on_grid(map: &'a ScanMap, options: &'a RetrievalOptions, coarser: usize) -> Result<Self, Error> {
         options.gate.validate(&map.range_m)?;
         let step_m = uniform_step_m(&map.range_m);
+        let longest_m = |std_m: f64| coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
         let kernel = match &options.gate {
             Gate::Gaussian { std_m } if *std_m > 0.0 => {
-                let longest_m = coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
+                let longest_m = longest_m(*std_m);
                 let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
                 gaussian(*std_m, spacing_m, (REACH * std_m / spacing_m).ceil() as usize)?
             }
             Gate::Kernel(kernel) => {
-                step_m.map_or_else(|| kernel.coarser(coarser), |step_m| kernel.dividing(step_m, coarser))
+                let factor = kernel.points_within(longest_m(kernel.width_m())).max(coarser);
+                step_m.map_or_else(|| kernel.coarser(factor), |step_m| kernel.dividing(step_m, factor))
             }
             Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
         };

@@ -10,7 +10,6 @@ use crate::setup::estimators::{Response, response, sampling, signal_kind};
 use crate::setup::progress::Observer;
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::{places, region_radius};
-use ndarray::{Array2, Axis};
 use wakescope_estimate::Radius;
 use wakescope_estimate::bound::Noise;
 use wakescope_estimate::vortex_fit::{EstimatorResponse, PulseShape, ScanSetup, WakeModel};
@@ -87,15 +86,12 @@ impl SceneResponse {
         (2.0 * self.radius_m(range_m) / (step_rad * range_m)) as usize
     }
 
-    /// Ranges, m, and velocities \[line, gate\] of a map at every so-manyth gate: neighbours that share most of their window say
-    /// the same.
-    pub(crate) fn independent_gates(&self, range_m: &[f64], velocity_m_s: &Array2<f64>) -> (Vec<f64>, Array2<f64>) {
+    /// Every so-manyth gate of a map says something of its own: neighbours that share most of their window say the same.
+    pub(crate) fn gate_step(&self, range_m: &[f64]) -> usize {
         let period_s = 1.0 / self.scene.detector.sampling_hz;
         let apart_m = 0.25 * self.scene.estimator.window_samples as f64 * 0.5 * crate::SPEED_OF_LIGHT_M_S * period_s;
         // files round their ranges
-        let step = ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1);
-        let gates: Vec<usize> = (0..range_m.len()).step_by(step).collect();
-        (gates.iter().map(|gate| range_m[*gate]).collect(), velocity_m_s.select(Axis(1), &gates))
+        ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1)
     }
 
     /// How the records of lines at elevations, rad, were taken.

@@ -3,14 +3,18 @@
 use super::own::{retold, set};
 use super::retrieved_scan::{RetrievedScan, refused};
 use crate::Error;
+use crate::detection::strided;
 use crate::io::scans::ReadScan;
 use crate::measure::response::SceneResponse;
 use crate::scene::RetrievalMethod as Method;
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
-    Flag, RetrievalOptions, ScanResult, fit_scan, radial_velocity_method, with_secondary_vortices,
+    Flag, RetrievalOptions, ScanMap, ScanResult, fit_scan, radial_velocity_method, with_secondary_vortices,
 };
 use wakescope_estimate::vortex_fit::Sharing;
+
+/// Gates that share most of their window are left out unless fewer velocities are left.
+const ENOUGH: usize = 500;
 
 /// What the velocities of a map are of the air in its gates.
 #[derive(Clone, Copy)]
@@ -47,25 +51,28 @@ pub fn retrieve_map(
         Velocities::Shown(own) | Velocities::LikelyShown(own) => Some(own),
         Velocities::Means | Velocities::Unknown => None,
     };
-    let shown = match own {
-        Some(own) => {
+    let few = own.map(|own| strided(&scan.map, (1, own.gate_step(&scan.map.range_m))));
+    let is_enough = |few: &&ScanMap| few.velocity_m_s.iter().filter(|v| v.is_finite()).count() >= ENOUGH;
+    let map = few.as_ref().filter(is_enough).unwrap_or(&scan.map);
+    let shown = match own.zip(few.as_ref()) {
+        Some((own, few)) => {
             let mut rough = RetrievalOptions { core_radius_m: None, other_profile: false, ..options.clone() };
             rough.free.core_radius = Sharing::Fixed;
-            let found = fit_scan(&scan.map, &rough).map_err(refuse)?;
-            own.refined(&scan.map, &options, &found)
+            let found = fit_scan(map, &rough).map_err(refuse)?;
+            own.refined(few, &options, &found)
         }
         None => None,
     };
     let (mut result, options) = match (shown, velocities) {
         (Some(shown), Velocities::Shown(_)) => return Ok(RetrievedScan { result: shown.0, options: shown.1, scan }),
         (Some((mut result, with_secondary)), _) => {
-            let means = fit_scan(&scan.map, &options).map_err(refuse)?;
+            let means = fit_scan(map, &options).map_err(refuse)?;
             doubt(&mut result, &means, &scan, &with_secondary);
             (result, with_secondary)
         }
         (None, _) => {
-            let found = fit_scan(&scan.map, &options).map_err(refuse)?;
-            with_secondary_vortices(&scan.map, &options, &found).map_err(refuse)?.unwrap_or((found, options))
+            let found = fit_scan(map, &options).map_err(refuse)?;
+            with_secondary_vortices(map, &options, &found).map_err(refuse)?.unwrap_or((found, options))
         }
     };
     let are_means = matches!(velocities, Velocities::Means);

@@ -35,7 +35,7 @@ impl SceneResponse {
     }
 
     /// The fit to what the estimator of the scene shows, for a map in which `found` has a wake: of a pair, as means may show but one of its
-    /// vortices, else of the one that is found. Nothing where there is no wake, the estimator is one of those without such a model, or
+    /// vortices and the other may be beyond the scan, else of the one that is found. Nothing where there is no wake, the estimator is one of those without such a model, or
     /// the fit does not come to an end. The options are those with the secondary vortices that the map shows beside the pair.
     pub(super) fn refined(
         &self,
@@ -53,14 +53,13 @@ impl SceneResponse {
             0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
             count => found.vortices.iter().map(|vortex| place(vortex).0).sum::<f64>() / count as f64,
         };
-        let (ranges_m, velocity_m_s) = self.independent_gates(&map.range_m, &map.velocity_m_s);
         let fits = Fits {
             scan: map,
             // Maps of one scan know no deviation, and those of a few scans hardly any.
             view: VelocityMap {
                 elevation_rad: &map.elevation_rad,
-                range_m: &ranges_m,
-                velocity_m_s: velocity_m_s.view(),
+                range_m: &map.range_m,
+                velocity_m_s: map.velocity_m_s.view(),
                 standard_deviation_m_s: None,
             },
             still: self.shown(range_m)?,
@@ -75,19 +74,21 @@ impl SceneResponse {
                 ..MapFitOptions::default()
             },
         };
-        // Beyond the scan there may be anything.
         let (ranges, elevations) = (ends(&map.range_m)?, ends(&map.elevation_rad)?);
-        let is_sure = |vortex: &VortexResult| {
+        let is_seen = |vortex: &VortexResult| {
             let (range_m, elevation_rad) = place(vortex);
-            let circulation = vortex.circulation_m2_s;
-            ranges.contains(&range_m)
-                && elevations.contains(&elevation_rad)
-                && circulation.value > CERTAIN_SIGMAS * circulation.std
+            ranges.contains(&range_m) && elevations.contains(&elevation_rad)
         };
+        let is_certain =
+            |vortex: &VortexResult| vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std;
+        let unseen = |pair: &ScanResult| pair.vortices.iter().filter(|vortex| !is_seen(vortex)).count();
         match (fits.pair(found), found.vortices.len()) {
             (Some(pair), 2) => Some(pair),
-            (Some(pair), _) if pair.0.vortices.iter().all(is_sure) => Some(pair),
-            (_, 1) => fits.one(found),
+            // What is beyond the scan acts on what is in it, but is not told. Where nothing is found in it, anything may be beyond.
+            (Some((pair, options)), count) if pair.vortices.iter().all(is_certain) && unseen(&pair) <= count => {
+                Some((telling(pair, is_seen), options))
+            }
+            (_, 1) => fits.one(found).filter(|(one, _)| one.vortices.iter().all(is_certain)),
             _ => None,
         }
     }
@@ -152,11 +153,17 @@ impl Fits<'_> {
     /// The one vortex that is found; another may be there beyond the scan.
     fn one(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
         let (fit, moves) = self.best(found.wake.as_ref())?;
-        let mut result = of_fit(found, self.scan, self.options, &fit, moves);
-        result.vortices.retain(|vortex| found.vortex(vortex.side).is_some());
-        set(&mut result.flags, Flag::OneVortex, true);
-        Some((result, self.options.clone()))
+        let result = of_fit(found, self.scan, self.options, &fit, moves);
+        Some((telling(result, |vortex| found.vortex(vortex.side).is_some()), self.options.clone()))
     }
+}
+
+/// The result without the vortices that are not to be told.
+fn telling(mut result: ScanResult, is_told: impl Fn(&VortexResult) -> bool) -> ScanResult {
+    result.vortices.retain(is_told);
+    set(&mut result.flags, Flag::OneVortex, result.vortices.len() == 1);
+    set(&mut result.flags, Flag::CoreKept, result.vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
+    result
 }
 
 fn ends(axis: &[f64]) -> Option<std::ops::RangeInclusive<f64>> {

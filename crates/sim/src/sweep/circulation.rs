@@ -8,7 +8,7 @@ use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::scene::{Flow, VortexPair};
 use crate::setup::wind::vortex_pair;
-use ndarray::Array2;
+use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
@@ -60,11 +60,12 @@ impl<'p> Retrieval<'p> {
 
     fn fit(&self, velocity_m_s: &Array2<f64>, shown: &EstimatorResponse<'_>) -> Option<f64> {
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
-        let (range_m, velocity_m_s) = self.response.independent_gates(&g.gate_range_m, velocity_m_s);
+        let step = self.response.gate_step(&g.gate_range_m);
+        let range_m: Vec<f64> = g.gate_range_m.iter().copied().step_by(step).collect();
         let map = VelocityMap {
             elevation_rad: &g.elevation_rad,
             range_m: &range_m,
-            velocity_m_s: velocity_m_s.view(),
+            velocity_m_s: velocity_m_s.slice(s![.., ..;step]),
             standard_deviation_m_s: None,
         };
         let step_rad = scene.scan.elevation_step_rad;

@@ -109,6 +109,25 @@ fn a_pair_of_which_peaks_show_one_vortex_is_found_by_what_the_estimator_shows() 
     }
 }
 
+/// Of this pair, means show the vortex in the scan alone. Fitted without the other one, 24 m before the first gate, its core shrinks and is kept, and the
+/// circulation is a third too small.
+#[test]
+fn a_vortex_has_its_circulation_though_its_partner_is_beyond_the_scan() {
+    let scene = "seed = 8016\n[scan]\nelevation_step_rad = 2.1e-3\nrealisations = 1\n[outputs]\nsvg = false\npng = false\nflow = false\n\
+        profile_points = 2\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 0\n[flow]\nkind = \"vortex_pair\"\n\
+        circulation_m2_s = 400.0\ncore_radius_m = 4.0\nlateral_position_m = 293.5\nheight_m = 50.0\n";
+    let temp = tempfile::tempdir().unwrap();
+    fs::write(temp.path().join("s.toml"), scene).unwrap();
+    assert!(wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+    let one = retrieved(temp.path(), "o/map.nc");
+    assert_eq!((one.rows.len(), text(&one, 0, "side")), (1, "right"));
+    let flags = text(&one, 0, "flags");
+    assert!(flags.contains("one_vortex") && !flags.contains("core_kept"), "{flags}");
+    // (3) over radii of 5 to 15 m
+    let (mean, std) = (number(&one, 0, "gamma_5_15_m2_s"), number(&one, 0, "gamma_5_15_std_m2_s"));
+    assert!((mean - 333.74).abs() < 3.0 * std && std < 40.0, "{mean} +- {std}");
+}
+
 #[test]
 fn wind_without_a_wake_is_a_result() {
     let temp = tempfile::tempdir().unwrap();

@@ -133,8 +133,7 @@ impl Setting<'_, '_> {
         near_sigmas: f64,
         counted: Option<f64>,
     ) -> Result<Settled, Error> {
-        let coreless: Vec<Vec<usize>> = all.iter().filter(|group| !is_core(group)).cloned().collect();
-        let (mut groups, mut released) = (all, false);
+        let (mut groups, mut released) = (all.to_vec(), false);
         let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
         let mut known: Option<(Vec<f64>, Vec<Array2<f64>>)> = None;
         let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, STEPS);
@@ -142,14 +141,14 @@ impl Setting<'_, '_> {
             steps += 1;
             let kept = known.take().filter(|(at, slopes)| near(at, &p) && slopes.len() == groups.len());
             let is_kept = kept.is_some();
-            let (linear, about) = self.linear(&p, groups, kept)?;
+            let (linear, about) = self.linear(&p, &groups, kept)?;
             if !is_kept && counted.is_none() {
                 alike = self.about(&linear, 1.0).alike(&p, self.options.correlated_lines);
             }
             let squares = self.about(&linear, alike);
             let no_way = |sigmas_left| Error::NotConverged { iterations: steps, sigmas_left };
-            let next = squares.reweighted(&p, groups, DESCENT)?;
-            let curvature = squares.normal(&p, groups).ok_or(no_way(sigmas_left))?.curvature;
+            let next = squares.reweighted(&p, &groups, DESCENT)?;
+            let curvature = squares.normal(&p, &groups).ok_or(no_way(sigmas_left))?.curvature;
             let way: Vec<f64> = next.iter().zip(&p).map(|(next, p)| next - p).collect();
             let free = |step: &[f64]| groups.iter().map(|group| step[group[0]]).collect::<Array1<f64>>();
             let product = |a: &[f64], b: &[f64]| free(a).dot(&curvature.dot(&free(b)));
@@ -158,10 +157,10 @@ impl Setting<'_, '_> {
             if sigmas_left <= near_sigmas {
                 // a core that shrank on the way, as where the pair was narrow, may show where it ends
                 if groups.len() < all.len() && !released {
-                    (groups, released, most) = (all, true, steps + STEPS);
+                    (groups, released, most) = (all.to_vec(), true, steps + STEPS);
                     continue;
                 }
-                return Ok(Settled { linear, groups: groups.to_vec(), counted: alike });
+                return Ok(Settled { linear, groups, counted: alike });
             }
             let there = halved(share.min(linear.tangent.reach(&next)), |part| {
                 let trial: Vec<f64> = p.iter().zip(&way).map(|(p, way)| p + part * way).collect();
@@ -169,9 +168,7 @@ impl Setting<'_, '_> {
             });
             p = there.ok_or(no_way(sigmas_left))?;
             (last, known) = (way, Some((about, linear.tangent.here.slopes)));
-            if groups.len() > coreless.len() && raised(&mut p, self.least_core_m) {
-                groups = &coreless;
-            }
+            keep_small_cores(&mut p, &mut groups, self.least_core_m);
         }
         Err(Error::NotConverged { iterations: steps, sigmas_left })
     }
@@ -254,19 +251,31 @@ fn learnt_deviations(variances: &Array2<f64>, cells: &[Cell], residual: impl Fn(
     broad.into_iter().map(|broad| if power.is_finite() { (power * broad).exp() } else { 1.0 }).collect()
 }
 
-/// Raises core radii below the least one, and tells whether there were any.
-fn raised(p: &mut [f64], least_m: f64) -> bool {
-    let mut any = false;
-    for place in [Parameter::LeftCore as usize, Parameter::RightCore as usize] {
-        any |= p[place] < least_m;
-        p[place] = p[place].max(least_m);
-    }
-    any
+/// Raises free core radii below the least one, which are kept from then on; those of the other vortex stay free.
+fn keep_small_cores(p: &mut [f64], groups: &mut Vec<Vec<usize>>, least_m: f64) {
+    groups.retain(|group| {
+        let is_small = is_core(group) && group.iter().any(|&place| p[place] < least_m);
+        if is_small {
+            group.iter().for_each(|&place| p[place] = p[place].max(least_m));
+        }
+        !is_small
+    });
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_core_that_does_not_show_is_kept_alone() {
+        let wake = Wake::from_array(&[480.0, 20.0, 376.5, 45.0, 423.5, 49.0, 4.0, 0.3, 1.3, 0.0]);
+        let (mut p, mut groups) = (wake.to_array().to_vec(), vec![vec![0], vec![6], vec![7], vec![8]]);
+        keep_small_cores(&mut p, &mut groups, 0.5);
+        assert_eq!((p[6], p[7], groups), (4.0, 0.5, vec![vec![0], vec![6], vec![8]]));
+        let mut common = vec![vec![6, 7]];
+        keep_small_cores(&mut p, &mut common, 0.6);
+        assert_eq!((p[6], p[7], common.len()), (4.0, 0.6, 0));
+    }
 
     /// Residuals whose size grows with the variance of the air to a known power.
     #[test]

@@ -70,6 +70,11 @@ impl RangeKernel {
         moment(2, moment(1, 0.0)).max(0.0).sqrt()
     }
 
+    /// Distances of its points in a length \[m\].
+    pub(crate) fn points_within(&self, length_m: f64) -> usize {
+        (length_m / self.spacing_m) as usize
+    }
+
     /// The centre of the weights alone, which sees of a linear wind what they see.
     pub(crate) fn middle(&self) -> Self {
         let away = self.weights.iter().enumerate().map(|(i, w)| i as f64 * self.spacing_m * w).sum::<f64>();
