@@ -26,7 +26,8 @@ impl Search<'_> {
         }
         self.estimator_keys()?;
         let kept_s = KEPT * self.out.allowed_s;
-        let (mut scenes, mut places) = self.undecided()?;
+        let mut places = self.undecided();
+        let mut scenes = self.beside_the_finest(&places)?;
         let all = places.len();
         let needed_s = (self.out.spent_s + self.cost_s(&scenes, LEAST)?) / (1.0 - KEPT);
         let mut found = self.measure(&scenes, 0, LEAST, kept_s)?;
@@ -34,7 +35,8 @@ impl Search<'_> {
         while found.is_none() && !places.is_empty() {
             let longest = self.out.ladders.iter().map(|ladder| ladder.steps.len()).max().unwrap_or(1);
             self.out.ladders.iter_mut().for_each(|ladder| ladder.steps.truncate(longest - 1));
-            (scenes, places) = self.undecided()?;
+            places = self.undecided();
+            scenes = self.beside_the_finest(&places)?;
             found = self.measure(&scenes, 0, LEAST, if places.is_empty() { 0.0 } else { kept_s })?;
         }
         if places.len() < all {
@@ -58,16 +60,20 @@ impl Search<'_> {
         Ok(Some(shown.swap_remove(0)))
     }
 
-    /// The finest setting and those whose value is to be measured, each with the places of its key and value.
-    fn undecided(&self) -> Result<(Vec<SceneFile>, Vec<(usize, usize)>), Error> {
-        let (mut scenes, mut places) = (vec![self.fine.clone()], Vec::new());
-        for (which, ladder) in self.out.ladders.iter().enumerate() {
-            for (place, step) in ladder.steps.iter().enumerate().filter(|(_, s)| s.verdict == Verdict::NotDecided) {
-                scenes.push(with(&self.fine, &[(ladder.key, step.value)])?);
-                places.push((which, place));
-            }
-        }
-        Ok((scenes, places))
+    /// Places of keys and values that are to be measured.
+    fn undecided(&self) -> Vec<(usize, usize)> {
+        let steps = |which: usize| self.out.ladders[which].steps.iter().enumerate();
+        let of_key = |which| steps(which).filter(|(_, step)| step.verdict == Verdict::NotDecided);
+        (0..self.out.ladders.len()).flat_map(|which| of_key(which).map(move |(place, _)| (which, place))).collect()
+    }
+
+    /// The finest setting, and after it the same with each of the values at those places.
+    fn beside_the_finest(&self, places: &[(usize, usize)]) -> Result<Vec<SceneFile>, Error> {
+        let varied = places.iter().map(|&(which, place)| {
+            let ladder = &self.out.ladders[which];
+            with(&self.fine, &[(ladder.key, ladder.steps[place].value)])
+        });
+        std::iter::once(Ok(self.fine.clone())).chain(varied).collect()
     }
 
     /// The keys of the estimator, from the finest values on.
