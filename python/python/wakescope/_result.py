@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import io
 import re
@@ -103,17 +104,11 @@ def numbers(name: str, cells: Sequence[str]) -> numpy.ndarray[Any, Any]:
     """The cells of a column as whole numbers, numbers or texts, whichever comes first."""
     import numpy
 
-    try:
-        return numpy.array([int(cell) for cell in cells])
-    except ValueError:
-        pass
-    try:
-        # An empty cell is a number that is not there, unless no cell has one and the name tells of none.
-        values = numpy.array([float(cell) if cell else numpy.nan for cell in cells])
-        if any(cells) or UNIT.search(name):
-            return values
-    except ValueError:
-        pass
+    # An empty cell is a number that is not there, unless no cell has one and the name tells of none.
+    if any(cells) or UNIT.search(name) or not cells:
+        for read in (int, lambda cell: float(cell or "nan")):
+            with contextlib.suppress(ValueError):
+                return numpy.array([read(cell) for cell in cells])
     return numpy.array(cells, dtype=str)
 
 
