@@ -19,7 +19,7 @@ pub(crate) struct Options {
     /// The program to run, instead of the release build.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
-    /// Compile each crate with its features from nothing, too: half an hour of two cores.
+    /// Compile each crate with its features from nothing, too, which takes long.
     #[arg(long)]
     compile: bool,
     /// Store both tables in the book.

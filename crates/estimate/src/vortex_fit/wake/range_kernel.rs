@@ -70,7 +70,7 @@ impl RangeKernel {
         moment(2, moment(1, 0.0)).max(0.0).sqrt()
     }
 
-    /// Distances of its points in a length \[m\].
+    /// How often the distance of its points goes into a length \[m\], rounded down.
     pub(crate) fn points_within(&self, length_m: f64) -> usize {
         (length_m / self.spacing_m) as usize
     }
