@@ -229,13 +229,13 @@ fn pair_of_scene(shown: bool, seed: u64) -> (Flow, Vec<Flow>) {
         cross_wind_m_s: wake.lateral_wind_m_s,
         ..VortexPair::default()
     };
-    // a line towards +x turns the air to larger y above it, as a left vortex does
+    // a positive line towards +x turns y towards z, as a right vortex does
     let lines = VortexLines {
         nodes_m: secondary
             .iter()
             .map(|v| [-1.0, 1.0].map(|x| [x, v.lateral_position_m, v.height_m]).to_vec())
             .collect(),
-        circulation_m2_s: vec![secondary[0].circulation_m2_s, -secondary[1].circulation_m2_s],
+        circulation_m2_s: vec![-secondary[0].circulation_m2_s, secondary[1].circulation_m2_s],
         core_radius_m: secondary[0].core_radius_m,
         ..VortexLines::default()
     };

@@ -16,7 +16,7 @@ use crate::vortex_fit::{Loss, Wake};
 
 /// Most velocities that are whitened, that are fitted, and that are searched for a wake: blocks stand for more.
 const WHITENED: usize = 1500;
-const MOST: usize = 16_000;
+pub(super) const MOST: usize = 16_000;
 const SEARCHED: usize = 1200;
 /// A statistic below this part of the threshold in medians, which tell two thirds of what all velocities do, is no wake.
 const NOTHING: f64 = 0.5;

@@ -5,6 +5,7 @@
 use ndarray::Array2;
 
 use crate::error::Error;
+use crate::retrieval::fit::MOST;
 use crate::retrieval::{Flag, RetrievalOptions, ScanMap, ScanResult, VortexResult, fit_scan};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::setting::Setting;
@@ -37,10 +38,12 @@ pub fn with_secondary_vortices(
         ..MapFitOptions::default()
     };
     let unfolded = map.unfolded();
-    let gates = Gates::rough(&unfolded, options)?;
-    let gates = Gates { seconds: moves.then(|| map.after_middle_s()), shared_points: true, ..gates };
+    let bounded = unfolded.medians(MOST);
+    let sought = bounded.as_ref().unwrap_or(&unfolded);
+    let gates = Gates::rough(sought, options)?;
+    let gates = Gates { seconds: moves.then(|| sought.after_middle_s()), shared_points: true, ..gates };
     let setting = Setting {
-        map: &unfolded.view(),
+        map: &sought.view(),
         model: &options.model,
         prediction: &gates,
         kernel: &gates.kernel,

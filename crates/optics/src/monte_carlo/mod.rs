@@ -32,10 +32,11 @@ use crate::screens::propagate::Propagator;
 use crate::{Error, Misalignment, Telescope, Turbulence, theory};
 use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
 
 /// Realisations of one unit of work; their sums are added in order.
 pub(crate) const GROUP: usize = 8;
-/// Groups between two calls of the progress function (and two tests for the end).
+/// Groups between two tests for the end.
 pub(crate) const GROUPS_PER_WAVE: usize = 8;
 
 /// When the Monte Carlo ends.
@@ -61,7 +62,7 @@ pub struct Progress {
     pub done: usize,
     /// Realisations at which it ends at the latest.
     pub total: usize,
-    /// Largest relative standard error of the monostatic mean over the ranges, so far.
+    /// Largest relative standard error of the monostatic mean over the ranges at the last test for the end.
     pub relative_standard_error: f64,
 }
 
@@ -143,14 +144,14 @@ impl MonteCarlo {
 
     /// Runs in the number type `T` (f32 is twice as fast; its rounding is far below a Monte-Carlo error).
     ///
-    /// `progress` is called between groups of realisations; `ControlFlow::Break` cancels.
+    /// `progress` is called after each layer of two realisations, by the thread that carried them; `ControlFlow::Break` cancels.
     ///
     /// # Errors
     /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::AgainstTheory`], [`Error::Cancelled`].
     pub fn run_in<T: Real>(
         &self,
         stop: Stop,
-        mut progress: impl FnMut(Progress) -> ControlFlow<()>,
+        mut progress: impl FnMut(Progress) -> ControlFlow<()> + Send,
     ) -> Result<EfficiencyEstimate, Error> {
         let set_up = self.in_order();
         let prepared = set_up.prepare::<T>()?;
@@ -164,7 +165,7 @@ impl MonteCarlo {
     pub fn grid_free_space<T: Real>(&self) -> Result<Vec<f64>, Error> {
         let calm = Self { turbulence: Turbulence::none(), ..self.in_order() };
         let prepared = calm.prepare::<T>()?;
-        let ranges = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1)?;
+        let ranges = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1, &|_| Ok(()))?;
         Ok(ranges.iter().map(|at| at.samples[0].same_path).collect())
     }
 
@@ -207,18 +208,28 @@ impl MonteCarlo {
         &self,
         prepared: &Prepared<T>,
         stop: Stop,
-        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+        progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
     ) -> Result<EfficiencyEstimate, Error> {
         within("realisations", stop.realisations as f64, stop.realisations > 0, "at least 1")?;
         stop.relative_standard_error.map_or(Ok(0.0), |target| positive("relative_standard_error", target))?;
         // Without turbulence every realisation is the same.
         let total = if prepared.screens.is_some() { stop.realisations } else { 1 };
         let mut ranges: Vec<AtRange<T>> = Vec::new();
-        let mut done = 0;
+        let (mut done, mut relative_standard_error) = (0, f64::INFINITY);
+        let carried = Mutex::new((0, progress));
         while done < total {
             let firsts: Vec<usize> = (done..total).step_by(GROUP).take(GROUPS_PER_WAVE).collect();
-            let group =
-                |&first: &usize| Walker::new(prepared, self.seed, self.sampling).group(first, GROUP.min(total - first));
+            let watch = |more| {
+                let (done, progress) = &mut *carried.lock().unwrap_or_else(PoisonError::into_inner);
+                *done += more;
+                match progress(Progress { done: *done, total, relative_standard_error }) {
+                    ControlFlow::Continue(()) => Ok(()),
+                    ControlFlow::Break(()) => Err(Error::Cancelled { realisations: *done }),
+                }
+            };
+            let group = |&first: &usize| {
+                Walker::new(prepared, self.seed, self.sampling).group(first, GROUP.min(total - first), &watch)
+            };
             for group in in_parallel(&firsts, group) {
                 let group = group?;
                 if ranges.is_empty() {
@@ -228,11 +239,8 @@ impl MonteCarlo {
                 }
             }
             done = (done + GROUPS_PER_WAVE * GROUP).min(total);
-            let error = ranges.iter().map(relative_error).fold(0.0, f64::max);
-            if progress(Progress { done, total, relative_standard_error: error }).is_break() {
-                return Err(Error::Cancelled { realisations: done });
-            }
-            if stop.relative_standard_error.is_some_and(|target| error <= target) {
+            relative_standard_error = ranges.iter().map(relative_error).fold(0.0, f64::max);
+            if stop.relative_standard_error.is_some_and(|target| relative_standard_error <= target) {
                 break;
             }
         }

@@ -143,8 +143,14 @@ impl<'a, T: Real> Walker<'a, T> {
         }
     }
 
-    /// Realisations `first` to `first + count`, two side by side: what they leave at each range.
-    pub(crate) fn group(mut self, first: usize, count: usize) -> Result<Vec<AtRange<T>>, Error> {
+    /// Realisations `first` to `first + count`, two side by side: what they leave at each range. `watch` is told after each leg how many
+    /// have come to the end of the path, and may end the walk.
+    pub(crate) fn group(
+        mut self,
+        first: usize,
+        count: usize,
+        watch: &(dyn Fn(usize) -> Result<(), Error> + Sync),
+    ) -> Result<Vec<AtRange<T>>, Error> {
         let Prepared { path, scale, folding, start, .. } = self.prepared;
         let nothing = |_| AtRange {
             planes: vec![vec![T::zero(); folding.points()]; start.len()],
@@ -169,7 +175,9 @@ impl<'a, T: Real> Walker<'a, T> {
                         ranges[range].collect(folding, scale[range]);
                     }
                 }
+                watch(0)?;
             }
+            watch(active)?;
         }
         Ok(ranges)
     }

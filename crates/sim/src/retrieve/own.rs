@@ -123,10 +123,16 @@ impl Fits<'_> {
             return Some((first, moves));
         }
         let chi2 = |fit: &MapFit| fit.tops.first().map_or(f64::INFINITY, |top| top.chi2);
-        let other = refine_map_fit_of_estimator(view, model, self.shown(!moves), &first.wake, options).ok();
-        match other.filter(|other| chi2(&first) - chi2(other) > RetrievalOptions::MOVES) {
-            Some(other) => Some((other, !moves)),
-            None => Some((first, moves)),
+        let from =
+            |moves, start: &Wake| refine_map_fit_of_estimator(view, model, self.shown(moves), start, options).ok();
+        let is_better = |other: &MapFit, than: &MapFit| chi2(than) - chi2(other) > RetrievalOptions::MOVES;
+        let Some(other) = from(!moves, &first.wake).filter(|other| is_better(other, &first)) else {
+            return Some((first, moves));
+        };
+        // It may be better because it came to another place: there, too, the first has to be worse.
+        match from(moves, &other.wake).filter(|again| !is_better(&other, again)) {
+            Some(again) => Some((again, moves)),
+            None => Some((other, !moves)),
         }
     }
 

@@ -57,7 +57,7 @@ const NEAR: f64 = 3.0;
 /// The map is linear enough over this many steps.
 const REACH: f64 = 12.0;
 /// Spacing that stands for that of a vortex without a partner \[m\].
-const LONE_M: f64 = 45.0;
+pub(crate) const LONE_M: f64 = 45.0;
 /// Steps of secondary vortices over the circulation and the height of their vortex.
 const SECONDARY: f64 = 0.02;
 

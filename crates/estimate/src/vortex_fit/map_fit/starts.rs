@@ -4,32 +4,57 @@
 //! not the best add their distance to the covariance, weighted with their likelihood. Check: made-up ends; fits of many maps.
 
 use crate::error::Error;
+use crate::vortex_fit::map_fit::prediction::LONE_M;
 use crate::vortex_fit::top::SAME_SIGMAS;
-use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Wake};
+use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Vortex, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
 pub(crate) const CORE_OVER_SPACING: f64 = CorePrior::TYPICAL.median_ratio;
 /// Core radii of the starts over the spacing, if they are fitted.
 const CORES_OVER_SPACING: [f64; 2] = [CORE_OVER_SPACING, 0.1];
+/// Circulation of a vortex over that of its partner, below which another one may be the partner.
+const WEAK: f64 = 0.5;
 /// A typical core is known to this part of itself, after at most so many rounds.
 const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
 /// Ends of rough fits that are closer lead to one.
 const ONE_SIGMAS: f64 = 1.0;
 
-/// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted.
+/// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted. Where one vortex is far
+/// weaker than the other, a pair of equal ones is the other start.
 pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
-    let typical_m = CORES_OVER_SPACING.map(|over_spacing| over_spacing * about.spacing_m());
-    let cores_m = match options.free.core_radius {
-        Sharing::Fixed => vec![options.core_radius_m.unwrap_or(typical_m[0])],
-        Sharing::Common | Sharing::Separate => typical_m.to_vec(),
+    let cores_m = |wake: &Wake| {
+        let typical_m = CORES_OVER_SPACING.map(|over_spacing| over_spacing * wake.spacing_m());
+        match options.free.core_radius {
+            Sharing::Fixed => vec![options.core_radius_m.unwrap_or(typical_m[0])],
+            Sharing::Common | Sharing::Separate => typical_m.to_vec(),
+        }
     };
-    let of = |core_m: f64| {
-        let mut wake = *about;
+    let with_core = |wake: &Wake, core_m: f64| {
+        let mut wake = *wake;
         (wake.left.core_radius_m, wake.right.core_radius_m) = (core_m, core_m);
         wake
     };
-    cores_m.into_iter().map(of).collect()
+    let mut starts: Vec<Wake> = cores_m(about).into_iter().map(|core_m| with_core(about, core_m)).collect();
+    if let Some(equal) = with_equal_partner(about) {
+        starts.truncate(1);
+        starts.push(with_core(&equal, cores_m(&equal)[0]));
+    }
+    starts
+}
+
+/// A vortex whose partner is far weaker with one like itself in its place, as where the partner is beyond the scan and what is taken for it is not.
+fn with_equal_partner(wake: &Wake) -> Option<Wake> {
+    let Wake { left, right, .. } = *wake;
+    let is_weak = |one: &Vortex, other: &Vortex| one.circulation_m2_s < WEAK * other.circulation_m2_s;
+    let beside = |own: Vortex, by_m: f64| Vortex { lateral_position_m: own.lateral_position_m + by_m, ..own };
+    if is_weak(&left, &right) {
+        Some(Wake { left: beside(right, -LONE_M), ..*wake })
+    } else if is_weak(&right, &left) {
+        Some(Wake { right: beside(left, LONE_M), ..*wake })
+    } else {
+        None
+    }
 }
 
 /// The best end of the fits from some starts; the first error if none comes to an end.

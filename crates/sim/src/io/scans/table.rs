@@ -84,34 +84,44 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
         return Err("it has a header and no rows".into());
     }
     let origin = table.origin();
+    // Programs that write it again keep the names of its columns.
+    let is_own = table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
     rows.into_iter()
         .map(|(sweep, rows)| {
-            let (rays, range_m) = cells(&table, &columns, &rows, format)?;
+            let (rays, range_m) = cells(&table, &columns, &rows, format, is_own)?;
             let what = format!("sweep {sweep}");
             one_plane(&rays, &what)?;
             Ok(ReadScan {
                 scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
                 scans: mean_count(columns.count.iter().flat_map(|c| rows.iter().map(|row| table.number(*row, *c)))),
-                // Programs that write it again keep the names of its columns.
-                is_own: table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some(),
+                is_own,
                 ..ReadScan::new(path, sweep as usize, scan_map(rays, range_m, None, &what)?)
             })
         })
         .collect()
 }
 
-/// The rays of one scan on the ranges of all.
+/// The rays of one scan on the ranges of all. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in
+/// degrees: fits to what jumps tell the same of both.
 fn cells(
     table: &TextTable,
     columns: &Columns,
     rows: &[usize],
     format: &ScanFormat,
+    is_own: bool,
 ) -> Result<(Vec<RayRow>, Vec<f64>), String> {
     let number = |row: usize, column: usize| table.number(row, column);
+    let single = |row: usize, column: usize| match number(row, column) {
+        value if is_own => f64::from(value as f32),
+        value => value,
+    };
+    let angle = |row: usize, (column, unit): (usize, f64)| match unit * number(row, column) {
+        angle_rad if is_own => f64::from(angle_rad.to_degrees() as f32).to_radians(),
+        angle_rad => angle_rad,
+    };
     let mut places = Vec::with_capacity(rows.len());
     for &row in rows {
-        let (range_m, elevation_rad) =
-            (number(row, columns.range), columns.elevation.1 * number(row, columns.elevation.0));
+        let (range_m, elevation_rad) = (single(row, columns.range), angle(row, columns.elevation));
         if !(range_m.is_finite() && elevation_rad.is_finite()) {
             return Err(format!("row {}: its range or elevation is no number", row + 1));
         }
@@ -146,7 +156,7 @@ fn cells(
         }
         let ray = &mut rays[line];
         let text = table.rows[row][columns.velocity].trim();
-        let velocity_m_s = number(row, columns.velocity);
+        let velocity_m_s = single(row, columns.velocity);
         if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
             return Err(format!("row {}: its velocity is no number; an empty cell is a missing one", row + 1));
         }
@@ -157,7 +167,7 @@ fn cells(
         }
         if let Some(column) = columns.sigma {
             let count = columns.count.map(|c| number(row, c));
-            ray.sigma_m_s[gate] = of_mean(number(row, column), count);
+            ray.sigma_m_s[gate] = of_mean(single(row, column), count);
         }
         for (of, value) in [
             (&mut ray.time_s, columns.time.map(|c| number(row, c))),
