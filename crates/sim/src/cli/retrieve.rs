@@ -257,7 +257,9 @@ fn of_signals(
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;
         match (&own, words.method) {
-            (Some(own), Method::Signals) => one = retrieve::retrieve_signals(own, &mut records, measured, one)?,
+            (Some(own), Method::Signals) => {
+                one = retrieve::retrieve_signals(own, &mut records, measured, one, observer)?
+            }
             (Some(own), Method::Envelope) => {
                 if let (Some(spectra), Some(wake)) = (&spectra, one.result.wake) {
                     let snr = own.snr_of(&wake);

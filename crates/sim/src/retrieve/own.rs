@@ -10,6 +10,7 @@ use crate::measure::recorded::{MeasuredScan, samples, upward};
 use crate::measure::response::{SceneResponse, spacing_m};
 use crate::plan::Plan;
 use crate::scene::DetectorSignal;
+use crate::setup::progress::Observer;
 use ndarray::{Array2, ArrayView2, Axis};
 use num_complex::Complex;
 use wakescope_estimate::retrieval::{
@@ -184,7 +185,7 @@ fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &M
     result
 }
 
-/// Retrieves a scan from its raw signals: the wake of its map starts the fit.
+/// Retrieves a scan from its raw signals: the wake of its map starts the fit, which the observer may stop.
 ///
 /// # Errors
 /// What the system says of the file, and what the fits refuse.
@@ -193,14 +194,15 @@ pub fn retrieve_signals(
     records: &mut RawRecords,
     measured: &MeasuredScan,
     found: RetrievedScan,
+    observer: &dyn Observer,
 ) -> Result<RetrievedScan, Error> {
     let ((range, elevation_rad), all) = (measured.lines.all_records(), 0..records.samples());
     match own.scene.detector.signal {
         DetectorSignal::IntermediateFrequency => {
-            own.of_records(samples::<f64>(records, range, all)?.view(), elevation_rad, found)
+            own.of_records(samples::<f64>(records, range, all)?.view(), elevation_rad, found, observer)
         }
         DetectorSignal::Baseband => {
-            own.of_records(samples::<Complex<f64>>(records, range, all)?.view(), elevation_rad, found)
+            own.of_records(samples::<Complex<f64>>(records, range, all)?.view(), elevation_rad, found, observer)
         }
     }
 }
@@ -215,11 +217,16 @@ impl SceneResponse {
         samples: ArrayView2<'_, S>,
         elevation_rad: Vec<f64>,
         found: RetrievedScan,
+        observer: &dyn Observer,
     ) -> Result<RetrievedScan, Error> {
         let Some(guess) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(found) };
         let RetrievedScan { scan, options, result } = found;
         let setup = self.setup(options.model, elevation_rad)?;
-        let snr = |range_m: f64, _: f64| self.snr_at(range_m);
+        let snr = |range_m: f64, _: f64| {
+            // Whenever the fit makes a model of the lines.
+            observer.advance(0);
+            self.snr_at(range_m)
+        };
         let fit_options = SignalFitOptions { free: options.free, ..SignalFitOptions::default() };
         let fit = match fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options) {
             // what the map shows is what was found

@@ -91,7 +91,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
             let found = match (method, of_map.clone(), &own) {
                 (Method::Rv, ..) => by(method),
                 (Method::Signals | Method::Envelope, Some(map), Some(own)) => {
-                    of_signals::<S>(plan, scanner, (method, own), (realisation, lines), map)?
+                    of_signals::<S>(plan, scanner, (method, own), (realisation, lines), map, observer)?
                 }
                 (Method::Integral, Some(map), _) => integral(map).ok(),
                 (_, map, _) => map.filter(|_| method == Method::Fit),
@@ -158,6 +158,7 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
     (method, own): (Method, &SceneResponse),
     (realisation, lines): (usize, &[usize]),
     mut of_map: RetrievedScan,
+    observer: &dyn Observer,
 ) -> Result<Option<RetrievedScan>, Error> {
     let Some(wake) = of_map.result.wake.filter(|_| of_map.result.vortices.len() == 2) else { return Ok(None) };
     let schedule = &plan.geometry.schedule;
@@ -178,7 +179,7 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
         let lines = 0..spectra.elevation_rad.len();
         return Ok(envelopes(plan, &spectra, lines, own.snr_of(&wake), &mut of_map).ok().map(|_| of_map));
     }
-    Ok(own.of_records(samples, elevation_rad, of_map).ok())
+    Ok(own.of_records(samples, elevation_rad, of_map, observer).ok())
 }
 
 /// The circulation over 5 to 15 m by integrals over the map itself, not corrected.
