@@ -236,6 +236,8 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
         let (values, errors) = (results.f(value), results.f(error));
         // Of what most seeds do not show, the stated error is that of what could be, and counts of none and one do not scatter as widely.
         if value.starts_with("flagged") && 2 * values.iter().filter(|value| **value == 0.0).count() > values.len() {
+            let without = errors.iter().filter(|error| error.is_nan() || **error <= 0.0).count();
+            ledger.equal(&format!("results.csv: {error}, none told"), without as f64, 0.0, 0.0);
             continue;
         }
         // Squares have means without bias; roots of them do not.
