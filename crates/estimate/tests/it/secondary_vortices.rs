@@ -105,6 +105,24 @@ fn secondary_vortices_are_fitted_never_or_always_and_told_where_the_map_shows_th
     assert!(with.model.secondary.is_some() && !four.has(Flag::SecondaryVortices), "{four:?}");
 }
 
+/// Where gates resolve them, cores of secondary vortices are what they are, and not what is known of them before.
+#[test]
+fn cores_of_secondary_vortices_are_fitted() {
+    let mut case = case("b");
+    case.options.gate = Gate::Point;
+    let [mut left, mut right] = secondary_of_grounded();
+    (left.core_radius_m, right.core_radius_m) = (3.0, 8.0);
+    let mut air = case.options.clone();
+    air.model.secondary = Some([left, right]);
+    case.map.velocity_m_s = expected_velocities(&case.map, &air, &grounded(), false).unwrap();
+    case.map.sigma_m_s = Some(case.map.velocity_m_s.mapv(|_| 0.05));
+    let pair = fit_scan(&case.map, &case.options).unwrap();
+    let (_, with) = with_secondary_vortices(&case.map, &case.options, &pair).unwrap().unwrap();
+    for (found, truth) in with.model.secondary.unwrap().iter().zip([left, right]) {
+        assert!((found.core_radius_m / truth.core_radius_m - 1.0).abs() < 0.1, "{found:?}");
+    }
+}
+
 /// Pairs with secondary vortices beside them, and the same scans without.
 #[test]
 fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {

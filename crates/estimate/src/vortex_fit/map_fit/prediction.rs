@@ -1,12 +1,13 @@
 //! What is expected of the velocities of a map, with slopes.
 //!
-//! The parameters are a list: the ten of a wake and, if secondary vortices are fitted, circulation, lateral position and height of each. What
+//! The parameters are a list: the ten of a wake and, if secondary vortices are fitted, those of each. What
 //! gates show in the mean ([`Gates`](crate::vortex_fit::map_fit::gates::Gates)) and what an estimator shows have no more in common than this
 //! trait; of the latter, least squares see the [`Tangent`]. Check: fits of exact maps; difference quotients.
 
 use ndarray::{Array2, Zip};
 
 use crate::vortex_fit::wake::free_parameters::stepped;
+use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Wake};
 
 /// Velocities \[m/s\] \[line, gate\], and their derivatives by free number; NaN where there are none.
@@ -58,8 +59,9 @@ const NEAR: f64 = 3.0;
 const REACH: f64 = 12.0;
 /// Spacing that stands for that of a vortex without a partner \[m\].
 pub(crate) const LONE_M: f64 = 45.0;
-/// Steps of secondary vortices over the circulation and the height of their vortex.
+/// Steps of secondary vortices over the circulation and the height of their vortex, and of the logarithm of their core radii.
 const SECONDARY: f64 = 0.02;
+const LOG_CORE: f64 = 0.1;
 
 /// Step of a difference quotient.
 fn step(p: &[f64], place: usize) -> f64 {
@@ -72,9 +74,12 @@ fn step(p: &[f64], place: usize) -> f64 {
         8 => 0.1,
         9 => 0.1 / spacing_m,
         _ => {
-            let (side, number) = ((place - PARAMETERS) / 3, (place - PARAMETERS) % 3);
-            let own = [wake.left, wake.right][side];
-            SECONDARY * if number == 0 { own.circulation_m2_s.abs().max(1.0) } else { own.height_m }
+            let own = [wake.left, wake.right][(place - PARAMETERS) / SECONDARY_PARAMETERS];
+            match (place - PARAMETERS) % SECONDARY_PARAMETERS {
+                0 => SECONDARY * own.circulation_m2_s.abs().max(1.0),
+                3 => LOG_CORE,
+                _ => SECONDARY * own.height_m,
+            }
         }
     }
 }

@@ -3,8 +3,8 @@
 //! Gates that are longer than the distance of a vortex from its secondary one see both at once: a fit of two vortices then puts them metres
 //! to the side and some tenths too weak. So the residuals of such a fit are searched for a vortex of the other sense near each of
 //! the two, beside all that the pair or another profile of its vortices could do about them. If both together explain enough, all four are
-//! fitted at once: secondary vortices are six parameters more. Of them it is known before how strong they are and how far from their vortex,
-//! and their cores are kept. Check: exact maps with four vortices, and with two; simulated wakes.
+//! fitted at once: secondary vortices are eight parameters more. Of them it is known before how strong they are, how far from their vortex,
+//! and how wide. Check: exact maps with four vortices, and with two; simulated wakes.
 
 use ndarray::{Array1, Array2};
 use std::ops::Range;
@@ -14,8 +14,8 @@ use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::Scores;
 use crate::vortex_fit::map_fit::setting::{Linear, Setting, Settled};
-use crate::vortex_fit::wake::core_prior::secondary_ratios;
-use crate::vortex_fit::wake::pair::SECONDARY_CORE_OVER_HEIGHT;
+use crate::vortex_fit::wake::core_prior::{KNOWN_CORE, secondary_ratios};
+use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Secondary, Vortex, Wake, WakeModel};
 
 /// What is allowed in the search, and in the end of any opposite circulation, of the circulation over that of the vortex and of the distance over
@@ -28,7 +28,7 @@ const GRID_OVER_HEIGHT: f64 = 0.12;
 /// of four vortices, in the search by the residuals of the pair, which are alike where it misses vortices.
 const LEAST_GAIN: f64 = 20.0;
 /// Numbers of the secondary vortices that are fitted.
-const NUMBERS: usize = 6;
+const NUMBERS: usize = 2 * SECONDARY_PARAMETERS;
 /// What is left of the last step in standard deviations.
 const NEAR_SIGMAS: f64 = 0.3;
 
@@ -86,7 +86,7 @@ impl Setting<'_, '_> {
         if gain < LEAST_GAIN.max(counted) && !always {
             return None;
         }
-        let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m];
+        let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m, KNOWN_CORE.0.ln()];
         let start: Vec<f64> = two.iter().copied().chain(secondary.iter().flat_map(numbers)).collect();
         groups.extend((PARAMETERS..PARAMETERS + NUMBERS).map(|place| vec![place]));
         let settled = self.settled(start, &groups, NEAR_SIGMAS, Some(counted)).ok()?;
@@ -163,7 +163,7 @@ impl Setting<'_, '_> {
             circulation_m2_s: 1.0,
             lateral_position_m: own.lateral_position_m + i as f64 * step_m,
             height_m: own.height_m + j as f64 * step_m,
-            core_radius_m: SECONDARY_CORE_OVER_HEIGHT * own.height_m,
+            core_radius_m: KNOWN_CORE.0 * own.height_m,
         };
         let distance = GRID_OVER_HEIGHT * (i as f64).hypot(j as f64);
         if !is_near(distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {

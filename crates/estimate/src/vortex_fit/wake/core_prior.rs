@@ -7,6 +7,7 @@
 
 use crate::error::{Error, positive};
 use crate::vortex_fit::wake::free_parameters::{gathered, stepped};
+use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Parameter, Wake};
 
 /// Log-normal density of the core radius over the spacing of the vortices.
@@ -54,11 +55,13 @@ impl CorePrior {
 /// vorticity about it that gates see as well.
 const KNOWN_RATIO: (f64, f64) = (-0.4, 0.25);
 const KNOWN_DISTANCE: (f64, f64) = (0.8, 0.4);
+/// Core radius over the height of its vortex: median and standard deviation of the natural logarithm.
+pub(crate) const KNOWN_CORE: (f64, f64) = (0.12, 0.3);
 
 /// For a list of parameters with secondary vortices, left before right: circulation of each over that of its vortex, distance over the height of the latter.
 pub(crate) fn secondary_ratios(p: &[f64]) -> [(f64, f64); 2] {
     let wake = Wake::from_list(p);
-    [(wake.left, PARAMETERS), (wake.right, PARAMETERS + 3)].map(|(own, at)| {
+    [(wake.left, PARAMETERS), (wake.right, PARAMETERS + SECONDARY_PARAMETERS)].map(|(own, at)| {
         let distance_m = (p[at + 1] - own.lateral_position_m).hypot(p[at + 2] - own.height_m);
         (p[at] / own.circulation_m2_s, distance_m / own.height_m)
     })
@@ -67,19 +70,23 @@ pub(crate) fn secondary_ratios(p: &[f64]) -> [(f64, f64); 2] {
 /// How many deviations each of these is away from what is known, and the derivatives of that by all free numbers.
 pub(crate) fn secondary_terms(p: &[f64], groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
     let away = |p: &[f64]| {
-        secondary_ratios(p).map(|(ratio, distance)| {
-            [(ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1, (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1]
-        })
+        let known = |(ratio, distance), log_core: f64| {
+            let core = (log_core - KNOWN_CORE.0.ln()) / KNOWN_CORE.1;
+            [(ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1, (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1, core]
+        };
+        let [left, right] = secondary_ratios(p);
+        let log_core = |side: usize| p[PARAMETERS + side * SECONDARY_PARAMETERS + 3];
+        [known(left, log_core(0)), known(right, log_core(1))]
     };
     let slopes = groups.iter().map(|group| {
         let step = 1e-6 * p[group[0]].abs().max(1.0);
         let at = |by: f64| away(&stepped(std::slice::from_ref(group), p, &[by]));
         let (ahead, behind) = (at(step), at(-step));
-        [0, 1, 2, 3].map(|i| (ahead[i / 2][i % 2] - behind[i / 2][i % 2]) / (2.0 * step))
+        std::array::from_fn(|i| (ahead[i / 3][i % 3] - behind[i / 3][i % 3]) / (2.0 * step))
     });
-    let slopes: Vec<[f64; 4]> = slopes.collect();
+    let slopes: Vec<[f64; 6]> = slopes.collect();
     let here = away(p);
-    (0..4).map(|i| (here[i / 2][i % 2], slopes.iter().map(|slope| slope[i]).collect())).collect()
+    (0..6).map(|i| (here[i / 3][i % 3], slopes.iter().map(|slope| slope[i]).collect())).collect()
 }
 
 /// Whether a free number moves core radii.

@@ -14,11 +14,11 @@ use crate::error::{Error, finite, positive};
 /// Root of 2 s + 1 = exp(s): makes the core radius that of the largest speed of a Lamb-Oseen vortex.
 pub(crate) const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
 
-/// Core radius of a fitted secondary vortex over the height of its vortex.
-pub(crate) const SECONDARY_CORE_OVER_HEIGHT: f64 = 0.12;
-
 /// Number of parameters of a [`Wake`].
 pub const PARAMETERS: usize = 10;
+/// Number of those of a secondary vortex beside one of a pair: circulation, lateral position, height, and the natural logarithm of its core
+/// radius over the height of its vortex.
+pub(crate) const SECONDARY_PARAMETERS: usize = 4;
 
 /// One parameter of a [`Wake`]; `as usize` is its place in gradients and covariances.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -283,17 +283,16 @@ impl WakeModel {
         wake.validate().is_ok() && (!self.images || all.all(|vortex| vortex.height_m > 0.0))
     }
 
-    /// The model and the wake of a list of parameters: those of a wake and, if there are more, circulation, lateral position and height of a
-    /// secondary vortex beside each vortex.
+    /// The model and the wake of a list of parameters: those of a wake and, if there are more, those of a secondary vortex beside each vortex.
     pub(crate) fn with(&self, p: &[f64]) -> (Self, Wake) {
         let wake = Wake::from_list(p);
-        let of = |own: &Vortex, [circulation_m2_s, lateral_position_m, height_m]: [f64; 3]| Vortex {
+        let of = |own: &Vortex, [circulation_m2_s, lateral_position_m, height_m, log_core]: [f64; _]| Vortex {
             circulation_m2_s,
             lateral_position_m,
             height_m,
-            core_radius_m: SECONDARY_CORE_OVER_HEIGHT * own.height_m,
+            core_radius_m: own.height_m * log_core.exp(),
         };
-        let secondary = match p[PARAMETERS..].as_chunks().0 {
+        let secondary = match p[PARAMETERS..].as_chunks::<SECONDARY_PARAMETERS>().0 {
             [left, right] => Some([of(&wake.left, *left), of(&wake.right, *right)]),
             _ => self.secondary,
         };
