@@ -127,10 +127,18 @@ fn line_of(breaks: &[usize], offset: usize) -> usize {
     breaks.partition_point(|end| *end < offset) + 1
 }
 
-/// Where the key with this path stands, and its value.
+/// Where the key with this path stands, and its value; the path may lead through a table of a list.
 fn find<'t, 'a>(table: &'t DeTable<'a>, path: &str) -> Option<(Range<usize>, &'t Spanned<DeValue<'a>>)> {
     let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
-    let (key, value) = table.iter().find(|(key, _)| key.get_ref() == head)?;
+    let (name, place) = match head.strip_suffix(']').and_then(|head| head.split_once('[')) {
+        Some((name, place)) => (name, Some(place.parse::<usize>().ok()?)),
+        None => (head, None),
+    };
+    let (key, value) = table.iter().find(|(key, _)| key.get_ref() == name)?;
+    let value = match (place, value.get_ref()) {
+        (Some(place), DeValue::Array(values)) => values.get(place)?,
+        _ => value,
+    };
     match (rest, value.get_ref()) {
         (None, _) => Some((key.span(), value)),
         (Some(rest), DeValue::Table(inner)) => find(inner, rest),

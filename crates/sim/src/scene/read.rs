@@ -142,6 +142,10 @@ mod tests {
     fn limits_are_reported_with_key_value_range_and_line() {
         let text = "seed = 3\n[scan]\nrange_min_m = 300.0\nrealisations = 0\n";
         assert_eq!(message(text), "s.toml:4: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000");
+        let second =
+            "[[added_flows]]\nkind = \"calm\"\n[[added_flows]]\nkind = \"vortex_pair\"\ncirculation_m2_s = -166\n";
+        let told = message(second);
+        assert!(told.starts_with("s.toml:5: added_flows[1].circulation_m2_s = -166 is not allowed"), "{told}");
     }
 
     #[test]
