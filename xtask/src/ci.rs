@@ -69,13 +69,12 @@ fn steps() -> Result<Vec<Step>, Failure> {
     // This very program: in another profile the workspace would be compiled once more.
     let own = std::env::current_exe()?.display().to_string();
     out.push(plain("tidy", format!("'{own}' tidy")));
-    // On a wake of a few cells: that of the profile takes several minutes and shows no other fault of the program.
-    out.push(plain(
-        "wake",
-        format!("cargo run --quiet --bin wakescope -- wake {WAKE} --out {WAKE_OUT} --overwrite --quiet"),
-    ));
-    // On the program that the step before has built.
+    // Beside it is the program, in the same profile.
+    let both = if cfg!(debug_assertions) { "--bins --tests" } else { "--bins --release" };
+    out.push(plain("program", format!("cargo build --quiet --workspace {both}")));
     let sibling = std::env::current_exe()?.with_file_name("wakescope").display().to_string();
+    // On a wake of a few cells: that of the profile takes several minutes and shows no other fault of the program.
+    out.push(plain("wake", format!("'{sibling}' wake {WAKE} --out {WAKE_OUT} --overwrite --quiet")));
     out.push(plain("audit", format!("'{own}' audit --program '{sibling}'")));
     // Installs what it needs, or says what is lacking and fails.
     out.push(plain("python", format!("WAKESCOPE_PROGRAM='{sibling}' python/check")));

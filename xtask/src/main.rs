@@ -52,7 +52,7 @@ enum Task {
     /// Compare what the crates compute now with the stored reference curves.
     Regress(regress::Options),
     /// A wake under `mpirun` against one process; a run whose second process is killed.
-    Ranks,
+    Ranks(ranks::Options),
     /// What the wakes at the chapter's Reynolds number come to, from the histories that the book keeps.
     Histories,
     /// Write stored reference curves from what the crates compute now.
@@ -85,7 +85,7 @@ fn main() -> std::process::ExitCode {
     let result = match Cli::parse().task {
         Task::ReproduceFigs(options) => reproduce::run(&options),
         Task::Regress(options) => regress::run(&options),
-        Task::Ranks => ranks::run(),
+        Task::Ranks(options) => ranks::run(&options),
         Task::Histories => histories::run(),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),

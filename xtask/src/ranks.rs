@@ -1,5 +1,5 @@
 //! `cargo xtask ranks`: a wake under `mpirun` on 2 and 4 processes against one process, byte for byte, a run whose
-//! second process is killed, how fast two processes are, and how long single exchanges take.
+//! second process is killed; with `--measure` also how fast two processes are, and how long single exchanges take.
 //!
 //! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
 
@@ -29,11 +29,19 @@ const WHOLE: f64 = 8.0;
 /// Planes of halos that leave a slab in a stage with the multiscale model.
 pub(crate) const PLANES: f64 = 63.0;
 
+/// Options of the task.
+#[derive(Debug, clap::Args)]
+pub(crate) struct Options {
+    /// Measure as well, which decides nothing: two ranks against one, and single exchanges.
+    #[arg(long)]
+    measure: bool,
+}
+
 /// Runs the checks, or says why there are none.
 ///
 /// # Errors
 /// A build that fails, files that differ, a run that hangs or ends well although a process was killed.
-pub(crate) fn run() -> Outcome {
+pub(crate) fn run(options: &Options) -> Outcome {
     let succeeds = |command: &str| {
         let status = Command::new("sh").args(["-c", command]).stdout(Stdio::null()).stderr(Stdio::null()).status();
         status.is_ok_and(|status| status.success())
@@ -45,9 +53,10 @@ pub(crate) fn run() -> Outcome {
         return Ok(());
     }
     // As one of the workspace, so that everything but the crate itself is that of the tests.
+    let example: &[&str] = if options.measure { &["--example", "exchange_times"] } else { &[] };
     let built = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi"])
-        .args(["--bin", "wakescope", "--example", "exchange_times"])
+        .args(["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi", "--bin", "wakescope"])
+        .args(example)
         .current_dir(root())
         .status()?;
     if !built.success() {
@@ -68,6 +77,9 @@ pub(crate) fn run() -> Outcome {
     std::fs::write(scratch.join("long.toml"), case(""))?;
     compare(&program, &scratch)?;
     kill_one(&program, &scratch)?;
+    if !options.measure {
+        return Ok(());
+    }
     let work_s = measure(&program, &scratch)?;
     exchanges(&root().join("target/debug/examples/exchange_times"), work_s)
 }

@@ -34,8 +34,13 @@ pub fn quadrature_cost_s(telescope: &Telescope, screens: usize, range_m: f64) ->
     let fresnel = fresnel_number(telescope, range_m);
     // Nodes grow with the Fresnel number, and so do those of M(rho) at each until steepest descent takes over.
     let overlaps = 1e-4 + (fresnel * (4e-4 + 1.5e-5 * fresnel)).min(0.03 + 3.2e-4 * fresnel);
-    let annulus = if telescope.obscuration_radius_m > 0.0 { 2.5 } else { 1.0 };
-    0.7 * overlaps * annulus + (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64
+    let through = (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64;
+    let obscured = telescope.obscuration_radius_m / telescope.aperture_radius_m;
+    if obscured > 0.0 {
+        // Four lenses in place of one, and three kinks of M(rho) that are halved to.
+        return 3.2e-3 + 0.7 * overlaps * (1.3 + 3.2 * obscured) + through;
+    }
+    0.7 * overlaps + through
 }
 
 pub(crate) fn check_fresnel_number(telescope: &Telescope, range_m: f64) -> Result<(), Error> {
