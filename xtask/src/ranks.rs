@@ -52,7 +52,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         println!("skipped: mpicc, mpirun or libclang is missing, and cannot be installed here ({INSTALL})");
         return Ok(());
     }
-    // As one of the workspace, so that everything but the crate itself is that of the tests.
+    // As one of the workspace, with the features that its other crates ask for.
     let example: &[&str] = if options.measure { &["--example", "exchange_times"] } else { &[] };
     let built = Command::new(env!("CARGO"))
         .args(["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi", "--bin", "wakescope"])

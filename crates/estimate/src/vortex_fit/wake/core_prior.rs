@@ -55,7 +55,7 @@ impl CorePrior {
 /// vorticity about it that gates see as well.
 const KNOWN_RATIO: (f64, f64) = (-0.4, 0.25);
 const KNOWN_DISTANCE: (f64, f64) = (0.8, 0.4);
-/// Core radius over the height of its vortex: median and standard deviation of the natural logarithm.
+/// Core radius over the height of its vortex: median and standard deviation of the natural logarithm. Assumed: no measurement stands behind it.
 pub(crate) const KNOWN_CORE: (f64, f64) = (0.12, 0.3);
 
 /// For a list of parameters with secondary vortices, left before right: circulation of each over that of its vortex, distance over the height of the latter.
@@ -99,6 +99,21 @@ mod tests {
     use super::*;
     use crate::vortex_fit::wake::free_parameters::stepped;
     use crate::vortex_fit::{FreeParameters, Sharing};
+
+    #[test]
+    fn secondary_vortices_are_so_many_deviations_from_what_is_known() {
+        let wake = Wake::from_array(&[480.0, 520.0, 376.5, 40.0, 423.5, 50.0, 2.0, 2.0, 1.3, 0.0]);
+        // one deviation stronger, farther and wider; half of one weaker, nearer and narrower
+        let mut p = wake.to_array().to_vec();
+        p.extend([-0.65 * 480.0, 376.5 - 1.2 * 40.0, 40.0, 0.12_f64.ln() + 0.3]);
+        p.extend([-0.275 * 520.0, 423.5, 50.0 + 0.6 * 50.0, 0.12_f64.ln() - 0.15]);
+        let terms = secondary_terms(&p, &[vec![PARAMETERS + 3]]);
+        let away: Vec<f64> = terms.iter().map(|(away, _)| *away).collect();
+        for (away, right) in away.iter().zip([-1.0, 1.0, 1.0, 0.5, -0.5, -0.5]) {
+            assert!((away - right).abs() < 1e-9, "{away} {right}");
+        }
+        assert!((terms[2].1[0] - 1.0 / 0.3).abs() < 1e-6 && terms[5].1[0] == 0.0);
+    }
 
     #[test]
     fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {
