@@ -156,6 +156,8 @@ const NORMAL: [f64; 2] = [0.683, 0.954];
 const OF_CELLS: [f64; 2] = [0.6, 0.9];
 /// Of averages of squares: with few outliers, or few cells, those that show none state too little (page Sweeps).
 const OF_SQUARES: [f64; 2] = [0.35, 0.75];
+/// Of a handful of estimates, which may show none of the outliers of their corner of the map: no share is promised (page Sweeps), their mean square is.
+const OF_A_HANDFUL: [f64; 2] = [0.0, 0.0];
 
 /// The share of errors within one and two of what is stated of them, and how far the stated ones are too large or small; `alike` of them in a
 /// row share what they are made of.
@@ -251,17 +253,17 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
             ledger.equal(&format!("results.csv: {error}, none told"), without as f64, 0.0, 0.0);
             continue;
         }
-        // A handful of estimates may show none of the outliers of their corner of the map (page Sweeps).
-        if estimates_of(s, value, &maps[0]) < LEAST_ESTIMATES {
-            continue;
-        }
         // Squares have means without bias; roots of them do not.
         let truth = if value.starts_with("bias") || value.starts_with("flagged") {
             average(&finite(&values))
         } else {
             quadratic(&values)
         };
-        let shares = if value.starts_with("std") || value.starts_with("rms") { OF_SQUARES } else { NORMAL };
+        let shares = match value {
+            _ if estimates_of(s, value, &maps[0]) < LEAST_ESTIMATES => OF_A_HANDFUL,
+            _ if value.starts_with("std") || value.starts_with("rms") => OF_SQUARES,
+            _ => NORMAL,
+        };
         hold_stated(ledger, &format!("results.csv: {error}"), &apart(&values, truth), &errors, shares, 1);
     }
     // Of the maps of some of the same seeds each cell's rms against that of all of them.
