@@ -8,6 +8,7 @@
 use ndarray::Array2;
 
 use crate::error::Error;
+use crate::vortex_fit::damped_newton::Stop;
 use crate::vortex_fit::map_fit::coarse::Coarse;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::gates::Gates;
@@ -24,12 +25,12 @@ use crate::vortex_fit::{
 const SMALLEST_CORE: f64 = 0.25;
 /// Fits end at a step of this many standard deviations at the latest, with neighbours that are alike counted once: estimators
 /// round.
-const NEAR_SIGMAS: f64 = 0.03;
+const NEAR: Stop = Stop { iterations: 40, sigmas: 0.03, learns: false };
 /// Fits that only lead to a start may end at such a step, and fits of means for themselves.
 const ROUGH_SIGMAS: f64 = 0.1;
 const FINE_SIGMAS: f64 = 0.01;
-/// So may those to few places, which all places correct at once.
-const COARSE_SIGMAS: f64 = 0.5;
+/// Those from one of several starts may end at such a step; what takes longer is on its way to where another start is nearer, or nowhere.
+const COARSE: Stop = Stop { iterations: 12, sigmas: 0.5, learns: false };
 /// Places that tell nearly all of a map: no farther apart than this part of the radius of its regions, for starts and for slopes (half the
 /// radius for these saves a tenth of the time, but heights scatter by some per cent more), and of the width of its gates.
 const LINES_OVER_RADIUS: [f64; 2] = [0.8, 0.3];
@@ -91,10 +92,15 @@ pub fn fit_map_of_estimator(
     };
     let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
     let all = all.with_slopes_at(for_slopes.as_ref(), response)?;
-    let refine = |start: &Wake| all.setting().refined(start, NEAR_SIGMAS);
+    let refine = |start: &Wake| all.setting().refined(start, NEAR);
     let from = |about: &Wake| {
         let starts = starts(about, options);
-        let ends = few.as_ref().map_or_else(Vec::new, |few| few.ends(&starts));
+        // where a map cannot be thinned its own rough ends tell which starts lead to one end, and which nowhere
+        let ends = match &few {
+            Some(few) => few.ends(&starts),
+            None if starts.len() > 1 => all.ends(&starts),
+            None => Vec::new(),
+        };
         best_of(if ends.is_empty() { &starts } else { &ends }, refine)
     };
     let fit = match from(by_means.as_ref().map_or(&guess, |fit| &fit.wake)) {
@@ -119,7 +125,7 @@ pub fn refine_map_fit_of_estimator(
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
     let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
-    all.with_slopes_at(for_slopes.as_ref(), response)?.setting().refined(guess, NEAR_SIGMAS)
+    all.with_slopes_at(for_slopes.as_ref(), response)?.setting().refined(guess, NEAR)
 }
 
 /// Secondary vortices beside the pair of a fit, if the map shows them or the options want them anyway, and that pair with them: both are fitted at
@@ -201,7 +207,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
 
     /// Where the fits from some starts end that do, without those that are one.
     fn ends(&self, starts: &[Wake]) -> Vec<Wake> {
-        let refine = |start: &Wake| self.setting().refined(start, COARSE_SIGMAS);
+        let refine = |start: &Wake| self.setting().refined(start, COARSE);
         let end = |start: &Wake| with_typical_core(refine(start)?, &self.options, refine);
         distinct(starts.iter().filter_map(|start| end(start).ok()).collect())
     }

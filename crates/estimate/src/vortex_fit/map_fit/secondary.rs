@@ -9,7 +9,7 @@
 use ndarray::{Array1, Array2};
 use std::ops::Range;
 
-use crate::vortex_fit::damped_newton::inverse;
+use crate::vortex_fit::damped_newton::{Stop, inverse};
 use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::Scores;
@@ -29,8 +29,8 @@ const GRID_OVER_HEIGHT: f64 = 0.12;
 const LEAST_GAIN: f64 = 20.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 2 * SECONDARY_PARAMETERS;
-/// What is left of the last step in standard deviations.
-const NEAR_SIGMAS: f64 = 0.3;
+/// The end of a fit of four; of those that are there it takes five to ten steps.
+const NEAR: Stop = Stop { iterations: 15, sigmas: 0.3, learns: false };
 
 /// Secondary vortices, of the left and of the right vortex, that were found beside a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -77,19 +77,23 @@ impl Setting<'_, '_> {
         if !self.model.images || !possible(&pair.left) || !possible(&pair.right) {
             return None;
         }
+        let always = self.options.secondary == Secondary::Always;
+        // what is not understood of one vortex in view may be its partner beyond the scan
+        if !always && !(self.sees(&pair.left) && self.sees(&pair.right)) {
+            return None;
+        }
         let (lines, mut groups) = (self.options.correlated_lines, self.options.free.groups());
         let two = pair.to_array().to_vec();
         let alone = self.linear(&two, &groups, None).ok()?.0;
         let counted = self.about(&alone, 1.0).alike(&two, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
-        let always = self.options.secondary == Secondary::Always;
         if gain < LEAST_GAIN.max(counted) && !always {
             return None;
         }
         let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m, KNOWN_CORE.0.ln()];
         let start: Vec<f64> = two.iter().copied().chain(secondary.iter().flat_map(numbers)).collect();
         groups.extend((PARAMETERS..PARAMETERS + NUMBERS).map(|place| vec![place]));
-        let settled = self.settled(start, &groups, NEAR_SIGMAS, Some(counted)).ok()?;
+        let settled = self.settled(start, &groups, NEAR, Some(counted)).ok()?;
         let p = &settled.linear.tangent.at;
         // what two vortices miss looks like noise that neighbours share: what four leave tells how many velocities count as one
         let four = self.about(&settled.linear, counted);

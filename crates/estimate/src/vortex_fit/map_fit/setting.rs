@@ -22,8 +22,6 @@ use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Parameter, RangeKernel
 const DESCENT: Stop = Stop { iterations: 200, sigmas: 1e-2, learns: false };
 /// The scale of residuals from means is taken anew this often.
 const ROUNDS: usize = 5;
-/// Most steps of Gauss and Newton.
-const STEPS: usize = 40;
 
 /// What is fitted, and to what.
 pub(crate) struct Setting<'a, 'm> {
@@ -115,12 +113,11 @@ impl Setting<'_, '_> {
         self.outcome(&squares, &p, &groups, scale)
     }
 
-    /// The fit by steps of Gauss and Newton from a start on, until the step that is left is below `near_sigmas`, with neighbours that are alike
-    /// counted once.
-    pub(crate) fn refined(&self, start: &Wake, near_sigmas: f64) -> Result<MapFit, Error> {
+    /// The fit by steps of Gauss and Newton from a start on, with neighbours that are alike counted once.
+    pub(crate) fn refined(&self, start: &Wake, stop: Stop) -> Result<MapFit, Error> {
         let groups = self.groups(start)?;
         let start = self.options.free.start(start).to_array().to_vec();
-        let settled = self.settled(start, &groups, near_sigmas, None)?;
+        let settled = self.settled(start, &groups, stop, None)?;
         let squares = self.about(&settled.linear, settled.counted);
         self.outcome(&squares, &settled.linear.tangent.at, &settled.groups, settled.linear.scale)
     }
@@ -130,13 +127,13 @@ impl Setting<'_, '_> {
         &self,
         mut p: Vec<f64>,
         all: &[Vec<usize>],
-        near_sigmas: f64,
+        stop: Stop,
         counted: Option<f64>,
     ) -> Result<Settled, Error> {
         let (mut groups, mut released) = (all.to_vec(), false);
         let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
         let mut known: Option<(Vec<f64>, Vec<Array2<f64>>)> = None;
-        let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, STEPS);
+        let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, stop.iterations);
         while steps < most {
             steps += 1;
             let kept = known.take().filter(|(at, slopes)| near(at, &p) && slopes.len() == groups.len());
@@ -154,10 +151,10 @@ impl Setting<'_, '_> {
             let product = |a: &[f64], b: &[f64]| free(a).dot(&curvature.dot(&free(b)));
             let share = averaging.part(product(&way, &last), product(&last, &last));
             sigmas_left = share * (product(&way, &way) / alike).sqrt();
-            if sigmas_left <= near_sigmas {
+            if sigmas_left <= stop.sigmas {
                 // a core that shrank on the way, as where the pair was narrow, may show where it ends
                 if groups.len() < all.len() && !released {
-                    (groups, released, most) = (all.to_vec(), true, steps + STEPS);
+                    (groups, released, most) = (all.to_vec(), true, steps + stop.iterations);
                     continue;
                 }
                 return Ok(Settled { linear, groups, counted: alike });

@@ -19,6 +19,8 @@ const TYPICAL: f64 = 0.05;
 const ROUNDS: usize = 3;
 /// Ends of rough fits that are closer lead to one.
 const ONE_SIGMAS: f64 = 1.0;
+/// Ends with a chi-square so much above the best one's weigh less than a ten thousandth beside it.
+const HOPELESS: f64 = 20.0;
 
 /// The starts about a wake: its core radii are the one that is kept, the typical one, or that and others if they are fitted. Where one vortex is far
 /// weaker than the other, a pair of equal ones is the other start.
@@ -99,9 +101,11 @@ fn apart(a: &MapFit, b: &MapFit, sigmas: f64) -> (Vec<f64>, bool) {
     (apart, same)
 }
 
-/// The wakes of those ends of rough fits that lead to different ends, the best first.
+/// The wakes of those ends of rough fits that lead to different ends, the best first, but for those that are hopeless.
 pub(crate) fn distinct(mut ends: Vec<MapFit>) -> Vec<Wake> {
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
+    let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS;
+    ends.retain(|end| chi2(end) <= hopeless);
     let mut kept: Vec<MapFit> = Vec::new();
     for end in ends {
         if !kept.iter().any(|better| apart(better, &end, ONE_SIGMAS).1) {
