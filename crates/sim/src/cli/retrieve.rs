@@ -5,8 +5,11 @@ use super::{Cli, paths};
 use crate::Error;
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
+use crate::measure::recorded::MeasuredScan;
 use crate::outputs::Outputs;
 use crate::plan::Stage;
+use crate::plan::time::scan_s;
+use crate::plan::units::seconds;
 use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, StatedEstimator, Velocities, gate_of};
 use crate::scene::{Flow, SceneFile};
 use crate::setup::progress::{Observer, Silent};
@@ -154,6 +157,10 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     words.folder.prepare(cli, |files| list(words.method, count, None, files))?;
     let mut found = Found::default();
     observer.begin(Stage::Retrieval, count as u64);
+    if matches!(words.method, Method::Fit | Method::Signals) {
+        let due_s = inputs.iter().map(|input| forecast_s(words, input, stated.is_some())).sum();
+        observer.reach(&format!("forecast: {} of one core, to a factor of three", seconds(due_s)));
+    }
     for input in inputs {
         match input {
             Scans::Maps(maps, _) => {
@@ -178,6 +185,24 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
     let note = if is_of_signals { HEIGHTS } else { "" };
     cli.say(&object, &format!("{}{note}{}", text(&found.scans), words.folder.wrote(&files)))
+}
+
+/// Time of the fits to the scans of a file on one core, s.
+fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
+    match input {
+        Scans::Maps(maps, _) => {
+            let is_shown = is_stated || words.estimator.as_deref().is_some_and(|method| method != MEANS);
+            let are_means = |scan: &ReadScan| !(is_shown || scan.is_own && words.estimator.is_none());
+            maps.iter().map(|scan| scan_s(scan.map.velocity_m_s.len() as f64, are_means(scan), 0.0)).sum()
+        }
+        Scans::Signals(signals) => {
+            let samples = if words.method == Method::Signals { signals.records.samples() } else { 0 };
+            let one = |scan: &MeasuredScan| {
+                scan_s(scan.velocity_m_s.len() as f64, false, (scan.lines.elevation_rad.len() * samples) as f64)
+            };
+            signals.scans.iter().map(one).sum()
+        }
+    }
 }
 
 /// Where the track of the scans so far says that the wake is, to start from beside the blind search.
