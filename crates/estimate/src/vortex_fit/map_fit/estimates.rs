@@ -29,8 +29,10 @@ const NEAR: Stop = Stop { iterations: 40, sigmas: 0.03, learns: false };
 /// Fits that only lead to a start may end at such a step, and fits of means for themselves.
 const ROUGH_SIGMAS: f64 = 0.1;
 const FINE_SIGMAS: f64 = 0.01;
-/// Those from one of several starts may end at such a step; what takes longer is on its way to where another start is nearer, or nowhere.
-const COARSE: Stop = Stop { iterations: 12, sigmas: 0.5, learns: false };
+/// So may those to few places, which all places correct at once.
+const COARSE: Stop = Stop { iterations: 40, sigmas: 0.5, learns: false };
+/// And those to all places from one of several starts; what takes longer is on its way to where another start is nearer, or nowhere.
+const SHORT: Stop = Stop { iterations: 12, ..COARSE };
 /// Places that tell nearly all of a map: no farther apart than this part of the radius of its regions, for starts and for slopes (half the
 /// radius for these saves a tenth of the time, but heights scatter by some per cent more), and of the width of its gates.
 const LINES_OVER_RADIUS: [f64; 2] = [0.8, 0.3];
@@ -97,8 +99,8 @@ pub fn fit_map_of_estimator(
         let starts = starts(about, options);
         // where a map cannot be thinned its own rough ends tell which starts lead to one end, and which nowhere
         let ends = match &few {
-            Some(few) => few.ends(&starts),
-            None if starts.len() > 1 => all.ends(&starts),
+            Some(few) => few.ends(&starts, COARSE),
+            None if starts.len() > 1 => all.ends(&starts, SHORT),
             None => Vec::new(),
         };
         best_of(if ends.is_empty() { &starts } else { &ends }, refine)
@@ -206,8 +208,8 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 
     /// Where the fits from some starts end that do, without those that are one.
-    fn ends(&self, starts: &[Wake]) -> Vec<Wake> {
-        let refine = |start: &Wake| self.setting().refined(start, COARSE);
+    fn ends(&self, starts: &[Wake], stop: Stop) -> Vec<Wake> {
+        let refine = |start: &Wake| self.setting().refined(start, stop);
         let end = |start: &Wake| with_typical_core(refine(start)?, &self.options, refine);
         distinct(starts.iter().filter_map(|start| end(start).ok()).collect())
     }
