@@ -8,7 +8,7 @@ use wakescope_tests::extreme::rows;
 const APART: f64 = 0.01;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let rows = rows(|_, case| !(case.long && context.profile == Profile::Quick));
+    let rows = rows(|_, case| !(case.long && context.profile != Profile::Full));
     let points = maps::measure()?;
     let origin = context.provenance_of_run();
     let mut out = Rendered::new(&stability::table(&rows), &maps::panels(&points), &origin)?;

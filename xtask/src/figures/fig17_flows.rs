@@ -84,10 +84,10 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<O
     scene.scan.elevation_step_rad = context.profile.choose(2.5e-3, 1.25e-3, 1.25e-3);
     scene.estimator.gate_step_samples = context.profile.choose(15, 5, 5);
     scene.scan.pulses_per_line = 4;
-    scene.scan.realisations = context.profile.choose(3, 16, 32);
+    scene.scan.realisations = context.profile.choose(3, 12, 32);
     (scene.outputs.flow, scene.outputs.signals) = (false, false);
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
-    let some = METHODS[..context.profile.choose(4, 5, 5)].iter().map(|(method, _)| *method).collect();
+    let some = METHODS[..context.profile.choose(4, 4, 5)].iter().map(|(method, _)| *method).collect();
     let name = |method: Method| METHODS.iter().find(|(of, _)| *of == method).map_or("", |(_, name)| *name);
     let mut rows: Vec<_> =
         retrieved(&scene, some, &sight.folder)?.into_iter().map(|row| (name(row.method), row)).collect();

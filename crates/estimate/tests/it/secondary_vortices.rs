@@ -11,22 +11,24 @@ use wakescope_estimate::{
     Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise, spectrum::unweighted_lags,
 };
 
-/// A map of peaks with noise, of a pair with these secondary vortices, fitted without and with such vortices.
-fn fits_near_the_ground(
-    shown: Option<[Vortex; 2]>,
-    seed: u64,
-    secondary: Secondary,
-) -> (MapFit, Option<(Option<MapFit>, SecondaryVortices)>) {
+/// What is made of a map of peaks with noise, from that range on, of a pair with these secondary vortices, and of its estimator.
+fn of_peaks<T>(
+    (pair, shown): (Wake, Option<[Vortex; 2]>),
+    (first_m, seed): (f64, u64),
+    make: impl FnOnce(&VelocityMap<'_>, &EstimatorResponse<'_>) -> T,
+) -> T {
     let sampling = table_2();
     let peak =
         SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
     let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
-    let (elevation_rad, range_m): (Vec<f64>, Vec<f64>) =
-        ((0..90).map(|i| 0.02 + 0.002 * f64::from(i)).collect(), (0..34).map(|i| 296.0 + 6.0 * f64::from(i)).collect());
+    let (elevation_rad, range_m): (Vec<f64>, Vec<f64>) = (
+        (0..90).map(|i| 0.02 + 0.002 * f64::from(i)).collect(),
+        (0..34).map(|i| first_m + 6.0 * f64::from(i)).collect(),
+    );
     let truth = WakeModel { secondary: shown, ..Default::default() };
-    let mut velocity_m_s = response.map(&truth, &grounded(), &elevation_rad, &range_m).unwrap();
+    let mut velocity_m_s = response.map(&truth, &pair, &elevation_rad, &range_m).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     velocity_m_s.mapv_inplace(|v| v + 0.2 * normal(&mut rng));
     let map = VelocityMap {
@@ -35,11 +37,22 @@ fn fits_near_the_ground(
         velocity_m_s: velocity_m_s.view(),
         standard_deviation_m_s: None,
     };
+    make(&map, &response)
+}
+
+/// Such a map fitted without and with secondary vortices.
+fn fits_near_the_ground(
+    shown: Option<[Vortex; 2]>,
+    seed: u64,
+    secondary: Secondary,
+) -> (MapFit, Option<(Option<MapFit>, SecondaryVortices)>) {
     let (model, options) =
         (WakeModel::default(), MapFitOptions { correlated_lines: 2, secondary, ..Default::default() });
-    let pair = fit_map_of_estimator(&map, &model, &response, &options).unwrap();
-    let four = fit_secondary_vortices(&map, &model, &response, &pair.wake, &options).unwrap();
-    (pair, four)
+    of_peaks((grounded(), shown), (296.0, seed), |map, response| {
+        let pair = fit_map_of_estimator(map, &model, response, &options).unwrap();
+        let four = fit_secondary_vortices(map, &model, response, &pair.wake, &options).unwrap();
+        (pair, four)
+    })
 }
 
 /// Vortices of which the ground has driven the left and the right one apart.
@@ -86,6 +99,23 @@ fn a_pair_alone_has_no_secondary_vortices() {
     for seed in 0..4 {
         assert!(fits_near_the_ground(None, seed, Secondary::Auto).1.is_none(), "{seed}");
     }
+}
+
+/// What is not understood beside one vortex in view may be its partner beyond the scan, though both secondary vortices are in it.
+#[test]
+fn secondary_vortices_are_sought_beside_pairs_in_view_alone() {
+    let [_, right] = secondary_of_grounded();
+    let left = Vortex { lateral_position_m: 378.0, height_m: 24.0, ..right };
+    let found = |first_m: f64, secondary: Secondary| {
+        let (model, options) =
+            (WakeModel::default(), MapFitOptions { correlated_lines: 2, secondary, ..Default::default() });
+        of_peaks((grounded(), Some([left, right])), (first_m, 0), |map, response| {
+            fit_secondary_vortices(map, &model, response, &grounded(), &options).unwrap()
+        })
+    };
+    assert!(found(296.0, Secondary::Auto).is_some_and(|(_, secondary)| secondary.shown));
+    assert!(found(356.0, Secondary::Auto).is_none());
+    assert!(found(356.0, Secondary::Always).is_some_and(|(_, secondary)| secondary.shown && secondary.fitted));
 }
 
 /// Fitted or not, the flag says what the residuals of the pair look like.

@@ -65,9 +65,10 @@ impl FlowForecast {
         let scheme = setup.settings.scheme;
         let passes = if scheme == TimeScheme::RungeKutta3 { 3.0 } else { 1.0 };
         let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
-        let start_s: f64 = dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum();
+        let pictures_s = if case.wake.is_some() && cfg!(feature = "plots") { PICTURES_S } else { 0.0 };
+        let start_s = START_S + pictures_s + dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum::<f64>();
         let cell_s = CELL_S[usize::from(setup.settings.pressure.is_multigrid(&setup.mesh))];
-        let pass_s = count(cells) * (cell_s + matrices * MATRIX_S);
+        let pass_s = PASS_S + count(cells) * (cell_s + matrices * MATRIX_S);
         Self {
             case_hash: file.hash.clone(),
             cells,
@@ -259,6 +260,10 @@ const SPREADING_PARTS: usize = 100;
 const CELL_S: [f64; 2] = [1.2e-7, 2.2e-7];
 const MATRIX_S: f64 = 1.5e-10;
 const EIGEN_S: f64 = 5e-9;
+/// What a stage takes however few its cells are, a run however few its steps, and the pictures of a wake.
+const PASS_S: f64 = 1e-4;
+const START_S: f64 = 0.02;
+const PICTURES_S: f64 = 0.1;
 
 #[cfg(test)]
 mod tests {

@@ -136,3 +136,35 @@ fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
     best.covariance /= weights;
     Some(best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vortex_fit::{PARAMETERS, Top};
+    use ndarray::Array2;
+
+    /// An end at so many errors of its first circulation from 400 m^2/s.
+    fn end(sigmas: f64, chi2: f64) -> MapFit {
+        let wake = Wake::from_array(&[400.0 + 10.0 * sigmas, 400.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.0, 0.0]);
+        MapFit {
+            wake,
+            covariance: Array2::from_diag_elem(PARAMETERS, 100.0),
+            cores_fitted: true,
+            used: 1000,
+            outliers: 0,
+            residual_scale: 1.0,
+            explained_fraction: 0.9,
+            tops: vec![Top { wake, chi2 }],
+        }
+    }
+
+    #[test]
+    fn ends_are_followed_that_differ_from_better_ones_and_are_not_hopeless() {
+        let ends = [end(6.0, 25.0), end(3.0, 19.0), end(0.5, 2.0), end(0.0, 0.0)];
+        let kept: Vec<f64> =
+            distinct(ends.to_vec()).iter().map(|wake| (wake.left.circulation_m2_s - 400.0) / 10.0).collect();
+        assert_eq!(kept, [0.0, 3.0]);
+        // alone it is followed, however large its chi-square is
+        assert_eq!(distinct(ends[..1].to_vec()).len(), 1);
+    }
+}
