@@ -1,6 +1,6 @@
 //! `cargo xtask book`: the book as pages that a server of files can give, with the documentation of the crates in its folder `api`.
 
-use crate::workspace::root;
+use crate::workspace::{built, root};
 use fixtures::failure::{Failure, Outcome};
 use std::io::ErrorKind;
 use std::path::Path;
@@ -18,7 +18,7 @@ pub(crate) fn run() -> Outcome {
     call("mdbook", &["build", "docs"])?;
     let without: Vec<&str> = NOT_FOR_OTHERS.iter().flat_map(|name| ["--exclude", *name]).collect();
     call(env!("CARGO"), &[&["doc", "--workspace", "--no-deps"], without.as_slice()].concat())?;
-    copy(&root().join("target/doc"), &root().join("target/book/api"))?;
+    copy(&built().join("doc"), &root().join("target/book/api"))?;
     println!("target/book/index.html");
     Ok(())
 }

@@ -3,7 +3,7 @@
 //! Linux only: the figures come from /proc.
 
 use crate::cost;
-use crate::workspace::root;
+use crate::workspace::{built, root};
 use fixtures::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -29,9 +29,9 @@ pub(crate) fn program(given: Option<&Path>) -> Result<PathBuf, Failure> {
         return Ok(given.canonicalize()?);
     }
     let words = ["build", "--release", "--quiet", "--package", "wakescope-sim"];
-    let built = Command::new(env!("CARGO")).args(words).current_dir(root()).status();
-    match built.map_err(|e| Failure::new(format!("cannot run cargo: {e}")))?.success() {
-        true => Ok(root().join("target/release/wakescope")),
+    let status = Command::new(env!("CARGO")).args(words).current_dir(root()).status();
+    match status.map_err(|e| Failure::new(format!("cannot run cargo: {e}")))?.success() {
+        true => Ok(built().join("release/wakescope")),
         false => Err(Failure::new("wakescope does not build".into())),
     }
 }

@@ -5,7 +5,7 @@
 pub(crate) enum Profile {
     /// Minutes: every component, coarse meshes and small samples; most bars of flows are then wider.
     Quick,
-    /// An hour or two: what the documentation shows.
+    /// Some twenty minutes of two cores: what the documentation shows.
     Standard,
     /// The chapter's own numbers, and the turbulent channel.
     Full,

@@ -4,7 +4,7 @@
 //! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
 
 use crate::process::watch;
-use crate::workspace::root;
+use crate::workspace::{built, root};
 use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -54,15 +54,15 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     // As one of the workspace, with the features that its other crates ask for.
     let example: &[&str] = if options.measure { &["--example", "exchange_times"] } else { &[] };
-    let built = Command::new(env!("CARGO"))
+    let status = Command::new(env!("CARGO"))
         .args(["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi", "--bin", "wakescope"])
         .args(example)
         .current_dir(root())
         .status()?;
-    if !built.success() {
+    if !status.success() {
         return Err(Failure::new("wakescope does not build with the feature `mpi`".into()));
     }
-    let program = root().join("target/debug/wakescope");
+    let program = built().join("debug/wakescope");
     let scratch = root().join("target/ranks");
     let _ = std::fs::remove_dir_all(&scratch);
     std::fs::create_dir_all(&scratch)?;
@@ -81,7 +81,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         return Ok(());
     }
     let work_s = measure(&program, &scratch)?;
-    exchanges(&root().join("target/debug/examples/exchange_times"), work_s)
+    exchanges(&built().join("debug/examples/exchange_times"), work_s)
 }
 
 /// Prints how much less time steps take on two ranks of one thread than on one, and what they spend in turns and halos. A

@@ -16,6 +16,11 @@ pub(crate) fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()
 }
 
+/// The folder of what cargo builds.
+pub(crate) fn built() -> PathBuf {
+    root().join(std::env::var_os("CARGO_TARGET_DIR").unwrap_or("target".into()))
+}
+
 /// The text of a file, by its path from the root.
 pub(crate) fn read(file: &str) -> Result<String, Failure> {
     std::fs::read_to_string(root().join(file)).map_err(|e| Failure::new(format!("cannot read {file}: {e}")))

@@ -149,6 +149,11 @@ fn forecast_of_a_quadrature_grows_no_faster_than_the_fresnel_number() {
     // Ten times the Fresnel number, ten times the nodes: not a hundred times the time.
     let at = |range_m| theory::quadrature_cost_s(&Telescope::table2(), 0, range_m);
     assert!(at(1.0) / at(10.0) < 11.0 && at(1.0) > at(10.0) && at(10.0) > at(1000.0));
+    // An obscured aperture has more pieces, and the more the larger its obscuration is.
+    let obscured = |radius_m| {
+        theory::quadrature_cost_s(&Telescope { obscuration_radius_m: radius_m, ..Telescope::table2() }, 0, 100.0)
+    };
+    assert!(obscured(0.02) > obscured(0.01) && obscured(0.01) > 2.0 * at(100.0));
     let far = theory::fresnel_number(&Telescope::table2(), 1000.0);
     assert!((far - 2.5e-3 / (1000.0 * 1.55e-6)).abs() < 1e-12);
 }
