@@ -79,7 +79,8 @@ impl Setting<'_, '_> {
         }
         let always = self.options.secondary == Secondary::Always;
         // what is not understood of one vortex in view may be its partner beyond the scan
-        if !always && !(self.sees(&pair.left) && self.sees(&pair.right)) {
+        let are_seen = self.sees(&pair.left) && self.sees(&pair.right);
+        if !are_seen && !always {
             return None;
         }
         let (lines, mut groups) = (self.options.correlated_lines, self.options.free.groups());
