@@ -30,7 +30,7 @@ fn free() -> FreeParameters {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     // Eight scans decide the claims on maps; of gates every 8 samples, which overlap, every third is taken in quick. Fits of signals
     // take longest: the few that quick could make decide no claim on their scatter.
-    let (scans, of_signals, every) = context.profile.choose((BATCHES, 0, 24), (48, 24, 8), (100, 100, 8));
+    let (scans, of_signals, every) = context.profile.choose((BATCHES, 0, 24), (48, 12, 8), (100, 100, 8));
     let levels_db = context.profile.choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
     let mut fits = Vec::new();
     let mut bounds = Vec::new();

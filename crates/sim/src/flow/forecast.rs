@@ -41,8 +41,10 @@ pub struct FlowForecast {
     pub step_s: f64,
     /// Steps to the end, or to the pause.
     pub steps: f64,
-    /// Computing time on one core \[s\].
+    /// Computing time of the flow on one core \[s\].
     pub core_s: f64,
+    /// Of the program beside it, once: its start, and the pictures of a wake \[s\].
+    pub program_s: f64,
     /// Memory held at once \[bytes\].
     pub memory_bytes: f64,
     /// Ranks that share the run.
@@ -66,9 +68,9 @@ impl FlowForecast {
         let passes = if scheme == TimeScheme::RungeKutta3 { 3.0 } else { 1.0 };
         let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
         let pictures_s = if case.wake.is_some() && cfg!(feature = "plots") { PICTURES_S } else { 0.0 };
-        let start_s = START_S + pictures_s + dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum::<f64>();
+        let eigen_s: f64 = dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum();
         let cell_s = CELL_S[usize::from(setup.settings.pressure.is_multigrid(&setup.mesh))];
-        let pass_s = PASS_S + count(cells) * (cell_s + matrices * MATRIX_S);
+        let pass_s = count(cells) * (cell_s + matrices * MATRIX_S);
         Self {
             case_hash: file.hash.clone(),
             cells,
@@ -86,7 +88,8 @@ impl FlowForecast {
             end_tau: plan.end_s * setup.tau_per_s,
             step_s,
             steps,
-            core_s: start_s + (steps * passes + 2.0) * pass_s,
+            core_s: eigen_s + (steps * passes + 2.0) * pass_s,
+            program_s: START_S + pictures_s,
             memory_bytes: memory_bytes(case, [cells; 2], &dense),
             ranks: setup.settings.ranks.count(),
             rank_bytes: rank_bytes(case, setup, &dense),
@@ -115,7 +118,7 @@ impl fmt::Display for FlowForecast {
             let (courant, damped) = (self.courant, self.damped_courant);
             writeln!(f, "  courant  {courant:.3}, all waves of the mesh decay up to {damped:.3}")?;
         }
-        writeln!(f, "  time     about {} on one core", seconds(self.core_s))?;
+        writeln!(f, "  time     about {} on one core", seconds(self.core_s + self.program_s))?;
         let available = machine::available_memory_bytes().map_or(String::new(), |b| format!(" of {}", bytes(b)));
         writeln!(f, "  memory   about {}{available}", bytes(self.memory_bytes))?;
         if self.ranks > 1 {
@@ -260,8 +263,7 @@ const SPREADING_PARTS: usize = 100;
 const CELL_S: [f64; 2] = [1.2e-7, 2.2e-7];
 const MATRIX_S: f64 = 1.5e-10;
 const EIGEN_S: f64 = 5e-9;
-/// What a stage takes however few its cells are, a run however few its steps, and the pictures of a wake.
-const PASS_S: f64 = 1e-4;
+// What a run takes however few its cells and steps are, and the pictures of a wake.
 const START_S: f64 = 0.02;
 const PICTURES_S: f64 = 0.1;
 
