@@ -5,7 +5,7 @@
 pub(crate) enum Profile {
     /// Minutes: every component, coarse meshes and small samples; most bars of flows are then wider.
     Quick,
-    /// Some twenty minutes of two cores: what the documentation shows.
+    /// Tens of minutes: finer meshes and more samples.
     Standard,
     /// The chapter's own numbers, and the turbulent channel.
     Full,

@@ -198,7 +198,7 @@ fn claims(fits: &[Fits], [known_m2_s, fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
         at_most("F17d", 2.0, " m²/s", Estimate { value: bias.value.abs(), ..bias }),
     ];
     let tried = !known.is_empty();
-    let longest = "profile standard, which fits signals";
+    let longest = "profile full, which fits the signals of 100 scans";
     claims.extend(of_signals.map(|claim| if tried { claim } else { claim.open(longest) }));
     claims
 }

@@ -78,17 +78,8 @@ fn fit_s(n: &Sizes) -> f64 {
 }
 
 /// Of a fit to what an estimator shows, for each velocity of the map; of one to signals, for each sample.
-const FIT_S: f64 = 2e-4;
-const SIGNAL_FIT_S: f64 = 3e-4;
-/// Velocities of means that a fit looks at: of more, some.
-const MOST: f64 = 8000.0;
-
-/// Time of the fits to one scan with so many velocities, which are means or what an estimator shows, and so many samples of signals if they are
-/// fitted, on one core, s. Good to a factor of three: scans without a wake take less.
-pub(crate) fn scan_s(velocities: f64, are_means: bool, samples: f64) -> f64 {
-    let of_means_s = 0.25 + 0.5 * (velocities / MOST).min(1.0) + 4e-6 * velocities;
-    of_means_s + if are_means { 0.0 } else { FIT_S * velocities } + SIGNAL_FIT_S * samples
-}
+pub(crate) const FIT_S: f64 = 2e-4;
+pub(crate) const SIGNAL_FIT_S: f64 = 3e-4;
 
 /// Vortices of every realisation, and the test for a wake, if the scene asks for them.
 fn retrieval_s(scene: &Scene, n: &Sizes, record_s: f64) -> f64 {
