@@ -271,7 +271,11 @@ impl Stage {
 
 impl Drop for Stage {
     fn drop(&mut self) {
-        drop(fs::remove_dir_all(&self.root));
+        // The lock goes last: without it a stage that is not empty is nobody's to sweep.
+        let goes = |part: &Path| fs::remove_dir_all(part).is_ok() || part.symlink_metadata().is_err();
+        if goes(&self.new) && goes(&self.old) {
+            drop(fs::remove_dir_all(&self.root));
+        }
     }
 }
 
@@ -399,6 +403,21 @@ mod tests {
         assert_eq!(fs::read_to_string(&path).unwrap(), "second");
         assert!(write_atomic(&temp.path().join("none/one.csv"), "x").is_err());
         assert_eq!(listing(temp.path()), ["one.csv"]);
+    }
+
+    #[test]
+    fn a_stage_that_is_going_keeps_its_lock_to_the_end_so_that_a_kill_then_leaves_what_is_swept() {
+        let temp = tempfile::tempdir().unwrap();
+        let stage = Stage::make(temp.path()).unwrap();
+        let (root, old) = (stage.root.clone(), stage.old.clone());
+        fs::remove_dir(&old).unwrap();
+        // What stops the removing, as a kill would.
+        fs::write(&old, "").unwrap();
+        drop(stage);
+        assert_eq!(listing(&root), ["lock", "old"]);
+        fs::remove_file(&old).unwrap();
+        sweep_stages(temp.path());
+        assert!(listing(temp.path()).is_empty());
     }
 
     #[test]
