@@ -121,6 +121,8 @@ pub enum Flag {
     NearGround,
     /// The scan shows secondary vortices beside the pair; whether they were fitted is in the options.
     SecondaryVortices,
+    /// Circulations are from what is near each vortex, in a wind of its own: the pair does not explain the scan.
+    LocalCirculation,
     /// The vortices were taken as standing still although the scan lasted, or its times are unknown.
     MotionIgnored,
     /// Another wake is within 9 of the least chi-square.
@@ -148,6 +150,7 @@ impl Flag {
             Self::AtEdge => "at_edge",
             Self::NearGround => "near_ground",
             Self::SecondaryVortices => "secondary_vortices",
+            Self::LocalCirculation => "local_circulation",
             Self::MotionIgnored => "motion_ignored",
             Self::Ambiguous => "ambiguous",
             Self::PoorFit => "poor_fit",

@@ -3,7 +3,7 @@
 //! | module | content |
 //! |---|---|
 //! | `wake` | `pair`: the vortices with their images and the wind, derivatives; `motion`; `free_parameters`: which a fit may change; `core_prior`: what is known before; `range_kernel`, `wake_map`: what a range gate and a region see in the mean; `pulse` |
-//! | `map_fit` | `data`, `cells`: the map; `prediction`: what is expected of it, by `gates` at rest or in motion or by an estimator (`estimator_response`); `least_squares`: what is minimised and what is known at the minimum; `residual_covariance`; `setting`: both ways to the minimum; `guess`, `starts`, `estimates`: fits of our own maps; `secondary`: four vortices |
+//! | `map_fit` | `data`, `cells`: the map; `prediction`: what is expected of it, by `gates` at rest or in motion or by an estimator (`estimator_response`); `least_squares`: what is minimised and what is known at the minimum; `residual_covariance`; `setting`: both ways to the minimum; `guess`, `starts`, `estimates`: fits of our own maps; `secondary`: four vortices; `local_circulation`: what is near each vortex |
 //! | `signal_fit` | `baseband`, `scan_model`: signals at the rate of the detector band, lines cut into layers; `line_covariance`, `banded_cholesky`, `likelihood`: covariance of a line, its factor and derivatives, Fisher information; `fit`, `ascent`, `tops`: the fit and the tops of its likelihood |
 //! | `top` | the ends of fits from several starts |
 //! | `damped_newton` | the iteration of Levenberg and Marquardt that both fits share |
@@ -40,7 +40,9 @@ pub(crate) mod top;
 pub(crate) mod wake;
 
 pub use map_fit::data::{Loss, MapFit, MapFitOptions, Secondary, VelocityMap};
-pub use map_fit::estimates::{fit_map, fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator};
+pub use map_fit::estimates::{
+    fit_map, fit_map_of_estimator, fit_secondary_vortices, refine_map_fit_of_estimator, with_local_circulations,
+};
 pub use map_fit::estimator_response::EstimatorResponse;
 pub use map_fit::secondary::SecondaryVortices;
 pub use signal_fit::baseband::Baseband;

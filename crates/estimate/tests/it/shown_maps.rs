@@ -130,6 +130,56 @@ fn cores_that_shrink_on_the_way_are_fitted_where_it_ends() {
     }
 }
 
+/// Winds that blow the vortices together, as secondary vortices above them do: a pair in one wind does not explain them.
+#[test]
+fn circulations_are_those_near_the_vortices_where_a_pair_does_not_explain_the_map() {
+    let truth = |wind| Wake::from_array(&[440.0, 440.0, 355.0, 45.0, 445.0, 45.0, 3.0, 3.0, wind, 0.0]);
+    let same = |map: &VelocityMap<'_>| map.velocity_m_s.to_owned();
+    let (left, right) =
+        (fitted(&truth(0.7), |r| r, |map, _| same(map)), fitted(&truth(-0.7), |r| r, |map, _| same(map)));
+    let (elevation_rad, range_m) = axes();
+    let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(3);
+    let mut fit = |of: &dyn Fn([usize; 2]) -> f64| {
+        let size = (elevation_rad.len(), range_m.len());
+        let velocity_m_s = Array2::from_shape_fn(size, |(line, gate)| of([line, gate]) + 0.15 * normal(&mut rng));
+        let map = VelocityMap {
+            elevation_rad: &elevation_rad,
+            range_m: &range_m,
+            velocity_m_s: velocity_m_s.view(),
+            standard_deviation_m_s: None,
+        };
+        let (model, options) = (WakeModel::default(), MapFitOptions { correlated_lines: 2, ..Default::default() });
+        fitted(
+            &truth(0.0),
+            |r| r,
+            |_, shown| {
+                let pair = refine_map_fit_of_estimator(&map, &model, shown, &truth(0.0), &options).unwrap();
+                let local = with_local_circulations(&map, &model, shown, &pair, &options).unwrap();
+                // a vortex that is not in the scan has nothing near it
+                let elsewhere = MapFit {
+                    wake: Wake::from_array(&[440.0, 440.0, -90.0, 45.0, 990.0, 45.0, 3.0, 3.0, 0.0, 0.0]),
+                    ..pair.clone()
+                };
+                assert!(with_local_circulations(&map, &model, shown, &elsewhere, &options).unwrap().is_none());
+                (pair, local)
+            },
+        )
+    };
+    let (_, local) = fit(&|at| left[at]);
+    assert!(local.is_none(), "{local:?}");
+    let (pair, local) = fit(&|at| if range_m[at[1]] < 400.0 { left[at] } else { right[at] });
+    let local = local.unwrap();
+    let errors = |fit: &MapFit| {
+        [Parameter::LeftCirculation, Parameter::RightCirculation]
+            .map(|of| fit.wake.to_array()[of as usize] / 440.0 - 1.0)
+    };
+    assert!(errors(&local).iter().all(|error| error.abs() < 0.07), "{local:?}");
+    assert!(errors(&pair)[0] < -0.15, "{pair:?}");
+    for of in [Parameter::LeftCirculation, Parameter::RightCirculation] {
+        assert!(local.covariance[[of as usize; 2]] >= pair.covariance[[of as usize; 2]]);
+    }
+}
+
 /// One vortex has no spacing, and nothing is known of its core but what the map shows.
 #[test]
 fn one_vortex_alone_is_fitted_with_its_core() {

@@ -18,7 +18,7 @@ use wakescope_estimate::retrieval::{
 };
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, MapFit, MapFitOptions, Parameter, SignalFit, SignalFitOptions, VelocityMap, Wake,
-    fit_map_of_estimator, fit_secondary_vortices, fit_signals, refine_map_fit_of_estimator,
+    fit_map_of_estimator, fit_secondary_vortices, fit_signals, refine_map_fit_of_estimator, with_local_circulations,
 };
 use wakescope_estimate::window::Sample;
 
@@ -145,15 +145,19 @@ impl Fits<'_> {
     fn pair(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
         let mut options = self.options.clone();
         let (mut fit, moves) = self.best(None)?;
-        let (model, shown) = (&options.model, self.shown(moves));
-        let four = fit_secondary_vortices(&self.view, model, shown, &fit.wake, &self.map_options).ok().flatten();
+        let shown = self.shown(moves);
+        let four =
+            fit_secondary_vortices(&self.view, &options.model, shown, &fit.wake, &self.map_options).ok().flatten();
         let are_shown = four.as_ref().is_some_and(|(_, secondary)| secondary.shown);
         if let Some((Some(with_secondary), secondary)) = four {
             fit = with_secondary;
             options.model.secondary = Some(secondary.vortices);
         }
-        let mut result = of_fit(found, self.scan, &options, &fit, moves);
+        let local = with_local_circulations(&self.view, &options.model, shown, &fit, &self.map_options).ok().flatten();
+        let are_local = local.is_some();
+        let mut result = of_fit(found, self.scan, &options, &local.unwrap_or(fit), moves);
         set(&mut result.flags, Flag::SecondaryVortices, are_shown);
+        set(&mut result.flags, Flag::LocalCirculation, are_local);
         Some((result, options))
     }
 

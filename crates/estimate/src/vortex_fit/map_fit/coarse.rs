@@ -3,7 +3,7 @@
 //! Neighbouring places of a map see much the same air, so some of them tell nearly all, and what varies no faster than they do is
 //! known everywhere from there, linear between. Check: planes are linear between places; holes; what is too small stays whole.
 
-use ndarray::{Array2, Axis};
+use ndarray::{Array2, ArrayView2, Axis};
 
 use crate::vortex_fit::VelocityMap;
 
@@ -27,19 +27,36 @@ impl Coarse {
     pub(crate) fn of(map: &VelocityMap<'_>, line_m: f64, gate_m: f64) -> Option<Self> {
         let (line_step, lines) = every(map.elevation_rad.len(), line_m / map.line_spacing_m());
         let (gate_step, gates) = every(map.range_m.len(), gate_m / map.gate_spacing_m());
-        let some = |all: &Array2<f64>| all.select(Axis(0), &lines).select(Axis(1), &gates);
-        let velocity_m_s = some(&map.velocity_m_s.to_owned());
-        let standard_deviation_m_s = map.standard_deviation_m_s.map(|deviation| some(&deviation.to_owned()));
-        let found = velocity_m_s.iter().filter(|v| v.is_finite()).count();
-        (line_step * gate_step > 1 && found >= NEEDED).then(|| Self {
+        let some = Self::at(map, lines, gates, line_step);
+        let found = some.velocity_m_s.iter().filter(|v| v.is_finite()).count();
+        (line_step * gate_step > 1 && found >= NEEDED).then_some(some)
+    }
+
+    /// Those of which `is_near` says so of line and gate; of the lines and gates in which one is.
+    pub(crate) fn near(map: &VelocityMap<'_>, is_near: impl Fn(usize, usize) -> bool) -> Self {
+        let (all_lines, all_gates) = map.velocity_m_s.dim();
+        let lines: Vec<usize> = (0..all_lines).filter(|line| (0..all_gates).any(|gate| is_near(*line, gate))).collect();
+        let gates: Vec<usize> = (0..all_gates).filter(|gate| (0..all_lines).any(|line| is_near(line, *gate))).collect();
+        let mut near = Self::at(map, lines, gates, 1);
+        for ((line, gate), velocity_m_s) in near.velocity_m_s.indexed_iter_mut() {
+            if !is_near(near.lines[line], near.gates[gate]) {
+                *velocity_m_s = f64::NAN;
+            }
+        }
+        near
+    }
+
+    fn at(map: &VelocityMap<'_>, lines: Vec<usize>, gates: Vec<usize>, line_step: usize) -> Self {
+        let some = |all: ArrayView2<'_, f64>| all.select(Axis(0), &lines).select(Axis(1), &gates);
+        Self {
             elevation_rad: lines.iter().map(|&line| map.elevation_rad[line]).collect(),
             range_m: gates.iter().map(|&gate| map.range_m[gate]).collect(),
-            velocity_m_s,
-            standard_deviation_m_s,
+            velocity_m_s: some(map.velocity_m_s),
+            standard_deviation_m_s: map.standard_deviation_m_s.map(some),
             line_step,
             lines,
             gates,
-        })
+        }
     }
 
     /// The map there.

@@ -13,6 +13,7 @@ use crate::vortex_fit::map_fit::coarse::Coarse;
 use crate::vortex_fit::map_fit::estimator_response::Prepared;
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::first_guess;
+use crate::vortex_fit::map_fit::local_circulation::{REACH_M, joined};
 use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::map_fit::starts::{best_of, distinct, starts, with_typical_core};
@@ -85,7 +86,7 @@ pub fn fit_map_of_estimator(
     let all = Shown::new(map, model, response, options, 1.0)?;
     let guess = first_guess(map, model, &all.kernel)?;
     let coarse = all.coarse(response, LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options)).transpose()?;
+    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options, COARSER_NODES)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
     let rough = MapFitOptions { free: FreeParameters { core_radius: Sharing::Fixed, ..options.free }, ..*options };
     let by_means = match &few {
@@ -147,7 +148,7 @@ pub fn fit_secondary_vortices(
     pair.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
     let coarse = all.coarse(response, LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options)).transpose()?;
+    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options, COARSER_NODES)).transpose()?;
     let found = match &few {
         Some(few) => few.setting().with_secondary(pair),
         None => all.setting().with_secondary(pair),
@@ -159,6 +160,32 @@ pub fn fit_secondary_vortices(
     let model = WakeModel { secondary: Some(found.secondary.vortices), ..*model };
     let fit = refine_map_fit_of_estimator(map, &model, response, &found.wake, options)?;
     Ok(Some((Some(MapFit { covariance: found.covariance, ..fit }), found.secondary)))
+}
+
+/// The same pair with the circulation of each vortex from what is near it, in a wind of its own, where that explains the map clearly better: what
+/// else is in the air than a pair then weighs less.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::OutOfRange`] for impossible input.
+pub fn with_local_circulations(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    response: &EstimatorResponse<'_>,
+    pair: &MapFit,
+    options: &MapFitOptions,
+) -> Result<Option<MapFit>, Error> {
+    map.validate()?;
+    pair.wake.validate()?;
+    let vortices = [pair.wake.left, pair.wake.right];
+    let local = [0, 1].map(|side| {
+        let near = Coarse::near(map, |line, gate| {
+            let (y_m, z_m) = model.position_m(map.range_m[gate], map.elevation_rad[line]);
+            (y_m - vortices[side].lateral_position_m).hypot(z_m - vortices[side].height_m) < REACH_M
+        });
+        let shown = near.shown(model, response, options, 1.0).ok()?;
+        shown.setting().local_circulation(&pair.wake, side, NEAR)
+    });
+    Ok(joined(pair, &local))
 }
 
 /// A map, and what an estimator shows at its places.
@@ -198,7 +225,8 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     /// The same with slopes at some places.
     fn with_slopes_at(self, places: Option<&'a Coarse>, response: &'a EstimatorResponse<'a>) -> Result<Self, Error> {
         let model = self.prepared.model;
-        let slopes_at = places.map(|coarse| Ok((coarse, coarse.shown(model, response, &self.options)?.prepared)));
+        let slopes_at =
+            places.map(|coarse| Ok((coarse, coarse.shown(model, response, &self.options, COARSER_NODES)?.prepared)));
         Ok(Self { slopes_at: slopes_at.transpose()?, ..self })
     }
 
@@ -222,10 +250,11 @@ impl Coarse {
         model: &'a WakeModel,
         response: &'a EstimatorResponse<'a>,
         options: &MapFitOptions,
+        coarser: f64,
     ) -> Result<Shown<'a, 'a>, Error> {
         let correlated_lines = options.correlated_lines.div_ceil(self.line_step());
         let options = MapFitOptions { correlated_lines, ..*options };
-        Shown::new(&self.map(), model, response, &options, COARSER_NODES)
+        Shown::new(&self.map(), model, response, &options, coarser)
     }
 }
 

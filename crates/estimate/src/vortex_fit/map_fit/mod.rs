@@ -8,6 +8,7 @@ pub(crate) mod estimator_response;
 pub(crate) mod gates;
 pub(crate) mod guess;
 pub(crate) mod least_squares;
+pub(crate) mod local_circulation;
 pub(crate) mod prediction;
 pub(crate) mod residual_covariance;
 pub(crate) mod secondary;
