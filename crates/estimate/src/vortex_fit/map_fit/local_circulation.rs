@@ -55,10 +55,12 @@ impl Setting<'_, '_> {
     }
 }
 
-/// The pair with such circulations, if both together explain enough more. Their variances are no smaller than those of the pair, whose other numbers
-/// and correlations stay.
-pub(crate) fn joined(pair: &MapFit, local: &[Option<Local>; 2]) -> Option<MapFit> {
-    if local.iter().flatten().map(|local| local.gain).sum::<f64>() < LEAST_GAIN {
+/// The pair with such circulations, if both together explain enough more, or secondary vortices say already that the air is no pair's. Their
+/// variances are no smaller than those of the pair, whose other numbers and correlations stay.
+pub(crate) fn joined(pair: &MapFit, local: &[Option<Local>; 2], has_secondary: bool) -> Option<MapFit> {
+    let least = if has_secondary { 0.0 } else { LEAST_GAIN };
+    let gain = local.iter().flatten().map(|local| local.gain).reduce(|a, b| a + b)?;
+    if gain < least {
         return None;
     }
     let (mut p, mut covariance) = (pair.wake.to_array(), pair.covariance.clone());
