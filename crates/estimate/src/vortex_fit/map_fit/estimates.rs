@@ -185,7 +185,7 @@ pub fn with_local_circulations(
         let shown = near.shown(model, response, options, 1.0).ok()?;
         shown.setting().local_circulation(&pair.wake, side, NEAR)
     });
-    Ok(joined(pair, &local, model.secondary.is_some()))
+    Ok(joined(pair, &local))
 }
 
 /// A map, and what an estimator shows at its places.

@@ -14,7 +14,7 @@ use crate::vortex_fit::{MapFit, Parameter, Sharing, Wake};
 /// How far what is near a vortex reaches: the circle of 15 m over which circulations are averaged, and some more \[m\].
 pub(crate) const REACH_M: f64 = 20.0;
 /// Least gain of the logarithm of the likelihood by both vortices, with velocities that say the same counted once, for four numbers more: of 80 maps
-/// of a pair alone four reach it, of 56 of simulated wakes past their lowest point 31.
+/// of a pair alone four reach it, of 56 of simulated wakes past their lowest point 29.
 const LEAST_GAIN: f64 = 6.0;
 const CIRCULATIONS: [Parameter; 2] = [Parameter::LeftCirculation, Parameter::RightCirculation];
 
@@ -27,7 +27,8 @@ pub(crate) struct Local {
 }
 
 impl Setting<'_, '_> {
-    /// That of one vortex from this map, which holds what is near it alone; nothing where that is too little, or the fit comes to no end.
+    /// That of one vortex from this map, which holds what is near it alone; nothing where that is too little, turns
+    /// the other way round, or the fit comes to no end.
     pub(crate) fn local_circulation(&self, pair: &Wake, side: usize, stop: Stop) -> Option<Local> {
         if self.options.free.circulation != Sharing::Separate {
             return None;
@@ -39,7 +40,7 @@ impl Setting<'_, '_> {
         let (best, alone) = (&settled.linear, self.linear(&start, &groups, None).ok()?.0);
         let is_seen = |cell: &&Cell| alone.tangent.here.velocity_m_s[[cell.line, cell.gate]].is_finite();
         let cells: Vec<Cell> = best.cells.iter().filter(is_seen).cloned().collect();
-        if cells.len() < 10 * groups.len() {
+        if cells.len() < 10 * groups.len() || best.tangent.at[own] <= 0.0 {
             return None;
         }
         let of = |linear: &Linear| {
@@ -55,12 +56,10 @@ impl Setting<'_, '_> {
     }
 }
 
-/// The pair with such circulations, if both together explain enough more, or secondary vortices say already that the air is no pair's. Their
-/// variances are no smaller than those of the pair, whose other numbers and correlations stay.
-pub(crate) fn joined(pair: &MapFit, local: &[Option<Local>; 2], has_secondary: bool) -> Option<MapFit> {
-    let least = if has_secondary { 0.0 } else { LEAST_GAIN };
-    let gain = local.iter().flatten().map(|local| local.gain).reduce(|a, b| a + b)?;
-    if gain < least {
+/// The pair with such circulations, if both together explain enough more. Their variances are no smaller than those of the pair, whose other numbers
+/// and correlations stay.
+pub(crate) fn joined(pair: &MapFit, local: &[Option<Local>; 2]) -> Option<MapFit> {
+    if local.iter().flatten().map(|local| local.gain).sum::<f64>() < LEAST_GAIN {
         return None;
     }
     let (mut p, mut covariance) = (pair.wake.to_array(), pair.covariance.clone());

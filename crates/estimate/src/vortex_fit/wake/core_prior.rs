@@ -30,29 +30,18 @@ impl CorePrior {
     }
 
     /// For each free number that moves core radii: how many deviations the core is away, and the derivatives of that by all
-    /// free numbers. Nothing for one vortex, which has no spacing. The spacing is that before the ground drove the pair apart: on their paths, 1/y^2 +
-    /// 1/z^2 = 4/b^2 about the middle (Lamb 1932, section 155), vortices are never nearer to the ground than half of it.
+    /// free numbers. Nothing for one vortex, which has no spacing.
     pub(crate) fn terms(&self, wake: &Wake, groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
         if !wake.is_pair() {
             return Vec::new();
         }
         let (p, spacing_m) = (wake.to_array(), wake.spacing_m());
         let term = |place: usize| {
-            let own =
-                if place == Parameter::LeftCore as usize { Parameter::LeftHeight } else { Parameter::RightHeight };
-            let height_m = p[own as usize];
+            let away = (p[place] / (self.median_ratio * spacing_m)).ln() / self.log_deviation;
             let mut all = [0.0; PARAMETERS];
             all[place] = (self.log_deviation * p[place]).recip();
-            let is_driven_apart = height_m > 0.0 && 2.0 * height_m < spacing_m;
-            let first_m = if is_driven_apart {
-                all[own as usize] = -(self.log_deviation * height_m).recip();
-                2.0 * height_m
-            } else {
-                all[Parameter::LeftLateral as usize] = (self.log_deviation * spacing_m).recip();
-                all[Parameter::RightLateral as usize] = -all[Parameter::LeftLateral as usize];
-                spacing_m
-            };
-            let away = (p[place] / (self.median_ratio * first_m)).ln() / self.log_deviation;
+            all[Parameter::LeftLateral as usize] = (self.log_deviation * spacing_m).recip();
+            all[Parameter::RightLateral as usize] = -all[Parameter::LeftLateral as usize];
             let mut slope = vec![0.0; groups.len()];
             gathered(groups, &all, &mut slope);
             (away, slope)
@@ -129,28 +118,23 @@ mod tests {
     #[test]
     fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {
         let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02]);
-        // driven apart by the ground: the first spacing was twice the height at most
-        let apart = Wake::from_array(&[480.0, 520.0, 336.5, 30.0, 463.5, 30.0, 2.0, 2.0, 1.3, 0.02]);
-        for (wake, first_m) in [(wake, 47.0), (apart, 60.0)] {
-            for core_radius in [Sharing::Common, Sharing::Separate] {
-                let groups = FreeParameters { core_radius, ..Default::default() }.groups();
-                let terms = CorePrior::TYPICAL.terms(&wake, &groups);
-                assert_eq!(terms.len(), if core_radius == Sharing::Common { 1 } else { 2 });
-                for (index, (away, slope)) in terms.iter().enumerate() {
-                    assert!((away - (2.0 / first_m / 0.045_f64).ln() / 0.5).abs() < 1e-12);
-                    for (number, slope) in slope.iter().enumerate() {
-                        let at = |by: f64| {
-                            let step: Vec<f64> =
-                                (0..groups.len()).map(|i| if i == number { by } else { 0.0 }).collect();
-                            let p = stepped(&groups, &wake.to_array(), &step);
-                            CorePrior::TYPICAL.terms(&Wake::from_list(&p), &groups)[index].0
-                        };
-                        assert!((slope - (at(1e-4) - at(-1e-4)) / 2e-4).abs() < 1e-7, "{number}");
-                    }
+        for core_radius in [Sharing::Common, Sharing::Separate] {
+            let groups = FreeParameters { core_radius, ..Default::default() }.groups();
+            let terms = CorePrior::TYPICAL.terms(&wake, &groups);
+            assert_eq!(terms.len(), if core_radius == Sharing::Common { 1 } else { 2 });
+            for (index, (away, slope)) in terms.iter().enumerate() {
+                assert!((away - (2.0 / 47.0 / 0.045_f64).ln() / 0.5).abs() < 1e-12);
+                for (number, slope) in slope.iter().enumerate() {
+                    let at = |by: f64| {
+                        let step: Vec<f64> = (0..groups.len()).map(|i| if i == number { by } else { 0.0 }).collect();
+                        CorePrior::TYPICAL.terms(&Wake::from_list(&stepped(&groups, &wake.to_array(), &step)), &groups)
+                            [index]
+                            .0
+                    };
+                    assert!((slope - (at(1e-4) - at(-1e-4)) / 2e-4).abs() < 1e-7, "{number}");
                 }
             }
         }
-        let wake = apart;
         let fixed = FreeParameters { core_radius: Sharing::Fixed, ..Default::default() }.groups();
         assert!(CorePrior::TYPICAL.terms(&wake, &fixed).is_empty());
     }
