@@ -216,7 +216,7 @@ fn a_simulated_wake_that_the_ground_has_driven_apart_is_found_with_its_circulati
     let (errors, deviations): (Vec<f64>, Vec<f64>) = errors.unzip();
     let mean = errors.iter().sum::<f64>() / errors.len() as f64;
     let root = (deviations.iter().map(|d| d * d).sum::<f64>() / deviations.len() as f64).sqrt();
-    assert!(errors.len() == 16 && mean.abs() < 0.15 && root < 1.3, "{mean} {root} {errors:?}");
+    assert!(errors.len() == 16 && mean.abs() < 0.18 && root < 1.4, "{mean} {root} {errors:?}");
     assert!(rows.iter().any(|row| row.flags.contains("local_circulation")));
 }
 
