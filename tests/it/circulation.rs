@@ -187,10 +187,6 @@ fn likelihood_fit_after_the_map_is_within_its_error_of_the_truth() {
     assert!(fit.powers.log_signal.abs() < 0.1 && fit.powers.log_noise.abs() < 0.05, "{:?}", fit.powers);
 }
 
-/// Standard deviation and bias of the likelihood fit over scans. `FIRST`, `SCANS`, `SNR_DB` and `FREE_CORE` in the environment
-/// change the first scan (1) and the last (24), the signal-to-noise ratio (0) and free the core radii.
-///
-/// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 /// The pair alone, fitted to all of the map, finds a quarter too little.
 #[test]
 fn a_simulated_wake_that_the_ground_has_driven_apart_is_found_with_its_circulation() {
@@ -220,6 +216,10 @@ fn a_simulated_wake_that_the_ground_has_driven_apart_is_found_with_its_circulati
     assert!(rows.iter().any(|row| row.flags.contains("local_circulation")));
 }
 
+/// Standard deviation and bias of the likelihood fit over scans. `FIRST`, `SCANS`, `SNR_DB` and `FREE_CORE` in the environment
+/// change the first scan (1) and the last (24), the signal-to-noise ratio (0) and free the core radii.
+///
+/// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_over_many_scans`
 #[test]
 #[ignore = "minutes: measures bias and standard deviation"]
 fn circulation_over_many_scans() {

@@ -1,4 +1,4 @@
-//! Every few lines and gates of a map: as many as its regions and gates resolve.
+//! Some lines and gates of a map: every few, as many as its regions and gates resolve, or those near a point.
 //!
 //! Neighbouring places of a map see much the same air, so some of them tell nearly all, and what varies no faster than they do is
 //! known everywhere from there, linear between. Check: planes are linear between places; holes; what is too small stays whole.
@@ -32,7 +32,7 @@ impl Coarse {
         (line_step * gate_step > 1 && found >= NEEDED).then_some(some)
     }
 
-    /// Those of which `is_near` says so of line and gate; of the lines and gates in which one is.
+    /// The lines and gates that hold a place which is near, `is_near(line, gate)`; without the velocities of those that are not.
     pub(crate) fn near(map: &VelocityMap<'_>, is_near: impl Fn(usize, usize) -> bool) -> Self {
         let (all_lines, all_gates) = map.velocity_m_s.dim();
         let lines: Vec<usize> = (0..all_lines).filter(|line| (0..all_gates).any(|gate| is_near(*line, gate))).collect();

@@ -13,8 +13,8 @@ use crate::vortex_fit::{MapFit, Parameter, Sharing, Wake};
 
 /// How far what is near a vortex reaches: the circle of 15 m over which circulations are averaged, and some more \[m\].
 pub(crate) const REACH_M: f64 = 20.0;
-/// Least gain of the logarithm of the likelihood by both vortices, with velocities that say the same counted once, for four numbers more: of 80 maps
-/// of a pair alone four reach it, of 56 of simulated wakes past their lowest point 29.
+/// Least gain of the logarithm of the likelihood by both vortices, with velocities that say the same counted once, for the four numbers that are
+/// free: chance alone gives two in the mean. How many maps reach it is in `theory/retrieval.md`.
 const LEAST_GAIN: f64 = 6.0;
 const CIRCULATIONS: [Parameter; 2] = [Parameter::LeftCirculation, Parameter::RightCirculation];
 
