@@ -29,8 +29,8 @@ pub(super) fn viscous_rates_per_s(mesh: &Mesh, viscosity_m2_s: f64) -> [f64; 3] 
 
 /// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
 pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s: f64) -> [bool; 3] {
-    let step_s = settings.time_step.step_s(courant_per_s);
-    viscous_rates_per_s(mesh, settings.viscosity_m2_s).map(|rate_per_s| step_s * rate_per_s > IMPLICIT_SHARE)
+    let most_per_s = IMPLICIT_SHARE * settings.scheme.largest_decay() / settings.time_step.step_s(courant_per_s);
+    viscous_rates_per_s(mesh, settings.viscosity_m2_s).map(|rate_per_s| rate_per_s > most_per_s)
 }
 
 /// The two largest decay rates of viscosity along implicit axes \[1/s\].
@@ -71,5 +71,28 @@ impl Stiffness {
                  time.damped_steps = 4 takes them out"
             )
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::mesh::Direction;
+    use super::super::settings::{TimeScheme, TimeStep};
+    use super::*;
+
+    #[test]
+    fn a_direction_is_implicit_beyond_a_tenth_of_the_limit_of_its_scheme() {
+        let direction = |cells| Direction::periodic(cells, 0.0, 1.0);
+        let mesh = Mesh::new(Direction::thin(1.0), direction(8), direction(32)).unwrap();
+        let step_s = 0.01;
+        let per_viscosity = viscous_rates_per_s(&mesh, 1.0)[2] * step_s;
+        for (scheme, limit) in [(TimeScheme::AdamsBashforth2, 1.0), (TimeScheme::RungeKutta3, 2.5)] {
+            for share in [0.09, 0.11] {
+                let viscosity_m2_s = share * limit / per_viscosity;
+                let settings = FlowSettings { scheme, ..FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s }) };
+                let implicit = implicit_axes(&mesh, &settings, 0.0);
+                assert_eq!(implicit, [false, false, share > 0.1], "{scheme:?} at {share} of its limit");
+            }
+        }
     }
 }
