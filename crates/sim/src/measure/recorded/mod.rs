@@ -228,7 +228,8 @@ fn of_samples<S: FromParts>(
     observer.begin(Stage::Estimates, scans.iter().map(|scan| scan.elevation_rad.len() as u64).sum());
     let found = blocks::scans::<S>(plan, records, largest, &scans, options, observer)?;
     observer.end();
-    let spectra = found.iter().any(|scan| scan.spectra.is_some()).then(|| Spectra::of(plan, &found)).transpose()?;
+    let density: Vec<_> = found.iter().filter_map(|scan| Some((&scan.lines, scan.spectra.as_deref()?))).collect();
+    let spectra = (!density.is_empty()).then(|| Spectra::of(plan, &density)).transpose()?;
     if is_run {
         return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra });
     }

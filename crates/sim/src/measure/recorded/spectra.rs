@@ -2,7 +2,7 @@
 //!
 //! Check: the highest density of a spectrum is where the velocity of its gate is.
 
-use super::blocks::ScanCells;
+use super::lines::ScanLines;
 use crate::Error;
 use crate::io::OutputError;
 use crate::measure::map_estimator::{MapEstimator, places_of};
@@ -31,15 +31,16 @@ pub struct Spectra {
 }
 
 impl Spectra {
-    pub(super) fn of(plan: &Plan, scans: &[ScanCells]) -> Result<Self, Error> {
+    /// Of the lines and the densities of each scan.
+    pub(super) fn of(plan: &Plan, scans: &[(&ScanLines, &[f32])]) -> Result<Self, Error> {
         let velocity_m_s = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.scene))?.velocity_m_s;
-        let lines = || scans.iter().map(|scan| &scan.lines);
+        let lines = || scans.iter().map(|(lines, _)| lines);
         Ok(Self {
             velocity_m_s,
             range_m: plan.geometry.gate_range_m.clone(),
             elevation_rad: lines().flat_map(|lines| lines.elevation_rad.iter().copied()).collect(),
             time_s: lines().flat_map(|lines| lines.time_s.iter().copied()).collect(),
-            density: scans.iter().flat_map(|scan| scan.spectra.iter().flatten().copied()).collect(),
+            density: scans.iter().flat_map(|(_, density)| density.iter().copied()).collect(),
         })
     }
 
