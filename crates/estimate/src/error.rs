@@ -155,6 +155,11 @@ pub(crate) fn not_empty(field: &'static str, count: usize) -> Result<(), Error> 
     if count > 0 { Ok(()) } else { Err(Error::Empty { field }) }
 }
 
+/// Checks that a fit or a test has the velocities that it needs.
+pub(crate) fn enough_velocities(found: usize, needed: usize) -> Result<(), Error> {
+    if found >= needed { Ok(()) } else { Err(Error::TooFewVelocities { found, needed }) }
+}
+
 /// Checks that finite numbers increase.
 pub(crate) fn increasing(field: &'static str, numbers: &[f64]) -> Result<(), Error> {
     let late = numbers.windows(2).find(|pair| pair[1] <= pair[0]);

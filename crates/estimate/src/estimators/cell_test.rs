@@ -43,10 +43,8 @@ impl CellTest {
     /// [`Error::OutOfRange`] unless both are above 0 and their product at most 10 000: with more cells the noise is known.
     pub fn against_cells(windows: f64, reference_cells: f64) -> Result<Self, Error> {
         positive("reference_cells", reference_cells)?;
-        let (value, allowed) = (windows * reference_cells, "at most 10000: with more cells the noise is known");
-        if value > MOST_REFERENCES {
-            return Err(Error::OutOfRange { field: "windows times reference_cells", value, allowed });
-        }
+        let (cells, allowed) = (windows * reference_cells, "at most 10000: with more cells the noise is known");
+        check("windows times reference_cells", cells, allowed, cells.is_nan() || cells <= MOST_REFERENCES)?;
         Ok(Self { reference_cells: Some(reference_cells), ..Self::known_noise(windows)? })
     }
 

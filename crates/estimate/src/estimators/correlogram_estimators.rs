@@ -6,7 +6,7 @@
 use num_complex::Complex;
 
 use crate::error::Error;
-use crate::estimators::{Estimator, GateVelocity, Quality, Refinement, SpectralPeak};
+use crate::estimators::{Estimator, GateVelocity, Quality, Refinement, SpectralPeak, model_lag_weights};
 use crate::models::autoregressive::check_order;
 use crate::window::{Sampling, Scratch, SignalKind};
 
@@ -34,8 +34,7 @@ impl LagWindowPeak {
         refinement: Refinement,
     ) -> Result<Self, Error> {
         check_order(reach_lags, lag_weights.len())?;
-        let step_rad = std::f64::consts::PI / reach_lags as f64;
-        let weights: Vec<f64> = (0..reach_lags).map(|m| 0.5 + 0.5 * (step_rad * m as f64).cos()).collect();
+        let weights = model_lag_weights(reach_lags - 1);
         let seen: Vec<f64> = weights.iter().zip(lag_weights).map(|(weight, own)| weight * own).collect();
         let [peak, sharp] = [&seen, lag_weights]
             .map(|lag_weights| SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement));

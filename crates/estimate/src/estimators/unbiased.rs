@@ -7,7 +7,7 @@
 //! the unit circle and no model of order 16 exists ([`Quality::Invalid`](crate::estimators::Quality::Invalid)). Check: its mean
 //! over noise of known covariance; how often a model fails.
 
-use crate::error::{Error, length};
+use crate::error::{Error, check, length};
 use crate::estimators::{Estimator, GateVelocity};
 use crate::window::{Scratch, SignalKind};
 
@@ -27,9 +27,8 @@ impl<E: Estimator> Unbiased<E> {
     /// [`Error::Length`] unless there is one weight per lag, [`Error::OutOfRange`] for a weight that is 0 or not finite.
     pub fn new(estimator: E, kind: SignalKind, lag_weights: &[f64]) -> Result<Self, Error> {
         length("lag_weights", estimator.statistic_len(), kind.lag_numbers(lag_weights.len()))?;
-        if let Some(&value) = lag_weights.iter().find(|weight| !weight.is_finite() || **weight == 0.0) {
-            return Err(Error::OutOfRange { field: "lag_weights", value, allowed: "finite and not 0" });
-        }
+        let usable = |&w: &f64| check("lag_weights", w, "finite and not 0", w.is_finite() && w != 0.0);
+        lag_weights.iter().try_for_each(usable)?;
         Ok(Self { estimator, kind, gains: lag_weights.iter().map(|weight| weight.recip()).collect() })
     }
 }

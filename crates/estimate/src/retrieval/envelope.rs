@@ -16,6 +16,7 @@ use ndarray::ArrayView3;
 use std::f64::consts::PI;
 
 use crate::error::{Error, length, positive};
+use crate::estimators::tails::bisected;
 use crate::retrieval::{Measured, Side};
 use crate::vortex_fit::map_fit::data::validate_axes;
 use crate::vortex_fit::{Vortex, Wake, WakeModel};
@@ -106,12 +107,8 @@ impl SpectralShape {
         let from = fastest + 6.0 * self.width_m_s;
         let count = ((from - slowest) / step).ceil() as i32;
         let above = (0..=count).map(|i| from - f64::from(i) * step).find(|v| self.power(&air, snr, *v) >= threshold)?;
-        let (mut low, mut high) = (above, above + step);
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if self.power(&air, snr, middle) >= threshold { low = middle } else { high = middle }
-        }
-        Some(sign * low)
+        let [outermost, _] = bisected(above, above + step, HALVINGS, |v| self.power(&air, snr, v) >= threshold);
+        Some(sign * outermost)
     }
 }
 
@@ -182,8 +179,7 @@ fn one(
         Side::Left => (about.left, -1.0),
         Side::Right => (about.right, 1.0),
     };
-    let (dy, dz) = (vortex.lateral_position_m - model.lidar_lateral_position_m, vortex.height_m - model.lidar_height_m);
-    let (range_m, elevation_rad) = (dy.hypot(dz), dz.atan2(dy));
+    let (range_m, elevation_rad) = model.range_and_elevation(vortex.place_m());
     let away = |gate: &usize| (spectra.range_m[*gate] - range_m).abs();
     let gate = (0..spectra.range_m.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
     let (mut raw, mut narrowed, mut inverted, mut left_out) = (vec![], vec![], vec![], 0);
@@ -220,14 +216,11 @@ fn one(
             left_out += 1;
             continue;
         };
-        let (mut low, mut high) = (STEP_M2_S * f64::from(step - 1), STEP_M2_S * f64::from(step));
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (low + high);
-            if faster(middle) { high = middle } else { low = middle }
-        }
+        let [low, high] = [step - 1, step].map(|step| STEP_M2_S * f64::from(step));
+        let [found, _] = bisected(low, high, HALVINGS, |circulation_m2_s| !faster(circulation_m2_s));
         raw.push(2.0 * PI * off_m.abs() * speed);
         narrowed.push(2.0 * PI * off_m.abs() * (speed - calm));
-        inverted.push(share * low);
+        inverted.push(share * found);
     }
     let mean = |numbers: &[f64]| numbers.iter().sum::<f64>() / numbers.len() as f64;
     let (value, count) = (mean(&inverted), inverted.len() as f64);

@@ -156,9 +156,7 @@ impl<'a> Stage<'a> {
         let given = wakes.len();
         for pair in &pairs {
             let wake = search.wake(pair);
-            let near = |a: &Vortex, b: &Vortex| {
-                (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) < APART_M
-            };
+            let near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
             if wakes.len() < given + PAIRS
                 && !wakes
                     .iter()
@@ -171,8 +169,8 @@ impl<'a> Stage<'a> {
         let mut starts: Vec<(Kind, Wake)> = wakes.into_iter().map(|wake| (Kind::Both, wake)).collect();
         for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
             let single = search.single(sense);
-            starts.extend(single.map(|(circulation_m2_s, lateral_position_m, height_m)| {
-                let vortex = Vortex { circulation_m2_s, lateral_position_m, height_m, core_radius_m: LONE_CORE_M };
+            starts.extend(single.map(|(place_m, circulation_m2_s)| {
+                let vortex = Vortex::at(place_m, circulation_m2_s, LONE_CORE_M);
                 (kind, kind.of(&Wake::calm(vortex, vortex)))
             }));
         }
@@ -194,10 +192,6 @@ impl<'a> Stage<'a> {
         Some(End { kind, wake: Wake::from_list(&p), chi2: 2.0 * cost, sigmas_left, groups })
     }
 
-    fn end(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>) -> Option<End> {
-        self.lowest(kind, start, groups, ROUGH)
-    }
-
     /// Core radius that a fit starts with or keeps.
     fn core_m(&self, kind: Kind, wake: &Wake) -> f64 {
         let typical = if kind == Kind::Both { CORE_OVER_SPACING * wake.spacing_m() } else { LONE_CORE_M };
@@ -209,7 +203,7 @@ impl<'a> Stage<'a> {
         let groups = self.groups(kind);
         let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
         let spacing_m = if kind == Kind::Both { start.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
-        let broad = with_cores(&self.options.free.start(start), BROAD * spacing_m);
+        let broad = self.options.free.start(start).with_cores(BROAD * spacing_m);
         self.lowest(kind, &broad, coreless, FAR).map(|end| end.wake)
     }
 
@@ -218,12 +212,12 @@ impl<'a> Stage<'a> {
         let mut groups = self.groups(kind);
         let core_m = self.core_m(kind, near);
         if !groups.iter().any(|group| is_core(group)) {
-            let end = self.end(kind, &with_cores(near, core_m), groups.clone())?;
+            let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), ROUGH)?;
             // the typical core is that of the spacing which the fit ends with
-            return self.end(kind, &with_cores(&end.wake, self.core_m(kind, &end.wake)), groups);
+            return self.lowest(kind, &end.wake.with_cores(self.core_m(kind, &end.wake)), groups, ROUGH);
         }
         let spacing_m = if kind == Kind::Both { near.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
-        let end = self.end(kind, &with_cores(near, core_m), groups.clone());
+        let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), ROUGH);
         let vague: Vec<usize> = match &end {
             Some(end) => self.vague_cores(end, LARGEST * spacing_m),
             None => vec![Parameter::LeftCore as usize, Parameter::RightCore as usize],
@@ -238,7 +232,7 @@ impl<'a> Stage<'a> {
             let found = end.wake.to_array();
             (0..PARAMETERS).filter(|place| is_core(&[*place]) && !vague.contains(place)).for_each(|i| p[i] = found[i]);
         }
-        self.end(kind, &Wake::from_array(&p), groups)
+        self.lowest(kind, &Wake::from_array(&p), groups, ROUGH)
     }
 
     /// Places of the core radii that the scan does not resolve.
@@ -336,9 +330,4 @@ pub(crate) fn tops<'a>(ends: &'a [End], best: &End, covariance: &ndarray::Array2
         }
     }
     tops
-}
-
-fn with_cores(wake: &Wake, core_radius_m: f64) -> Wake {
-    let with = |vortex: &Vortex| Vortex { core_radius_m, ..*vortex };
-    Wake { left: with(&wake.left), right: with(&wake.right), ..*wake }
 }

@@ -59,9 +59,7 @@ pub fn circulation_profile(
     wake.validate()?;
     radius_m.iter().try_for_each(|radius| positive("radius_m", *radius))?;
     let gates = Gates::rough(map, options)?.frozen().fine(&options.gate)?;
-    let mut calm = *wake;
-    (calm.left.circulation_m2_s, calm.right.circulation_m2_s) = (0.0, 0.0);
-    let (of_wake, of_wind) = (gates.velocities(wake), gates.velocities(&calm));
+    let (of_wake, of_wind) = (gates.velocities(wake), gates.velocities(&wake.wind_alone()));
     let measured = Field::new(map, &map.velocity_m_s - &of_wind);
     let fitted = Field::new(map, of_wake - of_wind);
     let (vortex, sense) = if side == Side::Left { (wake.left, -1.0) } else { (wake.right, 1.0) };

@@ -8,7 +8,7 @@
 
 use ndarray::Array2;
 
-use crate::error::Error;
+use crate::error::{Error, enough_velocities};
 use crate::retrieval::hypotheses::{End, Kind, Stage};
 use crate::retrieval::report::Report;
 use crate::retrieval::{Measured, Movement, RetrievalOptions, ScanMap, ScanResult};
@@ -26,10 +26,7 @@ const GATES: usize = 3;
 /// As [`fit_scan`](crate::retrieval::fit_scan).
 pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
     options.validate()?;
-    let found = map.validate()?;
-    if found < 100 {
-        return Err(Error::TooFewVelocities { found, needed: 100 });
-    }
+    enough_velocities(map.validate()?, 100)?;
     let fixed = Sharing::Fixed;
     let free = FreeParameters { lateral_position: fixed, height: fixed, core_radius: fixed, ..options.free };
     let linear = RetrievalOptions {
@@ -61,14 +58,9 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
     };
     let fits = |stage: &Stage<'_>| -> Vec<End> {
         let (Some(left), Some(right)) = (centre(true), centre(false)) else { return vec![] };
-        let core_radius_m = options.core_radius_m.unwrap_or(CORE_OVER_SPACING * (right.0 - left.0).abs());
-        let vortex = |(lateral_position_m, height_m), circulation_m2_s| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m,
-        };
-        let wake = Wake { left: vortex(left, 1.0), right: vortex(right, 1.0), ..calm.wake };
+        let core_m = options.core_radius_m.unwrap_or(CORE_OVER_SPACING * (right.0 - left.0).abs());
+        let [left, right] = [left, right].map(|place_m| Vortex::at(place_m, 1.0, core_m));
+        let wake = Wake { left, right, ..calm.wake };
         let kinds = [Kind::Left, Kind::Right, Kind::Both].map(|kind| End {
             kind,
             wake: kind.of(&wake),

@@ -8,10 +8,10 @@
 
 use ndarray::{Array1, Array2};
 
-use crate::error::{Error, finite, increasing, positive};
+use crate::error::{Error, finite, increasing, not_empty, positive};
 use crate::retrieval::{Measured, ScanResult, Side, VortexResult};
 use crate::vortex_fit::damped_newton::inverse;
-use crate::vortex_fit::{Parameter, Vortex, Wake};
+use crate::vortex_fit::{Vortex, Wake};
 
 /// Numbers of one vortex and of both.
 const ONE: usize = 6;
@@ -143,9 +143,7 @@ pub fn track(results: &[ScanResult], options: &TrackOptions) -> Result<Track, Er
     let times: Vec<f64> = results.iter().map(|result| result.reference_time_s).collect();
     times.iter().try_for_each(|time| finite("reference_time_s", *time))?;
     increasing("reference_time_s", &times)?;
-    if results.is_empty() {
-        return Err(Error::Empty { field: "results" });
-    }
+    not_empty("results", results.len())?;
     let mut filter = Filter { options, steps: vec![], misses: [0; 2], innovations: vec![], rejected: 0 };
     for (k, result) in results.iter().enumerate() {
         let seconds = if k > 0 { times[k] - times[k - 1] } else { 0.0 };
@@ -301,7 +299,6 @@ impl Filter<'_> {
         result: &ScanResult,
         vortices: &[(usize, &VortexResult)],
     ) -> Result<(f64, State), Error> {
-        use Parameter as P;
         let order = 3 * vortices.len();
         let (mut z, mut h) = (Array1::zeros(order), Array2::zeros((order, BOTH)));
         let (mut deviations, mut places) = (vec![], vec![]);
@@ -313,10 +310,8 @@ impl Filter<'_> {
                 h[[3 * n + row, ONE * i + 2 * row + 1]] = if row < 2 { seconds } else { -seconds };
                 deviations.push(std);
             }
-            places.extend(match vortex.side {
-                Side::Left => [P::LeftLateral as usize, P::LeftHeight as usize, P::LeftCirculation as usize],
-                Side::Right => [P::RightLateral as usize, P::RightHeight as usize, P::RightCirculation as usize],
-            });
+            let [circulation, lateral, height, _] = vortex.side.parameters();
+            places.extend([lateral, height, circulation].map(|parameter| parameter as usize));
         }
         let c = &result.covariance;
         let r = Array2::from_shape_fn((order, order), |(i, j)| {

@@ -99,8 +99,7 @@ pub(super) fn shown(
 ) -> Vec<f64> {
     let ranges = &cells.range_m;
     let (middle, reach_m) = (kernel.middle(), FAR_OVER_GATE * kernel.width_m());
-    let [one_m, other_m] = [&wake.left, &wake.right]
-        .map(|vortex| model.range_and_elevation((vortex.lateral_position_m, vortex.height_m)).0);
+    let [one_m, other_m] = [&wake.left, &wake.right].map(|vortex| model.range_and_elevation(vortex.place_m()).0);
     let from = ranges.partition_point(|range_m| *range_m < one_m.min(other_m) - reach_m);
     let to = ranges.partition_point(|range_m| *range_m <= one_m.max(other_m) + reach_m);
     let mut map = Array2::zeros((cells.elevation_rad.len(), ranges.len()));

@@ -9,7 +9,7 @@
 
 use ndarray::{Array1, Array2, ArrayView1, Axis, s};
 
-use crate::error::{Error, increasing, positive};
+use crate::error::{Error, enough_velocities, increasing, not_empty, positive};
 use crate::linalg::cholesky::cholesky;
 use crate::retrieval::{Gate, ScanMap};
 use crate::vortex_fit::damped_newton::solve;
@@ -82,9 +82,7 @@ impl WakeDetector {
         if map.sigma_m_s.is_none() {
             return Err(Error::Empty { field: "sigma_m_s" });
         }
-        if found < Self::NEEDED {
-            return Err(Error::TooFewVelocities { found, needed: Self::NEEDED });
-        }
+        enough_velocities(found, Self::NEEDED)?;
         positive("least spacing_m", options.spacing_m.0)?;
         if options.spacing_m.0 != options.spacing_m.1 {
             increasing("spacing_m", &[options.spacing_m.0, options.spacing_m.1])?;
@@ -94,9 +92,7 @@ impl WakeDetector {
         let background = Background::new(&cells, options.turbulence.as_ref())?;
         let kernel = kernel(gate)?;
         let bank = Bank::new(&cells, model, kernel.width_m(), options);
-        if bank.templates.is_empty() {
-            return Err(Error::Empty { field: "list of wakes that fit into the scan" });
-        }
+        not_empty("list of wakes that fit into the scan", bank.templates.len())?;
         let mut shapes = bank.shapes(&cells, model, &kernel);
         background.whiten(&mut shapes);
         let wind = wind(&cells, &background);
@@ -161,10 +157,7 @@ impl WakeDetector {
         if missing == 0 {
             return Ok(0);
         }
-        let (found, needed) = (means.len() - missing, means.len() - means.len() / MISSING);
-        if found < needed {
-            return Err(Error::TooFewVelocities { found, needed });
-        }
+        enough_velocities(means.len() - missing, means.len() - means.len() / MISSING)?;
         let cells = &self.cells.cells;
         let row = |i: usize| wind_row(&self.cells, i).map(|x| x / cells[i].deviation_m_s);
         let (mut curvature, mut towards) = (Array2::zeros((2, 2)), [0.0; 2]);
@@ -243,12 +236,9 @@ impl WakeDetector {
         let other = template.left.or(template.right).unwrap_or(0);
         let vortex = |place: Option<usize>, sense: f64| {
             let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
-            Vortex {
-                circulation_m2_s: if place.is_some() { circulation_m2_s } else { 0.0 },
-                lateral_position_m: lateral_m + if place.is_some() { 0.0 } else { sense * self.bank.step_m.0 },
-                height_m,
-                core_radius_m: self.bank.core_m,
-            }
+            let (away_m, circulation_m2_s) =
+                place.map_or((sense * self.bank.step_m.0, 0.0), |_| (0.0, circulation_m2_s));
+            Vortex::at((lateral_m + away_m, height_m), circulation_m2_s, self.bank.core_m)
         };
         Wake::calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
     }

@@ -16,7 +16,7 @@ use rand::Rng;
 use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
 
-use crate::error::{Error, finite};
+use crate::error::{Error, check, finite};
 use crate::parallel::map_indexed;
 use crate::wake_detection::WakeDetector;
 
@@ -92,10 +92,7 @@ impl EmptyScanLaw {
     /// [`Error::OutOfRange`] with fewer than a thousand, or one that is not finite.
     pub fn new(mut statistics: Vec<f64>) -> Result<Self, Error> {
         let count = statistics.len();
-        if count < FEWEST {
-            let allowed = "at least 1000: the tail of fewer is not known";
-            return Err(Error::OutOfRange { field: "empty scans", value: count as f64, allowed });
-        }
+        check("empty scans", count as f64, "at least 1000: the tail of fewer is not known", count >= FEWEST)?;
         statistics.iter().try_for_each(|value| finite("statistic of an empty scan", *value))?;
         statistics.sort_by(|a, b| b.total_cmp(a));
         let mean = statistics.iter().sum::<f64>() / count as f64;
@@ -136,10 +133,8 @@ impl EmptyScanLaw {
     /// # Errors
     /// [`Error::OutOfRange`] unless the rate lies between 0 and 1.
     pub fn threshold(&self, false_alarm: f64) -> Result<f64, Error> {
-        if !(false_alarm > 0.0 && false_alarm < 1.0) {
-            let allowed = "between 0 and 1, for example 0.01";
-            return Err(Error::OutOfRange { field: "false_alarm", value: false_alarm, allowed });
-        }
+        let is_rate = false_alarm > 0.0 && false_alarm < 1.0;
+        check("false_alarm", false_alarm, "between 0 and 1, for example 0.01", is_rate)?;
         let least = self.least_counted_rate();
         if false_alarm < least {
             let (anchor, share) = (self.last_counted(), false_alarm / least);

@@ -7,7 +7,7 @@
 use ndarray::{Array1, Array2};
 use rand::{Rng, RngExt};
 
-use crate::error::{Error, positive};
+use crate::error::{Error, not_empty, positive};
 use crate::vortex_fit::{Vortex, Wake};
 use crate::wake_detection::WakeDetector;
 
@@ -58,15 +58,9 @@ impl WakeDetector {
                 let spacing_m = between(spacings_m);
                 (0..TRIES.1).find_map(|_| {
                     let (left_m, height_m) = (between(sector.lateral_m), between(sector.up_m));
-                    let vortex = |lateral_position_m: f64| Vortex {
-                        circulation_m2_s: 1.0,
-                        lateral_position_m,
-                        height_m,
-                        core_radius_m: 0.05 * spacing_m,
-                    };
-                    let (left, right) = (vortex(left_m), vortex(left_m + spacing_m));
-                    let seen = [left, right].iter().all(|v| sector.holds((v.lateral_position_m, v.height_m)));
-                    seen.then_some(Wake::calm(left, right))
+                    let places_m = [left_m, left_m + spacing_m].map(|lateral_m| (lateral_m, height_m));
+                    let [left, right] = places_m.map(|place_m| Vortex::at(place_m, 1.0, 0.05 * spacing_m));
+                    places_m.iter().all(|place_m| sector.holds(*place_m)).then(|| Wake::calm(left, right))
                 })
             })
         };
@@ -83,9 +77,7 @@ impl WakeDetector {
         trials: usize,
         stream: impl Fn(u64) -> R + Sync + Send,
     ) -> Result<DetectionTrials<'_>, Error> {
-        if wakes.is_empty() || trials == 0 {
-            return Err(Error::Empty { field: "wakes and trials" });
-        }
+        not_empty("wakes and trials", wakes.len().min(trials))?;
         let (mut products, mut deviations) = (Vec::new(), Vec::new());
         for wake in wakes {
             wake.validate()?;

@@ -25,12 +25,6 @@ impl WindFit {
     pub fn standard_deviation_m_s(&self) -> [f64; 3] {
         std::array::from_fn(|d| self.residual_m_s * self.unit_covariance[d][d].sqrt())
     }
-
-    /// The same for radial velocities that have this standard deviation \[m/s\].
-    #[must_use]
-    pub fn of_noise_m_s(&self, radial_m_s: f64) -> [f64; 3] {
-        std::array::from_fn(|d| radial_m_s * self.unit_covariance[d][d].sqrt())
-    }
 }
 
 /// The wind that fits velocities \[m/s\], positive away from the lidar, along unit vectors; NaN is no velocity. `None` if the

@@ -87,7 +87,7 @@ fn errors_of_noise_are_those_of_the_closed_forms_within_three_standard_errors() 
             let fit = fit_wind(&directions, &seen).unwrap().unwrap();
             for d in 0..3 {
                 squares[0][d] += (fit.velocity_m_s[d] - wind[d]).powi(2) / TRIALS as f64;
-                assert!((fit.of_noise_m_s(sigma)[d] / expected[d] - 1.0).abs() < 1e-9);
+                assert!((sigma * fit.unit_covariance[d][d].sqrt() / expected[d] - 1.0).abs() < 1e-9);
             }
             residual += fit.residual_m_s.powi(2) / TRIALS as f64;
             if let [north, east, south, west] = seen[..] {

@@ -179,8 +179,7 @@ pub fn with_local_circulations(
     let vortices = [pair.wake.left, pair.wake.right];
     let local = [0, 1].map(|side| {
         let near = Coarse::near(map, |line, gate| {
-            let (y_m, z_m) = model.position_m(map.range_m[gate], map.elevation_rad[line]);
-            (y_m - vortices[side].lateral_position_m).hypot(z_m - vortices[side].height_m) < REACH_M
+            vortices[side].away_m(model.position_m(map.range_m[gate], map.elevation_rad[line])) < REACH_M
         });
         let shown = near.shown(model, response, options, 1.0).ok()?;
         shown.setting().local_circulation(&pair.wake, side, NEAR)

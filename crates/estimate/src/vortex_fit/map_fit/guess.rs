@@ -7,7 +7,7 @@
 
 use ndarray::{Array1, Array2};
 
-use crate::error::Error;
+use crate::error::{Error, enough_velocities};
 use crate::parallel::map_indexed;
 use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
@@ -108,10 +108,7 @@ impl Search {
     /// # Errors
     /// [`Error::TooFewVelocities`] with less than a hundred velocities.
     pub(crate) fn new(map: &VelocityMap<'_>, model: &WakeModel, kernel: &RangeKernel) -> Result<Self, Error> {
-        let found = map.validate()?;
-        if found < NEEDED {
-            return Err(Error::TooFewVelocities { found, needed: NEEDED });
-        }
+        enough_velocities(map.validate()?, NEEDED)?;
         let thinned = thin(map);
         let weighted = |shape: &[f64]| scaled(&thinned.weight, shape);
         let basis = orthonormal(&wind_shapes(&thinned, model).map(|shape| weighted(&shape)));
@@ -152,14 +149,8 @@ impl Search {
     /// The wake of a pair, without wind.
     pub(crate) fn wake(&self, pair: &Pair) -> Wake {
         let (left, right) = (self.places_m[pair.left], self.places_m[pair.right]);
-        let core_radius_m = CORE_OVER_SPACING * (right.0 - left.0);
-        let vortex = |(lateral_position_m, height_m), circulation_m2_s| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m,
-        };
-        Wake::calm(vortex(left, pair.strength.0), vortex(right, pair.strength.1))
+        let core_m = CORE_OVER_SPACING * (right.0 - left.0);
+        Wake::calm(Vortex::at(left, pair.strength.0, core_m), Vortex::at(right, pair.strength.1, core_m))
     }
 }
 
@@ -224,12 +215,11 @@ impl Search {
         (0..self.places_m.len()).filter_map(best).collect()
     }
 
-    /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone: its circulation, lateral position, height.
-    pub(crate) fn single(&self, sense: f64) -> Option<(f64, f64, f64)> {
+    /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone, and its circulation.
+    pub(crate) fn single(&self, sense: f64) -> Option<((f64, f64), f64)> {
         let explained = |place: usize| (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]];
         let best = (0..self.places_m.len()).reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
         let strength = sense * self.towards[best] / self.gram[[best, best]];
-        let (lateral_m, height_m) = self.places_m[best];
-        (strength > 0.0).then_some((strength, lateral_m, height_m))
+        (strength > 0.0).then_some((self.places_m[best], strength))
     }
 }

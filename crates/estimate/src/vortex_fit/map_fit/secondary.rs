@@ -164,12 +164,8 @@ impl Setting<'_, '_> {
     fn gain(&self, (pair, side): (&Wake, usize), (i, j): (i64, i64), free: &Residuals<'_>) -> Option<(Vortex, f64)> {
         let own = [pair.left, pair.right][side];
         let step_m = GRID_OVER_HEIGHT * own.height_m;
-        let vortex = Vortex {
-            circulation_m2_s: 1.0,
-            lateral_position_m: own.lateral_position_m + i as f64 * step_m,
-            height_m: own.height_m + j as f64 * step_m,
-            core_radius_m: KNOWN_CORE.0 * own.height_m,
-        };
+        let place_m = (own.lateral_position_m + i as f64 * step_m, own.height_m + j as f64 * step_m);
+        let vortex = Vortex::at(place_m, 1.0, KNOWN_CORE.0 * own.height_m);
         let distance = GRID_OVER_HEIGHT * (i as f64).hypot(j as f64);
         if !is_near(distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
             return None;

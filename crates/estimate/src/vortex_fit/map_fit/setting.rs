@@ -8,7 +8,7 @@
 
 use ndarray::{Array1, Array2};
 
-use crate::error::{Error, finite};
+use crate::error::{Error, enough_velocities, finite};
 use crate::vortex_fit::damped_newton::{Averaging, Stop, halved};
 use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
@@ -58,8 +58,8 @@ impl Setting<'_, '_> {
         start.validate()?;
         self.options.core_prior.as_ref().map_or(Ok(()), CorePrior::validate)?;
         let groups = self.options.free.groups_of(start);
-        let needed = 10 * groups.len().max(1);
-        if found < needed { Err(Error::TooFewVelocities { found, needed }) } else { Ok(groups) }
+        enough_velocities(found, 10 * groups.len().max(1))?;
+        Ok(groups)
     }
 
     pub(crate) fn squares<'s>(

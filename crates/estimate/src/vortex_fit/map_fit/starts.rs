@@ -32,15 +32,10 @@ pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
             Sharing::Common | Sharing::Separate => typical_m.to_vec(),
         }
     };
-    let with_core = |wake: &Wake, core_m: f64| {
-        let mut wake = *wake;
-        (wake.left.core_radius_m, wake.right.core_radius_m) = (core_m, core_m);
-        wake
-    };
-    let mut starts: Vec<Wake> = cores_m(about).into_iter().map(|core_m| with_core(about, core_m)).collect();
+    let mut starts: Vec<Wake> = cores_m(about).into_iter().map(|core_m| about.with_cores(core_m)).collect();
     if let Some(equal) = with_equal_partner(about) {
         starts.truncate(1);
-        starts.push(with_core(&equal, cores_m(&equal)[0]));
+        starts.push(equal.with_cores(cores_m(&equal)[0]));
     }
     starts
 }

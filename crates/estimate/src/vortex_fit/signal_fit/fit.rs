@@ -98,8 +98,7 @@ pub fn fit_signals<S: Sample>(
     let mut start = options.free.start(guess);
     if options.starts == Starts::Several && options.free.core_radius != Sharing::Fixed {
         // wide cores make few tops
-        let core_m = FIRST_CORE_OVER_SPACING * start.spacing_m();
-        (start.left.core_radius_m, start.right.core_radius_m) = (core_m, core_m);
+        start = start.with_cores(FIRST_CORE_OVER_SPACING * start.spacing_m());
     }
     let model = ScanModel::new(setup, &snr, &start)?;
     let signals = ScanSignals::new(&model, records, noise_power)?;
@@ -174,8 +173,7 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
     fn others(&mut self, first: &Settled) -> Result<Vec<Candidate>, Error> {
         let mut guess = first.state.0;
         if self.options.free.core_radius != Sharing::Fixed {
-            let core_m = CORES_OVER_SPACING[1] * guess.spacing_m();
-            (guess.left.core_radius_m, guess.right.core_radius_m) = (core_m, core_m);
+            guess = guess.with_cores(CORES_OVER_SPACING[1] * guess.spacing_m());
         }
         let rough = ScanModel::with_layers(self.setup, self.snr, &guess, ROUGH_LAYERS)?;
         let near = near_lines(&rough, &first.state.0);
@@ -204,9 +202,7 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         }
         let best = *tops.first().ok_or(failed.clone())?;
         let (wake, powers) = best.state;
-        let mut calm = wake;
-        (calm.left.circulation_m2_s, calm.right.circulation_m2_s) = (0.0, 0.0);
-        let without = best.model.log_likelihood(signals, &calm, powers).ok_or(failed)?;
+        let without = best.model.log_likelihood(signals, &wake.wind_alone(), powers).ok_or(failed)?;
         let (mut covariance, mut bound, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), None, 0.0);
         for (top, information) in tops.iter().zip(&informations) {
             let within = spread(&options.free.groups(), &inverse("information on the wake", information)?);

@@ -9,7 +9,7 @@
 use ndarray::{Array2, ArrayView2};
 use num_complex::Complex;
 
-use crate::error::{Error, length, positive};
+use crate::error::{Error, length, not_empty, positive};
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
 use crate::vortex_fit::signal_fit::banded_cholesky::Banded;
@@ -66,10 +66,9 @@ impl ScanSignals {
         })
         .into_iter()
         .collect::<Result<_, _>>()?;
-        if rays.iter().all(Option::is_none) {
-            return Err(Error::Empty { field: "rays without missing samples" });
-        }
-        Ok(Self { rays })
+        let signals = Self { rays };
+        not_empty("rays without missing samples", signals.used_rays())?;
+        Ok(signals)
     }
 
     /// Number of rays that are used.

@@ -8,7 +8,7 @@
 use std::f64::consts::PI;
 
 use crate::bound::Noise;
-use crate::error::{Error, finite, not_negative, positive};
+use crate::error::{Error, finite, not_empty, not_negative, positive};
 use crate::vortex_fit::signal_fit::baseband::PowerGain;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::pulse::PairWeights;
@@ -100,9 +100,7 @@ impl ScanModel {
         guess.validate()?;
         finite("first_sample_time_s", setup.first_sample_time_s)?;
         setup.elevation_rad.iter().try_for_each(|e| finite("elevation_rad", *e))?;
-        if setup.elevation_rad.is_empty() {
-            return Err(Error::Empty { field: "elevation_rad" });
-        }
+        not_empty("elevation_rad", setup.elevation_rad.len())?;
         let baseband = Baseband::new(&setup.sampling, setup.kind)?;
         let samples = baseband.samples(setup.record_samples)?;
         let interval_s = baseband.interval_s();
@@ -163,8 +161,7 @@ impl ScanModel {
     pub(crate) fn covers(&self, wake: &Wake) -> bool {
         // steeper cores are those smaller than the third to spare
         let covers = |a: &Vortex, b: &Vortex| {
-            (a.lateral_position_m - b.lateral_position_m).hypot(a.height_m - b.height_m) <= MARGIN_M
-                && a.core_radius_m >= b.core_radius_m * 2.0 / 3.0
+            a.away_m(b.place_m()) <= MARGIN_M && a.core_radius_m >= b.core_radius_m * 2.0 / 3.0
         };
         covers(&wake.left, &self.guess.left) && covers(&wake.right, &self.guess.right)
     }
@@ -212,7 +209,7 @@ impl Cutter<'_> {
 
     /// Layers that the wake of the guess needs in the node interval about a point, a third of its core radius spare.
     fn parts(&self, range_m: f64, elevation_rad: f64) -> f64 {
-        let (y_m, z_m) = self.setup.wake.position_m(range_m, elevation_rad);
+        let place_m = self.setup.wake.position_m(range_m, elevation_rad);
         let steep: f64 = match self.setup.wake.profile {
             CoreProfile::Algebraic => 1.0,
             CoreProfile::LambOseen => 1.5,
@@ -220,7 +217,7 @@ impl Cutter<'_> {
         let gradient_per_s: f64 = [&self.guess.left, &self.guess.right]
             .iter()
             .map(|vortex| {
-                let away_m = (y_m - vortex.lateral_position_m).hypot(z_m - vortex.height_m) - MARGIN_M - self.spacing_m;
+                let away_m = vortex.away_m(place_m) - MARGIN_M - self.spacing_m;
                 let core_m = vortex.core_radius_m * 2.0 / 3.0;
                 let radius_m = away_m.max(2.0 * core_m / steep.sqrt());
                 vortex.circulation_m2_s.abs() / (2.0 * PI * radius_m * radius_m)

@@ -107,14 +107,13 @@ fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluatio
     let (heights, cores) = axes(ascent.options);
     let Ok(covariance) = inverse("information on the wake", information) else { return Vec::new() };
     let deviations: Vec<f64> = covariance.diag().iter().map(|variance| variance.max(0.0).sqrt()).collect();
-    let core_m = |k: usize| CORES_OVER_SPACING[k] * top.0.spacing_m();
     let rows = if cores.is_empty() { 1 } else { CORES_OVER_SPACING.len() };
     let quick: Vec<usize> = (0..information.nrows()).filter(|i| !heights.contains(i) && !cores.contains(i)).collect();
     let mut scores: Vec<(f64, usize, Vec<i32>, State)> = Vec::new();
     for row in 0..rows {
         let mut at = *top;
         if !cores.is_empty() {
-            (at.0.left.core_radius_m, at.0.right.core_radius_m) = (core_m(row), core_m(row));
+            at.0 = at.0.with_cores(CORES_OVER_SPACING[row] * top.0.spacing_m());
         }
         let mut score = |ascent: &Ascent<'_>, state: State| {
             *evaluations += 1;

@@ -60,6 +60,21 @@ pub struct Vortex {
 }
 
 impl Vortex {
+    /// One with its centre at that lateral coordinate and height.
+    pub(crate) fn at((lateral_position_m, height_m): (f64, f64), circulation_m2_s: f64, core_radius_m: f64) -> Self {
+        Self { circulation_m2_s, lateral_position_m, height_m, core_radius_m }
+    }
+
+    /// Lateral coordinate and height of the centre.
+    pub(crate) fn place_m(&self) -> (f64, f64) {
+        (self.lateral_position_m, self.height_m)
+    }
+
+    /// Distance of the centre from a place.
+    pub(crate) fn away_m(&self, (lateral_m, height_m): (f64, f64)) -> f64 {
+        (lateral_m - self.lateral_position_m).hypot(height_m - self.height_m)
+    }
+
     pub(crate) fn validate(&self) -> Result<(), Error> {
         finite("circulation_m2_s", self.circulation_m2_s)?;
         finite("lateral_position_m", self.lateral_position_m)?;
@@ -103,15 +118,9 @@ impl Wake {
     /// The wake of parameters in the order of [`Parameter`].
     #[must_use]
     pub fn from_array(p: &[f64; PARAMETERS]) -> Self {
-        let vortex = |circulation_m2_s, lateral_position_m, height_m, core_radius_m| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m,
-        };
         Self {
-            left: vortex(p[0], p[2], p[3], p[6]),
-            right: vortex(p[1], p[4], p[5], p[7]),
+            left: Vortex::at((p[2], p[3]), p[0], p[6]),
+            right: Vortex::at((p[4], p[5]), p[1], p[7]),
             lateral_wind_m_s: p[8],
             wind_shear_per_s: p[9],
         }
@@ -123,14 +132,21 @@ impl Wake {
     }
 
     /// An anticlockwise vortex of unit circulation alone, at that lateral position and height.
-    pub(crate) fn of_unit_vortex((lateral_position_m, height_m): (f64, f64), core_radius_m: f64) -> Self {
-        let of = |circulation_m2_s, lateral_position_m| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m,
-        };
-        Self::calm(of(0.0, lateral_position_m - 1.0), of(1.0, lateral_position_m))
+    pub(crate) fn of_unit_vortex(place_m: (f64, f64), core_radius_m: f64) -> Self {
+        let right = Vortex::at(place_m, 1.0, core_radius_m);
+        Self::calm(Vortex::at((place_m.0 - 1.0, place_m.1), 0.0, core_radius_m), right)
+    }
+
+    /// The same vortices with that core radius.
+    pub(crate) fn with_cores(&self, core_radius_m: f64) -> Self {
+        let [left, right] = [self.left, self.right].map(|vortex| Vortex { core_radius_m, ..vortex });
+        Self { left, right, ..*self }
+    }
+
+    /// The same wind without vortices.
+    pub(crate) fn wind_alone(&self) -> Self {
+        let [left, right] = [self.left, self.right].map(|vortex| Vortex { circulation_m2_s: 0.0, ..vortex });
+        Self { left, right, ..*self }
     }
 
     /// The wake of a list of parameters that begins with those of a wake.
@@ -286,11 +302,8 @@ impl WakeModel {
     /// The model and the wake of a list of parameters: those of a wake and, if there are more, those of a secondary vortex beside each vortex.
     pub(crate) fn with(&self, p: &[f64]) -> (Self, Wake) {
         let wake = Wake::from_list(p);
-        let of = |own: &Vortex, [circulation_m2_s, lateral_position_m, height_m, log_core]: [f64; _]| Vortex {
-            circulation_m2_s,
-            lateral_position_m,
-            height_m,
-            core_radius_m: own.height_m * log_core.exp(),
+        let of = |own: &Vortex, [circulation_m2_s, lateral_m, height_m, log_core]: [f64; _]| {
+            Vortex::at((lateral_m, height_m), circulation_m2_s, own.height_m * log_core.exp())
         };
         let secondary = match p[PARAMETERS..].as_chunks::<SECONDARY_PARAMETERS>().0 {
             [left, right] => Some([of(&wake.left, *left), of(&wake.right, *right)]),
