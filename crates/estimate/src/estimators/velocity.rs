@@ -3,8 +3,7 @@
 //! Check: zero, constant and out-of-band signals are flagged, never silently 0 m/s; width and SNR of simulated wind
 //! (in the tests of the estimators).
 //!
-//! A velocity beyond the unambiguous interval folds before any estimator sees it:
-//! [`Sampling::folded_velocity_m_s`](crate::Sampling::folded_velocity_m_s) tells what it reads.
+//! A velocity beyond the unambiguous interval folds before any estimator sees it: it reads the one whose beat frequency has the same samples.
 
 /// What a velocity estimate is worth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -239,10 +239,7 @@ impl Autoregression {
             let weight = |k: usize| if capon { (order + 1 - m) as f64 - 2.0 * k as f64 } else { 1.0 };
             let lag: Complex<f64> = (0..=order - m).map(|k| a(k + m) * a(k).conj() * weight(k)).sum();
             let scale = if capon { 1.0 / ((order + 1) as f64 * self.noise_power) } else { 1.0 / self.noise_power };
-            out.push(lag.re * scale);
-            if kind == SignalKind::Complex {
-                out.push(lag.im * scale);
-            }
+            out.extend([lag.re * scale, lag.im * scale].into_iter().take(kind.lag_numbers(1)));
         }
     }
 }

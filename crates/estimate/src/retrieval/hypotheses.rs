@@ -3,14 +3,14 @@
 //! Check: the reference maps; wakes of which one vortex is in view.
 
 use crate::error::Error;
-use crate::retrieval::{RetrievalOptions, ScanMap};
-use crate::vortex_fit::damped_newton::{Stop, inverse};
+use crate::retrieval::{RetrievalOptions, ScanMap, Side};
+use crate::vortex_fit::damped_newton::{Minimum, Stop, inverse};
 use crate::vortex_fit::map_fit::cells::{cells, products};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::guess::Search;
-use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Minimum};
+use crate::vortex_fit::map_fit::least_squares::LeastSquares;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
-use crate::vortex_fit::top::SAME_SIGMAS;
+use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{PARAMETERS, Parameter, Vortex, Wake};
 
@@ -51,9 +51,8 @@ pub(crate) enum Kind {
 
 impl Kind {
     /// Whether the parameter belongs to a vortex that there is, or to the wind.
-    fn has(self, place: usize) -> bool {
-        let left = [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore];
-        let is_left = left.iter().any(|parameter| *parameter as usize == place);
+    pub(crate) fn has(self, place: usize) -> bool {
+        let is_left = Side::Left.parameters().iter().any(|parameter| *parameter as usize == place);
         match self {
             _ if place >= Parameter::Wind as usize => true,
             Self::Wind => false,
@@ -77,9 +76,7 @@ impl Kind {
             Self::Wind => Wake { left: nowhere(&wake.left, 0.0), right: nowhere(&wake.right, 0.0), ..*wake },
         }
     }
-}
 
-impl Kind {
     /// Whether two wakes are one but for a part of each parameter.
     fn same(self, a: &Wake, b: &Wake, part: f64) -> bool {
         let (a, b) = (a.to_array(), b.to_array());
@@ -152,21 +149,10 @@ impl<'a> Stage<'a> {
         let search = Search::new(&self.map.view(), self.gates.model, &self.gates.kernel)?;
         let mut pairs = search.pairs();
         pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
-        let mut wakes: Vec<Wake> = self.options.start.into_iter().collect();
-        let given = wakes.len();
-        for pair in &pairs {
-            let wake = search.wake(pair);
-            let near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
-            if wakes.len() < given + PAIRS
-                && !wakes
-                    .iter()
-                    .skip(given)
-                    .any(|known| near(&known.left, &wake.left) && near(&known.right, &wake.right))
-            {
-                wakes.push(wake);
-            }
-        }
-        let mut starts: Vec<(Kind, Wake)> = wakes.into_iter().map(|wake| (Kind::Both, wake)).collect();
+        let near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
+        let same = |a: &Wake, b: &Wake| near(&a.left, &b.left) && near(&a.right, &b.right);
+        let found = distinct(pairs.iter().map(|pair| search.wake(pair)), same).into_iter().take(PAIRS);
+        let mut starts: Vec<_> = self.options.start.into_iter().chain(found).map(|wake| (Kind::Both, wake)).collect();
         for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
             let single = search.single(sense);
             starts.extend(single.map(|(place_m, circulation_m2_s)| {
@@ -188,8 +174,8 @@ impl<'a> Stage<'a> {
 
     /// The end from a start on, with those free numbers.
     pub(crate) fn lowest(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>, stop: Stop) -> Option<End> {
-        let Minimum { p, cost, sigmas_left, .. } = self.squares.minimum(&start.to_array(), &groups, stop)?;
-        Some(End { kind, wake: Wake::from_list(&p), chi2: 2.0 * cost, sigmas_left, groups })
+        let Minimum { at, normal, sigmas_left, .. } = self.squares.minimum(&start.to_array(), &groups, stop)?;
+        Some(End { kind, wake: Wake::from_list(&at), chi2: 2.0 * normal.cost, sigmas_left, groups })
     }
 
     /// Core radius that a fit starts with or keeps.
@@ -253,14 +239,9 @@ impl<'a> Stage<'a> {
 
     /// Ends of all starts; pairs also start fits of each of their vortices alone.
     pub(crate) fn ends_of(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
-        let (mut nears, mut ends): (Vec<(Kind, Wake)>, Vec<End>) = (Vec::new(), Vec::new());
-        for (kind, start) in starts {
-            let Some(near) = self.near(*kind, start) else { continue };
-            if !nears.iter().any(|(other, wake)| other == kind && kind.same(wake, &near, NEARLY)) {
-                nears.push((*kind, near));
-                ends.extend(self.polished(*kind, &near));
-            }
-        }
+        let nears = starts.iter().filter_map(|(kind, start)| Some((*kind, self.near(*kind, start)?)));
+        let nears = distinct(nears, |(other, wake), (kind, near)| other == kind && kind.same(wake, near, NEARLY));
+        let mut ends: Vec<End> = nears.iter().filter_map(|(kind, near)| self.polished(*kind, near)).collect();
         if let Some(pair) = best(&ends, Kind::Both).map(|end| end.wake) {
             ends.extend([Kind::Left, Kind::Right].iter().filter_map(|kind| self.polished(*kind, &kind.of(&pair))));
         }
@@ -286,15 +267,9 @@ impl<'a> Stage<'a> {
 
 /// Rough ends without those that are the same or far worse than the best of their kind.
 pub(crate) fn rivals(ends: &[End], scale: f64) -> Vec<End> {
-    let mut rivals: Vec<End> = Vec::new();
-    for end in ends {
-        let same = |other: &End| other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY);
-        let hopeless = best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale);
-        if !hopeless && !rivals.iter().any(same) {
-            rivals.push(end.clone());
-        }
-    }
-    rivals
+    let hopeless = |end: &End| best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale);
+    let same = |other: &End, end: &End| other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY);
+    distinct(ends.iter().filter(|end| !hopeless(end)).cloned(), same)
 }
 
 /// The best end of a kind whose circulations have the sense of an aircraft's: a left vortex the other way round is a right one.
@@ -315,19 +290,12 @@ pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
 pub(crate) fn tops<'a>(ends: &'a [End], best: &End, covariance: &ndarray::Array2<f64>) -> Vec<&'a End> {
     let mut sorted: Vec<&End> = ends.iter().filter(|end| end.kind == best.kind).collect();
     sorted.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
-    let mut tops: Vec<&End> = Vec::new();
-    for end in sorted {
-        let same = |top: &&End| {
-            let (a, b) = (end.wake.to_array(), top.wake.to_array());
-            let near = |i: usize| {
-                let sigma = covariance[[i, i]].sqrt();
-                (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME * a[i].abs().max(1.0))
-            };
-            (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
+    distinct(sorted, |top, end| {
+        let (a, b) = (end.wake.to_array(), top.wake.to_array());
+        let near = |i: usize| {
+            let sigma = covariance[[i, i]].sqrt();
+            (a[i] - b[i]).abs() <= (SAME_SIGMAS * sigma).max(SAME * a[i].abs().max(1.0))
         };
-        if !tops.iter().any(same) {
-            tops.push(end);
-        }
-    }
-    tops
+        (0..PARAMETERS).all(|i| near(i) || !end.kind.has(i))
+    })
 }

@@ -58,9 +58,6 @@ impl<'a> Report<'a> {
     /// The likely end if it is a wake, a lone vortex instead of a pair of which one is not seen, or the wind.
     pub(crate) fn chosen(&self) -> Result<Chosen<'a>, Error> {
         let cells = self.stage.squares.cells.len();
-        let gain = |without: Option<&End>, with: &End| {
-            without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2)
-        };
         let likely = least(self.ends, cells);
         let mut of_likely = likely.map(|end| self.uncertainty(end)).transpose()?;
         let alike = match (likely, &of_likely) {
@@ -69,7 +66,9 @@ impl<'a> Report<'a> {
             }
             _ => 1.0,
         };
-        let gain = |without: Option<&End>, with: &End| gain(without, with) / alike;
+        let gain = |without: Option<&End>, with: &End| {
+            without.map_or(f64::INFINITY, |end| end.chi2 - with.chi2) / self.scale.powi(2) / alike
+        };
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
         let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
         let lone = [left, right].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
@@ -107,12 +106,8 @@ impl<'a> Report<'a> {
     }
 
     fn sides(&self, end: &End) -> Vec<Side> {
-        match end.kind {
-            Kind::Wind => vec![],
-            Kind::Left => vec![Side::Left],
-            Kind::Right => vec![Side::Right],
-            Kind::Both => vec![Side::Left, Side::Right],
-        }
+        let is_there = |side: &Side| end.kind.has(side.parameters()[0] as usize);
+        [Side::Left, Side::Right].into_iter().filter(is_there).collect()
     }
 
     fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
@@ -140,7 +135,8 @@ impl<'a> Report<'a> {
             value: end.wake.to_array()[parameter as usize],
             std: covariance[[parameter as usize; 2]].sqrt(),
         };
-        let low = |vortex: &VortexResult| vortex.height_m.value < 0.5 * self.spacing_m(end);
+        let spacing_m = if end.kind == Kind::Both { end.wake.spacing_m() } else { 2.0 * SEEN_M };
+        let low = |vortex: &VortexResult| vortex.height_m.value < 0.5 * spacing_m;
         let competes = tops
             .get(1)
             .zip(tops.first())
@@ -175,10 +171,6 @@ impl<'a> Report<'a> {
             covariance,
             tops,
         }
-    }
-
-    fn spacing_m(&self, end: &End) -> f64 {
-        if end.kind == Kind::Both { end.wake.spacing_m() } else { 2.0 * SEEN_M }
     }
 
     /// How far the sector reaches beyond a centre \[m\]; negative outside.

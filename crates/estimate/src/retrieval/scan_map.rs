@@ -6,7 +6,7 @@ use ndarray::Array2;
 
 use crate::error::{Error, finite, length, positive};
 use crate::vortex_fit::VelocityMap;
-use crate::vortex_fit::map_fit::data::median;
+use crate::vortex_fit::map_fit::data::{block_means, median};
 
 /// Deviation of the median of many normal numbers over that of their mean.
 const MEDIAN_OVER_MEAN: f64 = 1.253_314_137_315_500_3;
@@ -59,17 +59,11 @@ impl ScanMap {
         if by_line * by_gate == 1 {
             return None;
         }
-        let mean = |axis: &[f64], by: usize| -> Vec<f64> {
-            axis.chunks(by).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect()
-        };
-        let (elevation_rad, range_m) = (mean(&self.elevation_rad, by_line), mean(&self.range_m, by_gate));
+        let (elevation_rad, range_m) = (block_means(&self.elevation_rad, by_line), block_means(&self.range_m, by_gate));
         let mut velocity_m_s = Array2::from_elem((elevation_rad.len(), range_m.len()), f64::NAN);
         let mut sigma_m_s = Array2::ones(velocity_m_s.raw_dim());
         for ((block, velocity), sigma) in velocity_m_s.indexed_iter_mut().zip(&mut sigma_m_s) {
-            let lines = (block.0 * by_line..self.elevation_rad.len()).take(by_line);
-            let cells = lines
-                .flat_map(|line| (block.1 * by_gate..self.range_m.len()).take(by_gate).map(move |gate| [line, gate]));
-            let known: Vec<_> = cells.filter(|cell| self.velocity_m_s[*cell].is_finite()).collect();
+            let known = self.view().known_in(block, (by_line, by_gate));
             let Some(count) = (!known.is_empty()).then_some(known.len() as f64) else { continue };
             let mut values: Vec<f64> = known.iter().map(|cell| self.velocity_m_s[*cell]).collect();
             values.sort_by(f64::total_cmp);
@@ -79,7 +73,7 @@ impl ScanMap {
             let wider = if values.len() > 2 { MEDIAN_OVER_MEAN } else { 1.0 };
             *sigma = stated.unwrap_or(1.0) * wider / count.sqrt();
         }
-        let (time_s, fold_m_s) = (mean(&self.time_s, by_line), self.fold_m_s);
+        let (time_s, fold_m_s) = (block_means(&self.time_s, by_line), self.fold_m_s);
         let sigma_m_s = self.sigma_m_s.is_some().then_some(sigma_m_s);
         Some(Self { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s, fold_m_s })
     }

@@ -57,6 +57,12 @@ pub(crate) fn solve(a: &Array2<f64>, b: &[f64]) -> Option<Vec<f64>> {
     Some(x)
 }
 
+/// The error of a matrix that is not positive definite.
+pub(crate) fn singular(what: &'static str, order: usize) -> Error {
+    let reason = "is singular to working precision: a free parameter does not show in the data";
+    Error::Linalg { what, order, reason }
+}
+
 /// Inverse of a symmetric positive definite matrix.
 ///
 /// # Errors
@@ -66,11 +72,7 @@ pub(crate) fn inverse(what: &'static str, a: &Array2<f64>) -> Result<Array2<f64>
     let mut inverse = Array2::zeros((n, n));
     for j in 0..n {
         let unit: Vec<f64> = (0..n).map(|i| if i == j { 1.0 } else { 0.0 }).collect();
-        let column = solve(a, &unit).ok_or(Error::Linalg {
-            what,
-            order: n,
-            reason: "is singular to working precision: a free parameter does not show in the data",
-        })?;
+        let column = solve(a, &unit).ok_or(singular(what, n))?;
         (0..n).for_each(|i| inverse[[i, j]] = column[i]);
     }
     Ok(inverse)
@@ -89,41 +91,48 @@ pub(crate) struct Stop {
     pub(crate) learns: bool,
 }
 
-/// As [`lowest`], to the end.
+/// The end of a descent.
+pub(crate) struct Minimum<P> {
+    pub(crate) at: P,
+    pub(crate) normal: Normal,
+    iterations: usize,
+    /// The step that is left \[standard deviations\].
+    pub(crate) sigmas_left: f64,
+}
+
+/// A minimum that was found.
 ///
 /// # Errors
-/// [`Error::NotConverged`] after `stop.iterations` evaluations, or where no step goes downhill.
-pub(crate) fn descend<P: Clone>(
-    start: P,
-    stop: Stop,
-    evaluate: impl FnMut(&P) -> Option<Normal>,
-    moved: impl Fn(&P, &[f64]) -> P,
-) -> Result<(P, Normal, usize), Error> {
-    let nowhere = Error::NotConverged { iterations: 0, sigmas_left: f64::INFINITY };
-    match lowest(start, stop, evaluate, moved).ok_or(nowhere)? {
-        (at, here, iterations, sigmas_left) if sigmas_left <= stop.sigmas => Ok((at, here, iterations)),
-        (_, _, iterations, sigmas_left) => Err(Error::NotConverged { iterations, sigmas_left }),
+/// [`Error::NotConverged`] after `stop.iterations` evaluations, or where no step goes downhill or there is no model.
+pub(crate) fn converged<P>(end: Option<Minimum<P>>, stop: Stop) -> Result<Minimum<P>, Error> {
+    match end {
+        Some(end) if end.sigmas_left <= stop.sigmas => Ok(end),
+        end => {
+            let (iterations, sigmas_left) = end.map_or((0, f64::INFINITY), |end| (end.iterations, end.sigmas_left));
+            Err(Error::NotConverged { iterations, sigmas_left })
+        }
     }
 }
 
 /// Goes downhill from `start` until the step that is left is below `stop.sigmas` standard deviations (the curvature taken
-/// as the inverse covariance), no step goes downhill or there are no evaluations left; with their number and the step that is left.
+/// as the inverse covariance), no step goes downhill or there are no evaluations left.
 /// `evaluate` returns nothing where the model does not exist, `moved` adds a step. Nothing if it does not at the start.
 pub(crate) fn lowest<P: Clone>(
     start: P,
     stop: Stop,
     mut evaluate: impl FnMut(&P) -> Option<Normal>,
     moved: impl Fn(&P, &[f64]) -> P,
-) -> Option<(P, Normal, usize, f64)> {
+) -> Option<Minimum<P>> {
     let mut at = start;
     let mut here = evaluate(&at)?;
     let (mut damping, mut left) = (1e-3, f64::INFINITY);
+    let end = |at, normal, iterations, sigmas_left| Some(Minimum { at, normal, iterations, sigmas_left });
     for iteration in 1..=stop.iterations {
         let down: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
         if let Some(newton) = solve(&here.curvature, &down) {
             left = newton.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>().max(0.0).sqrt();
             if left <= stop.sigmas {
-                return Some((at, here, iteration, left));
+                return end(at, here, iteration, left);
             }
         }
         let mut damped = here.curvature.clone();
@@ -150,10 +159,10 @@ pub(crate) fn lowest<P: Clone>(
             }
         }
         if damping > 1e12 {
-            return Some((at, here, iteration, left));
+            return end(at, here, iteration, left);
         }
     }
-    Some((at, here, stop.iterations, left))
+    end(at, here, stop.iterations, left)
 }
 
 /// A step back by more than this part of the one before turns round.
@@ -214,11 +223,12 @@ mod tests {
     fn a_curved_valley_is_followed_to_its_end() {
         let moved = |p: &[f64; 2], s: &[f64]| [p[0] + s[0], p[1] + s[1]];
         let stop = Stop { iterations: 100, sigmas: 1e-9, learns: false };
-        let (end, normal, _) = descend([-1.2, 1.0], stop, valley, moved).unwrap();
+        let descend = |start, stop| converged(lowest(start, stop, valley, moved), stop);
+        let Minimum { at: end, normal, .. } = descend([-1.2, 1.0], stop).unwrap();
         assert!((end[0] - 1.0).abs() < 1e-8 && (end[1] - 1.0).abs() < 1e-8 && normal.cost < 1e-16);
-        let error = descend([-1.2, 1.0], Stop { iterations: 3, ..stop }, valley, moved).unwrap_err();
-        assert!(matches!(error, Error::NotConverged { iterations: 3, .. }));
-        assert!(descend([2.0, 1.0], stop, valley, moved).is_err());
+        let hasty = descend([-1.2, 1.0], Stop { iterations: 3, ..stop });
+        assert!(matches!(hasty, Err(Error::NotConverged { iterations: 3, .. })));
+        assert!(descend([2.0, 1.0], stop).is_err());
     }
 
     #[test]

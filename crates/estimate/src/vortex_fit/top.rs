@@ -5,6 +5,17 @@ use crate::vortex_fit::Wake;
 /// Tops closer than this many standard deviations are one.
 pub(crate) const SAME_SIGMAS: f64 = 0.3;
 
+/// Those that are not the same as one before them.
+pub(crate) fn distinct<T>(all: impl IntoIterator<Item = T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+    let mut kept: Vec<T> = Vec::new();
+    for one in all {
+        if !kept.iter().any(|before| same(before, &one)) {
+            kept.push(one);
+        }
+    }
+    kept
+}
+
 /// A top of the likelihood: an end of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Top {

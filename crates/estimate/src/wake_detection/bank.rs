@@ -143,12 +143,7 @@ impl<'a> Sector<'a> {
     }
 
     pub(super) fn holds(&self, place_m: (f64, f64)) -> bool {
-        let (y, z) = (place_m.0 - self.model.lidar_lateral_position_m, place_m.1 - self.model.lidar_height_m);
-        let within = |axis: &[f64], value: f64| match (axis.first(), axis.last()) {
-            (Some(first), Some(last)) => (*first..=*last).contains(&value),
-            _ => false,
-        };
-        within(&self.cells.range_m, y.hypot(z)) && within(&self.cells.elevation_rad, z.atan2(y))
+        self.model.sees((&self.cells.elevation_rad, &self.cells.range_m), place_m)
     }
 }
 

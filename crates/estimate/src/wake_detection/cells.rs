@@ -5,6 +5,7 @@
 use ndarray::{Array2, ArrayView2};
 
 use crate::error::{Error, length};
+use crate::vortex_fit::map_fit::data::block_means;
 use crate::vortex_fit::{VelocityMap, WakeModel};
 
 /// Most cells that are kept: more tell little that is new about a wake of some ten metres, and whitening takes the cube.
@@ -34,10 +35,7 @@ impl Cells {
     pub(super) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
         let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
         let (by_line, by_gate) = map.blocks(MOST_CELLS);
-        let mean = |axis: &[f64], by: usize| -> Vec<f64> {
-            axis.chunks(by).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect()
-        };
-        let (elevation_rad, range_m) = (mean(map.elevation_rad, by_line), mean(map.range_m, by_gate));
+        let (elevation_rad, range_m) = (block_means(map.elevation_rad, by_line), block_means(map.range_m, by_gate));
         let weight = |line: usize, gate: usize| {
             let known = map.velocity_m_s[[line, gate]].is_finite();
             known.then(|| map.deviation(line, gate).powi(-2))

@@ -18,7 +18,8 @@ pub(crate) struct Coarse {
     range_m: Vec<f64>,
     velocity_m_s: Array2<f64>,
     standard_deviation_m_s: Option<Array2<f64>>,
-    line_step: usize,
+    /// Lines of the whole map from one to the next.
+    pub(crate) line_step: usize,
 }
 
 impl Coarse {
@@ -67,11 +68,6 @@ impl Coarse {
             velocity_m_s: self.velocity_m_s.view(),
             standard_deviation_m_s: self.standard_deviation_m_s.as_ref().map(|deviation| deviation.view()),
         }
-    }
-
-    /// Lines of the whole map from one to the next.
-    pub(crate) fn line_step(&self) -> usize {
-        self.line_step
     }
 
     /// Numbers of these places at all places of a map of that size: linear between, and beyond the outermost as there. Numbers
@@ -131,7 +127,7 @@ mod tests {
         };
         let coarse = Coarse::of(&map, 3.1, 10.5).unwrap();
         let some = coarse.map();
-        assert_eq!((coarse.line_step(), some.velocity_m_s.dim()), (3, (30, 21)));
+        assert_eq!((coarse.line_step, some.velocity_m_s.dim()), (3, (30, 21)));
         assert_eq!(some.elevation_rad[1], elevation_rad[coarse.lines[1]]);
         assert_eq!(some.range_m[1], range_m[coarse.gates[1]]);
         assert_eq!(some.standard_deviation_m_s.unwrap()[[1, 1]], plane[[coarse.lines[1], coarse.gates[1]]]);

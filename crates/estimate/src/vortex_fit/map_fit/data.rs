@@ -66,10 +66,23 @@ impl VelocityMap<'_> {
         (by_line, by_gate)
     }
 
+    /// Places of the velocities that there are in a block of so many lines and gates.
+    pub(crate) fn known_in(&self, (line, gate): (usize, usize), (by_line, by_gate): (usize, usize)) -> Vec<[usize; 2]> {
+        let lines = (line * by_line..self.elevation_rad.len()).take(by_line);
+        let gates = (gate * by_gate..self.range_m.len()).take(by_gate);
+        let places = lines.flat_map(|line| gates.clone().map(move |gate| [line, gate]));
+        places.filter(|place| self.velocity_m_s[*place].is_finite()).collect()
+    }
+
     /// Standard deviation of one velocity, 1 if none was given.
     pub(crate) fn deviation(&self, line: usize, gate: usize) -> f64 {
         self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])
     }
+}
+
+/// Means of an axis over blocks of so many.
+pub(crate) fn block_means(axis: &[f64], by: usize) -> Vec<f64> {
+    axis.chunks(by).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect()
 }
 
 /// Both axes are finite and increase.

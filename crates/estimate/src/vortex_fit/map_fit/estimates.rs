@@ -16,7 +16,7 @@ use crate::vortex_fit::map_fit::guess::first_guess;
 use crate::vortex_fit::map_fit::local_circulation::{REACH_M, joined};
 use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
-use crate::vortex_fit::map_fit::starts::{best_of, distinct, starts, with_typical_core};
+use crate::vortex_fit::map_fit::starts::{best_of, rivals, starts, with_typical_core};
 use crate::vortex_fit::{
     EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices, Sharing, VelocityMap,
     Wake, WakeModel,
@@ -238,7 +238,7 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     fn ends(&self, starts: &[Wake], stop: Stop) -> Vec<Wake> {
         let refine = |start: &Wake| self.setting().refined(start, stop);
         let end = |start: &Wake| with_typical_core(refine(start)?, &self.options, refine);
-        distinct(starts.iter().filter_map(|start| end(start).ok()).collect())
+        rivals(starts.iter().filter_map(|start| end(start).ok()).collect())
     }
 }
 
@@ -251,7 +251,7 @@ impl Coarse {
         options: &MapFitOptions,
         coarser: f64,
     ) -> Result<Shown<'a, 'a>, Error> {
-        let correlated_lines = options.correlated_lines.div_ceil(self.line_step());
+        let correlated_lines = options.correlated_lines.div_ceil(self.line_step);
         let options = MapFitOptions { correlated_lines, ..*options };
         Shown::new(&self.map(), model, response, &options, coarser)
     }

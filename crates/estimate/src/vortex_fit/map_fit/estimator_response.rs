@@ -85,19 +85,15 @@ impl<'a> EstimatorResponse<'a> {
         let in_band = Noise::Band { floor: 0.0 }.covariance(sampling, 0.0, S::KIND).re;
         let numbers = statistic.lag_weights().into_iter().enumerate().flat_map(|(m, weight)| {
             let lag = noise.covariance(sampling, m as f64, S::KIND) * (weight / in_band / snr);
-            [lag.re, lag.im]
+            [lag.re, lag.im].into_iter().take(S::KIND.lag_numbers(1))
         });
-        let noise = match S::KIND {
-            SignalKind::Real => numbers.step_by(2).collect(),
-            SignalKind::Complex => numbers.collect(),
-        };
         Ok(Self {
             estimator,
             kind: S::KIND,
             tapers: statistic.tapers().to_vec(),
             sampling: *sampling,
             pulse: pulse.clone(),
-            noise,
+            noise: numbers.collect(),
             radius_m: Box::new(move |_| radius_m),
             line_times: Vec::new(),
         })
@@ -179,12 +175,9 @@ impl<'a> EstimatorResponse<'a> {
         weights.truncate((powers.len() - after) * numbers);
         weights.drain(..before * numbers);
         weights.iter_mut().for_each(|weight| *weight /= power);
-        let regions = elevation_rad
-            .iter()
-            .enumerate()
-            .flat_map(|(line, _)| range_m.iter().map(move |&range_m| (line, range_m)))
-            .map(|(line, range_m)| region(elevation_rad, line, range_m, (self.radius_m)(range_m)).collect())
-            .collect();
+        let regions = Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
+            region(elevation_rad, line, range_m[gate], (self.radius_m)(range_m[gate])).collect()
+        });
         let first_offset_m = (before as f64 - reach as f64) * spacing_m;
         let seconds = match self.line_times.is_empty() {
             true => Vec::new(),
@@ -217,8 +210,8 @@ pub(crate) struct Prepared<'r> {
     numbers: usize,
     /// \[node, number\]
     weights: Vec<f64>,
-    /// Lines of the region of each place with their shares, one line of the map after the other.
-    regions: Vec<Vec<(usize, f64)>>,
+    /// Lines of the region of each place \[line, gate\] with their shares.
+    regions: Array2<Vec<(usize, f64)>>,
     /// Time of each line after that of the wake \[s\]; empty if it stands still.
     seconds: Vec<f64>,
 }
@@ -231,11 +224,6 @@ impl Prepared<'_> {
     pub(crate) fn kernel(&self) -> Result<RangeKernel, Error> {
         let weights: Vec<f64> = self.weights.iter().step_by(self.numbers).copied().collect();
         RangeKernel::new(self.first_offset_m, self.spacing_m, &weights)
-    }
-
-    /// Lines of the region of a place with their shares.
-    fn region(&self, line: usize, gate: usize) -> &[(usize, f64)] {
-        &self.regions[line * self.range_m.len() + gate]
     }
 
     /// The wake when each line is measured.
@@ -258,7 +246,7 @@ impl Prepared<'_> {
         let rows = map_indexed(lines, state, |(scratch, mean), line| {
             let one = |gate: usize| {
                 mean.copy_from_slice(&self.response.noise);
-                for &(other, share) in self.region(line, gate) {
+                for &(other, share) in &self.regions[[line, gate]] {
                     let lags = &correlograms[other][gate * self.numbers..][..self.numbers];
                     mean.iter_mut().zip(lags).for_each(|(sum, lag)| *sum += share * lag);
                 }
@@ -288,10 +276,11 @@ impl Prepared<'_> {
             },
         );
         Array2::from_shape_fn((lines, gates), |(line, gate)| {
-            let [mean, square] = self.region(line, gate).iter().fold([0.0, 0.0], |[mean, square], &(other, share)| {
-                let [m, s] = moments[other][gate];
-                [mean + share * m, square + share * s]
-            });
+            let [mean, square] =
+                self.regions[[line, gate]].iter().fold([0.0, 0.0], |[mean, square], &(other, share)| {
+                    let [m, s] = moments[other][gate];
+                    [mean + share * m, square + share * s]
+                });
             (square - mean * mean).max(0.0)
         })
     }
@@ -304,7 +293,10 @@ impl Prepared<'_> {
         let nodes = self.weights.len() / self.numbers;
         let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
         let at_m = |point: usize| nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
-        (0..points).map(|point| model.velocity_on(wake, at_m(point), ray)).collect()
+        let mut velocities = [Vec::new()];
+        model.along(wake, &(0..points).map(at_m).collect::<Vec<f64>>(), ray, &mut velocities);
+        let [velocities] = velocities;
+        velocities
     }
 
     /// Expected correlograms of the signal at all gates of a line, of power 1.

@@ -10,7 +10,7 @@ use ndarray::{Array1, Array2};
 use crate::error::{Error, enough_velocities};
 use crate::parallel::map_indexed;
 use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
-use crate::vortex_fit::map_fit::data::{median, robust_scale};
+use crate::vortex_fit::map_fit::data::{block_means, median, robust_scale};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
@@ -38,29 +38,16 @@ struct Thinned {
 }
 
 fn thin(map: &VelocityMap<'_>) -> Thinned {
-    let blocks = |axis: &[f64]| -> Vec<(usize, usize)> {
-        let size = axis.len().div_ceil(BLOCKS);
-        (0..axis.len()).step_by(size).map(|from| (from, (from + size).min(axis.len()))).collect()
+    let (by_line, by_gate) = (map.elevation_rad.len().div_ceil(BLOCKS), map.range_m.len().div_ceil(BLOCKS));
+    let (elevation_rad, range_m) = (block_means(map.elevation_rad, by_line), block_means(map.range_m, by_gate));
+    let block = |index: usize| {
+        let known = map.known_in((index / range_m.len(), index % range_m.len()), (by_line, by_gate));
+        let of = |place: &[usize; 2]| (map.velocity_m_s[*place], map.deviation(place[0], place[1]));
+        let (mut velocities, mut deviations): (Vec<f64>, Vec<f64>) = known.iter().map(of).unzip();
+        if known.is_empty() { (0.0, 0.0) } else { (median(&mut velocities), median(&mut deviations).recip()) }
     };
-    let middle = |axis: &[f64], (from, to): (usize, usize)| axis[from..to].iter().sum::<f64>() / (to - from) as f64;
-    let (lines, gates) = (blocks(map.elevation_rad), blocks(map.range_m));
-    let (mut velocity, mut weight) = (Vec::with_capacity(lines.len() * gates.len()), Vec::new());
-    for &(first, last) in &lines {
-        for &(from, to) in &gates {
-            let block = map.velocity_m_s.slice(ndarray::s![first..last, from..to]);
-            let known = block.indexed_iter().filter(|(_, v)| v.is_finite());
-            let (mut deviations, mut finite): (Vec<f64>, Vec<f64>) =
-                known.map(|((line, gate), v)| (map.deviation(first + line, from + gate), *v)).unzip();
-            velocity.push(if finite.is_empty() { 0.0 } else { median(&mut finite) });
-            weight.push(if deviations.is_empty() { 0.0 } else { median(&mut deviations).recip() });
-        }
-    }
-    Thinned {
-        elevation_rad: lines.iter().map(|&block| middle(map.elevation_rad, block)).collect(),
-        range_m: gates.iter().map(|&block| middle(map.range_m, block)).collect(),
-        velocity,
-        weight,
-    }
+    let (velocity, weight) = (0..elevation_rad.len() * range_m.len()).map(block).unzip();
+    Thinned { elevation_rad, range_m, velocity, weight }
 }
 
 /// A pair of places with the circulations that fit best there.

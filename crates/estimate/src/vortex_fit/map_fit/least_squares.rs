@@ -14,7 +14,7 @@ use crate::error::Error;
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
 use crate::retrieval::Whitening;
-use crate::vortex_fit::damped_newton::{Normal, Stop, inverse, lowest, solve};
+use crate::vortex_fit::damped_newton::{Minimum, Normal, Stop, inverse, lowest, singular, solve};
 use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
 use crate::vortex_fit::map_fit::data::robust_scale;
 use crate::vortex_fit::map_fit::prediction::Prediction;
@@ -42,15 +42,6 @@ pub(crate) struct LeastSquares<'a> {
 pub(crate) struct Rows {
     pub(crate) residuals: Vec<f64>,
     pub(crate) slopes: Vec<Vec<f64>>,
-}
-
-/// The end of a descent.
-pub(crate) struct Minimum {
-    pub(crate) p: Vec<f64>,
-    pub(crate) cost: f64,
-    pub(crate) iterations: usize,
-    /// The step that is left \[standard deviations\].
-    pub(crate) sigmas_left: f64,
 }
 
 /// Where the covariance of the gradient comes from.
@@ -139,11 +130,8 @@ impl LeastSquares<'_> {
     }
 
     /// The minimum from a start on; nothing from an impossible one.
-    pub(crate) fn minimum(&self, start: &[f64], groups: &[Vec<usize>], stop: Stop) -> Option<Minimum> {
-        let step = |p: &Vec<f64>, step: &[f64]| stepped(groups, p, step);
-        let (p, end, iterations, sigmas_left) =
-            lowest(start.to_vec(), stop, |p: &Vec<f64>| self.normal(p, groups), step)?;
-        Some(Minimum { p, cost: end.cost, iterations, sigmas_left })
+    pub(crate) fn minimum(&self, start: &[f64], groups: &[Vec<usize>], stop: Stop) -> Option<Minimum<Vec<f64>>> {
+        lowest(start.to_vec(), stop, |p| self.normal(p, groups), |p, step| stepped(groups, p, step))
     }
 
     /// The minimum of a model that is linear in the parameters, by least squares with weights taken anew: each round lowers the cost, whatever the
@@ -153,11 +141,7 @@ impl LeastSquares<'_> {
         for _ in 0..stop.iterations {
             let Some(Normal { gradient, curvature, .. }) = self.normal(&p, groups) else { break };
             let down: Vec<f64> = gradient.iter().map(|g| -g).collect();
-            let step = solve(&curvature, &down).ok_or(Error::Linalg {
-                what: CURVATURE,
-                order: down.len(),
-                reason: "is singular to working precision: a free parameter does not show in the data",
-            })?;
+            let step = solve(&curvature, &down).ok_or(singular(CURVATURE, down.len()))?;
             p = stepped(groups, &p, &step);
             if dot(&step, &down) <= stop.sigmas * stop.sigmas {
                 break;

@@ -6,9 +6,8 @@
 //! takes from the whole map what these fits take from a part. Check: pairs in winds that differ; simulated wakes.
 
 use crate::vortex_fit::damped_newton::Stop;
-use crate::vortex_fit::map_fit::cells::Cell;
 use crate::vortex_fit::map_fit::least_squares::Scores;
-use crate::vortex_fit::map_fit::setting::{Linear, Setting};
+use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::{MapFit, Parameter, Sharing, Wake};
 
 /// How far what is near a vortex reaches: the circle of 15 m over which circulations are averaged, and some more \[m\].
@@ -38,20 +37,15 @@ impl Setting<'_, '_> {
         let start = pair.to_array().to_vec();
         let settled = self.settled(start.clone(), &groups, stop, None).ok()?;
         let (best, alone) = (&settled.linear, self.linear(&start, &groups, None).ok()?.0);
-        let is_seen = |cell: &&Cell| alone.tangent.here.velocity_m_s[[cell.line, cell.gate]].is_finite();
-        let cells: Vec<Cell> = best.cells.iter().filter(is_seen).cloned().collect();
-        if cells.len() < 10 * groups.len() || best.tangent.at[own] <= 0.0 {
+        if best.shared_with(&alone).len() < 10 * groups.len() || best.tangent.at[own] <= 0.0 {
             return None;
         }
-        let of = |linear: &Linear| {
-            self.squares(&linear.tangent, cells.clone(), 1.0).log_likelihood(&linear.tangent.at, &groups)
-        };
         let scores = Scores::OfNeighbours { lines: self.options.correlated_lines };
         let uncertainty = self.about(best, settled.counted).uncertainty(&best.tangent.at, &groups, scores).ok()?;
         Some(Local {
             circulation_m2_s: best.tangent.at[own],
             variance: uncertainty.covariance(|_| true).ok()?[[own, own]],
-            gain: (of(best) - of(&alone)) / settled.counted,
+            gain: self.gain((best, &groups), (&alone, &groups), settled.counted),
         })
     }
 }

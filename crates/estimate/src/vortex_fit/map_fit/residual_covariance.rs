@@ -122,7 +122,7 @@ impl<'a> Plane<'a> {
     }
 
     /// A function of the distances (lines, gates) on the grid.
-    fn of_distance(&self, f: impl Fn(f64, f64) -> f64) -> Vec<f64> {
+    fn of_distance<T>(&self, f: impl Fn(f64, f64) -> T) -> Vec<T> {
         let short = |i: usize, of: usize| i.min(of - i) as f64;
         let places = (0..self.lines).flat_map(|i| (0..self.gates).map(move |j| (i, j)));
         places.map(|(i, j)| f(short(i, self.lines), short(j, self.gates))).collect()
@@ -304,27 +304,20 @@ pub(crate) fn of_neighbours(all: Cells<'_>, bread: &Array2<f64>, lines: usize) -
 /// Correlation of residuals with those of their neighbours on the grid, 0 beyond where it ends.
 fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<f64>> {
     let (sums, pairs) = (plane.power(residuals), plane.power(&vec![1.0; residuals.len()]));
-    let mean = |line: usize, gate: usize| {
-        let at = line * plane.gates + gate;
-        if pairs[at] > 0.5 { sums[at] / pairs[at] } else { 0.0 }
-    };
-    let variance = mean(0, 0);
+    let means = sums.iter().zip(&pairs).map(|(sum, pairs)| if *pairs > 0.5 { sum / pairs } else { 0.0 });
+    let means: Vec<f64> = means.collect();
+    let variance = means[0];
     if variance <= 0.0 || !variance.is_finite() {
         return None;
     }
     let last =
         |most: usize, of: &dyn Fn(usize) -> f64| (1..=most).find(|k| of(*k) < LEAST * variance).map_or(most, |k| k - 1);
-    let last_line = last(lines.min(plane.extent.0 / 3), &|line| mean(line, 0));
-    let last_gate = last(plane.extent.1 / 3, &|gate| mean(0, gate));
-    let (mut at, short) = (vec![0.0; sums.len()], |i: usize, of: usize| i.min(of - i));
-    for (line, gate) in (0..plane.lines).flat_map(|line| (0..plane.gates).map(move |gate| (line, gate))) {
-        let correlation = mean(line, gate) / variance;
-        if short(line, plane.lines) <= last_line && short(gate, plane.gates) <= last_gate && correlation.abs() >= LEAST
-        {
-            at[line * plane.gates + gate] = correlation;
-        }
-    }
-    Some(at)
+    let last_line = last(lines.min(plane.extent.0 / 3), &|line| means[line * plane.gates]) as f64;
+    let last_gate = last(plane.extent.1 / 3, &|gate| means[gate]) as f64;
+    let near = plane.of_distance(|line, gate| line <= last_line && gate <= last_gate);
+    let correlation = |(mean, near): (&f64, bool)| (mean / variance, near && (mean / variance).abs() >= LEAST);
+    let correlations = means.iter().zip(near).map(correlation);
+    Some(correlations.map(|(correlation, counts)| if counts { correlation } else { 0.0 }).collect())
 }
 
 /// B, and the number of cells that count as one. Residuals and slopes are summed over blocks of so many lines and gates, over the root of their

@@ -10,10 +10,10 @@ use ndarray::{Array1, Array2};
 use std::ops::Range;
 
 use crate::vortex_fit::damped_newton::{Stop, inverse};
-use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
+use crate::vortex_fit::map_fit::cells::{products, scaled};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::Scores;
-use crate::vortex_fit::map_fit::setting::{Linear, Setting, Settled};
+use crate::vortex_fit::map_fit::setting::{Linear, Setting};
 use crate::vortex_fit::wake::core_prior::{KNOWN_CORE, secondary_ratios};
 use crate::vortex_fit::wake::pair::SECONDARY_PARAMETERS;
 use crate::vortex_fit::{PARAMETERS, Secondary, Vortex, Wake, WakeModel};
@@ -100,8 +100,8 @@ impl Setting<'_, '_> {
         let four = self.about(&settled.linear, counted);
         let counted = four.alike(p, lines).min(counted);
         let four = self.about(&settled.linear, counted);
-        let gain =
-            self.gain_of_four((&settled, &alone), &groups[..groups.len() - NUMBERS], counted) - of_profile / counted;
+        let own = &groups[..groups.len() - NUMBERS];
+        let gain = self.gain((&settled.linear, &settled.groups), (&alone, own), counted) - of_profile / counted;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
         let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
@@ -113,18 +113,6 @@ impl Setting<'_, '_> {
         let uncertainty = four.uncertainty(p, &settled.groups, Scores::OfNeighbours { lines }).ok()?;
         let secondary = SecondaryVortices { vortices: model.secondary?, shown, fitted };
         Some(Found { wake, secondary, covariance: uncertainty.covariance(|_| true).ok()? })
-    }
-
-    /// What four vortices gain over the pair in the logarithm of the likelihood, so many velocities counted once. Deviations are the same for both,
-    /// those that four vortices leave: a scale that each fit takes from its own residuals changes by chance, and with it the likelihood of all.
-    fn gain_of_four(&self, (four, pair): (&Settled, &Linear), own: &[Vec<usize>], counted: f64) -> f64 {
-        let expected = &pair.tangent.here.velocity_m_s;
-        let cells = four.linear.cells.iter().filter(|cell| expected[[cell.line, cell.gate]].is_finite());
-        let cells: Vec<Cell> = cells.cloned().collect();
-        let of = |linear: &Linear, groups: &[Vec<usize>]| {
-            self.squares(&linear.tangent, cells.clone(), counted).log_likelihood(&linear.tangent.at, groups)
-        };
-        (of(&four.linear, &four.groups) - of(pair, own)) / counted
     }
 
     /// The vortices of the other sense, one beside each of the pair, that explain most of its residuals by their means over gates if the pair
@@ -153,7 +141,7 @@ impl Setting<'_, '_> {
         let count = (DISTANCES.1 / GRID_OVER_HEIGHT).ceil() as i64;
         let best = |rows: Range<i64>, columns: Range<i64>, step: usize| {
             let places = rows.step_by(step).flat_map(|i| columns.clone().step_by(step).map(move |j| (i, j)));
-            let gains = places.filter_map(|at| Some((at, self.gain((pair, side), at, free)?)));
+            let gains = places.filter_map(|at| Some((at, self.at_place((pair, side), at, free)?)));
             gains.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
         };
         let ((i, j), _) = best(-count..count + 1, -count..count + 1, 2)?;
@@ -161,7 +149,12 @@ impl Setting<'_, '_> {
     }
 
     /// The best vortex at a place of the grid about one of the pair, and what it gains; nothing where there can be none.
-    fn gain(&self, (pair, side): (&Wake, usize), (i, j): (i64, i64), free: &Residuals<'_>) -> Option<(Vortex, f64)> {
+    fn at_place(
+        &self,
+        (pair, side): (&Wake, usize),
+        (i, j): (i64, i64),
+        free: &Residuals<'_>,
+    ) -> Option<(Vortex, f64)> {
         let own = [pair.left, pair.right][side];
         let step_m = GRID_OVER_HEIGHT * own.height_m;
         let place_m = (own.lateral_position_m + i as f64 * step_m, own.height_m + j as f64 * step_m);
@@ -173,9 +166,8 @@ impl Setting<'_, '_> {
         let plain = WakeModel { secondary: None, ..*self.model };
         let nowhere = Vortex { circulation_m2_s: 0.0, ..own };
         let (left, right) = if side == 0 { (vortex, nowhere) } else { (nowhere, vortex) };
-        let wake = Wake::calm(left, right);
         let places = (self.map.elevation_rad, self.map.range_m);
-        let shown = Gates::at_rest(&plain, self.kernel.clone(), places).velocities(&wake);
+        let shown = Gates::at_rest(&plain, self.kernel.clone(), places).velocities(&Wake::calm(left, right));
         let cells = free.linear.cells.iter();
         let shown: Vec<f64> = cells.map(|cell| shown[[cell.line, cell.gate]] / cell.sigma_m_s).collect();
         let weighted = scaled(&free.weights, &shown);
@@ -191,9 +183,6 @@ impl Setting<'_, '_> {
 
     /// Whether a centre lies within the scan.
     fn sees(&self, vortex: &Vortex) -> bool {
-        let (range_m, elevation_rad) = self.model.range_and_elevation((vortex.lateral_position_m, vortex.height_m));
-        let within =
-            |axis: &[f64], at: f64| axis.first().is_some_and(|a| at >= *a) && axis.last().is_some_and(|b| at <= *b);
-        within(self.map.range_m, range_m) && within(self.map.elevation_rad, elevation_rad)
+        self.model.sees((self.map.elevation_rad, self.map.range_m), vortex.place_m())
     }
 }

@@ -9,11 +9,11 @@
 use ndarray::{Array1, Array2};
 
 use crate::error::{Error, enough_velocities, finite};
-use crate::vortex_fit::damped_newton::{Averaging, Stop, halved};
+use crate::vortex_fit::damped_newton::{Averaging, Stop, converged, halved};
 use crate::vortex_fit::map_fit::cells::{Cell, cells};
 use crate::vortex_fit::map_fit::data::{median, robust_scale};
 use crate::vortex_fit::map_fit::gates::Gates;
-use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Minimum, Scores};
+use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
 use crate::vortex_fit::wake::core_prior::is_core;
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Parameter, RangeKernel, Top, VelocityMap, Wake, WakeModel};
@@ -51,6 +51,14 @@ pub(crate) struct Settled {
     pub(crate) counted: f64,
 }
 
+impl Linear {
+    /// Its cells at which another one has a velocity, too.
+    pub(crate) fn shared_with(&self, other: &Self) -> Vec<Cell> {
+        let is_seen = |cell: &&Cell| other.tangent.here.velocity_m_s[[cell.line, cell.gate]].is_finite();
+        self.cells.iter().filter(is_seen).cloned().collect()
+    }
+}
+
 impl Setting<'_, '_> {
     /// Free numbers of a fit from that start on.
     fn groups(&self, start: &Wake) -> Result<Vec<Vec<usize>>, Error> {
@@ -77,6 +85,22 @@ impl Setting<'_, '_> {
         self.squares(&linear.tangent, linear.cells.clone(), counted)
     }
 
+    /// What a model with these free numbers gains over another one in the logarithm of the likelihood, so many velocities counted once. Deviations
+    /// are the same for both, those that it leaves: a scale that each fit takes from its own residuals changes by chance, and with it the likelihood
+    /// of all.
+    pub(crate) fn gain(
+        &self,
+        (better, groups): (&Linear, &[Vec<usize>]),
+        (than, its_groups): (&Linear, &[Vec<usize>]),
+        counted: f64,
+    ) -> f64 {
+        let cells = better.shared_with(than);
+        let of = |linear: &Linear, groups: &[Vec<usize>]| {
+            self.squares(&linear.tangent, cells.clone(), counted).log_likelihood(&linear.tangent.at, groups)
+        };
+        (of(better, groups) - of(than, its_groups)) / counted
+    }
+
     /// The fit by descent from a start on, to steps of `sigmas`.
     pub(crate) fn descended(&self, start: &Wake, sigmas: f64) -> Result<MapFit, Error> {
         let stop = Stop { sigmas, ..DESCENT };
@@ -93,21 +117,13 @@ impl Setting<'_, '_> {
         };
         for round in 0..ROUNDS {
             let (squares, _) = scaled(&p)?;
-            let converged = |end: Option<Minimum>| match end {
-                Some(end) if end.sigmas_left <= stop.sigmas => Ok(end),
-                end => {
-                    let (iterations, sigmas_left) =
-                        end.map_or((0, f64::INFINITY), |end| (end.iterations, end.sigmas_left));
-                    Err(Error::NotConverged { iterations, sigmas_left })
-                }
-            };
-            let mut end = converged(squares.minimum(&p, &groups, stop));
+            let mut end = converged(squares.minimum(&p, &groups, stop), stop);
             // a core that the map does not resolve may run away to nothing: it keeps what the last round gave
             if end.is_err() && round > 0 && coreless.len() < groups.len() {
                 groups.clone_from(&coreless);
-                end = converged(squares.minimum(&p, &groups, stop));
+                end = converged(squares.minimum(&p, &groups, stop), stop);
             }
-            p = end?.p;
+            p = end?.at;
         }
         let (squares, scale) = scaled(&p)?;
         self.outcome(&squares, &p, &groups, scale)
@@ -226,7 +242,7 @@ impl Setting<'_, '_> {
             used: self.map.validate()?,
             outliers: residuals.iter().filter(|r| r.abs() > 3.0).count(),
             residual_scale: scale,
-            explained_fraction: 1.0 - cost / calm.map_or(f64::NAN, |calm| calm.cost),
+            explained_fraction: 1.0 - cost / calm.map_or(f64::NAN, |calm| calm.normal.cost),
             tops: vec![Top { wake, chi2: -2.0 * squares.log_likelihood(p, groups) / uncertainty.alike }],
         })
     }

@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
-use crate::vortex_fit::top::SAME_SIGMAS;
+use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Vortex, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
@@ -97,17 +97,11 @@ fn apart(a: &MapFit, b: &MapFit, sigmas: f64) -> (Vec<f64>, bool) {
 }
 
 /// The wakes of those ends of rough fits that lead to different ends, the best first, but for those that are hopeless.
-pub(crate) fn distinct(mut ends: Vec<MapFit>) -> Vec<Wake> {
+pub(crate) fn rivals(mut ends: Vec<MapFit>) -> Vec<Wake> {
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
     let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS;
     ends.retain(|end| chi2(end) <= hopeless);
-    let mut kept: Vec<MapFit> = Vec::new();
-    for end in ends {
-        if !kept.iter().any(|better| apart(better, &end, ONE_SIGMAS).1) {
-            kept.push(end);
-        }
-    }
-    kept.into_iter().map(|end| end.wake).collect()
+    distinct(ends, |better, end| apart(better, end, ONE_SIGMAS).1).into_iter().map(|end| end.wake).collect()
 }
 
 /// The best of some ends with the others as its competing tops.
@@ -157,9 +151,9 @@ mod tests {
     fn ends_are_followed_that_differ_from_better_ones_and_are_not_hopeless() {
         let ends = [end(6.0, 25.0), end(3.0, 19.0), end(0.5, 2.0), end(0.0, 0.0)];
         let kept: Vec<f64> =
-            distinct(ends.to_vec()).iter().map(|wake| (wake.left.circulation_m2_s - 400.0) / 10.0).collect();
+            rivals(ends.to_vec()).iter().map(|wake| (wake.left.circulation_m2_s - 400.0) / 10.0).collect();
         assert_eq!(kept, [0.0, 3.0]);
         // alone it is followed, however large its chi-square is
-        assert_eq!(distinct(ends[..1].to_vec()).len(), 1);
+        assert_eq!(rivals(ends[..1].to_vec()).len(), 1);
     }
 }

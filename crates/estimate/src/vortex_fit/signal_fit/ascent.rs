@@ -9,7 +9,7 @@ use ndarray::Array2;
 
 use crate::error::Error;
 use crate::linalg::dot;
-use crate::vortex_fit::damped_newton::{Normal, Stop, descend};
+use crate::vortex_fit::damped_newton::{Normal, Stop, converged, lowest};
 use crate::vortex_fit::signal_fit::likelihood::groups;
 use crate::vortex_fit::wake::free_parameters::{gathered, stepped};
 use crate::vortex_fit::{PARAMETERS, Powers, ScanModel, ScanSignals, SignalFitOptions, Wake};
@@ -104,8 +104,8 @@ impl Ascent<'_> {
         let step = |x: &Vec<f64>, step: &[f64]| x.iter().zip(step).map(|(x, s)| x + s).collect();
         let (iterations, sigmas) = (self.options.max_iterations, self.options.tolerance_sigmas);
         let stop = Stop { iterations, sigmas, learns: true };
-        let (end, normal, _) = descend(origin, stop, evaluate, step)?;
-        Ok((self.stepped(&start, &end), -normal.cost))
+        let end = converged(lowest(origin, stop, evaluate, step), stop)?;
+        Ok((self.stepped(&start, &end.at), -end.normal.cost))
     }
 }
 

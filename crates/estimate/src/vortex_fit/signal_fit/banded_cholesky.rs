@@ -53,16 +53,6 @@ impl Banded {
         (self.width + 1).min(self.order - column)
     }
 
-    /// Replaces the matrix by its Cholesky factor L (A = L L^H) and returns ln det A; nothing if not positive definite.
-    pub(crate) fn factorize(&mut self) -> Option<f64> {
-        factorize(self)
-    }
-
-    /// Replaces rows `from` .. `to` of x by those of L^-1 x, for an x that is 0 above `from`.
-    pub(crate) fn forward(&self, re: &mut [f64], im: &mut [f64], from: usize, to: usize) {
-        forward(self, re, im, from, to);
-    }
-
     /// Replaces x by L^-H x.
     pub(crate) fn backward(&self, x: &mut [Complex<f64>]) {
         for j in (0..self.order).rev() {
@@ -74,15 +64,11 @@ impl Banded {
             x[j] = value / self.re[start];
         }
     }
-
-    /// Entries of A^-1 in the band, from the factor L.
-    pub(crate) fn inverse_into(&self, out: &mut Banded) {
-        inverse_into(self, out);
-    }
 }
 
+/// Replaces a matrix by its Cholesky factor L (A = L L^H) and returns ln det A; nothing if not positive definite.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn factorize(band: &mut Banded) -> Option<f64> {
+pub(crate) fn factorize(band: &mut Banded) -> Option<f64> {
     let mut log_determinant = 0.0;
     for j in 0..band.order {
         let (start, height) = (band.at(j, 0), band.height(j));
@@ -113,8 +99,9 @@ fn factorize(band: &mut Banded) -> Option<f64> {
     Some(log_determinant)
 }
 
+/// Replaces rows `from` .. `to` of x by those of L^-1 x, for an x that is 0 above `from`.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize, to: usize) {
+pub(crate) fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize, to: usize) {
     for j in from..to {
         let start = band.at(j, 0);
         let scale = band.re[start].recip();
@@ -131,8 +118,9 @@ fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize, to: usize
     }
 }
 
+/// Entries of A^-1 in the band, from the factor L.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn inverse_into(band: &Banded, out: &mut Banded) {
+pub(crate) fn inverse_into(band: &Banded, out: &mut Banded) {
     out.reset(band.order, band.width);
     let stride = band.width + 1;
     let (mut lr, mut li, mut xr, mut xi) = (vec![0.0; stride], vec![0.0; stride], vec![0.0; stride], vec![0.0; stride]);
@@ -218,12 +206,12 @@ mod tests {
     fn inverse_in_the_band_and_determinant_are_those_of_the_dense_matrix() {
         for (order, width) in [(1, 0), (2, 1), (7, 3), (9, 8), (30, 11)] {
             let (mut band, dense) = random(order, width);
-            let log_determinant = band.factorize().unwrap();
+            let log_determinant = factorize(&mut band).unwrap();
             let inverse = crate::linalg::inverse(dense.view());
             let (values, _) = crate::linalg::hermitian_eigen("test", dense.view()).unwrap();
             assert!((log_determinant - values.mapv(f64::ln).sum()).abs() < 1e-10);
             let mut out = Banded::default();
-            band.inverse_into(&mut out);
+            inverse_into(&band, &mut out);
             for j in 0..order {
                 for d in 0..=out.width.min(order - 1 - j) {
                     let place = out.at(j, d);
@@ -237,10 +225,10 @@ mod tests {
     #[test]
     fn forward_and_backward_solve_with_the_dense_matrix() {
         let (mut band, dense) = random(25, 6);
-        band.factorize().unwrap();
+        factorize(&mut band).unwrap();
         let x: Vec<C64> = (0..25).map(|i| if i < 4 { C64::ZERO } else { C64::new(i as f64, 1.0 - i as f64) }).collect();
         let (mut re, mut im): (Vec<f64>, Vec<f64>) = x.iter().map(|x| (x.re, x.im)).unzip();
-        band.forward(&mut re, &mut im, 4, 25);
+        forward(&band, &mut re, &mut im, 4, 25);
         let mut solution: Vec<C64> = re.iter().zip(&im).map(|(a, b)| C64::new(*a, *b)).collect();
         band.backward(&mut solution);
         let back = dense.dot(&ndarray::Array1::from(solution));
@@ -252,9 +240,9 @@ mod tests {
         let (mut band, _) = random(8, 2);
         let place = band.at(5, 0);
         band.re[place] = -1.0;
-        assert!(band.factorize().is_none());
+        assert!(factorize(&mut band).is_none());
         let (mut band, _) = random(8, 2);
         band.re[place] = f64::NAN;
-        assert!(band.factorize().is_none());
+        assert!(factorize(&mut band).is_none());
     }
 }

@@ -58,12 +58,6 @@ impl Baseband {
         Ok(Self { sampling: *sampling, kind, decimation, taps })
     }
 
-    /// Kind of the records.
-    #[must_use]
-    pub fn kind(&self) -> SignalKind {
-        self.kind
-    }
-
     /// Interval between the samples of the baseband \[s\].
     #[must_use]
     pub fn interval_s(&self) -> f64 {

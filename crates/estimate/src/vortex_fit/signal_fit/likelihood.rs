@@ -12,7 +12,7 @@ use num_complex::Complex;
 use crate::error::{Error, length, not_empty, positive};
 use crate::linalg::dot;
 use crate::parallel::map_indexed;
-use crate::vortex_fit::signal_fit::banded_cholesky::Banded;
+use crate::vortex_fit::signal_fit::banded_cholesky::{Banded, factorize, forward, inverse_into};
 use crate::vortex_fit::signal_fit::line_covariance::Work;
 use crate::vortex_fit::signal_fit::scan_model::Line;
 use crate::vortex_fit::{FreeParameters, PARAMETERS, ScanModel, Wake};
@@ -122,8 +122,8 @@ impl ScanModel {
         }
         let count = rays.len() as f64;
         self.covariance_into(line, wake, powers, space);
-        let log_determinant = space.factor.factorize()?;
-        space.factor.inverse_into(&mut space.inverse);
+        let log_determinant = factorize(&mut space.factor)?;
+        inverse_into(&space.factor, &mut space.inverse);
         // the inverse becomes the weight of the gradient: sum of x x^H - R^-1, off the diagonal for both triangles
         let Space { work, signal, factor, inverse: weight } = space;
         weight.scale(-count);
@@ -205,7 +205,7 @@ impl ScanModel {
         let order = space.factor.order;
         let indefinite =
             Error::Linalg { what: "covariance of a line of sight", order, reason: "is not positive definite" };
-        space.factor.factorize().ok_or(indefinite)?;
+        factorize(&mut space.factor).ok_or(indefinite)?;
         let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
         let mut whitened = Vec::new();
         for group in groups {
@@ -255,7 +255,7 @@ pub(crate) fn groups(free: &FreeParameters, powers_free: bool) -> Vec<Vec<usize>
 /// R^-1 z from the factor of R.
 fn solve(factor: &Banded, z: &[Complex<f64>]) -> Vec<Complex<f64>> {
     let (mut re, mut im): (Vec<f64>, Vec<f64>) = z.iter().map(|z| (z.re, z.im)).unzip();
-    factor.forward(&mut re, &mut im, 0, z.len());
+    forward(factor, &mut re, &mut im, 0, z.len());
     let mut x: Vec<_> = re.iter().zip(&im).map(|(re, im)| Complex::new(*re, *im)).collect();
     factor.backward(&mut x);
     x
@@ -306,7 +306,7 @@ fn whiten(factor: &Banded, d: &Banded) -> Vec<f64> {
             let place = d.at(column, row - column);
             (re[row], im[row]) = (d.re[place], d.im[place]);
         }
-        factor.forward(&mut re, &mut im, first, n);
+        forward(factor, &mut re, &mut im, first, n);
         // stored as the column of the adjoint
         for row in first..n {
             half_re[row * n + column] = re[row];
@@ -316,7 +316,7 @@ fn whiten(factor: &Banded, d: &Banded) -> Vec<f64> {
     let mut out = Vec::with_capacity(n * (n + 1));
     for column in 0..n {
         let (re, im) = (&mut half_re[column * n..(column + 1) * n], &mut half_im[column * n..(column + 1) * n]);
-        factor.forward(re, im, 0, column + 1);
+        forward(factor, re, im, 0, column + 1);
         out.extend(re[..column].iter().chain(&im[..column]).map(|v| v * std::f64::consts::SQRT_2));
         out.push(re[column]);
     }

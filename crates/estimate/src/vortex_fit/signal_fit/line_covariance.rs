@@ -117,7 +117,7 @@ impl ScanModel {
             work.sums.resize(2 * count, 0.0);
             let (sum_re, sum_im) = work.sums.split_at_mut(count);
             let row = (lags, places.start);
-            sum_nodes(self.weights.rows(), &work.nodes[first * 2 * lags..], row, sum_re, sum_im);
+            sum_nodes(&self.weights.rows, &work.nodes[first * 2 * lags..], row, sum_re, sum_im);
             for i in 0..count {
                 let lag = 2 * i + twice % 2;
                 let place = out.at((twice - lag) / 2, lag);
@@ -142,7 +142,7 @@ impl ScanModel {
                 (sum_re[i], sum_im[i]) = (weight.re[place], weight.im[place]);
             }
             let row = (lags, places.start);
-            spread_to_nodes(self.weights.rows(), &mut work.nodes[first * 2 * lags..], row, sum_re, sum_im);
+            spread_to_nodes(&self.weights.rows, &mut work.nodes[first * 2 * lags..], row, sum_re, sum_im);
         }
         let phase_slopes = self.lag_phase_slopes();
         let mut seen = vec![0.0; 2 * lags];

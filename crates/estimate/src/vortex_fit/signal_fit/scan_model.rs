@@ -145,18 +145,6 @@ impl ScanModel {
         })
     }
 
-    /// Number of lines of sight; rays of equal elevation are one.
-    #[must_use]
-    pub fn lines(&self) -> usize {
-        self.lines.len()
-    }
-
-    /// Complex baseband samples that each record gives.
-    #[must_use]
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
     /// Whether the layers are still thin enough for a wake.
     pub(crate) fn covers(&self, wake: &Wake) -> bool {
         // steeper cores are those smaller than the third to spare

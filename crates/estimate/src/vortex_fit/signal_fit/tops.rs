@@ -12,7 +12,7 @@ use crate::error::Error;
 use crate::linalg::dot;
 use crate::vortex_fit::damped_newton::{inverse, solve};
 use crate::vortex_fit::signal_fit::ascent::{Ascent, Parabola, State, times};
-use crate::vortex_fit::top::SAME_SIGMAS;
+use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
 use crate::vortex_fit::{Parameter, ScanModel, ScanSignals, SignalFitOptions, Wake};
 
 /// Core radii that are tried, over the spacing of the vortices.
@@ -63,13 +63,9 @@ pub(crate) fn other_tops(
     let gradient = at_top.iter().map(|g| -g).collect();
     ascent.others = Some(Parabola { about: top, gradient, information });
     let information = ascent.information(&top, 1)?;
-    let mut found: Vec<(State, f64)> = Vec::new();
-    for start in places(&ascent, &top, &information, evaluations) {
-        let Ok(end) = ascent.climb(start, evaluations) else { continue };
-        if !found.iter().any(|other| same(&ascent, &information, &end.0, &other.0)) {
-            found.push(end);
-        }
-    }
+    let starts = places(&ascent, &top, &information, evaluations);
+    let ends = starts.into_iter().filter_map(|start| ascent.climb(start, evaluations).ok());
+    let mut found = distinct(ends, |other, end| same(&ascent, &information, &end.0, &other.0));
     let best = found.iter().map(|(_, log_likelihood)| *log_likelihood).fold(value_at_top, f64::max);
     found.retain(|(state, value)| *value > best - FAR_BELOW && !same(&ascent, &information, state, &top));
     found.sort_by(|a, b| b.1.total_cmp(&a.1));
@@ -166,19 +162,10 @@ fn combine(
 /// The best of the scored places, without neighbours of a better one.
 fn chosen(mut scores: Vec<(f64, usize, Vec<i32>, State)>) -> Vec<State> {
     scores.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut taken: Vec<(usize, Vec<i32>, State)> = Vec::new();
-    for (_, row, steps, state) in scores {
-        let near = |other: &(usize, Vec<i32>, State)| {
-            other.0.abs_diff(row) <= 1 && other.1.iter().zip(&steps).all(|(a, b)| (a - b).abs() <= 1)
-        };
-        if !taken.iter().any(near) {
-            taken.push((row, steps, state));
-        }
-        if taken.len() == PLACES {
-            break;
-        }
-    }
-    taken.into_iter().map(|(_, _, state)| state).collect()
+    let taken = distinct(scores, |(_, row, steps, _), (_, other_row, other_steps, _)| {
+        row.abs_diff(*other_row) <= 1 && steps.iter().zip(other_steps).all(|(a, b)| (a - b).abs() <= 1)
+    });
+    taken.into_iter().take(PLACES).map(|(_, _, _, state)| state).collect()
 }
 
 /// The step of Newton of the numbers `quick` alone, at most 3 standard deviations long, with the ln p that it promises.

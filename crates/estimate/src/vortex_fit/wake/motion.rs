@@ -63,6 +63,14 @@ impl WakeModel {
         (dy.hypot(dz), dz.atan2(dy))
     }
 
+    /// Whether a place (y, z) \[m\] lies within the elevations \[rad\] and ranges \[m\] of a scan, both increasing.
+    pub(crate) fn sees(&self, (elevation_rad, range_m): (&[f64], &[f64]), place_m: (f64, f64)) -> bool {
+        let (at_m, at_rad) = self.range_and_elevation(place_m);
+        let within =
+            |axis: &[f64], at: f64| axis.first().zip(axis.last()).is_some_and(|(a, b)| (*a..=*b).contains(&at));
+        within(range_m, at_m) && within(elevation_rad, at_rad)
+    }
+
     /// Velocities \[m/s\] that the other vortex, the images and the wind have at the centres: lateral and vertical of the left, lateral
     /// and vertical of the right vortex.
     #[must_use]

@@ -284,7 +284,9 @@ impl WakeModel {
     /// Radial velocity \[m/s\], positive away from the lidar.
     #[must_use]
     pub fn radial_velocity_m_s(&self, wake: &Wake, range_m: f64, elevation_rad: f64) -> f64 {
-        self.velocity_on(wake, range_m, Ray::new(elevation_rad))
+        let mut velocities = [Vec::new()];
+        self.along(wake, &[range_m], Ray::new(elevation_rad), &mut velocities);
+        velocities[0][0]
     }
 
     /// Radial velocity \[m/s\] and its derivatives, in the order of [`Parameter`].
@@ -330,20 +332,6 @@ impl WakeModel {
         all.into_iter().filter(move |source| images || source.1 > 0.0).map(of)
     }
 
-    pub(crate) fn velocity_on(&self, wake: &Wake, range_m: f64, ray: Ray) -> f64 {
-        let (y_m, z_m) = self.place(range_m, ray);
-        let mut velocity_m_s = (wake.lateral_wind_m_s + wake.wind_shear_per_s * z_m) * ray.cos;
-        // a search tries vortices one by one
-        for (vortex, _, side, sense) in self.sources(wake).filter(|source| source.0.circulation_m2_s != 0.0) {
-            velocity_m_s += of_source(self.profile, (vortex, side, sense), (y_m, z_m), ray).0;
-        }
-        let secondary = self.secondary.map(|[left, right]| Wake { left, right, ..*wake });
-        for (vortex, _, side, sense) in secondary.iter().flat_map(|secondary| self.sources(secondary)) {
-            velocity_m_s += of_source(self.profile, (vortex, side, sense), (y_m, z_m), ray).0;
-        }
-        velocity_m_s
-    }
-
     /// Radial velocities at points of a line with their derivatives.
     pub(crate) fn gradients(&self, wake: &Wake, range_m: &[f64], ray: Ray) -> Vec<(f64, [f64; PARAMETERS])> {
         let mut rows = vec![Vec::new(); PARAMETERS + 1];
@@ -366,6 +354,7 @@ impl WakeModel {
                 rows[Parameter::Shear as usize + 1][i] = z_m * ray.cos;
             }
         }
+        // a search tries vortices one by one
         for (vortex, places, side, sense) in self.sources(wake).filter(|s| slopes || s.0.circulation_m2_s != 0.0) {
             add_along((self, (vortex, side, sense), range_m, ray), rows, slopes.then_some(places));
         }

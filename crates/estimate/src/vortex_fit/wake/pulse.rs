@@ -95,7 +95,8 @@ pub(crate) struct PairWeights {
     pub(crate) half: usize,
     /// Number of even lags.
     pub(crate) even: usize,
-    rows: Vec<f64>,
+    /// Weights of all lags, row by row: those of the nodes from `-half` to `half` from the middle.
+    pub(crate) rows: Vec<f64>,
 }
 
 impl PairWeights {
@@ -118,11 +119,6 @@ impl PairWeights {
             .map(|(node, lag)| weight(node, lag) * step_s)
             .collect();
         Self { lags: longest, half, even, rows }
-    }
-
-    /// All rows: those of the nodes from `-half` to `half` from the middle.
-    pub(crate) fn rows(&self) -> &[f64] {
-        &self.rows
     }
 
     /// Weights of all lags for the node `offset - half` from the middle.
