@@ -256,11 +256,6 @@ impl GradientPeak {
         Ok(readings)
     }
 
-    /// The true velocity that reads `velocity_m_s` with gradient number `k`.
-    fn corrected(&self, k: usize, velocity_m_s: f64) -> f64 {
-        self.corrections.get(k).map_or(velocity_m_s, |readings| truth(readings, velocity_m_s))
-    }
-
     /// Velocity and gradient for the mean statistic `mean`.
     pub fn velocity_and_gradient(&self, mean: &[f64], scratch: &mut Scratch) -> GradientVelocity {
         let none = |flag| GradientVelocity { velocity: GateVelocity::none(flag), gradient_per_s: f64::NAN };
@@ -286,7 +281,8 @@ impl GradientPeak {
             // a window of a noise-free line leaves no energy: the logarithm stays finite
             let rest = (energy - located.peak).max(1e-12 * energy).max(f64::MIN_POSITIVE);
             let likelihood = -self.samples_in_band * rest.ln() - spread;
-            found.push((likelihood, self.corrected(k, estimate.velocity_m_s)));
+            let read_m_s = estimate.velocity_m_s;
+            found.push((likelihood, self.corrections.get(k).map_or(read_m_s, |readings| truth(readings, read_m_s))));
             if best.as_ref().is_none_or(|(_, highest, _)| likelihood > *highest) {
                 best = Some((k, likelihood, estimate));
             }

@@ -20,19 +20,6 @@ use crate::error::{Error, length, not_empty};
 /// Residual allowed per unit of the matrix's norm and order.
 const RESIDUAL: f64 = 1e-12;
 
-/// Column-major copy of a square, finite matrix that is not empty.
-fn columns<T: Scalar<Real = f64> + Lapack>(field: &'static str, a: ArrayView2<'_, T>) -> Result<Array2<T>, Error> {
-    let (rows, order) = a.dim();
-    not_empty(field, order)?;
-    length(field, order, rows)?;
-    if a.iter().any(|value| !value.abs().is_finite()) {
-        return Err(Error::Linalg { what: field, order, reason: "holds a value that is not finite" });
-    }
-    let mut copy = Array2::zeros(a.raw_dim().f());
-    copy.assign(&a);
-    Ok(copy)
-}
-
 fn norm<T: Scalar<Real = f64>>(a: &ArrayView2<'_, T>) -> f64 {
     a.iter().map(|value| value.square()).sum::<f64>().sqrt()
 }
@@ -45,9 +32,15 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     field: &'static str,
     a: ArrayView2<'_, T>,
 ) -> Result<(Array1<f64>, Array2<T>), Error> {
-    let columns = columns(field, a)?;
-    let order = columns.nrows();
+    let (rows, order) = a.dim();
+    not_empty(field, order)?;
+    length(field, order, rows)?;
     let failed = |reason| Error::Linalg { what: field, order, reason };
+    if a.iter().any(|value| !value.abs().is_finite()) {
+        return Err(failed("holds a value that is not finite"));
+    }
+    let mut columns = Array2::zeros(a.raw_dim().f());
+    columns.assign(&a);
     let (values, vectors) = columns.eigh(UPLO::Lower).map_err(|_| failed("has no converged eigenvalues"))?;
     let mut scaled = vectors.clone();
     for (mut column, value) in scaled.columns_mut().into_iter().zip(&values) {

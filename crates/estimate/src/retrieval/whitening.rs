@@ -2,7 +2,7 @@
 //!
 //! C_ik = deviation^2 exp(-distance / length) + sigma_i^2 [i = k]. Check: white residuals of made-up turbulence; the inverse.
 
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 
 use crate::linalg::cholesky::{cholesky, forward_one};
 use crate::retrieval::Turbulence;
@@ -10,7 +10,7 @@ use crate::retrieval::Turbulence;
 /// Lower factor L of C = L L^T.
 #[derive(Debug, Clone)]
 pub(crate) struct Whitening {
-    lower: Array2<f64>,
+    pub(crate) lower: Array2<f64>,
 }
 
 impl Whitening {
@@ -31,12 +31,10 @@ impl Whitening {
 
     /// Replaces x by L^-1 x.
     pub(crate) fn whiten(&self, x: &mut [f64]) {
-        forward_one(self.lower.view(), x);
-    }
-
-    /// L.
-    pub(crate) fn lower(&self) -> ArrayView2<'_, f64> {
-        self.lower.view()
+        // rows of a factor lie in one piece
+        if let Some(rows) = self.lower.as_slice() {
+            forward_one(rows, x);
+        }
     }
 }
 

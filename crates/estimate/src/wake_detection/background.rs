@@ -45,7 +45,7 @@ impl Background {
             Self::Noise(deviations) => {
                 columns.axis_iter_mut(Axis(0)).zip(deviations).for_each(|(mut row, deviation)| row /= *deviation);
             }
-            Self::Turbulent(whitening) => forward(whitening.lower(), columns),
+            Self::Turbulent(whitening) => forward(whitening.lower.view(), columns),
         }
     }
 

@@ -46,15 +46,16 @@ impl Bank {
     pub(super) fn new(cells: &Cells, model: &WakeModel, gate_m: f64, options: &DetectorOptions) -> Self {
         let spacing_m = options.spacing_m;
         let sector = Sector::new(cells, model);
-        let area = sector.width_m() * sector.height_m();
+        let [width_m, height_m] = [sector.lateral_m, sector.up_m].map(|(low, high)| (high - low).max(0.0));
+        let area = width_m * height_m;
         let apart_m = STEP_M.max((area / MOST_PLACES).sqrt());
         let lateral_m = apart_m.max(STEP_OVER_GATE * gate_m);
         // the least spacing is a number of steps, unless the scan is so large that this gives too many places
         let lateral_m = spacing_m.0 / (spacing_m.0 / lateral_m).ceil().max(1.0);
         let lateral_m = lateral_m.max(area / apart_m / (MANY * MOST_PLACES));
         let step_m = (lateral_m, apart_m);
-        let columns = (sector.width_m() / lateral_m) as usize + 1;
-        let rows = (sector.height_m() / apart_m) as usize + 1;
+        let columns = (width_m / lateral_m) as usize + 1;
+        let rows = (height_m / apart_m) as usize + 1;
         let mut index = Array2::from_elem((rows, columns), None);
         let mut places_m = Vec::new();
         for ((row, column), at) in index.indexed_iter_mut() {
@@ -132,14 +133,6 @@ impl<'a> Sector<'a> {
             up_m.0 = up_m.0.max(STEP_M);
         }
         Self { cells, model, lateral_m: ends(|place| place.0), up_m }
-    }
-
-    fn width_m(&self) -> f64 {
-        (self.lateral_m.1 - self.lateral_m.0).max(0.0)
-    }
-
-    fn height_m(&self) -> f64 {
-        (self.up_m.1 - self.up_m.0).max(0.0)
     }
 
     pub(super) fn holds(&self, place_m: (f64, f64)) -> bool {

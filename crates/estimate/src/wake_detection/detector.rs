@@ -204,7 +204,7 @@ impl WakeDetector {
     }
 
     /// Statistic and index of the best wake of the bank, given the products of a scan with all places.
-    fn best(&self, products: ArrayView1<'_, f64>) -> (f64, usize) {
+    pub(super) fn best(&self, products: ArrayView1<'_, f64>) -> (f64, usize) {
         let all = self.scores(products).enumerate();
         let (most, best) = all.fold((0.0, 0), |best, (i, x)| if x > best.0 { (x, i) } else { best });
         (most * most, best)
@@ -217,10 +217,6 @@ impl WakeDetector {
             (of(template.right) - of(template.left)) * length
         };
         self.bank.templates.iter().zip(&self.reciprocal_length).map(score)
-    }
-
-    pub(super) fn value(&self, products: ArrayView1<'_, f64>) -> f64 {
-        self.best(products).0
     }
 
     /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its

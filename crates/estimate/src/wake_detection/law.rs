@@ -48,7 +48,7 @@ impl WakeDetector {
         scans: usize,
         stream: impl Fn(u64) -> R + Sync + Send,
     ) -> Result<EmptyScanLaw, Error> {
-        EmptyScanLaw::new(self.empty_products(scans, stream).rows().into_iter().map(|row| self.value(row)).collect())
+        EmptyScanLaw::new(self.empty_products(scans, stream).rows().into_iter().map(|row| self.best(row).0).collect())
     }
 
     /// Products of empty scans with all places: scans by places.
@@ -119,11 +119,6 @@ impl EmptyScanLaw {
         (self.location, self.scale)
     }
 
-    /// The statistic from which on fewer than 30 scans lie above.
-    fn last_counted(&self) -> f64 {
-        self.statistics[COUNTED - 1]
-    }
-
     fn tail(&self, statistic: f64) -> f64 {
         -(-(-(statistic - self.location) / self.scale).exp()).exp_m1()
     }
@@ -137,7 +132,7 @@ impl EmptyScanLaw {
         check("false_alarm", false_alarm, "between 0 and 1, for example 0.01", is_rate)?;
         let least = self.least_counted_rate();
         if false_alarm < least {
-            let (anchor, share) = (self.last_counted(), false_alarm / least);
+            let (anchor, share) = (self.statistics[COUNTED - 1], false_alarm / least);
             let tail = share * self.tail(anchor);
             return Ok(self.location - self.scale * (-(-tail).ln_1p()).ln());
         }
@@ -154,6 +149,6 @@ impl EmptyScanLaw {
         if above >= COUNTED {
             return above as f64 / self.scans() as f64;
         }
-        self.least_counted_rate() * self.tail(statistic) / self.tail(self.last_counted())
+        self.least_counted_rate() * self.tail(statistic) / self.tail(self.statistics[COUNTED - 1])
     }
 }

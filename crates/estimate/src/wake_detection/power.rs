@@ -98,7 +98,7 @@ impl DetectionTrials<'_> {
     pub fn statistics(&self, circulation_m2_s: f64) -> Vec<f64> {
         let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
             let wake = &self.wakes[i % self.wakes.len()];
-            self.detector.value((&empty + circulation_m2_s * wake).view())
+            self.detector.best((&empty + circulation_m2_s * wake).view()).0
         };
         self.empty.rows().into_iter().enumerate().map(trial).collect()
     }

@@ -54,20 +54,10 @@ pub fn fit_map(
     options: &MapFitOptions,
 ) -> Result<MapFit, Error> {
     let guess = first_guess(map, model, kernel)?;
-    let refine = |start: &Wake| of_means(map, model, kernel, options, (start, FINE_SIGMAS));
-    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)
-}
-
-/// The fit to a map of means over gates from a start on, to steps of so many standard deviations.
-fn of_means(
-    map: &VelocityMap<'_>,
-    model: &WakeModel,
-    kernel: &RangeKernel,
-    options: &MapFitOptions,
-    (start, sigmas): (&Wake, f64),
-) -> Result<MapFit, Error> {
     let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
-    Setting { map, model, prediction: &gates, kernel, options, least_core_m: 0.0 }.descended(start, sigmas)
+    let setting = Setting { map, model, prediction: &gates, kernel, options, least_core_m: 0.0 };
+    let refine = |start: &Wake| setting.descended(start, FINE_SIGMAS);
+    with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)
 }
 
 /// Fits the wake to a map that an estimator of this crate made, without any prior knowledge: as [`fit_map`] with its mean gate, then
@@ -89,9 +79,14 @@ pub fn fit_map_of_estimator(
     let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options, COARSER_NODES)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
     let rough = MapFitOptions { free: FreeParameters { core_radius: Sharing::Fixed, ..options.free }, ..*options };
+    let by_means = |map: &VelocityMap<'_>, kernel: &RangeKernel| {
+        let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
+        let setting = Setting { map, model, prediction: &gates, kernel, options: &rough, least_core_m: 0.0 };
+        setting.descended(&guess, ROUGH_SIGMAS)
+    };
     let by_means = match &few {
-        Some(few) => of_means(&few.map, model, &few.kernel, &rough, (&guess, ROUGH_SIGMAS)),
-        None => of_means(map, model, &all.kernel.coarser(2), &rough, (&guess, ROUGH_SIGMAS)),
+        Some(few) => by_means(&few.map, &few.kernel),
+        None => by_means(map, &all.kernel.coarser(2)),
     };
     let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
     let all = all.with_slopes_at(for_slopes.as_ref(), response)?;

@@ -138,7 +138,7 @@ impl ScanModel {
             samples,
             record_samples: setup.record_samples,
             rays: setup.elevation_rad.len(),
-            nodes: cutter.nodes(),
+            nodes: 2 * samples - 1 + 2 * cutter.pad(),
             lines: lines.into_iter().map(|(_, line)| line).collect(),
             guess: *guess,
             largest_snr: largest,
@@ -189,10 +189,6 @@ impl Cutter<'_> {
     /// Nodes before that of the first sample.
     fn pad(&self) -> usize {
         self.half + 2
-    }
-
-    fn nodes(&self) -> usize {
-        2 * self.samples - 1 + 2 * self.pad()
     }
 
     /// Layers that the wake of the guess needs in the node interval about a point, a third of its core radius spare.

@@ -131,32 +131,22 @@ fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluatio
                 (-STEPS..=STEPS).map(of).collect()
             })
             .collect();
-        combine(ascent, &heights, (row, middle), &alone, &mut scores);
+        // adds up what the heights do, for all pairs of them
+        let count = 2 * STEPS as usize + 1;
+        for index in 0..count.pow(heights.len() as u32) {
+            let steps: Vec<usize> = (0..heights.len()).map(|axis| index / count.pow(axis as u32) % count).collect();
+            let mut value = middle.0;
+            let mut by = vec![0.0; deviations.len()];
+            for (axis, &step) in steps.iter().enumerate() {
+                let Some((score, state)) = &alone[axis][step] else { continue };
+                value += score - middle.0;
+                by.iter_mut().zip(ascent.steps(&middle.1, state)).for_each(|(b, s)| *b += s);
+            }
+            let steps = steps.iter().map(|&step| step as i32 - STEPS).collect();
+            scores.push((value, row, steps, ascent.stepped(&middle.1, &by)));
+        }
     }
     chosen(scores)
-}
-
-/// Adds up what the heights do, for all pairs of them.
-fn combine(
-    ascent: &Ascent<'_>,
-    heights: &[usize],
-    (row, middle): (usize, (f64, State)),
-    alone: &[Vec<Option<(f64, State)>>],
-    scores: &mut Vec<(f64, usize, Vec<i32>, State)>,
-) {
-    let count = 2 * STEPS as usize + 1;
-    for index in 0..count.pow(heights.len() as u32) {
-        let steps: Vec<usize> = (0..heights.len()).map(|axis| index / count.pow(axis as u32) % count).collect();
-        let mut value = middle.0;
-        let mut by = vec![0.0; ascent.steps(&middle.1, &middle.1).len()];
-        for (axis, &step) in steps.iter().enumerate() {
-            let Some((score, state)) = &alone[axis][step] else { continue };
-            value += score - middle.0;
-            by.iter_mut().zip(ascent.steps(&middle.1, state)).for_each(|(b, s)| *b += s);
-        }
-        let steps = steps.iter().map(|&step| step as i32 - STEPS).collect();
-        scores.push((value, row, steps, ascent.stepped(&middle.1, &by)));
-    }
 }
 
 /// The best of the scored places, without neighbours of a better one.

@@ -130,17 +130,11 @@ pub(crate) fn gathered(groups: &[Vec<usize>], slope: &[f64], out: &mut [f64]) {
 
 /// Covariance of the parameters of a wake \[10, 10\] from that of the free numbers; fixed parameters have zeros.
 pub(crate) fn spread(groups: &[Vec<usize>], covariance: &Array2<f64>) -> Array2<f64> {
-    let mut all = Array2::zeros((PARAMETERS, PARAMETERS));
-    for (i, rows) in groups.iter().enumerate() {
-        for (j, columns) in groups.iter().enumerate() {
-            for &row in rows.iter().filter(|row| **row < PARAMETERS) {
-                for &column in columns.iter().filter(|column| **column < PARAMETERS) {
-                    all[[row, column]] = covariance[[i, j]];
-                }
-            }
-        }
-    }
-    all
+    // each place belongs to one free number at most
+    let number = |place: usize| groups.iter().position(|group| group.contains(&place));
+    Array2::from_shape_fn((PARAMETERS, PARAMETERS), |(row, column)| {
+        number(row).zip(number(column)).map_or(0.0, |(i, j)| covariance[[i, j]])
+    })
 }
 
 #[cfg(test)]
