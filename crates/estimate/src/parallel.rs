@@ -20,6 +20,11 @@ pub(crate) fn map_indexed<T: Send, W>(
     }
 }
 
+/// The same without a state.
+pub(crate) fn map_each<T: Send>(count: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+    map_indexed(count, || (), |(), index| f(index))
+}
+
 /// `f(state, index, chunk)` for every chunk of `size` numbers.
 pub(crate) fn for_each_chunk<W>(
     data: &mut [f64],

@@ -130,23 +130,17 @@ impl GradientModel {
             positive("windows", windows)?;
             let model = Self { noise, ..self.clone() };
             let [covariance, by_velocity, by_gradient] = model.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
-            let information = information(kind, &covariance, &[by_velocity, by_gradient])?;
-            GradientBound::of(&(information * windows))
-        })
-    }
-}
-
-impl GradientBound {
-    fn of(information: &Array2<f64>) -> Result<Self, Error> {
-        let [vv, vg, gg] = [information[[0, 0]], information[[0, 1]], information[[1, 1]]];
-        let determinant = vv * gg - vg * vg;
-        positive("information on velocity", vv)?;
-        // what is left after rounding of the two products
-        positive("information on velocity and gradient apart", determinant - 8.0 * f64::EPSILON * vv * gg)?;
-        Ok(Self {
-            velocity_m_s: (gg / determinant).sqrt(),
-            gradient_per_s: (vv / determinant).sqrt(),
-            velocity_alone_m_s: vv.sqrt().recip(),
+            let information = information(kind, &covariance, &[by_velocity, by_gradient])? * windows;
+            let [vv, vg, gg] = [information[[0, 0]], information[[0, 1]], information[[1, 1]]];
+            let determinant = vv * gg - vg * vg;
+            positive("information on velocity", vv)?;
+            // what is left after rounding of the two products
+            positive("information on velocity and gradient apart", determinant - 8.0 * f64::EPSILON * vv * gg)?;
+            Ok(GradientBound {
+                velocity_m_s: (gg / determinant).sqrt(),
+                gradient_per_s: (vv / determinant).sqrt(),
+                velocity_alone_m_s: vv.sqrt().recip(),
+            })
         })
     }
 }

@@ -107,11 +107,7 @@ impl RecordModel {
             if correlation == 0.0 {
                 return 0.0;
             }
-            let power = match self.is_gaussian {
-                true => between(n, m),
-                false => (between(n, n) * between(m, m)).sqrt(),
-            };
-            correlation * power
+            correlation * if self.is_gaussian { between(n, m) } else { (between(n, n) * between(m, m)).sqrt() }
         };
         let order = places.len();
         let signal = Array2::from_shape_fn((order, order), |(n, m)| signal((n.max(m), n.min(m))));
@@ -134,10 +130,8 @@ impl RecordModel {
         let largest = covariance_as_it_is.rows().into_iter().map(row).fold(0.0, f64::max);
         let white = of_lag(0.0, Noise::White);
         let least = LEAST_CONDITION * order as f64 * largest / white;
-        match floor < least {
-            true => [covariance(Noise::Band { floor: least.min(1.0) }), derivative],
-            false => [covariance_as_it_is, derivative],
-        }
+        let raised = (floor < least).then(|| covariance(Noise::Band { floor: least.min(1.0) }));
+        [raised.unwrap_or(covariance_as_it_is), derivative]
     }
 }
 

@@ -43,14 +43,9 @@ impl LagWindowPeak {
 
     /// The peak of the lag-windowed spectrum alone, without a width.
     pub(crate) fn smooth(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        let per_lag = self.peak.search.kind.lag_numbers(1);
         let mut numbers = std::mem::take(&mut scratch.numbers);
         numbers.clear();
-        numbers.extend(
-            mean.iter()
-                .enumerate()
-                .map_while(|(place, value)| self.weights.get(place / per_lag).map(|weight| value * weight)),
-        );
+        numbers.extend(self.peak.search.kind.weighted_lags(mean, &self.weights));
         let estimate = self.peak.estimate(&numbers, scratch);
         scratch.numbers = numbers;
         GateVelocity { spread_m2_s2: f64::NAN, ..estimate }

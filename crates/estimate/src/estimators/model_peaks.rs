@@ -137,8 +137,7 @@ impl Estimator for ModelPeak {
         // The density of a model is not linear in the correlogram: power and detection are those of its lags, which also tell what
         // lines outside leak. How wide a spectrum is a model does not show: its peaks narrow with the signal-to-noise ratio.
         numbers.clear();
-        let lags = mean.chunks(kind.lag_numbers(1)).zip(&self.lag_weights);
-        numbers.extend(lags.flat_map(|(lag, w)| lag.iter().map(move |r| r * w)));
+        numbers.extend(kind.weighted_lags(mean, &self.lag_weights));
         if let Some(found) = self.search.find(&numbers, Refinement::None, false, scratch) {
             match (estimate.flag, found.flag) {
                 (Quality::Good | Quality::OutOfBand, flag @ Quality::NoSignal) => estimate = GateVelocity::none(flag),

@@ -39,10 +39,9 @@ impl<E: Estimator> Estimator for Unbiased<E> {
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        let per_lag = self.kind.lag_numbers(1);
         let mut numbers = std::mem::take(&mut scratch.unbiased);
         numbers.clear();
-        numbers.extend(mean.iter().enumerate().map(|(place, value)| value * self.gains[place / per_lag]));
+        numbers.extend(self.kind.weighted_lags(mean, &self.gains));
         let estimate = self.estimator.estimate(&numbers, scratch);
         scratch.unbiased = numbers;
         estimate

@@ -203,7 +203,9 @@ impl Scan {
                 estimate = estimator.estimate(mean, scratch);
                 estimate.scale_power(self.scale * self.scale);
             }
-            Ok(MapPoint { estimate, level, left_out: self.windows(point, radius_m) - level, n_eff })
+            let of_chord = |chord: Chord| chord.gates() * self.geometry.rays.count(chord.line);
+            let windows: usize = self.chords(point, radius_m).map(of_chord).sum();
+            Ok(MapPoint { estimate, level, left_out: windows - level, n_eff })
         });
         found.into_iter().collect()
     }
@@ -306,12 +308,6 @@ impl Scan {
             let (first, last) = (chord.first.max(self.held.start), chord.last.min(self.held.end - 1));
             (first <= last).then_some(Chord { first, last, ..chord })
         })
-    }
-
-    /// Windows of a region, valid or not.
-    fn windows(&self, point: PolarPoint, radius_m: f64) -> usize {
-        let of = |chord: Chord| chord.gates() * self.geometry.rays.count(chord.line);
-        self.chords(point, radius_m).map(of).sum()
     }
 
     /// Valid windows of a chord.

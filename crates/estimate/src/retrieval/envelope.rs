@@ -175,10 +175,7 @@ fn one(
     side: Side,
     threshold: f64,
 ) -> EnvelopeResult {
-    let (vortex, sense) = match side {
-        Side::Left => (about.left, -1.0),
-        Side::Right => (about.right, 1.0),
-    };
+    let (vortex, sense) = if side == Side::Left { (about.left, -1.0) } else { (about.right, 1.0) };
     let (range_m, elevation_rad) = model.range_and_elevation(vortex.place_m());
     let away = |gate: &usize| (spectra.range_m[*gate] - range_m).abs();
     let gate = (0..spectra.range_m.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -196,21 +193,15 @@ fn one(
             continue;
         };
         let place = (spectra.range_m[gate], *elevation);
-        let with = |circulation_m2_s: f64| {
-            let own = Vortex { circulation_m2_s, ..vortex };
-            match side {
-                Side::Left => Wake { left: own, ..*about },
-                Side::Right => Wake { right: own, ..*about },
-            }
-        };
-        let expected = |circulation_m2_s: f64| {
-            let level = (spectra.snr, threshold);
-            shape.expected_envelope_m_s((model, &with(circulation_m2_s)), place, level, sign)
-        };
         let wind =
             (about.lateral_wind_m_s + about.wind_shear_per_s * model.position_m(place.0, place.1).1) * elevation.cos();
         let speed = sign * (envelope - wind);
-        let faster = |circulation_m2_s: f64| expected(circulation_m2_s).is_some_and(|v| sign * v > sign * envelope);
+        let faster = |circulation_m2_s: f64| {
+            let own = Vortex { circulation_m2_s, ..vortex };
+            let wake = if side == Side::Left { Wake { left: own, ..*about } } else { Wake { right: own, ..*about } };
+            let expected = shape.expected_envelope_m_s((model, &wake), place, (spectra.snr, threshold), sign);
+            expected.is_some_and(|v| sign * v > sign * envelope)
+        };
         // upwards: very fast air is so spread out that nothing of it is above the threshold
         let Some(step) = (1..=STEPS_UP).find(|step| faster(STEP_M2_S * f64::from(*step))) else {
             left_out += 1;

@@ -1,11 +1,13 @@
-//! What a velocity of a scan is of the air about its range, on points that are as many as a fit needs.
+//! What a velocity of a scan is of the air about its range, on points that are as many as a fit needs, and what a wake shows there.
 //!
-//! Check: the reference maps.
+//! Check: the reference maps; a wake without circulation shows its wind.
+
+use ndarray::Array2;
 
 use crate::error::Error;
 use crate::retrieval::{Gate, Movement, RetrievalOptions, ScanMap};
-use crate::vortex_fit::RangeKernel;
 use crate::vortex_fit::map_fit::gates::Gates;
+use crate::vortex_fit::{RangeKernel, Wake};
 
 /// A Gaussian weight is cut off after so many standard deviations, and sampled at so many points at last.
 const REACH: f64 = 3.5;
@@ -75,4 +77,48 @@ fn uniform_step_m(range_m: &[f64]) -> Option<f64> {
     let step = (last - first) / (range_m.len() - 1) as f64;
     let even = range_m.iter().enumerate().all(|(i, r)| (r - first - i as f64 * step).abs() < 1e-4 * step);
     (even && step > 0.0).then_some(step)
+}
+
+/// Radial velocities \[m/s\] \[line, gate\] of `wake`, given at the reference time of the scan, as the options see it; vortices stand
+/// still unless `moving`.
+///
+/// # Errors
+/// [`Error::Length`], [`Error::OutOfRange`] for impossible input.
+pub fn expected_velocities(
+    map: &ScanMap,
+    options: &RetrievalOptions,
+    wake: &Wake,
+    moving: bool,
+) -> Result<Array2<f64>, Error> {
+    options.validate()?;
+    map.validate()?;
+    let movement = if moving { Movement::Moving } else { Movement::Frozen };
+    let options = RetrievalOptions { movement, ..options.clone() };
+    Ok(Gates::rough(map, &options)?.fine(&options.gate)?.velocities(wake))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn wind_without_vortices_is_seen_along_the_lines() {
+        let map = ScanMap {
+            elevation_rad: vec![0.0, 0.3],
+            time_s: vec![f64::NAN; 2],
+            range_m: vec![100.0, 110.0],
+            velocity_m_s: Array2::from_elem((2, 2), 0.0),
+            sigma_m_s: None,
+            fold_m_s: None,
+        };
+        let wind = Wake::from_array(&[0.0, 0.0, 90.0, 20.0, 110.0, 20.0, 1.0, 1.0, 2.0, 0.1]);
+        let found = expected_velocities(&map, &RetrievalOptions::default(), &wind, true).unwrap();
+        let at = |line: usize, gate: usize| {
+            let (angle, range_m) = (map.elevation_rad[line], map.range_m[gate]);
+            (2.0 + 0.1 * range_m * angle.sin()) * angle.cos()
+        };
+        for ((line, gate), velocity) in found.indexed_iter() {
+            assert!((velocity - at(line, gate)).abs() < 1e-12, "{found}");
+        }
+    }
 }

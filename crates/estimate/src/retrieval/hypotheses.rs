@@ -126,10 +126,9 @@ impl<'a> Stage<'a> {
     }
 
     /// Where no deviations are stated, they are those of the residuals of an end.
-    pub(crate) fn rescaled(mut self, end: &End) -> Self {
+    pub(crate) fn rescaled(self, end: &End) -> Self {
         let scale = self.residual_scale(end);
-        self.squares = self.squares.rescaled(scale);
-        self
+        Self { squares: self.squares.rescaled(scale), ..self }
     }
 
     /// Scale of the residuals over their deviations.

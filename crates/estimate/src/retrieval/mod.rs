@@ -26,7 +26,6 @@
 
 mod alternatives;
 mod envelope;
-mod expected_map;
 mod fit;
 mod gates;
 mod hypotheses;
@@ -42,8 +41,8 @@ mod whitening;
 
 pub use crate::vortex_fit::Top;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
-pub use expected_map::expected_velocities;
 pub use fit::fit_scan;
+pub use gates::expected_velocities;
 pub use integral::{ProfilePoint, circulation_profile};
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;

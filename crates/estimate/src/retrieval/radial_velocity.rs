@@ -75,16 +75,8 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
         stage = stage.rescaled(&best);
         ends = fits(&stage);
     }
-    let wind = stage.wind(&calm.wake)?;
-    let report = Report {
-        stage: &stage,
-        scale: 1.0,
-        rejected: 0,
-        thinned: false,
-        is_noise_left: false,
-        wind: &wind,
-        ends: &ends,
-    };
+    let (stage, wind, ends) = (&stage, &stage.wind(&calm.wake)?, &ends[..]);
+    let report = Report { stage, scale: 1.0, rejected: 0, thinned: false, is_noise_left: false, wind, ends };
     let mut result = report.result()?;
     for vortex in &mut result.vortices {
         for place in [&mut vortex.lateral_position_m, &mut vortex.height_m] {

@@ -206,8 +206,8 @@ impl Filter<'_> {
                     transition[[a, b]] = sign * seconds;
                     noise[[a, a]] = density * seconds.powi(3) / 3.0;
                     noise[[b, b]] = density * seconds;
-                    (noise[[a, b]], noise[[b, a]]) =
-                        (sign * density * seconds.powi(2) / 2.0, sign * density * seconds.powi(2) / 2.0);
+                    noise[[a, b]] = sign * density * seconds.powi(2) / 2.0;
+                    noise[[b, a]] = noise[[a, b]];
                 } else {
                     (transition[[a, a]], transition[[b, b]]) = (0.0, 0.0);
                     (noise[[a, a]], noise[[b, b]]) = (1.0, 1.0);

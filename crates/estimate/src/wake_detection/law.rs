@@ -17,7 +17,7 @@ use rand_distr::{Distribution, StandardNormal};
 use std::f64::consts::PI;
 
 use crate::error::{Error, check, finite};
-use crate::parallel::map_indexed;
+use crate::parallel::map_each;
 use crate::wake_detection::WakeDetector;
 
 /// Scans that are drawn together.
@@ -54,20 +54,16 @@ impl WakeDetector {
     /// Products of empty scans with all places: scans by places.
     pub(super) fn empty_products<R: Rng>(&self, scans: usize, stream: impl Fn(u64) -> R + Sync + Send) -> Array2<f64> {
         let places = self.factor.nrows();
-        let batches = map_indexed(
-            scans.div_ceil(BATCH),
-            || (),
-            |(), batch| {
-                let first = batch * BATCH;
-                let count = BATCH.min(scans - first);
-                let mut normal = Array2::<f64>::zeros((count, places));
-                for (scan, mut row) in normal.rows_mut().into_iter().enumerate() {
-                    let mut generator = stream((first + scan) as u64);
-                    row.mapv_inplace(|_| StandardNormal.sample(&mut generator));
-                }
-                lower_product(&normal, &self.factor)
-            },
-        );
+        let batches = map_each(scans.div_ceil(BATCH), |batch| {
+            let first = batch * BATCH;
+            let count = BATCH.min(scans - first);
+            let mut normal = Array2::<f64>::zeros((count, places));
+            for (scan, mut row) in normal.rows_mut().into_iter().enumerate() {
+                let mut generator = stream((first + scan) as u64);
+                row.mapv_inplace(|_| StandardNormal.sample(&mut generator));
+            }
+            lower_product(&normal, &self.factor)
+        });
         let views: Vec<_> = batches.iter().map(|batch| batch.view()).collect();
         ndarray::concatenate(ndarray::Axis(0), &views).unwrap_or_else(|_| Array2::zeros((0, places)))
     }

@@ -4,6 +4,7 @@
 
 use crate::window::SignalKind;
 use num_complex::Complex;
+use std::ops::Mul;
 
 mod sealed {
     pub trait Sealed {}
@@ -12,15 +13,21 @@ mod sealed {
 }
 
 /// One sample of a window: `f64` or `Complex<f64>`.
-pub trait Sample: Copy + Send + Sync + sealed::Sealed + 'static {
+pub trait Sample: Copy + Send + Sync + Into<Complex<f64>> + Mul<f64, Output = Self> + sealed::Sealed + 'static {
     /// Kind of signal made of such samples.
     const KIND: SignalKind;
 
     /// The sample as a complex number.
-    fn to_complex(self) -> Complex<f64>;
+    #[inline]
+    fn to_complex(self) -> Complex<f64> {
+        self.into()
+    }
 
     /// The sample times a real factor.
-    fn scaled(self, factor: f64) -> Self;
+    #[inline]
+    fn scaled(self, factor: f64) -> Self {
+        self * factor
+    }
 
     /// Largest absolute value of the parts, the measure used for scaling.
     #[inline]
@@ -45,28 +52,8 @@ pub trait Sample: Copy + Send + Sync + sealed::Sealed + 'static {
 
 impl Sample for f64 {
     const KIND: SignalKind = SignalKind::Real;
-
-    #[inline]
-    fn to_complex(self) -> Complex<f64> {
-        Complex::new(self, 0.0)
-    }
-
-    #[inline]
-    fn scaled(self, factor: f64) -> Self {
-        self * factor
-    }
 }
 
 impl Sample for Complex<f64> {
     const KIND: SignalKind = SignalKind::Complex;
-
-    #[inline]
-    fn to_complex(self) -> Complex<f64> {
-        self
-    }
-
-    #[inline]
-    fn scaled(self, factor: f64) -> Self {
-        self * factor
-    }
 }

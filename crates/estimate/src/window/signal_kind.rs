@@ -23,6 +23,12 @@ impl SignalKind {
         }
     }
 
+    /// The numbers of a stored correlogram times one weight for each lag, as far as there are weights.
+    pub(crate) fn weighted_lags(self, numbers: &[f64], weights: &[f64]) -> impl Iterator<Item = f64> {
+        let lags = numbers.chunks(self.lag_numbers(1)).zip(weights);
+        lags.flat_map(|(lag, weight)| lag.iter().map(move |number| number * weight))
+    }
+
     /// Share of its power that a signal has at its own frequencies: real samples carry half of it at the negative ones.
     pub(crate) fn one_sided_share(self) -> f64 {
         match self {

@@ -14,7 +14,7 @@ use super::{BLOCK, Scan, add};
 use crate::error::{Error, check, length};
 use crate::estimators::Statistic;
 use crate::map::ScanGeometry;
-use crate::parallel::{for_each_chunk, map_indexed};
+use crate::parallel::{for_each_chunk, map_each};
 use crate::window::missing::{Rule, invalid_windows};
 use crate::window::{Gates, Sample, Scratch};
 
@@ -96,8 +96,7 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         length("samples of a record", self.record_samples, samples)?;
         let scale = self.rescale(records);
         let (gates, rule, count) = (&self.gates, &self.rule, self.held.len());
-        let found =
-            map_indexed(rays, || (), |(), ray| invalid_windows(records.row(ray).iter().copied(), rule, gates, count));
+        let found = map_each(rays, |ray| invalid_windows(records.row(ray).iter().copied(), rule, gates, count));
         let found = found.into_iter().enumerate().filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
         self.invalid.extend(found);
         let (statistic, invalid, lines, numbers) = (self.statistic, &self.invalid, &self.geometry.rays, self.numbers);

@@ -20,7 +20,7 @@ use crate::bound::Noise;
 use crate::error::{Error, length, not_negative, positive};
 use crate::estimators::Estimator;
 use crate::linalg::dot;
-use crate::parallel::map_indexed;
+use crate::parallel::{map_each, map_indexed};
 use crate::spectrum::{Correlogram, Taper};
 use crate::vortex_fit::wake::motion::Motion;
 use crate::vortex_fit::wake::pair::Ray;
@@ -262,19 +262,15 @@ impl Prepared<'_> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
         let wakes = self.wakes(self.model, wake);
-        let moments = map_indexed(
-            lines,
-            || (),
-            |(), line| {
-                let velocities = self.velocities_on((self.model, &wakes[line]), Ray::new(self.elevation_rad[line]));
-                let one = |range_m: &f64| {
-                    let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
-                    let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
-                    seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
-                };
-                self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
-            },
-        );
+        let moments = map_each(lines, |line| {
+            let velocities = self.velocities_on((self.model, &wakes[line]), Ray::new(self.elevation_rad[line]));
+            let one = |range_m: &f64| {
+                let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
+                let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
+                seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
+            };
+            self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
+        });
         Array2::from_shape_fn((lines, gates), |(line, gate)| {
             let [mean, square] =
                 self.regions[[line, gate]].iter().fold([0.0, 0.0], |[mean, square], &(other, share)| {

@@ -8,7 +8,7 @@
 use ndarray::{Array1, Array2};
 
 use crate::error::{Error, enough_velocities};
-use crate::parallel::map_indexed;
+use crate::parallel::{map_each, map_indexed};
 use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
 use crate::vortex_fit::map_fit::data::{block_means, median, robust_scale};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
@@ -102,15 +102,11 @@ impl Search {
         let mut data = weighted(&thinned.velocity);
         remove(&basis, &mut data);
         let seen = places(&thinned, model, kernel);
-        let rows = map_indexed(
-            seen.len(),
-            || (),
-            |(), i| {
-                let mut shape = weighted(&seen[i].1);
-                remove(&basis, &mut shape);
-                shape
-            },
-        );
+        let rows = map_each(seen.len(), |i| {
+            let mut shape = weighted(&seen[i].1);
+            remove(&basis, &mut shape);
+            shape
+        });
         let (data, blocks) = (Array1::from_vec(data), thinned.weight.len());
         let shapes = Array2::from_shape_fn((rows.len(), blocks), |(place, block)| rows[place][block]);
         Ok(Self {
@@ -138,6 +134,34 @@ impl Search {
         let (left, right) = (self.places_m[pair.left], self.places_m[pair.right]);
         let core_m = CORE_OVER_SPACING * (right.0 - left.0);
         Wake::calm(Vortex::at(left, pair.strength.0, core_m), Vortex::at(right, pair.strength.1, core_m))
+    }
+
+    /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
+    pub(crate) fn pairs(&self) -> Vec<Pair> {
+        let best = |left: usize| {
+            // a clockwise vortex shows the opposite shape
+            let (a, aa) = (-self.towards[left], self.gram[[left, left]]);
+            let pair = |right: usize| {
+                let (b, bb, ab) = (self.towards[right], self.gram[[right, right]], -self.gram[[left, right]]);
+                let determinant = aa * bb - ab * ab;
+                let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
+                let possible = strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb;
+                possible.then_some(Pair { explained: strength.0 * a + strength.1 * b, left, right, strength })
+            };
+            let apart = |right: &usize| self.places_m[*right].0 - self.places_m[left].0 >= CLOSEST_M;
+            let pairs = (0..self.places_m.len()).filter(apart).filter_map(pair);
+            // the first of equals
+            pairs.reduce(|most, next| if next.explained > most.explained { next } else { most })
+        };
+        (0..self.places_m.len()).filter_map(best).collect()
+    }
+
+    /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone, and its circulation.
+    pub(crate) fn single(&self, sense: f64) -> Option<((f64, f64), f64)> {
+        let explained = |place: usize| (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]];
+        let best = (0..self.places_m.len()).reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
+        let strength = sense * self.towards[best] / self.gram[[best, best]];
+        (strength > 0.0).then_some((self.places_m[best], strength))
     }
 }
 
@@ -179,34 +203,4 @@ fn wind_shapes(thinned: &Thinned, model: &WakeModel) -> [Vec<f64>; 2] {
         }
     }
     shapes
-}
-
-impl Search {
-    /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
-    pub(crate) fn pairs(&self) -> Vec<Pair> {
-        let best = |left: usize| {
-            // a clockwise vortex shows the opposite shape
-            let (a, aa) = (-self.towards[left], self.gram[[left, left]]);
-            let pair = |right: usize| {
-                let (b, bb, ab) = (self.towards[right], self.gram[[right, right]], -self.gram[[left, right]]);
-                let determinant = aa * bb - ab * ab;
-                let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
-                let possible = strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb;
-                possible.then_some(Pair { explained: strength.0 * a + strength.1 * b, left, right, strength })
-            };
-            let apart = |right: &usize| self.places_m[*right].0 - self.places_m[left].0 >= CLOSEST_M;
-            let pairs = (0..self.places_m.len()).filter(apart).filter_map(pair);
-            // the first of equals
-            pairs.reduce(|most, next| if next.explained > most.explained { next } else { most })
-        };
-        (0..self.places_m.len()).filter_map(best).collect()
-    }
-
-    /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone, and its circulation.
-    pub(crate) fn single(&self, sense: f64) -> Option<((f64, f64), f64)> {
-        let explained = |place: usize| (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]];
-        let best = (0..self.places_m.len()).reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
-        let strength = sense * self.towards[best] / self.gram[[best, best]];
-        (strength > 0.0).then_some((self.places_m[best], strength))
-    }
 }

@@ -12,7 +12,7 @@ use ndarray::{Array2, Axis};
 
 use crate::error::Error;
 use crate::linalg::dot;
-use crate::parallel::map_indexed;
+use crate::parallel::map_each;
 use crate::retrieval::Whitening;
 use crate::vortex_fit::damped_newton::{Minimum, Normal, Stop, inverse, lowest, singular, solve};
 use crate::vortex_fit::map_fit::cells::{Cell, products, scaled};
@@ -61,28 +61,24 @@ impl LeastSquares<'_> {
     /// Residuals and slopes by the groups of parameters, in the order of the cells.
     pub(crate) fn rows(&self, p: &[f64], groups: &[Vec<usize>]) -> Rows {
         let predicted = self.prediction.predict(p, groups);
-        let columns = map_indexed(
-            predicted.slopes.len() + 1,
-            || (),
-            |(), column| {
-                let number = |cell: &Cell| {
-                    let place = [cell.line, cell.gate];
-                    let number = match column.checked_sub(1) {
-                        Some(slope) => predicted.slopes[slope][place],
-                        None => {
-                            let away = cell.velocity_m_s - predicted.velocity_m_s[place];
-                            self.fold_m_s.map_or(away, |fold| away - fold * (away / fold).round())
-                        }
-                    };
-                    if self.whitening.is_some() { number } else { number / cell.sigma_m_s }
+        let columns = map_each(predicted.slopes.len() + 1, |column| {
+            let number = |cell: &Cell| {
+                let place = [cell.line, cell.gate];
+                let number = match column.checked_sub(1) {
+                    Some(slope) => predicted.slopes[slope][place],
+                    None => {
+                        let away = cell.velocity_m_s - predicted.velocity_m_s[place];
+                        self.fold_m_s.map_or(away, |fold| away - fold * (away / fold).round())
+                    }
                 };
-                let mut numbers: Vec<f64> = self.cells.iter().map(number).collect();
-                if let Some(whitening) = &self.whitening {
-                    whitening.whiten(&mut numbers);
-                }
-                numbers
-            },
-        );
+                if self.whitening.is_some() { number } else { number / cell.sigma_m_s }
+            };
+            let mut numbers: Vec<f64> = self.cells.iter().map(number).collect();
+            if let Some(whitening) = &self.whitening {
+                whitening.whiten(&mut numbers);
+            }
+            numbers
+        });
         let mut columns = columns.into_iter();
         Rows { residuals: columns.next().unwrap_or_default(), slopes: columns.collect() }
     }

@@ -111,27 +111,7 @@ impl RangeKernel {
         }
         Self { first_offset_m: self.first_offset_m, spacing_m, weights }
     }
-}
 
-/// Wind on the grid of one line.
-#[derive(Debug, Default)]
-pub(crate) struct LineScratch {
-    points_m: Vec<f64>,
-    rows: Vec<Vec<f64>>,
-    weights: Vec<f64>,
-}
-
-/// Mean velocity of the gate whose first weight falls on grid point `index`, and the means of the other rows.
-#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn means(weights: &[f64], rows: &[Vec<f64>], index: usize) -> [f64; PARAMETERS + 1] {
-    let mut found = [0.0; PARAMETERS + 1];
-    for (found, row) in found.iter_mut().zip(rows) {
-        *found = dot(weights, &row[index..index + weights.len()]);
-    }
-    found
-}
-
-impl RangeKernel {
     /// The weights for a gate that lies by that share of the way to the next point: linear between both.
     fn between<'w>(&self, share: f64, out: &'w mut Vec<f64>) -> &'w [f64] {
         out.clear();
@@ -169,6 +149,24 @@ impl RangeKernel {
             out(gate, found[0], &slope);
         }
     }
+}
+
+/// Wind on the grid of one line.
+#[derive(Debug, Default)]
+pub(crate) struct LineScratch {
+    points_m: Vec<f64>,
+    rows: Vec<Vec<f64>>,
+    weights: Vec<f64>,
+}
+
+/// Mean velocity of the gate whose first weight falls on grid point `index`, and the means of the other rows.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn means(weights: &[f64], rows: &[Vec<f64>], index: usize) -> [f64; PARAMETERS + 1] {
+    let mut found = [0.0; PARAMETERS + 1];
+    for (found, row) in found.iter_mut().zip(rows) {
+        *found = dot(weights, &row[index..index + weights.len()]);
+    }
+    found
 }
 
 #[cfg(test)]
