@@ -106,10 +106,10 @@ fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluatio
     let rows = if cores.is_empty() { 1 } else { CORES_OVER_SPACING.len() };
     let quick: Vec<usize> = (0..information.nrows()).filter(|i| !heights.contains(i) && !cores.contains(i)).collect();
     let mut scores: Vec<(f64, usize, Vec<i32>, State)> = Vec::new();
-    for row in 0..rows {
+    for (row, over_spacing) in CORES_OVER_SPACING.iter().enumerate().take(rows) {
         let mut at = *top;
         if !cores.is_empty() {
-            at.0 = at.0.with_cores(CORES_OVER_SPACING[row] * top.0.spacing_m());
+            at.0 = at.0.with_cores(over_spacing * top.0.spacing_m());
         }
         let mut score = |ascent: &Ascent<'_>, state: State| {
             *evaluations += 1;
