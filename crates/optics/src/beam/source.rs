@@ -78,7 +78,7 @@ pub(crate) fn aperture_field<T: Real>(
     let fft = Fft2::<f64>::new(grid);
     let mut field = vec![Complex::default(); grid.points()];
     let mut scratch = fft.scratch();
-    fft.inverse_y(&mut field, &mut scratch, |ix, block| {
+    Fft2::transposing(&fft.inverse_y, &mut field, &mut scratch, |ix, block| {
         let start = ix * grid.ny;
         block.copy_from_slice(&spectrum[start..start + block.len()]);
     });

@@ -47,10 +47,6 @@ pub struct ScreenGenerator<T: Real> {
 pub struct ScreenWork<T: Real> {
     field: Vec<Complex<T>>,
     scratch: FftScratch<T>,
-    radius: Vec<u32>,
-    angle: Vec<u32>,
-    row: Vec<T>,
-    ramp: Vec<Complex<T>>,
 }
 
 /// Random stream of one screen: xoshiro256++ seeded by a hash of the run's seed, the realisation and the screen.
@@ -105,14 +101,7 @@ impl<T: Real> ScreenGenerator<T> {
 
     /// Buffers for [`ScreenGenerator::fill_pair`].
     pub fn work(&self) -> ScreenWork<T> {
-        ScreenWork {
-            field: vec![Complex::default(); self.grid.points()],
-            scratch: self.fft.scratch(),
-            radius: vec![0; self.grid.ny],
-            angle: vec![0; self.grid.ny],
-            row: vec![T::zero(); self.grid.ny],
-            ramp: vec![Complex::default(); self.grid.nx],
-        }
+        ScreenWork { field: vec![Complex::default(); self.grid.points()], scratch: self.fft.scratch() }
     }
 
     /// Phi_psi of the spectrum at a frequency, for unit k^2 Cn2 dz \[rad^2 m^2\].
@@ -214,15 +203,16 @@ impl<T: Real> ScreenGenerator<T> {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
         let low = self.low.draw(&*self.spectrum, self.shift_sign, rng);
-        let ScreenWork { field, scratch, radius, angle, row, ramp } = work;
-        self.fft.inverse_y(field, scratch, |ix, block| {
+        let ScreenWork { field, scratch } = work;
+        let (mut radius, mut angle, mut row) = (vec![0; ny], vec![0; ny], vec![T::zero(); ny]);
+        Fft2::transposing(&self.fft.inverse_y, field, scratch, |ix, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
-                for (u, v) in radius.iter_mut().zip(angle.iter_mut()) {
+                for (u, v) in radius.iter_mut().zip(&mut angle) {
                     let word = rng.next_u64();
                     (*u, *v) = ((word >> 32) as u32, word as u32);
                 }
-                self.shifted_row(ix + i, shift, row);
-                kernel::normals(radius, angle, row, line);
+                self.shifted_row(ix + i, shift, &mut row);
+                kernel::normals(&radius, &angle, &row, line);
             }
         });
         // The shift of the frequencies is a linear phase over the points.
@@ -230,9 +220,7 @@ impl<T: Real> ScreenGenerator<T> {
             let phase = Complex::cis(self.shift_sign * 2.0 * PI * s * i as f64 / n as f64);
             Complex::new(T::of(phase.re), T::of(phase.im))
         };
-        for (i, value) in ramp.iter_mut().enumerate() {
-            *value = shifted(nx, shift[0], i);
-        }
+        let ramp: Vec<_> = (0..nx).map(|i| shifted(nx, shift[0], i)).collect();
         self.fft.inverse_x(field, scratch, |y, block| {
             for (i, line) in block.chunks_exact(nx).enumerate() {
                 let y = y + i;

@@ -97,75 +97,44 @@ pub(crate) struct FftScratch<T> {
     inner: Vec<Complex<T>>,
 }
 
-/// Fourier transforms of the rows and columns of one grid, planned once.
+/// Fourier transforms along either axis of one grid, planned once.
 pub(crate) struct Fft2<T: Real> {
-    pub(crate) nx: usize,
-    pub(crate) ny: usize,
-    /// Along x and y, forward.
-    forward: [Arc<dyn Fft<T>>; 2],
-    /// Along x and y, inverse.
-    inverse: [Arc<dyn Fft<T>>; 2],
-    scratch: usize,
+    pub(crate) forward_x: Arc<dyn Fft<T>>,
+    pub(crate) forward_y: Arc<dyn Fft<T>>,
+    pub(crate) inverse_x: Arc<dyn Fft<T>>,
+    pub(crate) inverse_y: Arc<dyn Fft<T>>,
 }
 
 impl<T: Real> Fft2<T> {
     pub(crate) fn new(grid: &Grid) -> Self {
         let [[forward_x, inverse_x], [forward_y, inverse_y]] = [grid.nx, grid.ny].map(T::transforms);
-        let (forward, inverse) = ([forward_x, forward_y], [inverse_x, inverse_y]);
-        let scratch = forward.iter().chain(&inverse).map(|f| f.get_inplace_scratch_len()).max().unwrap_or(0);
-        Self { nx: grid.nx, ny: grid.ny, forward, inverse, scratch }
+        Self { forward_x, forward_y, inverse_x, inverse_y }
     }
 
     /// Buffers of one transform: a block of rows, which stays in the fastest cache, and the transform's own.
     pub(crate) fn scratch(&self) -> FftScratch<T> {
-        FftScratch {
-            block: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
-            spectrum: vec![Complex::default(); ROWS * self.nx.max(self.ny)],
-            inner: vec![Complex::default(); self.scratch],
-        }
+        let plans = [&self.forward_x, &self.forward_y, &self.inverse_x, &self.inverse_y];
+        let block = plans.iter().map(|plan| ROWS * plan.len()).max().unwrap_or(0);
+        let inner = plans.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
+        let zeros = |length| vec![Complex::default(); length];
+        FftScratch { block: zeros(block), spectrum: zeros(block), inner: zeros(inner) }
     }
 
-    /// Calls `rows` on each block of `length`-point rows, with the index of its first row, and stores it transposed in `out`.
-    fn transposing(
-        out: &mut [Complex<T>],
-        length: usize,
-        block: &mut [Complex<T>],
-        mut rows: impl FnMut(usize, &mut [Complex<T>]),
-    ) {
-        let count = out.len() / length;
-        for first in (0..count).step_by(ROWS) {
-            let height = ROWS.min(count - first);
-            let block = &mut block[..height * length];
-            rows(first, block);
-            Self::store_transposed(out, length, first, block);
-        }
-    }
-
-    /// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
-    fn store_transposed(out: &mut [Complex<T>], length: usize, first: usize, block: &[Complex<T>]) {
-        let (count, height) = (out.len() / length, block.len() / length);
-        for (i, column) in out.chunks_exact_mut(count).enumerate() {
-            for (b, value) in column[first..first + height].iter_mut().enumerate() {
-                *value = block[b * length + i];
-            }
-        }
-    }
-
-    /// Rows `[y][x]`: `before` each block, forward transform along x, transposed into `out` `[kx][y]`.
-    pub(crate) fn forward_x(
-        &self,
-        field: &[Complex<T>],
+    /// Rows of the length of `plan`: `fill` makes each block, told the index of its first row; transform, transposed into `out`.
+    pub(crate) fn transposing(
+        plan: &Arc<dyn Fft<T>>,
         out: &mut [Complex<T>],
         scratch: &mut FftScratch<T>,
-        mut before: impl FnMut(usize, &mut [Complex<T>]),
+        mut fill: impl FnMut(usize, &mut [Complex<T>]),
     ) {
         let FftScratch { block, inner, .. } = scratch;
-        Self::transposing(out, self.nx, block, |first, block| {
-            let start = first * self.nx;
-            block.copy_from_slice(&field[start..start + block.len()]);
-            before(first, block);
-            transform(&self.forward[0], block, inner);
-        });
+        let count = out.len() / plan.len();
+        for first in (0..count).step_by(ROWS) {
+            let block = &mut block[..ROWS.min(count - first) * plan.len()];
+            fill(first, block);
+            transform(plan, block, inner);
+            store_transposed(out, plan.len(), first, block);
+        }
     }
 
     /// Rows `[kx][y]`: forward along y, then for each of the fields `outs`, whose number `middle` is told: `middle` on the spectrum
@@ -178,39 +147,24 @@ impl<T: Real> Fft2<T> {
         mut middle: impl FnMut(usize, usize, &mut [Complex<T>]),
     ) {
         let FftScratch { block, spectrum, inner } = scratch;
-        for (index, rows) in field.chunks(ROWS * self.ny).enumerate() {
-            let first = index * ROWS;
-            let spectrum = &mut spectrum[..rows.len()];
-            spectrum.copy_from_slice(rows);
-            transform(&self.forward[1], spectrum, inner);
+        let length = self.forward_y.len();
+        for (index, rows) in field.chunks(ROWS * length).enumerate() {
+            let (first, points) = (index * ROWS, ..rows.len());
+            spectrum[points].copy_from_slice(rows);
+            transform(&self.forward_y, &mut spectrum[points], inner);
             for (which, out) in outs.iter_mut().enumerate() {
                 // The last filter needs no copy.
-                let block = if which + 1 < N {
-                    let block = &mut block[..rows.len()];
-                    block.copy_from_slice(spectrum);
-                    block
+                if which + 1 < N {
+                    block[points].copy_from_slice(&spectrum[points]);
                 } else {
-                    &mut *spectrum
-                };
+                    std::mem::swap(block, spectrum);
+                }
+                let block = &mut block[points];
                 middle(which, first, block);
-                transform(&self.inverse[1], block, inner);
-                Self::store_transposed(out, self.ny, first, block);
+                transform(&self.inverse_y, block, inner);
+                store_transposed(out, length, first, block);
             }
         }
-    }
-
-    /// Rows `[kx][ky]`: `fill` makes each block, inverse along y, transposed into `out` `[y]\[kx\]`.
-    pub(crate) fn inverse_y(
-        &self,
-        out: &mut [Complex<T>],
-        scratch: &mut FftScratch<T>,
-        mut fill: impl FnMut(usize, &mut [Complex<T>]),
-    ) {
-        let FftScratch { block, inner, .. } = scratch;
-        Self::transposing(out, self.ny, block, |first, block| {
-            fill(first, block);
-            transform(&self.inverse[1], block, inner);
-        });
     }
 
     /// Rows `[y]\[kx\]`: inverse along x, then `after` on each block with the index of its first row.
@@ -220,9 +174,19 @@ impl<T: Real> Fft2<T> {
         scratch: &mut FftScratch<T>,
         mut after: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        for (block_index, block) in field.chunks_mut(ROWS * self.nx).enumerate() {
-            transform(&self.inverse[0], block, &mut scratch.inner);
+        for (block_index, block) in field.chunks_mut(ROWS * self.inverse_x.len()).enumerate() {
+            transform(&self.inverse_x, block, &mut scratch.inner);
             after(block_index * ROWS, block);
+        }
+    }
+}
+
+/// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
+fn store_transposed<T: Real>(out: &mut [Complex<T>], length: usize, first: usize, block: &[Complex<T>]) {
+    let (count, height) = (out.len() / length, block.len() / length);
+    for (i, column) in out.chunks_exact_mut(count).enumerate() {
+        for (b, value) in column[first..first + height].iter_mut().enumerate() {
+            *value = block[b * length + i];
         }
     }
 }
@@ -244,7 +208,9 @@ mod tests {
         let field: Vec<Complex<f64>> =
             (0..grid.points()).map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos())).collect();
         let mut b = field.clone();
-        fft.forward_x(&field, &mut b, &mut scratch, |_, _| {});
+        Fft2::transposing(&fft.forward_x, &mut b, &mut scratch, |first, block| {
+            block.copy_from_slice(&field[first * 17..first * 17 + block.len()]);
+        });
         let mut found = Complex::default();
         let (kx, ky) = (5usize, 3usize);
         let mut out = field.clone();

@@ -133,10 +133,11 @@ impl<T: Real> Propagator<T> {
             return Err(Error::Length { field: "screen", found: phase.len(), expected });
         }
         let PropagatorWork { transposed, scratch } = work;
-        self.fft.forward_x(field, transposed, scratch, |row, block| {
+        Fft2::transposing(&self.fft.forward_x, transposed, scratch, |row, block| {
+            let points = row * self.grid.nx..row * self.grid.nx + block.len();
+            block.copy_from_slice(&field[points.clone()]);
             if let Some((phase, scale)) = screen {
-                let start = row * self.grid.nx;
-                kernel::multiply_cis(block, &phase[start..start + block.len()], scale);
+                kernel::multiply_cis(block, &phase[points], scale);
             }
         });
         Ok(())
