@@ -8,7 +8,7 @@
 use crate::beam::Telescope;
 use crate::plan::violation::{Limit, Violation};
 use crate::quadrature::{GaussLegendre, cubic};
-use crate::screens::grid::{Fft2, Grid};
+use crate::screens::grid::{Fft2, Grid, Work};
 use crate::screens::kernel::Real;
 use crate::{Error, Misalignment};
 use rustfft::num_complex::Complex;
@@ -76,8 +76,7 @@ pub(crate) fn aperture_field<T: Real>(
         *value *= (1.0 + weight * e) * scale;
     }
     let fft = Fft2::<f64>::new(grid);
-    let mut field = vec![Complex::default(); grid.points()];
-    let mut scratch = fft.scratch();
+    let Work { whole: mut field, mut scratch } = fft.work();
     Fft2::transposing(&fft.inverse_y, &mut field, &mut scratch, |ix, block| {
         let start = ix * grid.ny;
         block.copy_from_slice(&spectrum[start..start + block.len()]);

@@ -5,9 +5,10 @@
 use crate::Error;
 use crate::monte_carlo::path::{Leg, Path};
 use crate::monte_carlo::statistics::{Folding, Sample};
-use crate::screens::generator::{ScreenGenerator, ScreenWork, stream};
+use crate::screens::generator::{ScreenGenerator, stream};
+use crate::screens::grid::Work;
 use crate::screens::kernel::{self, Real};
-use crate::screens::propagate::{Propagator, PropagatorWork, Transfer};
+use crate::screens::propagate::{Propagator, Transfer};
 use rustfft::num_complex::Complex;
 
 /// How realisations are drawn.
@@ -76,8 +77,8 @@ pub(crate) struct Walker<'a, T: Real> {
     prepared: &'a Prepared<T>,
     seed: u64,
     sampling: Sampling,
-    work: PropagatorWork<T>,
-    screen_work: Option<ScreenWork<T>>,
+    work: Work<T>,
+    screen_work: Option<Work<T>>,
     pair: Vec<Realisation<T>>,
     rows: [Vec<T>; 4],
 }

@@ -13,7 +13,7 @@
 use crate::Error;
 use crate::air::spectrum::Spectrum;
 use crate::quadrature::GaussLegendre;
-use crate::screens::grid::{Fft2, FftScratch, Grid};
+use crate::screens::grid::{Fft2, Grid, Work};
 use crate::screens::kernel::{self, Real};
 use crate::screens::low_frequency::{LowFrequencies, unit};
 use rand::Rng;
@@ -41,12 +41,6 @@ pub struct ScreenGenerator<T: Real> {
     exact: [usize; 2],
     /// +1; a test sets it to -1 to show that the bistatic test finds a wrong sign.
     pub(crate) shift_sign: f64,
-}
-
-/// Buffers of a synthesis, reused from screen to screen.
-pub struct ScreenWork<T: Real> {
-    field: Vec<Complex<T>>,
-    scratch: FftScratch<T>,
 }
 
 /// Random stream of one screen: xoshiro256++ seeded by a hash of the run's seed, the realisation and the screen.
@@ -94,14 +88,9 @@ impl<T: Real> ScreenGenerator<T> {
         self.spectrum.inner_wavenumber_rad_m() * self.grid.largest_spacing_m() <= 2.97
     }
 
-    /// The grid.
-    pub fn grid(&self) -> &Grid {
-        &self.grid
-    }
-
     /// Buffers for [`ScreenGenerator::fill_pair`].
-    pub fn work(&self) -> ScreenWork<T> {
-        ScreenWork { field: vec![Complex::default(); self.grid.points()], scratch: self.fft.scratch() }
+    pub fn work(&self) -> Work<T> {
+        self.fft.work()
     }
 
     /// Phi_psi of the spectrum at a frequency, for unit k^2 Cn2 dz \[rad^2 m^2\].
@@ -191,7 +180,7 @@ impl<T: Real> ScreenGenerator<T> {
     pub fn fill_pair(
         &self,
         rng: &mut impl Rng,
-        work: &mut ScreenWork<T>,
+        work: &mut Work<T>,
         first: &mut [T],
         second: &mut [T],
     ) -> Result<(), Error> {
@@ -203,7 +192,7 @@ impl<T: Real> ScreenGenerator<T> {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
         let low = self.low.draw(&*self.spectrum, self.shift_sign, rng);
-        let ScreenWork { field, scratch } = work;
+        let Work { whole: field, scratch } = work;
         let (mut radius, mut angle, mut row) = (vec![0; ny], vec![0; ny], vec![T::zero(); ny]);
         Fft2::transposing(&self.fft.inverse_y, field, scratch, |ix, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {

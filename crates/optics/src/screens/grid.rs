@@ -90,7 +90,14 @@ impl Grid {
     }
 }
 
-/// Buffers of [`Fft2`].
+/// Buffers of steps or of screens on one grid, reused from one to the next.
+pub struct Work<T> {
+    /// A field between the transforms along its axes.
+    pub(crate) whole: Vec<Complex<T>>,
+    pub(crate) scratch: FftScratch<T>,
+}
+
+/// Buffers of one transform: blocks of rows, which stay in the fastest cache, and the transform's own.
 pub(crate) struct FftScratch<T> {
     block: Vec<Complex<T>>,
     spectrum: Vec<Complex<T>>,
@@ -111,13 +118,13 @@ impl<T: Real> Fft2<T> {
         Self { forward_x, forward_y, inverse_x, inverse_y }
     }
 
-    /// Buffers of one transform: a block of rows, which stays in the fastest cache, and the transform's own.
-    pub(crate) fn scratch(&self) -> FftScratch<T> {
+    pub(crate) fn work(&self) -> Work<T> {
         let plans = [&self.forward_x, &self.forward_y, &self.inverse_x, &self.inverse_y];
         let block = plans.iter().map(|plan| ROWS * plan.len()).max().unwrap_or(0);
         let inner = plans.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
         let zeros = |length| vec![Complex::default(); length];
-        FftScratch { block: zeros(block), spectrum: zeros(block), inner: zeros(inner) }
+        let scratch = FftScratch { block: zeros(block), spectrum: zeros(block), inner: zeros(inner) };
+        Work { whole: zeros(self.forward_x.len() * self.forward_y.len()), scratch }
     }
 
     /// Rows of the length of `plan`: `fill` makes each block, told the index of its first row; transform, transposed into `out`.
@@ -204,7 +211,7 @@ mod tests {
     fn two_dimensional_transform_is_the_direct_sum_for_odd_sizes() {
         let grid = Grid { nx: 17, ny: 23, dx_m: 1.0, dy_m: 1.0 };
         let fft = Fft2::<f64>::new(&grid);
-        let mut scratch = fft.scratch();
+        let mut scratch = fft.work().scratch;
         let field: Vec<Complex<f64>> =
             (0..grid.points()).map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos())).collect();
         let mut b = field.clone();

@@ -6,7 +6,7 @@ pub(crate) mod kernel;
 pub(crate) mod low_frequency;
 pub(crate) mod propagate;
 
-pub use generator::{ScreenGenerator, ScreenWork, stream};
-pub use grid::Grid;
+pub use generator::{ScreenGenerator, stream};
+pub use grid::{Grid, Work};
 pub use kernel::Real;
-pub use propagate::{Propagator, PropagatorWork, Transfer};
+pub use propagate::{Propagator, Transfer};

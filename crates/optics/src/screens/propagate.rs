@@ -6,7 +6,7 @@
 
 use crate::Error;
 use crate::error::{finite, positive, within};
-use crate::screens::grid::{Fft2, FftScratch, Grid};
+use crate::screens::grid::{Fft2, Grid, Work};
 use crate::screens::kernel::{self, Real};
 use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
@@ -23,12 +23,6 @@ pub struct Propagator<T: Real> {
     wavelength_m: f64,
     fft: Fft2<T>,
     window: [Vec<T>; 2],
-}
-
-/// Buffers of a step, reused.
-pub struct PropagatorWork<T: Real> {
-    transposed: Vec<Complex<T>>,
-    scratch: FftScratch<T>,
 }
 
 impl<T: Real> Propagator<T> {
@@ -48,8 +42,8 @@ impl<T: Real> Propagator<T> {
     }
 
     /// Buffers for [`Propagator::step`].
-    pub fn work(&self) -> PropagatorWork<T> {
-        PropagatorWork { transposed: vec![Complex::default(); self.grid.points()], scratch: self.fft.scratch() }
+    pub fn work(&self) -> Work<T> {
+        self.fft.work()
     }
 
     /// Number of equal steps into which `distance_m` must be cut so that each is sampled: N dx^2/lambda at most.
@@ -88,7 +82,7 @@ impl<T: Real> Propagator<T> {
         field: &mut [Complex<T>],
         screen: Option<(&[T], T)>,
         transfer: &Transfer<T>,
-        work: &mut PropagatorWork<T>,
+        work: &mut Work<T>,
     ) -> Result<f64, Error> {
         self.forward(field, screen, work)?;
         let [power] = self.arrive([field], [transfer], work);
@@ -106,7 +100,7 @@ impl<T: Real> Propagator<T> {
         tap: &mut [Complex<T>],
         screen: Option<(&[T], T)>,
         transfers: [&Transfer<T>; 2],
-        work: &mut PropagatorWork<T>,
+        work: &mut Work<T>,
     ) -> Result<[f64; 2], Error> {
         let expected = self.grid.points();
         if tap.len() != expected {
@@ -117,12 +111,7 @@ impl<T: Real> Propagator<T> {
     }
 
     /// Screen and transform along x into the transposed buffer.
-    fn forward(
-        &self,
-        field: &[Complex<T>],
-        screen: Option<(&[T], T)>,
-        work: &mut PropagatorWork<T>,
-    ) -> Result<(), Error> {
+    fn forward(&self, field: &[Complex<T>], screen: Option<(&[T], T)>, work: &mut Work<T>) -> Result<(), Error> {
         let expected = self.grid.points();
         if field.len() != expected {
             return Err(Error::Length { field: "field", found: field.len(), expected });
@@ -132,7 +121,7 @@ impl<T: Real> Propagator<T> {
         {
             return Err(Error::Length { field: "screen", found: phase.len(), expected });
         }
-        let PropagatorWork { transposed, scratch } = work;
+        let Work { whole: transposed, scratch } = work;
         Fft2::transposing(&self.fft.forward_x, transposed, scratch, |row, block| {
             let points = row * self.grid.nx..row * self.grid.nx + block.len();
             block.copy_from_slice(&field[points.clone()]);
@@ -148,9 +137,9 @@ impl<T: Real> Propagator<T> {
         &self,
         mut fields: [&mut [Complex<T>]; N],
         transfers: [&Transfer<T>; N],
-        work: &mut PropagatorWork<T>,
+        work: &mut Work<T>,
     ) -> [f64; N] {
-        let PropagatorWork { transposed, scratch } = work;
+        let Work { whole: transposed, scratch } = work;
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
         self.fft.filter_y(transposed, fields.each_mut().map(|field| &mut **field), scratch, |which, kx, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
