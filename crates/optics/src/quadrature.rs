@@ -69,15 +69,12 @@ impl GaussLegendre {
     }
 }
 
-/// Legendre polynomial of degree n and its derivative.
+/// Legendre polynomial of degree n, 1 or more, and its derivative.
 fn legendre(n: usize, x: f64) -> (f64, f64) {
     let (mut p0, mut p1) = (1.0, x);
     for k in 2..=n {
         let k = k as f64;
         (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
-    }
-    if n == 0 {
-        return (1.0, 0.0);
     }
     (p1, n as f64 * (x * p1 - p0) / (x * x - 1.0))
 }

@@ -104,6 +104,19 @@ impl StructureTable {
         let near = self.ln_value[start..start + 6].iter().enumerate();
         near.map(|(i, value)| lagrange(&Self::NODES, i, t - start as f64) * value).sum::<f64>().exp()
     }
+
+    /// Structure function D(rho) \[rad^2\] of two spherical waves from `range_m` that are rho apart at the telescope: k^2 times the sum of
+    /// w G(rho (1 - z/R)) over places z \[m\] with weights w = Cn2 dz \[m^(1/3)\].
+    pub(crate) fn of_spherical_waves(
+        &self,
+        wavenumber_rad_m: f64,
+        range_m: f64,
+        places: impl IntoIterator<Item = (f64, f64)>,
+    ) -> impl Fn(f64) -> f64 {
+        let k2 = wavenumber_rad_m.powi(2);
+        let weights: Vec<_> = places.into_iter().map(|(z, w)| (1.0 - z / range_m, k2 * w)).collect();
+        move |rho| weights.iter().map(|(g, w)| w * self.at(rho * g)).sum()
+    }
 }
 
 #[cfg(test)]

@@ -118,22 +118,17 @@ impl<'a> Gaps<'a> {
                 }
             }
             let rytov = path_rytov_variance(cn2, telescope.wavelength_m, range_m)?;
-            let places: Vec<(f64, f64)> = cn2.quadrature(range_m)?;
             let mut at = AtRange { range_m, node, path: 0.0, standard_error: forecast_error(rytov, realisations) };
-            at.path = gaps.integral(&at, &places);
+            at.path = gaps.integral(&at, cn2.quadrature(range_m)?);
             gaps.ranges.push(at);
         }
         Ok(gaps)
     }
 
     /// Integral of M^2 exp(-D) for a path that is a sum over places z with weights Cn2 dz.
-    fn integral(&self, at: &AtRange, places: &[(f64, f64)]) -> f64 {
-        let k2 = self.wavenumber_rad_m.powi(2);
-        let factor: Vec<(f64, f64)> = places.iter().map(|(z, w)| (1.0 - z / at.range_m, k2 * w)).collect();
-        let damped = |&(rho, weight): &(f64, f64)| {
-            weight * (-factor.iter().map(|(g, w)| w * self.table.at(rho * g)).sum::<f64>()).exp()
-        };
-        at.node.iter().map(damped).sum()
+    fn integral(&self, at: &AtRange, places: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+        let structure_rad2 = self.table.of_spherical_waves(self.wavenumber_rad_m, at.range_m, places);
+        at.node.iter().map(|&(rho, weight)| weight * (-structure_rad2(rho)).exp()).sum()
     }
 
     /// The gap of a set of layers at each range; of very many layers, at some of the ranges.
@@ -144,8 +139,8 @@ impl<'a> Gaps<'a> {
         let mut out = Vec::new();
         for at in spread_over(&self.ranges.iter().collect::<Vec<_>>(), some) {
             let screens = layers.screens_to(at.range_m, self.cn2)?;
-            let places: Vec<(f64, f64)> = screens.iter().map(|s| (s.position_m, s.cn2_thickness_m13)).collect();
-            let relative = self.integral(at, &places) / at.path - 1.0;
+            let places = screens.iter().map(|s| (s.position_m, s.cn2_thickness_m13));
+            let relative = self.integral(at, places) / at.path - 1.0;
             out.push(LayerGap { range_m: at.range_m, relative, standard_error: at.standard_error });
         }
         Ok(out)

@@ -4,12 +4,11 @@ use super::Case;
 use super::gaps::{Gaps, thin_layers};
 use super::light::{Light, scatter_rad};
 use super::violation::{Limit, SetUp, Violation, not_above, not_below};
-use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
 use crate::beam::source::{beam_limits_m, slope_rad};
 use crate::screens::grid::Grid;
 use crate::theory::fresnel_number;
-use crate::{Error, Misalignment, Telescope, Turbulence};
+use crate::{Error, Layers, Turbulence};
 
 /// Points along an axis up to which a plan keeps a margin in its spacing, and the most that it proposes.
 const COMFORTABLE_POINTS: usize = 4096;
@@ -23,42 +22,33 @@ const FAR_FIELD: f64 = 0.2;
 
 /// A case with what its limits need, computed once.
 pub(super) struct Limits<'a> {
-    pub(super) telescope: Telescope,
-    pub(super) misalignment: Misalignment,
-    pub(super) turbulence: &'a Turbulence,
-    pub(super) cn2: Cn2Path,
-    pub(super) table: StructureTable,
-    realisations: usize,
-}
-
-/// A row of the table of largest spacings through turbulence \[m\]: the one to plan with, and the one up to which a grid is
-/// accepted.
-struct Spacing {
-    limit: Limit,
-    planned_m: f64,
-    accepted_m: f64,
+    pub(super) case: &'a Case,
+    table: StructureTable,
 }
 
 impl<'a> Limits<'a> {
     pub(super) fn new(case: &'a Case) -> Result<Self, Error> {
-        Ok(Self {
-            telescope: case.telescope.validated()?,
-            misalignment: case.misalignment.validated()?,
-            turbulence: &case.turbulence,
-            cn2: case.turbulence.cn2.clone().validated()?,
-            table: StructureTable::new(&*case.turbulence.spectrum),
-            realisations: case.realisations,
-        })
+        case.telescope.validated()?;
+        case.misalignment.validated()?;
+        case.turbulence.cn2.clone().validated()?;
+        Ok(Self { case, table: StructureTable::new(&*case.turbulence.spectrum) })
     }
 
     /// What layers do to the mean at these ranges.
     pub(super) fn gaps(&self, range_m: &[f64]) -> Result<Gaps<'_>, Error> {
-        Gaps::new(&self.telescope, &self.cn2, &self.table, range_m, self.realisations)
+        let Case { telescope, turbulence, realisations, .. } = self.case;
+        Gaps::new(telescope, &turbulence.cn2, &self.table, range_m, *realisations)
+    }
+
+    /// Equal layers to the last of these ranges, each thin against diffraction.
+    pub(super) fn thin_layers(&self, range_m: &[f64]) -> Result<Layers, Error> {
+        thin_layers(&self.case.turbulence.cn2, self.case.telescope.wavelength_m, last(range_m)?)
     }
 
     /// Tails of the beam out to the furthest range.
     fn light(&self, range_m: &[f64]) -> Result<Light, Error> {
-        Light::new(&self.telescope, &self.misalignment, &self.cn2, &self.table, last(range_m)?)
+        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        Light::new(telescope, misalignment, &turbulence.cn2, &self.table, last(range_m)?)
     }
 
     /// Width \[m\] at which the border takes three quarters of what is doubtful, at the spacing of a grid.
@@ -67,29 +57,28 @@ impl<'a> Limits<'a> {
     }
 
     /// The table: what turbulence and the aperture demand of the spacing, beside what the beam demands of any grid
-    /// ([`beam_limits_m`]).
+    /// ([`beam_limits_m`]); the largest \[m\] to plan with, and the largest that is accepted.
     ///
     /// Where every range is in the far field, the pattern at the target is that of the aperture's few lowest waves, and a sixth
     /// of the points give the efficiency as well (within 1e-4 in free space). For the angles into which focus, tilt and
     /// turbulence send the beam the plan keeps a margin of two: what lies within it is left to the monitored border.
-    fn spacings(&self, range_m: &[f64]) -> Result<[Spacing; 2], Error> {
-        let (a, lambda) = (self.telescope.aperture_radius_m, self.telescope.wavelength_m);
-        let fresnel = range_m.iter().fold(0f64, |worst, &r| worst.max(fresnel_number(&self.telescope, r)));
+    fn spacings_m(&self, range_m: &[f64]) -> Result<[(Limit, f64, f64); 2], Error> {
+        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        let (a, lambda) = (telescope.aperture_radius_m, telescope.wavelength_m);
+        let fresnel = range_m.iter().fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
         let [planned, accepted] = if fresnel < FAR_FIELD { [4.0, 3.0] } else { [25.0, 12.5] };
-        let scatter = scatter_rad(&self.telescope, &self.cn2, last(range_m)?)?;
-        let slope = (slope_rad(&self.telescope, &self.misalignment) + 2.0 * scatter).max(1e-30);
-        Ok([
-            Spacing { limit: Limit::Aperture, planned_m: a / planned, accepted_m: a / accepted },
-            Spacing { limit: Limit::Scatter, planned_m: 0.5 * lambda / slope, accepted_m: lambda / slope },
-        ])
+        let scatter = scatter_rad(telescope, &turbulence.cn2, last(range_m)?)?;
+        let slope = (slope_rad(telescope, misalignment) + 2.0 * scatter).max(1e-30);
+        Ok([(Limit::Aperture, a / planned, a / accepted), (Limit::Scatter, 0.5 * lambda / slope, lambda / slope)])
     }
 
     /// What a grid violates for these ranges, and the share of the light that its border takes.
     pub(super) fn verdict(&self, grid: &Grid, range_m: &[f64]) -> Result<(Vec<Violation>, f64), Error> {
         let grid = grid.validated()?;
-        let mut limits_m = beam_limits_m(&self.telescope, &self.misalignment, last(range_m)?).to_vec();
-        if !self.cn2.is_none() {
-            limits_m.extend(self.spacings(range_m)?.map(|row| (row.limit, row.accepted_m)));
+        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        let mut limits_m = beam_limits_m(telescope, misalignment, last(range_m)?).to_vec();
+        if !turbulence.cn2.is_none() {
+            limits_m.extend(self.spacings_m(range_m)?.map(|(limit, _, accepted_m)| (limit, accepted_m)));
         }
         let (light, spacing_m, width_m) = (self.light(range_m)?, grid.largest_spacing_m(), grid.smallest_width_m());
         let light_lost = light.lost(width_m, spacing_m);
@@ -103,12 +92,12 @@ impl<'a> Limits<'a> {
     /// A grid for these ranges: with the spacing to plan with, or else with the largest that is accepted; with the border that takes next
     /// to nothing, or else with the narrowest that is accepted.
     pub(super) fn grid(&self, range_m: &[f64]) -> Result<Grid, Error> {
-        let ([aperture, scatter], light) = (self.spacings(range_m)?, self.light(range_m)?);
-        let mut planned_m = aperture.planned_m.min(scatter.planned_m);
-        let accepted_m = aperture.accepted_m.min(scatter.accepted_m);
+        let ([aperture, scatter], light) = (self.spacings_m(range_m)?, self.light(range_m)?);
+        let (mut planned_m, accepted_m) = (aperture.1.min(scatter.1), aperture.2.min(scatter.2));
         // Half the inner scale if that costs no more than a factor of two.
-        let fine_m = 2.96 / self.turbulence.spectrum.inner_wavenumber_rad_m();
-        if !self.cn2.is_none() && fine_m < planned_m && fine_m >= 0.5 * planned_m {
+        let Turbulence { spectrum, cn2 } = &self.case.turbulence;
+        let fine_m = 2.96 / spectrum.inner_wavenumber_rad_m();
+        if !cn2.is_none() && fine_m < planned_m && fine_m >= 0.5 * planned_m {
             planned_m = fine_m;
         }
         let grid = |spacing_m, loss| self.grid_of(spacing_m, light.width_m(loss, spacing_m), last(range_m)?);
@@ -120,7 +109,7 @@ impl<'a> Limits<'a> {
 
     /// A grid of at most this spacing and at least this width that holds the beam to `furthest_m`.
     fn grid_of(&self, mut spacing_m: f64, mut width_m: f64, furthest_m: f64) -> Result<Grid, Error> {
-        for (limit, limit_m) in beam_limits_m(&self.telescope, &self.misalignment, furthest_m) {
+        for (limit, limit_m) in beam_limits_m(&self.case.telescope, &self.case.misalignment, furthest_m) {
             match limit.is_spacing() {
                 true => spacing_m = spacing_m.min(limit_m),
                 false => width_m = width_m.max(not_below(limit_m)),
@@ -151,8 +140,7 @@ impl<'a> Limits<'a> {
     pub(super) fn equal_layers(&self, runs: &[&[f64]]) -> Result<Option<usize>, Error> {
         let mut count = 1;
         for range_m in runs {
-            let thin = thin_layers(&self.cn2, self.telescope.wavelength_m, last(range_m)?)?;
-            count = count.max(thin.end_m().len());
+            count = count.max(self.thin_layers(range_m)?.end_m().len());
         }
         // What is enough for one may leave a gap in another.
         loop {

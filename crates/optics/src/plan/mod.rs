@@ -21,7 +21,7 @@ use crate::monte_carlo::{GROUP, GROUPS_PER_WAVE};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::{Error, Misalignment, Telescope, Turbulence};
-use gaps::{thin_layers, worst_rytov};
+use gaps::worst_rytov;
 use limits::{Limits, last};
 
 /// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
@@ -152,8 +152,7 @@ impl Case {
         crate::efficiency::check_increasing("range_m", range_m)?;
         let limits = Limits::new(self)?;
         let grid = limits.grid(range_m)?;
-        let thin = thin_layers(&limits.cn2, limits.telescope.wavelength_m, last(range_m)?)?;
-        let layers = limits.gaps(range_m)?.refined(thin)?;
+        let layers = limits.gaps(range_m)?.refined(limits.thin_layers(range_m)?)?;
         self.examine(&grid, &layers, range_m)
     }
 
@@ -208,17 +207,18 @@ impl Limits<'_> {
         light_lost: f64,
         runs: &[&[f64]],
     ) -> Result<Plan, Error> {
-        let lambda = self.telescope.wavelength_m;
+        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        let lambda = telescope.wavelength_m;
         let split = layers.split_at(range_m);
-        let path = Path::new(&split, range_m, &self.cn2, grid, lambda)?;
-        let beams = if self.misalignment == Misalignment::NONE { 1 } else { 2 };
+        let path = Path::new(&split, range_m, &turbulence.cn2, grid, lambda)?;
+        let beams = if *misalignment == Misalignment::NONE { 1 } else { 2 };
         let transfers = path.distance_m.len() * (grid.nx + grid.ny) * 8;
         let group_bytes = group_bytes(grid, range_m.len(), beams);
         let steps_s = LAYER_S * path.transform_pairs() * beams as f64 + SCREEN_S * path.strength.len() as f64;
         let mut plan = Plan {
             grid: *grid,
             layers: layers.clone(),
-            layer_rytov_variance: worst_rytov(&self.cn2, lambda, &split, last(range_m)?)?,
+            layer_rytov_variance: worst_rytov(&turbulence.cn2, lambda, &split, last(range_m)?)?,
             light_lost,
             gaps: self.gaps(range_m)?.of(&split)?,
             memory_bytes: GROUPS_PER_WAVE * group_bytes + shared_bytes(grid, range_m.len(), beams) + transfers,
@@ -246,13 +246,14 @@ impl Limits<'_> {
             let width_m = self.width_for_light_m(&plan.grid, range_m)?;
             warnings.push(Warning::LightLost { fraction: plan.light_lost, width_m });
         }
-        if !self.cn2.is_none() {
-            let rytov_variance = path_rytov_variance(&self.cn2, self.telescope.wavelength_m, last(range_m)?)?;
+        let Case { telescope, turbulence, .. } = self.case;
+        if !turbulence.cn2.is_none() {
+            let rytov_variance = path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, last(range_m)?)?;
             if rytov_variance < 1e-3 {
                 warnings.push(Warning::WeakTurbulence { rytov_variance });
             }
-            if self.turbulence.spectrum.inner_wavenumber_rad_m() * plan.grid.largest_spacing_m() > 2.97 {
-                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(self.turbulence, &plan.grid)? });
+            if turbulence.spectrum.inner_wavenumber_rad_m() * plan.grid.largest_spacing_m() > 2.97 {
+                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(turbulence, &plan.grid)? });
             }
         }
         Ok(warnings)

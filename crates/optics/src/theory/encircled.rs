@@ -35,13 +35,7 @@ pub fn mean_power_beyond(
     for &r in radius_m {
         largest_m = largest_m.max(not_negative("radius_m", r)?);
     }
-    let places: Vec<(f64, f64)> = cn2
-        .clone()
-        .validated()?
-        .quadrature(range_m)?
-        .into_iter()
-        .map(|(z, w)| (1.0 - z / range_m, 0.5 * k * k * w))
-        .collect();
+    let structure_rad2 = table.of_spherical_waves(k, range_m, cn2.clone().validated()?.quadrature(range_m)?);
     let overlap = Overlap::new(&telescope, range_m);
     let rule = GaussLegendre::new(12);
     let mut nodes = Vec::new();
@@ -49,8 +43,7 @@ pub fn mean_power_beyond(
         // Waves of J1 at the largest radius; the breaks follow those of M.
         let panels = 2 + (k * largest_m / range_m * (pair[1] - pair[0]) / 6.0) as usize;
         for (rho, weight) in rule.on_panels(pair[0], pair[1], panels) {
-            let half_d: f64 = places.iter().map(|(g, w)| w * table.at(rho * g)).sum();
-            let damping = (-half_d).exp();
+            let damping = (-0.5 * structure_rad2(rho)).exp();
             if damping > 1e-16 {
                 nodes.push((rho, weight * damping * overlap.at(rho)));
             }

@@ -112,10 +112,9 @@ pub fn bistatic_efficiency_with(
     if cn2.is_none() {
         return free_space_efficiency_misaligned(telescope, misalignment, range_m);
     }
-    let k2 = telescope.validated()?.wavenumber_rad_m().powi(2);
-    let places = cn2.quadrature(range_m)?;
-    let weights: Vec<(f64, f64)> = places.into_iter().map(|(z, w)| (1.0 - z / range_m, k2 * w)).collect();
-    efficiency_with(telescope, misalignment, range_m, &|rho| weights.iter().map(|(g, w)| w * table.at(rho * g)).sum())
+    let k = telescope.validated()?.wavenumber_rad_m();
+    let structure_rad2 = table.of_spherical_waves(k, range_m, cn2.quadrature(range_m)?);
+    efficiency_with(telescope, misalignment, range_m, &structure_rad2)
 }
 
 /// Mean bistatic efficiency (19) for the very screens of a simulated path: no modelling gap between this number and a
@@ -131,15 +130,15 @@ pub fn bistatic_efficiency_screens(
     range_m: f64,
 ) -> Result<f64, Error> {
     let range_m = positive("range_m", range_m)?;
-    let k2 = telescope.validated()?.wavenumber_rad_m().powi(2);
-    let mut weights = Vec::new();
+    let k = telescope.validated()?.wavenumber_rad_m();
+    let mut places = Vec::new();
     for screen in screens {
         let strength = not_negative("cn2_thickness_m13", screen.cn2_thickness_m13)?;
         if not_negative("position_m", screen.position_m)? < range_m {
-            weights.push((1.0 - screen.position_m / range_m, k2 * strength));
+            places.push((screen.position_m, strength));
         }
     }
-    efficiency_with(telescope, misalignment, range_m, &|rho| weights.iter().map(|(g, w)| w * table.at(rho * g)).sum())
+    efficiency_with(telescope, misalignment, range_m, &table.of_spherical_waves(k, range_m, places))
 }
 
 #[cfg(test)]
