@@ -11,7 +11,7 @@ use std::f64::consts::PI;
 
 use num_complex::Complex;
 use wakescope_signal::digitise::Digitiser;
-use wakescope_signal::efficiency::EfficiencyTable;
+use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::sampled::{Resampling, SampledPulse};
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
@@ -67,7 +67,7 @@ fn main() -> Result<(), Error> {
     }
     // Four realisations stand for the hundreds that optics would give.
     let realisations = [[0.012, 0.004], [0.008, 0.009], [0.015, 0.002], [0.006, 0.005]];
-    let efficiency = EfficiencyTable::new(vec![100.0, 700.0], &realisations)?.onto_layers(&lines[0])?;
+    let efficiency = LayerEfficiency::new(&[100.0, 700.0], &realisations, &lines[0])?;
 
     let scan = Scan {
         simulator: &simulator,
@@ -93,7 +93,10 @@ fn main() -> Result<(), Error> {
     let middle_s = simulator.time_s(GATE.start) + 0.5 * window.len() as f64 / RECEIVER.sample_rate_hz;
     let range_m = 0.5 * SPEED_OF_LIGHT_M_S * middle_s;
     let mut mean_efficiency = vec![0.0; lines[0].layers()];
-    efficiency.mean_into(&mut mean_efficiency)?;
+    for pulse in 0..realisations.len() {
+        let own = efficiency.of_pulse(pulse);
+        mean_efficiency.iter_mut().zip(own).for_each(|(mean, e)| *mean += e / realisations.len() as f64);
+    }
     let velocity_m_s = |lag: Complex<f64>| -lag.arg() * RECEIVER.wavelength_m * RECEIVER.sample_rate_hz / (20.0 * PI);
     println!(
         "Velocities at {range_m:.1} m [m/s], {PULSES} pulses per line. Near air returns more, and at any moment it returns"

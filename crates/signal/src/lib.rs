@@ -30,7 +30,7 @@
 //! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, and how it is resampled |
 //! | `piecewise` | the cubic pieces that a sampled envelope is kept in |
 //! | `medium` | [`Medium`]: backscatter and extinction by range |
-//! | [`efficiency`] | [`EfficiencyTable`](efficiency::EfficiencyTable): heterodyne efficiency, one curve or one realisation per pulse |
+//! | [`efficiency`] | [`LayerEfficiency`](efficiency::LayerEfficiency): heterodyne efficiency, one curve or one realisation per pulse |
 //! | `table` | tables over range |
 //! | `line` | [`LineOfSight`]; how thin a layer must be, [`LayerLimits`] |
 //! | `shot` | [`Shot`]: what one pulse meets |

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use approx::assert_relative_eq;
-use wakescope_signal::efficiency::EfficiencyTable;
+use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::scan::pulse_generator;
 use wakescope_signal::{Error, GaussianPulse, LineOfSight, Medium, NoiseModel, Receiver, Scan, Scratch};
 
@@ -23,15 +23,15 @@ fn medium() -> Medium {
     .unwrap()
 }
 
-fn efficiency() -> EfficiencyTable {
+fn efficiency(line: &LineOfSight) -> LayerEfficiency {
     let ranges: Vec<f64> = (0..40).map(|i| 20.0 + 20.0 * f64::from(i)).collect();
     let curve: Vec<f64> = ranges.iter().map(|r| 0.01 / (1.0 + (r / 500.0).powi(2))).collect();
-    EfficiencyTable::new(ranges, &[curve]).unwrap()
+    LayerEfficiency::new(&ranges, &[curve], line).unwrap()
 }
 
 fn scene(thickness_m: f64) -> LineOfSight {
     let mut line = line(90.0, 760.0, thickness_m, |r| 10.0 * (0.02 * r).sin());
-    let eta = efficiency().onto_layers(&line).unwrap();
+    let eta = efficiency(&line);
     medium().weigh(&mut line, AREA_M2, Some(eta.of_pulse(0))).unwrap();
     line
 }
@@ -53,7 +53,7 @@ fn mean_power_is_the_integral_of_14_at_every_range_of_a_scene() {
                 radial_velocity_m_s: vec![0.0],
                 weight_per_m: vec![0.0],
             };
-            let eta = efficiency().onto_layers(&eta_line).unwrap().of_pulse(0)[0];
+            let eta = efficiency(&eta_line).of_pulse(0)[0];
             let weight = medium().return_per_m(range_m, AREA_M2).unwrap() * eta;
             weight * pulse.intensity_per_s(2.0 * (seen_m - range_m) / C) * step_m
         };

@@ -4,7 +4,7 @@ use num_complex::Complex;
 use rand::Rng;
 use std::collections::HashSet;
 use wakescope_signal::digitise::{Clipped, Digitiser};
-use wakescope_signal::efficiency::EfficiencyTable;
+use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{Error, LineOfSight, NoiseModel, Scan, Scratch, Shot, Simulator};
 
@@ -159,8 +159,7 @@ fn an_efficiency_of_its_own_for_each_pulse_adds_its_variance_to_that_of_the_spec
     let simulator = simulator(gaussian(200e-9), NoiseModel::None, 400.0, 2);
     let air = line(330.0, 480.0, STEP_M, |_| 2.0);
     let realisations = [[0.2, 0.2], [1.0, 1.0], [1.8, 1.8]];
-    let table = EfficiencyTable::new(vec![300.0, 500.0], &realisations).unwrap();
-    let layers = table.onto_layers(&air).unwrap();
+    let layers = LayerEfficiency::new(&[300.0, 500.0], &realisations, &air).unwrap();
     let moments = |own: bool| {
         let scan = Scan {
             simulator: &simulator,

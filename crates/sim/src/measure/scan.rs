@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use std::ops::Range;
 use wakescope_signal::Sample;
 use wakescope_signal::digitise::Clipped;
-use wakescope_signal::efficiency::{EfficiencyTable, LayerEfficiency};
+use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::PulseKey;
 use wakescope_signal::{LineOfSight, Pulse, RangeFilter, Record, Scan, Shot, Simulator};
@@ -368,5 +368,5 @@ fn drawn_efficiency(
     let first_m = [plan.geometry.first_layer_range_m];
     let Some(&(ends_m, _)) = stretches(scene, &plan.geometry, &first_m).first() else { return Ok(None) };
     let screens = known.screens(scene, &plan.instrument, ends_m, observer)?;
-    Ok(Some(EfficiencyTable::new(screens.range_m.clone(), &screens.realisations)?.onto_layers(line)?))
+    Ok(Some(LayerEfficiency::new(&screens.range_m, &screens.realisations, line)?))
 }
