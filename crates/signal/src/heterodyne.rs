@@ -66,7 +66,7 @@ impl Simulator {
     /// As [`Receiver::validate`]; [`Error::OutOfRange`] for a record without samples or a first time that is not finite.
     pub fn new(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
         receiver.validate()?;
-        Self::planned(pulse.into(), receiver, record)
+        Self::for_baseband(pulse, receiver, record)
     }
 
     /// Plans complex records, those of `Complex<f64>`: the band may be wider than a real current of this rate holds.
@@ -75,10 +75,6 @@ impl Simulator {
     /// As [`Simulator::new`], with [`Receiver::validate_baseband`].
     pub fn for_baseband(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
         receiver.validate_baseband()?;
-        Self::planned(pulse.into(), receiver, record)
-    }
-
-    fn planned(pulse: Pulse, receiver: Receiver, record: Record) -> Result<Self, Error> {
         check("time_of_first_sample_s", record.time_of_first_sample_s, "finite", |_| true)?;
         check("samples", record.samples as f64, "1 or more", |n| n >= 1.0)?;
         let interval_s = 1.0 / receiver.sample_rate_hz;
@@ -92,6 +88,7 @@ impl Simulator {
             .collect();
         let noise = RealNoise::new(&receiver, record.samples);
         let baseband_noise = BasebandNoise::new(&receiver, record.samples);
+        let pulse = pulse.into();
         Ok(Self { pulse, receiver, record, detector: Arc::new(Detector { carrier, noise, baseband_noise }) })
     }
 
@@ -140,7 +137,8 @@ impl Simulator {
         envelope_a.resize(self.record.samples, Complex::ZERO);
         let result = self.envelope_into(shot, rng, scratch, &mut envelope_a);
         if result.is_ok() {
-            T::receive(&self.detector, &envelope_a, rng, &mut scratch.noise, out_a);
+            T::receive(&self.detector, &envelope_a, out_a);
+            T::add_noise(&self.detector, rng, &mut scratch.noise, out_a);
         }
         scratch.envelope = envelope_a;
         result

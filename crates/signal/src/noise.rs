@@ -47,26 +47,42 @@ pub(crate) type RealNoise = Noise<dyn ComplexToReal<f64>>;
 /// Complex circular noise about zero frequency.
 pub(crate) type BasebandNoise = Noise<dyn Fft<f64>>;
 
-impl RealNoise {
-    pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
+impl<T: ?Sized> Noise<T> {
+    /// Noise of the detector's width about `centre_hz`: either part at a frequency has the variance `share` times the one-sided
+    /// density. `last` is the last frequency of a record of so many numbers, `plan` its transform.
+    fn planned(
+        receiver: &Receiver,
+        samples: usize,
+        (centre_hz, share): (f64, f64),
+        last: fn(usize) -> usize,
+        plan: impl FnOnce(usize) -> Arc<T>,
+    ) -> Self {
         let density_a2_hz = receiver.noise_density_a2_hz();
         match receiver.noise {
             NoiseModel::None => Self::None,
-            NoiseModel::White => Self::White { sd_a: (density_a2_hz * 0.5 * receiver.sample_rate_hz).sqrt() },
+            NoiseModel::White => Self::White { sd_a: (0.5 * density_a2_hz * receiver.sample_rate_hz).sqrt() },
             NoiseModel::BandLimited => {
                 let length = smooth_even_length(2 * samples);
-                let (centre_hz, half_hz) = (receiver.intermediate_frequency_hz, 0.5 * receiver.bandwidth_hz);
                 let cell_hz = receiver.sample_rate_hz / length as f64;
-                let last = length / 2;
-                let (first, width_hz) = cells_of_band((centre_hz - half_hz, centre_hz + half_hz), cell_hz, last);
-                let sd_a = (first..).zip(width_hz).map(|(cell, width_hz)| {
-                    let sd_a = (density_a2_hz * width_hz).sqrt();
-                    // Inside, a frequency and its mirror give 2 Re{X}: variance 4 sd^2. The two ends have no mirror.
-                    if cell == 0 || cell == last { sd_a } else { 0.5 * sd_a }
-                });
-                Self::Band { transform: RealFftPlanner::new().plan_fft_inverse(length), first, sd_a: sd_a.collect() }
+                let [low_hz, high_hz] = [-0.5, 0.5].map(|side| centre_hz + side * receiver.bandwidth_hz);
+                let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last(length));
+                let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last(length));
+                let sd_a = |cell: usize| {
+                    let [from_hz, to_hz] = [-0.5, 0.5].map(|side| cell as f64 * cell_hz + side * cell_hz);
+                    (share * density_a2_hz * (to_hz.min(high_hz) - from_hz.max(low_hz)).max(0.0)).sqrt()
+                };
+                Self::Band { transform: plan(length), first, sd_a: (first..=end).map(sd_a).collect() }
             }
         }
+    }
+}
+
+impl RealNoise {
+    /// A frequency and its mirror give 2 Re{X}: variance 4 sd^2.
+    pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
+        let band = (receiver.intermediate_frequency_hz, 0.25);
+        let plan = |length| RealFftPlanner::new().plan_fft_inverse(length);
+        Self::planned(receiver, samples, band, |length| length / 2, plan)
     }
 
     /// Adds the noise of one record to `out_a`.
@@ -84,8 +100,10 @@ impl RealNoise {
                 circular.resize(length, 0.0);
                 work.resize(transform.get_scratch_len(), Complex::ZERO);
                 spectrum[*first..].iter_mut().zip(sd_a).for_each(|(value, sd_a)| *value = normal(rng, *sd_a));
-                spectrum[0].im = 0.0;
-                spectrum[length / 2].im = 0.0;
+                // The two ends have no mirror.
+                for end in [0, length / 2] {
+                    spectrum[end] = Complex::new(2.0 * spectrum[end].re, 0.0);
+                }
                 let done = transform.process_with_scratch(spectrum, circular, work);
                 debug_assert!(done.is_ok(), "buffers have the lengths of the plan and the end frequencies are real");
                 out_a.iter_mut().zip(circular).for_each(|(out, noise)| *out += *noise);
@@ -95,21 +113,10 @@ impl RealNoise {
 }
 
 impl BasebandNoise {
+    /// A complex envelope has its power on both sides of zero, with the one-sided density of the real noise.
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
-        // A complex envelope has its power on both sides of zero, with the one-sided density of the real noise.
-        let density_a2_hz = 0.5 * receiver.noise_density_a2_hz();
-        match receiver.noise {
-            NoiseModel::None => Self::None,
-            NoiseModel::White => Self::White { sd_a: (density_a2_hz * receiver.sample_rate_hz).sqrt() },
-            NoiseModel::BandLimited => {
-                let length = smooth_even_length(2 * samples);
-                let edge_hz = 0.5 * receiver.bandwidth_hz;
-                let cell_hz = receiver.sample_rate_hz / length as f64;
-                let (first, width_hz) = cells_of_band((-edge_hz, edge_hz), cell_hz, length / 2 - 1);
-                let sd_a = width_hz.into_iter().map(|width_hz| (density_a2_hz * width_hz).sqrt()).collect();
-                Self::Band { transform: FftPlanner::new().plan_fft_inverse(length), first, sd_a }
-            }
-        }
+        let plan = |length| FftPlanner::new().plan_fft_inverse(length);
+        Self::planned(receiver, samples, (0.0, 0.5), |length| length / 2 - 1, plan)
     }
 
     /// Adds the noise of one record to `out_a`.
@@ -141,18 +148,6 @@ fn normal<R: Rng + ?Sized>(rng: &mut R, sd_a: f64) -> Complex<f64> {
     let re: f64 = rng.sample(StandardNormal);
     let im: f64 = rng.sample(StandardNormal);
     Complex::new(re, im) * sd_a
-}
-
-/// The cells of a spectrum, from the one about zero to `last`, that a band reaches: the first of them, and how much of each lies
-/// in the band \[Hz\].
-fn cells_of_band((low_hz, high_hz): (f64, f64), cell_hz: f64, last: usize) -> (usize, Vec<f64>) {
-    let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last);
-    let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last);
-    let width_hz = |cell: usize| {
-        let centre_hz = cell as f64 * cell_hz;
-        ((centre_hz + 0.5 * cell_hz).min(high_hz) - (centre_hz - 0.5 * cell_hz).max(low_hz)).max(0.0)
-    };
-    (first, (first..=end).map(width_hz).collect())
 }
 
 /// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the band of a short

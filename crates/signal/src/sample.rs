@@ -30,14 +30,11 @@ pub(crate) mod sealed {
         /// Whether samples of this kind hold the band of the receiver.
         fn check_band(receiver: &Receiver) -> Result<(), Error>;
 
-        /// The samples of an envelope, with noise.
-        fn receive<R: Rng + ?Sized>(
-            detector: &Detector,
-            envelope_a: &[Complex<f64>],
-            rng: &mut R,
-            scratch: &mut NoiseScratch,
-            out_a: &mut [Self],
-        );
+        /// The samples of an envelope, without noise.
+        fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]);
+
+        /// Adds the noise of one record.
+        fn add_noise<R: Rng + ?Sized>(from: &Detector, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Self]);
 
         /// Real numbers that the sample consists of.
         fn for_each_part(&mut self, act: impl FnMut(&mut f64));
@@ -48,17 +45,14 @@ pub(crate) mod sealed {
             receiver.validate_band()
         }
 
-        fn receive<R: Rng + ?Sized>(
-            detector: &Detector,
-            envelope_a: &[Complex<f64>],
-            rng: &mut R,
-            scratch: &mut NoiseScratch,
-            out_a: &mut [Self],
-        ) {
+        fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]) {
             for ((out, s), carrier) in out_a.iter_mut().zip(envelope_a).zip(&detector.carrier) {
                 *out = SQRT_2 * (s.re * carrier.re - s.im * carrier.im);
             }
-            detector.noise.add_to(rng, scratch, out_a);
+        }
+
+        fn add_noise<R: Rng + ?Sized>(from: &Detector, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Self]) {
+            from.noise.add_to(rng, scratch, out_a);
         }
 
         fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
@@ -71,15 +65,12 @@ pub(crate) mod sealed {
             Ok(())
         }
 
-        fn receive<R: Rng + ?Sized>(
-            detector: &Detector,
-            envelope_a: &[Self],
-            rng: &mut R,
-            scratch: &mut NoiseScratch,
-            out_a: &mut [Self],
-        ) {
+        fn receive(_: &Detector, envelope_a: &[Self], out_a: &mut [Self]) {
             out_a.copy_from_slice(envelope_a);
-            detector.baseband_noise.add_to(rng, scratch, out_a);
+        }
+
+        fn add_noise<R: Rng + ?Sized>(from: &Detector, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Self]) {
+            from.baseband_noise.add_to(rng, scratch, out_a);
         }
 
         fn for_each_part(&mut self, mut act: impl FnMut(&mut f64)) {
