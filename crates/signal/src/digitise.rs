@@ -50,16 +50,6 @@ impl Digitiser {
         Ok(Self { bits, full_scale_a })
     }
 
-    /// Number of bits.
-    pub fn bits(&self) -> u32 {
-        self.bits
-    }
-
-    /// Current of full scale \[A\].
-    pub fn full_scale_a(&self) -> f64 {
-        self.full_scale_a
-    }
-
     /// Current from one code to the next \[A\], `2 full_scale/2^bits`.
     pub fn step_a(&self) -> f64 {
         2.0 * self.full_scale_a / self.levels()
@@ -74,17 +64,6 @@ impl Digitiser {
         let half = 0.5 * self.levels();
         let code = (current_a / self.step_a()).round_ties_even();
         (code, code.clamp(-half, half - 1.0))
-    }
-
-    /// Code of a current; currents beyond full scale have the lowest or highest code.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for NaN, which no converter delivers.
-    pub fn code(&self, current_a: f64) -> Result<i64, Error> {
-        if current_a.is_nan() {
-            return Err(Error::OutOfRange { field: "current_a", value: current_a, allowed: "a number" });
-        }
-        Ok(self.codes(current_a).1 as i64)
     }
 
     /// Replaces each current by that of its code, and counts those beyond full scale. Complex samples have a converter for each
@@ -145,8 +124,9 @@ mod tests {
         let clipped = digitiser.digitise(&mut samples).unwrap();
         assert_eq!(samples, [-4.0, -4.0, -4.0, -4.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0]);
         assert_eq!((clipped, clipped.total()), (Clipped { low: 2, high: 2 }, 4));
-        assert_eq!(digitiser.code(f64::INFINITY), Ok(3));
-        assert_eq!(digitiser.code(-2.2), Ok(-2));
+        let mut others = [f64::INFINITY, -2.2];
+        digitiser.digitise(&mut others).unwrap();
+        assert_eq!(others, [3.0, -2.0]);
         let mut pair = [Complex::new(9.0, -1.2)];
         assert_eq!(digitiser.digitise(&mut pair).unwrap().total(), 1);
         assert_eq!(pair[0], Complex::new(3.0, -1.0));
@@ -169,7 +149,6 @@ mod tests {
         let mut samples = [0.123, f64::NAN];
         assert!(matches!(digitiser.digitise(&mut samples), Err(Error::ElementOutOfRange { index: 1, .. })));
         assert_eq!(samples[0], 0.123);
-        assert!(matches!(digitiser.code(f64::NAN), Err(Error::OutOfRange { field: "current_a", .. })));
         let complex = digitiser.digitise(&mut [Complex::new(0.0, f64::NAN)]);
         assert!(matches!(complex, Err(Error::ElementOutOfRange { index: 0, .. })));
     }

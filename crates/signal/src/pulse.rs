@@ -145,12 +145,6 @@ impl From<SampledPulse> for Pulse {
     }
 }
 
-impl From<&GaussianPulse> for Pulse {
-    fn from(pulse: &GaussianPulse) -> Self {
-        Self::from(*pulse)
-    }
-}
-
 impl From<&Self> for Pulse {
     fn from(pulse: &Self) -> Self {
         pulse.clone()
@@ -168,11 +162,6 @@ impl Pulse {
         check("chirp_hz_s", chirp_hz_s, "finite", |_| true)?;
         self.chirp_hz_s = chirp_hz_s;
         Ok(self)
-    }
-
-    /// Rate of the linear chirp \[Hz/s\].
-    pub fn chirp_hz_s(&self) -> f64 {
-        self.chirp_hz_s
     }
 
     /// Energy of the pulse, `E_t` \[J\].

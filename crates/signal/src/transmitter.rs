@@ -69,19 +69,9 @@ impl Fibre {
         let length_m = self.effective_length_m(pulse_fwhm_s);
         21.0 * self.effective_area_m2 / (self.brillouin_gain_m_w * length_m) * widening
     }
-
-    /// Energy of the Gaussian pulse that reaches this power \[J\].
-    pub fn brillouin_energy_j(&self, pulse_fwhm_s: f64) -> f64 {
-        self.brillouin_threshold_w(pulse_fwhm_s) * pulse_fwhm_s / peak_power_factor()
-    }
 }
 
 /// Width of the spectrum of a Gaussian pulse, full at half maximum, `(2 ln 2/pi)/FWHM` \[Hz\].
 pub fn pulse_spectrum_hz(pulse_fwhm_s: f64) -> f64 {
     2.0 * LN_2 / PI / pulse_fwhm_s
-}
-
-/// Peak power times the width over the energy of a Gaussian pulse, `2 sqrt(ln 2/pi)` = 1/1.0645.
-fn peak_power_factor() -> f64 {
-    2.0 * (LN_2 / PI).sqrt()
 }

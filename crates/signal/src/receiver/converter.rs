@@ -40,11 +40,6 @@ impl Converter {
         let rounding = self.rounding();
         (rounding * (1.0 - gain * gain) + distortion * spread) / (gain * gain)
     }
-
-    /// Full-scale tone over the noise of rounding \[dB\], 6.02 bits + 1.76.
-    pub fn full_scale_tone_db(&self) -> f64 {
-        10.0 * (1.5 * (2.0 * f64::from(self.bits)).exp2()).log10()
-    }
 }
 
 /// Gaussian noise clipped at some standard deviations, in units of its variance (Bussgang: a scaled copy and a distortion that is
@@ -72,10 +67,5 @@ impl Clipping {
         let missing = (k * k - 1.0) * clipped_fraction - 2.0 * k * density;
         let distortion = (missing + 2.0 * clipped_fraction - clipped_fraction * clipped_fraction).max(0.0);
         Self { clipped_fraction, gain, variance: 1.0 + missing, distortion }
-    }
-
-    /// What is lost if all of the distortion is in the band \[dB\].
-    pub fn loss_db(&self) -> f64 {
-        10.0 * (1.0 + self.distortion / (self.gain * self.gain)).log10()
     }
 }

@@ -31,11 +31,3 @@ impl Receiver {
 pub fn ambiguous_range_m(pulse_repetition_hz: f64) -> f64 {
     0.5 * SPEED_OF_LIGHT_M_S / pulse_repetition_hz
 }
-
-/// Echo of the pulse before, from `R + c/(2 PRF)`, over that from `range_m` in even air, a power ratio:
-/// `(beta_2/beta_1) (R/R_2)^2 exp(-2 alpha (R_2 - R))`, without the ratio of the efficiencies.
-pub fn second_trip_ratio(range_m: f64, pulse_repetition_hz: f64, backscatter_ratio: f64, extinction_per_m: f64) -> f64 {
-    let apart_m = ambiguous_range_m(pulse_repetition_hz);
-    let spread = range_m / (range_m + apart_m);
-    backscatter_ratio * spread * spread * (-2.0 * extinction_per_m * apart_m).exp()
-}

@@ -26,11 +26,6 @@ impl NoiseDensities {
     pub fn total_a2_hz(&self) -> f64 {
         self.response * (self.shot_a2_hz + self.dark_a2_hz + self.intensity_a2_hz) + self.amplifier_a2_hz
     }
-
-    /// What a density beside the shot noise costs \[dB\], `10 log(1 + density/shot)`.
-    pub fn excess_db(&self, density_a2_hz: f64) -> f64 {
-        decibels(1.0 + density_a2_hz / self.shot_a2_hz)
-    }
 }
 
 /// What lies between the shot-noise limit and the signal-to-noise ratio of a receiver \[dB\], each beside those before it.

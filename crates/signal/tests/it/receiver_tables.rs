@@ -1,7 +1,9 @@
 //! A receiver beyond shot noise, and what a laser can send: closed forms against stored tables of independent origin.
 
+use std::f64::consts::{LN_2, PI};
+
 use approx::assert_relative_eq;
-use wakescope_signal::receiver::echoes::{ambiguous_range_m, second_trip_ratio};
+use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
 use wakescope_signal::receiver::{Butterworth, Clipping, Converter, FrontEnd};
 use wakescope_signal::transmitter::{Amplifier, Fibre, pulse_spectrum_hz};
@@ -22,6 +24,11 @@ fn rows<const N: usize>(name: &str) -> Vec<[f64; N]> {
 
 fn close(found: f64, expected: f64) {
     approx::assert_relative_eq!(found, expected, max_relative = 1e-6, epsilon = 1e-12);
+}
+
+/// What noise beside that of so much power costs \[dB\].
+fn excess_db(ratio: f64) -> f64 {
+    10.0 * (1.0 + ratio).log10()
 }
 
 fn with(front_end: FrontEnd) -> Receiver {
@@ -49,9 +56,9 @@ fn noise_densities_and_what_they_cost_are_the_stored_ones() {
             n.amplifier_a2_hz,
             n.dark_a2_hz,
             n.intensity_a2_hz,
-            n.excess_db(n.amplifier_a2_hz),
-            n.excess_db(n.dark_a2_hz),
-            n.excess_db(n.intensity_a2_hz),
+            excess_db(n.amplifier_a2_hz / n.shot_a2_hz),
+            excess_db(n.dark_a2_hz / n.shot_a2_hz),
+            excess_db(n.intensity_a2_hz / n.shot_a2_hz),
             receiver.penalties().total_db(),
         ];
         found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
@@ -116,12 +123,13 @@ fn rounding_and_clipping_cost_what_is_stored() {
         let converter = Converter { bits, full_scale_over_noise, bandwidth_hz, sample_rate_hz, input_over_noise: 1.0 };
         let loss_db =
             with(FrontEnd { rounding_noise: converter.rounding(), ..FrontEnd::IDEAL }).penalties().rounding_db;
-        let found = [converter.rounding(), loss_db, converter.full_scale_tone_db()];
+        let full_scale_tone_db = 10.0 * (1.5 * (2.0 * f64::from(bits)).exp2()).log10();
+        let found = [converter.rounding(), loss_db, full_scale_tone_db];
         found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
     }
     for [k, expected @ ..] in rows::<6>("clipping") {
         let c = Clipping::at(k);
-        let found = [c.clipped_fraction, c.gain, c.variance, c.distortion, c.loss_db()];
+        let found = [c.clipped_fraction, c.gain, c.variance, c.distortion, excess_db(c.distortion / (c.gain * c.gain))];
         found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
     }
 }
@@ -154,7 +162,9 @@ fn the_reflex_and_the_pulse_before_are_the_stored_ones() {
     for [rate_hz, ambiguous_m, range_m, ratio, extinction_per_m, second_m, second_db] in rows::<7>("second_trip") {
         close(ambiguous_range_m(rate_hz), ambiguous_m);
         close(range_m + ambiguous_range_m(rate_hz), second_m);
-        close(10.0 * second_trip_ratio(range_m, rate_hz, ratio, extinction_per_m).log10(), second_db);
+        let spread = range_m / (range_m + ambiguous_range_m(rate_hz));
+        let lost = (-2.0 * extinction_per_m * ambiguous_range_m(rate_hz)).exp();
+        close(10.0 * (ratio * spread * spread * lost).log10(), second_db);
     }
 }
 
@@ -174,7 +184,8 @@ fn amplifiers_give_the_stored_energy_and_fibres_bear_it() {
             fibre.effective_length_m(fwhm_s),
             pulse_spectrum_hz(fwhm_s),
             fibre.brillouin_threshold_w(fwhm_s),
-            fibre.brillouin_energy_j(fwhm_s),
+            // Peak power times the width over the energy of a Gaussian pulse is 2 sqrt(ln 2/pi).
+            fibre.brillouin_threshold_w(fwhm_s) * fwhm_s / (2.0 * (LN_2 / PI).sqrt()),
         ];
         found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
     }
