@@ -30,18 +30,14 @@ impl EfficiencyProfile {
     /// # Errors
     /// What the function returns, and as [`EfficiencyProfile::validated`].
     pub fn from_theory(range_m: &[f64], mut efficiency: impl FnMut(f64) -> Result<f64, Error>) -> Result<Self, Error> {
-        let mean = range_m.iter().map(|&r| efficiency(r)).collect::<Result<Vec<_>, _>>()?;
-        Self {
-            range_m: range_m.to_vec(),
-            standard_deviation: vec![0.0; mean.len()],
-            standard_error: vec![0.0; mean.len()],
-            mean,
+        let mut profile = Self::default();
+        for &range_m in range_m {
+            profile.push(range_m, [efficiency(range_m)?, 0.0, 0.0]);
         }
-        .validated()
+        profile.validated()
     }
 
     /// Adds a range with its mean, standard deviation and standard error.
-    #[cfg(feature = "screens")]
     pub(crate) fn push(&mut self, range_m: f64, [mean, standard_deviation, standard_error]: [f64; 3]) {
         self.range_m.push(range_m);
         self.mean.push(mean);

@@ -10,15 +10,14 @@ use std::ops::Mul;
 /// Gauss-Legendre rule on \[-1, 1\].
 #[derive(Debug, Clone)]
 pub(crate) struct GaussLegendre {
-    node: Vec<f64>,
-    weight: Vec<f64>,
+    /// Nodes and weights.
+    rule: Vec<(f64, f64)>,
 }
 
 impl GaussLegendre {
     /// The rule with `n` nodes, by Newton's iteration on the Legendre polynomial.
     pub(crate) fn new(n: usize) -> Self {
-        let mut node = vec![0.0; n];
-        let mut weight = vec![0.0; n];
+        let mut rule = vec![(0.0, 0.0); n];
         for i in 0..n.div_ceil(2) {
             let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (n as f64 + 0.5)).cos();
             let mut slope = 1.0;
@@ -31,20 +30,18 @@ impl GaussLegendre {
                     break;
                 }
             }
-            node[i] = -x;
-            node[n - 1 - i] = x;
             let w = 2.0 / ((1.0 - x * x) * slope * slope);
-            weight[i] = w;
-            weight[n - 1 - i] = w;
+            rule[i] = (-x, w);
+            rule[n - 1 - i] = (x, w);
         }
-        Self { node, weight }
+        Self { rule }
     }
 
     /// Integral of `f` from `a` to `b` with this rule once.
     pub(crate) fn integrate(&self, a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
         let mut sum = 0.0;
-        for (x, w) in self.node.iter().zip(&self.weight) {
+        for (x, w) in &self.rule {
             sum += w * f(mid + half * x);
         }
         sum * half
@@ -65,7 +62,7 @@ impl GaussLegendre {
     /// Nodes and weights mapped to \[a, b\].
     pub(crate) fn mapped(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
-        self.node.iter().zip(&self.weight).map(move |(x, w)| (mid + half * x, half * w))
+        self.rule.iter().map(move |(x, w)| (mid + half * x, half * w))
     }
 }
 

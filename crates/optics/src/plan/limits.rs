@@ -57,19 +57,20 @@ impl<'a> Limits<'a> {
     }
 
     /// The table: what turbulence and the aperture demand of the spacing, beside what the beam demands of any grid
-    /// ([`beam_limits_m`]); the largest \[m\] to plan with, and the largest that is accepted.
+    /// ([`beam_limits_m`]); the largest that each accepts, and the largest to plan with \[m\].
     ///
     /// Where every range is in the far field, the pattern at the target is that of the aperture's few lowest waves, and a sixth
     /// of the points give the efficiency as well (within 1e-4 in free space). For the angles into which focus, tilt and
     /// turbulence send the beam the plan keeps a margin of two: what lies within it is left to the monitored border.
-    fn spacings_m(&self, range_m: &[f64]) -> Result<[(Limit, f64, f64); 2], Error> {
+    fn spacings_m(&self, range_m: &[f64]) -> Result<([(Limit, f64); 2], f64), Error> {
         let Case { telescope, misalignment, turbulence, .. } = self.case;
         let (a, lambda) = (telescope.aperture_radius_m, telescope.wavelength_m);
         let fresnel = range_m.iter().fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
         let [planned, accepted] = if fresnel < FAR_FIELD { [4.0, 3.0] } else { [25.0, 12.5] };
         let scatter = scatter_rad(telescope, &turbulence.cn2, last(range_m)?)?;
         let slope = (slope_rad(telescope, misalignment) + 2.0 * scatter).max(1e-30);
-        Ok([(Limit::Aperture, a / planned, a / accepted), (Limit::Scatter, 0.5 * lambda / slope, lambda / slope)])
+        let planned_m = (a / planned).min(0.5 * lambda / slope);
+        Ok(([(Limit::Aperture, a / accepted), (Limit::Scatter, lambda / slope)], planned_m))
     }
 
     /// What a grid violates for these ranges, and the share of the light that its border takes.
@@ -78,7 +79,7 @@ impl<'a> Limits<'a> {
         let Case { telescope, misalignment, turbulence, .. } = self.case;
         let mut limits_m = beam_limits_m(telescope, misalignment, last(range_m)?).to_vec();
         if !turbulence.cn2.is_none() {
-            limits_m.extend(self.spacings_m(range_m)?.map(|(limit, _, accepted_m)| (limit, accepted_m)));
+            limits_m.extend(self.spacings_m(range_m)?.0);
         }
         let (light, spacing_m, width_m) = (self.light(range_m)?, grid.largest_spacing_m(), grid.smallest_width_m());
         let light_lost = light.lost(width_m, spacing_m);
@@ -92,8 +93,8 @@ impl<'a> Limits<'a> {
     /// A grid for these ranges: with the spacing to plan with, or else with the largest that is accepted; with the border that takes next
     /// to nothing, or else with the narrowest that is accepted.
     pub(super) fn grid(&self, range_m: &[f64]) -> Result<Grid, Error> {
-        let ([aperture, scatter], light) = (self.spacings_m(range_m)?, self.light(range_m)?);
-        let (mut planned_m, accepted_m) = (aperture.1.min(scatter.1), aperture.2.min(scatter.2));
+        let ([(_, aperture_m), (_, scatter_m)], mut planned_m) = self.spacings_m(range_m)?;
+        let (accepted_m, light) = (aperture_m.min(scatter_m), self.light(range_m)?);
         // Half the inner scale if that costs no more than a factor of two.
         let Turbulence { spectrum, cn2 } = &self.case.turbulence;
         let fine_m = 2.96 / spectrum.inner_wavenumber_rad_m();

@@ -68,10 +68,10 @@ impl<T: Real> ScreenGenerator<T> {
         let low = LowFrequencies::new([grid.nx, grid.ny], [grid.dx_m, grid.dy_m], &*spectrum);
         let mut generator = Self {
             fft: Fft2::new(&grid),
+            amplitude: vec![T::zero(); grid.points()],
+            folded: vec![0.0; grid.points()],
             grid,
             spectrum,
-            amplitude: Vec::new(),
-            folded: Vec::new(),
             low,
             delta_rad_m,
             exact,
@@ -120,8 +120,6 @@ impl<T: Real> ScreenGenerator<T> {
         let [dx, dy] = self.delta_rad_m;
         let area = dx * dy;
         let rule = GaussLegendre::new(2);
-        let mut amplitude = vec![T::zero(); nx * ny];
-        let mut folded = vec![0.0; nx * ny];
         for ix in 0..nx {
             let mx = Grid::frequency_index(nx, ix);
             for iy in 0..ny {
@@ -130,11 +128,11 @@ impl<T: Real> ScreenGenerator<T> {
                 // The spectrum depends on the absolute values alone: one quadrant is enough.
                 let (jx, jy) = (ix.min(nx - ix), iy.min(ny - iy));
                 if (jx, jy) != (ix, iy) {
-                    amplitude[at] = amplitude[jx * ny + jy];
-                    folded[at] = folded[jx * ny + jy];
+                    self.amplitude[at] = self.amplitude[jx * ny + jy];
+                    self.folded[at] = self.folded[jx * ny + jy];
                     continue;
                 }
-                folded[at] = self.folded_density(mx * dx, my * dy);
+                self.folded[at] = self.folded_density(mx * dx, my * dy);
                 if mx.abs() <= 1.0 && my.abs() <= 1.0 {
                     continue;
                 }
@@ -144,11 +142,9 @@ impl<T: Real> ScreenGenerator<T> {
                         mean += wx * wy * self.phase_density(kx, ky);
                     }
                 }
-                amplitude[at] = T::of((mean + folded[at] * area).sqrt());
+                self.amplitude[at] = T::of((mean + self.folded[at] * area).sqrt());
             }
         }
-        self.amplitude = amplitude;
-        self.folded = folded;
     }
 
     /// Amplitudes of row `ix`, those of small frequencies taken at the shifted frequency.
