@@ -9,8 +9,9 @@ use crate::{Error, Sample};
 /// A converter with `2^bits` codes, from `-2^(bits-1)` to `2^(bits-1) - 1`; code 0 is no current.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Digitiser {
-    bits: u32,
-    full_scale_a: f64,
+    step_a: f64,
+    /// Codes of either sign.
+    half: f64,
 }
 
 /// Samples beyond full scale.
@@ -47,23 +48,13 @@ impl Digitiser {
         check("full_scale_a", full_scale_a, "large enough for its steps to be normal numbers", |s| {
             (s / 2f64.powi(31)).is_normal()
         })?;
-        Ok(Self { bits, full_scale_a })
+        let levels = f64::from(bits).exp2();
+        Ok(Self { step_a: 2.0 * full_scale_a / levels, half: 0.5 * levels })
     }
 
     /// Current from one code to the next \[A\], `2 full_scale/2^bits`.
     pub fn step_a(&self) -> f64 {
-        2.0 * self.full_scale_a / self.levels()
-    }
-
-    fn levels(&self) -> f64 {
-        f64::from(self.bits).exp2()
-    }
-
-    /// Code of a current, before and after saturation.
-    fn codes(&self, current_a: f64) -> (f64, f64) {
-        let half = 0.5 * self.levels();
-        let code = (current_a / self.step_a()).round_ties_even();
-        (code, code.clamp(-half, half - 1.0))
+        self.step_a
     }
 
     /// Replaces each current by that of its code, and counts those beyond full scale. Complex samples have a converter for each
@@ -83,13 +74,15 @@ impl Digitiser {
         if let Some((index, value)) = bad {
             return Err(Error::ElementOutOfRange { field: "samples_a", index, value, allowed: "a number" });
         }
-        let (step_a, mut clipped) = (self.step_a(), Clipped::default());
+        let mut clipped = Clipped::default();
         for sample in samples_a {
             sample.for_each_part(|part| {
-                let (code, kept) = self.codes(*part);
+                // Before and after saturation.
+                let code = (*part / self.step_a).round_ties_even();
+                let kept = code.clamp(-self.half, self.half - 1.0);
                 clipped.low += u64::from(code < kept);
                 clipped.high += u64::from(code > kept);
-                *part = kept * step_a;
+                *part = kept * self.step_a;
             });
         }
         Ok(clipped)
