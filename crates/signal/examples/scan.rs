@@ -62,7 +62,7 @@ fn main() -> Result<(), Error> {
             radial_velocity_m_s: ranges_m.map(|r| wind_m_s(*distance_m, r)).collect(),
             weight_per_m: Vec::new(),
         };
-        haze.weigh(&mut line, PI * 0.05 * 0.05, None)?;
+        haze.weigh(&mut line, PI * 0.05 * 0.05)?;
         lines.push(line);
     }
     // Four realisations stand for the hundreds that optics would give.

@@ -98,26 +98,14 @@ impl Medium {
         Ok(backscatter_per_m_sr * (-2.0 * depth).exp() * aperture_area_m2 / (range_m * range_m))
     }
 
-    /// Sets the weights of a line's layers to [`Medium::return_per_m`] times `efficiency` of each layer (one per layer, or
-    /// none for 1: then each [`Shot`](crate::Shot) brings its own). Layers without scatterers (NaN) get their weight too.
+    /// Sets the weights of a line's layers to [`Medium::return_per_m`]; each [`Shot`](crate::Shot) brings its efficiency. Layers
+    /// without scatterers (NaN) get their weight too.
     ///
     /// # Errors
-    /// As [`Medium::return_per_m`]; [`Error::LengthMismatch`], [`Error::ElementOutOfRange`] for the efficiencies.
-    pub fn weigh(
-        &self,
-        line: &mut LineOfSight,
-        aperture_area_m2: f64,
-        efficiency: Option<&[f64]>,
-    ) -> Result<(), Error> {
-        if let Some(efficiency) = efficiency {
-            check_values("efficiency", efficiency, line.layers())?;
-        }
-        line.weight_per_m = (0..line.layers())
-            .map(|layer| {
-                let eta = efficiency.map_or(1.0, |e| e[layer]);
-                Ok(self.return_per_m(line.range_m(layer), aperture_area_m2)? * eta)
-            })
-            .collect::<Result<_, Error>>()?;
+    /// As [`Medium::return_per_m`].
+    pub fn weigh(&self, line: &mut LineOfSight, aperture_area_m2: f64) -> Result<(), Error> {
+        let weight_per_m = |layer| self.return_per_m(line.range_m(layer), aperture_area_m2);
+        line.weight_per_m = (0..line.layers()).map(weight_per_m).collect::<Result<_, _>>()?;
         Ok(())
     }
 }
@@ -165,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn weights_of_a_line_are_return_times_efficiency() {
+    fn weights_of_a_line_are_the_return_of_its_layers() {
         let medium = Medium::uniform(1e-7, 7e-5).unwrap();
         let mut line = LineOfSight {
             first_range_m: 100.0,
@@ -173,12 +161,11 @@ mod tests {
             radial_velocity_m_s: vec![0.0; 3],
             weight_per_m: vec![],
         };
-        medium.weigh(&mut line, 8e-3, Some(&[0.1, 0.2, 0.3])).unwrap();
-        let expected = 0.3 * medium.return_per_m(120.0, 8e-3).unwrap();
+        medium.weigh(&mut line, 8e-3).unwrap();
+        let expected = medium.return_per_m(120.0, 8e-3).unwrap();
         assert_relative_eq!(line.weight_per_m[2], expected, max_relative = 1e-15);
-        assert!(matches!(medium.weigh(&mut line, 8e-3, Some(&[0.1])), Err(Error::LengthMismatch { .. })));
         line.first_range_m = -5.0;
-        assert!(matches!(medium.weigh(&mut line, 8e-3, None), Err(Error::OutOfRange { field: "range_m", .. })));
+        assert!(matches!(medium.weigh(&mut line, 8e-3), Err(Error::OutOfRange { field: "range_m", .. })));
     }
 
     #[test]

@@ -32,7 +32,8 @@ fn efficiency(line: &LineOfSight) -> LayerEfficiency {
 fn scene(thickness_m: f64) -> LineOfSight {
     let mut line = line(90.0, 760.0, thickness_m, |r| 10.0 * (0.02 * r).sin());
     let eta = efficiency(&line);
-    medium().weigh(&mut line, AREA_M2, Some(eta.of_pulse(0))).unwrap();
+    medium().weigh(&mut line, AREA_M2).unwrap();
+    line.weight_per_m.iter_mut().zip(eta.of_pulse(0)).for_each(|(weight, eta)| *weight *= eta);
     line
 }
 
