@@ -140,17 +140,15 @@ pub fn curved_ranges_m(telescope: &Telescope, first_m: f64, last_m: f64, density
 
 /// Slope at point `i` which keeps monotone data monotone (weighted harmonic mean of the two secants).
 fn monotone_slope(x: &[f64], y: &[f64], i: usize) -> f64 {
-    let secant = |j: usize| (y[j + 1] - y[j]) / (x[j + 1] - x[j]);
+    let width = |j: usize| x[j + 1] - x[j];
+    let secant = |j: usize| (y[j + 1] - y[j]) / width(j);
     let last = x.len() - 1;
     if last == 1 {
         return secant(0);
     }
     if i == 0 || i == last {
-        let (near, far, h0, h1) = if i == 0 {
-            (secant(0), secant(1), x[1] - x[0], x[2] - x[1])
-        } else {
-            (secant(last - 1), secant(last - 2), x[last] - x[last - 1], x[last - 1] - x[last - 2])
-        };
+        let [next, beyond] = if i == 0 { [0, 1] } else { [last - 1, last - 2] };
+        let (near, far, h0, h1) = (secant(next), secant(beyond), width(next), width(beyond));
         let slope = ((2.0 * h0 + h1) * near - h0 * far) / (h0 + h1);
         return if slope * near <= 0.0 {
             0.0
@@ -164,7 +162,7 @@ fn monotone_slope(x: &[f64], y: &[f64], i: usize) -> f64 {
     if left * right <= 0.0 {
         return 0.0;
     }
-    let (h0, h1) = (x[i] - x[i - 1], x[i + 1] - x[i]);
+    let (h0, h1) = (width(i - 1), width(i));
     let (w0, w1) = (2.0 * h1 + h0, h1 + 2.0 * h0);
     (w0 + w1) / (w0 / left + w1 / right)
 }

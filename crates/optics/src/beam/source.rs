@@ -84,18 +84,15 @@ pub(crate) fn aperture_field<T: Real>(
     fft.inverse_x(&mut field, &mut scratch, |_, _| {});
     let k = telescope.wavenumber_rad_m();
     let bend = 0.5 * k * telescope.focus.curvature_per_m();
-    let mut out = Vec::with_capacity(grid.points());
-    for iy in 0..grid.ny {
-        let y = Grid::offset_m(grid.ny, grid.dy_m, iy);
-        for ix in 0..grid.nx {
-            let x = Grid::offset_m(grid.nx, grid.dx_m, ix);
-            let (u, v) = (x - misalignment.offset_m[0], y - misalignment.offset_m[1]);
-            let phase = k * (x * misalignment.tilt_rad[0] + y * misalignment.tilt_rad[1]) - bend * (u * u + v * v);
-            let value = field[iy * grid.nx + ix] * Complex::cis(phase);
-            out.push(Complex::new(T::of(value.re), T::of(value.im)));
-        }
-    }
-    out
+    let bent = |(i, e): (usize, Complex<f64>)| {
+        let x = Grid::offset_m(grid.nx, grid.dx_m, i % grid.nx);
+        let y = Grid::offset_m(grid.ny, grid.dy_m, i / grid.nx);
+        let (u, v) = (x - misalignment.offset_m[0], y - misalignment.offset_m[1]);
+        let phase = k * (x * misalignment.tilt_rad[0] + y * misalignment.tilt_rad[1]) - bend * (u * u + v * v);
+        let value = e * Complex::cis(phase);
+        Complex::new(T::of(value.re), T::of(value.im))
+    };
+    field.into_iter().enumerate().map(bent).collect()
 }
 
 /// Slope of the wave front \[rad\] of which the spacing takes half a wave at most: that of the tilt, and **twice** that of the focus.

@@ -127,12 +127,8 @@ pub(crate) struct Sample {
 
 /// Mean and variance of a list; the variance of fewer than two values is NaN, as nothing is known of it.
 pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
-    let (mut n, mut sum) = (0.0, 0.0);
-    for v in values.clone() {
-        n += 1.0;
-        sum += v;
-    }
-    let mean = sum / n;
+    let n = values.clone().count() as f64;
+    let mean = values.clone().sum::<f64>() / n;
     let squares: f64 = values.map(|v| (v - mean) * (v - mean)).sum();
     (mean, if n > 1.0 { squares / (n - 1.0) } else { f64::NAN })
 }
@@ -155,19 +151,14 @@ pub(crate) fn bistatic(samples: &[Sample], total: f64, folding: &Folding, scale:
             }
         }
     }
-    let symmetric = samples[0].rings[1].is_empty();
+    // Aligned beams are one.
+    let other = usize::from(!samples[0].rings[1].is_empty());
     let with_others = |s: &Sample| -> f64 {
         let mut sum = 0.0;
         for (i, points) in folding.ring_points.iter().enumerate() {
             if *points > 0.0 {
-                let t = f64::from(s.rings[0][i]);
-                let product = if symmetric {
-                    2.0 * t * (sums[0][i] - t)
-                } else {
-                    let b = f64::from(s.rings[1][i]);
-                    t * (sums[1][i] - b) + b * (sums[0][i] - t)
-                };
-                sum += product / points;
+                let [t, b] = [0, other].map(|beam| f64::from(s.rings[beam][i]));
+                sum += (t * (sums[other][i] - b) + b * (sums[0][i] - t)) / points;
             }
         }
         sum * scale

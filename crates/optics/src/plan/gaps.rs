@@ -49,9 +49,6 @@ impl LayerGap {
 
 /// Largest Rytov variance of a layer before `furthest_m`.
 pub(super) fn worst_rytov(cn2: &Cn2Path, wavelength_m: f64, layers: &Layers, furthest_m: f64) -> Result<f64, Error> {
-    if cn2.is_none() {
-        return Ok(0.0);
-    }
     let mut worst = 0f64;
     for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < furthest_m) {
         let end = end.min(furthest_m);
@@ -118,17 +115,16 @@ impl<'a> Gaps<'a> {
                 }
             }
             let rytov = path_rytov_variance(cn2, telescope.wavelength_m, range_m)?;
-            let mut at = AtRange { range_m, node, path: 0.0, standard_error: forecast_error(rytov, realisations) };
-            at.path = gaps.integral(&at, cn2.quadrature(range_m)?);
-            gaps.ranges.push(at);
+            let path = gaps.integral(&node, range_m, cn2.quadrature(range_m)?);
+            gaps.ranges.push(AtRange { range_m, node, path, standard_error: forecast_error(rytov, realisations) });
         }
         Ok(gaps)
     }
 
     /// Integral of M^2 exp(-D) for a path that is a sum over places z with weights Cn2 dz.
-    fn integral(&self, at: &AtRange, places: impl IntoIterator<Item = (f64, f64)>) -> f64 {
-        let structure_rad2 = self.table.of_spherical_waves(self.wavenumber_rad_m, at.range_m, places);
-        at.node.iter().map(|&(rho, weight)| weight * (-structure_rad2(rho)).exp()).sum()
+    fn integral(&self, node: &[(f64, f64)], range_m: f64, places: impl IntoIterator<Item = (f64, f64)>) -> f64 {
+        let structure_rad2 = self.table.of_spherical_waves(self.wavenumber_rad_m, range_m, places);
+        node.iter().map(|&(rho, weight)| weight * (-structure_rad2(rho)).exp()).sum()
     }
 
     /// The gap of a set of layers at each range; of very many layers, at some of the ranges.
@@ -140,7 +136,7 @@ impl<'a> Gaps<'a> {
         for at in spread_over(&self.ranges.iter().collect::<Vec<_>>(), some) {
             let screens = layers.screens_to(at.range_m, self.cn2)?;
             let places = screens.iter().map(|s| (s.position_m, s.cn2_thickness_m13));
-            let relative = self.integral(at, places) / at.path - 1.0;
+            let relative = self.integral(&at.node, at.range_m, places) / at.path - 1.0;
             out.push(LayerGap { range_m: at.range_m, relative, standard_error: at.standard_error });
         }
         Ok(out)

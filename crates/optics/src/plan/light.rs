@@ -102,9 +102,6 @@ impl Plane {
 
 /// Angle into which turbulence scatters the beam \[rad\], lambda/(pi rho_0).
 pub(super) fn scatter_rad(telescope: &Telescope, cn2: &Cn2Path, range_m: f64) -> Result<f64, Error> {
-    if cn2.is_none() {
-        return Ok(0.0);
-    }
     let rho_0 = coherence_radius_m(cn2, telescope.wavelength_m, range_m)?;
     Ok(telescope.wavelength_m / (std::f64::consts::PI * rho_0))
 }

@@ -28,9 +28,6 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// Smallest number of points along an axis.
-    pub const SMALLEST: usize = 16;
-
     /// A square grid of n x n points.
     ///
     /// # Errors
@@ -50,7 +47,7 @@ impl Grid {
     /// [`Error::OutOfRange`] for fewer than 16 points along an axis, or a spacing that is not positive.
     pub fn validated(self) -> Result<Self, Error> {
         for (field, n) in [("nx", self.nx), ("ny", self.ny)] {
-            within(field, n as f64, (Self::SMALLEST..=1 << 15).contains(&n), "16 to 32768 points")?;
+            within(field, n as f64, (16..=1 << 15).contains(&n), "16 to 32768 points")?;
         }
         positive("dx_m", self.dx_m)?;
         positive("dy_m", self.dy_m)?;

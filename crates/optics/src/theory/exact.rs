@@ -109,9 +109,6 @@ pub fn bistatic_efficiency_with(
 ) -> Result<f64, Error> {
     let cn2 = cn2.clone().validated()?;
     let range_m = positive("range_m", range_m)?;
-    if cn2.is_none() {
-        return free_space_efficiency_misaligned(telescope, misalignment, range_m);
-    }
     let k = telescope.validated()?.wavenumber_rad_m();
     let structure_rad2 = table.of_spherical_waves(k, range_m, cn2.quadrature(range_m)?);
     efficiency_with(telescope, misalignment, range_m, &structure_rad2)
