@@ -3,7 +3,7 @@
 //! Check: the interpolation passes through the points, keeps monotone data monotone and refuses to extrapolate; between ranges that
 //! follow the curvature it is the function itself, however near the focus.
 
-use crate::error::{finite, not_negative, positive};
+use crate::error::{check_length, finite, not_negative, positive};
 use crate::{Error, Telescope};
 use std::f64::consts::SQRT_2;
 
@@ -66,9 +66,7 @@ impl EfficiencyProfile {
             ("standard_error", &self.standard_error),
         ];
         for (field, list) in lists {
-            if list.len() != expected {
-                return Err(Error::Length { field, found: list.len(), expected });
-            }
+            check_length(field, list.len(), expected)?;
             for &value in list {
                 // A scatter that nobody knows is no mistake; a mean is always known.
                 if !value.is_nan() || field == "mean" {

@@ -141,6 +141,11 @@ pub(crate) fn finite(field: &'static str, value: f64) -> Result<f64, Error> {
     within(field, value, value.is_finite(), "a finite number")
 }
 
+/// Nothing where a list has as many entries as it must, else an error that names `field`.
+pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -> Result<(), Error> {
+    if found == expected { Ok(()) } else { Err(Error::Length { field, found, expected }) }
+}
+
 /// The field that an error names.
 #[cfg(test)]
 pub(crate) fn refused<T>(result: Result<T, Error>) -> &'static str {

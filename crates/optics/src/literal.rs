@@ -14,6 +14,7 @@
 
 use crate::air::Spectrum;
 use crate::beam::source::aperture_field;
+use crate::error::check_length;
 use crate::screens::low_frequency::normal_pair;
 use crate::{Error, Grid, Misalignment, Telescope};
 use rand::Rng;
@@ -68,10 +69,7 @@ pub fn irradiance_per_m2(telescope: &Telescope, grid: &Grid, layers: &[Layer]) -
     let mut field = aperture_field(&telescope, &Misalignment::NONE, &grid);
     let (mut here_m, mut start_m) = (0.0, 0.0);
     for Layer { thickness_m, phase_rad } in layers {
-        let (found, expected) = (phase_rad.len(), field.len());
-        if found != expected {
-            return Err(Error::Length { field: "phase_rad", found, expected });
-        }
+        check_length("phase_rad", phase_rad.len(), field.len())?;
         let middle_m = start_m + 0.5 * thickness_m;
         field = step(&grid, &field, telescope.wavelength_m, middle_m - here_m);
         field.iter_mut().zip(phase_rad).for_each(|(e, psi)| *e *= Complex::cis(*psi));

@@ -12,6 +12,7 @@
 
 use crate::Error;
 use crate::air::spectrum::Spectrum;
+use crate::error::check_length;
 use crate::quadrature::GaussLegendre;
 use crate::screens::grid::{Fft2, Grid, Work};
 use crate::screens::kernel::{self, Real};
@@ -180,11 +181,8 @@ impl<T: Real> ScreenGenerator<T> {
         first: &mut [T],
         second: &mut [T],
     ) -> Result<(), Error> {
-        for (field, screen) in [("first", &*first), ("second", &*second)] {
-            if screen.len() != self.grid.points() {
-                return Err(Error::Length { field, found: screen.len(), expected: self.grid.points() });
-            }
-        }
+        check_length("first", first.len(), self.grid.points())?;
+        check_length("second", second.len(), self.grid.points())?;
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
         let low = self.low.draw(&*self.spectrum, self.shift_sign, rng);

@@ -5,7 +5,7 @@
 //! conserved power, a step forth and back.
 
 use crate::Error;
-use crate::error::{finite, positive, within};
+use crate::error::{check_length, finite, positive, within};
 use crate::screens::grid::{Fft2, Grid, Work};
 use crate::screens::kernel::{self, Real};
 use rustfft::num_complex::Complex;
@@ -102,24 +102,16 @@ impl<T: Real> Propagator<T> {
         transfers: [&Transfer<T>; 2],
         work: &mut Work<T>,
     ) -> Result<[f64; 2], Error> {
-        let expected = self.grid.points();
-        if tap.len() != expected {
-            return Err(Error::Length { field: "tap", found: tap.len(), expected });
-        }
+        check_length("tap", tap.len(), self.grid.points())?;
         self.forward(field, screen, work)?;
         Ok(self.arrive([tap, field], transfers, work))
     }
 
     /// Screen and transform along x into the transposed buffer.
     fn forward(&self, field: &[Complex<T>], screen: Option<(&[T], T)>, work: &mut Work<T>) -> Result<(), Error> {
-        let expected = self.grid.points();
-        if field.len() != expected {
-            return Err(Error::Length { field: "field", found: field.len(), expected });
-        }
-        if let Some((phase, _)) = screen
-            && phase.len() != expected
-        {
-            return Err(Error::Length { field: "screen", found: phase.len(), expected });
+        check_length("field", field.len(), self.grid.points())?;
+        if let Some((phase, _)) = screen {
+            check_length("screen", phase.len(), self.grid.points())?;
         }
         let Work { whole: transposed, scratch } = work;
         Fft2::transposing(&self.fft.forward_x, transposed, scratch, |row, block| {
