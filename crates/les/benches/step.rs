@@ -48,7 +48,7 @@ fn all(c: &mut Criterion) -> Result<(), Error> {
     bench_case(c, "Taylor-Green 64^3, no model", &vortices)?;
     vortices.settings.subgrid = MULTISCALE;
     bench_case(c, "Taylor-Green 64^3, multiscale model", &vortices)?;
-    let pair = VortexPairCase { cells: [48, 96, 64], slip_sides: true, ..VortexPairCase::default() };
+    let pair = VortexPairCase { cells: [48, 96, 64], slip_sides: true, ..VortexPairCase::coarse() };
     let mut wake = pair.case(TimeStep::Fixed { step_s: 1e-3 })?;
     wake.settings.subgrid = MULTISCALE;
     // One pressure solve per step, as in the other flows.

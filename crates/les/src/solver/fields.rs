@@ -14,13 +14,12 @@ use super::layout::Shape;
 use super::mesh::{Ends, Mesh};
 use super::planes::without_halos;
 use super::settings::FlowSettings;
+use super::transport::MEAN;
 use crate::error::{Error, check_lengths};
 use crate::solver::aligned::Aligned;
 
 /// Fourth-order interpolation from the faces to the first centre at a wall.
 const AT_WALL: [f64; 4] = [5.0 / 16.0, 15.0 / 16.0, -5.0 / 16.0, 1.0 / 16.0];
-/// Fourth-order interpolation from the faces to a centre.
-const INSIDE: [f64; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
 
 impl Flow {
     /// The mesh.
@@ -112,11 +111,6 @@ impl Flow {
         self.first_largest(error).map_or(f64::NAN, |(largest, ..)| largest)
     }
 
-    /// Velocity along `direction` at the centres of the cells, interpolated with fourth order \[m/s\], `[z][y][x]`.
-    pub fn centre_velocity_m_s(&self, direction: usize) -> Vec<f64> {
-        self.whole(self.own_centre_velocity_m_s(direction))
-    }
-
     /// From the faces of the planes that are shown to the centres of those that are owned.
     pub(crate) fn centred(&self, direction: usize, faces: &[f64]) -> Vec<f64> {
         let shown = self.shown();
@@ -136,13 +130,13 @@ impl Flow {
                     // One cell: nothing varies, or nothing flows through it.
                     face(0)
                 } else if is_periodic {
-                    (0..4).map(|t| INSIDE[t] * face((index + n + t - 1) % n)).sum()
+                    (0..4).map(|t| MEAN[t] * face((index + n + t - 1) % n)).sum()
                 } else if index == 0 {
                     (0..4).map(|t| AT_WALL[t] * face(t)).sum()
                 } else if index + 1 == n {
                     (0..4).map(|t| AT_WALL[t] * face(n - t)).sum()
                 } else {
-                    (0..4).map(|t| INSIDE[t] * face(index + t - 1)).sum()
+                    (0..4).map(|t| MEAN[t] * face(index + t - 1)).sum()
                 };
             }
         });
@@ -158,7 +152,7 @@ impl Flow {
     /// subgrid model.
     pub fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
         let model = self.model.as_ref()?;
-        let own = self.in_planes(model.viscosity_m2_s()).map(|planes| without_halos(self.shown(), planes));
+        let own = self.in_planes(&model.viscosity_m2_s).map(|planes| without_halos(self.shown(), planes));
         Some(self.whole(own))
     }
 
@@ -216,7 +210,7 @@ mod tests {
                 for (a, b) in again.face_velocity_m_s(direction).iter().zip(faces) {
                     assert!((a - b).abs() < 1e-12);
                 }
-                let centred = flow.centre_velocity_m_s(direction);
+                let centred = flow.whole(flow.own_centre_velocity_m_s(direction));
                 let (y_m, z_m) = (flow.mesh().centre_m(1), flow.mesh().centre_m(2));
                 for (place, value) in centred.iter().enumerate() {
                     let expected = field([0.5, y_m[place % n], z_m[place / n]])[direction];

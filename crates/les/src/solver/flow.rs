@@ -230,7 +230,7 @@ impl Flow {
             let (_, axis, place) = self.first_not_finite()?;
             return Err(self.diverged(axis, place, "velocity"));
         }
-        let largest = self.model.as_ref().map(Subgrid::largest).unwrap_or_default();
+        let largest = self.model.as_ref().map(|model| model.largest).unwrap_or_default();
         Ok(StepReport {
             step: self.state.step,
             time_s: self.state.time_s,
@@ -326,7 +326,6 @@ impl Flow {
 /// `a L field` along one axis for one component into `out`; zero on walls.
 fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64), field: &[f64], out: &mut [f64]) {
     let (shape, n) = (layout.shape, layout.shape.n[0]);
-    let starts_at_wall = ops.axis == 0 && layout.line[0].first_face() == 1;
     let planes = out[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
     planes.for_each_init(
         || Scratch::new(n),
@@ -337,9 +336,7 @@ fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64)
                     add_laplacian_row(ops, field, axis, [j, k], row, &mut scratch.padded[0]);
                 }
                 row.iter_mut().for_each(|value| *value *= a_m2);
-                if starts_at_wall {
-                    row[0] = 0.0;
-                }
+                ops.hold_at_wall(row);
             }
         },
     );

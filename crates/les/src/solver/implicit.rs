@@ -56,11 +56,11 @@ const COLUMNS: usize = 64;
 impl LineSolver {
     /// Factors `1 - a L` of component `ops` along `axis`, `a_s_m2` being half the time step times the viscosity \[m^2\].
     pub(crate) fn new(ops: &Momentum, axis: usize, a_m2: f64) -> Self {
-        let mass = ops.mass(axis).to_vec();
+        let mass = ops.mass[axis].clone();
         let n = mass.len();
         let mut dense: Vec<Taps> = Vec::with_capacity(n);
         let mut pivot = vec![0.0; n];
-        for (i, row) in ops.laplacian(axis).iter().enumerate() {
+        for (i, row) in ops.laplacian[axis].rows.iter().enumerate() {
             // Row i of the factor, from its first entry to the diagonal.
             let first = row.iter().map(|tap| tap.0).filter(|j| *j <= i).min().unwrap_or(i);
             let mut work = vec![0.0; i - first + 1];
@@ -211,7 +211,7 @@ mod tests {
                         let index = place / stride % shape.n[axis];
                         let origin = place - index * stride;
                         let applied: f64 =
-                            ops.laplacian(axis)[index].iter().map(|&(i, c)| c * x[origin + i * stride]).sum();
+                            ops.laplacian[axis].rows[index].iter().map(|&(i, c)| c * x[origin + i * stride]).sum();
                         let residual = x[place] - a_m2 * applied - right[place];
                         assert!(residual.abs() < 1e-11, "component {component}, axis {axis}, {index}: {residual}");
                     }

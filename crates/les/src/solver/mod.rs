@@ -13,7 +13,7 @@ pub(crate) mod flow;
 mod flux_cache;
 mod growth;
 mod implicit;
-mod layout;
+pub(crate) mod layout;
 #[cfg(test)]
 mod literal;
 mod mapping;
@@ -30,7 +30,7 @@ mod rows;
 mod run;
 pub(crate) mod settings;
 pub(crate) mod shape;
-pub(crate) mod slabs;
+mod slabs;
 #[cfg(test)]
 mod slabs_tests;
 mod stage;

@@ -10,7 +10,7 @@ use multiversion::multiversion;
 
 use super::flux_cache::FluxCache;
 use super::layout::{Layout, Shape};
-use super::operators_1d::{DIFFERENCE, Taps};
+use super::operators_1d::DIFFERENCE;
 use super::row_operator::RowOperator;
 use super::rows::HALO;
 use super::transport::{Stencil, Transport};
@@ -37,9 +37,9 @@ pub(crate) struct Momentum {
     /// `1/h` at the faces of `axis` \[1/m\]; zero where the flow cannot vary.
     pub(super) inverse_metric: Vec<f64>,
     /// Mass of the control volume of this component along each axis.
-    mass: [Vec<f64>; 3],
+    pub(super) mass: [Vec<f64>; 3],
     /// Laplacian along each axis, and the source from moving walls; none along an axis of equal periodic cells.
-    laplacian: [RowOperator; 3],
+    pub(super) laplacian: [RowOperator; 3],
     wall_source: [Vec<f64>; 3],
     gradient: RowOperator,
 }
@@ -137,22 +137,19 @@ impl Momentum {
         (self.mass[1][j] * self.mass[2][k], &self.mass[0])
     }
 
-    /// Masses along one axis.
-    pub(crate) fn mass(&self, axis: usize) -> &[f64] {
-        &self.mass[axis]
-    }
-
-    /// Rows of the Laplacian along one axis.
-    pub(crate) fn laplacian(&self, axis: usize) -> &[Taps] {
-        self.laplacian[axis].rows()
-    }
-
     /// Whether row `(j, k)` lies on a wall, where this component is zero.
     pub(crate) fn is_wall_row(&self, j: usize, k: usize) -> bool {
         match self.axis {
             1 => self.inverse_face_mass[j] == 0.0,
             2 => self.inverse_face_mass[k] == 0.0,
             _ => false,
+        }
+    }
+
+    /// A velocity along axis 0 is zero at the wall that the row begins with.
+    pub(crate) fn hold_at_wall(&self, row: &mut [f64]) {
+        if self.axis == 0 && self.inverse_face_mass[0] == 0.0 {
+            row[0] = 0.0;
         }
     }
 }

@@ -1,16 +1,15 @@
 //! Fields as they are measured and written: planes across z in the order `[z][y][x]`, whatever their order in memory.
 //!
 //! Of a flow on several ranks each has some of these planes, with halos about them. Where z is the last direction in memory
-//! they are those that it owns, and nothing is exchanged; otherwise all give all what they need.
+//! they are those that it owns, and nothing is exchanged; otherwise, which is so in plane flows, all give all what they own.
 //!
 //! Check: fields on ranks against those of one process, every order in memory, fewer planes across z than ranks.
-
-use std::ops::Range;
 
 use rayon::prelude::*;
 
 use super::flow::Flow;
 use super::layout::Shape;
+use super::slabs::Slabs;
 use crate::Error;
 use crate::ranks::Ranks;
 
@@ -19,6 +18,8 @@ use crate::ranks::Ranks;
 pub(crate) struct Faces {
     pub(crate) shape: Shape,
     pub(crate) field: [Vec<f64>; 3],
+    /// Asks the other ranks.
+    pub(crate) slabs: Slabs,
 }
 
 impl Flow {
@@ -33,7 +34,8 @@ impl Flow {
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn faces(&self) -> Result<Faces, Error> {
-        Ok(Faces { shape: self.shown(), field: [self.face(0)?, self.face(1)?, self.face(2)?] })
+        let field = [self.face(0)?, self.face(1)?, self.face(2)?];
+        Ok(Faces { shape: self.shown(), field, slabs: self.layout.slabs.clone() })
     }
 
     /// One component of it.
@@ -51,40 +53,21 @@ impl Flow {
     pub(crate) fn in_planes(&self, field: &[f64]) -> Result<Vec<f64>, Error> {
         let (layout, shown) = (&self.layout, self.shown());
         let [nx, ny, _] = shown.n;
-        let place = |at: [usize; 3]| layout.shape.place(layout.direction.map(|d| at[d]));
-        let mut out = vec![0.0; shown.len()];
-        if layout.direction[2] == 2 || layout.slabs.is_alone() {
-            let held: Vec<usize> = shown.held().collect();
-            out.par_chunks_mut(nx * ny).zip(held).for_each(|(plane, k)| {
-                for (j, row) in plane.chunks_mut(nx).enumerate() {
-                    row.iter_mut().enumerate().for_each(|(i, value)| *value = field[place([i, j, k])]);
-                }
-            });
-            return Ok(out);
-        }
-        let (ranks, cut) = (&layout.slabs.ranks, layout.direction[2]);
-        let count = ranks.count();
-        // What a rank has of a plane: some columns, or some rows.
-        let piece = |rank: usize, k: usize| {
-            let part = layout.shape.planes_of(rank, count);
-            let of = |d: usize, cells: usize| if d == cut { part.clone() } else { 0..cells };
-            let (columns, rows): (Range<usize>, Range<usize>) = (of(0, nx), of(1, ny));
-            rows.flat_map(move |j| columns.clone().map(move |i| [i, j, k]))
+        let gathered;
+        let (shape, field) = if layout.direction[2] == 2 || layout.slabs.is_alone() {
+            (layout.shape, field)
+        } else {
+            gathered = layout.slabs.all_gather(field[layout.shape.own_places()].to_vec())?;
+            (Shape::whole(layout.shape.n), &gathered[..])
         };
-        let pieces = |rank: usize, shape: Shape| shape.held().flat_map(move |k| piece(rank, k));
-        let size = |rank: usize, shape: Shape| shape.len() / shown.n[cut] * layout.shape.planes_of(rank, count).len();
-        let of_rank = |rank: usize| Shape::slab(shown.n, rank, count);
-        let to: Vec<usize> = (0..count).map(|rank| size(ranks.rank(), of_rank(rank))).collect();
-        let from: Vec<usize> = (0..count).map(|rank| size(rank, shown)).collect();
-        let mut send = Vec::with_capacity(to.iter().sum());
-        for rank in 0..count {
-            send.extend(pieces(ranks.rank(), of_rank(rank)).map(|at| field[place(at)]));
-        }
-        let mut came = vec![0.0; from.iter().sum()];
-        ranks.all_to_all(&send, &to, &mut came, &from)?;
-        for (at, value) in (0..count).flat_map(|rank| pieces(rank, shown)).zip(came) {
-            out[shown.place(at)] = value;
-        }
+        let place = |at: [usize; 3]| shape.place(layout.direction.map(|d| at[d]));
+        let mut out = vec![0.0; shown.len()];
+        let held: Vec<usize> = shown.held().collect();
+        out.par_chunks_mut(nx * ny).zip(held).for_each(|(plane, k)| {
+            for (j, row) in plane.chunks_mut(nx).enumerate() {
+                row.iter_mut().enumerate().for_each(|(i, value)| *value = field[place([i, j, k])]);
+            }
+        });
         Ok(out)
     }
 }
@@ -136,7 +119,7 @@ mod tests {
                                 );
                             }
                         }
-                        assert_eq!(flow.centre_velocity_m_s(2), centred);
+                        assert_eq!(flow.whole(flow.own_centre_velocity_m_s(2)), centred);
                         (flow.own_planes(), flow.own_centre_velocity_m_s(2).unwrap().len())
                     });
                     let [nx, ny, nz] = mesh.cells();

@@ -105,15 +105,14 @@ fn divergence_row(
 /// \[1/s\].
 pub(crate) fn correct(
     ops: &[Momentum; 3],
-    layout: &Layout,
     predicted: [&[f64]; 3],
     phi: &[f64],
     scale: f64,
-    velocity: [&mut [f64]; 3],
+    velocity: &mut [&mut [f64]; 3],
 ) -> Vec<[f64; 2]> {
-    let shape = layout.shape;
+    let shape = ops[0].shape;
     let n = shape.n[0];
-    let [u, v, w] = velocity.map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
+    let [u, v, w] = velocity.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
     (u, v, w, shape.own())
         .into_par_iter()
         .map_init(

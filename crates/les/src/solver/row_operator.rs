@@ -11,7 +11,8 @@ pub(crate) struct RowOperator {
     axis: usize,
     shape: Shape,
     periodic: bool,
-    rows: Vec<Taps>,
+    /// For each target the places and their coefficients.
+    pub(super) rows: Vec<Taps>,
     columns: Columns,
     /// Coefficients of the pairs at the distances 1, 2 and 3, the same in all rows, of a second difference on equal periodic cells.
     even: Option<[f64; 3]>,
@@ -28,11 +29,6 @@ impl RowOperator {
     /// The same, which is a second difference with these coefficients of pairs if there are any.
     pub(crate) fn with_pairs(self, even: Option<[f64; 3]>) -> Self {
         Self { even, ..self }
-    }
-
-    /// Its rows: for each target the places and their coefficients.
-    pub(crate) fn rows(&self) -> &[Taps] {
-        &self.rows
     }
 
     /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes 1 and 2).

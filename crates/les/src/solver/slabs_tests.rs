@@ -24,7 +24,7 @@ fn seen(case: &Case, implicit: Option<[bool; 3]>, ranks: Arc<dyn Ranks>, steps: 
     flow.state.implicit = implicit.unwrap_or(flow.state.implicit);
     let reports = (0..steps).map(|_| flow.step()).collect::<Result<_, Error>>()?;
     let mut fields: Vec<_> = [0, 1, 2].map(|d| bits(flow.face_velocity_m_s(d))).into();
-    fields.push(bits(flow.centre_velocity_m_s(2)));
+    fields.push(bits(flow.whole(flow.own_centre_velocity_m_s(2))));
     fields.push(bits(flow.pressure_m2_s2()));
     fields.extend(flow.subgrid_viscosity_m2_s().map(bits));
     Ok((start, reports, fields, flow.relative_divergence()))

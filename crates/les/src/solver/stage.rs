@@ -5,12 +5,11 @@ use rayon::prelude::*;
 
 use super::aligned::Aligned;
 use super::flow::{Flow, Work};
-use super::layout::{Layout, Shape};
-use super::momentum::{Momentum, Scratch};
+use super::layout::Shape;
+use super::momentum::Scratch;
 use super::projection::weighted_dot;
 use super::report::Powers;
 use super::settings::Stage;
-use super::subgrid::Subgrid;
 use crate::Error;
 
 /// Share of the explicit limit beyond which the subgrid viscosity is cut. In the core of a vortex WALE's viscosity has no
@@ -62,15 +61,18 @@ impl Flow {
         measured: bool,
     ) -> Result<Powers, Error> {
         let shape = self.layout.shape;
-        let (task, predicted, previous) = self.task();
         let keep = if keeps { 1.0 } else { 0.0 };
-        let powers: Vec<[Powers; 3]> = blocks(shape, predicted, previous)
+        // What is written leaves the flow, which the blocks read.
+        let mut predicted = std::mem::take(&mut self.work.predicted);
+        let mut previous = std::mem::take(&mut self.state.previous_terms);
+        let powers: Vec<[Powers; 3]> = blocks(shape, &mut predicted, &mut previous)
             .into_par_iter()
             .map_init(
                 || std::array::from_fn(|_| Scratch::new(shape.n[0])),
-                |scratch, block| task.increments(block, (stage, stage_s, keep, measured), scratch),
+                |scratch, block| self.increments(block, (stage, stage_s, keep, measured), scratch),
             )
             .collect();
+        (self.work.predicted, self.state.previous_terms) = (predicted, previous);
         if !measured {
             return Ok(Powers::default());
         }
@@ -93,36 +95,6 @@ impl Flow {
         model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, predicted, phi)
     }
 
-    /// What the momentum equation reads, and what it writes: the predicted velocity and the previous terms.
-    fn task(&mut self) -> (Task<'_>, &mut [Aligned; 3], &mut [Aligned; 3]) {
-        let Self { ops, state, work, model, layout, settings, .. } = self;
-        let task = Task {
-            layout,
-            ops,
-            velocity: state.velocity.each_ref().map(Aligned::as_slice),
-            pressure: &state.pressure,
-            model: model.as_ref(),
-            viscosity_m2_s: settings.viscosity_m2_s,
-            force_m_s2: layout.direction.map(|d| settings.force_m_s2[d]),
-            implicit: state.implicit,
-        };
-        (task, &mut work.predicted, &mut state.previous_terms)
-    }
-}
-
-/// What the planes of the momentum equation read.
-struct Task<'a> {
-    layout: &'a Layout,
-    ops: &'a [Momentum; 3],
-    velocity: [&'a [f64]; 3],
-    pressure: &'a [f64],
-    model: Option<&'a Subgrid>,
-    viscosity_m2_s: f64,
-    force_m_s2: [f64; 3],
-    implicit: [bool; 3],
-}
-
-impl Task<'_> {
     /// `predicted = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the previous terms; returns the work of each
     /// component if `measured`.
     fn increments(
@@ -142,16 +114,16 @@ impl Task<'_> {
                     continue;
                 }
                 self.terms([axis, j, k], predicted, scratch, measured.then_some(&mut *powers));
-                scratch.gradient(&self.ops[axis], self.pressure, j, k);
-                let own = &self.velocity[axis][self.layout.shape.row(j, k)];
-                let nu = if keep == 1.0 { 0.0 } else { self.viscosity_m2_s };
+                scratch.gradient(&self.ops[axis], &self.state.pressure, j, k);
+                let own = &self.state.velocity[axis][self.layout.shape.row(j, k)];
+                let nu = if keep == 1.0 { 0.0 } else { self.settings.viscosity_m2_s };
                 advance_row(
                     [stage.new, stage.old, nu, stage_s, keep],
                     predicted,
                     previous,
                     [&scratch.implicit, &scratch.pressure, own],
                 );
-                self.hold_at_wall(axis, predicted);
+                self.ops[axis].hold_at_wall(predicted);
             }
         }
         powers
@@ -164,23 +136,24 @@ impl Task<'_> {
         if self.model.is_some() {
             scratch.model.copy_from_slice(out);
         }
-        scratch.convection(ops, self.velocity, j, k);
-        let (nu, force) = (self.viscosity_m2_s, self.force_m_s2[axis]);
+        scratch.convection(ops, self.state.velocity.each_ref().map(Aligned::as_slice), j, k);
+        let nu = self.settings.viscosity_m2_s;
+        let force = self.settings.force_m_s2[self.layout.direction[axis]];
         if nu == 0.0 {
             scratch.implicit.fill(0.0);
             scratch.explicit.fill(0.0);
         } else {
-            scratch.laplacians(ops, self.velocity[axis], self.implicit, j, k);
+            scratch.laplacians(ops, &self.state.velocity[axis], self.state.implicit, j, k);
         }
         explicit_terms(out, nu, &scratch.explicit, &scratch.convection, force);
-        if let Some(model) = self.model {
+        if let Some(model) = &self.model {
             model.add_divergence_row(axis, j, k, &mut scratch.model);
             for (out, model) in out.iter_mut().zip(&scratch.model) {
                 *out += model;
             }
         }
         let Some(powers) = powers else { return };
-        let own = &self.velocity[axis][self.layout.shape.row(j, k)];
+        let own = &self.state.velocity[axis][self.layout.shape.row(j, k)];
         let (across, along) = ops.row_mass(j, k);
         if nu > 0.0 {
             let work = weighted_dot(own, &scratch.implicit, along) + weighted_dot(own, &scratch.explicit, along);
@@ -192,13 +165,6 @@ impl Task<'_> {
         }
         if self.model.is_some() {
             powers[1] += across * weighted_dot(own, &scratch.model, along);
-        }
-    }
-
-    /// A velocity along axis 0 is zero at the wall that the row begins with.
-    fn hold_at_wall(&self, axis: usize, row: &mut [f64]) {
-        if axis == 0 && self.layout.line[0].first_face() == 1 {
-            row[0] = 0.0;
         }
     }
 }

@@ -74,7 +74,7 @@ pub(crate) enum Ghost {
 pub(crate) struct Axis {
     name: &'static str,
     /// Positions of all nodes, ghosts included.
-    position_m: Vec<f64>,
+    pub(crate) position_m: Vec<f64>,
     /// Range of positions that the mesh holds; unbounded if periodic.
     span_m: Option<(f64, f64)>,
     period_m: Option<f64>,
@@ -156,19 +156,9 @@ impl Axis {
         self.position_m.len() - 2 * GHOSTS
     }
 
-    /// Number of nodes with ghosts.
-    pub(crate) fn padded_nodes(&self) -> usize {
-        self.position_m.len()
-    }
-
     /// Padded indices of the cells between nodes, with the cell that closes a period.
     pub(crate) fn cells(&self) -> std::ops::Range<usize> {
         GHOSTS..GHOSTS + self.nodes() - usize::from(self.period_m.is_none())
-    }
-
-    /// Positions of the nodes with ghosts \[m\].
-    pub(crate) fn padded_position_m(&self) -> &[f64] {
-        &self.position_m
     }
 
     /// Index (in the padded nodes) of the first node of the four-point stencil of `x_m`, and the four weights; `None`

@@ -75,7 +75,7 @@ impl GridSnapshot {
         let (first_z, weights_z) = self.z.stencil(z_m)?;
         let mut sum = [0.0; 3];
         for (row, weight_z) in weights_z.iter().enumerate() {
-            let start = (first_z + row) * self.y.padded_nodes() + first_y;
+            let start = (first_z + row) * self.y.position_m.len() + first_y;
             let nodes = &self.velocity_m_s[start..start + 4];
             for (velocity, weight_y) in nodes.iter().zip(&weights_y) {
                 let weight = weight_y * weight_z;
@@ -112,8 +112,8 @@ impl Wind for GridSnapshot {
 
 /// The nodes with their ghosts: first beyond the ends in y, then, for the widened rows, beyond the ends in z.
 fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let (width, nodes_y, nodes_z) = (y.padded_nodes(), y.nodes(), z.nodes());
-    let mut padded = vec![[0.0; 3]; width * z.padded_nodes()];
+    let (width, nodes_y, nodes_z) = (y.position_m.len(), y.nodes(), z.nodes());
+    let mut padded = vec![[0.0; 3]; width * z.position_m.len()];
     for (i_z, row) in velocity_m_s.chunks_exact(nodes_y).enumerate() {
         let start = (i_z + GHOSTS) * width;
         padded[start + GHOSTS..start + GHOSTS + nodes_y].copy_from_slice(row);
@@ -157,8 +157,8 @@ pub(crate) fn ghost_value(ghost: Ghost, across: usize, component: usize, at: imp
 /// The largest strain rate over the middles of the cells between nodes: the largest eigenvalue of its in-plane part,
 /// plus the shear of the axial velocity.
 fn largest_strain_per_s(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> f64 {
-    let width = y.padded_nodes();
-    let (y_m, z_m) = (y.padded_position_m(), z.padded_position_m());
+    let width = y.position_m.len();
+    let (y_m, z_m) = (&y.position_m, &z.position_m);
     let mut largest = 0.0_f64;
     for j in z.cells() {
         for i in y.cells() {

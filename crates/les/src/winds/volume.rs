@@ -74,7 +74,7 @@ impl VolumeSnapshot {
     fn steepest_per_s(&self) -> Result<f64, Error> {
         let nodes_m = self.components[0].axes.each_ref().map(|axis| {
             let cells = axis.cells();
-            &axis.padded_position_m()[cells.start..=cells.end]
+            &axis.position_m[cells.start..=cells.end]
         });
         let [xs, ys, zs] = nodes_m;
         let nx = xs.len();
@@ -161,7 +161,7 @@ impl Padded {
         for &value in values {
             check("velocity_m_s", value, "finite", |_| true)?;
         }
-        let [px, py, pz] = axes.each_ref().map(Axis::padded_nodes);
+        let [px, py, pz] = axes.each_ref().map(|axis| axis.position_m.len());
         let mut padded = vec![0.0; px * py * pz];
         for (row, from) in values.chunks_exact(nx).enumerate() {
             let start = ((row / ny + GHOSTS) * py + row % ny + GHOSTS) * px + GHOSTS;
@@ -194,7 +194,7 @@ impl Padded {
         let (i, across_x) = self.axes[0].stencil(point_m[0])?;
         let (j, across_y) = self.axes[1].stencil(point_m[1])?;
         let (k, across_z) = self.axes[2].stencil(point_m[2])?;
-        let (px, py) = (self.axes[0].padded_nodes(), self.axes[1].padded_nodes());
+        let (px, py) = (self.axes[0].position_m.len(), self.axes[1].position_m.len());
         let mut sum = 0.0;
         for (dk, weight_z) in across_z.iter().enumerate() {
             for (dj, weight_y) in across_y.iter().enumerate() {

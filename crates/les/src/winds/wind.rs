@@ -46,9 +46,6 @@ pub struct Sum {
     pub winds: Vec<Box<dyn Wind>>,
 }
 
-/// Points handled at once, so that the scratch stays on the stack.
-pub(super) const BATCH: usize = 256;
-
 /// Lets `act` change each component of `out_m_s` by that of another wind at the same point.
 pub(super) fn combine(
     wind: &dyn Wind,
@@ -57,12 +54,9 @@ pub(super) fn combine(
     out_m_s: &mut [[f64; 3]],
     act: impl Fn(&mut f64, f64),
 ) -> Result<(), Error> {
-    let mut scratch = [[0.0; 3]; BATCH];
-    for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
-        let part = &mut scratch[..points.len()];
-        wind.velocity_into(points, time_s, part)?;
-        outs.as_flattened_mut().iter_mut().zip(part.as_flattened()).for_each(|(out, other)| act(out, *other));
-    }
+    let mut others = vec![[0.0; 3]; points_m.len()];
+    wind.velocity_into(points_m, time_s, &mut others)?;
+    out_m_s.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(out, other)| act(out, *other));
     Ok(())
 }
 
@@ -97,10 +91,10 @@ mod tests {
     use crate::winds::Linear;
 
     #[test]
-    fn sum_adds_velocities_and_gradients_over_more_than_one_batch() {
+    fn sum_adds_velocities_and_gradients() {
         let uniform = |v| Box::new(Linear::uniform(v).unwrap()) as Box<dyn Wind>;
         let sum = Sum { winds: vec![uniform([1.0, 2.0, 3.0]), Box::<Sum>::default(), uniform([0.5, -4.0, 0.25])] };
-        let points = vec![[0.0; 3]; 2 * BATCH + 7];
+        let points = vec![[0.0; 3]; 519];
         let mut out = vec![[9.0; 3]; points.len()];
         sum.velocity_into(&points, 0.0, &mut out).unwrap();
         assert!(out.iter().all(|&v| v == [1.5, -2.0, 3.25]));

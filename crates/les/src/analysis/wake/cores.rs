@@ -8,17 +8,23 @@
 /// Iterations of a centroid at most; each gains a digit or more where the vortex is smaller than the circle.
 const ITERATIONS: usize = 60;
 
+/// The edges along x, as a cross-plane sees them.
+#[derive(Debug, Clone)]
+pub(super) struct EdgeGrid {
+    /// Positions of the faces along y and z \[m\].
+    pub(super) y_m: Vec<f64>,
+    pub(super) z_m: Vec<f64>,
+    /// Lengths about them \[m\].
+    pub(super) y_length_m: Vec<f64>,
+    pub(super) z_length_m: Vec<f64>,
+    /// Width of the box if it is periodic \[m\].
+    pub(super) period_m: Option<f64>,
+}
+
 /// Axial vorticity at the edges of a cross-plane.
 #[derive(Debug, Clone)]
 pub(super) struct EdgePlane<'a> {
-    /// Positions of the faces along y and z \[m\].
-    pub(super) y_m: &'a [f64],
-    pub(super) z_m: &'a [f64],
-    /// Lengths about them \[m\].
-    pub(super) y_length_m: &'a [f64],
-    pub(super) z_length_m: &'a [f64],
-    /// Width of the box if it is periodic \[m\].
-    pub(super) period_m: Option<f64>,
+    pub(super) grid: &'a EdgeGrid,
     /// Vorticity \[1/s\], `[z][y]`.
     pub(super) vorticity_per_s: Vec<f64>,
 }
@@ -32,7 +38,7 @@ pub(super) struct Core {
     pub(super) circulation_m2_s: f64,
 }
 
-impl EdgePlane<'_> {
+impl EdgeGrid {
     /// Distance along y from `from_m` to `to_m`, the shorter way round.
     pub(super) fn lateral_m(&self, from_m: f64, to_m: f64) -> f64 {
         match self.period_m {
@@ -40,7 +46,9 @@ impl EdgePlane<'_> {
             None => to_m - from_m,
         }
     }
+}
 
+impl EdgePlane<'_> {
     /// The vortex of the given sign about `guess_m`; none where there is no such vorticity.
     pub(super) fn core(&self, guess_m: [f64; 2], sign: f64, radius_m: f64) -> Option<Core> {
         let mut core = self.moments(guess_m, sign, radius_m)?;
@@ -57,16 +65,16 @@ impl EdgePlane<'_> {
 
     /// Centroid and circulation within the circle about `centre_m`.
     fn moments(&self, centre_m: [f64; 2], sign: f64, radius_m: f64) -> Option<Core> {
-        let ny = self.y_m.len();
+        let (grid, ny) = (self.grid, self.grid.y_m.len());
         let (mut sum, mut y_sum, mut z_sum) = (0.0, 0.0, 0.0);
-        for (k, (z_m, z_length_m)) in self.z_m.iter().zip(self.z_length_m).enumerate() {
+        for (k, (z_m, z_length_m)) in grid.z_m.iter().zip(&grid.z_length_m).enumerate() {
             let dz_m = z_m - centre_m[1];
             if dz_m.abs() > radius_m + z_length_m {
                 continue;
             }
             let row = &self.vorticity_per_s[k * ny..(k + 1) * ny];
-            for (j, (value, y_length_m)) in row.iter().zip(self.y_length_m).enumerate() {
-                let dy_m = self.lateral_m(centre_m[0], self.y_m[j]);
+            for (j, (value, y_length_m)) in row.iter().zip(&grid.y_length_m).enumerate() {
+                let dy_m = grid.lateral_m(centre_m[0], grid.y_m[j]);
                 let value = sign * value;
                 if value <= 0.0 || dy_m.abs() > radius_m + y_length_m {
                     continue;
@@ -104,10 +112,10 @@ impl EdgePlane<'_> {
 
     /// Position, vorticity and area of all edges.
     fn edges(&self) -> impl Iterator<Item = ([f64; 2], f64, f64)> + '_ {
-        let ny = self.y_m.len();
+        let (grid, ny) = (self.grid, self.grid.y_m.len());
         self.vorticity_per_s.iter().enumerate().map(move |(place, value)| {
             let (j, k) = (place % ny, place / ny);
-            ([self.y_m[j], self.z_m[k]], *value, self.y_length_m[j] * self.z_length_m[k])
+            ([grid.y_m[j], grid.z_m[k]], *value, grid.y_length_m[j] * grid.z_length_m[k])
         })
     }
 }
@@ -118,22 +126,15 @@ mod tests {
 
     const RADIUS_M: f64 = 0.25;
 
-    struct Axes {
-        y_m: Vec<f64>,
-        z_m: Vec<f64>,
-        y_length_m: Vec<f64>,
-        z_length_m: Vec<f64>,
-    }
-
-    fn axes() -> Axes {
+    fn axes() -> EdgeGrid {
         let y_m: Vec<f64> = (0..100).map(|j| -1.5 + 0.03 * f64::from(j)).collect();
         let z_m: Vec<f64> = (0..=60).map(|k| 2.0 * (f64::from(k) / 60.0).powf(1.3)).collect();
         let middle = |k: usize| 0.5 * (z_m[k.min(59)] + z_m[(k + 1).min(60)]);
         let z_length_m = (0..=60).map(|k: usize| middle(k) - if k == 0 { 0.0 } else { middle(k - 1) }).collect();
-        Axes { y_length_m: vec![0.03; 100], y_m, z_m, z_length_m }
+        EdgeGrid { y_length_m: vec![0.03; 100], y_m, z_m, z_length_m, period_m: Some(3.0) }
     }
 
-    fn plane(axes: &Axes, vortices: &[(f64, f64, f64)]) -> Vec<f64> {
+    fn plane(axes: &EdgeGrid, vortices: &[(f64, f64, f64)]) -> Vec<f64> {
         let at = |y: f64, z: f64| {
             let one = |&(sign, y0, z0): &(f64, f64, f64)| {
                 let dy = (y - y0) - 3.0 * ((y - y0) / 3.0).round();
@@ -144,15 +145,8 @@ mod tests {
         axes.z_m.iter().flat_map(|z| axes.y_m.iter().map(move |y| (*y, *z))).map(|(y, z)| at(y, z)).collect()
     }
 
-    fn edges<'a>(axes: &'a Axes, vorticity_per_s: Vec<f64>) -> EdgePlane<'a> {
-        EdgePlane {
-            y_m: &axes.y_m,
-            z_m: &axes.z_m,
-            y_length_m: &axes.y_length_m,
-            z_length_m: &axes.z_length_m,
-            period_m: Some(3.0),
-            vorticity_per_s,
-        }
+    fn edges(grid: &EdgeGrid, vorticity_per_s: Vec<f64>) -> EdgePlane<'_> {
+        EdgePlane { grid, vorticity_per_s }
     }
 
     #[test]
@@ -166,7 +160,7 @@ mod tests {
             assert!(off_m < 3e-4, "{off_m} from ({y}, {z})");
             assert!((core.circulation_m2_s / within - 1.0).abs() < 2e-3, "{}", core.circulation_m2_s);
             let other = plane.core([y - 0.45, z], -1.0, RADIUS_M).unwrap();
-            assert!((plane.lateral_m(y - 0.5, other.centre_m[0])).abs() < 3e-4, "{:?}", other.centre_m);
+            assert!((axes.lateral_m(y - 0.5, other.centre_m[0])).abs() < 3e-4, "{:?}", other.centre_m);
             assert!((other.circulation_m2_s / within + 0.8).abs() < 2e-3, "it keeps its sign");
         }
     }

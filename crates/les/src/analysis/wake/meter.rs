@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::cores::{Core, EdgePlane};
+use super::cores::{Core, EdgeGrid, EdgePlane};
 use super::record::{SecondaryRecord, VortexRecord, WakeRecord};
 use super::scales::WakeScales;
 use super::spectrum::mode_energies_m4_s2;
@@ -16,7 +16,6 @@ use crate::ranks::Ranks;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::{Ends, Mesh};
 use crate::solver::planes::Faces;
-use crate::solver::slabs::Slabs;
 use crate::winds::{GridSnapshot, OutsidePolicy};
 
 /// Radius of the circle of a centroid, in `b0`.
@@ -41,8 +40,7 @@ pub struct WakeMeter {
     window: [f64; 2],
     core_radius: f64,
     curl: Curl,
-    face_m: [Vec<f64>; 2],
-    period_m: Option<f64>,
+    grid: EdgeGrid,
     viscosity_m2_s: f64,
     first_height_m: f64,
     /// The last two times and centres of the left, then of the right vortex.
@@ -61,13 +59,14 @@ impl WakeMeter {
         scales.validate()?;
         let curl = Curl::new(mesh)?;
         let lateral = &mesh.directions()[1];
-        let face_m = [1, 2].map(|d| mesh.face_m(d)[..curl.faces[d]].to_vec());
+        let [y_m, z_m] = [1, 2].map(|d| mesh.face_m(d)[..curl.faces[d]].to_vec());
+        let [_, y_length_m, z_length_m] = curl.face_m.clone();
+        let period_m = (lateral.ends == Ends::Periodic).then(|| lateral.length_m());
         Ok(Self {
             scales,
             window: WINDOW,
             core_radius: CORE_RADIUS,
-            face_m,
-            period_m: (lateral.ends == Ends::Periodic).then(|| lateral.length_m()),
+            grid: EdgeGrid { y_m, z_m, y_length_m, z_length_m, period_m },
             viscosity_m2_s,
             first_height_m: mesh.centre_m(2)[0] - mesh.face_m(2)[0],
             track: centres_m.map(|[y, z]| [[f64::NAN; 3], [f64::NAN, y, z]]),
@@ -137,9 +136,9 @@ impl WakeMeter {
     pub fn measure(&mut self, flow: &Flow) -> Result<WakeRecord, Error> {
         let cells: usize = self.curl.cell_m.iter().map(Vec::len).product();
         crate::error::check_lengths(cells, flow.mesh().cells().iter().product())?;
-        let seen = Seen { faces: flow.faces()?, slabs: &flow.layout.slabs };
+        let seen = flow.faces()?;
         let plane = self.mean_vorticity(&seen)?;
-        let wind = flow.plane_snapshot(&flow.mean_plane_of(&seen.faces)?, OutsidePolicy::Mask)?;
+        let wind = flow.plane_snapshot(&flow.mean_plane_of(&seen)?, OutsidePolicy::Mask)?;
         let radius_m = self.core_radius * self.scales.spacing_m;
         let time_s = flow.time_s();
         let core = |v: usize| seen.core(|| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
@@ -159,7 +158,7 @@ impl WakeMeter {
         let vortex = |own: usize| {
             let side = Side { plane: &plane, centres_m, own };
             let mut record = self.vortex(&seen, &side, cores[own].is_some(), &wind)?;
-            let faces = self.face_m[0].iter().zip(&shear).filter(|(y_m, _)| side.has(**y_m));
+            let faces = self.grid.y_m.iter().zip(&shear).filter(|(y_m, _)| side.has(**y_m));
             record.outward_shear_per_s = faces.map(|(_, shear)| SIGN[own] * shear).fold(f64::NAN, f64::min);
             Ok::<_, Error>(record)
         };
@@ -172,8 +171,8 @@ impl WakeMeter {
             left: vortex(0)?,
             right: vortex(1)?,
             energy_m4_s2: flow.kinetic_energy_m5_s2() / length_m,
-            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &seen.faces, |own| seen.slabs.all_gather(own))?,
-            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&seen.faces, |own| seen.slabs.all_gather(own))?,
+            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &seen)?,
+            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&seen)?,
             wall_shear_per_s,
             wall_units,
         };
@@ -181,49 +180,38 @@ impl WakeMeter {
         Ok(record)
     }
 
-    fn edge_plane(&self, vorticity_per_s: Vec<f64>) -> EdgePlane<'_> {
-        EdgePlane {
-            y_m: &self.face_m[0],
-            z_m: &self.face_m[1],
-            y_length_m: &self.curl.face_m[1],
-            z_length_m: &self.curl.face_m[2],
-            period_m: self.period_m,
-            vorticity_per_s,
-        }
-    }
-
     /// Axial vorticity averaged over x.
-    fn mean_vorticity(&self, seen: &Seen<'_>) -> Result<EdgePlane<'_>, Error> {
-        let (ny, x_m) = (self.face_m[0].len(), &self.curl.cell_m[0]);
+    fn mean_vorticity(&self, seen: &Faces) -> Result<EdgePlane<'_>, Error> {
+        let (ny, x_m) = (self.grid.y_m.len(), &self.curl.cell_m[0]);
         let length_m: f64 = x_m.iter().sum();
-        let own = self.curl.own_faces(seen.faces.shape.own());
+        let own = self.curl.own_faces(seen.shape.own());
         let mut mean = vec![0.0; ny * own.len()];
         mean.par_chunks_mut(ny).zip(own).for_each(|(out, k)| {
             let mut row = vec![0.0; x_m.len()];
             for (j, out) in out.iter_mut().enumerate() {
-                self.curl.row(&seen.faces, 0, j, k, &mut row);
+                self.curl.row(seen, 0, j, k, &mut row);
                 *out = row.iter().zip(x_m).map(|(w, x_m)| w * x_m).sum::<f64>() / length_m;
             }
         });
-        seen.slabs.all_gather(mean).map(|mean| self.edge_plane(mean))
+        let vorticity_per_s = seen.slabs.all_gather(mean)?;
+        Ok(EdgePlane { grid: &self.grid, vorticity_per_s })
     }
 
     /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank seeks it in some of the planes.
-    fn slices(&self, seen: &Seen<'_>, about: Core, sign: f64, floor_m: f64) -> Result<Vec<[f64; 2]>, Error> {
+    fn slices(&self, seen: &Faces, about: Core, sign: f64, floor_m: f64) -> Result<Vec<[f64; 2]>, Error> {
         let radius_m = self.core_radius * self.scales.spacing_m;
-        let (ny, nz, nx) = (self.face_m[0].len(), self.face_m[1].len(), self.curl.cell_m[0].len());
+        let (ny, nz, nx) = (self.grid.y_m.len(), self.grid.z_m.len(), self.curl.cell_m[0].len());
         let near = |k: &usize| {
-            let z_m = self.face_m[1][*k];
+            let z_m = self.grid.z_m[*k];
             z_m > floor_m && (z_m - about.centre_m[1]).abs() < 2.0 * radius_m
         };
-        let flat = self.edge_plane(Vec::new());
-        let is_beside = |j: usize| flat.lateral_m(about.centre_m[0], self.face_m[0][j]).abs() < 2.0 * radius_m;
-        let beside: Vec<usize> = (0..ny).filter(|j| is_beside(*j)).collect();
+        let lateral_m = |j: usize| self.grid.lateral_m(about.centre_m[0], self.grid.y_m[j]);
+        let beside: Vec<usize> = (0..ny).filter(|j| lateral_m(*j).abs() < 2.0 * radius_m).collect();
         // Each rank gives the vorticity of its planes across z to all, and seeks in some planes across x.
-        let own = self.curl.own_faces(seen.faces.shape.own()).filter(near);
+        let own = self.curl.own_faces(seen.shape.own()).filter(near);
         let rows: Vec<[usize; 2]> = own.flat_map(|k| beside.iter().map(move |j| [*j, k])).collect();
         let mut values = vec![0.0; rows.len() * nx];
-        values.par_chunks_mut(nx).zip(&rows).for_each(|(row, [j, k])| self.curl.row(&seen.faces, 0, *j, *k, row));
+        values.par_chunks_mut(nx).zip(&rows).for_each(|(row, [j, k])| self.curl.row(seen, 0, *j, *k, row));
         let values = seen.slabs.all_gather(values)?;
         let places: Vec<usize> = (0..nz).filter(near).flat_map(|k| beside.iter().map(move |j| k * ny + j)).collect();
         let (rank, count) = (seen.slabs.ranks.rank(), seen.slabs.ranks.count());
@@ -233,7 +221,7 @@ impl WakeMeter {
                 let mut plane = vec![0.0; ny * nz];
                 let column = values.iter().skip(i).step_by(nx);
                 places.iter().zip(column).for_each(|(place, value)| plane[*place] = *value);
-                let core = self.edge_plane(plane).core(about.centre_m, sign, radius_m);
+                let core = EdgePlane { grid: &self.grid, vorticity_per_s: plane }.core(about.centre_m, sign, radius_m);
                 core.map_or([f64::NAN; 2], |core| core.centre_m)
             })
             .collect();
@@ -242,7 +230,7 @@ impl WakeMeter {
 
     fn vortex(
         &self,
-        seen: &Seen<'_>,
+        seen: &Faces,
         side: &Side<'_>,
         is_found: bool,
         wind: &GridSnapshot,
@@ -280,7 +268,7 @@ impl WakeMeter {
 
     fn secondary(
         &self,
-        seen: &Seen<'_>,
+        seen: &Faces,
         side: &Side<'_>,
         above: impl Fn(f64, f64) -> bool,
     ) -> Result<SecondaryRecord, Error> {
@@ -288,7 +276,7 @@ impl WakeMeter {
         // The layer at the ground has vorticity of the same sign and would draw the centroid down.
         let floor_m = ABOVE_LAYER * self.scales.spacing_m;
         let mut upper = side.plane.clone();
-        let below = self.face_m[1].partition_point(|z_m| *z_m <= floor_m) * self.face_m[0].len();
+        let below = self.grid.z_m.partition_point(|z_m| *z_m <= floor_m) * self.grid.y_m.len();
         upper.vorticity_per_s[..below].fill(0.0);
         let radius_m = self.core_radius * self.scales.spacing_m;
         // The first vortex of the other side has the same sign: a search that slides over to it has found nothing.
@@ -296,7 +284,7 @@ impl WakeMeter {
         let first = || side.plane.strongest_m(sign, &above).and_then(core_at);
         // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
         let apart = |y_m: f64, z_m: f64, core: &Core| {
-            side.plane.lateral_m(core.centre_m[0], y_m).hypot(z_m - core.centre_m[1]) > 2.0 * radius_m
+            side.plane.grid.lateral_m(core.centre_m[0], y_m).hypot(z_m - core.centre_m[1]) > 2.0 * radius_m
         };
         let second = |core: Core| {
             side.plane.strongest_m(sign, |y_m, z_m| above(y_m, z_m) && apart(y_m, z_m, &core)).and_then(core_at)
@@ -313,7 +301,7 @@ impl WakeMeter {
                 let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
                 // Beside its own vortex, which is counted on over the sides.
                 let own_y_m = side.centres_m[side.own][0];
-                let y_m = own_y_m + side.plane.lateral_m(own_y_m, y_m);
+                let y_m = own_y_m + side.plane.grid.lateral_m(own_y_m, y_m);
                 SecondaryRecord { y_m, z_m, y_spread_m, z_spread_m, gamma_m2_s }
             }
             _ => SecondaryRecord::NONE,
@@ -321,7 +309,7 @@ impl WakeMeter {
     }
 
     /// Lateral shear at the ground averaged over x, at the faces of y, and the largest magnitude of the shear anywhere.
-    fn wall_shear(&self, seen: &Seen<'_>) -> Result<(Vec<f64>, f64), Error> {
+    fn wall_shear(&self, seen: &Faces) -> Result<(Vec<f64>, f64), Error> {
         let (nx, ny) = (self.curl.cell_m[0].len(), self.curl.cell_m[1].len());
         // The first rank has the lowest planes.
         let mut found = seen.slabs.broadcast(|| {
@@ -330,8 +318,8 @@ impl WakeMeter {
             let mut largest = 0.0_f64;
             for j in 0..ny {
                 // At the ground w does not vary, so that the vorticity is the shear.
-                self.curl.row(&seen.faces, 0, j, 0, &mut across);
-                self.curl.row(&seen.faces, 1, j, 0, &mut along);
+                self.curl.row(seen, 0, j, 0, &mut across);
+                self.curl.row(seen, 1, j, 0, &mut along);
                 found.push(-across.iter().sum::<f64>() / nx as f64);
                 largest = across.iter().zip(&along).map(|(a, b)| a.hypot(*b)).fold(largest, f64::max);
             }
@@ -343,13 +331,7 @@ impl WakeMeter {
     }
 }
 
-/// What this rank has of a flow, and how it asks the others.
-struct Seen<'a> {
-    faces: Faces,
-    slabs: &'a Slabs,
-}
-
-impl Seen<'_> {
+impl Faces {
     /// The core that rank 0 finds: which planes are looked at depends on it.
     fn core(&self, find: impl FnOnce() -> Option<Core>) -> Result<Option<Core>, Error> {
         let numbers = |core: Core| vec![core.centre_m[0], core.centre_m[1], core.circulation_m2_s];
@@ -371,7 +353,7 @@ struct Side<'a> {
 
 impl Side<'_> {
     fn has(&self, y_m: f64) -> bool {
-        let distance = |v: usize| self.plane.lateral_m(self.centres_m[v][0], y_m).abs();
+        let distance = |v: usize| self.plane.grid.lateral_m(self.centres_m[v][0], y_m).abs();
         distance(self.own) <= distance(1 - self.own)
     }
 }

@@ -150,7 +150,7 @@ fn the_meter_follows_across_the_period_and_remembers_through_a_restart() {
         sticky_ground: false,
         perturbation: 0.0,
         cross_wind: 2.0,
-        ..VortexPairCase::default()
+        ..VortexPairCase::coarse()
     };
     let (mut flow, _) = pair.case(TimeStep::Fixed { step_s: 0.002 }).unwrap().start().unwrap();
     let mut meter = meter(&flow).moving_with([[2.0, -0.8]; 2]);

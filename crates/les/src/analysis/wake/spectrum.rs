@@ -10,15 +10,10 @@ use crate::Error;
 use crate::solver::planes::Faces;
 
 /// Energy per length of x \[m^4/s^2\] of each axial mode `m = 0..=n/2`, wavelength `L_x/m`, all velocity components together.
-/// `all_gather` gives the numbers of all ranks in their order from those of the planes that are owned.
 ///
 /// # Errors
-/// Those of `all_gather`.
-pub(super) fn mode_energies_m4_s2(
-    curl: &Curl,
-    velocity: &Faces,
-    all_gather: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
-) -> Result<Vec<f64>, Error> {
+/// Those of the exchange between ranks.
+pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Result<Vec<f64>, Error> {
     let nx = curl.cell_m[0].len();
     let transform = RealFftPlanner::new().plan_fft_forward(nx);
     let modes = nx / 2 + 1;
@@ -43,7 +38,7 @@ pub(super) fn mode_energies_m4_s2(
         };
         let own = field[velocity.shape.own_places()].par_chunks(velocity.shape.plane());
         let own: Vec<Vec<f64>> = own.map(plane).collect();
-        for (sums, z_m) in all_gather(own.concat())?.chunks(modes).zip(z_m) {
+        for (sums, z_m) in velocity.slabs.all_gather(own.concat())?.chunks(modes).zip(z_m) {
             for (energy, sum) in energies.iter_mut().zip(sums) {
                 *energy += 0.5 * z_m * sum;
             }
@@ -60,6 +55,7 @@ pub(super) fn mode_energies_m4_s2(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::layout::Layout;
     use crate::solver::mesh::{Direction, Mapping, Mesh, Wall};
     use crate::solver::shape::Shape;
     use std::f64::consts::TAU;
@@ -79,8 +75,8 @@ mod tests {
                 .collect();
             let v: Vec<f64> = (0..8 * 16).flat_map(|_| x_m[..nx].iter().map(|x| (TAU * x / 3.0).sin())).collect();
             let w = vec![0.0; u.len()];
-            let faces = Faces { shape: Shape::whole([nx, 8, 16]), field: [u, v, w] };
-            let energies = mode_energies_m4_s2(&curl, &faces, Ok).unwrap();
+            let faces = Faces { shape: Shape::whole([nx, 8, 16]), field: [u, v, w], slabs: Layout::new(&mesh).slabs };
+            let energies = mode_energies_m4_s2(&curl, &faces).unwrap();
             assert_eq!(energies.len(), nx / 2 + 1);
             // The area is 1; a wave of amplitude a has the energy a^2/4.
             for (m, expected) in [0.5 * 0.49, 0.25, 0.25 * 0.25, 0.0].into_iter().enumerate() {
@@ -89,10 +85,12 @@ mod tests {
         }
         let even = Direction::periodic(4, 0.0, 1.0);
         let z = Direction::between(4, 0.0, 1.0, Wall::Slip, Wall::Slip);
-        let curl = Curl::new(&Mesh::new(even.clone(), even, z).unwrap()).unwrap();
+        let mesh = Mesh::new(even.clone(), even, z).unwrap();
+        let curl = Curl::new(&mesh).unwrap();
         let saw: Vec<f64> = (0..64).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
-        let faces = Faces { shape: Shape::whole([4; 3]), field: [saw, vec![0.0; 64], vec![0.0; 64]] };
-        let energies = mode_energies_m4_s2(&curl, &faces, Ok).unwrap();
+        let field = [saw, vec![0.0; 64], vec![0.0; 64]];
+        let faces = Faces { shape: Shape::whole([4; 3]), field, slabs: Layout::new(&mesh).slabs };
+        let energies = mode_energies_m4_s2(&curl, &faces).unwrap();
         assert!((energies[2] - 0.5).abs() < 1e-14 && energies[0].abs() < 1e-14, "the shortest wave: {energies:?}");
     }
 }

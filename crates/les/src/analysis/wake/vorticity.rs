@@ -133,16 +133,11 @@ impl Curl {
         if own.end == self.cells[2] { own.start..self.faces[2] } else { own }
     }
 
-    /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\]. `all_gather` gives the numbers of all
-    /// ranks in their order from those of the planes that are owned.
+    /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\].
     ///
     /// # Errors
-    /// Those of `all_gather`.
-    pub(super) fn enstrophy_m2_s2(
-        &self,
-        velocity: &Faces,
-        all_gather: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
-    ) -> Result<f64, Error> {
+    /// Those of the exchange between ranks.
+    pub(super) fn enstrophy_m2_s2(&self, velocity: &Faces) -> Result<f64, Error> {
         let nx = self.cells[0];
         let component = |c: usize| {
             let [ny, _] = self.places(c);
@@ -161,7 +156,7 @@ impl Curl {
             let own = velocity.shape.own();
             let own = if c == 2 { own } else { self.own_faces(own) };
             // Collected first, so that the order of the sum is that of the planes.
-            let planes = all_gather(own.into_par_iter().map(plane).collect())?;
+            let planes = velocity.slabs.all_gather(own.into_par_iter().map(plane).collect())?;
             Ok(0.5 * planes.iter().zip(z_m).map(|(sum, z_m)| sum * z_m).sum::<f64>())
         };
         let components = [component(0)?, component(1)?, component(2)?];
@@ -255,7 +250,7 @@ mod tests {
         }
         // -dE/dt = nu int omega^2 = 2 nu times the enstrophy, between planes without friction.
         let curl = Curl::new(flow.mesh()).unwrap();
-        let enstrophy = curl.enstrophy_m2_s2(&flow.faces().unwrap(), Ok).unwrap();
+        let enstrophy = curl.enstrophy_m2_s2(&flow.faces().unwrap()).unwrap();
         let mut flow = flow;
         let power = flow.step().unwrap().viscous_power_m5_s3 / 2.0;
         assert!((-power / (2.0 * 0.01 * enstrophy) - 1.0).abs() < 1e-4, "{power} for {enstrophy}");

@@ -127,34 +127,21 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
     // Rows 0, 1, n - 2, n - 1 hold W = W' = 0 at the plates.
     let boundary = |i: usize| i < 2 || i + 2 >= n;
     let mut b = vec![vec![C64::ZERO; n]; n];
-    let mut a = vec![vec![C64::ZERO; n]; n];
+    let mut shifted = b.clone();
     for i in 0..n {
         for j in 0..n {
-            let one = if i == j { 1.0 } else { 0.0 };
-            if boundary(i) {
+            let one = f64::from(u8::from(i == j));
+            let a = if boundary(i) {
                 let wall = if i < 2 { 0 } else { n - 1 };
                 let derivative = i == 1 || i + 2 == n;
-                let value = if derivative {
-                    d[wall][j]
-                } else if j == wall {
-                    1.0
-                } else {
-                    0.0
-                };
-                a[i][j] = C64::from(value);
-                continue;
-            }
-            let laplacian = d2[i][j] - a2 * one;
-            let speed = 1.0 - z[i] * z[i];
-            a[i][j] =
-                C64::from(speed * laplacian + 2.0 * one) - viscous * (d4[i][j] - 2.0 * a2 * d2[i][j] + a2 * a2 * one);
-            b[i][j] = C64::from(laplacian);
-        }
-    }
-    let mut shifted = a;
-    for (row, b) in shifted.iter_mut().zip(&b) {
-        for (x, b) in row.iter_mut().zip(b) {
-            *x -= guess * b;
+                C64::from(if derivative { d[wall][j] } else { f64::from(u8::from(j == wall)) })
+            } else {
+                let laplacian = d2[i][j] - a2 * one;
+                b[i][j] = C64::from(laplacian);
+                let speed = 1.0 - z[i] * z[i];
+                C64::from(speed * laplacian + 2.0 * one) - viscous * (d4[i][j] - 2.0 * a2 * d2[i][j] + a2 * a2 * one)
+            };
+            shifted[i][j] = a - guess * b[i][j];
         }
     }
     let lu = Lu::new(shifted);

@@ -63,13 +63,6 @@ pub struct VortexPairCase {
     pub subgrid: SubgridModel,
 }
 
-impl Default for VortexPairCase {
-    /// [`VortexPairCase::coarse`].
-    fn default() -> Self {
-        Self::coarse()
-    }
-}
-
 impl VortexPairCase {
     /// How the pair is stepped: over as many revolutions of the cores as a wake lives Adams-Bashforth, at the same cost, feeds
     /// energy to the shortest waves.

@@ -136,7 +136,7 @@ pub(super) struct Reader {
     sections: Vec<(Tag, Vec<u8>)>,
     planes: Planes,
     /// Number of planes, and bytes of each.
-    counts: [u64; 2],
+    pub(super) counts: [u64; 2],
 }
 
 impl Reader {
@@ -186,11 +186,6 @@ impl Reader {
 
     fn seek(&mut self, place: u64) -> Result<(), Error> {
         self.file.seek(SeekFrom::Start(place)).map(drop).map_err(|e| refused("read", &self.path, &e))
-    }
-
-    /// Number of planes, and bytes of each.
-    pub(super) fn counts(&self) -> [u64; 2] {
-        self.counts
     }
 
     /// The bytes of a plane.

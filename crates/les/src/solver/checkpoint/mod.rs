@@ -123,7 +123,7 @@ impl Flow {
         read_scalars(file.bytes(SCALARS)?, &mut flow.state).ok_or_else(|| file.damaged("its scalars are not whole"))?;
         let user_data = file.bytes(USER)?.to_vec();
         let shape = flow.layout.shape;
-        if file.counts() != [shape.n[2] as u64, flow.plane_bytes()] {
+        if file.counts != [shape.n[2] as u64, flow.plane_bytes()] {
             return Err(file.damaged("its fields are not of the size of the mesh"));
         }
         for k in shape.own() {
@@ -145,7 +145,7 @@ impl Flow {
 /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`].
 pub fn check_checkpoint(path: impl AsRef<Path>) -> Result<(), Error> {
     let mut file = Reader::open(path.as_ref(), VERSION)?;
-    let [planes, _] = file.counts();
+    let [planes, _] = file.counts;
     (0..planes as usize).try_for_each(|number| file.plane(number).map(drop))
 }
 

@@ -87,8 +87,7 @@ impl Flow {
     fn correct(&mut self, stage_s: f64, phi: &[f64]) -> Result<(), Error> {
         let predicted = self.work.predicted.each_ref().map(Aligned::as_slice);
         let mut velocity = self.state.velocity.each_mut().map(Aligned::as_mut_slice);
-        let planes =
-            correct(&self.ops, &self.layout, predicted, phi, stage_s, velocity.each_mut().map(|field| &mut **field));
+        let planes = correct(&self.ops, predicted, phi, stage_s, &mut velocity);
         self.layout.slabs.halos(&mut velocity, WHOLE)?;
         let planes = self.layout.slabs.planes(planes)?;
         self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);

@@ -19,8 +19,10 @@ use crate::Error;
 /// Every row is applied to the differences from its own cell: a constant leaves exactly nothing, however large it is.
 #[derive(Debug)]
 pub(crate) struct Operator {
-    shape: Shape,
-    slabs: Slabs,
+    /// Shape of its fields.
+    pub(super) shape: Shape,
+    /// What the ranks exchange of its fields.
+    pub(super) slabs: Slabs,
     mass_m: [Vec<f64>; 3],
     /// `Dw_0 f_0^-1 Dw_0^T` by columns.
     along: Columns,
@@ -49,16 +51,6 @@ impl Operator {
             periodic,
             across: [neighbours(&rows[1]), neighbours(&rows[2])],
         }
-    }
-
-    /// Shape of its fields.
-    pub(crate) fn shape(&self) -> Shape {
-        self.shape
-    }
-
-    /// What the ranks exchange of its fields.
-    pub(crate) fn slabs(&self) -> &Slabs {
-        &self.slabs
     }
 
     /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`.

@@ -3,7 +3,7 @@
 use crate::Error;
 
 /// A way to solve the pressure equation.
-pub(super) trait Method: Send + std::fmt::Debug {
+pub(super) trait Method: Send + Sync + std::fmt::Debug {
     /// Its name in errors.
     fn name(&self) -> &'static str;
 

@@ -70,7 +70,7 @@ impl PressureSolver {
             field.fill(0.0);
             return Ok(Solved { residual: 0.0, iterations: 0, factor: None });
         }
-        let own = operator.shape().own_places();
+        let own = operator.shape.own_places();
         let (mut iterations, mut history, mut last, mut attainable) = (0, Vec::new(), 1.0, 0.0);
         let reason = loop {
             // Of a later solve the right side is what the field so far leaves.
@@ -80,7 +80,7 @@ impl PressureSolver {
             if refines {
                 field.par_iter_mut().zip(&left[..]).for_each(|(phi, more)| *phi += more);
             }
-            operator.slabs().halos(&mut [field], WHOLE)?;
+            operator.slabs.halos(&mut [field], WHOLE)?;
             let residual = operator.residual_norm(right, field)? / size;
             history.push(residual);
             if residual <= tolerance {

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// 2-norm of the residual over that of the right side `g`.
 fn relative_residual(operator: &Operator, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
-    let (left, size) = (operator.residual_norm(g, phi)?, norm(operator.slabs(), g)?);
+    let (left, size) = (operator.residual_norm(g, phi)?, norm(&operator.slabs, g)?);
     Ok(if size > 0.0 { left / size } else { 0.0 })
 }
 

@@ -162,7 +162,8 @@ pub struct Run {
     flow: Flow,
     plan: RunPlan,
     kept: Kept,
-    has_warned: HasWarned,
+    has_warned_of_energy: bool,
+    has_warned_of_growth: bool,
     is_fresh: bool,
     stepping: Stepping,
 }
@@ -174,13 +175,6 @@ struct Kept {
     open: Option<EnergyBudget>,
     energy: EnergyBound,
     window: Window,
-}
-
-/// What has been warned of.
-#[derive(Debug, Default)]
-struct HasWarned {
-    energy: bool,
-    growth: bool,
 }
 
 impl Run {
@@ -215,8 +209,8 @@ impl Run {
     }
 
     fn with(flow: Flow, plan: RunPlan, kept: Kept, is_fresh: bool) -> Self {
-        let (has_warned, stepping) = Default::default();
-        Self { flow, plan, kept, has_warned, is_fresh, stepping }
+        let (has_warned_of_energy, has_warned_of_growth, stepping) = Default::default();
+        Self { flow, plan, kept, has_warned_of_energy, has_warned_of_growth, is_fresh, stepping }
     }
 
     /// The simulation, or the part that this rank has.
@@ -318,8 +312,8 @@ impl Run {
                 cause: energy.to_string(),
             });
         }
-        if !self.has_warned.energy {
-            self.has_warned.energy = true;
+        if !self.has_warned_of_energy {
+            self.has_warned_of_energy = true;
             self.tell(observer, &RunWarning::StepEnergy { step: report.step, energy });
         }
         Ok(())
@@ -329,7 +323,7 @@ impl Run {
         let step = self.flow.steps();
         // What a model takes from the waves, the energy of the steps tells.
         let is_modelled = self.flow.settings().subgrid != SubgridModel::None;
-        if self.has_warned.growth || is_modelled || !step.is_multiple_of(STEPS_PER_CHECK) {
+        if self.has_warned_of_growth || is_modelled || !step.is_multiple_of(STEPS_PER_CHECK) {
             return;
         }
         let left_s = self.plan.end_s - self.flow.time_s();
@@ -337,7 +331,7 @@ impl Run {
         // If a rank is lost, the next step says so.
         let growth = self.flow.stability().ok().and_then(|s| s.undamped(self.flow.judged_step_s(&s, step_s)));
         if let Some(growth) = growth.filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
-            self.has_warned.growth = true;
+            self.has_warned_of_growth = true;
             self.tell(observer, &RunWarning::UndampedGrowth { step, growth });
         }
     }

@@ -36,7 +36,7 @@ impl RunObserver for Witness {
     }
 
     fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        self.fields.extend([0, 1, 2].map(|d| flow.centre_velocity_m_s(d)));
+        self.fields.extend([0, 1, 2].map(|d| flow.whole(flow.own_centre_velocity_m_s(d))));
         self.fields.extend([flow.pressure_m2_s2(), flow.subgrid_viscosity_m2_s().unwrap()]);
         self.fields.extend([flow.whole(flow.own_vorticity_magnitude_per_s()), vec![flow.relative_divergence()]]);
         if self.fails && index == 1 { Err("no space left on device".into()) } else { Ok(()) }

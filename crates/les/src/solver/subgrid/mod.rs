@@ -93,9 +93,10 @@ pub(crate) struct Subgrid {
     operators: Operators,
     /// The filter of the multiscale model, and the small scales of the last two components.
     small: Option<(Filter, [Aligned; 2])>,
-    /// At the centres \[m^2/s\].
-    viscosity: Aligned,
-    largest: Largest,
+    /// Eddy viscosity at the centres, in the order of memory.
+    pub(super) viscosity_m2_s: Aligned,
+    /// The largest viscosity and decay rate of the last update.
+    pub(super) largest: Largest,
     /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\]: what the divergence needs of the stress.
     across: [Aligned; 3],
     slabs: Slabs,
@@ -113,7 +114,7 @@ impl Subgrid {
             formula,
             operators: Operators::new(layout),
             small: order.map(|order| (Filter::new(layout, order), [0, 1].map(|_| Aligned::zeros(cells)))),
-            viscosity: Aligned::zeros(cells),
+            viscosity_m2_s: Aligned::zeros(cells),
             largest: Largest::default(),
             across: [0, 1, 2].map(|_| Aligned::zeros(cells)),
             slabs: layout.slabs.clone(),
@@ -133,7 +134,7 @@ impl Subgrid {
         in_plane: &mut [Aligned; 3],
         free: &mut [f64],
     ) -> Result<(), Error> {
-        let Self { operators, formula, viscosity, small, slabs, across, .. } = self;
+        let Self { operators, formula, viscosity_m2_s: viscosity, small, slabs, across, .. } = self;
         let largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
         let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
         self.largest = Largest { viscosity_m2_s, decay_per_s };
@@ -162,16 +163,6 @@ impl Subgrid {
         let Operators { to_cells, to_faces, .. } = &self.operators;
         let operator = if component == 2 { &to_faces[2] } else { &to_cells[2] };
         add_divergence_row(operator, &self.across[component], [j, k], out_m_s2);
-    }
-
-    /// The largest viscosity and decay rate of the last update.
-    pub(crate) fn largest(&self) -> Largest {
-        self.largest
-    }
-
-    /// Eddy viscosity at the centres, in the order of memory \[m^2/s\].
-    pub(crate) fn viscosity_m2_s(&self) -> &[f64] {
-        &self.viscosity
     }
 }
 

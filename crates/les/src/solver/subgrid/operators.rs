@@ -41,7 +41,7 @@ impl Operators {
         let to_cells = std::array::from_fn(|axis| operator(axis, divergence(&layout.line[axis])));
         let to_faces = std::array::from_fn(|axis| operator(axis, layout.line[axis].gradient()));
         // of the viscosity the plane below
-        let [[a, b], [c, d]] = [&to_cells, &to_faces].map(|of: &[RowOperator; 3]| layout.slabs.reach(of[2].rows()));
+        let [[a, b], [c, d]] = [&to_cells, &to_faces].map(|of: &[RowOperator; 3]| layout.slabs.reach(&of[2].rows));
         Self {
             shape: layout.shape,
             reach: [a.max(c).max(1), b.max(d)],

@@ -104,7 +104,7 @@ fn the_stress_has_the_same_bits_with_one_two_and_seven_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let flow = Modelled::new(directions(), model, waves(0.9, 4.0));
-                (flow.acceleration(), flow.model.viscosity_m2_s().to_vec(), flow.model.largest().viscosity_m2_s)
+                (flow.acceleration(), flow.model.viscosity_m2_s.to_vec(), flow.model.largest.viscosity_m2_s)
             })
         };
         let expected = run(1);
@@ -135,7 +135,7 @@ fn a_flow_that_does_not_vary_in_a_direction_has_the_same_bits_with_one_cell_ther
                 let first: Vec<usize> =
                     (0..flow.layout.shape.len()).filter(|&place| flow.index(place)[axis] == 0).collect();
                 let of = |field: &[f64]| first.iter().map(|&place| field[place]).collect::<Vec<f64>>();
-                (acceleration.map(|field| of(&field)), of(flow.model.viscosity_m2_s()))
+                (acceleration.map(|field| of(&field)), of(&flow.model.viscosity_m2_s))
             };
             assert_eq!(run(1), run(4), "{model:?}, axis {axis}");
             assert!(run(1).1.iter().any(|nu| *nu > 0.0));

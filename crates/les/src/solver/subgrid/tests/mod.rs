@@ -83,7 +83,7 @@ impl Modelled {
     fn plain_stress(&self) -> [Vec<f64>; 6] {
         let small = self.small();
         let mut strain = strain(&self.layout, small.as_ref().unwrap_or(&self.velocity));
-        let nu = &self.model.viscosity;
+        let nu = &self.model.viscosity_m2_s;
         let before = |place: usize, axis: usize| {
             let mut index = self.index(place);
             let n = self.layout.shape.n[axis];
