@@ -14,6 +14,7 @@ use std::f64::consts::TAU;
 
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
+use wakescope_les::cases::Initial;
 use wakescope_les::{Direction, Error, Flow, FlowSettings, Mesh, SubgridModel, TimeStep};
 
 /// Wave number \[1/cm\] and the spectral energy at the three stations \[cm^3/s^2\]. At the first wave number the table has the last station
@@ -144,7 +145,7 @@ fn start(n: usize, velocity_m_s: &[Vec<f64>; 3], model: SubgridModel) -> Result<
     let time_step = TimeStep::Courant { courant: 0.35, longest_s: 0.01 };
     let mut settings = FlowSettings::new(VISCOSITY_M2_S, time_step);
     settings.subgrid = model;
-    Ok(Flow::from_face_velocities(mesh, settings, velocity_m_s.each_ref().map(Vec::as_slice))?.0)
+    Ok(Initial::Faces(velocity_m_s.clone()).start(mesh, settings)?.0)
 }
 
 fn run_to(flow: &mut Flow, end_s: f64) -> Result<(), Error> {

@@ -79,14 +79,6 @@ impl Flow {
         Ok(CrossPlane::at(x_m, mesh, self.layout.slabs.planes(own)?))
     }
 
-    /// The cross-plane at `x_m` \[m\] as a wind at the present time, with the walls and periods of the mesh.
-    ///
-    /// # Errors
-    /// As [`Self::cross_plane`].
-    pub fn snapshot(&self, x_m: f64, outside: OutsidePolicy) -> Result<GridSnapshot, Error> {
-        self.plane_snapshot(&self.cross_plane(x_m)?, outside)
-    }
-
     /// The velocity at the faces averaged along the flight, at the centres of the cells; its `x_m` is the middle of the mesh.
     pub(super) fn mean_plane_of(&self, faces: &Faces) -> Result<CrossPlane, Error> {
         let mesh = self.mesh();
@@ -180,7 +172,7 @@ mod tests {
             let mut worst = 0.0_f64;
             for i in 0..9_u8 {
                 let x_m = 0.713 * f64::from(i) - 1.0;
-                let wind = flow.snapshot(x_m, OutsidePolicy::Error).unwrap();
+                let wind = flow.plane_snapshot(&flow.cross_plane(x_m).unwrap(), OutsidePolicy::Error).unwrap();
                 for j in 0..200_u16 {
                     let at_m = [x_m, 0.311 * f64::from(j), 0.173 * f64::from(j) - 3.0];
                     for (found, expected) in probe(&wind, at_m).iter().zip(beltrami(at_m)) {
@@ -206,7 +198,7 @@ mod tests {
             |[x, y, z]| [(TAU * x).sin() * z, z + 0.1 * (TAU * y).sin(), 0.2 * z],
         );
         for x_m in [0.01, 0.5, 0.97] {
-            let wind = flow.snapshot(x_m, OutsidePolicy::Error).unwrap();
+            let wind = flow.plane_snapshot(&flow.cross_plane(x_m).unwrap(), OutsidePolicy::Error).unwrap();
             for y in [0.0, 0.13, 0.99] {
                 let ground = probe(&wind, [x_m, y, 0.0]);
                 assert!(ground.iter().zip([0.3, 0.5, 0.0]).all(|(a, b)| (a - b).abs() < 1e-13), "{ground:?}");
@@ -230,7 +222,7 @@ mod tests {
         assert_eq!(plane.cross_plane(-7.0).unwrap().velocity_m_s, plane.cross_plane(0.1).unwrap().velocity_m_s);
         assert!(matches!(plane.cross_plane(f64::INFINITY), Err(Error::OutOfRange { field: "x_m", .. })));
         let shear = start(wide(), thin(), wide(), |[_, _, z]| [(TAU * z).sin(), 2.0, 0.0]);
-        let wind = shear.snapshot(0.3, OutsidePolicy::Error).unwrap();
+        let wind = shear.plane_snapshot(&shear.cross_plane(0.3).unwrap(), OutsidePolicy::Error).unwrap();
         let [a, b] = [0.0, 0.37].map(|y| probe(&wind, [0.3, y, 0.21]));
         assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14) && (a[1] - 2.0).abs() < 1e-14, "{a:?} {b:?}");
         let expected = (TAU * 0.21).sin();

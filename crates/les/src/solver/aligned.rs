@@ -32,13 +32,6 @@ impl Aligned {
         Self { memory, first }
     }
 
-    /// Makes it as many zeros, unless it has that many numbers already.
-    pub(crate) fn fit(&mut self, count: usize) {
-        if self.len() != count {
-            *self = Self::zeros(count);
-        }
-    }
-
     pub(crate) fn as_slice(&self) -> &[f64] {
         self
     }
@@ -64,21 +57,15 @@ impl DerefMut for Aligned {
 
 impl Clone for Aligned {
     fn clone(&self) -> Self {
-        Self::from(&**self)
+        let mut copy = Self::zeros(self.len());
+        copy.copy_from_slice(self);
+        copy
     }
 }
 
 impl PartialEq for Aligned {
     fn eq(&self, other: &Self) -> bool {
         **self == **other
-    }
-}
-
-impl From<&[f64]> for Aligned {
-    fn from(values: &[f64]) -> Self {
-        let mut copy = Self::zeros(values.len());
-        copy.copy_from_slice(values);
-        copy
     }
 }
 

@@ -13,6 +13,7 @@ use super::flow::Flow;
 use super::layout::Shape;
 use super::mesh::{Ends, Mesh};
 use super::planes::without_halos;
+use super::report::StartReport;
 use super::settings::FlowSettings;
 use super::transport::MEAN;
 use crate::error::{Error, check_lengths};
@@ -148,28 +149,11 @@ impl Flow {
         self.whole(self.own_pressure_m2_s2())
     }
 
-    /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step started from; `None` without a
-    /// subgrid model.
-    pub fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
-        let model = self.model.as_ref()?;
-        let own = self.in_planes(&model.viscosity_m2_s).map(|planes| without_halos(self.shown(), planes));
-        Some(self.whole(own))
-    }
-
-    /// A flow that starts from velocities given at the low faces of the cells, `[z][y][x]` \[m/s\]; they are projected.
+    /// Starts from velocities given at the low faces of the cells, `[z][y][x]` \[m/s\].
     ///
     /// # Errors
     /// As [`Flow::new`], and for arrays of the wrong length.
-    pub fn from_face_velocities(
-        mesh: Mesh,
-        settings: FlowSettings,
-        velocity_m_s: [&[f64]; 3],
-    ) -> Result<(Self, super::StartReport), Error> {
-        Self::at_rest(mesh, settings)?.with_faces(velocity_m_s)
-    }
-
-    /// Starts from these velocities.
-    pub(super) fn with_faces(self, velocity_m_s: [&[f64]; 3]) -> Result<(Self, super::StartReport), Error> {
+    pub(super) fn with_faces(self, velocity_m_s: &[Vec<f64>; 3]) -> Result<(Self, StartReport), Error> {
         let ([nx, ny, nz], direction) = (self.mesh.cells(), self.layout.direction);
         for values in velocity_m_s {
             check_lengths(nx * ny * nz, values.len())?;
@@ -179,6 +163,17 @@ impl Flow {
             (0..3).for_each(|b| at[direction[b]] = index[b]);
             velocity_m_s[direction[axis]][(at[2] * ny + at[1]) * nx + at[0]]
         })
+    }
+}
+
+#[cfg(test)]
+impl Flow {
+    /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step started from; `None` without a
+    /// subgrid model.
+    pub(crate) fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
+        let model = self.model.as_ref()?;
+        let own = self.in_planes(&model.viscosity_m2_s).map(|planes| without_halos(self.shown(), planes));
+        Some(self.whole(own))
     }
 }
 
@@ -203,8 +198,7 @@ mod tests {
             let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
             let (flow, _) = Flow::new(mesh, settings.clone(), field).unwrap();
             let faces = [0, 1, 2].map(|d| flow.face_velocity_m_s(d));
-            let (again, _) =
-                Flow::from_face_velocities(flow.mesh().clone(), settings, faces.each_ref().map(Vec::as_slice)).unwrap();
+            let (again, _) = Flow::at_rest(flow.mesh().clone(), settings).unwrap().with_faces(&faces).unwrap();
             let mut worst = 0.0_f64;
             for (direction, faces) in faces.iter().enumerate() {
                 for (a, b) in again.face_velocity_m_s(direction).iter().zip(faces) {

@@ -58,7 +58,7 @@ impl LineSolver {
     pub(crate) fn new(ops: &Momentum, axis: usize, a_m2: f64) -> Self {
         let mass = ops.mass[axis].clone();
         let n = mass.len();
-        let mut dense: Vec<Taps> = Vec::with_capacity(n);
+        let [mut lower, mut upper] = [vec![Taps::new(); n], vec![Taps::new(); n]];
         let mut pivot = vec![0.0; n];
         for (i, row) in ops.laplacian[axis].rows.iter().enumerate() {
             // Row i of the factor, from its first entry to the diagonal.
@@ -68,30 +68,21 @@ impl LineSolver {
             for &(j, c) in row.iter().filter(|tap| tap.0 <= i) {
                 work[j - first] -= a_m2 * mass[i] * c;
             }
-            let mut taps = Taps::new();
             for j in first..i {
                 // work[j] holds l_ij d_j once the earlier columns are taken off.
-                let sum: f64 = dense[j].iter().filter(|t| t.0 >= first).map(|&(p, l)| l * work[p - first]).sum();
-                work[j - first] -= sum;
+                let sum: f64 = lower[j].iter().filter(|t| t.0 >= first).map(|&(p, l)| l * work[p - first]).sum();
+                work[j - first] += sum;
             }
             let mut diagonal = work[i - first];
             for j in first..i {
                 let value = work[j - first];
                 if value != 0.0 {
                     diagonal -= value * value / pivot[j];
-                    taps.push((j, value / pivot[j]));
+                    lower[i].push((j, -value / pivot[j]));
+                    upper[j].push((i, -value / pivot[j]));
                 }
             }
             pivot[i] = diagonal;
-            dense.push(taps);
-        }
-        let mut lower = vec![Taps::new(); n];
-        let mut upper = vec![Taps::new(); n];
-        for (i, taps) in dense.iter().enumerate() {
-            for &(j, l) in taps {
-                lower[i].push((j, -l));
-                upper[j].push((i, -l));
-            }
         }
         Self { component: ops.axis, axis, mass, inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(), lower, upper }
     }

@@ -73,41 +73,30 @@ impl Slabs {
         if self.is_alone() {
             return Ok(());
         }
-        let (shape, count) = (self.shape, self.ranks.count());
-        let (plane, n2, own) = (shape.plane(), shape.n[2], shape.own());
-        let before = (self.ranks.rank() + count - 1) % count;
-        let after = (self.ranks.rank() + 1) % count;
-        // Of each neighbour: the planes that it gets, and those that it sends.
-        let mut neighbours = [
-            (before, own.start..own.start + above, own.start + n2 - below..own.start + n2),
-            (after, own.end - below..own.end, own.end..own.end + above),
-        ];
-        let [mut to, mut from] = [vec![0; count], vec![0; count]];
-        for (rank, gets, sends) in &neighbours {
-            to[*rank] += gets.len() * plane * fields.len();
-            from[*rank] += sends.len() * plane * fields.len();
-        }
-        // A message holds lowest planes before highest ones, so that what comes are highest halos before lowest. With two ranks the other
-        // one is both neighbours.
-        neighbours.sort_by_key(|neighbour| neighbour.0);
+        let (shape, count, own_rank) = (self.shape, self.ranks.count(), self.ranks.rank());
+        let (plane, n2) = (shape.plane(), shape.n[2]);
+        // Planes of the halos of one rank that another owns, in the order in which they are sent.
+        let sent = |from: usize, to: usize| {
+            let (owned, Range { start, end }) = (shape.planes_of(from, count), shape.planes_of(to, count));
+            let halos = (start + n2 - below..start + n2).chain(end..end + above).map(move |k| k % n2);
+            halos.filter(move |k| owned.contains(k))
+        };
+        let values = |from: usize, to: usize| sent(from, to).count() * plane * fields.len();
+        let to: Vec<usize> = (0..count).map(|rank| values(own_rank, rank)).collect();
+        let from: Vec<usize> = (0..count).map(|rank| values(rank, own_rank)).collect();
         let mut send = Vec::with_capacity(to.iter().sum());
-        for (_, gets, _) in &neighbours {
-            for field in fields.iter() {
-                let start = shape.place([0, 0, gets.start]);
-                send.extend_from_slice(&field[start..start + gets.len() * plane]);
+        for rank in 0..count {
+            for (field, k) in fields.iter().flat_map(|field| sent(own_rank, rank).map(move |k| (field, k))) {
+                send.extend_from_slice(&field[shape.place([0, 0, k])..][..plane]);
             }
         }
-        let mut receive = vec![0.0; send.len()];
+        let mut receive = vec![0.0; from.iter().sum()];
         self.ranks.all_to_all(&send, &to, &mut receive, &from)?;
         let mut came = receive.chunks(plane);
-        if before == after {
-            neighbours.reverse();
-        }
-        for (_, _, sends) in neighbours {
+        for rank in 0..count {
             for field in fields.iter_mut() {
-                for (k, plane) in sends.clone().zip(&mut came) {
-                    let start = shape.place([0, 0, k % n2]);
-                    field[start..start + plane.len()].copy_from_slice(plane);
+                for (k, plane) in sent(rank, own_rank).zip(&mut came) {
+                    field[shape.place([0, 0, k])..][..plane.len()].copy_from_slice(plane);
                 }
             }
         }

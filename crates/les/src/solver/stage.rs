@@ -204,8 +204,10 @@ mod tests {
     #[test]
     fn blocks_hold_every_value_that_is_owned_once_and_in_its_place() {
         for shape in [Shape::whole([100, 130, 5]), Shape::slab([100, 41, 16], 1, 3), Shape::whole([5000, 2, 9])] {
-            let values = |axis| (0..shape.len()).map(move |place| (3 * place + axis) as f64).collect::<Vec<f64>>();
-            let mut predicted = [0, 1, 2].map(|axis| Aligned::from(&values(axis)[..]));
+            let mut predicted = [0, 1, 2].map(|_| Aligned::zeros(shape.len()));
+            for (axis, field) in predicted.iter_mut().enumerate() {
+                field.iter_mut().enumerate().for_each(|(place, value)| *value = (3 * place + axis) as f64);
+            }
             let mut previous = predicted.clone();
             let mut seen = 0;
             for Block { plane, row, predicted, previous } in blocks(shape, &mut predicted, &mut previous) {

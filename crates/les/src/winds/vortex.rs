@@ -103,12 +103,7 @@ impl VortexPair {
         self.circulation_m2_s / (2.0 * PI * self.spacing_m)
     }
 
-    /// Dimensionless time `tau = t V0/b0`.
-    pub fn reduced_time(&self, time_s: f64) -> f64 {
-        time_s * self.descent_speed_m_s() / self.spacing_m
-    }
-
-    /// Time \[s\] of the dimensionless time `tau`; infinite if the circulation is zero.
+    /// Time \[s\] of the dimensionless time `tau = t V0/b0`; infinite if the circulation is zero.
     pub fn time_s(&self, reduced_time: f64) -> f64 {
         reduced_time * self.spacing_m / self.descent_speed_m_s()
     }
@@ -130,7 +125,9 @@ impl VortexPair {
                 let sum: f64 = (0..=SIMPSON_PANELS)
                     .map(|i| {
                         let radius_m = 5.0 + f64::from(i) * step;
-                        simpson_weight(i) * self.profile.circulation_m2_s(self.circulation_m2_s, core, radius_m)
+                        let is_end = i == 0 || i == SIMPSON_PANELS;
+                        let weight = if is_end { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
+                        weight * self.profile.circulation_m2_s(self.circulation_m2_s, core, radius_m)
                     })
                     .sum();
                 sum * step / 30.0
@@ -169,15 +166,6 @@ impl VortexPair {
 
 /// Intervals of Simpson's rule for `Gamma_5-15` (even).
 const SIMPSON_PANELS: i32 = 400;
-
-/// Weight of node `i` in Simpson's rule, to be multiplied by a third of the step.
-fn simpson_weight(i: i32) -> f64 {
-    match i {
-        0 | SIMPSON_PANELS => 1.0,
-        _ if i % 2 == 1 => 4.0,
-        _ => 2.0,
-    }
-}
 
 /// The velocity field of a [`VortexPair`] that has been checked.
 #[derive(Debug, Clone, Copy, PartialEq)]

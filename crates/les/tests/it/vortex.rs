@@ -147,7 +147,7 @@ fn without_a_ground_the_pair_descends_straight_at_v0() {
     let later = pair.centres(pair.time_s(3.0));
     assert_relative_eq!(later.height_m, 47.0 - 3.0 * 47.0, max_relative = 1e-12);
     assert_eq!(later.left_y_m, 376.5);
-    assert_relative_eq!(pair.reduced_time(pair.time_s(3.0)), 3.0, max_relative = 1e-15);
+    assert_relative_eq!(pair.time_s(3.0) * pair.descent_speed_m_s() / pair.spacing_m, 3.0, max_relative = 1e-15);
 }
 
 /// The bound of the gradient of a pair over the largest that a search about a core and towards the other one finds.

@@ -25,13 +25,10 @@ use super::report::StartReport;
 use super::settings::FlowSettings;
 use crate::Error;
 
-/// Velocity at a position \[m\], `(u, v, w)` \[m/s\].
-pub type InitialField = Box<dyn Fn([f64; 3]) -> [f64; 3] + Send + Sync>;
-
 /// What a flow starts from.
 pub enum Initial {
-    /// A formula.
-    Field(InitialField),
+    /// A formula: velocity `(u, v, w)` \[m/s\] at a position \[m\].
+    Field(Box<dyn Fn([f64; 3]) -> [f64; 3] + Send + Sync>),
     /// Velocities along x, y, z at the low faces of the cells, `[z][y][x]` \[m/s\].
     Faces([Vec<f64>; 3]),
 }
@@ -40,11 +37,11 @@ impl Initial {
     /// The simulation that starts from this field.
     ///
     /// # Errors
-    /// As [`Flow::new`] and [`Flow::from_face_velocities`].
+    /// As [`Flow::new`], and [`Error::LengthMismatch`] for velocities that are not one for each cell.
     pub fn start(&self, mesh: Mesh, settings: FlowSettings) -> Result<(Flow, StartReport), Error> {
         match self {
             Self::Field(field) => Flow::new(mesh, settings, field),
-            Self::Faces(faces) => Flow::from_face_velocities(mesh, settings, faces.each_ref().map(Vec::as_slice)),
+            Self::Faces(faces) => Flow::at_rest(mesh, settings)?.with_faces(faces),
         }
     }
 }
@@ -62,7 +59,7 @@ impl Initial {
         let flow = Flow::laid_out(mesh, settings, layout)?;
         let started = match self {
             Self::Field(field) => flow.filled(field),
-            Self::Faces(faces) => flow.with_faces(faces.each_ref().map(Vec::as_slice)),
+            Self::Faces(faces) => flow.with_faces(faces),
         };
         started.map(|(flow, _)| flow)
     }

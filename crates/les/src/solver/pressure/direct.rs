@@ -132,14 +132,16 @@ impl Direct {
         });
     }
 
-    /// Divides the coefficients of the eigenvectors of all axes by their values, on the way along axis 2 there and back.
+    /// Divides the coefficients of the eigenvectors of all axes by their values, pencil by pencil between the transforms along axis 2.
     fn divide(&self, transform: &LineTransform, field: &mut [f64], shape: Shape, first: usize) {
         let value = &self.value;
         pencils(field, shape, 2, usize::MAX).par_iter_mut().for_each_init(Work::default, |work, pencil| {
             let along = &value[0][first + pencil.start..];
-            transform.there_and_back(&mut pencil.rows, work, |mode, start, values| {
-                kernel::divide(values, value[1][pencil.other] + value[2][mode], &along[start..], self.scale);
-            });
+            transform.apply(Way::There, &mut pencil.rows, work);
+            for (row, own) in pencil.rows.iter_mut().zip(&value[2]) {
+                kernel::divide(row, value[1][pencil.other] + own, along, self.scale);
+            }
+            transform.apply(Way::Back, &mut pencil.rows, work);
         });
     }
 }

@@ -89,26 +89,6 @@ impl Left {
         }
     }
 
-    /// As `there`, which has sums and differences before it alone, and `back`, with those after it alone, one after the other;
-    /// `act` is given each row in between, in pieces, with the first place of the piece.
-    pub(crate) fn there_and_back(
-        [there, back]: &[Self; 2],
-        f: &mut [&mut [f64]],
-        packed: &mut Packed,
-        act: impl Fn(usize, usize, &mut [f64]),
-    ) {
-        let (panel, product) = packed.panels(there.n);
-        for columns in panels(f) {
-            take(&there.before, f, columns, panel);
-            there.multiply(panel, columns, product);
-            for (row, values) in product.iter_mut().enumerate() {
-                act(row, columns[0], &mut values[..columns[1] - columns[0]]);
-            }
-            back.multiply(product, columns, panel);
-            give(&back.after, panel, f, columns);
-        }
-    }
-
     /// The product with one panel.
     fn multiply(&self, panel: &[TileRow], [start, end]: [usize; 2], product: &mut [TileRow]) {
         for &(first, rows, ref groups) in &self.blocks {

@@ -89,7 +89,7 @@ struct Axis {
 }
 
 /// What one thread needs: the fields of conjugate gradients, solution and right side on each mesh, a line, a coarse row.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Work {
     x: Vec<Wide>,
     r: Vec<Wide>,
@@ -100,7 +100,7 @@ struct Work {
 }
 
 /// A few lines that are solved together, and a coarse row.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Lines {
     line: Vec<[Cell; TOGETHER]>,
     row: Vec<Lanes>,
@@ -149,8 +149,7 @@ impl Multigrid {
         let masses = self.levels[0].axes.each_ref().map(|axis| &*axis.mass);
         let Work { x, r, p, q, fields, lines } = work;
         for field in [&mut *x, &mut *r, &mut *p, &mut *q] {
-            field.clear();
-            field.resize(rows.len(), [0.0; LANES]);
+            field.fill([0.0; LANES]);
         }
         for (out, row) in r.iter_mut().zip(rows.iter()) {
             out.iter_mut().zip(row.iter()).for_each(|(out, value)| *out = value * self.scale);
@@ -171,7 +170,9 @@ impl Multigrid {
         let [mut rz, mut alpha] = [[0.0; LANES]; 2];
         let (mut iterations, mut least, mut since) = (0, f64::INFINITY, 0);
         while squares > enough && iterations < MAX_ITERATIONS && since < PATIENCE {
-            let z = self.cycle(r, &single, fields, lines);
+            fields[0][1].iter_mut().zip(&*r).for_each(|(f, r)| *f = r.map(|r| r as f32));
+            v_cycle(&self.levels, &single, fields, lines);
+            let z = &fields[0][0];
             let before = rz;
             rz = dot(z, r);
             let zq = dot(z, q);
@@ -206,24 +207,19 @@ impl Multigrid {
         field.iter_mut().enumerate().for_each(|(p, value)| value[l] -= sum / volume * shape(mass(p)));
     }
 
-    /// The correction by one cycle for the residual `r`.
-    fn cycle<'a>(
-        &self,
-        r: &[Wide],
-        mode: &Lanes,
-        fields: &'a mut Vec<[Vec<Lanes>; 2]>,
-        lines: &mut Lines,
-    ) -> &'a [Lanes] {
-        fields.resize_with(self.levels.len(), Default::default);
-        for (fields, Level { axes, .. }) in fields.iter_mut().zip(&self.levels) {
-            fields.iter_mut().for_each(|field| field.resize(axes[0].len() * axes[1].len(), [0.0; LANES]));
+    /// Room for the work of one thread.
+    fn work(&self) -> Work {
+        let field = |level: &Level| vec![[0.0; LANES]; level.axes[0].len() * level.axes[1].len()];
+        let wide = || vec![[0.0; LANES]; field(&self.levels[0]).len()];
+        let [first, second] = self.levels[0].axes.each_ref().map(Axis::len);
+        Work {
+            x: wide(),
+            r: wide(),
+            p: wide(),
+            q: wide(),
+            fields: self.levels.iter().map(|level| [field(level), field(level)]).collect(),
+            lines: Lines { line: vec![[NO_CELL; TOGETHER]; first.max(second)], row: vec![[0.0; LANES]; first] },
         }
-        let [first, second] = &self.levels[0].axes;
-        lines.line.resize(first.len().max(second.len()), [NO_CELL; TOGETHER]);
-        lines.row.resize(first.len(), [0.0; LANES]);
-        fields[0][1].iter_mut().zip(r).for_each(|(f, r)| *f = r.map(|r| r as f32));
-        v_cycle(&self.levels, mode, fields, lines);
-        &fields[0][0]
     }
 
     /// Transforms the rows.
@@ -245,9 +241,10 @@ impl Method for Multigrid {
         let allowed = (tolerance * size * self.scale).powi(2);
         let most = self.slabs.transposed(own, LANES, |field, shape, first| {
             let mut groups = columns(field, shape, LANES);
-            let groups = groups.par_iter_mut().enumerate().map_init(Work::default, |work, (group, rows)| {
-                self.group(first / LANES + group, rows, allowed, tolerance, work)
-            });
+            let groups = groups.par_iter_mut().enumerate().map_init(
+                || self.work(),
+                |work, (group, rows)| self.group(first / LANES + group, rows, allowed, tolerance, work),
+            );
             groups.max()
         })?;
         self.transform(Way::Back, own);

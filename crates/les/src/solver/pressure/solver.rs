@@ -41,6 +41,7 @@ pub(crate) struct PressureSolver {
     pub(super) operator: Operator,
     method: Box<dyn Method>,
     right: Aligned,
+    /// What the solution leaves, once it is solved for.
     left: Aligned,
 }
 
@@ -52,7 +53,8 @@ impl PressureSolver {
         } else {
             Box::new(Direct::new(layout))
         };
-        Self { operator: Operator::new(layout), method, right: Aligned::default(), left: Aligned::default() }
+        let right = Aligned::zeros(layout.shape.len());
+        Self { operator: Operator::new(layout), method, right, left: Aligned::default() }
     }
 
     /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos included.
@@ -64,7 +66,6 @@ impl PressureSolver {
         let Self { operator, method, right, left } = self;
         check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)?;
         // The methods ignore what no pressure can balance; only the residual must not hold it against them.
-        right.fit(field.len());
         let size = operator.copy_balanced(field, right, BALANCED * tolerance)?;
         if size == 0.0 {
             field.fill(0.0);
@@ -96,7 +97,9 @@ impl PressureSolver {
                 break if at_round_off { PressureFailure::RoundOff { attainable } } else { PressureFailure::Stalled };
             }
             last = residual;
-            left.fit(field.len());
+            if left.is_empty() {
+                *left = Aligned::zeros(field.len());
+            }
             operator.residual(right, field, left);
             // The methods take the negative of their right side.
             left.par_iter_mut().for_each(|value| *value = -*value);

@@ -185,23 +185,6 @@ impl LineTransform {
             Self::Dense(ways) => ways[way as usize].apply(rows, &mut work.packed),
         }
     }
-
-    /// Lines to modes, `act` on pieces of these (the mode, the first line, the values), and back: each line is read and written once.
-    pub(crate) fn there_and_back(
-        &self,
-        rows: &mut [&mut [f64]],
-        work: &mut Work,
-        act: impl Fn(usize, usize, &mut [f64]),
-    ) {
-        match self {
-            Self::Thin(scale) => {
-                scale_rows(rows, *scale);
-                rows.iter_mut().enumerate().for_each(|(mode, row)| act(mode, 0, row));
-                scale_rows(rows, *scale);
-            }
-            Self::Dense(ways) => Left::there_and_back(ways, rows, &mut work.packed, act),
-        }
-    }
 }
 
 fn scale_rows(rows: &mut [&mut [f64]], scale: f64) {
