@@ -18,21 +18,19 @@ impl Flow {
 
     /// Length of the next step \[s\].
     pub(super) fn next_step_s(&self) -> f64 {
-        match self.settings.time_step {
-            TimeStep::Fixed { step_s } => step_s,
-            TimeStep::Courant { .. } => {
-                let mut step_s = self.settings.time_step.step_s(self.state.courant_per_s);
-                let explicit = self.explicit_viscous_rate_per_s();
-                if explicit > 0.0 {
-                    step_s = step_s.min(EXPLICIT_SHARE / explicit);
-                }
-                step_s = step_s.min(self.stiffness().longest_s());
-                if self.state.last_step_s > 0.0 {
-                    step_s = step_s.min(LARGEST_GROWTH * self.state.last_step_s);
-                }
-                step_s
-            }
+        let mut step_s = self.settings.time_step.step_s(self.state.courant_per_s);
+        if matches!(self.settings.time_step, TimeStep::Fixed { .. }) {
+            return step_s;
         }
+        let explicit = self.explicit_viscous_rate_per_s();
+        if explicit > 0.0 {
+            step_s = step_s.min(EXPLICIT_SHARE / explicit);
+        }
+        step_s = step_s.min(self.stiffness().longest_s());
+        if self.state.last_step_s > 0.0 {
+            step_s = step_s.min(LARGEST_GROWTH * self.state.last_step_s);
+        }
+        step_s
     }
 
     pub(super) fn explicit_viscous_rate_per_s(&self) -> f64 {

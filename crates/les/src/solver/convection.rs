@@ -20,21 +20,14 @@ struct Row<'a> {
 impl Scratch {
     /// Convection of one row into `self.convection`. A scratch belongs to one component of one velocity field.
     pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
-        self.fluxes.fit(ops.n);
-        let row = Row { ops, velocity, j, k };
-        convection_row(&row, &mut self.convection, &mut self.padded, &mut self.flux, &mut self.fluxes);
+        self.fluxes.fit(ops.shape.n);
+        convection_row(&Row { ops, velocity, j, k }, self);
     }
 }
 
-/// Convection of row `(j, k)`, `out = (u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
+/// Convection of row `(j, k)`, `(u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn convection_row(
-    row: &Row<'_>,
-    out: &mut [f64],
-    padded: &mut [Vec<f64>; 2],
-    flux: &mut [Vec<f64>; 2],
-    cache: &mut FluxCache,
-) {
+fn convection_row(row: &Row<'_>, Scratch { convection: out, padded, flux, fluxes: cache, .. }: &mut Scratch) {
     let &Row { ops, j, k, .. } = row;
     out.fill(0.0);
     if !ops.thin[0] {
@@ -133,7 +126,7 @@ fn across_rows(
     let &Row { ops, ref velocity, j, k } = target;
     let length = out.len();
     let index = if axis == 1 { j } else { k };
-    let count = ops.n[axis];
+    let count = ops.shape.n[axis];
     let transport = &ops.transport[axis];
     let scale = if axis == ops.axis { 1.0 } else { ops.inverse_cell_mass[axis][index] };
     let values = velocity[ops.axis];
@@ -144,7 +137,7 @@ fn across_rows(
         let q = rows_from::<7>(values, length, rows, first, count);
         let (values, offsets) = (&mut cache.values[axis - 1], &mut cache.offsets[axis - 1]);
         // The flux at offset 2 to 5 from the row has the same place for all four rows on which it acts.
-        let (across, j_of) = if axis == 1 { (1, 0) } else { (ops.n[1], j) };
+        let (across, j_of) = if axis == 1 { (1, 0) } else { (ops.shape.n[1], j) };
         let mut places = [0; SLOTS];
         for slot in 0..SLOTS {
             let place = (first + slot + 2) % SLOTS * across + j_of;
@@ -211,7 +204,7 @@ fn flux_row(target: &Row<'_>, along: usize, face: usize, out: &mut [f64], padded
     }
     let own = if ops.axis == 1 { j } else { k };
     if let Some(mass) = ops.equal_mass {
-        let count = ops.n[ops.axis];
+        let count = ops.shape.n[ops.axis];
         even_mean(out, mass, &rows_from(field, n, ops.shape.row_offsets(ops.axis, [j, k]), own + 2 * count - 2, count));
         return;
     }

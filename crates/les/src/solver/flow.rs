@@ -39,7 +39,8 @@ pub struct Flow {
     line_solvers: LineSolvers,
     /// Largest decay rate of the viscous term along each memory axis \[1/s\].
     pub(super) viscous_per_s: [f64; 3],
-    pub(super) work: Work,
+    pub(super) predicted: [Aligned; 3],
+    pub(super) phi: Aligned,
     pub(crate) state: State,
 }
 
@@ -58,12 +59,6 @@ pub(crate) struct State {
     pub(crate) energy: f64,
     /// Memory axes along which viscosity is implicit.
     pub(crate) implicit: [bool; 3],
-}
-
-#[derive(Debug, Default)]
-pub(super) struct Work {
-    pub(super) predicted: [Aligned; 3],
-    pub(super) phi: Aligned,
 }
 
 impl Flow {
@@ -150,7 +145,8 @@ impl Flow {
             model: Subgrid::new(&layout, settings.subgrid)?,
             line_solvers: LineSolvers::default(),
             viscous_per_s: layout.direction.map(|d| viscous_rates_per_s(&mesh, settings.viscosity_m2_s)[d]),
-            work: Work { predicted: fields(), phi: field() },
+            predicted: fields(),
+            phi: field(),
             mesh,
             settings,
             layout,
@@ -165,7 +161,7 @@ impl Flow {
             return Err(self.diverged(axis, place, "initial velocity"));
         }
         let [given] = self.layout.slabs.sums(self.kinetic_energy())?;
-        std::mem::swap(&mut self.state.velocity, &mut self.work.predicted);
+        std::mem::swap(&mut self.state.velocity, &mut self.predicted);
         self.project(1.0)?;
         self.repeat(1.0, 0.0)?;
         let implicit = implicit_axes(&self.mesh, &self.settings, self.state.courant_per_s);
@@ -175,8 +171,8 @@ impl Flow {
         self.predict(&Stage { fraction: 1.0, new: 1.0, old: 0.0 }, 1.0, false, false)?;
         self.state.previous_terms.iter_mut().for_each(|terms| terms.fill(0.0));
         self.take_divergence(1.0)?;
-        unless_stalled(self.pressure_solver.solve(&mut self.work.phi, self.settings.pressure_tolerance))?;
-        self.state.pressure.copy_from_slice(&self.work.phi);
+        unless_stalled(self.pressure_solver.solve(&mut self.phi, self.settings.pressure_tolerance))?;
+        self.state.pressure.copy_from_slice(&self.phi);
         Ok(StartReport { given_energy_m5_s2: given, kinetic_energy_m5_s2: self.state.energy })
     }
 
@@ -280,7 +276,7 @@ impl Flow {
     /// that are stiff along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
     /// `1/((1 + d1) (1 + d2))`.
     fn solve_viscous(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
-        let Self { state, layout, ops, work: Work { predicted, phi }, .. } = self;
+        let Self { state, layout, ops, predicted, phi, .. } = self;
         if state.implicit == [false; 3] {
             return Ok(());
         }
@@ -307,7 +303,7 @@ impl Flow {
 
     /// (25).
     fn add_pressure(&mut self) {
-        add(&mut self.state.pressure, &self.work.phi, self.layout.shape);
+        add(&mut self.state.pressure, &self.phi, self.layout.shape);
     }
 
     /// Kinetic energy of each plane that is owned.

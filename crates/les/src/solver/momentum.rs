@@ -20,8 +20,6 @@ use super::transport::{Stencil, Transport};
 pub(crate) struct Momentum {
     /// Memory axis of the component.
     pub(super) axis: usize,
-    /// Sizes of the memory axes.
-    pub(super) n: [usize; 3],
     pub(super) shape: Shape,
     pub(super) periodic: [bool; 3],
     pub(super) thin: [bool; 3],
@@ -107,7 +105,6 @@ impl Momentum {
         let stencil = Stencil::of(line);
         Self {
             axis,
-            n,
             shape: layout.shape,
             periodic: std::array::from_fn(|b| line[b].is_periodic()),
             thin: std::array::from_fn(|b| line[b].is_thin()),

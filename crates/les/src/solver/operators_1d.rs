@@ -88,11 +88,6 @@ impl Operators1d {
         self.is_periodic() && self.cell_metric_m.iter().all(|h| *h == self.cell_metric_m[0])
     }
 
-    /// Whether the low and the high end are no-slip walls.
-    pub(crate) fn no_slip(&self) -> [bool; 2] {
-        self.ends.no_slip()
-    }
-
     /// First stored face that carries a velocity: face 0 of a bounded direction is a wall.
     pub(crate) fn first_face(&self) -> usize {
         usize::from(!self.is_periodic())
@@ -149,7 +144,7 @@ impl Operators1d {
 
     /// For each cell the sum of factors times the weighted gradients at faces.
     fn sums_of_gradients(&self, faces: impl Iterator<Item = Taps>) -> (Vec<Taps>, Vec<[f64; 2]>) {
-        let (adjoint, sticks, last) = (self.adjoint(), self.no_slip(), self.cells);
+        let (adjoint, sticks, last) = (self.adjoint(), self.ends.no_slip(), self.cells);
         let of_cell = |faces: Taps| {
             let (mut sums, mut walls) = (vec![0.0; self.cells], [0.0; 2]);
             for (face, factor) in faces {

@@ -7,16 +7,14 @@ use rayon::prelude::*;
 
 use super::layout::{Layout, Shape};
 use super::momentum::{Momentum, Scratch};
-use super::operators_1d::Taps;
-use super::rows::{Columns, HALO, add_across, cut_rows, wrap};
+use super::row_operator::RowOperator;
+use super::rows::{HALO, add_across, cut_rows, wrap};
 
 /// The weighted divergence `sum_b (prod_{d != b} m_d) Dw_b u_b` \[m^3/s\].
 #[derive(Debug, Clone)]
 pub(crate) struct Divergence {
     shape: Shape,
-    periodic: bool,
-    columns: Columns,
-    rows: [Vec<Taps>; 3],
+    along: [RowOperator; 3],
     cell_mass: [Vec<f64>; 3],
     /// What the third component needs of its halos.
     pub(super) reach: [usize; 2],
@@ -24,14 +22,11 @@ pub(crate) struct Divergence {
 
 impl Divergence {
     pub(crate) fn new(layout: &Layout) -> Self {
-        let rows: [Vec<Taps>; 3] = std::array::from_fn(|b| layout.line[b].stored_divergence());
-        let periodic = layout.line[0].is_periodic();
+        let along = std::array::from_fn(|b| RowOperator::new(layout, b, layout.line[b].stored_divergence()));
         Self {
             shape: layout.shape,
-            periodic,
-            columns: Columns::new(&rows[0], periodic),
-            reach: layout.slabs.reach(&rows[2]),
-            rows,
+            reach: layout.slabs.reach(&along[2].rows),
+            along,
             cell_mass: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
         }
     }
@@ -87,8 +82,8 @@ fn divergence_row(
     let n = out.len();
     let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
     out.fill(0.0);
-    add_across(out, velocity[1], mass_2, &ops.rows[1][j], ops.shape.row_offsets(1, [j, k]));
-    add_across(out, velocity[2], mass_1, &ops.rows[2][k], ops.shape.row_offsets(2, [j, k]));
+    add_across(out, velocity[1], mass_2, &ops.along[1].rows[j], ops.shape.row_offsets(1, [j, k]));
+    add_across(out, velocity[2], mass_1, &ops.along[2].rows[k], ops.shape.row_offsets(2, [j, k]));
     for (out, mass) in out.iter_mut().zip(&ops.cell_mass[0]) {
         *out *= mass;
     }
@@ -97,8 +92,8 @@ fn divergence_row(
     for (to, from) in padded[HALO..].iter_mut().zip(&velocity[0][start..start + n]) {
         *to = across * from;
     }
-    wrap(padded, n, ops.periodic);
-    ops.columns.add(out, padded);
+    wrap(padded, n, ops.along[0].periodic);
+    ops.along[0].columns.add(out, padded);
 }
 
 /// `velocity = predicted - scale grad(phi)`; returns of each plane `1/2 sum mass u^2` \[m^5/s^2\] and the largest `sum_a |u_a|/h_a`

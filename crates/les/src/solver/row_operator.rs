@@ -10,10 +10,10 @@ use super::rows::{Columns, HALO, add_across, add_even, from_places, pad, rows_fr
 pub(crate) struct RowOperator {
     axis: usize,
     shape: Shape,
-    periodic: bool,
+    pub(super) periodic: bool,
     /// For each target the places and their coefficients.
     pub(super) rows: Vec<Taps>,
-    columns: Columns,
+    pub(super) columns: Columns,
     /// Coefficients of the pairs at the distances 1, 2 and 3, the same in all rows, of a second difference on equal periodic cells.
     even: Option<[f64; 3]>,
 }

@@ -4,7 +4,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::aligned::Aligned;
-use super::flow::{Flow, Work};
+use super::flow::Flow;
 use super::layout::Shape;
 use super::momentum::Scratch;
 use super::projection::weighted_dot;
@@ -63,7 +63,7 @@ impl Flow {
         let shape = self.layout.shape;
         let keep = if keeps { 1.0 } else { 0.0 };
         // What is written leaves the flow, which the blocks read.
-        let mut predicted = std::mem::take(&mut self.work.predicted);
+        let mut predicted = std::mem::take(&mut self.predicted);
         let mut previous = std::mem::take(&mut self.state.previous_terms);
         let powers: Vec<[Powers; 3]> = blocks(shape, &mut predicted, &mut previous)
             .into_par_iter()
@@ -72,7 +72,7 @@ impl Flow {
                 |scratch, block| self.increments(block, (stage, stage_s, keep, measured), scratch),
             )
             .collect();
-        (self.work.predicted, self.state.previous_terms) = (predicted, previous);
+        (self.predicted, self.state.previous_terms) = (predicted, previous);
         if !measured {
             return Ok(Powers::default());
         }
@@ -91,7 +91,7 @@ impl Flow {
     pub(super) fn update_model(&mut self, fraction: f64, stage_s: f64) -> Result<(), Error> {
         let explicit_per_s = self.settings.scheme.largest_decay() * fraction / stage_s;
         let limit_per_s = (SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0);
-        let Self { model: Some(model), work: Work { predicted, phi }, .. } = self else { return Ok(()) };
+        let Self { model: Some(model), predicted, phi, .. } = self else { return Ok(()) };
         model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, predicted, phi)
     }
 

@@ -62,7 +62,7 @@ impl Stencil {
 
     /// That of a mesh with these directions.
     pub(crate) fn of(lines: &[Operators1d]) -> Self {
-        if lines.iter().all(|line| line.no_slip() == [false; 2]) { Self::WIDE } else { Self::PLAIN }
+        if lines.iter().all(|line| line.ends.no_slip() == [false; 2]) { Self::WIDE } else { Self::PLAIN }
     }
 
     const fn with(share: f64) -> Self {
@@ -120,7 +120,7 @@ impl Operators1d {
     /// The rows of wall faces are empty.
     pub(crate) fn flux_mean(&self) -> Vec<Taps> {
         let n = self.cells;
-        let sticks = self.no_slip();
+        let sticks = self.ends.no_slip();
         (0..n)
             .map(|face| {
                 let mut sums = vec![0.0; n];
@@ -152,7 +152,7 @@ impl Operators1d {
         if self.is_thin() {
             return Transport { rows, regular: 0..0, stencil };
         }
-        let sticks = self.no_slip();
+        let sticks = self.ends.no_slip();
         for (k, row) in rows.iter_mut().enumerate() {
             for (face, cell, c) in stencil.products() {
                 let (face, cell) = (k as isize + face, k as isize + cell);
@@ -179,7 +179,7 @@ impl Operators1d {
         if self.is_thin() {
             return Transport { rows, regular: 0..0, stencil };
         }
-        let sticks = self.no_slip();
+        let sticks = self.ends.no_slip();
         let from_table = |face: usize| (sticks[0] && face <= 4) || (sticks[1] && face + 4 >= n);
         for (m, row) in rows.iter_mut().enumerate().skip(self.first_face()) {
             for (face, value, c) in interior_products(stencil, m as isize) {
@@ -255,7 +255,7 @@ mod tests {
 
     /// What may be used along a direction.
     fn stencils(line: &Operators1d) -> Vec<Stencil> {
-        if line.no_slip() == [false; 2] { vec![Stencil::PLAIN, Stencil::WIDE] } else { vec![Stencil::PLAIN] }
+        if line.ends.no_slip() == [false; 2] { vec![Stencil::PLAIN, Stencil::WIDE] } else { vec![Stencil::PLAIN] }
     }
 
     /// `S^n` of a transport as dense matrices.

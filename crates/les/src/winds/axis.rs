@@ -108,8 +108,8 @@ impl Axis {
                 (ghosts, below, above, None, Some(period_m))
             }
             Edges::Bounded { low, high } => {
-                let low = End::new(name, "low wall", node_m, low, false)?;
-                let high = End::new(name, "high wall", node_m, high, true)?;
+                let low = End::new(name, node_m, low, false)?;
+                let high = End::new(name, node_m, high, true)?;
                 let span_m = Some((low.end_m, high.end_m));
                 ([low.ghosts, high.ghosts], low.position_m, high.position_m, span_m, None)
             }
@@ -224,13 +224,7 @@ struct End {
 }
 
 impl End {
-    fn new(
-        axis: &'static str,
-        boundary: &'static str,
-        node_m: &[f64],
-        side: Side,
-        is_high: bool,
-    ) -> Result<Self, Error> {
+    fn new(axis: &'static str, node_m: &[f64], side: Side, is_high: bool) -> Result<Self, Error> {
         // Node counted from this end.
         let inner = |i: usize| if is_high { node_m.len() - 1 - i } else { i };
         let at = |i: usize| node_m[inner(i)];
@@ -246,7 +240,8 @@ impl End {
         let gap_m = if is_high { wall_m - at(0) } else { at(0) - wall_m };
         let cell_m = (at(1) - at(0)).abs();
         if !(0.0..cell_m).contains(&gap_m) {
-            return Err(refused(axis, boundary, wall_m, "at the last node or less than a cell beyond it"));
+            let wall = if is_high { "high wall" } else { "low wall" };
+            return Err(refused(axis, wall, wall_m, "at the last node or less than a cell beyond it"));
         }
         // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
         let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };

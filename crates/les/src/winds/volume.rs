@@ -167,18 +167,13 @@ impl Padded {
             let start = ((row / ny + GHOSTS) * py + row % ny + GHOSTS) * px + GHOSTS;
             padded[start..start + nx].copy_from_slice(from);
         }
-        // Ghosts direction by direction, over what is already there.
+        // Ghosts direction by direction; what is made of places that are not there yet, a later direction replaces.
         let strides = [1, px, px * py];
-        let spans = [
-            [0..1, GHOSTS..GHOSTS + ny, GHOSTS..GHOSTS + nz],
-            [0..px, 0..1, GHOSTS..GHOSTS + nz],
-            [0..px, 0..py, 0..1],
-        ];
         for d in 0..3 {
-            let [xs, ys, zs] = &spans[d];
+            let count: [usize; 3] = std::array::from_fn(|along| if along == d { 1 } else { [px, py, pz][along] });
             for (ghost_at, ghost) in ghost_places(&axes[d]) {
-                for (k, j) in zs.clone().flat_map(|k| ys.clone().map(move |j| (k, j))) {
-                    for i in xs.clone() {
+                for (k, j) in (0..count[2]).flat_map(|k| (0..count[1]).map(move |j| (k, j))) {
+                    for i in 0..count[0] {
                         let base = i + j * strides[1] + k * strides[2];
                         let at = |node: usize| padded[base + (node + GHOSTS) * strides[d]];
                         padded[base + ghost_at * strides[d]] = ghost_value(ghost, d, number(d), at);

@@ -156,7 +156,7 @@ impl WakeMeter {
         let centres_m = tracks.map(|track| [track[1][1], track[1][2]]);
         let (shear, wall_shear_per_s) = self.wall_shear(&seen)?;
         let vortex = |own: usize| {
-            let side = Side { plane: &plane, centres_m, own };
+            let side = Side { plane: &plane, centres_m, own, floor_m: ABOVE_LAYER * self.scales.spacing_m };
             let mut record = self.vortex(&seen, &side, cores[own].is_some(), &wind)?;
             let faces = self.grid.y_m.iter().zip(&shear).filter(|(y_m, _)| side.has(**y_m));
             record.outward_shear_per_s = faces.map(|(_, shear)| SIGN[own] * shear).fold(f64::NAN, f64::min);
@@ -245,7 +245,6 @@ impl WakeMeter {
             mean += circulation(from + i as f64 * step_m)? / WINDOW_RADII as f64;
         }
         let gamma_m2_s = self.radii_m().into_iter().map(circulation).collect::<Result<_, _>>()?;
-        let above = |y: f64, z: f64| z > ABOVE_LAYER * spacing_m && side.has(y);
         let slices_m = match seen.core(|| side.plane.core(centre_m, sign, self.core_radius * spacing_m))? {
             Some(core) if is_found => self.slices(seen, core, sign, f64::NEG_INFINITY)?,
             _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
@@ -260,28 +259,23 @@ impl WakeMeter {
             z_spread_m,
             gamma_5_15_m2_s: mean + missing,
             gamma_m2_s,
-            gamma_opposite_m2_s: side.plane.circulation_m2_s(-sign, above),
-            secondary: self.secondary(seen, side, above)?,
+            gamma_opposite_m2_s: side.plane.circulation_m2_s(-sign, |y_m, z_m| side.has_above(y_m, z_m)),
+            secondary: self.secondary(seen, side)?,
             outward_shear_per_s: f64::NAN,
         })
     }
 
-    fn secondary(
-        &self,
-        seen: &Faces,
-        side: &Side<'_>,
-        above: impl Fn(f64, f64) -> bool,
-    ) -> Result<SecondaryRecord, Error> {
+    fn secondary(&self, seen: &Faces, side: &Side<'_>) -> Result<SecondaryRecord, Error> {
         let sign = -SIGN[side.own];
         // The layer at the ground has vorticity of the same sign and would draw the centroid down.
-        let floor_m = ABOVE_LAYER * self.scales.spacing_m;
         let mut upper = side.plane.clone();
-        let below = self.grid.z_m.partition_point(|z_m| *z_m <= floor_m) * self.grid.y_m.len();
+        let below = self.grid.z_m.partition_point(|z_m| *z_m <= side.floor_m) * self.grid.y_m.len();
         upper.vorticity_per_s[..below].fill(0.0);
         let radius_m = self.core_radius * self.scales.spacing_m;
         // The first vortex of the other side has the same sign: a search that slides over to it has found nothing.
         let core_at = |guess_m: [f64; 2]| upper.core(guess_m, sign, radius_m).filter(|core| side.has(core.centre_m[0]));
-        let first = || side.plane.strongest_m(sign, &above).and_then(core_at);
+        let above = |y_m: f64, z_m: f64| side.has_above(y_m, z_m);
+        let first = || side.plane.strongest_m(sign, above).and_then(core_at);
         // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
         let apart = |y_m: f64, z_m: f64, core: &Core| {
             side.plane.grid.lateral_m(core.centre_m[0], y_m).hypot(z_m - core.centre_m[1]) > 2.0 * radius_m
@@ -297,7 +291,7 @@ impl WakeMeter {
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
         Ok(match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
-                let [y_spread_m, z_spread_m] = spread(&self.slices(seen, core, sign, floor_m)?);
+                let [y_spread_m, z_spread_m] = spread(&self.slices(seen, core, sign, side.floor_m)?);
                 let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
                 // Beside its own vortex, which is counted on over the sides.
                 let own_y_m = side.centres_m[side.own][0];
@@ -349,12 +343,18 @@ struct Side<'a> {
     plane: &'a EdgePlane<'a>,
     centres_m: [[f64; 2]; 2],
     own: usize,
+    /// Height above which vorticity is not that of the layer at the ground \[m\].
+    floor_m: f64,
 }
 
 impl Side<'_> {
     fn has(&self, y_m: f64) -> bool {
         let distance = |v: usize| self.plane.grid.lateral_m(self.centres_m[v][0], y_m).abs();
         distance(self.own) <= distance(1 - self.own)
+    }
+
+    fn has_above(&self, y_m: f64, z_m: f64) -> bool {
+        z_m > self.floor_m && self.has(y_m)
     }
 }
 

@@ -123,11 +123,6 @@ impl Curl {
         }
     }
 
-    /// Places along y and z of component `c`.
-    fn places(&self, c: usize) -> [usize; 2] {
-        [if c == 1 { self.cells[1] } else { self.faces[1] }, if c == 2 { self.cells[2] } else { self.faces[2] }]
-    }
-
     /// The faces across z of the cells in the planes that are owned; the highest one is with the last cells.
     pub(super) fn own_faces(&self, own: Range<usize>) -> Range<usize> {
         if own.end == self.cells[2] { own.start..self.faces[2] } else { own }
@@ -140,14 +135,13 @@ impl Curl {
     pub(super) fn enstrophy_m2_s2(&self, velocity: &Faces) -> Result<f64, Error> {
         let nx = self.cells[0];
         let component = |c: usize| {
-            let [ny, _] = self.places(c);
             let weight = |d: usize| if c == d { &self.cell_m[d] } else { &self.face_m[d] };
             let (x_m, y_m) = (weight(0), weight(1));
             let z_m = if c == 2 { &self.cell_m[2] } else { &self.corrected_m };
             let plane = |k: usize| {
                 let mut row = vec![0.0; nx];
                 let mut sum = 0.0;
-                for (j, y_m) in y_m.iter().enumerate().take(ny) {
+                for (j, y_m) in y_m.iter().enumerate() {
                     self.row(velocity, c, j, k, &mut row);
                     sum += y_m * row.iter().zip(x_m).map(|(w, x_m)| x_m * w * w).sum::<f64>();
                 }

@@ -29,16 +29,16 @@ impl Flow {
     pub(super) fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
         self.take_divergence(stage_s)?;
         let tolerance = self.settings.pressure_tolerance;
-        let solved = self.pressure_solver.solve(&mut self.work.phi, tolerance);
-        let phi = std::mem::take(&mut self.work.phi);
+        let solved = self.pressure_solver.solve(&mut self.phi, tolerance);
+        let phi = std::mem::take(&mut self.phi);
         let corrected = self.correct(stage_s, &phi);
-        self.work.phi = phi;
+        self.phi = phi;
         corrected?;
         let Err(Error::PressureNotSolved { reason, iterations, history, .. }) = &solved else { return solved };
         match reason {
             PressureFailure::RoundOff { .. } => {
                 let mut right = Aligned::zeros(self.layout.shape.len());
-                self.divergence.apply(self.work.predicted.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut right);
+                self.divergence.apply(self.predicted.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut right);
                 let size = norm(&self.layout.slabs, &right)?;
                 let left = self.repeat(stage_s, tolerance * size)?;
                 // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
@@ -56,9 +56,9 @@ impl Flow {
 
     /// The weighted divergence of `predicted` over `stage_s` into `phi`.
     pub(super) fn take_divergence(&mut self, stage_s: f64) -> Result<(), Error> {
-        self.layout.slabs.halos(&mut [&mut self.work.predicted[2]], self.divergence.reach)?;
-        let predicted = self.work.predicted.each_ref().map(Aligned::as_slice);
-        self.divergence.apply(predicted, 1.0 / stage_s, &mut self.work.phi);
+        self.layout.slabs.halos(&mut [&mut self.predicted[2]], self.divergence.reach)?;
+        let predicted = self.predicted.each_ref().map(Aligned::as_slice);
+        self.divergence.apply(predicted, 1.0 / stage_s, &mut self.phi);
         Ok(())
     }
 
@@ -76,16 +76,16 @@ impl Flow {
             last = size;
             let tolerance = self.settings.pressure_tolerance.max(REPETITION_TOLERANCE);
             unless_stalled(self.pressure_solver.solve(&mut rest, tolerance))?;
-            std::mem::swap(&mut self.work.predicted, &mut self.state.velocity);
+            std::mem::swap(&mut self.predicted, &mut self.state.velocity);
             self.correct(stage_s, &rest)?;
-            add(&mut self.work.phi, &rest, self.layout.shape);
+            add(&mut self.phi, &rest, self.layout.shape);
         }
         Ok(last)
     }
 
     /// `velocity = predicted - stage_s grad(phi)`.
     fn correct(&mut self, stage_s: f64, phi: &[f64]) -> Result<(), Error> {
-        let predicted = self.work.predicted.each_ref().map(Aligned::as_slice);
+        let predicted = self.predicted.each_ref().map(Aligned::as_slice);
         let mut velocity = self.state.velocity.each_mut().map(Aligned::as_mut_slice);
         let planes = correct(&self.ops, predicted, phi, stage_s, &mut velocity);
         self.layout.slabs.halos(&mut velocity, WHOLE)?;

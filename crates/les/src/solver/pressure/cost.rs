@@ -43,7 +43,7 @@ impl PressureMethod {
 
     pub(super) fn takes_multigrid(self, layout: &Layout) -> bool {
         match self {
-            Self::Auto => direct::dense_cells(layout) > DENSE_LIMIT,
+            Self::Auto => direct::dense_axes(layout).into_iter().any(|axis| layout.shape.n[axis] > DENSE_LIMIT),
             Self::Direct => false,
             Self::Multigrid => true,
         }

@@ -165,11 +165,6 @@ pub(crate) fn dense_axes(layout: &Layout) -> Vec<usize> {
     [1, 2].into_iter().filter(|axis| Some(*axis) != banded).collect()
 }
 
-/// Cells of the longest of these.
-pub(crate) fn dense_cells(layout: &Layout) -> usize {
-    dense_axes(layout).into_iter().map(|axis| layout.shape.n[axis]).max().unwrap_or(0)
-}
-
 /// The axis that is factorised: the longer of the bounded ones, axis 2 if they are about equal.
 fn banded_axis(layout: &Layout) -> Option<usize> {
     let bounded = |axis: usize| !layout.line[axis].is_periodic() && !layout.line[axis].is_thin();

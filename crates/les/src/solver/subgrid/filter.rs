@@ -101,7 +101,7 @@ fn cell_ghost(line: &Operators1d, wall_m_s: [f64; 2], index: isize) -> Ghost {
     let n = line.cells;
     let side = usize::from(index >= 0);
     let beyond = !line.is_periodic() && (index < 0 || index >= n as isize);
-    let odd = beyond && line.no_slip()[side];
+    let odd = beyond && line.ends.no_slip()[side];
     Ghost {
         index: resolve_cell(n, line.ends, index),
         sign: if odd { -1.0 } else { 1.0 },

@@ -29,14 +29,6 @@ struct Scratch {
     padded: Vec<f64>,
 }
 
-impl Scratch {
-    fn new(n: usize) -> Self {
-        let row = || vec![0.0; n];
-        let three = || [row(), row(), row()];
-        Self { gradient: [three(), three(), three()], row: vec![0.0; n + 1], padded: vec![0.0; n + 2 * HALO] }
-    }
-}
-
 /// Writes the eddy viscosity \[m^2/s\] of `velocity`, at most as large as lets no wave decay faster than `limit_per_s`, and
 /// returns the largest viscosity and the largest decay rate that it would have had without this limit.
 pub(super) fn eddy_viscosity(
@@ -48,13 +40,17 @@ pub(super) fn eddy_viscosity(
 ) -> Largest {
     let shape = operators.shape;
     let n = shape.n[0];
+    let scratch = || Scratch {
+        gradient: [0; 3].map(|_| [0; 3].map(|_| vec![0.0; n])),
+        row: vec![0.0; n + 1],
+        padded: vec![0.0; n + 2 * HALO],
+    };
     viscosity[shape.own_places()]
         .par_chunks_mut(shape.plane())
         .zip(shape.own())
-        .map_init(
-            || Scratch::new(n),
-            |scratch, (plane, k)| viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch),
-        )
+        .map_init(scratch, |scratch, (plane, k)| {
+            viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
+        })
         .reduce(Largest::default, Largest::or)
 }
 
