@@ -201,7 +201,7 @@ pub enum Error {
     #[error(
         "the {method} did not reach the tolerance {tolerance:.1e} of the pressure equation: {reason}; \
          relative residuals after each solve: {}",
-        listed(history)
+        history.iter().map(|residual| format!("{residual:.1e}")).collect::<Vec<_>>().join(", ")
     )]
     PressureNotSolved {
         /// Which solver.
@@ -274,11 +274,6 @@ pub enum PressureFailure {
     /// The right side holds a value that is not finite.
     #[error("the right side holds a value that is not finite")]
     NotFinite,
-}
-
-/// Residuals, one after the other.
-fn listed(history: &[f64]) -> String {
-    history.iter().map(|residual| format!("{residual:.1e}")).collect::<Vec<_>>().join(", ")
 }
 
 /// `value` if it is finite and `accept` holds, else [`Error::OutOfRange`].

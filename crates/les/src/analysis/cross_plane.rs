@@ -61,9 +61,8 @@ impl Flow {
         } else {
             return Err(refused());
         }
-        let centred = [0, 1, 2].map(|component| self.own_centre_velocity_m_s(component));
-        let [u, v, w] = centred;
-        let centred = [u?, v?, w?];
+        let centred = |component| self.own_centre_velocity_m_s(component);
+        let centred = [centred(0)?, centred(1)?, centred(2)?];
         let own: Vec<[f64; 3]> = (0..ny * self.own_planes().len())
             .map(|row| {
                 let node = |i: usize| centred.each_ref().map(|field| field[row * nx + i]);

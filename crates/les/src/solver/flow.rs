@@ -250,25 +250,22 @@ impl Flow {
         let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
         let is_damped = self.state.step < self.settings.damped_steps;
         let keeps = is_damped || self.state.implicit == [false; 3];
+        // Adams-Bashforth begins with a step of Runge-Kutta and then wants the terms of the initial field.
+        let begins = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
         let (mut begun, mut solved) = (None, None);
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
             self.update_model(stage.fraction, stage_s)?;
             let powers = self.predict(&stage, stage_s, keeps, begun.is_none())?;
-            begun.get_or_insert_with(|| (powers, self.first_terms(ratio)));
+            begun.get_or_insert_with(|| (powers, begins.then(|| self.state.previous_terms.clone())));
             self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
-            self.add_pressure();
+            // (25).
+            add(&mut self.state.pressure, &self.phi, self.layout.shape);
         }
         let (powers, first_terms) = begun.unwrap_or_default();
         self.state.previous_terms = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.previous_terms));
         Ok((powers, solved))
-    }
-
-    /// The terms of the initial field: Adams-Bashforth begins with a step of Runge-Kutta and then wants them.
-    fn first_terms(&self, ratio: Option<f64>) -> Option<[Aligned; 3]> {
-        let begins = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
-        begins.then(|| self.state.previous_terms.clone())
     }
 
     /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the increments by Crank-Nicolson and adds the
@@ -299,11 +296,6 @@ impl Flow {
             }
         }
         Ok(())
-    }
-
-    /// (25).
-    fn add_pressure(&mut self) {
-        add(&mut self.state.pressure, &self.phi, self.layout.shape);
     }
 
     /// Kinetic energy of each plane that is owned.

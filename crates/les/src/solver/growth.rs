@@ -74,7 +74,7 @@ impl Stability {
     /// Of a flow of `settings` on `mesh`, whose velocity in the cell of the indices along x, y, z is `velocity_m_s`.
     pub fn of(mesh: &Mesh, settings: &FlowSettings, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> Self {
         let rates = largest_rates(mesh, velocity_m_s);
-        let implicit = implicit_axes(mesh, settings, largest(&rates));
+        let implicit = implicit_axes(mesh, settings, rates.iter().flatten().copied().fold(0.0, f64::max));
         Self::at_rates(mesh, settings, implicit, &rates)
     }
 
@@ -183,10 +183,6 @@ fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sy
 /// Takes the larger of these rates and those of `others`, one direction after the other.
 fn larger(rates: &mut [Vec<f64>; 3], others: &[f64]) {
     rates.iter_mut().flatten().zip(others).for_each(|(rate, other)| *rate = rate.max(*other));
-}
-
-fn largest(rates: &[Vec<f64>; 3]) -> f64 {
-    rates.iter().flatten().copied().fold(0.0, f64::max)
 }
 
 /// The end of the low part of an interval, in which `holds`.

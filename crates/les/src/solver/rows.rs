@@ -35,12 +35,9 @@ impl Columns {
         for (i, row) in rows.iter().enumerate() {
             for &(index, c) in row {
                 // A wrapped tap belongs to the offset that the padded row shows it at.
-                let band = (0..=2 * HALO).find(|band| {
-                    let place = (i + band) as isize - HALO as isize;
-                    if periodic { place.rem_euclid(n as isize) == index as isize } else { place == index as isize }
-                });
-                if let Some(band) = band {
-                    bands[band][i] += c;
+                let band = if periodic { (index + HALO + n - i) % n } else { (index + HALO).wrapping_sub(i) };
+                if let Some(coefficients) = bands.get_mut(band) {
+                    coefficients[i] += c;
                 }
             }
         }

@@ -169,7 +169,7 @@ impl Operators1d {
         for entry in WALL_PAIRS {
             add_closure(&mut rows, sticks, [n, n - 1], 3, entry);
         }
-        Transport { rows, regular: regular(3, n.saturating_sub(3)), stencil }
+        Transport { rows, regular: 3..n.saturating_sub(3), stencil }
     }
 
     /// Transport of the normal velocity at the faces by itself; pairs alone at a no-slip wall.
@@ -197,7 +197,7 @@ impl Operators1d {
             }
         }
         let margin = |sticks: bool| if sticks { WALL_ROWS + 1 } else { 3 };
-        Transport { rows, regular: regular(margin(sticks[0]), n.saturating_sub(margin(sticks[1]))), stencil }
+        Transport { rows, regular: margin(sticks[0])..n.saturating_sub(margin(sticks[1])), stencil }
     }
 }
 
@@ -219,11 +219,6 @@ fn add_closure(
         rows[a].push((face, b, -c));
         rows[b].push((face, a, c));
     }
-}
-
-/// `low..high`, or nothing.
-fn regular(low: usize, high: usize) -> std::ops::Range<usize> {
-    if low < high { low..high } else { 0..0 }
 }
 
 /// Products of row `m` of the normal velocity away from walls: pairs of faces times the mean flux of the cell between.

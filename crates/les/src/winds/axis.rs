@@ -108,10 +108,9 @@ impl Axis {
                 (ghosts, below, above, None, Some(period_m))
             }
             Edges::Bounded { low, high } => {
-                let low = End::new(name, node_m, low, false)?;
-                let high = End::new(name, node_m, high, true)?;
-                let span_m = Some((low.end_m, high.end_m));
-                ([low.ghosts, high.ghosts], low.position_m, high.position_m, span_m, None)
+                let (low, below, low_m) = end(name, node_m, low, false)?;
+                let (high, above, high_m) = end(name, node_m, high, true)?;
+                ([low, high], below, above, Some((low_m, high_m)), None)
             }
         };
         let mut position_m = vec![below[1], below[0]];
@@ -215,40 +214,32 @@ pub(crate) fn refused(axis: &'static str, what: impl Into<String>, value: f64, a
     Error::BadDirection { axis, what: what.into(), value, allowed }
 }
 
-/// The ghosts of one bounded end, nearest first.
-struct End {
-    ghosts: [Ghost; GHOSTS],
-    position_m: [f64; GHOSTS],
-    /// Where the mesh ends.
-    end_m: f64,
-}
-
-impl End {
-    fn new(axis: &'static str, node_m: &[f64], side: Side, is_high: bool) -> Result<Self, Error> {
-        // Node counted from this end.
-        let inner = |i: usize| if is_high { node_m.len() - 1 - i } else { i };
-        let at = |i: usize| node_m[inner(i)];
-        let wall_m = match side {
-            Side::Open => {
-                // Beyond the last node only the cell next to it is completed, by its first ghost.
-                let first = 3.0 * at(0) - 3.0 * at(1) + at(2);
-                let ghost = Ghost::Parabola([inner(0), inner(1), inner(2)]);
-                return Ok(Self { ghosts: [ghost; 2], position_m: [first, 2.0 * first - at(0)], end_m: at(0) });
-            }
-            Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
-        };
-        let gap_m = if is_high { wall_m - at(0) } else { at(0) - wall_m };
-        let cell_m = (at(1) - at(0)).abs();
-        if !(0.0..cell_m).contains(&gap_m) {
-            let wall = if is_high { "high wall" } else { "low wall" };
-            return Err(refused(axis, wall, wall_m, "at the last node or less than a cell beyond it"));
+/// The ghosts of one bounded end and their positions, nearest first, and where the mesh ends.
+fn end(
+    axis: &'static str,
+    node_m: &[f64],
+    side: Side,
+    is_high: bool,
+) -> Result<([Ghost; GHOSTS], [f64; GHOSTS], f64), Error> {
+    // Node counted from this end.
+    let inner = |i: usize| if is_high { node_m.len() - 1 - i } else { i };
+    let at = |i: usize| node_m[inner(i)];
+    let wall_m = match side {
+        Side::Open => {
+            // Beyond the last node only the cell next to it is completed, by its first ghost.
+            let first = 3.0 * at(0) - 3.0 * at(1) + at(2);
+            let ghost = Ghost::Parabola([inner(0), inner(1), inner(2)]);
+            return Ok(([ghost; 2], [first, 2.0 * first - at(0)], at(0)));
         }
-        // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
-        let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
-        Ok(Self {
-            ghosts: mirrored.map(|i| Ghost::Image(inner(i), side)),
-            position_m: mirrored.map(|i| 2.0 * wall_m - at(i)),
-            end_m: wall_m,
-        })
+        Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
+    };
+    let gap_m = if is_high { wall_m - at(0) } else { at(0) - wall_m };
+    let cell_m = (at(1) - at(0)).abs();
+    if !(0.0..cell_m).contains(&gap_m) {
+        let wall = if is_high { "high wall" } else { "low wall" };
+        return Err(refused(axis, wall, wall_m, "at the last node or less than a cell beyond it"));
     }
+    // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
+    let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
+    Ok((mirrored.map(|i| Ghost::Image(inner(i), side)), mirrored.map(|i| 2.0 * wall_m - at(i)), wall_m))
 }

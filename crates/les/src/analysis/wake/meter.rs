@@ -118,9 +118,7 @@ impl WakeMeter {
 
     /// What the meter remembers, to be kept in a checkpoint.
     pub fn state(&self) -> [f64; 12] {
-        let mut state = [0.0; 12];
-        state.iter_mut().zip(self.track.as_flattened().as_flattened()).for_each(|(s, t)| *s = *t);
-        state
+        std::array::from_fn(|i| self.track.as_flattened().as_flattened()[i])
     }
 
     /// Takes back what [`Self::state`] gave.

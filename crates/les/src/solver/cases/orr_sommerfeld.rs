@@ -144,12 +144,12 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
             shifted[i][j] = a - guess * b[i][j];
         }
     }
-    let lu = Lu::new(shifted);
+    let (factors, order) = factorised(shifted);
     let mut w: Vec<C64> = z.iter().map(|z| C64::from((1.0 - z * z).powi(2))).collect();
     let mut c = guess;
     for _ in 0..60 {
         let right: Vec<C64> = b.iter().map(|row| row.iter().zip(&w).map(|(b, w)| b * w).sum()).collect();
-        let next = lu.solve(right);
+        let next = solved(&factors, &order, &right);
         let norm: C64 = next.iter().zip(&w).map(|(x, w)| x * w.conj()).sum();
         let square: f64 = w.iter().map(|w| w.norm_sqr()).sum();
         let found = guess + C64::from(square) / norm;
@@ -191,46 +191,40 @@ fn interpolate(values: &[C64], z: f64) -> C64 {
     above / below
 }
 
-/// Factors of a dense complex matrix with partial pivoting.
-struct Lu {
-    rows: Vec<Vec<C64>>,
-    order: Vec<usize>,
-}
-
-impl Lu {
-    fn new(mut rows: Vec<Vec<C64>>) -> Self {
-        let n = rows.len();
-        let mut order: Vec<usize> = (0..n).collect();
-        for k in 0..n {
-            let best = (k..n).max_by(|&a, &b| rows[a][k].norm().total_cmp(&rows[b][k].norm())).unwrap_or(k);
-            rows.swap(k, best);
-            order.swap(k, best);
-            let (head, tail) = rows.split_at_mut(k + 1);
-            let pivot = &head[k];
-            for row in tail {
-                let factor = row[k] / pivot[k];
-                row[k] = factor;
-                for (x, p) in row[k + 1..].iter_mut().zip(&pivot[k + 1..]) {
-                    *x -= factor * p;
-                }
+/// Factors of a dense complex matrix with partial pivoting, and the order of its rows.
+fn factorised(mut rows: Vec<Vec<C64>>) -> (Vec<Vec<C64>>, Vec<usize>) {
+    let n = rows.len();
+    let mut order: Vec<usize> = (0..n).collect();
+    for k in 0..n {
+        let best = (k..n).max_by(|&a, &b| rows[a][k].norm().total_cmp(&rows[b][k].norm())).unwrap_or(k);
+        rows.swap(k, best);
+        order.swap(k, best);
+        let (head, tail) = rows.split_at_mut(k + 1);
+        let pivot = &head[k];
+        for row in tail {
+            let factor = row[k] / pivot[k];
+            row[k] = factor;
+            for (x, p) in row[k + 1..].iter_mut().zip(&pivot[k + 1..]) {
+                *x -= factor * p;
             }
         }
-        Self { rows, order }
     }
+    (rows, order)
+}
 
-    fn solve(&self, right: Vec<C64>) -> Vec<C64> {
-        let n = right.len();
-        let mut x: Vec<C64> = self.order.iter().map(|&i| right[i]).collect();
-        for i in 0..n {
-            let sum: C64 = self.rows[i][..i].iter().zip(&x).map(|(l, x)| l * x).sum();
-            x[i] -= sum;
-        }
-        for i in (0..n).rev() {
-            let sum: C64 = self.rows[i][i + 1..].iter().zip(&x[i + 1..]).map(|(u, x)| u * x).sum();
-            x[i] = (x[i] - sum) / self.rows[i][i];
-        }
-        x
+/// Solves with the factors.
+fn solved(factors: &[Vec<C64>], order: &[usize], right: &[C64]) -> Vec<C64> {
+    let n = right.len();
+    let mut x: Vec<C64> = order.iter().map(|&i| right[i]).collect();
+    for i in 0..n {
+        let sum: C64 = factors[i][..i].iter().zip(&x).map(|(l, x)| l * x).sum();
+        x[i] -= sum;
     }
+    for i in (0..n).rev() {
+        let sum: C64 = factors[i][i + 1..].iter().zip(&x[i + 1..]).map(|(u, x)| u * x).sum();
+        x[i] = (x[i] - sum) / factors[i][i];
+    }
+    x
 }
 
 #[cfg(test)]

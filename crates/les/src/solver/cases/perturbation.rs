@@ -65,10 +65,9 @@ impl Perturbation {
     /// Noise about the vortices at `(+-1/2, height)` of the given root mean square of each component within 0.3 of them, in a
     /// box of the given length.
     pub(super) fn noise(length: f64, height: f64, rms: f64, seed: Option<u64>) -> Self {
-        let closed = |n: usize, irrational: f64| (n as f64 * irrational).fract();
         let irrationals = [0.618_033_988_749_894_9, 2.0_f64.sqrt(), 7.0_f64.sqrt(), 11.0_f64.sqrt(), 13.0_f64.sqrt()];
         let fraction = |n: usize, which: usize| match seed {
-            None => closed(n, irrationals[which]),
+            None => (n as f64 * irrationals[which]).fract(),
             Some(seed) => hashed(seed, (5 * n + which) as u64),
         };
         let wave = |n: usize| {

@@ -194,8 +194,7 @@ impl VortexPairCase {
     /// The mesh in units of `unit_m` \[m\].
     fn mesh(&self, unit_m: f64) -> Result<Mesh, Error> {
         let [length, width, height] = self.size.map(|l| l * unit_m);
-        let x =
-            if self.cells[0] == 1 { Direction::thin(length) } else { Direction::periodic(self.cells[0], 0.0, length) };
+        let x = Direction::periodic(self.cells[0], 0.0, length);
         let mut y = Direction::periodic(self.cells[1], -0.5 * width, 0.5 * width);
         if self.slip_sides {
             y.ends = Ends::Walls { low: Wall::Slip, high: Wall::Slip };
@@ -208,16 +207,13 @@ impl VortexPairCase {
 
     /// The initial velocities at the low faces of the cells of the mesh, in the units of the pair.
     fn faces(&self, mesh: &Mesh) -> [Vec<f64>; 3] {
-        let noise = (self.perturbation > 0.0)
+        // Nothing varies along x in a plane flow.
+        let varies = self.cells[0] > 1;
+        let noise = (varies && self.perturbation > 0.0)
             .then(|| Perturbation::noise(self.size[0], self.height, self.perturbation, self.seed));
-        let background = (self.background > 0.0)
+        let background = (varies && self.background > 0.0)
             .then(|| Perturbation::background(self.size, self.background, self.seed.unwrap_or_default()));
-        let disturbances: Vec<Perturbation> = if self.cells[0] == 1 {
-            // Nothing varies along x in a plane flow.
-            Vec::new()
-        } else {
-            noise.into_iter().chain(background).collect()
-        };
+        let disturbances: Vec<Perturbation> = noise.into_iter().chain(background).collect();
         let [nx, ny, _] = self.cells;
         std::array::from_fn(|component| {
             let at = |d: usize| if d == component { mesh.face_m(d) } else { mesh.centre_m(d) };

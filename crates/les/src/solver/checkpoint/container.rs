@@ -184,14 +184,11 @@ impl Reader {
         Ok(reader)
     }
 
-    fn seek(&mut self, place: u64) -> Result<(), Error> {
-        self.file.seek(SeekFrom::Start(place)).map(drop).map_err(|e| refused("read", &self.path, &e))
-    }
-
     /// The bytes of a plane.
     pub(super) fn plane(&mut self, number: usize) -> Result<Vec<u8>, Error> {
         let [_, plane_bytes] = self.counts;
-        self.seek(self.planes.start + number as u64 * (plane_bytes + CHECKSUM_BYTES))?;
+        let place = SeekFrom::Start(self.planes.start + number as u64 * (plane_bytes + CHECKSUM_BYTES));
+        self.file.seek(place).map_err(|e| refused("read", &self.path, &e))?;
         let mut bytes = vec![0; plane_bytes as usize];
         let mut stored = self.planes.checksum;
         self.fill(&mut bytes)?;

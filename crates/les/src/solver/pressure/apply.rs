@@ -7,7 +7,7 @@ use std::ops::Range;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-use super::super::layout::{Layout, Shape};
+use super::super::layout::Layout;
 use super::super::operators_1d::{Operators1d, Taps};
 use super::super::rows::{Columns, HALO, cut_rows, from_places, pad};
 use super::super::slabs::Slabs;
@@ -19,9 +19,7 @@ use crate::Error;
 /// Every row is applied to the differences from its own cell: a constant leaves exactly nothing, however large it is.
 #[derive(Debug)]
 pub(crate) struct Operator {
-    /// Shape of its fields.
-    pub(super) shape: Shape,
-    /// What the ranks exchange of its fields.
+    /// Shape of its fields, and what the ranks exchange of them.
     pub(super) slabs: Slabs,
     mass_m: [Vec<f64>; 3],
     /// `Dw_0 f_0^-1 Dw_0^T` by columns.
@@ -43,7 +41,6 @@ impl Operator {
             rows.iter().enumerate().map(others).collect()
         };
         Self {
-            shape: layout.shape,
             slabs: layout.slabs.clone(),
             mass_m: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
             along: Columns::new(&rows[0], periodic),
@@ -55,7 +52,7 @@ impl Operator {
 
     /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`.
     pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) {
-        let (shape, n0) = (self.shape, self.shape.n[0]);
+        let (shape, n0) = (self.slabs.shape, self.slabs.shape.n[0]);
         let planes = residual[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
         planes.for_each_init(
             || vec![0.0; n0 + 2 * HALO],
@@ -72,8 +69,8 @@ impl Operator {
     /// # Errors
     /// Those of the exchange between ranks.
     pub(crate) fn residual_norm(&self, g: &[f64], phi: &[f64]) -> Result<f64, Error> {
-        let [n0, n1, _] = self.shape.n;
-        let planes = self.shape.own().into_par_iter();
+        let [n0, n1, _] = self.slabs.shape.n;
+        let planes = self.slabs.shape.own().into_par_iter();
         let squares = planes.map_init(
             || (vec![0.0; n0], vec![0.0; n0 + 2 * HALO]),
             |(out, padded), k| [(0..n1).map(|j| residual_row(self, g, phi, [j, k], out, padded)).sum()],
@@ -87,7 +84,7 @@ impl Operator {
     /// # Errors
     /// Those of the exchange between ranks.
     pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> Result<f64, Error> {
-        let (plane, own) = (self.shape.plane(), self.shape.own_places());
+        let (plane, own) = (self.slabs.shape.plane(), self.slabs.shape.own_places());
         let parts: Vec<[f64; 2]> = to[own.clone()]
             .par_chunks_mut(plane)
             .zip(from[own].par_chunks(plane))
@@ -114,7 +111,7 @@ impl Operator {
     /// # Errors
     /// Those of the exchange between ranks.
     pub(crate) fn round_off(&self, phi: &[f64]) -> Result<f64, Error> {
-        let (n0, shape) = (self.shape.n[0], self.shape);
+        let (n0, shape) = (self.slabs.shape.n[0], self.slabs.shape);
         let sum = |taps: &Taps| {
             taps.iter().map(|tap| tap.1 * tap.1).sum::<f64>() + taps.iter().map(|tap| tap.1).sum::<f64>().powi(2)
         };
@@ -137,7 +134,7 @@ impl Operator {
 
     /// Gives each value that is owned, with `scale` times the mass of its cell, to `act`.
     pub(super) fn each_mass(&self, field: &mut [f64], scale: f64, act: impl Fn(&mut f64, f64) + Sync) {
-        let (n0, shape) = (self.shape.n[0], self.shape);
+        let (n0, shape) = (self.slabs.shape.n[0], self.slabs.shape);
         field[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
             for (row, m1) in plane.chunks_mut(n0).zip(&self.mass_m[1]) {
                 let mass = m1 * self.mass_m[2][k] * scale;
@@ -149,13 +146,13 @@ impl Operator {
 
 /// Residual of row `(j, k)`; returns the sum of its squares.
 fn residual_row(op: &Operator, g: &[f64], phi: &[f64], [j, k]: [usize; 2], out: &mut [f64], padded: &mut [f64]) -> f64 {
-    let at = op.shape.row(j, k);
+    let at = op.slabs.shape.row(j, k);
     let own = &phi[at.clone()];
     let (m1, m2) = (op.mass_m[1][j], op.mass_m[2][k]);
     // Places that are not needed see the row itself.
     let mut taps = [(at.start, 0.0); MOST_TAPS];
-    let below = op.across[0][j].iter().map(|&(i, c)| (op.shape.row(i, k).start, c * m2));
-    let aside = op.across[1][k].iter().map(|&(i, c)| (op.shape.row(j, i).start, c * m1));
+    let below = op.across[0][j].iter().map(|&(i, c)| (op.slabs.shape.row(i, k).start, c * m2));
+    let aside = op.across[1][k].iter().map(|&(i, c)| (op.slabs.shape.row(j, i).start, c * m1));
     for (tap, new) in taps.iter_mut().zip(below.chain(aside)) {
         *tap = new;
     }

@@ -71,7 +71,7 @@ impl PressureSolver {
             field.fill(0.0);
             return Ok(Solved { residual: 0.0, iterations: 0, factor: None });
         }
-        let own = operator.shape.own_places();
+        let own = operator.slabs.shape.own_places();
         let (mut iterations, mut history, mut last, mut attainable) = (0, Vec::new(), 1.0, 0.0);
         let reason = loop {
             // Of a later solve the right side is what the field so far leaves.

@@ -396,7 +396,7 @@ impl RunPlan {
 }
 
 impl Kept {
-    /// Bit 0 of the first number: whether a budget is open; bit 1: whether the window is there, which older checkpoints lack.
+    /// The first number is 3 if a budget is open, else 2.
     fn bytes(&self) -> Vec<u8> {
         let open = self.open.map_or([2, 0, 0, 0], |b| [3, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
         let Self { energy, window, .. } = self;
@@ -407,15 +407,12 @@ impl Kept {
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let number = |at: usize| Some(u64::from_le_bytes(*bytes.get(8 * at..)?.first_chunk()?));
         let float = |at: usize| number(at).map(f64::from_bits);
-        let flags = number(0).filter(|flags| *flags < 4)?;
+        let is_open = number(0).filter(|kind| matches!(kind, 2 | 3))? == 3;
         let (rate_m5_s3, power_m5_s3) = (float(2)?, float(3)?);
-        let open = (flags & 1 == 1).then_some(EnergyBudget { step: number(1)?, rate_m5_s3, power_m5_s3 });
+        let open = is_open.then_some(EnergyBudget { step: number(1)?, rate_m5_s3, power_m5_s3 });
         let energy = EnergyBound { bound_m5_s2: float(4)?, largest_m5_s2: float(5)? };
-        let (window, own) = match flags & 2 {
-            0 => (Window::default(), 48),
-            _ => (Window { fed_m5_s3: float(6)?, taken_m5_s3: float(7)? }, 64),
-        };
-        Some((Self { open, energy, window }, bytes.get(own..)?))
+        let window = Window { fed_m5_s3: float(6)?, taken_m5_s3: float(7)? };
+        Some((Self { open, energy, window }, bytes.get(64..)?))
     }
 }
 
