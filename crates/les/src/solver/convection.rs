@@ -74,7 +74,11 @@ fn along_row(target: &Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux
         let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
         add_transport(out, 1.0, transport.stencil, &[at(1), at(2), at(3), at(4)], &values);
         if !periodic {
-            irregular_columns(transport, out, &velocity[0][start..start + n]);
+            // Columns to which the formula of the interior does not apply are replaced.
+            let values = &velocity[0][start..start + n];
+            for i in irregular(transport, n) {
+                out[i] = transport.rows[i].iter().map(|&(face, cell, c)| c * values[face] * values[cell]).sum();
+            }
         }
     } else {
         flux_row(target, 0, 0, &mut flux[0], fluxes);
@@ -98,14 +102,6 @@ fn along_row(target: &Row<'_>, out: &mut [f64], padded: &mut [Vec<f64>; 2], flux
                 out[i] += inverse[i] * (sum - done[i]);
             }
         }
-    }
-}
-
-/// Replaces the columns of a normal velocity to which the formula of the interior does not apply.
-#[inline(always)]
-fn irregular_columns(transport: &Transport, out: &mut [f64], values: &[f64]) {
-    for i in irregular(transport, out.len()) {
-        out[i] = transport.rows[i].iter().map(|&(face, cell, c)| c * values[face] * values[cell]).sum();
     }
 }
 

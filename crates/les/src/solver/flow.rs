@@ -168,7 +168,7 @@ impl Flow {
         self.state.implicit = self.layout.direction.map(|d| implicit[d]);
         // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long. The terms are no history.
         self.update_model(1.0, 0.0)?;
-        self.predict(&Stage { fraction: 1.0, new: 1.0, old: 0.0 }, 1.0, false, false)?;
+        self.predict(Stage { fraction: 1.0, new: 1.0, old: 0.0 }, 1.0, false, false)?;
         self.state.previous_terms.iter_mut().for_each(|terms| terms.fill(0.0));
         self.take_divergence(1.0)?;
         unless_stalled(self.pressure_solver.solve(&mut self.phi, self.settings.pressure_tolerance))?;
@@ -256,7 +256,7 @@ impl Flow {
         for stage in self.settings.scheme.stages(ratio) {
             let stage_s = stage.fraction * step_s;
             self.update_model(stage.fraction, stage_s)?;
-            let powers = self.predict(&stage, stage_s, keeps, begun.is_none())?;
+            let powers = self.predict(stage, stage_s, keeps, begun.is_none())?;
             begun.get_or_insert_with(|| (powers, begins.then(|| self.state.previous_terms.clone())));
             self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);

@@ -89,9 +89,10 @@ impl Momentum {
             (0..n[axis]).map(|face| if face < own.first_face() { 0.0 } else { 1.0 / own.face_mass_m[face] }).collect();
         let laplacian = std::array::from_fn(|b| {
             let per_h2 = line[b].cell_mass_m[0].powi(-2);
-            let pairs = line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
             let rows = if b == axis { line[b].laplacian_at_faces() } else { line[b].laplacian_at_cells().0 };
-            RowOperator::new(layout, b, rows).with_pairs(pairs)
+            let mut along = RowOperator::new(layout, b, rows);
+            along.even = line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
+            along
         });
         let wall_source = std::array::from_fn(|b| {
             if line[b].is_fourier() {

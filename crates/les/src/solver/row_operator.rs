@@ -15,7 +15,7 @@ pub(crate) struct RowOperator {
     pub(super) rows: Vec<Taps>,
     pub(super) columns: Columns,
     /// Coefficients of the pairs at the distances 1, 2 and 3, the same in all rows, of a second difference on equal periodic cells.
-    even: Option<[f64; 3]>,
+    pub(super) even: Option<[f64; 3]>,
 }
 
 impl RowOperator {
@@ -24,11 +24,6 @@ impl RowOperator {
         let periodic = layout.line[axis].is_periodic();
         let columns = if axis == 0 { Columns::new(&rows, periodic) } else { Columns::default() };
         Self { axis, shape: layout.shape, periodic, rows, columns, even: None }
-    }
-
-    /// The same, which is a second difference with these coefficients of pairs if there are any.
-    pub(crate) fn with_pairs(self, even: Option<[f64; 3]>) -> Self {
-        Self { even, ..self }
     }
 
     /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes 1 and 2).

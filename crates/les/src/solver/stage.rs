@@ -53,13 +53,7 @@ fn blocks<'a>(shape: Shape, predicted: &'a mut [Aligned; 3], previous: &'a mut [
 impl Flow {
     /// The right side of (22) into `predicted`, or the velocity with all but implicit viscosity if `keeps` says that no line solve of the
     /// increments follows; its terms into the previous ones. The work of the terms if `measured`.
-    pub(super) fn predict(
-        &mut self,
-        stage: &Stage,
-        stage_s: f64,
-        keeps: bool,
-        measured: bool,
-    ) -> Result<Powers, Error> {
+    pub(super) fn predict(&mut self, stage: Stage, stage_s: f64, keeps: bool, measured: bool) -> Result<Powers, Error> {
         let shape = self.layout.shape;
         let keep = if keeps { 1.0 } else { 0.0 };
         // What is written leaves the flow, which the blocks read.
@@ -100,7 +94,7 @@ impl Flow {
     fn increments(
         &self,
         block: Block<'_>,
-        (stage, stage_s, keep, measured): (&Stage, f64, f64, bool),
+        (stage, stage_s, keep, measured): (Stage, f64, f64, bool),
         scratch: &mut [Scratch; 3],
     ) -> [Powers; 3] {
         let (n, k) = (self.layout.shape.n[0], block.plane);

@@ -87,8 +87,11 @@ impl Stencil {
 /// Rows of the normal velocity that a no-slip wall changes.
 const WALL_ROWS: usize = 7;
 
+/// An entry of a skew matrix: row, column, value.
+type SkewEntry = (usize, usize, f64);
+
 /// Extra products of flux 3 on the cells 0, 1, 2 at a no-slip wall (the upper triangle; the lower is its negative).
-const WALL_PAIRS: [(usize, usize, f64); 3] = [(0, 1, -1.0 / 48.0), (0, 2, 1.0 / 36.0), (1, 2, -1.0 / 24.0)];
+const WALL_PAIRS: [SkewEntry; 3] = [(0, 1, -1.0 / 48.0), (0, 2, 1.0 / 36.0), (1, 2, -1.0 / 24.0)];
 
 /// Mean of the weighted fluxes along the wall at the faces 1 to 4: coefficients of the cells 0 to 5.
 #[rustfmt::skip]
@@ -101,7 +104,7 @@ const WALL_MEAN: [[f64; 6]; 4] = [
 
 /// Upper triangles of `S^1` to `S^4` at a no-slip wall for the normal velocity at the faces.
 #[rustfmt::skip]
-const WALL_SKEW: [&[(usize, usize, f64)]; 4] = [
+const WALL_SKEW: [&[SkewEntry]; 4] = [
     &[(0, 1, 0.313_476_562_5), (0, 3, -3.0 / 256.0), (1, 2, 0.306_089_743_589_743_56), (1, 4, 1.0 / 768.0),
       (2, 3, -0.032_738_413_983_667_558), (3, 4, -1.0 / 768.0)],
     &[(0, 1, 0.003_016_493_055_555_5), (0, 3, -3.0 / 256.0), (0, 4, 0.001_406_25), (1, 2, 81.0 / 256.0),
@@ -203,13 +206,7 @@ impl Operators1d {
 
 /// Adds the skew entry `(a, b, c)` of the flux through `face` at each end that sticks, places counted from there; the last face and the
 /// last place of a value are `last`.
-fn add_closure(
-    rows: &mut [Vec<Product>],
-    sticks: [bool; 2],
-    last: [usize; 2],
-    face: usize,
-    (a, b, c): (usize, usize, f64),
-) {
+fn add_closure(rows: &mut [Vec<Product>], sticks: [bool; 2], last: [usize; 2], face: usize, (a, b, c): SkewEntry) {
     if sticks[0] {
         rows[a].push((face, b, c));
         rows[b].push((face, a, -c));

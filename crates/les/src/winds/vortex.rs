@@ -82,11 +82,10 @@ impl VortexPair {
         check("spacing_m", self.spacing_m, "positive", |v| v > 0.0)?;
         check("core_radius_m", self.core_radius_m, "positive", |v| v > 0.0)?;
         check("lateral_position_m", self.lateral_position_m, "finite", |_| true)?;
-        let (allowed, positive) = match self.ground {
-            Ground::Image => ("positive, above the ground", true),
-            Ground::None => ("finite", false),
-        };
-        check("height_m", self.height_m, allowed, |v| !positive || v > 0.0)
+        match self.ground {
+            Ground::Image => check("height_m", self.height_m, "positive, above the ground", |v| v > 0.0),
+            Ground::None => check("height_m", self.height_m, "finite", |_| true),
+        }
     }
 
     /// The wind of this pair.

@@ -154,8 +154,9 @@ impl WakeMeter {
         let centres_m = tracks.map(|track| [track[1][1], track[1][2]]);
         let (shear, wall_shear_per_s) = self.wall_shear(&seen)?;
         let vortex = |own: usize| {
-            let side = Side { plane: &plane, centres_m, own, floor_m: ABOVE_LAYER * self.scales.spacing_m };
-            let mut record = self.vortex(&seen, &side, cores[own].is_some(), &wind)?;
+            let (is_found, floor_m) = (cores[own].is_some(), ABOVE_LAYER * self.scales.spacing_m);
+            let side = Side { plane: &plane, centres_m, own, is_found, floor_m };
+            let mut record = self.vortex(&seen, &side, &wind)?;
             let faces = self.grid.y_m.iter().zip(&shear).filter(|(y_m, _)| side.has(**y_m));
             record.outward_shear_per_s = faces.map(|(_, shear)| SIGN[own] * shear).fold(f64::NAN, f64::min);
             Ok::<_, Error>(record)
@@ -226,13 +227,7 @@ impl WakeMeter {
         seen.slabs.planes(own)
     }
 
-    fn vortex(
-        &self,
-        seen: &Faces,
-        side: &Side<'_>,
-        is_found: bool,
-        wind: &GridSnapshot,
-    ) -> Result<VortexRecord, Error> {
+    fn vortex(&self, seen: &Faces, side: &Side<'_>, wind: &GridSnapshot) -> Result<VortexRecord, Error> {
         let (sign, centre_m) = (SIGN[side.own], side.centres_m[side.own]);
         let spacing_m = self.scales.spacing_m;
         let circulation = |radius_m: f64| circulation_m2_s(wind, centre_m, radius_m, 0.0, POINTS);
@@ -244,11 +239,11 @@ impl WakeMeter {
         }
         let gamma_m2_s = self.radii_m().into_iter().map(circulation).collect::<Result<_, _>>()?;
         let slices_m = match seen.core(|| side.plane.core(centre_m, sign, self.core_radius * spacing_m))? {
-            Some(core) if is_found => self.slices(seen, core, sign, f64::NEG_INFINITY)?,
+            Some(core) if side.is_found => self.slices(seen, core, sign, f64::NEG_INFINITY)?,
             _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
         };
         let [y_spread_m, z_spread_m] = spread(&slices_m);
-        let missing = if is_found { 0.0 } else { f64::NAN };
+        let missing = if side.is_found { 0.0 } else { f64::NAN };
         Ok(VortexRecord {
             y_m: centre_m[0] + missing,
             z_m: centre_m[1] + missing,
@@ -341,6 +336,8 @@ struct Side<'a> {
     plane: &'a EdgePlane<'a>,
     centres_m: [[f64; 2]; 2],
     own: usize,
+    /// Whether its vortex is there.
+    is_found: bool,
     /// Height above which vorticity is not that of the layer at the ground \[m\].
     floor_m: f64,
 }

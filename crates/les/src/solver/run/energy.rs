@@ -98,10 +98,10 @@ fn cause(flow: &Flow) -> Result<String, Error> {
     if let Some(note) = flow.stiffness().note(step_s, settings.damped_steps) {
         return Ok(note);
     }
-    if settings.pressure_tolerance > LOOSE {
+    let tolerance = settings.pressure_tolerance;
+    if tolerance > LOOSE {
         return Ok(format!(
-            "the pressure tolerance {:e} leaves divergence, which feeds energy: take 1e-8 or less",
-            settings.pressure_tolerance
+            "the pressure tolerance {tolerance:e} leaves divergence, which feeds energy: take 1e-8 or less"
         ));
     }
     Ok("the time step is too long for this flow: shorten it".into())

@@ -65,6 +65,7 @@ impl StepEnergy {
 
 impl std::fmt::Display for StepEnergy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { pressure_tolerance, .. } = self;
         let does = if self.share > 0.0 { "feeds the flow with" } else { "takes" };
         if self.share.is_finite() {
             write!(f, "the time step {does} {:.2} times what viscosity and subgrid model take", self.share.abs())?;
@@ -72,12 +73,8 @@ impl std::fmt::Display for StepEnergy {
             write!(f, "the time step {does} energy, of which nothing else takes any,")?;
         }
         write!(f, " (energy_residual over {STEPS} steps at Courant number {:.2}): ", self.courant)?;
-        if self.share > 0.0 && self.pressure_tolerance > LOOSE {
-            return write!(
-                f,
-                "the pressure tolerance {:e} leaves divergence, take 1e-8 or less",
-                self.pressure_tolerance
-            );
+        if self.share > 0.0 && *pressure_tolerance > LOOSE {
+            return write!(f, "the pressure tolerance {pressure_tolerance:e} leaves divergence, take 1e-8 or less");
         }
         if self.share > 0.0 && self.scheme == TimeScheme::AdamsBashforth2 {
             write!(f, "take Runge-Kutta, or ")?;
