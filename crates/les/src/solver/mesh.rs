@@ -8,6 +8,7 @@
 
 pub use super::mapping::{Mapping, MappingFn};
 use crate::Error;
+pub(crate) use crate::winds::axis::AXIS_NAMES;
 use crate::winds::axis::{self, jump_at};
 
 /// What bounds a direction at one of its ends.
@@ -176,9 +177,6 @@ pub(crate) fn refused(axis: usize, what: impl Into<String>, value: f64, allowed:
 
 /// Largest ratio of neighbouring cells.
 const MAX_NEIGHBOUR_RATIO: (f64, &str) = (1.5, "at most 1.5");
-
-/// Names of the three directions in messages and files.
-pub(crate) const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 
 /// A mesh of three directions: x along the flight, y across it, z up.
 #[derive(Debug, Clone)]

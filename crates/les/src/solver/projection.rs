@@ -48,24 +48,21 @@ impl Divergence {
     /// Largest modulus of the divergence in the planes that are owned \[1/s\].
     pub(crate) fn largest_per_s(&self, velocity: [&[f64]; 3]) -> f64 {
         let n = self.shape.n[0];
-        self.shape
-            .own()
-            .into_par_iter()
-            .map_init(
-                || (vec![0.0; n + 2 * HALO], vec![0.0; n]),
-                |(padded, row), k| {
-                    let mut largest = 0.0_f64;
-                    for j in 0..self.shape.n[1] {
-                        divergence_row(self, velocity, 1.0, j, k, row, padded);
-                        let across = self.cell_mass[1][j] * self.cell_mass[2][k];
-                        for (value, mass) in row.iter().zip(&self.cell_mass[0]) {
-                            largest = largest.max((value / (mass * across)).abs());
-                        }
+        let largest = self.shape.own().into_par_iter().map_init(
+            || (vec![0.0; n + 2 * HALO], vec![0.0; n]),
+            |(padded, row), k| {
+                let mut largest = 0.0_f64;
+                for j in 0..self.shape.n[1] {
+                    divergence_row(self, velocity, 1.0, j, k, row, padded);
+                    let across = self.cell_mass[1][j] * self.cell_mass[2][k];
+                    for (value, mass) in row.iter().zip(&self.cell_mass[0]) {
+                        largest = largest.max((value / (mass * across)).abs());
                     }
-                    largest
-                },
-            )
-            .reduce(|| 0.0, f64::max)
+                }
+                largest
+            },
+        );
+        largest.reduce(|| 0.0, f64::max)
     }
 }
 

@@ -48,6 +48,9 @@ pub enum Edges {
     },
 }
 
+/// Names of the three directions in messages and files.
+pub(crate) const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
+
 /// Nodes beyond each end that the stencil may need.
 pub(crate) const GHOSTS: usize = 2;
 

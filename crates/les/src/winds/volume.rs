@@ -4,7 +4,7 @@
 //! a plane. Where the mesh ends at open sides nothing is known beyond: NaN. Check: linear fields are exact on staggered and
 //! stretched meshes, the error of a sampled vortex falls with the third power of the cell.
 
-use super::axis::{Axis, Edges, GHOSTS, Side};
+use super::axis::{AXIS_NAMES, Axis, Edges, GHOSTS, Side};
 use super::grid_wind::{ghost_places, ghost_value};
 use super::strain::largest_strain_per_s;
 use super::wind::Wind;
@@ -151,8 +151,7 @@ impl Wind for VolumeSnapshot {
 impl Padded {
     /// `number` says for each direction which component of a velocity the values are to its walls.
     fn new(component: &VolumeComponent, edges: [Edges; 3], number: impl Fn(usize) -> usize) -> Result<Self, Error> {
-        const NAMES: [&str; 3] = ["x", "y", "z"];
-        let [x, y, z] = std::array::from_fn(|d| Axis::new(NAMES[d], &component.nodes_m[d], edges[d]));
+        let [x, y, z] = std::array::from_fn(|d| Axis::new(AXIS_NAMES[d], &component.nodes_m[d], edges[d]));
         let axes = [x?, y?, z?];
         let [nx, ny, nz] = axes.each_ref().map(Axis::nodes);
         let values = &component.values;

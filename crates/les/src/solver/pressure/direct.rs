@@ -90,16 +90,11 @@ impl Direct {
         self.slabs.shape.n[2] >= ENOUGH_PLANES
     }
 
-    /// Values handled at a time by the transform of the rows.
-    fn slab(&self) -> usize {
-        let [n0, n1, n2] = self.slabs.shape.n;
-        if self.by_planes() { n0 * n1 } else { n0 * (n1 * n2).div_ceil(64).next_multiple_of(6) }
-    }
-
     /// Transforms along axis 0, and along axis 1 where that is done plane by plane.
     fn rows(&self, way: Way, field: &mut [f64]) {
-        let n0 = self.slabs.shape.n[0];
-        field.par_chunks_mut(self.slab()).for_each_init(Work::default, |work, slab| {
+        let [n0, n1, n2] = self.slabs.shape.n;
+        let rows = if self.by_planes() { n1 } else { (n1 * n2).div_ceil(64).next_multiple_of(6) };
+        field.par_chunks_mut(n0 * rows).for_each_init(Work::default, |work, slab| {
             if way == Way::There {
                 self.rows.apply(way, slab, work);
             }

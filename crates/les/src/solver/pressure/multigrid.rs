@@ -262,8 +262,7 @@ impl Axis {
             *x += distance;
             Some(*x)
         }));
-        let end = if centre.len() > line.cells { centre.pop() } else { None };
-        let period = end.filter(|_| line.is_periodic() && line.cells > 1);
+        let period = centre.pop().filter(|_| line.is_periodic() && line.cells > 1);
         let axis = Self::new(line.cell_mass_m.iter().map(|mass| mass / unit_m).collect(), centre, period);
         let link = axis.link.iter().map(|c| RAISED * c).collect();
         let others = |(i, row): (usize, &Taps)| row.iter().filter(|tap| tap.0 != i).map(|&(j, c)| (j, -c)).collect();
