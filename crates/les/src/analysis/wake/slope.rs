@@ -36,8 +36,7 @@ impl Slope {
             return Self { taps: vec![Vec::new(); faces], from_walls: vec![0.0; faces] };
         }
         let nodes = extended(direction, component);
-        let mut slope = Self { taps: Vec::with_capacity(faces), from_walls: Vec::with_capacity(faces) };
-        for face in 0..faces {
+        let at_face = |face: usize| {
             let at_m = direction.at(face as f64).0;
             let below = nodes.partition_point(|(x_m, _)| *x_m < at_m);
             let first = below.saturating_sub(TAPS / 2).min(nodes.len() - TAPS);
@@ -54,10 +53,10 @@ impl Slope {
                     },
                 }
             }
-            slope.taps.push(taps);
-            slope.from_walls.push(from_walls);
-        }
-        slope
+            (taps, from_walls)
+        };
+        let (taps, from_walls) = (0..faces).map(at_face).unzip();
+        Self { taps, from_walls }
     }
 }
 

@@ -85,15 +85,12 @@ impl Operator {
     /// Those of the exchange between ranks.
     pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> Result<f64, Error> {
         let (plane, own) = (self.slabs.shape.plane(), self.slabs.shape.own_places());
-        let parts: Vec<[f64; 2]> = to[own.clone()]
-            .par_chunks_mut(plane)
-            .zip(from[own].par_chunks(plane))
-            .map(|(to, from)| {
-                to.copy_from_slice(from);
-                [kernel::sum(to), kernel::dot(to, to)]
-            })
-            .collect();
-        let [sum, squares] = self.slabs.sums(parts)?;
+        let planes = to[own.clone()].par_chunks_mut(plane).zip(from[own].par_chunks(plane));
+        let parts = planes.map(|(to, from)| {
+            to.copy_from_slice(from);
+            [kernel::sum(to), kernel::dot(to, to)]
+        });
+        let [sum, squares] = self.slabs.sums(parts.collect())?;
         let (mut volume, mut mass) = (1.0, 1.0);
         for axis in &self.mass_m {
             volume *= axis.iter().sum::<f64>();

@@ -45,13 +45,11 @@ pub(super) fn eddy_viscosity(
         row: vec![0.0; n + 1],
         padded: vec![0.0; n + 2 * HALO],
     };
-    viscosity[shape.own_places()]
-        .par_chunks_mut(shape.plane())
-        .zip(shape.own())
-        .map_init(scratch, |scratch, (plane, k)| {
-            viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
-        })
-        .reduce(Largest::default, Largest::or)
+    let planes = viscosity[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+    let largest = planes.map_init(scratch, |scratch, (plane, k)| {
+        viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
+    });
+    largest.reduce(Largest::default, Largest::or)
 }
 
 /// Extremes of the eddy viscosity.
