@@ -8,8 +8,8 @@ use crate::parallel::map_indexed;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
-use crate::wake_detection::DetectorOptions;
 use crate::wake_detection::cells::Cells;
+use crate::wake_detection::options::DetectorOptions;
 
 /// Distance of places \[m\] where lines and gates are closer; between them a wake loses little of its statistic.
 const STEP_M: f64 = 4.0;

@@ -11,12 +11,13 @@ use ndarray::{Array1, Array2, ArrayView1, Axis, s};
 
 use crate::error::{Error, enough_velocities, increasing, not_empty, positive};
 use crate::linalg::cholesky::cholesky;
-use crate::retrieval::{Gate, ScanMap, Turbulence};
+use crate::retrieval::{Gate, ScanMap};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::background::Background;
 use crate::wake_detection::bank::{Bank, Sector, Template, shown};
 use crate::wake_detection::cells::Cells;
+use crate::wake_detection::options::DetectorOptions;
 
 /// One part in so many of the cells may be missing in a scan.
 const MISSING: usize = 2;
@@ -25,24 +26,6 @@ const REGULAR: f64 = 1e-9;
 
 /// What is nearer to a vortex than this \[m\] is not taken for background.
 const WAKE_M: f64 = 25.0;
-
-/// What a test takes for granted.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct DetectorOptions {
-    /// Least and largest distance of a pair's vortices that is tried \[m\].
-    pub spacing_m: (f64, f64),
-    /// Whether single vortices are tried, too: the partner may be out of view.
-    pub single_vortices: bool,
-    /// The background besides wind and the noise of the map's standard deviations.
-    pub turbulence: Option<Turbulence>,
-}
-
-impl Default for DetectorOptions {
-    /// Wakes of wings of 20 to 80 m (spacing pi/4 of the span), single vortices, and no turbulence.
-    fn default() -> Self {
-        Self { spacing_m: (16.0, 63.0), single_vortices: true, turbulence: None }
-    }
-}
 
 /// The test of one scan's geometry, noise and background for a wake.
 #[derive(Debug, Clone)]

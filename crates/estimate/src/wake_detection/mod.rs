@@ -15,10 +15,12 @@ mod bank;
 mod cells;
 mod detector;
 mod law;
+mod options;
 mod power;
 mod spikes;
 
-pub use detector::{DetectorOptions, WakeDetector, WakeStatistic};
+pub use detector::{WakeDetector, WakeStatistic};
 pub use law::EmptyScanLaw;
+pub use options::DetectorOptions;
 pub use power::{DetectionTrials, Share};
 pub use spikes::without_spikes;

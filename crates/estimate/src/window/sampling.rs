@@ -1,7 +1,8 @@
 //! How the samples relate to frequency and velocity: sampling rate, intermediate frequency, wavelength, detector band.
 //!
 //! Computes (30): a scatterer with radial velocity v, positive away from the lidar, beats at
-//! f = f_c - 2 v / lambda. Check: the inverse returns the velocity.
+//! f = f_c - 2 v / lambda. Check: the inverse returns the velocity, and a velocity beyond the
+//! unambiguous interval reads as its folded alias (63 m/s reads 61.0 m/s at 250 MHz, 80 MHz, 1.55 um).
 
 use crate::error::{Error, finite, positive};
 use crate::window::SignalKind;
@@ -105,6 +106,25 @@ impl Sampling {
     pub fn velocity_limits_m_s(&self) -> (f64, f64) {
         (self.velocity_m_s(self.band_hz.1), self.velocity_m_s(self.band_hz.0))
     }
+
+    /// Frequency \[Hz\] at which a true frequency \[Hz\] appears after sampling.
+    ///
+    /// Complex samples fold into -F_s/2 .. F_s/2; real samples fold into 0 .. F_s/2.
+    #[must_use]
+    pub fn folded_frequency_hz(&self, frequency_hz: f64, kind: SignalKind) -> f64 {
+        let turns = (frequency_hz / self.sample_rate_hz).round();
+        let folded_hz = frequency_hz - turns * self.sample_rate_hz;
+        match kind {
+            SignalKind::Real => folded_hz.abs(),
+            SignalKind::Complex => folded_hz,
+        }
+    }
+
+    /// Velocity \[m/s\] that a true velocity \[m/s\] reads after sampling, whatever the band.
+    #[must_use]
+    pub fn folded_velocity_m_s(&self, velocity_m_s: f64, kind: SignalKind) -> f64 {
+        self.velocity_m_s(self.folded_frequency_hz(self.frequency_hz(velocity_m_s), kind))
+    }
 }
 
 #[cfg(test)]
@@ -128,6 +148,21 @@ mod tests {
         let (low_m_s, high_m_s) = table_2().velocity_limits_m_s();
         assert_relative_eq!(low_m_s, -19.375, max_relative = 1e-12);
         assert_relative_eq!(high_m_s, 19.375, max_relative = 1e-12);
+    }
+
+    #[test]
+    fn velocities_beyond_the_unambiguous_interval_fold() {
+        let sampling = table_2();
+        assert_relative_eq!(sampling.folded_velocity_m_s(63.0, SignalKind::Real), 61.0, max_relative = 1e-12);
+        assert_relative_eq!(sampling.folded_velocity_m_s(100.0, SignalKind::Real), 24.0, max_relative = 1e-12);
+        assert_relative_eq!(sampling.folded_velocity_m_s(-12.0, SignalKind::Real), -12.0, max_relative = 1e-12);
+        let baseband = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
+        // complex samples repeat after F_s lambda / 2 = 193.75 m/s
+        assert_relative_eq!(
+            baseband.folded_velocity_m_s(100.0, SignalKind::Complex),
+            100.0 - 193.75,
+            max_relative = 1e-12
+        );
     }
 
     #[test]
