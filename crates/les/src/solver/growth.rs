@@ -127,7 +127,8 @@ impl Stability {
         self.courant_per_s() * halve(0.0, step_s, |step_s| self.worst(step_s).0 <= growth)
     }
 
-    /// Largest Courant number at which every wave decays; infinite in a flow that carries none.
+    /// Largest Courant number at which every wave decays; infinite in a flow that carries none. Viscosity is implicit along the directions
+    /// in which it is at the step of the settings: a longer step that makes more of them so may have a lower limit.
     pub fn damped_courant(&self) -> f64 {
         let longest_s = MOST_COURANT / self.courant_per_s();
         if longest_s.is_finite() { self.largest_courant(ROUND_OFF, longest_s) } else { f64::INFINITY }
