@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::flow::Flow;
 use super::mesh::{Mesh, Wall};
 use super::settings::{FlowSettings, ROUND_OFF, TimeScheme, TimeStep};
-use super::stiffness::{Stiffness, implicit_axes, metrics, viscous_rates_per_s};
+use super::stiffness::{Stiffness, explicit_up_to_s, implicit_axes, metrics, viscous_rates_per_s};
 use crate::Error;
 
 /// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes without no-slip walls and of
@@ -57,6 +57,9 @@ pub struct Stability {
     transport: [f64; 3],
     viscosity_m2_s: f64,
     cells: Vec<Carrying>,
+    /// Whether viscosity is implicit along x, y, z, and up to which steps it is explicit \[s\] in a flow that starts with them.
+    implicit: [bool; 3],
+    explicit_up_to_s: [f64; 3],
     stiffness: Stiffness,
 }
 
@@ -66,8 +69,8 @@ struct Carrying {
     /// `S = sum |u_i|/h_i` \[1/s\].
     rate_per_s: f64,
     length_m: f64,
-    /// Whether viscosity is implicit along that direction.
-    is_implicit: bool,
+    /// That direction.
+    axis: usize,
 }
 
 impl Stability {
@@ -82,18 +85,19 @@ impl Stability {
     fn at_rates(mesh: &Mesh, settings: &FlowSettings, implicit: [bool; 3], rates: &[Vec<f64>; 3]) -> Self {
         let sticks = mesh.directions().iter().any(|d| d.ends.no_slip() != [false; 2]);
         let mut cells: Vec<Carrying> = Vec::new();
-        for ((rates, lengths_m), is_implicit) in rates.iter().zip(metrics(mesh)).zip(implicit) {
+        for (axis, (rates, lengths_m)) in rates.iter().zip(metrics(mesh)).enumerate() {
             for (&rate_per_s, length_m) in rates.iter().zip(lengths_m).filter(|(rate, _)| **rate > 0.0) {
-                match cells.iter_mut().find(|c| c.length_m == length_m && c.is_implicit == is_implicit) {
+                match cells.iter_mut().find(|c| c.length_m == length_m && c.axis == axis) {
                     Some(same) => same.rate_per_s = same.rate_per_s.max(rate_per_s),
-                    None => cells.push(Carrying { rate_per_s, length_m, is_implicit }),
+                    None => cells.push(Carrying { rate_per_s, length_m, axis }),
                 }
             }
         }
         let transport = TRANSPORT[usize::from(sticks)];
         let nu = settings.viscosity_m2_s;
         let stiffness = Stiffness::new(viscous_rates_per_s(mesh, nu), implicit);
-        Self { scheme: settings.scheme, transport, viscosity_m2_s: nu, cells, stiffness }
+        let explicit_up_to_s = explicit_up_to_s(mesh, settings);
+        Self { scheme: settings.scheme, transport, viscosity_m2_s: nu, cells, implicit, explicit_up_to_s, stiffness }
     }
 
     /// Length of the first step that `time_step` gives, or of the longest if the flow starts from rest \[s\].
@@ -112,31 +116,41 @@ impl Stability {
         self.cells.iter().fold(0.0, |most, cell| most.max(cell.rate_per_s))
     }
 
-    /// Growth of the worst wave in a step of `step_s`, `ln |G|`, and its cell.
-    fn worst(&self, step_s: f64) -> (f64, Option<Carrying>) {
+    /// Growth of the worst wave in a step of `step_s`, `ln |G|`, and its cell, where viscosity is `implicit` along these axes.
+    fn worst(&self, step_s: f64, implicit: [bool; 3]) -> (f64, Option<Carrying>) {
         let growth = |cell: &Carrying| {
             let viscous = self.viscosity_m2_s * step_s / cell.length_m.powi(2);
-            largest_growth(self.scheme, self.transport, step_s * cell.rate_per_s, viscous, cell.is_implicit)
+            largest_growth(self.scheme, self.transport, step_s * cell.rate_per_s, viscous, implicit[cell.axis])
         };
         let all = self.cells.iter().map(|cell| (growth(cell), Some(*cell)));
         all.fold((f64::NEG_INFINITY, None), |worst, next| if next.0 > worst.0 { next } else { worst })
     }
 
-    /// Largest Courant number, of steps of at most `step_s`, at which no wave grows by more than `growth` in a step.
-    fn largest_courant(&self, growth: f64, step_s: f64) -> f64 {
-        self.courant_per_s() * halve(0.0, step_s, |step_s| self.worst(step_s).0 <= growth)
-    }
-
-    /// Largest Courant number at which every wave decays; infinite in a flow that carries none. Viscosity is implicit along the directions
-    /// in which it is at the step of the settings: a longer step that makes more of them so may have a lower limit.
+    /// Largest Courant number at which every wave decays, as it does at all smaller ones; infinite in a flow that carries none. Shorter
+    /// steps make viscosity explicit along more directions.
     pub fn damped_courant(&self) -> f64 {
         let longest_s = MOST_COURANT / self.courant_per_s();
-        if longest_s.is_finite() { self.largest_courant(ROUND_OFF, longest_s) } else { f64::INFINITY }
+        if longest_s.is_infinite() {
+            return f64::INFINITY;
+        }
+        let decays = |step_s: f64, implicit| self.worst(step_s, implicit).0 <= ROUND_OFF;
+        let mut ends_s = self.explicit_up_to_s.map(|step_s| step_s.min(longest_s)).to_vec();
+        ends_s.push(longest_s);
+        ends_s.sort_by(f64::total_cmp);
+        let mut start_s = 0.0;
+        for end_s in ends_s {
+            let implicit = self.explicit_up_to_s.map(|step_s| step_s < end_s);
+            if !decays(end_s, implicit) {
+                return self.courant_per_s() * halve(start_s, end_s, |step_s| decays(step_s, implicit));
+            }
+            start_s = end_s;
+        }
+        MOST_COURANT
     }
 
     /// What grows in steps of `step_s`; `None` where nothing does.
     pub fn undamped(&self, step_s: f64) -> Option<UndampedGrowth> {
-        let (growth, Some(cell)) = self.worst(step_s) else { return None };
+        let (growth, Some(cell)) = self.worst(step_s, self.implicit) else { return None };
         (growth > ROUND_OFF).then(|| UndampedGrowth {
             cell_reynolds: cell.length_m.powi(2) * cell.rate_per_s / self.viscosity_m2_s,
             courant: self.courant_per_s() * step_s,
@@ -148,7 +162,8 @@ impl Stability {
     /// The largest Courant number of such a step, if one of `step_s` is refused.
     pub fn refused(&self, step_s: f64) -> Option<f64> {
         let allowed = self.scheme.allowed_growth();
-        (self.worst(step_s).0 > allowed).then(|| self.largest_courant(allowed, step_s))
+        let grows = |step_s: f64| self.worst(step_s, self.implicit).0 > allowed;
+        grows(step_s).then(|| self.courant_per_s() * halve(0.0, step_s, |step_s| !grows(step_s)))
     }
 }
 
@@ -315,8 +330,9 @@ mod tests {
     }
 
     /// Reynolds number of a cell up to which every wave decays under Adams-Bashforth.
-    fn largest_reynolds(transport: [f64; 3], courant: f64) -> f64 {
-        let decays = |power: f64| largest_growth(AB2, transport, courant, courant / 10.0_f64.powf(power), true) < 0.0;
+    fn largest_reynolds(transport: [f64; 3], courant: f64, is_implicit: bool) -> f64 {
+        let decays =
+            |power: f64| largest_growth(AB2, transport, courant, courant / 10.0_f64.powf(power), is_implicit) < 0.0;
         10.0_f64.powf(halve(-2.0, 12.0, decays))
     }
 
@@ -330,7 +346,7 @@ mod tests {
     fn a_wave_grows_above_the_cells_reynolds_number_and_decays_below_it() {
         let waves = [2.4, 3.2, 48.0 / 13.0, 4.0, 8.0, 24.0];
         for (courant, factor) in [(0.2, 0.88), (0.35, 0.66)] {
-            let limit = largest_reynolds(TRANSPORT[0], courant);
+            let limit = largest_reynolds(TRANSPORT[0], courant, true);
             // The leading order of the growth gives 4/(2.047 C^3).
             assert!((limit * 2.047 * courant.powi(3) / 4.0 - factor).abs() < 0.02, "{limit}");
             let all = |reynolds: f64| waves.map(|cells| measured_per_s(cells, 1.0 / reynolds, courant));
@@ -338,12 +354,13 @@ mod tests {
             assert!(above.iter().any(|(grown, _)| *grown > 0.0), "{above:?}");
             let found = above[0].1.unwrap();
             assert!((found.cell_reynolds / limit - 1.15).abs() < 1e-9, "{found:?}");
-            let damped = largest_reynolds(TRANSPORT[0], found.damped_courant);
+            // In a flow that starts with so little viscosity it is explicit.
+            let damped = largest_reynolds(TRANSPORT[0], found.damped_courant, false);
             assert!((damped / found.cell_reynolds - 1.0).abs() < 1e-6, "{found:?}");
             let below = all(0.85 * limit);
             assert!(below.iter().all(|(grown, found)| *grown < 0.0 && found.is_none()), "{below:?}");
         }
-        assert!((largest_reynolds(TRANSPORT[1], 0.35) / 82.0 - 1.0).abs() < 0.01);
+        assert!((largest_reynolds(TRANSPORT[1], 0.35, true) / 82.0 - 1.0).abs() < 0.01);
         // Without viscosity; the rate of the amplitude is half that of the energy, and the worst wave has 3.2 cells.
         let (grown, found) = measured_per_s(3.2, 0.0, 0.35);
         let found = found.unwrap();

@@ -27,10 +27,16 @@ pub(super) fn viscous_rates_per_s(mesh: &Mesh, viscosity_m2_s: f64) -> [f64; 3] 
     })
 }
 
+/// Longest steps of a flow in which viscosity is explicit along x, y, z \[s\].
+pub(super) fn explicit_up_to_s(mesh: &Mesh, settings: &FlowSettings) -> [f64; 3] {
+    let most = IMPLICIT_SHARE * settings.scheme.largest_decay();
+    viscous_rates_per_s(mesh, settings.viscosity_m2_s).map(|rate_per_s| most / rate_per_s)
+}
+
 /// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
 pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s: f64) -> [bool; 3] {
-    let most_per_s = IMPLICIT_SHARE * settings.scheme.largest_decay() / settings.time_step.step_s(courant_per_s);
-    viscous_rates_per_s(mesh, settings.viscosity_m2_s).map(|rate_per_s| rate_per_s > most_per_s)
+    let step_s = settings.time_step.step_s(courant_per_s);
+    explicit_up_to_s(mesh, settings).map(|longest_s| step_s > longest_s)
 }
 
 /// The two largest decay rates of viscosity along implicit axes \[1/s\].
