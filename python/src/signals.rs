@@ -6,7 +6,8 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::PySlice;
 use std::ops::Range;
-use wakescope_sim::io::raw::{SampleArray, Source};
+use std::path::Path;
+use wakescope_sim::io::raw::{RawRecords, Source};
 
 /// An array \[record, sample\].
 #[derive(Debug)]
@@ -29,7 +30,7 @@ impl Source for NumpyRecords {
 }
 
 /// The records of an array, whose last dimension are the samples of one.
-pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<SampleArray> {
+pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<RawRecords> {
     let kind: String = array.getattr("dtype")?.getattr("kind")?.extract()?;
     if !["f", "c", "i", "u"].contains(&kind.as_str()) {
         return Err(PyTypeError::new_err(format!(
@@ -47,14 +48,9 @@ pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<SampleArray> {
             "signals: numpy.ascontiguousarray makes an array that is read without a copy",
         ));
     }
-    let records = before.iter().product();
+    let records: usize = before.iter().product();
     let plane = array.call_method1("reshape", (records, samples))?;
-    Ok(SampleArray {
-        name: "signals".into(),
-        source: Box::new(NumpyRecords(plane.unbind())),
-        records,
-        samples,
-        is_complex: kind == "c",
-        are_integers: kind == "i" || kind == "u",
-    })
+    let are_integers = kind == "i" || kind == "u";
+    let source = NumpyRecords(plane.unbind());
+    Ok(RawRecords::new(Path::new("signals"), source, [records, samples], kind == "c", are_integers))
 }

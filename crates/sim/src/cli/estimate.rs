@@ -39,11 +39,11 @@ pub(super) struct EstimateWords {
 
 pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let scene = cli.scene(&words.scene)?;
-    let format = RawFormat { scale: words.scale, ..words.format.clone() };
     let mut records = match cli.signals(&words.data) {
-        Some(array) => RawRecords::of_array(array, words.scale)?,
-        None => RawRecords::open(&words.data, &format, record_shape(&scene.scene))?,
+        Some(records) => records.not_empty()?,
+        None => RawRecords::open(&words.data, &words.format, record_shape(&scene.scene))?,
     };
+    records.scale = words.scale;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let (plan, is_own) = recorded::plan(scene, &records)?;
     words.folder.prepare_names(cli, &write::recorded_names(&plan)?)?;

@@ -8,7 +8,7 @@ use super::progress::{Bars, Quiet};
 use super::{Cli, dispatch, with_threads};
 use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
-use crate::io::raw::SampleArray;
+use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, write_atomic};
 use crate::keys::{Located, Problem, SceneError};
 use crate::outputs::{self, Outputs};
@@ -28,8 +28,8 @@ pub struct Host {
     pub observer: Arc<dyn Observer + Send>,
     /// Texts of scenes and cases, by the words that stand for their files.
     pub texts: BTreeMap<PathBuf, String>,
-    /// Signals, whose name stands for a file.
-    pub signals: Mutex<Option<SampleArray>>,
+    /// Signals, whose path stands for a file.
+    pub signals: Mutex<Option<RawRecords>>,
     /// Whether files of `--out` stay in memory; those of flows, wakes and sweeps, which can be continued, are written.
     pub keeps_files: bool,
 }
@@ -161,9 +161,9 @@ impl Cli {
     }
 
     /// The signals that a path stands for, where the program that called gave them.
-    pub(super) fn signals(&self, path: &Path) -> Option<SampleArray> {
+    pub(super) fn signals(&self, path: &Path) -> Option<RawRecords> {
         let mut held = self.call.as_ref()?.host.signals.lock().unwrap_or_else(PoisonError::into_inner);
-        held.take_if(|array| array.name == path)
+        held.take_if(|records| records.path == path)
     }
 
     fn keeper(&self) -> Option<&Call> {

@@ -177,8 +177,8 @@ impl ScanWords {
             let reason = "it holds raw signals: --scene says which instrument recorded them".into();
             return Err(Error::Input { path: path.to_owned(), reason });
         };
-        let format = RawFormat { scale: self.scale.unwrap_or(1.0), ..RawFormat::default() };
-        let mut records = RawRecords::open(path, &format, record_shape(&scene.scene))?;
+        let mut records = RawRecords::open(path, &RawFormat::default(), record_shape(&scene.scene))?;
+        records.scale = self.scale.unwrap_or(1.0);
         let (plan, is_own) = recorded::plan(scene.clone(), &records)?;
         let noise = if is_own || self.scale.is_some() { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
         // What is known of the air is not looked at: this is a retrieval.

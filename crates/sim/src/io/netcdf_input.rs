@@ -14,8 +14,6 @@ use netcdf_reader::{
 };
 use std::ops::Range;
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
-#[cfg(feature = "netcdf4")]
 use std::sync::Arc;
 
 /// Deflate makes no more than so many bytes of one.
@@ -59,7 +57,7 @@ pub(crate) const Z: Role =
 #[derive(Clone)]
 pub(crate) struct NetcdfFile {
     path: PathBuf,
-    file: Rc<NcFile>,
+    file: Arc<NcFile>,
     /// Length of the file.
     bytes: u64,
     /// Name of the group; empty for the root.
@@ -106,7 +104,7 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
         return Err(unsound());
     }
     let (variables, attributes) = (root.variables.clone(), root.attributes.clone());
-    Ok(NetcdfFile { path: path.to_owned(), file: Rc::new(file), bytes, group: String::new(), variables, attributes })
+    Ok(NetcdfFile { path: path.to_owned(), file: Arc::new(file), bytes, group: String::new(), variables, attributes })
 }
 
 /// Opens the root of a file and the groups in it, as far as they have the variable `needed`, with their names; attributes of the file

@@ -9,13 +9,13 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex};
 use wakescope_sim::cli::{Answer, Host, Refusal, call};
 use wakescope_sim::io::Existing;
-use wakescope_sim::io::raw::{SampleArray, Source};
+use wakescope_sim::io::raw::{RawRecords, Source};
 use wakescope_sim::{Silent, write_contents};
 
 const SCENE: &str = "scan.elevation_min_rad = 0.1\nscan.elevation_max_rad = 0.11\nscan.pulses_per_line = 1\n\
                      outputs.signals = true\noutputs.svg = false\noutputs.png = false\n";
 
-fn run(words: &[&str], text: &str, signals: Option<SampleArray>, keeps_files: bool) -> Result<Answer, Refusal> {
+fn run(words: &[&str], text: &str, signals: Option<RawRecords>, keeps_files: bool) -> Result<Answer, Refusal> {
     let words: Vec<OsString> = words.iter().map(OsString::from).collect();
     let texts = BTreeMap::from([(PathBuf::from("scene"), text.to_owned())]);
     call(&words, Host { observer: Arc::new(Silent), texts, signals: Mutex::new(signals), keeps_files })
@@ -73,21 +73,18 @@ fn signals_of_an_array_give_the_map_of_those_of_a_file() {
     bytes.extend(head.bytes());
     bytes.extend(current_a.iter().flat_map(|a| a.to_le_bytes()));
     std::fs::write(&npy, bytes).unwrap();
-    let array = |scale: f64| SampleArray {
-        name: "signals".into(),
-        source: Box::new(Memory(current_a.iter().map(|a| a * scale).collect(), samples)),
-        records,
-        samples,
-        is_complex: false,
-        are_integers: false,
+    let of = |scale: f64, records: usize| {
+        let memory = Memory(current_a.iter().map(|a| a * scale).collect(), samples);
+        RawRecords::new(Path::new("signals"), memory, [records, samples], false, false)
     };
+    let array = |scale: f64| of(scale, records);
     let words = |data| ["estimate", data, "--scene", "scene", "--out", "."];
     let of_file = run(&words(npy.to_str().unwrap()), SCENE, None, true).unwrap();
     let of_array = run(&words("signals"), SCENE, Some(array(1.0)), true).unwrap();
     assert_eq!(of_array.files, of_file.files);
     let scaled = run(&[&words("signals")[..], &["--scale", "0.125"]].concat(), SCENE, Some(array(8.0)), true).unwrap();
     assert_eq!(scaled.files, of_file.files);
-    let none = run(&words("signals"), SCENE, Some(SampleArray { records: 0, ..array(1.0) }), true).unwrap_err();
+    let none = run(&words("signals"), SCENE, Some(of(1.0, 0)), true).unwrap_err();
     assert!(none.0["error"].as_str().unwrap().contains("no records"), "{none:?}");
 }
 

@@ -3,7 +3,7 @@
 //! Check: every order of an array gives the same records.
 
 use super::Source;
-use crate::io::number::{ByteOrder, NumberType};
+use super::numpy::StoredArray;
 use num_complex::Complex;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
@@ -26,13 +26,9 @@ pub enum Order {
 #[derive(Debug)]
 pub(super) struct ArrayInFile {
     pub(super) file: File,
-    pub(super) number: NumberType,
-    pub(super) byte_order: ByteOrder,
-    /// Whether samples are pairs of numbers, the first quadrature before the second.
-    pub(super) are_pairs: bool,
+    /// Where its numbers begin, and how they stand; complex ones as pairs, the first quadrature before the second.
+    pub(super) stored: StoredArray,
     pub(super) order: Order,
-    /// Where the first number is.
-    pub(super) begin: u64,
     pub(super) records: usize,
     pub(super) samples: usize,
     /// Pulses of a line, for [`Order::PulseMajor`].
@@ -49,11 +45,6 @@ impl Source for ArrayInFile {
 }
 
 impl ArrayInFile {
-    /// Bytes of a sample.
-    fn sample_bytes(&self) -> u64 {
-        self.number.bytes * if self.are_pairs { 2 } else { 1 }
-    }
-
     /// Place in the file of a record in the order of lines and their pulses.
     fn row(&self, record: usize) -> u64 {
         match self.order {
@@ -90,22 +81,24 @@ impl ArrayInFile {
 
     /// Samples that follow each other in the file, from one of them on.
     fn run(&mut self, first: u64, count: usize) -> std::io::Result<Vec<Complex<f64>>> {
-        let mut raw = vec![0; count * self.sample_bytes() as usize];
-        self.file.seek(SeekFrom::Start(self.begin + first * self.sample_bytes()))?;
+        let (stored, size) = (&self.stored, self.stored.sample_bytes());
+        let mut raw = vec![0; count * size as usize];
+        self.file.seek(SeekFrom::Start(stored.begin + first * size))?;
         self.file.read_exact(&mut raw)?;
-        let number = |bytes: &[u8]| self.number.value(bytes, self.byte_order);
+        let number = |bytes: &[u8]| stored.number.value(bytes, stored.byte_order);
         let sample = |bytes: &[u8]| {
-            let (first, second) = bytes.split_at(self.number.bytes as usize);
-            Complex::new(number(first), if self.are_pairs { number(second) } else { 0.0 })
+            let (first, second) = bytes.split_at(stored.number.bytes as usize);
+            Complex::new(number(first), if stored.is_complex { number(second) } else { 0.0 })
         };
-        Ok(raw.chunks_exact(self.sample_bytes() as usize).map(sample).collect())
+        Ok(raw.chunks_exact(size as usize).map(sample).collect())
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::{RawRecords, Stored};
+    use super::super::RawRecords;
     use super::*;
+    use crate::io::number::{ByteOrder, NumberType};
     use std::io::Write;
     use std::path::Path;
 
@@ -122,11 +115,15 @@ mod tests {
     fn array(numbers: &[f64], order: Order) -> ArrayInFile {
         ArrayInFile {
             file: file(numbers, ByteOrder::Big),
-            number: NumberType::named("i16").unwrap(),
-            byte_order: ByteOrder::Big,
-            are_pairs: false,
+            stored: StoredArray {
+                number: NumberType::named("i16").unwrap(),
+                byte_order: ByteOrder::Big,
+                is_complex: false,
+                fortran_order: false,
+                shape: Vec::new(),
+                begin: 0,
+            },
             order,
-            begin: 0,
             records: 4,
             samples: 3,
             pulses_per_line: 2,
@@ -150,8 +147,8 @@ mod tests {
             (Order::PulseMajor, with(&|i| (i / 3 % 2, i / 6, i % 3))),
             (Order::SampleMajor, with(&|i| (i / 2 % 2, i % 2, i / 4))),
         ] {
-            let stored = Stored::of_array(array(&numbers, order), vec![-1.0], 2.0);
-            let mut array = RawRecords::new(Path::new("x"), stored);
+            let mut array = RawRecords::new(Path::new("x"), array(&numbers, order), [4, 3], false, true);
+            (array.fills, array.scale) = (vec![-1.0], 2.0);
             for records in [0..4, 1..3, 3..4] {
                 for samples in [0..3, 1..2, 1..3] {
                     let found = array.read_samples(records.clone(), samples.clone()).unwrap();
@@ -170,7 +167,7 @@ mod tests {
     fn the_parts_of_complex_samples_stand_together() {
         let mut together = ArrayInFile { samples: 3, records: 2, ..array(&[], Order::LineMajor) };
         together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
-        together.are_pairs = true;
+        together.stored.is_complex = true;
         let found = together.read(1..2, 0..3).unwrap();
         assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
     }

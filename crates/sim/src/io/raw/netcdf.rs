@@ -2,14 +2,13 @@
 //!
 //! Check: signals of a run come back; constants of the recording that the scene contradicts are named.
 
-use super::{About, RawFormat, Source, Stored};
+use super::{About, RawFormat, RawRecords, Source};
 use crate::Error;
 use crate::io::netcdf_input::{NetcdfFile, open};
 use netcdf_reader::NcType;
 use num_complex::Complex;
 use std::ops::Range;
 use std::path::Path;
-use wakescope_estimate::window::MissingSamples;
 
 /// Constants of a recording: the name of the variable, and the key of a scene that says the same.
 const CONSTANTS: [(&str, &str); 6] = [
@@ -35,12 +34,12 @@ struct NetcdfRecords {
 }
 
 /// Opens the signals of a file.
-pub(super) fn read(path: &Path, format: &RawFormat) -> Result<Stored, Error> {
+pub(super) fn read(path: &Path, format: &RawFormat) -> Result<RawRecords, Error> {
     let file = open(path)?;
-    signals(&file, format).map_err(|reason| file.refuse(reason))
+    signals(path, &file, format).map_err(|reason| file.refuse(reason))
 }
 
-fn signals(file: &NetcdfFile, format: &RawFormat) -> Result<Stored, String> {
+fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawRecords, String> {
     let name = match &format.variable {
         Some(name) => name.clone(),
         None if file.has("current_a") => "current_a".to_owned(),
@@ -69,23 +68,14 @@ fn signals(file: &NetcdfFile, format: &RawFormat) -> Result<Stored, String> {
         Some(NcType::Int) => (true, Some(-2_147_483_647.0)),
         _ => (true, None),
     };
-    let mut fills: Vec<f64> = fill.into_iter().filter(|_| !is_filled).collect();
-    fills.iter_mut().for_each(|fill| *fill = *fill * scale + number("add_offset").unwrap_or(0.0));
-    // Of a converter's codes each may be a sample.
-    if !are_integers {
-        fills.extend(MissingSamples::default().fill);
-    }
-    let records = lengths.iter().product::<u64>() as usize;
-    Ok(Stored {
-        records,
-        samples: samples as usize,
-        is_complex: are_pairs || second.is_some(),
-        are_integers,
-        fills,
-        scale: [scale, format.scale],
-        about: about(file, records)?,
-        source: Box::new(NetcdfRecords { file: file.clone(), name, second, are_pairs, lengths }),
-    })
+    let (shape, is_complex) =
+        ([lengths.iter().product::<u64>() as usize, samples as usize], are_pairs || second.is_some());
+    let about = about(file, shape[0])?;
+    let source = NetcdfRecords { file: file.clone(), name: name.clone(), second, are_pairs, lengths };
+    let mut out = RawRecords::new(path, source, shape, is_complex, are_integers);
+    let unwritten = fill.filter(|_| !is_filled);
+    out.fills.extend(unwritten.map(|fill| fill * scale + number("add_offset").unwrap_or(0.0)));
+    Ok(RawRecords { packed_scale: scale, about, ..out })
 }
 
 impl Source for NetcdfRecords {
@@ -179,7 +169,7 @@ mod tests {
         let variables = vec![packed("current_a", 0), packed("quadrature_a", 100)];
         let layout = Layout { dims: vec![("line", 2), ("pulse", 3), ("sample", 4)], globals: Vec::new(), variables };
         let mut found = opened(layout.into_bytes(&crate::io::provenance::example()).unwrap(), &RawFormat::default());
-        assert_eq!((found.records(), found.samples(), found.is_complex(), found.scale()), (6, 4, true, 2.0));
+        assert_eq!((found.records(), found.samples(), found.is_complex(), found.whole_scale()), (6, 4, true, 2.0));
         assert!(found.is_of_integers());
         for records in (0..6).flat_map(|first| (first + 1..=6).map(move |end| first..end)) {
             for samples in [0..4, 1..3, 3..4] {
@@ -206,8 +196,8 @@ mod tests {
         let second = ("quadrature_a", &[2, 3, 4][..], numbers(100.0));
         let lines = ("ray_line", &[6][..], vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
         let open = |arrays: &[(&str, &[u64], Vec<f64>)], format: &RawFormat| opened(of_arrays(arrays), format);
-        let twice = RawFormat { scale: 2.0, ..RawFormat::default() };
-        let mut found = open(&[real.clone(), lines], &twice);
+        let mut found = open(&[real.clone(), lines], &RawFormat::default());
+        found.scale = 2.0;
         assert_eq!((found.records(), found.samples(), found.is_complex()), (6, 4, false));
         assert_eq!(found.about.line, Some(vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
         let some = found.read_samples(1..3, 1..3).unwrap();

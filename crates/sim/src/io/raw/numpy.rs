@@ -26,6 +26,11 @@ const NO_ARCHIVE: &str = "it is no sound NPZ file: it is cut short, or its table
 const LONGEST_HEADER_BYTES: u64 = 1 << 20;
 
 impl StoredArray {
+    /// Bytes of a sample.
+    pub(super) fn sample_bytes(&self) -> u64 {
+        self.number.bytes * if self.is_complex { 2 } else { 1 }
+    }
+
     /// Reads the header of an array that begins at `at` and ends at `end`.
     pub(super) fn read(file: &mut File, at: u64, end: u64) -> Result<Self, String> {
         let mut bytes = Vec::new();
@@ -43,7 +48,7 @@ impl StoredArray {
         let text = bytes.get(head..head + length as usize).ok_or(NO_ARRAY)?;
         let found = Self::of_text(&String::from_utf8_lossy(text), at + head as u64 + u64::from(length))?;
         let numbers = found.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
-        let bytes = numbers.and_then(|n| n.checked_mul(found.number.bytes * if found.is_complex { 2 } else { 1 }));
+        let bytes = numbers.and_then(|n| n.checked_mul(found.sample_bytes()));
         let over = bytes.and_then(|bytes| bytes.checked_add(found.begin)).ok_or(TRUNCATED)?;
         match over {
             over if over > end => Err(format!("{TRUNCATED} by {} bytes", over - end)),

@@ -210,7 +210,7 @@ fn of_samples<S: FromParts>(
 ) -> Result<Recorded, Error> {
     let largest = largest_part(plan, records)?;
     // Numbers that are scaled are not those of the scene any more, and another noise gives another map.
-    let is_own = is_own && records.scale() == 1.0;
+    let is_own = is_own && records.whole_scale() == 1.0;
     let noise = options.noise.unwrap_or(if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest });
     let is_run = is_own && noise == NoiseLevel::OfScene && options.rays.is_none();
     if is_run && !options.spectra {
@@ -297,11 +297,11 @@ fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
     }
     if let Digitiser::Quantised { bits, .. } = plan.scene.scene.detector.digitiser
         && records.is_of_integers()
-        && largest / records.scale() > (f64::from(bits) - 1.0).exp2()
+        && largest / records.whole_scale() > (f64::from(bits) - 1.0).exp2()
     {
         return Err(records.refuse(format!(
             "it has the code {}, beyond the {bits} bits of detector.digitiser: is --byte-order right?",
-            largest / records.scale()
+            largest / records.whole_scale()
         )));
     }
     Ok(largest)
