@@ -5,6 +5,9 @@
 use super::error::{OutputError, OutputResult, same_length};
 use super::provenance::Provenance;
 
+/// A usual float with its separator.
+const USUAL_CELL_BYTES: usize = 20;
+
 /// Values of one column.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Column {
@@ -22,15 +25,6 @@ impl Column {
             Self::Float(v) => v.len(),
             Self::Int(v) => v.len(),
             Self::Text(v) => v.len(),
-        }
-    }
-
-    /// Bytes of a usual cell with its separator.
-    fn usual_width(&self) -> usize {
-        match self {
-            Self::Float(_) => 20,
-            Self::Int(_) => 7,
-            Self::Text(_) => 16,
         }
     }
 
@@ -194,7 +188,7 @@ impl Table {
 
     fn push_rows(&self, out: &mut String) {
         // Room for most texts at once, so that growing does not copy what is there.
-        out.reserve(self.columns.iter().map(|(_, column)| column.len() * column.usual_width()).sum());
+        out.reserve(USUAL_CELL_BYTES * self.columns.len() * self.len());
         for row in 0..self.len() {
             for (i, (_, column)) in self.columns.iter().enumerate() {
                 if i > 0 {

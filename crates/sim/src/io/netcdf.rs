@@ -60,12 +60,6 @@ impl Data {
     fn len(&self) -> usize {
         self.bytes.len() / self.width
     }
-
-    /// What fills the last word.
-    fn padding(&self) -> u8 {
-        // The value that the library of NetCDF stores where nothing was written.
-        if self.code == 1 { (-127_i8) as u8 } else { 0 }
-    }
 }
 
 /// One variable.
@@ -140,7 +134,6 @@ impl Layout {
     pub(crate) fn into_parts(mut self, provenance: &Provenance, is_first: bool) -> OutputResult<FileParts> {
         self.check()?;
         self.globals.extend(provenance.entries());
-        self.check_names()?;
         let sizes: Vec<u64> = self.variables.iter().map(|v| (self.count(v) * v.data.width) as u64).collect();
         if let Some(size) = sizes.iter().find(|size| **size > LARGEST_VARIABLE) {
             let reason = format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
@@ -161,7 +154,9 @@ impl Layout {
             parts.push((0, self.head(&sizes, &begins)));
         }
         for (variable, begin) in self.variables.into_iter().zip(begins) {
-            let (padding, each, mut bytes) = (variable.data.padding(), variable.data.width, variable.data.bytes);
+            let (each, mut bytes) = (variable.data.width, variable.data.bytes);
+            // Behind bytes the value that the library of NetCDF stores where nothing was written.
+            let padding = if variable.data.code == 1 { (-127_i8) as u8 } else { 0 };
             match variable.first {
                 Some(first) => parts.push((begin + (first * each) as u64, bytes)),
                 None if is_first => {
@@ -180,14 +175,21 @@ impl Layout {
         variable.dims.iter().map(size).product()
     }
 
-    /// Checks the lengths.
+    /// Checks the lengths, and that readers can take names for such and tell them apart.
     fn check(&self) -> OutputResult<()> {
-        for variable in &self.variables {
+        for (place, variable) in self.variables.iter().enumerate() {
+            let name = &variable.name;
+            if name.is_empty() || name.contains(['/', '\0']) {
+                return Err(OutputError::encode("NetCDF", format!("'{name}' is no name")));
+            }
+            if self.variables[..place].iter().any(|other| other.name == *name) {
+                return Err(OutputError::Duplicate { what: "name in NetCDF", name: name.clone() });
+            }
             let (found, expected) = (variable.data.len(), self.count(variable));
             let axes = variable.dims.join(" x ");
             match variable.first {
                 Some(first) if first + found <= expected => {}
-                first => same_length(&variable.name, first.unwrap_or(0) + found, &axes, expected)?,
+                first => same_length(name, first.unwrap_or(0) + found, &axes, expected)?,
             }
         }
         let own = self.variables.iter().filter(|variable| variable.first.is_none());
@@ -197,27 +199,6 @@ impl Layout {
                 format: "NetCDF",
                 reason: format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep"),
             });
-        }
-        Ok(())
-    }
-
-    /// Checks what readers could not tell apart or not take for a name.
-    fn check_names(&self) -> OutputResult<()> {
-        let dims: Vec<&str> = self.dims.iter().map(|(name, _)| *name).collect();
-        let variables: Vec<&str> = self.variables.iter().map(|variable| variable.name.as_str()).collect();
-        let globals: Vec<&str> = self.globals.iter().map(|(name, _)| *name).collect();
-        let of_variable = |v: &Variable| v.attrs.iter().map(|(name, _)| *name).collect();
-        let mut lists = vec![dims, variables, globals];
-        lists.extend(self.variables.iter().map(of_variable));
-        for list in lists {
-            for (place, name) in list.iter().enumerate() {
-                if name.is_empty() || name.contains(['/', '\0']) {
-                    return Err(OutputError::encode("NetCDF", format!("'{name}' is no name")));
-                }
-                if list[..place].contains(name) {
-                    return Err(OutputError::Duplicate { what: "name in NetCDF", name: (*name).into() });
-                }
-            }
         }
         Ok(())
     }

@@ -15,18 +15,11 @@ pub struct FileParts {
 impl FileParts {
     /// The bytes of a file whose parts are all here.
     pub fn into_bytes(self) -> Vec<u8> {
-        match &self.parts[..] {
-            [(0, bytes)] if bytes.len() as u64 == self.length => {
-                self.parts.into_iter().next().map_or_else(Vec::new, |(_, bytes)| bytes)
-            }
-            _ => {
-                let mut all = vec![0; self.length as usize];
-                for (start, bytes) in self.parts {
-                    all[start as usize..start as usize + bytes.len()].copy_from_slice(&bytes);
-                }
-                all
-            }
+        let mut all = vec![0; self.length as usize];
+        for (start, bytes) in self.parts {
+            all[start as usize..start as usize + bytes.len()].copy_from_slice(&bytes);
         }
+        all
     }
 }
 

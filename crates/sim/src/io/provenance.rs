@@ -38,21 +38,12 @@ impl Provenance {
 
     /// The entries as comment lines `# key: value` that end with a line feed; the scene follows its key line by line, indented.
     pub fn comment_lines(&self) -> String {
-        let mut out = String::new();
-        for (key, text) in self.entries() {
-            if key == "scene" {
-                out.push_str("# scene:\n");
-                for line in text.lines() {
-                    // A comment must stay one line for every reader of the table.
-                    out.push_str(&format!("#   {}", line.replace('\r', " ")));
-                    out.truncate(out.trim_end().len());
-                    out.push('\n');
-                }
-            } else {
-                out.push_str(&format!("# {key}: {}\n", text.replace(['\n', '\r'], " ")));
-            }
-        }
-        out
+        let [source, seed, hash, (_, scene)] = self.entries();
+        let entry = |(key, text): (&str, String)| format!("# {key}: {}\n", text.replace(['\n', '\r'], " "));
+        // A comment must stay one line for every reader of the table.
+        let line = |line: &str| format!("#   {}", line.replace('\r', " ")).trim_end().to_owned() + "\n";
+        let entries: String = [source, seed, hash].map(entry).concat();
+        entries + "# scene:\n" + &scene.lines().map(line).collect::<String>()
     }
 }
 
