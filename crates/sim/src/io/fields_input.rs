@@ -32,12 +32,8 @@ pub(crate) struct FieldPlace {
 /// A file that cannot be read or lacks the variable `name`; a time without values.
 pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> {
     let file = open(path)?;
-    times(&file, name)
-        .map(|times| {
-            let of = |(place, time_s): (Option<usize>, f64)| FieldPlace { path: path.to_owned(), place, time_s };
-            times.into_iter().map(of).collect()
-        })
-        .map_err(|reason| file.refuse(reason))
+    let times = times(&file, name).map_err(|reason| file.refuse(reason))?;
+    Ok(times.into_iter().map(|(place, time_s)| FieldPlace { path: path.to_owned(), place, time_s }).collect())
 }
 
 fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
@@ -85,12 +81,11 @@ pub(crate) fn periods_m(field: &FieldPlace, name: &str) -> Result<[Option<f64>; 
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
     let file = open(&field.path)?;
     let scalar = component(&file, name, field.place, false).map_err(|reason| file.refuse(reason))?;
-    match scalar.values.iter().position(|v| *v < 0.0) {
-        Some(at) => {
-            Err(file.refuse(format!("{name} is {:?} at place {at}: it must not be negative", scalar.values[at])))
-        }
-        None => Ok(scalar),
-    }
+    let bad = scalar.values.iter().enumerate().find(|(_, value)| **value < 0.0);
+    bad.map_or(Ok(()), |(at, value)| {
+        Err(file.refuse(format!("{name} is {value:?} at place {at}: it must not be negative")))
+    })?;
+    Ok(scalar)
 }
 
 fn component(
@@ -100,10 +95,7 @@ fn component(
     is_velocity: bool,
 ) -> Result<VolumeComponent, String> {
     let dims = match place {
-        Some(_) => {
-            let [_, z, y, x] = file.roles(name, [TIME, Z, Y, X])?;
-            [z, y, x]
-        }
+        Some(_) => file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x])?,
         None => file.roles(name, [Z, Y, X])?,
     };
     let [z, y, x] = dims.each_ref().map(String::as_str);

@@ -107,21 +107,20 @@ pub(crate) fn open(path: &Path) -> Result<NetcdfFile, Error> {
     Ok(NetcdfFile { path: path.to_owned(), file: Arc::new(file), bytes, group: String::new(), variables, attributes })
 }
 
-/// Opens the root of a file and the groups in it, as far as they have the variable `needed`, with their names; attributes of the file
-/// are those of its root. A classic file is its root alone.
+/// Opens the root of a file and the groups in it, as far as they have the variable `needed`; attributes of the file are those of its
+/// root. A classic file is its root alone.
 ///
 /// # Errors
 /// As [`open`]; a file without that variable.
-pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<(String, NetcdfFile)>, Error> {
+pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<NetcdfFile>, Error> {
     let root = open(path)?;
     let groups = root.file.root_group().map_or(&[][..], |group| &group.groups);
     let of_group = |group: &NcGroup| {
-        let (name, variables) = (group.name.clone(), group.variables.clone());
-        (name.clone(), NetcdfFile { group: name, variables, ..root.clone() })
+        let (group, variables) = (group.name.clone(), group.variables.clone());
+        NetcdfFile { group, variables, ..root.clone() }
     };
-    let mut found = vec![(String::new(), root.clone())];
-    found.extend(groups.iter().map(of_group));
-    found.retain(|(_, group)| group.has(needed));
+    let mut found: Vec<NetcdfFile> = std::iter::once(root.clone()).chain(groups.iter().map(of_group)).collect();
+    found.retain(|group| group.has(needed));
     if found.is_empty() {
         return Err(root.refuse(format!("neither it nor one of its groups has a variable {needed}")));
     }
@@ -129,8 +128,9 @@ pub(crate) fn open_groups(path: &Path, needed: &str) -> Result<Vec<(String, Netc
 }
 
 impl NetcdfFile {
-    /// An error of this file.
+    /// An error of this file, or of its group.
     pub(crate) fn refuse(&self, reason: String) -> Error {
+        let reason = if self.group.is_empty() { reason } else { format!("group {}: {reason}", self.group) };
         Error::Input { path: self.path.clone(), reason }
     }
 
@@ -318,7 +318,7 @@ impl NetcdfFile {
     /// As [`Self::coordinate`]; a unit that is no length.
     pub(crate) fn coordinate_m(&self, dim: &str) -> Result<Vec<f64>, String> {
         let unit_m = self.unit(dim, Quantity::Length)?;
-        Ok(scaled(self.coordinate(dim)?, unit_m))
+        Ok(self.coordinate(dim)?.into_iter().map(|value| value * unit_m).collect())
     }
 
     /// Times in seconds, from the unit of a variable; a date from which they count is left out.
@@ -329,7 +329,7 @@ impl NetcdfFile {
         // Plain numbers are taken for seconds.
         let is_plain = self.text(name, "units") == Some("1");
         let unit_s = if is_plain { 1.0 } else { self.unit(name, Quantity::Time)? };
-        Ok(scaled(self.floats(name)?, unit_s))
+        Ok(self.floats(name)?.into_iter().map(|value| value * unit_s).collect())
     }
 
     /// Velocities in m/s with their dimensions in this order, as [`Self::ordered`].
@@ -338,7 +338,7 @@ impl NetcdfFile {
     /// As there; a unit that is no velocity.
     pub(crate) fn velocities(&self, name: &str, order: &[String], place: Option<usize>) -> Result<Vec<f64>, String> {
         let unit_m_s = self.unit(name, Quantity::Velocity)?;
-        Ok(scaled(self.ordered(name, order, place)?, unit_m_s))
+        Ok(self.ordered(name, order, place)?.into_iter().map(|value| value * unit_m_s).collect())
     }
 
     /// Values of a variable with its dimensions in this order, the last one fastest: all, or those of one place of the slowest dimension,
@@ -376,12 +376,6 @@ fn text(value: &NcAttrValue) -> Option<&str> {
         NcAttrValue::Strings(texts) if texts.len() == 1 => Some(&texts[0]),
         _ => None,
     }
-}
-
-/// The values in another unit; with the same bits in the same.
-fn scaled(mut values: Vec<f64>, unit: f64) -> Vec<f64> {
-    values.iter_mut().for_each(|value| *value *= unit);
-    values
 }
 
 /// A name that may be shown: a short word of letters, digits and underscores. Nothing else of a file is.

@@ -75,13 +75,7 @@ pub(super) fn scan_map(
         return Err(format!("{what}: range reaches {far} m: at most {FARTHEST_M} m are read"));
     }
     rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
-    let mut lines: Vec<Vec<RayRow>> = Vec::new();
-    for ray in rays {
-        match lines.last_mut() {
-            Some(line) if line.first().is_some_and(|first| first.elevation_rad == ray.elevation_rad) => line.push(ray),
-            _ => lines.push(vec![ray]),
-        }
-    }
+    let lines: Vec<&[RayRow]> = rays.chunk_by(|a, b| a.elevation_rad == b.elevation_rad).collect();
     let (least_lines, least_gates, least_values) = LEAST;
     if lines.len() < least_lines || gates < least_gates {
         return Err(format!(
@@ -90,19 +84,18 @@ pub(super) fn scan_map(
             lines.len()
         ));
     }
-    let has_sigma = lines.iter().flatten().all(|ray| !ray.sigma_m_s.is_empty());
+    let has_sigma = rays.iter().all(|ray| !ray.sigma_m_s.is_empty());
     let mean_at = |line: &[RayRow], of: &dyn Fn(&RayRow) -> f64| {
         let values: Vec<f64> = line.iter().map(of).filter(|value| value.is_finite()).collect();
         values.iter().sum::<f64>() / values.len() as f64
     };
     let sigma_at = |line: usize, gate: usize| {
-        let rows = &lines[line];
+        let rows = lines[line];
         let count = rows.iter().filter(|ray| ray.velocity_m_s[gate].is_finite()).count();
         mean_at(rows, &|ray| ray.sigma_m_s[gate]) / (count as f64).sqrt()
     };
-    let mut velocity_m_s = Array2::from_shape_fn((lines.len(), gates), |(line, gate)| {
-        mean_at(&lines[line], &|ray| ray.velocity_m_s[gate])
-    });
+    let mut velocity_m_s =
+        Array2::from_shape_fn((lines.len(), gates), |(line, gate)| mean_at(lines[line], &|ray| ray.velocity_m_s[gate]));
     let mut sigma_m_s =
         has_sigma.then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
     if let Some(sigma) = &mut sigma_m_s {
@@ -129,20 +122,16 @@ pub(super) fn scan_map(
     if let Some(bad) = velocity_m_s.iter().find(|value| value.abs() > 500.0) {
         return Err(format!("{what}: a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"));
     }
+    let time_s: Vec<f64> = lines.iter().map(|line| mean_at(line, &|ray| ray.time_s)).collect();
     Ok(ScanMap {
         elevation_rad: lines.iter().map(|line| line[0].elevation_rad).collect(),
-        time_s: times(&lines.iter().map(|line| mean_at(line, &|ray| ray.time_s)).collect::<Vec<_>>()),
+        // Of all lines, or of none.
+        time_s: if time_s.iter().all(|time| time.is_finite()) { time_s } else { vec![f64::NAN; lines.len()] },
         range_m,
         velocity_m_s,
         sigma_m_s,
         fold_m_s: fold_m_s.filter(|fold| *fold > 0.0 && fold.is_finite()),
     })
-}
-
-/// Times of all lines, or of none.
-fn times(of_lines: &[f64]) -> Vec<f64> {
-    let known = of_lines.iter().all(|time| time.is_finite());
-    if known { of_lines.to_vec() } else { vec![f64::NAN; of_lines.len()] }
 }
 
 /// Refuses rays that do not lie in one vertical plane on one side of the lidar; `what` names the scan in messages.

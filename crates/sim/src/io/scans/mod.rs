@@ -103,12 +103,9 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<Stri
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
             let (mut out, mut left_out) = (Vec::new(), Vec::new());
             let groups = crate::io::netcdf_input::open_groups(path, "elevation")?;
-            for (sweep, (name, group)) in groups.into_iter().enumerate() {
+            for (sweep, group) in groups.into_iter().enumerate() {
                 let found = cfradial::scans(&group, path, format, sweep);
-                let (scans, others) = found.map_err(|reason| match name.as_str() {
-                    "" => refuse(reason),
-                    name => refuse(format!("group {name}: {reason}")),
-                })?;
+                let (scans, others) = found.map_err(|reason| group.refuse(reason))?;
                 out.extend(scans);
                 left_out.extend(others);
             }
