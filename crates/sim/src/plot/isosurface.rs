@@ -9,7 +9,6 @@ use super::png_file::pixels;
 use super::volume::Volume;
 use crate::io::{OutputError, OutputResult};
 use rayon::prelude::*;
-use std::sync::Arc;
 use tiny_skia::Pixmap;
 
 /// Pixels of the embedded picture per drawing unit, as those of a PNG file.
@@ -29,8 +28,6 @@ pub struct Surface {
     pub colour: Rgb,
     /// 1 hides what lies behind.
     pub opacity: f64,
-    /// Name in the legend.
-    pub name: String,
 }
 
 /// Surfaces of one field to draw.
@@ -39,15 +36,11 @@ pub struct IsosurfacePlot {
     /// Title above the panel.
     pub title: String,
     /// The field.
-    pub volume: Arc<Volume>,
+    pub volume: Volume,
     /// The surfaces.
     pub surfaces: Vec<Surface>,
     /// From where it is seen: angle from the x axis in the horizontal plane, and above it \[rad\].
     pub view_rad: [f64; 2],
-    /// Names of the axes, written at the edges of the box.
-    pub axes: [String; 3],
-    /// Whether the lowest plane is drawn as a ground.
-    pub ground: bool,
 }
 
 /// Directions of the picture: to the right, up, and into it.
@@ -123,9 +116,7 @@ impl IsosurfacePlot {
         let lines = |edges: &[(usize, usize, usize)]| -> Vec<Shape> {
             edges.iter().map(|(_, a, b)| Shape::line([corners[*a], corners[*b]], EDGE, 1.0)).collect()
         };
-        if self.ground {
-            out.push(Shape::area([0, 1, 3, 2].map(|corner| corners[corner]), GROUND));
-        }
+        out.push(Shape::area([0, 1, 3, 2].map(|corner| corners[corner]), GROUND));
         out.extend(lines(&hidden));
         let size = [frame.width, frame.height].map(|length| ((length * DENSITY).round() as u32).max(1));
         out.push(Shape::Image { frame, pixels: self.pixels(&camera, size)? });
@@ -138,7 +129,7 @@ impl IsosurfacePlot {
             let (a, b) = (corners[*a], corners[*b]);
             (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
         };
-        for (d, name) in self.axes.iter().enumerate() {
+        for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
             let outward = |edge: &(usize, usize, usize)| if d == 2 { -along(edge, 0.5).0 } else { along(edge, 0.5).1 };
             let of_axis = hidden.iter().chain(&seen).filter(|edge| edge.0 == d);
             let Some(edge) = of_axis.max_by(|a, b| outward(a).total_cmp(&outward(b))) else { continue };
@@ -155,7 +146,7 @@ impl IsosurfacePlot {
             let (left, bottom) = (frame.left + 4.0, frame.top + 14.0 + 18.0 * row as f64);
             let points = Frame { left, top: bottom - 9.0, width: 14.0, height: 9.0 }.outline();
             out.push(Shape::Area { points, fill: surface.colour, opacity: surface.opacity.max(0.4) });
-            out.push(Shape::text((left + 20.0, bottom), &surface.name, TICK_SIZE - 1.0, Anchor::Start));
+            out.push(Shape::text((left + 20.0, bottom), &surface.level.to_string(), TICK_SIZE - 1.0, Anchor::Start));
         }
         Ok(())
     }
@@ -207,15 +198,12 @@ mod tests {
     use crate::io::provenance::example;
 
     fn plot(surfaces: &[(f64, Rgb, f64)]) -> IsosurfacePlot {
-        let surface =
-            |&(level, colour, opacity): &(f64, Rgb, f64)| Surface { level, colour, opacity, name: "r".into() };
+        let surface = |&(level, colour, opacity): &(f64, Rgb, f64)| Surface { level, colour, opacity };
         IsosurfacePlot {
             title: "sphere".into(),
-            volume: Arc::new(cone(40)),
+            volume: cone(40),
             surfaces: surfaces.iter().map(surface).collect(),
             view_rad: [-0.6, 0.4],
-            axes: ["x", "y", "z"].map(String::from),
-            ground: true,
         }
     }
 

@@ -5,7 +5,6 @@ use crate::Error;
 use crate::flow::read::{read_field, read_planes};
 use crate::io::CrossPlanes;
 use crate::plot::{Cells, ColourMap, Figure, IsosurfacePlot, MapPlot, Surface, Volume};
-use std::sync::Arc;
 
 /// Times that the box is repeated along the flight, so that waves can be seen as such.
 pub const REPEATS: usize = 2;
@@ -34,15 +33,13 @@ impl FinishedWake {
             let values =
                 rows.flat_map(|row| (0..REPEATS * nx + 1).map(|i| (row[i % nx] / unit_per_s) as f32)).collect();
             let in_b0 = |axis: Vec<f64>| axis.into_iter().map(|a| a / scales.spacing_m).collect();
-            let volume = Arc::new(Volume::new([repeated, in_b0(y), in_b0(z)], values)?);
-            let surface = |level: f64, colour, opacity| Surface { level, colour, opacity, name: format!("{level}") };
+            let volume = Volume::new([repeated, in_b0(y), in_b0(z)], values)?;
+            let surface = |level: f64, colour, opacity| Surface { level, colour, opacity };
             panels.push(IsosurfacePlot {
                 title: format!("τ = {tau}"),
                 volume,
                 surfaces: vec![surface(1.0, [120, 170, 215], 0.35), surface(10.0, [200, 60, 40], 1.0)],
                 view_rad: [-0.55, 0.35],
-                axes: ["x", "y", "z"].map(String::from),
-                ground: true,
             });
         }
         if panels.is_empty() {
