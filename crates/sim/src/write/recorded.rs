@@ -5,7 +5,7 @@
 use super::pictures;
 use super::{list, list_map};
 use crate::Error;
-use crate::io::{Existing, VelocityMap};
+use crate::io::Existing;
 use crate::measure::recorded::{Recorded, Spectra, measured_map, predicted_table};
 use crate::outputs::Outputs;
 use crate::plan::Plan;
@@ -41,7 +41,10 @@ pub(crate) fn list_recorded(plan: &Plan, found: Recorded, files: &mut Outputs) -
         Recorded::Measured { scans, spectra } => {
             let map = measured_map(plan, &scans)?;
             drop(scans);
-            measured(plan, &map, files)?;
+            files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
+            list_map(plan, Some(&map), files)?;
+            #[cfg(feature = "plots")]
+            files.figure("map", Some(&map), pictures::measured)?;
             list_spectra(spectra, files)
         }
     }
@@ -52,14 +55,6 @@ fn of_run(plan: &Plan, result: &RunResult, spectra: Option<Spectra>, files: &mut
     list(plan, result, files)?;
     files.table("predicted", result.map.as_ref(), |map| predicted_table(plan, map))?;
     list_spectra(spectra, files)
-}
-
-fn measured(plan: &Plan, map: &VelocityMap, files: &mut Outputs) -> Result<(), Error> {
-    files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
-    list_map(plan, Some(map), files)?;
-    #[cfg(feature = "plots")]
-    files.figure("map", Some(map), pictures::measured)?;
-    Ok(())
 }
 
 fn list_spectra(spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Error> {
