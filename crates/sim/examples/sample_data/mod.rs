@@ -2,7 +2,8 @@
 #![allow(dead_code, reason = "each example uses a part")]
 
 use ndarray::{Array2, Array3};
-use wakescope_sim::io::{CrossPlanes, Field, OPEN_EDGES, Provenance, PulseInfo, Ray, Site, Sweep, Unit, VelocityMap};
+use wakescope_sim::io::{CrossPlanes, Field, OPEN_EDGES, Provenance, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+use wakescope_sim::scene::Site;
 
 /// Origin written into the sample files.
 pub(crate) fn origin() -> Provenance {
@@ -72,14 +73,14 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
     }
     let flag = mean.mapv(|v| if v.is_nan() { 1.0 } else { 0.0 });
     let away = "positive away from the lidar";
-    let speed = Unit::MetrePerSecond;
+    let speed = Unit::METRE_PER_SECOND;
     map.fields = vec![
         Field::float("v_exact", speed, &format!("exact radial velocity, {away}"), exact.clone()),
         Field::float("v_gate", speed, &format!("gate-weighted radial velocity, {away}"), exact.mapv(|v| 0.97 * v)),
         Field::float("radial_velocity", speed, &format!("estimated radial velocity, {away}"), mean),
         Field::float("velocity_standard_deviation", speed, "standard deviation of the estimate", spread),
-        Field::float("signal_to_noise_ratio", Unit::Decibel, "signal-to-noise ratio", snr),
-        Field::float("quality_flag", Unit::One, "1 where the estimate is missing", flag),
+        Field::float("signal_to_noise_ratio", Unit::DECIBEL, "signal-to-noise ratio", snr),
+        Field::float("quality_flag", Unit::ONE, "1 where the estimate is missing", flag),
     ];
     map
 }

@@ -7,7 +7,7 @@ use super::error::{OutputError, OutputResult};
 use super::map::{Field, Unit, VelocityMap};
 use super::netcdf::{Data, FILL, Layout, Variable};
 use super::provenance::Provenance;
-use super::site::MAX_TIME_S;
+use super::utc::MAX_TIME_S;
 use crate::setup::beams::SweepMode;
 use std::f64::consts::FRAC_PI_2;
 
@@ -96,7 +96,7 @@ fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
     let degrees = |angle: fn(&super::map::Ray) -> f64| Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32));
     vec![
         Variable::new("time", &["time"], Data::f64(times))
-            .named(["time", "time since the start of the flow", &format!("seconds since {}", map.site.start)])
+            .named(["time", "time since the start of the flow", &format!("seconds since {}", map.start())])
             .text("calendar", "gregorian"),
         Variable::new("range", &["range"], single(gates))
             .named(["projection_range_coordinate", "range to centre of measurement volume", "meters"])
@@ -214,10 +214,11 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
 fn texts(map: &VelocityMap) -> Vec<Variable> {
     const ONE: &[&str] = &["string_length_32"];
     const EACH: &[&str] = &["sweep", "string_length_32"];
-    let start = map.site.start;
+    let start = map.start();
     let time = |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
     let one = |name: &str, text: &str| Variable::new(name, ONE, Data::text(padded(text)));
     let each = |name: &str, text: &str| Variable::new(name, EACH, Data::text(padded(text).repeat(map.sweeps.len())));
+    let modes: Vec<u8> = map.sweeps.iter().flat_map(|sweep| padded(sweep.mode.name())).collect();
     vec![
         one("time_coverage_start", &time(map.rays.first())),
         one("time_coverage_end", &time(map.rays.last())),
@@ -225,11 +226,7 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
         one("platform_type", if map.carrier.is_some() { "aircraft" } else { "fixed" }),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
-        Variable::new(
-            "sweep_mode",
-            EACH,
-            Data::text(map.sweeps.iter().flat_map(|s| padded(s.mode.name())).collect::<Vec<u8>>()),
-        ),
+        Variable::new("sweep_mode", EACH, Data::text(modes)),
         each("follow_mode", "none"),
         each("prt_mode", "fixed"),
     ]
@@ -275,7 +272,7 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
             what: "field radial_velocity".into(),
             needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact to stand for it".into(),
         })?;
-        let copy = Field::float("radial_velocity", Unit::MetrePerSecond, &source.long_name, source.values.clone());
+        let copy = Field::float("radial_velocity", Unit::METRE_PER_SECOND, &source.long_name, source.values.clone());
         out.push(field_variable(&copy).text("comment", &format!("no estimate was made: copy of {}", source.name)));
     }
     Ok(out)
@@ -293,10 +290,10 @@ fn instrument_of(scene_toml: &str) -> String {
 fn field_variable(field: &Field) -> Variable {
     const DIMS: &[&str] = &["time", "range"];
     let mut out = Variable::new(&field.name, DIMS, Data::filled(&field.values))
-        .named(["", &field.long_name, field.unit.udunits()])
+        .named(["", &field.long_name, field.unit.udunits])
         .text("coordinates", "elevation azimuth range");
     let further = [
-        ("standard_name", field.standard_name.as_deref()),
+        ("standard_name", field.standard_name()),
         ("cell_methods", field.cell_methods.as_deref()),
         ("ancillary_variables", Some(field.ancillary.as_str()).filter(|names| !names.is_empty())),
     ];

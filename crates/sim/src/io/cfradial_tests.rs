@@ -2,8 +2,8 @@
 
 use super::super::provenance::example;
 use super::super::samples;
-use super::super::site::{Site, UtcTime};
 use super::*;
+use crate::scene::Site;
 use netcdf3::FileReader;
 
 /// Writes the map, and opens it with a reader that shares no code with the writer.
@@ -145,7 +145,7 @@ fn place_and_date_are_those_of_the_site() {
         latitude_deg: 43.6293,
         longitude_deg: 1.3638,
         altitude_m: 151.5,
-        start: UtcTime::parse("2023-12-31T23:59:00Z").unwrap(),
+        start_utc: "2023-12-31T23:59:00Z".into(),
     };
     let (_temp, mut file) = reopened(&map);
     for (name, expected) in [("latitude", 43.6293), ("longitude", 1.3638), ("altitude", 151.5 + map.lidar_height_m)] {

@@ -6,7 +6,7 @@
 use super::csv::Table;
 use super::error::{OutputError, OutputResult};
 use super::map::VelocityMap;
-use super::site::DAY_S;
+use super::utc::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::setup::beams::SweepMode;
 use ndarray::Array2;
@@ -27,7 +27,7 @@ pub(super) const SYSTEM_ID: &str = "System ID:\t0";
 pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResult<Vec<u8>> {
     let ((first, last), [velocity, snr_db]) = swept(map, sweep)?;
     let (gate_m, before) = gate_grid(&map.range_m)?;
-    within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.site.start)?;
+    within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.start())?;
     let mut out = header(map, file_name, gate_m, before + map.range_m.len(), (first, last));
     for ray in first..=last {
         let hours = second_of_day(map, ray) / 3600.0;
@@ -106,15 +106,14 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
     }
     let gate_m = (range_m[range_m.len() - 1] - range_m[0]) / (range_m.len() - 1) as f64;
     let before = (range_m[0] / gate_m - 0.5).round();
-    let misplaced = |(i, r): &(usize, &f64)| {
+    for (i, r) in range_m.iter().enumerate() {
         // Readers compute the centre as (gate + 0.5) * length; a millimetre is below what they keep.
-        before < 0.0 || ((before + *i as f64 + 0.5) * gate_m - **r).abs() > 1e-3
-    };
-    if let Some((i, r)) = range_m.iter().enumerate().find(misplaced) {
         let expected = (before + i as f64 + 0.5) * gate_m;
-        return Err(refuse(format!(
-            "gate {i} is at {r} m; the format puts it at {expected} m: gates must touch, and start a whole number of gates from the lidar"
-        )));
+        if before < 0.0 || (expected - r).abs() > 1e-3 {
+            return Err(refuse(format!(
+                "gate {i} is at {r} m; the format puts it at {expected} m: gates must touch, and start a whole number of gates from the lidar"
+            )));
+        }
     }
     Ok((gate_m, before as usize))
 }
@@ -163,11 +162,11 @@ fn scan_type(map: &VelocityMap, (first, last): (usize, usize)) -> &'static str {
 
 /// Seconds since midnight UTC of a ray.
 fn second_of_day(map: &VelocityMap, ray: usize) -> f64 {
-    (map.site.start.second_of_day() as f64 + map.rays[ray].time_s).rem_euclid(DAY_S)
+    (map.start().second_of_day() as f64 + map.rays[ray].time_s).rem_euclid(DAY_S)
 }
 
 fn start_time(map: &VelocityMap, ray: usize) -> String {
-    let date = map.site.start.after_s(map.rays[ray].time_s).date();
+    let date = map.start().after_s(map.rays[ray].time_s).date();
     let s = second_of_day(map, ray);
     let (h, m) = ((s / 3600.0) as u32, (s / 60.0) as u32 % 60);
     // Hundredths are cut, not rounded: 59.999 s must not become 60.00.
@@ -255,12 +254,12 @@ mod tests {
     #[test]
     fn a_date_of_ones_own_is_in_the_header_and_in_the_hours_and_ends_at_midnight() {
         let mut map = samples::map();
-        map.site.start = super::super::UtcTime::parse("2023-12-31T23:58:00Z").unwrap();
+        map.site.start_utc = "2023-12-31T23:58:00Z".into();
         let lines = lines(&map, 0);
         assert_eq!(lines[9], "Start time:\t20231231 23:58:40.00", "the sweep begins 40 s after the flow");
         let hours: f64 = lines[17].split_whitespace().next().unwrap().parse().unwrap();
         approx::assert_abs_diff_eq!(hours, 23.0 + 58.0 / 60.0 + 40.0 / 3600.0, epsilon = 1e-8);
-        map.site.start = map.site.start.after_s(79.0);
+        map.site.start_utc = "2023-12-31T23:59:19Z".into();
         let error = hpl_bytes(&map, 0, "x.hpl").unwrap_err().to_string();
         assert!(error.contains("2023-12-31T23:59:59Z to 2024-01-01T00:00:01Z"), "{error}");
     }

@@ -3,48 +3,31 @@
 //! Check: each rule of `check` is broken once by a test; positions follow from ray geometry.
 
 use super::error::{OutputError, OutputResult, increasing, same_length};
-use super::site::Site;
+use super::utc::UtcTime;
+use crate::scene::Site;
 use crate::setup::beams::{Direction, SweepMode};
 use ndarray::{Array2, Array3, Axis};
 use std::f64::consts::FRAC_PI_2;
 use wakescope_les::winds::{Edges, Side};
 
-/// Unit of a field: its tag in a CSV column name and its text in NetCDF (UDUNITS).
+/// Unit of a field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Unit {
-    /// Dimensionless; no tag.
-    One,
-    /// Metre per second, tag `m_s`.
-    MetrePerSecond,
-    /// Decibel, tag `db`.
-    Decibel,
+pub struct Unit {
+    /// Tag that ends a CSV column name; empty for a dimensionless one.
+    pub tag: &'static str,
+    /// Text of the NetCDF attribute `units` (UDUNITS).
+    pub udunits: &'static str,
+    /// Text for people; empty for a dimensionless one.
+    pub label: &'static str,
 }
 
 impl Unit {
-    /// Tag of a CSV column name, text in NetCDF, text for people.
-    fn texts(self) -> [&'static str; 3] {
-        match self {
-            Self::One => ["", "1", ""],
-            Self::MetrePerSecond => ["m_s", "m s-1", "m/s"],
-            Self::Decibel => ["db", "dB", "dB"],
-        }
-    }
-
-    /// Tag that ends a CSV column name; empty for a dimensionless one.
-    pub fn tag(self) -> &'static str {
-        self.texts()[0]
-    }
-
-    /// Text of the NetCDF attribute `units`.
-    pub fn udunits(self) -> &'static str {
-        self.texts()[1]
-    }
-
-    /// Text for people; empty for a dimensionless one.
-    pub fn label(self) -> &'static str {
-        self.texts()[2]
-    }
+    /// Dimensionless.
+    pub const ONE: Self = Self { tag: "", udunits: "1", label: "" };
+    /// Metre per second.
+    pub const METRE_PER_SECOND: Self = Self { tag: "m_s", udunits: "m s-1", label: "m/s" };
+    /// Decibel.
+    pub const DECIBEL: Self = Self { tag: "db", udunits: "dB", label: "dB" };
 }
 
 /// One quantity over all rays and gates.
@@ -56,8 +39,6 @@ pub struct Field {
     pub unit: Unit,
     /// One sentence for plots and headers; for velocities it says that positive means away from the lidar.
     pub long_name: String,
-    /// CF or CfRadial standard name, where one exists.
-    pub standard_name: Option<String>,
     /// How the value was made of several realisations, in the words of CF.
     pub cell_methods: Option<String>,
     /// Names of the fields that say how good this one is, with blanks between them.
@@ -67,13 +48,12 @@ pub struct Field {
 }
 
 impl Field {
-    /// A field of that name with what its name says of it.
+    /// A field of that name.
     pub fn float(name: &str, unit: Unit, long_name: &str, values: Array2<f64>) -> Self {
         Self {
             name: name.into(),
             unit,
             long_name: long_name.into(),
-            standard_name: standard_name_of(name).map(str::to_owned),
             cell_methods: None,
             ancillary: String::new(),
             values,
@@ -93,27 +73,28 @@ impl Field {
         Self { ancillary: names.into(), ..self }
     }
 
+    /// CF or CfRadial standard name, where one exists.
+    pub fn standard_name(&self) -> Option<&'static str> {
+        match self.name.as_str() {
+            "radial_velocity" | "velocity_standard_deviation" | "v_scan" | "v_exact" | "v_pulse" | "v_gate" => {
+                Some("radial_velocity_of_scatterers_away_from_instrument")
+            }
+            "width" => Some("doppler_spectrum_width"),
+            "count" => Some("number_of_observations"),
+            "signal_to_noise_ratio" => Some("signal_to_noise_ratio"),
+            _ => None,
+        }
+    }
+
     /// Column name in a CSV table: name and unit tag, with the short names `v_mean_m_s` and `std_m_s` of the estimate and `snr_db`.
     pub fn column(&self) -> String {
         match self.name.as_str() {
             "radial_velocity" => "v_mean_m_s".into(),
             "velocity_standard_deviation" => "std_m_s".into(),
             "signal_to_noise_ratio" => "snr_db".into(),
-            name if self.unit == Unit::One => name.into(),
-            name => format!("{name}_{}", self.unit.tag()),
+            name if self.unit == Unit::ONE => name.into(),
+            name => format!("{name}_{}", self.unit.tag),
         }
-    }
-}
-
-fn standard_name_of(name: &str) -> Option<&'static str> {
-    match name {
-        "radial_velocity" | "velocity_standard_deviation" | "v_scan" | "v_exact" | "v_pulse" | "v_gate" => {
-            Some("radial_velocity_of_scatterers_away_from_instrument")
-        }
-        "width" => Some("doppler_spectrum_width"),
-        "count" => Some("number_of_observations"),
-        "signal_to_noise_ratio" => Some("signal_to_noise_ratio"),
-        _ => None,
     }
 }
 
@@ -203,7 +184,7 @@ pub struct VelocityMap {
     pub ray_pulses: Option<Vec<u32>>,
     /// Where the lidar is at each ray (x, y, z), m, and its velocity, m/s, if it moves.
     pub carrier: Option<Vec<([f64; 3], [f64; 3])>>,
-    /// Place and date.
+    /// Place, and date from which the times of the rays count.
     pub site: Site,
     /// Whether the signals were simulated.
     pub is_simulated: bool,
@@ -241,15 +222,19 @@ impl VelocityMap {
         self.fields.iter().find(|f| f.name == name)
     }
 
-    /// First and last (inclusive) ray of each sweep.
+    /// The date from which the times of the rays count.
+    pub fn start(&self) -> UtcTime {
+        UtcTime::parse(&self.site.start_utc).unwrap_or(UtcTime::SYNTHETIC)
+    }
+
+    /// First and last (inclusive) ray of each sweep: of all rays that follow each other in it.
     pub fn sweep_bounds(&self) -> Vec<(usize, usize)> {
-        (0..self.sweeps.len())
-            .filter_map(|s| {
-                let first = self.rays.iter().position(|r| r.sweep == s)?;
-                let last = self.rays.iter().rposition(|r| r.sweep == s)?;
-                Some((first, last))
-            })
-            .collect()
+        let mut next = 0;
+        let bounds = |rays: &[Ray]| {
+            next += rays.len();
+            (next - rays.len(), next - 1)
+        };
+        self.rays.chunk_by(|a, b| a.sweep == b.sweep).map(bounds).collect()
     }
 
     /// Checks shapes, order and values.
@@ -279,24 +264,20 @@ impl VelocityMap {
     }
 
     fn check_rays(&self) -> OutputResult<()> {
-        let mut expected = 0;
-        for (i, ray) in self.rays.iter().enumerate() {
-            if !(ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite()) {
-                let pair = format!("{}, {}", ray.elevation_rad, ray.azimuth_rad);
-                return Err(OutputError::value(format!("ray {i} angles"), pair, "must be finite"));
-            }
-            if i > 0 && ray.sweep == expected + 1 {
-                expected += 1;
-            }
-            if ray.sweep != expected {
-                return Err(OutputError::value(
-                    format!("ray {i} sweep"),
-                    ray.sweep,
-                    format!("sweeps tile the rays in order: {expected} is next"),
-                ));
+        let is_known = |ray: &Ray| ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite();
+        if let Some(i) = self.rays.iter().position(|ray| !is_known(ray)) {
+            let pair = format!("{}, {}", self.rays[i].elevation_rad, self.rays[i].azimuth_rad);
+            return Err(OutputError::value(format!("ray {i} angles"), pair, "must be finite"));
+        }
+        let bounds = self.sweep_bounds();
+        for (expected, (first, _)) in bounds.iter().enumerate() {
+            let sweep = self.rays[*first].sweep;
+            if sweep != expected {
+                let allowed = format!("sweeps tile the rays in order: {expected} is next");
+                return Err(OutputError::value(format!("ray {first} sweep"), sweep, allowed));
             }
         }
-        same_length("sweeps", self.sweeps.len(), "the rays", expected + 1)
+        same_length("sweeps", self.sweeps.len(), "the rays", bounds.len())
     }
 
     fn check_field(&self, field: &Field) -> OutputResult<()> {

@@ -8,7 +8,7 @@
 //! | [`map`] | (data) [`VelocityMap`], [`CrossPlanes`] | - |
 //! | [`fields`] | (data) [`VelocityField`] | - |
 //! | [`provenance`] | (data) where a file comes from | - |
-//! | [`site`] | (data) place and date of a measurement | - |
+//! | [`utc`] | (data) dates of a measurement | - |
 //! | [`own`] | which files this program wrote, so that no other is replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
@@ -55,8 +55,8 @@ pub mod raw;
 pub mod scan_list;
 pub mod scans;
 pub mod signals;
-pub mod site;
 pub mod tables;
+pub mod utc;
 #[cfg(feature = "vtk")]
 pub mod vtr;
 
@@ -70,8 +70,8 @@ pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, Veloc
 pub use own::Existing;
 pub use parts::{FileParts, Share};
 pub use provenance::Provenance;
-pub(crate) use site::MAX_TIME_S;
-pub use site::{Site, UtcTime};
+pub(crate) use utc::MAX_TIME_S;
+pub use utc::UtcTime;
 
 #[cfg(test)]
 pub(crate) mod samples;

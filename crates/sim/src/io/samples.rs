@@ -1,7 +1,7 @@
 //! Small made-up results for the tests of the writers: two sweeps, missing values, a stretched mesh.
 
 use super::map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
-use super::site::Site;
+use crate::scene::Site;
 use ndarray::{Array2, Array3};
 
 /// Two sweeps of 6 rays, 5 gates; NaN in a corner.
@@ -40,38 +40,38 @@ pub(crate) fn map() -> VelocityMap {
         fields: vec![
             Field::float(
                 "v_exact",
-                Unit::MetrePerSecond,
+                Unit::METRE_PER_SECOND,
                 "exact radial velocity, positive away from the lidar",
                 wave(0.0),
             ),
             Field::float(
                 "v_pulse",
-                Unit::MetrePerSecond,
+                Unit::METRE_PER_SECOND,
                 "pulse-weighted radial velocity, positive away from the lidar",
                 wave(0.05),
             ),
             Field::float(
                 "v_gate",
-                Unit::MetrePerSecond,
+                Unit::METRE_PER_SECOND,
                 "gate-weighted radial velocity, positive away from the lidar",
                 wave(0.07),
             ),
             Field::float(
                 "radial_velocity",
-                Unit::MetrePerSecond,
+                Unit::METRE_PER_SECOND,
                 "estimated radial velocity, positive away from the lidar",
                 mean,
             ),
             Field::float(
                 "velocity_standard_deviation",
-                Unit::MetrePerSecond,
+                Unit::METRE_PER_SECOND,
                 "standard deviation of the estimate",
                 positive(0.05),
             ),
-            Field::float("rms", Unit::MetrePerSecond, "root mean square error", positive(0.06)),
-            Field::float("level", Unit::One, "accumulation level", positive(3.0)),
-            Field::float("n_eff", Unit::One, "effective number of independent spectra", positive(2.0)),
-            Field::float("signal_to_noise_ratio", Unit::Decibel, "signal-to-noise ratio", wave(1.0)),
+            Field::float("rms", Unit::METRE_PER_SECOND, "root mean square error", positive(0.06)),
+            Field::float("level", Unit::ONE, "accumulation level", positive(3.0)),
+            Field::float("n_eff", Unit::ONE, "effective number of independent spectra", positive(2.0)),
+            Field::float("signal_to_noise_ratio", Unit::DECIBEL, "signal-to-noise ratio", wave(1.0)),
         ],
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,

@@ -1,35 +1,8 @@
-//! Place and date of a measurement, for the formats that ask for both.
+//! Dates of a measurement.
 //! Check: dates against a calendar, leap days and centuries included; texts that are no date are refused.
 
 use jiff::tz::Offset;
 use jiff::{SignedDuration, Timestamp};
-
-/// Where the lidar stands and when the flow began. The default is that of a simulation that says neither.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Site {
-    /// Name of the place.
-    pub name: String,
-    /// Latitude, degrees north.
-    pub latitude_deg: f64,
-    /// Longitude, degrees east.
-    pub longitude_deg: f64,
-    /// Height of the ground above the sea, m.
-    pub altitude_m: f64,
-    /// Date of the start of the flow, from which the times of the rays count.
-    pub start: UtcTime,
-}
-
-impl Default for Site {
-    fn default() -> Self {
-        Self {
-            name: "simulated runway".into(),
-            latitude_deg: 0.0,
-            longitude_deg: 0.0,
-            altitude_m: 0.0,
-            start: UtcTime::SYNTHETIC,
-        }
-    }
-}
 
 /// A second of a day in UTC, without leap seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -205,7 +205,7 @@ fn round_up(value: f64) -> f64 {
 fn bar_label(long_name: &str, unit: Unit) -> String {
     // The part after a comma explains the sign; a colour bar shows it.
     let short = long_name.split(',').next().unwrap_or(long_name);
-    if unit == Unit::One { short.into() } else { format!("{short} [{}]", unit.label()) }
+    if unit == Unit::ONE { short.into() } else { format!("{short} [{}]", unit.label) }
 }
 
 #[cfg(test)]

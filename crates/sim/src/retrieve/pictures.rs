@@ -34,7 +34,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         sweeps: vec![Sweep::rhi(f64::NAN, 0.0)],
         fields: fields
             .iter()
-            .map(|(name, text, values)| Field::float(name, Unit::MetrePerSecond, text, values.clone()))
+            .map(|(name, text, values)| Field::float(name, Unit::METRE_PER_SECOND, text, values.clone()))
             .collect(),
         lidar_y_m: scan.options.model.lidar_lateral_position_m,
         lidar_height_m: scan.options.model.lidar_height_m,

@@ -1,6 +1,6 @@
-//! What files say of a scene's instrument and of its place.
+//! What files say of a scene's instrument.
 
-use crate::io::{PulseInfo, Site, UtcTime};
+use crate::io::PulseInfo;
 use crate::scene::{DetectorSignal, Scene};
 
 /// Least and largest velocity that the samples of a scene can tell from others, m/s: real currents are mirrored at 0 and at half the
@@ -26,18 +26,6 @@ pub(crate) fn pulse_info(scene: &Scene) -> PulseInfo {
         sampling_hz: scene.detector.sampling_hz,
         samples: scene.scan.pulses_per_line as u32,
         frequency_hz: crate::SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m,
-    }
-}
-
-/// The site of a checked scene.
-pub(crate) fn site(scene: &Scene) -> Site {
-    let s = &scene.site;
-    Site {
-        name: s.name.clone(),
-        latitude_deg: s.latitude_deg,
-        longitude_deg: s.longitude_deg,
-        altitude_m: s.altitude_m,
-        start: UtcTime::parse(&s.start_utc).unwrap_or(UtcTime::SYNTHETIC),
     }
 }
 

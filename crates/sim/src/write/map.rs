@@ -5,7 +5,7 @@ use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::setup::beams::SweepMode;
-use crate::setup::described::{pulse_info, site};
+use crate::setup::described::pulse_info;
 use std::f64::consts::FRAC_PI_2;
 
 /// Fields that say how good the mean estimate is.
@@ -25,10 +25,10 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let start_s = plan.wind.start_s;
     let away = |what: &str| format!("{what}, positive away from the lidar");
     let speed = |name: &str, text: String, values: &ndarray::Array2<f64>| {
-        Field::float(name, Unit::MetrePerSecond, &text, values.clone())
+        Field::float(name, Unit::METRE_PER_SECOND, &text, values.clone())
     };
     let number =
-        |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::One, text, values.clone());
+        |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::ONE, text, values.clone());
     let spread = e
         .v_spread_m_s
         .as_ref()
@@ -70,7 +70,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             speed("width", "spectral width of air and pulse".into(), &e.width_m_s),
             Field::float(
                 "signal_to_noise_ratio",
-                Unit::Decibel,
+                Unit::DECIBEL,
                 "signal-to-noise ratio in the detector band that the spectra show",
                 e.snr_db.clone(),
             ),
@@ -90,7 +90,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
                 .collect()
         }),
         flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
-        site: site(scene),
+        site: scene.site.clone(),
         is_simulated: true,
     }
 }

@@ -223,7 +223,7 @@ mod tests {
         let shape = map.field("radial_velocity").unwrap().values.dim();
         let ratio = ndarray::Array2::from_elem(shape, 3.0);
         map.fields.retain(|field| field.name != "signal_to_noise_ratio");
-        map.fields.push(crate::io::Field::float("signal_to_noise_ratio", Unit::Decibel, "ratio", ratio));
+        map.fields.push(crate::io::Field::float("signal_to_noise_ratio", Unit::DECIBEL, "ratio", ratio));
         // Two sweeps of six rays and five gates: 30 velocities are as few as a scan may have.
         let bytes = hpl::hpl_bytes(&map, 0, "halo.hpl").unwrap();
         let found = read(&String::from_utf8(bytes).unwrap(), &ScanFormat::default());

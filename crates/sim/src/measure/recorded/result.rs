@@ -10,7 +10,7 @@ use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::measure::gate_estimates::GateSums;
 use crate::plan::Plan;
-use crate::setup::described::{pulse_info, site};
+use crate::setup::described::pulse_info;
 use ndarray::{Array2, Axis, concatenate};
 use wakescope_estimate::estimators::noise_floor;
 use wakescope_estimate::map::PolarPoint;
@@ -122,7 +122,7 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
     let field = |name: &str, unit: Unit, text: &str, of: fn(&MeasuredScan) -> &Array2<f64>| {
         Ok::<_, Error>(Field::float(name, unit, text, stacked(of)?))
     };
-    let speed = Unit::MetrePerSecond;
+    let speed = Unit::METRE_PER_SECOND;
     Ok(VelocityMap {
         title: "Radial velocity estimated from recorded signals".into(),
         rays: scans.iter().enumerate().flat_map(of_scan).collect(),
@@ -141,20 +141,20 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
                 |s| &s.predicted_m_s,
             )?,
             field("bias", speed, "predicted bias of the method in this noise, not taken off", |s| &s.bias_m_s)?,
-            field("level", Unit::One, "windows accumulated for one estimate", |s| &s.level)?,
-            field("n_eff", Unit::One, "independent windows that these are worth", |s| &s.n_eff)?,
-            field("flagged", Unit::One, "1 where the estimate was flagged", |s| &s.flagged)?,
+            field("level", Unit::ONE, "windows accumulated for one estimate", |s| &s.level)?,
+            field("n_eff", Unit::ONE, "independent windows that these are worth", |s| &s.n_eff)?,
+            field("flagged", Unit::ONE, "1 where the estimate was flagged", |s| &s.flagged)?,
             field("width", speed, "spectral width of air and pulse", |s| &s.width_m_s)?,
             field(
                 "signal_to_noise_ratio",
-                Unit::Decibel,
+                Unit::DECIBEL,
                 "signal-to-noise ratio in the detector band that the spectra show",
                 |s| &s.snr_db,
             )?,
-            field("quality", Unit::One, "density of the peak over the mean density in the band", |s| &s.quality)?,
+            field("quality", Unit::ONE, "density of the peak over the mean density in the band", |s| &s.quality)?,
         ],
         lidar_height_m: scene.scan.lidar_height_m,
-        site: site(scene),
+        site: scene.site.clone(),
         ..VelocityMap::default()
     })
 }
