@@ -15,8 +15,8 @@ pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> Ou
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
     let time = Variable::new("time", &["time"], Data::f64(signals.time_s.clone())).text("units", "s");
-    let time = time.text("standard_name", "time");
-    let mut variables = vec![time.text("long_name", "time after the middle of the pulse left the telescope")];
+    let time = time.named(["time", "time after the middle of the pulse left the telescope", ""]);
+    let mut variables = vec![time];
     variables.extend(of_rays(signals, rays));
     let second = "second quadrature of the baseband signal; the first is current_a";
     let currents = [
@@ -88,15 +88,10 @@ fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
 
 fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
     let above_horizon = "elevation of the line of sight above the horizon";
+    let range = Data::f64(signals.range_m.clone());
     let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
     vec![
-        Variable::in_units(
-            "range",
-            &["range"],
-            Data::f64(signals.range_m.clone()),
-            "m",
-            "range of the true velocities",
-        ),
+        Variable::in_units("range", &["range"], range, "m", "range of the true velocities"),
         Variable::in_units("line_elevation", &["line"], Data::f64(elevation.copied()), "rad", above_horizon),
         Variable::new("radial_velocity", &["line", "range"], Data::filled(signals.radial_velocity_m_s))
             .text("units", "m s-1")

@@ -102,13 +102,13 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
         let angles_rad = [number(row, azimuth, -turns, turns)? * unit, number(row, elevation, -up, up)? * unit];
         let mut stop = Stop::new(SweepMode::Pointing, angles_rad);
         let of_column = |name: &str, low, high| column(name).map(|at| number(row, at, low, high)).transpose();
+        let whole = |name: &str, low, high| match of_column(name, low, high)? {
+            Some(value) if value.fract() != 0.0 => Err(format!("row {}: {name} = {value}: a whole number", row + 1)),
+            value => Ok(value.map(|value| value as usize)),
+        };
         stop.time_s = of_column("time_s", 0.0, 1e9)?;
-        if let Some(pulses) = of_column("pulses", 1.0, 1e6)? {
-            stop.pulses = Some(whole(row, "pulses", pulses)?);
-        }
-        if let Some(sweep) = of_column("sweep", 0.0, 1e5)? {
-            stop.sweep = whole(row, "sweep", sweep)?;
-        }
+        stop.pulses = whole("pulses", 1.0, 1e6)?;
+        stop.sweep = whole("sweep", 0.0, 1e5)?.unwrap_or(stop.sweep);
         let before = out.last();
         let next = before.map_or(0, |b| b.sweep + 1);
         if stop.sweep > next || before.is_some_and(|b| stop.sweep < b.sweep) {
@@ -137,14 +137,6 @@ fn table(table: &TextTable) -> Result<Vec<Stop>, String> {
         out.push(stop);
     }
     Ok(out)
-}
-
-fn whole(row: usize, name: &str, value: f64) -> Result<usize, String> {
-    if value.fract() == 0.0 {
-        Ok(value as usize)
-    } else {
-        Err(format!("row {}: {name} = {value}: a whole number", row + 1))
-    }
 }
 
 #[cfg(test)]

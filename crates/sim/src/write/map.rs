@@ -33,23 +33,22 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         .v_spread_m_s
         .as_ref()
         .map(|values| speed("v_spread", "standard deviation of v_pulse over the pulses of a line".into(), values));
+    let ray = |i: usize| Ray {
+        sweep: lines[i].sweep,
+        time_s: start_s + g.line_time_s[i],
+        elevation_rad: g.elevation_rad[i],
+        azimuth_rad: g.schedule.middle(i).azimuth_rad,
+    };
+    let carried = |i: usize| {
+        let beam = g.schedule.middle(i);
+        (beam.position_m, beam.velocity_m_s)
+    };
+    let sweep = |&(mode, fixed_angle_rad): &(SweepMode, f64)| Sweep { tau: plan.wind.tau, fixed_angle_rad, mode };
     VelocityMap {
         title: "Radial velocity of a wake-vortex scan".into(),
-        rays: (0..g.elevation_rad.len())
-            .map(|i| Ray {
-                sweep: g.schedule.lines[i].sweep,
-                time_s: start_s + g.line_time_s[i],
-                elevation_rad: g.elevation_rad[i],
-                azimuth_rad: g.schedule.middle(i).azimuth_rad,
-            })
-            .collect(),
+        rays: (0..g.elevation_rad.len()).map(ray).collect(),
         range_m: e.range_m.clone(),
-        sweeps: g
-            .schedule
-            .sweeps
-            .iter()
-            .map(|&(mode, fixed_angle_rad)| Sweep { tau: plan.wind.tau, fixed_angle_rad, mode })
-            .collect(),
+        sweeps: g.schedule.sweeps.iter().map(sweep).collect(),
         pulse: pulse_info(scene),
         fields: vec![
             speed("v_exact", away("radial velocity of the air at the gate's centre"), &e.v_exact_m_s),
@@ -83,12 +82,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         lidar_y_m: mount.position_m[1],
         lidar_height_m: scene.scan.lidar_height_m,
         ray_pulses: lines.iter().any(|line| line.pulses != scene.scan.pulses_per_line).then_some(pulses),
-        carrier: moves.then(|| {
-            (0..lines.len())
-                .map(|line| g.schedule.middle(line))
-                .map(|beam| (beam.position_m, beam.velocity_m_s))
-                .collect()
-        }),
+        carrier: moves.then(|| (0..lines.len()).map(carried).collect()),
         flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
         site: scene.site.clone(),
         is_simulated: true,

@@ -17,83 +17,40 @@ const SIGMAS: [&str; 3] = ["sigma_m_s", "std_m_s", "predicted_std_m_s"];
 /// Values of an axis that differ by less than this part of its mean step are the same.
 const SAME: f64 = 1e-3;
 
-/// Columns of a table that are read.
-struct Columns {
-    range: usize,
-    elevation: (usize, f64),
-    azimuth: Option<(usize, f64)>,
-    time: Option<usize>,
-    velocity: usize,
-    sigma: Option<usize>,
-    sweep: Option<usize>,
-    snr: Option<usize>,
-    flagged: Option<usize>,
-    count: Option<usize>,
-}
-
-impl Columns {
-    fn new(table: &TextTable, format: &ScanFormat) -> Result<Self, String> {
-        let one_of = |names: &[&str]| names.iter().find_map(|name| table.column(name));
-        let needed = |names: &[&str]| {
-            one_of(names).ok_or_else(|| {
-                format!(
-                    "it has no column {}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s \
-                     are read",
-                    names.join(" or ")
-                )
-            })
-        };
-        let angle = |name: &str| {
-            let in_degrees = || Some((table.column(&format!("{name}_deg"))?, 1f64.to_radians()));
-            table.column(&format!("{name}_rad")).map(|column| (column, 1.0)).or_else(in_degrees)
-        };
-        let velocity = match &format.field {
-            Some(name) => needed(&[name])?,
-            None => needed(&VELOCITIES)?,
-        };
-        let is_mean = table.header.get(velocity).is_some_and(|name| name == OWN);
-        Ok(Self {
-            elevation: angle("elevation").map_or_else(|| Ok((needed(&["elevation_rad"])?, 1.0)), Ok::<_, String>)?,
-            velocity,
-            range: needed(&["range_m"])?,
-            azimuth: angle("azimuth"),
-            time: table.column("time_s"),
-            sigma: one_of(&SIGMAS),
-            sweep: one_of(&["sweep", "scan"]),
-            snr: table.column("snr_db"),
-            flagged: table.column("flagged"),
-            // The mean of so many scans.
-            count: table.column("count").filter(|_| is_mean),
-        })
-    }
+/// A row of a table; NaN is what it does not say.
+struct Row {
+    /// In the table, from 1.
+    number: usize,
+    range_m: f64,
+    elevation_rad: f64,
+    azimuth_rad: f64,
+    time_s: f64,
+    /// NaN of noise, too.
+    velocity_m_s: f64,
+    /// None in a table without.
+    sigma_m_s: Option<f64>,
+    /// Scans of which the velocity is the mean.
+    count: f64,
 }
 
 /// The scans of a table.
 pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<ReadScan>, String> {
     let table = TextTable::parse(text)?;
-    let columns = Columns::new(&table, format)?;
-    let mut rows: BTreeMap<u64, Vec<usize>> = BTreeMap::new();
-    for row in 0..table.rows.len() {
-        let sweep = columns.sweep.map_or(0.0, |column| table.number(row, column));
-        if !(sweep >= 0.0 && sweep.fract() == 0.0) {
-            return Err(format!("row {}: sweep is no whole number", row + 1));
-        }
-        rows.entry(sweep as u64).or_default().push(row);
-    }
+    // Programs that write it again keep the names of its columns.
+    let is_own = table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
+    let rows = rows(&table, format, is_own)?;
     if rows.is_empty() {
         return Err("it has a header and no rows".into());
     }
-    let origin = table.origin();
-    // Programs that write it again keep the names of its columns.
-    let is_own = table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
+    let scene_toml = Some(table.origin().scene_toml).filter(|text| !text.is_empty());
     rows.into_iter()
         .map(|(sweep, rows)| {
-            let (rays, range_m) = cells(&table, &columns, &rows, format, is_own)?;
+            let (rays, range_m) = grid(&rows)?;
             let what = format!("sweep {sweep}");
             one_plane(&rays, &what)?;
             Ok(ReadScan {
-                scene_toml: Some(origin.scene_toml.clone()).filter(|text| !text.is_empty()),
-                scans: mean_count(columns.count.iter().flat_map(|c| rows.iter().map(|row| table.number(*row, *c)))),
+                scene_toml: scene_toml.clone(),
+                scans: mean_count(rows.iter().map(|row| row.count)),
                 is_own,
                 ..ReadScan::new(path, sweep as usize, scan_map(rays, range_m, None, &what)?)
             })
@@ -101,79 +58,103 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
         .collect()
 }
 
-/// The rays of one scan on the ranges of all. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in
-/// degrees: fits to what jumps tell the same of both.
-fn cells(
-    table: &TextTable,
-    columns: &Columns,
-    rows: &[usize],
-    format: &ScanFormat,
-    is_own: bool,
-) -> Result<(Vec<RayRow>, Vec<f64>), String> {
-    let number = |row: usize, column: usize| table.number(row, column);
-    let single = |row: usize, column: usize| match number(row, column) {
-        value if is_own => f64::from(value as f32),
-        value => value,
+/// The rows of each sweep. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
+/// fits to what jumps tell the same of both.
+fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<BTreeMap<u64, Vec<Row>>, String> {
+    let one_of = |names: &[&str]| names.iter().find_map(|name| table.column(name));
+    let needed = |names: &[&str]| {
+        one_of(names).ok_or_else(|| {
+            format!(
+                "it has no column {}: range_m, elevation_rad (or elevation_deg), velocity_m_s and, if known, time_s and sigma_m_s are read",
+                names.join(" or ")
+            )
+        })
     };
-    let angle = |row: usize, (column, unit): (usize, f64)| match unit * number(row, column) {
-        angle_rad if is_own => f64::from(angle_rad.to_degrees() as f32).to_radians(),
-        angle_rad => angle_rad,
+    let angle = |name: &str| {
+        let in_degrees = || Some((table.column(&format!("{name}_deg"))?, 1f64.to_radians()));
+        table.column(&format!("{name}_rad")).map(|column| (column, 1.0)).or_else(in_degrees)
     };
-    let mut places = Vec::with_capacity(rows.len());
-    for &row in rows {
-        let (range_m, elevation_rad) = (single(row, columns.range), angle(row, columns.elevation));
-        if !(range_m.is_finite() && elevation_rad.is_finite()) {
-            return Err(format!("row {}: its range or elevation is no number", row + 1));
+    let velocity = match &format.field {
+        Some(name) => needed(&[name])?,
+        None => needed(&VELOCITIES)?,
+    };
+    let elevation = angle("elevation").map_or_else(|| needed(&["elevation_rad"]).map(|column| (column, 1.0)), Ok)?;
+    let (range, azimuth, time) = (needed(&["range_m"])?, angle("azimuth"), table.column("time_s"));
+    let (sweep, snr, flagged) = (one_of(&["sweep", "scan"]), table.column("snr_db"), table.column("flagged"));
+    let is_mean = table.header[velocity] == OWN;
+    let (sigma, count) = (one_of(&SIGMAS), table.column("count").filter(|_| is_mean));
+    let mut out: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
+    for (row, cells) in table.rows.iter().enumerate() {
+        let refuse = |reason: &str| Err(format!("row {}: {reason}", row + 1));
+        let number = |column: usize| table.number(row, column);
+        let single = |column: usize| if is_own { f64::from(number(column) as f32) } else { number(column) };
+        let radians = |(column, unit): (usize, f64)| unit * number(column);
+        let sweep = sweep.map_or(0.0, number);
+        if !(sweep >= 0.0 && sweep.fract() == 0.0) {
+            return refuse("sweep is no whole number");
         }
-        places.push((range_m, elevation_rad));
+        let (range_m, elevation_rad) = (single(range), radians(elevation));
+        if !(range_m.is_finite() && elevation_rad.is_finite()) {
+            return refuse("its range or elevation is no number");
+        }
+        let (text, velocity_m_s) = (cells[velocity].trim(), single(velocity));
+        if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
+            return refuse("its velocity is no number; an empty cell is a missing one");
+        }
+        let is_noise = snr.is_some_and(|c| format.is_noise(number(c))) || flagged.is_some_and(|c| number(c) > 0.5);
+        out.entry(sweep as u64).or_default().push(Row {
+            number: row + 1,
+            range_m,
+            elevation_rad: match is_own {
+                true => f64::from(elevation_rad.to_degrees() as f32).to_radians(),
+                false => elevation_rad,
+            },
+            azimuth_rad: azimuth.map_or(f64::NAN, radians),
+            time_s: time.map_or(f64::NAN, number),
+            velocity_m_s: if is_noise { f64::NAN } else { format.sign() * velocity_m_s },
+            sigma_m_s: sigma.map(|column| of_mean(single(column), count.map(number))),
+            count: count.map_or(f64::NAN, number),
+        });
     }
-    let range_m = axis(places.iter().map(|place| place.0));
-    let elevation_rad = axis(places.iter().map(|place| place.1));
-    if range_m.len() * elevation_rad.len() > 10 * rows.len() + 1000 {
+    Ok(out)
+}
+
+/// The rays of one scan on the ranges of all.
+fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
+    let range_m = axis(rows.iter().map(|row| row.range_m));
+    let elevation_rad = axis(rows.iter().map(|row| row.elevation_rad));
+    let (lines, gates) = (elevation_rad.len(), range_m.len());
+    if gates * lines > 10 * rows.len() + 1000 {
         return Err(format!(
-            "its {} rows make no polar grid: they have {} different ranges and {} different elevations",
-            rows.len(),
-            range_m.len(),
-            elevation_rad.len()
+            "its {} rows make no polar grid: they have {gates} different ranges and {lines} different elevations",
+            rows.len()
         ));
     }
+    let has_sigma = rows.iter().any(|row| row.sigma_m_s.is_some());
     let empty = |elevation_rad: &f64| RayRow {
         elevation_rad: *elevation_rad,
         azimuth_rad: f64::NAN,
         time_s: f64::NAN,
-        velocity_m_s: vec![f64::NAN; range_m.len()],
-        sigma_m_s: if columns.sigma.is_some() { vec![f64::NAN; range_m.len()] } else { Vec::new() },
+        velocity_m_s: vec![f64::NAN; gates],
+        sigma_m_s: if has_sigma { vec![f64::NAN; gates] } else { Vec::new() },
     };
     let mut rays: Vec<RayRow> = elevation_rad.iter().map(empty).collect();
-    let mut seen = vec![false; range_m.len() * elevation_rad.len()];
-    for (&row, (range, elevation)) in rows.iter().zip(places) {
-        let (line, gate) = (nearest(&elevation_rad, elevation), nearest(&range_m, range));
-        if std::mem::replace(&mut seen[line * range_m.len() + gate], true) {
+    let mut seen = vec![false; gates * lines];
+    for row in rows {
+        let (line, gate) = (nearest(&elevation_rad, row.elevation_rad), nearest(&range_m, row.range_m));
+        if std::mem::replace(&mut seen[line * gates + gate], true) {
             return Err(format!(
-                "row {}: range {range} m at elevation {elevation} rad is there twice: a column sweep tells scans apart",
-                row + 1
+                "row {}: range {} m at elevation {} rad is there twice: a column sweep tells scans apart",
+                row.number, row.range_m, row.elevation_rad
             ));
         }
         let ray = &mut rays[line];
-        let text = table.rows[row][columns.velocity].trim();
-        let velocity_m_s = single(row, columns.velocity);
-        if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
-            return Err(format!("row {}: its velocity is no number; an empty cell is a missing one", row + 1));
+        ray.velocity_m_s[gate] = row.velocity_m_s;
+        if let Some(sigma_m_s) = row.sigma_m_s {
+            ray.sigma_m_s[gate] = sigma_m_s;
         }
-        let noisy = columns.snr.is_some_and(|c| format.is_noise(number(row, c)));
-        let is_flagged = columns.flagged.is_some_and(|c| number(row, c) > 0.5);
-        if !noisy && !is_flagged {
-            ray.velocity_m_s[gate] = format.sign() * velocity_m_s;
-        }
-        if let Some(column) = columns.sigma {
-            let count = columns.count.map(|c| number(row, c));
-            ray.sigma_m_s[gate] = of_mean(single(row, column), count);
-        }
-        for (of, value) in [
-            (&mut ray.time_s, columns.time.map(|c| number(row, c))),
-            (&mut ray.azimuth_rad, columns.azimuth.map(|(c, unit)| unit * number(row, c))),
-        ] {
-            if let Some(value) = value.filter(|value| value.is_finite()) {
+        for (of, value) in [(&mut ray.time_s, row.time_s), (&mut ray.azimuth_rad, row.azimuth_rad)] {
+            if value.is_finite() {
                 *of = value;
             }
         }
