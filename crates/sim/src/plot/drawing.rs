@@ -108,38 +108,31 @@ pub(crate) struct Drawing {
     pub(crate) shapes: Vec<Shape>,
 }
 
-/// Part of a text with one position: 0 on the base line, 1 raised, -1 lowered.
+/// Part of a text with one position.
 #[derive(Debug, PartialEq)]
 pub(crate) struct Run<'a> {
     pub(crate) text: &'a str,
-    pub(crate) level: i8,
-}
-
-impl Run<'_> {
-    /// Size of the run's letters and height of its base line above that of the text, in sizes of the text.
-    pub(crate) fn scale_and_rise(&self) -> (f64, f64) {
-        match self.level {
-            0 => (1.0, 0.0),
-            1 => (0.72, 0.36),
-            _ => (0.72, -0.18),
-        }
-    }
+    /// Size of its letters, in sizes of the text.
+    pub(crate) scale: f64,
+    /// Height of its base line above that of the text, in sizes of the text.
+    pub(crate) rise: f64,
 }
 
 /// Splits a text at `^{...}` and `_{...}`; a brace that is never closed is plain text.
 pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
     let mut out = Vec::new();
     let mut rest = text;
+    let plain = |text| Run { text, scale: 1.0, rise: 0.0 };
     let marked = |rest: &str| {
         let start = ["^{", "_{"].iter().filter_map(|mark| rest.find(mark)).min()?;
         Some((start, start + rest[start..].find('}')?))
     };
     while let Some((start, end)) = marked(rest) {
-        let level = if rest[start..].starts_with('^') { 1 } else { -1 };
-        out.extend([Run { text: &rest[..start], level: 0 }, Run { text: &rest[start + 2..end], level }]);
+        let rise = if rest[start..].starts_with('^') { 0.36 } else { -0.18 };
+        out.extend([plain(&rest[..start]), Run { text: &rest[start + 2..end], scale: 0.72, rise }]);
         rest = &rest[end + 1..];
     }
-    out.push(Run { text: rest, level: 0 });
+    out.push(plain(rest));
     out.retain(|run| !run.text.is_empty());
     out
 }
@@ -150,9 +143,9 @@ mod tests {
 
     #[test]
     fn raised_and_lowered_parts_are_split() {
-        let parts: Vec<(&str, i8)> = runs("Γ_{5-15} [m^{2}/s] v_mean").iter().map(|r| (r.text, r.level)).collect();
-        assert_eq!(parts, [("Γ", 0), ("5-15", -1), (" [m", 0), ("2", 1), ("/s] v_mean", 0)]);
-        assert_eq!(runs("a^{b"), [Run { text: "a^{b", level: 0 }]);
+        let parts: Vec<(&str, f64)> = runs("Γ_{5-15} [m^{2}/s] v_mean").iter().map(|r| (r.text, r.rise)).collect();
+        assert_eq!(parts, [("Γ", 0.0), ("5-15", -0.18), (" [m", 0.0), ("2", 0.36), ("/s] v_mean", 0.0)]);
+        assert_eq!(runs("a^{b"), [Run { text: "a^{b", scale: 1.0, rise: 0.0 }]);
         assert!(runs("").is_empty());
     }
 }

@@ -41,12 +41,11 @@ impl Font {
     /// Each letter: glyph, width, drawing units for one of the font, height of its base line.
     fn letters(&self, text: &str, size: f64) -> impl Iterator<Item = (GlyphId, f64, f64, f64)> {
         runs(text).into_iter().flat_map(move |run| {
-            let (scale, rise) = run.scale_and_rise();
-            let scale = size * scale / f64::from(self.face.units_per_em());
+            let scale = size * run.scale / f64::from(self.face.units_per_em());
             run.text.chars().map(move |c| {
                 let glyph = self.glyph(c);
                 let advance = self.face.glyph_hor_advance(glyph).unwrap_or(0);
-                (glyph, scale * f64::from(advance), scale, size * rise)
+                (glyph, scale * f64::from(advance), scale, size * run.rise)
             })
         })
     }

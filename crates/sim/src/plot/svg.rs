@@ -81,10 +81,9 @@ fn text_element(text: &Text) -> String {
     );
     let mut height = 0.0;
     for run in runs(&text.text) {
-        let (scale, rise) = run.scale_and_rise();
-        let (shift, size) = (number(text.size * (height - rise)), number(text.size * scale));
-        height = rise;
-        out += &match run.level == 0 && shift == "0" {
+        let (shift, size) = (number(text.size * (height - run.rise)), number(text.size * run.scale));
+        height = run.rise;
+        out += &match run.scale == 1.0 && shift == "0" {
             true => escape(run.text),
             false => format!("<tspan dy=\"{shift}\" font-size=\"{size}\">{}</tspan>", escape(run.text)),
         };
