@@ -49,7 +49,7 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     words.folder.prepare_names(cli, &write::recorded_names(&plan)?)?;
     let options = RecordedOptions { rays, noise: words.noise, spectra: words.spectra, block_bytes: None };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
-    let (text, results) = told(&plan, &found, records.records());
+    let (text, results) = told(&plan, &found, records.records);
     let of = (plan.scene.scene.outputs, plan.scene.provenance());
     let files = words.folder.write(cli, of, |files| write::list_recorded(&plan, found, files))?;
     let object = json!({

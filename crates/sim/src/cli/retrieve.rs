@@ -206,7 +206,7 @@ fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
             maps.iter().map(|scan| scan_s(scan.map.velocity_m_s.len() as f64, are_means(scan), 0.0)).sum()
         }
         Scans::Signals(signals) => {
-            let samples = if words.method == Method::Signals { signals.records.samples() } else { 0 };
+            let samples = if words.method == Method::Signals { signals.records.samples } else { 0 };
             let one = |scan: &MeasuredScan| {
                 scan_s(scan.velocity_m_s.len() as f64, false, (scan.lines.elevation_rad.len() * samples) as f64)
             };

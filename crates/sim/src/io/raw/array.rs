@@ -45,17 +45,6 @@ impl Source for ArrayInFile {
 }
 
 impl ArrayInFile {
-    /// Place in the file of a record in the order of lines and their pulses.
-    fn row(&self, record: usize) -> u64 {
-        match self.order {
-            Order::LineMajor | Order::SampleMajor => record as u64,
-            Order::PulseMajor => {
-                let lines = self.records / self.pulses_per_line.max(1);
-                (record % self.pulses_per_line.max(1) * lines + record / self.pulses_per_line.max(1)) as u64
-            }
-        }
-    }
-
     /// Some samples of some records, one record after the other.
     fn part(&mut self, records: Range<usize>, samples: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
         let count = samples.len();
@@ -72,9 +61,13 @@ impl ArrayInFile {
             true => records.len().max(1),
             false => 1,
         };
+        let pulses = self.pulses_per_line.max(1);
         for (first, out) in records.step_by(together).zip(out.chunks_mut((together * count).max(1))) {
-            let at = self.row(first) * self.samples as u64 + samples.start as u64;
-            out.copy_from_slice(&self.run(at, out.len())?);
+            let row = match self.order {
+                Order::PulseMajor => first % pulses * (self.records / pulses) + first / pulses,
+                _ => first,
+            };
+            out.copy_from_slice(&self.run((row * self.samples + samples.start) as u64, out.len())?);
         }
         Ok(out)
     }

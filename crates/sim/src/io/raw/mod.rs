@@ -100,10 +100,14 @@ pub struct RawRecords {
     /// The file, or what stands for one in words and messages.
     pub path: PathBuf,
     source: Box<dyn Source + Send>,
-    records: usize,
-    samples: usize,
-    is_complex: bool,
-    are_integers: bool,
+    /// Number of records.
+    pub records: usize,
+    /// Samples of a record.
+    pub samples: usize,
+    /// Whether samples are complex.
+    pub is_complex: bool,
+    /// Whether the numbers are codes of a converter.
+    pub are_integers: bool,
     /// Stand for a missing number.
     fills: Vec<f64>,
     /// The factor that the numbers of the source have had.
@@ -111,7 +115,7 @@ pub struct RawRecords {
     /// What its numbers are multiplied with, A for signals in counts.
     pub scale: f64,
     /// Samples of this size and above are missing.
-    outsized: f64,
+    pub outsized: f64,
     /// What the file says of them.
     pub about: About,
 }
@@ -180,26 +184,6 @@ impl RawRecords {
         }
     }
 
-    /// Number of records.
-    pub fn records(&self) -> usize {
-        self.records
-    }
-
-    /// Samples of a record.
-    pub fn samples(&self) -> usize {
-        self.samples
-    }
-
-    /// Whether samples are complex.
-    pub fn is_complex(&self) -> bool {
-        self.is_complex
-    }
-
-    /// Whether the numbers are codes of a converter.
-    pub fn is_of_integers(&self) -> bool {
-        self.are_integers
-    }
-
     /// What the numbers of the file were multiplied with in all.
     pub fn whole_scale(&self) -> f64 {
         self.packed_scale * self.scale
@@ -210,18 +194,13 @@ impl RawRecords {
         Error::Input { path: self.path.clone(), reason }
     }
 
-    /// Counts samples of this size and above as missing.
-    pub fn leave_out(&mut self, outsized: f64) {
-        self.outsized = outsized;
-    }
-
     /// The samples of some records, one record after the other; the second parts of real samples are 0. A missing sample has a
     /// part that is not finite.
     ///
     /// # Errors
     /// What the system says; words in place of numbers.
     pub fn read(&mut self, records: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
-        self.read_samples(records, 0..self.samples())
+        self.read_samples(records, 0..self.samples)
     }
 
     /// The same of some samples of each of them.

@@ -169,8 +169,8 @@ mod tests {
         let variables = vec![packed("current_a", 0), packed("quadrature_a", 100)];
         let layout = Layout { dims: vec![("line", 2), ("pulse", 3), ("sample", 4)], globals: Vec::new(), variables };
         let mut found = opened(layout.into_bytes(&crate::io::provenance::example()).unwrap(), &RawFormat::default());
-        assert_eq!((found.records(), found.samples(), found.is_complex(), found.whole_scale()), (6, 4, true, 2.0));
-        assert!(found.is_of_integers());
+        assert_eq!((found.records, found.samples, found.is_complex, found.whole_scale()), (6, 4, true, 2.0));
+        assert!(found.are_integers);
         for records in (0..6).flat_map(|first| (first + 1..=6).map(move |end| first..end)) {
             for samples in [0..4, 1..3, 3..4] {
                 let part = found.read_samples(records.clone(), samples.clone()).unwrap();
@@ -198,17 +198,17 @@ mod tests {
         let open = |arrays: &[(&str, &[u64], Vec<f64>)], format: &RawFormat| opened(of_arrays(arrays), format);
         let mut found = open(&[real.clone(), lines], &RawFormat::default());
         found.scale = 2.0;
-        assert_eq!((found.records(), found.samples(), found.is_complex()), (6, 4, false));
+        assert_eq!((found.records, found.samples, found.is_complex), (6, 4, false));
         assert_eq!(found.about.line, Some(vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
         let some = found.read_samples(1..3, 1..3).unwrap();
         assert_eq!(some, [5.5, 6.5, 9.5, 10.5].map(|re| Complex::new(2.0 * re, 0.0)));
         let mut found = open(&[real, second], &RawFormat::default());
-        assert!(found.is_complex());
+        assert!(found.is_complex);
         assert_eq!(found.read(5..6).unwrap()[3], Complex::new(23.5, 123.0));
         let mut pairs = open(
             &[("volts", &[3, 4, 2], numbers(0.0))],
             &RawFormat { variable: Some("volts".into()), complex: true, ..RawFormat::default() },
         );
-        assert_eq!((pairs.records(), pairs.read(1..2).unwrap()[0]), (3, Complex::new(8.0, 9.0)));
+        assert_eq!((pairs.records, pairs.read(1..2).unwrap()[0]), (3, Complex::new(8.0, 9.0)));
     }
 }

@@ -93,7 +93,7 @@ pub(crate) fn upward(lines: impl IntoIterator<Item = usize>, elevation_rad: &[f6
 /// # Errors
 /// Records that do not fit the angles, angles that are none, times that do not increase.
 pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>) -> Result<Vec<ScanLines>, Error> {
-    let count = records.records();
+    let count = records.records;
     let per_line = plan.scene.scene.scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
         Some(table) => of_table(table, count, per_line)?,
@@ -191,7 +191,7 @@ fn of_table(table: &RayTable, count: usize, per_line: usize) -> Result<(Vec<f64>
 
 /// Angles as the scene has them.
 fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
-    let (count, lines) = (records.records(), &plan.geometry.elevation_rad);
+    let (count, lines) = (records.records, &plan.geometry.elevation_rad);
     let per_line = plan.scene.scene.scan.pulses_per_line;
     let whole = lines.len() * per_line;
     if !count.is_multiple_of(whole) {

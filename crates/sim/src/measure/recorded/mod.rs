@@ -120,8 +120,8 @@ pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Erro
             )));
         }
     }
-    let is_own = own.is_some() && records.records().is_multiple_of(whole);
-    let repetitions = records.records() / whole.max(1);
+    let is_own = own.is_some() && records.records.is_multiple_of(whole);
+    let repetitions = records.records / whole.max(1);
     let file = if !is_own || repetitions == scene.scene.scan.realisations {
         scene
     } else {
@@ -148,20 +148,20 @@ fn signals_of(scene: &Scene) -> String {
 /// Refuses records that are not those of the scene's receiver.
 fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
     let samples = scene.samples_per_record();
-    if records.samples() != samples {
-        let last_m = scene.scan.range_min_m + (records.samples() as f64 - 0.5) * scene.sample_spacing_m();
+    if records.samples != samples {
+        let last_m = scene.scan.range_min_m + (records.samples as f64 - 0.5) * scene.sample_spacing_m();
         return Err(records.refuse(format!(
             "a record has {} samples, {samples} in the scene: scan.range_max_m = {last_m:.3} makes it as many",
-            records.samples()
+            records.samples
         )));
     }
     let needed = scene.detector.signal == DetectorSignal::Baseband;
-    if records.is_complex() != needed {
+    if records.is_complex != needed {
         let kind = |complex| if complex { "complex" } else { "real" };
         return Err(records.refuse(format!(
             "its samples are {}, the scene's {}: detector.signal is \"intermediate_frequency\" for real and \"baseband\" for \
              complex samples; --complex says that the numbers of a file are pairs",
-            kind(records.is_complex()),
+            kind(records.is_complex),
             kind(needed)
         )));
     }
@@ -247,8 +247,8 @@ fn of_run<S: FromParts>(
     let (lines, pulses) = (plan.geometry.elevation_rad.len() as u64, scanner.pulses());
     let read = |realisation: usize, add: AddRecords<'_, S>| {
         let scan = realisation * pulses..(realisation + 1) * pulses;
-        for piece in pieces(scan.clone(), records.samples()) {
-            let samples = samples::<S>(records, piece.clone(), 0..records.samples())?;
+        for piece in pieces(scan.clone(), records.samples) {
+            let samples = samples::<S>(records, piece.clone(), 0..records.samples)?;
             add(piece.start - scan.start, samples.view())?;
         }
         observer.advance(lines);
@@ -280,14 +280,14 @@ pub(crate) fn samples<S: FromParts>(
 /// scene's converter does not have.
 fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
     let (mut sizes, mut any) = (SampleSizes::default(), false);
-    for piece in pieces(0..records.records(), records.samples()) {
+    for piece in pieces(0..records.records, records.samples) {
         for sample in records.read(piece)?.into_iter().filter(|sample| sample.is_finite()) {
             any = true;
             sizes.add(sample.largest_part());
         }
     }
-    let outsized = if records.is_of_integers() { f64::INFINITY } else { sizes.outsized() };
-    records.leave_out(outsized);
+    let outsized = if records.are_integers { f64::INFINITY } else { sizes.outsized() };
+    records.outsized = outsized;
     let largest = sizes.largest_below(outsized);
     if !any {
         return Err(records.refuse("all of its samples are missing: none is a finite number".into()));
@@ -296,7 +296,7 @@ fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
         return Err(records.refuse("all of its samples are 0".into()));
     }
     if let Digitiser::Quantised { bits, .. } = plan.scene.scene.detector.digitiser
-        && records.is_of_integers()
+        && records.are_integers
         && largest / records.whole_scale() > (f64::from(bits) - 1.0).exp2()
     {
         return Err(records.refuse(format!(
