@@ -27,8 +27,8 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
             .attr("_FillValue", Data::f32([FILL]))
     };
     // By which readers close a period of cells that are not equal.
-    let across = |name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str, period_m: Option<f64>| {
-        let axis = axis(name, dims, values, long_name);
+    let across = |name: &'static str, values: &[f64], long_name: &str, period_m: Option<f64>| {
+        let axis = axis(name, values, long_name);
         match period_m {
             Some(period_m) => axis.text("edges", &edges::to_text(Edges::Periodic { period_m })),
             None => axis,
@@ -37,9 +37,9 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
     let [x_period_m, y_period_m] = field.period_m;
     let mut variables = vec![
         Variable::new("time", &["time"], Data::f64([field.time_s])).named(SINCE_START),
-        axis("z", &["z"], &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
-        across("y", &["y"], &field.y_m, "position of the cell centre across the flight direction", y_period_m),
-        across("x", &["x"], &field.x_m, "position of the cell centre along the flight direction", x_period_m),
+        axis("z", &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
+        across("y", &field.y_m, "position of the cell centre across the flight direction", y_period_m),
+        across("x", &field.x_m, "position of the cell centre along the flight direction", x_period_m),
         data("u", u, "m s-1", "wind along the flight direction").text("standard_name", "x_wind"),
         data("v", v, "m s-1", "horizontal wind across the flight direction").text("standard_name", "y_wind"),
         data("w", w, "m s-1", "vertical wind").text("standard_name", "upward_air_velocity"),
@@ -74,36 +74,30 @@ pub struct FaceVelocities {
 /// # Errors
 /// An array of another length than its axes, or a result too large for one file.
 pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<FileParts> {
-    const NAMES: [(&str, &[&str], &str, &[&str]); 3] = [
-        ("x", &["x"], "x_face", &["x_face"]),
-        ("y", &["y"], "y_face", &["y_face"]),
-        ("z", &["z"], "z_face", &["z_face"]),
-    ];
-    const DIMS: [&[&str]; 3] = [&["z", "y", "x_face"], &["z", "y_face", "x"], &["z_face", "y", "x"]];
     let mut dims = Vec::new();
     let mut variables = vec![Variable::new("time", &[], Data::f64([faces.time_s])).named(SINCE_START)];
-    for (d, (name, own, face, own_face)) in NAMES.into_iter().enumerate() {
+    for (d, (name, face)) in [("x", "x_face"), ("y", "y_face"), ("z", "z_face")].into_iter().enumerate() {
         same_length(face, faces.face_m[d].len(), name, faces.centre_m[d].len())?;
         dims.extend([(name, faces.centre_m[d].len()), (face, faces.face_m[d].len())]);
-        variables.push(axis(name, own, &faces.centre_m[d], "cell centre"));
-        variables.push(axis(face, own_face, &faces.face_m[d], "low face of the cell"));
+        variables.push(axis(name, &faces.centre_m[d], "cell centre"));
+        variables.push(axis(face, &faces.face_m[d], "low face of the cell"));
     }
     let plane = faces.centre_m[0].len() * faces.centre_m[1].len();
-    for (d, (name, values)) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s).enumerate() {
+    let components = [
+        ("u", ["z", "y", "x_face"], "x_wind", "wind along the flight direction"),
+        ("v", ["z", "y_face", "x"], "y_wind", "horizontal wind across it"),
+        ("w", ["z_face", "y", "x"], "upward_air_velocity", "vertical wind"),
+    ];
+    for ((name, dims, standard_name, long_name), values) in components.into_iter().zip(&faces.velocity_m_s) {
         same_length(name, values.len(), "z x y x x", faces.share.planes.len() * plane)?;
-        let names = [
-            ["x_wind", "wind along the flight direction", "m s-1"],
-            ["y_wind", "horizontal wind across it", "m s-1"],
-            ["upward_air_velocity", "vertical wind", "m s-1"],
-        ];
         let (data, first) = (Data::f64(values.iter().copied()), faces.share.planes.start * plane);
-        variables.push(Variable::part(name, DIMS[d], data, first).named(names[d]));
+        variables.push(Variable::part(name, &dims, data, first).named([standard_name, long_name, "m s-1"]));
     }
     Layout::cf(&faces.title, dims, variables, provenance).into_parts(provenance, faces.share.is_first)
 }
 
-fn axis(name: &str, dims: &'static [&'static str], values: &[f64], long_name: &str) -> Variable {
-    let variable = Variable::new(name, dims, Data::f64(values.iter().copied())).named(["", long_name, "m"]);
+fn axis(name: &'static str, values: &[f64], long_name: &str) -> Variable {
+    let variable = Variable::new(name, &[name], Data::f64(values.iter().copied())).named(["", long_name, "m"]);
     let variable = variable.text("axis", &name[..1].to_uppercase());
     if name == "z" { variable.text("standard_name", "height") } else { variable }
 }

@@ -15,7 +15,7 @@ use ndarray::Array3;
 /// What [`CrossPlanes::check`] finds, or a result too large for one file.
 pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    let axis = |name: &str, dims: &'static [&'static str], values: &[f64], names: [&str; 3]| {
+    let axis = |name: &str, dims: &[&'static str], values: &[f64], names: [&str; 3]| {
         Variable::new(name, dims, Data::f64(values.iter().copied())).named(names)
     };
     let across = "horizontal position of the cell centre across the flight direction";

@@ -65,7 +65,7 @@ impl Data {
 /// One variable.
 pub(crate) struct Variable {
     pub(crate) name: String,
-    pub(crate) dims: &'static [&'static str],
+    pub(crate) dims: Vec<&'static str>,
     pub(crate) data: Data,
     pub(crate) attrs: Vec<(&'static str, Data)>,
     /// The first of its values that are here, of a variable that ranks share.
@@ -73,17 +73,17 @@ pub(crate) struct Variable {
 }
 
 impl Variable {
-    pub(crate) fn new(name: &str, dims: &'static [&'static str], data: Data) -> Self {
-        Self { name: name.into(), dims, data, attrs: Vec::new(), first: None }
+    pub(crate) fn new(name: &str, dims: &[&'static str], data: Data) -> Self {
+        Self { name: name.into(), dims: dims.to_vec(), data, attrs: Vec::new(), first: None }
     }
 
     /// Of a variable that ranks share, the values from number `first` on.
-    pub(crate) fn part(name: &str, dims: &'static [&'static str], data: Data, first: usize) -> Self {
+    pub(crate) fn part(name: &str, dims: &[&'static str], data: Data, first: usize) -> Self {
         Self { first: Some(first), ..Self::new(name, dims, data) }
     }
 
     /// Its unit, and what it is.
-    pub(crate) fn in_units(name: &str, dims: &'static [&'static str], data: Data, units: &str, what: &str) -> Self {
+    pub(crate) fn in_units(name: &str, dims: &[&'static str], data: Data, units: &str, what: &str) -> Self {
         Self::new(name, dims, data).text("units", units).text("long_name", what)
     }
 
@@ -219,7 +219,7 @@ impl Layout {
         for ((variable, size), begin) in self.variables.iter().zip(sizes).zip(begins) {
             head.name(&variable.name);
             head.number(variable.dims.len());
-            for dim in variable.dims {
+            for dim in &variable.dims {
                 // Every axis is among the dimensions, or the variable had no values and was refused.
                 head.number(self.dims.iter().position(|(name, _)| name == dim).unwrap_or_default());
             }
