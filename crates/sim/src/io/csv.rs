@@ -165,13 +165,8 @@ impl Table {
     /// # Errors
     /// No column, columns of different lengths, a repeated or empty name, a name that would look like a comment.
     pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
-        self.check()?;
-        let mut out = provenance.comment_lines();
         let header: Vec<String> = self.columns.iter().map(|(name, _)| quoted(name.clone())).collect();
-        out.push_str(&header.join(","));
-        out.push('\n');
-        self.push_rows(&mut out);
-        Ok(out)
+        self.with_rows(provenance.comment_lines() + &header.join(",") + "\n")
     }
 
     /// The rows alone.
@@ -180,13 +175,12 @@ impl Table {
     /// As [`Self::to_csv`].
     #[cfg(feature = "flow")]
     pub(crate) fn rows(&self) -> OutputResult<String> {
-        self.check()?;
-        let mut out = String::new();
-        self.push_rows(&mut out);
-        Ok(out)
+        self.with_rows(String::new())
     }
 
-    fn push_rows(&self, out: &mut String) {
+    /// A text with the rows behind it.
+    fn with_rows(&self, mut out: String) -> OutputResult<String> {
+        self.check()?;
         // Room for most texts at once, so that growing does not copy what is there.
         out.reserve(USUAL_CELL_BYTES * self.columns.len() * self.len());
         for row in 0..self.len() {
@@ -199,6 +193,7 @@ impl Table {
             out.push('\n');
         }
         out.shrink_to_fit();
+        Ok(out)
     }
 
     fn check(&self) -> OutputResult<()> {
