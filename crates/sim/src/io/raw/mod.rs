@@ -266,18 +266,14 @@ fn in_file(
         lengths.pop();
         stored.is_complex = true;
     }
-    let order = match (stored.fortran_order && lengths.len() > 1, lengths.len()) {
-        (false, _) => format.order,
-        (true, 2) if !pairs => Order::SampleMajor,
-        (true, _) => {
-            return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
-        }
-    };
+    let is_fortran = stored.fortran_order && lengths.len() > 1;
+    if is_fortran && (pairs || lengths.len() > 2) {
+        return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
+    }
+    let order = if is_fortran { Order::SampleMajor } else { format.order };
     // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
-    let samples = match (stored.fortran_order, order) {
-        (false, Order::SampleMajor) => (!lengths.is_empty()).then(|| lengths.remove(0)),
-        _ => lengths.pop(),
-    };
+    let are_first = order == Order::SampleMajor && !stored.fortran_order && !lengths.is_empty();
+    let samples = if are_first { Some(lengths.remove(0)) } else { lengths.pop() };
     let samples = samples.ok_or("it holds a single number, no records")? as usize;
     let (records, is_complex) = (lengths.iter().product::<u64>() as usize, stored.is_complex);
     let are_integers = !stored.number.is_float();

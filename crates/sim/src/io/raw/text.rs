@@ -43,7 +43,7 @@ pub(super) fn read(path: &Path, file: File, bytes: u64, mut is_complex: bool) ->
             return Err(format!("line {line} is longer than {most} MiB: each record is a line of its own"));
         }
         let Some(content) = content(&text) else { continue };
-        let cells: Vec<&str> = cells(content).collect();
+        let cells = cells(content);
         if records.is_empty() && table.is_none() {
             // A sample takes sixteen bytes, and in the text as many as it has digits.
             machine::holds("its table", 3.0 * bytes as f64)?;
@@ -91,10 +91,10 @@ fn content(line: &str) -> Option<&str> {
 }
 
 /// Cells of a row: between commas or semicolons, or between blanks.
-fn cells(row: &str) -> Box<dyn Iterator<Item = &str> + '_> {
+fn cells(row: &str) -> Vec<&str> {
     let separator = [',', ';'].into_iter().find(|separator| row.contains(*separator));
     match separator {
-        Some(separator) => Box::new(row.split(separator).map(str::trim)),
-        None => Box::new(row.split_whitespace()),
+        Some(separator) => row.split(separator).map(str::trim).collect(),
+        None => row.split_whitespace().collect(),
     }
 }

@@ -30,6 +30,8 @@ const VELOCITIES: [&str; 9] = [
 const SIGMAS: [&str; 4] = ["velocity_standard_deviation", "sigma_m_s", "radial_velocity_error", "velocity_error"];
 /// Whether a Windcube trusts a velocity; its times are those of the ends of rays.
 const STATUS: &str = "radial_wind_speed_status";
+/// The largest velocity that can be told apart, m/s: that of the first ray is taken.
+const NYQUIST: &str = "nyquist_velocity";
 /// Names of the signal-to-noise ratio in dB.
 const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
 
@@ -65,8 +67,10 @@ pub(super) fn scans(
     let sigma_m_s = layout.optional(file, &SIGMAS)?;
     let realisations = if velocity.is_mean { layout.optional(file, &["count"])? } else { None };
     let scans = mean_count(realisations.iter().flatten().copied());
-    let moving = if file.has("antenna_transition") { file.floats("antenna_transition")? } else { Vec::new() };
-    let fold_m_s = nyquist(file)?.map(|nyquist| 2.0 * nyquist);
+    let moving = optional(file, "antenna_transition")?;
+    // Mirrored velocities are no multiple away from those of the air.
+    let is_mirrored = file.text(NYQUIST, "folding").is_some_and(|folding| folding == MIRRORED);
+    let nyquist_m_s = if is_mirrored { None } else { first(file, NYQUIST)? };
     let gates = range_m.len();
     let ray = |ray: usize| {
         let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
@@ -88,7 +92,7 @@ pub(super) fn scans(
         }
     };
     let (mut out, mut left_out) = (Vec::new(), Vec::new());
-    let pulse_width_s = if file.has("pulse_width") { first(file, "pulse_width")? } else { None };
+    let pulse_width_s = first(file, "pulse_width")?;
     let step_m = range_m.get(1).zip(range_m.first()).map(|(second, first)| second - first);
     let of_field = |name| file.text(&velocity.name, name);
     let scene_toml = file.global_text("scene").or_else(|| of_field("scene")).or_else(|| of_field("instrument"));
@@ -110,7 +114,7 @@ pub(super) fn scans(
                 left_out.push(format!("{what}: all of its rays have one elevation"));
                 continue;
             }
-            match scan_map(rows, range_m.clone(), fold_m_s, &what) {
+            match scan_map(rows, range_m.clone(), nyquist_m_s.map(|nyquist| 2.0 * nyquist), &what) {
                 Err(reason) => left_out.push(reason),
                 Ok(map) => out.push(ReadScan {
                     reference,
@@ -286,17 +290,14 @@ fn sweeps(file: &NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>
         .collect()
 }
 
-/// The largest velocity that can be told apart, m/s: that of the file's first ray.
-fn nyquist(file: &NetcdfFile) -> Result<Option<f64>, String> {
-    const NAME: &str = "nyquist_velocity";
-    let is_mirrored = file.text(NAME, "folding").is_some_and(|folding| folding == MIRRORED);
-    // Mirrored velocities are no multiple away from those of the air.
-    if file.has(NAME) && !is_mirrored { first(file, NAME) } else { Ok(None) }
+/// The values of a variable; none where it is not there.
+fn optional(file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
+    if file.has(name) { file.floats(name) } else { Ok(Vec::new()) }
 }
 
-/// The first value of a variable, if it is above 0.
+/// The first value of a variable, if it is there and above 0.
 fn first(file: &NetcdfFile, name: &str) -> Result<Option<f64>, String> {
-    Ok(file.floats(name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
+    Ok(optional(file, name)?.first().copied().filter(|value| *value > 0.0 && value.is_finite()))
 }
 
 #[cfg(test)]
