@@ -3,7 +3,7 @@
 //! Check: the names that commands announce are those that they write; folders in use, in the way or not writable are refused.
 
 use crate::Error;
-use crate::io::atomic::{in_folder, try_folder};
+use crate::io::atomic::{Stage, in_folder};
 use crate::io::lock::FolderLock;
 use crate::io::own::refuse_foreign;
 use crate::io::{Existing, FileGroup, Provenance, Table};
@@ -174,7 +174,7 @@ pub fn write_contents(folder: &Path, files: Vec<(String, Vec<u8>)>, existing: Ex
 pub(crate) fn prepare(folder: &Path, names: &[String], existing: Existing, alone: bool) -> Result<(), Error> {
     refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
     in_folder(folder, false, || {
-        try_folder(folder)?;
+        drop(Stage::make(folder)?);
         let lock = alone.then(|| FolderLock::take(folder)).transpose()?;
         drop(lock);
         Ok(())

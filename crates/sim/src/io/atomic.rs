@@ -171,14 +171,6 @@ pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()
     group.commit_inside().map(drop)
 }
 
-/// Finds out whether files can be written to a folder.
-///
-/// # Errors
-/// The refusal of the system.
-pub(crate) fn try_folder(folder: &Path) -> OutputResult<()> {
-    Stage::make(folder).map(drop)
-}
-
 /// Hidden folder for the new and the replaced files; removed when dropped.
 #[derive(Debug)]
 pub(crate) struct Stage {
@@ -237,7 +229,11 @@ impl Stage {
         Self { new: root.join(NEW), old: root.join("old"), root, _lock: lock }
     }
 
-    fn make(folder: &Path) -> OutputResult<Self> {
+    /// Makes the stage of a folder.
+    ///
+    /// # Errors
+    /// Files cannot be written there.
+    pub(crate) fn make(folder: &Path) -> OutputResult<Self> {
         for attempt in 0..10_000 {
             let root = folder.join(format!("{STAGE}{}-{attempt}", std::process::id()));
             match fs::create_dir(&root) {
