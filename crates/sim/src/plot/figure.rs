@@ -2,7 +2,7 @@
 //! Check: both formats of a figure with every kind of panel come out the same twice, and the panels do not overlap.
 
 use super::curves::CurvePlot;
-use super::drawing::{Drawing, Frame, Shape};
+use super::drawing::{Drawing, Frame};
 use super::font::Font;
 use super::frame::title;
 use super::isosurface::IsosurfacePlot;
@@ -23,24 +23,6 @@ pub enum Panel {
     Map(MapPlot),
     /// Surfaces in space.
     Surfaces(IsosurfacePlot),
-}
-
-impl Panel {
-    fn height(&self, width: f64) -> OutputResult<f64> {
-        Ok(match self {
-            Self::Curves(plot) => plot.height(width)?,
-            Self::Map(plot) => plot.height(width),
-            Self::Surfaces(plot) => plot.height(width),
-        })
-    }
-
-    fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
-        match self {
-            Self::Curves(plot) => plot.draw(cell, font, out),
-            Self::Map(plot) => plot.draw(cell, font, out),
-            Self::Surfaces(plot) => plot.draw(cell, out),
-        }
-    }
 }
 
 impl From<IsosurfacePlot> for Panel {
@@ -156,12 +138,21 @@ impl Figure {
         }
         let width = (self.width - 2.0 * MARGIN) / self.columns as f64;
         for row in self.panels.chunks(self.columns) {
-            let heights: Vec<f64> = row.iter().map(|panel| panel.height(width)).collect::<OutputResult<_>>()?;
+            let height = |panel: &Panel| match panel {
+                Panel::Curves(plot) => plot.height(width),
+                Panel::Map(plot) => Ok(plot.height(width)),
+                Panel::Surfaces(plot) => Ok(plot.height(width)),
+            };
+            let heights: Vec<f64> = row.iter().map(height).collect::<OutputResult<_>>()?;
             let highest = heights.iter().copied().fold(0.0, f64::max);
             for (column, (panel, own)) in row.iter().zip(heights).enumerate() {
                 let left = MARGIN + column as f64 * width;
-                let height = if matches!(panel, Panel::Map(_)) { own } else { highest };
-                panel.draw(Frame { left, top, width, height }, &font, &mut shapes)?;
+                let cell = Frame { left, top, width, height: highest };
+                match panel {
+                    Panel::Curves(plot) => plot.draw(cell, &font, &mut shapes)?,
+                    Panel::Map(plot) => plot.draw(Frame { height: own, ..cell }, &font, &mut shapes)?,
+                    Panel::Surfaces(plot) => plot.draw(cell, &mut shapes)?,
+                }
             }
             top += highest;
         }
@@ -185,6 +176,7 @@ mod tests {
     use super::*;
     use crate::io::provenance::example;
     use crate::io::samples;
+    use crate::plot::drawing::Shape;
     use crate::plot::{Axis, Series, Style};
 
     fn figure() -> Figure {

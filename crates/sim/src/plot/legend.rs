@@ -60,17 +60,8 @@ pub(crate) fn place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64,
         };
         occupied.iter().filter(inside).count()
     };
-    let mut best = (frame, usize::MAX);
-    for frame in places {
-        let count = covered(&frame);
-        if count < best.1 {
-            best = (frame, count);
-        }
-        if count == 0 {
-            break;
-        }
-    }
-    best
+    let counted = places.map(|place| (place, covered(&place)));
+    counted.min_by_key(|(_, count)| *count).unwrap_or((frame, 0))
 }
 
 #[cfg(test)]

@@ -29,7 +29,9 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     }
     let styles = [Style::Line, Style::Dash, Style::DashDot, Style::Dot];
     for ((name, other), style) in profile.others.iter().zip(styles) {
-        efficiency = efficiency.with(curve(&label_of(name), style, other));
+        // The column of a model in words.
+        let label = name.replace("efficiency_", "").replace('_', " ").replace("monte carlo", "Monte Carlo");
+        efficiency = efficiency.with(curve(&label, style, other));
     }
     let mut snr = Series::new("", Style::Line, points(&profile.snr_db));
     let is_fixed = matches!(plan.scene.scene.detector.snr, SnrReference::Fixed { .. });
@@ -40,11 +42,6 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     let mut figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot { shape: 0.75, ..plot }));
     figure.width = 1120.0;
     figure
-}
-
-/// The column of a model in words.
-fn label_of(column: &str) -> String {
-    column.replace("efficiency_", "").replace('_', " ").replace("monte carlo", "Monte Carlo")
 }
 
 fn has_error(profile: &EfficiencyProfile) -> bool {
