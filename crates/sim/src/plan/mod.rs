@@ -4,9 +4,8 @@
 //! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
 
 use crate::Error;
-use crate::scene::{Method, Scene, SceneFile, Weighting};
+use crate::scene::SceneFile;
 use crate::setup::Setup;
-use crate::setup::estimators::grid_step_and_bias_m_s;
 use crate::setup::known::Known;
 use crate::setup::wind::SceneWind;
 use std::fmt;
@@ -14,13 +13,10 @@ use std::ops::Deref;
 use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
 
-mod ambiguity;
-mod coverage;
 mod fastest;
 mod file_limits;
 mod files;
 mod fit;
-mod hardware;
 mod optics;
 mod possible;
 mod schedule;
@@ -29,6 +25,7 @@ mod stage;
 mod stages;
 pub(crate) mod time;
 pub(crate) mod units;
+mod warnings;
 
 pub use crate::setup::progress::Stage;
 pub use schedule::ScanSchedule;
@@ -88,36 +85,19 @@ impl Plan {
     ) -> Result<Self, Error> {
         let setup = Setup::new(scene, wind)?;
         let scene = &setup.scene.scene;
-        let mut warnings = warnings(scene)?;
-        warnings.extend(ambiguity::warning(scene, &setup.instrument.pulse));
-        warnings.extend(hardware::warnings(scene, &setup.instrument));
+        let fastest_m_s = fastest::fastest_m_s(&setup)?;
+        let mut warnings = warnings::of_scene(&setup, fastest_m_s)?;
         let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
         let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
         let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
         let times = time::times(scene, target, &sizes, optics_s);
-        let fastest_m_s = fastest::fastest_m_s(&setup)?;
         let mut plan = Self { setup, target, stages, core_s: times.total_s(), times, screens, fastest_m_s, warnings };
-        plan.warnings.splice(0..0, plan.of_fast_air());
         if plan.runs(Stage::Estimates) {
-            plan.warnings.extend(coverage::warning(&plan.scene.scene, &plan.geometry)?);
+            plan.warnings.extend(warnings::of_empty_gates(&plan)?);
         }
         possible::check(&plan)?;
         file_limits::check(&plan)?;
         Ok(plan)
-    }
-
-    /// A warning of air that the detector band does not hold.
-    fn of_fast_air(&self) -> Option<String> {
-        let scene = &self.scene.scene;
-        let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
-        let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] { "" } else { ", seen from the lidar," };
-        (self.fastest_m_s > half_band_m_s).then(|| {
-            format!(
-                "the air on the lines of sight{seen} reaches {:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster \
-                 air is not seen",
-                self.fastest_m_s
-            )
-        })
     }
 
     /// Memory of the whole, with the threads of the pool in which it was planned.
@@ -154,30 +134,6 @@ impl Deref for Plan {
     }
 }
 
-/// What is allowed but probably not meant.
-fn warnings(scene: &Scene) -> Result<Vec<String>, Error> {
-    let mut out = Vec::new();
-    if scene.estimator.padded_samples < 4 * scene.estimator.window_samples {
-        let (step_m_s, off_m_s) = grid_step_and_bias_m_s(scene)?;
-        out.push(format!(
-            "estimator.padded_samples gives a spectrum in steps of {step_m_s:.2} m/s: with this estimator.refinement a line is found up \
-             to {off_m_s:.3} m/s off"
-        ));
-    }
-    let method = scene.estimator.method;
-    let is_model = method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
-    if is_model && scene.estimator.weighting != Weighting::Rectangular {
-        out.push(
-            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
-                .into(),
-        );
-    }
-    if scene.scan.realisations < 2 {
-        out.push("one realisation: no standard deviation can be given".into());
-    }
-    Ok(out)
-}
-
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.scene.seed)?;
@@ -200,7 +156,7 @@ impl fmt::Display for Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Flow, NoiseModel, RefractiveTurbulence, SnrReference, Turbulence};
+    use crate::scene::{Flow, NoiseModel, RefractiveTurbulence, Scene, SnrReference, Turbulence};
 
     fn plan(target: Target, change: impl FnOnce(&mut Scene)) -> Plan {
         let mut scene = Scene::default();

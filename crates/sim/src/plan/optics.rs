@@ -47,7 +47,7 @@ pub(super) fn stages(
         curved_ranges_m(telescope, first_m, last_m, OF_QUADRATURES)
     });
     let ranges_m: Vec<f64> = table.iter().chain(&layers).flatten().copied().collect();
-    refuse_fresnel_numbers(file, telescope, &ranges_m)?;
+    refuse_fresnel_numbers(telescope, &ranges_m)?;
     // A table through turbulence has the free-space and the exact bistatic curves beside the Monte Carlo.
     let places = if turbulence(scene).is_some() { 16 } else { 0 };
     let quadratures_s: f64 = ranges_m.iter().map(|&r| theory::quadrature_cost_s(telescope, places, r)).sum();
@@ -91,33 +91,29 @@ pub(super) fn stages(
 }
 
 /// Refuses a beam whose Fresnel number is too large for the quadratures, in the words of the scene.
-fn refuse_fresnel_numbers(file: &SceneFile, telescope: &Telescope, ranges_m: &[f64]) -> Result<(), Error> {
+fn refuse_fresnel_numbers(telescope: &Telescope, ranges_m: &[f64]) -> Result<(), Error> {
     let worst = ranges_m.iter().map(|&r| (theory::fresnel_number(telescope, r), r)).max_by(|a, b| a.0.total_cmp(&b.0));
     let Some((found, range_m)) = worst.filter(|(n, _)| *n > theory::LARGEST_FRESNEL_NUMBER) else { return Ok(()) };
-    let t = &file.scene.telescope;
     let most = theory::LARGEST_FRESNEL_NUMBER;
     let excess = format!(
         "a Fresnel number a^2 |1/R - 1/F| / lambda of at most {most}, for which the efficiency has a quadrature; it is {found:.0} at \
          {range_m} m"
     );
     // Without the focus the number would be this.
-    let collimated = Telescope { focus: Focus::Collimated, ..*telescope };
-    let rest = theory::fresnel_number(&collimated, range_m);
-    let problem = if rest < most {
-        // |1/R - 1/F| <= limit from F = 1/(1/R + limit) upwards, of either sign.
-        let shortest_m = range_m * rest / (most + if t.focus_m > 0.0 { rest } else { -rest });
-        let example = format!("{}{:.2}", if t.focus_m > 0.0 { "from " } else { "to -" }, 1.01 * shortest_m + 0.01);
-        Problem {
-            key: "telescope.focus_m".into(),
-            value: t.focus_m.to_string(),
-            allowed: format!("{excess}: {example} m"),
+    let rest = theory::fresnel_number(&Telescope { focus: Focus::Collimated, ..*telescope }, range_m);
+    Err(match telescope.focus {
+        Focus::At(focus_m) if rest < most => {
+            // |1/R - 1/F| <= limit from F = 1/(1/R + limit) upwards, of either sign.
+            let shortest_m = range_m * rest / (most + if focus_m > 0.0 { rest } else { -rest });
+            let sign = if focus_m > 0.0 { "from " } else { "to -" };
+            let reason = format!("{excess}: {sign}{:.2} m", 1.01 * shortest_m + 0.01);
+            Error::Key { key: "telescope.focus_m", reason }
         }
-    } else {
-        let largest_m = 0.99 * t.aperture_radius_m * (most / found).sqrt();
-        let allowed = format!("{excess}: to {largest_m:.4} m");
-        Problem { key: "telescope.aperture_radius_m".into(), value: t.aperture_radius_m.to_string(), allowed }
-    };
-    Err(file.located(vec![problem]).into())
+        _ => {
+            let largest_m = 0.99 * telescope.aperture_radius_m * (most / found).sqrt();
+            Error::Key { key: "telescope.aperture_radius_m", reason: format!("{excess}: to {largest_m:.4} m") }
+        }
+    })
 }
 
 /// The phase screens of all runs, each for its own ranges, their time, s, and their plans.

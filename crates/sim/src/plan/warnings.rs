@@ -1,0 +1,190 @@
+//! What is allowed in a scene but probably not meant, or cannot be done by a real laser or receiver.
+//!
+//! Check: each warning appears with what it warns of, and not without; remedies that it names leave none; the number of empty gates is that
+//! of the gates which a run leaves empty.
+
+use crate::scene::{Method, Weighting};
+use crate::setup::Setup;
+use crate::setup::estimators::grid_step_and_bias_m_s;
+use crate::setup::region::{largest_radius_m, places};
+use crate::{Error, SPEED_OF_LIGHT_M_S};
+use wakescope_estimate::map::PolarPoint;
+
+/// What the user should know of a scene whose air has a radial velocity of at most `fastest_m_s`, m/s, but for its phase screens and gates.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, Error> {
+    let scene = &setup.scene.scene;
+    let (e, method) = (&scene.estimator, scene.estimator.method);
+    let mut out = Vec::from_iter(of_fast_air(setup, fastest_m_s));
+    if e.padded_samples < 4 * e.window_samples {
+        let (step_m_s, off_m_s) = grid_step_and_bias_m_s(scene)?;
+        out.push(format!(
+            "estimator.padded_samples gives a spectrum in steps of {step_m_s:.2} m/s: with this estimator.refinement a line is found up \
+             to {off_m_s:.3} m/s off"
+        ));
+    }
+    let is_model = method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
+    if is_model && e.weighting != Weighting::Rectangular {
+        out.push(
+            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
+                .into(),
+        );
+    }
+    if scene.scan.realisations < 2 {
+        out.push("one realisation: no standard deviation can be given".into());
+    }
+    out.extend(of_ambiguous_ranges(setup));
+    out.extend(of_scattering(setup));
+    let (first_m, blind_m) = (scene.scan.range_min_m, scene.telescope.blind_range_m);
+    if first_m < blind_m {
+        out.push(format!("scan.range_min_m = {first_m}: nothing is seen up to telescope.blind_range_m, {blind_m} m"));
+    }
+    Ok(out)
+}
+
+/// Air that the detector band does not hold.
+fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
+    let scene = &setup.scene.scene;
+    let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
+    let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] { "" } else { ", seen from the lidar," };
+    (fastest_m_s > half_band_m_s).then(|| {
+        format!(
+            "the air on the lines of sight{seen} reaches {fastest_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster \
+             air is not seen"
+        )
+    })
+}
+
+/// Pulses so close that light of the one before comes back from the ranges of the scan, or a later one is sent meanwhile: a pulse that leaves
+/// a time T after another one has its light come back with that from c T/2 farther away. The signals of a scene hold one pulse each,
+/// as if the one before were long gone.
+fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
+    let scene = &setup.scene.scene;
+    let rate_hz = scene.laser.pulse_repetition_hz;
+    let apart_m = 0.5 * SPEED_OF_LIGHT_M_S / rate_hz;
+    let (first_s, _) = setup.instrument.pulse.support_s();
+    // the front of the pulse lights air beyond the range of the last sample
+    let reach_m = 0.5 * SPEED_OF_LIGHT_M_S * (-first_s).max(0.0);
+    let farthest_m = scene.scan.range_max_m + reach_m;
+    (apart_m < farthest_m).then(|| {
+        let most_hz = 0.5 * SPEED_OF_LIGHT_M_S / farthest_m;
+        // rounded down, so that the number given is good
+        let digit = 10f64.powf(most_hz.log10().floor() - 2.0);
+        format!(
+            "laser.pulse_repetition_hz = {rate_hz}: the pulses are {apart_m:.0} m of range apart, the scan reaches to \
+             {farthest_m:.0} m (scan.range_max_m and the pulse): returns of several pulses overlap in a real record, which \
+             the simulated one leaves out, but for one with scan.second_trip; up to {:.0} Hz they do not",
+            (most_hz / digit).floor() * digit
+        )
+    })
+}
+
+/// Brillouin scattering in the fibre of the amplifier.
+fn of_scattering(setup: &Setup) -> Option<String> {
+    let (fibre, instrument) = (setup.scene.scene.laser.fibre?, &setup.instrument);
+    let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
+    let peak_w = instrument.peak_power_w();
+    (peak_w > threshold_w).then(|| {
+        format!(
+            "the peak power, {peak_w:.0} W, is {:.1} times the Brillouin threshold of laser.fibre, {threshold_w:.0} W (good to a \
+             factor of 2 to 3)",
+            peak_w / threshold_w
+        )
+    })
+}
+
+/// Gates without a window: windows may be farther apart than regions are wide. Regions as large as a standard deviation asks for are not
+/// looked at.
+///
+/// # Errors
+/// What the estimators refuse; a checked scene gives none.
+pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
+    let (scene, g) = (&setup.scene.scene, &setup.geometry);
+    let (e, places) = (&scene.estimator, places(scene, g)?);
+    let elevation_rad = places.line_elevation_rad()[0];
+    let is_empty = |range_m: f64| {
+        places.chords(PolarPoint { range_m, elevation_rad }, largest_radius_m(scene, range_m)).next().is_none()
+    };
+    let empty = g.gate_range_m.iter().filter(|range_m| is_empty(**range_m)).count();
+    let step_m = e.window_step_samples as f64 * scene.sample_spacing_m();
+    let windows_m = places.gate_ranges_m();
+    let nearest_m = |gate_m: &f64| windows_m.iter().map(|at_m| (at_m - gate_m).abs()).fold(f64::INFINITY, f64::min);
+    let farthest_m = g.gate_range_m.iter().map(nearest_m).fold(0.0, f64::max);
+    Ok((empty > 0).then(|| {
+        format!(
+            "{empty} of {} gates of a line have no window in their region and stay empty: windows are {step_m:.2} m apart \
+             (estimator.window_step_samples = {}), regions are {:.2} m wide; none is empty with an estimator.radius_m of {:.3} or more, or \
+             with windows that gates are a multiple of apart",
+            g.gate_range_m.len(),
+            e.window_step_samples,
+            2.0 * largest_radius_m(scene, g.gate_range_m[0]),
+            // rounded up, so that the number given is good
+            (1000.0 * farthest_m).ceil() / 1000.0,
+        )
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::plan::{Plan, Target};
+    use crate::scene::{AmplifierFibre, Scene, SceneFile};
+    use wakescope_estimate::map::ScanGeometry;
+
+    fn plan(change: impl FnOnce(&mut Scene)) -> Plan {
+        let mut scene = Scene::default();
+        change(&mut scene);
+        Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap()
+    }
+
+    #[test]
+    fn gates_that_no_window_is_near_are_counted_with_a_remedy() {
+        let plan = |step: usize, radius_m: f64| {
+            plan(|s| (s.estimator.window_step_samples, s.estimator.radius_m) = (step, radius_m))
+        };
+        for (step, radius_m) in [(16, 2.0), (7, 0.5), (12, 1.5)] {
+            let planned = plan(step, radius_m);
+            let found: Vec<&String> = planned.warnings.iter().filter(|text| text.contains("have no window")).collect();
+            let text = found.first().unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", planned.warnings));
+            let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
+            // by the distances themselves
+            let (g, scene) = (&planned.geometry, &planned.scene.scene);
+            let places: ScanGeometry = crate::setup::region::places(scene, g).unwrap();
+            let windows_m = places.gate_ranges_m();
+            let near = |gate_m: &f64| windows_m.iter().any(|window_m| (window_m - gate_m).abs() <= radius_m + 1e-5);
+            assert_eq!(empty, g.gate_range_m.iter().filter(|gate_m| !near(gate_m)).count(), "{text}");
+            let words = text.split("estimator.radius_m of ").nth(1).unwrap();
+            let good_m: f64 = words.split(' ').next().unwrap().parse().unwrap();
+            assert!(plan(step, good_m).warnings.iter().all(|text| !text.contains("have no window")), "{text}");
+        }
+        assert!(plan(1, 1.0).warnings.is_empty());
+    }
+
+    #[test]
+    fn pulses_closer_than_the_scan_is_long_are_warned_of_with_a_rate_that_is_not() {
+        let warnings = |rate_hz: f64| plan(|s| s.laser.pulse_repetition_hz = rate_hz).warnings;
+        let found = warnings(1e6);
+        assert!(found.len() == 1 && found[0].contains("150 m") && found[0].contains("scan.range_max_m"), "{found:?}");
+        let words: Vec<&str> = found[0].split(' ').collect();
+        let at = words.iter().position(|word| *word == "to" && found[0].contains("up to")).unwrap();
+        let rate_hz = words[at..].iter().filter_map(|word| word.parse().ok()).next_back().unwrap();
+        assert!((200e3..300e3).contains(&rate_hz) && warnings(rate_hz).is_empty(), "{rate_hz}");
+        assert!(!warnings(1.02 * rate_hz).is_empty());
+        assert!(warnings(Scene::default().laser.pulse_repetition_hz).is_empty());
+    }
+
+    #[test]
+    fn fibres_that_scatter_and_ranges_that_are_blind_are_warned_of() {
+        let warnings = |change: fn(&mut Scene)| plan(change).warnings;
+        let found = warnings(|s| s.laser.fibre = Some(AmplifierFibre::default()));
+        assert!(found.len() == 1 && found[0].contains("5.4 times") && found[0].contains("132 W"), "{found:?}");
+        let wide = |s: &mut Scene| {
+            s.laser.fibre = Some(AmplifierFibre { effective_area_m2: 3e-9, ..AmplifierFibre::default() });
+        };
+        assert!(warnings(wide).is_empty());
+        let found = warnings(|s| s.telescope.blind_range_m = 350.0);
+        assert!(found.len() == 1 && found[0].contains("350 m"), "{found:?}");
+        assert!(warnings(|s| s.telescope.blind_range_m = 280.0).is_empty());
+    }
+}
