@@ -4,8 +4,7 @@ use crate::Error;
 use crate::io::CrossPlanes;
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::plane;
-use crate::measure::profile::Efficiencies;
-use crate::measure::profile::{RangeProfile, profile_at};
+use crate::measure::profile::{Efficiencies, LineOptics, RangeProfile};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage, Target};
 use crate::retrieve::realisations::{SceneRetrieval, of_realisations};
@@ -85,11 +84,12 @@ pub struct SummaryLine {
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
     let (o, known, mut there) = (&plan.scene.scene.outputs, Efficiencies::default(), None);
+    let optics = LineOptics { plan, known: &known, observer };
     if matches!(plan.target, Target::Run | Target::Efficiency) {
         let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
-        result.profile = Some(profile_at(plan, &known, &range_m, observer)?);
+        result.profile = Some(optics.profile_at(&range_m)?);
         if (o.profile_range_min_m..=o.profile_range_max_m).contains(&middle_m(plan)) {
-            there = Some(profile_at(plan, &known, &[middle_m(plan)], observer)?);
+            there = Some(optics.profile_at(&[middle_m(plan)])?);
         }
     }
     if plan.runs(Stage::CrossPlane) {
@@ -151,7 +151,7 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     if samples > 0 {
         result.signals_a = Array2::from_shape_vec(shape, in_phase).ok();
         result.quadrature_a = quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
-        let lines = scanner.lines();
+        let lines = &scanner.lines;
         let layers = lines.first().map_or(0, |line| line.radial_velocity_m_s.len());
         let velocity_m_s = |(i, l): (usize, usize)| lines[i].radial_velocity_m_s[l];
         result.line_velocity_m_s = Some(Array2::from_shape_fn((lines.len(), layers), velocity_m_s));

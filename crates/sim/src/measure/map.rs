@@ -160,7 +160,7 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>, shape: (usize, usize)) -> Result<Ve
     let [mut exact_m_s, mut pulse_m_s, mut gate_m_s] = [(); 3].map(|()| Array2::zeros(shape));
     let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
     let by_gate = range_filter(plan)?;
-    for i in 0..scanner.lines().len() {
+    for i in 0..scanner.lines.len() {
         exact_m_s.row_mut(i).assign(&ArrayView1::from(&radial_velocity_m_s(plan, i, &g.gate_range_m)?));
         let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
@@ -172,7 +172,7 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>, shape: (usize, usize)) -> Result<Ve
         v_exact_m_s: exact_m_s,
         v_pulse_m_s: pulse_m_s,
         v_gate_m_s: gate_m_s,
-        v_spread_m_s: scanner.spread_m_s().cloned(),
+        v_spread_m_s: scanner.spread_m_s.clone(),
         v_scan_m_s: Array2::from_elem(shape, f64::NAN),
         ..VelocityEstimates::default()
     })

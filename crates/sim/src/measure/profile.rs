@@ -5,7 +5,8 @@
 
 use crate::Error;
 use crate::plan::{Plan, Stage};
-use crate::scene::{ReceiverPath, RefractiveTurbulence, Scene, SnrReference, hash_of};
+use crate::scene::{ReceiverPath, Scene, SnrReference, hash_of};
+use crate::setup::Setup;
 use crate::setup::efficiency_model::{MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
 use crate::setup::instrument::Instrument;
 use crate::setup::known::Known;
@@ -21,9 +22,7 @@ use wakescope_optics::{EfficiencyProfile, Misalignment, Stop, curved_ranges_m};
 /// Efficiency (19) and signal-to-noise ratio (14) at the same ranges.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RangeProfile {
-    /// The model that the scene's signals use.
-    pub model: Model,
-    /// Efficiency by that model, with its scatter and error.
+    /// Efficiency by the model that the scene's signals use, with its scatter and error.
     pub efficiency: EfficiencyProfile,
     /// Mean signal-to-noise ratio in the detector band, dB, for a pulse short against the changes
     /// of the path; NaN where no light comes back.
@@ -35,45 +34,166 @@ pub struct RangeProfile {
     pub lost_power_fraction: Option<f64>,
 }
 
-/// The profile at some ranges, m, increasing: with turbulence, theory and Monte Carlo side by side.
-///
-/// # Errors
-/// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
-/// the profile of the scene.
-pub(crate) fn profile_at(
-    plan: &Plan,
-    known: &Efficiencies,
-    range_m: &[f64],
-    observer: &dyn Observer,
-) -> Result<RangeProfile, Error> {
-    let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-    let model = model(scene);
-    let theory = efficiency_by_theory(instrument, range_m)?;
-    let (mut others, mut lost_power_fraction) = (Vec::new(), None);
-    let mut efficiency = theory.clone();
-    if turbulence(scene).is_some() {
-        let ([monostatic, bistatic], lost) = across_screens(plan, known, &theory, observer)?;
-        lost_power_fraction = Some(lost);
-        if model == Model::MonteCarlo {
-            efficiency = monostatic.clone();
-        }
-        others.push(("efficiency_free_space", free_space(instrument, range_m)?));
-        others.push(("efficiency_bistatic_exact", theory));
-        others.push(("efficiency_monostatic_monte_carlo", monostatic));
-        others.push(("efficiency_bistatic_monte_carlo", bistatic));
+/// The curves of some scenes.
+#[derive(Debug, Default)]
+pub(crate) struct Efficiencies {
+    layers: Known<EfficiencyProfile>,
+    screens: Known<Screens>,
+}
+
+impl Efficiencies {
+    /// How many were computed.
+    pub(crate) fn computed(&self) -> usize {
+        self.layers.len()
     }
-    // No light comes back from the blind range or from air without aerosol.
-    let known = |db: f64| if db.is_finite() { db } else { f64::NAN };
-    let snr_db = snr_db(scene, instrument, &efficiency)?.into_iter().map(known).collect();
-    Ok(RangeProfile { model, efficiency, snr_db, others, lost_power_fraction })
+}
+
+/// The optics of a plan along its lines: what is known of them already, and who is told of what is made.
+#[derive(Clone, Copy)]
+pub(crate) struct LineOptics<'a> {
+    pub(crate) plan: &'a Plan,
+    pub(crate) known: &'a Efficiencies,
+    pub(crate) observer: &'a dyn Observer,
+}
+
+impl LineOptics<'_> {
+    /// The profile at some ranges, m, increasing: with turbulence, theory and Monte Carlo side by side.
+    ///
+    /// # Errors
+    /// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
+    /// the profile of the scene.
+    pub(crate) fn profile_at(&self, range_m: &[f64]) -> Result<RangeProfile, Error> {
+        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let theory = efficiency_by_theory(instrument, range_m)?;
+        let (mut others, mut lost_power_fraction) = (Vec::new(), None);
+        let mut efficiency = theory.clone();
+        if turbulence(scene).is_some() {
+            let ([monostatic, bistatic], lost) = self.across_screens(&theory)?;
+            lost_power_fraction = Some(lost);
+            if model(scene) == Model::MonteCarlo {
+                efficiency = monostatic.clone();
+            }
+            others.push(("efficiency_free_space", free_space(instrument, range_m)?));
+            others.push(("efficiency_bistatic_exact", theory));
+            others.push(("efficiency_monostatic_monte_carlo", monostatic));
+            others.push(("efficiency_bistatic_monte_carlo", bistatic));
+        }
+        // No light comes back from the blind range or from air without aerosol.
+        let known = |db: f64| if db.is_finite() { db } else { f64::NAN };
+        let snr_db = snr_db(self.plan, &efficiency)?.into_iter().map(known).collect();
+        Ok(RangeProfile { efficiency, snr_db, others, lost_power_fraction })
+    }
+
+    /// The efficiency at given ranges, m, increasing, by the cheapest model that is valid: the one that signals, budget, bound, map and
+    /// profile have.
+    ///
+    /// # Errors
+    /// As [`Self::profile_at`].
+    pub(crate) fn efficiency_at(&self, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
+        let theory = efficiency_by_theory(&self.plan.instrument, range_m)?;
+        match model(&self.plan.scene.scene) {
+            Model::MonteCarlo => Ok(self.across_screens(&theory)?.0[0].clone()),
+            _ => Ok(theory),
+        }
+    }
+
+    /// The efficiency at the layers of the lines, as [`Self::efficiency_at`].
+    pub(crate) fn of_layers(&self) -> Result<Arc<EfficiencyProfile>, Error> {
+        let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
+        self.known.layers.of(cause(&self.plan.scene.scene, &ranges_m), || {
+            self.observer.begin(Stage::Efficiency, 1);
+            let profile = self.efficiency_at(&ranges_m)?;
+            self.observer.end();
+            Ok(profile)
+        })
+    }
+
+    /// The phase screens of a stretch of range, m.
+    pub(crate) fn screens(&self, [from_m, to_m]: [f64; 2]) -> Result<Arc<Screens>, Error> {
+        let range_m = curved_ranges_m(&self.plan.instrument.telescope, from_m, to_m, OF_SCREENS);
+        self.known.screens.of(cause(&self.plan.scene.scene, &range_m), || self.run_screens(range_m))
+    }
+
+    /// The monostatic and the bistatic efficiency across phase screens at the ranges of `theory`, and the light lost at the border: the
+    /// ratio to theory, which is smooth, on straight lines between the ranges of the screens, times theory.
+    fn across_screens(&self, theory: &EfficiencyProfile) -> Result<([EfficiencyProfile; 2], f64), Error> {
+        let (mut found, mut done, mut lost) = ([const { Vec::new() }; 6], 0, 0f64);
+        for (ends_m, inside) in stretches(&self.plan.scene.scene, &self.plan.geometry, &theory.range_m) {
+            let screens = self.screens(ends_m)?;
+            lost = lost.max(screens.lost_power_fraction);
+            if theory.range_m.get(done) != inside.first() {
+                break;
+            }
+            for &range_m in inside {
+                for (column, ratio) in found.iter_mut().zip(screens.over_theory.as_flattened()) {
+                    column.push(theory.mean[done] * of_table(&screens.range_m, ratio, range_m));
+                }
+                done += 1;
+            }
+        }
+        if let Some(&range_m) = theory.range_m.get(done) {
+            let o = &self.plan.scene.scene.outputs;
+            let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
+            return Err(wakescope_optics::Error::Extrapolation { range_m, first_m, last_m }.into());
+        }
+        let profile = |[mean, standard_deviation, standard_error]: [Vec<f64>; 3]| EfficiencyProfile {
+            range_m: theory.range_m.clone(),
+            mean,
+            standard_deviation,
+            standard_error,
+        };
+        let [a, b, c, d, e, f] = found;
+        Ok(([profile([a, b, c]), profile([d, e, f])], lost))
+    }
+
+    /// Runs the screens of some ranges, m, increasing.
+    ///
+    /// # Errors
+    /// What the optics refuse, such as a grid too small for the beam.
+    fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
+        let (scene, instrument, observer) = (&self.plan.scene.scene, &self.plan.instrument, self.observer);
+        let t = turbulence(scene).unwrap_or_default();
+        observer.begin(Stage::PhaseScreens, t.realisations as u64);
+        let mut seen = 0;
+        // Single precision: its rounding is far below the error of any number of realisations.
+        let estimate = instrument.monte_carlo(&t, &range_m, scene.seed)?.0.run_in::<f32>(
+            Stop::after(t.realisations),
+            |progress| {
+                observer.advance((progress.done - seen) as u64);
+                seen = progress.done;
+                ControlFlow::Continue(())
+            },
+        )?;
+        observer.end();
+        let lost_power_fraction = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
+        if lost_power_fraction > DOUBTFUL_LOSS {
+            observer.warn(&format!(
+                "the border of the phase screens took {lost_power_fraction:.3} of the light, 0.01 at most is good: a wider grid is \
+                 needed, more atmosphere.turbulence.grid_points or sampling = \"derived\""
+            ));
+        }
+        // A checked scene has at least two realisations, and so pairs of them.
+        let pairs = wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 };
+        let theory = efficiency_by_theory(instrument, &range_m)?.mean;
+        let over_theory = [estimate.monostatic, estimate.bistatic.ok_or(pairs)?].map(|found| {
+            let over = |values: Vec<f64>| values.iter().zip(&theory).map(|(value, eta)| value / eta).collect();
+            [found.mean, found.standard_deviation, found.standard_error].map(over)
+        });
+        let by_range = match scene.telescope.receiver {
+            ReceiverPath::Monostatic => estimate.monostatic_realisations,
+            ReceiverPath::Bistatic => estimate.bistatic_realisations,
+        };
+        let count = by_range.iter().map(Vec::len).min().unwrap_or(0);
+        let mean: Vec<f64> = by_range.iter().map(|all| all[..count].iter().sum::<f64>() / count as f64).collect();
+        let over_mean = |i: usize| by_range.iter().zip(&mean).map(|(all, mean)| all[i] / mean).collect();
+        let realisations = (0..count).map(over_mean).collect();
+        Ok(Screens { range_m, over_theory, realisations, lost_power_fraction })
+    }
 }
 
 /// Mean signal-to-noise ratio (14) in the detector band at the ranges of an efficiency, dB, or what the scene fixes.
-pub(crate) fn snr_db(
-    scene: &Scene,
-    instrument: &Instrument,
-    efficiency: &EfficiencyProfile,
-) -> Result<Vec<f64>, Error> {
+pub(crate) fn snr_db(setup: &Setup, efficiency: &EfficiencyProfile) -> Result<Vec<f64>, Error> {
+    let (scene, instrument) = (&setup.scene.scene, &setup.instrument);
     let snr_db = |(&range_m, &mean): (&f64, &f64)| match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Ok(snr_db),
         _ => {
@@ -82,24 +202,6 @@ pub(crate) fn snr_db(
         }
     };
     efficiency.range_m.iter().zip(&efficiency.mean).map(snr_db).collect()
-}
-
-/// The efficiency at given ranges, m, increasing, by the cheapest model that is valid: the one that signals, budget, bound, map and
-/// profile have.
-///
-/// # Errors
-/// As [`profile_at`].
-pub(crate) fn efficiency_at(
-    plan: &Plan,
-    known: &Efficiencies,
-    range_m: &[f64],
-    observer: &dyn Observer,
-) -> Result<EfficiencyProfile, Error> {
-    let theory = efficiency_by_theory(&plan.instrument, range_m)?;
-    match model(&plan.scene.scene) {
-        Model::MonteCarlo => Ok(across_screens(plan, known, &theory, observer)?.0[0].clone()),
-        _ => Ok(theory),
-    }
 }
 
 pub(crate) fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
@@ -139,136 +241,12 @@ fn of_theory(
 #[derive(Debug)]
 pub(crate) struct Screens {
     pub(crate) range_m: Vec<f64>,
-    /// Mean, scatter and standard error, monostatic and then bistatic, over theory: `[number][range]`.
-    over_theory: [Vec<f64>; 6],
+    /// Mean, scatter and standard error, monostatic and then bistatic, over theory: `[receiver][number][range]`.
+    over_theory: [[Vec<f64>; 3]; 2],
     /// Of the receiver of the scene, over their mean: `[realisation][range]`.
     pub(crate) realisations: Vec<Vec<f64>>,
     /// Largest mean fraction of the power that the border of the grid took.
     lost_power_fraction: f64,
-}
-
-/// The monostatic and the bistatic efficiency across phase screens at the ranges of `theory`, and the light lost at the border: the
-/// ratio to theory, which is smooth, on straight lines between the ranges of the screens, times theory.
-fn across_screens(
-    plan: &Plan,
-    known: &Efficiencies,
-    theory: &EfficiencyProfile,
-    observer: &dyn Observer,
-) -> Result<([EfficiencyProfile; 2], f64), Error> {
-    let (scene, mut columns, mut done, mut lost) = (&plan.scene.scene, [const { Vec::new() }; 6], 0, 0f64);
-    for (ends_m, inside) in stretches(scene, &plan.geometry, &theory.range_m) {
-        let screens = known.screens(scene, &plan.instrument, ends_m, observer)?;
-        lost = lost.max(screens.lost_power_fraction);
-        if theory.range_m.get(done) != inside.first() {
-            break;
-        }
-        for &range_m in inside {
-            for (column, ratio) in columns.iter_mut().zip(&screens.over_theory) {
-                column.push(theory.mean[done] * of_table(&screens.range_m, ratio, range_m));
-            }
-            done += 1;
-        }
-    }
-    if let Some(&range_m) = theory.range_m.get(done) {
-        let (first_m, last_m) = (scene.outputs.profile_range_min_m, scene.outputs.profile_range_max_m);
-        return Err(wakescope_optics::Error::Extrapolation { range_m, first_m, last_m }.into());
-    }
-    let [mean, standard_deviation, standard_error, ..] = columns.clone();
-    let monostatic = EfficiencyProfile { range_m: theory.range_m.clone(), mean, standard_deviation, standard_error };
-    let [.., mean, standard_deviation, standard_error] = columns;
-    Ok((
-        [monostatic, EfficiencyProfile { range_m: theory.range_m.clone(), mean, standard_deviation, standard_error }],
-        lost,
-    ))
-}
-
-impl Screens {
-    /// Runs the screens of some ranges, m, increasing.
-    ///
-    /// # Errors
-    /// What the optics refuse, such as a grid too small for the beam.
-    pub(crate) fn run(
-        scene: &Scene,
-        instrument: &Instrument,
-        t: &RefractiveTurbulence,
-        range_m: Vec<f64>,
-        observer: &dyn Observer,
-    ) -> Result<Self, Error> {
-        observer.begin(Stage::PhaseScreens, t.realisations as u64);
-        let mut seen = 0;
-        // Single precision: its rounding is far below the error of any number of realisations.
-        let estimate = instrument.monte_carlo(t, &range_m, scene.seed)?.0.run_in::<f32>(
-            Stop::after(t.realisations),
-            |progress| {
-                observer.advance((progress.done - seen) as u64);
-                seen = progress.done;
-                ControlFlow::Continue(())
-            },
-        )?;
-        observer.end();
-        let lost_power_fraction = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
-        if lost_power_fraction > DOUBTFUL_LOSS {
-            observer.warn(&format!(
-                "the border of the phase screens took {lost_power_fraction:.3} of the light, 0.01 at most is good: a wider grid is \
-                 needed, more atmosphere.turbulence.grid_points or sampling = \"derived\""
-            ));
-        }
-        // A checked scene has at least two realisations, and so pairs of them.
-        let (m, b) = (estimate.monostatic, estimate.bistatic);
-        let b = b.ok_or(wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 })?;
-        let mut over_theory =
-            [m.mean, m.standard_deviation, m.standard_error, b.mean, b.standard_deviation, b.standard_error];
-        let theory = efficiency_by_theory(instrument, &range_m)?.mean;
-        over_theory.iter_mut().for_each(|list| list.iter_mut().zip(&theory).for_each(|(value, eta)| *value /= eta));
-        let by_range = match scene.telescope.receiver {
-            ReceiverPath::Monostatic => estimate.monostatic_realisations,
-            ReceiverPath::Bistatic => estimate.bistatic_realisations,
-        };
-        let count = by_range.iter().map(Vec::len).min().unwrap_or(0);
-        let mean: Vec<f64> = by_range.iter().map(|all| all[..count].iter().sum::<f64>() / count as f64).collect();
-        let over_mean = |i: usize| by_range.iter().zip(&mean).map(|(all, mean)| all[i] / mean).collect();
-        let realisations = (0..count).map(over_mean).collect();
-        Ok(Self { range_m, over_theory, realisations, lost_power_fraction })
-    }
-}
-
-/// The curves of some scenes.
-#[derive(Debug, Default)]
-pub(crate) struct Efficiencies {
-    layers: Known<EfficiencyProfile>,
-    screens: Known<Screens>,
-}
-
-impl Efficiencies {
-    /// The efficiency at the layers of the lines, as [`efficiency_at`].
-    pub(crate) fn of_layers(&self, plan: &Plan, observer: &dyn Observer) -> Result<Arc<EfficiencyProfile>, Error> {
-        let ranges_m: Vec<f64> = plan.geometry.layer_range_m().collect();
-        self.layers.of(cause(&plan.scene.scene, &ranges_m), || {
-            observer.begin(Stage::Efficiency, 1);
-            let profile = efficiency_at(plan, self, &ranges_m, observer)?;
-            observer.end();
-            Ok(profile)
-        })
-    }
-
-    /// The phase screens of a stretch of range, m.
-    pub(crate) fn screens(
-        &self,
-        scene: &Scene,
-        instrument: &Instrument,
-        [from_m, to_m]: [f64; 2],
-        observer: &dyn Observer,
-    ) -> Result<Arc<Screens>, Error> {
-        let t = turbulence(scene).unwrap_or_default();
-        let range_m = curved_ranges_m(&instrument.telescope, from_m, to_m, OF_SCREENS);
-        let cause = cause(scene, &range_m);
-        self.screens.of(cause, || Screens::run(scene, instrument, &t, range_m, observer))
-    }
-
-    /// How many were computed.
-    pub(crate) fn computed(&self) -> usize {
-        self.layers.len()
-    }
 }
 
 /// What a curve depends on: on the seed only in turbulence, where screens may be drawn.
@@ -298,6 +276,10 @@ mod tests {
         Plan::new(file, target).unwrap()
     }
 
+    fn optics<'a>(plan: &'a Plan, known: &'a Efficiencies) -> LineOptics<'a> {
+        LineOptics { plan, known, observer: &Silent }
+    }
+
     /// (14) as it is written, for a return that changes slowly over the pulse, in even air.
     fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
         const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
@@ -314,7 +296,7 @@ mod tests {
         let of_bound = bound(plan, &Silent).unwrap().by_range;
         let ranges_m: Vec<f64> = of_bound.iter().map(|p| p.range_m).collect();
         let budget = Budget::new(plan, &ranges_m, &Silent).unwrap();
-        let profile = profile_at(plan, &Efficiencies::default(), &ranges_m, &Silent).unwrap();
+        let profile = optics(plan, &Efficiencies::default()).profile_at(&ranges_m).unwrap();
         let all = of_bound.iter().zip(budget.snr_db()).zip(&profile.snr_db);
         all.map(|((bound, budget), profile)| (bound.range_m, [bound.snr_db, *budget, *profile])).collect()
     }
@@ -364,9 +346,9 @@ mod tests {
                 assert!((a - b).abs() < 1e-9, "{a} {b}");
             }
             let middle = result.middle.unwrap();
-            let there = efficiency_at(&plan, &Efficiencies::default(), &[middle.range_m], &Silent).unwrap();
+            let there = optics(&plan, &Efficiencies::default()).efficiency_at(&[middle.range_m]).unwrap();
             assert!((middle.efficiency / there.mean[0] - 1.0).abs() < 1e-12);
-            assert!((middle.snr_db - snr_db(&plan.scene.scene, &plan.instrument, &there).unwrap()[0]).abs() < 0.02);
+            assert!((middle.snr_db - snr_db(&plan, &there).unwrap()[0]).abs() < 0.02);
         }
     }
 
@@ -397,8 +379,8 @@ mod tests {
         let mut all_m: Vec<f64> = nodes_m.iter().chain(&between_m).copied().collect();
         all_m.sort_by(f64::total_cmp);
         // One run at all of them has the same layers and random numbers: what differs is the interpolation.
-        let screens = Screens::run(scene, instrument, &turbulence(scene).unwrap(), all_m.clone(), &Silent).unwrap();
-        let ratio = |range_m: &f64| screens.over_theory[0][all_m.iter().position(|m| m == range_m).unwrap()];
+        let screens = optics(&plan, &Efficiencies::default()).run_screens(all_m.clone()).unwrap();
+        let ratio = |range_m: &f64| screens.over_theory[0][0][all_m.iter().position(|m| m == range_m).unwrap()];
         let at_nodes: Vec<f64> = nodes_m.iter().map(ratio).collect();
         for range_m in &between_m {
             let off_db = 10.0 * (of_table(&nodes_m, &at_nodes, *range_m) / ratio(range_m)).log10();

@@ -1,11 +1,10 @@
 //! One scan: the air along each line of sight, and the signals that it returns.
 
 use crate::Error;
-use crate::measure::profile::Efficiencies;
-use crate::measure::profile::efficiency_by_theory;
+use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory};
 use crate::plan::{Plan, Stage};
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
-use crate::setup::air::{Air, LineAirs, air_along, beam_of_air, known_velocity_m_s, seen_into};
+use crate::setup::air::{Air, air_along, air_of_line, beam_of_air, known_velocity_m_s, seen_into};
 use crate::setup::beams::{Beam, Line};
 use crate::setup::efficiency_model::{drawn_turbulence, stretches};
 use crate::setup::geometry::Geometry;
@@ -22,26 +21,26 @@ use wakescope_signal::digitise::Clipped;
 use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::scan::PulseKey;
-use wakescope_signal::{LineOfSight, Pulse, RangeFilter, Record, Scan, Shot, Simulator};
+use wakescope_signal::{LineOfSight, RangeFilter, Record, Scan, Shot, Simulator};
 
 /// The lines of sight of a scan, and what makes signals of them.
 pub struct Scanner<'a> {
     plan: &'a Plan,
     simulator: Simulator,
     returns: Returns,
-    /// The air of each line: that of its middle, or the mean of the airs of its pulses.
-    lines: Vec<LineOfSight>,
+    /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the airs of its pulses.
+    pub lines: Vec<LineOfSight>,
     /// Backscatter that the flow carries \[line\]\[layer\], 1/(m sr); empty where it carries none.
     backscatter_per_m_sr: Vec<Vec<f64>>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have airs of their own.
-    spread_m_s: Option<Array2<f64>>,
+    pub spread_m_s: Option<Array2<f64>>,
     /// The efficiency of each pulse over the mean, where pulses have their own.
     efficiency: Option<LayerEfficiency>,
     /// The air that the pulse before lights meanwhile, if the scene asks for its echo.
     previous: Option<Vec<LineOfSight>>,
-    /// The realisation of the scene with which it begins.
-    first: usize,
+    /// The realisation of the scene with which it begins: what was made before it is not made again.
+    pub(crate) first: usize,
 }
 
 impl<'a> Scanner<'a> {
@@ -59,16 +58,18 @@ impl<'a> Scanner<'a> {
     /// As [`Scanner::new`].
     pub(crate) fn with(plan: &'a Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
-        let returns = layer_returns(plan, known, observer)?;
+        let optics = LineOptics { plan, known, observer };
+        let returns = layer_returns(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
-        let airs = LineAirs::new(plan)?;
+        let by_pulse = RangeFilter::pulse(&instrument.pulse, geometry.layer_thickness_m)?;
+        let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
         let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
         let lines = in_time_order(
             plan,
             &all,
             |line| geometry.line_time_s[*line],
             |&line| {
-                let air = airs.of_line(line)?;
+                let air = air_of_line(plan, &by_pulse, &ranges_m, line)?;
                 observer.advance(1);
                 Ok(air)
             },
@@ -80,7 +81,7 @@ impl<'a> Scanner<'a> {
         let shape = (lines.len(), geometry.gate_range_m.len());
         let spread_m_s = spreads.and_then(|values| Array2::from_shape_vec(shape, values).ok());
         observer.end();
-        let efficiency = drawn_efficiency(plan, &lines, known, observer)?;
+        let efficiency = drawn_efficiency(&optics, &lines)?;
         let record = Record {
             time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
             samples: geometry.samples,
@@ -91,12 +92,6 @@ impl<'a> Scanner<'a> {
         };
         let previous = previous_air(plan, &lines)?;
         Ok(Self { plan, simulator, returns, lines, backscatter_per_m_sr, spread_m_s, efficiency, previous, first: 0 })
-    }
-
-    /// The same that begins with a later realisation of the scene: what was made before it is not made again.
-    #[must_use]
-    pub(crate) fn beginning_with(self, first: usize) -> Self {
-        Self { first, ..self }
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
@@ -116,15 +111,10 @@ impl<'a> Scanner<'a> {
     /// # Errors
     /// As [`Scanner::new`].
     pub(crate) fn expected_layer_snr(plan: &Plan, observer: &dyn Observer) -> Result<Vec<(f64, f64)>, Error> {
-        let known = Efficiencies::default();
+        let optics = LineOptics { plan, known: &Efficiencies::default(), observer };
         let still = Air { radial_velocity_m_s: vec![0.0; plan.geometry.layers], backscatter_per_m_sr: None };
-        let line = layer_returns(plan, &known, observer)?.line(&still, &plan.geometry);
+        let line = layer_returns(&optics)?.line(&still, &plan.geometry);
         Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line))
-    }
-
-    /// The pulse that is sent along them.
-    pub fn pulse(&self) -> &Pulse {
-        &self.plan.instrument.pulse
     }
 
     /// What a filter sees of a line at the gates of a geometry, m/s: that of this scan, or of one with the same layers whose
@@ -141,17 +131,6 @@ impl<'a> Scanner<'a> {
     ) -> Result<(), Error> {
         let backscatter = self.backscatter_per_m_sr.get(line).map(Vec::as_slice);
         seen_into(filter, gates, &self.lines[line].radial_velocity_m_s, backscatter, out_m_s)
-    }
-
-    /// The air along each line of sight, in the order of the geometry's elevations.
-    pub fn lines(&self) -> &[LineOfSight] {
-        &self.lines
-    }
-
-    /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the
-    /// pulses have airs of their own.
-    pub fn spread_m_s(&self) -> Option<&Array2<f64>> {
-        self.spread_m_s.as_ref()
     }
 
     /// The signals of one realisation \[pulse, sample\], A; the pulses of a line stand together.
@@ -318,14 +297,15 @@ impl Returns {
 }
 
 /// The returns of the layers; a signal-to-noise ratio that the scene states takes the place of all of it.
-fn layer_returns(plan: &Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Returns, Error> {
+fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
+    let plan = optics.plan;
     let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), 1.0);
         let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
         return Ok(Returns { weight_per_m, of_backscatter_sr: Vec::new() });
     }
-    let efficiency = known.of_layers(plan, observer)?;
+    let efficiency = optics.of_layers()?;
     let with_efficiency = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
         efficiency.range_m.iter().zip(&efficiency.mean).map(|(&range_m, eta)| Ok(of(range_m)? * eta)).collect()
     };
@@ -357,16 +337,11 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
 }
 
 /// Efficiencies of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
-fn drawn_efficiency(
-    plan: &Plan,
-    lines: &[LineOfSight],
-    known: &Efficiencies,
-    observer: &dyn Observer,
-) -> Result<Option<LayerEfficiency>, Error> {
-    let scene = &plan.scene.scene;
+fn drawn_efficiency(optics: &LineOptics<'_>, lines: &[LineOfSight]) -> Result<Option<LayerEfficiency>, Error> {
+    let (scene, geometry) = (&optics.plan.scene.scene, &optics.plan.geometry);
     let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
-    let first_m = [plan.geometry.first_layer_range_m];
-    let Some(&(ends_m, _)) = stretches(scene, &plan.geometry, &first_m).first() else { return Ok(None) };
-    let screens = known.screens(scene, &plan.instrument, ends_m, observer)?;
+    let first_m = [geometry.first_layer_range_m];
+    let Some(&(ends_m, _)) = stretches(scene, geometry, &first_m).first() else { return Ok(None) };
+    let screens = optics.screens(ends_m)?;
     Ok(Some(LayerEfficiency::new(&screens.range_m, &screens.realisations, line)?))
 }

@@ -17,20 +17,10 @@ pub(crate) struct Air {
     pub(crate) backscatter_per_m_sr: Option<Vec<f64>>,
 }
 
-impl Air {
-    /// What a filter sees at the gates: the mean velocity with its weights and those of the backscatter.
-    ///
-    /// # Errors
-    /// What the filter refuses; a checked scene gives none.
-    pub(crate) fn seen_into(&self, filter: &RangeFilter, g: &Geometry, out_m_s: &mut [f64]) -> Result<(), Error> {
-        seen_into(filter, g, &self.radial_velocity_m_s, self.backscatter_per_m_sr.as_deref(), out_m_s)
-    }
-}
-
-/// [`Air::seen_into`] for the parts of an air.
+/// What a filter sees of an air at the gates: the mean velocity with its weights and those of the backscatter.
 ///
 /// # Errors
-/// As that.
+/// What the filter refuses; a checked scene gives none.
 pub(crate) fn seen_into(
     filter: &RangeFilter,
     g: &Geometry,
@@ -62,72 +52,60 @@ pub(crate) fn beam_of_air(setup: &Setup, line: usize, air: usize) -> Beam {
     schedule.beam(line, 0.5 * (first(air) + first(air + 1) - 1) as f64)
 }
 
-/// The air of a line, and where its pulses have airs of their own the standard deviation of what they see at the gates, m/s.
-pub(crate) type LineAir = (Air, Option<Vec<f64>>);
-
-/// What the air of lines is made with.
-pub(crate) struct LineAirs<'a> {
-    setup: &'a Setup,
-    ranges_m: Vec<f64>,
-    filter: RangeFilter,
-}
-
-impl<'a> LineAirs<'a> {
-    pub(crate) fn new(setup: &'a Setup) -> Result<Self, Error> {
-        let g = &setup.geometry;
-        let filter = RangeFilter::pulse(&setup.instrument.pulse, g.layer_thickness_m)?;
-        Ok(Self { setup, ranges_m: g.layer_range_m().collect(), filter })
+/// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own: then with the standard deviation
+/// of what they see at the gates through the filter of the pulse, m/s.
+pub(crate) fn air_of_line(
+    setup: &Setup,
+    filter: &RangeFilter,
+    range_m: &[f64],
+    line: usize,
+) -> Result<(Air, Option<Vec<f64>>), Error> {
+    let g = &setup.geometry;
+    let schedule = &g.schedule;
+    let pulses = schedule.lines[line].pulses;
+    let of = setup.scene.scene.scan.wind_of_pulses;
+    if of == WindOfPulses::default() {
+        return Ok((air_along(setup, &schedule.middle(line), range_m)?, None));
     }
-
-    /// The air in the middle of a line, or the mean over its pulses if they have airs of their own.
-    pub(crate) fn of_line(&self, line: usize) -> Result<LineAir, Error> {
-        let (setup, g) = (self.setup, &self.setup.geometry);
-        let schedule = &g.schedule;
-        let pulses = schedule.lines[line].pulses;
-        let of = setup.scene.scene.scan.wind_of_pulses;
-        if of == WindOfPulses::default() {
-            return Ok((air_along(setup, &schedule.middle(line), &self.ranges_m)?, None));
+    let airs = of.of_line(pulses);
+    let mut sums_m_s = vec![0.0; range_m.len()];
+    let mut backscatter: Option<Vec<f64>> = None;
+    let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
+    let mut seen_m_s = vec![0.0; g.gate_range_m.len()];
+    let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
+    for air in 0..airs {
+        let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
+        let here = air_along(setup, &beam_of_air(setup, line, air), range_m)?;
+        seen_into(filter, g, &here.radial_velocity_m_s, here.backscatter_per_m_sr.as_deref(), &mut seen_m_s)?;
+        // About the first air, so that the mean of equal airs is that air.
+        if air == 0 {
+            (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), seen_m_s.clone());
+            backscatter = here.backscatter_per_m_sr.as_ref().map(|carried| vec![0.0; carried.len()]);
         }
-        let airs = of.of_line(pulses);
-        let mut sums_m_s = vec![0.0; self.ranges_m.len()];
-        let mut backscatter: Option<Vec<f64>> = None;
-        let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
-        let mut seen_m_s = vec![0.0; g.gate_range_m.len()];
-        let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
-        for air in 0..airs {
-            let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
-            let here = air_along(setup, &beam_of_air(setup, line, air), &self.ranges_m)?;
-            here.seen_into(&self.filter, g, &mut seen_m_s)?;
-            // About the first air, so that the mean of equal airs is that air.
-            if air == 0 {
-                (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), seen_m_s.clone());
-                backscatter = here.backscatter_per_m_sr.as_ref().map(|carried| vec![0.0; carried.len()]);
-            }
-            let weight = |layer: usize| here.backscatter_per_m_sr.as_ref().map_or(1.0, |carried| carried[layer]);
-            for (layer, (sum, v)) in sums_m_s.iter_mut().zip(&here.radial_velocity_m_s).enumerate() {
-                *sum += share * weight(layer) * (v - first_m_s[layer]);
-            }
-            if let Some(backscatter) = &mut backscatter {
-                backscatter.iter_mut().enumerate().for_each(|(layer, sum)| *sum += share * weight(layer));
-            }
-            for ((sum, square), (v, first)) in sums.iter_mut().zip(seen_m_s.iter().zip(&first_seen_m_s)) {
-                let beside = v - first;
-                *sum += share * beside;
-                *square += share * beside * beside;
-            }
+        let weight = |layer: usize| here.backscatter_per_m_sr.as_ref().map_or(1.0, |carried| carried[layer]);
+        for (layer, (sum, v)) in sums_m_s.iter_mut().zip(&here.radial_velocity_m_s).enumerate() {
+            *sum += share * weight(layer) * (v - first_m_s[layer]);
         }
-        for (layer, (sum, first)) in sums_m_s.iter_mut().zip(&first_m_s).enumerate() {
-            match backscatter.as_ref().map_or(1.0, |mean| mean[layer]) {
-                // Nothing returns light: any velocity will do.
-                0.0 => *sum = 0.0,
-                total => *sum /= total,
-            }
-            *sum += first;
+        if let Some(backscatter) = &mut backscatter {
+            backscatter.iter_mut().enumerate().for_each(|(layer, sum)| *sum += share * weight(layer));
         }
-        let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
-        let air = Air { radial_velocity_m_s: sums_m_s, backscatter_per_m_sr: backscatter };
-        Ok((air, Some(sums.into_iter().map(spread).collect())))
+        for ((sum, square), (v, first)) in sums.iter_mut().zip(seen_m_s.iter().zip(&first_seen_m_s)) {
+            let beside = v - first;
+            *sum += share * beside;
+            *square += share * beside * beside;
+        }
     }
+    for (layer, (sum, first)) in sums_m_s.iter_mut().zip(&first_m_s).enumerate() {
+        match backscatter.as_ref().map_or(1.0, |mean| mean[layer]) {
+            // Nothing returns light: any velocity will do.
+            0.0 => *sum = 0.0,
+            total => *sum /= total,
+        }
+        *sum += first;
+    }
+    let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
+    let air = Air { radial_velocity_m_s: sums_m_s, backscatter_per_m_sr: backscatter };
+    Ok((air, Some(sums.into_iter().map(spread).collect())))
 }
 
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
@@ -144,7 +122,7 @@ pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<A
     let radial_velocity_m_s = velocity_of(setup, beam, range_m, &points_m, known_m_s)?;
     let mut backscatter_per_m_sr = setup.wind.backscatter_per_m_sr(&points_m, setup.wind.start_s + beam.time_s)?;
     for (beta, range_m) in backscatter_per_m_sr.iter_mut().flatten().zip(range_m).filter(|(beta, _)| beta.is_nan()) {
-        *beta = setup.instrument.backscatter_per_m_sr(*range_m)?;
+        *beta = setup.instrument.air.backscatter_per_m_sr(*range_m)?;
     }
     Ok(Air { radial_velocity_m_s, backscatter_per_m_sr })
 }

@@ -69,20 +69,12 @@ impl Instrument {
         Ok(seen * self.air.return_per_m(range_m, self.telescope.aperture_area_m2())?)
     }
 
-    /// Backscatter of the scene's air at a range, 1/(m sr).
-    ///
-    /// # Errors
-    /// What signals refuse of a range.
-    pub(crate) fn backscatter_per_m_sr(&self, range_m: f64) -> Result<f64, Error> {
-        Ok(self.air.backscatter_per_m_sr(range_m)?)
-    }
-
     /// [`Self::return_per_m`] of air with a backscatter of 1/(m sr): K^2 A_R/R^2 less losses, sr.
     ///
     /// # Errors
     /// What optics or signals refuse of a range.
     pub(crate) fn return_of_backscatter_sr(&self, range_m: f64) -> Result<f64, Error> {
-        let one = self.air_transmission(range_m)?.powi(2) * self.telescope.aperture_area_m2() / (range_m * range_m);
+        let one = self.air.transmission(range_m)?.powi(2) * self.telescope.aperture_area_m2() / (range_m * range_m);
         Ok(if range_m < self.blind_range_m { 0.0 } else { self.transmission * one })
     }
 
@@ -97,14 +89,6 @@ impl Instrument {
         let (first_s, last_s) = self.pulse.support_s();
         let time_s = |i: u32| first_s + (last_s - first_s) * f64::from(i) / f64::from(STEPS);
         self.pulse.energy_j() * (0..=STEPS).map(|i| self.pulse.intensity_per_s(time_s(i))).fold(0.0, f64::max)
-    }
-
-    /// One-way transmission K of the air to a range.
-    ///
-    /// # Errors
-    /// What signals refuse of a range.
-    pub fn air_transmission(&self, range_m: f64) -> Result<f64, Error> {
-        Ok(self.air.transmission(range_m)?)
     }
 
     /// Grid and layers of the phase screens for several runs, each with its ranges, m, increasing; with their cost.

@@ -3,55 +3,35 @@
 use crate::Error;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
-/// A part of the measurement that can run alone or be left out.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Stage {
-    /// Large-eddy simulation of the flow.
-    FlowSimulation,
-    /// Wind on a cross-plane, for the files.
-    CrossPlane,
-    /// Phase screens and beam propagation.
-    PhaseScreens,
-    /// Efficiency and SNR against range.
-    Efficiency,
-    /// Wind along the lines of sight.
-    LinesOfSight,
-    /// Heterodyne signals.
-    Signals,
-    /// Shot noise.
-    Noise,
-    /// Velocity estimates.
-    Estimates,
-    /// Estimates against the truth.
-    Errors,
-    /// Vortices from maps and signals.
-    Retrieval,
-    /// Scans that are drawn for thresholds and shares of wakes that are found.
-    Detection,
-    /// Tables and pictures.
-    Files,
-    /// Cases of a sweep.
-    Cases,
-}
-
-impl Stage {
-    /// The name that plans, progress and summaries use.
-    pub fn name(self) -> &'static str {
-        match self {
-            Stage::FlowSimulation => "flow simulation",
-            Stage::CrossPlane => "cross-plane",
-            Stage::PhaseScreens => "phase screens",
-            Stage::Efficiency => "efficiency",
-            Stage::LinesOfSight => "lines of sight",
-            Stage::Signals => "signals",
-            Stage::Noise => "noise",
-            Stage::Estimates => "estimates",
-            Stage::Errors => "errors",
-            Stage::Retrieval => "retrieval",
-            Stage::Detection => "detection",
-            Stage::Files => "files",
-            Stage::Cases => "cases",
-        }
+crate::keys::choice! {
+    /// A part of the measurement that can run alone or be left out, by the name that plans, progress and summaries use.
+    Stage {
+        /// Large-eddy simulation of the flow.
+        FlowSimulation = "flow simulation",
+        /// Wind on a cross-plane, for the files.
+        CrossPlane = "cross-plane",
+        /// Phase screens and beam propagation.
+        PhaseScreens = "phase screens",
+        /// Efficiency and SNR against range.
+        Efficiency = "efficiency",
+        /// Wind along the lines of sight.
+        LinesOfSight = "lines of sight",
+        /// Heterodyne signals.
+        Signals = "signals",
+        /// Shot noise.
+        Noise = "noise",
+        /// Velocity estimates.
+        Estimates = "estimates",
+        /// Estimates against the truth.
+        Errors = "errors",
+        /// Vortices from maps and signals.
+        Retrieval = "retrieval",
+        /// Scans that are drawn for thresholds and shares of wakes that are found.
+        Detection = "detection",
+        /// Tables and pictures.
+        Files = "files",
+        /// Cases of a sweep.
+        Cases = "cases",
     }
 }
 

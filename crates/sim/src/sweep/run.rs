@@ -199,7 +199,8 @@ pub(crate) fn measured<T>(
     for places in groups(scenes.iter()) {
         let plans: Vec<Plan> =
             places.iter().map(|&i| common.plan(&scenes[i], Target::Map)).collect::<Result<_, _>>()?;
-        let scanner = Scanner::with(&plans[0], &common.efficiencies, observer)?.beginning_with(first);
+        let mut scanner = Scanner::with(&plans[0], &common.efficiencies, observer)?;
+        scanner.first = first;
         let found = map::of_plans(&plans.iter().collect::<Vec<_>>(), &scanner, observer, |_, _| ())?;
         let found = plans.iter().zip(found).map(|(plan, map)| finish(plan, &scanner, map));
         let found: Vec<T> = found.collect::<Result<_, _>>()?;

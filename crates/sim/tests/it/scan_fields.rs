@@ -185,7 +185,7 @@ fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
     };
     let dusty = flow("backscatter = { name = \"dust\", unit_per_m_sr = 1e-7 }\n");
     let (plain, dusty) = (of(&flow(""), level).unwrap(), of(&dusty, level).unwrap());
-    let lines = |plan: &Plan| Scanner::new(plan, &Silent).unwrap().lines()[0].clone();
+    let lines = |plan: &Plan| Scanner::new(plan, &Silent).unwrap().lines[0].clone();
     let (clear, seen) = (lines(&plain), lines(&dusty));
     let time_s = dusty.geometry.schedule.middle(0).time_s;
     for layer in 0..clear.layers() {

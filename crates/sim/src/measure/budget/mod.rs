@@ -10,8 +10,7 @@ mod text;
 pub use limits::Limits;
 
 use crate::Error;
-use crate::measure::profile::Efficiencies;
-use crate::measure::profile::{efficiency_at, efficiency_by_theory, free_space};
+use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory, free_space};
 use crate::plan::Plan;
 use crate::scene::{Digitiser, FrontEnd, Scene, SnrReference};
 use crate::setup::efficiency_model::turbulence;
@@ -67,8 +66,8 @@ impl Budget {
     /// What the optics refuse, such as a range beyond both in turbulence.
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
         let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-        let efficiency = |sorted_m: &[f64]| efficiency_at(plan, &Efficiencies::default(), sorted_m, observer);
-        let mut rows = Rows::new(plan, range_m, efficiency)?;
+        let optics = LineOptics { plan, known: &Efficiencies::default(), observer };
+        let mut rows = Rows::new(plan, range_m, |sorted_m| optics.efficiency_at(sorted_m))?;
         rows.beside_the_ratio(scene, instrument, range_m)?;
         let limits = Limits::new(plan)?;
         Ok(Self { range_m: range_m.to_vec(), rows: rows.rows, limits, warnings: plan.warnings.clone() })
@@ -206,14 +205,14 @@ fn transmitter_and_path(
     let (air, beta) = (scene.atmosphere.profile.as_ref(), scene.atmosphere.backscatter_per_m_sr);
     let backscatter = by_range(&|r| {
         let clear = Instrument { blind_range_m: 0.0, transmission: 1.0, ..instrument.clone() };
-        Ok(clear.return_per_m(r)? / (instrument.air_transmission(r)?.powi(2) * solid_angle(r)))
+        Ok(clear.return_per_m(r)? / (instrument.air.transmission(r)?.powi(2) * solid_angle(r)))
     })?;
     let value = air.map_or_else(|| format!("{} /(m sr)", scientific(beta)), |_| profile());
     rows.push("backscatter", "beta", value, backscatter);
     let value = format!("A_R/R^2, aperture {}", si(2.0 * telescope.aperture_radius_m, "m"));
     rows.push("solid angle", "A_R/R^2", value, by_range(&|r| Ok(solid_angle(r)))?);
     let value = air.map_or_else(|| format!("{} /m", scientific(scene.atmosphere.extinction_per_m)), |_| profile());
-    rows.push("air, out and back", "K^2", value, by_range(&|r| Ok(instrument.air_transmission(r)?.powi(2)))?);
+    rows.push("air, out and back", "K^2", value, by_range(&|r| Ok(instrument.air.transmission(r)?.powi(2)))?);
     let passed = telescope.transmitted_fraction();
     rows.same("truncation, two beams", "T^2", format!("T = {passed:.4}"), 2.0 * decibels(passed));
     let empty = free_space(instrument, &increasing(range_m))?;

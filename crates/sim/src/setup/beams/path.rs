@@ -4,36 +4,26 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// How CfRadial names a kind of sweep.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SweepMode {
-    /// Elevation at one azimuth.
-    Rhi,
-    /// A full turn of azimuth at one elevation.
-    AzimuthSurveillance,
-    /// A part of a turn.
-    Sector,
-    /// Straight up.
-    VerticalPointing,
-    /// One or a few directions.
-    Pointing,
+crate::keys::choice! {
+    /// A kind of sweep, by the word of CfRadial 1.4 for it.
+    SweepMode {
+        /// Elevation at one azimuth.
+        Rhi = "rhi",
+        /// A full turn of azimuth at one elevation.
+        AzimuthSurveillance = "azimuth_surveillance",
+        /// A part of a turn.
+        Sector = "sector",
+        /// Straight up.
+        VerticalPointing = "vertical_pointing",
+        /// One or a few directions.
+        Pointing = "pointing",
+    }
 }
 
 impl SweepMode {
     /// All of them.
     pub const ALL: [Self; 5] =
         [Self::Rhi, Self::AzimuthSurveillance, Self::Sector, Self::VerticalPointing, Self::Pointing];
-
-    /// The word of CfRadial 1.4 for it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Rhi => "rhi",
-            Self::AzimuthSurveillance => "azimuth_surveillance",
-            Self::Sector => "sector",
-            Self::VerticalPointing => "vertical_pointing",
-            Self::Pointing => "pointing",
-        }
-    }
 
     /// Whether it is made of directions, not of a way of the head.
     pub(crate) fn is_pointing(self) -> bool {
