@@ -152,11 +152,9 @@ impl Cli {
 
     /// The flow case of a path; keys that it lacks are those of the preset, if there is one.
     pub(super) fn case(&self, path: &Path, preset: Option<WakePreset>) -> Result<CaseFile, Error> {
-        match (self.text(path), preset) {
-            (None, None) => CaseFile::read(path),
-            (None, Some(preset)) => CaseFile::read_over(preset, path),
-            (Some(text), None) => Ok(CaseFile::parse(text, path)?),
-            (Some(text), Some(preset)) => Ok(CaseFile::parse_over(preset, text, path)?),
+        match self.text(path) {
+            None => CaseFile::read(path, preset),
+            Some(text) => Ok(CaseFile::parse_over(preset, text, path)?),
         }
     }
 

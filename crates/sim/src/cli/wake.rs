@@ -41,6 +41,6 @@ pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
 pub(super) fn case_file(path: Option<&Path>, preset: Option<WakePreset>, cli: &Cli) -> Result<CaseFile, Error> {
     match path {
         Some(path) => cli.case(path, preset),
-        None => Ok(CaseFile::preset(preset.unwrap_or(WakePreset::Coarse))?),
+        None => Ok(CaseFile::parse_over(preset.or(Some(WakePreset::Coarse)), "", Path::new("preset"))?),
     }
 }

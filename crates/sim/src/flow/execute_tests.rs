@@ -75,7 +75,7 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
     assert_eq!(lists("end_tau = 1.7\n"), (vec![0.5, 1.0, 1.7], vec![0.85, 1.7]));
     assert_eq!(lists("end_tau = 1.7\nfields_tau = []\n"), (vec![], vec![0.85, 1.7]));
     let own = "[case]\nkind = \"wake\"\n[wake]\nend_tau = 0.5\n";
-    let over = CaseFile::parse_over(WakePreset::Medium, own, Path::new("case.toml")).unwrap();
+    let over = CaseFile::parse_over(Some(WakePreset::Medium), own, Path::new("case.toml")).unwrap();
     assert_eq!(over.case.wake.unwrap().fields_tau, Some(vec![0.5]));
     // An end from the command line: lists of the case lose what lies behind it.
     let ended = |keys: &str, end: f64| {

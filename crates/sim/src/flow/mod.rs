@@ -66,12 +66,13 @@ pub struct CaseFile {
 }
 
 impl CaseFile {
-    /// Reads and checks a case file.
+    /// Reads and checks a case file; keys that it does not have are those of the preset of a wake, if there is one.
     ///
     /// # Errors
     /// What the system says; [`SceneError`] names the file, the line, the key, the value and what is allowed.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        Ok(Self::parse(&case_text(path)?, path)?)
+    pub fn read(path: &Path, preset: Option<WakePreset>) -> Result<Self, Error> {
+        let text = text_file::read(path).map_err(Error::io("read the case", path))?;
+        Ok(Self::parse_over(preset, &text, path)?)
     }
 
     /// Whether a file is a case, by its keys, and no scene.
@@ -89,31 +90,16 @@ impl CaseFile {
     /// # Errors
     /// As [`CaseFile::read`].
     pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        Ok(Self::of(text::read(text, path, None)?, Source::new(path, text)))
+        Self::parse_over(None, text, path)
     }
 
-    /// A preset.
-    ///
-    /// # Errors
-    /// None of a preset as it is.
-    pub fn preset(preset: WakePreset) -> Result<Self, SceneError> {
-        Self::parse_over(preset, "", Path::new("preset"))
-    }
-
-    /// Reads a case file of a wake over a preset.
-    ///
-    /// # Errors
-    /// As [`CaseFile::read`].
-    pub fn read_over(preset: WakePreset, path: &Path) -> Result<Self, Error> {
-        Ok(Self::parse_over(preset, &case_text(path)?, path)?)
-    }
-
-    /// The text of a case file of a wake over a preset: keys that it does not have are those of the preset.
+    /// The text of a case file over the preset of a wake, if there is one: keys that it does not have are those of the preset.
     ///
     /// # Errors
     /// As [`CaseFile::parse`].
-    pub fn parse_over(preset: WakePreset, text: &str, path: &Path) -> Result<Self, SceneError> {
-        Ok(Self::of(text::read(text, path, Some(&preset.case()))?, Source::new(path, text)))
+    pub fn parse_over(preset: Option<WakePreset>, text: &str, path: &Path) -> Result<Self, SceneError> {
+        let base = preset.map(WakePreset::case);
+        Ok(Self::of(text::read(text, path, base.as_ref())?, Source::new(path, text)))
     }
 
     /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
@@ -180,11 +166,6 @@ impl CaseFile {
 fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
     let tau = time_s * tau_per_s;
     format!("{tau:.13e}").parse().unwrap_or(tau)
-}
-
-/// The text of a case file.
-fn case_text(path: &Path) -> Result<String, Error> {
-    text_file::read(path).map_err(Error::io("read the case", path))
 }
 
 /// Whether a run begins or continues.

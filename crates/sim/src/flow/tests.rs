@@ -207,14 +207,14 @@ fn the_history_of_a_wake_opens_with_its_axes() {
 
 #[test]
 fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
-    let coarse = CaseFile::preset(WakePreset::Coarse).unwrap();
+    let coarse = CaseFile::parse_over(Some(WakePreset::Coarse), "", Path::new("preset")).unwrap();
     let text = example("wake").unwrap();
     let mut commented = parse(text).case;
     (commented.time.scheme, commented.time.courant) = (None, None);
     commented.checkpoint.every_steps = None;
     assert_eq!(commented, coarse.case, "the commented example is the preset");
     for preset in [WakePreset::Coarse, WakePreset::Medium, WakePreset::Fine, WakePreset::Chapter] {
-        let file = CaseFile::preset(preset).unwrap();
+        let file = CaseFile::parse_over(Some(preset), "", Path::new("preset")).unwrap();
         let CaseKind::Wake(flow) = &file.case.case else { panic!("{preset:?}") };
         let mut pair = flow.pair_case().unwrap();
         pair.subgrid = preset.pair().subgrid;
@@ -222,11 +222,11 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
     }
     let own = "[case]\nkind = \"wake\"\nreynolds = 1e4\npair = { from = \"a320\" }\n[wake]\nend_tau = 1.0\n\
                fields_tau = []\nplanes_tau = []\n";
-    let file = CaseFile::parse_over(WakePreset::Medium, own, Path::new("case.toml")).unwrap();
+    let file = CaseFile::parse_over(Some(WakePreset::Medium), own, Path::new("case.toml")).unwrap();
     let CaseKind::Wake(flow) = &file.case.case else { panic!() };
     assert_eq!((flow.cells, flow.reynolds, flow.pair), ([48, 240, 128], 1e4, PairScale::A320 {}));
     let over =
-        |text: &str| CaseFile::parse_over(WakePreset::Coarse, text, Path::new("c.toml")).unwrap_err().to_string();
+        |text: &str| CaseFile::parse_over(Some(WakePreset::Coarse), text, Path::new("c.toml")).unwrap_err().to_string();
     let message = over("[case]\nkind = \"wake\"\ncore_radius = -0.1\n");
     assert!(message.contains("c.toml:3") && message.contains("case.core_radius = -0.1"), "{message}");
     let message = over("[case]\nkind = \"wake\"\n[wake]\nfields_tau = [9.0]\n");

@@ -20,6 +20,12 @@ const TAGS: [&str; 3] = ["kind", "from", "model"];
 /// # Errors
 /// The file, the line, the key, the value and what is allowed.
 pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<FlowCase, SceneError> {
+    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(|| {
+        let mut keys = keys_of::<FlowCase>();
+        // Which flow is no matter of defaults.
+        keys.iter_mut().for_each(|key| key.is_required = key.name == "case");
+        keys
+    });
     let document = Document::parse(text, path)?;
     let kind = document.value("case.kind").and_then(|kind| kind.as_str());
     let defaults = match (base, kind) {
@@ -27,7 +33,7 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
         (None, Some(kind)) => defaults_of(kind),
         (None, None) => Table::new(),
     };
-    let table = vetted(&document, kind, &defaults)?;
+    let table = document.vet(&Format { keys: &KEYS, defaults: &defaults, examples: &examples_of(kind) })?;
     let whole = match base {
         Some(_) => over(defaults, table),
         None => table,
@@ -38,17 +44,6 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
     }
     let problems = case.problems();
     if problems.is_empty() { Ok(case) } else { Err(document.located(problems)) }
-}
-
-fn vetted(document: &Document<'_>, kind: Option<&str>, defaults: &Table) -> Result<Table, SceneError> {
-    static KEYS: LazyLock<Vec<Key>> = LazyLock::new(|| {
-        let mut keys = keys_of::<FlowCase>();
-        // Which flow is no matter of defaults.
-        keys.iter_mut().for_each(|key| key.is_required = key.name == "case");
-        keys
-    });
-    let format = Format { keys: &KEYS, defaults, examples: &examples_of(kind) };
-    document.vet(&format)
 }
 
 /// Texts with values of keys, that of the same kind first.
@@ -148,8 +143,8 @@ mod tests {
 
     #[test]
     fn a_file_over_a_preset_needs_only_what_differs_and_is_blamed_on_its_own_lines() {
-        let over = |text: &str| CaseFile::parse_over(WakePreset::Fine, text, Path::new("c.toml"));
-        let fine = CaseFile::preset(WakePreset::Fine).unwrap();
+        let over = |text: &str| CaseFile::parse_over(Some(WakePreset::Fine), text, Path::new("c.toml"));
+        let fine = over("").unwrap();
         assert_eq!(over("").unwrap().toml, fine.toml);
         let changed = over("[case.pair]\nfrom = \"a340\"\n[solver.subgrid]\norder = 2\n").unwrap().toml;
         assert!(changed.contains("from = \"a340\"\n") && !changed.contains("spacing_m"), "{changed}");

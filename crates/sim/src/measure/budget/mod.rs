@@ -65,10 +65,9 @@ impl Budget {
     /// # Errors
     /// What the optics refuse, such as a range beyond both in turbulence.
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
-        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
         let optics = LineOptics { plan, known: &Efficiencies::default(), observer };
         let mut rows = Rows::new(plan, range_m, |sorted_m| optics.efficiency_at(sorted_m))?;
-        rows.beside_the_ratio(scene, instrument, range_m)?;
+        rows.beside_the_ratio()?;
         let limits = Limits::new(plan)?;
         Ok(Self { range_m: range_m.to_vec(), rows: rows.rows, limits, warnings: plan.warnings.clone() })
     }
@@ -103,28 +102,27 @@ fn decibels(ratio: f64) -> f64 {
     10.0 * ratio.log10()
 }
 
-/// Rows under construction.
-struct Rows {
+/// Rows under construction, at the ranges of a budget, m.
+struct Rows<'a> {
+    plan: &'a Plan,
+    range_m: &'a [f64],
     rows: Vec<Row>,
-    ranges: usize,
 }
 
-impl Rows {
+impl<'a> Rows<'a> {
     /// All that the signal-to-noise ratio is made of; `efficiency` is asked for increasing ranges, if the scene needs any.
     fn new(
-        plan: &Plan,
-        range_m: &[f64],
+        plan: &'a Plan,
+        range_m: &'a [f64],
         efficiency: impl FnOnce(&[f64]) -> Result<EfficiencyProfile, Error>,
     ) -> Result<Self, Error> {
-        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
-        let mut rows = Self { rows: Vec::new(), ranges: range_m.len() };
-        match scene.detector.snr {
+        let mut rows = Self { plan, range_m, rows: Vec::new() };
+        match plan.scene.scene.detector.snr {
             SnrReference::Fixed { snr_db } => rows.same("stated by the scene", "", "detector.snr".into(), snr_db),
             _ => {
-                let efficiency = efficiency(&increasing(range_m))?;
-                transmitter_and_path(&mut rows, scene, instrument, range_m, &efficiency)?;
+                rows.transmitter_and_path(&efficiency(&increasing(range_m))?)?;
                 rows.sum("= shot-noise limit", "(14)", "(14)".into());
-                receiver(&mut rows, scene, instrument);
+                rows.receiver();
             }
         }
         rows.sum(TOTAL, "", "one pulse".into());
@@ -132,7 +130,8 @@ impl Rows {
     }
 
     /// The ratio in the width of the pulse, and the echo of the pulse before.
-    fn beside_the_ratio(&mut self, scene: &Scene, instrument: &Instrument, range_m: &[f64]) -> Result<(), Error> {
+    fn beside_the_ratio(&mut self) -> Result<(), Error> {
+        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
         let width_hz = instrument.pulse.spectral_full_width_half_maximum_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
         let fwhm_s = instrument.gaussian_fwhm_s();
@@ -144,8 +143,7 @@ impl Rows {
         let wide = self.sums().iter().map(|db| db + gain_db).collect();
         self.push("= in the width of the pulse", "", value, wide);
         if scene.scan.second_trip.is_some() {
-            let echoes = range_m.iter().map(|&range_m| second_trip_db(scene, instrument, range_m));
-            let echoes = echoes.collect::<Result<Vec<_>, _>>()?;
+            let echoes = self.at_each(&|range_m| second_trip(scene, instrument, range_m))?;
             let value = format!("from {} farther", si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m"));
             self.push("= pulse before over echo", "", value, echoes);
         }
@@ -158,7 +156,7 @@ impl Rows {
 
     /// A factor that is the same at every range.
     fn same(&mut self, name: &'static str, symbol: &'static str, value: String, db: f64) {
-        self.push(name, symbol, value, vec![db; self.ranges]);
+        self.push(name, symbol, value, vec![db; self.range_m.len()]);
     }
 
     /// A factor that a scene need not have.
@@ -170,114 +168,112 @@ impl Rows {
 
     fn sums(&self) -> Vec<f64> {
         let factors = self.rows.iter().filter(|row| !row.name.starts_with('='));
-        factors.fold(vec![0.0; self.ranges], |sums, row| sums.iter().zip(&row.db).map(|(a, b)| a + b).collect())
+        factors.fold(vec![0.0; self.range_m.len()], |sums, row| sums.iter().zip(&row.db).map(|(a, b)| a + b).collect())
     }
 
     fn sum(&mut self, name: &'static str, symbol: &'static str, value: String) {
         let db = self.sums();
         self.push(name, symbol, value, db);
     }
-}
 
-/// From the photons of the pulse to the electrons that it gives.
-fn transmitter_and_path(
-    rows: &mut Rows,
-    scene: &Scene,
-    instrument: &Instrument,
-    range_m: &[f64],
-    efficiency: &EfficiencyProfile,
-) -> Result<(), Error> {
-    let (telescope, receiver, t) = (&instrument.telescope, &instrument.receiver, &scene.telescope);
-    let (energy_j, photon_j) = (scene.pulse_energy_j(), receiver.photon_energy_j());
-    let by_range = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
-        range_m.iter().map(|&r| Ok(decibels(of(r)?))).collect()
-    };
-    let area_m2 = telescope.aperture_area_m2();
-    let solid_angle = |r: f64| area_m2 / (r * r);
-    let sent = format!("{} / {photon_j:.2e} J", si(energy_j, "J"));
-    rows.same("photons sent", "E/(h nu)", sent, decibels(energy_j / photon_j));
-    let printed = scene.detector.snr == SnrReference::Chapter {};
-    rows.optional(printed, "hbar for h", "2 pi", "as the chapter prints (14)".into(), decibels(2.0 * PI));
-    let bandwidth_hz = receiver.bandwidth_hz;
-    rows.same("per bandwidth", "1/B", si(bandwidth_hz, "Hz"), -decibels(bandwidth_hz));
-    rows.same("range per time", "c/2", "c/2".into(), decibels(0.5 * crate::SPEED_OF_LIGHT_M_S));
-    let profile = || "profile".to_owned();
-    let (air, beta) = (scene.atmosphere.profile.as_ref(), scene.atmosphere.backscatter_per_m_sr);
-    let backscatter = by_range(&|r| {
-        let clear = Instrument { blind_range_m: 0.0, transmission: 1.0, ..instrument.clone() };
-        Ok(clear.return_per_m(r)? / (instrument.air.transmission(r)?.powi(2) * solid_angle(r)))
-    })?;
-    let value = air.map_or_else(|| format!("{} /(m sr)", scientific(beta)), |_| profile());
-    rows.push("backscatter", "beta", value, backscatter);
-    let value = format!("A_R/R^2, aperture {}", si(2.0 * telescope.aperture_radius_m, "m"));
-    rows.push("solid angle", "A_R/R^2", value, by_range(&|r| Ok(solid_angle(r)))?);
-    let value = air.map_or_else(|| format!("{} /m", scientific(scene.atmosphere.extinction_per_m)), |_| profile());
-    rows.push("air, out and back", "K^2", value, by_range(&|r| Ok(instrument.air.transmission(r)?.powi(2)))?);
-    let passed = telescope.transmitted_fraction();
-    rows.same("truncation, two beams", "T^2", format!("T = {passed:.4}"), 2.0 * decibels(passed));
-    let empty = free_space(instrument, &increasing(range_m))?;
-    let antenna = by_range(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
-    rows.push("antenna efficiency", "eta_a", "free space".into(), antenna);
-    if let Some(air) = turbulence(scene) {
-        let value = format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23));
-        let left = by_range(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;
-        rows.push("turbulence", "eta_s/eta_s(0)", value, left);
+    /// A factor at each range, dB.
+    fn at_each(&self, of: &dyn Fn(f64) -> Result<f64, Error>) -> Result<Vec<f64>, Error> {
+        self.range_m.iter().map(|&range_m| Ok(decibels(of(range_m)?))).collect()
     }
-    let lost = |db: f64| if db == 0.0 { 0.0 } else { -db };
-    rows.same("optics", "both ways", "key optics_loss_db".into(), lost(t.optics_loss_db));
-    rows.same("polarisation", "", "key polarisation_loss_db".into(), lost(t.polarisation_loss_db));
-    let efficiency = receiver.quantum_efficiency;
-    rows.same("quantum efficiency", "eta_Q", format!("{efficiency:.2}"), decibels(efficiency));
-    if range_m.iter().any(|r| *r < t.blind_range_m) {
-        let seen = by_range(&|r| Ok(f64::from(u8::from(r >= t.blind_range_m))))?;
-        rows.push("blind range", "", format!("to {}", si(t.blind_range_m, "m")), seen);
-    }
-    Ok(())
-}
 
-/// What the receiver loses against the shot-noise limit.
-fn receiver(rows: &mut Rows, scene: &Scene, instrument: &Instrument) {
-    let (receiver, front) = (&instrument.receiver, scene.detector.front_end.unwrap_or_default());
-    let (lost, n) = (receiver.penalties(), receiver.noise_densities());
-    let FrontEnd { saturation_w, half_power_hz, dark_current_a, intensity_noise_db_hz, rejection_db, .. } = front;
-    let off = || "none".to_owned();
-    let value = format!("{} of {}", si(receiver.local_oscillator_w, "W"), si(saturation_w, "W"));
-    rows.optional(saturation_w.is_finite(), "saturation", "(1 + P/Ps)^-3", value, -lost.saturation_db);
-    let value = match n.amplifier_a2_hz > 0.0 {
-        true => format!(
-            "{}: {:.1e} of shot {:.1e}",
-            si(n.amplifier_a2_hz.sqrt(), "A/rtHz"),
-            n.amplifier_a2_hz,
-            n.shot_a2_hz
-        ),
-        false => off(),
-    };
-    rows.same("amplifier noise", "", value, -lost.amplifier_db);
-    let value = if dark_current_a > 0.0 { si(dark_current_a, "A") } else { off() };
-    rows.same("dark current", "", value, -lost.dark_db);
-    let value = match n.intensity_a2_hz > 0.0 {
-        true => format!("{intensity_noise_db_hz} dB/Hz, {rejection_db} dB rejected"),
-        false => off(),
-    };
-    rows.same("intensity noise of the LO", "", value, -lost.intensity_db);
-    let value = format!("half power at {}", si(half_power_hz, "Hz"));
-    rows.optional(half_power_hz.is_finite(), "response of the detector", "|H|^2", value, -lost.response_db);
-    let (value, is_clipped) = match scene.detector.digitiser {
-        Digitiser::None {} => (off(), false),
-        Digitiser::Quantised { bits, full_scale_over_noise: k } => {
-            (format!("{bits} bits, {k} x noise"), lost.clipping_db > 0.0)
+    /// From the photons of the pulse to the electrons that it gives.
+    fn transmitter_and_path(&mut self, efficiency: &EfficiencyProfile) -> Result<(), Error> {
+        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let (telescope, receiver, t) = (&instrument.telescope, &instrument.receiver, &scene.telescope);
+        let (energy_j, photon_j) = (scene.pulse_energy_j(), receiver.photon_energy_j());
+        let area_m2 = telescope.aperture_area_m2();
+        let solid_angle = |r: f64| area_m2 / (r * r);
+        let sent = format!("{} / {photon_j:.2e} J", si(energy_j, "J"));
+        self.same("photons sent", "E/(h nu)", sent, decibels(energy_j / photon_j));
+        let printed = scene.detector.snr == SnrReference::Chapter {};
+        self.optional(printed, "hbar for h", "2 pi", "as the chapter prints (14)".into(), decibels(2.0 * PI));
+        let bandwidth_hz = receiver.bandwidth_hz;
+        self.same("per bandwidth", "1/B", si(bandwidth_hz, "Hz"), -decibels(bandwidth_hz));
+        self.same("range per time", "c/2", "c/2".into(), decibels(0.5 * crate::SPEED_OF_LIGHT_M_S));
+        let profile = || "profile".to_owned();
+        let (air, beta) = (scene.atmosphere.profile.as_ref(), scene.atmosphere.backscatter_per_m_sr);
+        let backscatter = self.at_each(&|r| {
+            let clear = Instrument { blind_range_m: 0.0, transmission: 1.0, ..instrument.clone() };
+            Ok(clear.return_per_m(r)? / (instrument.air.transmission(r)?.powi(2) * solid_angle(r)))
+        })?;
+        let value = air.map_or_else(|| format!("{} /(m sr)", scientific(beta)), |_| profile());
+        self.push("backscatter", "beta", value, backscatter);
+        let value = format!("A_R/R^2, aperture {}", si(2.0 * telescope.aperture_radius_m, "m"));
+        self.push("solid angle", "A_R/R^2", value, self.at_each(&|r| Ok(solid_angle(r)))?);
+        let value = air.map_or_else(|| format!("{} /m", scientific(scene.atmosphere.extinction_per_m)), |_| profile());
+        self.push("air, out and back", "K^2", value, self.at_each(&|r| Ok(instrument.air.transmission(r)?.powi(2)))?);
+        let passed = telescope.transmitted_fraction();
+        self.same("truncation, two beams", "T^2", format!("T = {passed:.4}"), 2.0 * decibels(passed));
+        let empty = free_space(instrument, &increasing(self.range_m))?;
+        let antenna = self.at_each(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
+        self.push("antenna efficiency", "eta_a", "free space".into(), antenna);
+        if let Some(air) = turbulence(scene) {
+            let value = format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23));
+            let left = self.at_each(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;
+            self.push("turbulence", "eta_s/eta_s(0)", value, left);
         }
-    };
-    rows.same("converter", "", value, -lost.rounding_db);
-    rows.optional(is_clipped, "clipping", "", "beyond full scale".into(), -lost.clipping_db);
+        let lost = |db: f64| if db == 0.0 { 0.0 } else { -db };
+        self.same("optics", "both ways", "key optics_loss_db".into(), lost(t.optics_loss_db));
+        self.same("polarisation", "", "key polarisation_loss_db".into(), lost(t.polarisation_loss_db));
+        let efficiency = receiver.quantum_efficiency;
+        self.same("quantum efficiency", "eta_Q", format!("{efficiency:.2}"), decibels(efficiency));
+        if self.range_m.iter().any(|r| *r < t.blind_range_m) {
+            let seen = self.at_each(&|r| Ok(f64::from(u8::from(r >= t.blind_range_m))))?;
+            self.push("blind range", "", format!("to {}", si(t.blind_range_m, "m")), seen);
+        }
+        Ok(())
+    }
+
+    /// What the receiver loses against the shot-noise limit.
+    fn receiver(&mut self) {
+        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let (receiver, front) = (&instrument.receiver, scene.detector.front_end.unwrap_or_default());
+        let (lost, n) = (receiver.penalties(), receiver.noise_densities());
+        let FrontEnd { saturation_w, half_power_hz, dark_current_a, intensity_noise_db_hz, rejection_db, .. } = front;
+        let off = || "none".to_owned();
+        let value = format!("{} of {}", si(receiver.local_oscillator_w, "W"), si(saturation_w, "W"));
+        self.optional(saturation_w.is_finite(), "saturation", "(1 + P/Ps)^-3", value, -lost.saturation_db);
+        let value = match n.amplifier_a2_hz > 0.0 {
+            true => format!(
+                "{}: {:.1e} of shot {:.1e}",
+                si(n.amplifier_a2_hz.sqrt(), "A/rtHz"),
+                n.amplifier_a2_hz,
+                n.shot_a2_hz
+            ),
+            false => off(),
+        };
+        self.same("amplifier noise", "", value, -lost.amplifier_db);
+        let value = if dark_current_a > 0.0 { si(dark_current_a, "A") } else { off() };
+        self.same("dark current", "", value, -lost.dark_db);
+        let value = match n.intensity_a2_hz > 0.0 {
+            true => format!("{intensity_noise_db_hz} dB/Hz, {rejection_db} dB rejected"),
+            false => off(),
+        };
+        self.same("intensity noise of the LO", "", value, -lost.intensity_db);
+        let value = format!("half power at {}", si(half_power_hz, "Hz"));
+        self.optional(half_power_hz.is_finite(), "response of the detector", "|H|^2", value, -lost.response_db);
+        let (value, is_clipped) = match scene.detector.digitiser {
+            Digitiser::None {} => (off(), false),
+            Digitiser::Quantised { bits, full_scale_over_noise: k } => {
+                (format!("{bits} bits, {k} x noise"), lost.clipping_db > 0.0)
+            }
+        };
+        self.same("converter", "", value, -lost.rounding_db);
+        self.optional(is_clipped, "clipping", "", "beyond full scale".into(), -lost.clipping_db);
+    }
 }
 
-/// Echo of the pulse before over that of the last, dB.
-fn second_trip_db(scene: &Scene, instrument: &Instrument, range_m: f64) -> Result<f64, Error> {
+/// Echo of the pulse before over that of the last.
+fn second_trip(scene: &Scene, instrument: &Instrument, range_m: f64) -> Result<f64, Error> {
     let far_m = range_m + ambiguous_range_m(scene.laser.pulse_repetition_hz);
     let efficiency = efficiency_by_theory(instrument, &[range_m, far_m])?;
     let power = |r: f64| Ok::<_, Error>(instrument.return_per_m(r)? * efficiency.interpolated(r)?);
-    Ok(decibels(power(far_m)? / power(range_m)?))
+    Ok(power(far_m)? / power(range_m)?)
 }
 
 #[cfg(test)]
