@@ -134,7 +134,7 @@ impl<S: Sample> Mapper<S> {
     /// `clipped_fraction` is that of the samples that the converter clipped.
     fn finish(self, plan: &Plan, clipped_fraction: f64) -> Result<VelocityEstimates, Error> {
         let Self { mut map, gates, .. } = self;
-        let (statistics, noise_a2) = (self.errors.statistics(), self.estimator.noise_power_a2());
+        let (statistics, noise_a2) = (self.errors.statistics(), self.estimator.tools.noise.power_a2);
         map.level = gates.map(|gate| gate.level);
         map.n_eff = gates.map(|gate| gate.n_eff);
         map.count = gates.map(|gate| gate.count);

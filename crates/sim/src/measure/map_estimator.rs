@@ -27,7 +27,7 @@ pub(crate) struct MapEstimator<S> {
     sampling: Sampling,
     gates: Gates,
     record_samples: usize,
-    tools: Toolkit<S>,
+    pub(crate) tools: Toolkit<S>,
     covariance: WindowCovariance,
     of_rays: RayInformation,
     radius: Radius,
@@ -73,25 +73,9 @@ impl<S: Sample> MapEstimator<S> {
         })
     }
 
-    /// Numbers of a window.
-    pub(crate) fn numbers(&self) -> usize {
-        self.tools.statistic.statistic_len()
-    }
-
     /// Radius of the region at a range, m.
     pub(crate) fn radius_m(&self, range_m: f64) -> Result<f64, Error> {
         Ok(self.radius.at_m(range_m)?)
-    }
-
-    /// Angle that the region at a range reaches from its line, rad.
-    pub(crate) fn reach_rad(&self, range_m: f64) -> Result<f64, Error> {
-        let share = self.radius_m(range_m)? / range_m;
-        Ok(if share < 1.0 { share.asin() } else { std::f64::consts::PI })
-    }
-
-    /// Whether estimates follow the wind that first estimates of their neighbours show.
-    pub(crate) fn follows_wind(&self) -> bool {
-        self.tools.following.is_some()
     }
 
     /// Sums over the windows of some lines, still without any record.
@@ -106,16 +90,6 @@ impl<S: Sample> MapEstimator<S> {
         held: Range<usize>,
     ) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
         Ok(ScanSums::of_gates(&*self.tools.statistic, &self.gates, places, held)?)
-    }
-
-    /// Mean power, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
-    pub(crate) fn noise_power_a2(&self) -> f64 {
-        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.power_a2)
-    }
-
-    /// Density, A^2, that the estimator finds in the band of the scene's noise; NaN without noise.
-    pub(crate) fn noise_density_a2(&self) -> f64 {
-        self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.density_a2)
     }
 
     /// Estimates at points, the gates of a line together and lines by increasing elevation, held against the noise there.
@@ -145,7 +119,7 @@ impl<S: Sample> MapEstimator<S> {
             GateEstimate {
                 found: MapPoint { n_eff: scan.n_eff(*point, *radius_m, correlation), ..found },
                 power_a2: if e.velocity_m_s.is_finite() { e.power } else { f64::NAN },
-                gain: self.tools.noise.as_ref().map_or(f64::NAN, |noise| noise.gain(e.velocity_m_s)),
+                gain: self.tools.noise.gain(e.velocity_m_s),
                 detection_ratio: noise.threshold.as_ref().map_or(f64::NAN, |of| e.detection / of[index]),
                 deviation: noise.deviation[index],
             }
@@ -155,13 +129,13 @@ impl<S: Sample> MapEstimator<S> {
 
     /// What noise gives at points of a scan.
     pub(crate) fn noise(&self, places: &ScanGeometry, points: &[PolarPoint]) -> Result<NoiseAtPoints, Error> {
-        let (Some(test), Some(noise)) = (&self.tools.test, &self.tools.noise) else {
+        let Some(test) = &self.tools.test else {
             return Ok(NoiseAtPoints { threshold: None, deviation: vec![0.0; points.len()] });
         };
         let region = |point: &PolarPoint| Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?));
         let regions = points.iter().map(region).collect::<Result<Vec<RegionNoise>, Error>>()?;
         let threshold = match self.rate > 0.0 {
-            true => Some(thresholds(test, noise.density_a2, &regions, self.rate)?),
+            true => Some(thresholds(test, self.tools.noise.density_a2, &regions, self.rate)?),
             false => None,
         };
         Ok(NoiseAtPoints { threshold, deviation: regions.iter().map(|at| test.band_deviation(at.n_eff)).collect() })

@@ -311,7 +311,7 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
     };
     Ok(Returns {
         weight_per_m: with_efficiency(&|range_m| instrument.return_per_m(range_m))?,
-        of_backscatter_sr: if plan.wind.carries_backscatter() {
+        of_backscatter_sr: if plan.wind.carries_backscatter {
             with_efficiency(&|range_m| instrument.return_of_backscatter_sr(range_m))?
         } else {
             Vec::new()

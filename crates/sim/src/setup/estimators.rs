@@ -209,10 +209,10 @@ pub struct Toolkit<S> {
     /// The test against noise, if the scene has noise and the method one.
     pub test: Option<NoiseTest>,
     /// What the estimator finds in the mean statistic of the scene's noise.
-    pub noise: Option<NoiseSeen>,
+    pub noise: NoiseSeen,
 }
 
-/// What an estimator finds in the mean statistic of the scene's noise, and of signals beside it.
+/// What an estimator finds in the mean statistic of the scene's noise, and of signals beside it; NaN without noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct NoiseSeen {
     /// Power in the band, A^2.
@@ -231,9 +231,9 @@ impl NoiseSeen {
         instrument: &Instrument,
         estimator: &dyn Estimator,
         seen: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
-    ) -> Result<Option<Self>, Error> {
+    ) -> Result<Self, Error> {
         let (Some(noise), sampling, kind) = (noise_kind(scene), sampling(scene)?, signal_kind(scene)) else {
-            return Ok(None);
+            return Ok(Self { power_a2: f64::NAN, density_a2: f64::NAN, gain: Default::default() });
         };
         let n = scene.estimator.window_samples;
         let found = |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut Scratch::new()));
@@ -249,7 +249,7 @@ impl NoiseSeen {
         let gain = velocity_m_s.iter().map(gain).collect::<Result<Vec<f64>, Error>>()?;
         let unit_a2 = instrument.receiver.noise_variance_a2();
         let (power_a2, density_a2) = (of_noise.power * unit_a2, of_noise.detection * unit_a2);
-        Ok(Some(Self { power_a2, density_a2, gain: (velocity_m_s, gain) }))
+        Ok(Self { power_a2, density_a2, gain: (velocity_m_s, gain) })
     }
 
     /// Signal-to-noise ratio of a signal of that velocity over the excess of the power in the band over that of the noise; NaN without
@@ -367,7 +367,7 @@ pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<
 }
 
 /// Spectrum of a scene's noise.
-fn noise_kind(scene: &Scene) -> Option<Noise> {
+pub(crate) fn noise_kind(scene: &Scene) -> Option<Noise> {
     match scene.detector.noise {
         NoiseModel::White => Some(Noise::White),
         NoiseModel::BandLimited => Some(Noise::Band { floor: 0.0 }),

@@ -288,7 +288,7 @@ fn shown_db<S: Sample>(plan: &Plan, velocity_m_s: f64, sinusoid: fn(f64, f64) ->
     };
     let unit: f64 = mean.iter().fold(0.0, |largest, x| x.abs().max(largest));
     let scaled: Vec<f64> = mean.iter().map(|x| x / unit).collect();
-    let (found, noise) = (estimator.estimate(&scaled, &mut scratch), tools.noise.unwrap());
+    let (found, noise) = (estimator.estimate(&scaled, &mut scratch), tools.noise);
     let excess = found.power * unit / noise.power_a2 - 1.0;
     [velocity_m_s, found.velocity_m_s].map(|velocity_m_s| 10.0 * (excess * noise.gain(velocity_m_s)).log10())
 }

@@ -89,7 +89,7 @@ impl<S: FromParts> Blocks<'_, S> {
             }
         }
         let radius_m = range_m.iter().map(|range_m| self.estimator.radius_m(*range_m)).collect::<Result<_, _>>()?;
-        let noise_a2 = self.estimator.noise_power_a2();
+        let noise_a2 = self.estimator.tools.noise.power_a2;
         Ok(ScanCells { lines: lines.clone(), gates, noise_a2, regions: (self.places.clone(), radius_m), spectra })
     }
 
@@ -122,7 +122,7 @@ impl<S: FromParts> Blocks<'_, S> {
                 cells[[line, gate]] = found[at];
                 if let (Some(spectra), Some(of_gate)) = (&mut spectra, self.spectra) {
                     let radius_m = estimator.radius_m(points[at].range_m)?;
-                    let one = of_gate.density(&scan, points[at], radius_m, estimator.noise_density_a2())?;
+                    let one = of_gate.density(&scan, points[at], radius_m, estimator.tools.noise.density_a2)?;
                     let place = (line * cells.ncols() + gate) * one.len();
                     spectra[place..place + one.len()].copy_from_slice(&one);
                 }

@@ -63,7 +63,7 @@ impl Spectra {
         for &elevation_rad in &g.elevation_rad {
             for &range_m in &g.gate_range_m {
                 let (point, radius_m) = (PolarPoint { range_m, elevation_rad }, estimator.radius_m(range_m)?);
-                density.extend(of_gate.density(&scan, point, radius_m, estimator.noise_density_a2())?);
+                density.extend(of_gate.density(&scan, point, radius_m, estimator.tools.noise.density_a2)?);
             }
         }
         Ok(Self {

@@ -50,11 +50,11 @@ fn reaches<S: Sample>(
     let own = range_m.iter().enumerate().map(|(gate, range_m)| {
         let radius_m = estimator.radius_m(*range_m)?;
         let windows = places.gates_between(range_m - radius_m, range_m + radius_m);
-        let windows_rad = estimator.reach_rad(*range_m)?;
+        let windows_rad = if radius_m < *range_m { (radius_m / range_m).asin() } else { std::f64::consts::PI };
         Ok(Reach { guessed_rad: 0.0, guessed: gate..gate + 1, windows_rad, windows })
     });
     let reach = own.collect::<Result<Vec<Reach>, Error>>()?;
-    if !estimator.follows_wind() {
+    if estimator.tools.following.is_none() {
         return Ok(reach);
     }
     let followed = reach.iter().zip(range_m).map(|(own, at_m)| {
@@ -81,7 +81,7 @@ pub(super) fn tiles<S: Sample>(
 ) -> Result<Vec<Tile>, Error> {
     let reaches = reaches(estimator, places, range_m)?;
     // Sums of windows, and those of eight of them.
-    let window_bytes = estimator.numbers() * size_of::<f64>() * 9 / 8;
+    let window_bytes = estimator.tools.statistic.statistic_len() * size_of::<f64>() * 9 / 8;
     let step_rad = elevation_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(f64::INFINITY, f64::min);
     let bytes = |lines: usize, reach: &Reach| lines.saturating_mul(reach.windows.len()) * window_bytes;
     let mut tiles = Vec::new();
@@ -159,7 +159,7 @@ mod tests {
             let mut held = vec![0_u8; elevation_rad.len() * range_m.len()];
             for tile in tiles(&estimator, &places, &elevation_rad, range_m, most_bytes).unwrap() {
                 let (read, windows) = &tile.windows;
-                let bytes = read.len() * windows.len() * estimator.numbers() * 9;
+                let bytes = read.len() * windows.len() * estimator.tools.statistic.statistic_len() * 9;
                 assert!(bytes <= most_bytes, "{samples} samples: {bytes} bytes for {tile:?}");
                 for line in tile.lines.clone() {
                     tile.gates.clone().for_each(|gate| held[line * range_m.len() + gate] += 1);
@@ -178,7 +178,7 @@ mod tests {
                 let own =
                     PolarPoint { range_m: range_m[tile.gates.start], elevation_rad: elevation_rad[tile.lines.start] };
                 let reached = places.chords(own, 5.0).map(|chord| chord.line);
-                assert!(!estimator.follows_wind() || reached.into_iter().all(|line| guessed.contains(&line)));
+                assert!(estimator.tools.following.is_none() || reached.into_iter().all(|line| guessed.contains(&line)));
             }
             assert!(held.iter().all(|count| *count == 1), "{samples} samples");
         }
