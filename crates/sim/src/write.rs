@@ -164,7 +164,7 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
     let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
     let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
     let is_plane = g.schedule.is_plane();
-    let first_s = 2.0 * g.first_range_m / crate::SPEED_OF_LIGHT_M_S;
+    let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
     let first_pulse_s = plan.wind.start_s;
     Some(RawSignals {
         recording: recording(plan),

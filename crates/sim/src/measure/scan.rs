@@ -83,7 +83,7 @@ impl<'a> Scanner<'a> {
         observer.end();
         let efficiency = drawn_efficiency(&optics, &lines)?;
         let record = Record {
-            time_of_first_sample_s: 2.0 * geometry.first_range_m / crate::SPEED_OF_LIGHT_M_S,
+            time_of_first_sample_s: 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S,
             samples: geometry.samples,
         };
         let simulator = match scene.detector.signal {

@@ -21,12 +21,8 @@ pub struct Geometry {
     pub line_time_s: Vec<f64>,
     /// Samples recorded of each pulse.
     pub samples: usize,
-    /// Range of the first sample, m.
-    pub first_range_m: f64,
     /// Distance between samples c T_s/2, m.
     pub sample_spacing_m: f64,
-    /// Index of the first sample of the window of each gate of the map.
-    pub gate_first_sample: Vec<usize>,
     /// Range of each gate of the map, that is of the centre of its window, m.
     pub gate_range_m: Vec<f64>,
     /// Thickness of the scattering layers, m.
@@ -54,9 +50,9 @@ impl Geometry {
         let sample_spacing_m = scene.sample_spacing_m();
         let samples = scene.samples_per_record();
         let window = scene.estimator.window_samples;
-        let gate_first_sample: Vec<usize> = (0..=samples - window).step_by(scene.estimator.gate_step_samples).collect();
+        let first_samples = (0..=samples - window).step_by(scene.estimator.gate_step_samples);
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
-        let centre_m = |first: &usize| scan.range_min_m + (*first as f64 + 0.5 * window as f64) * sample_spacing_m;
+        let centre_m = |first: usize| scan.range_min_m + (first as f64 + 0.5 * window as f64) * sample_spacing_m;
         let (sample_rate_hz, wavelength_m) = (scene.detector.sampling_hz, scene.laser.wavelength_m);
         let layer_thickness_m =
             pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s })?;
@@ -70,10 +66,8 @@ impl Geometry {
             schedule,
             line_time_s,
             samples,
-            first_range_m: scan.range_min_m,
             sample_spacing_m,
-            gate_range_m: gate_first_sample.iter().map(centre_m).collect(),
-            gate_first_sample,
+            gate_range_m: first_samples.map(centre_m).collect(),
             layer_thickness_m,
             first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
             layers: ((record_m / layer_thickness_m).ceil() as usize)

@@ -116,7 +116,8 @@ impl Schedule {
     /// # Errors
     /// The index of a stop that the head cannot reach in the time that it asks for, and why.
     pub fn new(stops: &[Stop], pace: &Pace, mount: Mount) -> Result<Self, (usize, String)> {
-        let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s: pace.prt_s, mount };
+        let prt_s = pace.prt_s;
+        let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s, mount };
         // When and where the head has done its last line, and the way it then moves.
         let mut last: Option<(f64, Angles, Angles)> = None;
         for (i, stop) in stops.iter().enumerate() {
@@ -132,7 +133,8 @@ impl Schedule {
                         Some(_) if turns => pace.head.turn_round_s(),
                         Some(_) => 0.0,
                     };
-                    scan.next_tick(end, head_s.max(least_s))
+                    // The first pulse of the clock that is not before the head is there.
+                    (end + head_s.max(least_s) / prt_s - 1e-6).ceil()
                 }
                 (Some(time_s), last) => {
                     let end = last.map_or(f64::NEG_INFINITY, |(end, ..)| end);
@@ -145,11 +147,12 @@ impl Schedule {
             let group = if stop.apart { stops.len() + i } else { stop.sweep };
             for line in 0..lines {
                 let before = (line * pulses) as f64;
-                let at = std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * pace.prt_s));
-                scan.push(stop.sweep, group, tick + before, pulses, at, rate_rad_s);
-                if let (Some(line), Some(carrier)) = (scan.lines.last_mut(), stop.carrier) {
-                    (line.position_m, line.velocity_m_s) = carrier;
-                }
+                let angles_rad = std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * prt_s));
+                let (sweep, first, tick) = (stop.sweep, scan.pulses(), tick + before);
+                let own = |d: usize| mount.position_m[d] + mount.velocity_m_s[d] * (tick * prt_s);
+                let (position_m, velocity_m_s) = stop.carrier.unwrap_or((std::array::from_fn(own), mount.velocity_m_s));
+                let line = Line { sweep, group, tick, first, pulses, angles_rad, rate_rad_s, position_m, velocity_m_s };
+                scan.lines.push(line);
             }
             last = Some((tick + periods, stop.to_rad.unwrap_or(from), rate_rad_s));
         }
@@ -168,19 +171,6 @@ impl Schedule {
         } else {
             format!("at least {early_s:?} s: the head needs {head_s:.3} s from the angles before")
         })
-    }
-
-    /// The first pulse of the clock that is not before a wait after `tick`.
-    fn next_tick(&self, tick: f64, wait_s: f64) -> f64 {
-        (tick + wait_s / self.prt_s - 1e-6).ceil()
-    }
-
-    fn push(&mut self, sweep: usize, group: usize, tick: f64, pulses: usize, angles_rad: Angles, rate_rad_s: Angles) {
-        let first = self.pulses();
-        let (time_s, Mount { position_m: start_m, velocity_m_s, .. }) = (tick * self.prt_s, self.mount);
-        let position_m = std::array::from_fn(|d| start_m[d] + velocity_m_s[d] * time_s);
-        let line = Line { sweep, group, tick, first, pulses, angles_rad, rate_rad_s, position_m, velocity_m_s };
-        self.lines.push(line);
     }
 
     /// Pulses of the whole scan.
