@@ -3,7 +3,7 @@
 //! The rows of a list are slowest, then the keys in the order in which they were given; the last is fastest. Check: the
 //! stored cases, to the last bit.
 
-use super::expression::{Condition, Expression};
+use super::expression;
 use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
@@ -157,21 +157,25 @@ struct Grid<'a> {
     request: &'a Request,
     /// The slowest first.
     axes: Vec<Axis>,
-    lets: Vec<(Column, Expression)>,
-    conditions: Vec<Condition>,
+    /// Keys with the expressions that determine them.
+    lets: Vec<(Column, &'a str)>,
 }
 
 impl<'a> Grid<'a> {
     fn new(path: &'a Path, base: Table, request: &'a Request) -> Result<Self, Error> {
-        fn each<T>(word: &str, all: &[String], read: fn(&str) -> Result<T, Problem>) -> Result<Vec<T>, Error> {
+        fn each<'t, T>(
+            word: &str,
+            all: &'t [String],
+            read: impl Fn(&'t str) -> Result<T, Problem>,
+        ) -> Result<Vec<T>, Error> {
             all.iter().map(|text| read(text).map_err(|problem| refused(word, problem))).collect()
         }
-        let condition = |text: &str| Condition::parse(text).map_err(|why| problem("condition", text, why));
+        let condition = |text| expression::holds(text, None).map_err(|why| problem("condition", text, why));
         let mut axes: Vec<Axis> = request.list.as_deref().map(list).transpose()?.into_iter().collect();
         axes.extend(each("--vary", &request.vary, axis)?);
         let lets = each("--let", &request.lets, binding)?;
-        let conditions = each("--where", &request.conditions, condition)?;
-        let grid = Self { path, base, request, axes, lets, conditions };
+        each("--where", &request.conditions, condition)?;
+        let grid = Self { path, base, request, axes, lets };
         let columns: Vec<&Column> = grid.columns().collect();
         let again = |(i, column): &(usize, &&Column)| columns[..*i].iter().any(|c| c.key.path == column.key.path);
         if let Some((_, column)) = columns.iter().enumerate().find(again) {
@@ -210,9 +214,8 @@ impl<'a> Grid<'a> {
             return Err(failed(combination, described(names, &values), others, error));
         }
         if cases.is_empty() {
-            let all: Vec<String> = self.conditions.iter().map(ToString::to_string).collect();
             let why = format!("none of the {combinations} cases is left");
-            return Err(refused("--where", problem("condition", &all.join(" and "), why)));
+            return Err(refused("--where", problem("condition", &self.request.conditions.join(" and "), why)));
         }
         Ok(cases)
     }
@@ -239,18 +242,18 @@ impl<'a> Grid<'a> {
             set(&mut table, &column.key.path, value.clone());
         }
         for (column, expression) in &self.lets {
-            let refused = |why: String| refused("--let", problem(&column.shown.name, &expression.to_string(), why));
+            let refused = |why: String| refused("--let", problem(&column.shown.name, expression, why));
             let whole = self.whole(&table)?;
-            let number = expression.value(&|name| value_of(&whole, name)).map_err(refused)?;
+            let number = expression::value(expression, Some(&|name| value_of(&whole, name))).map_err(refused)?;
             let value = column.key.of_number(number).map_err(|problem| refused(problem.allowed))?;
             values.push(shown(&value));
             set(&mut table, &column.key.path, value);
         }
-        if !self.conditions.is_empty() {
+        if !self.request.conditions.is_empty() {
             let whole = self.whole(&table)?;
-            for condition in &self.conditions {
-                let refused = |why| refused("--where", problem("condition", &condition.to_string(), why));
-                if !condition.holds(&|name| value_of(&whole, name)).map_err(refused)? {
+            for condition in &self.request.conditions {
+                let refused = |why| refused("--where", problem("condition", condition, why));
+                if !expression::holds(condition, Some(&|name| value_of(&whole, name))).map_err(refused)? {
                     return Ok(None);
                 }
             }
@@ -341,7 +344,7 @@ fn range_of(is_log: bool, text: &str) -> Result<Vec<f64>, String> {
 }
 
 /// `KEY = EXPRESSION`.
-fn binding(word: &str) -> Result<(Column, Expression), Problem> {
+fn binding(word: &str) -> Result<(Column, &str), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
     let (name, text) = word.split_once('=').ok_or_else(|| problem("--let", word, example))?;
     let column = Column::named(name, text, true)?;
@@ -349,8 +352,8 @@ fn binding(word: &str) -> Result<(Column, Expression), Problem> {
     if !column.key.is_numeric() {
         return Err(refuse("an expression is a number, and this key takes none".into()));
     }
-    let expression = Expression::parse(text).map_err(refuse)?;
-    Ok((column, expression))
+    expression::value(text, None).map_err(refuse)?;
+    Ok((column, text.trim()))
 }
 
 /// The keys and rows of a list file.

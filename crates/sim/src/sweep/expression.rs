@@ -2,38 +2,35 @@
 //!
 //! `^` binds before the sign and from the right, as in mathematics. Check: values by hand; every slip is refused with its place.
 
-use std::fmt;
-
-/// Values of the names in an expression.
-type Values<'v> = &'v dyn Fn(&str) -> Result<f64, String>;
+/// Values of the names in an expression. Without them all numbers are missing, and nothing but the text can be wrong.
+pub(crate) type Values<'v> = Option<&'v dyn Fn(&str) -> Result<f64, String>>;
 
 /// Deepest nesting of an expression.
 const DEEPEST: usize = 100;
 /// Most operators of an expression.
 const MOST_OPERATORS: usize = 1000;
 
-/// The text of an arithmetic expression, which can be read.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Expression(String);
+/// The value of an expression.
+///
+/// # Errors
+/// What is wrong in the text, and where; what `values` says of a name; a division by zero; numbers that give none. What is missing
+/// (NaN) stays so.
+pub(crate) fn value(text: &str, values: Values<'_>) -> Result<f64, String> {
+    let parser = Parser { rest: text, text, depth: 0, operators: 0, values };
+    parser.whole().map_err(|reason| format!("\"{}\" cannot be computed: {reason}", text.trim()))
+}
 
-impl Expression {
-    /// Reads an expression.
-    ///
-    /// # Errors
-    /// What is wrong, and where.
-    pub(crate) fn parse(text: &str) -> Result<Self, String> {
-        Parser { rest: text, text, depth: 0, operators: 0, values: None }.whole()?;
-        Ok(Self(text.trim().into()))
-    }
-
-    /// The value, with those of its names.
-    ///
-    /// # Errors
-    /// What `values` says of a name; a division by zero; numbers that give none. What is missing (NaN) stays so.
-    pub(crate) fn value(&self, values: Values<'_>) -> Result<f64, String> {
-        let parser = Parser { rest: &self.0, text: &self.0, depth: 0, operators: 0, values: Some(values) };
-        parser.whole().map_err(|reason| format!("\"{self}\": {reason}"))
-    }
+/// Whether `a <= b`, or the same with `>=`, `<` or `>`, holds; false where a side is no number.
+///
+/// # Errors
+/// No comparison; as [`value`].
+pub(crate) fn holds(text: &str, values: Values<'_>) -> Result<bool, String> {
+    let operators: [(&str, fn(&f64, &f64) -> bool); 4] =
+        [("<=", f64::le), (">=", f64::ge), ("<", f64::lt), (">", f64::gt)];
+    let found = operators.into_iter().find_map(|(operator, compare)| Some((text.split_once(operator)?, compare)));
+    let ((left, right), compare) =
+        found.ok_or_else(|| format!("\"{text}\" is no comparison: two expressions with <=, >=, < or > between"))?;
+    Ok(compare(&value(left, values)?, &value(right, values)?))
 }
 
 /// Two values and the operator between them.
@@ -52,13 +49,13 @@ fn combined(a: f64, operator: char, b: f64) -> Result<f64, String> {
     Ok(value)
 }
 
-/// Computes while it reads. Without values all numbers are missing, and nothing but the text can be wrong.
+/// Computes while it reads.
 struct Parser<'t> {
     rest: &'t str,
     text: &'t str,
     depth: usize,
     operators: usize,
-    values: Option<Values<'t>>,
+    values: Values<'t>,
 }
 
 impl Parser<'_> {
@@ -83,7 +80,7 @@ impl Parser<'_> {
     fn wrong(&self, wanted: &str) -> String {
         let at = self.text.len() - self.rest.len();
         let place = if self.rest.is_empty() { "at its end".to_owned() } else { format!("at \"{}\"", self.rest) };
-        format!("\"{}\" cannot be read {place}, character {}: {wanted} is needed", self.text.trim(), at + 1)
+        format!("{wanted} is needed {place}, character {}", at + 1)
     }
 
     fn chain(&mut self, operators: &[char], part: fn(&mut Self) -> Result<f64, String>) -> Result<f64, String> {
@@ -154,54 +151,6 @@ impl Parser<'_> {
     }
 }
 
-/// A comparison of two expressions.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Condition {
-    left: Expression,
-    operator: &'static str,
-    right: Expression,
-}
-
-impl Condition {
-    /// Reads `a <= b`, also with `>=`, `<` and `>`.
-    ///
-    /// # Errors
-    /// No comparison, or sides that are no expressions.
-    pub(crate) fn parse(text: &str) -> Result<Self, String> {
-        let operators = ["<=", ">=", "<", ">"];
-        let found = operators.into_iter().find_map(|operator| Some((operator, text.split_once(operator)?)));
-        let (operator, (left, right)) =
-            found.ok_or_else(|| format!("\"{text}\" is no comparison: two expressions with <=, >=, < or > between"))?;
-        Ok(Self { left: Expression::parse(left)?, operator, right: Expression::parse(right)? })
-    }
-
-    /// Whether it holds; false where a side is no number.
-    ///
-    /// # Errors
-    /// As [`Expression::value`].
-    pub(crate) fn holds(&self, values: Values<'_>) -> Result<bool, String> {
-        let (left, right) = (self.left.value(values)?, self.right.value(values)?);
-        Ok(match self.operator {
-            "<=" => left <= right,
-            ">=" => left >= right,
-            "<" => left < right,
-            _ => left > right,
-        })
-    }
-}
-
-impl fmt::Display for Expression {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl fmt::Display for Condition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} {} {}", self.left, self.operator, self.right)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -214,8 +163,10 @@ mod tests {
         }
     }
 
+    /// Read before it is computed, as a sweep does.
     fn value(text: &str) -> Result<f64, String> {
-        Expression::parse(text)?.value(&keys)
+        super::value(text, None)?;
+        super::value(text, Some(&keys))
     }
 
     #[test]
@@ -263,7 +214,7 @@ mod tests {
 
     #[test]
     fn comparisons_hold_or_not() {
-        let holds = |text: &str| Condition::parse(text).and_then(|c| c.holds(&keys));
+        let holds = |text: &str| holds(text, None).and_then(|_| holds(text, Some(&keys)));
         assert_eq!(holds("laser.prf_hz * 2 <= 800"), Ok(true));
         assert_eq!(holds("laser.prf_hz < 400"), Ok(false));
         assert_eq!(holds("laser.prf_hz >= 400"), Ok(true));

@@ -2,7 +2,7 @@
 //!
 //! Check: tables by hand; columns and conditions that cannot be are refused.
 
-use super::expression::Condition;
+use super::expression::holds;
 use super::pareto::{NEAR, Objective, Place, front};
 use super::results::standard_error_of;
 use crate::io::csv_input::TextTable;
@@ -51,9 +51,10 @@ impl FrontTable {
         };
         let mut kept: Vec<usize> = (0..table.rows.len()).collect();
         for text in &wanted.conditions {
-            let condition = Condition::parse(text)?;
-            let holds = |row: usize| condition.holds(&|name| Ok(table.number(row, place(name)?)));
-            let held = (0..table.rows.len()).map(holds).collect::<Result<Vec<bool>, String>>()?;
+            // Of a table without rows, too.
+            holds(text, None)?;
+            let of_row = |row: usize| holds(text, Some(&|name| Ok(table.number(row, place(name)?))));
+            let held = (0..table.rows.len()).map(of_row).collect::<Result<Vec<bool>, String>>()?;
             kept.retain(|row| held[*row]);
         }
         let column = |place: usize| kept.iter().map(|row| table.number(*row, place)).collect::<Vec<f64>>();
