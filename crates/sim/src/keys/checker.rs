@@ -7,6 +7,11 @@ use std::fmt::{Debug, Display};
 /// One side of a limit between keys: the key, its value, what is allowed beside the others.
 pub(crate) type Side<'a> = (&'a str, String, String);
 
+/// The side of a number.
+pub(crate) fn side(key: &str, value: f64, allowed: String) -> Side<'_> {
+    (key, format!("{value:?}"), allowed)
+}
+
 /// Collects what is wrong; `is_stated` says which keys the file states.
 pub(crate) struct Checker<'s> {
     found: Vec<Problem>,

@@ -19,14 +19,9 @@ pub(crate) trait Declared {
 }
 
 impl Key {
-    /// A key of a table that has a default for it.
-    pub(crate) fn with_default<T: Declared>(name: &'static str) -> Self {
-        Self { name, kind: T::kind(), is_required: false }
-    }
-
-    /// A key of a table that has none.
-    pub(crate) fn without_default<T: Declared>(name: &'static str) -> Self {
-        Self { name, kind: T::kind(), is_required: !T::IS_OPTIONAL }
+    /// A key of a table, which may have a default for it.
+    pub(crate) fn of<T: Declared>(name: &'static str, has_default: bool) -> Self {
+        Self { name, kind: T::kind(), is_required: !has_default && !T::IS_OPTIONAL }
     }
 }
 
@@ -59,7 +54,7 @@ macro_rules! table {
         }
         impl $crate::keys::Declared for $name {
             fn kind() -> $crate::keys::Kind {
-                $crate::keys::Kind::Table(vec![$($crate::keys::Key::with_default::<$ty>(stringify!($field)),)*])
+                $crate::keys::Kind::Table(vec![$($crate::keys::Key::of::<$ty>(stringify!($field), true),)*])
             }
             fn check_limits(&self, at: &str, c: &mut $crate::keys::Checker<'_>) {
                 $($crate::keys::held!(c, at, $field, &self.$field $(, $limit)*);)*
@@ -91,7 +86,7 @@ macro_rules! kinds {
             fn kind() -> $crate::keys::Kind {
                 $crate::keys::Kind::Tagged { tag: $tag, kinds: vec![$((
                     $word,
-                    vec![$($($crate::keys::Key::without_default::<$ty>(stringify!($field)),)*)?]
+                    vec![$($($crate::keys::Key::of::<$ty>(stringify!($field), false),)*)?]
                         $(.into_iter().chain($crate::keys::keys_of::<$inner>()).collect())?,
                 ),)*] }
             }
@@ -121,7 +116,7 @@ macro_rules! choice {
             }
         }
         impl $crate::keys::Declared for $name {
-            fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(&[$($word),*]) }
+            fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(vec![$($word),*]) }
         }
     };
 }
@@ -148,7 +143,7 @@ macro_rules! second {
 macro_rules! foreign_choices {
     ($($ty:ty: $($word:literal)|*,)*) => {
         $(impl $crate::keys::Declared for $ty {
-            fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(&[$($word),*]) }
+            fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(vec![$($word),*]) }
         })*
     };
 }
@@ -227,7 +222,7 @@ mod tests {
         let Kind::Table(pulse) = &find(&scene, "pulse").kind else { panic!("a table") };
         assert_eq!(find(pulse, "energy_j").kind, Kind::Number);
         let Kind::Tagged { kinds, .. } = &find(pulse, "shape").kind else { panic!("tagged") };
-        assert_eq!(find(&kinds[0].1, "definition").kind, Kind::Choice(&["fwhm", "one_over_e_half_width"]));
+        assert_eq!(find(&kinds[0].1, "definition").kind, Kind::Choice(vec!["fwhm", "one_over_e_half_width"]));
         let Kind::Tagged { tag: "kind", kinds } = &find(&scene, "flow").kind else { panic!("tagged") };
         let names = ["calm", "uniform", "linear", "vortex_lines", "vortex_pair", "simulated", "fields"];
         assert_eq!(kinds.iter().map(|k| k.0).collect::<Vec<_>>(), names);

@@ -15,7 +15,7 @@ pub(crate) enum Kind {
     /// A text.
     Text,
     /// One of these names.
-    Choice(&'static [&'static str]),
+    Choice(Vec<&'static str>),
     /// Values of one kind.
     List {
         /// That kind.

@@ -16,7 +16,7 @@ mod source;
 mod vet;
 mod words;
 
-pub(crate) use checker::{Checker, Side};
+pub(crate) use checker::{Checker, side};
 pub(crate) use declare::{Declared, choice, foreign_choices, held, keys, keys_of, kinds, second, table};
 pub(crate) use key::{Key, Kind, join};
 #[cfg(feature = "flow")]

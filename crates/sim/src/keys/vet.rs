@@ -228,8 +228,8 @@ impl Walk<'_> {
     fn missing(&mut self, path: &str, key: &Key, line: usize) {
         // Of a table with a tag, the tag is what must be said.
         let (path, allowed) = match &key.kind {
-            Kind::Tagged { tag, kinds } => (join(path, tag), one_of(&names(kinds))),
-            kind => (path.to_owned(), self.wanted(path, kind)),
+            Kind::Tagged { tag, kinds } => (join(path, tag), one_of(&names(kinds), "")),
+            kind => (path.to_owned(), self.wanted(path, kind, "")),
         };
         self.refuse(path, Problem::ABSENT.into(), allowed, line);
     }
@@ -251,8 +251,8 @@ impl Walk<'_> {
             }
             (Kind::Switch, DeValue::Boolean(value)) => Some(Value::Boolean(*value)),
             (Kind::Text, DeValue::String(text)) => Some(Value::String(text.to_string())),
-            (Kind::Choice(names), _) => {
-                return self.named(names, value, path, line).map(|name| Value::String(name.to_owned()));
+            (Kind::Choice(names), DeValue::String(text)) if names.iter().any(|name| name == text) => {
+                Some(Value::String(text.to_string()))
             }
             (Kind::List { of, len }, DeValue::Array(values)) if len.is_none_or(|len| len == values.len()) => {
                 // Each value that does not fit is named itself.
@@ -272,27 +272,10 @@ impl Walk<'_> {
             _ => None,
         };
         if read.is_none() {
-            self.refuse(path.to_owned(), self.shown(value), self.wanted(path, kind), line);
+            let allowed = self.wanted(path, kind, inner.as_str().unwrap_or_default());
+            self.refuse(path.to_owned(), self.shown(value), allowed, line);
         }
         read
-    }
-
-    /// One of some names.
-    fn named<'n>(
-        &mut self,
-        names: &[&'n str],
-        value: &Spanned<DeValue<'_>>,
-        path: &str,
-        line: usize,
-    ) -> Option<&'n str> {
-        let text = value.get_ref().as_str();
-        let found = names.iter().copied().find(|name| Some(*name) == text);
-        if found.is_none() {
-            let meant = text.and_then(|text| near(text, names.iter().copied()));
-            let hint = meant.map(|name| format!("; did you mean \"{name}\"?")).unwrap_or_default();
-            self.refuse(path.to_owned(), self.shown(value), one_of(names) + &hint, line);
-        }
-        found
     }
 
     fn tagged(
@@ -306,15 +289,15 @@ impl Walk<'_> {
     ) -> Option<toml::Table> {
         let of_default = defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
         let at = join(path, tag);
-        let stated = table.iter().find(|(key, _)| key.get_ref() == tag);
-        let name = match (stated, of_default) {
+        let name = match (table.iter().find(|(key, _)| key.get_ref() == tag), of_default) {
             (Some((key, value)), _) => {
                 let line = self.line_of(&key.span());
-                self.named(&names(kinds), value, &at, line)?
+                self.value(&Kind::Choice(names(kinds)), value, &at, None, line)?;
+                value.get_ref().as_str()?
             }
             (None, Some(name)) => name,
             (None, None) => {
-                self.refuse(at, Problem::ABSENT.into(), one_of(&names(kinds)), line);
+                self.refuse(at, Problem::ABSENT.into(), one_of(&names(kinds), ""), line);
                 return None;
             }
         };
@@ -348,10 +331,10 @@ impl Walk<'_> {
         format!("there is no such key{hint} Known here: {}", known.join(", "))
     }
 
-    /// What a key takes, with an example.
-    fn wanted(&self, path: &str, kind: &Kind) -> String {
+    /// What a key takes in place of what is written, with an example.
+    fn wanted(&self, path: &str, kind: &Kind, written: &str) -> String {
         let name = path.rsplit('.').next().and_then(|name| name.split('[').next());
-        let what = wanted(name.unwrap_or(path), kind);
+        let what = wanted(name.unwrap_or(path), kind, written);
         match kind {
             Kind::Switch | Kind::Choice(_) => what,
             Kind::Table(keys) => {

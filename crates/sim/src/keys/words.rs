@@ -47,15 +47,15 @@ fn in_unit(key: &str) -> String {
     unit_of(key).map(|unit| format!(" in {unit}")).unwrap_or_default()
 }
 
-/// The kind of value that a key of this name takes.
-pub(super) fn wanted(key: &str, kind: &Kind) -> String {
+/// The kind of value that a key of this name takes, in place of what is written.
+pub(super) fn wanted(key: &str, kind: &Kind, written: &str) -> String {
     match kind {
         Kind::Number => format!("a number{}", in_unit(key)),
         Kind::Whole { largest } if *largest < u64::from(u32::MAX) => format!("a whole number from 0 to {largest}"),
         Kind::Whole { .. } => "a whole number that is not negative".into(),
         Kind::Switch => "true or false".into(),
         Kind::Text => "a text in quotation marks".into(),
-        Kind::Choice(names) => one_of(names),
+        Kind::Choice(names) => one_of(names, written),
         Kind::List { of, len } => {
             let many = len.map(|len| format!("{len} ")).unwrap_or_default();
             match &**of {
@@ -69,9 +69,10 @@ pub(super) fn wanted(key: &str, kind: &Kind) -> String {
     }
 }
 
-/// `one of "a", "b"`.
-pub(crate) fn one_of(names: &[&str]) -> String {
-    format!("one of {}", list(names))
+/// `one of "a", "b"`, with the one that may have been meant by what is written.
+pub(crate) fn one_of(names: &[&str], written: &str) -> String {
+    let hint = near(written, names.iter().copied()).map(|name| format!("; did you mean \"{name}\"?"));
+    format!("one of {}{}", list(names), hint.unwrap_or_default())
 }
 
 fn list(names: &[&str]) -> String {
@@ -118,7 +119,7 @@ mod tests {
 
     #[test]
     fn units_come_from_the_end_of_the_name() {
-        let number = |key| wanted(key, &Kind::Number);
+        let number = |key| wanted(key, &Kind::Number, "");
         assert_eq!(number("energy_j"), "a number in J");
         assert_eq!(number("circulation_m2_s"), "a number in m^2/s");
         assert_eq!(number("backscatter_per_m_sr"), "a number in 1/(m sr)");

@@ -3,8 +3,8 @@
 //! [`Scene::problems`] collects all violations, so that one run of `wakescope check` shows them
 //! all. Each names the key, the value and what is allowed.
 
-use super::check_estimator::check_estimator;
-use super::check_flow::check_flow;
+use super::estimator::check_estimator;
+use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
     EfficiencyOfPulse, FORMAT, FieldFlow, Flow, PulseShape, Scan, Scene, SnrReference, SpectrumKind, Turbulence,

@@ -8,11 +8,6 @@
 mod atmosphere;
 mod between;
 mod check;
-mod check_estimator;
-mod check_flow;
-mod check_outputs;
-mod check_pattern;
-mod check_receiver;
 mod estimator;
 mod flow;
 mod idle;
@@ -234,7 +229,7 @@ mod tests {
             let Kind::Choice(words) = T::kind() else { panic!("no choice") };
             assert_eq!(words.len(), count);
             for word in words {
-                assert!(toml::Value::from(*word).try_into::<T>().is_ok(), "{word}");
+                assert!(toml::Value::from(word).try_into::<T>().is_ok(), "{word}");
             }
         }
         check::<CoreProfile>(2);

@@ -25,8 +25,7 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
         match &key.kind {
             Kind::Table(inner) => leaves(inner, &here, out),
             Kind::Tagged { tag, kinds } => {
-                // Made once for the whole program.
-                let names: &[&str] = kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().leak();
+                let names = kinds.iter().map(|(name, _)| *name).collect();
                 out.push(SceneKey { path: join(&here, tag), kind: Kind::Choice(names) });
                 kinds.iter().for_each(|(_, inner)| leaves(inner, &here, out));
             }
@@ -96,17 +95,16 @@ fn unknown(written: &str) -> String {
     let last = written.rsplit('.').next().unwrap_or(written);
     let meant = near(written, paths())
         .or_else(|| near(last, paths().map(name)).and_then(|meant| paths().find(|path| name(path) == meant)));
+    let of = |path: &'static str| path.split('.').next().unwrap_or(path);
     let section = written.split('.').next().unwrap_or(written);
-    let known: Vec<&str> = paths().filter(|path| path.split('.').next() == Some(section)).collect();
     let hint = meant.map(|path| format!("; did you mean {path}?")).unwrap_or_default();
-    match known.is_empty() {
-        true => {
-            let mut sections: Vec<&str> = paths().filter_map(|path| path.split('.').next()).collect();
-            sections.dedup();
-            format!("there is no such key{hint} Sections: {}", sections.join(", "))
-        }
-        false => format!("there is no such key{hint} Known there: {}", known.join(", ")),
+    let (mut where_to_look, mut known) =
+        ("Known there", paths().filter(|path| of(*path) == section).collect::<Vec<_>>());
+    if known.is_empty() {
+        (where_to_look, known) = ("Sections", paths().map(of).collect());
+        known.dedup();
     }
+    format!("there is no such key{hint} {where_to_look}: {}", known.join(", "))
 }
 
 impl SceneKey {
@@ -150,10 +148,7 @@ impl SceneKey {
         let allowed = match &self.kind {
             Kind::Number => "a number, e.g. 1.5e-6".into(),
             Kind::Whole { .. } => "a whole number from 0, e.g. 16".into(),
-            Kind::Choice(names) => {
-                let hint = near(value, names.iter().copied()).map(|name| format!("; did you mean \"{name}\"?"));
-                one_of(names) + &hint.unwrap_or_default()
-            }
+            Kind::Choice(names) => one_of(names, value),
             _ => "true or false".into(),
         };
         Problem { key: self.path.clone(), value: value.into(), allowed }
