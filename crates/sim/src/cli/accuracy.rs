@@ -1,8 +1,8 @@
 //! `wakescope accuracy`: how accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy.
 
+use super::Cli;
 use super::wake::case_file;
 use super::words::FolderWords;
-use super::{Cli, paths};
 use crate::Error;
 use crate::accuracy::{Accuracy, Request, Subject};
 use crate::flow::WakePreset;
@@ -44,14 +44,14 @@ fn answer<S: Subject>(
 ) -> Result<u8, Error> {
     words.folder.prepare(cli, |files| Accuracy::<S>::list(None, files))?;
     let found = find()?;
-    let files = words.folder.write_all(cli, found.scene.provenance(), |files| Accuracy::list(Some(&found), files))?;
-    let text = format!("{}search took {:.1} s\n{}", found.text(), found.took_s, words.folder.wrote(&files));
+    let text = format!("{}search took {:.1} s\n", found.text(), found.took_s);
     let mut object = json!({
-        "version": crate::VERSION, "is_reached": found.is_reached(), "took_s": found.took_s,
+        "is_reached": found.is_reached(), "took_s": found.took_s,
         "is_confirmed": found.verified.is_confirmed, "own_s": found.own_s, "search_s": found.spent_s, "run_s": found.run_s,
-        "rows": found.table().objects(), "notes": found.notes, "files": paths(&files),
+        "rows": found.table().objects(), "notes": found.notes,
     });
     object[format!("{}_hash", S::NAME)] = json!(found.of_scene);
-    cli.say(&object, &text)?;
+    let of = (Default::default(), found.scene.provenance());
+    words.folder.finish(cli, of, |files| Accuracy::list(Some(&found), files), (object, text))?;
     Ok(u8::from(!found.is_reached()))
 }

@@ -1,7 +1,7 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
+use super::Cli;
 use super::words::{AirWords, FolderWords, ScanWords, Scans, finite, rate, spacing, stride};
-use super::{Cli, paths};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
@@ -13,12 +13,12 @@ use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
 use crate::retrieve::{gate_of, scene_of};
-use crate::scene::{NoiseModel, SceneFile};
+use crate::scene::{NoiseModel, Scene, SceneFile};
 use crate::setup::progress::Observer;
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-use wakescope_estimate::retrieval::ScanMap;
+use wakescope_estimate::retrieval::{Gate, ScanMap};
 use wakescope_estimate::wake_detection::DetectorOptions;
 
 /// Words of `wakescope detect`.
@@ -55,143 +55,127 @@ pub(super) struct DetectWords {
     folder: FolderWords,
 }
 
-/// What was read and how it is tested.
-struct Task {
-    scans: Vec<ReadScan>,
-    settings: DetectionSettings,
-    /// The grid of the scene, if there are no scans.
-    empty: Option<ScanMap>,
-    scene: Option<SceneFile>,
-    /// Of the scene in still air.
-    plan: Option<Plan>,
-    notes: Vec<String>,
-}
-
 pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let observer = cli.observer();
-    let task = Task::new(words, cli, &*observer)?;
-    let maps: Vec<ScanMap> = task.scans.iter().map(|scan| scan.map.clone()).collect();
-    let (found, calibration) = test(&maps, &task.settings, &*observer).map_err(|error| match &task.scans[..] {
+    let stated = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
+    let (mut scans, mut notes) = (Vec::new(), Vec::new());
+    for path in &words.data {
+        match words.scans.read(path, stated.as_ref(), false)? {
+            Scans::Signals(signals) => scans.extend((0..signals.scans.len()).map(|sweep| signals.map(sweep))),
+            Scans::Maps(read, left_out) => {
+                scans.extend(read);
+                notes.extend(left_out);
+            }
+        }
+    }
+    let scene = match (stated, scans.first()) {
+        (None, Some(scan)) => scene_of(scan)?,
+        (stated, _) => stated,
+    };
+    let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
+    let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
+    words.folder.prepare(cli, |files| list(words, plan.as_ref(), None, &*observer, files))?;
+    let of_plan = plan.as_ref().map(|plan| &plan.scene.scene);
+    let (gate, note) = gate_of(scans.first(), words.air.gate_std, of_plan)?;
+    notes.extend(note.map(str::to_owned));
+    let mut settings = words.settings(cli, of_plan, gate);
+    // The grid of the scene, if there are no scans.
+    let mut empty = None;
+    if let Some(plan) = &plan {
+        let noise = SceneNoise::new(plan, &*observer)?;
+        settings.stride = words.stride.unwrap_or(noise.stride);
+        scans.iter_mut().for_each(|scan| noise.give(&mut scan.map, scan.scans));
+        empty = scans.is_empty().then(|| noise.empty_scan(plan));
+    }
+    let maps: Vec<ScanMap> = scans.iter().map(|scan| scan.map.clone()).collect();
+    let (found, mut calibration) = test(&maps, &settings, &*observer).map_err(|error| match &scans[..] {
         [only] => Error::Input { path: only.path.clone(), reason: error.to_string() },
         _ => error,
     })?;
-    let calibration = match (calibration, &task.empty) {
-        (None, Some(empty)) => {
-            Some(Calibration::new(&strided(empty, task.settings.stride), &task.settings, &*observer)?)
-        }
-        (known, _) => known,
-    };
-    let power = calibration.map(|known| known.power(&task.settings, &*observer)).transpose()?;
-    let none = || Provenance::new("", "", task.settings.seed);
-    let origin = task.scene.as_ref().map_or_else(none, SceneFile::provenance);
-    let files = words.folder.write_all(cli, origin, |files| {
-        list(words, task.plan.as_ref(), Some((&task.scans, &found, power.as_ref())), &*observer, files)
-    })?;
-    let has_sigma = found.iter().all(|scan| scan.assumed_sigma_m_s.is_none());
-    let holds = background(&task.settings, has_sigma);
-    let mut text = task.told(&found, power.as_ref());
-    text.push(format!("the rate of false alarms holds for {holds}"));
-    text.push(words.folder.wrote(&files));
+    if let Some(empty) = empty {
+        calibration = Some(Calibration::new(&strided(&empty, settings.stride), &settings, &*observer)?);
+    }
+    let power = calibration.map(|known| known.power(&settings, &*observer)).transpose()?;
+    let none = || Provenance::new("", "", settings.seed);
+    let origin = scene.as_ref().map_or_else(none, SceneFile::provenance);
+    let holds = background(&settings, found.iter().all(|scan| scan.assumed_sigma_m_s.is_none()));
+    let mut text = notes.clone();
+    told(&scans, &found, power.as_ref(), &mut text);
+    text.push(format!("the rate of false alarms holds for {holds}\n"));
     let object = json!({
-        "version": crate::VERSION, "false_alarm": words.false_alarm, "background": holds,
-        "scans": task.scans.iter().zip(&found).map(as_json).collect::<Vec<_>>(),
+        "false_alarm": words.false_alarm, "background": holds,
+        "scans": scans.iter().zip(&found).map(as_json).collect::<Vec<_>>(),
         "smallest_detectable_m2_s": power.as_ref().map(|power| power.smallest_m2_s.0),
         "smallest_detectable_error_m2_s": power.as_ref().map(|power| power.smallest_error_m2_s),
         "smallest_foretold_m2_s": power.as_ref().map(|power| power.smallest_m2_s.1),
         "threshold": power.as_ref().map(|power| power.threshold),
         "circulation_std_m2_s": power.as_ref().map(|power| power.circulation_std_m2_s),
         "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
-        "notes": task.notes, "files": paths(&files),
+        "notes": notes,
     });
-    cli.say(&object, &text.join("\n"))
+    let tested = Some((&scans[..], &found[..], power.as_ref()));
+    let list = |files: &mut Outputs| list(words, plan.as_ref(), tested, &*observer, files);
+    words.folder.finish(cli, (Default::default(), origin), list, (object, text.join("\n")))
 }
 
-impl Task {
-    fn new(words: &DetectWords, cli: &Cli, observer: &dyn Observer) -> Result<Self, Error> {
-        let (mut scans, mut notes) = (Vec::new(), Vec::new());
-        let scene = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
-        for path in &words.data {
-            match words.scans.read(path, scene.as_ref(), false)? {
-                Scans::Signals(signals) => scans.extend((0..signals.scans.len()).map(|sweep| signals.map(sweep))),
-                Scans::Maps(read, left_out) => {
-                    scans.extend(read);
-                    notes.extend(left_out);
-                }
-            }
-        }
-        let scene = match (scene, scans.first()) {
-            (Some(scene), _) => Some(scene),
-            (None, Some(scan)) => scene_of(scan)?,
-            (None, None) => None,
-        };
-        let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
-        let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
-        words.folder.prepare(cli, |files| list(words, plan.as_ref(), None, observer, files))?;
+impl DetectWords {
+    /// How wakes are looked for, but for the strides that the noise of a scene asks for.
+    fn settings(&self, cli: &Cli, scene: Option<&Scene>, gate: Gate) -> DetectionSettings {
         let mut settings = DetectionSettings {
-            false_alarm: words.false_alarm,
+            false_alarm: self.false_alarm,
+            gate,
             options: DetectorOptions {
-                spacing_m: words.spacing,
-                single_vortices: !words.pairs_only,
-                turbulence: words.air.turbulence,
+                spacing_m: self.spacing,
+                single_vortices: !self.pairs_only,
+                turbulence: self.air.turbulence,
             },
-            empty_scans: words.empty_scans as usize,
-            seed: cli.seed.or(plan.as_ref().map(|plan| plan.scene.scene.seed)).unwrap_or(1),
+            empty_scans: self.empty_scans as usize,
+            stride: self.stride.unwrap_or((1, 1)),
+            seed: cli.seed.or(scene.map(|scene| scene.seed)).unwrap_or(1),
             ..DetectionSettings::default()
         };
-        let height_m = plan.as_ref().map_or(0.0, |plan| plan.scene.scene.scan.lidar_height_m);
-        settings.model.lidar_height_m = words.lidar_height.unwrap_or(height_m);
-        settings.model.images = words.air.images;
-        let (gate, note) = gate_of(scans.first(), words.air.gate_std, plan.as_ref().map(|plan| &plan.scene.scene))?;
-        settings.gate = gate;
-        notes.extend(note.map(str::to_owned));
-        let mut empty = None;
-        if let Some(plan) = &plan {
-            let noise = SceneNoise::new(plan, observer)?;
-            settings.stride = noise.stride;
-            scans.iter_mut().for_each(|scan| noise.give(&mut scan.map, scan.scans));
-            empty = scans.is_empty().then(|| noise.empty_scan(plan));
-        }
-        settings.stride = words.stride.unwrap_or(settings.stride);
-        Ok(Self { scans, settings, empty, scene, plan, notes })
+        let height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
+        settings.model.lidar_height_m = self.lidar_height.unwrap_or(height_m);
+        settings.model.images = self.air.images;
+        settings
     }
+}
 
-    fn told(&self, found: &[ScanDetection], power: Option<&Power>) -> Vec<String> {
-        let mut text = self.notes.clone();
-        for (scan, found) in self.scans.iter().zip(found) {
-            let name = format!("{} sweep {}", scan.path.display(), scan.sweep);
-            let (statistic, rate) = (found.statistic.value, found.false_alarm);
-            let verdict = if found.is_wake() { "wake" } else { "no wake" };
-            let reached = if rate < 1e-12 { "less than 1e-12".into() } else { digits(rate) };
-            text.push(format!(
+/// Adds what people read of the scans and of the wakes that are found in scans like them.
+fn told(scans: &[ReadScan], found: &[ScanDetection], power: Option<&Power>, text: &mut Vec<String>) {
+    for (scan, found) in scans.iter().zip(found) {
+        let name = format!("{} sweep {}", scan.path.display(), scan.sweep);
+        let (statistic, rate) = (found.statistic.value, found.false_alarm);
+        let verdict = if found.is_wake() { "wake" } else { "no wake" };
+        let reached = if rate < 1e-12 { "less than 1e-12".into() } else { digits(rate) };
+        text.push(format!(
                 "{name}: {verdict}; statistic {statistic:.1}, threshold {:.1}; an empty scan reaches it with probability {reached}",
                 found.threshold
             ));
-            if let Some(sigma_m_s) = found.assumed_sigma_m_s {
-                text.push(format!("  no deviations are stated: {} m/s is taken for all", digits(sigma_m_s)));
-            }
-            if found.is_correlated() {
-                let (along, across) = found.statistic.neighbour_correlation;
-                text.push(format!(
+        if let Some(sigma_m_s) = found.assumed_sigma_m_s {
+            text.push(format!("  no deviations are stated: {} m/s is taken for all", digits(sigma_m_s)));
+        }
+        if found.is_correlated() {
+            let (along, across) = found.statistic.neighbour_correlation;
+            text.push(format!(
                     "  warning: neighbours are correlated, {along:.2} along the lines and {across:.2} across: this is not the background \
                      that the rate holds for; state --turbulence, or --stride for lines and gates that share pulses"
                 ));
-            }
         }
-        if let Some(power) = power {
-            let (mu, beta) = power.gumbel;
-            text.push(format!(
-                "threshold {:.2} for {} false alarms a scan; Gumbel's mu {mu:.2}, beta {beta:.2}{}",
-                power.threshold,
-                power.false_alarm,
-                if (1.5..2.6).contains(&beta) { "" } else { " (should be near 2: is the noise what was stated?)" }
-            ));
-            let (measured, foretold) = power.smallest_m2_s;
-            text.push(format!(
+    }
+    if let Some(power) = power {
+        let (mu, beta) = power.gumbel;
+        text.push(format!(
+            "threshold {:.2} for {} false alarms a scan; Gumbel's mu {mu:.2}, beta {beta:.2}{}",
+            power.threshold,
+            power.false_alarm,
+            if (1.5..2.6).contains(&beta) { "" } else { " (should be near 2: is the noise what was stated?)" }
+        ));
+        let (measured, foretold) = power.smallest_m2_s;
+        text.push(format!(
                 "circulation found nine times in ten: {measured:.1} +- {:.1} m^2/s (the bound of {:.2} m^2/s foretells {foretold:.1})",
                 power.smallest_error_m2_s, power.circulation_std_m2_s
             ));
-        }
-        text
     }
 }
 

@@ -1,7 +1,7 @@
 //! `wakescope estimate`: velocities from raw signals, simulated or measured.
 
+use super::Cli;
 use super::words::{FolderWords, noise, positive};
-use super::{Cli, paths};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape};
@@ -51,12 +51,8 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
     let (text, results) = told(&plan, &found, records.records);
     let of = (plan.scene.scene.outputs, plan.scene.provenance());
-    let files = words.folder.write(cli, of, |files| write::list_recorded(&plan, found, files))?;
-    let object = json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results,
-        "files": paths(&files),
-    });
-    cli.say(&object, &(text + &words.folder.wrote(&files)))
+    let object = json!({ "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results });
+    words.folder.finish(cli, of, |files| write::list_recorded(&plan, found, files), (object, text))
 }
 
 /// The result in a few numbers.

@@ -242,8 +242,6 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         let _ = write!(std::io::stderr(), "{plan}");
     }
     let outcome = run::run(&plan, &*cli.observer())?;
-    let of = (plan.scene.scene.outputs, plan.scene.provenance());
-    let files = io.folder.write(cli, of, |files| write::list(&plan, &outcome, files))?;
     let summary = outcome.summary();
     let mut text: String = summary.iter().map(|line| format!("{:<44} {}\n", line.text, digits(line.value))).collect();
     let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
@@ -256,8 +254,8 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         text.extend(detected.map(|found| format!("{share:<44} {}\n", digits(found))));
         object["retrieval"] = json!({ "errors": errors.objects(), "detected": detected });
     }
-    object["files"] = json!(paths(&files));
-    cli.say(&object, &(text + &io.folder.wrote(&files)))
+    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    io.folder.finish(cli, of, |files| write::list(&plan, &outcome, files), (object, text))
 }
 
 fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {

@@ -1,7 +1,7 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
+use super::Cli;
 use super::words::{AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch};
-use super::{Cli, paths};
 use crate::Error;
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
@@ -11,13 +11,13 @@ use crate::plan::Stage;
 use crate::plan::time::{FIT_S, SIGNAL_FIT_S};
 use crate::plan::units::seconds;
 use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, StatedEstimator, Velocities, gate_of};
-use crate::scene::{Flow, SceneFile};
+use crate::scene::SceneFile;
 use crate::setup::progress::{Observer, Silent};
 use clap::{ArgAction, Args};
 use serde_json::json;
 use std::path::PathBuf;
 use wakescope_estimate::retrieval::{Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track};
-use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Loss, Secondary, Sharing, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Secondary, Wake};
 
 /// Words of `wakescope retrieve`.
 #[derive(Debug, Args)]
@@ -77,49 +77,21 @@ pub(super) struct RetrieveWords {
 
 /// Few lines cross a core, and the likelihood of their speckle is no parabola.
 const HEIGHTS: &str = "fits of signals state the deviations of heights a quarter too small\n";
-/// Standard deviation of the weight of gates that do not show cores, m.
-const LONG_GATE_M: f64 = 3.0;
 
 impl RetrieveWords {
     fn options(&self, scene: Option<&SceneFile>, gate: Gate) -> RetrievalOptions {
-        let of_scene = scene.map(|file| &file.scene);
-        let of_pair = of_scene.and_then(|scene| match scene.flow {
-            Flow::VortexPair(pair) => Some(pair.profile),
-            _ => None,
-        });
-        let wanted = of_scene.and_then(|scene| scene.retrieval.as_ref());
-        let height_m = self.lidar_height.or(of_scene.map(|scene| scene.scan.lidar_height_m));
-        // Long gates do not show cores: without what is known of them they run away with the circulation.
-        let is_long = match &gate {
-            Gate::Point => false,
-            Gate::Gaussian { std_m } => *std_m > LONG_GATE_M,
-            Gate::Kernel(_) => true,
-        };
-        let mut options = RetrievalOptions {
-            core_prior: is_long.then_some(CorePrior::TYPICAL),
-            other_profile: self.profile.or(of_pair).is_none(),
-            model: WakeModel {
-                profile: self.profile.or(of_pair).unwrap_or_default(),
-                images: self.air.images,
-                lidar_height_m: height_m.unwrap_or(0.0),
-                ..WakeModel::default()
-            },
-            gate,
-            core_radius_m: self.core,
-            secondary: self.secondary.or(wanted.map(|wanted| wanted.secondary)).unwrap_or_default(),
-            turbulence: self.air.turbulence,
-            covariance: self.covariance,
-            movement: self.motion,
-            threshold: self.threshold,
-            ..RetrievalOptions::default()
-        };
+        let mut options = retrieve::options(scene.map(|file| &file.scene), gate, self.core);
+        if let Some(profile) = self.profile {
+            (options.model.profile, options.other_profile) = (profile, false);
+        }
         if !self.bears_outliers {
             options.loss = Loss::Squares;
         }
-        if self.core.is_some() {
-            options.free.core_radius = Sharing::Fixed;
-        }
-        options
+        options.model.images = self.air.images;
+        options.model.lidar_height_m = self.lidar_height.unwrap_or(options.model.lidar_height_m);
+        options.secondary = self.secondary.unwrap_or(options.secondary);
+        let (covariance, movement, threshold) = (self.covariance, self.motion, self.threshold);
+        RetrievalOptions { turbulence: self.air.turbulence, covariance, movement, threshold, ..options }
     }
 }
 
@@ -127,8 +99,6 @@ impl RetrieveWords {
 #[derive(Default)]
 struct Found {
     scans: Vec<RetrievedScan>,
-    /// The scene of each scan, where one is known.
-    scenes: Vec<Option<SceneFile>>,
     /// Circulations by envelopes, with the number of their scan.
     envelopes: Vec<(usize, EnvelopeResult)>,
     track: Option<Track>,
@@ -137,7 +107,8 @@ struct Found {
 pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     let stated = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
     let observer = cli.observer();
-    let (mut inputs, mut count) = (Vec::new(), 0);
+    // The files, and the scene of each scan, where one is known.
+    let (mut inputs, mut scenes) = (Vec::new(), Vec::<Option<SceneFile>>::new());
     for path in &words.data {
         if matches!(words.method, Method::Signals | Method::Envelope) && !is_signals(path) {
             let reason = "it is no file of raw signals, which this method needs: --method fit takes maps".into();
@@ -145,15 +116,17 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         }
         let scans = words.scans.read(path, stated.as_ref(), words.method == Method::Envelope)?;
         match &scans {
-            Scans::Signals(signals) => count += signals.scans.len(),
+            Scans::Signals(signals) => scenes.extend(signals.scans.iter().map(|_| Some(signals.plan.scene.clone()))),
             Scans::Maps(maps, left_out) => {
-                count += maps.len();
-                maps.iter().try_for_each(|scan| scene_of(scan, stated.as_ref()).map(drop))?;
+                for scan in maps {
+                    scenes.push(stated.clone().map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene)))?);
+                }
                 left_out.iter().for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
             }
         }
         inputs.push(scans);
     }
+    let count = scenes.len();
     words.folder.prepare(cli, |files| list(words.method, count, None, files))?;
     let mut found = Found::default();
     observer.begin(Stage::Retrieval, count as u64);
@@ -166,9 +139,8 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
             Scans::Maps(maps, _) => {
                 for scan in maps {
                     let start = prediction(&found.scans, &scan);
-                    let scene = scene_of(&scan, stated.as_ref())?;
-                    found.scans.push(of_map(words, scene.as_ref(), scan, start, &*observer)?);
-                    found.scenes.push(scene);
+                    let scene = scenes[found.scans.len()].as_ref();
+                    found.scans.push(of_map(words, scene, scan, start, &*observer)?);
                     observer.advance(1);
                 }
             }
@@ -178,13 +150,11 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
     observer.end();
     same_origin(&mut found.scans);
     found.track = retrieve::track_of(&found.scans)?;
-    let files =
-        words.folder.write_all(cli, found.provenance(), |files| list(words.method, count, Some(&found), files))?;
-    let object = json!({ "version": crate::VERSION, "scans": retrieve::json(&found.scans), "files": paths(&files) });
     let is_of_signals =
         words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
-    let note = if is_of_signals { HEIGHTS } else { "" };
-    cli.say(&object, &format!("{}{note}{}", text(&found.scans), words.folder.wrote(&files)))
+    let text = text(&found.scans) + if is_of_signals { HEIGHTS } else { "" };
+    let (of, object) = ((Default::default(), provenance(&scenes)), json!({ "scans": retrieve::json(&found.scans) }));
+    words.folder.finish(cli, of, |files| list(words.method, count, Some(&found), files), (object, text))
 }
 
 /// Velocities of means that a fit looks at: of more, some.
@@ -223,11 +193,6 @@ fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
     let time_s = of_last + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
     let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
     retrieve::track_of(before).ok().flatten()?.prediction(time_s, core_m)
-}
-
-/// The scene of a map: as stated, else its own.
-fn scene_of(scan: &ReadScan, stated: Option<&SceneFile>) -> Result<Option<SceneFile>, Error> {
-    stated.map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene.clone())))
 }
 
 /// The word for velocities that are means over the gates.
@@ -309,7 +274,6 @@ fn of_signals(
             _ => {}
         }
         found.scans.push(one);
-        found.scenes.push(Some(plan.scene.clone()));
         observer.advance(1);
     }
     Ok(())
@@ -330,14 +294,13 @@ fn same_origin(scans: &mut [RetrievedScan]) {
     }
 }
 
-impl Found {
-    /// Of the one scene of all scans; those of several scenes have none in common.
-    fn provenance(&self) -> Provenance {
-        let first = self.scenes.first().and_then(Option::as_ref);
-        let is_first = |scene: &SceneFile| first.is_some_and(|first| scene.hash == first.hash);
-        let one = first.filter(|_| self.scenes.iter().all(|scene| scene.as_ref().is_some_and(is_first)));
-        one.map_or_else(|| Provenance::new("", "", 0), SceneFile::provenance)
-    }
+/// Of the one scene of all scans; those of several scenes have none in common.
+fn provenance(scenes: &[Option<SceneFile>]) -> Provenance {
+    let first = scenes.first().and_then(Option::as_ref);
+    let is_first =
+        |scene: &Option<SceneFile>| scene.as_ref().map(|scene| &scene.hash) == first.map(|first| &first.hash);
+    let one = first.filter(|_| scenes.iter().all(is_first));
+    one.map_or_else(|| Provenance::new("", "", 0), SceneFile::provenance)
 }
 
 /// The files of so many scans, whose content is not there before the fits.

@@ -32,7 +32,7 @@ pub(super) struct FolderWords {
 }
 
 impl FolderWords {
-    pub(super) fn existing(&self) -> Existing {
+    fn existing(&self) -> Existing {
         Existing::with_overwrite(self.overwrite)
     }
 
@@ -46,29 +46,17 @@ impl FolderWords {
         cli.prepare(&self.out, names, self.existing())
     }
 
-    /// Writes the files of a list.
-    pub(super) fn write(
+    /// Writes the files of a list, and gives the result as an object and as a text, to which they are added.
+    pub(super) fn finish(
         &self,
         cli: &Cli,
         of: (scene::Outputs, Provenance),
         list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
-    ) -> Result<Vec<PathBuf>, Error> {
-        cli.write(&self.out, self.existing(), of, list)
-    }
-
-    /// The same in every format.
-    pub(super) fn write_all(
-        &self,
-        cli: &Cli,
-        origin: Provenance,
-        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
-    ) -> Result<Vec<PathBuf>, Error> {
-        self.write(cli, (scene::Outputs::default(), origin), list)
-    }
-
-    /// The last line of a text.
-    pub(super) fn wrote(&self, files: &[PathBuf]) -> String {
-        format!("wrote {} files to {}", files.len(), self.out.display())
+        (mut object, text): (Value, String),
+    ) -> Result<(), Error> {
+        let files = cli.write(&self.out, self.existing(), of, list)?;
+        (object["version"], object["files"]) = (crate::VERSION.into(), paths(&files).into());
+        cli.say(&object, &format!("{text}wrote {} files to {}", files.len(), self.out.display()))
     }
 }
 

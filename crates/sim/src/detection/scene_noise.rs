@@ -9,7 +9,6 @@
 use crate::Error;
 use crate::measure::map::velocities;
 use crate::plan::{Plan, Target};
-use crate::scene::{Flow, SceneFile};
 use crate::setup::progress::Observer;
 use ndarray::{Array2, s};
 use wakescope_estimate::retrieval::ScanMap;
@@ -51,8 +50,7 @@ impl SceneNoise {
     /// # Errors
     /// What the crates refuse.
     pub fn new(plan: &Plan, observer: &dyn Observer) -> Result<Self, Error> {
-        let mut scene = plan.scene.scene.clone();
-        (scene.flow, scene.added_flows, scene.retrieval) = (Flow::Calm {}, Vec::new(), None);
+        let mut scene = plan.scene.in_still_air()?.scene;
         scene.seed ^= SEED_BIT;
         let middle_rad = 0.5 * (scene.scan.elevation_min_rad + scene.scan.elevation_max_rad);
         let half_rad = 0.5 * LINES * scene.scan.elevation_step_rad;
@@ -60,9 +58,7 @@ impl SceneNoise {
         scene.scan.elevation_max_rad = scene.scan.elevation_max_rad.min(middle_rad + half_rad);
         let lines = (scene.scan.elevation_max_rad - scene.scan.elevation_min_rad) / scene.scan.elevation_step_rad + 1.0;
         scene.scan.realisations = (LINES_OF_ALL / lines).ceil() as usize;
-        scene.outputs.signals = false;
-        let file = SceneFile::new(scene).map_err(|problems| plan.scene.located(problems))?;
-        let still = Plan::new(file, Target::Map)?;
+        let still = Plan::new(plan.scene.with(scene)?, Target::Map)?;
         let maps = velocities(&still, observer)?;
         Ok(Self::of_maps(still.geometry.gate_range_m.clone(), &maps, plan.geometry.elevation_rad.len()))
     }
@@ -163,7 +159,7 @@ fn whitened(maps: &[Array2<f64>], sigma_m_s: &[f64]) -> Vec<Array2<f64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Scene, SnrReference};
+    use crate::scene::{Flow, Scene, SceneFile, SnrReference};
     use crate::{Silent, run};
 
     #[test]

@@ -29,7 +29,7 @@ mod truth;
 
 pub use gate::gate_of;
 pub use instrument::{StatedEstimator, scene_of, stated_scene};
-pub use one_scan::{Velocities, retrieve_map};
+pub use one_scan::{Velocities, options, retrieve_map};
 pub use others::{envelope_table, envelopes, profile_table};
 pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]

@@ -6,15 +6,47 @@ use crate::Error;
 use crate::detection::strided;
 use crate::io::scans::ReadScan;
 use crate::measure::response::SceneResponse;
-use crate::scene::RetrievalMethod as Method;
+use crate::scene::{Flow, RetrievalMethod as Method, Scene};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
-    Flag, RetrievalOptions, ScanMap, ScanResult, fit_scan, radial_velocity_method, with_secondary_vortices,
+    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, fit_scan, radial_velocity_method, with_secondary_vortices,
 };
-use wakescope_estimate::vortex_fit::Sharing;
+use wakescope_estimate::vortex_fit::{CorePrior, Sharing, WakeModel};
 
 /// Gates that share most of their window are left out unless fewer velocities are left.
 const ENOUGH: usize = 500;
+/// Standard deviation of the weight of gates that do not show cores, m.
+const LONG_GATE_M: f64 = 3.0;
+
+/// How scans are retrieved: with the ground, the profile and the secondary vortices of the scene, if it is known; cores are fitted
+/// unless one is to be kept.
+pub fn options(scene: Option<&Scene>, gate: Gate, core_radius_m: Option<f64>) -> RetrievalOptions {
+    let profile = scene.and_then(|scene| match scene.flow {
+        Flow::VortexPair(pair) => Some(pair.profile),
+        _ => None,
+    });
+    // Long gates do not show cores: without what is known of them they run away with the circulation.
+    let is_long = match &gate {
+        Gate::Point => false,
+        Gate::Gaussian { std_m } => *std_m > LONG_GATE_M,
+        Gate::Kernel(_) => true,
+    };
+    let lidar_height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
+    let wanted = scene.and_then(|scene| scene.retrieval.as_ref());
+    let mut options = RetrievalOptions {
+        model: WakeModel { profile: profile.unwrap_or_default(), lidar_height_m, ..WakeModel::default() },
+        gate,
+        core_radius_m,
+        core_prior: is_long.then_some(CorePrior::TYPICAL),
+        other_profile: profile.is_none(),
+        secondary: wanted.map(|wanted| wanted.secondary).unwrap_or_default(),
+        ..RetrievalOptions::default()
+    };
+    if core_radius_m.is_some() {
+        options.free.core_radius = Sharing::Fixed;
+    }
+    options
+}
 
 /// What the velocities of a map are of the air in its gates.
 #[derive(Clone, Copy)]

@@ -3,7 +3,7 @@
 //! Check: bias and scatter of a pair; a method that fails is counted; the test for a wake keeps its rate.
 
 use super::gate::gate_of;
-use super::one_scan::{Velocities, retrieve_map};
+use super::one_scan::{Velocities, options, retrieve_map};
 use super::others::envelopes;
 use super::retrieved_scan::RetrievedScan;
 use super::truth::{TrueVortex, true_vortices, true_wake};
@@ -14,11 +14,11 @@ use crate::measure::recorded::{Spectra, upward};
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
-use crate::scene::{Flow, FollowingAircraft, Retrieval, RetrievalMethod as Method, Scene};
+use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
 use ndarray::{Array2, ArrayView2, Axis};
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, VortexResult, circulation_profile};
-use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Follower, Sharing, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
 /// Radii of the circulation from integrals over the map, m.
@@ -74,7 +74,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     let truths = sweeps.iter().map(|lines| true_vortices(plan, lines)).collect::<Result<Vec<_>, _>>()?;
     let own = SceneResponse::new(plan, scanner.layer_snr())?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
-    let options = options(scene, wanted)?;
+    let options = options(Some(scene), gate_of(None, None, Some(scene))?.0, wanted.core_radius_m);
     let mut tests = Vec::new();
     if let Some(false_alarm) = wanted.false_alarm {
         tests = self::tests(plan, &options, false_alarm, maps, observer)?;
@@ -102,27 +102,6 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     }
     observer.end();
     Ok(Some(SceneRetrieval { rows, tests }))
-}
-
-/// How the scans of a scene are retrieved: its gates, ground and profile, cores fitted unless the scene keeps them.
-fn options(scene: &Scene, wanted: &Retrieval) -> Result<RetrievalOptions, Error> {
-    let profile = match scene.flow {
-        Flow::VortexPair(pair) => pair.profile,
-        _ => CoreProfile::Algebraic,
-    };
-    let mut options = RetrievalOptions {
-        model: WakeModel { profile, lidar_height_m: scene.scan.lidar_height_m, ..WakeModel::default() },
-        gate: gate_of(None, None, Some(scene))?.0,
-        core_radius_m: wanted.core_radius_m,
-        secondary: wanted.secondary,
-        core_prior: Some(CorePrior::TYPICAL),
-        other_profile: !matches!(scene.flow, Flow::VortexPair(_)),
-        ..RetrievalOptions::default()
-    };
-    if wanted.core_radius_m.is_some() {
-        options.free.core_radius = Sharing::Fixed;
-    }
-    Ok(options)
 }
 
 /// The lines of each sweep, by increasing elevation.
