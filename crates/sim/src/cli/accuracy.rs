@@ -1,7 +1,7 @@
 //! `wakescope accuracy`: how accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy.
 
 use super::Cli;
-use super::wake::case_file;
+use super::flow::case_file;
 use super::words::FolderWords;
 use crate::Error;
 use crate::accuracy::{Accuracy, Request, Subject};

@@ -1,16 +1,17 @@
-//! `wakescope flow`: simulations from case files.
+//! `wakescope flow` and `wakescope wake`: simulations from case files, and of the wake of an aircraft near the ground from presets, on the
+//! processes of `mpirun` or in one.
 
 use super::{Cli, paths};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
-use crate::flow::{Begin, CaseFile, EXAMPLES, RunOptions, check_on, example, run_on};
+use crate::flow::{Begin, CaseFile, CaseKind, EXAMPLES, RunOptions, WakePreset, check_on, example, run_on};
 use crate::setup::progress::{Observer, Silent};
 use clap::Args;
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use wakescope_les::ranks::Ranks;
+use wakescope_les::ranks::{Ranks, Single};
 
 /// Words of `wakescope flow`.
 #[derive(Debug, Args)]
@@ -23,6 +24,21 @@ pub(super) struct FlowWords {
     /// Print a commented case file and do nothing else.
     #[arg(long, value_name = "NAME", conflicts_with_all = ["case", "out"], value_parser = EXAMPLES.map(|(name, _)| name))]
     example: Option<String>,
+}
+
+/// Words of `wakescope wake`.
+#[derive(Debug, Args)]
+pub(super) struct WakeWords {
+    /// A case file with kind = "wake"; keys that it lacks are those of the preset.
+    case: Option<PathBuf>,
+    /// How fine the flow is; coarse without one, unless a case file is given.
+    #[arg(long, value_enum)]
+    preset: Option<WakePreset>,
+    /// Print the case file and do nothing else.
+    #[arg(long)]
+    print: bool,
+    #[command(flatten)]
+    run: RunWords,
 }
 
 /// Where a simulation writes and how it begins.
@@ -57,8 +73,29 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
     simulate(cli.case(case, None)?, &words.run, cli, ranks)
 }
 
+pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
+    let file = case_file(words.case.as_deref(), words.preset, cli)?;
+    if !matches!(file.case.case, CaseKind::Wake(_)) {
+        let path = words.case.clone().unwrap_or_default();
+        return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
+    }
+    if words.print {
+        let file = cli.seed.map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
+        return if ranks.rank() == 0 { cli.print(&file.toml) } else { Ok(()) };
+    }
+    simulate(file, &words.run, cli, ranks)
+}
+
+/// A case file, a preset, or the one over the other; the coarse preset without either.
+pub(super) fn case_file(path: Option<&Path>, preset: Option<WakePreset>, cli: &Cli) -> Result<CaseFile, Error> {
+    match path {
+        Some(path) => cli.case(path, preset),
+        None => Ok(CaseFile::parse_over(preset.or(Some(WakePreset::Coarse)), "", Path::new("preset"))?),
+    }
+}
+
 /// Runs a case and says what came of it, on rank 0.
-pub(super) fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
+fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     let is_first = ranks.rank() == 0;
     if let Some(end) = words.end {
         file = file.with_end(end)?;
@@ -126,4 +163,36 @@ pub(super) fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &
         out.display()
     );
     cli.say(&object, &text)
+}
+
+/// What Open MPI and MPICH (with its relatives) tell each process of their number.
+const COUNTS: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
+
+/// Runs `work` on the processes that share it. Where it fails, rank 0 alone says so, and all end.
+pub(super) fn ranked(cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
+    let started = COUNTS.iter().find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());
+    match started.filter(|count| *count > 1) {
+        None => work(&(Arc::new(Single) as Arc<dyn Ranks>)),
+        Some(count) => on_processes(count, cli, work),
+    }
+}
+
+#[cfg(feature = "mpi")]
+fn on_processes(_: usize, cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
+    let world = crate::processes::World::join()?;
+    let ranks = world.ranks();
+    if ranks.rank() == 0 && !cli.quiet {
+        use std::io::Write as _;
+        let (count, threads) = (ranks.count(), rayon::current_num_threads());
+        let _ = writeln!(std::io::stderr(), "{count} ranks; threads of the first: {threads}");
+    }
+    work(&ranks).or_else(|error| world.fail(|| super::output::complain(&error, cli.json)))
+}
+
+#[cfg(not(feature = "mpi"))]
+fn on_processes(count: usize, _: &Cli, _: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
+    let reason = format!(
+        "{count} processes were started, but this build shares no flow among them: build with `--features mpi`, or start one"
+    );
+    Err(Error::Input { path: "mpirun".into(), reason })
 }

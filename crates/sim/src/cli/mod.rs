@@ -12,10 +12,8 @@ mod flow;
 mod host;
 mod output;
 mod progress;
-mod ranked;
 mod retrieve;
 mod sweep;
-mod wake;
 mod words;
 
 use crate::io::Existing;
@@ -104,7 +102,7 @@ enum Command {
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
-    Wake(wake::WakeWords),
+    Wake(flow::WakeWords),
 }
 
 #[derive(Debug, Args)]
@@ -168,8 +166,8 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
         Command::Detect(words) => detect::detect(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),
         Command::Pareto(words) => sweep::pareto(words, cli),
-        Command::Flow(words) => ranked::ranked(cli, |ranks| flow::flow(words, cli, ranks)),
-        Command::Wake(words) => ranked::ranked(cli, |ranks| wake::wake(words, cli, ranks)),
+        Command::Flow(words) => flow::ranked(cli, |ranks| flow::flow(words, cli, ranks)),
+        Command::Wake(words) => flow::ranked(cli, |ranks| flow::wake(words, cli, ranks)),
     }?;
     Ok(0)
 }
