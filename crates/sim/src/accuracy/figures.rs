@@ -41,19 +41,10 @@ pub enum Figure {
 
 impl Figure {
     /// All of them, in the order of tables.
-    pub const ALL: [Self; 11] = [
-        Self::Efficiency,
-        Self::Bias,
-        Self::Std,
-        Self::Rms,
-        Self::U,
-        Self::V,
-        Self::W,
-        Self::Circulation,
-        Self::Height,
-        Self::Energy,
-        Self::Dissipation,
-    ];
+    pub const ALL: [Self; 11] = {
+        use Figure::*;
+        [Efficiency, Bias, Std, Rms, U, V, W, Circulation, Height, Energy, Dissipation]
+    };
 
     /// Its word on the command line and in tables.
     #[must_use]

@@ -7,7 +7,7 @@ use super::figures::{Figure, Shift};
 use super::keys::CELLS;
 use super::ladder::{Ladder, Step, Verdict};
 use super::order::errors;
-use super::{Accuracy, Request, Subject, Verified};
+use super::{Accuracy, Request, Subject};
 use crate::Error;
 use crate::flow::CaseFile;
 use crate::flow::trial::{History, of_history};
@@ -43,20 +43,20 @@ struct Trial {
     /// Length of its cells or steps over that of the case.
     spacing: f64,
     /// What stands in tables for it.
-    value: f64,
-    cells: Option<[usize; 3]>,
-    forecast_s: f64,
-    /// Its history, or why there is none.
-    found: Result<History, String>,
+    step: Step,
+    /// What it came to, if it was run.
+    history: Option<History>,
 }
 
 impl Trial {
     fn run(&mut self, observer: &dyn Observer) -> Result<(), Error> {
-        self.found = match of_history(&self.file, observer) {
+        match of_history(&self.file, observer) {
             // What one mesh or step does not stand says nothing against the others.
-            Err(error) if self.spacing != 1.0 => Err(error.to_string()),
-            found => Ok(found?),
-        };
+            Err(error) if self.spacing != 1.0 => {
+                self.step = Step { cells: self.step.cells, ..Step::new(self.step.value, Err(error)) };
+            }
+            found => self.history = Some(found?),
+        }
         observer.advance(1);
         Ok(())
     }
@@ -72,8 +72,8 @@ impl Accuracy<CaseFile> {
         let own = file.portable()?;
         let mut meshes = meshes(&own)?;
         observer.forecast(&own.forecast()?.to_string());
-        let own_s = meshes[0].forecast_s;
-        let spent_s = meshes.iter().map(|mesh| mesh.forecast_s).sum::<f64>();
+        let own_s = meshes[0].step.forecast_s;
+        let spent_s = meshes.iter().map(|mesh| mesh.step.forecast_s).sum::<f64>();
         if spent_s > request.budget * own_s {
             let least = (10.0 * spent_s / own_s).ceil() / 10.0;
             let allowed = format!("at least {least:?} runs of this case: three meshes take so many");
@@ -87,25 +87,8 @@ impl Accuracy<CaseFile> {
             let allowed = "a figure that the run has: air at rest has none, and a wake without vortices no circulation and no height";
             return Err(own.refuse_word("--of", figure.name(), allowed.into()).into());
         }
-        let mut out = Self {
-            of_scene: file.hash.clone(),
-            within: request.within,
-            own_s,
-            spent_s,
-            took_s: 0.0,
-            allowed_s: request.budget * own_s,
-            pilot: 0,
-            figures,
-            ladders: Vec::new(),
-            response: Vec::new(),
-            noises: Vec::new(),
-            verified: Verified::default(),
-            notes: Vec::new(),
-            scene: own,
-            run_s: own_s,
-        };
-        let cells = meshes[0].value;
-        out.compare((CELLS, cells, own_s), &meshes);
+        let mut out = Self::begun((own, &file.hash), request, [own_s, spent_s], figures);
+        out.compare(CELLS, meshes[0].step.value, own_s, &meshes);
         out.vary_steps(&meshes, observer)?;
         observer.end();
         out.choose(&meshes)?;
@@ -114,64 +97,49 @@ impl Accuracy<CaseFile> {
     }
 
     /// Adds the ladder of a key whose runs are these, from the finest on.
-    fn compare(&mut self, (key, now, own_s): (&'static str, f64, f64), trials: &[Trial]) {
+    fn compare(&mut self, key: &'static str, now: f64, own_s: f64, trials: &[Trial]) {
         let run: Vec<(f64, &History)> =
-            trials.iter().filter_map(|trial| Some((trial.spacing, trial.found.as_ref().ok()?))).collect();
+            trials.iter().filter_map(|trial| Some((trial.spacing, trial.history.as_ref()?))).collect();
         let spacings: Vec<f64> = run.iter().map(|(spacing, _)| *spacing).collect();
-        let of = |figure: Figure| {
-            let series: Vec<&[f64]> = run.iter().map(|(_, history)| history[place(figure)].as_slice()).collect();
-            errors(&spacings, &series)
+        let of = |figure: &Figure| {
+            let series: Vec<&[f64]> = run.iter().map(|(_, history)| history[place(*figure)].as_slice()).collect();
+            (*figure, errors(&spacings, &series))
         };
-        let found: Vec<_> = self.figures.iter().map(|figure| (*figure, of(*figure))).collect();
-        let (mut place, scale) = (0, self.own_s / own_s);
-        let steps = trials.iter().map(|trial| {
-            let mut step = Step {
-                value: trial.value,
-                cells: trial.cells,
-                forecast_s: f64::NAN,
-                shifts: Vec::new(),
-                verdict: Verdict::Finest,
-            };
-            match &trial.found {
-                Err(why) => step.verdict = Verdict::Refused(why.clone()),
-                Ok(_) => {
-                    let shift = |shift: f64| Shift { shift, error: 0.0 };
-                    step.shifts = found.iter().map(|(figure, (_, errors))| (*figure, shift(errors[place]))).collect();
-                    step.verdict = Verdict::of(&step.shifts, self.within);
-                    step.forecast_s = scale * trial.forecast_s;
-                    place += 1;
-                }
-            }
-            step
-        });
-        let (steps, orders) = (steps.collect(), found.iter().map(|(figure, (order, _))| (*figure, *order)).collect());
+        let found: Vec<_> = self.figures.iter().map(of).collect();
+        let mut steps: Vec<Step> = trials.iter().map(|trial| trial.step.clone()).collect();
+        let were_run = steps.iter_mut().zip(trials).filter(|(_, trial)| trial.history.is_some());
+        for (i, (step, _)) in were_run.enumerate() {
+            let shift = |shift: f64| Shift { shift, error: 0.0 };
+            step.shifts = found.iter().map(|(figure, (_, errors))| (*figure, shift(errors[i]))).collect();
+            step.verdict = Verdict::of(&step.shifts, self.within);
+            step.forecast_s *= self.own_s / own_s;
+        }
+        let orders = found.iter().map(|(figure, (order, _))| (*figure, *order)).collect();
         let chosen = trials.iter().position(|trial| trial.spacing == 1.0).unwrap_or(0);
-        self.ladders.push(Ladder { key, now, steps, chosen, note: None, orders });
+        self.ladders.push(Ladder { chosen, orders, ..Ladder::new(key, now, steps) });
     }
 
     /// Runs the finest mesh that the budget has room for with other steps, too.
     fn vary_steps(&mut self, meshes: &[Trial], observer: &dyn Observer) -> Result<(), Error> {
-        for (place, mesh) in meshes.iter().enumerate().filter(|(_, mesh)| mesh.found.is_ok()) {
+        for (place, mesh) in meshes.iter().enumerate().filter(|(_, mesh)| mesh.history.is_some()) {
             let (mut trials, mut of_key) = (Vec::new(), ("time.courant", f64::NAN));
-            for times in STEPS {
-                let (file, key, value) = mesh.file.with_longer_steps(times)?;
-                let forecast = file.forecast();
-                let found = if times == 1.0 { mesh.found.clone() } else { Err(String::new()) };
-                of_key = if times == 1.0 { (key, value) } else { of_key };
-                let forecast_s = forecast.as_ref().map_or(0.0, |forecast| forecast.core_s);
-                let found = forecast.map_or_else(|error| Err(error.to_string()), |_| found);
-                trials.push(Trial { file, spacing: times, value, cells: None, forecast_s, found });
+            for spacing in STEPS {
+                let (file, key, value) = mesh.file.with_longer_steps(spacing)?;
+                let step = Step::new(value, file.forecast().map(|forecast| forecast.core_s));
+                of_key = if spacing == 1.0 { (key, value) } else { of_key };
+                let history = mesh.history.clone().filter(|_| spacing == 1.0 && step.forecast_s.is_finite());
+                trials.push(Trial { file, spacing, step, history });
             }
-            let more = |trial: &&mut Trial| trial.spacing != 1.0 && trial.forecast_s > 0.0;
-            let more_s: f64 = trials.iter_mut().filter(more).map(|trial| trial.forecast_s).sum();
+            let more = |trial: &&mut Trial| trial.spacing != 1.0 && trial.step.forecast_s > 0.0;
+            let more_s: f64 = trials.iter_mut().filter(more).map(|trial| trial.step.forecast_s).sum();
             if self.spent_s + more_s > self.allowed_s {
                 continue;
             }
             self.spent_s += more_s;
             trials.iter_mut().filter(more).try_for_each(|trial| trial.run(observer))?;
-            self.compare((of_key.0, of_key.1, mesh.forecast_s), &trials);
+            self.compare(of_key.0, of_key.1, mesh.step.forecast_s, &trials);
             if place > 0 {
-                let [nx, ny, nz] = mesh.cells.unwrap_or_default();
+                let [nx, ny, nz] = mesh.step.cells.unwrap_or_default();
                 let note = format!("{}: looked at on {nx} x {ny} x {nz} cells, more is beyond the budget", of_key.0);
                 self.notes.push(note);
             }
@@ -194,7 +162,7 @@ impl Accuracy<CaseFile> {
         let mut good = Vec::new();
         for (mesh, step) in all.filter(is_within) {
             let of_key = self.ladders.get(1).filter(|_| step != own.1);
-            if of_key.is_some_and(|ladder| ladder.steps[step].shifts.is_empty()) || meshes[mesh].found.is_err() {
+            if of_key.is_some_and(|ladder| ladder.steps[step].shifts.is_empty()) || meshes[mesh].history.is_none() {
                 continue;
             }
             let file = match of_key {
@@ -251,9 +219,8 @@ impl Accuracy<CaseFile> {
 
 impl Trial {
     fn has(&self, figure: Figure) -> bool {
-        self.found
-            .as_ref()
-            .is_ok_and(|found| found[place(figure)].iter().any(|value| value.is_finite() && *value != 0.0))
+        let is_told = |value: &f64| value.is_finite() && *value != 0.0;
+        self.history.as_ref().is_some_and(|found| found[place(figure)].iter().any(is_told))
     }
 }
 
@@ -284,8 +251,8 @@ fn meshes(own: &CaseFile) -> Result<Vec<Trial>, Error> {
                 own.refuse_cells("enough for three meshes, the coarsest of half as many along each direction".into())
             );
         }
-        let found = Err(String::new());
-        meshes.push(Trial { file, spacing, value, cells: Some(cells), forecast_s: forecast.core_s, found });
+        let step = Step { cells: Some(cells), ..Step::new(value, Ok(forecast.core_s)) };
+        meshes.push(Trial { file, spacing, step, history: None });
     }
     Ok(meshes)
 }

@@ -3,6 +3,7 @@
 //! Errors of keys add with their sign; the sum of their sizes, each with two standard errors, bounds them. Check: choices by hand.
 
 use super::figures::{Figure, Shift};
+use crate::Error;
 
 /// What is said of a value of a key.
 #[derive(Debug, Clone, PartialEq)]
@@ -66,6 +67,13 @@ pub struct Step {
 }
 
 impl Step {
+    /// A value with its forecast, or why it is refused.
+    pub(super) fn new(value: f64, forecast_s: Result<f64, Error>) -> Self {
+        let refused = |error: Error| (f64::NAN, Verdict::Refused(error.to_string()));
+        let (forecast_s, verdict) = forecast_s.map_or_else(refused, |forecast_s| (forecast_s, Verdict::Finest));
+        Self { value, cells: None, forecast_s, shifts: Vec::new(), verdict }
+    }
+
     /// What it shifts a figure, where that is known.
     #[must_use]
     pub fn shift(&self, figure: Figure) -> Option<Shift> {
@@ -96,6 +104,11 @@ pub struct Ladder {
 }
 
 impl Ladder {
+    /// Values of a key from the finest on, which is chosen.
+    pub(super) fn new(key: &'static str, now: f64, steps: Vec<Step>) -> Self {
+        Self { key, now, steps, chosen: 0, note: None, orders: Vec::new() }
+    }
+
     /// The value that is chosen.
     #[must_use]
     pub fn value(&self) -> f64 {

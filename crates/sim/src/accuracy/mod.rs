@@ -65,30 +65,31 @@ impl Request {
     fn figures(&self, own: &Plan) -> Result<Vec<Figure>, Error> {
         let scene = &own.scene.scene;
         let tells_winds = matches!(scene.scan.pattern, Pattern::Vad(_) | Pattern::Dbs(_));
-        let is_wind = |figure: &Figure| matches!(figure, Figure::U | Figure::V | Figure::W);
-        if let Some(figure) = self.of.iter().find(|figure| is_wind(figure) && !tells_winds) {
-            let reason = format!("{} is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone", figure.name());
-            return Err(Error::Input { path: "--of".into(), reason });
-        }
-        let is_of_flow = |figure: &Figure| matches!(figure, Figure::Height | Figure::Energy | Figure::Dissipation);
-        if let Some(figure) = self.of.iter().find(|figure| is_of_flow(figure)) {
-            let reason = format!("{} is a figure of the case of a flow, and this is a scene", figure.name());
-            return Err(Error::Input { path: "--of".into(), reason });
-        }
-        if self.of.contains(&Figure::Efficiency) && drawn_turbulence(scene).is_some() {
-            let reason = "efficiency is one for each pulse with atmosphere.turbulence.efficiency = \"realisation\"; it has a mean \
-                          to judge with \"mean\"";
-            return Err(Error::Input { path: "--of".into(), reason: reason.into() });
+        let lacking = |figure: Figure| match figure {
+            Figure::U | Figure::V | Figure::W if !tells_winds => {
+                Some("is a wind of scan.pattern.kind = \"vad\" or \"dbs\" alone")
+            }
+            Figure::Height | Figure::Energy | Figure::Dissipation => {
+                Some("is a figure of the case of a flow, and this is a scene")
+            }
+            Figure::Efficiency if drawn_turbulence(scene).is_some() => Some(
+                "is one for each pulse with atmosphere.turbulence.efficiency = \"realisation\"; it has a mean to judge with \"mean\"",
+            ),
+            _ => None,
+        };
+        if let Some((figure, why)) = self.of.iter().find_map(|figure| Some((figure, lacking(*figure)?))) {
+            return Err(Error::Input { path: "--of".into(), reason: format!("{} {why}", figure.name()) });
         }
         let has = |figure: &Figure| match figure {
-            Figure::Efficiency => model(scene) == Model::MonteCarlo && drawn_turbulence(scene).is_none(),
-            Figure::Bias | Figure::Std | Figure::Rms => true,
-            Figure::U | Figure::V | Figure::W => tells_winds,
+            Figure::Efficiency => model(scene) == Model::MonteCarlo,
             Figure::Circulation => scene.retrieval.is_some() || !self.of.is_empty(),
-            Figure::Height | Figure::Energy | Figure::Dissipation => false,
+            _ => true,
         };
         let is_asked = |figure: &Figure| self.of.is_empty() || self.of.contains(figure);
-        Ok(Figure::ALL.into_iter().filter(|figure| has(figure) && is_asked(figure)).collect())
+        Ok(Figure::ALL
+            .into_iter()
+            .filter(|figure| lacking(*figure).is_none() && has(figure) && is_asked(figure))
+            .collect())
     }
 }
 
@@ -215,6 +216,27 @@ impl Accuracy {
 }
 
 impl<S: Subject> Accuracy<S> {
+    /// That of a scene or case, and its hash, before anything is looked at; forecasts of its own run and of what was done, s of one core.
+    fn begun((scene, hash): (S, &str), request: &Request, [own_s, spent_s]: [f64; 2], figures: Vec<Figure>) -> Self {
+        Self {
+            of_scene: hash.into(),
+            within: request.within,
+            own_s,
+            spent_s,
+            took_s: 0.0,
+            allowed_s: request.budget * own_s,
+            pilot: 0,
+            figures,
+            ladders: Vec::new(),
+            response: Vec::new(),
+            noises: Vec::new(),
+            verified: Verified::default(),
+            notes: Vec::new(),
+            scene,
+            run_s: own_s,
+        }
+    }
+
     /// Whether a run within the budget has every figure within the target.
     #[must_use]
     pub fn is_reached(&self) -> bool {

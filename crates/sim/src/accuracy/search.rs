@@ -6,7 +6,7 @@
 use super::figures::{Figure, Shift, Shown};
 use super::keys::{REALISATIONS, with};
 use super::ladder::{Ladder, Step, Verdict};
-use super::{Accuracy, Request, Verified};
+use super::{Accuracy, Request};
 use crate::Error;
 use crate::plan::{Plan, Target};
 use crate::scene::{Atmosphere, SceneFile};
@@ -60,24 +60,10 @@ impl<'a> Search<'a> {
         let own = common.plan(&fine, Target::Run)?;
         own.fits()?;
         let own_s = run_s(&own);
-        let out = Accuracy {
-            of_scene: file.hash.clone(),
-            within: request.within,
-            own_s,
-            spent_s: PLANNING_S * own.screens.len() as f64,
-            took_s: 0.0,
-            allowed_s: request.budget * own_s,
-            pilot: 0,
-            figures: request.figures(&own)?,
-            ladders: Vec::new(),
-            response: Vec::new(),
-            noises: Vec::new(),
-            // TOML has signed whole numbers.
-            verified: Verified { seed: stream(file.scene.seed, "accuracy", 0).next_u64() >> 1, ..Verified::default() },
-            notes: Vec::new(),
-            scene: file.clone(),
-            run_s: own_s,
-        };
+        let spent_s = PLANNING_S * own.screens.len() as f64;
+        let mut out = Accuracy::begun((file.clone(), &file.hash), request, [own_s, spent_s], request.figures(&own)?);
+        // TOML has signed whole numbers.
+        out.verified.seed = stream(file.scene.seed, "accuracy", 0).next_u64() >> 1;
         let mut search = Self { request, observer, common, own, fine, crossed: Vec::new(), scatter: None, out };
         observer.begin(Stage::Cases, 3);
         if model(&file.scene) != Model::MonteCarlo {
@@ -134,27 +120,22 @@ impl<'a> Search<'a> {
         values: impl IntoIterator<Item = f64>,
         shifts: impl Fn(&Self, &Plan) -> Vec<(Figure, Shift)>,
     ) {
-        let mut ladder = Ladder { key, now, steps: Vec::new(), chosen: 0, note: None, orders: Vec::new() };
+        let mut ladder = Ladder::new(key, now, Vec::new());
         for value in values {
             if !ladder.steps.is_empty() && !self.affords(0.0, 0.0) {
                 self.out.notes.push(format!("{key}: not all values are looked at, the budget is spent"));
                 break;
             }
             let planned = with(&self.fine, &[(key, value)]).and_then(|scene| self.plan(&scene, Target::Run));
-            let (forecast_s, shifts, verdict) = match planned {
-                Err(error) => (f64::NAN, Vec::new(), Verdict::Refused(error.to_string())),
-                Ok(plan) => {
-                    let shifts = shifts(self, &plan);
-                    let verdict = match (ladder.steps.is_empty(), shifts.is_empty()) {
-                        (true, _) => Verdict::Finest,
-                        (false, true) => Verdict::NotDecided,
-                        (false, false) => Verdict::of(&shifts, self.limit()),
-                    };
-                    (run_s(&plan), shifts, verdict)
-                }
-            };
-            ladder.steps.push(Step { value, cells: None, forecast_s, shifts, verdict });
-            if forecast_s.is_nan() {
+            let shifts = planned.as_ref().map_or(Vec::new(), |plan| shifts(self, plan));
+            let mut step = Step::new(value, planned.map(|plan| run_s(&plan)));
+            let is_refused = step.forecast_s.is_nan();
+            if !is_refused && !ladder.steps.is_empty() {
+                let undecided = shifts.is_empty();
+                step.verdict = if undecided { Verdict::NotDecided } else { Verdict::of(&shifts, self.limit()) };
+            }
+            ladder.steps.push(Step { shifts, ..step });
+            if is_refused {
                 break;
             }
         }

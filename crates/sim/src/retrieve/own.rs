@@ -307,28 +307,33 @@ pub(super) fn set(flags: &mut Vec<Flag>, flag: Flag, is_set: bool) {
 
 /// A scan of recorded signals as a map for a retrieval.
 pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: &MeasuredScan) -> ReadScan {
-    let order = upward(0..scan.lines.elevation_rad.len(), &scan.lines.elevation_rad);
-    let mut velocity_m_s = scan.velocity_m_s.select(Axis(0), &order);
-    let flagged = scan.flagged.select(Axis(0), &order);
-    velocity_m_s.zip_mut_with(&flagged, |velocity, flagged| {
+    let lines = &scan.lines;
+    let mut velocity_m_s = scan.velocity_m_s.clone();
+    velocity_m_s.zip_mut_with(&scan.flagged, |velocity, flagged| {
         if *flagged > 0.5 {
             *velocity = f64::NAN
         }
     });
-    let of = |values: &[f64]| order.iter().map(|line| values[*line]).collect();
-    let map = ScanMap {
-        elevation_rad: of(&scan.lines.elevation_rad),
-        time_s: of(&scan.lines.time_s),
-        range_m: plan.geometry.gate_range_m.clone(),
-        velocity_m_s,
-        sigma_m_s: None,
-        fold_m_s: None,
-    };
+    let order = upward(0..lines.elevation_rad.len(), &lines.elevation_rad);
     ReadScan {
         path: path.to_owned(),
         sweep,
         reference: crate::io::UtcTime::parse(&plan.scene.scene.site.start_utc),
         scene_toml: Some(plan.scene.toml.clone()),
-        ..ReadScan::own("", map)
+        ..scan_of_lines("", plan, &order, [&lines.elevation_rad, &lines.time_s], &velocity_m_s)
     }
+}
+
+/// Some lines of a map with the gates of a plan as a scan; `axes` are the elevations, rad, and times, s, of all of its lines.
+pub(super) fn scan_of_lines(
+    name: &str,
+    plan: &Plan,
+    lines: &[usize],
+    axes: [&[f64]; 2],
+    velocity_m_s: &Array2<f64>,
+) -> ReadScan {
+    let [elevation_rad, time_s] = axes.map(|values| lines.iter().map(|line| values[*line]).collect());
+    let velocity_m_s = velocity_m_s.select(Axis(0), lines);
+    let range_m = plan.geometry.gate_range_m.clone();
+    ReadScan::own(name, ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s: None, fold_m_s: None })
 }

@@ -5,18 +5,18 @@
 use super::gate::gate_of;
 use super::one_scan::{Velocities, options, retrieve_map};
 use super::others::envelopes;
+use super::own::scan_of_lines;
 use super::retrieved_scan::RetrievedScan;
 use super::truth::{TrueVortex, true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
-use crate::io::scans::ReadScan;
 use crate::measure::recorded::{Spectra, upward};
 use crate::measure::response::SceneResponse;
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
-use ndarray::{Array2, ArrayView2, Axis};
+use ndarray::{Array2, ArrayView2};
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, VortexResult, circulation_profile};
 use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
@@ -80,10 +80,11 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
         tests = self::tests(plan, &options, false_alarm, maps, observer)?;
     }
     observer.begin(Stage::Retrieval, (maps.len() * sweeps.len() * wanted.methods.len()) as u64);
-    let mut rows = Vec::new();
+    let (mut rows, g) = (Vec::new(), &plan.geometry);
+    let time_s: Vec<f64> = g.line_time_s.iter().map(|t| plan.wind.start_s + t).collect();
     let each = maps.iter().enumerate().flat_map(|map| sweeps.iter().zip(&truths).enumerate().map(move |of| (map, of)));
     for ((realisation, velocity_m_s), (sweep, (lines, truth))) in each {
-        let scan = || read_scan(plan, lines, velocity_m_s);
+        let scan = || scan_of_lines("retrieval", plan, lines, [&g.elevation_rad, &time_s], velocity_m_s);
         let by = |method| retrieve_map(scan(), method, options.clone(), velocities).ok();
         // the fit of the map also starts that of the signals and the integrals
         let of_map = wanted.methods.iter().any(|method| *method != Method::Rv).then(|| by(Method::Fit)).flatten();
@@ -112,21 +113,6 @@ fn upward_sweeps(plan: &Plan) -> Vec<Vec<usize>> {
         upward((0..g.schedule.lines.len()).filter(own), &g.elevation_rad)
     };
     (0..g.schedule.sweeps.len()).map(of_sweep).collect()
-}
-
-/// Lines of a map of one realisation as a scan.
-fn read_scan(plan: &Plan, lines: &[usize], velocity_m_s: &Array2<f64>) -> ReadScan {
-    let g = &plan.geometry;
-    let of = |values: &[f64]| lines.iter().map(|line| values[*line]).collect::<Vec<f64>>();
-    let map = ScanMap {
-        elevation_rad: of(&g.elevation_rad),
-        time_s: of(&g.line_time_s).iter().map(|t| plan.wind.start_s + t).collect(),
-        range_m: g.gate_range_m.clone(),
-        velocity_m_s: velocity_m_s.select(Axis(0), lines),
-        sigma_m_s: None,
-        fold_m_s: None,
-    };
-    ReadScan::own("retrieval", map)
 }
 
 /// What the signals of some lines of a realisation, which are made again, give by fit or envelopes; the wake of the map starts them.

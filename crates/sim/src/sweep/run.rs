@@ -105,8 +105,8 @@ pub struct Summary {
 pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn Observer) -> Result<Summary, Error> {
     let (definition, existing) =
         (Definition::of(sweep, !settings.no_circulation), Existing::with_overwrite(settings.overwrite));
-    let winds = Known::default();
-    let core_s = check(sweep, &winds, settings.allow_large)?;
+    let common = Common::default();
+    let core_s = check(sweep, &common, settings.allow_large)?;
     let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
     let mut names = vec![SWEEP.to_owned(), times.clone()];
     if settings.shard.is_none() {
@@ -122,17 +122,16 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
     observer.begin(Stage::Cases, due.len() as u64);
     let of_due_s = due.iter().filter_map(|case| core_s.get(case.index)).sum();
     observer.reach(&format!("forecast: {} of one core, to a factor of two", seconds(of_due_s)));
-    let known = Efficiencies::default();
     let (mut signals, mut walls) = (0, Vec::new());
     for group in groups(due.iter().map(|case| &case.scene)) {
         let planned = |&place: &usize| {
             let case: &'s Case = due[place];
-            Ok((case, plan(&case.scene, Target::Map, &winds, &Known::default()).map_err(|e| sweep.failed(case, 0, e))?))
+            Ok((case, common.plan(&case.scene, Target::Map).map_err(|e| sweep.failed(case, 0, e))?))
         };
         for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
             let begun = Instant::now();
             let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
-            let found = rows(&plans, &known, observer, !settings.no_circulation);
+            let found = rows(&plans, &common.efficiencies, observer, !settings.no_circulation);
             let found = found.map_err(|e| sweep.failed(cases[0], 0, e))?;
             signals += 1;
             let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
@@ -151,7 +150,7 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
         let gone = || Error::Input { path: out.join("cases"), reason: "a result that was written is gone".into() };
         files.extend(tables::write(&definition, &all.ok_or_else(gone)?, out, existing)?);
     }
-    let shared = Shared { flows: winds.len(), efficiencies: known.computed(), signals };
+    let shared = Shared { flows: common.winds.len(), efficiencies: common.efficiencies.computed(), signals };
     Ok(Summary { run: due.len(), kept: mine.len() - due.len(), shared, files })
 }
 
@@ -178,7 +177,9 @@ impl Common {
     /// # Errors
     /// As [`Plan::new`].
     pub(crate) fn plan(&self, scene: &SceneFile, target: Target) -> Result<Plan, Error> {
-        plan(scene, target, &self.winds, &self.screens)
+        let cause = hash_of(&format!("{:?}", (&scene.scene.flow, &scene.scene.added_flows, &scene.folder)));
+        let wind = self.winds.of(cause, || SceneWind::new(scene))?;
+        Plan::sharing(scene.clone(), target, wind, &self.screens)
     }
 
     /// How often phase screens were planned.
@@ -211,9 +212,9 @@ pub(crate) fn measured<T>(
 }
 
 /// Plans every case, and finds out whether it fits the memory; returns the forecast of the time of each, s of one core.
-fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<Vec<f64>, Error> {
+fn check(sweep: &Sweep, common: &Common, allow_large: bool) -> Result<Vec<f64>, Error> {
     let checked = |case: &Case| -> Result<f64, Error> {
-        let plan = plan(&case.scene, Target::Map, winds, &Known::default())?;
+        let plan = common.plan(&case.scene, Target::Map)?;
         if !allow_large {
             plan.fits()?;
         }
@@ -222,18 +223,6 @@ fn check(sweep: &Sweep, winds: &Known<SceneWind>, allow_large: bool) -> Result<V
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
     let others = found.iter().filter(|found| found.is_err()).count().saturating_sub(1);
     sweep.cases.iter().zip(found).map(|(case, found)| found.map_err(|e| sweep.failed(case, others, e))).collect()
-}
-
-/// The plan of a scene, with a wind and phase screens that others may share.
-fn plan(
-    scene: &SceneFile,
-    target: Target,
-    winds: &Known<SceneWind>,
-    screens: &Known<Vec<ScreenPlan>>,
-) -> Result<Plan, Error> {
-    let cause = hash_of(&format!("{:?}", (&scene.scene.flow, &scene.scene.added_flows, &scene.folder)));
-    let wind = winds.of(cause, || SceneWind::new(scene))?;
-    Plan::sharing(scene.clone(), target, wind, screens)
 }
 
 /// Places of the scenes with the same signals: those that differ in what is done with the records alone.
