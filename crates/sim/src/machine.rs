@@ -3,30 +3,23 @@
 //! Check: control groups and limits of the shell below the machine's memory win; text that is no number counts as no limit.
 
 use crate::plan::units;
-use std::path::Path;
 
 /// Memory that can be had without swapping, bytes: what the system says is available, or less where a control group or a limit
 /// of the shell (`ulimit -v`) leaves less. `None` where the system does not say.
 pub(crate) fn available_memory_bytes() -> Option<f64> {
     let read = |path: &str| std::fs::read_to_string(path).ok();
-    let mut found = read("/proc/meminfo").and_then(|text| kilobytes(&text, "MemAvailable:"));
-    let limit = read("/proc/self/limits").and_then(|text| of_addresses(&text));
-    if let (Some(limit), Some(text)) = (limit, read("/proc/self/status")) {
-        let left = (limit - kilobytes(&text, "VmSize:").unwrap_or(0.0)).max(0.0);
-        found = Some(found.map_or(left, |found: f64| found.min(left)));
-    }
-    for (limit, usage) in [
-        ("/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"),
-        ("/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"),
-    ] {
-        if Path::new(limit).exists()
-            && let (Some(limit), Some(usage)) = (read(limit).and_then(number), read(usage).and_then(number))
-        {
-            let left = (limit - usage).max(0.0);
-            found = Some(found.map_or(left, |found: f64| found.min(left)));
-        }
-    }
-    found
+    let of_system = || kilobytes(&read("/proc/meminfo")?, "MemAvailable:");
+    let of_shell = || {
+        let limit = of_addresses(&read("/proc/self/limits")?)?;
+        Some(limit - kilobytes(&read("/proc/self/status")?, "VmSize:").unwrap_or(0.0))
+    };
+    let of_group = |[limit, usage]: [&str; 2]| Some(number(read(limit)?)? - number(read(usage)?)?);
+    let groups = [
+        ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"],
+        ["/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"],
+    ];
+    let known = [of_system(), of_shell()].into_iter().chain(groups.map(of_group)).flatten();
+    known.map(|bytes| bytes.max(0.0)).reduce(f64::min)
 }
 
 /// Holds what a file asks for against the memory, before any of it is allocated.
