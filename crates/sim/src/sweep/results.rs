@@ -71,9 +71,11 @@ pub(crate) fn standard_error_of<'a>(name: &str, mut columns: impl Iterator<Item 
 /// What is collected of the maps of a case.
 struct Collected<'p> {
     plan: &'p Plan,
-    cells: Cells,
+    /// Distance of the cells from the nearer centre over the spacing, \[line, gate\]; infinite in air without vortices, NaN where centres
+    /// are not known.
+    distance: Array2<f64>,
     retrieval: Option<Retrieval<'p>>,
-    /// Cells outside the vortices, one of each group that shares windows, and their velocities, m/s, map after map.
+    /// Cells outside the vortices, all where these are not known, one of each group that shares windows, and their velocities, m/s, map after map.
     apart: Vec<(usize, usize)>,
     velocity_m_s: Vec<f64>,
 }
@@ -93,9 +95,7 @@ pub(super) fn rows(
     let scanner = Scanner::with(first, known, observer)?;
     let mut all = Vec::with_capacity(plans.len());
     for plan in plans {
-        let retrieval = if fits { Retrieval::new(plan, &scanner) } else { None };
-        let cells = Cells::new(plan)?;
-        all.push(Collected { plan, apart: cells.apart(), cells, retrieval, velocity_m_s: Vec::new() });
+        all.push(Collected::new(plan, if fits { Retrieval::new(plan, &scanner) } else { None })?);
     }
     let of_plans: Vec<&Plan> = plans.iter().collect();
     let maps = map::of_plans(&of_plans, &scanner, observer, |i, velocity_m_s| {
@@ -106,7 +106,40 @@ pub(super) fn rows(
     all.iter().zip(&maps).map(|(own, map)| own.row(map, &scanner)).collect()
 }
 
-impl Collected<'_> {
+impl<'p> Collected<'p> {
+    fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
+        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
+            let (y_m, z_m) = position_m(scene, g.elevation_rad[i], g.gate_range_m[j]);
+            match &scene.flow {
+                Flow::VortexPair(pair) => {
+                    let centres = vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
+                    let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
+                    to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
+                }
+                Flow::Simulated(_) | Flow::Fields(_) | Flow::VortexLines(_) => f64::NAN,
+                Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
+            }
+        });
+        let mut own = Self { plan, distance, retrieval, apart: Vec::new(), velocity_m_s: Vec::new() };
+        let [lines, gates] = shared_cells(plan)?.map(|cells| cells.ceil() as usize);
+        let outside = own.cells(OUTSIDE);
+        own.apart = if outside.is_empty() { own.cells(ALL) } else { outside };
+        own.apart.retain(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates));
+        Ok(own)
+    }
+
+    fn cells(&self, part: Part) -> Vec<(usize, usize)> {
+        self.distance.indexed_iter().filter(|(_, distance)| part(**distance)).map(|(cell, _)| cell).collect()
+    }
+
+    /// Standard deviation, bias and root mean square over some cells, each with its standard error, m/s.
+    fn averages(&self, map: &VelocityEstimates, part: Part) -> [f64; 6] {
+        let a = CellAverage::over(map, &self.cells(part));
+        let [bias, std] = [[a.bias_m_s, a.bias_standard_error_m_s], [a.std_m_s, a.std_standard_error_m_s]];
+        [std[0], std[1], bias[0], bias[1], a.rms_m_s, a.standard_error_m_s]
+    }
+
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
         let (plan, scene) = (self.plan, &self.plan.scene.scene);
         let middle = ScanMiddle::of(plan, None, Some(scanner))
@@ -118,7 +151,7 @@ impl Collected<'_> {
         let filter = range_filter(plan)?;
         let mut out = vec![middle.snr_db, filter.full_width_half_maximum_m(), filter.standard_deviation_m(), bound_m_s];
         for part in [ALL, INSIDE, OUTSIDE] {
-            out.extend(self.cells.averages(map, part));
+            out.extend(self.averages(map, part));
         }
         out.extend(flagged_fraction(map));
         let truths_m_s = self.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();
@@ -151,56 +184,6 @@ type Part = fn(f64) -> bool;
 const ALL: Part = |_| true;
 const INSIDE: Part = |distance| distance < INSIDE_PART;
 const OUTSIDE: Part = |distance| distance > OUTSIDE_PART;
-
-/// The cells of a map by their distance from the vortices.
-struct Cells {
-    /// Distance from the nearer centre over the spacing, \[line, gate\]; infinite in air without vortices, NaN where centres are
-    /// not known.
-    distance: Array2<f64>,
-    /// Neighbouring lines and gates that share windows.
-    shared: [f64; 2],
-}
-
-impl Cells {
-    /// Of the map of a plan.
-    ///
-    /// # Errors
-    /// What the regions refuse; a checked scene gives none.
-    fn new(plan: &Plan) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.scene, &plan.geometry);
-        let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
-            let (y_m, z_m) = position_m(scene, g.elevation_rad[i], g.gate_range_m[j]);
-            match &scene.flow {
-                Flow::VortexPair(pair) => {
-                    let centres = vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
-                    let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
-                    to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
-                }
-                Flow::Simulated(_) | Flow::Fields(_) | Flow::VortexLines(_) => f64::NAN,
-                Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
-            }
-        });
-        Ok(Self { distance, shared: shared_cells(plan)? })
-    }
-
-    fn of(&self, part: Part) -> Vec<(usize, usize)> {
-        self.distance.indexed_iter().filter(|(_, distance)| part(**distance)).map(|(cell, _)| cell).collect()
-    }
-
-    /// Cells outside the vortices, all where these are not known, so far apart that they share no window.
-    fn apart(&self) -> Vec<(usize, usize)> {
-        let [lines, gates] = self.shared.map(|cells| cells.ceil() as usize);
-        let cells = if self.of(OUTSIDE).is_empty() { self.of(ALL) } else { self.of(OUTSIDE) };
-        cells.into_iter().filter(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates)).collect()
-    }
-
-    /// Standard deviation, bias and root mean square, each with its standard error, m/s.
-    fn averages(&self, map: &VelocityEstimates, part: Part) -> [f64; 6] {
-        let a = CellAverage::over(map, &self.of(part));
-        let [bias, std] = [[a.bias_m_s, a.bias_standard_error_m_s], [a.std_m_s, a.std_standard_error_m_s]];
-        [std[0], std[1], bias[0], bias[1], a.rms_m_s, a.standard_error_m_s]
-    }
-}
 
 /// Distance along the ground and height of a point of the scan, m.
 fn position_m(scene: &Scene, elevation_rad: f64, range_m: f64) -> (f64, f64) {
