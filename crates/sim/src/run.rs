@@ -66,16 +66,9 @@ fn middle_m(plan: &Plan) -> f64 {
     0.5 * (scan.range_min_m + scan.range_max_m)
 }
 
-/// One line of the summary that a person or a program reads.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SummaryLine {
-    /// Name for programs, with the unit.
-    pub key: &'static str,
-    /// Description for people.
-    pub text: &'static str,
-    /// The value; NaN if it cannot be given.
-    pub value: f64,
-}
+/// One line of the summary that a person or a program reads: its name for programs, with the unit, its description for people, and the
+/// value; NaN if it cannot be given.
+pub type SummaryLine = (&'static str, &'static str, f64);
 
 /// Runs a plan.
 ///
@@ -163,7 +156,7 @@ impl RunResult {
     /// The results in a few numbers.
     pub fn summary(&self) -> Vec<SummaryLine> {
         let mut out = Vec::new();
-        let mut line = |key, text, value| out.push(SummaryLine { key, text, value });
+        let mut line = |key, text, value| out.push((key, text, value));
         if let Some(middle) = &self.middle {
             line("scan_range_m", "middle of the scan [m]", middle.range_m);
             line("scan_efficiency", "efficiency there", middle.efficiency);

@@ -9,7 +9,7 @@ use super::{Cli, dispatch, with_threads};
 use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
 use crate::io::raw::RawRecords;
-use crate::io::{Existing, Provenance, write_atomic};
+use crate::io::{Existing, Provenance, text_file, write_atomic};
 use crate::keys::{Located, Problem, SceneError};
 use crate::outputs::{self, Outputs};
 use crate::scene::{Outputs as Formats, SceneFile};
@@ -17,6 +17,7 @@ use crate::setup::progress::{Observer, stoppable};
 use crate::sweep::{Request, Sweep};
 use clap::Parser;
 use serde_json::Value;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
@@ -127,13 +128,18 @@ impl Cli {
         Ok(())
     }
 
-    fn text(&self, path: &Path) -> Option<&str> {
-        self.call.as_ref().and_then(|call| call.host.texts.get(path)).map(String::as_str)
+    /// The text of a scene or a case: what the program that called has for its path, else that of the file.
+    fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
+        let unreadable = |source| SceneError::Unreadable { path: path.to_owned(), source };
+        match self.call.as_ref().and_then(|call| call.host.texts.get(path)) {
+            Some(text) => Ok(text.into()),
+            None => text_file::read(path).map(Cow::Owned).map_err(unreadable),
+        }
     }
 
     /// The scene of a path, with the seed of the command line.
     pub(super) fn scene(&self, path: &Path) -> Result<SceneFile, Error> {
-        let file = self.text(path).map_or_else(|| SceneFile::read(path), |text| SceneFile::parse(text, path))?;
+        let file = SceneFile::parse(&self.text(path)?, path)?;
         match self.seed {
             Some(seed) => Ok(file.with(crate::scene::Scene { seed, ..file.scene.clone() })?),
             None => Ok(file),
@@ -142,20 +148,18 @@ impl Cli {
 
     /// The cases of a sweep over the scene of a path.
     pub(super) fn sweep(&self, path: &Path, request: &Request) -> Result<Sweep, Error> {
-        self.text(path).map_or_else(|| Sweep::new(path, request), |text| Sweep::parse(text, path, request))
+        Sweep::parse(&self.text(path)?, path, request)
     }
 
     /// Whether a path stands for the case of a flow, by its keys, and not for a scene.
     pub(super) fn is_case(&self, path: &Path) -> bool {
-        self.text(path).map_or_else(|| CaseFile::is_at(path), CaseFile::is_of)
+        self.text(path).is_ok_and(|text| CaseFile::is_of(&text))
     }
 
     /// The flow case of a path; keys that it lacks are those of the preset, if there is one.
     pub(super) fn case(&self, path: &Path, preset: Option<WakePreset>) -> Result<CaseFile, Error> {
-        match self.text(path) {
-            None => CaseFile::read(path, preset),
-            Some(text) => Ok(CaseFile::parse_over(preset, text, path)?),
-        }
+        let text = self.text(path)?;
+        Ok(CaseFile::parse_over(preset, &text, path)?)
     }
 
     /// The signals that a path stands for, where the program that called gave them.

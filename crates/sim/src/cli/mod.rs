@@ -5,7 +5,6 @@
 
 mod accuracy;
 mod bound;
-mod budget;
 mod detect;
 mod estimate;
 mod flow;
@@ -90,7 +89,7 @@ enum Command {
     /// The Cramer-Rao bound on the velocity, against signal-to-noise ratio and against range.
     Bound(bound::BoundWords),
     /// The power budget in dB, from the energy of a pulse to the signal-to-noise ratio, with what bounds the instrument.
-    Budget(budget::BudgetWords),
+    Budget(bound::BudgetWords),
     /// Whether scans hold a wake, at a rate of false alarms; the smallest circulation that is found.
     Detect(detect::DetectWords),
     /// Run many scenes that differ in some keys: a table and pictures of what each gives.
@@ -162,7 +161,7 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
         Command::Estimate(words) => estimate::estimate(words, cli),
         Command::Retrieve(words) => retrieve::retrieve(words, cli),
         Command::Bound(words) => bound::bound(words, cli),
-        Command::Budget(words) => budget::budget(words, cli),
+        Command::Budget(words) => bound::budget(words, cli),
         Command::Detect(words) => detect::detect(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),
         Command::Pareto(words) => sweep::pareto(words, cli),
@@ -189,6 +188,10 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
     )
 }
 
+/// What the ratio of a check lacks where phase screens make the efficiency.
+const AS_ON_INDEPENDENT_PATHS: &str =
+    "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says";
+
 fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let plan = planned(&words.scene, Target::Run, words.allow_large, cli)?;
     if let Some(folder) = &words.out {
@@ -209,12 +212,7 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     // What only phase screens could tell is not told.
     let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.scene) == Model::MonteCarlo;
     object["budget"]["independent_paths"] = json!(is_less);
-    let screens = match is_less {
-        true => {
-            "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says"
-        }
-        false => "",
-    };
+    let screens = if is_less { AS_ON_INDEPENDENT_PATHS } else { "" };
     let joined = |cells: Vec<String>| cells.join(", ");
     let short = format!(
         "SNR in the band, one pulse, at {} m: {} dB{screens}",
@@ -241,8 +239,8 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     }
     let outcome = run::run(&plan, &*cli.observer())?;
     let summary = outcome.summary();
-    let mut text: String = summary.iter().map(|line| format!("{:<44} {}\n", line.text, digits(line.value))).collect();
-    let values: serde_json::Map<String, Value> = summary.iter().map(|l| (l.key.to_owned(), json!(l.value))).collect();
+    let mut text: String = summary.iter().map(|(_, text, value)| format!("{text:<44} {}\n", digits(*value))).collect();
+    let values: serde_json::Map<_, _> = summary.iter().map(|(key, _, value)| ((*key).into(), json!(value))).collect();
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
     if let Some(retrieval) = &outcome.retrieval {

@@ -336,7 +336,7 @@ fn list(method: Method, count: usize, found: Option<&Found>, files: &mut Outputs
 fn text(found: &[RetrievedScan]) -> String {
     let mut out = String::new();
     for (number, scan) in found.iter().enumerate() {
-        let flags: Vec<&str> = scan.result.flags.iter().map(|flag| flag.name()).collect();
+        let flags = retrieve::flags(&scan.result);
         let flags = if flags.is_empty() { String::new() } else { format!("  [{}]", flags.join(" ")) };
         if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
             let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);

@@ -4,7 +4,7 @@ use super::words::TableWords;
 use super::{Cli, paths};
 use crate::io::Existing;
 use crate::io::csv_input::TextTable;
-use crate::sweep::front_table::{FrontTable, Wanted};
+use crate::sweep::pareto::{FrontTable, Wanted};
 use crate::sweep::{Request, Settings, merge, run};
 use crate::{Error, sweep};
 use clap::Args;

@@ -66,21 +66,16 @@ pub struct CaseFile {
 }
 
 impl CaseFile {
-    /// Reads and checks a case file; keys that it does not have are those of the preset of a wake, if there is one.
+    /// Reads and checks a case file.
     ///
     /// # Errors
     /// What the system says; [`SceneError`] names the file, the line, the key, the value and what is allowed.
-    pub fn read(path: &Path, preset: Option<WakePreset>) -> Result<Self, Error> {
+    pub fn read(path: &Path) -> Result<Self, Error> {
         let text = text_file::read(path).map_err(Error::io("read the case", path))?;
-        Ok(Self::parse_over(preset, &text, path)?)
+        Ok(Self::parse(&text, path)?)
     }
 
-    /// Whether a file is a case, by its keys, and no scene.
-    pub fn is_at(path: &Path) -> bool {
-        text_file::read(path).is_ok_and(|text| Self::is_of(&text))
-    }
-
-    /// The same of its text.
+    /// Whether a text is a case, by its keys, and no scene.
     pub fn is_of(text: &str) -> bool {
         text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("case"))
     }

@@ -3,8 +3,8 @@
 //! [`keys!`] declares tables (name, type, default and limits of each key), tables whose keys depend on one of them, and
 //! choices of names. Reading, the walk over a text ([`super::vet`]), limits, examples and hints follow from it.
 
-use super::checker::Checker;
 use super::key::{Key, Kind};
+use super::limit::Checker;
 
 /// What a type reads, and the limits of what it holds.
 pub(crate) trait Declared {

@@ -7,23 +7,18 @@
 //!
 //! Check: each key of a scene and of every case is given values of the wrong kind; the refusal names that key.
 
-mod checker;
 mod declare;
 mod key;
 mod limit;
 mod problem;
-mod source;
 mod vet;
 mod words;
 
-pub(crate) use checker::{Checker, side};
 pub(crate) use declare::{Declared, choice, foreign_choices, held, keys, keys_of, kinds, second, table};
 pub(crate) use key::{Key, Kind, join};
 #[cfg(feature = "flow")]
 pub(crate) use limit::{ABOVE_ZERO, FINITE};
-pub(crate) use limit::{ABOVE_ZERO_OR_INF, Is, Limit, NothingOr, Number, ZERO_OR_MORE};
+pub(crate) use limit::{ABOVE_ZERO_OR_INF, Checker, Is, Limit, NothingOr, Number, ZERO_OR_MORE, side};
 pub use problem::{Located, Problem, SceneError};
-pub(crate) use source::Source;
-pub(crate) use vet::{Document, Format, value_at};
-pub(crate) use words::unit_of;
-pub(crate) use words::{near, one_of};
+pub(crate) use vet::{Document, Format, Source, value_at};
+pub(crate) use words::{near, one_of, unit_of};

@@ -44,7 +44,7 @@ pub struct Located {
 #[non_exhaustive]
 pub enum SceneError {
     /// The file cannot be read.
-    #[error("cannot read the scene {}: {source}", path.display())]
+    #[error("cannot read {}: {source}", path.display())]
     Unreadable {
         /// The file.
         path: PathBuf,
@@ -87,10 +87,4 @@ fn list(path: &Path, problems: &[Located]) -> String {
         lines.push(format!("and {} more", problems.len() - MOST_LINES));
     }
     lines.join("\n")
-}
-
-impl Display for Located {
-    fn fmt(&self, f: &mut Formatter<'_>) -> Result {
-        self.problem.fmt(f)
-    }
 }

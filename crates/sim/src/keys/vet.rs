@@ -1,11 +1,12 @@
-//! A text beside the description of its keys: what does not fit, and the table that it stands for.
+//! A text beside the description of its keys: what does not fit, the table that it stands for, and the lines of problems that are found
+//! later.
 
 use super::key::{Key, Kind, join};
 use super::problem::{Located, Problem, SceneError};
 use super::words::{near, one_of, quote, tables_with, wanted};
 use serde::de::DeserializeOwned;
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::Spanned;
 use toml::Value;
 use toml::de::{DeTable, DeValue};
@@ -119,6 +120,49 @@ impl<'a> Document<'a> {
 
     fn quote(&self, span: Range<usize>) -> String {
         quote(self.text.get(span).unwrap_or_default())
+    }
+}
+
+/// The text of a scene or a case; empty for one that was made in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Source {
+    path: PathBuf,
+    text: String,
+}
+
+impl Source {
+    pub(crate) fn new(path: &Path, text: &str) -> Self {
+        Self { path: path.to_owned(), text: text.to_owned() }
+    }
+
+    #[cfg(feature = "flow")]
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The folder from which files that the text names are looked for.
+    pub(crate) fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Problems of what was asked for beside the text.
+    #[cfg(feature = "flow")]
+    pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
+        let problems = problems.into_iter().map(|problem| Located { problem, line: None }).collect();
+        SceneError::Invalid { path: self.path.clone(), problems }
+    }
+
+    /// Whether the text gives a value to a key.
+    pub(crate) fn has(&self, key: &str) -> bool {
+        Document::parse(&self.text, &self.path).is_ok_and(|document| document.value(key).is_some())
+    }
+
+    /// Problems with the lines of the text.
+    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
+        match Document::parse(&self.text, &self.path) {
+            Ok(document) => document.located(problems),
+            Err(error) => error,
+        }
     }
 }
 
@@ -367,23 +411,18 @@ impl Format<'_> {
     /// The value of a key in the texts with examples, or its default; of a list also one of its values, `key[0]`.
     pub(crate) fn example(&self, path: &str, kind: &Kind) -> Option<String> {
         let (whole, element) = path.split_once('[').map_or((path, false), |(whole, _)| (whole, true));
-        let is_list = matches!(kind, Kind::List { .. });
+        let at = if element { format!("{whole}[0]") } else { whole.to_owned() };
         let of_text = |text: &&str| {
             let document = Document::parse(text, Path::new("")).ok()?;
-            let (_, value) = find(&document.table, whole)?;
-            let span = match value.get_ref() {
-                DeValue::Array(values) if element => values.first()?.span(),
-                DeValue::Array(values) if is_list && !values.is_empty() => value.span(),
-                DeValue::Array(_) => return None,
-                _ if is_list || element => return None,
-                _ => value.span(),
-            };
-            Some(document.quote(span))
+            let (_, value) = find(&document.table, &at)?;
+            let has_values = value.get_ref().as_array().map(|values| !values.is_empty());
+            let fits = has_values == matches!(kind, Kind::List { .. }).then_some(true);
+            fits.then(|| document.quote(value.span()))
         };
         let of_defaults = || {
-            let (first, rest) = whole.split_once('.').map_or((whole, None), |(first, rest)| (first, Some(rest)));
-            let value = self.defaults.get(first)?;
-            let value = rest.map_or(Some(value), |rest| value_at(value, rest))?;
+            let mut keys = whole.split('.');
+            let section = keys.next().and_then(|section| self.defaults.get(section))?;
+            let value = keys.try_fold(section, |table, key| table.get(key))?;
             let plain = !value.is_array() && !value.is_table() && !element;
             plain.then(|| value.to_string())
         };

@@ -1,7 +1,7 @@
 //! Retrieval of one map.
 
 use super::own::{retold, set};
-use super::retrieved_scan::{RetrievedScan, refused};
+use super::table::{RetrievedScan, refused};
 use crate::Error;
 use crate::detection::strided;
 use crate::io::scans::ReadScan;

@@ -2,7 +2,7 @@
 //!
 //! Check: a pair's envelopes, inverted, have its circulation, and raw ones more, in the tests of the program.
 
-use super::retrieved_scan::{RetrievedScan, refused};
+use super::table::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::Table;
 use crate::measure::recorded::{Spectra, upward};

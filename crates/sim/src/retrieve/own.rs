@@ -2,7 +2,7 @@
 //!
 //! Check: circulations of maps and signals of a pair within their stated deviations.
 
-use super::retrieved_scan::{RetrievedScan, refused};
+use super::table::{RetrievedScan, refused};
 use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::io::scans::ReadScan;

@@ -1,12 +1,13 @@
-//! A scan, the wake that was found in it, and what is left.
+//! A scan, the wake that was found in it, and what is left; the track of vortices through several scans.
 //!
 //! Check: by eye; the files of a retrieval are named in its test.
 
 use super::RetrievedScan;
+use super::tracks::COLUMNS;
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
-use crate::plot::{Figure, MapPlot};
-use wakescope_estimate::retrieval::{Flag, Side, expected_velocities};
+use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
+use wakescope_estimate::retrieval::{Flag, Measured, ScanResult, Side, Track, expected_velocities};
 
 /// Velocities, the fitted wake and the residual of a scan side by side; velocities alone where no wake was found.
 ///
@@ -68,4 +69,42 @@ fn title(scan: &RetrievedScan, number: usize) -> String {
     let found: Vec<String> = [of(Side::Left), of(Side::Right)].into_iter().flatten().collect();
     let found = if found.is_empty() { "no wake".to_owned() } else { found.join(", ") };
     format!("Scan {number}, radial velocity [m/s]: {found}")
+}
+
+/// Circulation, lateral position and height against time, with bands of one standard deviation and the results of the scans.
+pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
+    let panels = [
+        ("Circulation", "circulation [m²/s]", 0),
+        ("Lateral position", "distance [m]", 1),
+        ("Height", "height [m]", 2),
+    ];
+    let panel = |(title, label, column): (&str, &str, usize)| {
+        let (_, _, get) = COLUMNS[column];
+        let mut plot = CurvePlot::new(title, Axis::linear("time [s]"), Axis::linear(label));
+        for (colour, side) in [Side::Left, Side::Right].into_iter().enumerate() {
+            let of_track: Vec<(f64, Measured)> = track
+                .points
+                .iter()
+                .filter_map(|point| {
+                    Some((point.time_s, get(point.vortices.iter().find(|vortex| vortex.side == side)?)))
+                })
+                .collect();
+            let of_scan = |result: &ScanResult| {
+                let vortex = result.vortex(side)?;
+                let of = [vortex.circulation_m2_s, vortex.lateral_position_m, vortex.height_m];
+                Some((result.reference_time_s, of[column].value))
+            };
+            let stds: Vec<f64> = of_track.iter().map(|(_, m)| m.std).collect();
+            let line = Series::new(super::table::side(side), Style::Line, of_track.iter().map(|(t, m)| (*t, m.value)));
+            let dots = scans.iter().filter_map(|scan| of_scan(&scan.result));
+            plot = plot
+                .with(line.with_band(&stds).in_colour(colour))
+                .with(Series::new("", Style::Markers, dots).in_colour(colour));
+        }
+        CurvePlot { shape: 0.75, ..plot }
+    };
+    let mut figure =
+        Figure::side_by_side(panels.map(panel)).titled("Track of the vortices: smoothed, with one standard deviation");
+    figure.width = 1560.0;
+    figure
 }

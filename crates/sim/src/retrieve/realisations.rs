@@ -6,7 +6,7 @@ use super::gate::gate_of;
 use super::one_scan::{Velocities, options, retrieve_map};
 use super::others::envelopes;
 use super::own::scan_of_lines;
-use super::retrieved_scan::RetrievedScan;
+use super::table::{RetrievedScan, flags};
 use super::truth::{TrueVortex, true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
@@ -179,7 +179,7 @@ fn rows_of(
         let wake = found.and_then(|found| found.result.wake);
         let place = |v: VortexResult| (v.lateral_position_m.value, v.height_m.value);
         let at_truth = (truth_of.lateral_position_m, truth_of.height_m);
-        let flags = found.map_or(Vec::new(), |found| found.result.flags.iter().map(|flag| flag.name()).collect());
+        let flags = found.map_or(Vec::new(), |found| flags(&found.result));
         Ok(RetrievalRow {
             realisation,
             sweep,

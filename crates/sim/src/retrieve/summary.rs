@@ -35,20 +35,22 @@ const QUANTITIES: [Quantity; 5] = [
 impl SceneRetrieval {
     /// The errors of all quantities whose truth is known.
     fn errors(&self) -> Vec<Errors> {
-        let mut of: Vec<(Method, Side)> = Vec::new();
+        let mut methods: Vec<Method> = Vec::new();
         for row in &self.rows {
-            if !of.iter().any(|(method, _)| *method == row.method) {
-                of.extend([Side::Left, Side::Right].map(|side| (row.method, side)));
+            if !methods.contains(&row.method) {
+                methods.push(row.method);
             }
         }
-        let of_vortex = |(method, side): (Method, Side)| {
+        let mut all = Vec::new();
+        for (method, side) in methods.into_iter().flat_map(|method| [(method, Side::Left), (method, Side::Right)]) {
             let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == (method, side)).collect();
-            QUANTITIES.iter().filter_map(move |(quantity, found, truth)| {
-                let (counts, numbers) = errors(*found, *truth, &rows)?;
-                Some((method, side, *quantity, counts, numbers))
-            })
-        };
-        of.into_iter().flat_map(of_vortex).collect()
+            for (quantity, found, truth) in QUANTITIES {
+                all.extend(
+                    errors(found, truth, &rows).map(|(counts, numbers)| (method, side, quantity, counts, numbers)),
+                );
+            }
+        }
+        all
     }
 
     /// Share of the maps whose test says wake; nothing without a test.

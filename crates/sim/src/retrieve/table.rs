@@ -2,9 +2,26 @@
 //!
 //! Check: rows of no wake, one vortex and two.
 
-use super::retrieved_scan::RetrievedScan;
+use crate::Error;
 use crate::io::Table;
-use wakescope_estimate::retrieval::{Measured, ScanResult, Side, VortexResult};
+use crate::io::scans::ReadScan;
+use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanResult, Side, VortexResult};
+
+/// One scan with what was found in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RetrievedScan {
+    /// The scan.
+    pub scan: ReadScan,
+    /// How it was retrieved.
+    pub options: RetrievalOptions,
+    /// Its vortices, or none.
+    pub result: ScanResult,
+}
+
+/// An error of the fits with the file that caused it.
+pub(super) fn refused(scan: &ReadScan, error: &wakescope_estimate::Error) -> Error {
+    Error::Input { path: scan.path.clone(), reason: format!("sweep {}: {error}", scan.sweep) }
+}
 
 /// A row for each vortex and scan; a scan without a wake has one row without a vortex.
 pub fn rows(scans: &[RetrievedScan]) -> Table {
@@ -77,7 +94,8 @@ pub fn side(side: Side) -> &'static str {
     }
 }
 
-fn flags(result: &ScanResult) -> Vec<&'static str> {
+/// Names of what is to be thought of a result.
+pub fn flags(result: &ScanResult) -> Vec<&'static str> {
     result.flags.iter().map(|flag| flag.name()).collect()
 }
 

@@ -5,10 +5,6 @@
 use super::RetrievedScan;
 use crate::Error;
 use crate::io::Table;
-#[cfg(feature = "plots")]
-use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
-#[cfg(feature = "plots")]
-use wakescope_estimate::retrieval::Side;
 use wakescope_estimate::retrieval::{Measured, ScanResult, Track, TrackOptions, TrackedVortex, track};
 
 /// The track of several scans in the order of their times; nothing of a single scan, of scans without times, or without a wake.
@@ -30,7 +26,7 @@ pub fn track_of(scans: &[RetrievedScan]) -> Result<Option<Track>, Error> {
 type OfVortex = (&'static str, &'static str, fn(&TrackedVortex) -> Measured);
 
 /// Columns of a track.
-const COLUMNS: [OfVortex; 6] = [
+pub(super) const COLUMNS: [OfVortex; 6] = [
     ("gamma_m2_s", "gamma_std_m2_s", |v| v.circulation_m2_s),
     ("y_m", "y_std_m", |v| v.lateral_position_m),
     ("z_m", "z_std_m", |v| v.height_m),
@@ -53,43 +49,4 @@ pub fn track_table(track: &Track) -> Table {
             .float(std, all.iter().map(|(_, vortex)| get(vortex).std));
     }
     table
-}
-
-/// Circulation, lateral position and height against time, with bands of one standard deviation and the results of the scans.
-#[cfg(feature = "plots")]
-pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
-    let panels = [
-        ("Circulation", "circulation [m²/s]", 0),
-        ("Lateral position", "distance [m]", 1),
-        ("Height", "height [m]", 2),
-    ];
-    let panel = |(title, label, column): (&str, &str, usize)| {
-        let (_, _, get) = COLUMNS[column];
-        let mut plot = CurvePlot::new(title, Axis::linear("time [s]"), Axis::linear(label));
-        for (colour, side) in [Side::Left, Side::Right].into_iter().enumerate() {
-            let of_track: Vec<(f64, Measured)> = track
-                .points
-                .iter()
-                .filter_map(|point| {
-                    Some((point.time_s, get(point.vortices.iter().find(|vortex| vortex.side == side)?)))
-                })
-                .collect();
-            let of_scan = |result: &ScanResult| {
-                let vortex = result.vortex(side)?;
-                let of = [vortex.circulation_m2_s, vortex.lateral_position_m, vortex.height_m];
-                Some((result.reference_time_s, of[column].value))
-            };
-            let stds: Vec<f64> = of_track.iter().map(|(_, m)| m.std).collect();
-            let line = Series::new(super::table::side(side), Style::Line, of_track.iter().map(|(t, m)| (*t, m.value)));
-            let dots = scans.iter().filter_map(|scan| of_scan(&scan.result));
-            plot = plot
-                .with(line.with_band(&stds).in_colour(colour))
-                .with(Series::new("", Style::Markers, dots).in_colour(colour));
-        }
-        CurvePlot { shape: 0.75, ..plot }
-    };
-    let mut figure =
-        Figure::side_by_side(panels.map(panel)).titled("Track of the vortices: smoothed, with one standard deviation");
-    figure.width = 1560.0;
-    figure
 }

@@ -1,15 +1,16 @@
 //! What a scene may say: every limit, and the limits between keys.
 //!
 //! [`Scene::problems`] collects all violations, so that one run of `wakescope check` shows them
-//! all. Each names the key, the value and what is allowed.
+//! all. Each names the key, the value and what is allowed. Limits between keys blame one that the file states, not the default beside it.
 
 use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    EfficiencyOfPulse, FORMAT, FieldFlow, Flow, PulseShape, Scan, Scene, SnrReference, SpectrumKind, Turbulence,
+    DetectorSignal, EfficiencyOfPulse, FORMAT, FieldFlow, Flow, Method, Outside, Pattern, PulseShape, Scan, Scene,
+    SnrReference, SpectrumKind, Turbulence,
 };
-use crate::keys::{Checker, Declared as _, Problem};
+use crate::keys::{Checker, Declared as _, Problem, side};
 
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
@@ -49,10 +50,8 @@ impl Scene {
 
     fn check_instrument(&self, c: &mut Checker<'_>) {
         if let PulseShape::Sampled(shape) = &self.pulse.shape {
-            let lists = [("pulse.shape.time_s", &shape.time_s), ("pulse.shape.power", &shape.power)];
-            let phase = ("pulse.shape.phase_rad", &shape.phase_rad);
-            let lists = lists.into_iter().chain((!phase.1.is_empty()).then_some(phase));
-            let counts: Vec<(&str, usize)> = lists.map(|(key, list)| (key, list.len())).collect();
+            let mut counts = vec![("pulse.shape.time_s", shape.time_s.len()), ("pulse.shape.power", shape.power.len())];
+            counts.extend(Some(("pulse.shape.phase_rad", shape.phase_rad.len())).filter(|(_, count)| *count > 0));
             check_lengths(&counts, "pulse.shape", c);
         }
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
@@ -127,6 +126,243 @@ impl Scene {
     }
 }
 
+impl Scene {
+    /// Limits that make sense only where each key is within its own.
+    pub(super) fn check_between(&self, c: &mut Checker<'_>) {
+        self.check_instrument_between(c);
+        self.check_band(c);
+        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial(_)) {
+            self.check_lines(c);
+        }
+        self.check_scan_between(c);
+        self.check_ranges(c);
+        if self.outputs.hpl {
+            self.check_hpl(c);
+        }
+        let o = &self.outputs;
+        let ends = [o.profile_range_max_m, o.profile_range_min_m];
+        c.compare(["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, "above");
+    }
+
+    fn check_instrument_between(&self, c: &mut Checker<'_>) {
+        let t = &self.telescope;
+        let radii = [t.obscuration_radius_m, t.aperture_radius_m];
+        c.compare(["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, "below");
+        if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
+            let keys = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.inner_scale_m"];
+            c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above");
+        }
+        if let Flow::VortexPair(p) = &self.flow {
+            let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
+            c.between(
+                core_m < 0.5 * spacing_m,
+                &[
+                    side("flow.core_radius_m", core_m, format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m)),
+                    side("flow.spacing_m", spacing_m, format!("above twice flow.core_radius_m, {} m", 2.0 * core_m)),
+                ],
+            );
+        }
+    }
+
+    /// The detector band of two quadratures lies within the sampling frequency, and before they are made above 0.
+    fn check_band_of_quadratures(&self, c: &mut Checker<'_>) {
+        let d = &self.detector;
+        let (width_hz, most_hz) = (d.bandwidth_hz, d.sampling_hz.min(2.0 * d.intermediate_frequency_hz));
+        let why = "so that two quadratures of the sampling frequency hold the band about the intermediate one";
+        let (below, above) = (format!("below {most_hz:e} Hz, {why}"), format!("above {width_hz:e} Hz, {why}"));
+        let middle = format!("above {:e} Hz, {why}", 0.5 * width_hz);
+        let mut sides = vec![side("detector.bandwidth_hz", width_hz, below)];
+        if d.sampling_hz <= width_hz {
+            sides.push(side("detector.sampling_hz", d.sampling_hz, above));
+        }
+        if d.intermediate_frequency_hz <= 0.5 * width_hz {
+            sides.push(side("detector.intermediate_frequency_hz", d.intermediate_frequency_hz, middle));
+        }
+        c.between(width_hz < most_hz, &sides);
+    }
+
+    /// The detector band lies between 0 and half the sampling frequency.
+    fn check_band(&self, c: &mut Checker<'_>) {
+        if self.detector.signal == DetectorSignal::Baseband {
+            return self.check_band_of_quadratures(c);
+        }
+        let d = &self.detector;
+        let (centre_hz, half_hz, nyquist_hz) = (d.intermediate_frequency_hz, 0.5 * d.bandwidth_hz, 0.5 * d.sampling_hz);
+        let why = "so that the detector band lies between 0 and half of detector.sampling_hz";
+        let ok = centre_hz > half_hz && centre_hz + half_hz < nyquist_hz;
+        let narrowest_hz = centre_hz.min(nyquist_hz - centre_hz);
+        let mut sides = Vec::new();
+        if half_hz < nyquist_hz - half_hz {
+            let allowed = format!("above {half_hz:e} and below {:e} Hz, {why}", nyquist_hz - half_hz);
+            sides.push(side("detector.intermediate_frequency_hz", centre_hz, allowed));
+        }
+        if centre_hz > half_hz {
+            let allowed = format!("above {:e} Hz, {why}", 2.0 * (centre_hz + half_hz));
+            sides.push(side("detector.sampling_hz", d.sampling_hz, allowed));
+        }
+        if narrowest_hz > 0.0 {
+            let allowed = format!("below {:e} Hz, {why}", 2.0 * narrowest_hz);
+            sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, allowed));
+        }
+        // Where no single key can mend it, the one that asks for most.
+        let allowed = format!("more than detector.bandwidth_hz, {:e} Hz, and {why}", d.bandwidth_hz);
+        sides.push(side("detector.sampling_hz", d.sampling_hz, allowed.clone()));
+        sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, format!("below {nyquist_hz:e} Hz, {why}")));
+        let beyond =
+            format!("above {half_hz:e} Hz, half of detector.bandwidth_hz, and below {nyquist_hz:e} Hz less that");
+        sides.push(side("detector.intermediate_frequency_hz", centre_hz, beyond));
+        if c.between(ok, &sides) {
+            self.check_frequencies(c);
+        }
+    }
+
+    /// The spectrum has a frequency in the band.
+    fn check_frequencies(&self, c: &mut Checker<'_>) {
+        let (d, e) = (&self.detector, &self.estimator);
+        let (key, value, points_of_one) = match e.method {
+            Method::PulsePair {} => ("estimator.window_samples", e.window_samples, 4.0),
+            _ => ("estimator.padded_samples", e.padded_samples, 1.0),
+        };
+        let step_hz = d.sampling_hz / (value as f64 * points_of_one);
+        let place = |edge: f64| (d.intermediate_frequency_hz + edge * 0.5 * d.bandwidth_hz) / step_hz;
+        let why = "so that the spectrum has a frequency in the detector band";
+        let needed = (d.sampling_hz / (d.bandwidth_hz * points_of_one)).ceil();
+        c.between(
+            (place(-1.0) - 1e-9).ceil() <= (place(1.0) + 1e-9).floor(),
+            &[
+                side("detector.bandwidth_hz", d.bandwidth_hz, format!("at least {step_hz:e} Hz, {why}")),
+                (key, value.to_string(), format!("at least {needed}, {why}")),
+            ],
+        );
+    }
+
+    fn check_lines(&self, c: &mut Checker<'_>) {
+        let s = &self.scan;
+        let (low_rad, high_rad) = (s.elevation_min_rad, s.elevation_max_rad);
+        c.compare(["scan.elevation_max_rad", "scan.elevation_min_rad"], [high_rad, low_rad], "at least");
+        let lowest_m = s.lidar_height_m + s.range_max_m * low_rad.sin();
+        c.require(
+            lowest_m >= 0.0 || s.below_ground != (Outside::Error {}),
+            "scan.elevation_min_rad",
+            low_rad,
+            format!(
+                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
+                 scan.below_ground.policy = \"mask\" allows",
+                // Not -0.
+                (-s.lidar_height_m / s.range_max_m).asin() + 0.0,
+                -lowest_m
+            ),
+        );
+    }
+
+    fn check_ranges(&self, c: &mut Checker<'_>) {
+        let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
+        // Scatterers that a sample sees reach back by the length of the summation of (15).
+        let reach_m = self.pulse_reach_m();
+        let mut sides = vec![side(
+            "scan.range_min_m",
+            first_m,
+            format!("above {reach_m:.3} m, half the length of the pulse in the air"),
+        )];
+        match &self.pulse.shape {
+            PulseShape::Sampled(_) => {
+                let allowed = format!(
+                    "that ends so early that half its length in the air, {reach_m:.3} m, is below scan.range_min_m"
+                );
+                sides.push(("pulse.shape", String::new(), format!("a pulse {allowed}, {first_m} m")));
+            }
+            PulseShape::Gaussian(shape) => {
+                // A little less, so that rounding it is safe.
+                let longest_s = shape.duration_s * first_m / reach_m * (1.0 - 1e-4);
+                let allowed = format!(
+                    "below {longest_s:.4e} s, so that half the length of the pulse in the air is below scan.range_min_m, {first_m} m"
+                );
+                sides.push(side("pulse.shape.duration_s", shape.duration_s, allowed));
+            }
+        }
+        c.between(first_m > reach_m, &sides);
+        let ordered = c.compare(["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], "above");
+        if ordered {
+            self.check_record(c);
+        }
+    }
+
+    /// The record has samples for a window, and not too many of them.
+    fn check_record(&self, c: &mut Checker<'_>) {
+        let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
+        let sampling_hz = self.detector.sampling_hz;
+        let (samples, spacing_m) = (self.samples_per_record(), self.sample_spacing_m());
+        let many = format!("records of at most 10000000 samples; this one has {samples}");
+        c.between(
+            samples <= 10_000_000,
+            &[
+                side("scan.range_max_m", last_m, many.clone()),
+                side("scan.range_min_m", first_m, many.clone()),
+                side("detector.sampling_hz", sampling_hz, many),
+            ],
+        );
+        let window = self.estimator.window_samples;
+        let window_m = (window as f64 - 1.0) * spacing_m;
+        let why = format!("so that the record, {samples} samples, holds estimator.window_samples, {window}");
+        // Rounded to the side that is accepted.
+        let up = |x: f64| (x * 1e3).ceil() / 1e3;
+        let down = |x: f64| (x * 1e3).floor() / 1e3;
+        let window_side = (
+            "estimator.window_samples",
+            window.to_string(),
+            format!("at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m"),
+        );
+        let faster_hz = sampling_hz * (window_m / (last_m - first_m)) * (1.0 + 1e-6);
+        c.between(
+            window <= samples,
+            &[
+                window_side,
+                side("scan.range_max_m", last_m, format!("at least {} m, {why}", up(first_m + window_m))),
+                side("scan.range_min_m", first_m, format!("at most {} m, {why}", down(last_m - window_m))),
+                side("detector.sampling_hz", sampling_hz, format!("at least {faster_hz:.6e} Hz, {why}")),
+            ],
+        );
+    }
+
+    /// A HALO raw file counts gates from the lidar and knows their length alone.
+    pub(super) fn check_hpl(&self, c: &mut Checker<'_>) {
+        let e = &self.estimator;
+        let window = e.window_samples;
+        if !c.require(
+            e.gate_step_samples == window,
+            "outputs.hpl",
+            true,
+            format!(
+                "only with gates that touch and do not overlap: estimator.gate_step_samples = {window}, as \
+                 estimator.window_samples, not {}",
+                e.gate_step_samples
+            ),
+        ) {
+            return;
+        }
+        let gate_m = window as f64 * self.sample_spacing_m();
+        let number = (self.scan.range_min_m / gate_m).round();
+        let near_m = |number: f64| (number * gate_m * 1e4).round() / 1e4;
+        c.require(
+            // A millimetre is below what readers of the format keep.
+            (number * gate_m - self.scan.range_min_m).abs() <= 1e-3,
+            "scan.range_min_m",
+            self.scan.range_min_m,
+            format!(
+                "a whole number of gates of {gate_m:.4} m with outputs.hpl, such as {} or {} m",
+                near_m((self.scan.range_min_m / gate_m).floor()),
+                near_m((self.scan.range_min_m / gate_m).floor() + 1.0)
+            ),
+        );
+        c.require(
+            self.samples_per_record() >= 2 * window,
+            "scan.range_max_m",
+            self.scan.range_max_m,
+            format!("at least {:.4} m with outputs.hpl, which needs two gates", self.scan.range_min_m + 2.0 * gate_m),
+        );
+    }
+}
+
 /// Lists of a table that belong together have the same length; the one that differs from the first is blamed.
 fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
     let Some((first, count)) = counts.first() else { return };
@@ -142,7 +378,8 @@ fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Flow;
+    use crate::scene::SceneFile;
+    use std::path::Path;
 
     fn keys(change: impl FnOnce(&mut Scene)) -> Vec<String> {
         let mut scene = Scene::default();
@@ -212,5 +449,134 @@ mod tests {
         };
         assert!(with(-0.1).is_empty());
         assert_eq!(with(-0.101), ["scan.elevation_min_rad"]);
+    }
+
+    fn message(text: &str) -> String {
+        SceneFile::parse(text, Path::new("s.toml")).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_limit_between_keys_blames_the_one_that_the_file_states() {
+        for (text, wanted) in [
+            (
+                "[estimator]\nwindow_samples = 65536\n",
+                "s.toml:2: estimator.window_samples = 65536 is not allowed: at most estimator.padded_samples, 1024",
+            ),
+            (
+                "[detector]\nsampling_hz = 100e6\n",
+                "s.toml:2: detector.sampling_hz = 100e6 is not allowed: above 2.1e8 Hz",
+            ),
+            ("[detector]\nbandwidth_hz = 95e6\n", "detector.bandwidth_hz = 95e6 is not allowed: below 9e7 Hz"),
+            ("[scan]\nrange_max_m = 300\n", "s.toml:2: scan.range_max_m = 300 is not allowed: at least 317.774 m"),
+            (
+                "[pulse.shape]\nduration_s = 1.2e-6\n",
+                "s.toml:2: pulse.shape.duration_s = 1.2e-6 is not allowed: below 8.36",
+            ),
+            ("[flow]\nspacing_m = 3\n", "flow.spacing_m = 3 is not allowed: above twice flow.core_radius_m, 4.7 m"),
+            (
+                "[telescope]\naperture_radius_m = 0.01\nobscuration_radius_m = 0.02\n",
+                "telescope.obscuration_radius_m = 0.02",
+            ),
+            (
+                "[scan]\nelevation_min_rad = 0.5\n",
+                "scan.elevation_min_rad = 0.5 is not allowed: at most scan.elevation_max_rad",
+            ),
+            ("[outputs]\nprofile_range_min_m = 4000\n", "outputs.profile_range_min_m = 4000 is not allowed: below"),
+            (
+                "[estimator]\nmethod.kind = \"capon\"\nwindow_samples = 10\n",
+                "estimator.window_samples = 10 is not allowed: above estimator.method.order, 16",
+            ),
+        ] {
+            let m = message(text);
+            assert!(m.contains(wanted), "{m}");
+        }
+    }
+
+    #[test]
+    fn what_a_limit_names_is_accepted() {
+        let good = |text: &str| SceneFile::parse(text, Path::new("s.toml")).map(|_| ()).map_err(|e| e.to_string());
+        assert_eq!(good("[pulse.shape]\nduration_s = 8.36e-7\n"), Ok(()));
+        assert_eq!(good("[scan]\nrange_max_m = 317.774\n"), Ok(()));
+        assert_eq!(good("[scan]\nrange_min_m = 482.226\n"), Ok(()));
+        assert_eq!(good("[detector]\nsampling_hz = 210000001\n"), Ok(()));
+        // The ends themselves are not accepted, and not named as if they were.
+        let band = |middle: &str| {
+            good(&format!(
+                "[detector]\nsampling_hz = 200e6\nbandwidth_hz = 60e6\nintermediate_frequency_hz = {middle}\n"
+            ))
+        };
+        let refused = band("70e6").unwrap_err();
+        assert!(refused.contains("above 3e7 and below 7e7 Hz") && band("30e6").is_err(), "{refused}");
+        assert_eq!((band("30000001"), band("69999999")), (Ok(()), Ok(())));
+        let fine = |words: &str| good(&format!("[detector]\nbandwidth_hz = 1e5\n{words}"));
+        assert!(fine("").unwrap_err().contains("detector.bandwidth_hz = 1e5 is not allowed: at least 2.44140625e5 Hz"));
+        assert_eq!(fine("[estimator]\npadded_samples = 2500\n"), Ok(()));
+        assert_eq!(good("[detector]\nbandwidth_hz = 244141\n"), Ok(()));
+        for (pattern, count) in [("\"vad\", beams", 10_000), ("\"stare\", lines", 100_000)] {
+            let with =
+                |n: usize| good(&format!("[scan]\npulses_per_line = 1\npattern = {{ kind = {pattern} = {n} }}\n"));
+            assert_eq!(with(count), Ok(()));
+            assert!(with(count + 1).is_err());
+        }
+        assert!(good("[scan]\npattern = { kind = \"vad\", beams = 3 }\n").unwrap_err().contains("from 4 to 10000"));
+        assert_eq!(good("[scan]\npattern = { kind = \"vad\", beams = 4 }\n"), Ok(()));
+    }
+
+    /// A default beside a changed key is not what the user wrote: nobody looks for it in the file.
+    #[test]
+    fn no_single_change_of_a_number_is_blamed_on_a_default() {
+        let defaults = toml::Table::try_from(Scene::default()).unwrap();
+        let mut texts = Vec::new();
+        for (section, keys) in defaults.iter().filter_map(|(name, value)| Some((name, value.as_table()?))) {
+            for (key, value) in keys {
+                let values: Vec<String> = match value {
+                    toml::Value::Float(x) => {
+                        let factors = [-1.0, 1e-9, 1e-4, 0.01, 0.1, 0.5, 2.0, 5.0, 20.0, 1e3, 1e6, 1e12];
+                        factors.iter().map(|f| format!("{:?}", x * f)).chain(["nan".into(), "inf".into()]).collect()
+                    }
+                    toml::Value::Integer(_) => {
+                        ["0", "1", "3", "100", "5000", "70000", "2000000"].map(String::from).into()
+                    }
+                    toml::Value::Boolean(_) => vec!["true".into(), "false".into()],
+                    _ => continue,
+                };
+                for value in values {
+                    texts.push((format!("{section}.{key}"), format!("[{section}]\n{key} = {value}\n")));
+                }
+            }
+        }
+        let mut refused = 0;
+        for (key, text) in texts {
+            let Err(error) = SceneFile::parse(&text, Path::new("s.toml")) else { continue };
+            refused += 1;
+            for line in error.to_string().lines() {
+                assert!(line.starts_with(&format!("s.toml:2: {key} = ")), "{text}{line}");
+            }
+        }
+        assert!(refused > 150, "{refused}");
+    }
+
+    #[test]
+    fn place_and_date_have_limits() {
+        assert_eq!(keys(|s| s.site.latitude_deg = 91.0), ["site.latitude_deg"]);
+        assert_eq!(keys(|s| s.site.longitude_deg = f64::NAN), ["site.longitude_deg"]);
+        assert_eq!(keys(|s| s.site.altitude_m = 1e6), ["site.altitude_m"]);
+        assert_eq!(keys(|s| s.site.start_utc = "yesterday".into()), ["site.start_utc"]);
+        assert_eq!(keys(|s| s.site.name = "two\nlines".into()), ["site.name"]);
+    }
+
+    #[test]
+    fn a_halo_file_needs_gates_that_touch_and_begin_at_the_lidar() {
+        let problems = |step: usize, range_min_m: f64| {
+            let mut scene = Scene::default();
+            scene.outputs.hpl = true;
+            (scene.estimator.gate_step_samples, scene.scan.range_min_m) = (step, range_min_m);
+            scene.problems().iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        let overlap = problems(5, 280.0).join(" ");
+        assert!(overlap.contains("outputs.hpl") && overlap.contains("gate_step_samples = 64"), "{overlap}");
+        let shifted = problems(64, 280.0).join(" ");
+        assert!(shifted.contains("scan.range_min_m = 280") && shifted.contains("306.9875"), "{shifted}");
+        assert_eq!(problems(64, 306.9875), Vec::<String>::new());
     }
 }

@@ -45,15 +45,14 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
     let fixed = matches!(scene.detector.snr, SnrReference::Fixed { .. });
     unused(fixed, &losses, "detector.snr.reference = \"fixed\" asks for no optics".into());
     if let Some(f) = &scene.detector.front_end {
-        let beside =
-            |key: &str, value: f64| format!("detector.front_end.{key} = {value} leaves nothing for it to act on");
-        let without_load = f.load_ohm.is_infinite();
-        unused(without_load, &["detector.front_end.load_temperature_k"], beside("load_ohm", f.load_ohm));
-        let quiet = f.intensity_noise_db_hz == f64::NEG_INFINITY;
-        let level = beside("intensity_noise_db_hz", f.intensity_noise_db_hz);
-        unused(quiet, &["detector.front_end.rejection_db"], level);
-        let fast = f.half_power_hz.is_infinite();
-        unused(fast, &["detector.front_end.poles"], beside("half_power_hz", f.half_power_hz));
+        for (key, none, value) in [
+            ("detector.front_end.load_temperature_k", "load_ohm", f.load_ohm),
+            ("detector.front_end.rejection_db", "intensity_noise_db_hz", f.intensity_noise_db_hz),
+            ("detector.front_end.poles", "half_power_hz", f.half_power_hz),
+        ] {
+            let purpose = format!("detector.front_end.{none} = {value} leaves nothing for it to act on");
+            unused(value.is_infinite(), &[key], purpose);
+        }
     }
     of_scan(&scene.scan, &mut unused);
     if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {

@@ -6,7 +6,6 @@
 //! names; a key without a unit has none.
 
 mod atmosphere;
-mod between;
 mod check;
 mod estimator;
 mod flow;
@@ -15,7 +14,6 @@ mod instrument;
 mod pattern;
 mod presets;
 mod read;
-mod receiver;
 mod retrieval;
 
 pub use crate::keys::{Located, Problem, SceneError};
@@ -26,7 +24,6 @@ pub use instrument::*;
 pub use pattern::*;
 pub use presets::{preset_names, preset_toml};
 pub use read::SceneFile;
-pub use receiver::*;
 pub use retrieval::*;
 pub use wakescope_estimate::Refinement;
 pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope, Secondary};

@@ -254,10 +254,8 @@ impl Scene {
         let lines = if moves { turn_rad / line_rad } else { (turn_rad / step_rad + 1e-9).floor() + 1.0 };
         let allowed = format!("at most {line_rad:?} rad of a line in a sweep of {turn_rad:?} rad: slower");
         c.require(!moves || lines >= 1.0 - 1e-9, "scan.head.rate_rad_s", s.head.rate_rad_s, allowed);
-        // Those of one sweep are counted with its limits.
-        let counted = s.pattern == Pattern::default() && !moves && s.head.sweeps == 1;
         let sweeps = rows * s.head.sweeps as f64;
-        let all = if counted { 0.0 } else { lines * sweeps };
+        let all = lines * sweeps;
         let many = || format!("at most 100000 lines of sight; there would be {all:.3e}");
         let of_sweeps = side("scan.head.sweeps", s.head.sweeps as f64, many());
         let of_step = match moves {

@@ -59,16 +59,16 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let Some(r) = &scene.retrieval else { return };
     let key = "retrieval.methods";
     let estimator = &scene.estimator;
+    let lacks = |method| !r.methods.contains(&method);
     let has_edges = estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
     c.require(
-        !r.methods.contains(&RetrievalMethod::Envelope) || has_edges,
+        lacks(RetrievalMethod::Envelope) || has_edges,
         key,
         "envelope",
         "another method unless estimator.weighting = \"gaussian\" and the windows are weighted with it, as all are but those of the likelihoods",
     );
     let one = "another method with more than one sweep (scan.head.sweeps)";
-    let alone = scene.scan.head.sweeps == 1 || !r.methods.contains(&RetrievalMethod::Envelope);
-    c.require(alone, key, "envelope", one);
+    c.require(scene.scan.head.sweeps == 1 || lacks(RetrievalMethod::Envelope), key, "envelope", one);
     if let Some(rate) = r.false_alarm {
         let noise = scene.detector.noise != NoiseModel::None;
         c.require(noise, "retrieval.false_alarm", rate, "absent where detector.noise = \"none\": nothing is by chance");
@@ -86,13 +86,10 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let allowed = "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);
     let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
-    for (method, word) in [(RetrievalMethod::Signals, "signals"), (RetrievalMethod::Envelope, "envelope")] {
-        c.require(
-            !r.methods.contains(&method) || (plain && scene.detector.noise != NoiseModel::None),
-            key,
-            word,
-            "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here",
-        );
+    let allowed = "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here";
+    for method in [RetrievalMethod::Signals, RetrievalMethod::Envelope] {
+        let is_likely = plain && scene.detector.noise != NoiseModel::None;
+        c.require(lacks(method) || is_likely, key, method.name(), allowed);
     }
 }
 

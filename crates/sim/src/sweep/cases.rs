@@ -7,7 +7,7 @@ use super::expression;
 use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
-use crate::io::{Provenance, csv::float_text, text_file};
+use crate::io::{Provenance, csv::float_text};
 use crate::keys::{Located, Problem, SceneError, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
 use crate::setup::streams::stream;
@@ -79,19 +79,10 @@ pub struct Sweep {
 }
 
 impl Sweep {
-    /// The cases of a request on a scene file.
+    /// The cases of a request on the text of a scene; `path` is where its files are looked for.
     ///
     /// # Errors
     /// Keys, values and expressions that cannot be; more than [`MOST_CASES`]; no case; the first case whose scene is refused.
-    pub fn new(path: &Path, request: &Request) -> Result<Self, Error> {
-        let text = text_file::read(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
-        Self::parse(&text, path, request)
-    }
-
-    /// The same for the text of a scene; `path` is where its files are looked for.
-    ///
-    /// # Errors
-    /// As [`Sweep::new`].
     pub fn parse(text: &str, path: &Path, request: &Request) -> Result<Self, Error> {
         // The reader of scenes says better what is no TOML.
         let of_scene = |other: Error| SceneFile::parse(text, path).err().map_or(other, Error::from);
@@ -299,11 +290,11 @@ fn axis(word: &str) -> Result<Axis, Problem> {
     let (name, text) = word.split_once('=').ok_or_else(|| problem("--vary", word, example))?;
     let (name, text) = (name.trim(), text.trim());
     let column = Column::named(name, text, false)?;
-    let key = &column.key;
+    let (key, is_numeric) = (&column.key, column.shown.holds != Holds::Texts);
     if text.is_empty() {
         return Err(problem(name, "an empty list", format!("at least one value is needed: {example}")));
     }
-    let range = text.split_once(':').filter(|(kind, _)| key.is_numeric() && matches!(*kind, "lin" | "log"));
+    let range = text.split_once(':').filter(|(kind, _)| is_numeric && matches!(*kind, "lin" | "log"));
     let values = match range {
         Some((kind, rest)) => {
             let numbers = range_of(kind == "log", rest).map_err(|why| problem(name, text, why))?;
@@ -349,7 +340,7 @@ fn binding(word: &str) -> Result<(Column, &str), Problem> {
     let (name, text) = word.split_once('=').ok_or_else(|| problem("--let", word, example))?;
     let column = Column::named(name, text, true)?;
     let refuse = |why: String| problem(&column.shown.name, text.trim(), why);
-    if !column.key.is_numeric() {
+    if column.shown.holds == Holds::Texts {
         return Err(refuse("an expression is a number, and this key takes none".into()));
     }
     expression::value(text, None).map_err(refuse)?;

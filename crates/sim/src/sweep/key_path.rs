@@ -139,11 +139,6 @@ impl SceneKey {
         }
     }
 
-    /// Whether ranges of numbers make sense.
-    pub(super) fn is_numeric(&self) -> bool {
-        matches!(self.kind, Kind::Number | Kind::Whole { .. })
-    }
-
     fn refused(&self, value: &str) -> Problem {
         let allowed = match &self.kind {
             Kind::Number => "a number, e.g. 1.5e-6".into(),

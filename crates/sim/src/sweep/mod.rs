@@ -8,12 +8,11 @@
 //! | `results`, `circulation` | cases of the same signals measured together; their numbers |
 //! | `stored` | a folder for each case |
 //! | `tables`, `pictures` | tables and pictures of all, from one folder or those of shards |
-//! | [`pareto`], [`front_table`] | set-ups that no other one beats; the rows of a table that are such |
+//! | [`pareto`] | set-ups that no other one beats; the rows of a table that are such |
 
 mod cases;
 mod circulation;
 mod expression;
-pub mod front_table;
 mod key_path;
 pub mod pareto;
 #[cfg(feature = "plots")]

@@ -270,7 +270,7 @@ fn results_are_those_of_the_map_of_the_case() {
     assert_eq!(of("snr_db"), result.middle.as_ref().unwrap().snr_db);
     // What both call a standard deviation, a root mean square error, is one number.
     for (line, column) in [("std_mean_m_s", "std_m_s"), ("rms_mean_m_s", "rms_m_s")] {
-        let told = result.summary().into_iter().find(|told| told.key == line).unwrap().value;
+        let (_, _, told) = result.summary().into_iter().find(|(key, ..)| *key == line).unwrap();
         assert!((told - of(column)).abs() < 1e-12, "{line} {told}, {column} {}", of(column));
     }
     let map = result.map.unwrap();

@@ -37,7 +37,7 @@ impl FinishedWake {
     /// Files that are not there or not those of a wake; a run that has not come to its end.
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let refuse = |reason: String| Error::Input { path: folder.to_owned(), reason };
-        let file = CaseFile::read(&folder.join("case.toml"), None)?;
+        let file = CaseFile::read(&folder.join("case.toml"))?;
         let (CaseKind::Wake(flow), Some(output)) = (file.case.case.clone(), &file.case.wake) else {
             return Err(refuse("the case is no wake".into()));
         };
