@@ -103,33 +103,7 @@ keys! {
         /// How many there are; odd, so that 0 is among them.
         gradients: usize = 7 => 1..=999 => Is(|n: &usize| n % 2 == 1, "an odd number, so that 0 is among them"),
     }
-}
 
-impl Method {
-    /// Whether tapers of its own take the place of the weighting of the windows.
-    pub(crate) fn has_own_tapers(&self) -> bool {
-        matches!(self, Self::Likelihood(_) | Self::GradientLikelihood(_))
-    }
-
-    /// The order of the model that the method fits, if it fits one.
-    pub fn order(&self) -> Option<ModelOrder> {
-        match self {
-            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => Some(*model),
-            _ => None,
-        }
-    }
-
-    /// Signal-to-noise ratio for which a likelihood is planned, dB, if the scene states one.
-    pub fn likelihood_snr_db(&self) -> Option<f64> {
-        match self {
-            Self::Likelihood(Likelihood { likelihood_snr_db })
-            | Self::GradientLikelihood(GradientLikelihood { likelihood_snr_db, .. }) => *likelihood_snr_db,
-            _ => None,
-        }
-    }
-}
-
-keys! {
     /// How the order of a model is found.
     choice OrderChoice {
         /// It is `order`.
@@ -179,6 +153,30 @@ keys! {
         Rectangular = "rectangular",
         /// Hann.
         Hann = "hann",
+    }
+}
+
+impl Method {
+    /// Whether tapers of its own take the place of the weighting of the windows.
+    pub(crate) fn has_own_tapers(&self) -> bool {
+        matches!(self, Self::Likelihood(_) | Self::GradientLikelihood(_))
+    }
+
+    /// The order of the model that the method fits, if it fits one.
+    pub fn order(&self) -> Option<ModelOrder> {
+        match self {
+            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => Some(*model),
+            _ => None,
+        }
+    }
+
+    /// Signal-to-noise ratio for which a likelihood is planned, dB, if the scene states one.
+    pub fn likelihood_snr_db(&self) -> Option<f64> {
+        match self {
+            Self::Likelihood(Likelihood { likelihood_snr_db })
+            | Self::GradientLikelihood(GradientLikelihood { likelihood_snr_db, .. }) => *likelihood_snr_db,
+            _ => None,
+        }
     }
 }
 

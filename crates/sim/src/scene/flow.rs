@@ -28,15 +28,7 @@ keys! {
         /// Whole fields: those of `wakescope flow` and `wake`, or of other programs.
         "fields" => Fields(FieldFlow),
     }
-}
 
-impl Default for Flow {
-    fn default() -> Self {
-        Flow::VortexPair(VortexPair::default())
-    }
-}
-
-keys! {
     /// The analytic vortex pair (3)-(5).
     #[derive(Copy)]
     table VortexPair {

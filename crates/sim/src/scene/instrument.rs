@@ -43,26 +43,7 @@ keys! {
         /// A table.
         "sampled" => Sampled(SampledShape),
     }
-}
 
-impl PulseShape {
-    /// The Gaussian of a full width at half maximum \[s\].
-    pub fn gaussian(duration_s: f64) -> Self {
-        Self::Gaussian(GaussianShape { duration_s, ..GaussianShape::default() })
-    }
-}
-
-impl GaussianShape {
-    /// Its duration as signals have it.
-    pub(crate) fn duration(&self) -> PulseDuration {
-        match self.definition {
-            PulseDefinition::Fwhm => PulseDuration::FullWidthHalfMaximum(self.duration_s),
-            PulseDefinition::OneOverEHalfWidth => PulseDuration::OneOverEHalfWidth(self.duration_s),
-        }
-    }
-}
-
-keys! {
     /// The Gaussian pulse (7).
     #[derive(Copy)]
     table GaussianShape {
@@ -184,9 +165,7 @@ keys! {
         #[serde(skip_serializing_if = "is_default")]
         blind_range_m: f64 = 0.0 => 0.0..=1e6,
     }
-}
 
-keys! {
     /// What the receiver has beyond shot noise.
     #[derive(Copy)]
     table FrontEnd {
@@ -241,6 +220,23 @@ keys! {
     table SecondTrip {
         /// Radial velocity of the air there where the flow is not known, m/s.
         radial_velocity_m_s: f64 = 0.0 => -1e3..=1e3,
+    }
+}
+
+impl PulseShape {
+    /// The Gaussian of a full width at half maximum \[s\].
+    pub fn gaussian(duration_s: f64) -> Self {
+        Self::Gaussian(GaussianShape { duration_s, ..GaussianShape::default() })
+    }
+}
+
+impl GaussianShape {
+    /// Its duration as signals have it.
+    pub(crate) fn duration(&self) -> PulseDuration {
+        match self.definition {
+            PulseDefinition::Fwhm => PulseDuration::FullWidthHalfMaximum(self.duration_s),
+            PulseDefinition::OneOverEHalfWidth => PulseDuration::OneOverEHalfWidth(self.duration_s),
+        }
     }
 }
 

@@ -74,7 +74,7 @@ keys! {
         /// Aerosol and refractive turbulence.
         atmosphere: Atmosphere = Atmosphere::default(),
         /// The wind that the lidar sees.
-        flow: Flow = Flow::default(),
+        flow: Flow = Flow::VortexPair(VortexPair::default()),
         /// Further winds that are added to it.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         added_flows: Vec<Flow> = Vec::new(),

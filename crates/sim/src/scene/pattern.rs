@@ -27,15 +27,7 @@ keys! {
             file: String => Is(|file: &String| !file.is_empty(), "the name of a file with the lines of the scan"),
         },
     }
-}
 
-impl Default for Pattern {
-    fn default() -> Self {
-        Self::Rhi {}
-    }
-}
-
-keys! {
     /// Sweeps of azimuth.
     table Ppi {
         /// Elevation of each sweep, rad.
@@ -164,6 +156,12 @@ keys! {
             /// How many.
             groups: usize => 1..=1_000_000,
         },
+    }
+}
+
+impl Default for Pattern {
+    fn default() -> Self {
+        Self::Rhi {}
     }
 }
 

@@ -146,8 +146,9 @@ struct Grid<'a> {
     path: &'a Path,
     base: Table,
     request: &'a Request,
-    /// The slowest first.
-    axes: Vec<Axis>,
+    /// Keys with values of their own, and those that each combination has.
+    columns: Vec<Column>,
+    rows: Vec<Vec<Value>>,
     /// Keys with the expressions that determine them.
     lets: Vec<(Column, &'a str)>,
 }
@@ -166,8 +167,9 @@ impl<'a> Grid<'a> {
         axes.extend(each("--vary", &request.vary, axis)?);
         let lets = each("--let", &request.lets, binding)?;
         each("--where", &request.conditions, condition)?;
-        let grid = Self { path, base, request, axes, lets };
-        let columns: Vec<&Column> = grid.columns().collect();
+        let count = axes.iter().map(|axis| axis.rows.len() as f64).product::<f64>();
+        let columns: Vec<&Column> =
+            axes.iter().flat_map(|axis| &axis.columns).chain(lets.iter().map(|(own, _)| own)).collect();
         let again = |(i, column): &(usize, &&Column)| columns[..*i].iter().any(|c| c.key.path == column.key.path);
         if let Some((_, column)) = columns.iter().enumerate().find(again) {
             let why = "each key varies once, by --vary, --cases or --let";
@@ -177,24 +179,29 @@ impl<'a> Grid<'a> {
             let why = "with --independent each case has a seed of its own: leave one of the two out";
             return Err(refused("sweep", problem("seed", "", why)));
         }
-        let count = grid.axes.iter().map(|axis| axis.rows.len() as f64).product::<f64>();
         if count > MOST_CASES as f64 {
             let why = format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
             return Err(refused("sweep", problem("number of cases", &format!("{count:?}"), why)));
         }
-        Ok(grid)
+        // The last axis is the fastest.
+        let mut rows = vec![Vec::new()];
+        for axis in &axes {
+            let longer = |row: &Vec<Value>| axis.rows.iter().map(|own| [&row[..], own].concat()).collect::<Vec<_>>();
+            rows = rows.iter().flat_map(longer).collect();
+        }
+        let columns = axes.into_iter().flat_map(|axis| axis.columns).collect();
+        Ok(Self { path, base, request, columns, rows, lets })
     }
 
     fn columns(&self) -> impl Iterator<Item = &Column> {
-        self.axes.iter().flat_map(|axis| &axis.columns).chain(self.lets.iter().map(|(column, _)| column))
+        self.columns.iter().chain(self.lets.iter().map(|(column, _)| column))
     }
 
     fn cases(&self) -> Result<Vec<Case>, Error> {
         let (mut cases, mut refusals) = (Vec::new(), Vec::new());
-        let combinations = self.axes.iter().map(|axis| axis.rows.len()).product();
-        for combination in 0..combinations {
+        for (combination, row) in self.rows.iter().enumerate() {
             let (index, mut values) = (cases.len(), Vec::new());
-            match self.scene(combination, index, &mut values) {
+            match self.scene(row, index, &mut values) {
                 Ok(scene) => cases.extend(scene.map(|scene| Case { index, scene, values })),
                 Err(error) => refusals.push((combination, values, error)),
             }
@@ -205,30 +212,19 @@ impl<'a> Grid<'a> {
             return Err(failed(combination, described(names, &values), others, error));
         }
         if cases.is_empty() {
-            let why = format!("none of the {combinations} cases is left");
+            let why = format!("none of the {} cases is left", self.rows.len());
             return Err(refused("--where", problem("condition", &self.request.conditions.join(" and "), why)));
         }
         Ok(cases)
     }
 
-    /// The values of a combination, the last axis fastest.
-    fn values(&self, combination: usize) -> impl Iterator<Item = &Value> {
-        let (mut rest, mut rows) = (combination, Vec::with_capacity(self.axes.len()));
-        for axis in self.axes.iter().rev() {
-            rows.push(&axis.rows[rest % axis.rows.len()]);
-            rest /= axis.rows.len();
-        }
-        rows.into_iter().rev().flatten()
-    }
-
     /// The scene of a combination, whose values are told one after the other; none where a condition does not hold.
-    fn scene(&self, combination: usize, index: usize, values: &mut Vec<String>) -> Result<Option<SceneFile>, Error> {
+    fn scene(&self, row: &[Value], index: usize, values: &mut Vec<String>) -> Result<Option<SceneFile>, Error> {
         let mut table = self.base.clone();
         if let Some(seed) = self.request.seed {
             table.insert("seed".into(), Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)));
         }
-        let of_axes = self.axes.iter().flat_map(|axis| &axis.columns);
-        for (column, value) in of_axes.zip(self.values(combination)) {
+        for (column, value) in self.columns.iter().zip(row) {
             values.push(shown(value));
             set(&mut table, &column.key.path, value.clone());
         }
