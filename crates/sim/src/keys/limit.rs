@@ -30,6 +30,8 @@ pub(crate) const ABOVE_ZERO_OR_INF: Number = Number(|value| value > 0.0, "above 
 pub(crate) const ABOVE_ZERO: Number = Number(|value| value.is_finite() && value > 0.0, "a finite number above 0");
 /// 0 or more.
 pub(crate) const ZERO_OR_MORE: Number = Number(|value| value.is_finite() && value >= 0.0, "a finite number, 0 or more");
+/// Whether a name is stated.
+pub(crate) const IS_NAMED: fn(&String) -> bool = |name| !name.is_empty();
 /// Neither infinite nor no number.
 #[cfg(feature = "flow")]
 pub(crate) const FINITE: Number = Number(f64::is_finite, "finite");

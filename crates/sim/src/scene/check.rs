@@ -7,7 +7,7 @@ use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    DetectorSignal, EfficiencyOfPulse, FORMAT, FieldFlow, Flow, Method, Outside, Pattern, PulseShape, Scan, Scene,
+    DetectorSignal, EfficiencyOfPulse, FieldFlow, Flow, Method, Outside, Pattern, PulseShape, Scan, Scene,
     SnrReference, SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
@@ -21,7 +21,6 @@ impl Scene {
     /// The same for a file that states only some keys: limits between keys blame those.
     pub(super) fn problems_where(&self, is_stated: &dyn Fn(&str) -> bool) -> Vec<Problem> {
         let mut c = Checker::new(is_stated);
-        c.require(self.format == FORMAT, "format", self.format, format!("{FORMAT}, the format of this program"));
         self.check_limits("", &mut c);
         self.check_instrument(&mut c);
         self.check_receiver(&mut c);

@@ -1,7 +1,7 @@
 //! The winds of a scene, that of `[flow]` and those that are added to it, and what they may say.
 //! Check: each limit is broken once.
 
-use crate::keys::{Checker, Problem, keys};
+use crate::keys::{Checker, IS_NAMED, Is, keys};
 use std::f64::consts::TAU;
 use wakescope_estimate::vortex_fit::CoreProfile;
 
@@ -97,7 +97,8 @@ keys! {
     /// Fields over (time, z, y, x), in one file or one for each time.
     table FieldFlow {
         /// The file, or the beginning of the names of numbered files, relative to the folder of the scene.
-        files: String = String::new(),
+        files: String = String::new()
+            => Is(IS_NAMED, "a file of fields, or the beginning of the names of numbered ones"),
         /// Names of the variables of u, v, w in the file.
         names: [String; 3] = ["u".into(), "v".into(), "w".into()],
         /// Whether the flow moves during the scan.
@@ -127,7 +128,7 @@ keys! {
     /// Backscatter that a field brings for each of its nodes.
     table CarriedBackscatter {
         /// Name of its variable in the file.
-        name: String = String::new(),
+        name: String = String::new() => Is(IS_NAMED, "the name of a variable of the file over (time, z, y, x)"),
         /// Backscatter coefficient in the unit of the file, 1/(m sr).
         unit_per_m_sr: f64 = 1.0 => 0.0..=1e6,
     }
@@ -154,7 +155,8 @@ keys! {
     table SimulatedFlow {
         /// The file of planes, or the beginning of the names of numbered files (`out/plane1` for `out/plane1_0001.nc`, ...),
         /// relative to the folder of the scene.
-        planes: String = String::new(),
+        planes: String = String::new()
+            => Is(IS_NAMED, "a file of cross-planes, or the beginning of the names of numbered ones"),
         /// Whether the flow moves during the scan.
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; the first of the planes if neither this nor `age_tau` is given.
@@ -196,25 +198,11 @@ keys! {
 pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");
     match flow {
-        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => {}
+        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::Fields(_) => {}
         Flow::VortexLines(lines) => check_lines(lines, at, c),
         Flow::Simulated(flow) => {
-            if flow.planes.is_empty() {
-                let allowed = "a file of cross-planes, or the beginning of the names of numbered ones";
-                c.refuse(&key("planes"), Problem::ABSENT, allowed);
-            }
             if let Some(time_s) = flow.time_s {
                 c.require(flow.age_tau.is_none(), &key("time_s"), time_s, "absent beside flow.age_tau");
-            }
-        }
-        Flow::Fields(flow) => {
-            if flow.files.is_empty() {
-                let allowed = "a file of fields, or the beginning of the names of numbered ones";
-                c.refuse(&key("files"), Problem::ABSENT, allowed);
-            }
-            if flow.backscatter.as_ref().is_some_and(|carried| carried.name.is_empty()) {
-                let allowed = "the name of a variable of the file over (time, z, y, x)";
-                c.refuse(&key("backscatter.name"), Problem::ABSENT, allowed);
             }
         }
         Flow::VortexPair(p) => {
@@ -230,15 +218,14 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
 fn check_lines(lines: &VortexLines, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");
     let (count, circulations) = (lines.nodes_m.len(), lines.circulation_m2_s.len());
-    let fits = (1..=1000).contains(&count);
-    c.require(fits, &key("nodes_m"), format!("a list of {count}"), "a list of 1 to 1000 vortices");
+    let allowed = "a list of 1 to 1000 vortices";
+    c.require((1..=1000).contains(&count), &key("nodes_m"), format!("a list of {count}"), allowed);
     let allowed = format!("as many values as {at}.nodes_m has vortices, {count}");
     c.require(circulations == count, &key("circulation_m2_s"), format!("a list of {circulations}"), allowed);
     let axial = lines.endless || lines.axial_deficit_m_s == 0.0;
     let allowed = format!("0 with {at}.endless = false: the middle of a polyline has no speed of its own");
     c.require(axial, &key("axial_deficit_m_s"), lines.axial_deficit_m_s, allowed);
-    if fits
-        && c.is_good()
+    if c.is_good()
         && let Err(e) = crate::setup::wind::vortex_lines(lines)
     {
         c.refuse(&key("nodes_m"), "", e.to_string());

@@ -60,7 +60,7 @@ keys! {
     /// A whole measurement. See the [module documentation](self).
     table Scene {
         /// Version of the scene format; only [`FORMAT`] is read.
-        format: u32 = FORMAT,
+        format: u32 = FORMAT => Is(|format| *format == FORMAT, format!("{FORMAT}, the format of this program")),
         /// Seed of every random number of the run; TOML integers are signed, a larger one could not be written back.
         seed: u64 = 1 => 0..=i64::MAX as u64,
         /// The laser source.
