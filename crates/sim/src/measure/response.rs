@@ -5,7 +5,7 @@
 use crate::Error;
 use crate::measure::scan::{Scanner, median_snr};
 use crate::plan::{Plan, Target};
-use crate::scene::{PulseShape as Shape, Scene, SceneFile};
+use crate::scene::{Scene, SceneFile};
 use crate::setup::estimators::{Response, noise_kind, response, sampling, signal_kind};
 use crate::setup::progress::Observer;
 use crate::setup::ray_information::RayInformation;
@@ -43,8 +43,7 @@ impl SceneResponse {
     /// What the regions refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
         let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
-        let is_gaussian = matches!(scene.pulse.shape, Shape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
-        let Some(noise) = noise_kind(scene).filter(|_| is_gaussian) else { return Ok(None) };
+        let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else { return Ok(None) };
         let of_rays = RayInformation::new(plan, &layer_snr)?;
         let radius = region_radius(scene, &of_rays, &places(scene, &plan.geometry)?)?;
         let response = response(scene, pulse, median_snr(&layer_snr)).ok().flatten();

@@ -7,7 +7,6 @@ use crate::Error;
 use crate::io::Table;
 use crate::measure::recorded::{Spectra, upward};
 use crate::plan::Plan;
-use crate::scene::PulseShape;
 use crate::setup::estimators;
 use ndarray::Array3;
 use std::ops::Range;
@@ -36,10 +35,8 @@ pub fn envelopes(
 ) -> Result<Vec<EnvelopeResult>, Error> {
     let scene = &plan.scene.scene;
     let refuse = |reason: &str| Error::Input { path: found.scan.path.clone(), reason: reason.into() };
-    let (true, Weighting::Gaussian { relative_half_width }) = (
-        matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0,
-        estimators::weighting(scene),
-    ) else {
+    let (true, Weighting::Gaussian { relative_half_width }) = (scene.pulse.is_gaussian(), estimators::weighting(scene))
+    else {
         return Err(refuse(
             "--method envelope knows Gaussian pulses and windows alone: estimator.weighting = \"gaussian\"",
         ));

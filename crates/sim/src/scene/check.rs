@@ -54,18 +54,13 @@ impl Scene {
             check_lengths(&counts, "pulse.shape", c);
         }
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
-            c.require(
-                t.spectrum != SpectrumKind::HillAndrews || t.inner_scale_m > 0.0,
-                "atmosphere.turbulence.inner_scale_m",
-                t.inner_scale_m,
-                "above 0 m with atmosphere.turbulence.spectrum = \"hill_andrews\", whose bump stands at it",
-            );
-            c.require(
-                t.efficiency == EfficiencyOfPulse::Mean || !matches!(self.detector.snr, SnrReference::Fixed { .. }),
-                "atmosphere.turbulence.efficiency",
-                "realisation",
-                "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency",
-            );
+            let has_place = t.spectrum != SpectrumKind::HillAndrews || t.inner_scale_m > 0.0;
+            let allowed = "above 0 m with atmosphere.turbulence.spectrum = \"hill_andrews\", whose bump stands at it";
+            c.require(has_place, "atmosphere.turbulence.inner_scale_m", t.inner_scale_m, allowed);
+            let is_asked = !matches!(self.detector.snr, SnrReference::Fixed { .. });
+            let allowed = "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency";
+            let is_one = t.efficiency == EfficiencyOfPulse::Mean;
+            c.require(is_one || is_asked, "atmosphere.turbulence.efficiency", "realisation", allowed);
         }
         if let Some(profile) = &self.atmosphere.profile {
             let counts = [
@@ -240,18 +235,15 @@ impl Scene {
         let (low_rad, high_rad) = (s.elevation_min_rad, s.elevation_max_rad);
         c.compare(["scan.elevation_max_rad", "scan.elevation_min_rad"], [high_rad, low_rad], "at least");
         let lowest_m = s.lidar_height_m + s.range_max_m * low_rad.sin();
-        c.require(
-            lowest_m >= 0.0 || s.below_ground != (Outside::Error {}),
-            "scan.elevation_min_rad",
-            low_rad,
-            format!(
-                "at least {} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
-                 scan.below_ground.policy = \"mask\" allows",
-                // Not -0.
-                (-s.lidar_height_m / s.range_max_m).asin() + 0.0,
-                -lowest_m
-            ),
+        let is_seen = lowest_m >= 0.0 || s.below_ground != (Outside::Error {});
+        // Not -0.
+        let least_rad = (-s.lidar_height_m / s.range_max_m).asin() + 0.0;
+        let allowed = format!(
+            "at least {least_rad} rad; at scan.range_max_m the lowest line is {:.3} m below the ground, which \
+             scan.below_ground.policy = \"mask\" allows",
+            -lowest_m
         );
+        c.require(is_seen, "scan.elevation_min_rad", low_rad, allowed);
     }
 
     fn check_ranges(&self, c: &mut Checker<'_>) {
@@ -325,40 +317,27 @@ impl Scene {
 
     /// A HALO raw file counts gates from the lidar and knows their length alone.
     pub(super) fn check_hpl(&self, c: &mut Checker<'_>) {
-        let e = &self.estimator;
-        let window = e.window_samples;
-        if !c.require(
-            e.gate_step_samples == window,
-            "outputs.hpl",
-            true,
-            format!(
-                "only with gates that touch and do not overlap: estimator.gate_step_samples = {window}, as \
-                 estimator.window_samples, not {}",
-                e.gate_step_samples
-            ),
-        ) {
+        let (window, step) = (self.estimator.window_samples, self.estimator.gate_step_samples);
+        let allowed = format!(
+            "only with gates that touch and do not overlap: estimator.gate_step_samples = {window}, as estimator.window_samples, not {step}"
+        );
+        if !c.require(step == window, "outputs.hpl", true, allowed) {
             return;
         }
-        let gate_m = window as f64 * self.sample_spacing_m();
-        let number = (self.scan.range_min_m / gate_m).round();
+        let (first_m, gate_m) = (self.scan.range_min_m, window as f64 * self.sample_spacing_m());
         let near_m = |number: f64| (number * gate_m * 1e4).round() / 1e4;
-        c.require(
-            // A millimetre is below what readers of the format keep.
-            (number * gate_m - self.scan.range_min_m).abs() <= 1e-3,
-            "scan.range_min_m",
-            self.scan.range_min_m,
-            format!(
-                "a whole number of gates of {gate_m:.4} m with outputs.hpl, such as {} or {} m",
-                near_m((self.scan.range_min_m / gate_m).floor()),
-                near_m((self.scan.range_min_m / gate_m).floor() + 1.0)
-            ),
+        let before = (first_m / gate_m).floor();
+        let allowed = format!(
+            "a whole number of gates of {gate_m:.4} m with outputs.hpl, such as {} or {} m",
+            near_m(before),
+            near_m(before + 1.0)
         );
-        c.require(
-            self.samples_per_record() >= 2 * window,
-            "scan.range_max_m",
-            self.scan.range_max_m,
-            format!("at least {:.4} m with outputs.hpl, which needs two gates", self.scan.range_min_m + 2.0 * gate_m),
-        );
+        // A millimetre is below what readers of the format keep.
+        let is_whole = ((first_m / gate_m).round() * gate_m - first_m).abs() <= 1e-3;
+        c.require(is_whole, "scan.range_min_m", first_m, allowed);
+        let allowed = format!("at least {:.4} m with outputs.hpl, which needs two gates", first_m + 2.0 * gate_m);
+        let has_two = self.samples_per_record() >= 2 * window;
+        c.require(has_two, "scan.range_max_m", self.scan.range_max_m, allowed);
     }
 }
 

@@ -1,7 +1,7 @@
 //! From signals to velocities: the estimator of a scene, its method with its own keys, and what all methods share, with the limits
 //! between them.
 
-use super::{PulseShape, Scene};
+use super::Scene;
 use crate::keys::{Checker, Is, Number, keys};
 use wakescope_estimate::Refinement;
 
@@ -193,40 +193,27 @@ pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
         beside_window("estimator.method.order", model.order, "below");
     }
     if let RegionRadius::OfRange { range_m, radius_m } = &e.radius {
-        c.require(
-            radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r)),
-            "estimator.radius.radius_m",
-            radius_m,
-            "one number from 0 to 1e5 m for each of estimator.radius.range_m",
-        );
+        let fits = radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r));
+        let allowed = "one number from 0 to 1e5 m for each of estimator.radius.range_m";
+        c.require(fits, "estimator.radius.radius_m", radius_m, allowed);
     }
-    c.require(
-        e.method != (Method::Periodogram {}) || e.radius == (RegionRadius::Fixed {}),
-        "estimator.method.kind",
-        "periodogram",
-        "another one with estimator.radius: \"periodogram\" has no region",
-    );
+    let without_region = e.method == (Method::Periodogram {});
+    let allowed = "another one with estimator.radius: \"periodogram\" has no region";
+    let is_fixed = e.radius == (RegionRadius::Fixed {});
+    c.require(is_fixed || !without_region, "estimator.method.kind", "periodogram", allowed);
     // Methods that exclude a knob.
-    let likelihood = matches!(e.method, Method::Likelihood(_) | Method::GradientLikelihood(_));
-    c.require(
-        e.correlogram == CorrelogramForm::Biased || !(likelihood || matches!(e.method, Method::FirstMoment(_))),
-        "estimator.correlogram",
-        "unbiased",
-        "\"biased\" with first_moment and the likelihoods, whose statistic has no unbiased form",
-    );
-    c.require(
-        !(e.follow_wind && matches!(e.method, Method::GradientLikelihood(_) | Method::Periodogram {})),
-        "estimator.follow_wind",
-        e.follow_wind,
-        "false with gradient_likelihood, which has the gradient itself, and with periodogram, which has no region",
-    );
-    c.require(
-        !matches!(e.method, Method::GradientLikelihood(_))
-            || (matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0),
-        "estimator.method.kind",
-        "gradient_likelihood",
-        "another one for a pulse that is sampled or has a chirp: its covariance is that of a Gaussian pulse",
-    );
+    let is_biased_alone = e.method.has_own_tapers() || matches!(e.method, Method::FirstMoment(_));
+    let allowed = "\"biased\" with first_moment and the likelihoods, whose statistic has no unbiased form";
+    let is_biased = e.correlogram == CorrelogramForm::Biased;
+    c.require(is_biased || !is_biased_alone, "estimator.correlogram", "unbiased", allowed);
+    let has_gradient = matches!(e.method, Method::GradientLikelihood(_));
+    let allowed =
+        "false with gradient_likelihood, which has the gradient itself, and with periodogram, which has no region";
+    let may_follow = !(has_gradient || without_region);
+    c.require(may_follow || !e.follow_wind, "estimator.follow_wind", e.follow_wind, allowed);
+    let allowed = "another one for a pulse that is sampled or has a chirp: its covariance is that of a Gaussian pulse";
+    let is_known = scene.pulse.is_gaussian();
+    c.require(is_known || !has_gradient, "estimator.method.kind", "gradient_likelihood", allowed);
 }
 
 #[cfg(test)]

@@ -223,6 +223,13 @@ keys! {
     }
 }
 
+impl Pulse {
+    /// Whether it is a Gaussian without chirp.
+    pub(crate) fn is_gaussian(&self) -> bool {
+        matches!(self.shape, PulseShape::Gaussian(_)) && self.chirp_hz_s == 0.0
+    }
+}
+
 impl PulseShape {
     /// The Gaussian of a full width at half maximum \[s\].
     pub fn gaussian(duration_s: f64) -> Self {

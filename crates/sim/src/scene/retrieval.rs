@@ -1,6 +1,6 @@
 //! Vortices from what a scene measures: methods, the test for a wake, an aircraft that follows.
 
-use super::{Flow, NoiseModel, Pattern, PulseShape, Scan, Scene, Weighting};
+use super::{Flow, NoiseModel, Pattern, Scan, Scene, Weighting};
 use crate::keys::{Checker, Is, keys};
 use crate::setup::beams::direction::sin_cos_of_turn;
 use wakescope_estimate::vortex_fit::{LiftSlope, Secondary};
@@ -61,12 +61,9 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let estimator = &scene.estimator;
     let lacks = |method| !r.methods.contains(&method);
     let has_edges = estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
-    c.require(
-        lacks(RetrievalMethod::Envelope) || has_edges,
-        key,
-        "envelope",
-        "another method unless estimator.weighting = \"gaussian\" and the windows are weighted with it, as all are but those of the likelihoods",
-    );
+    let allowed = "another method unless estimator.weighting = \"gaussian\" and the windows are weighted with it, as all are but those of the \
+                   likelihoods";
+    c.require(lacks(RetrievalMethod::Envelope) || has_edges, key, "envelope", allowed);
     let one = "another method with more than one sweep (scan.head.sweeps)";
     c.require(scene.scan.head.sweeps == 1 || lacks(RetrievalMethod::Envelope), key, "envelope", one);
     if let Some(rate) = r.false_alarm {
@@ -85,10 +82,9 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     };
     let allowed = "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);
-    let plain = matches!(scene.pulse.shape, PulseShape::Gaussian(_)) && scene.pulse.chirp_hz_s == 0.0;
     let allowed = "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here";
     for method in [RetrievalMethod::Signals, RetrievalMethod::Envelope] {
-        let is_likely = plain && scene.detector.noise != NoiseModel::None;
+        let is_likely = scene.pulse.is_gaussian() && scene.detector.noise != NoiseModel::None;
         c.require(lacks(method) || is_likely, key, method.name(), allowed);
     }
 }
