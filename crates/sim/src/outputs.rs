@@ -21,15 +21,17 @@ pub(crate) struct Outputs {
     made: Option<(FileGroup, Provenance)>,
 }
 
+/// What adds the files of a list.
+pub(crate) trait List: FnOnce(&mut Outputs) -> Result<(), Error> {}
+
+impl<T: FnOnce(&mut Outputs) -> Result<(), Error>> List for T {}
+
 impl Outputs {
     /// The names of a list.
     ///
     /// # Errors
     /// What the list finds before it makes a file.
-    pub(crate) fn names(
-        formats: Formats,
-        list: impl FnOnce(&mut Self) -> Result<(), Error>,
-    ) -> Result<Vec<String>, Error> {
+    pub(crate) fn names(formats: Formats, list: impl List) -> Result<Vec<String>, Error> {
         let mut files = Self { formats, names: Vec::new(), made: None };
         list(&mut files)?;
         Ok(files.names)
@@ -43,7 +45,7 @@ impl Outputs {
         folder: &Path,
         existing: Existing,
         (formats, origin): (Formats, Provenance),
-        list: impl FnOnce(&mut Self) -> Result<(), Error>,
+        list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
         put(Self::made(folder, (formats, origin), list)?, folder, existing)
     }
@@ -53,18 +55,11 @@ impl Outputs {
     /// # Errors
     /// What the makers find.
     #[cfg(feature = "cli")]
-    pub(crate) fn contents(
-        of: (Formats, Provenance),
-        list: impl FnOnce(&mut Self) -> Result<(), Error>,
-    ) -> Result<Vec<(String, Vec<u8>)>, Error> {
+    pub(crate) fn contents(of: (Formats, Provenance), list: impl List) -> Result<Vec<(String, Vec<u8>)>, Error> {
         Ok(Self::made(Path::new(""), of, list)?.into_contents())
     }
 
-    fn made(
-        folder: &Path,
-        (formats, origin): (Formats, Provenance),
-        list: impl FnOnce(&mut Self) -> Result<(), Error>,
-    ) -> Result<FileGroup, Error> {
+    fn made(folder: &Path, (formats, origin): (Formats, Provenance), list: impl List) -> Result<FileGroup, Error> {
         let mut files = Self { formats, names: Vec::new(), made: Some((FileGroup::new(folder), origin)) };
         list(&mut files)?;
         Ok(files.made.map_or_else(|| FileGroup::new(folder), |(group, _)| group))

@@ -11,7 +11,7 @@ use crate::flow::{CaseFile, WakePreset};
 use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, text_file, write_atomic};
 use crate::keys::{Located, Problem, SceneError};
-use crate::outputs::{self, Outputs};
+use crate::outputs::{self, List, Outputs};
 use crate::scene::{Outputs as Formats, SceneFile};
 use crate::setup::progress::{Observer, stoppable};
 use crate::sweep::{Request, Sweep};
@@ -183,7 +183,7 @@ impl Cli {
         folder: &Path,
         existing: Existing,
         of: (Formats, Provenance),
-        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
+        list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
         let Some(call) = self.keeper() else { return Outputs::write(folder, existing, of, list) };
         let files = Outputs::contents(of, list)?;

@@ -8,7 +8,7 @@ use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, Provenance, Table};
 use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
-use crate::outputs::Outputs;
+use crate::outputs::{List, Outputs};
 use crate::plan::Plan;
 use crate::scene::SceneFile;
 use crate::setup::progress::Silent;
@@ -37,7 +37,7 @@ impl FolderWords {
     }
 
     /// Finds out whether the files of a list can be written.
-    pub(super) fn prepare(&self, cli: &Cli, list: impl FnOnce(&mut Outputs) -> Result<(), Error>) -> Result<(), Error> {
+    pub(super) fn prepare(&self, cli: &Cli, list: impl List) -> Result<(), Error> {
         self.prepare_names(cli, &Outputs::names(scene::Outputs::default(), list)?)
     }
 
@@ -51,7 +51,7 @@ impl FolderWords {
         &self,
         cli: &Cli,
         of: (scene::Outputs, Provenance),
-        list: impl FnOnce(&mut Outputs) -> Result<(), Error>,
+        list: impl List,
         (mut object, text): (Value, String),
     ) -> Result<(), Error> {
         let files = cli.write(&self.out, self.existing(), of, list)?;

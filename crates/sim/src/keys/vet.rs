@@ -81,7 +81,8 @@ impl<'a> Document<'a> {
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
     pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, SceneError> {
         let mut walk = Walk { document: self, format, found: Vec::new() };
-        let table = walk.table(format.keys, &self.table, "", None, Some(format.defaults), 1);
+        let table =
+            walk.table(format.keys, &self.table, Place { path: "", line: 1, defaults: Some(format.defaults) }, None);
         if walk.found.is_empty() {
             return Ok(table);
         }
@@ -207,8 +208,18 @@ fn whole(value: &DeValue<'_>) -> Option<i64> {
     i64::from_str_radix(value.as_str(), value.radix()).ok()
 }
 
-/// The kinds that a table with a tag may have, and the one that it has.
-type Kinds<'k> = (&'k str, &'k str, &'k [(&'static str, Vec<Key>)]);
+/// The kinds that a table may have, each with its keys.
+type AllKinds = [(&'static str, Vec<Key>)];
+/// The tag of a table, the kind that it has, and all that it may have.
+type Kinds<'k> = (&'k str, &'k str, &'k AllKinds);
+
+/// Where a value stands, and the keys that it has where the text leaves them out.
+#[derive(Clone, Copy)]
+struct Place<'p> {
+    path: &'p str,
+    line: usize,
+    defaults: Option<&'p toml::Table>,
+}
 
 struct Walk<'w> {
     document: &'w Document<'w>,
@@ -235,22 +246,16 @@ impl Walk<'_> {
     }
 
     /// A table with these keys; `kinds` are those of a table with a tag.
-    fn table(
-        &mut self,
-        keys: &[Key],
-        table: &DeTable<'_>,
-        path: &str,
-        kinds: Option<Kinds<'_>>,
-        defaults: Option<&toml::Table>,
-        line: usize,
-    ) -> toml::Table {
+    fn table(&mut self, keys: &[Key], table: &DeTable<'_>, at: Place<'_>, kinds: Option<Kinds<'_>>) -> toml::Table {
+        let Place { path, line, defaults } = at;
+        let default = |name: &str| defaults.and_then(|d| d.get(name));
         let mut out = toml::Table::new();
         for (name, value) in table {
             let (here, line) = (name.get_ref().as_ref(), self.line_of(&name.span()));
             match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
-                    let default = defaults.and_then(|d| d.get(here));
-                    let read = self.value(&key.kind, value, &join(path, here), default, line);
+                    let defaults = default(here).and_then(Value::as_table);
+                    let read = self.value(&key.kind, value, Place { path: &join(path, here), line, defaults });
                     out.extend(read.map(|value| (here.to_owned(), value)));
                 }
                 None if kinds.is_some_and(|(tag, ..)| tag == here) => {}
@@ -261,7 +266,7 @@ impl Walk<'_> {
             }
         }
         for key in keys.iter().filter(|key| key.is_required && !table.contains_key(key.name)) {
-            match defaults.and_then(|d| d.get(key.name)) {
+            match default(key.name) {
                 Some(default) => out.extend([(key.name.to_owned(), default.clone())]),
                 None => self.missing(&join(path, key.name), key, line),
             }
@@ -278,15 +283,7 @@ impl Walk<'_> {
         self.refuse(path, Problem::ABSENT.into(), allowed, line);
     }
 
-    fn value(
-        &mut self,
-        kind: &Kind,
-        value: &Spanned<DeValue<'_>>,
-        path: &str,
-        default: Option<&Value>,
-        line: usize,
-    ) -> Option<Value> {
-        let defaults = default.and_then(Value::as_table);
+    fn value(&mut self, kind: &Kind, value: &Spanned<DeValue<'_>>, at: Place<'_>) -> Option<Value> {
         let inner = value.get_ref();
         let read = match (kind, inner) {
             (Kind::Number, _) => number(inner).map(Value::Float),
@@ -302,52 +299,44 @@ impl Walk<'_> {
                 // Each value that does not fit is named itself.
                 let mut list = Vec::with_capacity(values.len());
                 for (i, value) in values.iter().enumerate() {
-                    let line = self.line_of(&value.span());
-                    list.extend(self.value(of, value, &format!("{path}[{i}]"), None, line));
+                    let (path, line) = (&format!("{}[{i}]", at.path), self.line_of(&value.span()));
+                    list.extend(self.value(of, value, Place { path, line, defaults: None }));
                 }
                 return Some(Value::Array(list));
             }
             (Kind::Table(keys), DeValue::Table(table)) => {
-                return Some(Value::Table(self.table(keys, table, path, None, defaults, line)));
+                return Some(Value::Table(self.table(keys, table, at, None)));
             }
             (Kind::Tagged { tag, kinds }, DeValue::Table(table)) => {
-                return self.tagged(tag, kinds, table, path, defaults, line).map(Value::Table);
+                return self.tagged(tag, kinds, table, at).map(Value::Table);
             }
             _ => None,
         };
         if read.is_none() {
-            let allowed = self.wanted(path, kind, inner.as_str().unwrap_or_default());
-            self.refuse(path.to_owned(), self.shown(value), allowed, line);
+            let allowed = self.wanted(at.path, kind, inner.as_str().unwrap_or_default());
+            self.refuse(at.path.to_owned(), self.shown(value), allowed, at.line);
         }
         read
     }
 
-    fn tagged(
-        &mut self,
-        tag: &'static str,
-        kinds: &[(&'static str, Vec<Key>)],
-        table: &DeTable<'_>,
-        path: &str,
-        defaults: Option<&toml::Table>,
-        line: usize,
-    ) -> Option<toml::Table> {
-        let of_default = defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
-        let at = join(path, tag);
+    fn tagged(&mut self, tag: &str, kinds: &AllKinds, table: &DeTable<'_>, at: Place<'_>) -> Option<toml::Table> {
+        let of_default = at.defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
+        let path = &join(at.path, tag);
         let name = match (table.iter().find(|(key, _)| key.get_ref() == tag), of_default) {
             (Some((key, value)), _) => {
                 let line = self.line_of(&key.span());
-                self.value(&Kind::Choice(names(kinds)), value, &at, None, line)?;
+                self.value(&Kind::Choice(names(kinds)), value, Place { path, line, defaults: None })?;
                 value.get_ref().as_str()?
             }
             (None, Some(name)) => name,
             (None, None) => {
-                self.refuse(at, Problem::ABSENT.into(), one_of(&names(kinds), ""), line);
+                self.refuse(path.clone(), Problem::ABSENT.into(), one_of(&names(kinds), ""), at.line);
                 return None;
             }
         };
         let keys = kinds.iter().find(|(n, _)| *n == name).map_or(&[][..], |(_, keys)| keys);
-        let same = defaults.filter(|_| of_default == Some(name));
-        let mut out = self.table(keys, table, path, Some((tag, name, kinds)), same, line);
+        let defaults = at.defaults.filter(|_| of_default == Some(name));
+        let mut out = self.table(keys, table, Place { defaults, ..at }, Some((tag, name, kinds)));
         out.insert(tag.to_owned(), Value::String(name.to_owned()));
         Some(out)
     }
@@ -435,6 +424,6 @@ pub(crate) fn value_at<'v>(table: &'v Value, path: &str) -> Option<&'v Value> {
     path.split('.').try_fold(table, |table, key| table.get(key))
 }
 
-fn names(kinds: &[(&'static str, Vec<Key>)]) -> Vec<&'static str> {
+fn names(kinds: &AllKinds) -> Vec<&'static str> {
     kinds.iter().map(|(name, _)| *name).collect()
 }
