@@ -10,6 +10,7 @@ use super::{Accuracy, Noise, Subject};
 #[cfg(feature = "cli")]
 use crate::Error;
 use crate::io::{Table, csv::float_text};
+use crate::keys::lines_with_keys;
 #[cfg(feature = "cli")]
 use crate::outputs::Outputs;
 use crate::plan::units::seconds;
@@ -122,20 +123,19 @@ impl<S: Subject> Accuracy<S> {
     pub fn text(&self) -> String {
         let mut out = format!("{}: accuracy of {} {}", crate::PROGRAM, S::NAME, self.of_scene);
         let (within, figures, own) = (percent(self.within), names(self.figures.iter()), seconds(self.own_s));
+        let [spent, allowed] = [self.spent_s, self.allowed_s].map(|s| s / self.own_s);
+        let search = format!("search {spent:.1} of {allowed:.1} own runs (forecasts of one core)\n\n");
         out += &match S::IS_NOISY {
             true => format!(
                 ", seed {}\nasked for: {within} % of {figures}, two standard errors included\nown run: {own} without pictures; pilot of {} \
-                 realisations; ",
+                 realisations; {search}shift of each figure from the finest value, %, two standard errors in brackets; * chosen\n",
                 self.scene.provenance().seed,
                 self.pilot
             ),
-            false => format!("\nasked for: {within} % of {figures}\nown run: {own}; "),
-        };
-        let [spent, allowed] = [self.spent_s, self.allowed_s].map(|s| s / self.own_s);
-        out += &format!("search {spent:.1} of {allowed:.1} own runs (forecasts of one core)\n\n");
-        out += match S::IS_NOISY {
-            true => "shift of each figure from the finest value, %, two standard errors in brackets; * chosen\n",
-            false => "error of each figure over the run, % of its root mean square; * chosen\n",
+            false => format!(
+                "\nasked for: {within} % of {figures}\nown run: {own}; {search}error of each figure over the run, % of its root mean square; \
+                 * chosen\n"
+            ),
         };
         out += &self.key_table().aligned();
         for ladder in &self.ladders {
@@ -153,10 +153,8 @@ impl<S: Subject> Accuracy<S> {
             out += &format!("3 % of efficiency shift at most, %: {}\n", response.collect::<Vec<_>>().join(", "));
         }
         if S::IS_NOISY {
-            out += &format!("\nnoise, two standard errors\n{}", self.noise_table().aligned());
-        }
-        if S::IS_NOISY || !self.verified.rows.is_empty() {
-            out += &self.whole_text();
+            // Runs without noise are not tried again with another seed.
+            out += &format!("\nnoise, two standard errors\n{}{}", self.noise_table().aligned(), self.whole_text());
         }
         out.extend(self.notes.iter().map(|note| format!("note: {note}\n")));
         let reached = if self.is_reached() { "reached" } else { "not reached" };
@@ -197,12 +195,11 @@ impl<S: Subject> Accuracy<S> {
 
     fn whole_text(&self) -> String {
         let verified = &self.verified;
-        let seed = if S::IS_NOISY { format!(", with seed {}", verified.seed) } else { String::new() };
         let mut out = match (verified.rows.is_empty(), verified.is_confirmed) {
             (true, true) => "\nas a whole: nothing is coarser than the finest setting, nothing to confirm\n".to_owned(),
             (true, false) => "\nas a whole: not confirmed, the budget is spent\n".to_owned(),
-            (false, true) => format!("\nas a whole{seed}: confirmed\n"),
-            (false, false) => format!("\nas a whole{seed}: not confirmed\n"),
+            (false, true) => format!("\nas a whole, with seed {}: confirmed\n", verified.seed),
+            (false, false) => format!("\nas a whole, with seed {}: not confirmed\n", verified.seed),
         };
         for (figure, predicted, found) in &verified.rows {
             let (predicted, found) = (percent(*predicted), shift_text::<S>(*found));
@@ -213,14 +210,9 @@ impl<S: Subject> Accuracy<S> {
 
     /// The scene or case with the chosen keys, each with a comment, as TOML.
     pub fn scene_text(&self) -> String {
-        let (mut out, mut section) = (String::new(), "");
-        for line in self.scene.toml().lines() {
-            if let Some(name) = line.strip_prefix('[') {
-                section = name.trim_end_matches(']');
-            }
-            let key = line.split_once(" = ").map(|(name, _)| format!("{section}.{name}")).unwrap_or_default();
-            out += &format!("{line}{}\n", self.comment(&key).map(|words| format!(" # {words}")).unwrap_or_default());
-        }
+        let comment = |key: &str| self.comment(key).map(|words| format!(" # {words}")).unwrap_or_default();
+        let out: String =
+            lines_with_keys(self.scene.toml()).map(|(key, line)| format!("{line}{}\n", comment(&key))).collect();
         format!("# {}, {} {}\n{out}", crate::PROGRAM, S::NAME, hash_of(&out))
     }
 

@@ -419,6 +419,15 @@ impl Format<'_> {
     }
 }
 
+/// The lines of a text that was written, each with the path of its key; of other lines that is empty.
+pub(crate) fn lines_with_keys(toml: &str) -> impl Iterator<Item = (String, &str)> {
+    let mut section = "";
+    toml.lines().map(move |line| {
+        section = line.strip_prefix('[').map_or(section, |name| name.trim_end_matches(']'));
+        (line.split_once(" = ").map(|(key, _)| join(section, key)).unwrap_or_default(), line)
+    })
+}
+
 /// The value of the key with this path.
 pub(crate) fn value_at<'v>(table: &'v Value, path: &str) -> Option<&'v Value> {
     path.split('.').try_fold(table, |table, key| table.get(key))

@@ -6,7 +6,7 @@
 use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{Refinement, RegionRadius, Scan, SignalsOf};
-use crate::keys::{Document, value_at};
+use crate::keys::{Document, lines_with_keys, value_at};
 
 /// Keys of a scene without use: what each is for, and what the scene has instead.
 fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
@@ -97,7 +97,9 @@ impl Scene {
     /// Equal scenes give equal text; the hash of it names the scene.
     pub fn to_toml(&self) -> String {
         let whole = toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
-        without_idle(self, &whole)
+        let idle = idle(self);
+        let kept = lines_with_keys(&whole).filter(|(key, _)| !idle.iter().any(|(idle, _)| idle == key));
+        kept.map(|(_, line)| line.to_owned() + "\n").collect()
     }
 }
 
@@ -120,24 +122,6 @@ pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
         Problem { key: key.into(), value, allowed: format!("{purpose}: take the line out") }
     };
     idle.into_iter().map(problem).collect()
-}
-
-/// The text of a scene without the keys that it has no use for.
-fn without_idle(scene: &Scene, toml: &str) -> String {
-    let idle = idle(scene);
-    let mut section = String::new();
-    let mut out = String::with_capacity(toml.len());
-    for line in toml.lines() {
-        if let Some(name) = line.strip_prefix('[') {
-            section = name.trim_end_matches(']').to_owned();
-        }
-        let key = line.split_once(" = ").map(|(key, _)| crate::keys::join(&section, key));
-        if !key.is_some_and(|key| idle.iter().any(|(idle, _)| *idle == key)) {
-            out += line;
-            out.push('\n');
-        }
-    }
-    out
 }
 
 #[cfg(test)]
