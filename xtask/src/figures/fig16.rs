@@ -9,10 +9,10 @@ const APART: f64 = 0.01;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let rows = rows(|_, case| !(case.long && context.profile != Profile::Full));
-    let points = maps::measure()?;
+    let panels = maps::measure()?;
     let origin = context.provenance_of_run();
-    let mut out = Rendered::new(&stability::table(&rows), &maps::panels(&points), &origin)?;
-    out.add("maps.csv", &maps::table(&points), &origin)?;
+    let mut out = Rendered::new(&stability::table(&rows), &maps::picture(&panels), &origin)?;
+    out.add("maps.csv", &maps::table(&panels), &origin)?;
     let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
     out.caption = format!(
         "What is stable of flows, optics, signals, estimators and fits: measured points, lines from the roots of the schemes and of Crank and Nicolson's factors (of the \
@@ -26,7 +26,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         false => format!("{} cases; not: {}", rows.len() - missed.len(), missed.join(", ")),
     };
     let cases = Claim::exact("F16", measured, missed.is_empty());
-    let furthest = maps::furthest(&points);
+    let furthest = maps::furthest(&panels);
     let on_theory = Claim::exact("F16b", format!("at most {:.2} %", 100.0 * furthest), furthest <= APART);
     out.claims = vec![cases.expecting(format!("{} cases", rows.len())), on_theory];
     Ok(out)

@@ -1,11 +1,12 @@
 //! What is stable of flows: time schemes, stiff viscosity, pressure solvers, energy.
 
-use super::{DRIFT, FED, GROWTH, LIMITS, PRESSURE, Point, REYNOLDS, STIFF};
+use super::{Curve, NO_THEORY, Panel, logs};
 use fixtures::failure::Failure;
 use num_complex::Complex;
 use std::f64::consts::{PI, TAU};
 use wakescope_les::solver::{PressureMethod, StepReport};
 use wakescope_les::{Direction, Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases};
+use wakescope_sim::plot::Axis;
 use wakescope_tests::extreme::les::{energy_drift, energy_left};
 
 const SCHEMES: [(&str, TimeScheme); 2] =
@@ -32,42 +33,39 @@ fn amplitude(flow: &Flow, wave: usize) -> f64 {
     flow.face_velocity_m_s(0).iter().enumerate().map(at).sum::<Complex<f64>>().norm()
 }
 
+/// The wave number that convection sees of a wave that turns by `theta` from one cell to the next, times the length of a cell.
+fn symbol(theta: f64) -> f64 {
+    1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0
+}
+
 /// Growth of the amplitude in a step, of a wave that turns by `angle` in a step, against the larger root of the scheme.
-pub(super) fn growth() -> Result<Vec<Point>, Failure> {
+pub(super) fn growth() -> Result<Vec<Panel>, Failure> {
     const WAVE: usize = 14;
-    let theta = TAU * WAVE as f64 / CELLS as f64;
-    let symbol = 1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0;
-    let mut points = Vec::new();
-    for (name, scheme) in SCHEMES {
+    let symbol = symbol(TAU * WAVE as f64 / CELLS as f64);
+    let curves = SCHEMES.map(|(name, scheme)| {
         let angles: &[f64] = match scheme {
             TimeScheme::AdamsBashforth2 => &[0.0733, 0.1, 0.1467, 0.2, 0.2933, 0.4, 0.5133, 0.5456],
             TimeScheme::RungeKutta3 => &[0.2, 0.2933, 0.4, 0.5133, 0.7, 1.0132, 1.3, 1.5753, 1.7],
         };
-        for &angle in angles {
+        Curve::new(name, angles, |angle| {
             let step_s = angle / symbol / CELLS as f64;
             let mut flow = line(scheme, 0.0, step_s, |y| (TAU * WAVE as f64 * y).sin())?;
             (0..20).try_for_each(|_| flow.step().map(drop))?;
             let before = amplitude(&flow, WAVE);
             (0..40).try_for_each(|_| flow.step().map(drop))?;
             let measured = ((amplitude(&flow, WAVE) / before).powf(1.0 / 40.0) - 1.0).abs();
-            points.push(Point {
-                panel: GROWTH,
-                curve: name.into(),
-                x: angle,
-                measured,
-                theory: (root(scheme, Complex::new(0.0, angle), 0.0) - 1.0).abs(),
-            });
-        }
-    }
-    Ok(points)
+            Ok([measured, (root(scheme, Complex::new(0.0, angle), 0.0) - 1.0).abs()])
+        })
+    });
+    let axes = logs(["angle in a step [rad]", "||G| − 1|"]);
+    Ok(vec![Panel::new("growth of a wave in a step", axes, curves)?])
 }
 
 /// The largest Courant number, to a thousandth, at which a step is not refused and no wave grows, against the root of the scheme. Waves of all lengths
 /// start alike.
-pub(super) fn limits() -> Result<Vec<Point>, Failure> {
-    let mut points = Vec::new();
-    for (name, scheme) in SCHEMES {
-        for viscous in [1e-3, 1e-2, 3e-2, 1e-1, 3e-1] {
+pub(super) fn limits() -> Result<Vec<Panel>, Failure> {
+    let curves = SCHEMES.map(|(name, scheme)| {
+        Curve::new(name, &[1e-3, 1e-2, 3e-2, 1e-1, 3e-1], |viscous| {
             // nu = viscous h^2/dt, with dt = courant h.
             let holds = |courant: f64| -> Result<bool, Failure> {
                 let (h, step_s) = (1.0 / CELLS as f64, courant / CELLS as f64);
@@ -88,16 +86,10 @@ pub(super) fn limits() -> Result<Vec<Point>, Failure> {
                 let middle = 0.5 * (low + high);
                 if holds(middle)? { low = middle } else { high = middle }
             }
-            points.push(Point {
-                panel: LIMITS,
-                curve: name.into(),
-                x: viscous,
-                measured: low,
-                theory: limit(scheme, viscous),
-            });
-        }
-    }
-    Ok(points)
+            Ok([low, limit(scheme, viscous)])
+        })
+    });
+    Ok(vec![Panel::new("largest stable Courant number", logs(["ν Δt/h²", "Courant number"]), curves)?])
 }
 
 /// Decay of the shortest wave in a step up to which the solver takes viscosity explicitly.
@@ -108,11 +100,10 @@ fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
     let decays = |courant: f64| {
         (1..=180).all(|k| {
             let theta = PI * f64::from(k) / 180.0;
-            let symbol = 1.5 * theta.sin() - 0.3 * (2.0 * theta).sin() + (3.0 * theta).sin() / 30.0;
             let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
             let decay = viscous * kappa * kappa;
             let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT { [0.0, decay] } else { [decay, 0.0] };
-            root(scheme, Complex::new(-explicit, courant * symbol), implicit) <= 1.0
+            root(scheme, Complex::new(-explicit, courant * symbol(theta)), implicit) <= 1.0
         })
     };
     let (mut low, mut high) = (0.0, 2.5);
@@ -151,16 +142,16 @@ fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
 const KAPPA2: f64 = 49.0 / 9.0;
 
 /// What the first step leaves of the shortest wave, stiff along one direction or two, by Crank-Nicolson and by backward Euler.
-pub(super) fn stiff() -> Result<Vec<Point>, Failure> {
+pub(super) fn stiff() -> Result<Vec<Panel>, Failure> {
     const N: usize = 16;
-    let mut points = Vec::new();
-    for (name, damped_steps, both) in [
+    let cases = [
         ("Crank-Nicolson, one direction", 0, false),
         ("Crank-Nicolson, two directions", 0, true),
         ("backward Euler, one direction", 1, false),
         ("backward Euler, two directions", 1, true),
-    ] {
-        for viscous in [1e1, 1e2, 1e3, 1e4, 1e5, 1e6] {
+    ];
+    let curves = cases.map(|(name, damped_steps, both)| {
+        Curve::new(name, &[1e1, 1e2, 1e3, 1e4, 1e5, 1e6], |viscous| {
             let periodic = || Direction::periodic(N, 0.0, 1.0);
             let mesh =
                 Mesh::new(Direction::thin(1.0), periodic(), if both { periodic() } else { Direction::thin(1.0) })?;
@@ -173,7 +164,6 @@ pub(super) fn stiff() -> Result<Vec<Point>, Failure> {
             let mut flow =
                 Flow::new(mesh, settings, |[_, y, z]| [short(y) * if both { short(z) } else { 1.0 }, 0.0, 0.0])?.0;
             flow.step()?;
-            let measured = flow.face_velocity_m_s(0)[0].abs();
             let (d, directions) = (viscous * KAPPA2, if both { 2.0 } else { 1.0 });
             // The first step of either scheme is one of Runge-Kutta.
             let theory =
@@ -181,22 +171,23 @@ pub(super) fn stiff() -> Result<Vec<Point>, Failure> {
                     0 => left * (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs(),
                     _ => left * (1.0 + d).powf(-directions),
                 });
-            points.push(Point { panel: STIFF, curve: name.into(), x: viscous, measured, theory });
-        }
-    }
-    Ok(points)
+            Ok([flow.face_velocity_m_s(0)[0].abs(), theory])
+        })
+    });
+    let axes = logs(["ν Δt/h²", "share of the wave"]);
+    Ok(vec![Panel::new("what the first step leaves of a stiff wave", axes, curves)?])
 }
 
 /// The residual that an iteration of multigrid leaves, and what the direct solver leaves, on cells longer along y, or along x and y.
-pub(super) fn pressure() -> Result<Vec<Point>, Failure> {
-    let mut points = Vec::new();
-    for (name, pressure, both) in [
+pub(super) fn pressure() -> Result<Vec<Panel>, Failure> {
+    let cases = [
         ("multigrid, cells long along y", PressureMethod::Multigrid, false),
         ("multigrid, cells long along x and y", PressureMethod::Multigrid, true),
         ("direct, what it leaves, long along y", PressureMethod::Direct, false),
         ("direct, what it leaves, long along x and y", PressureMethod::Direct, true),
-    ] {
-        for aspect in [1.0, 1e1, 1e2, 1e3, 1e4, 1e5] {
+    ];
+    let curves = cases.map(|(name, pressure, both)| {
+        Curve::new(name, &[1.0, 1e1, 1e2, 1e3, 1e4, 1e5], |aspect| {
             let slip = |cells, length_m| Direction::between(cells, 0.0, length_m, Wall::Slip, Wall::Slip);
             let [length_m, width_m] = [if both { aspect } else { 1.0 }, aspect];
             let mesh = Mesh::new(Direction::periodic(8, 0.0, length_m / 6.0), slip(48, width_m), slip(48, 1.0))?;
@@ -221,46 +212,40 @@ pub(super) fn pressure() -> Result<Vec<Point>, Failure> {
                     if pressure == PressureMethod::Direct { report.pressure_residual } else { report.pressure_factor };
                 worst = worst.max(of.unwrap_or(f64::NAN));
             }
-            points.push(Point::measured(PRESSURE, name.into(), aspect, worst));
-        }
-    }
-    Ok(points)
+            Ok([worst, NO_THEORY])
+        })
+    });
+    let panel = Panel::new("pressure solvers on flat cells", logs(["aspect of the cells", "residual left"]), curves)?;
+    Ok(vec![Panel { limit: Some(("at most 0.10 an iteration", 0.1, true)), ..panel }])
 }
 
 /// Energy that a flow without viscosity gains or loses in half a second, against a cube through the shortest step.
-pub(super) fn drift() -> Result<Vec<Point>, Failure> {
-    let mut points = Vec::new();
-    for (name, scheme) in SCHEMES {
-        let steps_s = [0.02, 0.01, 0.005, 0.0025, 0.00125];
-        let found = steps_s
-            .iter()
-            .map(|&step_s| Ok((step_s, energy_drift(scheme, step_s).ok())))
-            .collect::<Result<Vec<_>, Failure>>()?;
-        let last = found.last().and_then(|found| found.1).unwrap_or(f64::NAN);
-        points.extend(found.into_iter().filter_map(|(step_s, drift)| {
-            let theory = last * (step_s / steps_s[4]).powi(3);
-            Some(Point { panel: DRIFT, curve: name.into(), x: step_s, measured: drift?, theory })
-        }));
-    }
-    Ok(points)
+pub(super) fn drift() -> Result<Vec<Panel>, Failure> {
+    const STEPS_S: [f64; 5] = [0.02, 0.01, 0.005, 0.0025, 0.00125];
+    let curves = SCHEMES.map(|(name, scheme)| {
+        let found = STEPS_S.map(|step_s| (step_s, energy_drift(scheme, step_s).ok()));
+        let last = found[4].1.unwrap_or(f64::NAN);
+        let point = |(step_s, drift): (f64, Option<f64>)| Some([step_s, drift?, last * (step_s / STEPS_S[4]).powi(3)]);
+        Ok(Curve { name: name.into(), points: found.into_iter().filter_map(point).collect() })
+    });
+    Ok(vec![Panel::new("energy lost without viscosity", logs(["step [s]", "energy lost, relative"]), curves)?])
 }
 
 /// Energy that steps feed beyond the powers of viscosity and subgrid stress, over what these take, as vortices break up into turbulence.
-pub(super) fn fed() -> Result<Vec<Point>, Failure> {
-    let mut points = Vec::new();
-    for (scheme_name, scheme) in SCHEMES {
-        for (model_name, subgrid) in
-            [("no model", SubgridModel::None), ("multiscale WALE", SubgridModel::MULTISCALE_WALE)]
-        {
-            for courant in [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0] {
-                // Where steps are refused there is no point.
-                if let Ok(measured) = fed_over_taken(scheme, subgrid, courant) {
-                    points.push(Point::measured(FED, format!("{scheme_name}, {model_name}"), courant, measured));
-                }
-            }
-        }
-    }
-    Ok(points)
+pub(super) fn fed() -> Result<Vec<Panel>, Failure> {
+    let models = [("no model", SubgridModel::None), ("multiscale WALE", SubgridModel::MULTISCALE_WALE)];
+    let curves = SCHEMES.into_iter().flat_map(|(scheme_name, scheme)| {
+        models.map(|(model_name, subgrid)| {
+            let courants = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
+            // Where steps are refused there is no point.
+            let point = |courant| Some([courant, fed_over_taken(scheme, subgrid, courant).ok()?, NO_THEORY]);
+            let points = courants.into_iter().filter_map(point).collect();
+            Ok(Curve { name: format!("{scheme_name}, {model_name}"), points })
+        })
+    });
+    let axes = ["Courant number", "fed over taken"].map(Axis::linear);
+    let panel = Panel::new("energy that steps feed, over what is taken", axes, curves)?;
+    Ok(vec![Panel { limit: Some(("nothing fed", 0.0, true)), ..panel }])
 }
 
 fn fed_over_taken(scheme: TimeScheme, subgrid: SubgridModel, courant: f64) -> Result<f64, Failure> {
@@ -280,17 +265,17 @@ fn fed_over_taken(scheme: TimeScheme, subgrid: SubgridModel, courant: f64) -> Re
 }
 
 /// Energy of Taylor and Green's vortices on 16 cells a side after 150 steps, over that of the start.
-pub(super) fn reynolds() -> Result<Vec<Point>, Failure> {
-    let mut points = Vec::new();
-    for (name, subgrid) in [
+pub(super) fn reynolds() -> Result<Vec<Panel>, Failure> {
+    let models = [
         ("no model", SubgridModel::None),
         ("WALE", SubgridModel::WALE),
         ("multiscale WALE", SubgridModel::MULTISCALE_WALE),
-    ] {
-        for reynolds in [1e3, 1e5, 1e8, 1e12] {
-            let measured = energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?;
-            points.push(Point::measured(REYNOLDS, name.into(), reynolds, measured));
-        }
-    }
-    Ok(points)
+    ];
+    let curves = models.map(|(name, subgrid)| {
+        Curve::new(name, &[1e3, 1e5, 1e8, 1e12], |reynolds| {
+            Ok([energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?, NO_THEORY])
+        })
+    });
+    let axes = logs(["Reynolds number", "energy over that of the start"]);
+    Ok(vec![Panel::new("energy of turbulent vortices", axes, curves)?])
 }
