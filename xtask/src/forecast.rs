@@ -3,7 +3,7 @@
 //! Ten diverse scenes, each a run of the release program in a process of its own with one thread, drawing and writing
 //! included. Memory is the largest resident set less that of a run that does next to nothing.
 
-use crate::process::{program, watch};
+use crate::process::{program, run_scene};
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
 use std::path::Path;
@@ -81,16 +81,7 @@ struct Measured {
 }
 
 fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result<Measured, Failure> {
-    std::fs::write(folder.join("s.toml"), scene)?;
-    let out = folder.join("out");
-    if out.exists() {
-        std::fs::remove_dir_all(&out)?;
-    }
-    let words = [command, "s.toml", "--out", "out", "--quiet", "--json", "--threads", "1"];
-    let run = watch(program, &words, folder, 600.0)?;
-    if run.code != Some(0) {
-        return Err(Failure::new(format!("{command} of\n{scene}ended with {:?}: {}", run.code, run.stderr)));
-    }
+    let run = run_scene(program, folder, scene, &[command, "--json"])?;
     // The plan is part of what a run tells; the numbers of the whole are those at the first level of the object.
     let number = |key: &str| {
         let line = run.stdout.lines().find_map(|l| l.strip_prefix(&format!("  \"{key}\": ")));

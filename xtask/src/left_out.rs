@@ -4,10 +4,11 @@
 //! each of ours, alone and with its features, are counted by cargo and, if asked, compiled from nothing.
 
 use crate::cost::children_cpu_s;
-use crate::process::{program, watch};
+use crate::process::{call, output, program, run_scene};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -59,9 +60,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
     for Without { name, keys } in std::iter::once(&all).chain(&without) {
         let mut scene = whole.clone();
         keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value))?;
-        let [seconds, peak, files] = measured(&program, &folder, &toml::to_string(&scene)?)?;
+        let run = run_scene(&program, &folder, &toml::to_string(&scene)?, &["run"])?;
+        let sizes = std::fs::read_dir(folder.join("out"))?.map(|file| Ok(file?.metadata()?.len()));
+        let bytes = sizes.sum::<std::io::Result<u64>>()? as f64;
         let name = if keys.is_empty() { name.clone() } else { format!("without {name}") };
-        let _ = writeln!(text, "| {name} | {seconds:.2} | {:.1} | {:.2} |", peak / 1e6, files / 1e6);
+        let _ = writeln!(text, "| {name} | {:.2} | {:.1} | {:.2} |", run.cpu_s, run.peak_bytes / 1e6, bytes / 1e6);
     }
     let (heads, lines) = if options.compile {
         (" processor time of compiling [s] | program [MB] |", "---|---|")
@@ -99,68 +102,25 @@ fn set(scene: &mut Table, key: &str, value: &Value) -> Outcome {
     set(inner.as_table_mut().ok_or_else(|| Failure::new(format!("{table} is no table")))?, rest, value)
 }
 
-/// Processor time \[s\], largest memory and bytes written of a run.
-fn measured(program: &Path, folder: &Path, scene: &str) -> Result<[f64; 3], Failure> {
-    std::fs::write(folder.join("scene.toml"), scene)?;
-    let out = folder.join("out");
-    if out.exists() {
-        std::fs::remove_dir_all(&out)?;
-    }
-    let words = ["run", "scene.toml", "--out", "out", "--threads", "1", "--quiet"];
-    let run = watch(program, &words, folder, 600.0)?;
-    if run.code != Some(0) {
-        return Err(Failure::new(format!("a scene did not run: {}", run.stderr)));
-    }
-    let sizes = std::fs::read_dir(&out)?
-        .map(|file| Ok(file?.metadata()?.len()))
-        .collect::<Result<Vec<u64>, std::io::Error>>()?;
-    Ok([run.cpu_s, run.peak_bytes, sizes.iter().sum::<u64>() as f64])
-}
-
 /// Processor time of compiling a crate and all that it needs from nothing, s, and the size of its program, bytes.
 fn compiled(package: &str, features: &str, target: &Path) -> Result<(f64, Option<f64>), Failure> {
     if target.exists() {
         std::fs::remove_dir_all(target)?;
     }
     let before_s = children_cpu_s();
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--release", "--quiet", "--package", package, "--no-default-features", "--features", features])
-        .env("CARGO_TARGET_DIR", target)
-        .current_dir(root())
-        .status()?;
-    if !built.success() {
-        return Err(Failure::new(format!("{package} does not build with the features {features:?}")));
-    }
+    let words =
+        ["build", "--release", "--quiet", "--package", package, "--no-default-features", "--features", features];
+    call(Command::new(env!("CARGO")).args(words).env("CARGO_TARGET_DIR", target))?;
     let program = std::fs::metadata(target.join("release/wakescope")).ok();
     Ok((children_cpu_s() - before_s, program.map(|file| file.len() as f64)))
 }
 
 /// How many crates cargo compiles for a library, itself among them, without those that only build it.
 fn crates(package: &str, features: &str) -> Result<usize, Failure> {
-    let out = Command::new(env!("CARGO"))
-        .args([
-            "tree",
-            "--package",
-            package,
-            "--edges",
-            "normal",
-            "--prefix",
-            "none",
-            "--no-default-features",
-            "--features",
-            features,
-        ])
-        .current_dir(root())
-        .output()?;
-    if !out.status.success() {
-        return Err(Failure::new(format!("cargo tree: {}", String::from_utf8_lossy(&out.stderr))));
-    }
-    let text = String::from_utf8_lossy(&out.stdout);
-    let mut names: Vec<&str> =
-        text.lines().filter_map(|line| line.split(" (").next()).filter(|name| !name.is_empty()).collect();
-    names.sort_unstable();
-    names.dedup();
-    Ok(names.len())
+    let of = ["tree", "--edges=normal", "--prefix=none", "--no-default-features", "--package", package, "--features"];
+    let text = output(Command::new(env!("CARGO")).args(of).arg(features))?;
+    let names: BTreeSet<&str> = text.lines().filter_map(|line| line.split(" (").next()).collect();
+    Ok(names.iter().filter(|name| !name.is_empty()).count())
 }
 
 #[cfg(test)]

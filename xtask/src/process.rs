@@ -1,10 +1,11 @@
-//! A run of the program `wakescope` as another process, watched: its time, its memory, its end.
+//! Other programs as processes: called, or watched, with their time, their memory, their end.
 //!
-//! Linux only: the figures come from /proc.
+//! Watching is of Linux only: the figures come from /proc.
 
 use crate::cost;
 use crate::workspace::{built, root};
 use fixtures::failure::Failure;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -23,16 +24,58 @@ pub(crate) struct Watched {
     pub(crate) stderr: String,
 }
 
+/// Runs a command in the root of the workspace, unless it has another folder, to its good end; what it prints where that is piped.
+///
+/// # Errors
+/// A program that is not there, one that fails.
+pub(crate) fn call(command: &mut Command) -> Result<String, Failure> {
+    if command.get_current_dir().is_none() {
+        command.current_dir(root());
+    }
+    let program = command.get_program().display().to_string();
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    match command.spawn().and_then(Child::wait_with_output) {
+        Ok(ended) if ended.status.success() => Ok(text(&ended.stdout)),
+        Ok(ended) => Err(Failure::new(format!("failed: {command:?}\n{}", text(&ended.stderr)))),
+        Err(error) if error.kind() == ErrorKind::NotFound => {
+            Err(Failure::new(format!("{program} is not installed: `cargo install --locked {program}` does that")))
+        }
+        Err(error) => Err(Failure::new(format!("cannot run {program}: {error}"))),
+    }
+}
+
+/// The same for what it prints.
+///
+/// # Errors
+/// As [`call`].
+pub(crate) fn output(command: &mut Command) -> Result<String, Failure> {
+    call(command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped()))
+}
+
 /// The program to run: the given one, or the release build, made anew.
 pub(crate) fn program(given: Option<&Path>) -> Result<PathBuf, Failure> {
     if let Some(given) = given {
         return Ok(given.canonicalize()?);
     }
-    let words = ["build", "--release", "--quiet", "--package", "wakescope-sim"];
-    let status = Command::new(env!("CARGO")).args(words).current_dir(root()).status();
-    match status.map_err(|e| Failure::new(format!("cannot run cargo: {e}")))?.success() {
-        true => Ok(built().join("release/wakescope")),
-        false => Err(Failure::new("wakescope does not build".into())),
+    call(Command::new(env!("CARGO")).args(["build", "--release", "--quiet", "--package", "wakescope-sim"]))?;
+    Ok(built().join("release/wakescope"))
+}
+
+/// Runs a scene anew in `folder`, in one thread and for at most ten minutes of processor: a command, and what it is told besides.
+///
+/// # Errors
+/// A scene that does not run to its end.
+pub(crate) fn run_scene(program: &Path, folder: &Path, scene: &str, words: &[&str]) -> Result<Watched, Failure> {
+    std::fs::write(folder.join("scene.toml"), scene)?;
+    if folder.join("out").exists() {
+        std::fs::remove_dir_all(folder.join("out"))?;
+    }
+    let (command, more) = words.split_at(1);
+    let words = [command, &["scene.toml", "--out", "out", "--quiet", "--threads", "1"], more].concat();
+    let run = watch(program, &words, folder, 600.0)?;
+    match run.code {
+        Some(0) => Ok(run),
+        code => Err(Failure::new(format!("{} of\n{scene}ended with {code:?}: {}", words[0], run.stderr))),
     }
 }
 

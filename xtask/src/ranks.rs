@@ -3,7 +3,7 @@
 //!
 //! Needs an MPI library with its compiler `mpicc`, and libclang, for the build; on Debian as root it installs them.
 
-use crate::process::watch;
+use crate::process::{call, output, watch};
 use crate::workspace::{built, root};
 use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeMap;
@@ -54,14 +54,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     // As one of the workspace, with the features that its other crates ask for.
     let example: &[&str] = if options.measure { &["--example", "exchange_times"] } else { &[] };
-    let status = Command::new(env!("CARGO"))
-        .args(["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi", "--bin", "wakescope"])
-        .args(example)
-        .current_dir(root())
-        .status()?;
-    if !status.success() {
-        return Err(Failure::new("wakescope does not build with the feature `mpi`".into()));
-    }
+    let words = ["build", "--quiet", "--workspace", "--features", "wakescope-sim/mpi", "--bin", "wakescope"];
+    call(Command::new(env!("CARGO")).args(words).args(example))?;
     let program = built().join("debug/wakescope");
     let scratch = root().join("target/ranks");
     let _ = std::fs::remove_dir_all(&scratch);
@@ -93,21 +87,17 @@ fn measure(program: &Path, scratch: &Path) -> Result<f64, Failure> {
          pause_after_steps = {steps}\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n[checkpoint]\nwrite = false\n"
     );
     std::fs::write(scratch.join("even.toml"), case)?;
-    let mut found = Vec::new();
-    for (count, out) in [(1, "even_one"), (2, "even_two")] {
+    let times_s = |count: usize, out: &str| {
         let words = ["flow", "even.toml", "--quiet", "--json", "--threads", "1", "--out", out];
-        let output = mpirun(count).arg(program).args(words).current_dir(scratch).output()?;
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let text = output(mpirun(count).arg(program).args(words).current_dir(scratch))?;
         let number = |key: &str| {
             let (_, rest) = text.split_once(&format!("\"{key}\":"))?;
             rest.split([',', '}']).next()?.trim().parse::<f64>().ok()
         };
         let both = number("steps_wall_s").zip(number("exchange_wall_s"));
-        found.push(both.ok_or_else(|| Failure::new(String::from_utf8_lossy(&output.stderr).into_owned()))?);
-    }
-    let [(one_s, _), (two_s, exchange_s)] = found[..] else {
-        return Err(Failure::new("two runs were to be measured".into()));
+        both.ok_or_else(|| Failure::new(format!("a flow tells no times: {text}")))
     };
+    let ((one_s, _), (two_s, exchange_s)) = (times_s(1, "even_one")?, times_s(2, "even_two")?);
     println!(
         "measured, {cells}^3 with the multiscale model: two ranks of one thread are {:.2} times as fast as one; {:.0} % of a \
          step in turns and halos",
@@ -127,8 +117,7 @@ fn exchanges(program: &Path, cell_s: f64) -> Outcome {
     );
     println!("|---|---|---|---|---|---|---|");
     for count in 2..=4 {
-        let output = mpirun(count).arg(program).output()?;
-        let text = String::from_utf8_lossy(&output.stdout).into_owned();
+        let text = output(mpirun(count).arg(program))?;
         let rows: Vec<Vec<&str>> = text.lines().skip(1).map(|line| line.split(',').collect()).collect();
         for pair in rows.chunks(2) {
             let [halos, turn] = [0, 1].map(|place| {
@@ -136,10 +125,7 @@ fn exchanges(program: &Path, cell_s: f64) -> Outcome {
                 <[f64; 3]>::try_from(numbers?).ok()
             });
             let (Some([cells, halo_bytes, halo_s]), Some([_, turn_bytes, turn_s])) = (halos, turn) else {
-                return Err(Failure::new(format!(
-                    "exchange_times prints\n{text}{}",
-                    String::from_utf8_lossy(&output.stderr)
-                )));
+                return Err(Failure::new(format!("exchange_times prints\n{text}")));
             };
             let work_s = cells * cell_s;
             let efficiency = work_s / (work_s + TURNS * turn_s + PLANES / WHOLE * halo_s);
@@ -172,13 +158,9 @@ fn compare(program: &Path, scratch: &Path) -> Outcome {
     let expected = files(&scratch.join("one"))?;
     for (count, out) in [(2, "two"), (4, "four")] {
         let begun = Instant::now();
-        let output = mpirun(count).arg(program).args(words(out)).current_dir(scratch).output()?;
-        let failed =
-            |why: &str| Failure::new(format!("{count} processes: {why}\n{}", String::from_utf8_lossy(&output.stderr)));
-        if !output.status.success() {
-            return Err(failed("they failed"));
-        }
-        if String::from_utf8_lossy(&output.stdout).matches("wrote").count() != 1 {
+        let text = output(mpirun(count).arg(program).args(words(out)).current_dir(scratch))?;
+        let failed = |why: &str| Failure::new(format!("{count} processes: {why}\n{text}"));
+        if text.matches("wrote").count() != 1 {
             return Err(failed("not exactly one of them says what was written"));
         }
         let found = files(&scratch.join(out))?;

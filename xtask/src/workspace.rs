@@ -1,5 +1,6 @@
 //! The files of the workspace, and what is written about those that a task makes.
 
+use crate::process::output;
 use fixtures::failure::Failure;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -36,14 +37,6 @@ pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {
 
 /// Paths, from the root, of the files that git tracks or would track.
 pub(crate) fn tracked_files() -> Result<Vec<String>, Failure> {
-    let out = Command::new("git")
-        .args(["ls-files", "--cached", "--others", "--exclude-standard"])
-        .current_dir(root())
-        .output()
-        .map_err(|e| Failure::new(format!("cannot run git: {e}")))?;
-    if !out.status.success() {
-        return Err(Failure::new("git ls-files failed: tidy needs a git checkout".into()));
-    }
-    let text = String::from_utf8_lossy(&out.stdout);
+    let text = output(Command::new("git").args(["ls-files", "--cached", "--others", "--exclude-standard"]))?;
     Ok(text.lines().filter(|f| root().join(f).exists()).map(str::to_owned).collect())
 }
