@@ -6,57 +6,39 @@
 use crate::sources::{Modules, circles, is_test_file};
 use crate::workspace::{read, tracked_files};
 use fixtures::failure::{Failure, Outcome};
-use std::collections::BTreeSet;
+use serde::Deserialize;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::sync::LazyLock;
 
-/// Crates of the workspace that each crate may depend on.
-const MAY_DEPEND_ON: [(&str, &[&str]); 8] = [
-    ("crates/optics", &[]),
-    ("crates/les", &[]),
-    ("crates/signal", &[]),
-    ("crates/estimate", &[]),
-    ("crates/sim", &["optics", "les", "signal", "estimate"]),
-    ("xtask", &["optics", "les", "signal", "estimate", "sim", "tests"]),
-    ("xtask/fixtures", &["optics", "les", "signal", "estimate", "sim"]),
-    ("tests", &["optics", "les", "signal", "estimate", "sim"]),
-];
+/// The rules in numbers and words.
+#[derive(Default, Deserialize)]
+struct Rules {
+    /// Longest source file, in lines of code: what explains them may take the room that it needs.
+    max_code_lines: usize,
+    /// Files and folders that may stand at the top.
+    top_level: Vec<String>,
+    /// File types that may stand anywhere below, and files of others.
+    extensions: Vec<String>,
+    others: Vec<String>,
+    /// What only a machine knows must not stand in the repository.
+    private: Vec<String>,
+    /// Words that name a physical quantity: a public number of that name needs a unit at its end; a fraction has none.
+    quantities: Vec<String>,
+    units: Vec<String>,
+    /// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
+    without_unit: Vec<(String, String)>,
+    /// Crates that work on one thread without their feature `rayon`.
+    with_threads: Vec<String>,
+    /// Crates of the workspace that each crate may depend on.
+    may_depend_on: BTreeMap<String, Vec<String>>,
+}
 
-/// Crates that work on one thread without their feature `rayon`.
-const WITH_THREADS: [&str; 3] = ["wakescope-optics", "wakescope-signal", "wakescope-estimate"];
+/// As they stand in their file, which the test reads.
+static RULES: LazyLock<Rules> = LazyLock::new(|| toml::from_str(include_str!("tidy.toml")).unwrap_or_default());
 
-/// Longest source file, in lines of code: what explains them may take the room that it needs.
-const MAX_CODE_LINES: usize = 500;
-
-/// Files and folders that may stand at the top.
-const TOP_LEVEL: &str = ".cargo .ci .gitignore CHANGELOG.md CITATION.cff CODE_OF_CONDUCT.md CONTRIBUTING.md Cargo.lock Cargo.toml LICENSE README.md \
-    SECURITY.md clippy.toml codemeta.json crates docs python rustfmt.toml tests xtask";
-
-/// File types that may stand anywhere below.
-const EXTENSIONS: [&str; 13] =
-    ["rs", "toml", "csv", "md", "svg", "png", "lock", "cff", "css", "json", "py", "pyi", "ipynb"];
-
-/// What only a machine knows must not stand in the repository.
-const PRIVATE: [&str; 5] = ["/home/", "/root/", "/work/", "/tmp/", "C:\\Users"];
-
-/// Words that name a physical quantity: a public number of that name needs a unit at its end.
-const QUANTITIES: &str = "range velocity speed time frequency wavelength length radius height width distance thickness spacing power \
-    energy duration elevation azimuth angle circulation bandwidth backscatter extinction area wavenumber position";
-
-/// What a name with a unit ends with; a fraction has none.
-const UNITS: &str = "_m _s _hz _rad _rad_m _m_s _m2_s _m2 _m3 _m13 _j _w _a _a_w _a2 _db _per_m _per_s _per_m_sr _per_m2 _deg _kg \
-    _kg_m3 _m_m23 _n _bytes _samples _m_s2 _m2_s2 _m4_s2 _m5_s2 _m5_s3 _a2_hz _per_hz _fraction _per_sqrt_s";
-
-/// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
-const WITHOUT_UNIT: [(&str, &str); 5] = [
-    // In the square of whatever unit the caller's samples have.
-    ("crates/estimate/src/estimators/velocity.rs", "power"),
-    ("crates/estimate/src/models/autoregressive.rs", "noise_power"),
-    // In spacings of the pair.
-    ("crates/les/src/solver/cases/vortex_pair.rs", "height"),
-    ("crates/les/src/solver/cases/vortex_pair.rs", "core_radius"),
-    // In drawing units.
-    ("crates/sim/src/plot/", "width"),
-];
+/// Where they stand and are tested, with words that must stand nowhere else.
+const OWN: &str = "xtask/src/tidy.";
 
 /// Checks the tree; every violation is printed.
 ///
@@ -85,7 +67,7 @@ pub(crate) fn run() -> Outcome {
             _ => {}
         }
     }
-    for (folder, allowed) in MAY_DEPEND_ON {
+    for (folder, allowed) in &RULES.may_depend_on {
         check_manifest(folder, allowed, &read(&format!("{folder}/Cargo.toml"))?, &mut found);
     }
     check_circles(&sources, &mut found);
@@ -101,31 +83,19 @@ pub(crate) fn run() -> Outcome {
 }
 
 /// Whether a word is among those of a list.
-fn listed(list: &str, word: &str) -> bool {
-    list.split(' ').any(|of| of == word)
+fn listed(list: &[String], word: &str) -> bool {
+    list.iter().any(|of| of == word)
 }
 
 fn check_place(file: &str, found: &mut Vec<String>) {
     let top = file.split('/').next().unwrap_or(file);
-    if !listed(TOP_LEVEL, top) {
+    if !listed(&RULES.top_level, top) {
         found.push(format!("{file}: a stray file at the top level"));
     }
-    let path = Path::new(file);
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("");
-    // The template of presets is no TOML until its braces are filled.
-    let named = [
-        "LICENSE",
-        ".gitignore",
-        ".ci/run",
-        "crates/sim/src/scene/preset.txt",
-        "python/LICENSE",
-        "python/check",
-        "python/python/wakescope/py.typed",
-    ]
-    .contains(&file);
+    let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("");
     // Files that other programs wrote, for readers to be held against.
     let of_others = file.starts_with("tests/reference/") && ["nc", "npz"].contains(&extension);
-    if !named && !of_others && !EXTENSIONS.contains(&extension) {
+    if !of_others && !listed(&RULES.extensions, extension) && !listed(&RULES.others, file) {
         found.push(format!("{file}: no file of this type belongs here"));
     }
 }
@@ -136,8 +106,9 @@ fn check_source(file: &str, text: &str, found: &mut Vec<String>) {
     }
     let is_code = |line: &&str| !line.trim().is_empty() && !line.trim_start().starts_with("//");
     let lines = text.lines().filter(is_code).count();
-    if lines > MAX_CODE_LINES {
-        found.push(format!("{file}: {lines} lines of code, at most {MAX_CODE_LINES}: split it by subject"));
+    if lines > RULES.max_code_lines {
+        let most = RULES.max_code_lines;
+        found.push(format!("{file}: {lines} lines of code, at most {most}: split it by subject"));
     }
     for (i, line) in text.lines().enumerate() {
         if ["TODO", "FIXME"].iter().any(|word| line.contains(word)) && !file.ends_with("tidy.rs") {
@@ -199,12 +170,12 @@ fn public_number(line: &str) -> Option<&str> {
 }
 
 fn lacks_unit(name: &str) -> bool {
-    let names_quantity = name.split('_').any(|word| listed(QUANTITIES, word));
-    names_quantity && !UNITS.split(' ').any(|unit| name.ends_with(unit))
+    let names_quantity = name.split('_').any(|word| listed(&RULES.quantities, word));
+    names_quantity && !RULES.units.iter().any(|unit| name.ends_with(unit))
 }
 
 fn excused(file: &str, name: &str) -> bool {
-    WITHOUT_UNIT.iter().any(|(path, number)| file.starts_with(path) && name == *number)
+    RULES.without_unit.iter().any(|(path, number)| file.starts_with(path) && name == number)
 }
 
 fn check_reference(file: &str, text: &str, found: &mut Vec<String>) {
@@ -216,17 +187,17 @@ fn check_reference(file: &str, text: &str, found: &mut Vec<String>) {
 }
 
 fn check_private(file: &str, text: &str, found: &mut Vec<String>) {
-    if file == "xtask/src/tidy.rs" {
+    if file.starts_with(OWN) {
         return;
     }
     for (i, line) in text.lines().enumerate() {
-        for word in PRIVATE.iter().filter(|word| line.contains(**word)) {
+        for word in RULES.private.iter().filter(|word| line.contains(*word)) {
             found.push(format!("{file}:{}: `{word}` is a path of one machine", i + 1));
         }
     }
 }
 
-fn check_manifest(folder: &str, allowed: &[&str], text: &str, found: &mut Vec<String>) {
+fn check_manifest(folder: &str, allowed: &[String], text: &str, found: &mut Vec<String>) {
     let mut section = "";
     for (i, line) in text.lines().enumerate() {
         if line.starts_with('[') {
@@ -241,7 +212,7 @@ fn check_manifest(folder: &str, allowed: &[&str], text: &str, found: &mut Vec<St
                 value.trim()
             ));
         }
-        if name.strip_prefix("wakescope-").is_some_and(|own| !allowed.contains(&own)) {
+        if name.strip_prefix("wakescope-").is_some_and(|own| !listed(allowed, own)) {
             found.push(format!("{folder}/Cargo.toml:{}: must not know `{name}`", i + 1));
         }
         if name == "ndarray-linalg" && folder != "crates/estimate" {
@@ -249,7 +220,7 @@ fn check_manifest(folder: &str, allowed: &[&str], text: &str, found: &mut Vec<St
         }
         // The workspace turns their default features off, and builds of the whole workspace hide that one is missing.
         let program = folder == "crates/sim" || folder == "xtask";
-        if program && WITH_THREADS.contains(&name) && !line.contains("\"rayon\"") {
+        if program && listed(&RULES.with_threads, name) && !line.contains("\"rayon\"") {
             found.push(format!("{folder}/Cargo.toml:{}: `{name}` without `rayon` works on one thread", i + 1));
         }
     }
@@ -276,10 +247,10 @@ mod tests {
     fn a_forbidden_dependency_is_found() {
         let manifest = "[dependencies]\nwakescope-les.workspace = true\n";
         assert_eq!(complaints(|f| check_manifest("crates/optics", &[], manifest, f)).len(), 1);
-        assert!(complaints(|f| check_manifest("crates/sim", &["les"], manifest, f)).is_empty());
+        assert!(complaints(|f| check_manifest("crates/sim", &["les".into()], manifest, f)).is_empty());
         let one_thread = "[dependencies]\nwakescope-signal.workspace = true\n";
-        assert_eq!(complaints(|f| check_manifest("crates/sim", &["signal"], one_thread, f)).len(), 1);
-        assert!(complaints(|f| check_manifest("crates/estimate", &["signal"], one_thread, f)).is_empty());
+        assert_eq!(complaints(|f| check_manifest("crates/sim", &["signal".into()], one_thread, f)).len(), 1);
+        assert!(complaints(|f| check_manifest("crates/estimate", &["signal".into()], one_thread, f)).is_empty());
         let version = "[dependencies]\nserde = \"1\"\n";
         assert_eq!(complaints(|f| check_manifest("crates/sim", &[], version, f)).len(), 1);
     }

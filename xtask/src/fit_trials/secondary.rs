@@ -11,8 +11,8 @@ use ndarray::Array2;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
+use serde::Deserialize;
 use std::f64::consts::{PI, TAU};
-use std::ops::Range;
 use std::path::Path;
 use wakescope_estimate::retrieval::{
     Flag, Gate, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan, with_secondary_vortices,
@@ -30,46 +30,32 @@ const MIDDLE_M: f64 = 400.0;
 /// Standard deviation of the weight of gates that do not show cores \[m\], as `retrieve` has it.
 const LONG_GATE_M: f64 = 3.0;
 
-/// Maps of one kind.
+/// Wakes of one kind, and how they are scanned.
+#[derive(Deserialize)]
 struct Kind {
-    name: &'static str,
+    name: String,
     profile: CoreProfile,
     shown: bool,
-    /// Of the vortices, and of their spacing \[m\].
-    height_m: Range<f64>,
-    spacing_m: Range<f64>,
-    /// Standard deviation of the weight of gates, and their distance \[m\].
+    /// Of the vortices, and of their spacing \[m\]: the least and the most.
+    height_m: [f64; 2],
+    spacing_m: [f64; 2],
+    /// Standard deviation of the weight of gates, and their distance \[m\]; scenes have gates, noise and times of their own.
+    #[serde(default)]
     gate_m: (f64, f64),
     /// Standard deviation of the velocities \[m/s\].
+    #[serde(default)]
     noise_m_s: f64,
     /// How long a scan takes \[s\].
+    #[serde(default)]
     lasts_s: f64,
 }
 
-/// Pairs where the ground does not matter, near it, and driven apart by it.
-const STANDING: Kind = Kind {
-    name: "high pairs, points",
-    profile: CoreProfile::Algebraic,
-    shown: false,
-    height_m: 40.0..60.0,
-    spacing_m: 38.0..56.0,
-    gate_m: (0.0, 5.0),
-    noise_m_s: 0.5,
-    lasts_s: 0.0,
-};
-const LOW: Kind = Kind { height_m: 15.0..30.0, spacing_m: 36.0..50.0, noise_m_s: 0.15, ..STANDING };
-const APART: Kind = Kind { height_m: 24.0..42.0, spacing_m: 50.0..90.0, noise_m_s: 0.3, shown: true, ..STANDING };
-const KINDS: [Kind; 9] = [
-    STANDING,
-    Kind { name: "high pairs that move, gates 10 m", gate_m: (10.0, 6.0), lasts_s: 6.0, ..STANDING },
-    Kind { name: "low pairs, gates 4 m", gate_m: (4.0, 6.0), ..LOW },
-    Kind { name: "low Lamb-Oseen pairs, gates 4 m", profile: CoreProfile::LambOseen, gate_m: (4.0, 6.0), ..LOW },
-    Kind { name: "low Lamb-Oseen pairs, gates 14 m", profile: CoreProfile::LambOseen, gate_m: (14.0, 6.0), ..LOW },
-    Kind { name: "secondary vortices, gates 8 m", gate_m: (8.0, 6.0), ..APART },
-    Kind { name: "secondary vortices, gates 14 m", gate_m: (14.0, 6.0), ..APART },
-    Kind { name: "secondary vortices, Lamb-Oseen, 8 m", profile: CoreProfile::LambOseen, gate_m: (8.0, 6.0), ..APART },
-    Kind { name: "secondary vortices that move, 14 m", gate_m: (14.0, 6.0), lasts_s: 6.0, ..APART },
-];
+/// Kinds whose maps are drawn, and whose scenes are run.
+#[derive(Deserialize)]
+struct Kinds {
+    map: Vec<Kind>,
+    scene: Vec<Kind>,
+}
 
 /// What is told of one vortex: errors of the mean circulation \[%\] and in deviations, and of the lateral place \[m\].
 #[derive(Clone, Copy)]
@@ -97,37 +83,37 @@ impl Scan {
 struct Draw(Xoshiro256PlusPlus);
 
 impl Draw {
-    fn within(&mut self, range: &Range<f64>) -> f64 {
-        range.start + (range.end - range.start) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    fn within(&mut self, [least, most]: [f64; 2]) -> f64 {
+        least + (most - least) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
 
     fn normal(&mut self) -> f64 {
-        let radius = (-2.0 * (1.0 - self.within(&(0.0..1.0))).ln()).sqrt();
-        radius * (TAU * self.within(&(0.0..1.0))).cos()
+        let radius = (-2.0 * (1.0 - self.within([0.0, 1.0])).ln()).sqrt();
+        radius * (TAU * self.within([0.0, 1.0])).cos()
     }
 
     /// A pair, and the secondary vortices that belong to it: outside and above, as the ground makes them.
-    fn air(&mut self, height_m: &Range<f64>, spacing_m: &Range<f64>) -> (Wake, [Vortex; 2]) {
-        let (circulation_m2_s, spacing_m) = (self.within(&(250.0..550.0)), self.within(spacing_m));
-        let (height_m, core_radius_m) = (self.within(height_m), self.within(&(2.0..4.5)));
+    fn air(&mut self, kind: &Kind) -> (Wake, [Vortex; 2]) {
+        let (circulation_m2_s, spacing_m) = (self.within([250.0, 550.0]), self.within(kind.spacing_m));
+        let (height_m, core_radius_m) = (self.within(kind.height_m), self.within([2.0, 4.5]));
         let mut sides = [-1.0, 1.0].map(|side| {
             let own = Vortex {
-                circulation_m2_s: circulation_m2_s * self.within(&(0.9..1.1)),
+                circulation_m2_s: circulation_m2_s * self.within([0.9, 1.1]),
                 lateral_position_m: MIDDLE_M + 0.5 * side * spacing_m,
-                height_m: height_m * self.within(&(0.9..1.1)),
+                height_m: height_m * self.within([0.9, 1.1]),
                 core_radius_m,
             };
-            let (away_m, angle) = (own.height_m * self.within(&(0.5..1.1)), self.within(&(0.0..0.4 * PI)));
+            let (away_m, angle) = (own.height_m * self.within([0.5, 1.1]), self.within([0.0, 0.4 * PI]));
             let secondary = Vortex {
-                circulation_m2_s: -own.circulation_m2_s * self.within(&(0.25..0.45)),
+                circulation_m2_s: -own.circulation_m2_s * self.within([0.25, 0.45]),
                 lateral_position_m: own.lateral_position_m + side * away_m * angle.cos(),
                 height_m: own.height_m + away_m * angle.sin(),
-                core_radius_m: own.height_m * self.within(&(0.08..0.16)),
+                core_radius_m: own.height_m * self.within([0.08, 0.16]),
             };
             (own, secondary)
         });
         let [(left, a), (right, b)] = &mut sides;
-        let (lateral_wind_m_s, wind_shear_per_s) = (self.within(&(-4.0..4.0)), self.within(&(-0.02..0.02)));
+        let (lateral_wind_m_s, wind_shear_per_s) = (self.within([-4.0, 4.0]), self.within([-0.02, 0.02]));
         (Wake { left: *left, right: *right, lateral_wind_m_s, wind_shear_per_s }, [*a, *b])
     }
 }
@@ -135,7 +121,7 @@ impl Draw {
 /// One map, fitted as `retrieve` fits that of any instrument. Nothing where it does not show a pair.
 fn of_map(kind: &Kind, seed: u64) -> Result<Option<Scan>, Failure> {
     let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
-    let (truth, secondary) = draw.air(&kind.height_m, &kind.spacing_m);
+    let (truth, secondary) = draw.air(kind);
     let elevation_rad: Vec<f64> = (0..60).map(|i| 0.01 + 0.003 * f64::from(i)).collect();
     let range_m: Vec<f64> =
         (0..).map(|i| MIDDLE_M - 110.0 + kind.gate_m.1 * f64::from(i)).take_while(|r| *r < MIDDLE_M + 110.0).collect();
@@ -216,16 +202,14 @@ fn of_scene(flow: Flow, added_flows: Vec<Flow>, folder: &Path, options: &Options
 }
 
 /// A pair of a scene with secondary vortices, or without.
-fn pair_of_scene(shown: bool, seed: u64) -> (Flow, Vec<Flow>) {
-    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
-    let (height_m, spacing_m) = (if shown { &APART } else { &LOW }).place();
-    let (wake, secondary) = draw.air(height_m, spacing_m);
+fn pair_of_scene(kind: &Kind, seed: u64) -> (Flow, Vec<Flow>) {
+    let (wake, secondary) = Draw(Xoshiro256PlusPlus::seed_from_u64(seed)).air(kind);
     let pair = VortexPair {
         circulation_m2_s: wake.left.circulation_m2_s,
         spacing_m: wake.spacing_m(),
         core_radius_m: wake.left.core_radius_m,
         height_m: wake.left.height_m,
-        profile: CoreProfile::LambOseen,
+        profile: kind.profile,
         cross_wind_m_s: wake.lateral_wind_m_s,
         ..VortexPair::default()
     };
@@ -239,13 +223,7 @@ fn pair_of_scene(shown: bool, seed: u64) -> (Flow, Vec<Flow>) {
         core_radius_m: secondary[0].core_radius_m,
         ..VortexLines::default()
     };
-    (Flow::VortexPair(pair), if shown { vec![Flow::VortexLines(lines)] } else { Vec::new() })
-}
-
-impl Kind {
-    fn place(&self) -> (&Range<f64>, &Range<f64>) {
-        (&self.height_m, &self.spacing_m)
-    }
+    (Flow::VortexPair(pair), if kind.shown { vec![Flow::VortexLines(lines)] } else { Vec::new() })
 }
 
 /// Some fit of a scan.
@@ -279,14 +257,15 @@ fn show(name: &str, scans: &[Scan]) {
 
 pub(super) fn run(options: &Options) -> Outcome {
     if options.wake.is_none() {
-        for kind in &KINDS {
+        let Kinds { map, scene } = toml::from_str(include_str!("secondary.toml"))?;
+        for kind in &map {
             let of = |scan| of_map(kind, options.seed.wrapping_mul(1 << 20) + u64::from(scan));
             let scans = (0..options.scans).into_par_iter().map(of).collect::<Result<Vec<_>, Failure>>()?;
-            show(kind.name, &scans.into_iter().flatten().collect::<Vec<_>>());
+            show(&kind.name, &scans.into_iter().flatten().collect::<Vec<_>>());
         }
-        for (name, shown) in [("peaks, low Lamb-Oseen pair", false), ("peaks, secondary vortices", true)] {
-            let (flow, added) = pair_of_scene(shown, options.seed);
-            show(name, &of_scene(flow, added, &root(), options)?);
+        for kind in &scene {
+            let (flow, added) = pair_of_scene(kind, options.seed);
+            show(&kind.name, &of_scene(flow, added, &root(), options)?);
         }
     }
     let folder = options.wake.clone().unwrap_or_else(|| root().join("tests/reference/wake"));

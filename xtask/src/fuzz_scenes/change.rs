@@ -9,35 +9,36 @@ use toml::{Table, Value};
 use wakescope_sim::scene::Scene;
 
 /// What may stand in place of what the default scene has.
-#[derive(Deserialize)]
+#[derive(Default, Deserialize)]
 struct Changes {
+    /// By section: a short scan, so that a change may make it longer and yet let it end soon.
+    short: BTreeMap<String, Table>,
     /// Section, key in it, table of another kind.
     kinds: Vec<(String, String, Table)>,
+    /// Section and key that the default scene does not have, and a usual value.
+    absent: Vec<(String, String, f64)>,
     /// What a key takes.
     words: BTreeMap<String, Vec<String>>,
 }
 
 /// The list of them; the test draws from it.
-static CHANGES: LazyLock<Changes> = LazyLock::new(|| {
-    toml::from_str(include_str!("changes.toml")).unwrap_or(Changes { kinds: Vec::new(), words: BTreeMap::new() })
-});
-
-/// Keys that the default scene does not have.
-const ABSENT: [(&str, &str, f64); 2] = [("estimator", "false_alarm", 1e-3), ("pulse", "chirp_hz_s", 1e13)];
+static CHANGES: LazyLock<Changes> = LazyLock::new(|| toml::from_str(include_str!("changes.toml")).unwrap_or_default());
 
 /// The scene of that number.
 pub(super) fn scene(seed: u64, index: u64) -> String {
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index));
     let mut scene = Table::try_from(Scene::default()).unwrap_or_default();
-    shorten(&mut scene);
+    for (section, keys) in &CHANGES.short {
+        keys.iter().for_each(|(key, value)| put(&mut scene, section, key, value.clone()));
+    }
     // Mostly one or two changes, now and then many.
     let changes = 1 + pick(&mut rng, 3) * pick(&mut rng, 2) + 6 * (pick(&mut rng, 12) / 11);
     for _ in 0..changes {
         match pick(&mut rng, 10) {
             0..2 => other_kind(&mut scene, &mut rng),
             2 => {
-                let (section, key, value) = ABSENT[pick(&mut rng, ABSENT.len())];
-                let value = changed(&Value::Float(value), key, &mut rng);
+                let (section, key, value) = &CHANGES.absent[pick(&mut rng, CHANGES.absent.len())];
+                let value = changed(&Value::Float(*value), key, &mut rng);
                 put(&mut scene, section, key, value);
             }
             _ => change_a_key(&mut scene, &mut rng),
@@ -61,21 +62,6 @@ fn stated(scene: &Table, usual: &Table) -> Table {
         }
     }
     out
-}
-
-/// A short scan, so that a change may make it longer and yet let it end soon.
-fn shorten(scene: &mut Table) {
-    for (key, angle_rad) in [("elevation_min_rad", 0.1), ("elevation_max_rad", 0.11)] {
-        put(scene, "scan", key, Value::Float(angle_rad));
-    }
-    for (section, key, count) in
-        [("scan", "pulses_per_line", 2), ("scan", "realisations", 2), ("outputs", "profile_points", 5)]
-    {
-        put(scene, section, key, Value::Integer(count));
-    }
-    for picture in ["svg", "png"] {
-        put(scene, "outputs", picture, Value::Boolean(false));
-    }
 }
 
 fn pick(rng: &mut Xoshiro256PlusPlus, below: usize) -> usize {

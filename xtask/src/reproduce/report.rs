@@ -17,27 +17,7 @@ pub(super) const STAGE: &str = "total";
 /// Figures with what they gave.
 type Done<'a> = [(&'a Figure, Rendered)];
 
-const STYLE: &str = "\
-:root{color-scheme:light}
-body{font:16px/1.5 system-ui,'Segoe UI','Helvetica Neue',Arial,sans-serif;color:#222;background:#fff;max-width:1040px;margin:0 auto;padding:24px 20px 80px}
-h1{font-size:28px;line-height:1.25;margin:8px 0 4px}h2{font-size:21px;margin:44px 0 10px;border-bottom:1px solid #ddd;padding-bottom:4px}
-h3{font-size:17px;margin:0 0 6px}.found{font-size:18px;margin:14px 0}
-.finding{margin:10px 0;padding:8px 14px;border-left:4px solid #b8ab73;background:#faf8f0}.finding.first{border-color:#b03a00;background:#fdf3ee}
-.finding p{margin:2px 0}.reason{color:#444;font-size:14.5px;overflow-wrap:anywhere}
-nav ul{columns:2;font-size:14.5px;padding-left:22px;margin:14px 0}a{color:#0063a6}
-dl{display:grid;grid-template-columns:max-content 1fr;gap:2px 18px;font-size:14px;margin:14px 0}dt{color:#666}dd{margin:0;overflow-wrap:anywhere}
-figure{margin:26px 0;padding:16px;border:1px solid #e3e3e3;border-radius:6px;background:#fff}
-figure svg{display:block;width:100%;height:auto}figcaption{font-size:14.5px;color:#333;margin-top:10px;white-space:pre-line;overflow-wrap:anywhere}
-.mark{display:inline-block;font-size:12px;font-weight:normal;background:#eef3f8;border:1px solid #cbd9e6;border-radius:10px;padding:1px 9px;margin-left:8px;vertical-align:2px}
-.scroll{overflow-x:auto}table{border-collapse:collapse;font-size:14px;width:100%}
-th,td{border-bottom:1px solid #e6e6e6;padding:5px 10px;text-align:left;vertical-align:top;overflow-wrap:anywhere}th{background:#f6f6f6;font-weight:600}
-td.pass{color:#00643f;font-weight:600}td.fail{color:#b03a00;font-weight:600}td.open{color:#6b5a00;font-weight:600}
-@media (max-width:700px){body{padding:12px 12px 60px}h1{font-size:23px}nav ul{columns:1}dl{grid-template-columns:1fr}dt{margin-top:6px}
-figure{padding:8px;margin:18px 0}thead{display:none}tr{display:block;border-bottom:2px solid #ccc;padding:6px 0}
-td{display:flex;gap:10px;border:0;padding:2px 4px}td::before{content:attr(data-label);flex:0 0 7.5em;color:#666;font-weight:normal}}
-@media print{body{max-width:none;padding:0;font-size:10.5pt}nav{display:none}a{color:inherit;text-decoration:none}
-figure,.finding,tr{break-inside:avoid}h2,h3{break-after:avoid}figure{border:0;padding:0}figure svg{max-height:22cm}thead{display:table-header-group}table{font-size:8.5pt}}
-";
+const STYLE: &str = include_str!("report.css");
 
 /// What stands before the figures: a heading, whether of the chapter's claims, and how they came out.
 const FINDINGS: [(&str, bool, Verdict); 4] = [

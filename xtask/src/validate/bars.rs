@@ -7,6 +7,7 @@ use crate::claim::Claim;
 use crate::wakes::mean;
 use crate::workspace::numbers;
 use fixtures::failure::Failure;
+use serde::Deserialize;
 use std::f64::consts::TAU;
 use std::path::Path;
 use wakescope_les::analysis::decay::{amplitude_growth, onset, value_at};
@@ -19,8 +20,9 @@ const END: f64 = 5.0;
 const LAMINAR: f64 = 2.2;
 
 /// What one mesh must keep.
+#[derive(Deserialize)]
 struct Bars {
-    file: &'static str,
+    file: String,
     position: f64,
     gamma: f64,
     energy: f64,
@@ -35,35 +37,15 @@ struct Bars {
     peak_tau: [f64; 2],
 }
 
-const COARSE: Bars = Bars {
-    file: "wake_3d_ground_re5000_coarse_box4_cans.csv",
-    position: 0.02,
-    gamma: 0.008,
-    energy: 0.005,
-    log_energy_3d: 0.7,
-    growth: 0.15,
-    onset: 0.25,
-    late: [(3.0, 0.65, 0.07), (4.0, 0.54, 0.07), (5.0, 0.50, 0.07)],
-    ratio_to_plane: (0.68, 0.07),
-    last_energy: (4.6, 0.35),
-    peak: [700.0, 1100.0],
-    peak_tau: [2.8, 3.2],
-};
+#[derive(Deserialize)]
+struct Meshes {
+    coarse: Bars,
+    medium: Bars,
+}
 
-const MEDIUM: Bars = Bars {
-    file: "wake_3d_ground_re5000_cans.csv",
-    position: 0.01,
-    gamma: 0.005,
-    energy: 0.003,
-    log_energy_3d: 0.35,
-    growth: 0.08,
-    onset: 0.15,
-    late: [(3.0, 0.68, 0.04), (4.0, 0.565, 0.04), (5.0, 0.515, 0.05)],
-    ratio_to_plane: (0.70, 0.05),
-    last_energy: (4.75, 0.25),
-    peak: [800.0, 1000.0],
-    peak_tau: [3.0, 3.2],
-};
+fn meshes() -> Result<Meshes, Failure> {
+    Ok(toml::from_str(include_str!("bars.toml"))?)
+}
 
 /// Columns of the stored rows, left and right.
 const GAMMA: [usize; 2] = [1, 2];
@@ -77,10 +59,11 @@ const SIDES: [&str; 2] = ["left", "right"];
 
 /// 24 x 128 x 80 cells; also the multiscale model up to the end of the laminar phase, which it must leave alone.
 pub(super) fn show_coarse() -> Result<Shown, Failure> {
+    let bars = meshes()?.coarse;
     let flow = run(WakePreset::Coarse, Subgrid::None {}, END, |_| {})?;
-    let mut shown = show(&flow, &COARSE)?;
+    let mut shown = show(&flow, &bars)?;
     let modelled = run(WakePreset::Coarse, MULTISCALE, LAMINAR, |_| {})?;
-    shown.checks.extend(laminar("multiscale: ", &modelled, &numbers(COARSE.file)?, &COARSE)?);
+    shown.checks.extend(laminar("multiscale: ", &modelled, &numbers(&bars.file)?, &bars)?);
     let mut off = 0.0_f64;
     for side in SIDES.map(|side| format!("gamma_ratio_{side}")) {
         off = off.max(worst(&modelled.curve(&side)?, &flow.curve(&side)?, [0.0, LAMINAR], apart));
@@ -91,7 +74,7 @@ pub(super) fn show_coarse() -> Result<Shown, Failure> {
 
 /// 48 x 240 x 128 cells.
 pub(super) fn show_medium() -> Result<Shown, Failure> {
-    show(&run(WakePreset::Medium, Subgrid::None {}, END, |_| {})?, &MEDIUM)
+    show(&run(WakePreset::Medium, Subgrid::None {}, END, |_| {})?, &meshes()?.medium)
 }
 
 /// A finished run of the flow of either preset on its own or a finer mesh, instead of one made here.
@@ -106,15 +89,14 @@ pub(super) fn show_files(folder: &Path) -> Result<Shown, Failure> {
             && f.size == pair.size
             && f.cells.iter().zip(pair.cells).all(|(has, least)| *has >= least)
     };
-    let choices = [(WakePreset::Medium, &MEDIUM), (WakePreset::Coarse, &COARSE)];
-    let found = choices.into_iter().find(|(preset, _)| like(*preset));
-    let (_, bars) =
-        found.ok_or_else(|| Failure::new(format!("{}: no stored run is of this flow", folder.display())))?;
-    show(&wake, bars)
+    let Meshes { coarse, medium } = meshes()?;
+    let found = [(WakePreset::Medium, medium), (WakePreset::Coarse, coarse)].into_iter().find(|of| like(of.0));
+    let found = found.ok_or_else(|| Failure::new(format!("{}: no stored run is of this flow", folder.display())))?;
+    show(&wake, &found.1)
 }
 
 fn show(flow: &FinishedWake, bars: &Bars) -> Result<Shown, Failure> {
-    let stored = numbers(bars.file)?;
+    let stored = numbers(&bars.file)?;
     let plane = run(WakePreset::Coarse, Subgrid::None {}, END, |of| {
         *of = flow.flow.clone();
         plane(of);
