@@ -13,7 +13,7 @@ mod report;
 use crate::cost::{Cost, machine};
 use crate::workspace::{provenance, root};
 use fixtures::failure::{Failure, Outcome};
-use front::{Measured, cheapest, on_front};
+use front::{cheapest, on_front};
 pub(crate) use report::{picture, text};
 use std::path::PathBuf;
 use wakescope_sim::io::{FileGroup, Table, write_atomic};
@@ -114,11 +114,6 @@ impl Row {
     fn is_own(&self) -> bool {
         self.version.is_empty()
     }
-
-    fn measured(&self) -> Measured {
-        let Found { error, standard_error, cost, .. } = self.found;
-        Measured { core_s: cost.cpu_s, error, standard_error }
-    }
 }
 
 /// The first three of the values if `quick`.
@@ -142,10 +137,10 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
             let (own, others) = of_case.split_at_mut(own);
             let (metric, reference) = (own[0].knob.metric, own[0].knob.reference);
             others.iter_mut().for_each(|row| (row.knob.metric, row.knob.reference) = (metric, reference));
-            let measured: Vec<Measured> = own.iter().map(Row::measured).collect();
-            own.iter_mut().zip(on_front(&measured)).for_each(|(row, is_on)| row.is_on_front = is_on);
-            for (place, (_, target)) in TARGETS.into_iter().enumerate() {
-                cheapest(&measured, target).into_iter().for_each(|best| own[best].is_cheapest[place] = true);
+            let found: Vec<&Found> = own.iter().map(|row| &row.found).collect();
+            let (front, best) = (on_front(&found), TARGETS.map(|(_, target)| cheapest(&found, target)));
+            for (place, row) in own.iter_mut().enumerate() {
+                (row.is_on_front, row.is_cheapest) = (front[place], best.map(|best| best == Some(place)));
             }
         }
         rows.iter_mut().for_each(|row| row.group = name);

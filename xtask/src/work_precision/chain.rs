@@ -16,8 +16,6 @@ use wakescope_sim::run;
 use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 use wakescope_sim::setup::progress::Silent;
 
-pub(super) const CASE: &str = "one whole map";
-
 /// Realisations of the scan.
 const COUNTS: [f64; 6] = [2.0, 4.0, 8.0, 16.0, 32.0, 64.0];
 /// Target of the search, a relative error, and what it may take in runs of the scene: enough that every step is looked at.
@@ -58,7 +56,13 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
 }
 
 fn knob() -> Knob {
-    Knob::new([CASE, "", "realisations", "standard deviation of the map, relative", "the finest keys, same signals"])
+    Knob::new([
+        "one whole map",
+        "",
+        "realisations",
+        "standard deviation of the map, relative",
+        "the finest keys, same signals",
+    ])
 }
 
 fn scene() -> Result<SceneFile, Failure> {

@@ -18,16 +18,13 @@ use wakescope_estimate::{
 };
 use wakescope_signal::NoiseModel;
 
-/// The case that is drawn.
-pub(super) const WHITE: &str = "0 dB, white";
-
 /// Windows of one estimate.
 const WINDOWS: usize = 20;
 
 /// All measurements; few trials if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let cases = [
-        (WHITE, NoiseModel::White, 0.0),
+        ("0 dB, white", NoiseModel::White, 0.0),
         ("0 dB, band", NoiseModel::BandLimited, 0.0),
         ("20 dB, band", NoiseModel::BandLimited, 20.0),
     ];

@@ -28,11 +28,6 @@ pub(super) const SEED: u64 = 1;
 const CN2_M_M23: f64 = 1e-13;
 const RANGE_M: f64 = 1000.0;
 
-pub(super) const SCREENS: &str = "phase screens";
-pub(super) const FREE_SPACE: &str = "free-space propagation";
-pub(super) const BISTATIC: &str = "bistatic efficiency";
-pub(super) const VORTICES: &str = "Taylor-Green vortices, Re 200";
-
 /// Screens, propagation and efficiency, and what layers of finite thickness do to it.
 pub(super) fn optics(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = phase_screens::<f32>("f32, one of a pair")?;
@@ -44,7 +39,7 @@ pub(super) fn optics(quick: bool) -> Result<Vec<Row>, Failure> {
 
 /// The expected structure function against quadrature: its worst error from two spacings to half the grid.
 fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
-    let knob = Knob::new([SCREENS, method, "points a side", "structure function, worst", "quadrature"]);
+    let knob = Knob::new(["phase screens", method, "points a side", "structure function, worst", "quadrature"]);
     let spectrum = Turbulence::table2(CN2_M_M23)?.spectrum;
     knob.rows(&[128.0, 256.0, 512.0], |points| {
         let points = points as usize;
@@ -68,7 +63,8 @@ fn free_space() -> Result<Vec<Row>, Failure> {
     let exact = theory::free_space_efficiency(&Telescope::table2(), RANGE_M)?;
     let mut rows = Vec::new();
     for (method, double) in [("f32, ten steps", false), ("f64, ten steps", true)] {
-        let knob = Knob::new([FREE_SPACE, method, "points a side", "efficiency, uncorrected", "exact theory"]);
+        let knob =
+            Knob::new(["free-space propagation", method, "points a side", "efficiency, uncorrected", "exact theory"]);
         rows.extend(knob.rows(&[128.0, 256.0, 512.0, 1024.0], |points| {
             let screens = screens(10, Grid::square(points as usize, 1.024 / points)?)?;
             let free =
@@ -91,7 +87,13 @@ fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
     let found = long.0.bistatic.ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
     let deviation = found.standard_error[0] / found.mean[0] * (many as f64).sqrt();
     let set_up_s = (short.1.cpu_s - few as f64 * one.cpu_s).max(0.0);
-    let knob = Knob::new([BISTATIC, "5 layers, 256 points", "realisations", "bias and standard error", "exact theory"]);
+    let knob = Knob::new([
+        "bistatic efficiency",
+        "5 layers, 256 points",
+        "realisations",
+        "bias and standard error",
+        "exact theory",
+    ]);
     knob.rows(&DRAWN_REALISATIONS, |count| {
         let noise = deviation / count.sqrt();
         let error = bias.hypot(noise);
@@ -157,7 +159,13 @@ fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
     let cells: &[f64] =
         if quick { &[12.0, 16.0, 24.0, 32.0, 48.0] } else { &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0] };
     let metric = "rate of loss of energy, rms over its peak";
-    let knob = Knob::new([VORTICES, "Runge-Kutta 3", "cells a side", metric, "Fourier solution on 96 points a side"]);
+    let knob = Knob::new([
+        "Taylor-Green vortices, Re 200",
+        "Runge-Kutta 3",
+        "cells a side",
+        metric,
+        "Fourier solution on 96 points a side",
+    ]);
     knob.rows(cells, |cells| {
         let substeps = (cells / 24.0).ceil();
         let mut case = cases::taylor_green_3d(cells as usize, 200.0)?;

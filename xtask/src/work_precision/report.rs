@@ -1,69 +1,35 @@
 //! The panels of error against run time, this program beside others, and what they say in words.
 
-use super::physics::{BISTATIC, FREE_SPACE, SCREENS, VORTICES};
-use super::{Row, TARGETS, chain, estimate};
+use super::{Row, TARGETS};
 use crate::cost::machine;
+use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use std::sync::LazyLock;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// What a panel shows, and what is compared with what.
+#[derive(Deserialize)]
 struct Panel {
-    case: &'static str,
-    title: &'static str,
-    compared: &'static str,
+    /// The case of its rows.
+    case: String,
+    title: String,
+    compared: String,
     guide: Option<Guide>,
 }
 
 /// A slope through the first point of this program.
+#[derive(Deserialize)]
 struct Guide {
-    label: &'static str,
+    label: String,
     power: f64,
 }
 
-const PANELS: [Panel; 6] = [
-    Panel {
-        case: SCREENS,
-        title: "Phase screens, 128, 256, 512 points a side",
-        compared: "The expected structure function of von Karman screens (inner scale 1 cm, κ₀ 1 rad/m, 2 mm between points), worst from two spacings \
-                   to half the grid, against quadrature; the time is that of one screen.",
-        guide: None,
-    },
-    Panel {
-        case: FREE_SPACE,
-        title: "Free-space propagation, 128 to 1024 points a side",
-        compared: "The efficiency of Table 2's beam after 1000 m against the exact one, by quadrature: this program in ten steps, as with screens, \
-                   the others in one.",
-        guide: None,
-    },
-    Panel {
-        case: BISTATIC,
-        title: "Bistatic efficiency, Cn² 1e-13, 1000 m, five screens, 256 points",
-        compared: "Bias and standard error, the root of their squares, of 50 to 51 200 realisations, against exact theory of the continuous path; the \
-                   bias is that of five layers and, of the others, of their screens.",
-        guide: Some(Guide { label: "t^{−1/2}", power: -0.5 }),
-    },
-    Panel {
-        case: VORTICES,
-        title: "Taylor-Green vortices, Re 200, 12 points a side and more",
-        compared: "The rate at which the vortices lose energy until t = 10, root mean square error over its peak, against a Fourier solution on 96 points \
-                   a side.",
-        guide: Some(Guide { label: "fourth order, t^{−1}", power: -1.0 }),
-    },
-    Panel {
-        case: estimate::WHITE,
-        title: "Velocity of 20 windows, 0 dB: scatter over the bound, less one",
-        compared: "By how much the standard deviation of good estimates exceeds the Cramer-Rao bound in white noise; smaller than two standard errors of \
-                   the trials nothing can be told.",
-        guide: None,
-    },
-    Panel {
-        case: chain::CASE,
-        title: "A whole map at 10 dB: its standard deviation",
-        compared: "Half of Table 2's scan about the nearer vortex with 2 to 64 realisations: the shift of the map's standard deviation that windows \
-                   further apart make, and its standard error, the root of their squares, both as `wakescope accuracy` tells them.",
-        guide: Some(Guide { label: "t^{−1/2}", power: -0.5 }),
-    },
-];
+/// The panels in their order.
+static PANELS: LazyLock<Vec<Panel>> = LazyLock::new(|| {
+    let panels: Result<BTreeMap<String, Vec<Panel>>, _> = toml::from_str(include_str!("panels.toml"));
+    panels.map_or(Vec::new(), |panels| panels.into_values().flatten().collect())
+});
 
 /// Of more methods than these a panel shows the best settings.
 const MOST_METHODS: usize = 4;
@@ -95,7 +61,7 @@ fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
         (widened(&[rows, failed].concat(), |row| row.found.cost.cpu_s, 1.0), widened(rows, |row| row.found.error, 2.0));
     let x = Axis { range: Some(x_range), ..Axis::log("processor time, one thread [s]") };
     let y = Axis { range: Some(y_range), ..Axis::log("relative error") };
-    let mut plot = CurvePlot { shape: 0.78, ..CurvePlot::new(panel.title, x, y) };
+    let mut plot = CurvePlot { shape: 0.78, ..CurvePlot::new(&panel.title, x, y) };
     let mut own: Vec<&str> = rows.iter().filter(|row| row.is_own()).map(|row| row.knob.method.as_str()).collect();
     own.sort_unstable();
     own.dedup();
@@ -150,7 +116,7 @@ fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
 /// Under each panel: what is compared, what this program costs, what others cost at their errors.
 pub(crate) fn text(rows: &[Row]) -> String {
     let mut out = format!("Measured on {}.\n\n", machine());
-    for panel in &PANELS {
+    for panel in PANELS.iter() {
         let of = drawn(rows, panel);
         if of.is_empty() {
             continue;
