@@ -13,11 +13,7 @@ pub(crate) enum Profile {
 
 impl Profile {
     pub(crate) fn name(self) -> &'static str {
-        match self {
-            Self::Quick => "quick",
-            Self::Standard => "standard",
-            Self::Full => "full",
-        }
+        self.choose("quick", "standard", "full")
     }
 
     /// One of three values.
