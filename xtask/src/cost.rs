@@ -1,6 +1,7 @@
 //! What a piece of work takes: processor time, time on the clock, memory; and on which machine. Linux only: memory and machine come
 //! from /proc.
 
+use crate::process::{output, resident_peak_bytes};
 use fixtures::failure::Failure;
 use rustix::time::{ClockId, clock_gettime};
 use std::process::Command;
@@ -34,7 +35,7 @@ pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(
     let (before_s, start) = (cpu_s(), Instant::now());
     let value = work()?;
     let cpu_s = cpu_s() - before_s;
-    Ok((value, Cost { cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: peak_bytes("self") }))
+    Ok((value, Cost { cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: resident_peak_bytes("self") }))
 }
 
 /// Processor time of the process so far, s: of all its threads, those that have ended included.
@@ -47,28 +48,9 @@ pub(crate) fn thread_cpu_s() -> f64 {
     seconds(ClockId::ThreadCPUTime)
 }
 
-/// Processor time of the processes that this one has waited for, and theirs, s; zero where the system does not tell.
-pub(crate) fn children_cpu_s() -> f64 {
-    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    ticks_s(&stat, 13) + ticks_s(&stat, 14)
-}
-
-/// The time at a place behind the name in `/proc/PID/stat`, where the state stands at place 0, s; zero where there is none.
-pub(crate) fn ticks_s(stat: &str, place: usize) -> f64 {
-    let field = stat.rsplit(')').next().and_then(|fields| fields.split_whitespace().nth(place));
-    field.and_then(|ticks| ticks.parse::<f64>().ok()).unwrap_or(0.0) / 100.0
-}
-
 fn seconds(clock: ClockId) -> f64 {
     let time = clock_gettime(clock);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
-}
-
-/// Largest resident memory of a process so far, bytes; NaN where the system does not tell.
-pub(crate) fn peak_bytes(process: &str) -> f64 {
-    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
-    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<f64>().ok());
-    peak.map_or(f64::NAN, |kb| 1024.0 * kb)
 }
 
 /// Shortest piece of work whose time is told by one of three runs: a call into the system and a full cache count little beside it \[s\].
@@ -101,16 +83,12 @@ pub(crate) fn machine() -> String {
         line.split_once(':').map(|(_, name)| name.trim().to_owned())
     });
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
-    let compiler = Command::new("rustc")
-        .arg("--version")
-        .output()
-        .ok()
-        .map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned());
+    let compiler = output(Command::new("rustc").arg("--version")).map(|text| text.trim().to_owned());
     format!(
         "{} ({}, {}), {cores} cores, {}",
         cpu.unwrap_or_else(|| "processor unknown".into()),
         std::env::consts::ARCH,
         std::env::consts::OS,
-        compiler.unwrap_or_else(|| "compiler unknown".into())
+        compiler.unwrap_or_else(|_| "compiler unknown".into())
     )
 }

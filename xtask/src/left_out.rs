@@ -3,8 +3,7 @@
 //! A scene that has everything is run whole and without one thing at a time, each run a process of its own with one thread; the crates behind
 //! each of ours, alone and with its features, are counted by cargo and, if asked, compiled from nothing.
 
-use crate::cost::children_cpu_s;
-use crate::process::{call, output, program, run_scene};
+use crate::process::{call, children_cpu_s, output, program, run_scene};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;

@@ -2,7 +2,6 @@
 //!
 //! Watching is of Linux only: the figures come from /proc.
 
-use crate::cost;
 use crate::workspace::{built, root};
 use fixtures::failure::Failure;
 use std::io::ErrorKind;
@@ -115,10 +114,29 @@ pub(crate) fn watch(program: &Path, words: &[&str], folder: &Path, seconds: f64)
 
 /// Brings time and memory up to date; whether the process has ended.
 fn sample(child: &Child, cpu_s: &mut f64, peak_bytes: &mut f64) -> bool {
-    *peak_bytes = peak_bytes.max(cost::peak_bytes(&child.id().to_string()));
+    *peak_bytes = peak_bytes.max(resident_peak_bytes(&child.id().to_string()));
     let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap_or_default();
     // utime and stime.
-    *cpu_s = cpu_s.max(cost::ticks_s(&stat, 11) + cost::ticks_s(&stat, 12));
+    *cpu_s = cpu_s.max(ticks_s(&stat, 11) + ticks_s(&stat, 12));
     let state = stat.rsplit(')').next().and_then(|fields| fields.split_whitespace().next());
     matches!(state, None | Some("Z" | "X"))
+}
+
+/// Processor time of the processes that this one has waited for, and theirs, s; zero where the system does not tell.
+pub(crate) fn children_cpu_s() -> f64 {
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    ticks_s(&stat, 13) + ticks_s(&stat, 14)
+}
+
+/// The time at a place behind the name in `/proc/PID/stat`, where the state stands at place 0, s; zero where there is none.
+pub(crate) fn ticks_s(stat: &str, place: usize) -> f64 {
+    let field = stat.rsplit(')').next().and_then(|fields| fields.split_whitespace().nth(place));
+    field.and_then(|ticks| ticks.parse::<f64>().ok()).unwrap_or(0.0) / 100.0
+}
+
+/// Largest resident memory of a process so far, bytes; NaN where the system does not tell.
+pub(crate) fn resident_peak_bytes(process: &str) -> f64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let peak = status.lines().find_map(|l| l.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB")?.parse::<f64>().ok());
+    peak.map_or(f64::NAN, |kb| 1024.0 * kb)
 }
