@@ -4,6 +4,7 @@
 //! included. Memory is the largest resident set less that of a run that does next to nothing.
 
 use crate::process::{program, run_scene};
+use crate::workspace::unless;
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
 use std::path::Path;
@@ -19,9 +20,8 @@ pub(crate) struct Options {
     only: Option<String>,
 }
 
-/// Largest ratio of forecast and time, either way, and of forecast and memory.
-const TIME: f64 = 2.0;
-const MEMORY: f64 = 1.5;
+/// Largest ratio of forecast and time, and of forecast and memory, either way.
+const MOST: [f64; 2] = [2.0, 1.5];
 
 /// A run that does next to nothing.
 const EMPTY: &str = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 0.0\n[flow]\nkind = \"calm\"\n[scan]\n\
@@ -44,43 +44,28 @@ struct Scene {
 pub(crate) fn run(options: &Options) -> Outcome {
     let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-forecast"));
     std::fs::create_dir_all(&folder)?;
-    let empty = measured(&program, &folder, EMPTY, "run")?;
-    println!("a run of next to nothing: {:.1} MB", empty.actual.1 / 1e6);
+    let [_, [_, empty_bytes]] = measured(&program, &folder, EMPTY, "run")?;
+    println!("a run of next to nothing: {:.1} MB", empty_bytes / 1e6);
     println!("{:<28} time: forecast, run [s], ratio; memory: forecast, run [MB], ratio", "scene");
     let mut beyond = Vec::new();
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
     let Scenes { scene } = toml::from_str(include_str!("forecast.toml"))?;
     for Scene { name, command, text } in scene.iter().filter(|s| wanted(&s.name)) {
-        let found = measured(&program, &folder, text, command)?;
-        let (forecast, time, memory) = (found.forecast, found.actual.0, (found.actual.1 - empty.actual.1).max(1e5));
-        let ratios = (forecast.0 / time, forecast.1 / memory);
-        println!(
-            "{name:<28} {:>10.2} {time:>10.2} {:>6.2}   {:>10.1} {:>10.1} {:>6.2}",
-            forecast.0,
-            ratios.0,
-            forecast.1 / 1e6,
-            memory / 1e6,
-            ratios.1
-        );
-        let inside = |ratio: f64, limit: f64| (1.0 / limit..=limit).contains(&ratio);
-        if !inside(ratios.0, TIME) || !inside(ratios.1, MEMORY) {
-            beyond.push(name.as_str());
-        }
+        let [[forecast_s, forecast_bytes], [time_s, bytes]] = measured(&program, &folder, text, command)?;
+        let bytes = (bytes - empty_bytes).max(1e5);
+        let ratios = [forecast_s / time_s, forecast_bytes / bytes];
+        let time = format!("{forecast_s:>10.2} {time_s:>10.2} {:>6.2}", ratios[0]);
+        let memory = format!("{:>10.1} {:>10.1} {:>6.2}", forecast_bytes / 1e6, bytes / 1e6, ratios[1]);
+        println!("{name:<28} {time}   {memory}");
+        let inside = ratios.iter().zip(MOST).all(|(ratio, most)| (1.0 / most..=most).contains(ratio));
+        beyond.extend((!inside).then_some(name));
     }
     std::fs::remove_dir_all(&folder)?;
-    match beyond.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::new(format!("beyond {TIME} in time or {MEMORY} in memory: {}", beyond.join(", ")))),
-    }
+    unless(&format!("beyond {} in time or {} in memory", MOST[0], MOST[1]), &beyond)
 }
 
-/// Time \[s\] and memory \[bytes\], forecast and found.
-struct Measured {
-    forecast: (f64, f64),
-    actual: (f64, f64),
-}
-
-fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result<Measured, Failure> {
+/// Time \[s\] and memory \[bytes\] as they are forecast, and as they are found.
+fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result<[[f64; 2]; 2], Failure> {
     let run = run_scene(program, folder, scene, &[command, "--json"])?;
     // The plan is part of what a run tells; the numbers of the whole are those at the first level of the object.
     let number = |key: &str| {
@@ -88,6 +73,5 @@ fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result
         let value = line.and_then(|l| l.trim_end_matches(',').parse::<f64>().ok());
         value.ok_or_else(|| Failure::new(format!("{command} tells no {key}: {}", run.stdout)))
     };
-    let forecast = (number("core_s")?, number("memory_bytes")?);
-    Ok(Measured { forecast, actual: (run.cpu_s, run.peak_bytes) })
+    Ok([[number("core_s")?, number("memory_bytes")?], [run.cpu_s, run.peak_bytes]])
 }

@@ -6,8 +6,9 @@
 mod change;
 
 use crate::process::{Watched, program, watch};
+use crate::workspace::unless;
 use change::scene;
-use fixtures::failure::{Failure, Outcome};
+use fixtures::failure::Outcome;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -60,10 +61,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     std::fs::remove_dir_all(&folder)?;
     let refused = options.count - good;
     println!("{} scenes: {refused} refused, {good} good, {ran} of these run; {} faults", options.count, faults.len());
-    match faults.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::new(format!("faults in the scenes {faults:?} of seed {}", options.seed))),
-    }
+    unless(&format!("faults in the scenes of seed {}", options.seed), &faults)
 }
 
 /// What is wrong with an end that is not among the `allowed` ones.

@@ -1,7 +1,7 @@
 //! `cargo xtask regress`: what the crates compute now against the curves stored in
 //! `tests/reference/`, as a table of name, error, tolerance, run time and verdict.
 
-use crate::workspace::{provenance, root};
+use crate::workspace::{provenance, root, unless};
 use fixtures::failure::{Failure, Outcome};
 use std::time::Instant;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -34,11 +34,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         println!("{:<34} {time_s:>7.3} s  {told}", curve.name);
         failed.extend((!told.starts_with("pass")).then_some(curve.name));
     }
-    if failed.is_empty() {
-        Ok(())
-    } else {
-        Err(Failure::new(format!("regress: out of tolerance: {}", failed.join(", "))))
-    }
+    unless("regress: out of tolerance", &failed)
 }
 
 fn told(curve: &Curve, c: &Comparison) -> String {

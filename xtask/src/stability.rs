@@ -5,8 +5,8 @@
 
 use crate::profile::Profile;
 use crate::statistics::Verdict;
-use crate::workspace::{provenance, root};
-use fixtures::failure::{Failure, Outcome};
+use crate::workspace::{provenance, root, unless};
+use fixtures::failure::Outcome;
 use std::path::PathBuf;
 use std::time::Instant;
 use wakescope_sim::io::{FileGroup, Table};
@@ -54,7 +54,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         start.elapsed().as_secs_f64(),
         folder.join("stability.csv").display()
     );
-    if missed.is_empty() { Ok(()) } else { Err(Failure::new(format!("not as expected: {}", missed.join("; ")))) }
+    unless("not as expected", &missed)
 }
 
 fn verdict(ended: &Ended) -> &'static str {

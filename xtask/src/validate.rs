@@ -10,12 +10,13 @@ mod parameters;
 mod runs;
 
 use crate::claim::Claim;
+use crate::figures::context::Rendered;
 use crate::profile::Profile;
-use crate::workspace::{provenance, root};
+use crate::workspace::{provenance, root, unless};
 use fixtures::failure::{Failure, Outcome};
 use std::path::PathBuf;
 use std::time::Instant;
-use wakescope_sim::io::{FileGroup, Table};
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::Figure;
 
 /// Options of the task.
@@ -90,7 +91,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
     }
     println!("pictures and tables in {}", folder.display());
-    if missed.is_empty() { Ok(()) } else { Err(Failure::new(format!("bars missed: {}", missed.join("; ")))) }
+    unless("bars missed", &missed)
 }
 
 fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) -> Outcome {
@@ -102,10 +103,8 @@ fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) 
         .text("measured", text(|c| &c.measured))
         .text("expected", text(|c| &c.expected))
         .text("verdict", text(|c| c.verdict.name()));
-    let mut files = FileGroup::new(folder);
-    files.add(&format!("{name}.csv"), shown.table.to_csv(&origin)?)?;
+    let mut files = Rendered::new(&shown.table, &shown.figure, &origin)?.files_in(folder, name)?;
     files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;
-    shown.figure.add_to(&mut files, name, &origin)?;
     files.commit()?;
     Ok(())
 }

@@ -4,19 +4,20 @@
 //! apart. Errors are relative, with their standard errors; a setting that fails is a row. Other programs come from `docs/peers`.
 
 mod chain;
-mod estimate;
+pub(crate) mod estimate;
 mod front;
 mod peers;
 mod physics;
 mod report;
 
 use crate::cost::{Cost, machine};
+use crate::figures::context::Rendered;
 use crate::workspace::{provenance, root};
 use fixtures::failure::{Failure, Outcome};
 use front::{cheapest, on_front};
 pub(crate) use report::{picture, text};
 use std::path::PathBuf;
-use wakescope_sim::io::{FileGroup, Table, write_atomic};
+use wakescope_sim::io::{Table, write_atomic};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
@@ -195,10 +196,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let parameters = format!("machine = {:?}\nthreads = 1\nquick = {}\n", machine(), options.quick);
     let origin = provenance(&parameters, physics::SEED);
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
-    let mut files = FileGroup::new(&folder);
-    files.add("work_precision.csv", table(&rows).to_csv(&origin)?)?;
-    picture(&rows).add_to(&mut files, "work_precision", &origin)?;
-    files.commit()?;
+    Rendered::new(&table(&rows), &picture(&rows), &origin)?.files_in(&folder, "work_precision")?.commit()?;
     println!("{}\nwrote {}", text(&rows), folder.join("work_precision.csv").display());
     if options.store {
         let book = root().join("docs/src");

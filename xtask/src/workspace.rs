@@ -1,7 +1,7 @@
 //! The files of the workspace, and what is written about those that a task makes.
 
 use crate::process::output;
-use fixtures::failure::Failure;
+use fixtures::failure::{Failure, Outcome};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use wakescope_sim::io::Provenance;
@@ -10,6 +10,12 @@ use wakescope_sim::io::Provenance;
 pub(crate) fn provenance(parameters: &str, seed: u64) -> Provenance {
     let (program, scene_hash) = (wakescope_sim::PROGRAM.into(), wakescope_sim::scene::hash_of(parameters));
     Provenance { program, scene_toml: parameters.into(), scene_hash, seed }
+}
+
+/// Well, unless some are named: then what is wrong with them, in words.
+pub(crate) fn unless(what: &str, named: &[impl ToString]) -> Outcome {
+    let named: Vec<String> = named.iter().map(ToString::to_string).collect();
+    if named.is_empty() { Ok(()) } else { Err(Failure::new(format!("{what}: {}", named.join("; ")))) }
 }
 
 /// The root folder of the workspace.
