@@ -1,6 +1,7 @@
 //! What is stable of optics, signals, estimators and fits.
 
 use super::{Curve, NO_THEORY, Panel, logs};
+use crate::work_precision::estimate::{Uniform, WINDOWS, bound_m_s};
 use fixtures::failure::Failure;
 use fixtures::methods::Known;
 use fixtures::uniform::{Air, BAND_M_S, errors};
@@ -9,14 +10,14 @@ use num_complex::Complex;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
-use wakescope_estimate::bound::{Noise, WindowModel};
+use wakescope_estimate::bound::Noise;
 use wakescope_estimate::estimators::{ModelPeak, ModelReading};
 use wakescope_estimate::map::good_and_bad;
 use wakescope_estimate::spectrum::unweighted_lags;
 use wakescope_estimate::vortex_fit::{
     EstimatorResponse, MapFitOptions, PulseShape, VelocityMap, Wake, WakeModel, refine_map_fit_of_estimator,
 };
-use wakescope_estimate::{Correlogram, Estimator, Refinement, SignalKind, SpectralPeak, Statistic, Weighting};
+use wakescope_estimate::{Correlogram, Refinement, SignalKind, SpectralPeak, Weighting};
 use wakescope_optics::{Focus, Grid, Layers, MonteCarlo, Stop, Telescope, theory};
 use wakescope_signal::literal::literal_envelope;
 use wakescope_signal::{
@@ -107,8 +108,7 @@ pub(super) fn phasors() -> Result<Vec<Panel>, Failure> {
 
 /// Methods that are drawn.
 const METHODS: [&str; 4] = ["PA", "CA, AR(16)", "pulse pair", "likelihood"];
-/// Windows that are accumulated, of so many trials.
-const WINDOWS: usize = 20;
+/// Trials of each method.
 const TRIALS: usize = 200;
 
 /// Standard deviation of good estimates over the Cramer-Rao bound, and the share of bad ones, in white noise.
@@ -117,7 +117,7 @@ pub(super) fn ratios() -> Result<Vec<Panel>, Failure> {
     for snr_db in [-20.0, -15.0, -10.0, 0.0, 20.0, 40.0, 70.0, 100.0] {
         let air = Air::new(NoiseModel::White, PULSE_S, snr_db, SEED)?;
         let known = Known { noise: NoiseModel::White, sigma_s: air.sigma_s(), snr: 10f64.powf(0.1 * snr_db) };
-        let bound_m_s = bound_m_s(&air, known.snr)?;
+        let bound_m_s = bound_m_s(&known)?;
         for of in errors(&air, &known, &[WINDOWS], TRIALS)? {
             let Some(method) = METHODS.iter().position(|method| *method == of.method) else { continue };
             let found = good_and_bad(&of.errors_m_s, BAND_M_S);
@@ -138,39 +138,17 @@ fn share(label: &str) -> Axis {
     Axis::linear(label).between(-0.05, 1.05)
 }
 
-fn bound_m_s(air: &Air, snr: f64) -> Result<f64, Failure> {
-    let model = WindowModel::gaussian_pulse(&sampling()?, WINDOW, air.sigma_s(), Noise::White)?;
-    Ok(model.bound_m_s(0.0, snr, SignalKind::Real, WINDOWS as f64)?)
-}
-
 /// Standard deviation over the bound of autoregressive models of all orders, where noise does not help the matrix.
 pub(super) fn orders() -> Result<Vec<Panel>, Failure> {
     let s = sampling()?;
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
     let curves = [0.0, 40.0, 100.0].map(|snr_db| {
-        let air = Air::new(NoiseModel::White, PULSE_S, snr_db, SEED)?;
-        let bound_m_s = bound_m_s(&air, 10f64.powf(0.1 * snr_db))?;
-        let (mut scratch, mut signal) = (wakescope_estimate::Scratch::new(), Scratch::default());
-        let (mut window, mut one) = (vec![0.0; WINDOW], vec![0.0; statistic.statistic_len()]);
-        let mut means = Vec::new();
-        for trial in 0..TRIALS {
-            let (line, velocity_m_s) = air.line(trial, TRIALS);
-            let mut mean = vec![0.0; one.len()];
-            for pulse in 0..WINDOWS {
-                air.window(&line, trial, pulse, &mut signal, &mut window)?;
-                statistic.evaluate(&window, &mut scratch, &mut one);
-                mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / WINDOWS as f64);
-            }
-            means.push((velocity_m_s, mean));
-        }
+        let wind = Uniform::new(NoiseModel::White, snr_db, TRIALS)?;
         Curve::new(format!("{snr_db} dB"), &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 48.0, (WINDOW - 1) as f64], |order| {
             let (reading, order) = (ModelReading::Spectrum, order as usize);
             let model = ModelPeak::new(reading, &s, SignalKind::Real, WINDOW, order, 2048, Refinement::Parabola)?;
-            let errors_m_s: Vec<f64> = means
-                .iter()
-                .map(|(velocity_m_s, mean)| model.estimate(mean, &mut scratch).velocity_m_s - velocity_m_s)
-                .collect();
-            Ok([good_and_bad(&errors_m_s, BAND_M_S).std_good_m_s / bound_m_s, NO_THEORY])
+            let errors_m_s: Vec<f64> = wind.errors(&statistic, &model).into_iter().map(|(error, _)| error).collect();
+            Ok([good_and_bad(&errors_m_s, BAND_M_S).std_good_m_s / wind.bound_m_s, NO_THEORY])
         })
     });
     Ok(vec![Panel::new("autoregressive models over the bound", logs(["order", "std over the bound"]), curves)?])

@@ -19,7 +19,13 @@ use wakescope_estimate::{
 use wakescope_signal::NoiseModel;
 
 /// Windows of one estimate.
-const WINDOWS: usize = 20;
+pub(crate) const WINDOWS: usize = 20;
+
+/// Cramer-Rao bound of one estimate in white noise \[m/s\].
+pub(crate) fn bound_m_s(known: &Known) -> Result<f64, Failure> {
+    let model = WindowModel::gaussian_pulse(&sampling()?, WINDOW, known.sigma_s, Noise::White)?;
+    Ok(model.bound_m_s(0.0, known.snr, SignalKind::Real, WINDOWS as f64)?)
+}
 
 /// All measurements; few trials if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
@@ -31,24 +37,22 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let (cases, trials) = if quick { (&cases[..1], 2000) } else { (&cases[..], 6000) };
     let mut rows = Vec::new();
     for &(case, noise, snr_db) in cases {
-        rows.extend(Uniform::new(case, noise, snr_db, trials)?.rows(quick)?);
+        rows.extend(Uniform::new(noise, snr_db, trials)?.rows(case, quick)?);
     }
     Ok(rows)
 }
 
-/// Windows drawn beforehand, so that only the estimates are timed.
-struct Uniform {
-    case: &'static str,
+/// Windows of a uniform wind, drawn beforehand, so that only the estimates are timed.
+pub(crate) struct Uniform {
     known: Known,
-    bound_m_s: f64,
+    pub(crate) bound_m_s: f64,
     trials: Vec<(f64, Vec<Vec<f64>>)>,
 }
 
 impl Uniform {
-    fn new(case: &'static str, noise: NoiseModel, snr_db: f64, trials: usize) -> Result<Self, Failure> {
+    pub(crate) fn new(noise: NoiseModel, snr_db: f64, trials: usize) -> Result<Self, Failure> {
         let air = Air::new(noise, 200e-9, snr_db, SEED)?;
         let known = Known { noise, sigma_s: air.sigma_s(), snr: 10f64.powf(0.1 * snr_db) };
-        let model = WindowModel::gaussian_pulse(&sampling()?, WINDOW, air.sigma_s(), Noise::White)?;
         let mut scratch = wakescope_signal::Scratch::default();
         let mut drawn = Vec::with_capacity(trials);
         for trial in 0..trials {
@@ -59,37 +63,39 @@ impl Uniform {
             }
             drawn.push((velocity_m_s, windows));
         }
-        let bound_m_s = model.bound_m_s(0.0, known.snr, SignalKind::Real, WINDOWS as f64)?;
-        Ok(Self { case, known, bound_m_s, trials: drawn })
+        Ok(Self { known, bound_m_s: bound_m_s(&known)?, trials: drawn })
+    }
+
+    /// Errors of all trials \[m/s\], and whether the estimator says that it has a velocity.
+    pub(crate) fn errors(&self, statistic: &dyn Statistic<f64>, estimator: &dyn Estimator) -> Vec<(f64, bool)> {
+        let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.statistic_len()]);
+        let mut mean = vec![0.0; one.len()];
+        let error = |(velocity_m_s, windows): &(f64, Vec<Vec<f64>>)| {
+            mean.fill(0.0);
+            for window in windows {
+                statistic.evaluate(window, &mut scratch, &mut one);
+                mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / WINDOWS as f64);
+            }
+            let found = estimator.estimate(&mean, &mut scratch);
+            (found.velocity_m_s - velocity_m_s, found.is_good())
+        };
+        self.trials.iter().map(error).collect()
     }
 
     /// One setting: the time is that of one estimate from all its windows.
     fn row(
         &self,
-        method: &'static str,
+        [case, method]: [&'static str; 2],
         (knob, value): (&'static str, f64),
         statistic: &dyn Statistic<f64>,
         estimator: &dyn Estimator,
     ) -> Result<Row, Failure> {
-        let (errors, cost) = fastest(|| {
-            let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.statistic_len()]);
-            let mut mean = vec![0.0; one.len()];
-            let mut errors = Vec::with_capacity(self.trials.len());
-            for (velocity_m_s, windows) in &self.trials {
-                mean.fill(0.0);
-                for window in windows {
-                    statistic.evaluate(window, &mut scratch, &mut one);
-                    mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / WINDOWS as f64);
-                }
-                let found = estimator.estimate(&mean, &mut scratch);
-                errors.push(if found.is_good() { found.velocity_m_s - velocity_m_s } else { f64::NAN });
-            }
-            Ok(errors)
-        })?;
+        let (errors, cost) = fastest(|| Ok(self.errors(statistic, estimator)))?;
+        let errors: Vec<f64> = errors.into_iter().map(|(error, good)| if good { error } else { f64::NAN }).collect();
         let found = good_and_bad(&errors, BAND_M_S);
         let excess = if found.bad_fraction > 0.2 { f64::NAN } else { found.std_good_m_s / self.bound_m_s - 1.0 };
         let knob = Knob::new([
-            self.case,
+            case,
             method,
             knob,
             "standard deviation of good estimates over the bound, less one; no number if a fifth is bad",
@@ -100,18 +106,18 @@ impl Uniform {
         Ok(knob.row(value, Found { error: excess, standard_error, cost, set_up_s: 0.0 }))
     }
 
-    fn rows(&self, quick: bool) -> Result<Vec<Row>, Failure> {
+    fn rows(&self, case: &'static str, quick: bool) -> Result<Vec<Row>, Failure> {
         let all = Methods::all(&self.known, &[WINDOWS])?;
         let of = all.methods.iter().map(|method| {
             let statistic = all.statistics[method.statistic].as_ref();
-            self.row(method.name, ("none", 0.0), statistic, method.estimators[0].as_ref())
+            self.row([case, method.name], ("none", 0.0), statistic, method.estimators[0].as_ref())
         });
         let mut rows = of.collect::<Result<Vec<_>, _>>()?;
         let (s, kind) = (sampling()?, SignalKind::Real);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
         for padded in [64, 128, 256, 1024, 4096] {
             let peak = SpectralPeak::new(&s, kind, &unweighted_lags(WINDOW), padded, Refinement::Parabola)?;
-            rows.push(self.row("PA by padding", ("padded_samples", padded as f64), &plain, &peak)?);
+            rows.push(self.row([case, "PA by padding"], ("padded_samples", padded as f64), &plain, &peak)?);
         }
         if quick {
             return Ok(rows);
@@ -121,16 +127,16 @@ impl Uniform {
             let ca = ModelPeak::new(ModelReading::Spectrum, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
             let capon = ModelPeak::new(ModelReading::Capon, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
             let lags = LagWindowPeak::new(&s, kind, &unweighted_lags(WINDOW), order, 1024, Refinement::Parabola)?;
-            rows.push(self.row("CA by order", knob, &plain, &ca)?);
-            rows.push(self.row("Capon by order", knob, &plain, &capon)?);
-            rows.push(self.row("CA-BT by lags", ("lags", order as f64), &plain, &lags)?);
+            rows.push(self.row([case, "CA by order"], knob, &plain, &ca)?);
+            rows.push(self.row([case, "Capon by order"], knob, &plain, &capon)?);
+            rows.push(self.row([case, "CA-BT by lags"], ("lags", order as f64), &plain, &lags)?);
         }
         let wind = GradientModel::new(&s, WINDOW, self.known.sigma_s, self.known.estimate_noise())?;
         for gradients in [1, 3, 5, 9] {
             let list: Vec<f64> = (0..gradients).map(|k| 0.1 * (k as f64 - 0.5 * (gradients - 1) as f64)).collect();
             let plan = GradientLikelihood::<f64>::new(&wind, self.known.snr, &list, 1024)?;
             let knob = ("gradients", gradients as f64);
-            rows.push(self.row("likelihood by gradients", knob, &plan.statistic, &plan.estimator)?);
+            rows.push(self.row([case, "likelihood by gradients"], knob, &plan.statistic, &plan.estimator)?);
         }
         Ok(rows)
     }
