@@ -15,7 +15,7 @@ use serde::Deserialize;
 use std::f64::consts::{PI, TAU};
 use std::path::Path;
 use wakescope_estimate::retrieval::{
-    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan, with_secondary_vortices,
+    Flag, Gate, Measured, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan, with_secondary_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};
 use wakescope_sim::Silent;
@@ -63,6 +63,13 @@ struct Errors {
     circulation: f64,
     deviations: f64,
     lateral_m: f64,
+}
+
+impl Errors {
+    fn of(circulation_m2_s: Measured, true_m2_s: f64, lateral_m: f64) -> Self {
+        let away_m2_s = circulation_m2_s.value - true_m2_s;
+        Self { circulation: 100.0 * away_m2_s / true_m2_s, deviations: away_m2_s / circulation_m2_s.std, lateral_m }
+    }
 }
 
 /// Both vortices of one scan, fitted as a pair, and as the program does with so many.
@@ -151,12 +158,8 @@ fn of_map(kind: &Kind, seed: u64) -> Result<Option<Scan>, Failure> {
         let sides = [(&wake.left, &truth.left), (&wake.right, &truth.right)];
         let of = |(vortex, (fitted, truth)): (&wakescope_estimate::retrieval::VortexResult, (&Vortex, &Vortex))| {
             let true_m2_s = truth.circulation_m2_s * kind.profile.mean_5_15(truth.core_radius_m).0;
-            let away_m2_s = vortex.circulation_5_15_m2_s.value - true_m2_s;
-            Errors {
-                circulation: 100.0 * away_m2_s / true_m2_s,
-                deviations: away_m2_s / vortex.circulation_5_15_m2_s.std,
-                lateral_m: fitted.lateral_position_m - truth.lateral_position_m,
-            }
+            let lateral_m = fitted.lateral_position_m - truth.lateral_position_m;
+            Errors::of(vortex.circulation_5_15_m2_s, true_m2_s, lateral_m)
         };
         found.vortices.iter().zip(sides).map(of).collect()
     };
@@ -184,12 +187,8 @@ fn of_scene(flow: Flow, added_flows: Vec<Flow>, folder: &Path, options: &Options
     let errors = |rows: &[RetrievalRow]| -> Vec<Errors> {
         let of = |row: &RetrievalRow| {
             let (found, truth) = (row.found?, row.truth);
-            let away_m2_s = found.circulation_5_15_m2_s.value - truth.circulation_5_15_m2_s;
-            Some(Errors {
-                circulation: 100.0 * away_m2_s / truth.circulation_5_15_m2_s,
-                deviations: away_m2_s / found.circulation_5_15_m2_s.std,
-                lateral_m: found.lateral_position_m.value - truth.lateral_position_m,
-            })
+            let lateral_m = found.lateral_position_m.value - truth.lateral_position_m;
+            Some(Errors::of(found.circulation_5_15_m2_s, truth.circulation_5_15_m2_s, lateral_m))
         };
         rows.iter().map(of).collect::<Option<_>>().unwrap_or_default()
     };
