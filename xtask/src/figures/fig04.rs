@@ -18,6 +18,7 @@ struct Curve {
     label: &'static str,
     style: Style,
     profile: EfficiencyProfile,
+    snr_db: Vec<f64>,
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
@@ -35,13 +36,16 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         theory::bistatic_efficiency(&telescope, &Misalignment::NONE, &turbulence, r)
     })?;
     let bistatic = medium.bistatic.clone().ok_or_else(|| Failure::new("one realisation has no pairs".into()))?;
-    let curve = |name, label, style, profile| Curve { name, label, style, profile };
+    let curve = |name, label, style, profile: EfficiencyProfile| {
+        let snr_db = decibels(&profile)?;
+        Ok::<_, Failure>(Curve { name, label, style, profile, snr_db })
+    };
     let curves = [
-        curve("free_space", "free space", Style::Line, free),
-        curve("monostatic_1e-15", "monostatic, 10^{−15}", Style::Dash, weak.monostatic),
-        curve("bistatic_1e-13", "bistatic, 10^{−13}", Style::Markers, bistatic),
-        curve("monostatic_1e-13", "monostatic, 10^{−13}", Style::DashDot, medium.monostatic),
-        curve("bistatic_1e-13_exact", "bistatic, 10^{−13}, exact", Style::Dot, exact),
+        curve("free_space", "free space", Style::Line, free)?,
+        curve("monostatic_1e-15", "monostatic, 10^{−15}", Style::Dash, weak.monostatic)?,
+        curve("bistatic_1e-13", "bistatic, 10^{−13}", Style::Markers, bistatic)?,
+        curve("monostatic_1e-13", "monostatic, 10^{−13}", Style::DashDot, medium.monostatic)?,
+        curve("bistatic_1e-13_exact", "bistatic, 10^{−13}, exact", Style::Dot, exact)?,
     ];
 
     let parameters = format!(
@@ -49,10 +53,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     );
     let origin = context.provenance_of_formula(&parameters);
     let figure = Figure::side_by_side([
-        plot("Signal-to-noise ratio", "SNR [dB]", &curves, |c| decibels(&c.profile, &c.profile.mean))?,
-        plot("System efficiency", "efficiency", &curves, |c| Ok(c.profile.mean.clone()))?,
+        plot("Signal-to-noise ratio", "SNR [dB]", &curves, |c| &c.snr_db),
+        plot("System efficiency", "efficiency", &curves, |c| &c.profile.mean),
     ]);
-    let mut out = Rendered::new(&table(&curves)?, &figure, &origin)?;
+    let mut out = Rendered::new(&table(&curves), &figure, &origin)?;
     out.caption = format!(
         "Signal-to-noise ratio (14) with h nu, and system efficiency (19), for the parameters of Table 2; {realisations} realisations \
          of 10 phase screens ({realisations_weak} at 1e-15), bands of one standard error. Cn2 in m^(-2/3); bistatic means independent paths (the dotted line beside the Monte Carlo is exact)."
@@ -77,43 +81,33 @@ fn exact_for_screens(range_m: &[f64], turbulence: &Turbulence) -> Result<Efficie
     })?)
 }
 
-fn decibels(profile: &EfficiencyProfile, efficiency: &[f64]) -> Result<Vec<f64>, Failure> {
+fn decibels(profile: &EfficiencyProfile) -> Result<Vec<f64>, Failure> {
     let (air, area_m2) = (Medium::table2(), Telescope::table2().aperture_area_m2());
     let of_range = |(&range_m, &efficiency): (&f64, &f64)| {
         let weight_per_m = air.return_per_m(range_m, area_m2)? * efficiency;
         let energy_j = GaussianPulse::table2().energy_j();
         Ok(10.0 * Receiver::table2().slowly_varying_snr(energy_j, weight_per_m).log10())
     };
-    profile.range_m.iter().zip(efficiency).map(of_range).collect()
+    profile.range_m.iter().zip(&profile.mean).map(of_range).collect()
 }
 
-fn table(curves: &[Curve]) -> Result<Table, Failure> {
-    let column =
-        |get: fn(&EfficiencyProfile) -> &Vec<f64>| curves.iter().flat_map(move |c| get(&c.profile).iter().copied());
-    let mut snr_db = Vec::new();
-    for curve in curves {
-        snr_db.extend(decibels(&curve.profile, &curve.profile.mean)?);
-    }
-    Ok(Table::new()
+fn table(curves: &[Curve]) -> Table {
+    let column = |get: fn(&Curve) -> &Vec<f64>| curves.iter().flat_map(move |c| get(c).iter().copied());
+    Table::new()
         .text("configuration", curves.iter().flat_map(|c| std::iter::repeat_n(c.name, c.profile.range_m.len())))
-        .float("range_m", column(|p| &p.range_m))
-        .float("efficiency", column(|p| &p.mean))
-        .float("efficiency_standard_deviation", column(|p| &p.standard_deviation))
-        .float("efficiency_standard_error", column(|p| &p.standard_error))
-        .float("snr_db", snr_db))
+        .float("range_m", column(|c| &c.profile.range_m))
+        .float("efficiency", column(|c| &c.profile.mean))
+        .float("efficiency_standard_deviation", column(|c| &c.profile.standard_deviation))
+        .float("efficiency_standard_error", column(|c| &c.profile.standard_error))
+        .float("snr_db", column(|c| &c.snr_db))
 }
 
-fn plot(
-    title: &str,
-    label: &str,
-    curves: &[Curve],
-    value: fn(&Curve) -> Result<Vec<f64>, Failure>,
-) -> Result<CurvePlot, Failure> {
+fn plot(title: &str, label: &str, curves: &[Curve], value: fn(&Curve) -> &Vec<f64>) -> CurvePlot {
     let mut plot = CurvePlot::new(title, Axis::linear("range [m]"), Axis::linear(label));
     plot.shape = 0.8;
     for curve in curves {
         let p = &curve.profile;
-        let y = value(curve)?;
+        let y = value(curve);
         let mut series = Series::new(curve.label, curve.style, p.range_m.iter().copied().zip(y.iter().copied()));
         if p.standard_error.iter().any(|&e| e > 0.0) {
             // The same relative error in the scale that is drawn.
@@ -124,7 +118,7 @@ fn plot(
         }
         plot = plot.with(series);
     }
-    Ok(plot)
+    plot
 }
 
 /// Difference of two profiles at each range, from the fewer realisations.

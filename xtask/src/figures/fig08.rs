@@ -5,7 +5,6 @@ use super::study::{EARLY_TAU, LATE_TAU, Sight, Study};
 use crate::wakes;
 use wakescope_sim::io::VelocityMap;
 use wakescope_sim::io::tables::map_table;
-use wakescope_sim::plot::ColourMap;
 use wakescope_sim::scene::SnrReference;
 use wakescope_sim::write;
 
@@ -42,31 +41,26 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (words, reach_m) = (wake.words(), REACH * wake.flow.pair.scales()?.spacing_m);
     let (early, late) = (Sight::of_wake(&wake, EARLY_TAU)?, Sight::of_wake(&wake, LATE_TAU)?);
     let scene = scene(context, sector(&[&early.cores[..], &late.cores[..]].concat(), reach_m));
-    let (mut panels, mut tables, mut extremes) = (Vec::new(), Vec::new(), Vec::new());
-    let mut colours: Option<ColourMap> = None;
-    let mut origin = None;
-    for (sight, tau) in [(&early, EARLY_TAU), (&late, LATE_TAU)] {
-        for study in Study::runs(context, sight, vec![scene.clone()])? {
-            let map = write::velocity_map(&study.plan, &study.map);
-            tables.push(map_table(&map)?);
-            extremes.push([extreme(&map, f64::min)?, extreme(&map, f64::max)?]);
-            for (field, title) in [("v_exact", "exact"), ("radial_velocity", "estimated")] {
-                let plot = MapPlot::new(&map, 0, field)?.titled(&format!("{title}, τ = {tau}")).labelled("v_R [m/s]");
-                let shared = *colours.get_or_insert(plot.colours);
-                panels.push(plot.coloured(shared));
-            }
-            origin = Some(study.provenance());
+    let one = |sight: &Sight| Ok::<_, Failure>(Study::runs(context, sight, vec![scene.clone()])?.remove(0));
+    let studies = [one(&early)?, one(&late)?];
+    let [early, late] = studies.each_ref().map(|study| write::velocity_map(&study.plan, &study.map));
+    let colours = MapPlot::new(&early, 0, "v_exact")?.colours;
+    let mut panels = Vec::new();
+    for (map, tau) in [(&early, EARLY_TAU), (&late, LATE_TAU)] {
+        for (field, title) in [("v_exact", "exact"), ("radial_velocity", "estimated")] {
+            let plot = MapPlot::new(map, 0, field)?.titled(&format!("{title}, τ = {tau}")).labelled("v_R [m/s]");
+            panels.push(plot.coloured(colours));
         }
     }
+    let [early_low, early_high] = extremes(&early)?;
+    let [late_low, late_high] = extremes(&late)?;
     let realisations = scene.scan.realisations;
     let title =
         format!("Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations");
     let mut figure = Figure::stacked(panels).titled(&title);
     (figure.columns, figure.width) = (2, 1300.0);
-    let (Some(origin), [[early_low, early_high], [late_low, late_high]]) = (origin, &extremes[..]) else {
-        return Err(Failure::new("two ages are compared".into()));
-    };
-    let mut out = Rendered::new(&Table::stack(tables)?, &figure, &origin)?;
+    let table = Table::stack([map_table(&early)?, map_table(&late)?])?;
+    let mut out = Rendered::new(&table, &figure, &studies[1].provenance())?;
     out.caption = format!(
         "Radial velocity early and late (left: exact, right: mean of the estimates by periodogram accumulation with the Gaussian weighting, 200 ns, no refractive \
          turbulence, one pulse a line, 0 dB, \u{3c1} = 2 m); {}.",
@@ -79,15 +73,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             late_low / early_low,
             late_high / early_high
         ),
-        *late_high < 0.8 * early_high && *late_low > 0.8 * early_low,
+        late_high < 0.8 * early_high && late_low > 0.8 * early_low,
     ));
     Ok(out)
 }
 
-/// An extremum of the exact radial velocity.
-fn extreme(map: &VelocityMap, pick: fn(f64, f64) -> f64) -> Result<f64, Failure> {
+/// The least and the largest exact radial velocity.
+fn extremes(map: &VelocityMap) -> Result<[f64; 2], Failure> {
     let field = map.field("v_exact").ok_or_else(|| Failure::new("the map has no exact velocity".into()))?;
-    Ok(field.values.iter().copied().fold(f64::NAN, pick))
+    Ok([f64::min, f64::max].map(|pick| field.values.iter().copied().fold(f64::NAN, pick)))
 }
 
 #[cfg(test)]

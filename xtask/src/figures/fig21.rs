@@ -3,13 +3,15 @@
 use super::context::*;
 use ndarray::Array2;
 use rayon::prelude::*;
+use serde::Deserialize;
+use std::path::Path;
 use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::RangeFilter;
 use wakescope_sim::Silent;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plot::Panel;
-use wakescope_sim::retrieve::{Method, RetrievalRow};
-use wakescope_sim::scene::{self, Axial, Flow, Pattern, Ppi, Retrieval, SnrReference};
+use wakescope_sim::retrieve::RetrievalRow;
+use wakescope_sim::scene::{self, Flow};
 use wakescope_sim::setup::estimators::weighting;
 use wakescope_sim::setup::wind::vortex_pair;
 use wakescope_sim::write::velocity_map;
@@ -34,7 +36,7 @@ struct Scan {
 
 /// One way to look at the wake.
 struct View {
-    name: &'static str,
+    name: String,
     scans: Vec<Scan>,
 }
 
@@ -51,38 +53,22 @@ fn true_m2_s() -> f64 {
     scene::VortexPair::default().circulation_m2_s
 }
 
-/// The scenes: each with as many pulses through the same air, 280 to 520 m away.
-fn scenes() -> [(&'static str, Scene); 3] {
-    let mut across = Scene::default();
-    across.detector.snr = SnrReference::Fixed { snr_db: 5.0 };
-    across.scan.realisations = 1;
-    across.estimator.gate_step_samples = 16;
-    let (mut round, mut along) = (across.clone(), across.clone());
-    across.scan.elevation_min_rad = 0.03;
-    across.scan.elevation_step_rad = 2.5e-3;
-    across.scan.elevation_max_rad = 0.03 + 2.5e-3 * (LINES - 1) as f64;
-    across.retrieval = Some(Retrieval { methods: vec![Method::Fit], ..Retrieval::default() });
-    let quarter_rad = std::f64::consts::FRAC_PI_2;
-    round.scan.pattern = Pattern::Ppi(Ppi {
-        elevations_rad: vec![0.09, 0.117, 0.145],
-        azimuth_min_rad: quarter_rad - 0.23,
-        azimuth_max_rad: quarter_rad + 0.23,
-        azimuth_step_rad: 0.02,
-    });
-    along.scan.pattern = Pattern::Axial(Axial {
-        azimuth_min_rad: -0.11,
-        azimuth_max_rad: 0.11,
-        azimuth_step_rad: 0.02,
-        ..Axial::default()
-    });
-    along.scan.lidar.y_m = 400.0;
-    (along.scan.elevation_min_rad, along.scan.elevation_max_rad, along.scan.elevation_step_rad) = (0.04, 0.19, 0.03);
-    [("rhi", across), ("ppi", round), ("axial", along)]
+/// One way to look at the wake, as it stands in the list.
+#[derive(Deserialize)]
+struct Listed {
+    name: String,
+    scene: String,
+}
+
+#[derive(Deserialize)]
+struct List {
+    view: Vec<Listed>,
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.profile.choose(2, 40, 100);
-    let views = scenes().into_iter().map(|(name, scene)| view(context, name, &scene, scans));
+    let List { view: listed } = toml::from_str(include_str!("fig21.toml"))?;
+    let views = listed.into_iter().map(|listed| view(context, listed, scans));
     let views = views.collect::<Result<Vec<View>, Failure>>()?;
     let mut out = Rendered::new(&table(&views), &picture(&views)?, &views[0].scans[0].plan.scene.provenance())?;
     out.marks = vec!["analytic pair".into()];
@@ -96,7 +82,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-fn view(context: &Context, name: &'static str, scene: &Scene, scans: u64) -> Result<View, Failure> {
+fn view(context: &Context, Listed { name, scene }: Listed, scans: u64) -> Result<View, Failure> {
+    let scene = SceneFile::parse(&scene, Path::new("fig21.toml"))?.scene;
     let one = |scan: u64| -> Result<Scan, Failure> {
         let mut file = context.scene_file(scene.clone())?;
         file.scene.seed += scan;
@@ -224,7 +211,7 @@ fn table(views: &[View]) -> Table {
     let rows: Vec<Fits<'_>> = views.iter().flat_map(View::fits).collect();
     let column = |of: &dyn Fn(&Fits<'_>) -> f64| rows.iter().map(of).collect::<Vec<_>>();
     Table::new()
-        .text("scan", rows.iter().map(|row| row.view.name))
+        .text("scan", rows.iter().map(|row| row.view.name.clone()))
         .float("energy_j", column(&|row| row.view.energy_j()))
         .float("duration_s", column(&|row| row.view.scans[0].plan.geometry.schedule.duration_s()))
         .text("method", rows.iter().map(|row| row.method))
