@@ -5,15 +5,19 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use wakescope_sim::io::{FileGroup, Provenance};
 
-// What nearly every figure is made of.
-pub(super) use crate::claim::Claim;
+// What figures are made of.
+pub(super) use crate::claim::{Claim, Part};
 pub(super) use crate::profile::Profile;
 pub(super) use crate::statistics::{BATCHES, Bar, Estimate, Verdict};
 pub(super) use fixtures::failure::Failure;
+pub(super) use ndarray::Array2;
+pub(super) use wakescope_les::analysis::decay::value_at;
+pub(super) use wakescope_sim::Silent;
+pub(super) use wakescope_sim::flow::FinishedWake;
 pub(super) use wakescope_sim::io::Table;
 pub(super) use wakescope_sim::plan::{Plan, Target};
 pub(super) use wakescope_sim::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
-pub(super) use wakescope_sim::scene::{Scene, SceneFile};
+pub(super) use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
 
 /// What a figure may depend on, as options of a task.
 #[derive(Debug, Clone, clap::Args)]

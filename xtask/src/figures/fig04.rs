@@ -1,7 +1,6 @@
 //! Figure 4: signal-to-noise ratio and system efficiency against range, in free space and through turbulence.
 
 use super::context::*;
-use crate::claim::Part;
 use wakescope_optics::air::StructureTable;
 use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::{EfficiencyProfile, Layers, Misalignment, MonteCarlo, Telescope, Turbulence, theory};

@@ -2,8 +2,7 @@
 
 use super::context::*;
 use crate::wakes;
-use wakescope_les::analysis::decay::value_at;
-use wakescope_sim::flow::{FinishedWake, REPEATS};
+use wakescope_sim::flow::REPEATS;
 use wakescope_sim::plot::apng;
 
 const FRAME_S: f64 = 0.15;

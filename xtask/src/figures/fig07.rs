@@ -4,8 +4,7 @@ use super::context::*;
 use crate::histories::{by_noise, swing};
 use crate::wakes::{self, mean};
 use crate::workspace::numbers;
-use wakescope_les::analysis::decay::{knee, onset, value_at};
-use wakescope_sim::flow::FinishedWake;
+use wakescope_les::analysis::decay::{knee, onset};
 
 /// The Reynolds number and core of the chapter.
 const CHAPTER: (f64, f64) = (2e4, 0.05);

@@ -5,7 +5,6 @@ use super::study::{EARLY_TAU, LATE_TAU, Sight, Study};
 use crate::wakes;
 use wakescope_sim::io::VelocityMap;
 use wakescope_sim::io::tables::map_table;
-use wakescope_sim::scene::SnrReference;
 use wakescope_sim::write;
 
 /// Air about the centre of a vortex that belongs to it, in spacings: half of the way between the two at the start.

@@ -2,7 +2,6 @@
 
 use super::context::*;
 use super::study::{EARLY_TAU, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
-use ndarray::Array2;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::write;
 

@@ -2,7 +2,6 @@
 
 use super::context::*;
 use super::study::{LATE_TAU, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method, with_turbulence};
-use crate::claim::Part;
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::scene::PulseShape;
 use wakescope_sim::write;
@@ -68,7 +67,7 @@ fn measure(study: &Study) -> (String, Vec<Part>) {
     let extreme = |field: &dyn Fn((usize, usize)) -> f64| near.iter().map(|c| field(*c).abs()).fold(0.0, f64::max);
     let mean = |cell, without| m.v_pulse_m_s[cell] + study.over_scans(cell, without, |error| error);
     let [pulse, exact] = [&m.v_pulse_m_s, &m.v_exact_m_s];
-    let distance = |field: &ndarray::Array2<f64>, without| {
+    let distance = |field: &Array2<f64>, without| {
         (near.iter().map(|c| (mean(*c, without) - field[*c]).powi(2)).sum::<f64>() / near.len() as f64).sqrt()
     };
     let [most_pulse, most_exact] = [pulse, exact].map(|field| extreme(&|cell| field[cell]));

@@ -5,7 +5,6 @@ use super::study::{
     EARLY_TAU, INSIDE_M, METHODS, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches, early_scene, with_method,
     with_turbulence,
 };
-use crate::claim::Part;
 use crate::statistics::NO_DIFFERENCE;
 
 const ENERGIES_J: [f64; 4] = [50e-6, 150e-6, 300e-6, 600e-6];

@@ -4,7 +4,7 @@
 use super::context::*;
 use super::profiles::{self, Profiles};
 use super::study::{EARLY_TAU, METHODS, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence};
-use wakescope_sim::scene::{PulseShape, SnrReference};
+use wakescope_sim::scene::PulseShape;
 
 const DURATIONS_S: [f64; 2] = [200e-9, 400e-9];
 /// The reference at which the chapter is judged.

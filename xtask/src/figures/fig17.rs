@@ -5,7 +5,6 @@ use super::fig17_flows as flows;
 use crate::fit_trials::trial::{FitTrial, RADIUS_M};
 use crate::statistics::mean;
 use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
-use ndarray::Array2;
 use rayon::prelude::*;
 use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
 use wakescope_signal::NoiseModel;

@@ -7,10 +7,8 @@ use crate::wakes;
 use rayon::prelude::*;
 use std::path::Path;
 use wakescope_estimate::retrieval::{Side, VortexResult};
-use wakescope_sim::Silent;
-use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::retrieve::{Method, RetrievalRow};
-use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, SnrReference, VortexPair, Weighting};
+use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPair, Weighting};
 
 /// Ages of the simulated wake; the pair has none.
 const AGES: [Option<f64>; 4] = [None, Some(1.0), Some(2.5), Some(4.0)];

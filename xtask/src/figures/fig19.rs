@@ -3,7 +3,6 @@
 use super::context::*;
 use wakescope_estimate::retrieval::{ScanMap, Turbulence};
 use wakescope_estimate::wake_detection::{DetectorOptions, Share};
-use wakescope_sim::Silent;
 use wakescope_sim::detection::{Calibration, DetectionSettings, Power, SceneNoise, detect, strided};
 use wakescope_sim::measure::budget::snr_without_screens_db;
 use wakescope_sim::measure::map::velocities;

@@ -3,10 +3,8 @@
 use super::context::*;
 use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, expected_velocities};
 use wakescope_estimate::vortex_fit::CorePrior;
-use wakescope_sim::Silent;
 use wakescope_sim::io::scans::ReadScan;
 use wakescope_sim::retrieve::{Method, RetrievedScan, SceneResponse, Velocities, figure, gate_of, retrieve_map};
-use wakescope_sim::scene::SnrReference;
 
 const TRUE_M2_S: f64 = 500.0;
 

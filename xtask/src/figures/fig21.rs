@@ -1,13 +1,11 @@
 //! Figure 21: one wake seen across, round and along the flight path at the same energy, and what each scan says of its circulation.
 
 use super::context::*;
-use ndarray::Array2;
 use rayon::prelude::*;
 use serde::Deserialize;
 use std::path::Path;
 use wakescope_les::{VortexPair, Wind};
 use wakescope_signal::RangeFilter;
-use wakescope_sim::Silent;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::plot::Panel;
 use wakescope_sim::retrieve::RetrievalRow;

@@ -5,7 +5,7 @@ use super::profiles::{self, Profiles};
 use super::study::{EARLY_TAU, METHODS, Sight, Study, near_scene, with_method};
 use crate::statistics::NO_DIFFERENCE;
 use crate::wakes;
-use wakescope_sim::scene::{NoiseModel, Refinement, SnrReference, VortexPair};
+use wakescope_sim::scene::{NoiseModel, Refinement, VortexPair};
 
 /// Ratio at which cores and bins are compared, near that of the chapter, and the one at which noise is, near the physical one, dB.
 const CHAPTER_DB: f64 = 0.0;

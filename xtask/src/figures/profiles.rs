@@ -6,7 +6,6 @@
 
 use super::context::*;
 use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
-use crate::claim::Part;
 use crate::statistics::NO_DIFFERENCE;
 use wakescope_sim::measure::cell_average::CellAverage;
 
@@ -116,7 +115,7 @@ fn on_line(points: impl Iterator<Item = [f64; 3]> + Clone, x: f64) -> f64 {
 
 /// Mean signal-to-noise ratio of the scene at the vortices, dB; the same for all methods on the same signals.
 pub(super) fn snr_db(study: &Study) -> Result<f64, Failure> {
-    let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &wakescope_sim::setup::progress::Silent)?;
+    let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &Silent)?;
     let near: Vec<f64> =
         scanner.layer_snr().into_iter().filter(|(r, _)| (350.0..450.0).contains(r)).map(|(_, snr)| snr).collect();
     Ok(10.0 * (near.iter().sum::<f64>() / near.len() as f64).log10())

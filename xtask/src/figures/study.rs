@@ -4,17 +4,14 @@ use super::context::*;
 use crate::statistics::MOST_BATCHES;
 use crate::wakes;
 use std::path::PathBuf;
-use wakescope_les::analysis::decay::value_at;
-use wakescope_sim::flow::FinishedWake;
 use wakescope_sim::io::Provenance;
 use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::scene::{
-    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, SnrReference, Turbulence,
-    VortexMotion, VortexPair, Weighting,
+    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, Turbulence, VortexMotion,
+    VortexPair, Weighting,
 };
-use wakescope_sim::setup::progress::Silent;
 use wakescope_sim::setup::wind;
 use wakescope_sim::sweep;
 

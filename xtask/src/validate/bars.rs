@@ -1,19 +1,13 @@
 //! The vortex pair near the ground in space against an independent code in the same box with the same noise formula
 //! (`tests/reference/les/wake_3d_*.csv`): coarse and medium mesh, without and with the multiscale model.
 
-use super::Shown;
-use super::runs::{Curve, MULTISCALE, apart, plane, relative, run, stored_curve, worst};
-use crate::claim::Claim;
+use super::runs::*;
 use crate::wakes::mean;
-use crate::workspace::numbers;
-use fixtures::failure::Failure;
 use serde::Deserialize;
 use std::f64::consts::TAU;
 use std::path::Path;
-use wakescope_les::analysis::decay::{amplitude_growth, onset, value_at};
-use wakescope_sim::flow::{FinishedWake, Subgrid, WakePreset, table as read_table};
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_les::analysis::decay::amplitude_growth;
+use wakescope_sim::flow::table as read_table;
 
 const END: f64 = 5.0;
 /// The flow is laminar until here.

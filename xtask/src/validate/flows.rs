@@ -1,18 +1,11 @@
 //! Flows with known answers: order of the scheme, waves on Poiseuille flow, a dipole against a wall, a cavity, the vortices of Taylor
 //! and Green, a channel.
 
-use super::Shown;
-use super::runs::table_of;
-use crate::claim::Claim;
-use crate::profile::Profile;
-use crate::workspace::{numbers, read};
-use fixtures::failure::Failure;
+use super::runs::*;
+use crate::workspace::read;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use wakescope_les::analysis::decay::value_at;
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
 use wakescope_les::{Flow, SubgridModel, TimeScheme};
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Advances a flow to a time.
 pub(super) fn advance(flow: &mut Flow, until_s: f64) -> Result<(), Failure> {

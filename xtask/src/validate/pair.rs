@@ -1,18 +1,12 @@
 //! The plane vortex pair above ground at Re 2500 against a spectral code; over a frictionless ground against the hyperbola.
 
-use super::Shown;
 use super::flows::advance;
-use super::runs::{Curve, apart, relative, run, stored_curve, table_of, worst};
-use crate::claim::Claim;
-use crate::profile::Profile;
-use crate::workspace::numbers;
-use fixtures::failure::Failure;
+use super::runs::*;
 use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
 use wakescope_les::analysis::{WakeRecord, WakeScales};
 use wakescope_les::cases::VortexPairCase;
-use wakescope_sim::flow::{Subgrid, WakePreset, WakeProfile};
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
+use wakescope_sim::flow::WakeProfile;
 
 const END: f64 = 3.0;
 /// Records per unit of tau.

@@ -1,16 +1,8 @@
 //! The pair along a parameter: when the fast decay begins against noise and Reynolds number, on 16 x 96 x 64 cells; drift and secondary
 //! vortices in a cross wind.
 
-use super::Shown;
-use super::runs::{Curve, run};
-use crate::claim::Claim;
-use crate::profile::Profile;
+use super::runs::*;
 use crate::wakes::mean;
-use fixtures::failure::Failure;
-use wakescope_les::analysis::decay::{onset, value_at};
-use wakescope_sim::flow::{FinishedWake, Subgrid, WakeFlow, WakePreset};
-use wakescope_sim::io::Table;
-use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Noise and Reynolds number of each run; the first two are those of the claim, which the quick form has alone.
 const RUNS: [(f64, f64); 6] =

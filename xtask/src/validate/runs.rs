@@ -2,10 +2,18 @@
 
 use crate::wakes;
 use crate::workspace::root;
-use fixtures::failure::Failure;
-use wakescope_les::analysis::decay::value_at;
-use wakescope_sim::flow::{CaseKind, FinishedWake, Subgrid, WakeFlow, WakePreset};
-use wakescope_sim::io::Table;
+use wakescope_sim::flow::CaseKind;
+
+// What the cases are made of.
+pub(super) use super::Shown;
+pub(super) use crate::claim::Claim;
+pub(super) use crate::profile::Profile;
+pub(super) use crate::workspace::numbers;
+pub(super) use fixtures::failure::Failure;
+pub(super) use wakescope_les::analysis::decay::{onset, value_at};
+pub(super) use wakescope_sim::flow::{FinishedWake, Subgrid, WakeFlow, WakePreset};
+pub(super) use wakescope_sim::io::Table;
+pub(super) use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Points of a curve.
 pub(super) type Curve = Vec<(f64, f64)>;
