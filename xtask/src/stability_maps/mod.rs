@@ -40,6 +40,8 @@ pub(crate) struct Panel {
     axes: [Axis; 2],
     /// The limit that the program keeps: its name, where it is, whether it is a level.
     limit: Option<(&'static str, f64, bool)>,
+    /// Theory that says no more is round-off, and not drawn.
+    least: f64,
     curves: Vec<Curve>,
 }
 
@@ -49,7 +51,7 @@ impl Panel {
         axes: [Axis; 2],
         curves: impl IntoIterator<Item = Result<Curve, Failure>>,
     ) -> Result<Self, Failure> {
-        Ok(Self { title, axes, limit: None, curves: curves.into_iter().collect::<Result<_, _>>()? })
+        Ok(Self { title, axes, limit: None, least: 0.0, curves: curves.into_iter().collect::<Result<_, _>>()? })
     }
 }
 
@@ -62,8 +64,6 @@ fn logs(labels: [&str; 2]) -> [Axis; 2] {
 const EXACT: usize = 3;
 /// Of a wave of which a step leaves less the solver's round-off is left.
 const ROUND_OFF: f64 = 1e-9;
-/// Theory that says less is not drawn.
-const LEAST: f64 = 1e-12;
 
 type Measurement = fn() -> Result<Vec<Panel>, Failure>;
 
@@ -107,10 +107,10 @@ pub(crate) fn table(panels: &[Panel]) -> Table {
 
 /// A panel each: points measured, lines of theory in the same colour, and the limits that the program keeps, dashed. Points without a theory are joined.
 pub(crate) fn picture(panels: &[Panel]) -> Figure {
-    let drawn = panels.iter().map(|Panel { title, axes: [x, y], limit, curves }| {
+    let drawn = panels.iter().map(|Panel { title, axes: [x, y], limit, least, curves }| {
         let mut plot = CurvePlot { shape: 0.7, ..CurvePlot::new(title, x.clone(), y.clone()) };
         for (colour, Curve { name, points }) in curves.iter().filter(|curve| !curve.points.is_empty()).enumerate() {
-            let theory = points.iter().map(|p| (p[0], p[2])).filter(|p| p.1 > LEAST);
+            let theory = points.iter().map(|p| (p[0], p[2])).filter(|p| p.1 > *least);
             let measured = points.iter().map(|p| (p[0], p[1])).filter(|p| p.1 <= 0.0 || p.1 > 1e-17);
             let style = if points[0][2].is_nan() { Style::LineMarkers } else { Style::Markers };
             plot = plot.with(Series::new(name, style, measured).in_colour(colour));
