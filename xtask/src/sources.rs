@@ -17,16 +17,10 @@ struct Module<'a> {
     file: &'a str,
     /// Names of items, and whether each is a constant or the name of a type: whoever states it needs nothing of who uses it.
     items: BTreeMap<String, bool>,
-    uses: Vec<Use>,
-    /// Paths outside of `use`, such as `crate::a::f` or `child::g`.
-    paths: Vec<Vec<String>>,
-}
-
-/// One `use` with its tree written out.
-struct Use {
-    is_public: bool,
-    is_exported: bool,
-    paths: Vec<Vec<String>>,
+    /// Paths that it takes: of `use`, unless other crates see it, and outside, such as `crate::a::f` or `child::g`.
+    taken: Vec<Vec<String>>,
+    /// Paths of `use` that others see.
+    handed: Vec<Vec<String>>,
 }
 
 /// Names that one file takes from another.
@@ -51,8 +45,7 @@ impl<'a> Modules<'a> {
     pub(crate) fn imports(&self, but_constants: bool) -> Imports<'a> {
         let mut out = Imports::new();
         for (from, module) in &self.0 {
-            let used = module.uses.iter().filter(|u| !u.is_exported).flat_map(|u| &u.paths);
-            for path in used.chain(&module.paths) {
+            for path in &module.taken {
                 let name = path.last().cloned().unwrap_or_default();
                 let Some(to) = self.absolute(from, path).and_then(|path| self.resolve(from, &path, 0)) else {
                     continue;
@@ -94,11 +87,8 @@ impl<'a> Modules<'a> {
         let Some(name) = rest.first().filter(|name| !module.items.contains_key(*name) && depth < 6) else {
             return Some(to);
         };
-        let handed = module.uses.iter().filter(|u| u.is_public).flat_map(|u| &u.paths);
-        let found = handed
-            .filter(|path| path.last() == Some(name))
-            .find_map(|path| self.resolve(to, &self.absolute(to, path)?, depth + 1));
-        found.or(Some(to))
+        let mut handed = module.handed.iter().filter(|path| path.last() == Some(name));
+        handed.find_map(|path| self.resolve(to, &self.absolute(to, path)?, depth + 1)).or(Some(to))
     }
 }
 
@@ -176,7 +166,8 @@ impl Module<'_> {
                     let is_public = is_exported || at > 1 && name(tokens, at - 2) == "pub";
                     let mut paths = Vec::new();
                     write_out(&tokens[at + 1..end], &[], &mut paths);
-                    self.uses.push(Use { is_public, is_exported, paths });
+                    self.handed.extend(paths.iter().filter(|_| is_public).cloned());
+                    self.taken.extend(paths.into_iter().filter(|_| !is_exported));
                     at = end;
                 }
                 (_, "const" | "static" | "type") if !["fn", "unsafe", "async", ""].contains(&next.as_str()) => {
@@ -194,7 +185,7 @@ impl Module<'_> {
                         path.push(name(tokens, at + 3));
                         at += 3;
                     }
-                    self.paths.extend((path.len() > 1).then_some(path));
+                    self.taken.extend((path.len() > 1).then_some(path));
                 }
                 _ => {}
             }
