@@ -1,9 +1,8 @@
 //! `cargo xtask book`: the book as pages that a server of files can give, with the documentation of the crates in its folder `api`.
 
 use crate::process::call;
-use crate::workspace::{built, root};
+use crate::workspace::built;
 use fixtures::failure::Outcome;
-use std::path::Path;
 use std::process::Command;
 
 /// Packages that nobody takes: tasks and tests.
@@ -18,21 +17,7 @@ pub(crate) fn run() -> Outcome {
     call(Command::new("mdbook").args(["build", "docs"]))?;
     let without = NOT_FOR_OTHERS.iter().flat_map(|name| ["--exclude", *name]);
     call(Command::new(env!("CARGO")).args(["doc", "--workspace", "--no-deps"]).args(without))?;
-    copy(&built().join("doc"), &root().join("target/book/api"))?;
+    call(Command::new("cp").arg("-r").arg(built().join("doc")).arg("target/book/api"))?;
     println!("target/book/index.html");
-    Ok(())
-}
-
-/// Copies a folder with all that is in it.
-fn copy(from: &Path, to: &Path) -> Outcome {
-    std::fs::create_dir_all(to)?;
-    for entry in std::fs::read_dir(from)? {
-        let entry = entry?;
-        let target = to.join(entry.file_name());
-        match entry.file_type()?.is_dir() {
-            true => copy(&entry.path(), &target)?,
-            false => drop(std::fs::copy(entry.path(), target)?),
-        }
-    }
     Ok(())
 }
