@@ -109,10 +109,6 @@ struct Fits {
 }
 
 impl Fits {
-    fn of(name: &'static str) -> Self {
-        Self { name, ..Default::default() }
-    }
-
     /// Keeps a fit, or tells why there is none.
     fn keep(&mut self, scan: usize, fit: Result<Found, String>, cpu_s: f64) -> Option<Wake> {
         match fit {
@@ -207,9 +203,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
     let covariance = model.bound(&truth, Powers::default(), &of_signals, true)?;
     let bound: [f64; PARAMETERS] = std::array::from_fn(|i| covariance[[i, i]].sqrt());
-    let mut maps =
-        [Fits::of("map, core kept"), Fits::of("map, core about the typical one"), Fits::of("map, core fitted freely")];
-    let mut signals = [Fits::of("signals"), Fits::of("signals, started at the truth")];
+    let of = |name| Fits { name, ..Default::default() };
+    let mut maps = ["map, core kept", "map, core about the typical one", "map, core fitted freely"].map(of);
+    let mut signals = ["signals", "signals, started at the truth"].map(of);
     let (mut below, mut widths) = (Vec::new(), HEIGHTS.map(|_| Vec::new()));
     for scan in 0..options.scans as usize {
         let trial = FitTrial::new(&pair, scan, options.radius_m)?;

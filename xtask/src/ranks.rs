@@ -7,6 +7,8 @@ use crate::process::{call, output, watch};
 use crate::workspace::{built, root};
 use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fs::DirEntry;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -165,7 +167,7 @@ fn compare(program: &Path, scratch: &Path) -> Outcome {
         }
         let found = files(&scratch.join(out))?;
         if let Some(name) = expected.keys().chain(found.keys()).find(|name| found.get(*name) != expected.get(*name)) {
-            return Err(failed(&format!("{name} is not that of one process")));
+            return Err(failed(&format!("{} is not that of one process", name.display())));
         }
         let seconds = begun.elapsed().as_secs_f64();
         println!("{count} processes: {} files of {STEPS} steps, the bytes of one process, {seconds:.0} s", found.len());
@@ -174,13 +176,12 @@ fn compare(program: &Path, scratch: &Path) -> Outcome {
 }
 
 /// The files of a folder.
-fn files(folder: &Path) -> Result<BTreeMap<String, Vec<u8>>, Failure> {
-    let mut found = BTreeMap::new();
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        found.insert(path.file_name().unwrap_or_default().to_string_lossy().into_owned(), std::fs::read(&path)?);
-    }
-    Ok(found)
+fn files(folder: &Path) -> Result<BTreeMap<OsString, Vec<u8>>, Failure> {
+    let read = |entry: std::io::Result<DirEntry>| {
+        let entry = entry?;
+        Ok((entry.file_name(), std::fs::read(entry.path())?))
+    };
+    std::fs::read_dir(folder)?.map(read).collect()
 }
 
 /// Kills one of two processes when there is a checkpoint: the other must end, and the checkpoint must be whole.

@@ -4,7 +4,7 @@
 //! them. A bar that is missed is printed plainly and fails the task at its end.
 
 mod bars;
-pub(crate) mod flows;
+mod flows;
 mod pair;
 mod parameters;
 mod runs;

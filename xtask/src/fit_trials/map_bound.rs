@@ -215,6 +215,15 @@ impl Grid {
     fn turn(&self, wavelength_m: f64, lag: f64) -> f64 {
         4.0 * PI / wavelength_m * self.period_s * lag
     }
+
+    /// Mean correlogram of a gate of a line with that covariance, lags from 0 on.
+    fn lags(&self, covariance: ArrayView2<'_, C64>, gate: usize) -> Vec<C64> {
+        let first = gate * self.step;
+        let one = |lag: usize| {
+            (0..self.window - lag).map(|q| covariance[[first + q + lag, first + q]] * self.tapers[[q + lag, q]]).sum()
+        };
+        (0..self.window).map(one).collect()
+    }
 }
 
 impl Line {
@@ -257,17 +266,6 @@ impl Line {
         // a factor of noise that fills its band alone: a part of 1e-9 outside of it
         covariance.diag_mut().iter_mut().for_each(|c| *c *= 1.0 + 1e-9);
         Some(Self { lags: (0..setting.range_m.len()).map(gate).collect(), factor: cholesky(covariance)? })
-    }
-}
-
-impl Grid {
-    /// Mean correlogram of a gate of a line with that covariance, lags from 0 on.
-    fn lags(&self, covariance: ArrayView2<'_, C64>, gate: usize) -> Vec<C64> {
-        let first = gate * self.step;
-        let one = |lag: usize| {
-            (0..self.window - lag).map(|q| covariance[[first + q + lag, first + q]] * self.tapers[[q + lag, q]]).sum()
-        };
-        (0..self.window).map(one).collect()
     }
 }
 

@@ -4,7 +4,7 @@
 use super::runs::*;
 use crate::workspace::read;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use wakescope_les::cases::{self, Case, TollmienSchlichting};
+use wakescope_les::cases::{self, TollmienSchlichting};
 use wakescope_les::{Flow, SubgridModel, TimeScheme};
 
 /// Advances a flow to a time.
@@ -41,16 +41,11 @@ pub(super) fn order(profile: Profile) -> Result<Shown, Failure> {
     Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
 }
 
-/// Plane vortices on a mesh stretched both ways.
+/// Largest error of plane vortices on a mesh stretched both ways.
 fn vortices(n: usize) -> Result<f64, Failure> {
     let steps = n * n / 64;
     let mut case = cases::taylor_green_plane(n, [0.5, -0.4], VISCOSITY_M2_S, 0.1 / steps as f64)?;
     case.settings.scheme = TimeScheme::RungeKutta3;
-    vortex_error(&case, steps, VISCOSITY_M2_S)
-}
-
-/// Largest error of plane vortices after some steps.
-pub(crate) fn vortex_error(case: &Case, steps: usize, viscosity_m2_s: f64) -> Result<f64, Failure> {
     let mut flow = case.start()?.0;
     for _ in 0..steps {
         flow.step()?;
@@ -58,7 +53,7 @@ pub(crate) fn vortex_error(case: &Case, steps: usize, viscosity_m2_s: f64) -> Re
     let n = flow.mesh().cells()[1];
     let (y_m, z_m) = (flow.mesh().face_m(1), flow.mesh().centre_m(2));
     let exact =
-        |i: usize| cases::taylor_green_plane_exact([0.0, y_m[i % n], z_m[i / n]], flow.time_s(), viscosity_m2_s)[1];
+        |i: usize| cases::taylor_green_plane_exact([0.0, y_m[i % n], z_m[i / n]], flow.time_s(), VISCOSITY_M2_S)[1];
     Ok(flow.face_velocity_m_s(1).iter().enumerate().map(|(i, v)| (v - exact(i)).abs()).fold(0.0, f64::max))
 }
 
@@ -197,16 +192,12 @@ pub(super) fn dipole(reynolds: f64, profile: Profile) -> Result<Shown, Failure> 
 /// Times and values of the two maxima in the literature.
 fn literature(reynolds: f64) -> Result<[(f64, f64); 2], Failure> {
     let text = read("tests/reference/les/dipole_wall_normal.csv")?;
-    let rows = text.lines().filter(|line| line.ends_with("C&B2006"));
-    let cells = rows.map(|line| line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect::<Vec<f64>>());
-    for row in cells {
-        if let [found, t1, omega1, t2, omega2] = row[..]
-            && found == reynolds
-        {
-            return Ok([(t1, omega1), (t2, omega2)]);
-        }
+    let row = text.lines().find(|line| line.starts_with(&format!("{reynolds},")) && line.ends_with("C&B2006"));
+    let cells = row.map(|line| line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect::<Vec<f64>>());
+    match cells.as_deref() {
+        Some(&[_, t1, omega1, t2, omega2]) => Ok([(t1, omega1), (t2, omega2)]),
+        _ => Err(Failure::new(format!("no row of Reynolds number {reynolds}"))),
     }
-    Err(Failure::new(format!("no row of Reynolds number {reynolds}")))
 }
 
 /// Vorticity at the wall that the dipole meets, z = -1, from the slope of the parabola through the wall.
