@@ -3,6 +3,7 @@
 //! Every row of this program is measured in this run, on one thread; the time is the smallest of three runs, of one beyond 0.2 s, and the set-up stands
 //! apart. Errors are relative, with their standard errors; a setting that fails is a row. Other programs come from `docs/peers`.
 
+mod cases;
 mod chain;
 pub(crate) mod estimate;
 mod front;
@@ -13,6 +14,7 @@ mod report;
 use crate::cost::{Cost, machine};
 use crate::figures::context::Rendered;
 use crate::workspace::{provenance, root};
+use cases::CASES;
 use fixtures::failure::{Failure, Outcome};
 use front::{cheapest, on_front};
 pub(crate) use report::{picture, text};
@@ -59,8 +61,6 @@ struct Knob {
     case: String,
     method: String,
     knob: &'static str,
-    metric: &'static str,
-    reference: &'static str,
 }
 
 /// What a setting came to.
@@ -96,8 +96,8 @@ impl Found {
 }
 
 impl Knob {
-    fn new([case, method, knob, metric, reference]: [&'static str; 5]) -> Self {
-        Self { case: case.into(), method: method.into(), knob, metric, reference }
+    fn new([case, method, knob]: [&'static str; 3]) -> Self {
+        Self { case: case.into(), method: method.into(), knob }
     }
 
     fn row(&self, value: f64, found: Found) -> Row {
@@ -114,6 +114,12 @@ impl Knob {
 impl Row {
     fn is_own(&self) -> bool {
         self.version.is_empty()
+    }
+
+    /// What the error is, and against what.
+    fn compared(&self) -> [&'static str; 2] {
+        let case = CASES.iter().find(|case| case.name == self.knob.case);
+        case.map_or([""; 2], |case| [&case.metric, &case.reference])
     }
 }
 
@@ -135,9 +141,7 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
         rows.sort_by_key(|row| (cases.iter().position(|case| *case == row.knob.case), !row.is_own()));
         for of_case in rows.chunk_by_mut(|a, b| a.knob.case == b.knob.case) {
             let own = of_case.iter().filter(|row| row.is_own()).count();
-            let (own, others) = of_case.split_at_mut(own);
-            let (metric, reference) = (own[0].knob.metric, own[0].knob.reference);
-            others.iter_mut().for_each(|row| (row.knob.metric, row.knob.reference) = (metric, reference));
+            let own = &mut of_case[..own];
             let found: Vec<&Found> = own.iter().map(|row| &row.found).collect();
             let (front, best) = (on_front(&found), TARGETS.map(|(_, target)| cheapest(&found, target)));
             for (place, row) in own.iter_mut().enumerate() {
@@ -160,8 +164,8 @@ pub(crate) fn table(rows: &[Row]) -> Table {
         .text("knob", text(|r| r.knob.knob))
         .float("value", float(|r| r.value))
         .float("error", float(|r| r.found.error))
-        .text("metric", text(|r| r.knob.metric))
-        .text("reference", text(|r| r.knob.reference))
+        .text("metric", text(|r| r.compared()[0]))
+        .text("reference", text(|r| r.compared()[1]))
         .float("cpu_s", float(|r| r.found.cost.cpu_s))
         .float("wall_s", float(|r| r.found.cost.wall_s))
         .int("threads", rows.iter().map(|_| 1))
@@ -186,9 +190,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     let rows = measure(options.group.as_deref(), options.quick)?;
     println!("{:<28} {:<34} {:<24} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
-    for Row { knob, value, found, version, .. } in &rows {
-        let Knob { case, method, knob, metric, reference } = knob;
+    for row in &rows {
+        let Row { knob: Knob { case, method, knob }, value, found, version, .. } = row;
         let Found { error, standard_error, cost, .. } = found;
+        let [metric, reference] = row.compared();
         let (error, cost) = (format!("{error:.2e} +- {standard_error:.1e}"), format!("{:.1e} s", cost.cpu_s));
         let method = format!("{method} {version}");
         println!("{case:<28} {method:<34} {knob:<24} {value:>8} {error:>22} {cost:>10} {metric}, {reference}");

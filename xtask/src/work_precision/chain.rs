@@ -36,7 +36,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
             1.0 => "windows at every sample".into(),
             value => format!("windows {value} samples apart"),
         };
-        let knob = Knob { method, ..knob() };
+        let knob = Knob { case: "one whole map".into(), method, knob: "realisations" };
         let shift = match step.verdict {
             Verdict::Finest => Some(Shift::default()),
             // What is left of the gates tells nothing of the map.
@@ -53,16 +53,6 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
         })?);
     }
     Ok(rows)
-}
-
-fn knob() -> Knob {
-    Knob::new([
-        "one whole map",
-        "",
-        "realisations",
-        "standard deviation of the map, relative",
-        "the finest keys, same signals",
-    ])
 }
 
 fn scene() -> Result<SceneFile, Failure> {

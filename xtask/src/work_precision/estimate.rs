@@ -94,13 +94,7 @@ impl Uniform {
         let errors: Vec<f64> = errors.into_iter().map(|(error, good)| if good { error } else { f64::NAN }).collect();
         let found = good_and_bad(&errors, BAND_M_S);
         let excess = if found.bad_fraction > 0.2 { f64::NAN } else { found.std_good_m_s / self.bound_m_s - 1.0 };
-        let knob = Knob::new([
-            case,
-            method,
-            knob,
-            "standard deviation of good estimates over the bound, less one; no number if a fifth is bad",
-            "Cramer-Rao bound in white noise",
-        ]);
+        let knob = Knob::new([case, method, knob]);
         let (standard_error, cost) =
             (found.std_good_error_m_s / self.bound_m_s, cost.scaled(1.0 / self.trials.len() as f64));
         Ok(knob.row(value, Found { error: excess, standard_error, cost, set_up_s: 0.0 }))

@@ -30,8 +30,7 @@ fn row(cells: &[String], scale: f64) -> Option<Row> {
     let [case, method, version, numbers @ ..] = cells else { return None };
     let numbers: Vec<f64> = numbers.iter().map(|n| n.parse().ok()).collect::<Option<_>>()?;
     let &[value, error, standard_error, cpu_s] = &numbers[..] else { return None };
-    // What is measured, and against what, is as in the rows of this program.
-    let knob = Knob { case: case.clone(), method: method.clone(), knob: "", metric: "", reference: "" };
+    let knob = Knob { case: case.clone(), method: method.clone(), knob: "" };
     let cost = Cost { cpu_s: cpu_s * scale, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
     let found = Found { error, standard_error, cost, set_up_s: f64::NAN };
     (!version.is_empty()).then(|| Row { version: version.clone(), ..knob.row(value, found) })

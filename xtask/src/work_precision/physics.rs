@@ -39,7 +39,7 @@ pub(super) fn optics(quick: bool) -> Result<Vec<Row>, Failure> {
 
 /// The expected structure function against quadrature: its worst error from two spacings to half the grid.
 fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
-    let knob = Knob::new(["phase screens", method, "points a side", "structure function, worst", "quadrature"]);
+    let knob = Knob::new(["phase screens", method, "points a side"]);
     let spectrum = Turbulence::table2(CN2_M_M23)?.spectrum;
     knob.rows(&[128.0, 256.0, 512.0], |points| {
         let points = points as usize;
@@ -63,8 +63,7 @@ fn free_space() -> Result<Vec<Row>, Failure> {
     let exact = theory::free_space_efficiency(&Telescope::table2(), RANGE_M)?;
     let mut rows = Vec::new();
     for (method, double) in [("f32, ten steps", false), ("f64, ten steps", true)] {
-        let knob =
-            Knob::new(["free-space propagation", method, "points a side", "efficiency, uncorrected", "exact theory"]);
+        let knob = Knob::new(["free-space propagation", method, "points a side"]);
         rows.extend(knob.rows(&[128.0, 256.0, 512.0, 1024.0], |points| {
             let screens = screens(10, Grid::square(points as usize, 1.024 / points)?)?;
             let free =
@@ -87,13 +86,7 @@ fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
     let found = long.0.bistatic.ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
     let deviation = found.standard_error[0] / found.mean[0] * (many as f64).sqrt();
     let set_up_s = (short.1.cpu_s - few as f64 * one.cpu_s).max(0.0);
-    let knob = Knob::new([
-        "bistatic efficiency",
-        "5 layers, 256 points",
-        "realisations",
-        "bias and standard error",
-        "exact theory",
-    ]);
+    let knob = Knob::new(["bistatic efficiency", "5 layers, 256 points", "realisations"]);
     knob.rows(&DRAWN_REALISATIONS, |count| {
         let noise = deviation / count.sqrt();
         let error = bias.hypot(noise);
@@ -127,8 +120,7 @@ fn efficiency(screens: &MonteCarlo, realisations: usize) -> Result<EfficiencyEst
 pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = taylor_green(quick)?;
     for (method, pressure) in [("direct", PressureMethod::Direct), ("multigrid", PressureMethod::Multigrid)] {
-        let metric = "divergence over the largest velocity per cell";
-        let knob = Knob::new(["pressure", method, "tolerance", metric, "none: what the solve leaves"]);
+        let knob = Knob::new(["pressure", method, "tolerance"]);
         rows.extend(knob.rows(few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick), |tolerance| {
             let mut case = cases::taylor_green_3d(32, 1600.0)?;
             (case.settings.pressure, case.settings.pressure_tolerance) = (pressure, tolerance);
@@ -158,14 +150,7 @@ fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
     // Steps that divide the outputs, at a Courant number of about one half.
     let cells: &[f64] =
         if quick { &[12.0, 16.0, 24.0, 32.0, 48.0] } else { &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0] };
-    let metric = "rate of loss of energy, rms over its peak";
-    let knob = Knob::new([
-        "Taylor-Green vortices, Re 200",
-        "Runge-Kutta 3",
-        "cells a side",
-        metric,
-        "Fourier solution on 96 points a side",
-    ]);
+    let knob = Knob::new(["Taylor-Green vortices, Re 200", "Runge-Kutta 3", "cells a side"]);
     knob.rows(cells, |cells| {
         let substeps = (cells / 24.0).ceil();
         let mut case = cases::taylor_green_3d(cells as usize, 200.0)?;
@@ -223,8 +208,7 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
     let records = if quick { 4 } else { 40 };
     let mut rows = Vec::new();
     for (case, pulse_s) in [("records, 200 ns", 200e-9), ("records, 400 ns", 400e-9)] {
-        let metric = "covariance of the samples, worst";
-        let knob = Knob::new([case, "record of 300 samples", "layers for each sample", metric, "layers of 7.5 cm"]);
+        let knob = Knob::new([case, "record of 300 samples", "layers for each sample"]);
         let (gate, long) = (simulator(pulse_s, GATE)?, simulator(pulse_s, SAMPLES)?);
         let exact = gate.covariance_a2(&line(&gate, GATE, 8)?)?;
         let largest = exact.iter().map(|value| value.norm()).fold(0.0, f64::max);

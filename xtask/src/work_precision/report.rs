@@ -1,58 +1,37 @@
 //! The panels of error against run time, this program beside others, and what they say in words.
 
+use super::cases::{CASES, Case, Guide, Panel};
 use super::{Row, TARGETS};
 use crate::cost::machine;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::sync::LazyLock;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
-
-/// What a panel shows, and what is compared with what.
-#[derive(Deserialize)]
-struct Panel {
-    /// The case of its rows.
-    case: String,
-    title: String,
-    compared: String,
-    guide: Option<Guide>,
-}
-
-/// A slope through the first point of this program.
-#[derive(Deserialize)]
-struct Guide {
-    label: String,
-    power: f64,
-}
-
-/// The panels in their order.
-static PANELS: LazyLock<Vec<Panel>> = LazyLock::new(|| {
-    let panels: Result<BTreeMap<String, Vec<Panel>>, _> = toml::from_str(include_str!("panels.toml"));
-    panels.map_or(Vec::new(), |panels| panels.into_values().flatten().collect())
-});
 
 /// Of more methods than these a panel shows the best settings.
 const MOST_METHODS: usize = 4;
 
-/// Rows of a panel in the order of their times, those that failed left out.
-fn drawn<'r>(rows: &'r [Row], panel: &Panel) -> Vec<&'r Row> {
-    let good = |row: &&Row| row.knob.case == panel.case && row.found.error > 0.0 && row.found.cost.cpu_s > 0.0;
+/// The cases that are drawn.
+fn panels() -> impl Iterator<Item = (&'static Case, &'static Panel)> {
+    CASES.iter().filter_map(|case| Some((case, case.panel.as_ref()?)))
+}
+
+/// Rows of a case in the order of their times, those that failed left out.
+fn drawn<'r>(rows: &'r [Row], case: &Case) -> Vec<&'r Row> {
+    let good = |row: &&Row| row.knob.case == case.name && row.found.error > 0.0 && row.found.cost.cpu_s > 0.0;
     let mut found: Vec<&Row> = rows.iter().filter(good).collect();
     found.sort_by(|a, b| a.found.cost.cpu_s.total_cmp(&b.found.cost.cpu_s));
     found
 }
 
-/// Rows of a panel that have no error, for the setting fails.
-fn failed<'r>(rows: &'r [Row], panel: &Panel) -> Vec<&'r Row> {
-    rows.iter().filter(|row| row.knob.case == panel.case && row.found.error.is_nan()).collect()
+/// Rows of a case that have no error, for the setting fails.
+fn failed<'r>(rows: &'r [Row], case: &Case) -> Vec<&'r Row> {
+    rows.iter().filter(|row| row.knob.case == case.name && row.found.error.is_nan()).collect()
 }
 
 /// The six panels: a curve for each method, one colour for each program.
 pub(crate) fn picture(rows: &[Row]) -> Figure {
-    let panels = PANELS.iter().map(|panel| (panel, drawn(rows, panel))).filter(|(_, rows)| !rows.is_empty());
-    let mut figure = Figure::stacked(panels.map(|(panel, of)| curves(panel, &of, &failed(rows, panel))));
-    (figure.columns, figure.width) = (2, 1300.0);
-    figure
+    let panels = panels().filter(|(case, _)| !drawn(rows, case).is_empty());
+    let drawn = panels.map(|(case, panel)| curves(panel, &drawn(rows, case), &failed(rows, case)));
+    Figure { columns: 2, width: 1300.0, ..Figure::stacked(drawn) }
 }
 
 fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
@@ -116,8 +95,8 @@ fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
 /// Under each panel: what is compared, what this program costs, what others cost at their errors.
 pub(crate) fn text(rows: &[Row]) -> String {
     let mut out = format!("Measured on {}.\n\n", machine());
-    for panel in PANELS.iter() {
-        let of = drawn(rows, panel);
+    for (case, panel) in panels() {
+        let of = drawn(rows, case);
         if of.is_empty() {
             continue;
         }
@@ -130,7 +109,7 @@ pub(crate) fn text(rows: &[Row]) -> String {
             format!("{} % {cost}", 100.0 * target)
         });
         let _ = writeln!(out, "This program reaches {}.\n", costs.collect::<Vec<_>>().join(", "));
-        let fails: Vec<String> = failed(rows, panel).into_iter().map(setting).collect();
+        let fails: Vec<String> = failed(rows, case).into_iter().map(setting).collect();
         if !fails.is_empty() {
             let _ = writeln!(out, "No error, for the setting fails: {}.\n", fails.join("; "));
         }
@@ -186,7 +165,7 @@ mod tests {
     use crate::cost::Cost;
 
     fn rows(settings: &[(f64, f64, f64)]) -> Vec<Row> {
-        let knob = Knob::new(["case", "method", "points", "", ""]);
+        let knob = Knob::new(["case", "method", "points"]);
         let row = |&(value, error, cpu_s): &(f64, f64, f64)| {
             let mut row = knob.row(value, Found::exact(error, Cost { cpu_s, wall_s: 0.0, peak_mem_bytes: 0.0 }));
             row.is_on_front = true;
