@@ -18,7 +18,7 @@ mod fig13_14;
 mod fig15;
 mod fig16;
 mod fig17;
-mod fig17_flows;
+pub(crate) mod fig17_flows;
 mod fig18;
 mod fig19;
 mod fig20;

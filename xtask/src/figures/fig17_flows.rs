@@ -76,28 +76,30 @@ pub(super) fn all(context: &Context) -> Result<Vec<OfFlow>, Failure> {
 fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<OfFlow, Failure> {
     let pair = || Ok(Sight::of_pair(VortexPair::default()));
     let sight = tau.map_or_else(pair, |tau| Sight::of_wake(wake, tau))?;
-    let mut scene = sight.scene(context, Scene { seed: 0, ..Scene::default() });
-    scene.detector.snr = SnrReference::Fixed { snr_db: SNR_DB };
-    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.02, 0.2);
-    scene.scan.elevation_step_rad = context.profile.choose(2.5e-3, 1.25e-3, 1.25e-3);
-    scene.estimator.gate_step_samples = context.profile.choose(15, 5, 5);
-    scene.scan.pulses_per_line = 4;
+    let mut scene = sight.scene(context, Scene { seed: 0, ..scene()? });
+    if context.profile != Profile::Quick {
+        (scene.scan.elevation_step_rad, scene.estimator.gate_step_samples) = (1.25e-3, 5);
+    }
     scene.scan.realisations = context.profile.choose(3, 12, 32);
-    (scene.outputs.flow, scene.outputs.signals) = (false, false);
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
     let some = METHODS[..context.profile.choose(4, 4, 5)].iter().map(|(method, _)| *method).collect();
     let name = |method: Method| METHODS.iter().find(|(of, _)| *of == method).map_or("", |(_, name)| *name);
-    let mut rows: Vec<_> =
-        retrieved(&scene, some, &sight.folder)?.into_iter().map(|row| (name(row.method), row)).collect();
+    let by = |scene: &Scene, methods| retrieved(scene, Retrieval { methods, ..Retrieval::default() }, &sight.folder);
+    let mut rows: Vec<_> = by(&scene, some)?.into_iter().map(|row| (name(row.method), row)).collect();
     scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
     scene.estimator.weighting = Weighting::Rectangular;
-    rows.extend(retrieved(&scene, vec![Method::Rv], &sight.folder)?.into_iter().map(|row| (OF_MEANS, row)));
+    rows.extend(by(&scene, vec![Method::Rv])?.into_iter().map(|row| (OF_MEANS, row)));
     Ok(OfFlow { tau, rows })
 }
 
-/// What some methods find in the scans of a scene beside a wake.
-fn retrieved(scene: &Scene, methods: Vec<Method>, wake: &Path) -> Result<Vec<RetrievalRow>, Failure> {
-    let scene = Scene { retrieval: Some(Retrieval { methods, ..Retrieval::default() }), ..scene.clone() };
+/// The scan, of which quick has all.
+pub(crate) fn scene() -> Result<Scene, Failure> {
+    Ok(SceneFile::parse(include_str!("retrieved.toml"), Path::new("retrieved.toml"))?.scene)
+}
+
+/// What retrievals find in the scans of a scene beside a wake.
+pub(crate) fn retrieved(scene: &Scene, retrieval: Retrieval, wake: &Path) -> Result<Vec<RetrievalRow>, Failure> {
+    let scene = Scene { retrieval: Some(retrieval), ..scene.clone() };
     let file = SceneFile::parse(&scene.to_toml(), &wake.join("scene.toml"))?;
     let result = wakescope_sim::run(&Plan::new(file, Target::Run)?, &Silent)?;
     Ok(result.retrieval.ok_or_else(|| Failure::new("a run without retrievals".into()))?.rows)

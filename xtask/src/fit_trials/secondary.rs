@@ -4,6 +4,7 @@
 //! simulated wake through the whole chain, whose velocities are peaks of spectra. No rule was chosen on these draws.
 
 use super::Options;
+use crate::figures::fig17_flows::{retrieved, scene};
 use crate::statistics::{Estimate, mean};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
@@ -18,12 +19,8 @@ use wakescope_estimate::retrieval::{
     Flag, Gate, Measured, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan, with_secondary_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};
-use wakescope_sim::Silent;
-use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::retrieve::RetrievalRow;
-use wakescope_sim::scene::{
-    Flow, Outside, Retrieval, Scene, SceneFile, SimulatedFlow, SimulatedMotion, SnrReference, VortexLines, VortexPair,
-};
+use wakescope_sim::scene::{Flow, Outside, Retrieval, Scene, SimulatedFlow, SimulatedMotion, VortexLines, VortexPair};
 
 /// The middle of the wakes \[m\].
 const MIDDLE_M: f64 = 400.0;
@@ -167,21 +164,13 @@ fn of_map(kind: &Kind, seed: u64) -> Result<Option<Scan>, Failure> {
     Ok(fits.iter().all(|errors| !errors.is_empty()).then_some(Scan { shown, fits }))
 }
 
-/// Scans of a scene: 10 dB, four pulses a line, gates of 38 m every 9 m.
+/// Scans of a scene.
 fn of_scene(flow: Flow, added_flows: Vec<Flow>, folder: &Path, options: &Options) -> Result<Vec<Scan>, Failure> {
-    let by = |secondary| -> Result<Vec<RetrievalRow>, Failure> {
-        let mut scene =
-            Scene { seed: options.seed, flow: flow.clone(), added_flows: added_flows.clone(), ..Scene::default() };
-        scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
-        (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.02, 0.2);
-        (scene.scan.elevation_step_rad, scene.scan.pulses_per_line) = (2.5e-3, 4);
+    let by = |secondary| {
+        let air = (flow.clone(), added_flows.clone());
+        let mut scene = Scene { seed: options.seed, flow: air.0, added_flows: air.1, ..scene()? };
         (scene.scan.realisations, scene.scan.outside_flow) = (options.scans as usize, Outside::Mask {});
-        scene.estimator.gate_step_samples = 15;
-        (scene.outputs.flow, scene.outputs.signals) = (false, false);
-        scene.retrieval = Some(Retrieval { secondary, ..Retrieval::default() });
-        let file = SceneFile::parse(&scene.to_toml(), &folder.join("scene.toml"))?;
-        let result = wakescope_sim::run(&Plan::new(file, Target::Run)?, &Silent)?;
-        Ok(result.retrieval.ok_or_else(|| Failure::new("a run without retrievals".into()))?.rows)
+        retrieved(&scene, Retrieval { secondary, ..Retrieval::default() }, folder)
     };
     let (pair, four) = (by(Secondary::Never)?, by(Secondary::Always)?);
     let errors = |rows: &[RetrievalRow]| -> Vec<Errors> {

@@ -1,7 +1,5 @@
 //! Error against run time of the whole chain: the standard deviation of a map by the realisations of the scan and by the step between
 //! windows, as `wakescope accuracy` tells its shift and its noise.
-//!
-//! The scene: half of Table 2's scan about the nearer vortex at 10 dB, four pulses a line.
 
 use super::{Found, Knob, Row, few};
 use crate::cost::fastest;
@@ -13,7 +11,7 @@ use wakescope_sim::accuracy::ladder::Verdict;
 use wakescope_sim::accuracy::{Accuracy, Request};
 use wakescope_sim::plan::{Plan, Target};
 use wakescope_sim::run;
-use wakescope_sim::scene::{Scene, SceneFile, SnrReference};
+use wakescope_sim::scene::SceneFile;
 use wakescope_sim::setup::progress::Silent;
 
 /// Realisations of the scan.
@@ -23,7 +21,7 @@ const SEARCH: (f64, f64) = (0.03, 100.0);
 
 /// All measurements; few realisations if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
-    let file = scene()?;
+    let file = SceneFile::parse(include_str!("chain.toml"), Path::new("chain.toml"))?;
     let request = Request { budget: SEARCH.1, ..Request::new(SEARCH.0, &[Figure::Std]) };
     let found = Accuracy::of(&file, &request, &Silent)?;
     let lacking = || Failure::new("the search tells no standard deviation of the map".into());
@@ -53,13 +51,4 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
         })?);
     }
     Ok(rows)
-}
-
-fn scene() -> Result<SceneFile, Failure> {
-    let mut scene = Scene::default();
-    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.11, 0.14);
-    (scene.scan.range_min_m, scene.scan.range_max_m) = (330.0, 430.0);
-    scene.scan.pulses_per_line = 4;
-    scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
-    Ok(SceneFile::parse(&scene.to_toml(), Path::new("chain.toml"))?)
 }
