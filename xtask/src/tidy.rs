@@ -3,12 +3,14 @@
 //! Who may depend on whom, no circles of imports, one line of documentation at the head of each file, file lengths, units
 //! in public names, reference curves with a header, tests and files that pages name, and no stray files or private paths.
 
+use crate::process::output;
 use crate::sources::{Modules, circles, is_test_file};
-use crate::workspace::{read, tracked_files};
+use crate::workspace::{read, root};
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
+use std::process::Command;
 use std::sync::LazyLock;
 
 /// The rules in numbers and words.
@@ -80,6 +82,12 @@ pub(crate) fn run() -> Outcome {
         println!("tidy: {line}");
     }
     Err(Failure::new(format!("tidy: {} violations", found.len())))
+}
+
+/// Paths, from the root, of the files that git tracks or would track.
+fn tracked_files() -> Result<Vec<String>, Failure> {
+    let text = output(Command::new("git").args(["ls-files", "--cached", "--others", "--exclude-standard"]))?;
+    Ok(text.lines().filter(|f| root().join(f).exists()).map(str::to_owned).collect())
 }
 
 /// Whether a word is among those of a list.

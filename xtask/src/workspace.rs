@@ -1,9 +1,7 @@
 //! The files of the workspace, and what is written about those that a task makes.
 
-use crate::process::output;
 use fixtures::failure::{Failure, Outcome};
 use std::path::{Path, PathBuf};
-use std::process::Command;
 use wakescope_sim::io::Provenance;
 
 /// Provenance of what follows from formulas and the parameters given as TOML.
@@ -39,10 +37,4 @@ pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {
     let rows = text.lines().filter(|line| !line.starts_with('#'));
     let parse = |line: &str| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<Vec<f64>>>();
     Ok(rows.filter_map(parse).collect())
-}
-
-/// Paths, from the root, of the files that git tracks or would track.
-pub(crate) fn tracked_files() -> Result<Vec<String>, Failure> {
-    let text = output(Command::new("git").args(["ls-files", "--cached", "--others", "--exclude-standard"]))?;
-    Ok(text.lines().filter(|f| root().join(f).exists()).map(str::to_owned).collect())
 }
