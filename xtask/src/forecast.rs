@@ -23,14 +23,11 @@ pub(crate) struct Options {
 /// Largest ratio of forecast and time, and of forecast and memory, either way.
 const MOST: [f64; 2] = [2.0, 1.5];
 
-/// A run that does next to nothing.
-const EMPTY: &str = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 0.0\n[flow]\nkind = \"calm\"\n[scan]\n\
-    elevation_max_rad = 0.0\nrange_max_m = 320.0\npulses_per_line = 1\nrealisations = 1\n[outputs]\nnetcdf = false\n\
-    svg = false\npng = false\nprofile_points = 2\n";
-
 /// The scenes.
 #[derive(Deserialize)]
 struct Scenes {
+    /// A run that does next to nothing.
+    empty: String,
     scene: Vec<Scene>,
 }
 
@@ -44,12 +41,12 @@ struct Scene {
 pub(crate) fn run(options: &Options) -> Outcome {
     let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-forecast"));
     std::fs::create_dir_all(&folder)?;
-    let [_, [_, empty_bytes]] = measured(&program, &folder, EMPTY, "run")?;
+    let Scenes { empty, scene } = toml::from_str(include_str!("forecast.toml"))?;
+    let [_, [_, empty_bytes]] = measured(&program, &folder, &empty, "run")?;
     println!("a run of next to nothing: {:.1} MB", empty_bytes / 1e6);
     println!("{:<28} time: forecast, run [s], ratio; memory: forecast, run [MB], ratio", "scene");
     let mut beyond = Vec::new();
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
-    let Scenes { scene } = toml::from_str(include_str!("forecast.toml"))?;
     for Scene { name, command, text } in scene.iter().filter(|s| wanted(&s.name)) {
         let [[forecast_s, forecast_bytes], [time_s, bytes]] = measured(&program, &folder, text, command)?;
         let bytes = (bytes - empty_bytes).max(1e5);

@@ -1,8 +1,8 @@
 //! Figure 3: the scan pattern on the runway, with the vortices and the lines of sight.
 
 use super::context::*;
-use wakescope_sim::scene::Flow;
-use wakescope_sim::setup::wind;
+use super::study::Sight;
+use wakescope_sim::scene::VortexPair;
 
 /// Every so many lines are drawn; the table has all.
 const DRAWN: usize = 8;
@@ -32,17 +32,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     }
     let recorded: Vec<(f64, f64)> = elevation_rad.iter().map(|&el| at(near_m, el)).collect();
     let last: Vec<(f64, f64)> = elevation_rad.iter().map(|&el| at(far_m, el)).collect();
-    let mut series = vec![
+    let series = vec![
         Series::new(&format!("line of sight, every {DRAWN}th"), Style::Line, fan),
         Series::new("first and last sample", Style::Dash, recorded),
         Series::new("", Style::Dash, last).in_colour(1),
         Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
+        Series::new("vortices", Style::Markers, Sight::of_pair(VortexPair::default()).cores),
     ];
-    if let Flow::VortexPair(pair) = &scene.flow {
-        let c = wind::vortex_pair(pair).centres(wind::start_time_s(scene));
-        let centres = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
-        series.push(Series::new("vortices", Style::Markers, centres));
-    }
     let (x, y) = (Axis::linear("distance from the lidar [m]"), Axis::linear("height [m]"));
     let plot = CurvePlot { series, equal_scales: true, ..CurvePlot::new("Scan across the runway", x, y) };
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;

@@ -12,7 +12,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = context.provenance_of_formula(&wake.case_toml);
     let mut table = Table::new();
     let names = ["tau", "energy", "energy_3d", "secondary_gamma_left", "secondary_gamma_right"].map(String::from);
-    for name in names.into_iter().chain((0..=8).map(mode_name)) {
+    for name in names.into_iter().chain((0..=8).map(|mode| format!("energy_mode_{mode}"))) {
         table = table.float(&name, wake.column(&name)?.iter().copied());
     }
     let figure = wake.surfaces_figure()?.ok_or_else(|| Failure::new(
@@ -28,10 +28,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     );
     out.claims = vec![secondary(&wake)?, short_waves(&wake)?];
     Ok(out)
-}
-
-fn mode_name(mode: usize) -> String {
-    format!("energy_mode_{mode}")
 }
 
 fn secondary(wake: &FinishedWake) -> Result<Claim, Failure> {
@@ -53,7 +49,7 @@ fn secondary(wake: &FinishedWake) -> Result<Claim, Failure> {
 /// Waves of 0.2 to 0.6 spacings together: their growth, half the slope of the logarithm of their energy, and their share of all waves.
 fn short_waves(wake: &FinishedWake) -> Result<Claim, Failure> {
     let [shortest, longest] = [0.2, 0.6].map(|length| wake.flow.size[0] / length);
-    let modes = (1..=8).map(|mode| Ok((mode, wake.curve(&mode_name(mode))?)));
+    let modes = (1..=8).map(|mode| Ok((mode, wake.curve(&format!("energy_mode_{mode}"))?)));
     let modes: Vec<(usize, Vec<(f64, f64)>)> = modes.collect::<Result<_, Failure>>()?;
     let (short, others): (Vec<_>, Vec<_>) = modes.iter().partition(|of| (longest..=shortest).contains(&(of.0 as f64)));
     let sum =

@@ -5,7 +5,8 @@ use super::{Found, Knob, Row, few};
 use crate::cost::{fastest, measured};
 use crate::workspace::numbers;
 use fixtures::failure::Failure;
-use fixtures::{ENERGY_J, pair::PairCase, receiver};
+use fixtures::pair::{PairCase, line_of_sight};
+use fixtures::{ENERGY_J, receiver};
 use num_complex::Complex;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
@@ -14,7 +15,7 @@ use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_les::solver::{PressureMethod, TimeStep};
-use wakescope_les::{TimeScheme, Wind, cases};
+use wakescope_les::{TimeScheme, cases};
 use wakescope_optics::air::{StructureTable, structure_function_m53};
 use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::screens::{Real, ScreenGenerator};
@@ -183,22 +184,12 @@ fn simulator(pulse_s: f64, samples: usize) -> Result<Simulator, Failure> {
 
 /// The line at 2 m over the centre of the nearer vortex of the figures' pair, with `parts` layers for each sample, 0 dB.
 fn line(simulator: &Simulator, samples: usize, parts: usize) -> Result<LineOfSight, Failure> {
-    let wind = PairCase::FIGURES.even().wind()?;
-    let (sin, cos) = (49.0_f64 / 376.5).atan().sin_cos();
     let thickness_m = 0.5 * SPEED_OF_LIGHT_M_S / simulator.receiver().sample_rate_hz / parts as f64;
     let before = 256 * parts;
-    let layers = samples * parts + 2 * before;
-    let first_range_m = FIRST_M - before as f64 * thickness_m;
-    let at_m = |l: usize| first_range_m + l as f64 * thickness_m;
-    let points_m: Vec<[f64; 3]> = (0..layers).map(|l| [0.0, at_m(l) * cos, at_m(l) * sin]).collect();
-    let mut wind_m_s = vec![[0.0; 3]; layers];
-    wind.velocity_into(&points_m, 0.0, &mut wind_m_s)?;
-    Ok(LineOfSight {
-        first_range_m,
-        layer_thickness_m: thickness_m,
-        radial_velocity_m_s: wind_m_s.iter().map(|u| u[1] * cos + u[2] * sin).collect(),
-        weight_per_m: vec![simulator.receiver().slowly_varying_snr(ENERGY_J, 1.0).recip(); layers],
-    })
+    let weight_per_m = simulator.receiver().slowly_varying_snr(ENERGY_J, 1.0).recip();
+    let layers = (FIRST_M - before as f64 * thickness_m, thickness_m);
+    let wind = PairCase::FIGURES.even().wind()?;
+    Ok(line_of_sight(&wind, (49.0_f64 / 376.5).atan(), layers, weight_per_m, samples * parts + 2 * before)?)
 }
 
 /// What the thickness of layers does to the covariance of a gate in a core, and costs a record.
