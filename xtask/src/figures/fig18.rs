@@ -1,15 +1,11 @@
 //! Figure 18: velocity error of every estimator against the Cramer-Rao bound, in a uniform random wind.
 
 use super::context::*;
-use fixtures::methods::Known;
+use crate::work_precision::estimate::bound_m_s;
+use fixtures::WINDOW;
 use fixtures::uniform::{Air, BAND_M_S, errors};
-use fixtures::{WINDOW, sampling};
 use rayon::prelude::*;
-use wakescope_estimate::{
-    SignalKind,
-    bound::{Noise, WindowModel},
-    map::{GoodAndBad, good_and_bad},
-};
+use wakescope_estimate::map::{GoodAndBad, good_and_bad};
 use wakescope_signal::NoiseModel;
 
 const NOISES: [(NoiseModel, &str); 2] = [(NoiseModel::White, "white"), (NoiseModel::BandLimited, "band")];
@@ -54,12 +50,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     }
     let rows_of = |(pulse_s, noise, snr_db): (f64, NoiseModel, f64)| -> Result<Vec<Row>, Failure> {
         let air = Air::new(noise, pulse_s, snr_db, context.seed)?;
-        let snr = 10f64.powf(0.1 * snr_db);
-        let known = Known { noise, sigma_s: air.sigma_s(), snr };
-        // white noise of the same density in the band, whatever the noise: the yardstick of all rows
-        let model = WindowModel::gaussian_pulse(&sampling()?, WINDOW, air.sigma_s(), Noise::White)?;
-        let found = errors(&air, &known, counts_at(snr_db), trials)?.into_iter().map(|errors| {
-            let bound_m_s = model.bound_m_s(0.0, snr, SignalKind::Real, errors.pulses as f64)?;
+        let found = errors(&air, counts_at(snr_db), trials)?.into_iter().map(|errors| {
+            let bound_m_s = bound_m_s(&air.known, errors.pulses)?;
             let (method, pulses) = (errors.method, errors.pulses);
             let found = good_and_bad(&errors.errors_m_s, BAND_M_S);
             Ok(Row { method, noise, pulse_s, pulses, snr_db, bound_m_s, found })

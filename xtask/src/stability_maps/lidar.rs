@@ -3,7 +3,6 @@
 use super::{Curve, NO_THEORY, Panel, logs};
 use crate::work_precision::estimate::{Uniform, WINDOWS, bound_m_s};
 use fixtures::failure::Failure;
-use fixtures::methods::Known;
 use fixtures::uniform::{Air, BAND_M_S, errors};
 use fixtures::{ENERGY_J, WINDOW, receiver, sampling};
 use num_complex::Complex;
@@ -116,9 +115,8 @@ pub(super) fn ratios() -> Result<Vec<Panel>, Failure> {
     let mut curves = [(); 2].map(|()| METHODS.map(|name| Curve { name: name.into(), points: Vec::new() }));
     for snr_db in [-20.0, -15.0, -10.0, 0.0, 20.0, 40.0, 70.0, 100.0] {
         let air = Air::new(NoiseModel::White, PULSE_S, snr_db, SEED)?;
-        let known = Known { noise: NoiseModel::White, sigma_s: air.sigma_s(), snr: 10f64.powf(0.1 * snr_db) };
-        let bound_m_s = bound_m_s(&known)?;
-        for of in errors(&air, &known, &[WINDOWS], TRIALS)? {
+        let bound_m_s = bound_m_s(&air.known, WINDOWS)?;
+        for of in errors(&air, &[WINDOWS], TRIALS)? {
             let Some(method) = METHODS.iter().position(|method| *method == of.method) else { continue };
             let found = good_and_bad(&of.errors_m_s, BAND_M_S);
             for (curves, measured) in curves.iter_mut().zip([found.std_good_m_s / bound_m_s, found.bad_fraction]) {
@@ -161,7 +159,7 @@ pub(super) fn basins() -> Result<Vec<Panel>, Failure> {
     let s = sampling()?;
     let peak = SpectralPeak::new(&s, SignalKind::Real, &unweighted_lags(WINDOW), 1024, Refinement::Parabola)?;
     let statistic = Correlogram::<f64>::new(Weighting::default(), WINDOW)?;
-    let sigma_s = Air::new(NoiseModel::White, PULSE_S, 10.0, SEED)?.sigma_s();
+    let sigma_s = Air::new(NoiseModel::White, PULSE_S, 10.0, SEED)?.known.sigma_s;
     let pulse = PulseShape::gaussian(sigma_s)?;
     let response = EstimatorResponse::new(&statistic, &peak, &s, &pulse, (Noise::White, 10.0), 2.0)?;
     let elevation_rad: Vec<f64> = (0..26).map(|i| 0.02 + 0.007 * f64::from(i)).collect();

@@ -21,10 +21,11 @@ use wakescope_signal::NoiseModel;
 /// Windows of one estimate.
 pub(crate) const WINDOWS: usize = 20;
 
-/// Cramer-Rao bound of one estimate in white noise \[m/s\].
-pub(crate) fn bound_m_s(known: &Known) -> Result<f64, Failure> {
+/// Cramer-Rao bound of an estimate from so many windows, in white noise of the same density in the band whatever the noise: the yardstick of
+/// all methods \[m/s\].
+pub(crate) fn bound_m_s(known: &Known, windows: usize) -> Result<f64, Failure> {
     let model = WindowModel::gaussian_pulse(&sampling()?, WINDOW, known.sigma_s, Noise::White)?;
-    Ok(model.bound_m_s(0.0, known.snr, SignalKind::Real, WINDOWS as f64)?)
+    Ok(model.bound_m_s(0.0, known.snr, SignalKind::Real, windows as f64)?)
 }
 
 /// All measurements; few trials if `quick`.
@@ -52,7 +53,6 @@ pub(crate) struct Uniform {
 impl Uniform {
     pub(crate) fn new(noise: NoiseModel, snr_db: f64, trials: usize) -> Result<Self, Failure> {
         let air = Air::new(noise, 200e-9, snr_db, SEED)?;
-        let known = Known { noise, sigma_s: air.sigma_s(), snr: 10f64.powf(0.1 * snr_db) };
         let mut scratch = wakescope_signal::Scratch::default();
         let mut drawn = Vec::with_capacity(trials);
         for trial in 0..trials {
@@ -63,7 +63,7 @@ impl Uniform {
             }
             drawn.push((velocity_m_s, windows));
         }
-        Ok(Self { known, bound_m_s: bound_m_s(&known)?, trials: drawn })
+        Ok(Self { known: air.known, bound_m_s: bound_m_s(&air.known, WINDOWS)?, trials: drawn })
     }
 
     /// Errors of all trials \[m/s\], and whether the estimator says that it has a velocity.
