@@ -31,6 +31,7 @@ mod tab02;
 
 use context::{Context, Rendered};
 use fixtures::failure::Failure;
+use std::collections::BTreeMap;
 
 /// A figure that can be asked for.
 pub(crate) struct Figure {
@@ -56,6 +57,22 @@ impl Figure {
     pub(crate) fn heading(&self) -> String {
         let kind = if self.id.starts_with("tab") { "Table" } else { "Figure" };
         format!("{kind} {}: {}", self.number, self.title)
+    }
+
+    /// The words of its caption with the values of a run.
+    pub(crate) fn caption(&self, values: &[String]) -> Result<String, Failure> {
+        let captions: BTreeMap<String, String> = toml::from_str(include_str!("figures/captions.toml"))?;
+        let words: Vec<&str> = captions.get(self.id).map_or(Vec::new(), |text| text.split("{}").collect());
+        if words.len() != values.len() + 1 {
+            return Err(Failure::new(format!(
+                "caption of {}: {} values, {} parts",
+                self.id,
+                values.len(),
+                words.len()
+            )));
+        }
+        let values = values.iter().map(String::as_str).chain([""]);
+        Ok(words.into_iter().zip(values).flat_map(|(words, value)| [words, value]).collect())
     }
 
     pub(crate) fn lane(&self) -> Lane {
@@ -99,3 +116,17 @@ pub(crate) const ALL: [Figure; 23] = [
     figure("fig21", 21, "One wake across, round and along the flight", fig21::make),
     figure("fig25", 25, "Where correlogram accumulation errs less", fig25::make),
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_figure_has_a_caption_of_its_own() {
+        let captions: BTreeMap<String, String> = toml::from_str(include_str!("figures/captions.toml")).unwrap();
+        let ids: Vec<&str> = ALL.iter().map(|figure| figure.id).collect();
+        assert!(captions.keys().all(|id| ids.contains(&id.as_str())) && captions.len() == ids.len());
+        assert_eq!(ALL[3].caption(&["3", "1.25", "8"].map(String::from)).unwrap().matches(" 1.25 mrad;").count(), 1);
+        assert!(ALL[3].caption(&[]).is_err());
+    }
+}

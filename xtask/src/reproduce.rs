@@ -91,6 +91,7 @@ fn drawn(
             };
             let (before_s, start) = (used_s(), Instant::now());
             let mut rendered = pool.install(|| (figure.make)(context))?;
+            rendered.caption = figure.caption(&std::mem::take(&mut rendered.values))?;
             rendered.claims.iter_mut().for_each(|claim| claim.figure = figure.id.into());
             rendered.took_s = [start.elapsed().as_secs_f64(), used_s() - before_s];
             if !is_other {

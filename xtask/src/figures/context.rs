@@ -72,8 +72,10 @@ pub(crate) struct Rendered {
     /// Extension and content of each file.
     #[serde(skip)]
     pub(crate) files: Vec<(String, Vec<u8>)>,
-    /// What is drawn, for the report.
+    /// What is drawn, for the report, which makes it of the caption of the list and the values in their order.
     pub(crate) caption: String,
+    #[serde(skip)]
+    pub(crate) values: Vec<String>,
     /// Short notes beside the name, such as what is not the real thing.
     pub(crate) marks: Vec<String>,
     /// What it comes to, for the head of the report; mostly nothing.

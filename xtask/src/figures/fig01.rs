@@ -44,10 +44,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .with(Series::new("algebraic profile (3)", Style::Line, scaled(&w_m_s)))
         .with(Series::new("potential vortices", Style::DashDot, scaled(&drawn_m_s)));
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    out.caption = format!(
-        "Vertical velocity through the two cores of a pair with Gamma0 = {GAMMA_M2_S} m2/s, b0 = {SPACING_M} m, rc = {CORE_M} m, \
-         in units of the largest tangential velocity of one vortex, and the profiles of potential vortices."
-    );
+    out.values = vec![GAMMA_M2_S.to_string(), SPACING_M.to_string(), CORE_M.to_string()];
     out.claims = claims(top_m_s, &y_m, &w_m_s);
     Ok(out)
 }

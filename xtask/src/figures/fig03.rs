@@ -42,10 +42,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (x, y) = (Axis::linear("distance from the lidar [m]"), Axis::linear("height [m]"));
     let plot = CurvePlot { series, equal_scales: true, ..CurvePlot::new("Scan across the runway", x, y) };
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    out.caption = format!(
-        "Vertical scan of {} lines of sight in steps of {} mrad; one in {DRAWN} is drawn.",
-        elevation_rad.len(),
-        1e3 * scene.scan.elevation_step_rad
-    );
+    out.values =
+        vec![elevation_rad.len().to_string(), (1e3 * scene.scan.elevation_step_rad).to_string(), DRAWN.to_string()];
     Ok(out)
 }

@@ -53,10 +53,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .with(Series::new("target", Style::Markers, [TARGET_M]));
     plot.equal_scales = true;
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    out.caption = "The 16 grid points (26) that give the velocity at one point of a line of sight; their weights, \
-                   products of the kernel (27), are in the table."
-        .into();
-
     // The claim holds for any target: a grid of offsets is tried.
     let (mut sum_error, mut quadratic): (f64, f64) = (0.0, 0.0);
     for (a, b) in (0..20).flat_map(|a| (0..20).map(move |b| (a, b))) {

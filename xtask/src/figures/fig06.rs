@@ -20,12 +20,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         ))?;
     let mut out = Rendered::new(&table, &figure, &origin)?;
     out.files.push(("apng".into(), apng(&wake.frames()?, FRAME_S, &origin)?));
-    out.caption = format!(
-        "Surfaces where |ω| b₀²/Γ₀ is 1 and 10, at τ = {:?}; {}, box repeated {REPEATS} times along the flight, lengths in b₀. The animation \
-         (fig06.apng) shows the axial vorticity of a cross-plane from τ = 0 on.",
-        wake.fields_tau,
-        wake.words()
-    );
+    out.values = vec![format!("{:?}", wake.fields_tau), wake.words(), REPEATS.to_string()];
     out.claims = vec![secondary(&wake)?, short_waves(&wake)?];
     Ok(out)
 }

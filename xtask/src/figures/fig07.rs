@@ -16,11 +16,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let figure = Figure::side_by_side([beside(&wake, wake.circulation_plot()?, [[0, 1], [0, 2]])?, paths(&wake)?]);
     let figure = Figure { width: 1200.0, ..figure };
     let mut out = Rendered::new(&table(&wake)?, &figure, &origin)?;
-    out.caption = format!(
-        "Circulation averaged over 5 to 15 m (left) and paths of both vortices (right) beside the inviscid hyperbola and an independent \
-         simulation at Γ₀/ν = 5000; {}. The noise sets when the fast decay begins.",
-        wake.words()
-    );
+    out.values = vec![wake.words()];
     out.claims = claims(&wake)?;
     Ok(out)
 }

@@ -60,11 +60,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     (figure.columns, figure.width) = (2, 1300.0);
     let table = Table::stack([map_table(&early)?, map_table(&late)?])?;
     let mut out = Rendered::new(&table, &figure, &studies[1].provenance())?;
-    out.caption = format!(
-        "Radial velocity early and late (left: exact, right: mean of the estimates by periodogram accumulation with the Gaussian weighting, 200 ns, no refractive \
-         turbulence, one pulse a line, 0 dB, \u{3c1} = 2 m); {}.",
-        words
-    );
+    out.values = vec![words];
     out.claims.push(Claim::exact(
         "F8",
         format!(

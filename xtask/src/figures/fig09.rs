@@ -59,9 +59,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (x, y) = (Axis::linear("range [m]"), Axis::log("windows accumulated"));
     let plot = CurvePlot { series, ..CurvePlot::new("Accumulation level", x, y) };
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    out.caption =
-        "Windows that one velocity estimate accumulates: one pulse a line every 1.25 mrad, one window a sample.".into();
-
     let here: Vec<(usize, f64)> = RADII_M.iter().map(|&rho| at(CHAPTER_RANGE_M, rho)).collect();
     out.claims = claims(&rows, &here);
     Ok(out)

@@ -33,12 +33,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = studies[0].provenance();
     let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
-    out.caption = format!(
-        "Radial velocity (top) and standard deviation of its estimates by periodogram accumulation (unweighted windows, 200 ns, no refractive \
-         turbulence) over {realisations} scans of one pulse a line, \u{3c1} = 2 m, for (14) with h (middle) and as the chapter prints it (bottom). \
-         The claim is on the root mean square error (rms_m_s in the table), which has the bias in it; {}.",
-        sight.words
-    );
+    out.values = vec![realisations.to_string(), sight.words];
     let beside =
         found.iter().map(|(name, rms, std)| format!("{name}: {}, of the standard deviation {std:.2}", rms.words()));
     let beside = beside.collect::<Vec<_>>().join("; ");

@@ -47,13 +47,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = studies[0].provenance();
     let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
-    out.caption = format!(
-        "Late: 400 ns, Cn2 = 1e-15 m^(-2/3), N = 64 (a gate of 38.4 m), periodogram accumulation, unweighted windows, \u{3c1} = 2 m, {} scans of one \
-         pulse a line; mean estimate, in the colours of the exact field, beyond which they stay the same, and root mean square error (33) \
-         against v_pulse; {}.",
-        studies[0].map.scans.len(),
-        sight.words
-    );
+    out.values = vec![studies[0].map.scans.len().to_string(), sight.words];
     out.claims.push(Claim::judged("F11", &parts).beside(&told.join("; ")));
     Ok(out)
 }

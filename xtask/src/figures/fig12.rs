@@ -87,13 +87,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     out.add("batches.csv", &batches_table(&all), &origin)?;
     out.marks = vec![sight.mark];
     let [few, many] = scans;
-    out.caption = format!(
-        "Root mean square over the lines of sight of the error (33) of correlogram accumulation (unweighted windows), \u{3c1} = 2 m, 200 ns, \
-         Cn2 = 1e-13 m^(-2/3), {many} scans ({few} at the physical ratio) of one pulse a line, bands of one standard error. The chapter's \
-         <\u{3c3}_v> is the mean over the lines of a standard deviation: with outliers not the same (column mean_of_lines_m_s), and its square \
-         has the bias in it, which the table tells apart; {}.",
-        sight.words
-    );
+    out.values = vec![many.to_string(), few.to_string(), sight.words];
     out.claims = vec![outside_claim(curves, &studies[0]), inside_claim(curves), thin_claim(curves, thin)];
     Ok(out)
 }

@@ -9,17 +9,12 @@ use wakescope_sim::scene::PulseShape;
 const DURATIONS_S: [f64; 2] = [200e-9, 400e-9];
 /// The reference at which the chapter is judged.
 const CHAPTER: &str = REFERENCES[1].0;
-/// What errors across a core are.
-const ACROSS: &str = "Root mean square error against the range from the vortex centre, over the lines within 4 m of a core, both vortices together, less its \
-     evolution with range, a straight line through what it is beyond 30 m from both; \u{3c1} = 2 m, bands of one standard error over batches of scans.";
 
 pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
-    let words = "Periodogram accumulation (PA), unweighted and with the Gaussian weighting, and correlogram accumulation (CA, AR(16), unweighted) \
-         on the same signals; no refractive turbulence";
     // Rare estimates anywhere in the band make most of the scatter, so scans count more than neighbouring gates, which see the same signals.
     // At 200 ns the difference from weighted PA is next to nothing, which takes many to tell.
     let scans = context.profile.choose([[8; 2], [1280, 160]], [[32; 2], [1280, 320]], [[96; 2], [1600, 400]]);
-    let (mut out, chapter) = compare(context, words, (1, scans), |mut scene| {
+    let (mut out, chapter) = compare(context, (1, scans), |mut scene| {
         scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
         scene
     })?;
@@ -36,10 +31,8 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
 }
 
 pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
-    let words =
-        "PA, unweighted and with the Gaussian weighting, and CA (unweighted) at 200 and 400 ns, Cn2 = 1e-15 m^(-2/3)";
     let scans = context.profile.choose([[8; 2], [168; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
-    let (mut out, chapter) = compare(context, words, (2, scans), |scene| with_turbulence(context, scene, 1e-15))?;
+    let (mut out, chapter) = compare(context, (2, scans), |scene| with_turbulence(context, scene, 1e-15))?;
     let peaks = profiles::parts(&chapter, " m/s", Profiles::peak_m_s);
     let widths = profiles::parts(&chapter, " m", Profiles::width_m);
     out.words = format!("Is its profile across a core narrower, too? {} (figure 14).", profiles::told(&widths));
@@ -51,7 +44,6 @@ pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
 /// duration, for scenes about the cores that may be changed: the figure, and the profiles at the chapter's reference.
 fn compare(
     context: &Context,
-    words: &str,
     (durations, scans): (usize, [[usize; 2]; 2]),
     change: impl Fn(Scene) -> Scene,
 ) -> Result<(Rendered, Vec<Profiles>), Failure> {
@@ -84,8 +76,7 @@ fn compare(
     out.add("batches.csv", &profiles::batches_table(all.iter().map(|p| (p.title(), p)), true), &origin)?;
     let [[few, _], [short, long]] = scans;
     let many = if short == long { short.to_string() } else { format!("{short} and {long}") };
-    out.caption =
-        format!("{ACROSS} {words}, {many} scans ({few} at the physical ratio) of one pulse a line; {}.", sight.words);
+    out.values = vec![many, few.to_string(), sight.words];
     out.marks = vec![sight.mark];
     Ok((out, all.into_iter().filter(|p| p.name == CHAPTER).collect()))
 }

@@ -35,10 +35,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = plan.scene.provenance();
     let mut out = Rendered::new(&table(&found)?, &figure(&found, 1)?, &origin)?;
     out.marks = vec!["analytic pair".into()];
-    out.caption = "ANALYTIC PAIR, not a simulated flow: velocities of one scan at 10 dB with four pulses a line, gate means of the fitted wake, and the \
-                   difference. What is left at the cores is what peaks of spectra show beyond means, which the fit knows; crosses: the fitted \
-                   centres."
-        .into();
     out.claims = claims(&found);
     Ok(out)
 }

@@ -133,12 +133,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
     let named = all.iter().flat_map(|m| m.of.iter().map(|p| (format!("{}; {} dB", m.case.name(), m.case.snr_db), p)));
     out.add("batches.csv", &profiles::batches_table(named, false), &origin)?;
-    out.caption = format!(
-        "Root mean square error of correlogram accumulation (CA, AR(16)) less that of periodogram accumulation over the latter, on the same \
-         signals, below 0 where CA errs less: inside the vortices (8 m) and outside (30 m), 200 ns, \u{3c1} = 2 m, no refractive turbulence, {scans} \
-         scans; the wake is {}, the pair ANALYTIC. Solid: unweighted PA, dashed: PA with the Gaussian weighting; bars are 95 % intervals.",
-        sight.words
-    );
+    out.values = vec![scans.to_string(), sight.words];
     out.marks = vec![sight.mark, "analytic pair".into()];
     out.words = words(&all)?;
     out.claims = claims(&all)?;

@@ -23,7 +23,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("delay_chapter_s", ROWS.iter().map(|r| r.3));
     let parameters = format!("approach_speed_m_s = {APPROACH_SPEED_M_S:?}\n");
     let mut out = Rendered::of_table(&table, &context.provenance_of_formula(&parameters))?;
-    out.caption = "Separations behind a landing aircraft (ICAO) and the time that they take at 70 m/s.".into();
     let measured: Vec<String> = ROWS.iter().map(|r| format!("{:.1}", delay_s(r.2))).collect();
     // The chapter prints whole seconds.
     let pass = ROWS.iter().all(|r| (delay_s(r.2) - r.3).abs() <= 0.5);

@@ -32,8 +32,6 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("chapter", ROWS.iter().map(|r| r.1))
         .float("scene", values.iter().copied());
     let mut out = Rendered::of_table(&table, &plan.scene.provenance())?;
-    out.caption =
-        "The chapter's Table 2 and the same parameters in the scene that a run writes beside its results.".into();
     let equal = ROWS.iter().zip(&values).filter(|(r, v)| r.1 == **v).count();
     out.claims.push(Claim::exact("T2", format!("{equal} of {} equal", ROWS.len()), equal == ROWS.len()));
     Ok(out)

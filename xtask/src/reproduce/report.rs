@@ -204,6 +204,7 @@ mod tests {
         let rendered = |extension: &str, bytes: &str| Rendered {
             files: vec![(extension.into(), bytes.as_bytes().to_vec())],
             caption: WILD.into(),
+            values: Vec::new(),
             marks: vec![WILD.into()],
             words: WILD.into(),
             claims: vec![claim(WILD)],
