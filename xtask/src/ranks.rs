@@ -13,6 +13,8 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+/// What is run, whole or for some steps.
+const CASE: &str = include_str!("ranks.toml");
 /// Steps of the runs that are compared.
 const STEPS: u32 = 20;
 /// Longest processor time of a run, s; six times as much of the clock.
@@ -62,15 +64,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let scratch = root().join("target/ranks");
     let _ = std::fs::remove_dir_all(&scratch);
     std::fs::create_dir_all(&scratch)?;
-    let case = |pause: &str| {
-        format!(
-            "format = 1\n[case]\nkind = \"wake\"\n[wake]\nend_tau = 1.0\nevery_tau = 0.02\nplanes_tau = [0.02, 0.04]\n\
-             fields_tau = [0.04]\n[time]\n{pause}[output]\nplanes = [\"netcdf\"]\n\
-             fields = [\"netcdf\", \"csv\", \"initial_netcdf\"]\n[checkpoint]\nevery_steps = 2\n"
-        )
-    };
-    std::fs::write(scratch.join("short.toml"), case(&format!("pause_after_steps = {STEPS}\n")))?;
-    std::fs::write(scratch.join("long.toml"), case(""))?;
+    std::fs::write(scratch.join("short.toml"), format!("{CASE}pause_after_steps = {STEPS}\n"))?;
+    std::fs::write(scratch.join("long.toml"), CASE)?;
     compare(&program, &scratch)?;
     kill_one(&program, &scratch)?;
     if !options.measure {
