@@ -175,9 +175,10 @@ fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation:
         let groups = FreeParameters { wind: WindFit::Linear, ..free }.groups();
         for (what, widths) in [("velocities", false), ("velocities and widths", true)] {
             let found = map.deviations(&groups, widths);
-            let found = found.ok_or_else(|| Failure::new("the covariance of the map is singular".into()))?;
-            show(&format!("{what} of the map, weights of their covariance"), found.best[0]);
-            show(&format!("{what} of the map, weights of their variances"), found.by_variance[0]);
+            let [best, by_variance] =
+                found.ok_or_else(|| Failure::new("the covariance of the map is singular".into()))?;
+            show(&format!("{what} of the map, weights of their covariance"), best);
+            show(&format!("{what} of the map, weights of their variances"), by_variance);
         }
     }
     Ok(())

@@ -22,12 +22,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 fn table(wake: &FinishedWake) -> Result<Table, Failure> {
+    let names = "tau gamma_5_15_left_m2_s gamma_5_15_right_m2_s y_left_m z_left_m y_right_m z_right_m y_left z_left y_right z_right \
+                 outward_shear_left outward_shear_right wall_shear";
     let mut table = Table::new();
-    let names =
-        ["tau", "gamma_5_15_left_m2_s", "gamma_5_15_right_m2_s", "y_left_m", "z_left_m", "y_right_m", "z_right_m"];
-    let of_claims =
-        ["y_left", "z_left", "y_right", "z_right", "outward_shear_left", "outward_shear_right", "wall_shear"];
-    for name in names.into_iter().chain(of_claims) {
+    for name in names.split(' ') {
         table = table.float(name, wake.column(name)?.iter().copied());
     }
     let tau = wake.column("tau")?;

@@ -66,14 +66,6 @@ pub(super) struct MapBound {
     covariance: Banded,
 }
 
-/// Standard deviations of free numbers.
-pub(super) struct Deviations {
-    /// With the best weights, those of the covariance.
-    pub(super) best: Vec<f64>,
-    /// With weights of the variances alone.
-    pub(super) by_variance: Vec<f64>,
-}
-
 /// The grid of the complex samples.
 struct Grid {
     period_s: f64,
@@ -144,8 +136,9 @@ impl MapBound {
         Ok(Self { slopes: cells.iter().flat_map(|cell| cell.slopes).collect(), covariance })
     }
 
-    /// Deviations of free numbers, each of which moves some parameters; with the widths of the spectra or without.
-    pub(super) fn deviations(&self, groups: &[Vec<usize>], widths: bool) -> Option<Deviations> {
+    /// Standard deviation of the first of some free numbers, each of which moves some parameters: with the best weights, those of the
+    /// covariance, and with weights of the variances alone; with the widths of the spectra or without.
+    pub(super) fn deviations(&self, groups: &[Vec<usize>], widths: bool) -> Option<[f64; 2]> {
         let mut covariance = self.covariance.clone();
         if !widths {
             // what varies so much tells nothing
@@ -164,8 +157,7 @@ impl MapBound {
         let sandwich = bread.dot(&weighted.t().dot(&about)).dot(&bread);
         let factor = covariance.factor()?;
         let white = of_columns(&slopes, &|j| factor.forward(j.to_owned()));
-        let roots = |a: &Array2<f64>| a.diag().iter().map(|v| v.sqrt()).collect();
-        Some(Deviations { best: roots(&inverse(&white.t().dot(&white))?), by_variance: roots(&sandwich) })
+        Some([inverse(&white.t().dot(&white))?, sandwich].map(|variances| variances[[0, 0]].sqrt()))
     }
 }
 
@@ -414,7 +406,7 @@ mod tests {
         Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 3.0, 0.0])
     }
 
-    fn deviation(noise: Noise, radius_m: f64, elevation_rad: &[f64], range_m: &[f64]) -> Deviations {
+    fn deviation(noise: Noise, radius_m: f64, elevation_rad: &[f64], range_m: &[f64]) -> [f64; 2] {
         let sampling = sampling().unwrap();
         let setting = MapSetting {
             model: WakeModel::default(),
@@ -438,7 +430,7 @@ mod tests {
         let baseband = Sampling::baseband(62.5e6, 1.55e-6, 50e6).unwrap();
         let model = WindowModel::gaussian_pulse(&baseband, WINDOW / 4, SIGMA_S, Noise::White).unwrap();
         let bound_m_s = model.bound_m_s(3.0, 2.0, SignalKind::Complex, 1.0).unwrap();
-        for deviation in [found.best[0], found.by_variance[0]] {
+        for deviation in found {
             assert!((deviation / bound_m_s - 1.0).abs() < 2e-3, "{deviation} {bound_m_s}");
         }
     }
@@ -447,10 +439,9 @@ mod tests {
     #[test]
     fn lines_count_once_whether_regions_share_them_or_not() {
         let lines = [0.0, 1e-3, 2e-3, 3e-3];
-        let one = deviation(Noise::White, 0.0, &lines[..1], &[400.0]).best[0];
+        let one = deviation(Noise::White, 0.0, &lines[..1], &[400.0])[0];
         for radius_m in [0.0, 50.0] {
-            let all = deviation(Noise::White, radius_m, &lines, &[400.0]);
-            for deviation in [all.best[0], all.by_variance[0]] {
+            for deviation in deviation(Noise::White, radius_m, &lines, &[400.0]) {
                 assert!((2.0 * deviation / one - 1.0).abs() < 2e-3, "{radius_m} {deviation} {one}");
             }
         }
@@ -461,7 +452,7 @@ mod tests {
     fn gates_that_overlap_are_correlated() {
         let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * 4e-9;
         let band = Noise::Band { floor: 0.0 };
-        let of = |range_m: &[f64]| deviation(band, 0.0, &[0.0], range_m).best[0];
+        let of = |range_m: &[f64]| deviation(band, 0.0, &[0.0], range_m)[0];
         let (one, two, apart) =
             (of(&[400.0]), of(&[400.0, 400.0 + 32.0 * sample_m]), of(&[400.0, 400.0 + 400.0 * sample_m]));
         assert!((apart / one - 0.5_f64.sqrt()).abs() < 1e-6, "{one} {apart}");
