@@ -62,17 +62,8 @@ impl Figure {
     /// The words of its caption with the values of a run.
     pub(crate) fn caption(&self, values: &[String]) -> Result<String, Failure> {
         let captions: BTreeMap<String, String> = toml::from_str(include_str!("figures/captions.toml"))?;
-        let words: Vec<&str> = captions.get(self.id).map_or(Vec::new(), |text| text.split("{}").collect());
-        if words.len() != values.len() + 1 {
-            return Err(Failure::new(format!(
-                "caption of {}: {} values, {} parts",
-                self.id,
-                values.len(),
-                words.len()
-            )));
-        }
-        let values = values.iter().map(String::as_str).chain([""]);
-        Ok(words.into_iter().zip(values).flat_map(|(words, value)| [words, value]).collect())
+        let caption = captions.get(self.id).and_then(|words| filled(words, values));
+        caption.ok_or_else(|| Failure::new(format!("no caption of {} with {} values", self.id, values.len())))
     }
 
     pub(crate) fn lane(&self) -> Lane {
@@ -82,6 +73,14 @@ impl Figure {
             _ => Lane::Formula,
         }
     }
+}
+
+/// A text with values in the places of its braces; nothing unless there are as many.
+pub(crate) fn filled(text: &str, values: &[String]) -> Option<String> {
+    let parts: Vec<&str> = text.split("{}").collect();
+    let between = values.iter().map(String::as_str).chain([""]);
+    let all = parts.iter().zip(between).flat_map(|(part, value)| [part, value]).collect();
+    (parts.len() == values.len() + 1).then_some(all)
 }
 
 type Make = fn(&Context) -> Result<Rendered, Failure>;

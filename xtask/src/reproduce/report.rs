@@ -5,8 +5,8 @@
 
 use crate::claim::{Claim, Kind};
 use crate::cost::machine;
-use crate::figures::Figure;
 use crate::figures::context::{Context, Rendered};
+use crate::figures::{Figure, filled};
 use crate::statistics::{Verdict, two_digits};
 use fixtures::failure::Failure;
 use wakescope_sim::plot::escape;
@@ -16,8 +16,6 @@ pub(super) const STAGE: &str = "total";
 
 /// Figures with what they gave.
 type Done<'a> = [(&'a Figure, Rendered)];
-
-const STYLE: &str = include_str!("report.css");
 
 /// What stands before the figures: a heading, whether of the chapter's claims, and how they came out.
 const FINDINGS: [(&str, bool, Verdict); 4] = [
@@ -32,11 +30,7 @@ const FINDINGS: [(&str, bool, Verdict); 4] = [
 /// # Errors
 /// A row with another number of cells than its header, a picture that is not an `<svg>` element, two figures of one id.
 pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<String, Failure> {
-    let title = "wakescope: figures and claims";
-    let mut out = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" content=\"width=device-width\">\n<title>{title}</title>\n<style>\n{STYLE}</style>\n</head>\n<body>\n<h1>{title}</h1>\n<p class=\"found\">{}</p>\n",
-        escape(&found(context, done, run_s))
-    );
+    let (mut findings, mut figures, mut made) = (String::new(), String::new(), String::new());
     let mut class = "finding first";
     for (heading, of_chapter, verdict) in FINDINGS {
         let here = |c: &&Claim| c.verdict == verdict && (c.kind() == Kind::Chapter) == of_chapter;
@@ -45,22 +39,19 @@ pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<Str
         };
         let list: String = done.iter().map(of).collect();
         if !list.is_empty() {
-            out += &format!("<h2>{heading}</h2>\n{list}");
+            findings += &format!("<h2>{heading}</h2>\n{list}");
             class = "finding";
         }
     }
     let link = |id: &str, name: &str| format!("<li><a href=\"#{id}\">{}</a></li>\n", escape(name));
     let links: String = done.iter().map(|(figure, _)| link(figure.id, &figure.heading())).collect();
     let links = links + &link("claims", "All claims") + &link("timings", "Run times");
-    out += &format!("<h2>Figures and tables</h2>\n<nav><ul>\n{links}</ul></nav>\n");
     for (place, (figure, rendered)) in done.iter().enumerate() {
         if done[..place].iter().any(|(before, _)| before.id == figure.id) {
             return Err(Failure::new(format!("two figures of the report are called '{}'", figure.id)));
         }
-        out += &entry(figure, rendered)?;
+        figures += &entry(figure, rendered)?;
     }
-    out += &format!("<h2 id=\"claims\">All claims</h2>\n{}", claims(done)?);
-    out += &format!("<h2 id=\"timings\">Run times</h2>\n{}<h2>How it was made</h2>\n<dl>\n", timings(done)?);
     let (profile, seed) = (context.profile.name(), context.seed);
     for (name, value) in [
         ("version", wakescope_sim::PROGRAM.into()),
@@ -69,9 +60,12 @@ pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<Str
         ("machine", machine()),
         ("command", format!("cargo xtask reproduce-figs --profile {profile} --seed {seed}")),
     ] {
-        out += &format!("<dt>{name}</dt><dd>{}</dd>\n", escape(&value));
+        made += &format!("<dt>{name}</dt><dd>{}</dd>\n", escape(&value));
     }
-    Ok(out + "</dl>\n</body>\n</html>\n")
+    let found = escape(&found(context, done, run_s));
+    let parts =
+        [include_str!("report.css").into(), found, findings, links, figures, claims(done)?, timings(done)?, made];
+    filled(include_str!("report.html"), &parts).ok_or_else(|| Failure::new("the page lacks parts".into()))
 }
 
 /// Of a list of claims how many hold, do not, are open.
