@@ -213,7 +213,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let mut guess = None;
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
         for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
-            let (fit, cost) = measured(|| trial.map(free(core), prior))?;
+            let (fit, cost) = measured(|| Ok(trial.map(free(core), prior)))?;
             let found = fit.map(|MapFit { wake, covariance, .. }| (wake, covariance)).map_err(|e| e.to_string());
             let kept = fits.keep(scan, found, cost.cpu_s);
             guess = guess.or(kept);
@@ -223,7 +223,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
             (guess.left.core_radius_m, guess.right.core_radius_m) = (case.core_radius_m, case.core_radius_m);
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
-            let (fit, cost) = measured(|| trial.signals(of_signals, guess, starts))?;
+            let (fit, cost) = measured(|| Ok(trial.signals(of_signals, guess, starts)))?;
             let found = fit.as_ref().map(|fit| (fit.wake, fit.covariance.clone())).map_err(ToString::to_string);
             signals[place].keep(scan, found, cost.cpu_s);
             Ok(fit.ok())

@@ -61,24 +61,24 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 /// The fits of one scan, of its signals too or of its map alone.
 fn fit(pair: &PairScan, scan: usize, signals: bool) -> Result<Vec<Found>, Failure> {
     let trial = FitTrial::new(pair, scan, RADIUS_M)?;
-    let from_map = |core_radius: Sharing| -> Result<Found, Failure> {
-        let fit = trial.map(FreeParameters { core_radius, ..free() }, Some(CorePrior::TYPICAL))?;
-        Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
+    let from_map = |core_radius: Sharing| -> Found {
+        let fit = trial.map(FreeParameters { core_radius, ..free() }, Some(CorePrior::TYPICAL)).ok()?;
+        Some((fit.wake, fit.covariance))
     };
-    let (typical, resolved) = (from_map(Sharing::Fixed)?, from_map(Sharing::Common)?);
+    let (typical, resolved) = (from_map(Sharing::Fixed), from_map(Sharing::Common));
     if !signals {
         return Ok(vec![typical, resolved]);
     }
-    let from_signals = |core_radius: Sharing| -> Result<Found, Failure> {
-        let Some((mut guess, _)) = typical.clone() else { return Ok(None) };
+    let from_signals = |core_radius: Sharing| -> Found {
+        let (mut guess, _) = typical.clone()?;
         if core_radius == Sharing::Fixed {
             guess.left.core_radius_m = truth().left.core_radius_m;
             guess.right.core_radius_m = truth().right.core_radius_m;
         }
-        let fit = trial.signals(FreeParameters { core_radius, ..free() }, &guess, Starts::Several)?;
-        Ok(fit.ok().map(|fit| (fit.wake, fit.covariance)))
+        let fit = trial.signals(FreeParameters { core_radius, ..free() }, &guess, Starts::Several).ok()?;
+        Some((fit.wake, fit.covariance))
     };
-    let (known, fitted) = (from_signals(Sharing::Fixed)?, from_signals(Sharing::Common)?);
+    let (known, fitted) = (from_signals(Sharing::Fixed), from_signals(Sharing::Common));
     Ok(vec![typical, resolved, known, fitted])
 }
 

@@ -4,9 +4,9 @@ use super::posterior::posterior_deviation;
 use fixtures::WINDOW;
 use fixtures::failure::Failure;
 use fixtures::pair::PairScan;
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanModel, ScanSignals, SignalFit,
+    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanModel, ScanSetup, ScanSignals, SignalFit,
     SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
@@ -22,12 +22,13 @@ pub(crate) const RADIUS_M: f64 = 2.0;
 /// One scan of a pair and what fits need of it.
 pub(crate) struct FitTrial<'a> {
     pair: &'a PairScan,
+    setup: ScanSetup,
     /// Radius of the regions of its map \[m\].
     radius_m: f64,
     records: Array2<f64>,
     tapered: Correlogram<f64>,
     peak: SpectralPeak,
-    velocities: Vec<f64>,
+    velocity_m_s: Array2<f64>,
 }
 
 impl<'a> FitTrial<'a> {
@@ -38,27 +39,24 @@ impl<'a> FitTrial<'a> {
         let peak =
             SpectralPeak::new(&pair.sampling, SignalKind::Real, &unweighted_lags(WINDOW), 1024, Refinement::Parabola)?;
         let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, radius_m, &peak)?;
-        Ok(Self { pair, radius_m, records, tapered, peak, velocities })
+        let velocity_m_s = Array2::from_shape_vec((pair.elevation_rad.len(), pair.range_m.len()), velocities)?;
+        Ok(Self { pair, setup: pair.setup()?, radius_m, records, tapered, peak, velocity_m_s })
     }
 
     /// The fit of the map, with nothing known but what typical cores are.
-    pub(crate) fn map(
-        &self,
-        free: FreeParameters,
-        core_prior: Option<CorePrior>,
-    ) -> Result<Result<MapFit, Error>, Failure> {
-        let (pair, setup) = (self.pair, self.pair.setup()?);
+    pub(crate) fn map(&self, free: FreeParameters, core_prior: Option<CorePrior>) -> Result<MapFit, Error> {
+        let Self { pair, setup, .. } = self;
         let map = VelocityMap {
             elevation_rad: &pair.elevation_rad,
             range_m: &pair.range_m,
-            velocity_m_s: ArrayView2::from_shape((pair.elevation_rad.len(), pair.range_m.len()), &self.velocities)?,
+            velocity_m_s: self.velocity_m_s.view(),
             standard_deviation_m_s: None,
         };
         let noise = (setup.noise, pair.snr);
         let shown =
             EstimatorResponse::new(&self.tapered, &self.peak, &setup.sampling, &setup.pulse, noise, self.radius_m)?;
         let options = MapFitOptions { free, core_prior, ..Default::default() };
-        Ok(fit_map_of_estimator(&map, &setup.wake, &shown, &options))
+        fit_map_of_estimator(&map, &setup.wake, &shown, &options)
     }
 
     /// How wide the likelihood of the signals is about a fit in one parameter, in its unit; see [`posterior_deviation`].
@@ -78,15 +76,9 @@ impl<'a> FitTrial<'a> {
     }
 
     /// The fit of all signals from a guess on.
-    pub(crate) fn signals(
-        &self,
-        free: FreeParameters,
-        guess: &Wake,
-        starts: Starts,
-    ) -> Result<Result<SignalFit, Error>, Failure> {
-        let (pair, setup) = (self.pair, self.pair.setup()?);
+    pub(crate) fn signals(&self, free: FreeParameters, guess: &Wake, starts: Starts) -> Result<SignalFit, Error> {
         let options = SignalFitOptions { free, starts, ..Default::default() };
-        let (records, noise_a2) = (self.records.view(), pair.noise_power_a2());
-        Ok(fit_signals(&setup, |_, _| pair.snr, records, noise_a2, guess, &options))
+        let (records, noise_a2) = (self.records.view(), self.pair.noise_power_a2());
+        fit_signals(&self.setup, |_, _| self.pair.snr, records, noise_a2, guess, &options)
     }
 }

@@ -12,14 +12,12 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rand_xoshiro::rand_core::SeedableRng;
 use rustfft::FftPlanner;
 use std::f64::consts::TAU;
-use std::ops::ControlFlow;
 use std::sync::Arc;
 use wakescope_les::solver::{PressureMethod, TimeStep};
 use wakescope_les::{TimeScheme, cases};
 use wakescope_optics::air::{StructureTable, structure_function_m53};
-use wakescope_optics::monte_carlo::EfficiencyEstimate;
 use wakescope_optics::screens::{Real, ScreenGenerator};
-use wakescope_optics::{Grid, Layers, Misalignment, MonteCarlo, Stop, Telescope, Turbulence, theory};
+use wakescope_optics::{Grid, Layers, Misalignment, MonteCarlo, Telescope, Turbulence, theory};
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
     GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
@@ -81,7 +79,7 @@ fn free_space() -> Result<Vec<Row>, Failure> {
 fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
     let (few, many) = (40, if quick { 200 } else { 800 });
     let bias = layers_bias(5)?;
-    let of = |realisations| measured(|| efficiency(&screens(5, Grid::square(256, 4e-3)?)?, realisations));
+    let of = |realisations| measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(realisations)?));
     let (short, long) = (of(few)?, of(many)?);
     let one = long.1.less(short.1).scaled(1.0 / (many - few) as f64);
     let found = long.0.bistatic.ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
@@ -111,10 +109,6 @@ pub(super) fn layers_bias(count: usize) -> Result<f64, Failure> {
 fn screens(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
     let layers = Layers::equal(layers, RANGE_M)?;
     Ok(MonteCarlo { layers, range_m: vec![RANGE_M], grid, ..MonteCarlo::table2(CN2_M_M23, SEED)? })
-}
-
-fn efficiency(screens: &MonteCarlo, realisations: usize) -> Result<EfficiencyEstimate, Failure> {
-    Ok(screens.run_in::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))?)
 }
 
 /// Vortices that become turbulent, and what an unfinished pressure solve costs and leaves.
