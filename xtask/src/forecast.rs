@@ -65,10 +65,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
 fn measured(program: &Path, folder: &Path, scene: &str, command: &str) -> Result<[[f64; 2]; 2], Failure> {
     let run = run_scene(program, folder, scene, &[command, "--json"])?;
     // The plan is part of what a run tells; the numbers of the whole are those at the first level of the object.
-    let number = |key: &str| {
-        let line = run.stdout.lines().find_map(|l| l.strip_prefix(&format!("  \"{key}\": ")));
-        let value = line.and_then(|l| l.trim_end_matches(',').parse::<f64>().ok());
-        value.ok_or_else(|| Failure::new(format!("{command} tells no {key}: {}", run.stdout)))
-    };
+    let told: serde_json::Value = serde_json::from_str(&run.stdout)?;
+    let number =
+        |key: &str| told[key].as_f64().ok_or_else(|| Failure::new(format!("{command} tells no {key}: {told}")));
     Ok([[number("core_s")?, number("memory_bytes")?], [run.cpu_s, run.peak_bytes]])
 }

@@ -234,15 +234,14 @@ impl Line {
             C64::from_polar(power.sqrt() * (-0.5 * (time_s / setting.sigma_s).powi(2)).exp(), phase)
         };
         let seen = Array2::from_shape_fn((grid.samples, layers), seen);
-        let (re, im) = (seen.mapv(|s| s.re), seen.mapv(|s| s.im));
+        let adjoint = seen.t().mapv(|s| s.conj());
         // B diag(weight) B^H
         let summed = |weight: &dyn Fn(usize) -> f64| {
-            let mut by = (re.clone(), im.clone());
-            for part in [&mut by.0, &mut by.1] {
-                part.columns_mut().into_iter().enumerate().for_each(|(layer, mut column)| column *= weight(layer));
+            let mut weighted = seen.clone();
+            for (layer, mut column) in weighted.columns_mut().into_iter().enumerate() {
+                column *= C64::from(weight(layer));
             }
-            let (real, imaginary) = (by.0.dot(&re.t()) + by.1.dot(&im.t()), by.1.dot(&re.t()) - by.0.dot(&im.t()));
-            Zip::from(&real).and(&imaginary).map_collect(|&re, &im| C64::new(re, im))
+            weighted.dot(&adjoint)
         };
         let mut covariance = summed(&|_| 1.0);
         covariance.indexed_iter_mut().for_each(|((p, q), c)| *c += grid.noise[p.abs_diff(q)]);
