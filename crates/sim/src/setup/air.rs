@@ -111,15 +111,12 @@ pub(crate) fn air_of_line(
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
 /// returns light: below the ground or outside the flow, if the scene masks that.
 pub(crate) fn radial_velocity_m_s(setup: &Setup, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let beam = setup.geometry.schedule.middle(line);
-    let (points_m, known_m_s) = known_velocity_m_s(setup, &beam, range_m)?;
-    velocity_of(setup, &beam, range_m, &points_m, known_m_s)
+    Ok(velocity_along(setup, &setup.geometry.schedule.middle(line), range_m)?.1)
 }
 
 /// The air along a beam.
 pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
-    let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
-    let radial_velocity_m_s = velocity_of(setup, beam, range_m, &points_m, known_m_s)?;
+    let (points_m, radial_velocity_m_s) = velocity_along(setup, beam, range_m)?;
     let mut backscatter_per_m_sr = setup.wind.backscatter_per_m_sr(&points_m, setup.wind.start_s + beam.time_s)?;
     for (beta, range_m) in backscatter_per_m_sr.iter_mut().flatten().zip(range_m).filter(|(beta, _)| beta.is_nan()) {
         *beta = setup.instrument.air.backscatter_per_m_sr(*range_m)?;
@@ -127,14 +124,9 @@ pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<A
     Ok(Air { radial_velocity_m_s, backscatter_per_m_sr })
 }
 
-/// The velocities of a beam with what the scene says of places where the flow is not known.
-fn velocity_of(
-    setup: &Setup,
-    beam: &Beam,
-    range_m: &[f64],
-    points_m: &[[f64; 3]],
-    known_m_s: Vec<f64>,
-) -> Result<Vec<f64>, Error> {
+/// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
+fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
+    let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
     let scan = &setup.scene.scene.scan;
     let elevation_rad = beam.elevation_rad;
     let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
@@ -150,7 +142,8 @@ fn velocity_of(
             Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
         }
     };
-    points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect()
+    let velocity_m_s = points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect::<Result<_, Error>>()?;
+    Ok((points_m, velocity_m_s))
 }
 
 /// Places along a beam, m, and the radial velocity of the flow there, m/s; NaN where it is not known.

@@ -67,10 +67,7 @@ impl SceneWind {
     /// Both winds, each from its own start.
     fn plus(self, other: Self) -> Self {
         let by_s = other.start_s - self.start_s;
-        let later: Box<dyn Wind> = match by_s {
-            0.0 => other.wind,
-            _ => Box::new(Retimed { wind: other.wind, time_s: move |time_s| time_s + by_s }),
-        };
+        let later = Box::new(Retimed { wind: other.wind, time_s: move |time_s| time_s + by_s });
         let mut field_times_s = self.field_times_s;
         field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
         field_times_s.sort_by(f64::total_cmp);
