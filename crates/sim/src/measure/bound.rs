@@ -52,7 +52,6 @@ pub struct SceneBound {
 /// What all points share.
 struct Setting {
     of_rays: RayInformation,
-    layer_snr: (Vec<f64>, Vec<f64>),
     places: ScanGeometry,
     covariance: WindowCovariance,
     radius: Radius,
@@ -61,22 +60,22 @@ struct Setting {
 
 impl Setting {
     fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let (scene, layer_snr) = (&plan.scene.scene, scanner.layer_snr());
+        let scene = &plan.scene.scene;
         if scene.detector.noise == NoiseModel::None {
             return Err(Error::NoBound);
         }
         let places = places(scene, &plan.geometry)?;
-        let of_rays = RayInformation::new(plan, &layer_snr)?;
+        let of_rays = RayInformation::new(plan, &scanner.layer_snr())?;
         let radius = region_radius(scene, &of_rays, &places)?;
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let lines = places.line_elevation_rad();
         let elevation_rad = lines[lines.len() / 2];
-        Ok(Self { of_rays, layer_snr: layer_snr.into_iter().unzip(), places, covariance, radius, elevation_rad })
+        Ok(Self { of_rays, places, covariance, radius, elevation_rad })
     }
 
     /// At a range, with the scene's own signal-to-noise ratios about it.
     fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
-        let ((layer_m, snr), radius_m) = (&self.layer_snr, self.radius.at_m(range_m)?);
+        let (rays, radius_m) = (&self.of_rays, self.radius.at_m(range_m)?);
         let (gates_m, most) = (self.places.gate_ranges_m(), self.places.most_gates(radius_m));
         // Each record is about its innermost window, with which rows of windows begin: ends of the scan cut chords. Most chords share one.
         let (mut about, mut of_region) = (BTreeMap::new(), 0.0);
@@ -84,13 +83,13 @@ impl Setting {
             let innermost = (chord.first + chord.last) / 2;
             let by_gates = match about.entry(innermost) {
                 Entry::Occupied(known) => known.into_mut(),
-                Entry::Vacant(place) => place.insert(self.of_rays.at(gates_m[innermost], most)?),
+                Entry::Vacant(place) => place.insert(rays.at(gates_m[innermost], most)?),
             };
-            let rays = self.places.line_rays(chord.line).count();
-            of_region += rays as f64 * by_gates[chord.gates().min(most) - 1];
+            let pulses = self.places.line_rays(chord.line).count();
+            of_region += pulses as f64 * by_gates[chord.gates().min(most) - 1];
         }
-        let ratios = [of_table(layer_m, snr, range_m), self.of_rays.of_windows(&[range_m])?[0]];
-        self.told(range_m, ratios, [self.of_rays.at(range_m, 1)?[0], of_region])
+        let ratios = [of_table(&rays.layer_m, &rays.layer_snr, range_m), rays.of_windows(&[range_m])?[0]];
+        self.told(range_m, ratios, [rays.at(range_m, 1)?[0], of_region])
     }
 
     /// At a range, all samples having one signal-to-noise ratio.

@@ -120,7 +120,7 @@ impl<S: Sample> MapEstimator<S> {
                 found: MapPoint { n_eff: scan.n_eff(*point, *radius_m, correlation), ..found },
                 power_a2: if e.velocity_m_s.is_finite() { e.power } else { f64::NAN },
                 gain: self.tools.noise.gain(e.velocity_m_s),
-                detection_ratio: noise.threshold.as_ref().map_or(f64::NAN, |of| e.detection / of[index]),
+                detection_ratio: e.detection / noise.threshold[index],
                 deviation: noise.deviation[index],
             }
         };
@@ -130,35 +130,33 @@ impl<S: Sample> MapEstimator<S> {
     /// What noise gives at points of a scan.
     pub(crate) fn noise(&self, places: &ScanGeometry, points: &[PolarPoint]) -> Result<NoiseAtPoints, Error> {
         let Some(test) = &self.tools.test else {
-            return Ok(NoiseAtPoints { threshold: None, deviation: vec![0.0; points.len()] });
+            return Ok(NoiseAtPoints { threshold: vec![f64::NAN; points.len()], deviation: vec![0.0; points.len()] });
         };
         let region = |point: &PolarPoint| Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?));
         let regions = points.iter().map(region).collect::<Result<Vec<RegionNoise>, Error>>()?;
-        let threshold = match self.rate > 0.0 {
-            true => Some(thresholds(test, self.tools.noise.density_a2, &regions, self.rate)?),
-            false => None,
-        };
+        let threshold = if self.rate > 0.0 { self.thresholds(test, &regions)? } else { vec![f64::NAN; points.len()] };
         Ok(NoiseAtPoints { threshold, deviation: regions.iter().map(|at| test.band_deviation(at.n_eff)).collect() })
+    }
+
+    /// Densities, A^2, that noise exceeds with the rate of false alarms; NaN where there is no window.
+    fn thresholds(&self, test: &NoiseTest, regions: &[RegionNoise]) -> Result<Vec<f64>, Error> {
+        let density_a2 = self.tools.noise.density_a2;
+        // Many points share their windows.
+        let mut known = HashMap::new();
+        let of = |region: &RegionNoise| {
+            Ok(match known.entry(region.key()) {
+                Entry::Occupied(level) => *level.get(),
+                Entry::Vacant(place) => *place.insert(density_a2 * test.threshold(region, self.rate)?),
+            })
+        };
+        regions.iter().map(of).collect()
     }
 }
 
 /// What noise alone gives at each point of a map.
 pub(crate) struct NoiseAtPoints {
-    /// Density in the band, A^2, that noise exceeds with the probability of the scene; none without a test.
-    threshold: Option<Vec<f64>>,
+    /// Density in the band, A^2, that noise exceeds with the probability of the scene; NaN without a test.
+    threshold: Vec<f64>,
     /// Standard deviation of the power in the band over its mean.
     deviation: Vec<f64>,
-}
-
-/// Densities, A^2, that noise exceeds with probability `rate`; NaN where there is no window.
-fn thresholds(test: &NoiseTest, density_a2: f64, regions: &[RegionNoise], rate: f64) -> Result<Vec<f64>, Error> {
-    // Many points share their windows.
-    let mut known = HashMap::new();
-    let of = |region: &RegionNoise| {
-        Ok(match known.entry(region.key()) {
-            Entry::Occupied(level) => *level.get(),
-            Entry::Vacant(place) => *place.insert(density_a2 * test.threshold(region, rate)?),
-        })
-    };
-    regions.iter().map(of).collect()
 }

@@ -28,8 +28,9 @@ pub(crate) struct RayInformation {
     spacing_m: f64,
     by_pulse: RangeFilter,
     by_gate: RangeFilter,
-    layer_m: Vec<f64>,
-    layer_snr: Vec<f64>,
+    /// Ranges of the layers, m, and their signal-to-noise ratios.
+    pub(crate) layer_m: Vec<f64>,
+    pub(crate) layer_snr: Vec<f64>,
     is_noisy: bool,
 }
 

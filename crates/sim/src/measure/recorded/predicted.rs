@@ -28,18 +28,16 @@ pub(super) struct PredictedError {
 }
 
 impl PredictedError {
-    /// For regions of a scan of a scene that have at most the radius `largest_m` and about `n_eff` independent windows; nothing without
-    /// noise.
-    pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64, n_eff: f64) -> Result<Option<Self>, Error> {
-        if plan.scene.scene.detector.noise == NoiseModel::None {
-            return Ok(None);
-        }
+    /// For regions of a scan of a scene that have at most the radius `largest_m` and about `n_eff` independent windows.
+    pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64, n_eff: f64) -> Result<Self, Error> {
+        let is_noisy = plan.scene.scene.detector.noise != NoiseModel::None;
         let (of_rays, count) = (RayInformation::new(plan, &[])?, places.most_gates(largest_m));
         let of_snr = |db: f64| of_rays.of_snr(10f64.powf(0.1 * db), count);
-        let snr_db: Vec<f64> = SNR_DB.map(f64::from).collect();
+        // Without noise no estimate has a ratio.
+        let snr_db: Vec<f64> = SNR_DB.filter(|_| is_noisy).map(f64::from).collect();
         let by_gates = snr_db.iter().map(|db| of_snr(*db)).collect::<Result<_, Error>>()?;
         let bias = ExpectedBias::new(&plan.scene.scene, &plan.instrument, &WindowStatistics { snr: 1.0, n_eff })?;
-        Ok(Some(Self { bias, places, snr_db, by_gates }))
+        Ok(Self { bias, places, snr_db, by_gates })
     }
 
     /// The bias of an estimate, m/s: that at the velocity which it would have without; NaN where it is not known.
@@ -76,12 +74,9 @@ pub fn predicted_table(plan: &Plan, map: &VelocityEstimates) -> Result<Table, Er
     let largest_m = map.radius_m.iter().copied().fold(0.0, f64::max);
     let n_eff = map.n_eff.mean().unwrap_or(1.0);
     let (predicted, gates) = (PredictedError::new(plan, places, largest_m, n_eff)?, map.range_m.len());
-    let of = |(at, ((snr_db, level), velocity_m_s)): (usize, ((&f64, &f64), &f64))| match &predicted {
-        None => (f64::NAN, f64::NAN),
-        Some(predicted) => (
-            predicted.deviation_m_s(points[at], map.radius_m[at % gates], *level, *snr_db),
-            predicted.bias_m_s(*velocity_m_s, *snr_db),
-        ),
+    let of = |(at, ((snr_db, level), velocity_m_s)): (usize, ((&f64, &f64), &f64))| {
+        let deviation_m_s = predicted.deviation_m_s(points[at], map.radius_m[at % gates], *level, *snr_db);
+        (deviation_m_s, predicted.bias_m_s(*velocity_m_s, *snr_db))
     };
     let rows = map.snr_db.iter().zip(&map.level).zip(&map.v_mean_m_s).enumerate();
     let (column, bias_m_s): (Vec<f64>, Vec<f64>) = rows.map(of).unzip();
@@ -124,7 +119,7 @@ mod tests {
             let plan = plan(detector, method);
             let map = run(&plan, &Silent).unwrap().map.unwrap();
             let places = places(&plan.scene.scene, &plan.geometry).unwrap();
-            let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap().unwrap();
+            let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
             let count = map.bias_m_s.len() as f64;
             let (mut found_m_s, mut stated_m_s) = (0.0, 0.0);
             for (bias_m_s, truth_m_s) in map.bias_m_s.iter().zip(&map.v_pulse_m_s) {
@@ -148,7 +143,7 @@ mod tests {
             let found = bound(&plan, &Silent).unwrap().by_range[3];
             let places = places(&plan.scene.scene, &plan.geometry).unwrap();
             let elevation_rad = places.line_elevation_rad()[2];
-            let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap().unwrap();
+            let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
             let point = PolarPoint { range_m: found.range_m, elevation_rad };
             let of = |level: f64, snr_db: f64| predicted.deviation_m_s(point, 3.0, level, snr_db);
             let whole = found.level as f64;

@@ -60,14 +60,11 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
         sums
     });
     let snr_db = sums.map(|gate| gate.snr_db(noise_a2, factor));
-    let of_gate = |of: &dyn Fn(&PredictedError, (usize, usize)) -> f64| {
-        Array2::from_shape_fn(sums.dim(), |at| predicted.as_ref().map_or(f64::NAN, |predicted| of(predicted, at)))
+    let deviation_m_s = |at: (usize, usize)| {
+        predicted.deviation_m_s(point(plan, &lines, at), radius_m[at.1], sums[at].level, snr_db[at])
     };
-    let predicted_m_s = of_gate(&|predicted, at| {
-        let point = point(plan, &lines, at);
-        predicted.deviation_m_s(point, radius_m[at.1], sums[at].level, snr_db[at])
-    });
-    let bias_m_s = of_gate(&|predicted, at| predicted.bias_m_s(velocity_m_s[at], snr_db[at]));
+    let predicted_m_s = Array2::from_shape_fn(sums.dim(), deviation_m_s);
+    let bias_m_s = Array2::from_shape_fn(sums.dim(), |at| predicted.bias_m_s(velocity_m_s[at], snr_db[at]));
     Ok(MeasuredScan {
         predicted_m_s,
         bias_m_s,
