@@ -22,46 +22,35 @@ pub(super) const CASE: &str = "case.toml";
 /// The table of the steps.
 pub(super) const STEPS: &str = "steps.csv";
 
-/// What a file of an output holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Holds {
-    /// The field at the centres of the cells.
-    Field,
-    /// The velocities on their faces.
-    Faces,
-    /// The plane of this number.
-    Plane(usize),
-    /// The names of all files with the same beginning up to this one.
-    Collection { of_planes: bool },
-}
-
-/// A file of an output.
+/// A file of an output: a field at the centres of the cells, the velocities on their faces as an initial field, or a plane.
 #[derive(Debug, Clone, PartialEq)]
 struct OutputFile {
     stem: String,
     /// Number of the output, from 0.
     index: usize,
-    ending: &'static str,
-    holds: Holds,
+    format: FileFormat,
+    /// Number of the plane; none of a field.
+    plane: Option<usize>,
 }
 
 impl OutputFile {
     fn name(&self) -> String {
-        match self.holds {
-            Holds::Collection { .. } => format!("{}.{}", self.stem, self.ending),
-            _ => numbered(&self.stem, self.index, self.ending),
-        }
+        numbered(&self.stem, self.index, self.format.ending())
+    }
+
+    /// Of VTK grids the file that names all with the same beginning up to this one.
+    fn collection(&self) -> Option<String> {
+        (self.format == FileFormat::Vtr).then(|| format!("{}.pvd", self.stem))
     }
 
     /// Its size, about, of a flow of so many cells \[bytes\].
     fn bytes(&self, cells: f64, plane: f64, variables: f64) -> f64 {
-        match (self.holds, self.ending) {
-            (Holds::Collection { .. }, _) => 0.0,
-            (Holds::Field, "csv") => cells * CSV_CELL_BYTES,
-            (Holds::Field, _) => cells * variables * 4.0,
-            (Holds::Faces, _) => cells * 24.0,
-            (Holds::Plane(_), "csv") => plane * CSV_PLANE_BYTES,
-            (Holds::Plane(_), _) => plane * 8.0,
+        match (self.plane, self.format) {
+            (None, FileFormat::Csv) => cells * CSV_CELL_BYTES,
+            (None, FileFormat::InitialNetcdf) => cells * 24.0,
+            (None, _) => cells * variables * 4.0,
+            (Some(_), FileFormat::Csv) => plane * CSV_PLANE_BYTES,
+            (Some(_), _) => plane * 8.0,
         }
     }
 }
@@ -105,27 +94,23 @@ impl Files {
     /// The files of an output, in the order in which they are written; those of a format that this build lacks were refused.
     fn of_output(&self, due: Due) -> Vec<OutputFile> {
         let mut out = Vec::new();
-        let mut add = |stem: &str, index: usize, format: FileFormat, holds: Holds| {
-            let mut file = |stem: &str, ending, holds| out.push(OutputFile { stem: stem.into(), index, ending, holds });
-            match format {
-                FileFormat::Csv => file(stem, "csv", holds),
-                FileFormat::Netcdf => file(stem, "nc", holds),
-                FileFormat::InitialNetcdf => file("initial", "nc", Holds::Faces),
-                FileFormat::Vtr => {
-                    file(stem, "vtr", holds);
-                    file(stem, "pvd", Holds::Collection { of_planes: holds != Holds::Field });
-                }
-            }
-        };
         if let Some(index) = due.fields {
             let mut formats = self.output.fields.clone();
             formats.sort_by_key(|format| *format == FileFormat::InitialNetcdf);
-            formats.into_iter().for_each(|format| add("fields", index, format, Holds::Field));
+            out.extend(formats.into_iter().map(|format| {
+                let stem = if format == FileFormat::InitialNetcdf { "initial" } else { "fields" };
+                OutputFile { stem: stem.into(), index, format, plane: None }
+            }));
         }
         if let Some(index) = due.planes {
             for number in 0..self.output.planes_x_m.len() {
-                let stem = format!("plane{}", number + 1);
-                self.output.planes.iter().for_each(|format| add(&stem, index, *format, Holds::Plane(number)));
+                let of = |&format: &FileFormat| OutputFile {
+                    stem: format!("plane{}", number + 1),
+                    index,
+                    format,
+                    plane: Some(number),
+                };
+                out.extend(self.output.planes.iter().map(of));
             }
         }
         out
@@ -144,7 +129,7 @@ impl Files {
             #[cfg(feature = "plots")]
             out.extend(wake::PICTURES.map(str::to_owned));
         }
-        out.extend(self.of_outputs().map(|file| file.name()));
+        out.extend(self.of_outputs().flat_map(|file| std::iter::once(file.name()).chain(file.collection())));
         out
     }
 
@@ -158,12 +143,10 @@ impl Files {
             None if count > 0 => out.push(FileForecast { name: name.into(), count, bytes }),
             None => {}
         };
-        let (planes, fields): (Vec<_>, Vec<_>) =
-            self.of_outputs().partition(|file| matches!(file.holds, Holds::Plane(_)));
+        let (planes, fields): (Vec<_>, Vec<_>) = self.of_outputs().partition(|file| file.plane.is_some());
         for file in fields.into_iter().chain(planes) {
-            let stem = if matches!(file.holds, Holds::Plane(_)) { "plane*" } else { &file.stem };
-            let bytes = file.bytes(nx * ny * nz, ny * nz, variables);
-            add(&format!("{stem}_*.{}", file.ending), usize::from(bytes > 0.0), bytes);
+            let stem = if file.plane.is_some() { "plane*" } else { &file.stem };
+            add(&format!("{stem}_*.{}", file.format.ending()), 1, file.bytes(nx * ny * nz, ny * nz, variables));
         }
         add(STEPS, usize::from(self.output.steps), steps * STEP_ROW_BYTES);
         let histories = 2;
@@ -193,6 +176,10 @@ impl Files {
                 match self.parts(&file, &shown, is_first)? {
                     Some(parts) => group.add_parts(&file.name(), parts)?,
                     None => rows.push((file.name(), self.rows(&shown)?)),
+                }
+                #[cfg(feature = "vtk")]
+                if let Some(name) = file.collection() {
+                    group.add_parts(&name, of_first(self.collection(&file), is_first))?;
                 }
             }
             Ok(())
@@ -230,27 +217,23 @@ impl Files {
 
     /// What this rank has of a file; none of the table of a field, in which the place of its text is not known yet.
     fn parts(&self, file: &OutputFile, shown: &Shown, is_first: bool) -> Result<Option<FileParts>, Error> {
-        // What all ranks have the first one writes.
-        let whole = |bytes: Vec<u8>| {
-            let length = bytes.len() as u64;
-            Some(FileParts { length, parts: if is_first { vec![(0, bytes)] } else { Vec::new() } })
-        };
+        let whole = |bytes: Vec<u8>| Some(of_first(bytes, is_first));
         let origin = &self.origin;
-        Ok(match (file.holds, file.ending, &shown.field) {
-            (Holds::Field, "nc", Some(field)) => Some(cf_fields::cf_field_parts(field, origin)?),
+        Ok(match (file.plane, file.format, &shown.field) {
+            (None, FileFormat::Netcdf, Some(field)) => Some(cf_fields::cf_field_parts(field, origin)?),
             #[cfg(feature = "vtk")]
-            (Holds::Field, "vtr", Some(field)) => Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?),
-            (Holds::Faces, ..) => {
+            (None, FileFormat::Vtr, Some(field)) => Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?),
+            (None, FileFormat::InitialNetcdf, _) => {
                 shown.faces.as_ref().map(|faces| cf_fields::cf_faces_parts(faces, origin)).transpose()?
             }
-            (Holds::Plane(at), "csv", _) => {
+            (Some(at), FileFormat::Csv, _) => {
                 whole(tables::planes_table(&shown.planes[at])?.to_csv(origin)?.into_bytes())
             }
-            (Holds::Plane(at), "nc", _) => whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[at], origin)?),
+            (Some(at), FileFormat::Netcdf, _) => {
+                whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[at], origin)?)
+            }
             #[cfg(feature = "vtk")]
-            (Holds::Plane(at), "vtr", _) => whole(vtr::plane_bytes(&shown.planes[at], 0, origin)?),
-            #[cfg(feature = "vtk")]
-            (Holds::Collection { of_planes }, ..) => whole(self.collection(file, of_planes)),
+            (Some(at), FileFormat::Vtr, _) => whole(vtr::plane_bytes(&shown.planes[at], 0, origin)?),
             _ => None,
         })
     }
@@ -264,7 +247,8 @@ impl Files {
 
     /// The collection of all outputs up to this one.
     #[cfg(feature = "vtk")]
-    fn collection(&self, file: &OutputFile, of_planes: bool) -> Vec<u8> {
+    fn collection(&self, file: &OutputFile) -> Vec<u8> {
+        let of_planes = file.plane.is_some();
         let names: Vec<String> = (0..=file.index).map(|i| numbered(&file.stem, i, "vtr")).collect();
         let per_s = if of_planes { self.tau_per_s } else { 1.0 };
         let times_s = self.schedule.times_of(|due| if of_planes { due.planes } else { due.fields });
@@ -330,6 +314,12 @@ impl Files {
             z_edges: plane.z_edges,
         })
     }
+}
+
+/// A file that all ranks have whole: the first one writes it.
+fn of_first(bytes: Vec<u8>, is_first: bool) -> FileParts {
+    let all = FileParts::from(bytes);
+    if is_first { all } else { FileParts { parts: Vec::new(), ..all } }
 }
 
 /// What is due of a flow: of fields what this rank has, planes whole.

@@ -9,8 +9,8 @@
 use super::case::{FileFormat, FlowCase, Subgrid};
 use super::files::{FileForecast, Files};
 use super::setup::Setup;
-use super::{CaseFile, CaseKind, WakeOutput};
-use crate::plan::units::{bytes, seconds};
+use super::{CaseFile, CaseKind, InitialName, WakeOutput};
+use crate::plan::units::{bytes, rounded, seconds};
 use crate::{Error, machine};
 use std::fmt;
 use wakescope_les::solver::{RunPlan, Stability};
@@ -109,8 +109,8 @@ impl fmt::Display for FlowForecast {
         writeln!(f, "case {}", self.case_hash)?;
         writeln!(f, "  cells    {nx} x {ny} x {nz} = {}", count(self.cells))?;
         let age =
-            if self.end_tau == self.end_s { String::new() } else { format!(", tau = {:?}", rounded(self.end_tau)) };
-        writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s))?;
+            if self.end_tau == self.end_s { String::new() } else { format!(", tau = {:?}", rounded(self.end_tau, 5)) };
+        writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s, 5))?;
         let scheme = if self.scheme == TimeScheme::RungeKutta3 { "runge_kutta3" } else { "adams_bashforth2" };
         let reason = self.scheme_reason.as_ref().map_or(String::new(), |reason| format!(", {reason}"));
         writeln!(f, "  steps    about {:.0} of {:.3e} s, {scheme}{reason}", self.steps, self.step_s)?;
@@ -130,11 +130,6 @@ impl fmt::Display for FlowForecast {
         }
         Ok(())
     }
-}
-
-/// Six digits of a number.
-fn rounded(value: f64) -> f64 {
-    format!("{value:.5e}").parse().unwrap_or(value)
 }
 
 fn count(cells: [usize; 3]) -> f64 {
@@ -215,7 +210,7 @@ fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize
     };
     let given = match &case.case {
         CaseKind::Wake(_) | CaseKind::VortexPair(_) => 3.0,
-        CaseKind::Free(free) if free.starts_from_file() => 3.0,
+        CaseKind::Free(free) if matches!(free.initial, InitialName::Netcdf { .. }) => 3.0,
         _ => 0.0,
     };
     let of_output = |format: &FileFormat| if *format == FileFormat::Csv { CSV_ARRAYS } else { OUTPUT_ARRAYS };

@@ -194,10 +194,6 @@ impl Free {
         }
     }
 
-    pub(super) fn starts_from_file(&self) -> bool {
-        matches!(self.initial, InitialName::Netcdf { .. })
-    }
-
     pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
         let mesh = Mesh::new(self.x.direction(), self.y.direction(), self.z.direction()).map_err(Error::Flow)?;
         let (initial, tau_per_s) = self.initial(&mesh, folder)?;

@@ -19,7 +19,6 @@ mod kind;
 mod named;
 #[cfg(test)]
 mod ranks_tests;
-mod read;
 mod setup;
 mod shared;
 mod steps;
@@ -39,8 +38,6 @@ pub use forecast::FlowForecast;
 pub use free::*;
 pub use kind::CaseKind;
 pub use named::*;
-
-pub use read::{FieldInSpace, read_field, read_planes};
 #[cfg(feature = "plots")]
 pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
@@ -159,8 +156,7 @@ impl CaseFile {
 
 /// Age of a wake of a time, without the last digits, in which the age that was asked for may not come back.
 fn age_tau(time_s: f64, tau_per_s: f64) -> f64 {
-    let tau = time_s * tau_per_s;
-    format!("{tau:.13e}").parse().unwrap_or(tau)
+    crate::plan::units::rounded(time_s * tau_per_s, 13)
 }
 
 /// Whether a run begins or continues.

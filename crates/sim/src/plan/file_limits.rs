@@ -35,14 +35,14 @@ pub(super) fn check(plan: &Plan) -> Result<(), Error> {
             let most_s = crate::io::MAX_TIME_S;
             if first_s.abs() > most_s || last_s > most_s {
                 let reason = format!("the rays end {last_s:e} s after the start of the flow; files hold {most_s:e} s");
-                return Err(refusal("scan.pulses_per_line", reason));
+                return Err(Error::Key { key: "scan.pulses_per_line", reason });
             }
         }
     }
     if scene.outputs.hpl && has_map {
         let start = UtcTime::parse(&scene.site.start_utc).unwrap_or(UtcTime::SYNTHETIC);
         within_a_day(first_s, last_s, start)
-            .map_err(|e| refusal("outputs.hpl", format!("{e}: choose another site.start_utc")))?;
+            .map_err(|e| Error::Key { key: "outputs.hpl", reason: format!("{e}: choose another site.start_utc") })?;
     }
     Ok(())
 }
@@ -53,11 +53,7 @@ fn fits(key: &'static str, file: &str, bytes: f64, remedy: &str) -> Result<(), E
         return Ok(());
     }
     let reason = format!("{file} would have {:.0} MB, and may have {:.0} MB: {remedy}", bytes / 1e6, most / 1e6);
-    Err(refusal(key, reason))
-}
-
-fn refusal(key: &'static str, reason: String) -> Error {
-    Error::Key { key, reason }
+    Err(Error::Key { key, reason })
 }
 
 #[cfg(test)]

@@ -74,30 +74,25 @@ impl Plan {
         planned: &Known<Vec<ScreenPlan>>,
     ) -> Result<Self, Error> {
         let file = scene.clone();
-        Self::made(scene, target, wind, planned).map_err(|error| file.of_key(error))
-    }
-
-    fn made(
-        scene: SceneFile,
-        target: Target,
-        wind: Arc<SceneWind>,
-        planned: &Known<Vec<ScreenPlan>>,
-    ) -> Result<Self, Error> {
-        let setup = Setup::new(scene, wind)?;
-        let scene = &setup.scene.scene;
-        let fastest_m_s = fastest::fastest_m_s(&setup)?;
-        let mut warnings = warnings::of_scene(&setup, fastest_m_s)?;
-        let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
-        let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
-        let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
-        let times = time::times(scene, target, &sizes, optics_s);
-        let mut plan = Self { setup, target, stages, core_s: times.total_s(), times, screens, fastest_m_s, warnings };
-        if plan.runs(Stage::Estimates) {
-            plan.warnings.extend(warnings::of_empty_gates(&plan)?);
-        }
-        possible::check(&plan)?;
-        file_limits::check(&plan)?;
-        Ok(plan)
+        let made = || {
+            let setup = Setup::new(scene, wind)?;
+            let scene = &setup.scene.scene;
+            let fastest_m_s = fastest::fastest_m_s(&setup)?;
+            let mut warnings = warnings::of_scene(&setup, fastest_m_s)?;
+            let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
+            let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
+            let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
+            let times = time::times(scene, target, &sizes, optics_s);
+            let mut plan =
+                Self { setup, target, stages, core_s: times.total_s(), times, screens, fastest_m_s, warnings };
+            if plan.runs(Stage::Estimates) {
+                plan.warnings.extend(warnings::of_empty_gates(&plan)?);
+            }
+            possible::check(&plan)?;
+            file_limits::check(&plan)?;
+            Ok(plan)
+        };
+        made().map_err(|error| file.of_key(error))
     }
 
     /// Memory of the whole, with the threads of the pool in which it was planned.

@@ -42,7 +42,7 @@ pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> 
     let signals_s = n.realisations * (n.records * record_s + airs * n.layers * wind_s) + kept_s;
     let maps_s = if matches!(target, Target::Run | Target::Map) { maps_s(scene, n) } else { 0.0 };
     let retrieval_s = if target == Target::Run { retrieval_s(scene, n, record_s) } else { 0.0 };
-    Times { optics_s, signals_s, maps_s, retrieval_s, fit_s: fit_s(n) }
+    Times { optics_s, signals_s, maps_s, retrieval_s, fit_s: n.cells * FIT_S }
 }
 
 /// Estimates, their errors, and the files of them.
@@ -73,10 +73,6 @@ fn maps_s(scene: &Scene, n: &Sizes) -> f64 {
     n.realisations * n.records * n.windows * window_s + points_s + planned_s + n.cells * 3e-6 + pictures_s
 }
 
-fn fit_s(n: &Sizes) -> f64 {
-    n.cells * FIT_S
-}
-
 /// Of a fit to what an estimator shows, for each velocity of the map; of one to signals, for each sample.
 pub(crate) const FIT_S: f64 = 2e-4;
 pub(crate) const SIGNAL_FIT_S: f64 = 3e-4;
@@ -85,7 +81,7 @@ pub(crate) const SIGNAL_FIT_S: f64 = 3e-4;
 fn retrieval_s(scene: &Scene, n: &Sizes, record_s: f64) -> f64 {
     let Some(wanted) = &scene.retrieval else { return 0.0 };
     // The fit of the map is made once for all that need it.
-    let map_s = if wanted.methods[..] == [RetrievalMethod::Rv] { n.cells * 2e-5 } else { fit_s(n) };
+    let map_s = if wanted.methods[..] == [RetrievalMethod::Rv] { n.cells * 2e-5 } else { n.cells * FIT_S };
     let sample_s = if wanted.methods.contains(&RetrievalMethod::Signals) { SIGNAL_FIT_S } else { 0.0 };
     let test_s = if wanted.false_alarm.is_some() { 3.0 } else { 0.0 };
     n.realisations * (map_s + n.records * (n.samples * sample_s + record_s)) + test_s

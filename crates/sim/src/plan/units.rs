@@ -1,6 +1,11 @@
-//! Times and amounts of memory as people read them.
+//! Numbers, times and amounts of memory as people read them.
 //!
 //! Check: each range of the units, and that they join without a gap.
+
+/// A number with so many digits behind the first.
+pub(crate) fn rounded(value: f64, digits: usize) -> f64 {
+    format!("{value:.digits$e}").parse().unwrap_or(value)
+}
 
 /// A time, s, in three digits or so.
 pub(crate) fn seconds(s: f64) -> String {

@@ -256,14 +256,11 @@ impl WakeRun {
             ("x", self.x_m.len()),
             ("mode", self.modes()),
         ];
-        let globals = vec![
-            ("Conventions", "CF-1.10".into()),
-            ("title", "History of a simulated wake".into()),
-            ("history", format!("written by {}", origin.program)),
-            ("spacing_m", format!("{:?}", self.setup.scales.spacing_m)),
-            ("circulation_m2_s", format!("{:?}", self.setup.scales.circulation_m2_s)),
-        ];
-        Ok(Layout { dims, globals, variables }.into_bytes(origin)?)
+        let mut layout = Layout::cf("History of a simulated wake", dims, variables, origin);
+        let WakeScales { spacing_m, circulation_m2_s, .. } = self.setup.scales;
+        let scales = [("spacing_m", spacing_m), ("circulation_m2_s", circulation_m2_s)];
+        layout.globals.extend(scales.map(|(name, value)| (name, format!("{value:?}"))));
+        Ok(layout.into_bytes(origin)?)
     }
 }
 

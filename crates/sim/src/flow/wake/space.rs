@@ -2,9 +2,10 @@
 
 use super::finished::FinishedWake;
 use crate::Error;
-use crate::flow::read::{read_field, read_planes};
-use crate::io::CrossPlanes;
+use crate::io::fields_input::{FieldPlace, read_scalar};
+use crate::io::{CrossPlanes, planes_input};
 use crate::plot::{Cells, ColourMap, Figure, IsosurfacePlot, MapPlot, Surface, Volume};
+use wakescope_les::winds::VolumeComponent;
 
 /// Times that the box is repeated along the flight, so that waves can be seen as such.
 pub const REPEATS: usize = 2;
@@ -21,15 +22,15 @@ impl FinishedWake {
             if !path.exists() {
                 return Ok(None);
             }
-            let field = read_field(&path, "vorticity_magnitude")?;
+            let place = FieldPlace { path, place: Some(0), time_s: 0.0 };
+            let VolumeComponent { nodes_m: [x, y, z], values } = read_scalar(&place, "vorticity_magnitude")?;
             let scales = self.flow.pair.scales().map_err(Error::Flow)?;
             let unit_per_s = scales.circulation_m2_s / scales.spacing_m.powi(2);
-            let [x, y, z] = field.axis_m;
             let length = self.flow.size[0];
             let nx = x.len();
             let repeated =
                 (0..REPEATS * nx + 1).map(|i| x[i % nx] / scales.spacing_m + (i / nx) as f64 * length).collect();
-            let rows = field.values.chunks(nx);
+            let rows = values.chunks(nx);
             let values =
                 rows.flat_map(|row| (0..REPEATS * nx + 1).map(|i| (row[i % nx] / unit_per_s) as f32)).collect();
             let in_b0 = |axis: Vec<f64>| axis.into_iter().map(|a| a / scales.spacing_m).collect();
@@ -62,7 +63,8 @@ impl FinishedWake {
         let scales = self.flow.pair.scales().map_err(Error::Flow)?;
         let unit_per_s = scales.circulation_m2_s / scales.spacing_m.powi(2);
         let mut frames: Vec<(f64, Figure)> = Vec::new();
-        for planes in read_planes(&name)? {
+        for path in planes_input::files(&name)? {
+            let planes = planes_input::read(&path)?;
             for (place, tau) in planes.tau.iter().enumerate() {
                 let vorticity = axial_vorticity_per_s(&planes, place).into_iter().map(|w| w / unit_per_s).collect();
                 let cells = Cells::of_plane(&planes.y_m, &planes.z_m, vorticity);
@@ -94,4 +96,41 @@ fn axial_vorticity_per_s(planes: &CrossPlanes, place: usize) -> Vec<f64> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Silent;
+    use crate::flow::{Begin, CaseFile, CaseKind, WakePreset, run};
+    use crate::io::fields_input::places;
+    use std::path::Path;
+
+    #[test]
+    fn fields_and_planes_of_a_run_come_back() {
+        let mut case = WakePreset::Coarse.case();
+        let CaseKind::Wake(wake) = &mut case.case else { panic!("a wake") };
+        wake.cells = [4, 16, 12];
+        if let Some(output) = &mut case.wake {
+            output.end_tau = 0.02;
+            output.fields_tau = Some(vec![0.02]);
+            output.planes_tau = Some(vec![0.0, 0.02]);
+        }
+        let file = CaseFile::parse(&toml::to_string(&case).unwrap(), Path::new("case.toml")).unwrap();
+        let folder = tempfile::tempdir().unwrap();
+        let outcome = run(&file, folder.path(), Begin::New, &Silent).unwrap();
+        let path = folder.path().join("fields_0001.nc");
+        let [place] = &places(&path, "vorticity_magnitude").unwrap()[..] else { panic!("one time") };
+        let field = read_scalar(place, "vorticity_magnitude").unwrap();
+        assert_eq!(field.nodes_m.each_ref().map(Vec::len), [4, 16, 12]);
+        assert!((place.time_s - outcome.time_s).abs() < 1e-9);
+        // The core turns by Gamma0/(pi r_c^2) at its centre; three cells see part of it.
+        let largest = field.values.iter().copied().fold(0.0, f64::max);
+        let core_per_s = 500.0 / (std::f64::consts::PI * 4.7_f64.powi(2));
+        assert!(largest > 0.05 * core_per_s && largest < 3.0 * core_per_s, "{largest} of {core_per_s}");
+        let planes = planes_input::files(&folder.path().join("plane1")).unwrap();
+        assert_eq!(planes.iter().map(|path| planes_input::read(path).unwrap().tau.len()).sum::<usize>(), 2);
+        assert!(read_scalar(place, "nothing").unwrap_err().to_string().contains("nothing"));
+        assert!(planes_input::files(&folder.path().join("plane7")).is_err());
+    }
 }

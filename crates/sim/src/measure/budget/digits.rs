@@ -2,6 +2,8 @@
 //!
 //! Check: prefixes join without a gap, and no digit is lost.
 
+use crate::plan::units::rounded;
+
 /// A number in three digits with a prefix of its unit.
 pub(super) fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [(f64, &str); 9] = [
@@ -31,8 +33,7 @@ pub(super) fn digits(value: f64) -> String {
 
 /// Three digits and a power of ten, as few of them as it takes.
 pub(super) fn scientific(value: f64) -> String {
-    let rounded: f64 = format!("{value:.2e}").parse().unwrap_or(value);
-    format!("{rounded:e}")
+    format!("{:e}", rounded(value, 2))
 }
 
 #[cfg(test)]

@@ -166,6 +166,11 @@ impl<'a> Rows<'a> {
         }
     }
 
+    /// A loss with a word for one that is not there.
+    fn or_none(&mut self, is_there: bool, name: &'static str, value: String, db: f64) {
+        self.same(name, "", if is_there { value } else { "none".into() }, db);
+    }
+
     fn sums(&self) -> Vec<f64> {
         let factors = self.rows.iter().filter(|row| !row.name.starts_with('='));
         factors.fold(vec![0.0; self.range_m.len()], |sums, row| sums.iter().zip(&row.db).map(|(a, b)| a + b).collect())
@@ -235,30 +240,19 @@ impl<'a> Rows<'a> {
         let (receiver, front) = (&instrument.receiver, scene.detector.front_end.unwrap_or_default());
         let (lost, n) = (receiver.penalties(), receiver.noise_densities());
         let FrontEnd { saturation_w, half_power_hz, dark_current_a, intensity_noise_db_hz, rejection_db, .. } = front;
-        let off = || "none".to_owned();
         let value = format!("{} of {}", si(receiver.local_oscillator_w, "W"), si(saturation_w, "W"));
         self.optional(saturation_w.is_finite(), "saturation", "(1 + P/Ps)^-3", value, -lost.saturation_db);
-        let value = match n.amplifier_a2_hz > 0.0 {
-            true => format!(
-                "{}: {:.1e} of shot {:.1e}",
-                si(n.amplifier_a2_hz.sqrt(), "A/rtHz"),
-                n.amplifier_a2_hz,
-                n.shot_a2_hz
-            ),
-            false => off(),
-        };
-        self.same("amplifier noise", "", value, -lost.amplifier_db);
-        let value = if dark_current_a > 0.0 { si(dark_current_a, "A") } else { off() };
-        self.same("dark current", "", value, -lost.dark_db);
-        let value = match n.intensity_a2_hz > 0.0 {
-            true => format!("{intensity_noise_db_hz} dB/Hz, {rejection_db} dB rejected"),
-            false => off(),
-        };
-        self.same("intensity noise of the LO", "", value, -lost.intensity_db);
+        let (amplifier_a2_hz, shot_a2_hz) = (n.amplifier_a2_hz, n.shot_a2_hz);
+        let root = si(amplifier_a2_hz.sqrt(), "A/rtHz");
+        let value = format!("{root}: {amplifier_a2_hz:.1e} of shot {shot_a2_hz:.1e}");
+        self.or_none(amplifier_a2_hz > 0.0, "amplifier noise", value, -lost.amplifier_db);
+        self.or_none(dark_current_a > 0.0, "dark current", si(dark_current_a, "A"), -lost.dark_db);
+        let value = format!("{intensity_noise_db_hz} dB/Hz, {rejection_db} dB rejected");
+        self.or_none(n.intensity_a2_hz > 0.0, "intensity noise of the LO", value, -lost.intensity_db);
         let value = format!("half power at {}", si(half_power_hz, "Hz"));
         self.optional(half_power_hz.is_finite(), "response of the detector", "|H|^2", value, -lost.response_db);
         let (value, is_clipped) = match scene.detector.digitiser {
-            Digitiser::None {} => (off(), false),
+            Digitiser::None {} => ("none".into(), false),
             Digitiser::Quantised { bits, full_scale_over_noise: k } => {
                 (format!("{bits} bits, {k} x noise"), lost.clipping_db > 0.0)
             }
