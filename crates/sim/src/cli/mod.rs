@@ -269,9 +269,9 @@ fn plan_json(plan: &Plan) -> Value {
         .iter()
         .map(|s| {
             json!({
-                "stage": s.stage.name(), "runs": s.cost.is_some(), "reason": s.reason,
-                "memory_bytes": s.cost.map(|c| c.memory_bytes()),
-                "kept_bytes": s.cost.map(|c| c.kept_bytes),
+                "stage": s.stage.name(), "runs": s.runs, "reason": s.reason,
+                "memory_bytes": s.runs.then_some(s.memory_bytes),
+                "kept_bytes": s.runs.then_some(s.kept_bytes),
             })
         })
         .collect();

@@ -29,7 +29,7 @@ mod warnings;
 
 pub use crate::setup::progress::Stage;
 pub use schedule::ScanSchedule;
-pub use stage::{Cost, Forecast, PlannedStage, Target};
+pub use stage::{Forecast, PlannedStage, Target};
 
 /// What a run will do.
 #[derive(Debug)]
@@ -102,7 +102,7 @@ impl Plan {
 
     /// Whether a stage runs.
     pub fn runs(&self, stage: Stage) -> bool {
-        self.stages.iter().any(|s| s.stage == stage && s.cost.is_some())
+        self.stages.iter().any(|s| s.stage == stage && s.runs)
     }
 
     /// Realisations whose raw signals are kept for the files.
@@ -133,7 +133,7 @@ impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.scene.seed)?;
         for s in &self.stages {
-            let (word, memory) = s.cost.map_or(("skip", String::new()), |c| ("run", units::bytes(c.memory_bytes())));
+            let (word, memory) = if s.runs { ("run", units::bytes(s.memory_bytes)) } else { ("skip", String::new()) };
             writeln!(f, "  {word:<5} {:<16} {memory:>10}   {}", s.stage.name(), s.reason)?;
         }
         let (time, memory) = (units::seconds(self.core_s), units::bytes(self.total().memory_bytes));
@@ -160,7 +160,7 @@ mod tests {
     }
 
     fn run_stages(plan: &Plan) -> Vec<&'static str> {
-        plan.stages.iter().filter(|s| s.cost.is_some()).map(|s| s.stage.name()).collect()
+        plan.stages.iter().filter(|s| s.runs).map(|s| s.stage.name()).collect()
     }
 
     #[test]
@@ -180,7 +180,7 @@ mod tests {
             s.detector.noise = NoiseModel::None;
         });
         assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors", "files"]);
-        assert!(lean.stages.iter().filter(|s| s.cost.is_none()).all(|s| !s.reason.is_empty()));
+        assert!(lean.stages.iter().filter(|s| !s.runs).all(|s| !s.reason.is_empty()));
         let calm = plan(Target::Run, |s| s.flow = Flow::Calm {});
         assert!(!calm.runs(Stage::CrossPlane));
     }

@@ -25,24 +25,12 @@ pub struct PlannedStage {
     pub stage: Stage,
     /// What will be done, or why nothing is.
     pub reason: String,
-    /// Forecast, for the stages that run.
-    pub cost: Option<Cost>,
-}
-
-/// Memory of one stage.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Cost {
-    /// Memory held while the stage runs and free after it, bytes.
-    pub working_bytes: f64,
+    /// Whether it runs.
+    pub runs: bool,
+    /// Memory that it holds at once, its results among it, bytes.
+    pub memory_bytes: f64,
     /// Memory of its results, held to the end of the run, bytes.
     pub kept_bytes: f64,
-}
-
-impl Cost {
-    /// Memory that the stage holds at once, its results among it, bytes.
-    pub fn memory_bytes(&self) -> f64 {
-        self.working_bytes + self.kept_bytes
-    }
 }
 
 /// Memory of a whole run.
@@ -56,23 +44,23 @@ pub struct Forecast {
 
 /// A stage that runs, and the memory that it works with and keeps.
 pub(super) fn run(stage: Stage, reason: String, [working_bytes, kept_bytes]: [f64; 2]) -> PlannedStage {
-    PlannedStage { stage, reason, cost: Some(Cost { working_bytes, kept_bytes }) }
+    PlannedStage { stage, reason, runs: true, memory_bytes: working_bytes + kept_bytes, kept_bytes }
 }
 
 /// A stage that is left out.
 pub(super) fn skip(stage: Stage, reason: &str) -> PlannedStage {
-    PlannedStage { stage, reason: reason.into(), cost: None }
+    PlannedStage { stage, reason: reason.into(), runs: false, memory_bytes: 0.0, kept_bytes: 0.0 }
 }
 
 /// Memory of stages that run one after another.
 pub(super) fn total(stages: &[PlannedStage]) -> Forecast {
     let mut forecast = Forecast { memory_bytes: 0.0, largest: None };
     let mut kept_bytes = 0.0;
-    for (stage, cost) in stages.iter().filter_map(|s| Some((s.stage, s.cost?))) {
-        if kept_bytes + cost.memory_bytes() > forecast.memory_bytes {
-            (forecast.memory_bytes, forecast.largest) = (kept_bytes + cost.memory_bytes(), Some(stage));
+    for stage in stages.iter().filter(|stage| stage.runs) {
+        if kept_bytes + stage.memory_bytes > forecast.memory_bytes {
+            forecast = Forecast { memory_bytes: kept_bytes + stage.memory_bytes, largest: Some(stage.stage) };
         }
-        kept_bytes += cost.kept_bytes;
+        kept_bytes += stage.kept_bytes;
     }
     forecast
 }
@@ -83,10 +71,8 @@ mod tests {
 
     #[test]
     fn memory_is_the_largest_of_what_is_held_at_once() {
-        let planned = |stage, cost: Option<[f64; 2]>| PlannedStage {
-            stage,
-            reason: String::new(),
-            cost: cost.map(|[working_bytes, kept_bytes]| Cost { working_bytes, kept_bytes }),
+        let planned = |stage, held_bytes: Option<[f64; 2]>| {
+            held_bytes.map_or_else(|| skip(stage, ""), |held_bytes| run(stage, String::new(), held_bytes))
         };
         let stages = [
             planned(Stage::FlowSimulation, None),

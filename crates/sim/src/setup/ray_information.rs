@@ -61,21 +61,17 @@ impl RayInformation {
         Ok(snr)
     }
 
-    /// Mean ratio of a sample that sees a range: the pulse lights layers before and behind it.
-    fn seen_snr(&self, range_m: f64) -> Result<f64, Error> {
-        let mut snr = [0.0];
-        self.by_pulse.apply_into(self.layer_m[0], &self.layer_snr, &[range_m], &mut snr)?;
-        Ok(snr[0])
-    }
-
     /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range, each sample having the ratio that it sees.
     pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
         if !self.is_noisy {
             return self.of_snr(*SNR.end(), count);
         }
-        // The samples of a window are centred half a sample before its range.
-        let seen = |samples: f64| self.seen_snr(range_m + (samples - 0.5) * self.spacing_m);
-        let snr = |samples: f64| seen(samples).map_or(f64::NAN, |snr| snr.clamp(0.0, *SNR.end()));
+        let snr = |samples: f64| {
+            // The samples of a window are centred half a sample before its range; the pulse lights layers before and behind each.
+            let (at_m, mut snr) = (range_m + (samples - 0.5) * self.spacing_m, [0.0]);
+            let seen = self.by_pulse.apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
+            seen.map_or(f64::NAN, |()| snr[0].clamp(0.0, *SNR.end()))
+        };
         Ok(self.model.information(&self.gates, count, snr)?)
     }
 
