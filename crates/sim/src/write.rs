@@ -58,7 +58,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
         files.table("flow", plane, |plane| Ok(tables::planes_table(plane)?))?;
         files.netcdf("flow", plane, |plane, origin| Ok(crate::io::cf_planes::cf_planes_bytes(plane, origin)?))?;
     }
-    if plan.keeps_signals() {
+    if plan.kept_realisations() > 0 {
         let signals = raw_signals(plan, result);
         files.table("signals", signals.as_ref(), |signals| Ok(signals.table()?))?;
         files.netcdf("signals", signals.as_ref(), |signals, origin| {

@@ -77,8 +77,8 @@ pub struct VelocityEstimates {
 }
 
 /// Accumulates the errors of realisation after realisation.
-struct Mapper<S> {
-    estimator: MapEstimator<S>,
+struct Mapper<'p, S> {
+    estimator: MapEstimator<'p, S>,
     places: ScanGeometry,
     points: Vec<PolarPoint>,
     noise: NoiseAtPoints,
@@ -88,8 +88,8 @@ struct Mapper<S> {
     gates: Array2<GateSums>,
 }
 
-impl<S: Sample> Mapper<S> {
-    fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+impl<'p, S: Sample> Mapper<'p, S> {
+    fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
@@ -212,11 +212,12 @@ pub(crate) fn of_records<S: Sample>(
     mut seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(plan) = plans.first() else { return Ok(Vec::new()) };
-    let mut mappers: Vec<Mapper<S>> = plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
+    let mut mappers: Vec<Mapper<'_, S>> =
+        plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
     let mut clipped = Clipped::default();
     observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
     for realisation in 0..plan.realisations() {
-        let sums = mappers.iter().map(|mapper| mapper.estimator.sums(mapper.places.clone()));
+        let sums = mappers.iter().map(|mapper| mapper.estimator.sums(mapper.places.clone(), None));
         let mut sums = sums.collect::<Result<Vec<_>, _>>()?;
         clipped += read(realisation, &mut |first, records| {
             Ok(sums.iter_mut().try_for_each(|sums| sums.add(first, records))?)

@@ -16,24 +16,23 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::ops::Range;
 use wakescope_estimate::{
-    Gates, Radius, Sampling, Scan, Statistic,
+    Radius, Scan, Statistic,
     estimators::{NoiseTest, RegionNoise},
     map::{MapPoint, PolarPoint, ScanGeometry, ScanSums, WindowCovariance},
     window::Sample,
 };
 
 /// Statistic, regions and estimator of a scene.
-pub(crate) struct MapEstimator<S> {
-    sampling: Sampling,
-    gates: Gates,
-    record_samples: usize,
+pub(crate) struct MapEstimator<'p, S> {
+    plan: &'p Plan,
     pub(crate) tools: Toolkit<S>,
     covariance: WindowCovariance,
     of_rays: RayInformation,
     radius: Radius,
-    /// Rate of false alarms of the test against noise; 0 without one.
-    rate: f64,
 }
+
+/// Sums over the windows of a scan.
+pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 
 /// Where the windows of records at some elevations, rad, are in a plane.
 ///
@@ -45,12 +44,12 @@ pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<Sca
     Ok(ScanGeometry::new(&sampling, &gates, record_elevation_rad, samples)?)
 }
 
-impl<S: Sample> MapEstimator<S> {
+impl<'p, S: Sample> MapEstimator<'p, S> {
     /// For the lines of `places`; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of a line.
     ///
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
-    pub(crate) fn new(plan: &Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
+    pub(crate) fn new(plan: &'p Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let of_rays = RayInformation::new(plan, layer_snr)?;
@@ -61,16 +60,8 @@ impl<S: Sample> MapEstimator<S> {
         let correlation = covariance.correlation(of_rays.of_windows(&[middle.range_m])?[0])?;
         let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
         let known = WindowStatistics { snr: median_snr(layer_snr), n_eff };
-        Ok(Self {
-            sampling: estimators::sampling(scene)?,
-            gates: estimators::gates(scene)?,
-            record_samples: g.samples,
-            tools: Toolkit::new(scene, &plan.instrument, &known)?,
-            covariance,
-            of_rays,
-            radius,
-            rate: scene.estimator.false_alarm,
-        })
+        let tools = Toolkit::new(scene, &plan.instrument, &known)?;
+        Ok(Self { plan, tools, covariance, of_rays, radius })
     }
 
     /// Radius of the region at a range, m.
@@ -78,18 +69,13 @@ impl<S: Sample> MapEstimator<S> {
         Ok(self.radius.at_m(range_m)?)
     }
 
-    /// Sums over the windows of some lines, still without any record.
-    pub(crate) fn sums(&self, places: ScanGeometry) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
-        Ok(ScanSums::new(&*self.tools.statistic, &self.gates, places, self.record_samples)?)
-    }
-
-    /// The same of some gates.
-    pub(crate) fn sums_of(
-        &self,
-        places: ScanGeometry,
-        held: Range<usize>,
-    ) -> Result<ScanSums<'_, S, dyn Statistic<S>>, Error> {
-        Ok(ScanSums::of_gates(&*self.tools.statistic, &self.gates, places, held)?)
+    /// Sums over the windows of some lines, still without any record; over those of some gates if these are given.
+    pub(crate) fn sums(&self, places: ScanGeometry, held: Option<Range<usize>>) -> Result<WindowSums<'_, S>, Error> {
+        let (statistic, gates) = (&*self.tools.statistic, estimators::gates(&self.plan.scene.scene)?);
+        Ok(match held {
+            None => ScanSums::new(statistic, &gates, places, self.plan.geometry.samples)?,
+            Some(held) => ScanSums::of_gates(statistic, &gates, places, held)?,
+        })
     }
 
     /// Estimates at points, the gates of a line together and lines by increasing elevation, held against the noise there.
@@ -106,7 +92,8 @@ impl<S: Sample> MapEstimator<S> {
             let shape = (points.len() / gates, gates);
             let velocity_m_s = Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
             let guess = interpolated(points, velocity_m_s);
-            found = scan.map_following(points, &self.radius, S::KIND, &self.sampling, &guess, &**following)?;
+            let sampling = estimators::sampling(&self.plan.scene.scene)?;
+            found = scan.map_following(points, &self.radius, S::KIND, &sampling, &guess, &**following)?;
         }
         // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.
         let range_m: Vec<f64> = points.iter().take(gates).map(|point| point.range_m).collect();
@@ -134,19 +121,20 @@ impl<S: Sample> MapEstimator<S> {
         };
         let region = |point: &PolarPoint| Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?));
         let regions = points.iter().map(region).collect::<Result<Vec<RegionNoise>, Error>>()?;
-        let threshold = if self.rate > 0.0 { self.thresholds(test, &regions)? } else { vec![f64::NAN; points.len()] };
+        let rate = self.plan.scene.scene.estimator.false_alarm;
+        let threshold = if rate > 0.0 { self.thresholds(test, &regions)? } else { vec![f64::NAN; points.len()] };
         Ok(NoiseAtPoints { threshold, deviation: regions.iter().map(|at| test.band_deviation(at.n_eff)).collect() })
     }
 
     /// Densities, A^2, that noise exceeds with the rate of false alarms; NaN where there is no window.
     fn thresholds(&self, test: &NoiseTest, regions: &[RegionNoise]) -> Result<Vec<f64>, Error> {
-        let density_a2 = self.tools.noise.density_a2;
+        let (density_a2, rate) = (self.tools.noise.density_a2, self.plan.scene.scene.estimator.false_alarm);
         // Many points share their windows.
         let mut known = HashMap::new();
         let of = |region: &RegionNoise| {
             Ok(match known.entry(region.key()) {
                 Entry::Occupied(level) => *level.get(),
-                Entry::Vacant(place) => *place.insert(density_a2 * test.threshold(region, self.rate)?),
+                Entry::Vacant(place) => *place.insert(density_a2 * test.threshold(region, rate)?),
             })
         };
         regions.iter().map(of).collect()

@@ -45,10 +45,10 @@ impl Plan {
             Stage::PhaseScreens if is_derived => "a smaller scan.range_max_m and outputs.profile_range_max_m".into(),
             Stage::PhaseScreens => "fewer atmosphere.turbulence.grid_points".into(),
             Stage::CrossPlane | Stage::Efficiency => "fewer outputs.profile_points, or outputs.flow = false".into(),
-            _ if self.keeps_signals() && self.target == Target::Run => {
+            _ if self.kept_realisations() > 0 && self.target == Target::Run => {
                 format!("outputs.signals = false, {lines} or fewer scan.pulses_per_line")
             }
-            _ if self.keeps_signals() => format!("{lines} or fewer scan.pulses_per_line"),
+            _ if self.kept_realisations() > 0 => format!("{lines} or fewer scan.pulses_per_line"),
             Stage::Estimates | Stage::Errors | Stage::Retrieval | Stage::Files => {
                 format!("{lines}, estimator.gate_step_samples or estimator.window_step_samples")
             }

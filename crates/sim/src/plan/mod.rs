@@ -110,11 +110,6 @@ impl Plan {
         sizes::kept_realisations(&self.scene.scene, self.target)
     }
 
-    /// Whether raw signals are kept for the files.
-    pub fn keeps_signals(&self) -> bool {
-        self.kept_realisations() > 0
-    }
-
     /// Realisations to run: the raw signals alone need those that are kept.
     pub fn realisations(&self) -> usize {
         if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }

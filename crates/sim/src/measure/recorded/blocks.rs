@@ -67,7 +67,7 @@ struct Blocks<'p, S> {
     plan: &'p Plan,
     largest: f64,
     observer: &'p dyn Observer,
-    estimator: MapEstimator<S>,
+    estimator: MapEstimator<'p, S>,
     places: ScanGeometry,
     tiles: Vec<Tile>,
     spectra: Option<&'p GateSpectra>,
@@ -104,7 +104,7 @@ impl<S: FromParts> Blocks<'_, S> {
         let of_records = lines.records(read);
         let of_samples = estimators::gates(&plan.scene.scene)?.samples(held);
         let places = places_of(plan, &lines.record_elevation_rad(read))?;
-        let mut sums = estimator.sums_of(places, held.clone())?.scaled_for(self.largest);
+        let mut sums = estimator.sums(places, Some(held.clone()))?.scaled_for(self.largest);
         for piece in pieces(of_records.clone(), of_samples.len()) {
             let samples = samples::<S>(records, piece.clone(), of_samples.clone())?;
             sums.add(piece.start - of_records.start, samples.view())?;

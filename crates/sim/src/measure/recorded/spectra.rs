@@ -57,7 +57,7 @@ impl Spectra {
     ) -> Result<Self, Error> {
         let (g, places) = (&plan.geometry, places_of(plan, pulse_elevation_rad)?);
         let estimator = MapEstimator::<S>::new(plan, layer_snr, &places)?;
-        let mut sums = estimator.sums(places)?;
+        let mut sums = estimator.sums(places, None)?;
         sums.add(0, samples)?;
         let (scan, of_gate, mut density) = (sums.finish(), GateSpectra::new(plan, S::KIND)?, Vec::new());
         for &elevation_rad in &g.elevation_rad {

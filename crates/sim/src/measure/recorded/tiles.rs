@@ -43,7 +43,7 @@ impl Reach {
 
 /// How far each gate of a map at `range_m` reaches.
 fn reaches<S: Sample>(
-    estimator: &MapEstimator<S>,
+    estimator: &MapEstimator<'_, S>,
     places: &ScanGeometry,
     range_m: &[f64],
 ) -> Result<Vec<Reach>, Error> {
@@ -73,7 +73,7 @@ fn reaches<S: Sample>(
 /// The tiles of a scan with lines at some elevations, rad, and gates at `range_m`: gates by increasing range and for each the lines
 /// in their order. The sums of a tile take `most_bytes` at most, or it is one gate of one line.
 pub(super) fn tiles<S: Sample>(
-    estimator: &MapEstimator<S>,
+    estimator: &MapEstimator<'_, S>,
     places: &ScanGeometry,
     elevation_rad: &[f64],
     range_m: &[f64],
