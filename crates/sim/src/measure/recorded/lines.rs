@@ -117,22 +117,18 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     if let Some(bad) = time_s.iter().find(|time| !time.is_finite()) {
         return Err(records.refuse(format!("the time of a record is {bad}: each must be finite")));
     }
-    let numbers = records.about.line.as_ref().filter(|_| table.is_none());
+    let marks = records.about.line.as_ref().filter(|_| table.is_none()).unwrap_or(&elevation_rad);
     let mut found: Vec<ScanLines> = Vec::new();
-    let mut first = 0;
     let mut direction = 0.0;
-    while first < count {
-        // Pulses of a line may share its time; a time that goes back begins another line.
-        let marks = numbers.unwrap_or(&elevation_rad);
-        let is_same = |record: &usize| {
-            marks[*record] == marks[first] && (*record == first || time_s[*record] >= time_s[*record - 1])
-        };
-        let same = (first..count).take_while(is_same).count();
+    let all: Vec<usize> = (0..count).collect();
+    // Pulses of a line may share its time; a time that goes back begins another line.
+    for line in all.chunk_by(|a, b| marks[*a] == marks[*b] && time_s[*b] >= time_s[*a]) {
+        let (first, last) = (line[0], line[line.len() - 1]);
         // The middle of angles that pulses may have of their own.
-        let beside = elevation_rad[first..first + same].iter().map(|angle| angle - elevation_rad[first]);
-        let angle_rad = elevation_rad[first] + beside.sum::<f64>() / same as f64;
-        let last = found.last().and_then(|scan| scan.elevation_rad.last());
-        let step = last.map_or(0.0, |last| angle_rad - last);
+        let beside = elevation_rad[first..=last].iter().map(|angle| angle - elevation_rad[first]);
+        let angle_rad = elevation_rad[first] + beside.sum::<f64>() / line.len() as f64;
+        let before = found.last().and_then(|scan| scan.elevation_rad.last());
+        let step = before.map_or(0.0, |before| angle_rad - before);
         // A line that goes back, or stays, begins another scan.
         if found.is_empty() || step == 0.0 || step * direction < 0.0 {
             found.push(ScanLines::default());
@@ -143,10 +139,9 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
         if let Some(scan) = found.last_mut() {
             scan.elevation_rad.push(angle_rad);
             // The middle of the pulses.
-            scan.time_s.push(0.5 * (time_s[first] + time_s[first + same - 1]));
+            scan.time_s.push(0.5 * (time_s[first] + time_s[last]));
             scan.first_record.push(first);
         }
-        first += same;
     }
     let ends: Vec<usize> = found.iter().skip(1).map(|scan| scan.first_record[0]).chain([count]).collect();
     found.iter_mut().zip(ends).for_each(|(scan, end)| scan.first_record.push(end));
