@@ -50,16 +50,16 @@ pub struct SceneBound {
 }
 
 /// What all points share.
-struct Setting {
-    of_rays: RayInformation,
+struct Setting<'p> {
+    of_rays: RayInformation<'p>,
     places: ScanGeometry,
     covariance: WindowCovariance,
     radius: Radius,
     elevation_rad: f64,
 }
 
-impl Setting {
-    fn new(plan: &Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
+impl<'p> Setting<'p> {
+    fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
         let scene = &plan.scene.scene;
         if scene.detector.noise == NoiseModel::None {
             return Err(Error::NoBound);

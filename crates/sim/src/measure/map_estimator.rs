@@ -27,7 +27,7 @@ pub(crate) struct MapEstimator<'p, S> {
     plan: &'p Plan,
     pub(crate) tools: Toolkit<S>,
     covariance: WindowCovariance,
-    of_rays: RayInformation,
+    of_rays: RayInformation<'p>,
     radius: Radius,
 }
 

@@ -133,14 +133,6 @@ impl<'a> Scanner<'a> {
         seen_into(filter, gates, &self.lines[line].radial_velocity_m_s, backscatter, out_m_s)
     }
 
-    /// The signals of one realisation \[pulse, sample\], A; the pulses of a line stand together.
-    ///
-    /// # Errors
-    /// As [`Scanner::in_pieces`].
-    pub fn records(&self, realisation: usize, observer: &dyn Observer) -> Result<Array2<f64>, Error> {
-        Ok(self.piece(realisation, 0..self.pulses(), observer)?.0)
-    }
-
     /// Pulses of one realisation.
     pub fn pulses(&self) -> usize {
         self.plan.geometry.schedule.pulses()

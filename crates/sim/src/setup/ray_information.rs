@@ -2,11 +2,11 @@
 //!
 //! Check: the stored bound of one window; estimates of whole regions, which no bound may pass.
 
+use crate::Error;
 use crate::scene::NoiseModel;
 use crate::setup::Setup;
 use crate::setup::estimators;
-use crate::{Error, SPEED_OF_LIGHT_M_S};
-use wakescope_estimate::{Gates, bound::RecordModel};
+use wakescope_estimate::bound::RecordModel;
 use wakescope_signal::RangeFilter;
 
 /// Signal-to-noise ratios of which a bound is made: no noise is as little as the last.
@@ -21,37 +21,27 @@ pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
 }
 
 /// Signal-to-noise ratio of the samples of a scene's records, and the information in windows of them.
-pub(crate) struct RayInformation {
+pub(crate) struct RayInformation<'a> {
+    setup: &'a Setup,
     model: RecordModel,
-    gates: Gates,
-    /// Range between samples, m.
-    spacing_m: f64,
     by_pulse: RangeFilter,
     by_gate: RangeFilter,
     /// Ranges of the layers, m, and their signal-to-noise ratios.
     pub(crate) layer_m: Vec<f64>,
     pub(crate) layer_snr: Vec<f64>,
-    is_noisy: bool,
 }
 
-impl RayInformation {
+impl<'a> RayInformation<'a> {
     /// For a planned scene; `layer_snr` holds range, m, and expected signal-to-noise ratio of the layers of its lines.
     ///
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
-    pub(crate) fn new(setup: &Setup, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
+    pub(crate) fn new(setup: &'a Setup, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
         let (scene, g, pulse) = (&setup.scene.scene, &setup.geometry, &setup.instrument.pulse);
         let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
-        Ok(Self {
-            model: estimators::record_model(scene, pulse)?,
-            gates: estimators::gates(scene)?,
-            spacing_m: 0.5 * SPEED_OF_LIGHT_M_S / scene.detector.sampling_hz,
-            by_pulse: RangeFilter::pulse(pulse, g.layer_thickness_m)?,
-            by_gate: range_filter(setup)?,
-            layer_m,
-            layer_snr,
-            is_noisy: scene.detector.noise != NoiseModel::None,
-        })
+        let model = estimators::record_model(scene, pulse)?;
+        let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
+        Ok(Self { setup, model, by_pulse, by_gate: range_filter(setup)?, layer_m, layer_snr })
     }
 
     /// Signal-to-noise ratios of the windows about some ranges, power ratios: means over what pulse and window see.
@@ -63,28 +53,30 @@ impl RayInformation {
 
     /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range, each sample having the ratio that it sees.
     pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
-        if !self.is_noisy {
+        let (scene, g) = (&self.setup.scene.scene, &self.setup.geometry);
+        if scene.detector.noise == NoiseModel::None {
             return self.of_snr(*SNR.end(), count);
         }
         let snr = |samples: f64| {
             // The samples of a window are centred half a sample before its range; the pulse lights layers before and behind each.
-            let (at_m, mut snr) = (range_m + (samples - 0.5) * self.spacing_m, [0.0]);
+            let (at_m, mut snr) = (range_m + (samples - 0.5) * g.sample_spacing_m, [0.0]);
             let seen = self.by_pulse.apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
             seen.map_or(f64::NAN, |()| snr[0].clamp(0.0, *SNR.end()))
         };
-        Ok(self.model.information(&self.gates, count, snr)?)
+        Ok(self.model.information(&estimators::gates(scene)?, count, snr)?)
     }
 
     /// The same where all samples have one signal-to-noise ratio.
     pub(crate) fn of_snr(&self, snr: f64, count: usize) -> Result<Vec<f64>, Error> {
         let snr = snr.clamp(*SNR.start(), *SNR.end());
-        Ok(self.model.information(&self.gates, count, |_| snr)?)
+        Ok(self.model.information(&estimators::gates(&self.setup.scene.scene)?, count, |_| snr)?)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::SPEED_OF_LIGHT_M_S;
     use crate::plan::{Plan, Target};
     use crate::scene::SceneFile;
 

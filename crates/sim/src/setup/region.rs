@@ -33,7 +33,11 @@ pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error>
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub(crate) fn region_radius(scene: &Scene, of_rays: &RayInformation, geometry: &ScanGeometry) -> Result<Radius, Error> {
+pub(crate) fn region_radius(
+    scene: &Scene,
+    of_rays: &RayInformation<'_>,
+    geometry: &ScanGeometry,
+) -> Result<Radius, Error> {
     let e = &scene.estimator;
     match &e.radius {
         _ if e.method == (Method::Periodogram {}) => Ok(Radius::Fixed { radius_m: 0.0 }),
