@@ -42,67 +42,22 @@ pub(super) fn scans(
     format: &ScanFormat,
     sweep: usize,
 ) -> Result<(Vec<ReadScan>, Vec<String>), String> {
-    let elevation_rad = angles(file, "elevation")?;
-    let azimuth_rad = angles(file, "azimuth")?;
-    let count = elevation_rad.len();
-    if azimuth_rad.len() != count {
-        return Err(format!("azimuth has {} values, elevation {count}: one for each ray", azimuth_rad.len()));
-    }
-    let (mut time_s, reference) = times(file, count)?;
-    if file.has(STATUS) {
-        let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
-        steps.sort_by(f64::total_cmp);
-        let half_s = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
-        time_s.iter_mut().for_each(|time_s| *time_s -= half_s);
-    }
-    let range_m = ranges(file)?;
-    let velocity = Field::velocity(file, format)?;
-    let layout = GateLayout::new(file, &velocity.name, count, range_m.len())?;
-    let velocity_m_s = layout.read(file, &velocity.name)?;
-    // A fraction of realisations, or 0 and 1.
-    let flagged = layout.optional(file, &["flagged"])?;
-    // 1 where the instrument trusts its velocity.
-    let status = layout.optional(file, &[STATUS])?;
-    let ratio_db = if format.min_snr_db.is_some() { layout.optional(file, &RATIOS)? } else { None };
-    let sigma_m_s = layout.optional(file, &SIGMAS)?;
-    let realisations = if velocity.is_mean { layout.optional(file, &["count"])? } else { None };
-    let scans = mean_count(realisations.iter().flatten().copied());
+    let (range_m, velocity) = (ranges(file)?, Field::velocity(file, format)?);
+    let (rays, reference, scans) = rays(file, format, &velocity, range_m.len())?;
     let moving = optional(file, "antenna_transition")?;
     // Mirrored velocities are no multiple away from those of the air.
     let is_mirrored = file.text(NYQUIST, "folding").is_some_and(|folding| folding == MIRRORED);
-    let nyquist_m_s = if is_mirrored { None } else { first(file, NYQUIST)? };
-    let gates = range_m.len();
-    let ray = |ray: usize| {
-        let cells = || (ray * gates..(ray + 1) * gates).map(|at| (at, velocity_m_s[at]));
-        let noisy = |at: usize| {
-            ratio_db.as_ref().is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
-                || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
-                || status.as_ref().is_some_and(|status| status[at] != 1.0)
-        };
-        let sigma = |sigma_m_s: &Vec<f64>| {
-            let of = |at: usize| of_mean(sigma_m_s[at], realisations.as_ref().map(|count| count[at]));
-            cells().map(|(at, _)| of(at)).collect()
-        };
-        RayRow {
-            elevation_rad: elevation_rad[ray],
-            azimuth_rad: azimuth_rad[ray],
-            time_s: time_s[ray],
-            velocity_m_s: cells().map(|(at, v)| if noisy(at) { f64::NAN } else { velocity.sign * v }).collect(),
-            sigma_m_s: sigma_m_s.as_ref().map(sigma).unwrap_or_default(),
-        }
-    };
-    let (mut out, mut left_out) = (Vec::new(), Vec::new());
+    let fold_m_s = if is_mirrored { None } else { first(file, NYQUIST)?.map(|nyquist| 2.0 * nyquist) };
     let pulse_width_s = first(file, "pulse_width")?;
-    let step_m = range_m.get(1).zip(range_m.first()).map(|(second, first)| second - first);
     let of_field = |name| file.text(&velocity.name, name);
     let scene_toml = file.global_text("scene").or_else(|| of_field("scene")).or_else(|| of_field("instrument"));
-    let scene_toml = scene_toml.map(str::to_owned);
     let is_own = file.global_text("source").is_some_and(|source| source.starts_with("wakescope "));
-    for (number, rays) in sweeps(file, count)?.into_iter().enumerate() {
+    let (mut out, mut left_out) = (Vec::new(), Vec::new());
+    for (number, range) in sweeps(file, rays.len())?.into_iter().enumerate() {
         let number = number + sweep;
         let what = format!("sweep {number}");
         let is_still = |ray: &usize| moving.get(*ray).is_none_or(|moves| *moves != 1.0);
-        let rows: Vec<RayRow> = rays.filter(is_still).map(&ray).collect();
+        let rows: Vec<RayRow> = range.filter(is_still).map(|ray| rays[ray].clone()).collect();
         if let Err(reason) = one_plane(&rows, &what) {
             left_out.push(reason);
             continue;
@@ -114,13 +69,13 @@ pub(super) fn scans(
                 left_out.push(format!("{what}: all of its rays have one elevation"));
                 continue;
             }
-            match scan_map(rows, range_m.clone(), nyquist_m_s.map(|nyquist| 2.0 * nyquist), &what) {
+            match scan_map(rows, range_m.clone(), fold_m_s, &what) {
                 Err(reason) => left_out.push(reason),
                 Ok(map) => out.push(ReadScan {
                     reference,
-                    gate_length_m: step_m,
+                    gate_length_m: range_m.get(1).map(|second_m| second_m - range_m[0]),
                     pulse_width_s,
-                    scene_toml: scene_toml.clone(),
+                    scene_toml: scene_toml.map(str::to_owned),
                     is_own,
                     scans,
                     ..ReadScan::new(path, number, map)
@@ -129,6 +84,51 @@ pub(super) fn scans(
         }
     }
     Ok((out, left_out))
+}
+
+/// All rays, the date from which their times count, and the scans of which their velocities are means.
+fn rays(
+    file: &NetcdfFile,
+    format: &ScanFormat,
+    velocity: &Field,
+    gates: usize,
+) -> Result<(Vec<RayRow>, Option<UtcTime>, f64), String> {
+    let (elevation_rad, azimuth_rad) = (angles(file, "elevation")?, angles(file, "azimuth")?);
+    let count = elevation_rad.len();
+    if azimuth_rad.len() != count {
+        return Err(format!("azimuth has {} values, elevation {count}: one for each ray", azimuth_rad.len()));
+    }
+    let (time_s, reference) = times(file, count)?;
+    let layout = GateLayout::new(file, &velocity.name, count, gates)?;
+    let velocity_m_s = layout.read(file, &velocity.name)?;
+    // A fraction of realisations, or 0 and 1.
+    let flagged = layout.optional(file, &["flagged"])?;
+    // 1 where the instrument trusts its velocity.
+    let status = layout.optional(file, &[STATUS])?;
+    let ratio_db = if format.min_snr_db.is_some() { layout.optional(file, &RATIOS)? } else { None };
+    let sigma_m_s = layout.optional(file, &SIGMAS)?;
+    let realisations = if velocity.is_mean { layout.optional(file, &["count"])? } else { None };
+    let known = |at: usize| {
+        let is_noise = ratio_db.as_ref().is_some_and(|ratios_db| format.is_noise(ratios_db[at]))
+            || flagged.as_ref().is_some_and(|flagged| flagged[at] > 0.5)
+            || status.as_ref().is_some_and(|status| status[at] != 1.0);
+        if is_noise { f64::NAN } else { velocity.sign * velocity_m_s[at] }
+    };
+    let ray = |ray: usize| {
+        let cells = ray * gates..(ray + 1) * gates;
+        let sigma = |sigma_m_s: &Vec<f64>| {
+            let of = |at: usize| of_mean(sigma_m_s[at], realisations.as_ref().map(|count| count[at]));
+            cells.clone().map(of).collect()
+        };
+        RayRow {
+            elevation_rad: elevation_rad[ray],
+            azimuth_rad: azimuth_rad[ray],
+            time_s: time_s[ray],
+            sigma_m_s: sigma_m_s.as_ref().map(sigma).unwrap_or_default(),
+            velocity_m_s: cells.map(known).collect(),
+        }
+    };
+    Ok(((0..count).map(ray).collect(), reference, mean_count(realisations.iter().flatten().copied())))
 }
 
 /// The variable that holds the velocities.
@@ -262,7 +262,13 @@ fn times(file: &NetcdfFile, count: usize) -> Result<(Vec<f64>, Option<UtcTime>),
         text += "T00:00:00";
     }
     let reference = UtcTime::parse(&format!("{text}Z"));
-    let time_s = file.seconds("time")?;
+    let mut time_s = file.seconds("time")?;
+    if file.has(STATUS) {
+        let mut steps: Vec<f64> = time_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        steps.sort_by(f64::total_cmp);
+        let half_s = 0.5 * steps.get(steps.len() / 2).copied().unwrap_or(0.0);
+        time_s.iter_mut().for_each(|time_s| *time_s -= half_s);
+    }
     match time_s.len() {
         found if found == count => Ok((time_s, reference)),
         found => Err(format!("time has {found} values, elevation {count}: one for each ray")),

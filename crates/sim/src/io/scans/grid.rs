@@ -96,21 +96,15 @@ pub(super) fn scan_map(
     };
     let mut velocity_m_s =
         Array2::from_shape_fn((lines.len(), gates), |(line, gate)| mean_at(lines[line], &|ray| ray.velocity_m_s[gate]));
-    let mut sigma_m_s =
-        has_sigma.then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
+    let is_known = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
+    let sigma_m_s = has_sigma.then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
+    let mut sigma_m_s = sigma_m_s.filter(|sigma| sigma.iter().any(is_known));
     if let Some(sigma) = &mut sigma_m_s {
-        let good = |value: &f64| value.is_finite() && *value > 0.0;
-        if sigma.iter().any(good) {
-            // A velocity of unknown error counts for nothing.
-            velocity_m_s.zip_mut_with(sigma, |velocity, sigma| {
-                if !good(sigma) {
-                    *velocity = f64::NAN
-                }
-            });
-            sigma.mapv_inplace(|value| if good(&value) { value } else { 1.0 });
-        } else {
-            sigma_m_s = None;
-        }
+        // A velocity of unknown error counts for nothing.
+        velocity_m_s.zip_mut_with(sigma, |velocity, sigma| {
+            *velocity = if is_known(sigma) { *velocity } else { f64::NAN };
+        });
+        sigma.mapv_inplace(|sigma| if is_known(&sigma) { sigma } else { 1.0 });
     }
     let values = velocity_m_s.iter().filter(|value| value.is_finite()).count();
     if values < least_values {
