@@ -36,6 +36,8 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
             time_s: 16.0 * tau + 0.1 * i as f64,
             elevation_rad: (0.5 + 0.25 * i as f64).to_radians(),
             azimuth_rad,
+            pulses: 64,
+            carrier: None,
         }));
     }
     let mut map = VelocityMap {
@@ -55,8 +57,6 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         lidar_y_m: -400.0,
         lidar_height_m: 2.0,
         flight: None,
-        ray_pulses: None,
-        carrier: None,
         site: Site::default(),
         is_simulated: true,
     };

@@ -77,7 +77,7 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         ("comment", comment),
         ("instrument_name", "wakescope lidar"),
         ("scan_name", map.sweeps.first().map_or("rhi", |sweep| sweep.mode.name())),
-        ("platform_is_mobile", if map.carrier.is_some() { "true" } else { "false" }),
+        ("platform_is_mobile", if map.is_carried() { "true" } else { "false" }),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
         ("simulated", simulated),
@@ -139,11 +139,11 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
         [latitude + north_m / DEGREE_M, longitude + east_m / (DEGREE_M * width), map.site.altitude_m + z_m]
     };
     let here_m = [map.flight.map_or(0.0, |(x_m, _)| x_m), map.lidar_y_m, map.lidar_height_m];
-    let places = match &map.carrier {
-        Some(all) => all.iter().map(|(place_m, _)| place(*place_m)).collect(),
-        None => vec![place(here_m)],
+    let carrier: Vec<([f64; 3], [f64; 3])> = map.rays.iter().filter_map(|ray| ray.carrier).collect();
+    let (places, dims) = match carrier.is_empty() {
+        true => (vec![place(here_m)], ONE),
+        false => (carrier.iter().map(|(place_m, _)| place(*place_m)).collect(), EACH),
     };
-    let dims = if map.carrier.is_some() { EACH } else { ONE };
     let values = |d: usize| Data::f64(places.iter().map(|p| p[d]));
     let mut out = vec![
         Variable::new("latitude", dims, values(0)).named(["latitude", "", "degrees_north"]),
@@ -152,7 +152,7 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
             .named(["altitude", "height of the telescope above the sea", "meters"])
             .text("positive", "up"),
     ];
-    if let Some(carrier) = &map.carrier {
+    if !carrier.is_empty() {
         // A level carrier that heads along the flight, and drifts where its track does not.
         let heading_deg = turn(heading_rad).to_degrees();
         let over_ground = |i: usize| north_east(carrier[i].1[0], carrier[i].1[1]);
@@ -223,7 +223,7 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
         one("time_coverage_start", &time(map.rays.first())),
         one("time_coverage_end", &time(map.rays.last())),
         one("time_reference", &start.to_string()),
-        one("platform_type", if map.carrier.is_some() { "aircraft" } else { "fixed" }),
+        one("platform_type", if map.is_carried() { "aircraft" } else { "fixed" }),
         one("instrument_type", "lidar"),
         one("primary_axis", "axis_z"),
         Variable::new("sweep_mode", EACH, Data::text(modes)),
@@ -234,8 +234,7 @@ fn texts(map: &VelocityMap) -> Vec<Variable> {
 
 fn instrument(map: &VelocityMap) -> Vec<Variable> {
     let (rays, pulse) = (map.rays.len(), &map.pulse);
-    let samples = map.ray_pulses.clone().unwrap_or_else(|| vec![pulse.samples; rays]);
-    let samples = Data::i32(samples.into_iter().map(|n| i32::try_from(n).unwrap_or(i32::MAX)));
+    let samples = Data::i32(map.rays.iter().map(|ray| i32::try_from(ray.pulses).unwrap_or(i32::MAX)));
     let group = |v: Variable, units: &str| v.text("units", units).text("meta_group", "instrument_parameters");
     let each = |name: &str, value: f64, long_name: &str| {
         Variable::new(name, &["time"], single(&vec![value; rays])).text("long_name", long_name)

@@ -222,7 +222,7 @@ fn the_place_is_that_of_the_telescope_whether_it_stands_or_moves() {
     near(of(&mut file), placed(&map, 3000.0 * cos - 500.0 * sin, 3000.0 * sin + 500.0 * cos), 39.5);
     // One that flies 70 m/s along it, drifts to the right and climbs.
     let at = |i: usize| [3000.0 + 7.0 * i as f64, 500.0 + 0.5 * i as f64, 50.0];
-    map.carrier = Some((0..map.rays.len()).map(|i| (at(i), [70.0, 5.0, 1.0])).collect());
+    map.rays.iter_mut().enumerate().for_each(|(i, ray)| ray.carrier = Some((at(i), [70.0, 5.0, 1.0])));
     let (_temp, mut file) = reopened(&map);
     near(of(&mut file), placed(&map, 3000.0 * cos - 500.0 * sin, 3000.0 * sin + 500.0 * cos), 87.5);
     let mut first = |name: &str| f64::from(file.read_var_f32(name).unwrap()[3]);

@@ -99,7 +99,7 @@ impl Field {
 }
 
 /// One line of sight of the scan.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Ray {
     /// Index into [`VelocityMap::sweeps`]; the rays of a sweep are contiguous and sweeps follow in order.
     pub sweep: usize,
@@ -109,6 +109,10 @@ pub struct Ray {
     pub elevation_rad: f64,
     /// Azimuth, clockwise from north, rad.
     pub azimuth_rad: f64,
+    /// Pulses averaged.
+    pub pulses: u32,
+    /// Where the lidar is (x, y, z), m, and its velocity, m/s, if it moves.
+    pub carrier: Option<([f64; 3], [f64; 3])>,
 }
 
 /// One sweep at one age of the wake.
@@ -140,7 +144,7 @@ pub struct PulseInfo {
     pub nyquist_velocity_m_s: f64,
     /// Samples per second.
     pub sampling_hz: f64,
-    /// Pulses averaged per ray.
+    /// Pulses averaged per ray, as the scene has them.
     pub samples: u32,
     /// Optical frequency, Hz.
     pub frequency_hz: f64,
@@ -180,10 +184,6 @@ pub struct VelocityMap {
     pub lidar_height_m: f64,
     /// Where the lidar is along the flight, m, and the azimuth of +x, rad; absent where all rays are in one plane across the flight.
     pub flight: Option<(f64, f64)>,
-    /// Pulses averaged for each ray, where they are not equally many.
-    pub ray_pulses: Option<Vec<u32>>,
-    /// Where the lidar is at each ray (x, y, z), m, and its velocity, m/s, if it moves.
-    pub carrier: Option<Vec<([f64; 3], [f64; 3])>>,
     /// Place, and date from which the times of the rays count.
     pub site: Site,
     /// Whether the signals were simulated.
@@ -194,10 +194,15 @@ impl VelocityMap {
     /// Position of a gate along the flight, across it and above the ground, m.
     pub fn place_m(&self, ray: usize, gate: usize) -> [f64; 3] {
         let here = [self.flight.map_or(0.0, |(x_m, _)| x_m), self.lidar_y_m, self.lidar_height_m];
-        let from_m = self.carrier.as_ref().and_then(|carrier| carrier.get(ray)).map_or(here, |(place_m, _)| *place_m);
-        let Ray { azimuth_rad, elevation_rad, .. } = self.rays[ray];
+        let Ray { azimuth_rad, elevation_rad, carrier, .. } = self.rays[ray];
+        let from_m = carrier.map_or(here, |(place_m, _)| place_m);
         let from_x_rad = self.flight.map_or(FRAC_PI_2, |(_, x_rad)| azimuth_rad - x_rad);
         Direction::new(from_x_rad, elevation_rad).at_range_m(from_m, self.range_m[gate])
+    }
+
+    /// Whether the lidar moves.
+    pub fn is_carried(&self) -> bool {
+        self.rays.iter().any(|ray| ray.carrier.is_some())
     }
 
     /// The sweeps of one kind alone.
@@ -210,8 +215,6 @@ impl VelocityMap {
         Self {
             rays: rays.iter().map(|&ray| Ray { sweep: before(self.rays[ray].sweep), ..self.rays[ray] }).collect(),
             sweeps: self.sweeps.iter().copied().filter(|sweep| sweep.mode == mode).collect(),
-            ray_pulses: self.ray_pulses.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
-            carrier: self.carrier.as_ref().map(|all| rays.iter().map(|&ray| all[ray]).collect()),
             fields: self.fields.iter().map(field).collect(),
             ..self.clone()
         }
@@ -250,10 +253,6 @@ impl VelocityMap {
             return Err(OutputError::value("range_m", format!("{:?}", self.range_m[0]), "must be positive"));
         }
         self.check_rays()?;
-        let counts = [self.ray_pulses.as_ref().map(Vec::len), self.carrier.as_ref().map(Vec::len)];
-        for (name, count) in ["ray_pulses", "carrier"].into_iter().zip(counts) {
-            same_length(name, count.unwrap_or(self.rays.len()), "rays", self.rays.len())?;
-        }
         for (i, field) in self.fields.iter().enumerate() {
             if self.fields[..i].iter().any(|f| f.name == field.name) {
                 return Err(OutputError::Duplicate { what: "field", name: field.name.clone() });

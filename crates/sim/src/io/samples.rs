@@ -15,6 +15,8 @@ pub(crate) fn map() -> VelocityMap {
                 time_s: 40.0 * (sweep as f64 + 1.0) + 0.5 * i as f64,
                 elevation_rad: 0.02 + 0.01 * i as f64,
                 azimuth_rad: std::f64::consts::FRAC_PI_2,
+                pulses: 64,
+                carrier: None,
             });
         }
     }
@@ -76,8 +78,6 @@ pub(crate) fn map() -> VelocityMap {
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,
         flight: None,
-        ray_pulses: None,
-        carrier: None,
         site: Site::default(),
         is_simulated: true,
     }

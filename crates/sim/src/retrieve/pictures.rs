@@ -27,7 +27,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         // The picture knows no times, and lines of a map may have any.
         time_s: i as f64,
         elevation_rad: *elevation_rad,
-        azimuth_rad: 0.0,
+        ..Ray::default()
     });
     let shown = VelocityMap {
         rays: rays.collect(),

@@ -16,7 +16,6 @@ const JUDGES: &str =
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let (mount, lines) = (&g.schedule.mount, &g.schedule.lines);
-    let pulses = lines.iter().map(|line| u32::try_from(line.pulses).unwrap_or(u32::MAX)).collect();
     let (zero_rad, from_x_rad) = mount.reference_rad;
     let moves = lines.iter().any(|line| line.velocity_m_s != [0.0; 3] || line.position_m != mount.position_m);
     let rhi = g.schedule.sweeps.iter().all(|(mode, _)| *mode == SweepMode::Rhi);
@@ -33,15 +32,16 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         .v_spread_m_s
         .as_ref()
         .map(|values| speed("v_spread", "standard deviation of v_pulse over the pulses of a line".into(), values));
-    let ray = |i: usize| Ray {
-        sweep: lines[i].sweep,
-        time_s: start_s + g.line_time_s[i],
-        elevation_rad: g.elevation_rad[i],
-        azimuth_rad: g.schedule.middle(i).azimuth_rad,
-    };
-    let carried = |i: usize| {
+    let ray = |i: usize| {
         let beam = g.schedule.middle(i);
-        (beam.position_m, beam.velocity_m_s)
+        Ray {
+            sweep: lines[i].sweep,
+            time_s: start_s + g.line_time_s[i],
+            elevation_rad: g.elevation_rad[i],
+            azimuth_rad: beam.azimuth_rad,
+            pulses: u32::try_from(lines[i].pulses).unwrap_or(u32::MAX),
+            carrier: moves.then_some((beam.position_m, beam.velocity_m_s)),
+        }
     };
     let sweep = |&(mode, fixed_angle_rad): &(SweepMode, f64)| Sweep { tau: plan.wind.tau, fixed_angle_rad, mode };
     VelocityMap {
@@ -81,8 +81,6 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
         .collect(),
         lidar_y_m: mount.position_m[1],
         lidar_height_m: scene.scan.lidar_height_m,
-        ray_pulses: lines.iter().any(|line| line.pulses != scene.scan.pulses_per_line).then_some(pulses),
-        carrier: moves.then(|| (0..lines.len()).map(carried).collect()),
         flight: (!across).then_some((mount.position_m[0], zero_rad - from_x_rad)),
         site: scene.site.clone(),
         is_simulated: true,

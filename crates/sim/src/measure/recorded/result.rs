@@ -106,10 +106,10 @@ fn quietest(plan: &Plan, scan: &ScanCells) -> f64 {
 /// The map of the scans, each a sweep, in the form that files and pictures take.
 pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, Error> {
     let scene = &plan.scene.scene;
-    let azimuth_rad = scene.scan.azimuth_rad;
+    let (azimuth_rad, pulses) = (scene.scan.azimuth_rad, scene.scan.pulses_per_line as u32);
     let of_scan = |(sweep, scan): (usize, &MeasuredScan)| -> Vec<Ray> {
         let rays = scan.lines.elevation_rad.iter().zip(&scan.lines.time_s);
-        rays.map(|(elevation_rad, time_s)| Ray { sweep, time_s: *time_s, elevation_rad: *elevation_rad, azimuth_rad })
+        rays.map(|(&elevation_rad, &time_s)| Ray { sweep, time_s, elevation_rad, azimuth_rad, pulses, carrier: None })
             .collect()
     };
     let stacked = |of: fn(&MeasuredScan) -> &Array2<f64>| -> Result<Array2<f64>, Error> {
