@@ -72,7 +72,6 @@ pub mod plot;
 mod error;
 
 pub use error::Error;
-#[cfg(feature = "cli")]
 pub use outputs::write_contents;
 pub use plan::{Plan, Target};
 pub use run::{RunResult, run};

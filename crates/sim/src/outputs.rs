@@ -16,9 +16,10 @@ use std::path::{Path, PathBuf};
 /// absent as long as it is not computed.
 pub(crate) struct Outputs {
     formats: Formats,
-    names: Vec<String>,
-    /// The files, and what is written into each; none where names alone are wanted.
-    made: Option<(FileGroup, Provenance)>,
+    /// What is written into each file; none where names alone are wanted.
+    origin: Option<Provenance>,
+    /// Names and contents, which are empty where names alone are wanted.
+    files: Vec<(String, Vec<u8>)>,
 }
 
 /// What adds the files of a list.
@@ -32,9 +33,8 @@ impl Outputs {
     /// # Errors
     /// What the list finds before it makes a file.
     pub(crate) fn names(formats: Formats, list: impl List) -> Result<Vec<String>, Error> {
-        let mut files = Self { formats, names: Vec::new(), made: None };
-        list(&mut files)?;
-        Ok(files.names)
+        let files = Self::of(formats, None, list)?;
+        Ok(files.into_iter().map(|(name, _)| name).collect())
     }
 
     /// Makes the files of a list and puts them into their folder, all or none; returns their paths.
@@ -44,40 +44,42 @@ impl Outputs {
     pub(crate) fn write(
         folder: &Path,
         existing: Existing,
-        (formats, origin): (Formats, Provenance),
+        of: (Formats, Provenance),
         list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
-        put(Self::made(folder, (formats, origin), list)?, folder, existing)
+        write_contents(folder, Self::contents(of, list)?, existing)
     }
 
     /// Makes the files of a list and keeps them: their names and contents.
     ///
     /// # Errors
     /// What the makers find.
-    #[cfg(feature = "cli")]
-    pub(crate) fn contents(of: (Formats, Provenance), list: impl List) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        Ok(Self::made(Path::new(""), of, list)?.into_contents())
+    pub(crate) fn contents(
+        (formats, origin): (Formats, Provenance),
+        list: impl List,
+    ) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        Self::of(formats, Some(origin), list)
     }
 
-    fn made(folder: &Path, (formats, origin): (Formats, Provenance), list: impl List) -> Result<FileGroup, Error> {
-        let mut files = Self { formats, names: Vec::new(), made: Some((FileGroup::new(folder), origin)) };
-        list(&mut files)?;
-        Ok(files.made.map_or_else(|| FileGroup::new(folder), |(group, _)| group))
+    fn of(formats: Formats, origin: Option<Provenance>, list: impl List) -> Result<Vec<(String, Vec<u8>)>, Error> {
+        let mut outputs = Self { formats, origin, files: Vec::new() };
+        list(&mut outputs)?;
+        Ok(outputs.files)
     }
 
     /// Adds a file that is made of `of`; where that is absent, its name alone.
     ///
     /// # Errors
-    /// What the maker finds; a name that is there already.
+    /// What the maker finds.
     pub(crate) fn add<T: ?Sized, B: Into<Vec<u8>>>(
         &mut self,
         name: &str,
         of: Option<&T>,
         make: impl FnOnce(&T, &Provenance) -> Result<B, Error>,
     ) -> Result<(), Error> {
-        match (&mut self.made, of) {
-            (None, _) => self.names.push(name.into()),
-            (Some((group, origin)), Some(of)) => group.add(name, make(of, origin)?)?,
+        match (&self.origin, of) {
+            (None, _) => self.files.push((name.into(), Vec::new())),
+            (Some(origin), Some(of)) => self.files.push((name.into(), make(of, origin)?.into())),
             (Some(_), None) => {}
         }
         Ok(())
@@ -135,29 +137,19 @@ impl Outputs {
     }
 }
 
-/// Puts files that are made into their folder, all or none; returns their paths.
-///
-/// # Errors
-/// A file in the way that may not be replaced; another run that writes there; what the system says.
-fn put(group: FileGroup, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    let there = folder.exists();
-    let lock = there.then(|| FolderLock::take(folder)).transpose()?;
-    // Again: a file may have come while the run computed.
-    refuse_foreign(folder, group.names(), existing)?;
-    let written = group.commit()?;
-    drop(lock);
-    Ok(written)
-}
-
 /// Writes files whose contents are there, such as those of a [`crate::cli::Answer`], to a folder, all or none; returns their paths.
 ///
 /// # Errors
 /// Names that are not plain; a file in the way that may not be replaced; another run that writes there; what the system says.
-#[cfg(feature = "cli")]
 pub fn write_contents(folder: &Path, files: Vec<(String, Vec<u8>)>, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+    let lock = folder.exists().then(|| FolderLock::take(folder)).transpose()?;
+    // Again: a file may have come while the run computed.
+    refuse_foreign(folder, files.iter().map(|(name, _)| name.as_str()), existing)?;
     let mut group = FileGroup::new(folder);
     files.into_iter().try_for_each(|(name, content)| group.add(&name, content))?;
-    put(group, folder, existing)
+    let written = group.commit()?;
+    drop(lock);
+    Ok(written)
 }
 
 /// Finds out, before any computing, whether files of these names can be written to a folder; leaves no trace. `alone`: no other

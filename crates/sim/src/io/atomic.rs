@@ -56,17 +56,6 @@ impl FileGroup {
         Ok(())
     }
 
-    /// Names in the order in which they were added.
-    pub fn names(&self) -> impl Iterator<Item = &str> {
-        self.files.iter().map(|(n, _)| n.as_str())
-    }
-
-    /// Names and contents of the files, all of whose parts are here.
-    #[cfg(feature = "cli")]
-    pub(crate) fn into_contents(self) -> Vec<(String, Vec<u8>)> {
-        self.files.into_iter().map(|(name, content)| (name, content.into_bytes())).collect()
-    }
-
     /// Writes all files, replacing older ones of the same names; returns their paths in the order in which they were added.
     ///
     /// # Errors
