@@ -34,11 +34,8 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     let outside = |t: &&f64| t.abs() > MAX_TIME_S;
     let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
     if let Some(bad) = times.iter().find(outside) {
-        return Err(OutputError::value(
-            "ray time_s",
-            format!("{bad:?}"),
-            format!("within {MAX_TIME_S:?} s of the start of the flow"),
-        ));
+        let allowed = format!("within {MAX_TIME_S:?} s of the start of the flow");
+        return Err(OutputError::value("ray time_s", format!("{bad:?}"), allowed));
     }
     let mut variables = axes(map, times);
     variables.extend(site(map));

@@ -98,6 +98,8 @@ impl Table {
     /// # Errors
     /// Tables whose columns differ in number, name or kind.
     pub fn stack(tables: impl IntoIterator<Item = Self>) -> OutputResult<Self> {
+        let refuse =
+            |name: &str, other| OutputError::value("column of a table", other, format!("{name}, of the same kind"));
         let mut tables = tables.into_iter();
         let mut all = tables.next().unwrap_or_default();
         for table in tables {
@@ -108,13 +110,7 @@ impl Table {
                     (Column::Float(column), Column::Float(more)) if fits => column.extend(more),
                     (Column::Int(column), Column::Int(more)) if fits => column.extend(more),
                     (Column::Text(column), Column::Text(more)) if fits => column.extend(more),
-                    _ => {
-                        return Err(OutputError::value(
-                            "column of a table",
-                            other,
-                            format!("{name}, of the same kind"),
-                        ));
-                    }
+                    _ => return Err(refuse(name, other)),
                 }
             }
         }

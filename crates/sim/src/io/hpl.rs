@@ -91,11 +91,8 @@ pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputR
     if first.date() == last.date() {
         return Ok(());
     }
-    Err(OutputError::value(
-        "time of the rays",
-        format!("{first} to {last}"),
-        "an .hpl file holds a sweep within one day",
-    ))
+    let both = format!("{first} to {last}");
+    Err(OutputError::value("time of the rays", both, "an .hpl file holds a sweep within one day"))
 }
 
 /// Gate length in metres, and number of gates between the lidar and the first one.

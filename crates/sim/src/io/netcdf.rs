@@ -195,10 +195,8 @@ impl Layout {
         let own = self.variables.iter().filter(|variable| variable.first.is_none());
         let total: usize = own.map(|v| v.data.bytes.len()).sum();
         if total > MAX_BYTES {
-            return Err(OutputError::Unsupported {
-                format: "NetCDF",
-                reason: format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep"),
-            });
+            let reason = format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep");
+            return Err(OutputError::Unsupported { format: "NetCDF", reason });
         }
         Ok(())
     }

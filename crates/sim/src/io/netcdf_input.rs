@@ -259,17 +259,15 @@ impl NetcdfFile {
         let spare: Vec<&str> = (0..dims.len()).filter(|i| !places.contains(&Some(*i))).map(|i| dims[i]).collect();
         let found: Vec<String> = places.iter().flatten().map(|place| dims[*place].to_owned()).collect();
         if let Some(missing) = places.iter().position(Option::is_none) {
-            let role = roles[missing];
+            let (role, count) = (roles[missing], dims.len());
             let known = spare.iter().find_map(|dim| presentable(dim));
             let rename = known.map_or(String::new(), |dim| {
                 format!(": rename {dim}, in xarray with ds.rename({dim}=\"{}\"), or", role.name)
             });
             return Err(format!(
-                "{name} needs dimensions for {needed} (in any order), and none of its {} is {}{rename} give its coordinate the attribute \
+                "{name} needs dimensions for {needed} (in any order), and none of its {count} is {}{rename} give its coordinate the attribute \
                  axis = \"{}\"",
-                dims.len(),
-                role.name,
-                role.axis
+                role.name, role.axis
             ));
         }
         if let Some(long) = spare.iter().find(|dim| self.length(dim) != Some(1)) {

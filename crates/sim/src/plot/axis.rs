@@ -39,11 +39,8 @@ impl Axis {
             if low < high && usable(&low) && usable(&high) {
                 return Ok((low, high));
             }
-            return Err(OutputError::value(
-                format!("range of axis '{}'", self.label),
-                format!("{low} to {high}"),
-                "finite and increasing, positive on a logarithmic axis",
-            ));
+            let (name, range) = (format!("range of axis '{}'", self.label), format!("{low} to {high}"));
+            return Err(OutputError::value(name, range, "finite and increasing, positive on a logarithmic axis"));
         }
         let (low, high) = extremes(values.filter(usable).map(|v| forth(self.log, v)));
         if low > high {

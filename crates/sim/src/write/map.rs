@@ -28,6 +28,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
     };
     let number =
         |name: &str, text: &str, values: &ndarray::Array2<f64>| Field::float(name, Unit::ONE, text, values.clone());
+    let in_band = "signal-to-noise ratio in the detector band that the spectra show";
     let spread = e
         .v_spread_m_s
         .as_ref()
@@ -67,12 +68,7 @@ pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
             number("flagged", "fraction of the realisations whose estimate was flagged", &e.flagged),
             number("count", "realisations with a velocity", &e.count),
             speed("width", "spectral width of air and pulse".into(), &e.width_m_s),
-            Field::float(
-                "signal_to_noise_ratio",
-                Unit::DECIBEL,
-                "signal-to-noise ratio in the detector band that the spectra show",
-                e.snr_db.clone(),
-            ),
+            Field::float("signal_to_noise_ratio", Unit::DECIBEL, in_band, e.snr_db.clone()),
             number("quality", "density of the peak over the mean density in the band", &e.quality),
             speed("v_scan", away("radial velocity estimated from the first realisation"), &e.v_scan_m_s),
         ]

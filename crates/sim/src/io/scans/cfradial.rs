@@ -203,11 +203,9 @@ impl GateLayout {
     /// The values \[ray, gate\], one ray after the other.
     fn read(&self, file: &NetcdfFile, name: &str) -> Result<Vec<f64>, String> {
         let (values, rays, gates) = (file.floats(name)?, self.rays.len(), self.gates);
-        if self.is_full && values.len() != rays * gates {
-            return Err(format!(
-                "variable {name} has {} values; {rays} rays x {gates} ranges are needed",
-                values.len()
-            ));
+        let count = values.len();
+        if self.is_full && count != rays * gates {
+            return Err(format!("variable {name} has {count} values; {rays} rays x {gates} ranges are needed"));
         }
         let mut out = vec![f64::NAN; rays * gates];
         for (ray, (start, count)) in self.rays.iter().enumerate() {
@@ -281,19 +279,13 @@ fn sweeps(file: &NetcdfFile, count: usize) -> Result<Vec<std::ops::Range<usize>>
     if !(file.has(start) && file.has(end)) {
         return Ok(std::iter::once(0..count).collect());
     }
-    let (starts, ends) = (file.floats(start)?, file.floats(end)?);
-    starts
-        .iter()
-        .zip(&ends)
-        .enumerate()
-        .map(|(sweep, (start, end))| match 0.0 <= *start && start <= end && *end < count as f64 {
+    let (starts, ends, last) = (file.floats(start)?, file.floats(end)?, count.max(1) - 1);
+    let range =
+        |(sweep, (start, end)): (usize, (&f64, &f64))| match 0.0 <= *start && start <= end && *end < count as f64 {
             true => Ok(*start as usize..*end as usize + 1),
-            false => Err(format!(
-                "sweep {sweep} goes from ray {start} to ray {end}; the file has rays 0 to {}",
-                count.max(1) - 1
-            )),
-        })
-        .collect()
+            false => Err(format!("sweep {sweep} goes from ray {start} to ray {end}; the file has rays 0 to {last}")),
+        };
+    starts.iter().zip(&ends).enumerate().map(range).collect()
 }
 
 /// The values of a variable; none where it is not there.

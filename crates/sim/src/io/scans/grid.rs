@@ -63,10 +63,8 @@ pub(super) fn scan_map(
     }
     let gates = range_m.len();
     if let Some(pair) = range_m.windows(2).find(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
-        return Err(format!(
-            "{what}: range must increase from gate to gate, and {} m is followed by {} m",
-            pair[0], pair[1]
-        ));
+        let (one_m, next_m) = (pair[0], pair[1]);
+        return Err(format!("{what}: range must increase from gate to gate, and {one_m} m is followed by {next_m} m"));
     }
     if !range_m.first().is_some_and(|first| *first >= 0.0 && first.is_finite()) {
         return Err(format!("{what}: range must be at least 0 m at the first gate"));

@@ -50,16 +50,13 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
             days_h += if 3600.0 * (hours + days_h) < before.time_s - 43_200.0 { 24.0 } else { 0.0 };
         }
         let (mut velocity_m_s, mut intensity) = (vec![f64::NAN; header.gates], vec![f64::NAN; header.gates]);
+        let ray = rays.len() + 1;
         for gate in 0..header.gates {
-            let (number, line) = rest.next().ok_or_else(|| {
-                format!("it is cut short: ray {} has {gate} of {} gates", rays.len() + 1, header.gates)
-            })?;
+            let (number, line) = rest
+                .next()
+                .ok_or_else(|| format!("it is cut short: ray {ray} has {gate} of {} gates", header.gates))?;
             let row = numbers(line).filter(|row| row.len() >= 3 && row[0] == gate as f64).ok_or_else(|| {
-                format!(
-                    "line {}: gate {gate} of ray {} is expected, with velocity and intensity",
-                    number + 1,
-                    rays.len() + 1
-                )
+                format!("line {}: gate {gate} of ray {ray} is expected, with velocity and intensity", number + 1)
             })?;
             (velocity_m_s[gate], intensity[gate]) = (row[1], row[2]);
         }
