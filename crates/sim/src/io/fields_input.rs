@@ -81,10 +81,9 @@ pub(crate) fn periods_m(field: &FieldPlace, name: &str) -> Result<[Option<f64>; 
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
     let file = open(&field.path)?;
     let scalar = component(&file, name, field.place, false).map_err(|reason| file.refuse(reason))?;
-    let bad = scalar.values.iter().enumerate().find(|(_, value)| **value < 0.0);
-    bad.map_or(Ok(()), |(at, value)| {
-        Err(file.refuse(format!("{name} is {value:?} at place {at}: it must not be negative")))
-    })?;
+    if let Some((at, value)) = scalar.values.iter().enumerate().find(|(_, value)| **value < 0.0) {
+        return Err(file.refuse(format!("{name} is {value:?} at place {at}: it must not be negative")));
+    }
     Ok(scalar)
 }
 

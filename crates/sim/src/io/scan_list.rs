@@ -33,18 +33,15 @@ pub fn read(path: &Path) -> Result<Vec<Stop>, Error> {
 /// As [`read`].
 pub fn parse(text: &str) -> Result<Vec<Stop>, String> {
     let first = text.lines().map(str::trim).find(|line| !line.is_empty() && !line.starts_with('#'));
+    let stare = |(i, line): (usize, &str)| match step_stare(line.trim()) {
+        Some(angles_rad) => Ok(Stop::new(SweepMode::Pointing, angles_rad)),
+        None => Err(format!("line {}: azimuth and elevation in degrees as 340.004090.000 are needed", i + 1)),
+    };
     let stops = match first {
-        Some(line) if step_stare(line).is_some() => text
-            .lines()
-            .enumerate()
-            .filter(|(_, line)| !line.trim().is_empty())
-            .map(|(i, line)| {
-                let angles_rad = step_stare(line.trim()).ok_or_else(|| {
-                    format!("line {}: azimuth and elevation in degrees as 340.004090.000 are needed", i + 1)
-                })?;
-                Ok(Stop::new(SweepMode::Pointing, angles_rad))
-            })
-            .collect::<Result<Vec<_>, String>>()?,
+        Some(line) if step_stare(line).is_some() => {
+            let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+            lines.map(stare).collect::<Result<Vec<_>, String>>()?
+        }
         _ => table(&TextTable::parse(text)?)?,
     };
     if stops.is_empty() || stops.len() > MOST_ROWS {
