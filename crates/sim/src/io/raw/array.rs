@@ -63,6 +63,7 @@ impl ArrayInFile {
         };
         let pulses = self.pulses_per_line.max(1);
         for (first, out) in records.step_by(together).zip(out.chunks_mut((together * count).max(1))) {
+            // The place in the file of a record in the order of lines and their pulses.
             let row = match self.order {
                 Order::PulseMajor => first % pulses * (self.records / pulses) + first / pulses,
                 _ => first,
