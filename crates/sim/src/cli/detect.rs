@@ -144,38 +144,32 @@ impl DetectWords {
 /// Adds what people read of the scans and of the wakes that are found in scans like them.
 fn told(scans: &[ReadScan], found: &[ScanDetection], power: Option<&Power>, text: &mut Vec<String>) {
     for (scan, found) in scans.iter().zip(found) {
-        let name = format!("{} sweep {}", scan.path.display(), scan.sweep);
-        let (statistic, rate) = (found.statistic.value, found.false_alarm);
         let verdict = if found.is_wake() { "wake" } else { "no wake" };
+        let (statistic, threshold, rate) = (found.statistic.value, found.threshold, found.false_alarm);
         let reached = if rate < 1e-12 { "less than 1e-12".into() } else { digits(rate) };
-        text.push(format!(
-                "{name}: {verdict}; statistic {statistic:.1}, threshold {:.1}; an empty scan reaches it with probability {reached}",
-                found.threshold
-            ));
+        let mut line = format!("{} sweep {}: {verdict}; statistic {statistic:.1}, ", scan.path.display(), scan.sweep);
+        line += &format!("threshold {threshold:.1}; an empty scan reaches it with probability {reached}");
+        text.push(line);
         if let Some(sigma_m_s) = found.assumed_sigma_m_s {
             text.push(format!("  no deviations are stated: {} m/s is taken for all", digits(sigma_m_s)));
         }
         if found.is_correlated() {
             let (along, across) = found.statistic.neighbour_correlation;
             text.push(format!(
-                    "  warning: neighbours are correlated, {along:.2} along the lines and {across:.2} across: this is not the background \
-                     that the rate holds for; state --turbulence, or --stride for lines and gates that share pulses"
-                ));
+                "  warning: neighbours are correlated, {along:.2} along the lines and {across:.2} across: this is not the background that \
+                 the rate holds for; state --turbulence, or --stride for lines and gates that share pulses"
+            ));
         }
     }
     if let Some(power) = power {
-        let (mu, beta) = power.gumbel;
-        text.push(format!(
-            "threshold {:.2} for {} false alarms a scan; Gumbel's mu {mu:.2}, beta {beta:.2}{}",
-            power.threshold,
-            power.false_alarm,
-            if (1.5..2.6).contains(&beta) { "" } else { " (should be near 2: is the noise what was stated?)" }
-        ));
-        let (measured, foretold) = power.smallest_m2_s;
-        text.push(format!(
-                "circulation found nine times in ten: {measured:.1} +- {:.1} m^2/s (the bound of {:.2} m^2/s foretells {foretold:.1})",
-                power.smallest_error_m2_s, power.circulation_std_m2_s
-            ));
+        let ((mu, beta), (measured, foretold)) = (power.gumbel, power.smallest_m2_s);
+        let (threshold, rate) = (power.threshold, power.false_alarm);
+        let doubt = if (1.5..2.6).contains(&beta) { "" } else { " (should be near 2: is the noise what was stated?)" };
+        let law = format!("Gumbel's mu {mu:.2}, beta {beta:.2}{doubt}");
+        text.push(format!("threshold {threshold:.2} for {rate} false alarms a scan; {law}"));
+        let (error, bound) = (power.smallest_error_m2_s, power.circulation_std_m2_s);
+        let by_bound = format!("the bound of {bound:.2} m^2/s foretells {foretold:.1}");
+        text.push(format!("circulation found nine times in ten: {measured:.1} +- {error:.1} m^2/s ({by_bound})"));
     }
 }
 

@@ -5,7 +5,9 @@ use super::{Cli, paths};
 use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
-use crate::flow::{Begin, CaseFile, CaseKind, EXAMPLES, RunOptions, WakePreset, check_on, example, run_on};
+use crate::flow::{
+    Begin, CaseFile, CaseKind, EXAMPLES, FlowOutcome, RunOptions, WakePreset, check_on, example, run_on,
+};
 use crate::setup::progress::{Observer, Silent};
 use clap::Args;
 use serde_json::json;
@@ -140,29 +142,20 @@ fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ran
             }
         }
     }
+    let FlowOutcome { steps, time_s, is_complete, kinetic_energy_m5_s2, relative_divergence, stepping, .. } = outcome;
     let object = json!({
-        "version": crate::VERSION, "case_hash": file.hash, "steps": outcome.steps, "time_s": outcome.time_s,
-        "is_complete": outcome.is_complete, "kinetic_energy_m5_s2": outcome.kinetic_energy_m5_s2,
-        "relative_divergence": outcome.relative_divergence, "steps_wall_s": outcome.stepping.wall_s,
-        "exchange_wall_s": outcome.stepping.exchange_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
+        "version": crate::VERSION, "case_hash": file.hash, "steps": steps, "time_s": time_s, "is_complete": is_complete,
+        "kinetic_energy_m5_s2": kinetic_energy_m5_s2, "relative_divergence": relative_divergence, "steps_wall_s": stepping.wall_s,
+        "exchange_wall_s": stepping.exchange_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
     });
-    let state = if outcome.is_complete { "done" } else { "paused, --restart continues it" };
-    let stepping = outcome.stepping;
-    let mut exchange = String::new();
+    let state = if is_complete { "done" } else { "paused, --restart continues it" };
+    let mut text = format!("{state}: step {steps}, t = {time_s:?} s, energy {kinetic_energy_m5_s2:.6e} m^5/s^2, ");
+    text += &format!("relative divergence {relative_divergence:.1e}\n");
     if ranks.count() > 1 {
         let share = 100.0 * stepping.exchange_s / stepping.wall_s;
-        exchange = format!("steps took {:.1} s, {share:.1} % of it in turns and halos\n", stepping.wall_s);
+        text += &format!("steps took {:.1} s, {share:.1} % of it in turns and halos\n", stepping.wall_s);
     }
-    let text = format!(
-        "{state}: step {}, t = {:?} s, energy {:.6e} m^5/s^2, relative divergence {:.1e}\n{exchange}wrote {} files to {}",
-        outcome.steps,
-        outcome.time_s,
-        outcome.kinetic_energy_m5_s2,
-        outcome.relative_divergence,
-        outcome.files.len(),
-        out.display()
-    );
-    cli.say(&object, &text)
+    cli.say(&object, &format!("{text}wrote {} files to {}", outcome.files.len(), out.display()))
 }
 
 /// What Open MPI and MPICH (with its relatives) tell each process of their number.

@@ -338,31 +338,26 @@ fn text(found: &[RetrievedScan]) -> String {
     for (number, scan) in found.iter().enumerate() {
         let flags = retrieve::flags(&scan.result);
         let flags = if flags.is_empty() { String::new() } else { format!("  [{}]", flags.join(" ")) };
+        let name = format!("scan {}", number + 1);
         if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
             let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);
-            let why = if statistic < threshold { "below" } else { "above" };
-            let certain = if statistic < threshold { "" } else { ", but no circulation is certain" };
-            out += &format!(
-                "scan {}: no wake, statistic {statistic:.1} {why} {threshold:.1}{certain}{flags}\n",
-                number + 1
-            );
+            let (why, certain) = match statistic < threshold {
+                true => ("below", ""),
+                false => ("above", ", but no circulation is certain"),
+            };
+            out += &format!("{name}: no wake, statistic {statistic:.1} {why} {threshold:.1}{certain}{flags}\n");
         }
         for vortex in &scan.result.vortices {
-            let (mean, y_m, z_m) = (vortex.circulation_5_15_m2_s, vortex.lateral_position_m, vortex.height_m);
+            let mean = vortex.circulation_5_15_m2_s;
             let circulation = match (mean.value.is_finite(), mean.std.is_finite()) {
                 (false, _) => "unknown: no line of it has an envelope that ends in the band".into(),
                 (true, false) => format!("{:.1} m^2/s, its error unknown,", mean.value),
                 (true, true) => format!("{:.1} +- {:.1} m^2/s", mean.value, mean.std),
             };
-            out += &format!(
-                "scan {}: {:<5} Gamma(5-15 m) {circulation} at y {:.2} +- {:.2} m, z {:.2} +- {:.2} m{flags}\n",
-                number + 1,
-                retrieve::side(vortex.side),
-                y_m.value,
-                y_m.std,
-                z_m.value,
-                z_m.std,
-            );
+            let [y, z] =
+                [vortex.lateral_position_m, vortex.height_m].map(|m| format!("{:.2} +- {:.2} m", m.value, m.std));
+            let side = retrieve::side(vortex.side);
+            out += &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");
         }
     }
     out

@@ -38,21 +38,17 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
         return cli.say(&json!({ "version": crate::VERSION, "files": paths(&files) }), &text);
     };
-    let summary = run(sweep, &words.out, words.settings, &*cli.observer())?;
-    let sweep::Summary { run: ran, kept, shared, files } = &summary;
+    let sweep::Summary { run: ran, kept, shared, files } = run(sweep, &words.out, words.settings, &*cli.observer())?;
+    let sweep::Shared { flows, efficiencies, signals } = shared;
     let text = format!(
-        "{ran} cases run, {kept} kept; computed once for all that share them: flows {}, efficiency curves {}, signals {}\n\
-         wrote {} files and the folders of the cases to {}",
-        shared.flows,
-        shared.efficiencies,
-        shared.signals,
+        "{ran} cases run, {kept} kept; computed once for all that share them: flows {flows}, efficiency curves {efficiencies}, signals \
+         {signals}\nwrote {} files and the folders of the cases to {}",
         files.len(),
         words.out.display()
     );
     let object = json!({
-        "version": crate::VERSION, "sweep_hash": sweep.origin.scene_hash, "cases": sweep.cases.len(), "run": ran,
-        "kept": kept, "flows": shared.flows, "efficiencies": shared.efficiencies, "signals": shared.signals,
-        "files": paths(files),
+        "version": crate::VERSION, "sweep_hash": sweep.origin.scene_hash, "cases": sweep.cases.len(), "run": ran, "kept": kept,
+        "flows": flows, "efficiencies": efficiencies, "signals": signals, "files": paths(&files),
     });
     cli.say(&object, &text)
 }

@@ -148,13 +148,10 @@ impl Scene {
         }
         if let Flow::VortexPair(p) = &self.flow {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
-            c.between(
-                core_m < 0.5 * spacing_m,
-                &[
-                    side("flow.core_radius_m", core_m, format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m)),
-                    side("flow.spacing_m", spacing_m, format!("above twice flow.core_radius_m, {} m", 2.0 * core_m)),
-                ],
-            );
+            let below = format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m);
+            let above = format!("above twice flow.core_radius_m, {} m", 2.0 * core_m);
+            let sides = [side("flow.core_radius_m", core_m, below), side("flow.spacing_m", spacing_m, above)];
+            c.between(core_m < 0.5 * spacing_m, &sides);
         }
     }
 
@@ -221,13 +218,9 @@ impl Scene {
         let place = |edge: f64| (d.intermediate_frequency_hz + edge * 0.5 * d.bandwidth_hz) / step_hz;
         let why = "so that the spectrum has a frequency in the detector band";
         let needed = (d.sampling_hz / (d.bandwidth_hz * points_of_one)).ceil();
-        c.between(
-            (place(-1.0) - 1e-9).ceil() <= (place(1.0) + 1e-9).floor(),
-            &[
-                side("detector.bandwidth_hz", d.bandwidth_hz, format!("at least {step_hz:e} Hz, {why}")),
-                (key, value.to_string(), format!("at least {needed}, {why}")),
-            ],
-        );
+        let wide = side("detector.bandwidth_hz", d.bandwidth_hz, format!("at least {step_hz:e} Hz, {why}"));
+        let fine = (key, value.to_string(), format!("at least {needed}, {why}"));
+        c.between((place(-1.0) - 1e-9).ceil() <= (place(1.0) + 1e-9).floor(), &[wide, fine]);
     }
 
     fn check_lines(&self, c: &mut Checker<'_>) {
@@ -250,17 +243,13 @@ impl Scene {
         let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
         // Scatterers that a sample sees reach back by the length of the summation of (15).
         let reach_m = self.pulse_reach_m();
-        let mut sides = vec![side(
-            "scan.range_min_m",
-            first_m,
-            format!("above {reach_m:.3} m, half the length of the pulse in the air"),
-        )];
-        match &self.pulse.shape {
+        let far = format!("above {reach_m:.3} m, half the length of the pulse in the air");
+        let of_pulse = match &self.pulse.shape {
             PulseShape::Sampled(_) => {
                 let allowed = format!(
-                    "that ends so early that half its length in the air, {reach_m:.3} m, is below scan.range_min_m"
+                    "a pulse that ends so early that half its length in the air, {reach_m:.3} m, is below scan.range_min_m, {first_m} m"
                 );
-                sides.push(("pulse.shape", String::new(), format!("a pulse {allowed}, {first_m} m")));
+                ("pulse.shape", String::new(), allowed)
             }
             PulseShape::Gaussian(shape) => {
                 // A little less, so that rounding it is safe.
@@ -268,10 +257,10 @@ impl Scene {
                 let allowed = format!(
                     "below {longest_s:.4e} s, so that half the length of the pulse in the air is below scan.range_min_m, {first_m} m"
                 );
-                sides.push(side("pulse.shape.duration_s", shape.duration_s, allowed));
+                side("pulse.shape.duration_s", shape.duration_s, allowed)
             }
-        }
-        c.between(first_m > reach_m, &sides);
+        };
+        c.between(first_m > reach_m, &[side("scan.range_min_m", first_m, far), of_pulse]);
         let ordered = c.compare(["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], "above");
         if ordered {
             self.check_record(c);
@@ -284,35 +273,24 @@ impl Scene {
         let sampling_hz = self.detector.sampling_hz;
         let (samples, spacing_m) = (self.samples_per_record(), self.sample_spacing_m());
         let many = format!("records of at most 10000000 samples; this one has {samples}");
-        c.between(
-            samples <= 10_000_000,
-            &[
-                side("scan.range_max_m", last_m, many.clone()),
-                side("scan.range_min_m", first_m, many.clone()),
-                side("detector.sampling_hz", sampling_hz, many),
-            ],
-        );
+        let values =
+            [("scan.range_max_m", last_m), ("scan.range_min_m", first_m), ("detector.sampling_hz", sampling_hz)];
+        c.between(samples <= 10_000_000, &values.map(|(key, value)| side(key, value, many.clone())));
         let window = self.estimator.window_samples;
         let window_m = (window as f64 - 1.0) * spacing_m;
         let why = format!("so that the record, {samples} samples, holds estimator.window_samples, {window}");
         // Rounded to the side that is accepted.
         let up = |x: f64| (x * 1e3).ceil() / 1e3;
         let down = |x: f64| (x * 1e3).floor() / 1e3;
-        let window_side = (
-            "estimator.window_samples",
-            window.to_string(),
-            format!("at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m"),
-        );
+        let all = format!("at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m");
         let faster_hz = sampling_hz * (window_m / (last_m - first_m)) * (1.0 + 1e-6);
-        c.between(
-            window <= samples,
-            &[
-                window_side,
-                side("scan.range_max_m", last_m, format!("at least {} m, {why}", up(first_m + window_m))),
-                side("scan.range_min_m", first_m, format!("at most {} m, {why}", down(last_m - window_m))),
-                side("detector.sampling_hz", sampling_hz, format!("at least {faster_hz:.6e} Hz, {why}")),
-            ],
-        );
+        let sides = [
+            ("estimator.window_samples", window.to_string(), all),
+            side("scan.range_max_m", last_m, format!("at least {} m, {why}", up(first_m + window_m))),
+            side("scan.range_min_m", first_m, format!("at most {} m, {why}", down(last_m - window_m))),
+            side("detector.sampling_hz", sampling_hz, format!("at least {faster_hz:.6e} Hz, {why}")),
+        ];
+        c.between(window <= samples, &sides);
     }
 
     /// A HALO raw file counts gates from the lidar and knows their length alone.
