@@ -30,13 +30,11 @@ pub(crate) fn holds(what: &str, bytes: f64) -> Result<(), String> {
     // So little is not worth the question.
     const LITTLE_BYTES: f64 = 1e7;
     let too_much = (bytes > LITTLE_BYTES).then(available_memory_bytes).flatten().filter(|available| bytes > *available);
-    too_much.map_or(Ok(()), |available| {
-        Err(format!(
-            "{what} would take {} of memory, and {} are available",
-            units::bytes(bytes),
-            units::bytes(available)
-        ))
-    })
+    let needed = units::bytes(bytes);
+    match too_much.map(units::bytes) {
+        Some(available) => Err(format!("{what} would take {needed} of memory, and {available} are available")),
+        None => Ok(()),
+    }
 }
 
 /// An entry of the texts of /proc that are in kB, bytes.

@@ -166,11 +166,8 @@ impl RunResult {
             line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
         }
         if let Some(a) = &self.signals_a {
-            line(
-                "signal_rms_a",
-                "rms of the raw signals [A]",
-                (a.iter().map(|x| x * x).sum::<f64>() / a.len() as f64).sqrt(),
-            );
+            let mean_square = a.iter().map(|x| x * x).sum::<f64>() / a.len() as f64;
+            line("signal_rms_a", "rms of the raw signals [A]", mean_square.sqrt());
         }
         if let Some(m) = &self.map {
             line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));

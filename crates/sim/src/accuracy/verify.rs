@@ -106,13 +106,8 @@ impl Search<'_> {
         let mut of_paths = 0.0;
         if let Some(scatter) = self.scatter {
             let (one, now) = (2.0 * scatter, value(&chosen.scene, PATHS));
-            let of = OfNoise {
-                key: PATHS,
-                now,
-                each_s: times.optics_s / now,
-                fixed_s: whole_s - times.optics_s,
-                least: LEAST_PATHS,
-            };
+            let (each_s, fixed_s) = (times.optics_s / now, whole_s - times.optics_s);
+            let of = OfNoise { key: PATHS, now, each_s, fixed_s, least: LEAST_PATHS };
             let judged = self.out.figures.contains(&Figure::Efficiency);
             let own =
                 judged.then(|| of.noise(Figure::Efficiency, one, self.bound(Figure::Efficiency), within, allowed_s));

@@ -56,10 +56,8 @@ pub struct Refusal(pub Value);
 impl Refusal {
     /// For a value that is not allowed.
     pub fn of(problem: Problem) -> Self {
-        refusal(
-            SceneError::Invalid { path: "scene".into(), problems: vec![Located { problem, line: None }] }.into(),
-            true,
-        )
+        let problems = vec![Located { problem, line: None }];
+        Self(as_object(&SceneError::Invalid { path: "scene".into(), problems }.into()))
     }
 }
 

@@ -182,10 +182,8 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
         return Err(Error::Io { action: "write", path: path.to_owned(), source });
     }
     crate::io::write_atomic(path, text.as_bytes())?;
-    cli.say(
-        &json!({ "scene": path.to_string_lossy() }),
-        &format!("wrote {}\nnext: wakescope check {0}", path.display()),
-    )
+    let text = format!("wrote {}\nnext: wakescope check {0}", path.display());
+    cli.say(&json!({ "scene": path.to_string_lossy() }), &text)
 }
 
 /// What the ratio of a check lacks where phase screens make the efficiency.
@@ -213,12 +211,9 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.scene) == Model::MonteCarlo;
     object["budget"]["independent_paths"] = json!(is_less);
     let screens = if is_less { AS_ON_INDEPENDENT_PATHS } else { "" };
-    let joined = |cells: Vec<String>| cells.join(", ");
-    let short = format!(
-        "SNR in the band, one pulse, at {} m: {} dB{screens}",
-        joined(ranges_m.iter().map(f64::to_string).collect()),
-        joined(snr_db.iter().map(|db| format!("{db:.2}")).collect())
-    );
+    let ranges = ranges_m.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    let ratios = snr_db.iter().map(|db| format!("{db:.2}")).collect::<Vec<_>>().join(", ");
+    let short = format!("SNR in the band, one pulse, at {ranges} m: {ratios} dB{screens}");
     cli.say(&object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
 }
 
@@ -264,17 +259,13 @@ fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T
 }
 
 fn plan_json(plan: &Plan) -> Value {
-    let stages: Vec<Value> = plan
-        .stages
-        .iter()
-        .map(|s| {
-            json!({
-                "stage": s.stage.name(), "runs": s.runs, "reason": s.reason,
-                "memory_bytes": s.runs.then_some(s.memory_bytes),
-                "kept_bytes": s.runs.then_some(s.kept_bytes),
-            })
+    let stages = plan.stages.iter().map(|s| {
+        json!({
+            "stage": s.stage.name(), "runs": s.runs, "reason": s.reason,
+            "memory_bytes": s.runs.then_some(s.memory_bytes), "kept_bytes": s.runs.then_some(s.kept_bytes),
         })
-        .collect();
+    });
+    let stages: Vec<Value> = stages.collect();
     json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
         "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s, "memory_bytes": plan.total().memory_bytes, "warnings": plan.warnings,

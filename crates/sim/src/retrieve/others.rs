@@ -43,12 +43,8 @@ pub fn envelopes(
     };
     let Some(about) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(Vec::new()) };
     let window_sigma_s = relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
-    let shape = SpectralShape::gaussian(
-        plan.instrument.pulse.sigma_s(),
-        window_sigma_s,
-        scene.laser.wavelength_m,
-        scene.detector.bandwidth_hz,
-    )?;
+    let (wavelength_m, band_hz) = (scene.laser.wavelength_m, scene.detector.bandwidth_hz);
+    let shape = SpectralShape::gaussian(plan.instrument.pulse.sigma_s(), window_sigma_s, wavelength_m, band_hz)?;
     let (gates, cells) = (spectra.range_m.len(), spectra.velocity_m_s.len());
     let order = upward(lines, &spectra.elevation_rad);
     let power = Array3::from_shape_fn((order.len(), gates, cells), |(line, gate, cell)| {
@@ -56,7 +52,7 @@ pub fn envelopes(
     });
     let elevation_rad: Vec<f64> = order.iter().map(|line| spectra.elevation_rad[*line]).collect();
     // Independent cells of the maximum over all frequencies of the band.
-    let count = 3.0 * scene.detector.bandwidth_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+    let count = 3.0 * band_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
     let of_cell = -((-FALSE_ALARM).ln_1p() / count).exp_m1();
     let windows = scene.scan.pulses_per_line as f64;
     let threshold = CellTest::known_noise(windows)?.threshold(of_cell)?;

@@ -21,11 +21,8 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
     let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment(_));
     unused(without_peak, &["estimator.refinement"], format!("{kind} refines no peak"));
     let no_exact = method.order().is_some() && scene.estimator.refinement == Refinement::Exact;
-    unused(
-        no_exact,
-        &["estimator.refinement"],
-        format!("{kind} has no exact refinement, \"parabola\" is what it takes"),
-    );
+    let purpose = format!("{kind} has no exact refinement, \"parabola\" is what it takes");
+    unused(no_exact, &["estimator.refinement"], purpose);
     let none = !scene.outputs.signals && scene.outputs.signals_of == SignalsOf::All;
     unused(none, &["outputs.signals_of"], "outputs.signals = false writes none".into());
     let untested = scene.estimator.false_alarm != Estimator::default().false_alarm;

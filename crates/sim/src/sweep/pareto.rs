@@ -155,11 +155,9 @@ impl FrontTable {
                 shown.push(place);
             }
         }
+        let (shown, count, of) = (self.columns(shown).aligned(), self.front.len(), self.of);
         format!(
-            "{}{} of {} rows are on the front; doubtful: within {NEAR} standard errors of being beaten\n",
-            self.columns(shown).aligned(),
-            self.front.len(),
-            self.of
+            "{shown}{count} of {of} rows are on the front; doubtful: within {NEAR} standard errors of being beaten\n"
         )
     }
 

@@ -123,17 +123,14 @@ impl Definition {
     /// # Errors
     /// What the system says; a file of somebody else in the way.
     pub(super) fn store(&self, folder: &Path, case: &Case, results: &[f64], existing: Existing) -> Result<(), Error> {
+        let names = RESULTS.iter().map(|(name, ..)| (*name).to_owned());
         let row = Row {
             source: crate::PROGRAM.into(),
             scene_hash: case.scene.hash.clone(),
             case: case.index,
             keys: self.keys.iter().map(|key| key.name.clone()).zip(case.values.iter().cloned()).collect(),
             circulation: self.circulation,
-            results: RESULTS
-                .iter()
-                .map(|(name, ..)| (*name).to_owned())
-                .zip(results.iter().map(|v| float_text(*v)))
-                .collect(),
+            results: names.zip(results.iter().map(|result| float_text(*result))).collect(),
         };
         let of = (Outputs::default(), case.scene.provenance());
         outputs::Outputs::write(&folder_of(folder, case.index), existing, of, |files| {
