@@ -86,10 +86,8 @@ impl Request {
             _ => true,
         };
         let is_asked = |figure: &Figure| self.of.is_empty() || self.of.contains(figure);
-        Ok(Figure::ALL
-            .into_iter()
-            .filter(|figure| lacking(*figure).is_none() && has(figure) && is_asked(figure))
-            .collect())
+        let is_judged = |figure: &Figure| lacking(*figure).is_none() && has(figure) && is_asked(figure);
+        Ok(Figure::ALL.into_iter().filter(is_judged).collect())
     }
 }
 

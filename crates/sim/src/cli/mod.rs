@@ -251,10 +251,8 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
 
 fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     let threads = usize::from(cli.threads.unwrap_or(0));
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|e| Error::Threads { threads, reason: e.to_string() })?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let pool = pool.map_err(|e| Error::Threads { threads, reason: e.to_string() })?;
     Ok(pool.install(work))
 }
 

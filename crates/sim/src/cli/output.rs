@@ -1,7 +1,7 @@
 //! What the program prints: results to standard output, errors to standard error, as text or as JSON.
 
 use crate::Error;
-use crate::scene::{Problem, SceneError};
+use crate::scene::{Located, SceneError};
 use clap::error::ContextKind;
 use serde_json::{Value, json};
 use std::io::{ErrorKind, Write as _};
@@ -69,15 +69,15 @@ pub(super) fn as_object(error: &Error) -> Value {
 }
 
 fn problems(error: &Error) -> Vec<Value> {
-    let problem = |file: &Path, line: Option<usize>, allowed: &str| json!({ "file": file.to_string_lossy(), "line": line, "key": null, "value": null, "allowed": allowed });
+    let object = |file: &Path, line: Option<usize>, [key, value]: [Value; 2], allowed: &str| json!({ "file": file.to_string_lossy(), "line": line, "key": key, "value": value, "allowed": allowed });
+    let problem = |file: &Path, line, allowed: &str| object(file, line, [Value::Null, Value::Null], allowed);
     match error {
-        Error::Scene(SceneError::Invalid { path, problems }) => problems
-            .iter()
-            .map(|located| {
-                let Problem { key, value, allowed } = &located.problem;
-                json!({ "file": path.to_string_lossy(), "line": located.line, "key": key, "value": value, "allowed": allowed })
-            })
-            .collect(),
+        Error::Scene(SceneError::Invalid { path, problems }) => {
+            let of = |Located { problem, line }: &Located| {
+                object(path, *line, [json!(problem.key), json!(problem.value)], &problem.allowed)
+            };
+            problems.iter().map(of).collect()
+        }
         Error::Scene(SceneError::Malformed { path, line, message }) => vec![problem(path, Some(*line), message)],
         Error::Input { path, reason } => vec![problem(path, None, reason)],
         Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {

@@ -75,14 +75,11 @@ pub enum SceneError {
 const MOST_LINES: usize = 50;
 
 fn list(path: &Path, problems: &[Located]) -> String {
-    let mut lines: Vec<String> = problems
-        .iter()
-        .take(MOST_LINES)
-        .map(|p| match p.line {
-            Some(line) => format!("{}:{line}: {}", path.display(), p.problem),
-            None => format!("{}: {}", path.display(), p.problem),
-        })
-        .collect();
+    let of = |Located { problem, line }: &Located| match line {
+        Some(line) => format!("{}:{line}: {problem}", path.display()),
+        None => format!("{}: {problem}", path.display()),
+    };
+    let mut lines: Vec<String> = problems.iter().take(MOST_LINES).map(of).collect();
     if problems.len() > MOST_LINES {
         lines.push(format!("and {} more", problems.len() - MOST_LINES));
     }

@@ -7,7 +7,8 @@ use super::tracks::COLUMNS;
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
-use wakescope_estimate::retrieval::{Flag, Measured, ScanResult, Side, Track, expected_velocities};
+use ndarray::Array2;
+use wakescope_estimate::retrieval::{Flag, Measured, ScanResult, Side, Track, TrackPoint, expected_velocities};
 
 /// Velocities, the fitted wake and the residual of a scan side by side; velocities alone where no wake was found.
 ///
@@ -29,14 +30,14 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         elevation_rad: *elevation_rad,
         ..Ray::default()
     });
+    let field = |(name, text, values): &(&'static str, &str, Array2<f64>)| {
+        Field::float(name, Unit::METRE_PER_SECOND, text, values.clone())
+    };
     let shown = VelocityMap {
         rays: rays.collect(),
         range_m: map.range_m.clone(),
         sweeps: vec![Sweep::rhi(f64::NAN, 0.0)],
-        fields: fields
-            .iter()
-            .map(|(name, text, values)| Field::float(name, Unit::METRE_PER_SECOND, text, values.clone()))
-            .collect(),
+        fields: fields.iter().map(field).collect(),
         lidar_y_m: scan.options.model.lidar_lateral_position_m,
         lidar_height_m: scan.options.model.lidar_height_m,
         ..VelocityMap::default()
@@ -82,13 +83,11 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
         let (_, _, get) = COLUMNS[column];
         let mut plot = CurvePlot::new(title, Axis::linear("time [s]"), Axis::linear(label));
         for (colour, side) in [Side::Left, Side::Right].into_iter().enumerate() {
-            let of_track: Vec<(f64, Measured)> = track
-                .points
-                .iter()
-                .filter_map(|point| {
-                    Some((point.time_s, get(point.vortices.iter().find(|vortex| vortex.side == side)?)))
-                })
-                .collect();
+            let of_point = |point: &TrackPoint| {
+                let vortex = point.vortices.iter().find(|vortex| vortex.side == side)?;
+                Some((point.time_s, get(vortex)))
+            };
+            let of_track: Vec<(f64, Measured)> = track.points.iter().filter_map(of_point).collect();
             let of_scan = |result: &ScanResult| {
                 let vortex = result.vortex(side)?;
                 let of = [vortex.circulation_m2_s, vortex.lateral_position_m, vortex.height_m];

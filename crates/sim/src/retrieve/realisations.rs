@@ -220,11 +220,9 @@ fn tests(
     };
     let empty = noise.empty_scan(plan);
     let calibration = Calibration::new(&strided(&empty, settings.stride), &settings, observer)?;
-    maps.iter()
-        .map(|map| {
-            let scan = ScanMap { velocity_m_s: map.clone(), ..empty.clone() };
-            let found = calibration.of_scan(&scan, &settings)?;
-            Ok((found.statistic.value, found.threshold))
-        })
-        .collect()
+    let test = |map: &Array2<f64>| {
+        let found = calibration.of_scan(&ScanMap { velocity_m_s: map.clone(), ..empty.clone() }, &settings)?;
+        Ok((found.statistic.value, found.threshold))
+    };
+    maps.iter().map(test).collect()
 }
