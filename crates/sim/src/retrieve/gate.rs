@@ -21,6 +21,11 @@ const WIDE_HZ: f64 = 500e6;
 /// Root of 8 ln 2: width at half height of a Gaussian over its standard deviation.
 const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 
+/// What is told of gates whose weight is not wholly known.
+const WITHOUT_PULSE: &str = "the file says nothing of the pulse: --gate-std states the weight of a gate";
+const AT_POINTS: &str =
+    "velocities are taken for those at points: --gate-std states the weight of a gate, or --scene the instrument";
+
 /// The gate of a scan: as stated, else of the scene, else of what the file says; points if it says nothing, with the remedy.
 ///
 /// # Errors
@@ -30,28 +35,16 @@ pub fn gate_of(
     stated_m: Option<f64>,
     scene: Option<&Scene>,
 ) -> Result<(Gate, Option<&'static str>), Error> {
-    match (stated_m, scene) {
-        (Some(std_m), _) => Ok((of_std(std_m), None)),
-        (None, Some(scene)) => Ok((of_scene(scene)?, None)),
-        (None, None) => {
-            let pulse_width_s = scan.and_then(|scan| scan.pulse_width_s);
-            let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
-            let window_m = scan.and_then(|scan| scan.gate_length_m).map(|length_m| length_m / 12f64.sqrt());
-            match (pulse_m, window_m) {
-                (Some(pulse_m), window_m) => Ok((of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None)),
-                (None, Some(window_m)) => Ok((
-                    of_std(window_m),
-                    Some("the file says nothing of the pulse: --gate-std states the weight of a gate"),
-                )),
-                (None, None) => Ok((
-                    Gate::Point,
-                    Some(
-                        "velocities are taken for those at points: --gate-std states the weight of a gate, or --scene the instrument",
-                    ),
-                )),
-            }
-        }
-    }
+    let pulse_width_s = scan.and_then(|scan| scan.pulse_width_s);
+    let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
+    let window_m = scan.and_then(|scan| scan.gate_length_m).map(|length_m| length_m / 12f64.sqrt());
+    Ok(match (stated_m, scene, pulse_m, window_m) {
+        (Some(std_m), ..) => (of_std(std_m), None),
+        (None, Some(scene), ..) => (of_scene(scene)?, None),
+        (None, None, Some(pulse_m), window_m) => (of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None),
+        (None, None, None, Some(window_m)) => (of_std(window_m), Some(WITHOUT_PULSE)),
+        (None, None, None, None) => (Gate::Point, Some(AT_POINTS)),
+    })
 }
 
 fn of_std(std_m: f64) -> Gate {

@@ -115,17 +115,16 @@ impl Fits<'_> {
             Movement::Auto => self.scan.lasts_s() >= RetrievalOptions::SHORT_S,
         } && self.scan.has_times();
         let (view, model, options) = (&self.view, &self.options.model, &self.map_options);
+        let from =
+            |moves, start: &Wake| refine_map_fit_of_estimator(view, model, self.shown(moves), start, options).ok();
         let first = match start {
-            Some(start) => refine_map_fit_of_estimator(view, model, self.shown(moves), start, options),
-            None => fit_map_of_estimator(view, model, self.shown(moves), options),
-        }
-        .ok()?;
+            Some(start) => from(moves, start)?,
+            None => fit_map_of_estimator(view, model, self.shown(moves), options).ok()?,
+        };
         if self.options.movement != Movement::Auto || self.scan.lasts_s() == 0.0 {
             return Some((first, moves));
         }
         let chi2 = |fit: &MapFit| fit.tops.first().map_or(f64::INFINITY, |top| top.chi2);
-        let from =
-            |moves, start: &Wake| refine_map_fit_of_estimator(view, model, self.shown(moves), start, options).ok();
         let is_better = |other: &MapFit, than: &MapFit| chi2(than) - chi2(other) > RetrievalOptions::MOVES;
         let Some(other) = from(!moves, &first.wake).filter(|other| is_better(other, &first)) else {
             return Some((first, moves));
