@@ -162,8 +162,6 @@ pub(crate) fn prepare(folder: &Path, names: &[String], existing: Existing, alone
     refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
     in_folder(folder, false, || {
         drop(Stage::make(folder)?);
-        let lock = alone.then(|| FolderLock::take(folder)).transpose()?;
-        drop(lock);
-        Ok(())
+        Ok(alone.then(|| FolderLock::take(folder)).transpose().map(drop)?)
     })
 }

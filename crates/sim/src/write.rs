@@ -163,18 +163,16 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
     let (scene, g) = (&plan.scene.scene, &plan.geometry);
     let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
     let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
-    let is_plane = g.schedule.is_plane();
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
-    let first_pulse_s = plan.wind.start_s;
     Some(RawSignals {
         recording: recording(plan),
         range_m: g.layer_range_m().collect(),
         radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
-        pulse_time_s: all().map(|at| first_pulse_s + beam(at).time_s).collect(),
+        pulse_time_s: all().map(|at| plan.wind.start_s + beam(at).time_s).collect(),
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
         elevation_rad: all().map(|at| beam(at).elevation_rad).collect(),
-        azimuth_rad: if is_plane { Vec::new() } else { all().map(|at| beam(at).azimuth_rad).collect() },
+        azimuth_rad: if g.schedule.is_plane() { Vec::new() } else { all().map(|at| beam(at).azimuth_rad).collect() },
         time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
         first_pulse: g.schedule.lines.iter().map(|line| line.first).collect(),
     })

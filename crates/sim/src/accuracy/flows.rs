@@ -28,10 +28,6 @@ impl Subject for CaseFile {
     const NAME: &'static str = "case";
     const IS_NOISY: bool = false;
 
-    fn toml(&self) -> &str {
-        &self.toml
-    }
-
     fn provenance(&self) -> Provenance {
         Self::provenance(self)
     }

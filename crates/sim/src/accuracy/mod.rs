@@ -148,20 +148,13 @@ pub trait Subject {
     /// Whether its figures are of random signals.
     const IS_NOISY: bool;
 
-    /// All of its keys as TOML.
-    fn toml(&self) -> &str;
-
-    /// What its files say of where they come from, its seed among them.
+    /// What its files say of where they come from: all of its keys as TOML, its seed.
     fn provenance(&self) -> Provenance;
 }
 
 impl Subject for SceneFile {
     const NAME: &'static str = "scene";
     const IS_NOISY: bool = true;
-
-    fn toml(&self) -> &str {
-        &self.toml
-    }
 
     fn provenance(&self) -> Provenance {
         Self::provenance(self)

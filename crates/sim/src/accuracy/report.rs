@@ -211,8 +211,8 @@ impl<S: Subject> Accuracy<S> {
     /// The scene or case with the chosen keys, each with a comment, as TOML.
     pub fn scene_text(&self) -> String {
         let comment = |key: &str| self.comment(key).map(|words| format!(" # {words}")).unwrap_or_default();
-        let out: String =
-            lines_with_keys(self.scene.toml()).map(|(key, line)| format!("{line}{}\n", comment(&key))).collect();
+        let toml = self.scene.provenance().scene_toml;
+        let out: String = lines_with_keys(&toml).map(|(key, line)| format!("{line}{}\n", comment(&key))).collect();
         format!("# {}, {} {}\n{out}", crate::PROGRAM, S::NAME, hash_of(&out))
     }
 

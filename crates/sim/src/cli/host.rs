@@ -8,6 +8,7 @@ use super::progress::{Bars, Quiet};
 use super::{Cli, dispatch, with_threads};
 use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
+use crate::io::own::refuse_foreign;
 use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, text_file, write_atomic};
 use crate::keys::{Located, Problem, SceneError};
@@ -190,15 +191,16 @@ impl Cli {
         Ok(names)
     }
 
+    /// Finds out whether a file can be written.
+    pub(super) fn prepare_one(&self, path: &Path, existing: Existing) -> Result<(), Error> {
+        let name = path.file_name().and_then(|name| name.to_str()).filter(|_| self.keeper().is_none());
+        Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?)
+    }
+
     /// Writes a file, or keeps it.
     pub(super) fn write_one(&self, path: &Path, content: String) -> Result<(), Error> {
         let Some(call) = self.keeper() else { return Ok(write_atomic(path, content)?) };
         call.answer().files.push((path.display().to_string(), content.into()));
         Ok(())
-    }
-
-    /// Whether files stay in memory.
-    pub(super) fn keeps_files(&self) -> bool {
-        self.keeper().is_some()
     }
 }

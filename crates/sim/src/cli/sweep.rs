@@ -38,8 +38,8 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
         return cli.say(&json!({ "version": crate::VERSION, "files": paths(&files) }), &text);
     };
-    let sweep::Summary { run: ran, kept, shared, files } = run(sweep, &words.out, words.settings, &*cli.observer())?;
-    let sweep::Shared { flows, efficiencies, signals } = shared;
+    let summary = run(sweep, &words.out, words.settings, &*cli.observer())?;
+    let sweep::Summary { run: ran, kept, flows, efficiencies, signals, files } = summary;
     let text = format!(
         "{ran} cases run, {kept} kept; computed once for all that share them: flows {flows}, efficiency curves {efficiencies}, signals \
          {signals}\nwrote {} files and the folders of the cases to {}",

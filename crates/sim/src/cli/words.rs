@@ -3,7 +3,6 @@
 use super::Cli;
 use super::output::paths;
 use crate::io::netcdf_input;
-use crate::io::own::refuse_foreign;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, Provenance, Table};
@@ -74,9 +73,8 @@ pub(super) struct TableWords {
 impl TableWords {
     /// Finds out whether the file can be written.
     pub(super) fn prepare(&self, cli: &Cli) -> Result<(), Error> {
-        let Some(path) = self.out.as_ref().filter(|_| !cli.keeps_files()) else { return Ok(()) };
-        let name = path.file_name().and_then(|name| name.to_str());
-        Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, Existing::with_overwrite(self.overwrite))?)
+        let existing = Existing::with_overwrite(self.overwrite);
+        self.out.as_ref().map_or(Ok(()), |path| cli.prepare_one(path, existing))
     }
 
     /// Writes the file, if there is to be one, and says so in the text; returns its path for an object.

@@ -3,7 +3,7 @@
 
 use super::key::{Key, Kind, join};
 use super::problem::{Located, Problem, SceneError};
-use super::words::{near, one_of, quote, tables_with, wanted};
+use super::words::{near, one_of, quote, table_with, wanted};
 use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -353,8 +353,7 @@ impl Walk<'_> {
             }
         }
         let meant = near(here, keys.iter().map(|key| key.name));
-        let elsewhere = tables_with(self.format.keys, here, "");
-        let hint = match (meant, elsewhere.first()) {
+        let hint = match (meant, table_with(self.format.keys, here, "")) {
             (Some(meant), _) => format!("; did you mean {meant}?"),
             (None, Some(table)) if table.is_empty() => "; it stands before the first [section].".into(),
             (None, Some(table)) => format!("; it is a key of [{table}]."),

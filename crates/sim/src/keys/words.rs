@@ -95,22 +95,16 @@ pub(super) fn quote(text: &str) -> String {
     if short.len() < text.trim().len() { format!("{short}...") } else { short }
 }
 
-/// Paths of the tables, below `keys`, that have a key of this name.
-pub(super) fn tables_with(keys: &[Key], name: &str, path: &str) -> Vec<String> {
-    let mut found = Vec::new();
+/// Path of the first table, from the one at `path` on, that has a key of this name.
+pub(super) fn table_with(keys: &[Key], name: &str, path: &str) -> Option<String> {
     if keys.iter().any(|key| key.name == name) {
-        found.push(path.to_owned());
+        return Some(path.to_owned());
     }
-    for key in keys {
-        let here = join(path, key.name);
-        match &key.kind {
-            Kind::Table(inner) => found.extend(tables_with(inner, name, &here)),
-            Kind::Tagged { kinds, .. } => found.extend(kinds.iter().flat_map(|(_, k)| tables_with(k, name, &here))),
-            _ => {}
-        }
-    }
-    found.dedup();
-    found
+    keys.iter().find_map(|key| match &key.kind {
+        Kind::Table(inner) => table_with(inner, name, &join(path, key.name)),
+        Kind::Tagged { kinds, .. } => kinds.iter().find_map(|(_, k)| table_with(k, name, &join(path, key.name))),
+        _ => None,
+    })
 }
 
 #[cfg(test)]

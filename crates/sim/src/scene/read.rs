@@ -58,8 +58,7 @@ impl SceneFile {
 
     /// The keys that a scene may state.
     pub(crate) fn keys() -> &'static [Key] {
-        static KEYS: LazyLock<Vec<Key>> = LazyLock::new(keys_of::<Scene>);
-        &KEYS
+        scene_format().keys
     }
 
     /// The scene of a text, whatever the limits of its values.
@@ -123,9 +122,9 @@ impl SceneFile {
 
 /// What a scene may say.
 fn scene_format() -> Format<'static> {
-    static DEFAULTS: LazyLock<toml::Table> =
-        LazyLock::new(|| toml::Table::try_from(Scene::default()).unwrap_or_default());
-    Format { keys: SceneFile::keys(), defaults: &DEFAULTS, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
+    static MAY_SAY: LazyLock<(Vec<Key>, toml::Table)> =
+        LazyLock::new(|| (keys_of::<Scene>(), toml::Table::try_from(Scene::default()).unwrap_or_default()));
+    Format { keys: &MAY_SAY.0, defaults: &MAY_SAY.1, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
 }
 
 #[cfg(test)]

@@ -155,18 +155,15 @@ struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn new(path: &'a Path, base: Table, request: &'a Request) -> Result<Self, Error> {
-        fn each<'t, T>(
-            word: &str,
-            all: &'t [String],
-            read: impl Fn(&'t str) -> Result<T, Problem>,
-        ) -> Result<Vec<T>, Error> {
-            all.iter().map(|text| read(text).map_err(|problem| refused(word, problem))).collect()
-        }
-        let condition = |text| expression::holds(text, None).map_err(|why| problem("condition", text, why));
+        let of = |word: &'static str| move |problem| refused(word, problem);
         let mut axes: Vec<Axis> = request.list.as_deref().map(list).transpose()?.into_iter().collect();
-        axes.extend(each("--vary", &request.vary, axis)?);
-        let lets = each("--let", &request.lets, binding)?;
-        each("--where", &request.conditions, condition)?;
+        for text in &request.vary {
+            axes.push(axis(text).map_err(of("--vary"))?);
+        }
+        let lets = request.lets.iter().map(|text| binding(text).map_err(of("--let"))).collect::<Result<Vec<_>, _>>()?;
+        for text in &request.conditions {
+            expression::holds(text, None).map_err(|why| refused("--where", problem("condition", text, why)))?;
+        }
         let count = axes.iter().map(|axis| axis.rows.len() as f64).product::<f64>();
         let columns: Vec<&Column> =
             axes.iter().flat_map(|axis| &axis.columns).chain(lets.iter().map(|(own, _)| own)).collect();

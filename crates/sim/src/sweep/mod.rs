@@ -27,7 +27,7 @@ pub use cases::{Case, MOST_CASES, Request, Sweep};
 pub(crate) use circulation::Retrieval;
 pub use results::RESULTS;
 pub(crate) use run::{Common, measured};
-pub use run::{Settings, Shard, Shared, Summary, maps, run};
+pub use run::{Settings, Shard, Summary, maps, run};
 pub use tables::merge;
 
 #[cfg(test)]

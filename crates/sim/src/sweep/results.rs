@@ -12,7 +12,7 @@ use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::run::ScanMiddle;
-use crate::scene::{Flow, Method, NoiseModel, Scene};
+use crate::scene::{Flow, Method, NoiseModel};
 use crate::setup::estimators;
 use crate::setup::progress::Observer;
 use crate::setup::ray_information::range_filter;
@@ -110,7 +110,8 @@ impl<'p> Collected<'p> {
     fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
-            let (y_m, z_m) = position_m(scene, g.elevation_rad[i], g.gate_range_m[j]);
+            let (elevation_rad, range_m) = (g.elevation_rad[i], g.gate_range_m[j]);
+            let (y_m, z_m) = (range_m * elevation_rad.cos(), scene.scan.lidar_height_m + range_m * elevation_rad.sin());
             match &scene.flow {
                 Flow::VortexPair(pair) => {
                     let centres = vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
@@ -184,8 +185,3 @@ type Part = fn(f64) -> bool;
 const ALL: Part = |_| true;
 const INSIDE: Part = |distance| distance < INSIDE_PART;
 const OUTSIDE: Part = |distance| distance > OUTSIDE_PART;
-
-/// Distance along the ground and height of a point of the scan, m.
-fn position_m(scene: &Scene, elevation_rad: f64, range_m: f64) -> (f64, f64) {
-    (range_m * elevation_rad.cos(), scene.scan.lidar_height_m + range_m * elevation_rad.sin())
-}

@@ -74,17 +74,6 @@ pub struct Settings {
     pub overwrite: bool,
 }
 
-/// What was computed once for all cases that have it in common.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Shared {
-    /// Winds, analytic or read.
-    pub flows: usize,
-    /// Efficiency curves.
-    pub efficiencies: usize,
-    /// Sets of signals.
-    pub signals: usize,
-}
-
 /// What became of a sweep.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Summary {
@@ -92,8 +81,12 @@ pub struct Summary {
     pub run: usize,
     /// Cases whose result was there.
     pub kept: usize,
-    /// What was computed for them.
-    pub shared: Shared,
+    /// Winds, analytic or read, each computed once for all cases that have it in common.
+    pub flows: usize,
+    /// Efficiency curves, as often.
+    pub efficiencies: usize,
+    /// Sets of signals, as often.
+    pub signals: usize,
     /// Files that were written beside those of the cases.
     pub files: Vec<PathBuf>,
 }
@@ -150,8 +143,8 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
         let gone = || Error::Input { path: out.join("cases"), reason: "a result that was written is gone".into() };
         files.extend(tables::write(&definition, &all.ok_or_else(gone)?, out, existing)?);
     }
-    let shared = Shared { flows: common.winds.len(), efficiencies: common.efficiencies.computed(), signals };
-    Ok(Summary { run: due.len(), kept: mine.len() - due.len(), shared, files })
+    let (flows, efficiencies) = (common.winds.len(), common.efficiencies.computed());
+    Ok(Summary { run: due.len(), kept: mine.len() - due.len(), flows, efficiencies, signals, files })
 }
 
 /// The plan and the map of every scene, in their order, without any file; what they have in common is computed once: flows,

@@ -209,7 +209,7 @@ fn what_cases_have_in_common_is_computed_once() {
                      grid_spacing_m = 0.003\nrealisations = 5\nlayers = 4\n[telescope]\nfocus_m = 400.0\n";
     let request = vary(&["pulse.energy_j=50e-6,150e-6,600e-6", "estimator.radius_m=1,2"]);
     let (counter, summary, table) = ran(&(SMALL.to_owned() + turbulent), &request);
-    assert_eq!(summary.shared, Shared { flows: 1, efficiencies: 1, signals: 3 });
+    assert_eq!((summary.flows, summary.efficiencies, summary.signals), (1, 1, 3));
     // Counted where it is done.
     let counts = [Stage::PhaseScreens, Stage::LinesOfSight, Stage::Estimates].map(|stage| counter.count(stage));
     assert_eq!(counts, [1, 3, 3]);
@@ -231,7 +231,7 @@ fn what_cases_have_in_common_is_computed_once() {
 fn seeds_share_an_efficiency_where_no_screens_are_drawn() {
     let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 80\n\
                      grid_spacing_m = 0.003\nrealisations = 5\nlayers = 4\n[telescope]\nfocus_m = 400.0\n";
-    let of_seeds = |scene: &str| ran(scene, &vary(&["seed=1,2"])).1.shared.efficiencies;
+    let of_seeds = |scene: &str| ran(scene, &vary(&["seed=1,2"])).1.efficiencies;
     assert_eq!(of_seeds(SMALL), 1);
     assert_eq!(of_seeds(&(SMALL.to_owned() + turbulent)), 2);
 }
