@@ -20,6 +20,9 @@ pub(crate) struct Number(pub(crate) fn(f64) -> bool, pub(crate) &'static str);
 /// A condition on a whole value, lists among them, and its words.
 pub(crate) struct Is<T, W>(pub(crate) fn(&T) -> bool, pub(crate) W);
 
+/// A name that has to be stated, and what it names.
+pub(crate) struct Named(pub(crate) &'static str);
+
 /// In a range; `-inf` stands for none.
 pub(crate) struct NothingOr(pub(crate) RangeInclusive<f64>);
 
@@ -30,11 +33,17 @@ pub(crate) const ABOVE_ZERO_OR_INF: Number = Number(|value| value > 0.0, "above 
 pub(crate) const ABOVE_ZERO: Number = Number(|value| value.is_finite() && value > 0.0, "a finite number above 0");
 /// 0 or more.
 pub(crate) const ZERO_OR_MORE: Number = Number(|value| value.is_finite() && value >= 0.0, "a finite number, 0 or more");
-/// Whether a name is stated.
-pub(crate) const IS_NAMED: fn(&String) -> bool = |name| !name.is_empty();
 /// Neither infinite nor no number.
 #[cfg(feature = "flow")]
 pub(crate) const FINITE: Number = Number(f64::is_finite, "finite");
+
+impl Limit<String> for Named {
+    fn hold(&self, key: &str, name: &String, c: &mut Checker<'_>) {
+        if name.is_empty() {
+            c.refuse(key, Problem::ABSENT, self.0);
+        }
+    }
+}
 
 impl Limit<f64> for Number {
     fn hold(&self, key: &str, value: &f64, c: &mut Checker<'_>) {

@@ -1,7 +1,7 @@
 //! The winds of a scene, that of `[flow]` and those that are added to it, and what they may say.
 //! Check: each limit is broken once.
 
-use crate::keys::{Checker, IS_NAMED, Is, keys};
+use crate::keys::{Checker, Named, keys};
 use std::f64::consts::TAU;
 use wakescope_estimate::vortex_fit::CoreProfile;
 
@@ -98,7 +98,7 @@ keys! {
     table FieldFlow {
         /// The file, or the beginning of the names of numbered files, relative to the folder of the scene.
         files: String = String::new()
-            => Is(IS_NAMED, "a file of fields, or the beginning of the names of numbered ones"),
+            => Named("a file of fields, or the beginning of the names of numbered ones"),
         /// Names of the variables of u, v, w in the file.
         names: [String; 3] = ["u".into(), "v".into(), "w".into()],
         /// Whether the flow moves during the scan.
@@ -128,7 +128,7 @@ keys! {
     /// Backscatter that a field brings for each of its nodes.
     table CarriedBackscatter {
         /// Name of its variable in the file.
-        name: String = String::new() => Is(IS_NAMED, "the name of a variable of the file over (time, z, y, x)"),
+        name: String = String::new() => Named("the name of a variable of the file over (time, z, y, x)"),
         /// Backscatter coefficient in the unit of the file, 1/(m sr).
         unit_per_m_sr: f64 = 1.0 => 0.0..=1e6,
     }
@@ -156,7 +156,7 @@ keys! {
         /// The file of planes, or the beginning of the names of numbered files (`out/plane1` for `out/plane1_0001.nc`, ...),
         /// relative to the folder of the scene.
         planes: String = String::new()
-            => Is(IS_NAMED, "a file of cross-planes, or the beginning of the names of numbered ones"),
+            => Named("a file of cross-planes, or the beginning of the names of numbered ones"),
         /// Whether the flow moves during the scan.
         motion: SimulatedMotion = SimulatedMotion::Moving,
         /// Time of the flow when the scan begins, s; the first of the planes if neither this nor `age_tau` is given.

@@ -3,7 +3,7 @@
 
 use super::Scene;
 use crate::io::MAX_TIME_S;
-use crate::keys::{Checker, IS_NAMED, Is, Number, keys, side};
+use crate::keys::{Checker, Is, Named, Number, keys, side};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI, TAU};
 
 keys! {
@@ -24,7 +24,7 @@ keys! {
         /// Lines from a file.
         "list" => List {
             /// The file, relative to the folder of the scene: CSV, or lines of HALO's step-stare scans.
-            file: String => Is(IS_NAMED, "the name of a file with the lines of the scan"),
+            file: String => Named("the name of a file with the lines of the scan"),
         },
     }
 

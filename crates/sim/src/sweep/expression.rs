@@ -25,8 +25,8 @@ pub(crate) fn value(text: &str, values: Values<'_>) -> Result<f64, String> {
 /// # Errors
 /// No comparison; as [`value`].
 pub(crate) fn holds(text: &str, values: Values<'_>) -> Result<bool, String> {
-    let operators: [(&str, fn(&f64, &f64) -> bool); 4] =
-        [("<=", f64::le), (">=", f64::ge), ("<", f64::lt), (">", f64::gt)];
+    type Compare = fn(&f64, &f64) -> bool;
+    let operators: [(&str, Compare); 4] = [("<=", f64::le), (">=", f64::ge), ("<", f64::lt), (">", f64::gt)];
     let found = operators.into_iter().find_map(|(operator, compare)| Some((text.split_once(operator)?, compare)));
     let ((left, right), compare) =
         found.ok_or_else(|| format!("\"{text}\" is no comparison: two expressions with <=, >=, < or > between"))?;

@@ -99,7 +99,7 @@ fn unknown(written: &str) -> String {
     let section = written.split('.').next().unwrap_or(written);
     let hint = meant.map(|path| format!("; did you mean {path}?")).unwrap_or_default();
     let (mut where_to_look, mut known) =
-        ("Known there", paths().filter(|path| of(*path) == section).collect::<Vec<_>>());
+        ("Known there", paths().filter(|path| of(path) == section).collect::<Vec<_>>());
     if known.is_empty() {
         (where_to_look, known) = ("Sections", paths().map(of).collect());
         known.dedup();
