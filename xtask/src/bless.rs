@@ -31,9 +31,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
             Failure::new(format!("bless {name}: no such curve; there are {}, {}", wakes::NAME, known.join(", ")))
         })?;
         let Origin::Blessed { quantity, grid } = curve.origin else {
-            return Err(Failure::new(format!(
-                "bless {name}: it comes from an independent source and is not ours to write"
-            )));
+            let why = "it comes from an independent source and is not ours to write";
+            return Err(Failure::new(format!("bless {name}: {why}")));
         };
         let x = grid();
         let y = (curve.compute)(&x)?;
@@ -41,16 +40,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
             "# {quantity}\n# Source: cargo xtask bless {name}\n# Uncertainty: the same seed gives the same curve; tolerance of the comparison {:e}\n{},{}\n",
             curve.tolerance, curve.x, curve.y
         );
-        for (x, y) in x.iter().zip(&y) {
-            text.push_str(&format!("{x:?},{y:?}\n"));
-        }
-        let path = root().join(curve.file);
-        write_atomic(&path, text)?;
-        println!(
-            "wrote {} points to {}: say in CHANGELOG.md, under Numerics, why the curve changed",
-            x.len(),
-            curve.file
-        );
+        text.extend(x.iter().zip(&y).map(|(x, y)| format!("{x:?},{y:?}\n")));
+        write_atomic(&root().join(curve.file), text)?;
+        let (points, file) = (x.len(), curve.file);
+        println!("wrote {points} points to {file}: say in CHANGELOG.md, under Numerics, why the curve changed");
     }
     Ok(())
 }

@@ -65,11 +65,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let name = if keys.is_empty() { name.clone() } else { format!("without {name}") };
         let _ = writeln!(text, "| {name} | {:.2} | {:.1} | {:.2} |", run.cpu_s, run.peak_bytes / 1e6, bytes / 1e6);
     }
-    let (heads, lines) = if options.compile {
-        (" processor time of compiling [s] | program [MB] |", "---|---|")
-    } else {
-        Default::default()
-    };
+    let heads = if options.compile { " processor time of compiling [s] | program [MB] |" } else { "" };
+    let lines = if options.compile { "---|---|" } else { "" };
     let _ = writeln!(text, "\n| crate | features | gives | crates compiled |{heads}\n|---|---|---|---|{lines}");
     for Package { name, features, gives } in &package {
         let named = if features.is_empty() { "none" } else { features };

@@ -100,11 +100,9 @@ fn main() -> std::process::ExitCode {
         Task::Tidy => tidy::run(),
         Task::Ci(options) => ci::run(&options),
     };
-    match result {
-        Ok(()) => std::process::ExitCode::SUCCESS,
-        Err(failure) => {
-            eprintln!("error: {failure}");
-            std::process::ExitCode::from(2)
-        }
+    if let Err(failure) = result {
+        eprintln!("error: {failure}");
+        return std::process::ExitCode::from(2);
     }
+    std::process::ExitCode::SUCCESS
 }

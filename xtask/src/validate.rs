@@ -79,7 +79,16 @@ pub(crate) fn run(options: &Options) -> Outcome {
             missed.extend((!claim.passes()).then(|| format!("{name}: {statement}")));
         }
         println!("{name:<16} took {:.1} s", start.elapsed().as_secs_f64());
-        write(name, options.profile, &shown, &folder)
+        let origin = provenance(&format!("case = \"{name}\"\nprofile = \"{}\"\n", options.profile.name()), 0);
+        let text = |get: fn(&Claim) -> &str| shown.checks.iter().map(get);
+        let checks = Table::new()
+            .text("quantity", text(|c| &c.statement))
+            .text("measured", text(|c| &c.measured))
+            .text("expected", text(|c| &c.expected))
+            .text("verdict", text(|c| c.verdict.name()));
+        let mut files = Rendered::new(&shown.table, &shown.figure, &origin)?.files_in(&folder, name)?;
+        files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;
+        Ok(files.commit().map(drop)?)
     };
     if let Some(run) = &options.wake {
         show("les_wake_files", bars::show_files(run), Instant::now())?;
@@ -92,19 +101,4 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     println!("pictures and tables in {}", folder.display());
     unless("bars missed", &missed)
-}
-
-fn write(name: &str, profile: Profile, shown: &Shown, folder: &std::path::Path) -> Outcome {
-    let parameters = format!("case = \"{name}\"\nprofile = \"{}\"\n", profile.name());
-    let origin = provenance(&parameters, 0);
-    let text = |get: fn(&Claim) -> &str| shown.checks.iter().map(get).collect::<Vec<_>>();
-    let checks = Table::new()
-        .text("quantity", text(|c| &c.statement))
-        .text("measured", text(|c| &c.measured))
-        .text("expected", text(|c| &c.expected))
-        .text("verdict", text(|c| c.verdict.name()));
-    let mut files = Rendered::new(&shown.table, &shown.figure, &origin)?.files_in(folder, name)?;
-    files.add(&format!("{name}_checks.csv"), checks.to_csv(&origin)?)?;
-    files.commit()?;
-    Ok(())
 }
