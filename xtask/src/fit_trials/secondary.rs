@@ -214,11 +214,11 @@ fn show(name: &str, scans: &[Scan]) {
     if scans.len() < 2 {
         return;
     }
-    let rows: [(&str, fn(&Scan) -> usize); 3] =
-        [("a pair alone", |_| 0), ("by the rule", |scan| scan.shown.into()), ("always four", |_| 1)];
-    for (what, of) in rows {
+    // By which fit a scan is told that does not show such vortices, and one that does.
+    for (what, fits) in [("a pair alone", [0, 0]), ("by the rule", [0, 1]), ("always four", [1, 1])] {
         let each = |get: fn(&Errors) -> f64| -> Vec<f64> {
-            scans.iter().map(|scan| mean(&scan.fits[of(scan)].iter().map(get).collect::<Vec<_>>(), None)).collect()
+            let of = scans.iter().map(|scan| &scan.fits[fits[usize::from(scan.shown)]]);
+            of.map(|errors| mean(&errors.iter().map(get).collect::<Vec<_>>(), None)).collect()
         };
         let bias = Estimate::mean(&each(|e| e.circulation));
         let root = |get: fn(&Errors) -> f64| mean(&each(get), None).sqrt();
