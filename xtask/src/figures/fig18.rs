@@ -28,9 +28,9 @@ struct Row {
 }
 
 impl Row {
-    /// Standard deviation of good estimates over the bound, and its standard error.
-    fn ratio(&self) -> (f64, f64) {
-        (self.found.std_good_m_s / self.bound_m_s, self.found.std_good_error_m_s / self.bound_m_s)
+    /// Standard deviation of good estimates over the bound.
+    fn ratio(&self) -> Estimate {
+        Estimate::stated(self.found.std_good_m_s / self.bound_m_s, self.found.std_good_error_m_s / self.bound_m_s)
     }
 }
 
@@ -38,9 +38,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let pulses_s = context.profile.choose(vec![200e-9], vec![200e-9, 400e-9], vec![200e-9, 400e-9]);
     let counts = context.profile.choose(vec![1, 20, 60], vec![1, 20, 60], vec![1, 20, 60, 200]);
     // the quick profile accumulates the largest number only where a claim asks for it
-    let quick = context.profile.choose(true, false, false);
-    let counts_at =
-        |snr_db: f64| &counts[..if quick && snr_db != MANY_PULSES_DB { counts.len() - 1 } else { counts.len() }];
+    let is_short = |snr_db: f64| context.profile == Profile::Quick && snr_db != MANY_PULSES_DB;
+    let counts_at = |snr_db| &counts[..counts.len() - usize::from(is_short(snr_db))];
     let trials = context.profile.choose(250, 2000, 20_000);
     let mut cases = Vec::new();
     for &pulse_s in &pulses_s {
@@ -88,7 +87,7 @@ fn table(rows: &[Row]) -> Table {
         .float("std_good_standard_error_m_s", float(|r| r.found.std_good_error_m_s))
         .float("bad_fraction_standard_error", float(|r| r.found.bad_fraction_error))
         .float("bias_standard_error_m_s", float(|r| r.found.bias_error_m_s))
-        .float("std_good_over_bound", float(|r| r.ratio().0))
+        .float("std_good_over_bound", float(|r| r.ratio().value))
 }
 
 fn picture(rows: &[Row]) -> Figure {
@@ -125,12 +124,12 @@ fn picture(rows: &[Row]) -> Figure {
     Figure { columns: 2, width: 1300.0, ..Figure::stacked(panels) }
 }
 
-/// Mean of a ratio to the bound over rows, and its standard error.
-fn mean_ratio<'r>(rows: impl Iterator<Item = &'r Row>) -> (f64, f64) {
-    let ratios: Vec<(f64, f64)> = rows.map(Row::ratio).collect();
+/// Mean of a ratio to the bound over rows.
+fn mean_ratio<'r>(rows: impl Iterator<Item = &'r Row>) -> Estimate {
+    let ratios: Vec<Estimate> = rows.map(Row::ratio).collect();
     let n = ratios.len() as f64;
-    let mean = ratios.iter().map(|r| r.0).sum::<f64>() / n;
-    (mean, ratios.iter().map(|r| r.1 * r.1).sum::<f64>().sqrt() / n)
+    let squares: f64 = ratios.iter().map(|r| r.standard_error * r.standard_error).sum();
+    Estimate::stated(ratios.iter().map(|r| r.value).sum::<f64>() / n, squares.sqrt() / n)
 }
 
 fn claims(rows: &[Row]) -> Vec<Claim> {
@@ -143,28 +142,23 @@ fn claims(rows: &[Row]) -> Vec<Claim> {
         };
         rows.iter().filter(of)
     };
-    let at_most = |id: &str, bar: f64, (value, error): (f64, f64)| {
-        Claim::judged_alone(id, Estimate::stated(value, error), "", Bar::Below(bar))
-    };
-    let near = mean_ratio(likelihood(20, 0.0, 15.0));
-    let wide = mean_ratio(likelihood(20, -5.0, 20.0));
+    let at_most = |id: &str, bar: f64, found: Estimate| Claim::judged_alone(id, found, "", Bar::Below(bar));
     let bad = |pulses| {
         let found: Vec<&Row> = likelihood(pulses, MANY_PULSES_DB, MANY_PULSES_DB).collect();
         let mean = |get: fn(&Row) -> f64| found.iter().map(|r| get(r)).sum::<f64>() / found.len() as f64;
-        (mean(|r| r.found.bad_fraction), mean(|r| r.found.bad_fraction_error) / (found.len() as f64).sqrt())
+        let error = mean(|r| r.found.bad_fraction_error) / (found.len() as f64).sqrt();
+        Estimate::stated(mean(|r| r.found.bad_fraction), error)
     };
-    let (few, many) = (bad(20), bad(60));
     // the pulse pair is drawn to the middle of the band and so no unbiased estimator
     let good = |r: &&Row| r.noise == NoiseModel::White && r.method != "pulse pair" && r.found.bad_fraction < 0.01;
-    let of: Vec<(&Row, Estimate)> =
-        rows.iter().filter(good).map(|r| (r, Estimate::stated(r.ratio().0, r.ratio().1))).collect();
+    let of: Vec<(&Row, Estimate)> = rows.iter().filter(good).map(|r| (r, r.ratio())).collect();
     let off = |found: &Estimate| (found.value - 1.0) / found.half_width_of(of.len());
     let lowest = of.iter().min_by(|a, b| off(&a.1).total_cmp(&off(&b.1)));
     let mut claims = vec![
-        at_most("F18a", 1.05, near),
-        at_most("F18b", 1.15, wide),
-        at_most("F18c", 0.1, few),
-        at_most("F18d", 0.005, many),
+        at_most("F18a", 1.05, mean_ratio(likelihood(20, 0.0, 15.0))),
+        at_most("F18b", 1.15, mean_ratio(likelihood(20, -5.0, 20.0))),
+        at_most("F18c", 0.1, bad(20)),
+        at_most("F18d", 0.005, bad(60)),
     ];
     claims.extend(lowest.map(|(row, found)| {
         Claim::exact(
