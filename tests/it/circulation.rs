@@ -48,7 +48,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
         pulse: PulseShape::gaussian(plan.instrument.pulse.sigma_s()).unwrap(),
         wake: WakeModel::default(),
         elevation_rad: plan.geometry.elevation_rad.clone(),
-        first_sample_time_s: 2.0 * plan.geometry.first_range_m / wakescope_estimate::window::SPEED_OF_LIGHT_M_S,
+        first_sample_time_s: 2.0 * scene.scan.range_min_m / wakescope_estimate::window::SPEED_OF_LIGHT_M_S,
         record_samples: plan.geometry.samples,
     };
     let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
