@@ -47,6 +47,7 @@ svg = false
 png = false
 flow = false
 [retrieval]
+secondary = "{secondary}"
 [flow]
 {flow}
 """
@@ -149,10 +150,10 @@ def of_files(case, name, options, programs, scans, seed, folder, **kind):
         table(case, program, pairs, truths, None if kind else bounds, scans, seconds)
 
 
-def of_scene(case, flow, programs, scans, seed, folder, snr_db):
+def of_scene(case, flow, programs, scans, seed, folder, snr_db, secondary):
     folder.mkdir(parents=True, exist_ok=True)
     scene = folder / "scene.toml"
-    scene.write_text(SCENE.format(seed=seed, scans=scans, flow=flow, snr_db=snr_db))
+    scene.write_text(SCENE.format(seed=seed, scans=scans, flow=flow, snr_db=snr_db, secondary=secondary))
     for program, path in programs:
         out = folder / program
         seconds = called(path, "run", scene, "--out", out, "--overwrite")
@@ -170,6 +171,7 @@ def main():
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--folder", type=Path, default=ROOT / "target/fits")
     parser.add_argument("--only", nargs="*", default=[], help="some of the cases")
+    parser.add_argument("--secondary", default="auto", help="of scenes: auto, never or always")
     parser.add_argument("--coarse", type=Path, help="folder of a wake of the preset coarse, run up to tau = 4")
     options = parser.parse_args()
     programs = [program.split("=", 1) for program in options.program]
@@ -182,14 +184,14 @@ def main():
         "map c": lambda at: of_files("map c, moving", "c", (), *common, at),
         "outliers": lambda at: of_files("map a, 5 % outliers", "a", (), *common, at, outliers=OUTLIERS),
         "turbulence": lambda at: of_files("map a, turbulence", "a", turbulent, *common, at, turbulence=True),
-        "low": lambda at: of_scene("low pair, 0 dB", LOW, *common, at, 0.0),
-        "moving": lambda at: of_scene("moving pair, 10 dB", LOW + 'motion = "inviscid"\n', *common, at, 10.0),
-        "stored 2.5": lambda at: of_scene("stored wake, τ = 2.5", planes + "age_tau = 2.5\n", *common, at, 10.0),
-        "stored 4": lambda at: of_scene("stored wake, τ = 4", planes + "age_tau = 4.0\n", *common, at, 10.0),
+        "low": lambda at: of_scene("low pair, 0 dB", LOW, *common, at, 0.0, options.secondary),
+        "moving": lambda at: of_scene("moving pair, 10 dB", LOW + 'motion = "inviscid"\n', *common, at, 10.0, options.secondary),
+        "stored 2.5": lambda at: of_scene("stored wake, τ = 2.5", planes + "age_tau = 2.5\n", *common, at, 10.0, options.secondary),
+        "stored 4": lambda at: of_scene("stored wake, τ = 4", planes + "age_tau = 4.0\n", *common, at, 10.0, options.secondary),
     }
     if options.coarse:
         coarse = f'kind = "simulated"\nmotion = "frozen"\nplanes = "{options.coarse.resolve()}/plane1"\nage_tau = 4.0\n'
-        cases["coarse"] = lambda at: of_scene("coarse wake, τ = 4", coarse, *common, at, 10.0)
+        cases["coarse"] = lambda at: of_scene("coarse wake, τ = 4", coarse, *common, at, 10.0, options.secondary)
     unknown = [name for name in options.only if name not in cases]
     if unknown:
         sys.exit(f"--only {unknown[0]}: none of {', '.join(cases)}")
