@@ -31,6 +31,7 @@ mod tab02;
 
 use context::{Context, Rendered};
 use fixtures::failure::Failure;
+use serde::Deserialize;
 use std::collections::BTreeMap;
 
 /// A figure that can be asked for.
@@ -39,6 +40,12 @@ pub(crate) struct Figure {
     pub(crate) number: u32,
     pub(crate) title: &'static str,
     pub(crate) make: Make,
+}
+
+/// The captions of the list of claims.
+#[derive(Deserialize)]
+struct Captions {
+    caption: BTreeMap<String, String>,
 }
 
 /// Which figures are drawn one after the other.
@@ -61,8 +68,8 @@ impl Figure {
 
     /// The words of its caption with the values of a run.
     pub(crate) fn caption(&self, values: &[String]) -> Result<String, Failure> {
-        let captions: BTreeMap<String, String> = toml::from_str(include_str!("figures/captions.toml"))?;
-        let caption = captions.get(self.id).and_then(|words| filled(words, values));
+        let captions: Captions = toml::from_str(include_str!("claims.toml"))?;
+        let caption = captions.caption.get(self.id).and_then(|words| filled(words, values));
         caption.ok_or_else(|| Failure::new(format!("no caption of {} with {} values", self.id, values.len())))
     }
 
@@ -122,7 +129,7 @@ mod tests {
 
     #[test]
     fn every_figure_has_a_caption_of_its_own() {
-        let captions: BTreeMap<String, String> = toml::from_str(include_str!("figures/captions.toml")).unwrap();
+        let Captions { caption: captions } = toml::from_str(include_str!("claims.toml")).unwrap();
         let ids: Vec<&str> = ALL.iter().map(|figure| figure.id).collect();
         assert!(captions.keys().all(|id| ids.contains(&id.as_str())) && captions.len() == ids.len());
         assert_eq!(ALL[3].caption(&["3", "1.25", "8"].map(String::from)).unwrap().matches(" 1.25 mrad;").count(), 1);
