@@ -45,7 +45,7 @@ pub enum OutputError {
         /// Why it is needed and what to do.
         needed: String,
     },
-    /// The format cannot say what the result contains.
+    /// The format, or its encoder, refuses what the result contains.
     #[error("{format} cannot hold this result: {reason}")]
     Unsupported {
         /// Name of the format.
@@ -78,22 +78,14 @@ pub enum OutputError {
         /// The folder.
         folder: PathBuf,
     },
-    /// An encoder (NetCDF, PNG, VTK) refused.
-    #[error("{format} encoder: {message}")]
-    Encode {
-        /// Name of the format.
-        format: &'static str,
-        /// The encoder's message.
-        message: String,
-    },
 }
 
 /// Result of the writers and drawings.
 pub type OutputResult<T> = Result<T, OutputError>;
 
 impl OutputError {
-    pub(crate) fn encode(format: &'static str, error: impl std::fmt::Display) -> Self {
-        Self::Encode { format, message: error.to_string() }
+    pub(crate) fn unsupported(format: &'static str, reason: impl ToString) -> Self {
+        Self::Unsupported { format, reason: reason.to_string() }
     }
 
     pub(crate) fn value(field: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {

@@ -97,7 +97,7 @@ pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputR
 
 /// Gate length in metres, and number of gates between the lidar and the first one.
 fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
-    let refuse = |reason: String| OutputError::Unsupported { format: "HALO .hpl", reason };
+    let refuse = |reason: String| OutputError::unsupported("HALO .hpl", reason);
     if range_m.len() < 2 {
         return Err(refuse("one gate does not tell the gate length".into()));
     }

@@ -137,7 +137,7 @@ impl Layout {
         let sizes: Vec<u64> = self.variables.iter().map(|v| (self.count(v) * v.data.width) as u64).collect();
         if let Some(size) = sizes.iter().find(|size| **size > LARGEST_VARIABLE) {
             let reason = format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
-            return Err(OutputError::Unsupported { format: "NetCDF", reason });
+            return Err(OutputError::unsupported("NetCDF", reason));
         }
         // The places of the data do not change the length of the head.
         let mut length = self.head(&sizes, &vec![0; sizes.len()]).len() as u64;
@@ -180,7 +180,7 @@ impl Layout {
         for (place, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             if name.is_empty() || name.contains(['/', '\0']) {
-                return Err(OutputError::encode("NetCDF", format!("'{name}' is no name")));
+                return Err(OutputError::unsupported("NetCDF", format!("'{name}' is no name")));
             }
             if self.variables[..place].iter().any(|other| other.name == *name) {
                 return Err(OutputError::Duplicate { what: "name in NetCDF", name: name.clone() });
@@ -196,7 +196,7 @@ impl Layout {
         let total: usize = own.map(|v| v.data.bytes.len()).sum();
         if total > MAX_BYTES {
             let reason = format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep");
-            return Err(OutputError::Unsupported { format: "NetCDF", reason });
+            return Err(OutputError::unsupported("NetCDF", reason));
         }
         Ok(())
     }

@@ -7,7 +7,6 @@
 use crate::Error;
 use crate::plan::Plan;
 use crate::setup::ray_information::range_filter;
-use crate::setup::region::largest_radius_m;
 use ndarray::Array2;
 use std::collections::BTreeMap;
 
@@ -40,7 +39,7 @@ pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
     steps.sort_by(f64::total_cmp);
     let line_m = middle_m * steps.get(steps.len() / 2).copied().unwrap_or(f64::INFINITY);
     let gate_m = scene.estimator.gate_step_samples as f64 * g.sample_spacing_m;
-    let across_m = 2.0 * largest_radius_m(scene, middle_m);
+    let across_m = 2.0 * scene.estimator.largest_radius_m(middle_m);
     let lines = (across_m / line_m).floor() + 1.0;
     let gates = (range_filter(plan)?.full_width_half_maximum_m().hypot(across_m) / gate_m).max(1.0);
     Ok([lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)])

@@ -61,7 +61,7 @@ impl SceneResponse {
     /// What the estimator shows of a wake about a range; nothing for complex signals, for the likelihood of gradients, and for lines
     /// that are shifted.
     pub(crate) fn shown(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
-        let Response { correlogram, estimator } = self.response.as_ref()?;
+        let (correlogram, estimator) = self.response.as_ref()?;
         let noise = (self.noise, self.snr_at(range_m));
         let sampling = sampling(&self.scene).ok()?;
         let of_lines = EstimatorResponse::new(correlogram, &**estimator, &sampling, &self.pulse, noise, 0.0).ok()?;

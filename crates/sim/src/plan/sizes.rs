@@ -3,10 +3,9 @@
 //! All are floating-point numbers: products of what a scene may say go far beyond what an integer holds.
 
 use super::stage::Target;
-use crate::scene::{DetectorSignal, Flow, Method, Scene, SignalsOf, Weighting};
+use crate::scene::{DetectorSignal, Flow, Method, Scene, SignalsOf};
 use crate::setup::efficiency_model::drawn_turbulence;
 use crate::setup::geometry::Geometry;
-use crate::setup::region::largest_radius_m;
 
 /// Fields of a map of estimates.
 pub(super) const MAP_FIELDS: f64 = 16.0;
@@ -58,7 +57,7 @@ impl Sizes {
         let window = e.window_samples as f64;
         let maps = matches!(target, Target::Run | Target::Map);
         let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
-        let radius_m = g.gate_range_m.iter().map(|range_m| largest_radius_m(scene, *range_m)).fold(0.0, f64::max);
+        let radius_m = g.gate_range_m.iter().map(|range_m| e.largest_radius_m(*range_m)).fold(0.0, f64::max);
         let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
         let samples_kept = window + g.layers_per_sample as f64 * g.layer_thickness_m / g.sample_spacing_m;
         Self {
@@ -115,15 +114,8 @@ fn numbers(scene: &Scene, parts: f64) -> f64 {
     let window = e.window_samples as f64;
     match e.method {
         Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * window + 1.0,
-        _ if keeps_few_lags(scene) => parts * (e.method.order().map_or(0.0, |model| model.order as f64) + 1.0),
-        _ => parts * window,
+        _ => parts * e.few_lags().map_or(window, |lags| lags as f64),
     }
-}
-
-/// Whether the statistic is the few lags that a model of the scene's order needs.
-pub(super) fn keeps_few_lags(scene: &Scene) -> bool {
-    let e = &scene.estimator;
-    e.method.order().is_some() && e.weighting == Weighting::Rectangular
 }
 
 /// Whether the air is at rest everywhere.

@@ -6,7 +6,7 @@
 use crate::scene::{Method, Weighting};
 use crate::setup::Setup;
 use crate::setup::estimators::grid_step_and_bias_m_s;
-use crate::setup::region::{largest_radius_m, places};
+use crate::setup::region::places;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_estimate::map::PolarPoint;
 
@@ -105,7 +105,7 @@ pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
     let (e, places) = (&scene.estimator, places(scene, g)?);
     let elevation_rad = places.line_elevation_rad()[0];
     let is_empty = |range_m: f64| {
-        places.chords(PolarPoint { range_m, elevation_rad }, largest_radius_m(scene, range_m)).next().is_none()
+        places.chords(PolarPoint { range_m, elevation_rad }, e.largest_radius_m(range_m)).next().is_none()
     };
     let empty = g.gate_range_m.iter().filter(|range_m| is_empty(**range_m)).count();
     let step_m = e.window_step_samples as f64 * scene.sample_spacing_m();
@@ -119,7 +119,7 @@ pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
              with windows that gates are a multiple of apart",
             g.gate_range_m.len(),
             e.window_step_samples,
-            2.0 * largest_radius_m(scene, g.gate_range_m[0]),
+            2.0 * e.largest_radius_m(g.gate_range_m[0]),
             // rounded up, so that the number given is good
             (1000.0 * farthest_m).ceil() / 1000.0,
         )

@@ -13,7 +13,8 @@ pub(crate) struct Font {
 
 impl Font {
     pub(crate) fn load() -> OutputResult<Self> {
-        let face = Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0).map_err(|e| OutputError::encode("font", e))?;
+        let face =
+            Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0).map_err(|e| OutputError::unsupported("font", e))?;
         Ok(Self { face })
     }
 

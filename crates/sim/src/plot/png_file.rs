@@ -123,7 +123,7 @@ pub(crate) fn encode(
     frame_s: f64,
     provenance: Option<&Provenance>,
 ) -> OutputResult<Vec<u8>> {
-    let refuse = |e: png::EncodingError| OutputError::encode("PNG", e);
+    let refuse = |e: png::EncodingError| OutputError::unsupported("PNG", e);
     let mut pictures = pictures.into_iter();
     let count = pictures.len();
     let first = pictures.next().ok_or_else(|| OutputError::value("figures", 0, "at least one"))??;

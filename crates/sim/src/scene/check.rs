@@ -11,6 +11,7 @@ use super::{
     SnrReference, SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
+use crate::setup::instrument::{medium, pulse};
 
 impl Scene {
     /// Everything in this scene that cannot be simulated; empty for a good scene.
@@ -71,16 +72,10 @@ impl Scene {
             check_lengths(&counts, "atmosphere.profile", c);
         }
         // What is a profile of the air, or a sampled pulse, the simulation of signals knows best.
-        if c.is_good()
-            && let Err(e) = crate::setup::instrument::medium(&self.atmosphere)
-        {
-            c.refuse("atmosphere.profile", "", e.to_string());
-        }
-        if c.is_good()
-            && matches!(self.pulse.shape, PulseShape::Sampled(_))
-            && let Err(e) = crate::setup::instrument::pulse(&self.pulse)
-        {
-            c.refuse("pulse.shape", "", e.to_string());
+        if c.is_good() {
+            let (air, pulse) = (medium(&self.atmosphere).err(), pulse(&self.pulse).err());
+            let problems = [("atmosphere.profile", air), ("pulse.shape", pulse)].into_iter();
+            problems.for_each(|(key, e)| e.iter().for_each(|e| c.refuse(key, "", e.to_string())));
         }
     }
 
@@ -98,9 +93,7 @@ impl Scene {
     /// The 1/e half width sigma of |f|^2 in (7), s; for a sampled pulse that of the Gaussian with the same spread.
     pub fn pulse_sigma_s(&self) -> f64 {
         match &self.pulse.shape {
-            PulseShape::Sampled(_) => {
-                crate::setup::instrument::pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s())
-            }
+            PulseShape::Sampled(_) => pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.sigma_s()),
             PulseShape::Gaussian(shape) => shape.duration().sigma_s(),
         }
     }
@@ -115,8 +108,7 @@ impl Scene {
 
     /// How far before the range of a sample air contributes to it, c/2 times the last time of the pulse, m.
     pub fn pulse_reach_m(&self) -> f64 {
-        crate::setup::instrument::pulse(&self.pulse)
-            .map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
+        pulse(&self.pulse).map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
     }
 }
 
@@ -155,54 +147,38 @@ impl Scene {
         }
     }
 
-    /// The detector band of two quadratures lies within the sampling frequency, and before they are made above 0.
-    fn check_band_of_quadratures(&self, c: &mut Checker<'_>) {
-        let d = &self.detector;
-        let (width_hz, most_hz) = (d.bandwidth_hz, d.sampling_hz.min(2.0 * d.intermediate_frequency_hz));
-        let why = "so that two quadratures of the sampling frequency hold the band about the intermediate one";
-        let (below, above) = (format!("below {most_hz:e} Hz, {why}"), format!("above {width_hz:e} Hz, {why}"));
-        let middle = format!("above {:e} Hz, {why}", 0.5 * width_hz);
-        let mut sides = vec![side("detector.bandwidth_hz", width_hz, below)];
-        if d.sampling_hz <= width_hz {
-            sides.push(side("detector.sampling_hz", d.sampling_hz, above));
-        }
-        if d.intermediate_frequency_hz <= 0.5 * width_hz {
-            sides.push(side("detector.intermediate_frequency_hz", d.intermediate_frequency_hz, middle));
-        }
-        c.between(width_hz < most_hz, &sides);
-    }
-
-    /// The detector band lies between 0 and half the sampling frequency.
+    /// The detector band lies between 0 and half the sampling frequency; that of two quadratures, which are made of it, within the whole one.
     fn check_band(&self, c: &mut Checker<'_>) {
-        if self.detector.signal == DetectorSignal::Baseband {
-            return self.check_band_of_quadratures(c);
-        }
         let d = &self.detector;
         let (centre_hz, half_hz, nyquist_hz) = (d.intermediate_frequency_hz, 0.5 * d.bandwidth_hz, 0.5 * d.sampling_hz);
-        let why = "so that the detector band lies between 0 and half of detector.sampling_hz";
-        let ok = centre_hz > half_hz && centre_hz + half_hz < nyquist_hz;
-        let narrowest_hz = centre_hz.min(nyquist_hz - centre_hz);
+        let is_baseband = d.signal == DetectorSignal::Baseband;
+        let (sampled_hz, highest_hz, why) = match is_baseband {
+            true => (
+                0.0,
+                f64::INFINITY,
+                "two quadratures of the sampling frequency hold the band about the intermediate one",
+            ),
+            false => {
+                (centre_hz, nyquist_hz - half_hz, "the detector band lies between 0 and half of detector.sampling_hz")
+            }
+        };
+        let narrowest_hz = centre_hz.min(nyquist_hz - sampled_hz);
         let mut sides = Vec::new();
-        if half_hz < nyquist_hz - half_hz {
-            let allowed = format!("above {half_hz:e} and below {:e} Hz, {why}", nyquist_hz - half_hz);
+        // Only a key that can mend it, or has to.
+        if half_hz < highest_hz && (centre_hz <= half_hz || centre_hz >= highest_hz) {
+            let below = if is_baseband { String::new() } else { format!(" and below {highest_hz:e}") };
+            let allowed = format!("above {half_hz:e}{below} Hz, so that {why}");
             sides.push(side("detector.intermediate_frequency_hz", centre_hz, allowed));
         }
-        if centre_hz > half_hz {
-            let allowed = format!("above {:e} Hz, {why}", 2.0 * (centre_hz + half_hz));
+        if nyquist_hz <= sampled_hz + half_hz {
+            let allowed = format!("above {:e} Hz, so that {why}", 2.0 * (sampled_hz + half_hz));
             sides.push(side("detector.sampling_hz", d.sampling_hz, allowed));
         }
         if narrowest_hz > 0.0 {
-            let allowed = format!("below {:e} Hz, {why}", 2.0 * narrowest_hz);
+            let allowed = format!("below {:e} Hz, so that {why}", 2.0 * narrowest_hz);
             sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, allowed));
         }
-        // Where no single key can mend it, the one that asks for most.
-        let allowed = format!("more than detector.bandwidth_hz, {:e} Hz, and {why}", d.bandwidth_hz);
-        sides.push(side("detector.sampling_hz", d.sampling_hz, allowed.clone()));
-        sides.push(side("detector.bandwidth_hz", d.bandwidth_hz, format!("below {nyquist_hz:e} Hz, {why}")));
-        let beyond =
-            format!("above {half_hz:e} Hz, half of detector.bandwidth_hz, and below {nyquist_hz:e} Hz less that");
-        sides.push(side("detector.intermediate_frequency_hz", centre_hz, beyond));
-        if c.between(ok, &sides) {
+        if c.between(half_hz < narrowest_hz, &sides) && !is_baseband {
             self.check_frequencies(c);
         }
     }

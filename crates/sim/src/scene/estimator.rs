@@ -3,6 +3,7 @@
 
 use super::Scene;
 use crate::keys::{Checker, Is, Number, keys};
+use crate::setup::table::of_table;
 use wakescope_estimate::Refinement;
 
 keys! {
@@ -153,6 +154,23 @@ keys! {
         Rectangular = "rectangular",
         /// Hann.
         Hann = "hann",
+    }
+}
+
+impl Estimator {
+    /// Radius of the regions at a range, m; the largest that is allowed where it is sought.
+    pub(crate) fn largest_radius_m(&self, range_m: f64) -> f64 {
+        match &self.radius {
+            _ if self.method == (Method::Periodogram {}) => 0.0,
+            RegionRadius::OfRange { range_m: at_m, radius_m } => of_table(at_m, radius_m, range_m),
+            RegionRadius::Target { largest_m, .. } => *largest_m,
+            RegionRadius::Fixed {} => self.radius_m,
+        }
+    }
+
+    /// Lags that are kept of a window where they are but those that a model of this order needs: of windows without weighting.
+    pub(crate) fn few_lags(&self) -> Option<usize> {
+        self.method.order().filter(|_| self.weighting == Weighting::Rectangular).map(|model| model.order + 1)
     }
 }
 

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::scene::{
-    CorrelogramForm, DetectorSignal, Estimator as Words, GradientLikelihood, Method, ModelOrder, NoiseModel,
-    OrderChoice, PulseShape, Scene, Weighting,
+    CorrelogramForm, DetectorSignal, GradientLikelihood, Method, ModelOrder, NoiseModel, OrderChoice, PulseShape,
+    Scene, Weighting,
 };
 use crate::setup::instrument::Instrument;
 use crate::setup::table::{of_table, spaced};
@@ -117,8 +117,8 @@ type Weighted<S> = (Box<dyn Statistic<S>>, Vec<f64>, Vec<Taper>);
 /// The statistic of a scene whose method knows correlograms: models of windows without weighting need few lags.
 fn statistic<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Weighted<S>, Error> {
     let e = &scene.estimator;
-    if let Some(model) = e.method.order().filter(|_| e.weighting == Weighting::Rectangular) {
-        let few = ShortCorrelogram::<S>::new(e.window_samples, model.order + 1)?;
+    if let Some(lags) = e.few_lags() {
+        let few = ShortCorrelogram::<S>::new(e.window_samples, lags)?;
         let (weights, taper) = (few.lag_weights(), Taper::unit(vec![1.0; e.window_samples])?);
         return Ok((Box::new(few), weights, vec![taper]));
     }
@@ -156,9 +156,9 @@ fn lags_at<'a>(
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub fn record_model(scene: &Scene, pulse: &Pulse) -> Result<RecordModel, Error> {
-    let noise = match scene.detector.noise {
-        NoiseModel::BandLimited => Noise::Band { floor: NOISE_FLOOR },
-        NoiseModel::White | NoiseModel::None => Noise::White,
+    let noise = match noise_kind(scene) {
+        Some(Noise::Band { .. }) => Noise::Band { floor: NOISE_FLOOR },
+        _ => Noise::White,
     };
     let is_gaussian = matches!(scene.pulse.shape, PulseShape::Gaussian(_));
     let correlation = pulse_correlation(scene, pulse);
@@ -346,10 +346,7 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
 }
 
 /// Correlogram of all lags and the scene's estimator of it, for what a mean of very many pulses would show.
-pub(crate) struct Response {
-    pub(crate) correlogram: Correlogram<f64>,
-    pub(crate) estimator: Box<dyn Estimator>,
-}
+pub(crate) type Response = (Correlogram<f64>, Box<dyn Estimator>);
 
 /// The response of a scene at a signal-to-noise ratio `snr`; none for complex signals, for the likelihood of gradients, which
 /// knows no correlogram, and for lines that are shifted.
@@ -363,7 +360,7 @@ pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<
     let correlogram = correlogram(scene, pulse, planned_snr(scene, snr))?;
     let known = WindowStatistics { snr, n_eff: 1.0 };
     let estimator = of_correlogram(scene, SignalKind::Real, &correlogram.lag_weights(), &known)?;
-    Ok(Some(Response { correlogram, estimator }))
+    Ok(Some((correlogram, estimator)))
 }
 
 /// Spectrum of a scene's noise.
@@ -408,9 +405,14 @@ fn of_correlogram(
     // Divided by their weights, all lags count alike.
     let alike = vec![1.0; lags];
     let seen = if e.correlogram == CorrelogramForm::Unbiased { &alike } else { lag_weights };
+    let samples = e.window_samples as f64 * known.n_eff.max(1.0);
     let model = |reading, model: ModelOrder| {
         let peak = ModelPeak::new(reading, &sampling, kind, lags, model.order, padded, refine)?;
-        Ok::<_, Error>(Box::new(peak.choosing(order_choice(e, &model, known))))
+        Ok::<_, Error>(Box::new(peak.choosing(match model.order_choice {
+            OrderChoice::Fixed => estimate::models::OrderChoice::Fixed,
+            OrderChoice::Aic => estimate::models::OrderChoice::Akaike { samples },
+            OrderChoice::Mdl => estimate::models::OrderChoice::DescriptionLength { samples },
+        })))
     };
     let estimator: Box<dyn Estimator> = match e.method {
         Method::Periodogram {}
@@ -430,15 +432,6 @@ fn of_correlogram(
         CorrelogramForm::Biased => estimator,
         CorrelogramForm::Unbiased => Box::new(Unbiased::new(estimator, kind, lag_weights)?),
     })
-}
-
-fn order_choice(e: &Words, model: &ModelOrder, known: &WindowStatistics) -> estimate::models::OrderChoice {
-    let samples = e.window_samples as f64 * known.n_eff.max(1.0);
-    match model.order_choice {
-        OrderChoice::Fixed => estimate::models::OrderChoice::Fixed,
-        OrderChoice::Aic => estimate::models::OrderChoice::Akaike { samples },
-        OrderChoice::Mdl => estimate::models::OrderChoice::DescriptionLength { samples },
-    }
 }
 
 fn gradient_likelihood<S: Sample>(

@@ -2,7 +2,7 @@
 //!
 //! Check: tables keep their values; a target standard deviation gives larger regions where the signal is weaker.
 
-use crate::scene::{Method, RegionRadius, Scene};
+use crate::scene::{RegionRadius, Scene};
 use crate::setup::geometry::Geometry;
 use crate::setup::ray_information::RayInformation;
 use crate::setup::table::of_table;
@@ -38,37 +38,19 @@ pub(crate) fn region_radius(
     of_rays: &RayInformation<'_>,
     geometry: &ScanGeometry,
 ) -> Result<Radius, Error> {
-    let e = &scene.estimator;
-    match &e.radius {
-        _ if e.method == (Method::Periodogram {}) => Ok(Radius::Fixed { radius_m: 0.0 }),
-        RegionRadius::Fixed {} => Ok(Radius::Fixed { radius_m: e.radius_m }),
-        RegionRadius::OfRange { range_m, radius_m } => {
-            let (range_m, radius_m) = (range_m.clone(), radius_m.clone());
-            Ok(Radius::OfRange(Box::new(move |at_m| of_table(&range_m, &radius_m, at_m))))
-        }
-        RegionRadius::Target { standard_deviation_m_s, largest_m } => {
-            let all_m = geometry.gate_ranges_m();
-            let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
-            let count = geometry.most_gates(*largest_m);
-            let known = range_m.iter().map(|at_m| of_rays.at(*at_m, count)).collect::<Result<Vec<_>, Error>>()?;
-            let by_gates = |at_m: f64| -> Vec<f64> {
-                let of = |gates: usize| known.iter().map(|by_gates| by_gates[gates]).collect::<Vec<f64>>();
-                (0..count).map(|gates| of_table(&range_m, &of(gates), at_m)).collect()
-            };
-            Ok(Radius::for_standard_deviation(geometry, by_gates, *standard_deviation_m_s, *largest_m)?)
-        }
-    }
-}
-
-/// Radius of the regions of a scene at a range, m; the largest that is allowed where it is sought.
-pub(crate) fn largest_radius_m(scene: &Scene, range_m: f64) -> f64 {
-    let e = &scene.estimator;
-    match &e.radius {
-        _ if e.method == (Method::Periodogram {}) => 0.0,
-        RegionRadius::OfRange { range_m: at_m, radius_m } => of_table(at_m, radius_m, range_m),
-        RegionRadius::Target { largest_m, .. } => *largest_m,
-        RegionRadius::Fixed {} => e.radius_m,
-    }
+    let RegionRadius::Target { standard_deviation_m_s, largest_m } = scene.estimator.radius else {
+        let own = scene.estimator.clone();
+        return Ok(Radius::OfRange(Box::new(move |range_m| own.largest_radius_m(range_m))));
+    };
+    let all_m = geometry.gate_ranges_m();
+    let range_m: Vec<f64> = all_m.iter().copied().step_by(all_m.len().div_ceil(16)).collect();
+    let count = geometry.most_gates(largest_m);
+    let known = range_m.iter().map(|at_m| of_rays.at(*at_m, count)).collect::<Result<Vec<_>, Error>>()?;
+    let by_gates = |at_m: f64| -> Vec<f64> {
+        let of = |gates: usize| known.iter().map(|by_gates| by_gates[gates]).collect::<Vec<f64>>();
+        (0..count).map(|gates| of_table(&range_m, &of(gates), at_m)).collect()
+    };
+    Ok(Radius::for_standard_deviation(geometry, by_gates, standard_deviation_m_s, largest_m)?)
 }
 
 /// The wind of a map \[line, gate\] anywhere, bilinear between its points; NaN outside and where a neighbour is NaN.

@@ -7,7 +7,7 @@ use crate::Error;
 use crate::io::OutputError;
 use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::plan::Plan;
-use crate::scene::{Method, Scene, Weighting};
+use crate::scene::Method;
 use crate::setup::estimators;
 use ndarray::ArrayView2;
 use wakescope_estimate::map::PolarPoint;
@@ -91,13 +91,15 @@ impl GateSpectra {
     /// A method whose numbers are no correlogram of the whole window.
     pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
         let scene = &plan.scene.scene;
-        if !has_spectrum(scene) {
+        // Gradients are no correlogram, and models of windows without weighting take the first lags alone.
+        let e = &scene.estimator;
+        if matches!(e.method, Method::GradientLikelihood(_)) || e.few_lags().is_some() {
             let reason =
                 "--spectra needs the correlogram of the whole window, which this estimator.method does not make".into();
             return Err(Error::Key { key: "estimator.method", reason });
         }
-        let spectrum = LagSpectrum::new(kind, scene.estimator.window_samples, scene.estimator.padded_samples)?;
-        let (sampling, padded) = (estimators::sampling(scene)?, scene.estimator.padded_samples);
+        let (sampling, padded) = (estimators::sampling(scene)?, e.padded_samples);
+        let spectrum = LagSpectrum::new(kind, e.window_samples, padded)?;
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let of_bin = |bin: usize| {
             let frequency_hz = bin as f64 * sampling.sample_rate_hz / padded as f64;
@@ -121,7 +123,7 @@ impl GateSpectra {
                 "--spectra makes {bytes} bytes, at most {MOST_BYTES}: larger estimator.gate_step_samples or smaller \
                  estimator.padded_samples make fewer"
             );
-            return Err(OutputError::Unsupported { format: "spectra.nc", reason }.into());
+            return Err(OutputError::unsupported("spectra.nc", reason).into());
         }
         Ok(())
     }
@@ -154,14 +156,3 @@ impl GateSpectra {
 
 /// Most bytes of a file of spectra.
 const MOST_BYTES: usize = 256 << 20;
-
-/// Whether the numbers of the windows are the correlogram of the whole window.
-fn has_spectrum(scene: &Scene) -> bool {
-    match scene.estimator.method {
-        Method::GradientLikelihood(_) => false,
-        Method::Autoregressive(_) | Method::AutoregressivePole(_) | Method::Capon(_) => {
-            scene.estimator.weighting != Weighting::Rectangular
-        }
-        _ => true,
-    }
-}
