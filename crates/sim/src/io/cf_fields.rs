@@ -5,13 +5,10 @@
 use super::edges;
 use super::error::{OutputResult, same_length};
 use super::fields::VelocityField;
-use super::netcdf::{Data, FILL, Layout, Variable};
+use super::netcdf::{Data, Layout, Variable, described};
 use super::parts::{FileParts, Share};
 use super::provenance::Provenance;
 use wakescope_les::winds::Edges;
-
-/// Names and unit of the time.
-const SINCE_START: [&str; 3] = ["", "time since the start of the flow", "s"];
 
 /// The field at the centres as a file, or what one of several ranks has of it.
 ///
@@ -19,36 +16,25 @@ const SINCE_START: [&str; 3] = ["", "time since the start of the flow", "s"];
 /// What [`VelocityField::check`] finds, or a result too large for one file.
 pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputResult<FileParts> {
     field.check()?;
-    const DIMS: &[&str] = &["time", "z", "y", "x"];
+    let axis = |values: &[f64]| Data::f64(values.iter().copied());
     let [u, v, w] = &field.velocity_m_s;
-    let data = |name: &str, values: &[f64], units: &str, long_name: &str| {
-        Variable::part(name, DIMS, Data::filled(values), field.first())
-            .named(["", long_name, units])
-            .attr("_FillValue", Data::f32([FILL]))
-    };
-    // By which readers close a period of cells that are not equal.
-    let across = |name: &'static str, values: &[f64], long_name: &str, period_m: Option<f64>| {
-        let axis = axis(name, values, long_name);
-        match period_m {
-            Some(period_m) => axis.text("edges", &edges::to_text(Edges::Periodic { period_m })),
-            None => axis,
-        }
-    };
-    let [x_period_m, y_period_m] = field.period_m;
-    let mut variables = vec![
-        Variable::new("time", &["time"], Data::f64([field.time_s])).named(SINCE_START),
-        axis("z", &field.z_m, "height of the cell centre above the ground").text("positive", "up"),
-        across("y", &field.y_m, "position of the cell centre across the flight direction", y_period_m),
-        across("x", &field.x_m, "position of the cell centre along the flight direction", x_period_m),
-        data("u", u, "m s-1", "wind along the flight direction").text("standard_name", "x_wind"),
-        data("v", v, "m s-1", "horizontal wind across the flight direction").text("standard_name", "y_wind"),
-        data("w", w, "m s-1", "vertical wind").text("standard_name", "upward_air_velocity"),
-        data("pressure_m2_s2", &field.pressure_m2_s2, "m2 s-2", "pressure over density, up to a constant"),
+    let mut values = vec![
+        ("time", Data::f64([field.time_s])),
+        ("z", axis(&field.z_m)),
+        ("y", axis(&field.y_m)),
+        ("x", axis(&field.x_m)),
+        ("u", Data::filled(u)),
+        ("v", Data::filled(v)),
+        ("w", Data::filled(w)),
+        ("pressure_m2_s2", Data::filled(&field.pressure_m2_s2)),
     ];
-    if let Some(vorticity) = &field.vorticity_per_s {
-        variables.push(data("vorticity_magnitude", vorticity, "s-1", "magnitude of the vorticity"));
-    }
+    values.extend(field.vorticity_per_s.as_ref().map(|vorticity| ("vorticity_magnitude", Data::filled(vorticity))));
+    // By which readers close a period of cells that are not equal.
+    let edges = |period_m: f64| Data::text(edges::to_text(Edges::Periodic { period_m }));
+    let periods = ["x:edges", "y:edges"].into_iter().zip(field.period_m);
+    values.extend(periods.filter_map(|(name, period_m)| Some((name, edges(period_m?)))));
     let dims = vec![("time", 1), ("z", field.z_m.len()), ("y", field.y_m.len()), ("x", field.x_m.len())];
+    let variables = shared(described(include_str!("cf_fields.cdl"), values), field.first());
     Layout::cf(&field.title, dims, variables, provenance).into_parts(provenance, field.share.is_first)
 }
 
@@ -75,31 +61,27 @@ pub struct FaceVelocities {
 /// An array of another length than its axes, or a result too large for one file.
 pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<FileParts> {
     let mut dims = Vec::new();
-    let mut variables = vec![Variable::new("time", &[], Data::f64([faces.time_s])).named(SINCE_START)];
+    let mut values = vec![("time", Data::f64([faces.time_s]))];
     for (d, (name, face)) in [("x", "x_face"), ("y", "y_face"), ("z", "z_face")].into_iter().enumerate() {
         same_length(face, faces.face_m[d].len(), name, faces.centre_m[d].len())?;
-        dims.extend([(name, faces.centre_m[d].len()), (face, faces.face_m[d].len())]);
-        variables.push(axis(name, &faces.centre_m[d], "cell centre"));
-        variables.push(axis(face, &faces.face_m[d], "low face of the cell"));
+        for (name, places_m) in [(name, &faces.centre_m[d]), (face, &faces.face_m[d])] {
+            dims.push((name, places_m.len()));
+            values.push((name, Data::f64(places_m.iter().copied())));
+        }
     }
     let plane = faces.centre_m[0].len() * faces.centre_m[1].len();
-    let components = [
-        ("u", ["z", "y", "x_face"], "x_wind", "wind along the flight direction"),
-        ("v", ["z", "y_face", "x"], "y_wind", "horizontal wind across it"),
-        ("w", ["z_face", "y", "x"], "upward_air_velocity", "vertical wind"),
-    ];
-    for ((name, dims, standard_name, long_name), values) in components.into_iter().zip(&faces.velocity_m_s) {
-        same_length(name, values.len(), "z x y x x", faces.share.planes.len() * plane)?;
-        let (data, first) = (Data::f64(values.iter().copied()), faces.share.planes.start * plane);
-        variables.push(Variable::part(name, &dims, data, first).named([standard_name, long_name, "m s-1"]));
+    for (name, velocity_m_s) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s) {
+        same_length(name, velocity_m_s.len(), "z x y x x", faces.share.planes.len() * plane)?;
+        values.push((name, Data::f64(velocity_m_s.iter().copied())));
     }
+    let variables = shared(described(include_str!("cf_faces.cdl"), values), faces.share.planes.start * plane);
     Layout::cf(&faces.title, dims, variables, provenance).into_parts(provenance, faces.share.is_first)
 }
 
-fn axis(name: &'static str, values: &[f64], long_name: &str) -> Variable {
-    let variable = Variable::new(name, &[name], Data::f64(values.iter().copied())).named(["", long_name, "m"]);
-    let variable = variable.text("axis", &name[..1].to_uppercase());
-    if name == "z" { variable.text("standard_name", "height") } else { variable }
+/// The variables of which ranks have the values from number `first` on: those over the planes across z.
+fn shared(mut variables: Vec<Variable>, first: usize) -> Vec<Variable> {
+    variables.iter_mut().filter(|variable| variable.dims.len() > 2).for_each(|variable| variable.first = Some(first));
+    variables
 }
 
 #[cfg(test)]

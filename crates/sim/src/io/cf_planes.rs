@@ -5,9 +5,8 @@
 use super::edges;
 use super::error::OutputResult;
 use super::map::CrossPlanes;
-use super::netcdf::{Data, FILL, Layout, Variable};
+use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
-use ndarray::Array3;
 
 /// The file's bytes.
 ///
@@ -15,40 +14,29 @@ use ndarray::Array3;
 /// What [`CrossPlanes::check`] finds, or a result too large for one file.
 pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    let axis = |name: &str, dims: &[&'static str], values: &[f64], names: [&str; 3]| {
-        Variable::new(name, dims, Data::f64(values.iter().copied())).named(names)
-    };
-    let across = "horizontal position of the cell centre across the flight direction";
-    let variables = vec![
-        axis("tau", &["tau"], &planes.tau, ["", "age of the wake, t Gamma0 / (2 pi b0^2)", "1"]),
-        axis("z", &["z"], &planes.z_m, ["height", "height of the cell centre above the ground", "m"])
-            .text("positive", "up")
-            .text("edges", &edges::to_text(planes.z_edges))
-            .text("axis", "Z"),
-        axis("y", &["y"], &planes.y_m, ["", across, "m"])
-            .text("edges", &edges::to_text(planes.y_edges))
-            .text("axis", "Y"),
-        // Not "seconds since": the run has no date.
-        axis("time", &["tau"], &planes.time_s, ["", "time since the start of the flow", "s"]),
-        wind("v", &planes.v_m_s, "horizontal wind across the flight direction").text("standard_name", "y_wind"),
-        wind("w", &planes.w_m_s, "vertical wind").text("standard_name", "upward_air_velocity"),
+    let axis = |values: &[f64]| Data::f64(values.iter().copied());
+    let values = [
+        ("tau", axis(&planes.tau)),
+        ("z", axis(&planes.z_m)),
+        ("z:edges", Data::text(edges::to_text(planes.z_edges))),
+        ("y", axis(&planes.y_m)),
+        ("y:edges", Data::text(edges::to_text(planes.y_edges))),
+        ("time", axis(&planes.time_s)),
+        ("v", Data::filled(&planes.v_m_s)),
+        ("w", Data::filled(&planes.w_m_s)),
     ];
+    let variables = described(include_str!("cf_planes.cdl"), values);
     let dims = vec![("tau", planes.tau.len()), ("z", planes.z_m.len()), ("y", planes.y_m.len())];
     Layout::cf(&planes.title, dims, variables, provenance).into_bytes(provenance)
 }
 
-fn wind(name: &str, values: &Array3<f64>, long_name: &str) -> Variable {
-    Variable::new(name, &["tau", "z", "y"], Data::filled(values))
-        .named(["", long_name, "m s-1"])
-        .text("coordinates", "time")
-        .attr("_FillValue", Data::f32([FILL]))
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::netcdf::FILL;
     use super::super::provenance::example;
     use super::super::samples;
     use super::*;
+    use ndarray::Array3;
     use netcdf3::FileReader;
 
     #[test]

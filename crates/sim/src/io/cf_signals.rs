@@ -3,7 +3,7 @@
 //! Check: the tests read the bytes back and compare values, axes and units.
 
 use super::error::OutputResult;
-use super::netcdf::{Data, FILL, Layout, Variable};
+use super::netcdf::{Data, Layout, described};
 use super::provenance::Provenance;
 use super::signals::RawSignals;
 
@@ -14,22 +14,20 @@ use super::signals::RawSignals;
 pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
-    let time = Variable::new("time", &["time"], Data::f64(signals.time_s.clone())).text("units", "s");
-    let time = time.named(["time", "time after the middle of the pulse left the telescope", ""]);
-    let mut variables = vec![time];
-    variables.extend(of_rays(signals, rays));
-    let second = "second quadrature of the baseband signal; the first is current_a";
-    let currents = [
-        ("current_a", Some(&signals.current_a), "heterodyne current of the detector"),
-        ("quadrature_a", signals.quadrature_a.as_ref(), second),
-    ];
-    variables.extend(currents.into_iter().filter_map(|(name, values, text)| {
-        Some(Variable::in_units(name, &["ray", "time"], Data::f64(values?.iter().copied()), "A", text))
-    }));
-    variables.extend(recording(signals));
-    variables.extend(truth(signals));
+    let mut values = of_rays(signals, rays);
+    values.extend(recording(signals));
+    let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
+    values.extend([
+        ("time", Data::f64(signals.time_s.iter().copied())),
+        ("current_a", Data::f64(signals.current_a.iter().copied())),
+        ("range", Data::f64(signals.range_m.iter().copied())),
+        ("line_elevation", Data::f64(elevation.copied())),
+        ("radial_velocity", Data::filled(signals.radial_velocity_m_s)),
+    ]);
+    values.extend(signals.quadrature_a.map(|second| ("quadrature_a", Data::f64(second.iter().copied()))));
     let (lines, ranges) = signals.radial_velocity_m_s.dim();
     let dims = vec![("ray", rays), ("time", samples), ("line", lines), ("range", ranges)];
+    let variables = described(include_str!("cf_signals.cdl"), values);
     Layout::cf("Raw heterodyne signals", dims, variables, provenance).into_bytes(provenance)
 }
 
@@ -40,69 +38,44 @@ pub(crate) fn data_bytes([pulses, samples, quadratures]: [f64; 3], [lines, range
 }
 
 /// Which line, pulse and realisation each record belongs to.
-fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<Variable> {
+fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<(&'static str, Data)> {
     let scan = signals.elevation_rad.len().max(1);
     let line_of = |ray: usize| signals.first_pulse.partition_point(|first| *first <= ray % scan).saturating_sub(1);
     let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
-    let number = |name: &str, of: &dyn Fn(usize) -> usize, text: &str| {
-        let values = (0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX));
-        Variable::in_units(name, &["ray"], Data::i32(values), "1", text)
-    };
-    let value = |name: &str, of: &[f64], units: &str, text: &str| {
-        let values = (0..rays).map(|ray| of[ray % scan]);
-        Variable::in_units(name, &["ray"], Data::f64(values), units, text)
-    };
-    let azimuth = (!signals.azimuth_rad.is_empty())
-        .then(|| value("azimuth", &signals.azimuth_rad, "rad", "azimuth of the line of sight, clockwise from north"));
+    let number =
+        |of: &dyn Fn(usize) -> usize| Data::i32((0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)));
+    let value = |of: &[f64]| Data::f64((0..rays).map(|ray| of[ray % scan]));
     let mut out = vec![
-        number("ray", &|ray| ray, "number of the record"),
-        number("ray_line", &line_of, "line of sight of the pulse, a place along dimension line"),
-        number("ray_pulse", &|ray| ray % scan - before(ray), "number of the pulse on its line of sight"),
-        number("realization", &|ray| ray / scan, "number of the repetition of the scan")
-            .text("standard_name", "realization"),
-        value("elevation", &signals.elevation_rad, "rad", "elevation of the line of sight above the horizon"),
-        value("pulse_time", &signals.pulse_time_s, "s", "time of the pulse from the start of the flow"),
+        ("ray", number(&|ray| ray)),
+        ("ray_line", number(&line_of)),
+        ("ray_pulse", number(&|ray| ray % scan - before(ray))),
+        ("realization", number(&|ray| ray / scan)),
+        ("elevation", value(&signals.elevation_rad)),
+        ("pulse_time", value(&signals.pulse_time_s)),
     ];
-    out.extend(azimuth);
+    if !signals.azimuth_rad.is_empty() {
+        out.push(("azimuth", value(&signals.azimuth_rad)));
+    }
     out
 }
 
-fn recording(signals: &RawSignals<'_>) -> Vec<Variable> {
+fn recording(signals: &RawSignals<'_>) -> [(&'static str, Data); 7] {
     let r = &signals.recording;
-    let at_rest = "frequency of air at rest; a velocity v away from the lidar lowers it by 2 v/wavelength";
     let scalars = [
-        ("sampling_frequency", r.sampling_hz, "Hz", "sampling frequency"),
-        ("intermediate_frequency", r.intermediate_frequency_hz, "Hz", at_rest),
-        ("bandwidth", r.bandwidth_hz, "Hz", "width of the detector band about the intermediate frequency"),
-        ("wavelength", r.wavelength_m, "m", "wavelength of the laser"),
-        ("pulse_repetition_frequency", r.pulse_repetition_hz, "Hz", "pulses per second"),
-        ("pulse_sigma", r.pulse_sigma_s, "s", "half width of the power of the pulse at 1/e of its largest"),
-        ("noise_power", r.noise_power_a2, "A2", "mean square of the shot noise of a sample, both quadratures together"),
+        ("sampling_frequency", r.sampling_hz),
+        ("intermediate_frequency", r.intermediate_frequency_hz),
+        ("bandwidth", r.bandwidth_hz),
+        ("wavelength", r.wavelength_m),
+        ("pulse_repetition_frequency", r.pulse_repetition_hz),
+        ("pulse_sigma", r.pulse_sigma_s),
+        ("noise_power", r.noise_power_a2),
     ];
-    let scalar = |(name, value, units, text)| {
-        let variable = Variable::in_units(name, &[], Data::f64([value]), units, text);
-        if name == "wavelength" { variable.text("standard_name", "radiation_wavelength") } else { variable }
-    };
-    scalars.into_iter().map(scalar).collect()
-}
-
-fn truth(signals: &RawSignals<'_>) -> Vec<Variable> {
-    let above_horizon = "elevation of the line of sight above the horizon";
-    let range = Data::f64(signals.range_m.clone());
-    let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
-    vec![
-        Variable::in_units("range", &["range"], range, "m", "range of the true velocities"),
-        Variable::in_units("line_elevation", &["line"], Data::f64(elevation.copied()), "rad", above_horizon),
-        Variable::new("radial_velocity", &["line", "range"], Data::filled(signals.radial_velocity_m_s))
-            .text("units", "m s-1")
-            .text("standard_name", "radial_velocity_of_scatterers_away_from_instrument")
-            .text("long_name", "true radial velocity of the air on the line of sight, positive away from the lidar")
-            .attr("_FillValue", Data::f32([FILL])),
-    ]
+    scalars.map(|(name, value)| (name, Data::f64([value])))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::netcdf::FILL;
     use super::super::provenance::example;
     use super::super::signals;
     use super::*;

@@ -5,7 +5,7 @@
 
 use super::error::{OutputError, OutputResult};
 use super::map::{Field, Unit, VelocityMap};
-use super::netcdf::{Data, FILL, Layout, Variable};
+use super::netcdf::{Data, FILL, Layout, Variable, described};
 use super::provenance::Provenance;
 use super::utc::MAX_TIME_S;
 use crate::setup::beams::SweepMode;
@@ -37,11 +37,17 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
         let allowed = format!("within {MAX_TIME_S:?} s of the start of the flow");
         return Err(OutputError::value("ray time_s", format!("{bad:?}"), allowed));
     }
-    let mut variables = axes(map, times);
-    variables.extend(site(map));
-    variables.extend(sweeps(map));
-    variables.extend(texts(map));
-    variables.extend(instrument(map));
+    let mut values = axes(map, times);
+    values.extend(site(map));
+    values.extend(sweeps(map));
+    values.extend(texts(map));
+    values.extend(instrument(map));
+    let mut variables = described(include_str!("cfradial.cdl"), values);
+    if !map.is_carried() {
+        // A lidar that stands has one place for all rays.
+        let is_place = |variable: &&mut Variable| ["latitude", "longitude", "altitude"].contains(&&*variable.name);
+        variables.iter_mut().filter(is_place).for_each(|variable| variable.dims.clear());
+    }
     variables.extend(fields(map, &provenance.scene_toml)?);
     Ok(Layout {
         dims: vec![
@@ -85,42 +91,34 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
     entries.map(|(name, text)| (name, text.to_owned())).into()
 }
 
-fn axes(map: &VelocityMap, times: Vec<f64>) -> Vec<Variable> {
+/// Values and attributes by the names that the description of the variables has for them.
+type Values = Vec<(&'static str, Data)>;
+
+fn axes(map: &VelocityMap, times: Vec<f64>) -> Values {
     let gates = &map.range_m;
     let spacing = if gates.len() > 1 { gates[1] - gates[0] } else { 0.0 };
     // Gate centres come from sums and products of a few terms: equal to a part in 1e6 is constant.
     let constant = gates.windows(2).all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
     let degrees = |angle: fn(&super::map::Ray) -> f64| Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32));
     vec![
-        Variable::new("time", &["time"], Data::f64(times))
-            .named(["time", "time since the start of the flow", &format!("seconds since {}", map.start())])
-            .text("calendar", "gregorian"),
-        Variable::new("range", &["range"], single(gates))
-            .named(["projection_range_coordinate", "range to centre of measurement volume", "meters"])
-            .text("spacing_is_constant", if constant { "true" } else { "false" })
-            .attr("meters_to_center_of_first_gate", Data::f32([gates[0] as f32]))
-            .attr("meters_between_gates", Data::f32([spacing as f32]))
-            .text("axis", "radial_range_coordinate"),
-        Variable::new("azimuth", &["time"], degrees(|r| turn(r.azimuth_rad)))
-            .named(["ray_azimuth_angle", "azimuth angle from true north", "degrees"])
-            .text("axis", "radial_azimuth_coordinate"),
-        Variable::new("elevation", &["time"], degrees(|r| r.elevation_rad))
-            .named(["ray_elevation_angle", "elevation angle from horizontal plane", "degrees"])
-            .text("axis", "radial_elevation_coordinate"),
+        ("time", Data::f64(times)),
+        ("time:units", Data::text(format!("seconds since {}", map.start()))),
+        ("range", single(gates)),
+        ("range:spacing_is_constant", Data::text(if constant { "true" } else { "false" })),
+        ("range:meters_to_center_of_first_gate", Data::f32([gates[0] as f32])),
+        ("range:meters_between_gates", Data::f32([spacing as f32])),
+        ("azimuth", degrees(|r| turn(r.azimuth_rad))),
+        ("elevation", degrees(|r| r.elevation_rad)),
     ]
 }
 
-/// Velocities of the instrument and its platform.
-const METRES: &str = "meters per second";
 /// What the attribute `folding` of `nyquist_velocity` says of real currents: faster air is mirrored, and no multiple of it is lost.
 pub(crate) const MIRRORED: &str = "mirrored";
 
 /// Length of a degree of latitude on a sphere with the mean radius of the Earth, m.
 const DEGREE_M: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 
-fn site(map: &VelocityMap) -> Vec<Variable> {
-    const ONE: &[&str] = &[];
-    const EACH: &[&str] = &["time"];
+fn site(map: &VelocityMap) -> Values {
     // A scan in one plane without a flight of its own looks across it.
     let across_rad = map.rays.first().map_or(0.0, |ray| ray.azimuth_rad - FRAC_PI_2);
     let heading_rad = map.flight.map_or(across_rad, |(_, azimuth_rad)| azimuth_rad);
@@ -137,18 +135,12 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
     };
     let here_m = [map.flight.map_or(0.0, |(x_m, _)| x_m), map.lidar_y_m, map.lidar_height_m];
     let carrier: Vec<([f64; 3], [f64; 3])> = map.rays.iter().filter_map(|ray| ray.carrier).collect();
-    let (places, dims) = match carrier.is_empty() {
-        true => (vec![place(here_m)], ONE),
-        false => (carrier.iter().map(|(place_m, _)| place(*place_m)).collect(), EACH),
+    let places: Vec<[f64; 3]> = match carrier.is_empty() {
+        true => vec![place(here_m)],
+        false => carrier.iter().map(|(place_m, _)| place(*place_m)).collect(),
     };
     let values = |d: usize| Data::f64(places.iter().map(|p| p[d]));
-    let mut out = vec![
-        Variable::new("latitude", dims, values(0)).named(["latitude", "", "degrees_north"]),
-        Variable::new("longitude", dims, values(1)).named(["longitude", "", "degrees_east"]),
-        Variable::new("altitude", dims, values(2))
-            .named(["altitude", "height of the telescope above the sea", "meters"])
-            .text("positive", "up"),
-    ];
+    let mut out = vec![("latitude", values(0)), ("longitude", values(1)), ("altitude", values(2))];
     if !carrier.is_empty() {
         // A level carrier that heads along the flight, and drifts where its track does not.
         let heading_deg = turn(heading_rad).to_degrees();
@@ -163,24 +155,22 @@ fn site(map: &VelocityMap) -> Vec<Variable> {
         let (rotation, tilt): (Vec<f32>, Vec<f32>) = angles.map(|[az, el]| (az - heading_deg as f32, el)).unzip();
         let still = || vec![0.0; map.rays.len()];
         let motion = [
-            ("heading", "degrees", "heading of the platform from true north", each(&|_| heading_deg as f32)),
-            ("roll", "degrees", "roll of the platform", still()),
-            ("pitch", "degrees", "pitch of the platform", still()),
-            ("drift", "degrees", "track of the platform over the ground less its heading", each(&drift)),
-            ("rotation", "degrees", "azimuth of the beam from the heading of the platform", rotation),
-            ("tilt", "degrees", "elevation of the beam from the plane of the platform", tilt),
-            ("eastward_velocity", METRES, "eastward velocity of the platform", each(&|i| over_ground(i).1 as f32)),
-            ("northward_velocity", METRES, "northward velocity of the platform", each(&|i| over_ground(i).0 as f32)),
-            ("vertical_velocity", METRES, "upward velocity of the platform", each(&|i| carrier[i].1[2] as f32)),
+            ("heading", each(&|_| heading_deg as f32)),
+            ("roll", still()),
+            ("pitch", still()),
+            ("drift", each(&drift)),
+            ("rotation", rotation),
+            ("tilt", tilt),
+            ("eastward_velocity", each(&|i| over_ground(i).1 as f32)),
+            ("northward_velocity", each(&|i| over_ground(i).0 as f32)),
+            ("vertical_velocity", each(&|i| carrier[i].1[2] as f32)),
         ];
-        out.extend(motion.map(|(name, units, long_name, values)| {
-            Variable::new(name, EACH, Data::f32(values)).named(["", long_name, units])
-        }));
+        out.extend(motion.map(|(name, values)| (name, Data::f32(values))));
     }
     out
 }
 
-fn sweeps(map: &VelocityMap) -> Vec<Variable> {
+fn sweeps(map: &VelocityMap) -> Values {
     let bounds = map.sweep_bounds();
     let ints = |values: &mut dyn Iterator<Item = usize>| Data::i32(values.map(|v| v as i32));
     let floats = |get: fn(&super::map::Sweep) -> f64| Data::f32(map.sweeps.iter().map(|s| get(s) as f32));
@@ -190,64 +180,50 @@ fn sweeps(map: &VelocityMap) -> Vec<Variable> {
         angle_rad.to_degrees()
     });
     let fixed_name = if is_rhi { "azimuth of the scan plane" } else { "angle that stays during the sweep" };
-    let (first, last) = (ints(&mut bounds.iter().map(|b| b.0)), ints(&mut bounds.iter().map(|b| b.1)));
-    let each = |(name, values, long_name, units): (&str, Data, &str, &str)| {
-        Variable::new(name, &["sweep"], values).named(["", long_name, units])
-    };
-    let mut of_sweeps = vec![
-        ("sweep_number", ints(&mut (0..bounds.len())), "sweep number, from 0", ""),
-        ("fixed_angle", fixed, fixed_name, "degrees"),
-        ("sweep_start_ray_index", first, "index of the first ray of the sweep", ""),
-        ("sweep_end_ray_index", last, "index of the last ray of the sweep, inclusive", ""),
+    let mut out = vec![
+        ("volume_number", Data::i32([0])),
+        ("sweep_number", ints(&mut (0..bounds.len()))),
+        ("fixed_angle", fixed),
+        ("fixed_angle:long_name", Data::text(fixed_name)),
+        ("sweep_start_ray_index", ints(&mut bounds.iter().map(|b| b.0))),
+        ("sweep_end_ray_index", ints(&mut bounds.iter().map(|b| b.1))),
     ];
     // Nobody knows the age of a measured wake.
     if map.sweeps.iter().all(|sweep| sweep.tau.is_finite()) {
-        of_sweeps.push(("wake_age", floats(|s| s.tau), "age of the wake, t Gamma0 / (2 pi b0^2)", "1"));
+        out.push(("wake_age", floats(|s| s.tau)));
     }
-    let volume = Variable::new("volume_number", &[], Data::i32([0])).text("long_name", "volume number");
-    std::iter::once(volume).chain(of_sweeps.into_iter().map(each)).collect()
+    out
 }
 
-fn texts(map: &VelocityMap) -> Vec<Variable> {
-    const ONE: &[&str] = &["string_length_32"];
-    const EACH: &[&str] = &["sweep", "string_length_32"];
+fn texts(map: &VelocityMap) -> Values {
     let start = map.start();
     let time = |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
-    let one = |name: &str, text: &str| Variable::new(name, ONE, Data::text(padded(text)));
-    let each = |name: &str, text: &str| Variable::new(name, EACH, Data::text(padded(text).repeat(map.sweeps.len())));
+    let each = |text: &str| Data::text(padded(text).repeat(map.sweeps.len()));
     let modes: Vec<u8> = map.sweeps.iter().flat_map(|sweep| padded(sweep.mode.name())).collect();
     vec![
-        one("time_coverage_start", &time(map.rays.first())),
-        one("time_coverage_end", &time(map.rays.last())),
-        one("time_reference", &start.to_string()),
-        one("platform_type", if map.is_carried() { "aircraft" } else { "fixed" }),
-        one("instrument_type", "lidar"),
-        one("primary_axis", "axis_z"),
-        Variable::new("sweep_mode", EACH, Data::text(modes)),
-        each("follow_mode", "none"),
-        each("prt_mode", "fixed"),
+        ("time_coverage_start", Data::text(padded(&time(map.rays.first())))),
+        ("time_coverage_end", Data::text(padded(&time(map.rays.last())))),
+        ("time_reference", Data::text(padded(&start.to_string()))),
+        ("platform_type", Data::text(padded(if map.is_carried() { "aircraft" } else { "fixed" }))),
+        ("instrument_type", Data::text(padded("lidar"))),
+        ("primary_axis", Data::text(padded("axis_z"))),
+        ("sweep_mode", Data::text(modes)),
+        ("follow_mode", each("none")),
+        ("prt_mode", each("fixed")),
     ]
 }
 
-fn instrument(map: &VelocityMap) -> Vec<Variable> {
+fn instrument(map: &VelocityMap) -> Values {
     let (rays, pulse) = (map.rays.len(), &map.pulse);
-    let samples = Data::i32(map.rays.iter().map(|ray| i32::try_from(ray.pulses).unwrap_or(i32::MAX)));
-    let group = |v: Variable, units: &str| v.text("units", units).text("meta_group", "instrument_parameters");
-    let each = |name: &str, value: f64, long_name: &str| {
-        Variable::new(name, &["time"], single(&vec![value; rays])).text("long_name", long_name)
-    };
-    let folding = if pulse.is_mirrored() { MIRRORED } else { "modulo" };
-    let frequency = Variable::new("frequency", &["frequency"], single(&[pulse.frequency_hz]));
-    let width = "full width at half maximum of the power of the pulse";
-    let nyquist = "largest velocity that the samples tell from others";
+    let each = |value: f64| single(&vec![value; rays]);
     vec![
-        group(frequency.text("standard_name", "radiation_frequency"), "s-1"),
-        group(each("prt", pulse.prt_s, "time between pulses"), "seconds"),
-        group(each("pulse_width", pulse.pulse_width_s, width), "seconds"),
-        group(each("nyquist_velocity", pulse.nyquist_velocity_m_s, nyquist).text("folding", folding), METRES),
-        group(Variable::new("n_samples", &["time"], samples).text("long_name", "pulses of the ray"), "1"),
-        Variable::new("antenna_transition", &["time"], Data::i8(vec![0; rays]))
-            .text("long_name", "1 while the telescope moves between sweeps"),
+        ("frequency", single(&[pulse.frequency_hz])),
+        ("prt", each(pulse.prt_s)),
+        ("pulse_width", each(pulse.pulse_width_s)),
+        ("nyquist_velocity", each(pulse.nyquist_velocity_m_s)),
+        ("nyquist_velocity:folding", Data::text(if pulse.is_mirrored() { MIRRORED } else { "modulo" })),
+        ("n_samples", Data::i32(map.rays.iter().map(|ray| i32::try_from(ray.pulses).unwrap_or(i32::MAX)))),
+        ("antenna_transition", Data::i8(vec![0; rays])),
     ]
 }
 
@@ -286,7 +262,8 @@ fn instrument_of(scene_toml: &str) -> String {
 fn field_variable(field: &Field) -> Variable {
     const DIMS: &[&str] = &["time", "range"];
     let mut out = Variable::new(&field.name, DIMS, Data::filled(&field.values))
-        .named(["", &field.long_name, field.unit.udunits])
+        .text("long_name", &field.long_name)
+        .text("units", field.unit.udunits)
         .text("coordinates", "elevation azimuth range");
     let further = [
         ("standard_name", field.standard_name()),

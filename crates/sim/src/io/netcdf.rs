@@ -6,6 +6,7 @@
 use super::error::{OutputError, OutputResult, same_length};
 use super::parts::FileParts;
 use super::provenance::Provenance;
+use std::collections::BTreeMap;
 
 /// The whole file is held in memory, unless ranks share it; a larger result belongs in one file per time.
 pub(crate) const MAX_BYTES: usize = 512 << 20;
@@ -77,22 +78,6 @@ impl Variable {
         Self { name: name.into(), dims: dims.to_vec(), data, attrs: Vec::new(), first: None }
     }
 
-    /// Of a variable that ranks share, the values from number `first` on.
-    pub(crate) fn part(name: &str, dims: &[&'static str], data: Data, first: usize) -> Self {
-        Self { first: Some(first), ..Self::new(name, dims, data) }
-    }
-
-    /// Its unit, and what it is.
-    pub(crate) fn in_units(name: &str, dims: &[&'static str], data: Data, units: &str, what: &str) -> Self {
-        Self::new(name, dims, data).text("units", units).text("long_name", what)
-    }
-
-    /// Adds its standard name, its long name and its unit, in this order; an empty one is none.
-    pub(crate) fn named(self, [standard_name, long_name, units]: [&str; 3]) -> Self {
-        let names = [("standard_name", standard_name), ("long_name", long_name), ("units", units)];
-        names.into_iter().filter(|(_, text)| !text.is_empty()).fold(self, |own, (name, text)| own.text(name, text))
-    }
-
     /// Adds a text attribute.
     pub(crate) fn text(self, name: &'static str, value: &str) -> Self {
         self.attr(name, Data::text(value))
@@ -103,6 +88,38 @@ impl Variable {
         self.attrs.push((name, value));
         self
     }
+}
+
+/// Variables as `cdl` describes them in the notation of `ncdump`, in its order: their dimensions and attributes. Values stand by the name
+/// of their variable; variables without are left out. An attribute `?` has the value of the name `variable:attribute`, or is left out, too.
+pub(crate) fn described(cdl: &'static str, values: impl IntoIterator<Item = (&'static str, Data)>) -> Vec<Variable> {
+    // Their types are those of the values.
+    let mut values: BTreeMap<&str, Data> = values.into_iter().collect();
+    let mut out: Vec<Variable> = Vec::new();
+    for line in cdl.lines().filter_map(|line| line.trim().strip_suffix(" ;")) {
+        match line.split_once(" = ") {
+            // Such as `float azimuth(time)`.
+            None => {
+                let (name, dims) = line.trim_end_matches(')').split_once('(').unwrap_or((line, ""));
+                let name = name.rsplit(' ').next().unwrap_or(name);
+                let dims: Vec<&str> = dims.split(", ").filter(|dim| !dim.is_empty()).collect();
+                out.extend(values.remove(name).map(|data| Variable::new(name, &dims, data)));
+            }
+            Some((key, value)) => {
+                let (name, attribute) = key.split_once(':').unwrap_or_default();
+                let number = value.strip_suffix('f').and_then(|number| number.parse::<f32>().ok());
+                let value = match number {
+                    _ if value == "?" => values.remove(key),
+                    Some(number) => Some(Data::f32([number])),
+                    None => Some(Data::text(value.trim_matches('"'))),
+                };
+                let variable = out.last_mut().filter(|variable| variable.name == name);
+                variable.into_iter().zip(value).for_each(|(variable, value)| variable.attrs.push((attribute, value)));
+            }
+        }
+    }
+    debug_assert!(values.is_empty(), "nothing describes {:?}", values.keys());
+    out
 }
 
 /// A whole file.
