@@ -115,33 +115,26 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
     Ok((gate_m, before as usize))
 }
 
+/// The head of the file; its focus range 65535 stands for a collimated beam, where readers ask for an integer.
 fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize, usize)) -> String {
     let pulse = &map.pulse;
     let points = (2.0 * gate_m / SPEED_OF_LIGHT_M_S * pulse.sampling_hz).round().max(1.0);
     let resolution_m_s = 0.5 * pulse.wavelength_m() * pulse.sampling_hz / points;
-    let lines = [
-        format!("Filename:\t{name}"),
-        SYSTEM_ID.into(),
-        format!("Number of gates:\t{gates}"),
+    let header = format!(
+        include_str!("hpl_header.txt"),
+        name = name,
+        system_id = SYSTEM_ID,
+        gates = gates,
         // Readers multiply it with the number of a gate.
-        format!("Range gate length (m):\t{gate_m:.6}"),
-        format!("Gate length (pts):\t{points}"),
-        format!("Pulses/ray:\t{}", pulse.samples),
-        format!("No. of rays in file:\t{}", rays.1 - rays.0 + 1),
-        format!("Scan type:\t{}", scan_type(map, rays)),
-        // 65535 stands for a collimated beam; readers ask for an integer.
-        "Focus range:\t65535".into(),
-        format!("Start time:\t{}", start_time(map, rays.0)),
-        format!("Resolution (m/s):\t{resolution_m_s:.4}"),
-        "Range of measurement (center of gate) = (range gate + 0.5) * Gate length".into(),
-        "Data line 1: Decimal time (hours)  Azimuth (degrees)  Elevation (degrees) Pitch (degrees) Roll (degrees)"
-            .into(),
-        "f9.6,1x,f6.2,1x,f6.2".into(),
-        "Data line 2: Range Gate  Doppler (m/s)  Intensity (SNR + 1)  Beta (m-1 sr-1)".into(),
-        "i3,1x,f6.4,1x,f8.6,1x,e12.6 - repeat for no. gates".into(),
-        "****".into(),
-    ];
-    lines.join("\r\n") + "\r\n"
+        gate_m = gate_m,
+        points = points,
+        pulses = pulse.samples,
+        rays = rays.1 - rays.0 + 1,
+        scan_type = scan_type(map, rays),
+        start_time = start_time(map, rays.0),
+        resolution_m_s = resolution_m_s
+    );
+    header.replace('\n', "\r\n")
 }
 
 /// The word of the instrument for a sweep, by its rays.

@@ -65,33 +65,16 @@ fn product(text: &str) -> Option<(f64, [i32; 2])> {
     Some((factor, powers))
 }
 
+/// Units in SI, with their powers of length and time.
+const UNITS: &str = include_str!("units.csv");
+
 /// One unit in SI, and its powers.
 fn base(word: &str) -> Option<(f64, [i32; 2])> {
     let lower = word.to_lowercase();
-    let (length, time) = (|factor: f64| Some((factor, [1, 0])), |factor: f64| Some((factor, [0, 1])));
-    let prefixed = |unit: &str| -> Option<f64> {
-        let prefixes = [("", 1.0), ("kilo", 1e3), ("centi", 1e-2), ("milli", 1e-3), ("micro", 1e-6), ("nano", 1e-9)];
-        let prefix = lower.trim_end_matches('s').strip_suffix(unit)?;
-        prefixes.into_iter().find(|(name, _)| *name == prefix).map(|(_, factor)| factor)
-    };
-    match lower.as_str() {
-        "m" => length(1.0),
-        "km" => length(1e3),
-        "cm" => length(1e-2),
-        "mm" => length(1e-3),
-        "s" | "sec" | "secs" => time(1.0),
-        "ms" => time(1e-3),
-        "us" | "µs" => time(1e-6),
-        "ns" => time(1e-9),
-        "min" | "mins" | "minute" | "minutes" => time(60.0),
-        "h" | "hr" | "hrs" | "hour" | "hours" => time(3600.0),
-        "d" | "day" | "days" => time(86_400.0),
-        "kn" | "kt" | "kts" | "knot" | "knots" => Some((1852.0 / 3600.0, [1, -1])),
-        _ => match prefixed("meter").or_else(|| prefixed("metre")) {
-            Some(factor) => length(factor),
-            None => prefixed("second").and_then(time),
-        },
-    }
+    let row = UNITS.lines().find_map(|row| row.split_once(',').filter(|(unit, _)| *unit == lower))?.1;
+    let (factor, (length, time)) =
+        row.split_once(',').and_then(|(factor, powers)| Some((factor, powers.split_once(',')?)))?;
+    Some((factor.parse().ok()?, [length.parse().ok()?, time.parse().ok()?]))
 }
 
 #[cfg(test)]

@@ -6,40 +6,11 @@ use super::key::{Key, Kind, join};
 const LONGEST_QUOTE: usize = 60;
 
 /// Endings of names and the units that they stand for, longer ones first.
-const UNITS: [(&str, &str); 28] = [
-    ("_per_m_sr", "1/(m sr)"),
-    ("_m2_s", "m^2/s"),
-    ("_m_m23", "m^(-2/3)"),
-    ("_kg_m3", "kg/m^3"),
-    ("_per_m", "1/m"),
-    ("_per_s", "1/s"),
-    ("_hz_s", "Hz/s"),
-    ("_db_hz", "dB/Hz"),
-    ("_a_rthz", "A/sqrt(Hz)"),
-    ("_m_w", "m/W"),
-    ("_ohm", "ohm"),
-    ("_m2", "m^2"),
-    ("_m_s2", "m/s^2"),
-    ("_m_s", "m/s"),
-    ("_rad", "rad"),
-    ("_deg", "degrees"),
-    ("_tau", "units of b0/V0"),
-    ("_hz", "Hz"),
-    ("_db", "dB"),
-    ("_kg", "kg"),
-    ("_m", "m"),
-    ("_s", "s"),
-    ("_j", "J"),
-    ("_w", "W"),
-    ("_a", "A"),
-    ("_k", "K"),
-    ("_pa", "Pa"),
-    ("_sr", "sr"),
-];
+const UNITS: &str = include_str!("units.csv");
 
 /// The unit of a key by its name.
 pub(crate) fn unit_of(key: &str) -> Option<&'static str> {
-    UNITS.iter().find(|(end, _)| key.ends_with(end)).map(|(_, unit)| *unit)
+    UNITS.lines().filter_map(|line| line.split_once(',')).find(|(end, _)| key.ends_with(end)).map(|(_, unit)| unit)
 }
 
 /// " in m", or nothing where the name has no unit.
