@@ -56,23 +56,18 @@ fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, Str
 ///
 /// # Errors
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
-pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<[VolumeComponent; 3], Error> {
+pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<Components, Error> {
     let file = open(&field.path)?;
     let component = |name: &str| component(&file, name, field.place, true).map_err(|reason| file.refuse(reason));
-    Ok([component(&names[0])?, component(&names[1])?, component(&names[2])?])
-}
-
-/// Lengths of the periods along x and y that the file states for the component `name` \[m\].
-///
-/// # Errors
-/// As [`read`].
-pub(crate) fn periods_m(field: &FieldPlace, name: &str) -> Result<[Option<f64>; 2], Error> {
-    let file = open(&field.path)?;
-    Ok([X, Y].map(|role| match file.text(&file.dim_of(name, role)?, "edges").and_then(edges::from_text) {
+    let period_m = |role| match file.text(&file.dim_of(&names[0], role)?, "edges").and_then(edges::from_text) {
         Some(Edges::Periodic { period_m }) => Some(period_m),
         _ => None,
-    }))
+    };
+    Ok(([component(&names[0])?, component(&names[1])?, component(&names[2])?], [X, Y].map(period_m)))
 }
+
+/// The components of a field, and the lengths of the periods along x and y that its file states for the first of them \[m\].
+type Components = ([VolumeComponent; 3], [Option<f64>; 2]);
 
 /// What the air carries with it in one field, in the units and axes of the file.
 ///
@@ -191,7 +186,7 @@ mod tests {
         std::fs::write(&path, layout.into_bytes(&crate::io::provenance::example()).unwrap()).unwrap();
         let place = places(&path, "u").unwrap().remove(0);
         assert_eq!(place.time_s, 43_200.0);
-        for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap() {
+        for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap().0 {
             assert!(component.values.iter().enumerate().all(|(i, v)| (v - i as f64).abs() < 1e-12));
             assert!(
                 component

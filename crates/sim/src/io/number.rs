@@ -5,34 +5,22 @@
 /// How a number is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct NumberType {
-    kind: Kind,
+    /// `i` for signed and `u` for unsigned whole numbers, `f` for floats.
+    kind: char,
     /// Bytes of one number.
     pub(crate) bytes: u64,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Kind {
-    Signed,
-    Unsigned,
-    Float,
-}
-
 impl NumberType {
-    pub(crate) const F32: Self = Self { kind: Kind::Float, bytes: 4 };
-    pub(crate) const F64: Self = Self { kind: Kind::Float, bytes: 8 };
+    pub(crate) const F32: Self = Self { kind: 'f', bytes: 4 };
+    pub(crate) const F64: Self = Self { kind: 'f', bytes: 8 };
 
     /// By its name with the number of bits, such as `i16`.
     pub(crate) fn named(name: &str) -> Option<Self> {
-        let (kind, bits) = name.split_at_checked(1)?;
-        match (kind, bits) {
-            ("f", "32") => Some(Self::F32),
-            ("f", "64") => Some(Self::F64),
-            ("i" | "u", "8" | "16" | "32" | "64") => {
-                let kind = if kind == "i" { Kind::Signed } else { Kind::Unsigned };
-                Some(Self { kind, bytes: bits.parse::<u64>().ok()? / 8 })
-            }
-            _ => None,
-        }
+        let kind = name.chars().next()?;
+        let bits = name.strip_prefix(kind)?;
+        let is_known = matches!((kind, bits), ('i' | 'u', "8" | "16" | "32" | "64") | ('f', "32" | "64"));
+        is_known.then_some(Self { kind, bytes: bits.parse::<u64>().ok()? / 8 })
     }
 
     /// By its name in numpy, which counts bytes: `i2`.
@@ -42,7 +30,7 @@ impl NumberType {
     }
 
     pub(crate) fn is_float(self) -> bool {
-        self.kind == Kind::Float
+        self.kind == 'f'
     }
 
     /// A number from its bytes in this order.
@@ -55,10 +43,10 @@ impl NumberType {
         let unused = 64 - 8 * self.bytes;
         match self.kind {
             // The sign is the highest of its own bits.
-            Kind::Signed => ((bits << unused) as i64 >> unused) as f64,
-            Kind::Unsigned => bits as f64,
-            Kind::Float if self.bytes == 4 => f64::from(f32::from_bits(bits as u32)),
-            Kind::Float => f64::from_bits(bits),
+            'i' => ((bits << unused) as i64 >> unused) as f64,
+            'u' => bits as f64,
+            _ if self.bytes == 4 => f64::from(f32::from_bits(bits as u32)),
+            _ => f64::from_bits(bits),
         }
     }
 }

@@ -45,27 +45,24 @@ pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<Bea
     if !matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
         return Ok(None);
     }
-    let g = &plan.geometry;
-    let mut out = Vec::with_capacity(g.schedule.sweeps.len() * map.range_m.len());
-    for sweep in 0..g.schedule.sweeps.len() {
+    let mut out = Vec::with_capacity(plan.geometry.schedule.sweeps.len() * map.range_m.len());
+    for sweep in 0..plan.geometry.schedule.sweeps.len() {
         let (lines, beams) = beams_of(plan, sweep);
         let direction: Vec<[f64; 3]> = beams.iter().map(|beam| beam.direction.0).collect();
-        let count = beams.len().max(1) as f64;
-        let after_s = beams.iter().map(|beam| beam.time_s).sum::<f64>() / count;
+        let time_s = plan.wind.start_s + beams.iter().map(|beam| beam.time_s).sum::<f64>() / beams.len().max(1) as f64;
         for (gate, &range_m) in map.range_m.iter().enumerate() {
             let of = |values: &Array2<f64>| -> Vec<f64> { lines.iter().map(|line| values[[*line, gate]]).collect() };
             let from = |values: &Array2<f64>| wind_of(pattern, &direction, &of(values));
             let (wind_m_s, error_bar_m_s) = from(&map.v_scan_m_s)?;
-            let slanted = beams.iter().zip(&direction).filter(|(_, e)| e[2] < 1.0);
-            let (sum_m, slanted) =
-                slanted.fold((0.0, 0.0), |(sum, n), (beam, _)| (sum + beam.at_range_m(range_m)[2], n + 1.0));
+            let slanted = beams.iter().filter(|beam| beam.direction.0[2] < 1.0).map(|beam| beam.at_range_m(range_m)[2]);
+            let (sum_m, slanted) = slanted.fold((0.0, 0.0), |(sum, n), height_m| (sum + height_m, n + 1.0));
             let height_m = sum_m / slanted;
             let mut truth = [[f64::NAN; 3]];
             let above_m = beams.first().map_or([0.0; 3], |beam| [beam.position_m[0], beam.position_m[1], height_m]);
-            plan.wind.wind().velocity_into(&[above_m], plan.wind.start_s + after_s, &mut truth)?;
+            plan.wind.wind().velocity_into(&[above_m], time_s, &mut truth)?;
             out.push(BeamWind {
                 sweep,
-                time_s: plan.wind.start_s + after_s,
+                time_s,
                 range_m,
                 height_m,
                 wind_m_s,

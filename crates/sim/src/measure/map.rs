@@ -7,11 +7,11 @@ use crate::measure::map_estimator::{MapEstimator, NoiseAtPoints};
 use crate::measure::scan::Scanner;
 use crate::plan::{Plan, Stage};
 use crate::scene::DetectorSignal;
-use crate::setup::air::radial_velocity_m_s;
+use crate::setup::air::{radial_velocity_m_s, seen_m_s};
 use crate::setup::progress::Observer;
 use crate::setup::ray_information::range_filter;
 use crate::setup::region::places;
-use ndarray::{Array2, ArrayView1, ArrayView2};
+use ndarray::{Array1, Array2, ArrayView2};
 use num_complex::Complex;
 use wakescope_estimate::{
     Scan,
@@ -161,11 +161,10 @@ fn truth(plan: &Plan, scanner: &Scanner<'_>, shape: (usize, usize)) -> Result<Ve
     let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
     let by_gate = range_filter(plan)?;
     for i in 0..scanner.lines.len() {
-        exact_m_s.row_mut(i).assign(&ArrayView1::from(&radial_velocity_m_s(plan, i, &g.gate_range_m)?));
-        let mut filtered_m_s = vec![0.0; g.gate_range_m.len()];
+        exact_m_s.row_mut(i).assign(&Array1::from(radial_velocity_m_s(plan, i, &g.gate_range_m)?));
+        let (line, backscatter) = (&scanner.lines[i], scanner.backscatter_per_m_sr.get(i).map(Vec::as_slice));
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
-            scanner.seen_into(filter, g, i, &mut filtered_m_s)?;
-            cells.row_mut(i).assign(&ArrayView1::from(&filtered_m_s));
+            cells.row_mut(i).assign(&Array1::from(seen_m_s(filter, g, &line.radial_velocity_m_s, backscatter)?));
         }
     }
     Ok(VelocityEstimates {

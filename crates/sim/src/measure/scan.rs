@@ -4,7 +4,7 @@ use crate::Error;
 use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory};
 use crate::plan::{Plan, Stage};
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
-use crate::setup::air::{Air, air_along, air_of_line, beam_of_air, known_velocity_m_s, seen_into};
+use crate::setup::air::{Air, air_along, air_of_line, beam_of_air, known_velocity_m_s};
 use crate::setup::beams::{Beam, Line};
 use crate::setup::efficiency_model::{drawn_turbulence, stretches};
 use crate::setup::geometry::Geometry;
@@ -31,7 +31,7 @@ pub struct Scanner<'a> {
     /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the airs of its pulses.
     pub lines: Vec<LineOfSight>,
     /// Backscatter that the flow carries \[line\]\[layer\], 1/(m sr); empty where it carries none.
-    backscatter_per_m_sr: Vec<Vec<f64>>,
+    pub(crate) backscatter_per_m_sr: Vec<Vec<f64>>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have airs of their own.
     pub spread_m_s: Option<Array2<f64>>,
@@ -64,16 +64,12 @@ impl<'a> Scanner<'a> {
         let by_pulse = RangeFilter::pulse(&instrument.pulse, geometry.layer_thickness_m)?;
         let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
         let all: Vec<usize> = (0..geometry.schedule.lines.len()).collect();
-        let lines = in_time_order(
-            plan,
-            &all,
-            |line| geometry.line_time_s[*line],
-            |&line| {
-                let air = air_of_line(plan, &by_pulse, &ranges_m, line)?;
-                observer.advance(1);
-                Ok(air)
-            },
-        )?;
+        let of_line = |&line: &usize| {
+            let air = air_of_line(plan, &by_pulse, &ranges_m, line)?;
+            observer.advance(1);
+            Ok(air)
+        };
+        let lines = in_time_order(plan, &all, |line| geometry.line_time_s[*line], of_line)?;
         let (airs, spreads): (Vec<Air>, Vec<_>) = lines.into_iter().unzip();
         let lines: Vec<LineOfSight> = airs.iter().map(|air| returns.line(air, geometry)).collect();
         let backscatter_per_m_sr = airs.into_iter().filter_map(|air| air.backscatter_per_m_sr).collect();
@@ -115,22 +111,6 @@ impl<'a> Scanner<'a> {
         let still = Air { radial_velocity_m_s: vec![0.0; plan.geometry.layers], backscatter_per_m_sr: None };
         let line = layer_returns(&optics)?.line(&still, &plan.geometry);
         Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line))
-    }
-
-    /// What a filter sees of a line at the gates of a geometry, m/s: that of this scan, or of one with the same layers whose
-    /// estimator has other gates.
-    ///
-    /// # Errors
-    /// What the filter refuses; a checked scene gives none.
-    pub(crate) fn seen_into(
-        &self,
-        filter: &RangeFilter,
-        gates: &Geometry,
-        line: usize,
-        out_m_s: &mut [f64],
-    ) -> Result<(), Error> {
-        let backscatter = self.backscatter_per_m_sr.get(line).map(Vec::as_slice);
-        seen_into(filter, gates, &self.lines[line].radial_velocity_m_s, backscatter, out_m_s)
     }
 
     /// Pulses of one realisation.
@@ -222,15 +202,9 @@ impl<'a> Scanner<'a> {
             })
             .collect();
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        let beams: Vec<(usize, Beam)> =
-            wanted.iter().map(|&(line, air)| (line, beam_of_air(self.plan, line, air))).collect();
-        let airs = in_time_order(
-            self.plan,
-            &beams,
-            |(_, beam)| beam.time_s,
-            |(_, beam)| Ok(self.returns.line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry)),
-        )?;
-        Ok((airs, air_of))
+        let beams: Vec<Beam> = wanted.iter().map(|&(line, air)| beam_of_air(self.plan, line, air)).collect();
+        let along = |beam: &Beam| Ok(self.returns.line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry));
+        Ok((in_time_order(self.plan, &beams, |beam| beam.time_s, along)?, air_of))
     }
 }
 

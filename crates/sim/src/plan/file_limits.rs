@@ -22,12 +22,8 @@ pub(super) fn check(plan: &Plan) -> Result<(), Error> {
             let quadratures = if scene.detector.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
             let bytes =
                 crate::io::cf_signals::data_bytes([pulses, g.samples as f64, quadratures], [rays, g.layers as f64]);
-            fits(
-                "outputs.signals",
-                "signals.nc",
-                bytes,
-                "keep fewer pulses, lines or realisations, or set it to false",
-            )?;
+            let remedy = "keep fewer pulses, lines or realisations, or set it to false";
+            fits("outputs.signals", "signals.nc", bytes, remedy)?;
         }
         if has_map {
             let bytes = crate::io::cfradial::data_bytes(rays, g.gate_range_m.len() as f64);

@@ -20,7 +20,7 @@ impl Plan {
     /// # Errors
     /// [`Error::TooLarge`] for more than nine tenths of what the machine has available, with the keys on which it depends.
     pub fn fits(&self) -> Result<(), Error> {
-        machine::available_memory_bytes().map_or(Ok(()), |available_bytes| self.fits_in(available_bytes))
+        self.fits_in(machine::available_memory_bytes().unwrap_or(f64::INFINITY))
     }
 
     /// The same for a given amount of memory, bytes.
@@ -61,7 +61,7 @@ impl Plan {
     /// # Errors
     /// As [`Plan::fits`].
     pub fn bound_fits(&self) -> Result<(), Error> {
-        machine::available_memory_bytes().map_or(Ok(()), |available_bytes| self.bound_fits_in(available_bytes))
+        self.bound_fits_in(machine::available_memory_bytes().unwrap_or(f64::INFINITY))
     }
 
     /// The same for a given amount of memory, bytes.

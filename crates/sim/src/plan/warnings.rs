@@ -27,10 +27,9 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
     }
     let is_model = method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
     if is_model && e.weighting != Weighting::Rectangular {
-        out.push(
-            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\""
-                .into(),
-        );
+        let meant =
+            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\"";
+        out.push(meant.into());
     }
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());

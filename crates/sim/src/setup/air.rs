@@ -21,22 +21,22 @@ pub(crate) struct Air {
 ///
 /// # Errors
 /// What the filter refuses; a checked scene gives none.
-pub(crate) fn seen_into(
+pub(crate) fn seen_m_s(
     filter: &RangeFilter,
     g: &Geometry,
     velocity_m_s: &[f64],
     backscatter_per_m_sr: Option<&[f64]>,
-    out_m_s: &mut [f64],
-) -> Result<(), Error> {
-    let apply =
-        |values: &[f64], out: &mut [f64]| filter.apply_into(g.first_layer_range_m, values, &g.gate_range_m, out);
-    let Some(backscatter) = backscatter_per_m_sr else { return Ok(apply(velocity_m_s, out_m_s)?) };
+) -> Result<Vec<f64>, Error> {
+    let apply = |values: Vec<f64>| -> Result<Vec<f64>, Error> {
+        let mut out = vec![0.0; g.gate_range_m.len()];
+        filter.apply_into(g.first_layer_range_m, &values, &g.gate_range_m, &mut out)?;
+        Ok(out)
+    };
+    let Some(backscatter) = backscatter_per_m_sr else { return apply(velocity_m_s.to_vec()) };
     let pairs = || velocity_m_s.iter().zip(backscatter);
-    let mut weight = vec![0.0; out_m_s.len()];
-    apply(&pairs().map(|(v, beta)| v * beta).collect::<Vec<_>>(), out_m_s)?;
-    apply(&pairs().map(|(v, beta)| if v.is_nan() { f64::NAN } else { *beta }).collect::<Vec<_>>(), &mut weight)?;
-    out_m_s.iter_mut().zip(&weight).for_each(|(sum, weight)| *sum /= weight);
-    Ok(())
+    let sums = apply(pairs().map(|(v, beta)| v * beta).collect())?;
+    let weights = apply(pairs().map(|(v, beta)| if v.is_nan() { f64::NAN } else { *beta }).collect())?;
+    Ok(sums.into_iter().zip(weights).map(|(sum, weight)| sum / weight).collect())
 }
 
 /// The beam in the middle of the pulses that share an air of a line.
@@ -71,15 +71,14 @@ pub(crate) fn air_of_line(
     let mut sums_m_s = vec![0.0; range_m.len()];
     let mut backscatter: Option<Vec<f64>> = None;
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
-    let mut seen_m_s = vec![0.0; g.gate_range_m.len()];
     let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
     for air in 0..airs {
         let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
         let here = air_along(setup, &beam_of_air(setup, line, air), range_m)?;
-        seen_into(filter, g, &here.radial_velocity_m_s, here.backscatter_per_m_sr.as_deref(), &mut seen_m_s)?;
+        let here_seen_m_s = seen_m_s(filter, g, &here.radial_velocity_m_s, here.backscatter_per_m_sr.as_deref())?;
         // About the first air, so that the mean of equal airs is that air.
         if air == 0 {
-            (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), seen_m_s.clone());
+            (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
             backscatter = here.backscatter_per_m_sr.as_ref().map(|carried| vec![0.0; carried.len()]);
         }
         let weight = |layer: usize| here.backscatter_per_m_sr.as_ref().map_or(1.0, |carried| carried[layer]);
@@ -89,7 +88,7 @@ pub(crate) fn air_of_line(
         if let Some(backscatter) = &mut backscatter {
             backscatter.iter_mut().enumerate().for_each(|(layer, sum)| *sum += share * weight(layer));
         }
-        for ((sum, square), (v, first)) in sums.iter_mut().zip(seen_m_s.iter().zip(&first_seen_m_s)) {
+        for ((sum, square), (v, first)) in sums.iter_mut().zip(here_seen_m_s.iter().zip(&first_seen_m_s)) {
             let beside = v - first;
             *sum += share * beside;
             *square += share * beside * beside;

@@ -15,17 +15,8 @@ use std::path::Path;
 const AWAY: &str = "radial_velocity_of_scatterers_away_from_instrument";
 const TOWARDS: &str = "radial_velocity_of_scatterers_toward_instrument";
 /// Names of the velocity where no standard name says it, positive away.
-const VELOCITIES: [&str; 9] = [
-    "radial_velocity",
-    "velocity",
-    "radial_wind_speed",
-    "VEL",
-    "VR",
-    "VRAD",
-    "VRADH",
-    "doppler_velocity",
-    "mean_doppler_velocity",
-];
+const VELOCITIES: &str =
+    "radial_velocity velocity radial_wind_speed VEL VR VRAD VRADH doppler_velocity mean_doppler_velocity";
 /// Names of its standard deviation.
 const SIGMAS: [&str; 4] = ["velocity_standard_deviation", "sigma_m_s", "radial_velocity_error", "velocity_error"];
 /// Whether a Windcube trusts a velocity; its times are those of the ends of rays.
@@ -147,7 +138,7 @@ impl Field {
             Some(name) if file.has(name) => name.clone(),
             Some(name) => return Err(format!("it has no variable {name}, which --field names")),
             None => {
-                let known = VELOCITIES.iter().find(|name| file.has(name)).map(|name| (*name).to_owned());
+                let known = VELOCITIES.split(' ').find(|name| file.has(name)).map(str::to_owned);
                 let by_standard =
                     || file.names().find(|name| [AWAY, TOWARDS].contains(&standard(name))).map(str::to_owned);
                 known.or_else(by_standard).ok_or(

@@ -6,19 +6,10 @@ use crate::plan::units::rounded;
 
 /// A number in three digits with a prefix of its unit.
 pub(super) fn si(value: f64, unit: &str) -> String {
-    const PREFIXES: [(f64, &str); 9] = [
-        (1e9, "G"),
-        (1e6, "M"),
-        (1e3, "k"),
-        (1.0, ""),
-        (1e-3, "m"),
-        (1e-6, "u"),
-        (1e-9, "n"),
-        (1e-12, "p"),
-        (1e-15, "f"),
-    ];
+    const PREFIXES: [&str; 9] = ["G", "M", "k", "", "m", "u", "n", "p", "f"];
+    let sizes = (-15..=9).rev().step_by(3).map(|power| 10f64.powi(power));
     // 999.6 is 1.00 of the next prefix.
-    match PREFIXES.iter().find(|(size, _)| value.abs() >= 0.9995 * size) {
+    match sizes.zip(PREFIXES).find(|(size, _)| value.abs() >= 0.9995 * size) {
         Some((size, prefix)) if value.is_finite() => format!("{} {prefix}{unit}", digits(value / size)),
         _ => format!("{} {unit}", scientific(value)),
     }

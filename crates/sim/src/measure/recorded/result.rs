@@ -105,6 +105,7 @@ fn quietest(plan: &Plan, scan: &ScanCells) -> f64 {
 
 /// The map of the scans, each a sweep, in the form that files and pictures take.
 pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, Error> {
+    type Of = fn(&MeasuredScan) -> &Array2<f64>;
     let scene = &plan.scene.scene;
     let (azimuth_rad, pulses) = (scene.scan.azimuth_rad, scene.scan.pulses_per_line as u32);
     let of_scan = |(sweep, scan): (usize, &MeasuredScan)| -> Vec<Ray> {
@@ -112,44 +113,36 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
         rays.map(|(&elevation_rad, &time_s)| Ray { sweep, time_s, elevation_rad, azimuth_rad, pulses, carrier: None })
             .collect()
     };
-    let stacked = |of: fn(&MeasuredScan) -> &Array2<f64>| -> Result<Array2<f64>, Error> {
+    let stacked = |of: Of| -> Result<Array2<f64>, Error> {
         let views: Vec<_> = scans.iter().map(|scan| of(scan).view()).collect();
         concatenate(Axis(0), &views).map_err(|_| wakescope_estimate::Error::Empty { field: "scans" }.into())
     };
-    let field = |name: &str, unit: Unit, text: &str, of: fn(&MeasuredScan) -> &Array2<f64>| {
-        Ok::<_, Error>(Field::float(name, unit, text, stacked(of)?))
-    };
-    let speed = Unit::METRE_PER_SECOND;
+    let (speed, of_bound) = (
+        Unit::METRE_PER_SECOND,
+        "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio",
+    );
+    let in_band = "signal-to-noise ratio in the detector band that the spectra show";
+    let fields: [(&str, Unit, &str, Of); 9] = [
+        ("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| &s.velocity_m_s),
+        ("velocity_standard_deviation", speed, of_bound, |s| &s.predicted_m_s),
+        ("bias", speed, "predicted bias of the method in this noise, not taken off", |s| &s.bias_m_s),
+        ("level", Unit::ONE, "windows accumulated for one estimate", |s| &s.level),
+        ("n_eff", Unit::ONE, "independent windows that these are worth", |s| &s.n_eff),
+        ("flagged", Unit::ONE, "1 where the estimate was flagged", |s| &s.flagged),
+        ("width", speed, "spectral width of air and pulse", |s| &s.width_m_s),
+        ("signal_to_noise_ratio", Unit::DECIBEL, in_band, |s| &s.snr_db),
+        ("quality", Unit::ONE, "density of the peak over the mean density in the band", |s| &s.quality),
+    ];
+    let field = |(name, unit, text, of): (&str, Unit, &str, Of)| Ok(Field::float(name, unit, text, stacked(of)?));
+    let mut fields = fields.into_iter().map(field).collect::<Result<Vec<Field>, Error>>()?;
+    fields[0].ancillary = "velocity_standard_deviation bias level n_eff flagged signal_to_noise_ratio quality".into();
     Ok(VelocityMap {
         title: "Radial velocity estimated from recorded signals".into(),
         rays: scans.iter().enumerate().flat_map(of_scan).collect(),
         range_m: plan.geometry.gate_range_m.clone(),
         sweeps: scans.iter().map(|_| Sweep::rhi(f64::NAN, azimuth_rad)).collect(),
         pulse: pulse_info(scene),
-        fields: vec![
-            field("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| {
-                &s.velocity_m_s
-            })?
-            .with_ancillary("velocity_standard_deviation bias level n_eff flagged signal_to_noise_ratio quality"),
-            field(
-                "velocity_standard_deviation",
-                speed,
-                "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio",
-                |s| &s.predicted_m_s,
-            )?,
-            field("bias", speed, "predicted bias of the method in this noise, not taken off", |s| &s.bias_m_s)?,
-            field("level", Unit::ONE, "windows accumulated for one estimate", |s| &s.level)?,
-            field("n_eff", Unit::ONE, "independent windows that these are worth", |s| &s.n_eff)?,
-            field("flagged", Unit::ONE, "1 where the estimate was flagged", |s| &s.flagged)?,
-            field("width", speed, "spectral width of air and pulse", |s| &s.width_m_s)?,
-            field(
-                "signal_to_noise_ratio",
-                Unit::DECIBEL,
-                "signal-to-noise ratio in the detector band that the spectra show",
-                |s| &s.snr_db,
-            )?,
-            field("quality", Unit::ONE, "density of the peak over the mean density in the band", |s| &s.quality)?,
-        ],
+        fields,
         lidar_height_m: scene.scan.lidar_height_m,
         site: scene.site.clone(),
         ..VelocityMap::default()

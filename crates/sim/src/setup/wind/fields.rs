@@ -3,7 +3,7 @@
 //! Check: a right-handed file with one vortex comes out unmirrored; a field off the cross-plane is what it says.
 
 use crate::Error;
-use crate::io::fields_input::{FieldPlace, periods_m, places, read, read_scalar};
+use crate::io::fields_input::{FieldPlace, places, read, read_scalar};
 use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
 use crate::setup::beams::direction::sin_cos_of_turn;
@@ -66,9 +66,9 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         nodes_m: c.nodes_m.map(|nodes| nodes.into_iter().map(|x| x * flow.length_unit_m).collect()),
         values: c.values.into_iter().map(|v| v * unit).collect(),
     };
-    let components = read(field, &flow.names)?.map(|c| scaled(c, flow.velocity_unit_m_s));
+    let (components, stated_m) = read(field, &flow.names)?;
+    let components = components.map(|c| scaled(c, flow.velocity_unit_m_s));
     let refuse = |reason: String| Error::Input { path: field.path.clone(), reason };
-    let stated_m = periods_m(field, &flow.names[0])?;
     // The period that the file states, or of evenly spaced nodes; faces and centres have the same.
     let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
         let nodes_m = &components[direction].nodes_m[direction];
