@@ -120,7 +120,7 @@ impl Sight {
             tau => format!("ANALYTIC PAIR at tau = {tau} on its inviscid path, core {} m", pair.core_radius_m),
         };
         let scene = Scene { flow: Flow::VortexPair(pair), ..Scene::default() };
-        let c = wind::vortex_pair(&pair).centres(wind::start_time_s(&scene));
+        let c = wind::vortex_pair(&pair).centres(wind::start_s(&scene.flow));
         let cores = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
         Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() }
     }

@@ -120,7 +120,8 @@ impl FileGroup {
                 return Err(error);
             }
         }
-        sync_folder(&self.folder);
+        // So that the renames reach the disk. Not every system can sync a folder; the files themselves are complete either way.
+        drop(fs::File::open(&self.folder).and_then(|folder| folder.sync_all()));
         Ok(self.files.iter().map(|(name, _)| self.folder.join(name)).collect())
     }
 
@@ -283,13 +284,6 @@ pub(crate) fn in_folder<T, E: From<OutputError>>(
         missing.into_iter().for_each(|f| drop(fs::remove_dir(f)));
     }
     done
-}
-
-/// Asks for the renames to reach the disk. Not every system can sync a folder; the files themselves are complete either way.
-fn sync_folder(folder: &Path) {
-    if let Ok(handle) = fs::File::open(folder) {
-        drop(handle.sync_all());
-    }
 }
 
 fn io_error(action: &'static str, path: &Path, source: std::io::Error) -> OutputError {

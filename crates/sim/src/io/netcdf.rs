@@ -122,21 +122,19 @@ pub(crate) fn described(cdl: &'static str, values: impl IntoIterator<Item = (&'s
     out
 }
 
+/// Names and lengths of dimensions.
+type Dims = Vec<(&'static str, usize)>;
+
 /// A whole file.
 pub(crate) struct Layout {
-    pub(crate) dims: Vec<(&'static str, usize)>,
+    pub(crate) dims: Dims,
     pub(crate) globals: Vec<(&'static str, String)>,
     pub(crate) variables: Vec<Variable>,
 }
 
 impl Layout {
     /// A file of the CF conventions.
-    pub(crate) fn cf(
-        title: &str,
-        dims: Vec<(&'static str, usize)>,
-        variables: Vec<Variable>,
-        provenance: &Provenance,
-    ) -> Self {
+    pub(crate) fn cf(title: &str, dims: Dims, variables: Vec<Variable>, provenance: &Provenance) -> Self {
         let history = format!("written by {}", provenance.program);
         let globals = vec![("Conventions", "CF-1.10".into()), ("title", title.into()), ("history", history)];
         Self { dims, globals, variables }

@@ -46,7 +46,8 @@ impl<'a> Document<'a> {
                 let is_bare = |key: &&str| key.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
                 let place = key.filter(is_bare).map(|key| format!("{}: ", quote(key))).unwrap_or_default();
                 let message = format!("{place}this is no valid TOML: {}", e.message().replace('\n', " "));
-                Err(SceneError::Malformed { path: path.to_owned(), line: line_of(&breaks, at), message })
+                let line = breaks.partition_point(|end| *end < at) + 1;
+                Err(SceneError::Malformed { path: path.to_owned(), line, message })
             }
         }
     }
@@ -55,7 +56,12 @@ impl<'a> Document<'a> {
     pub(crate) fn line(&self, path: &str) -> Option<usize> {
         // The values of a list stand where it does.
         let path = if path.ends_with(']') { path.split_once('[')?.0 } else { path };
-        find(&self.table, path).map(|(span, _)| line_of(&self.breaks, span.start))
+        find(&self.table, path).map(|(span, _)| self.line_of(&span))
+    }
+
+    /// The line of a place, from 1.
+    fn line_of(&self, at: &Range<usize>) -> usize {
+        self.breaks.partition_point(|end| *end < at.start) + 1
     }
 
     /// The line of a key, or of the table that would have it.
@@ -167,11 +173,6 @@ impl Source {
     }
 }
 
-/// The line of a place, from 1.
-fn line_of(breaks: &[usize], offset: usize) -> usize {
-    breaks.partition_point(|end| *end < offset) + 1
-}
-
 /// Where the key with this path stands, and its value; the path may lead through a table of a list.
 fn find<'t, 'a>(table: &'t DeTable<'a>, path: &str) -> Option<(Range<usize>, &'t Spanned<DeValue<'a>>)> {
     let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
@@ -232,10 +233,6 @@ impl Walk<'_> {
         self.found.push(Located { problem: Problem { key, value, allowed }, line: Some(line) });
     }
 
-    fn line_of(&self, at: &Range<usize>) -> usize {
-        line_of(&self.document.breaks, at.start)
-    }
-
     /// A value as the text writes it; nothing for tables, which no line can show.
     fn shown(&self, value: &Spanned<DeValue<'_>>) -> String {
         let is_table = match value.get_ref() {
@@ -251,7 +248,7 @@ impl Walk<'_> {
         let default = |name: &str| defaults.and_then(|d| d.get(name));
         let mut out = toml::Table::new();
         for (name, value) in table {
-            let (here, line) = (name.get_ref().as_ref(), self.line_of(&name.span()));
+            let (here, line) = (name.get_ref().as_ref(), self.document.line_of(&name.span()));
             match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
                     let defaults = default(here).and_then(Value::as_table);
@@ -299,7 +296,7 @@ impl Walk<'_> {
                 // Each value that does not fit is named itself.
                 let mut list = Vec::with_capacity(values.len());
                 for (i, value) in values.iter().enumerate() {
-                    let (path, line) = (&format!("{}[{i}]", at.path), self.line_of(&value.span()));
+                    let (path, line) = (&format!("{}[{i}]", at.path), self.document.line_of(&value.span()));
                     list.extend(self.value(of, value, Place { path, line, defaults: None }));
                 }
                 return Some(Value::Array(list));
@@ -324,7 +321,7 @@ impl Walk<'_> {
         let path = &join(at.path, tag);
         let name = match (table.iter().find(|(key, _)| key.get_ref() == tag), of_default) {
             (Some((key, value)), _) => {
-                let line = self.line_of(&key.span());
+                let line = self.document.line_of(&key.span());
                 self.value(&Kind::Choice(names(kinds)), value, Place { path, line, defaults: None })?;
                 value.get_ref().as_str()?
             }

@@ -66,7 +66,7 @@ impl<'p> Setting<'p> {
         }
         let places = places(scene, &plan.geometry)?;
         let of_rays = RayInformation::new(plan, &scanner.layer_snr())?;
-        let radius = region_radius(scene, &of_rays, &places)?;
+        let radius = region_radius(&of_rays, &places)?;
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let lines = places.line_elevation_rad();
         let elevation_rad = lines[lines.len() / 2];

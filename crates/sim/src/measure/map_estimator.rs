@@ -53,7 +53,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         let (scene, g) = (&plan.scene.scene, &plan.geometry);
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let of_rays = RayInformation::new(plan, layer_snr)?;
-        let radius = region_radius(scene, &of_rays, places)?;
+        let radius = region_radius(&of_rays, places)?;
         let lines = places.line_elevation_rad();
         let middle =
             PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };

@@ -45,7 +45,7 @@ impl SceneResponse {
         let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
         let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else { return Ok(None) };
         let of_rays = RayInformation::new(plan, &layer_snr)?;
-        let radius = region_radius(scene, &of_rays, &places(scene, &plan.geometry)?)?;
+        let radius = region_radius(&of_rays, &places(scene, &plan.geometry)?)?;
         let response = response(scene, pulse, median_snr(&layer_snr)).ok().flatten();
         let pulse = PulseShape::gaussian(pulse.sigma_s())?;
         let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();

@@ -69,13 +69,12 @@ impl<'a> Scanner<'a> {
             observer.advance(1);
             Ok(air)
         };
-        let lines = in_time_order(plan, &all, |line| geometry.line_time_s[*line], of_line)?;
-        let (airs, spreads): (Vec<Air>, Vec<_>) = lines.into_iter().unzip();
+        let airs = in_time_order(plan, &all, |line| geometry.line_time_s[*line], of_line)?;
         let lines: Vec<LineOfSight> = airs.iter().map(|air| returns.line(air, geometry)).collect();
-        let backscatter_per_m_sr = airs.into_iter().filter_map(|air| air.backscatter_per_m_sr).collect();
-        let spreads: Option<Vec<f64>> = spreads.into_iter().collect::<Option<Vec<Vec<f64>>>>().map(|all| all.concat());
+        let spreads: Option<Vec<&[f64]>> = airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
         let shape = (lines.len(), geometry.gate_range_m.len());
-        let spread_m_s = spreads.and_then(|values| Array2::from_shape_vec(shape, values).ok());
+        let spread_m_s = spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
+        let backscatter_per_m_sr = airs.into_iter().filter_map(|air| air.backscatter_per_m_sr).collect();
         observer.end();
         let efficiency = drawn_efficiency(&optics, &lines)?;
         let record = Record {
@@ -108,7 +107,8 @@ impl<'a> Scanner<'a> {
     /// As [`Scanner::new`].
     pub(crate) fn expected_layer_snr(plan: &Plan, observer: &dyn Observer) -> Result<Vec<(f64, f64)>, Error> {
         let optics = LineOptics { plan, known: &Efficiencies::default(), observer };
-        let still = Air { radial_velocity_m_s: vec![0.0; plan.geometry.layers], backscatter_per_m_sr: None };
+        let radial_velocity_m_s = vec![0.0; plan.geometry.layers];
+        let still = Air { radial_velocity_m_s, backscatter_per_m_sr: None, spread_m_s: None };
         let line = layer_returns(&optics)?.line(&still, &plan.geometry);
         Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line))
     }

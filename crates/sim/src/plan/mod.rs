@@ -14,7 +14,6 @@ use std::sync::Arc;
 use wakescope_optics::plan::Plan as ScreenPlan;
 
 mod fastest;
-mod file_limits;
 mod files;
 mod fit;
 mod optics;
@@ -81,7 +80,7 @@ impl Plan {
             let mut warnings = warnings::of_scene(&setup, fastest_m_s)?;
             let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
             let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
-            let stages = stages::stages(scene, target, &setup.geometry, &sizes, &setup.wind, optics);
+            let stages = stages::stages(&setup, target, &sizes, optics);
             let times = time::times(scene, target, &sizes, optics_s);
             let mut plan =
                 Self { setup, target, stages, core_s: times.total_s(), times, screens, fastest_m_s, warnings };
@@ -89,7 +88,6 @@ impl Plan {
                 plan.warnings.extend(warnings::of_empty_gates(&plan)?);
             }
             possible::check(&plan)?;
-            file_limits::check(&plan)?;
             Ok(plan)
         };
         made().map_err(|error| file.of_key(error))

@@ -6,24 +6,18 @@ use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};
 use super::stage::{PlannedStage, Target, run, skip};
 use crate::scene::{Method, NoiseModel, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
+use crate::setup::Setup;
 use crate::setup::geometry::Geometry;
 use crate::setup::progress::Stage;
 use crate::setup::sizes::{AIRS_BYTES, records_at_once};
-use crate::setup::wind::SceneWind;
 
 /// Numbers of a cell that fits hold.
 const RETRIEVED_NUMBERS: f64 = 60.0;
 
 /// All stages, in the order in which they run.
-pub(super) fn stages(
-    scene: &Scene,
-    target: Target,
-    g: &Geometry,
-    n: &Sizes,
-    wind: &SceneWind,
-    optics: [PlannedStage; 2],
-) -> Vec<PlannedStage> {
-    let mut out = vec![skip(Stage::FlowSimulation, &wind.source), cross_plane(scene, target)];
+pub(super) fn stages(setup: &Setup, target: Target, n: &Sizes, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
+    let (scene, g) = (&setup.scene.scene, &setup.geometry);
+    let mut out = vec![skip(Stage::FlowSimulation, &setup.wind.source), cross_plane(scene, target)];
     out.extend(optics);
     if target == Target::Efficiency {
         let rest = [Stage::LinesOfSight, Stage::Signals, Stage::Noise, Stage::Estimates, Stage::Errors];

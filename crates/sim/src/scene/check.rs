@@ -105,11 +105,6 @@ impl Scene {
             _ => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
         }
     }
-
-    /// How far before the range of a sample air contributes to it, c/2 times the last time of the pulse, m.
-    pub fn pulse_reach_m(&self) -> f64 {
-        pulse(&self.pulse).map_or(f64::NAN, |pulse| 0.5 * crate::SPEED_OF_LIGHT_M_S * pulse.support_s().1)
-    }
 }
 
 impl Scene {
@@ -217,8 +212,9 @@ impl Scene {
 
     fn check_ranges(&self, c: &mut Checker<'_>) {
         let (first_m, last_m) = (self.scan.range_min_m, self.scan.range_max_m);
-        // Scatterers that a sample sees reach back by the length of the summation of (15).
-        let reach_m = self.pulse_reach_m();
+        // Scatterers that a sample sees reach back by the length of the summation of (15), to the last time of the pulse.
+        let last_s = pulse(&self.pulse).map_or(f64::NAN, |pulse| pulse.support_s().1);
+        let reach_m = 0.5 * crate::SPEED_OF_LIGHT_M_S * last_s;
         let far = format!("above {reach_m:.3} m, half the length of the pulse in the air");
         let of_pulse = match &self.pulse.shape {
             PulseShape::Sampled(_) => {

@@ -15,6 +15,9 @@ pub(crate) struct Air {
     pub(crate) radial_velocity_m_s: Vec<f64>,
     /// Backscatter, 1/(m sr), where the flow carries some; the atmosphere's in those layers that the flow says nothing of.
     pub(crate) backscatter_per_m_sr: Option<Vec<f64>>,
+    /// Of a line whose pulses have airs of their own, the standard deviation of what they see at the gates through the filter of the
+    /// pulse, m/s.
+    pub(crate) spread_m_s: Option<Vec<f64>>,
 }
 
 /// What a filter sees of an air at the gates: the mean velocity with its weights and those of the backscatter.
@@ -52,20 +55,14 @@ pub(crate) fn beam_of_air(setup: &Setup, line: usize, air: usize) -> Beam {
     schedule.beam(line, 0.5 * (first(air) + first(air + 1) - 1) as f64)
 }
 
-/// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own: then with the standard deviation
-/// of what they see at the gates through the filter of the pulse, m/s.
-pub(crate) fn air_of_line(
-    setup: &Setup,
-    filter: &RangeFilter,
-    range_m: &[f64],
-    line: usize,
-) -> Result<(Air, Option<Vec<f64>>), Error> {
+/// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
+pub(crate) fn air_of_line(setup: &Setup, filter: &RangeFilter, range_m: &[f64], line: usize) -> Result<Air, Error> {
     let g = &setup.geometry;
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
     let of = setup.scene.scene.scan.wind_of_pulses;
     if of == WindOfPulses::default() {
-        return Ok((air_along(setup, &schedule.middle(line), range_m)?, None));
+        return air_along(setup, &schedule.middle(line), range_m);
     }
     let airs = of.of_line(pulses);
     let mut sums_m_s = vec![0.0; range_m.len()];
@@ -103,8 +100,8 @@ pub(crate) fn air_of_line(
         *sum += first;
     }
     let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
-    let air = Air { radial_velocity_m_s: sums_m_s, backscatter_per_m_sr: backscatter };
-    Ok((air, Some(sums.into_iter().map(spread).collect())))
+    let spread_m_s = Some(sums.into_iter().map(spread).collect());
+    Ok(Air { radial_velocity_m_s: sums_m_s, backscatter_per_m_sr: backscatter, spread_m_s })
 }
 
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
@@ -120,11 +117,11 @@ pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<A
     for (beta, range_m) in backscatter_per_m_sr.iter_mut().flatten().zip(range_m).filter(|(beta, _)| beta.is_nan()) {
         *beta = setup.instrument.air.backscatter_per_m_sr(*range_m)?;
     }
-    Ok(Air { radial_velocity_m_s, backscatter_per_m_sr })
+    Ok(Air { radial_velocity_m_s, backscatter_per_m_sr, spread_m_s: None })
 }
 
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
-fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
+fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, Error> {
     let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
     let scan = &setup.scene.scene.scan;
     let elevation_rad = beam.elevation_rad;
@@ -145,12 +142,11 @@ fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<(Vec<[f
     Ok((points_m, velocity_m_s))
 }
 
-/// Places along a beam, m, and the radial velocity of the flow there, m/s; NaN where it is not known.
-pub(crate) fn known_velocity_m_s(
-    setup: &Setup,
-    beam: &Beam,
-    range_m: &[f64],
-) -> Result<(Vec<[f64; 3]>, Vec<f64>), Error> {
+/// Places along a beam, m, and the radial velocity there, m/s.
+type Along = (Vec<[f64; 3]>, Vec<f64>);
+
+/// The radial velocity of the flow along a beam; NaN where it is not known.
+pub(crate) fn known_velocity_m_s(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, Error> {
     let points_m: Vec<[f64; 3]> = range_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
     setup.wind.wind().velocity_into(&points_m, setup.wind.start_s + beam.time_s, &mut velocity_m_s)?;

@@ -267,7 +267,7 @@ impl<S: Sample> Toolkit<S> {
     pub fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Self, Error> {
         let snr = planned_snr(scene, known.snr);
         if let Method::GradientLikelihood(own) = scene.estimator.method {
-            return gradient_likelihood(scene, instrument, &own, snr);
+            return Self::of_gradients(scene, instrument, &own, snr);
         }
         let (statistic, lag_weights, tapers) = statistic::<S>(scene, &instrument.pulse, snr)?;
         let estimator = of_correlogram(scene, S::KIND, &lag_weights, known)?;
@@ -287,6 +287,22 @@ impl<S: Sample> Toolkit<S> {
         let noise = NoiseSeen::new(scene, instrument, following.as_deref().unwrap_or(&*estimator), seen)?;
         let test = noise_test(scene, &tapers, &lag_weights)?;
         Ok(Self { statistic, estimator, following, test, noise })
+    }
+
+    fn of_gradients(scene: &Scene, instrument: &Instrument, own: &GradientLikelihood, snr: f64) -> Result<Self, Error> {
+        let e = &scene.estimator;
+        let noise = noise_kind(scene).unwrap_or(Noise::Band { floor: 0.0 });
+        let sampling = sampling(scene)?;
+        let model = GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
+        let half = (own.gradients / 2) as f64;
+        let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
+        let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
+        let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
+        let gates = gates(scene)?;
+        let test = noise_kind(scene).map(|noise| plan.noise_test(&gates, noise)).transpose()?;
+        let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| Ok(plan.mean_statistic(&lags)?))?;
+        let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
+        Ok(Self { statistic, estimator, following: None, test, noise })
     }
 }
 
@@ -432,25 +448,4 @@ fn of_correlogram(
         CorrelogramForm::Biased => estimator,
         CorrelogramForm::Unbiased => Box::new(Unbiased::new(estimator, kind, lag_weights)?),
     })
-}
-
-fn gradient_likelihood<S: Sample>(
-    scene: &Scene,
-    instrument: &Instrument,
-    own: &GradientLikelihood,
-    snr: f64,
-) -> Result<Toolkit<S>, Error> {
-    let e = &scene.estimator;
-    let noise = noise_kind(scene).unwrap_or(Noise::Band { floor: 0.0 });
-    let sampling = sampling(scene)?;
-    let model = GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
-    let half = (own.gradients / 2) as f64;
-    let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
-    let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
-    let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
-    let gates = gates(scene)?;
-    let test = noise_kind(scene).map(|noise| plan.noise_test(&gates, noise)).transpose()?;
-    let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| Ok(plan.mean_statistic(&lags)?))?;
-    let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
-    Ok(Toolkit { statistic, estimator, following: None, test, noise })
 }

@@ -22,7 +22,7 @@ pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
 
 /// Signal-to-noise ratio of the samples of a scene's records, and the information in windows of them.
 pub(crate) struct RayInformation<'a> {
-    setup: &'a Setup,
+    pub(crate) setup: &'a Setup,
     model: RecordModel,
     by_pulse: RangeFilter,
     by_gate: RangeFilter,

@@ -33,13 +33,10 @@ pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error>
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub(crate) fn region_radius(
-    scene: &Scene,
-    of_rays: &RayInformation<'_>,
-    geometry: &ScanGeometry,
-) -> Result<Radius, Error> {
-    let RegionRadius::Target { standard_deviation_m_s, largest_m } = scene.estimator.radius else {
-        let own = scene.estimator.clone();
+pub(crate) fn region_radius(of_rays: &RayInformation<'_>, geometry: &ScanGeometry) -> Result<Radius, Error> {
+    let estimator = &of_rays.setup.scene.scene.estimator;
+    let RegionRadius::Target { standard_deviation_m_s, largest_m } = estimator.radius else {
+        let own = estimator.clone();
         return Ok(Radius::OfRange(Box::new(move |range_m| own.largest_radius_m(range_m))));
     };
     let all_m = geometry.gate_ranges_m();

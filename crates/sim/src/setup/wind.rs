@@ -8,7 +8,7 @@ mod fields;
 mod planes;
 
 use crate::Error;
-use crate::scene::{CoreProfile, Flow, Scene, SceneFile, SimulatedMotion, VortexLines, VortexMotion, VortexPair};
+use crate::scene::{CoreProfile, Flow, SceneFile, SimulatedMotion, VortexLines, VortexMotion, VortexPair};
 use std::fmt;
 use wakescope_les::{self as les, Wind};
 
@@ -233,11 +233,7 @@ pub(crate) fn circulation_profile(profile: CoreProfile) -> les::CirculationProfi
 }
 
 /// Age of an analytic flow when the scan begins, s.
-pub fn start_time_s(scene: &Scene) -> f64 {
-    start_s(&scene.flow)
-}
-
-fn start_s(flow: &Flow) -> f64 {
+pub fn start_s(flow: &Flow) -> f64 {
     match flow {
         Flow::VortexPair(pair) if pair.age_tau > 0.0 && pair.circulation_m2_s > 0.0 => {
             vortex_pair(pair).time_s(pair.age_tau)

@@ -129,15 +129,14 @@ impl RawRecords {
         let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
         let (mut file, length, magic) = text_file::begin(path)?;
         let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+        let numbers = Numbers { path, format, shape };
         let found = match &magic[..] {
-            _ if format.number.is_some() => {
-                binary(length, format, shape).and_then(|array| in_file(path, file, array, format, shape))
-            }
+            _ if format.number.is_some() => numbers.binary(length).and_then(|array| numbers.records(file, array)),
             [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => Ok(netcdf::read(path, format)?),
             [0x93, b'N', b'U', b'M', ..] => {
-                StoredArray::read(&mut file, 0, length).and_then(|array| in_file(path, file, array, format, shape))
+                StoredArray::read(&mut file, 0, length).and_then(|array| numbers.records(file, array))
             }
-            [b'P', b'K', 3, 4, ..] => of_archive(path, file, length, format, shape),
+            [b'P', b'K', 3, 4, ..] => numbers.of_archive(file, length),
             _ if ["csv", "txt"].contains(&extension.as_str()) => {
                 file.rewind().map_err(Error::io("read", path))?;
                 text::read(path, file, length, format.complex)
@@ -220,103 +219,103 @@ impl RawRecords {
     }
 }
 
-/// A file of nothing but numbers behind a header.
-fn binary(length: u64, format: &RawFormat, shape: RecordShape) -> Result<StoredArray, String> {
-    let name = format.number.as_deref().unwrap_or_default();
-    let number =
-        NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
-    let array = StoredArray {
-        number,
-        byte_order: format.byte_order,
-        is_complex: format.complex,
-        fortran_order: false,
-        shape: Vec::new(),
-        begin: format.header_bytes,
-    };
-    let sample_bytes = array.sample_bytes();
-    let record_bytes = shape.samples as u64 * sample_bytes;
-    let data = length.checked_sub(format.header_bytes);
-    let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
-    let rest = data.checked_rem(record_bytes).unwrap_or(data);
-    if rest != 0 {
-        return Err(format!(
-            "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {sample_bytes} bytes: {rest} \
+/// A file of numbers that stand as a format and a scene say, as far as it does not say it.
+#[derive(Clone, Copy)]
+struct Numbers<'a> {
+    path: &'a Path,
+    format: &'a RawFormat,
+    shape: RecordShape,
+}
+
+impl Numbers<'_> {
+    /// A file of nothing but numbers behind a header.
+    fn binary(self, length: u64) -> Result<StoredArray, String> {
+        let Self { format, shape, .. } = self;
+        let name = format.number.as_deref().unwrap_or_default();
+        let number =
+            NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
+        let array = StoredArray {
+            number,
+            byte_order: format.byte_order,
+            is_complex: format.complex,
+            fortran_order: false,
+            shape: Vec::new(),
+            begin: format.header_bytes,
+        };
+        let sample_bytes = array.sample_bytes();
+        let record_bytes = shape.samples as u64 * sample_bytes;
+        let data = length.checked_sub(format.header_bytes);
+        let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
+        let rest = data.checked_rem(record_bytes).unwrap_or(data);
+        if rest != 0 {
+            return Err(format!(
+                "behind a header of {} bytes it holds {data} bytes, no whole number of records of {} samples of {sample_bytes} bytes: {rest} \
              are left over; scan.range_min_m and range_max_m say how many samples a record has",
-            format.header_bytes, shape.samples
-        ));
-    }
-    let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), shape.samples as u64];
-    if format.order == Order::SampleMajor {
-        lengths.reverse();
-    }
-    Ok(StoredArray { shape: lengths, ..array })
-}
-
-/// The records of an array.
-fn in_file(
-    path: &Path,
-    file: File,
-    mut stored: StoredArray,
-    format: &RawFormat,
-    shape: RecordShape,
-) -> Result<RawRecords, String> {
-    let mut lengths = std::mem::take(&mut stored.shape);
-    let pairs = format.complex && !stored.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
-    if pairs {
-        lengths.pop();
-        stored.is_complex = true;
-    }
-    let is_fortran = stored.fortran_order && lengths.len() > 1;
-    if is_fortran && (pairs || lengths.len() > 2) {
-        return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
-    }
-    let order = if is_fortran { Order::SampleMajor } else { format.order };
-    // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
-    let are_first = order == Order::SampleMajor && !stored.fortran_order && !lengths.is_empty();
-    let samples = if are_first { Some(lengths.remove(0)) } else { lengths.pop() };
-    let samples = samples.ok_or("it holds a single number, no records")? as usize;
-    let (records, is_complex) = (lengths.iter().product::<u64>() as usize, stored.is_complex);
-    let are_integers = !stored.number.is_float();
-    let array = ArrayInFile { file, stored, order, records, samples, pulses_per_line: shape.pulses_per_line };
-    Ok(RawRecords::new(path, array, [records, samples], is_complex, are_integers))
-}
-
-fn of_archive(
-    path: &Path,
-    mut file: File,
-    length: u64,
-    format: &RawFormat,
-    shape: RecordShape,
-) -> Result<RawRecords, String> {
-    let arrays = numpy::archive(&mut file, length)?;
-    let named = |names: &[&str]| arrays.iter().find(|(name, _)| names.contains(&name.as_str()));
-    let mut large = arrays.iter().filter(|(_, array)| array.shape.len() > 1);
-    let chosen = match (&format.variable, large.next(), large.next()) {
-        (Some(name), ..) => named(&[name]),
-        (None, Some(one), None) => Some(one),
-        (None, ..) => named(&["signals", "current_a"]),
-    };
-    let (_, signals) =
-        chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
-    let records_of = |array: &StoredArray, format: &RawFormat| {
-        in_file(path, file.try_clone().map_err(|e| e.to_string())?, array.clone(), format, shape)
-    };
-    let mut signals = records_of(signals, format)?;
-    let records = signals.records;
-    let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
-        let Some((name, array)) = named(&names) else { return Ok(None) };
-        let count = array.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length)).unwrap_or(u64::MAX);
-        if count != records as u64 {
-            return Err(format!("{name} has {count} values; one for each of the {records} records is needed"));
+                format.header_bytes, shape.samples
+            ));
         }
-        // The numbers of the array, both parts of them, and what is made of them.
-        machine::holds(name, 40.0 * records as f64)?;
-        // A row of numbers is one record.
-        let mut array = records_of(array, &RawFormat::default())?;
-        let read = array.source.read(0..array.records, 0..array.samples)?;
-        Ok(Some(read.into_iter().map(|value| value.re).collect()))
-    };
-    signals.about.elevation_rad = values(["elevation_rad", "elevation"])?;
-    signals.about.time_s = values(["time_s", "pulse_time"])?;
-    Ok(signals)
+        let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), shape.samples as u64];
+        if format.order == Order::SampleMajor {
+            lengths.reverse();
+        }
+        Ok(StoredArray { shape: lengths, ..array })
+    }
+
+    /// The records of an array.
+    fn records(self, file: File, mut stored: StoredArray) -> Result<RawRecords, String> {
+        let Self { path, format, shape } = self;
+        let mut lengths = std::mem::take(&mut stored.shape);
+        let pairs = format.complex && !stored.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
+        if pairs {
+            lengths.pop();
+            stored.is_complex = true;
+        }
+        let is_fortran = stored.fortran_order && lengths.len() > 1;
+        if is_fortran && (pairs || lengths.len() > 2) {
+            return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
+        }
+        let order = if is_fortran { Order::SampleMajor } else { format.order };
+        // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
+        let are_first = order == Order::SampleMajor && !stored.fortran_order && !lengths.is_empty();
+        let samples = if are_first { Some(lengths.remove(0)) } else { lengths.pop() };
+        let samples = samples.ok_or("it holds a single number, no records")? as usize;
+        let (records, is_complex) = (lengths.iter().product::<u64>() as usize, stored.is_complex);
+        let are_integers = !stored.number.is_float();
+        let array = ArrayInFile { file, stored, order, records, samples, pulses_per_line: shape.pulses_per_line };
+        Ok(RawRecords::new(path, array, [records, samples], is_complex, are_integers))
+    }
+
+    fn of_archive(self, mut file: File, length: u64) -> Result<RawRecords, String> {
+        let arrays = numpy::archive(&mut file, length)?;
+        let named = |names: &[&str]| arrays.iter().find(|(name, _)| names.contains(&name.as_str()));
+        let mut large = arrays.iter().filter(|(_, array)| array.shape.len() > 1);
+        let chosen = match (&self.format.variable, large.next(), large.next()) {
+            (Some(name), ..) => named(&[name]),
+            (None, Some(one), None) => Some(one),
+            (None, ..) => named(&["signals", "current_a"]),
+        };
+        let (_, signals) =
+            chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
+        let records_of = |array: &StoredArray, format: &RawFormat| {
+            Numbers { format, ..self }.records(file.try_clone().map_err(|e| e.to_string())?, array.clone())
+        };
+        let mut signals = records_of(signals, self.format)?;
+        let records = signals.records;
+        let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
+            let Some((name, array)) = named(&names) else { return Ok(None) };
+            let count = array.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length)).unwrap_or(u64::MAX);
+            if count != records as u64 {
+                return Err(format!("{name} has {count} values; one for each of the {records} records is needed"));
+            }
+            // The numbers of the array, both parts of them, and what is made of them.
+            machine::holds(name, 40.0 * records as f64)?;
+            // A row of numbers is one record.
+            let mut array = records_of(array, &RawFormat::default())?;
+            let read = array.source.read(0..array.records, 0..array.samples)?;
+            Ok(Some(read.into_iter().map(|value| value.re).collect()))
+        };
+        signals.about.elevation_rad = values(["elevation_rad", "elevation"])?;
+        signals.about.time_s = values(["time_s", "pulse_time"])?;
+        Ok(signals)
+    }
 }

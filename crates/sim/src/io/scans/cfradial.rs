@@ -5,7 +5,7 @@
 //! xradar in the tests of the program; files without Nyquist velocity, with ragged gates, another sign, several sweeps.
 
 use super::grid::{RayRow, between_turns, mean_count, of_mean, one_plane, scan_map};
-use super::{ReadScan, ScanFormat};
+use super::{Found, ReadScan, ScanFormat};
 use crate::io::netcdf_input::NetcdfFile;
 use crate::io::units::Quantity;
 use crate::io::{UtcTime, cfradial::MIRRORED};
@@ -27,12 +27,7 @@ const NYQUIST: &str = "nyquist_velocity";
 const RATIOS: [&str; 4] = ["signal_to_noise_ratio", "SNR", "snr", "cnr"];
 
 /// The scans of a file or a group, and what was left out; `sweep` is the number of its first sweep.
-pub(super) fn scans(
-    file: &NetcdfFile,
-    path: &Path,
-    format: &ScanFormat,
-    sweep: usize,
-) -> Result<(Vec<ReadScan>, Vec<String>), String> {
+pub(super) fn scans(file: &NetcdfFile, path: &Path, format: &ScanFormat, sweep: usize) -> Result<Found, String> {
     let (range_m, velocity) = (ranges(file)?, Field::velocity(file, format)?);
     let (rays, reference, scans) = rays(file, format, &velocity, range_m.len())?;
     let moving = optional(file, "antenna_transition")?;

@@ -92,11 +92,14 @@ impl ReadScan {
     }
 }
 
+/// Scans, and what was left out.
+type Found = (Vec<ReadScan>, Vec<String>);
+
 /// Reads the scans of a file; the sweeps that are none are left out, and said in the texts.
 ///
 /// # Errors
 /// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing.
-pub fn read(path: &Path, format: &ScanFormat) -> Result<(Vec<ReadScan>, Vec<String>), Error> {
+pub fn read(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
     let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
     let (_, length, magic) = text_file::begin(path)?;
     match &magic[..] {

@@ -5,7 +5,6 @@ use crate::plan::Plan;
 use crate::scene::Weighting;
 use crate::setup::described::sampled_velocities_m_s;
 use crate::setup::estimators;
-use crate::setup::instrument::Instrument;
 use crate::setup::ray_information::range_filter;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use wakescope_signal::RangeFilter;
@@ -72,7 +71,8 @@ impl Limits {
         let n = receiver.noise_densities();
         let mut oscillator = vec![format!("local oscillator {}", si(d.local_oscillator_w, "W"))];
         if n.amplifier_a2_hz > 0.0 {
-            let equal_w = equal_to_shot_w(instrument, n.amplifier_a2_hz);
+            // Shot noise grows with the power, this noise does not.
+            let equal_w = n.amplifier_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * receiver.responsivity_a_w());
             found.values.push(("amplifier_equals_shot_w", equal_w));
             oscillator.push(format!("amplifier noise equals shot noise at {}", si(equal_w, "W")));
         }
@@ -141,9 +141,4 @@ impl Limits {
         ));
         Ok(())
     }
-}
-
-/// Power of a local oscillator at which shot noise equals a noise that does not depend on it, W.
-fn equal_to_shot_w(instrument: &Instrument, density_a2_hz: f64) -> f64 {
-    density_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * instrument.receiver.responsivity_a_w())
 }
