@@ -58,7 +58,7 @@ fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, Str
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
 pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<Components, Error> {
     let file = open(&field.path)?;
-    let component = |name: &str| component(&file, name, field.place, true).map_err(|reason| file.refuse(reason));
+    let component = |name: &str| component(&file, name, field, true).map_err(|reason| file.refuse(reason));
     let period_m = |role| match file.text(&file.dim_of(&names[0], role)?, "edges").and_then(edges::from_text) {
         Some(Edges::Periodic { period_m }) => Some(period_m),
         _ => None,
@@ -75,19 +75,15 @@ type Components = ([VolumeComponent; 3], [Option<f64>; 2]);
 /// As [`read`]; a negative value.
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
     let file = open(&field.path)?;
-    let scalar = component(&file, name, field.place, false).map_err(|reason| file.refuse(reason))?;
+    let scalar = component(&file, name, field, false).map_err(|reason| file.refuse(reason))?;
     if let Some((at, value)) = scalar.values.iter().enumerate().find(|(_, value)| **value < 0.0) {
         return Err(file.refuse(format!("{name} is {value:?} at place {at}: it must not be negative")));
     }
     Ok(scalar)
 }
 
-fn component(
-    file: &NetcdfFile,
-    name: &str,
-    place: Option<usize>,
-    is_velocity: bool,
-) -> Result<VolumeComponent, String> {
+fn component(file: &NetcdfFile, name: &str, field: &FieldPlace, is_velocity: bool) -> Result<VolumeComponent, String> {
+    let place = field.place;
     let dims = match place {
         Some(_) => file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x])?,
         None => file.roles(name, [Z, Y, X])?,

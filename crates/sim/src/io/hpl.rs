@@ -10,7 +10,6 @@ use super::utc::DAY_S;
 use crate::SPEED_OF_LIGHT_M_S;
 use crate::setup::beams::SweepMode;
 use ndarray::Array2;
-use std::fmt::Write as _;
 
 /// No instrument has the number 0: with the file's own name it is all by which this program's files can be told, for readers
 /// refuse every other remark.
@@ -169,8 +168,7 @@ fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {
     let has_ratio = velocity_m_s.is_finite() && snr_db.is_finite();
     let intensity = if has_ratio { 1.0 + 10_f64.powf(snr_db / 10.0) } else { 1.0 };
     let backscatter = format!("{:.6E}", 0.0);
-    // Writing to a String cannot fail.
-    let _ = write!(out, "{gate:3} {velocity:.4} {intensity:.6} {backscatter:>13}\r\n");
+    *out += &format!("{gate:3} {velocity:.4} {intensity:.6} {backscatter:>13}\r\n");
 }
 
 #[cfg(test)]

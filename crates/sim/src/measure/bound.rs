@@ -105,23 +105,18 @@ impl<'p> Setting<'p> {
     }
 
     /// From the ratio of the air at the range and that of a window there, and the information of a window and of the region.
-    fn told(
-        &self,
-        range_m: f64,
-        [snr, seen_snr]: [f64; 2],
-        [of_window, of_region]: [f64; 2],
-    ) -> Result<BoundPoint, Error> {
-        let correlation = self.covariance.correlation(seen_snr)?;
+    fn told(&self, range_m: f64, snr: [f64; 2], information: [f64; 2]) -> Result<BoundPoint, Error> {
+        let correlation = self.covariance.correlation(snr[1])?;
         let (level, n_eff) = self.places.level(self.point(range_m), self.radius.at_m(range_m)?, &correlation);
         // Without any return there is no information.
         let bound_m_s = |information: f64| if information > 0.0 { information.sqrt().recip() } else { f64::NAN };
         Ok(BoundPoint {
             range_m,
-            snr_db: if snr > 0.0 { 10.0 * snr.log10() } else { f64::NAN },
-            window_m_s: bound_m_s(of_window),
+            snr_db: if snr[0] > 0.0 { 10.0 * snr[0].log10() } else { f64::NAN },
+            window_m_s: bound_m_s(information[0]),
             level,
             n_eff,
-            region_m_s: bound_m_s(of_region),
+            region_m_s: bound_m_s(information[1]),
         })
     }
 }

@@ -28,7 +28,7 @@ impl Plan {
     /// # Errors
     /// As [`Plan::fits`].
     pub fn fits_in(&self, available_bytes: f64) -> Result<(), Error> {
-        self.hold(&self.stages, available_bytes, |stage| self.smaller(stage))
+        hold(&self.stages, available_bytes, |stage| self.smaller(stage))
     }
 
     /// What makes a stage smaller, by the keys that this scene has a use for.
@@ -70,28 +70,23 @@ impl Plan {
     /// As [`Plan::fits`].
     pub fn bound_fits_in(&self, available_bytes: f64) -> Result<(), Error> {
         let stages = of_bound(&self.stages, &Sizes::new(&self.scene.scene, self.target, &self.geometry));
-        self.hold(&stages, available_bytes, |_| "fewer estimator.window_samples".into())
+        hold(&stages, available_bytes, |_| "fewer estimator.window_samples".into())
     }
+}
 
-    /// Holds the memory of some stages against what is available; `smaller` says what makes a stage smaller.
-    fn hold(
-        &self,
-        stages: &[PlannedStage],
-        available_bytes: f64,
-        smaller: impl Fn(Stage) -> String,
-    ) -> Result<(), Error> {
-        let Forecast { memory_bytes, largest } = total(stages);
-        if memory_bytes <= SHARE * available_bytes {
-            return Ok(());
-        }
-        let remedy = largest.map(smaller).unwrap_or_default();
-        Err(Error::TooLarge {
-            needed: bytes(memory_bytes),
-            available: bytes(available_bytes),
-            stage: largest.map_or("", Stage::name),
-            remedy: format!("{remedy} would take less"),
-        })
+/// Holds the memory of some stages against what is available; `smaller` says what makes a stage smaller.
+fn hold(stages: &[PlannedStage], available_bytes: f64, smaller: impl Fn(Stage) -> String) -> Result<(), Error> {
+    let Forecast { memory_bytes, largest } = total(stages);
+    if memory_bytes <= SHARE * available_bytes {
+        return Ok(());
     }
+    let remedy = largest.map(smaller).unwrap_or_default();
+    Err(Error::TooLarge {
+        needed: bytes(memory_bytes),
+        available: bytes(available_bytes),
+        stage: largest.map_or("", Stage::name),
+        remedy: format!("{remedy} would take less"),
+    })
 }
 
 #[cfg(test)]

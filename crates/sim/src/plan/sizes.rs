@@ -71,7 +71,10 @@ impl Sizes {
             window,
             chord: (window + 2.0 * radius_m / g.sample_spacing_m).min(samples_kept.max(256.0)),
             windows: ((g.samples - e.window_samples) / e.window_step_samples + 1) as f64,
-            numbers: numbers(scene, parts),
+            numbers: match e.method {
+                Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * window + 1.0,
+                _ => parts * e.few_lags().map_or(window, |lags| lags as f64),
+            },
             cells: lines * g.gate_range_m.len() as f64,
             frequencies: e.padded_samples as f64 * d.bandwidth_hz / d.sampling_hz,
             chords: (2.0 * half_rad / step_rad(scene, g) + 1.0).min(lines),
@@ -105,16 +108,6 @@ pub(super) fn kept_realisations(scene: &Scene, target: Target) -> usize {
         _ if !keeps => 0,
         SignalsOf::First => 1,
         SignalsOf::All => scene.scan.realisations,
-    }
-}
-
-/// Real numbers that the statistic keeps of a window.
-fn numbers(scene: &Scene, parts: f64) -> f64 {
-    let e = &scene.estimator;
-    let window = e.window_samples as f64;
-    match e.method {
-        Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * window + 1.0,
-        _ => parts * e.few_lags().map_or(window, |lags| lags as f64),
     }
 }
 

@@ -5,7 +5,7 @@
 
 use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
-use super::{Refinement, RegionRadius, Scan, SignalsOf};
+use super::{Refinement, RegionRadius, SignalsOf};
 use crate::keys::{Document, lines_with_keys, value_at};
 
 /// Keys of a scene without use: what each is for, and what the scene has instead.
@@ -51,41 +51,38 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
             unused(value.is_infinite(), &[key], purpose);
         }
     }
-    of_scan(&scene.scan, &mut unused);
-    if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
-        of_turbulence(turbulence, unused);
-    }
-    found
-}
-
-fn of_scan(scan: &Scan, unused: &mut impl FnMut(bool, &[&'static str], String)) {
-    let kind = format!("scan.pattern.kind = \"{}\" has angles of its own", scan.pattern.name());
+    let scan = &scene.scan;
+    let angles = format!("scan.pattern.kind = \"{}\" has angles of its own", scan.pattern.name());
     let rows = matches!(scan.pattern, Pattern::Rhi {} | Pattern::Axial(_));
-    unused(!rows, &["scan.elevation_min_rad", "scan.elevation_max_rad"], kind.clone());
-    unused(!rows, &["scan.elevation_step_rad"], kind.clone());
-    unused(!matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare(_)), &["scan.azimuth_rad"], kind);
+    unused(!rows, &["scan.elevation_min_rad", "scan.elevation_max_rad"], angles.clone());
+    unused(!rows, &["scan.elevation_step_rad"], angles.clone());
+    unused(!matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare(_)), &["scan.azimuth_rad"], angles);
     let moves = scan.head.motion == HeadMotion::Continuous;
     let pace = "with scan.head.motion = \"continuous\" the rate and the pulses of a line set the step";
     unused(moves && scan.pattern == Pattern::Rhi {}, &["scan.elevation_step_rad"], pace.into());
     unused(moves, &["scan.pattern.azimuth_step_rad", "scan.head.dead_time_s"], pace.into());
-}
-
-fn of_turbulence(turbulence: &RefractiveTurbulence, mut unused: impl FnMut(bool, &[&'static str], String)) {
-    const SCREENS: [&str; 3] =
-        ["atmosphere.turbulence.grid_points", "atmosphere.turbulence.grid_spacing_m", "atmosphere.turbulence.layers"];
-    const OUTER: [&str; 2] = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.outer_scale_wavenumber"];
-    let derived = turbulence.sampling == ScreenSampling::Derived;
-    unused(derived, &SCREENS, "this key is for atmosphere.turbulence.sampling = \"explicit\"".into());
-    let without_inner = turbulence.spectrum == SpectrumKind::Kolmogorov;
-    let without_outer = without_inner || turbulence.spectrum == SpectrumKind::Tatarskii;
-    let purpose =
-        |scale| format!("atmosphere.turbulence.spectrum = \"{}\" has no {scale} scale", turbulence.spectrum.name());
-    unused(without_inner, &["atmosphere.turbulence.inner_scale_m"], purpose("inner"));
-    unused(without_outer, &OUTER, purpose("outer"));
-    // A spectrum without outer scale has no wave number of it.
-    let endless = !without_outer && turbulence.outer_scale_m == f64::INFINITY;
-    let unset = turbulence.outer_scale_wavenumber == OuterScaleConvention::Inverse;
-    unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
+    if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
+        const SCREENS: [&str; 3] = [
+            "atmosphere.turbulence.grid_points",
+            "atmosphere.turbulence.grid_spacing_m",
+            "atmosphere.turbulence.layers",
+        ];
+        const OUTER: [&str; 2] =
+            ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.outer_scale_wavenumber"];
+        let derived = turbulence.sampling == ScreenSampling::Derived;
+        unused(derived, &SCREENS, "this key is for atmosphere.turbulence.sampling = \"explicit\"".into());
+        let without_inner = turbulence.spectrum == SpectrumKind::Kolmogorov;
+        let without_outer = without_inner || turbulence.spectrum == SpectrumKind::Tatarskii;
+        let purpose =
+            |scale| format!("atmosphere.turbulence.spectrum = \"{}\" has no {scale} scale", turbulence.spectrum.name());
+        unused(without_inner, &["atmosphere.turbulence.inner_scale_m"], purpose("inner"));
+        unused(without_outer, &OUTER, purpose("outer"));
+        // A spectrum without outer scale has no wave number of it.
+        let endless = !without_outer && turbulence.outer_scale_m == f64::INFINITY;
+        let unset = turbulence.outer_scale_wavenumber == OuterScaleConvention::Inverse;
+        unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
+    }
+    found
 }
 
 impl Scene {

@@ -15,7 +15,9 @@ use wakescope_estimate::estimators::{
     model_lag_weights,
 };
 use wakescope_estimate::spectrum::{ShortCorrelogram, Taper};
-use wakescope_estimate::{self as estimate, Correlogram, Estimator, Scratch, SignalKind, SpectralPeak, Statistic};
+use wakescope_estimate::{
+    self as estimate, Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak, Statistic,
+};
 use wakescope_estimate::{map::WindowCovariance, window::Sample};
 use wakescope_signal::Pulse;
 
@@ -23,16 +25,16 @@ use wakescope_signal::Pulse;
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
-pub fn sampling(scene: &Scene) -> Result<estimate::Sampling, Error> {
+pub fn sampling(scene: &Scene) -> Result<Sampling, Error> {
     let d = &scene.detector;
     let lambda_m = scene.laser.wavelength_m;
     let half_hz = 0.5 * d.bandwidth_hz;
     let band_hz = (d.intermediate_frequency_hz - half_hz, d.intermediate_frequency_hz + half_hz);
     Ok(match d.signal {
         DetectorSignal::IntermediateFrequency => {
-            estimate::Sampling::new(d.sampling_hz, d.intermediate_frequency_hz, lambda_m, band_hz)?
+            Sampling::new(d.sampling_hz, d.intermediate_frequency_hz, lambda_m, band_hz)?
         }
-        DetectorSignal::Baseband => estimate::Sampling::baseband(d.sampling_hz, lambda_m, d.bandwidth_hz)?,
+        DetectorSignal::Baseband => Sampling::baseband(d.sampling_hz, lambda_m, d.bandwidth_hz)?,
     })
 }
 
@@ -139,16 +141,11 @@ fn planned_snr(scene: &Scene, snr: f64) -> f64 {
 }
 
 /// Lags of a line at a velocity, whose sizes are given, as numbers of signals of a kind.
-fn lags_at<'a>(
-    sampling: &estimate::Sampling,
-    kind: SignalKind,
-    velocity_m_s: f64,
-    sizes: impl Iterator<Item = f64> + 'a,
-) -> impl Iterator<Item = f64> + 'a {
+fn lags_at(sampling: &Sampling, kind: SignalKind, velocity_m_s: f64, sizes: impl Iterator<Item = f64>) -> Vec<f64> {
     let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) * sampling.period_s();
-    let lag = move |(m, size): (usize, f64)| Complex::from_polar(size, turn * m as f64);
+    let lag = |(m, size): (usize, f64)| Complex::from_polar(size, turn * m as f64);
     let numbers = kind.lag_numbers(1);
-    sizes.enumerate().map(lag).flat_map(move |lag| [lag.re, lag.im].into_iter().take(numbers))
+    sizes.enumerate().map(lag).flat_map(|lag| [lag.re, lag.im].into_iter().take(numbers)).collect()
 }
 
 /// Second-order model of the record of a pulse of the scene in a uniform wind, for the bound; white noise stands for none.
@@ -244,7 +241,7 @@ impl NoiseSeen {
         let velocity_m_s = spaced(low_m_s, high_m_s, (8.0 * cells).ceil().clamp(65.0, 257.0) as usize);
         let gain = |velocity_m_s: &f64| {
             let lags = lags_at(&sampling, kind, *velocity_m_s, pulse.iter().copied().take(n));
-            Ok(of_noise.power / found(lags.collect())?.power)
+            Ok(of_noise.power / found(lags)?.power)
         };
         let gain = velocity_m_s.iter().map(gain).collect::<Result<Vec<f64>, Error>>()?;
         let unit_a2 = instrument.receiver.noise_variance_a2();
@@ -309,7 +306,7 @@ impl<S: Sample> Toolkit<S> {
 /// What an estimator of correlograms makes of the mean spectrum of air at one velocity in the scene's noise.
 pub(crate) struct ExpectedBias {
     estimator: Box<dyn Estimator>,
-    sampling: estimate::Sampling,
+    sampling: Sampling,
     kind: SignalKind,
     /// Mean statistic of a signal of unit power at rest, by lag, and of noise whose power in the band is one.
     signal: Vec<f64>,
@@ -337,7 +334,7 @@ impl ExpectedBias {
     /// The velocity that it finds less the true one, m/s, at a signal-to-noise ratio.
     pub(crate) fn m_s(&self, velocity_m_s: f64, snr: f64) -> f64 {
         let lags = lags_at(&self.sampling, self.kind, velocity_m_s, self.signal.iter().map(|power| snr * power));
-        let mean: Vec<f64> = lags.zip(&self.noise).map(|(signal, noise)| signal + noise).collect();
+        let mean: Vec<f64> = lags.iter().zip(&self.noise).map(|(signal, noise)| signal + noise).collect();
         self.estimator.estimate(&mean, &mut Scratch::new()).velocity_m_s - velocity_m_s
     }
 }
@@ -354,7 +351,7 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
     let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
     let off_m_s = |part: i32| {
         let velocity_m_s = 0.5 * (low_m_s + high_m_s) + step_m_s * f64::from(part) / 64.0;
-        let lags: Vec<f64> = lags_at(&sampling, kind, velocity_m_s, weights.iter().copied()).collect();
+        let lags = lags_at(&sampling, kind, velocity_m_s, weights.iter().copied());
         let found = peak.estimate(&lags, &mut Scratch::new());
         (found.velocity_m_s - velocity_m_s).abs()
     };

@@ -60,6 +60,7 @@ impl Geometry {
         let (first_s, last_s) = pulse.support_s();
         let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;
         let (near, far) = (reach(last_s), reach(-first_s));
+        let layers_per_sample = near.saturating_add(far).saturating_add(1);
         let record_m = (samples - 1) as f64 * sample_spacing_m;
         Ok(Self {
             elevation_rad: middles.iter().map(|beam| beam.elevation_rad).collect(),
@@ -70,11 +71,8 @@ impl Geometry {
             gate_range_m: first_samples.map(centre_m).collect(),
             layer_thickness_m,
             first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
-            layers: ((record_m / layer_thickness_m).ceil() as usize)
-                .saturating_add(near)
-                .saturating_add(far)
-                .saturating_add(1),
-            layers_per_sample: near.saturating_add(far).saturating_add(1),
+            layers: ((record_m / layer_thickness_m).ceil() as usize).saturating_add(layers_per_sample),
+            layers_per_sample,
         })
     }
 

@@ -8,7 +8,7 @@ use crate::scene::{
 use crate::setup::efficiency_model::turbulence as turbulence_of;
 use num_complex::Complex;
 use std::sync::Arc;
-use wakescope_optics as optics;
+use wakescope_optics::{self as optics, plan::Plan as ScreenPlan};
 use wakescope_signal as signal;
 
 /// Telescope, pulse, receiver and air.
@@ -95,11 +95,7 @@ impl Instrument {
     ///
     /// # Errors
     /// What cannot be resolved, with every limit and what would do for all of the runs.
-    pub fn screen_plans(
-        &self,
-        t: &RefractiveTurbulence,
-        runs: &[&[f64]],
-    ) -> Result<Vec<optics::plan::Plan>, optics::Error> {
+    pub fn screen_plans(&self, t: &RefractiveTurbulence, runs: &[&[f64]]) -> Result<Vec<ScreenPlan>, optics::Error> {
         let Some(turbulence) = &self.turbulence else { return Ok(Vec::new()) };
         let case = optics::plan::Case {
             telescope: self.telescope,

@@ -24,6 +24,7 @@ use crate::machine;
 use array::ArrayInFile;
 use num_complex::Complex;
 use numpy::StoredArray;
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Seek as _;
 use std::ops::Range;
@@ -79,8 +80,8 @@ pub struct About {
     pub time_s: Option<Vec<f64>>,
     /// Number of the line of each record.
     pub line: Option<Vec<f64>>,
-    /// Constants of the recording: their name in the file, the key of a scene that says the same, and the value.
-    pub constants: Vec<(&'static str, &'static str, f64)>,
+    /// Constants of the recording by their names in `signals.nc`.
+    pub constants: BTreeMap<&'static str, f64>,
     /// The scene that the signals were simulated for.
     pub scene_toml: Option<String>,
 }

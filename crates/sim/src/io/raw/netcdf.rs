@@ -10,15 +10,9 @@ use num_complex::Complex;
 use std::ops::Range;
 use std::path::Path;
 
-/// Constants of a recording: the name of the variable, and the key of a scene that says the same.
-const CONSTANTS: [(&str, &str); 6] = [
-    ("sampling_frequency", "detector.sampling_hz"),
-    ("intermediate_frequency", "detector.intermediate_frequency_hz"),
-    ("bandwidth", "detector.bandwidth_hz"),
-    ("wavelength", "laser.wavelength_m"),
-    ("pulse_repetition_frequency", "laser.pulse_repetition_hz"),
-    ("pulse_sigma", "pulse"),
-];
+/// Names of the constants of a recording.
+const CONSTANTS: &str =
+    "sampling_frequency intermediate_frequency bandwidth wavelength pulse_repetition_frequency pulse_sigma";
 
 /// Records of samples in a NetCDF file.
 #[derive(Debug)]
@@ -135,12 +129,8 @@ fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
     about.elevation_rad = of_records(["elevation", "elevation_rad"])?;
     about.time_s = of_records(["pulse_time", "ray_time"])?;
     about.line = of_records(["ray_line", "line"])?;
-    for (name, key) in CONSTANTS {
-        if file.has(name)
-            && let Some(value) = file.floats(name)?.first()
-        {
-            about.constants.push((name, key, *value));
-        }
+    for name in CONSTANTS.split(' ').filter(|name| file.has(name)) {
+        about.constants.extend(file.floats(name)?.first().map(|value| (name, *value)));
     }
     Ok(about)
 }

@@ -74,7 +74,7 @@ impl Budget {
 
     /// The signal-to-noise ratio in the detector band at each range, dB.
     pub fn snr_db(&self) -> &[f64] {
-        snr_db(&self.rows)
+        self.rows.iter().find(|row| row.name == TOTAL).map_or(&[], |row| &row.db)
     }
 
     /// The table `range_m,row,symbol,db`, range after range.
@@ -114,11 +114,8 @@ impl Budget {
 /// What the optics refuse.
 pub fn snr_without_screens_db(plan: &Plan, range_m: &[f64]) -> Result<Vec<f64>, Error> {
     let rows = Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(&plan.instrument, sorted_m))?;
-    Ok(snr_db(&rows.rows).to_vec())
-}
-
-fn snr_db(rows: &[Row]) -> &[f64] {
-    rows.iter().find(|row| row.name == TOTAL).map_or(&[], |row| &row.db)
+    // The last row of all.
+    Ok(rows.rows.into_iter().next_back().map_or(Vec::new(), |row| row.db))
 }
 
 fn increasing(range_m: &[f64]) -> Vec<f64> {

@@ -79,28 +79,26 @@ impl<S: FromParts> Blocks<'_, S> {
         let shape = (lines.elevation_rad.len(), range_m.len());
         let none = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
         let [power_a2, gain, detection_ratio, deviation] = [f64::NAN; 4];
-        let mut gates =
-            Array2::from_elem(shape, GateEstimate { found: none, power_a2, gain, detection_ratio, deviation });
-        let mut spectra = self.spectra.map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]);
+        let empty = GateEstimate { found: none, power_a2, gain, detection_ratio, deviation };
+        let radius_m = range_m.iter().map(|range_m| self.estimator.radius_m(*range_m)).collect::<Result<_, _>>()?;
+        let mut cells = ScanCells {
+            lines: lines.clone(),
+            gates: Array2::from_elem(shape, empty),
+            noise_a2: self.estimator.tools.noise.power_a2,
+            regions: (self.places.clone(), radius_m),
+            spectra: self.spectra.map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]),
+        };
         for tile in &self.tiles {
-            self.tile(records, lines, tile, (&mut gates, spectra.as_deref_mut()))?;
+            self.tile(records, tile, &mut cells)?;
             if tile.gates.end == shape.1 {
                 self.observer.advance(tile.lines.len() as u64);
             }
         }
-        let radius_m = range_m.iter().map(|range_m| self.estimator.radius_m(*range_m)).collect::<Result<_, _>>()?;
-        let noise_a2 = self.estimator.tools.noise.power_a2;
-        Ok(ScanCells { lines: lines.clone(), gates, noise_a2, regions: (self.places.clone(), radius_m), spectra })
+        Ok(cells)
     }
 
-    fn tile(
-        &self,
-        records: &mut RawRecords,
-        lines: &ScanLines,
-        tile: &Tile,
-        (cells, mut spectra): (&mut Array2<GateEstimate>, Option<&mut [f32]>),
-    ) -> Result<(), Error> {
-        let (plan, estimator, (read, held)) = (self.plan, &self.estimator, &tile.windows);
+    fn tile(&self, records: &mut RawRecords, tile: &Tile, cells: &mut ScanCells) -> Result<(), Error> {
+        let (plan, estimator, (read, held), lines) = (self.plan, &self.estimator, &tile.windows, &cells.lines);
         let of_records = lines.records(read);
         let of_samples = estimators::gates(&plan.scene.scene)?.samples(held);
         let places = places_of(plan, &lines.record_elevation_rad(read))?;
@@ -119,11 +117,11 @@ impl<S: FromParts> Blocks<'_, S> {
         for (row, line) in order.into_iter().enumerate().filter(|(_, line)| tile.lines.contains(line)) {
             for gate in tile.gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
-                cells[[line, gate]] = found[at];
-                if let (Some(spectra), Some(of_gate)) = (&mut spectra, self.spectra) {
-                    let radius_m = estimator.radius_m(points[at].range_m)?;
-                    let one = of_gate.density(&scan, points[at], radius_m, estimator.tools.noise.density_a2)?;
-                    let place = (line * cells.ncols() + gate) * one.len();
+                cells.gates[[line, gate]] = found[at];
+                if let (Some(spectra), Some(of_gate)) = (&mut cells.spectra, self.spectra) {
+                    let (radius_m, density_a2) = (cells.regions.1[gate], estimator.tools.noise.density_a2);
+                    let one = of_gate.density(&scan, points[at], radius_m, density_a2)?;
+                    let place = (line * cells.gates.ncols() + gate) * one.len();
                     spectra[place..place + one.len()].copy_from_slice(&one);
                 }
             }

@@ -165,17 +165,17 @@ fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
             kind(needed)
         )));
     }
-    for (name, key, value) in &records.about.constants {
-        let d = &scene.detector;
-        let own = match *name {
-            "sampling_frequency" => d.sampling_hz,
-            "intermediate_frequency" if needed => 0.0,
-            "intermediate_frequency" => d.intermediate_frequency_hz,
-            "bandwidth" => d.bandwidth_hz,
-            "wavelength" => scene.laser.wavelength_m,
-            "pulse_repetition_frequency" => scene.laser.pulse_repetition_hz,
-            _ => scene.pulse_sigma_s(),
-        };
+    let d = &scene.detector;
+    let at_rest_hz = if needed { 0.0 } else { d.intermediate_frequency_hz };
+    for (name, key, own) in [
+        ("sampling_frequency", "detector.sampling_hz", d.sampling_hz),
+        ("intermediate_frequency", "detector.intermediate_frequency_hz", at_rest_hz),
+        ("bandwidth", "detector.bandwidth_hz", d.bandwidth_hz),
+        ("wavelength", "laser.wavelength_m", scene.laser.wavelength_m),
+        ("pulse_repetition_frequency", "laser.pulse_repetition_hz", scene.laser.pulse_repetition_hz),
+        ("pulse_sigma", "pulse", scene.pulse_sigma_s()),
+    ] {
+        let Some(value) = records.about.constants.get(name) else { continue };
         let off = (value - own).abs();
         if off.is_nan() || off > 1e-6 * own.abs() {
             return Err(records.refuse(format!("its {name} is {value:?}, the scene's {key} says {own:?}")));

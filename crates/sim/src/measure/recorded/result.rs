@@ -117,10 +117,8 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
         let views: Vec<_> = scans.iter().map(|scan| of(scan).view()).collect();
         concatenate(Axis(0), &views).map_err(|_| wakescope_estimate::Error::Empty { field: "scans" }.into())
     };
-    let (speed, of_bound) = (
-        Unit::METRE_PER_SECOND,
-        "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio",
-    );
+    let speed = Unit::METRE_PER_SECOND;
+    let of_bound = "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio";
     let in_band = "signal-to-noise ratio in the detector band that the spectra show";
     let fields: [(&str, Unit, &str, Of); 9] = [
         ("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| &s.velocity_m_s),
