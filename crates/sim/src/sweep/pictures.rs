@@ -4,7 +4,7 @@
 
 use super::key_path::Holds;
 use super::pareto::{Objective, Place, front};
-use super::results::{RESULTS, standard_error_of};
+use super::results::{results, standard_error_of};
 use super::stored::{Definition, Row};
 use crate::Error;
 use crate::outputs::Outputs;
@@ -52,7 +52,7 @@ fn against(
     let axis = if low > 0.0 && high >= 8.0 * low { Axis::log(key) } else { Axis::linear(key) };
     let mut plot = CurvePlot::new(title, axis, if *is_log { Axis::log(label) } else { Axis::linear(label) });
     plot.shape = 0.6;
-    let error = standard_error_of(result, RESULTS.iter().map(|(name, ..)| *name));
+    let error = standard_error_of(result, results().map(|(name, ..)| name));
     let (curves, mut any) = (curves(definition, rows, key), false);
     // Without a name either no other key varies, or there are too many curves.
     let curves_are_whole = definition.free().count() == 1;

@@ -28,40 +28,14 @@ const OUTSIDE_PART: f64 = 30.0 / 47.0;
 const BEYOND_WIDTHS: f64 = 3.0;
 
 /// Names, units and meanings of the results, in the order of the columns.
-pub const RESULTS: [(&str, &str, &str); 32] = [
-    ("snr_db", "dB", "signal-to-noise ratio in the detector band in the middle of the scan"),
-    ("resolution_m", "m", "full width at half maximum of the weight of pulse and window in range"),
-    ("resolution_sd_m", "m", "standard deviation of that weight"),
-    ("bound_m_s", "m s-1", "Cramer-Rao bound on the velocity of a region in the middle of the scan"),
-    ("std_m_s", "m s-1", "standard deviation of one estimate, over the map"),
-    ("std_standard_error_m_s", "m s-1", "standard error of std_m_s"),
-    ("bias_m_s", "m s-1", "mean error, over the map"),
-    ("bias_standard_error_m_s", "m s-1", "standard error of bias_m_s"),
-    ("rms_m_s", "m s-1", "root mean square error, over the map"),
-    ("rms_standard_error_m_s", "m s-1", "standard error of rms_m_s"),
-    ("std_inside_m_s", "m s-1", "standard deviation of one estimate, inside the vortices"),
-    ("std_inside_standard_error_m_s", "m s-1", "standard error of std_inside_m_s"),
-    ("bias_inside_m_s", "m s-1", "mean error, inside the vortices"),
-    ("bias_inside_standard_error_m_s", "m s-1", "standard error of bias_inside_m_s"),
-    ("rms_inside_m_s", "m s-1", "root mean square error, inside the vortices"),
-    ("rms_inside_standard_error_m_s", "m s-1", "standard error of rms_inside_m_s"),
-    ("std_outside_m_s", "m s-1", "standard deviation of one estimate, outside the vortices"),
-    ("std_outside_standard_error_m_s", "m s-1", "standard error of std_outside_m_s"),
-    ("bias_outside_m_s", "m s-1", "mean error, outside the vortices"),
-    ("bias_outside_standard_error_m_s", "m s-1", "standard error of bias_outside_m_s"),
-    ("rms_outside_m_s", "m s-1", "root mean square error, outside the vortices"),
-    ("rms_outside_standard_error_m_s", "m s-1", "standard error of rms_outside_m_s"),
-    ("flagged_fraction", "1", "part of the estimates that is flagged"),
-    ("flagged_standard_error_fraction", "1", "standard error of flagged_fraction"),
-    ("bad_fraction", "1", "part of the estimates outside the vortices that is spread over the band"),
-    ("bad_standard_error_fraction", "1", "standard error of bad_fraction"),
-    ("circulation_bias_m2_s", "m2 s-1", "mean error of the circulation fitted to a map"),
-    ("circulation_bias_standard_error_m2_s", "m2 s-1", "standard error of circulation_bias_m2_s"),
-    ("circulation_rms_m2_s", "m2 s-1", "root mean square error of the circulation fitted to a map"),
-    ("circulation_rms_standard_error_m2_s", "m2 s-1", "standard error of circulation_rms_m2_s"),
-    ("circulation_failed_fraction", "1", "part of the fits that did not come to an end"),
-    ("circulation_bound_m2_s", "m2 s-1", "Cramer-Rao bound on the circulation from all signals of a scan, known cores"),
-];
+pub(super) fn results() -> impl Iterator<Item = (&'static str, &'static str, &'static str)> {
+    let of_line = |line: &'static str| {
+        let (name, rest) = line.split_once(',')?;
+        let (unit, meaning) = rest.split_once(',')?;
+        Some((name, unit, meaning))
+    };
+    include_str!("results.csv").lines().filter_map(of_line)
+}
 
 /// Name of the column that has the standard error of a column: `std_m_s` has `std_standard_error_m_s`.
 pub(crate) fn standard_error_of<'a>(name: &str, mut columns: impl Iterator<Item = &'a str>) -> Option<&'a str> {
@@ -80,7 +54,7 @@ struct Collected<'p> {
     velocity_m_s: Vec<f64>,
 }
 
-/// The rows of plans whose scenes differ in estimator, outputs and site alone, each in the order of [`RESULTS`]: the records of each
+/// The rows of plans whose scenes differ in estimator, outputs and site alone, each in the order of [`results`]: the records of each
 /// realisation are made once.
 ///
 /// # Errors

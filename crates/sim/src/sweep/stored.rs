@@ -5,7 +5,7 @@
 
 use super::cases::{Case, Sweep};
 use super::key_path::VaryingKey;
-use super::results::RESULTS;
+use super::results::results as columns;
 use crate::io::{Existing, Provenance, csv::float_text, text_file, write_atomic};
 use crate::scene::Outputs;
 use crate::{Error, outputs};
@@ -123,7 +123,7 @@ impl Definition {
     /// # Errors
     /// What the system says; a file of somebody else in the way.
     pub(super) fn store(&self, folder: &Path, case: &Case, results: &[f64], existing: Existing) -> Result<(), Error> {
-        let names = RESULTS.iter().map(|(name, ..)| (*name).to_owned());
+        let names = columns().map(|(name, ..)| name.to_owned());
         let row = Row {
             source: crate::PROGRAM.into(),
             scene_hash: case.scene.hash.clone(),
@@ -147,7 +147,7 @@ impl Definition {
         let is_this = (row.case, row.circulation) == (case, self.circulation)
             && (Some(&row.scene_hash), &row.source) == (self.scene_hashes.get(case), &self.source)
             && self.keys.iter().all(|key| row.keys.contains_key(&key.name))
-            && RESULTS.iter().all(|(name, ..)| row.results.contains_key(*name));
+            && columns().all(|(name, ..)| row.results.contains_key(name));
         is_this.then_some(row)
     }
 }

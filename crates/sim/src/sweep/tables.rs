@@ -4,7 +4,7 @@
 
 use super::cases::Sweep;
 use super::key_path::{Holds, VaryingKey};
-use super::results::RESULTS;
+use super::results::results;
 use super::stored::{Definition, Row, SWEEP};
 use crate::Error;
 use crate::io::{Existing, Table};
@@ -92,7 +92,7 @@ fn table(definition: &Definition, rows: &[Row]) -> Table {
         };
     }
     table = table.text("scene_hash", rows.iter().map(|row| row.scene_hash.clone()));
-    for (name, ..) in RESULTS {
+    for (name, ..) in results() {
         table = table.float(name, rows.iter().map(|row| row.result(name)));
     }
     table
@@ -126,7 +126,7 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
         variables.push(variable.text("long_name", &format!("key {name} of the scene")));
     }
     variables.push(words("scene_hash", &|row| &row.scene_hash).text("long_name", "hash of the scene of the case"));
-    for (name, unit, meaning) in RESULTS {
+    for (name, unit, meaning) in results() {
         let values = rows.iter().map(|row| row.result(name));
         let variable = Variable::new(name, &["case"], Data::f64(values));
         let variable = variable.attr("_FillValue", Data::f64([f64::NAN]));
