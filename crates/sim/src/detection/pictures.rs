@@ -23,7 +23,6 @@ pub fn picture(power: &Power) -> Figure {
     let title = format!("Found at {} false alarms; 9 in 10: {:.0} m²/s", power.false_alarm, power.smallest_m2_s.0);
     let found =
         CurvePlot::new(&title, Axis::linear("circulation [m²/s]"), Axis::linear("share of wakes found")).with(found);
-    let mut figure = Figure::side_by_side([roc, found].map(|plot| CurvePlot { shape: 0.75, ..plot }));
-    figure.width = 1120.0;
-    figure
+    let figure = Figure::side_by_side([roc, found].map(|plot| CurvePlot { shape: 0.75, ..plot }));
+    Figure { width: 1120.0, ..figure }
 }

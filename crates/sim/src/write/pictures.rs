@@ -39,9 +39,8 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
         snr.band = Some(snr_band_db(profile));
     }
     let snr = CurvePlot::new("Signal-to-noise ratio", range(), Axis::linear("SNR [dB]")).with(snr);
-    let mut figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot { shape: 0.75, ..plot }));
-    figure.width = 1120.0;
-    figure
+    let figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot { shape: 0.75, ..plot }));
+    Figure { width: 1120.0, ..figure }
 }
 
 fn has_error(profile: &EfficiencyProfile) -> bool {
@@ -97,9 +96,7 @@ pub(super) fn map(plan: &Plan, map: &VelocityMap, winds: Option<&[BeamWind]>) ->
         ]
     };
     let has_gaps = panels.iter().any(|plot| plot.cells.values.iter().any(|v| v.is_nan()));
-    let mut figure = Figure::stacked(panels).titled(&title(plan, has_gaps));
-    (figure.columns, figure.width) = (3, 1560.0);
-    Ok(figure)
+    Ok(Figure { columns: 3, width: 1560.0, ..Figure::stacked(panels).titled(&title(plan, has_gaps)) })
 }
 
 /// The first scan of recorded signals: velocity, its predicted error, signal-to-noise ratio.
@@ -112,9 +109,8 @@ pub(super) fn measured(map: &VelocityMap) -> Result<Figure, Error> {
         panel("velocity_standard_deviation", "predicted standard deviation", "m/s")?,
         panel("signal_to_noise_ratio", "signal-to-noise ratio", "dB")?,
     ];
-    let mut figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
-    (figure.columns, figure.width) = (3, 1560.0);
-    Ok(figure)
+    let figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
+    Ok(Figure { columns: 3, width: 1560.0, ..figure })
 }
 
 /// Curves of the first lines over range: the air, and the mean estimates.
@@ -195,9 +191,7 @@ pub(super) fn scan(plan: &Plan) -> Figure {
         plot.with(Series::new("lidar", Style::Markers, [(start_m[1], start_m[up])]).in_colour(2))
     };
     let panels = [panel("from above", "along the flight [m]", 0), panel("from behind", "height [m]", 2)];
-    let mut figure = Figure::side_by_side(panels).titled(&plan.schedule().to_string());
-    figure.width = 1120.0;
-    figure
+    Figure { width: 1120.0, ..Figure::side_by_side(panels).titled(&plan.schedule().to_string()) }
 }
 
 /// What is shown, of which age and from how many realisations.
