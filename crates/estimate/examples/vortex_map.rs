@@ -35,15 +35,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         println!();
     }
-    let flags: Vec<&str> = found.flags.iter().map(|flag| flag.name()).collect();
     println!(
-        "# wind {:.2} +- {:.2} m/s; {} of {} velocities are outliers; statistic {:.0}; {}; {:.2} s",
+        "# wind {:.2} +- {:.2} m/s; {} of {} velocities are outliers; statistic {:.0}; {:?}; {:.2} s",
         found.lateral_wind_m_s.value,
         found.lateral_wind_m_s.std,
         found.cells_rejected,
         found.cells_used + found.cells_rejected,
         found.statistic,
-        flags.join(", "),
+        found.flags,
         begin.elapsed().as_secs_f64()
     );
     if let Some(wake) = found.wake {

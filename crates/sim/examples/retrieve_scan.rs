@@ -20,8 +20,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let options = RetrievalOptions { gate: Gate::Gaussian { std_m }, ..RetrievalOptions::default() };
     for scan in scans {
         let found = fit_scan(&scan.map, &options)?;
-        let flags: Vec<&str> = found.flags.iter().map(|flag| flag.name()).collect();
-        println!("sweep {}: statistic {:.1}, {}", scan.sweep, found.statistic, flags.join(" "));
+        println!("sweep {}: statistic {:.1}, {:?}", scan.sweep, found.statistic, found.flags);
         for vortex in &found.vortices {
             let (mean, y_m, z_m) = (vortex.circulation_5_15_m2_s, vortex.lateral_position_m, vortex.height_m);
             println!(

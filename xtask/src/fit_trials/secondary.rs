@@ -19,7 +19,7 @@ use wakescope_estimate::retrieval::{
     Flag, Gate, Measured, RetrievalOptions, ScanMap, ScanResult, expected_velocities, fit_scan, with_secondary_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};
-use wakescope_sim::retrieve::RetrievalRow;
+use wakescope_sim::retrieve::{self, RetrievalRow};
 use wakescope_sim::scene::{Flow, Outside, Retrieval, Scene, SimulatedFlow, SimulatedMotion, VortexLines, VortexPair};
 
 /// The middle of the wakes \[m\].
@@ -174,7 +174,7 @@ fn of_scene(flow: Flow, added_flows: Vec<Flow>, folder: &Path, options: &Options
         };
         rows.iter().map(of).collect::<Option<_>>().unwrap_or_default()
     };
-    let name = Flag::SecondaryVortices.name();
+    let name = retrieve::name(Flag::SecondaryVortices);
     let scans = pair.chunks(2).zip(four.chunks(2)).map(|(pair, four)| Scan {
         shown: pair[0].flags.split(' ').any(|flag| flag == name),
         fits: [errors(pair), errors(four)],

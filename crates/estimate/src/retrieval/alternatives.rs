@@ -70,10 +70,7 @@ pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error
     let told = if is_ambiguous { nearest_to_the_mean_spacing(&all[..spacings]) } else { end };
     let mut result = report.told(told, mixed(&all, &told.wake), statistic);
     result.vortices.iter_mut().for_each(|vortex| widen(vortex, &all));
-    if is_ambiguous && !result.has(Flag::Ambiguous) {
-        result.flags.push(Flag::Ambiguous);
-        result.flags.sort();
-    }
+    result.set(Flag::Ambiguous, is_ambiguous || result.has(Flag::Ambiguous));
     Ok(result)
 }
 

@@ -165,7 +165,7 @@ pub fn velocity_envelopes(
     positive("snr", spectra.snr)?;
     positive("threshold - 1", threshold - 1.0)?;
     about.validate()?;
-    Ok([Side::Left, Side::Right].map(|side| one(spectra, shape, (model, about), side, threshold)))
+    Ok(Side::BOTH.map(|side| one(spectra, shape, (model, about), side, threshold)))
 }
 
 fn one(

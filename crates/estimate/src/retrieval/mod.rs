@@ -49,5 +49,5 @@ pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, VortexResult};
 pub use scan_map::ScanMap;
 pub use secondary::with_secondary_vortices;
-pub use track::{Track, TrackOptions, TrackPoint, TrackedVortex, track};
+pub use track::{Track, TrackPoint, TrackedVortex, track};
 pub(crate) use whitening::Whitening;

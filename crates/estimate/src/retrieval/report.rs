@@ -107,7 +107,7 @@ impl<'a> Report<'a> {
 
     fn sides(&self, end: &End) -> Vec<Side> {
         let is_there = |side: &Side| end.kind.has(side.parameters()[0] as usize);
-        [Side::Left, Side::Right].into_iter().filter(is_there).collect()
+        Side::BOTH.into_iter().filter(is_there).collect()
     }
 
     fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
@@ -131,10 +131,6 @@ impl<'a> Report<'a> {
         }
         let tops: Vec<Top> =
             tops(self.ends, end, &covariance).iter().map(|end| Top { wake: end.wake, chi2: end.chi2 }).collect();
-        let measured = |parameter: Parameter| Measured {
-            value: end.wake.to_array()[parameter as usize],
-            std: covariance[[parameter as usize; 2]].sqrt(),
-        };
         let spacing_m = if end.kind == Kind::Both { end.wake.spacing_m() } else { 2.0 * SEEN_M };
         let low = |vortex: &VortexResult| vortex.height_m.value < 0.5 * spacing_m;
         let competes = tops
@@ -159,8 +155,8 @@ impl<'a> Report<'a> {
         ScanResult {
             wake: (!vortices.is_empty()).then_some(end.wake),
             reference_time_s: self.stage.map.middle_s(),
-            lateral_wind_m_s: measured(Parameter::Wind),
-            wind_shear_per_s: measured(Parameter::Shear),
+            lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &end.wake, &covariance),
+            wind_shear_per_s: Measured::of_wake(Parameter::Shear, &end.wake, &covariance),
             chi2_per_dof: squares / (count.saturating_sub(end.groups.len()).max(1)) as f64,
             cells_used: count,
             cells_rejected,

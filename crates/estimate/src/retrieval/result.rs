@@ -8,6 +8,7 @@ use crate::vortex_fit::{PARAMETERS, Parameter, Top, Wake, WakeModel};
 
 /// A number with its standard deviation; NaN where that is not known.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct Measured {
     /// The value.
     pub value: f64,
@@ -15,8 +16,18 @@ pub struct Measured {
     pub std: f64,
 }
 
+impl Measured {
+    /// A parameter of a wake with that covariance \[10, 10\].
+    #[must_use]
+    pub fn of_wake(parameter: Parameter, wake: &Wake, covariance: &Array2<f64>) -> Self {
+        let place = parameter as usize;
+        Self { value: wake.to_array()[place], std: covariance[[place, place]].sqrt() }
+    }
+}
+
 /// Which of the two vortices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Side {
     /// The one at smaller y, clockwise.
     Left,
@@ -25,6 +36,9 @@ pub enum Side {
 }
 
 impl Side {
+    /// Left before right.
+    pub const BOTH: [Self; 2] = [Self::Left, Self::Right];
+
     /// Circulation, lateral coordinate, height and core radius of the vortex of that side.
     #[must_use]
     pub fn parameters(self) -> [Parameter; 4] {
@@ -108,6 +122,7 @@ impl VortexResult {
 
 /// What to think of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
 pub enum Flag {
     /// No wake was found.
     NoWake,
@@ -137,29 +152,6 @@ pub enum Flag {
     Thinned,
     /// The fit came to no end: what is told is where it was.
     NotConverged,
-}
-
-impl Flag {
-    /// The name in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::NoWake => "no_wake",
-            Self::OneVortex => "one_vortex",
-            Self::CoreKept => "core_kept",
-            Self::AtEdge => "at_edge",
-            Self::NearGround => "near_ground",
-            Self::SecondaryVortices => "secondary_vortices",
-            Self::LocalCirculation => "local_circulation",
-            Self::MotionIgnored => "motion_ignored",
-            Self::Ambiguous => "ambiguous",
-            Self::PoorFit => "poor_fit",
-            Self::Outliers => "outliers",
-            Self::TakenForMeans => "taken_for_means",
-            Self::Thinned => "thinned",
-            Self::NotConverged => "not_converged",
-        }
-    }
 }
 
 /// Outcome of a retrieval from one scan.
@@ -199,6 +191,13 @@ impl ScanResult {
     #[must_use]
     pub fn has(&self, flag: Flag) -> bool {
         self.flags.contains(&flag)
+    }
+
+    /// Sets a flag, or takes it away.
+    pub fn set(&mut self, flag: Flag, is_set: bool) {
+        self.flags.retain(|own| *own != flag);
+        self.flags.extend(is_set.then_some(flag));
+        self.flags.sort();
     }
 
     /// The vortex of that side, if there is one.

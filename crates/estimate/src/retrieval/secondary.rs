@@ -53,8 +53,7 @@ pub fn with_secondary_vortices(
     let Some(four) = setting.with_secondary(&pair) else { return Ok(None) };
     if !four.secondary.fitted {
         let mut result = found.clone();
-        result.flags.push(Flag::SecondaryVortices);
-        result.flags.sort();
+        result.set(Flag::SecondaryVortices, true);
         return Ok(Some((result, options.clone())));
     }
     // what another profile would do was free in the search
@@ -65,10 +64,7 @@ pub fn with_secondary_vortices(
     if result.vortices.len() < 2 {
         return Ok(None);
     }
-    if four.secondary.shown {
-        result.flags.push(Flag::SecondaryVortices);
-        result.flags.sort();
-    }
+    result.set(Flag::SecondaryVortices, four.secondary.shown);
     widen(&mut result, map, &four.covariance, &options);
     Ok(Some((result, options)))
 }

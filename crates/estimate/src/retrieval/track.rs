@@ -3,7 +3,7 @@
 //! State of each vortex: y and its rate, z and its rate, ln Gamma and q = -d ln Gamma/dt. Positions have white acceleration of spectral
 //! density q_a, q is a random walk. Both vortices are one state of twelve numbers, as their errors in a scan are correlated. A scan
 //! is taken for a vortex if its normalised innovation is below 16.3 (99.9 % of chi^2 with three degrees). A vortex is born at the first of two
-//! detections within three scans; it ends with its last detection before three misses, below the ground or outside the given limits.
+//! detections within three scans; it ends with its last detection before three misses or below the ground.
 //! Check: made-up series, innovations, errors of smoothed circulations.
 
 use ndarray::{Array1, Array2};
@@ -24,31 +24,10 @@ const DEATH: usize = 3;
 /// What is known at birth of rates \[m/s\] and of q \[1/s\].
 const RATE_M_S: f64 = 5.0;
 const DECAY_PER_S: f64 = 0.05;
-
-/// How vortices are tracked.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TrackOptions {
-    /// Spectral density of the acceleration \[m^2/s^3\]: 0.002 to 0.02.
-    pub acceleration_density_m2_s3: f64,
-    /// Spectral density of the changes of the rate of decay \[1/s^3\].
-    pub decay_density_per_s3: f64,
-    /// Standard deviation of positions whose method states none \[m\].
-    pub unstated_position_std_m: f64,
-    /// Lateral coordinates \[m\] between which vortices are seen.
-    pub limits_m: Option<(f64, f64)>,
-}
-
-impl Default for TrackOptions {
-    /// 0.005 m^2/s^3, 1e-7 1/s^3, 1.5 m, no limits.
-    fn default() -> Self {
-        Self {
-            acceleration_density_m2_s3: 0.005,
-            decay_density_per_s3: 1e-7,
-            unstated_position_std_m: 1.5,
-            limits_m: None,
-        }
-    }
-}
+/// Spectral density of the changes of the rate of decay \[1/s^3\].
+const DECAY_DENSITY_PER_S3: f64 = 1e-7;
+/// Standard deviation of positions whose method states none \[m\].
+const UNSTATED_M: f64 = 1.5;
 
 /// A vortex at the reference time of a scan, with the standard deviations of the smoother.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,6 +71,9 @@ pub struct Track {
 }
 
 impl Track {
+    /// A spectral density of the acceleration \[m^2/s^3\] that suits most wakes; it lies between 0.002 and 0.02.
+    pub const ACCELERATION_DENSITY_M2_S3: f64 = 0.005;
+
     /// The pair at a time \[s\] after the last scan, to start the next fit from; nothing unless both vortices live.
     #[must_use]
     pub fn prediction(&self, time_s: f64, core_radius_m: f64) -> Option<Wake> {
@@ -129,22 +111,20 @@ struct Step {
     detected: [bool; 2],
 }
 
-const SIDES: [Side; 2] = [Side::Left, Side::Right];
-
-/// Tracks the vortices through scans, in the order of their times.
+/// Tracks the vortices through scans, in the order of their times; `acceleration_density_m2_s3` is the spectral density of the
+/// acceleration \[m^2/s^3\], such as [`Track::ACCELERATION_DENSITY_M2_S3`].
 ///
 /// # Errors
-/// [`Error::Empty`] without scans; [`Error::OutOfRange`] for unknown or not increasing times and impossible options; [`Error::Linalg`] for
-/// covariances that are no covariances.
-pub fn track(results: &[ScanResult], options: &TrackOptions) -> Result<Track, Error> {
-    positive("acceleration_density_m2_s3", options.acceleration_density_m2_s3)?;
-    positive("decay_density_per_s3", options.decay_density_per_s3)?;
-    positive("unstated_position_std_m", options.unstated_position_std_m)?;
+/// [`Error::Empty`] without scans; [`Error::OutOfRange`] for unknown or not increasing times and a density that is not above 0;
+/// [`Error::Linalg`] for covariances that are no covariances.
+pub fn track(results: &[&ScanResult], acceleration_density_m2_s3: f64) -> Result<Track, Error> {
+    positive("acceleration_density_m2_s3", acceleration_density_m2_s3)?;
     let times: Vec<f64> = results.iter().map(|result| result.reference_time_s).collect();
     times.iter().try_for_each(|time| finite("reference_time_s", *time))?;
     increasing("reference_time_s", &times)?;
     not_empty("results", results.len())?;
-    let mut filter = Filter { options, steps: vec![], misses: [0; 2], innovations: vec![], rejected: 0 };
+    let (steps, innovations) = (vec![], vec![]);
+    let mut filter = Filter { acceleration_density_m2_s3, steps, misses: [0; 2], innovations, rejected: 0 };
     for (k, result) in results.iter().enumerate() {
         let seconds = if k > 0 { times[k] - times[k - 1] } else { 0.0 };
         let soon = &results[k + 1..results.len().min(k + BIRTH)];
@@ -172,7 +152,7 @@ fn tracked(state: &State, i: usize, detected: bool) -> TrackedVortex {
     let circulation = number(4);
     let value = circulation.value.exp();
     TrackedVortex {
-        side: SIDES[i],
+        side: Side::BOTH[i],
         lateral_position_m: number(0),
         lateral_velocity_m_s: number(1),
         height_m: number(2),
@@ -183,23 +163,23 @@ fn tracked(state: &State, i: usize, detected: bool) -> TrackedVortex {
     }
 }
 
-struct Filter<'a> {
-    options: &'a TrackOptions,
+struct Filter {
+    acceleration_density_m2_s3: f64,
     steps: Vec<Step>,
     misses: [usize; 2],
     innovations: Vec<f64>,
     rejected: usize,
 }
 
-impl Filter<'_> {
+impl Filter {
     /// Prediction to the next scan; a vortex that does not live is forgotten.
     fn predicted(&self, before: &State, alive: [bool; 2], seconds: f64) -> (Array2<f64>, State) {
         let (mut transition, mut noise) = (Array2::eye(BOTH), Array2::zeros((BOTH, BOTH)));
         for (i, alive) in alive.into_iter().enumerate() {
             for (place, sign, density) in [
-                (0, 1.0, self.options.acceleration_density_m2_s3),
-                (2, 1.0, self.options.acceleration_density_m2_s3),
-                (4, -1.0, self.options.decay_density_per_s3),
+                (0, 1.0, self.acceleration_density_m2_s3),
+                (2, 1.0, self.acceleration_density_m2_s3),
+                (4, -1.0, DECAY_DENSITY_PER_S3),
             ] {
                 let (a, b) = (ONE * i + place, ONE * i + place + 1);
                 if alive {
@@ -219,16 +199,16 @@ impl Filter<'_> {
         (transition, State { mean, covariance })
     }
 
-    fn step(&mut self, result: &ScanResult, soon: &[ScanResult], seconds: f64) -> Result<(), Error> {
+    fn step(&mut self, result: &ScanResult, soon: &[&ScanResult], seconds: f64) -> Result<(), Error> {
         let nothing = State { mean: Array1::zeros(BOTH), covariance: Array2::eye(BOTH) };
         let (before, mut alive) = self.steps.last().map_or((&nothing, [false; 2]), |step| (&step.filtered, step.alive));
         let (transition, mut predicted) = self.predicted(before, alive, seconds);
         let (mut taken, mut lost) = ([None; 2], [false; 2]);
-        for (i, side) in SIDES.into_iter().enumerate() {
+        for (i, side) in Side::BOTH.into_iter().enumerate() {
             let seen = result.vortex(side).filter(|vortex| vortex.circulation_m2_s.value > 0.0);
             if let (false, Some(vortex)) = (alive[i], seen) {
                 if soon.iter().any(|next| next.vortex(side).is_some()) {
-                    self.born(&mut predicted, i, vortex);
+                    Self::born(&mut predicted, i, vortex);
                     (alive[i], self.misses[i], taken[i]) = (true, 0, Some(vortex));
                 }
                 continue;
@@ -236,7 +216,7 @@ impl Filter<'_> {
             if !alive[i] {
                 continue;
             }
-            let distance = seen.map(|v| self.innovation(&predicted, result, &[(i, v)])).transpose()?;
+            let distance = seen.map(|v| Self::innovation(&predicted, result, &[(i, v)])).transpose()?;
             match (seen, distance) {
                 (Some(vortex), Some((distance, _))) if distance < GATE => {
                     taken[i] = Some(vortex);
@@ -248,14 +228,13 @@ impl Filter<'_> {
                     self.misses[i] += 1;
                 }
             }
-            let (y, z) = (predicted.mean[ONE * i], predicted.mean[ONE * i + 2]);
-            let outside = self.options.limits_m.is_some_and(|(low, high)| !(low..=high).contains(&y));
-            lost[i] = self.misses[i] >= DEATH || ((z < 0.0 || outside) && taken[i].is_none());
+            let height_m = predicted.mean[ONE * i + 2];
+            lost[i] = self.misses[i] >= DEATH || (height_m < 0.0 && taken[i].is_none());
         }
         let pairs: Vec<(usize, &VortexResult)> =
             taken.iter().enumerate().filter_map(|(i, v)| Some((i, (*v)?))).collect();
         let filtered =
-            if pairs.is_empty() { predicted.clone() } else { self.innovation(&predicted, result, &pairs)?.1 };
+            if pairs.is_empty() { predicted.clone() } else { Self::innovation(&predicted, result, &pairs)?.1 };
         for i in 0..2 {
             if lost[i] {
                 alive[i] = false;
@@ -270,8 +249,8 @@ impl Filter<'_> {
     }
 
     /// A vortex begins where it is seen, with rates that are unknown.
-    fn born(&self, state: &mut State, i: usize, vortex: &VortexResult) {
-        let z = self.measured(vortex);
+    fn born(state: &mut State, i: usize, vortex: &VortexResult) {
+        let z = Self::measured(vortex);
         for (place, rate) in [(0, RATE_M_S), (2, RATE_M_S), (4, DECAY_PER_S)] {
             let (value, std) = z[place / 2];
             for (at, mean, deviation) in [(ONE * i + place, value, 100.0 * std), (ONE * i + place + 1, 0.0, rate)] {
@@ -284,8 +263,8 @@ impl Filter<'_> {
     }
 
     /// y, z and ln Gamma with their standard deviations.
-    fn measured(&self, vortex: &VortexResult) -> [(f64, f64); 3] {
-        let place = |m: Measured| (m.value, if m.std > 0.0 { m.std } else { self.options.unstated_position_std_m });
+    fn measured(vortex: &VortexResult) -> [(f64, f64); 3] {
+        let place = |m: Measured| (m.value, if m.std > 0.0 { m.std } else { UNSTATED_M });
         let circulation = vortex.circulation_m2_s;
         let part = circulation.std / circulation.value;
         let log = (circulation.value.ln(), if part > 0.0 { part } else { 0.1 });
@@ -294,7 +273,6 @@ impl Filter<'_> {
 
     /// Normalised innovation of the vortices of a scan, and the state with them.
     fn innovation(
-        &self,
         state: &State,
         result: &ScanResult,
         vortices: &[(usize, &VortexResult)],
@@ -304,7 +282,7 @@ impl Filter<'_> {
         let (mut deviations, mut places) = (vec![], vec![]);
         for (n, (i, vortex)) in vortices.iter().enumerate() {
             let seconds = if vortex.time_s.is_finite() { vortex.time_s - result.reference_time_s } else { 0.0 };
-            for (row, (value, std)) in self.measured(vortex).into_iter().enumerate() {
+            for (row, (value, std)) in Self::measured(vortex).into_iter().enumerate() {
                 z[3 * n + row] = value;
                 h[[3 * n + row, ONE * i + 2 * row]] = 1.0;
                 h[[3 * n + row, ONE * i + 2 * row + 1]] = if row < 2 { seconds } else { -seconds };
@@ -371,6 +349,10 @@ mod tests {
         (results, truth)
     }
 
+    fn tracked_with(results: &[ScanResult], acceleration_density_m2_s3: f64) -> Result<Track, Error> {
+        track(&results.iter().collect::<Vec<_>>(), acceleration_density_m2_s3)
+    }
+
     fn scan(k: usize, wake: &Wake, rng: &mut Xoshiro256PlusPlus) -> ScanResult {
         let mut number = |value: f64, std: f64| Measured {
             value: value + std * rng.sample::<f64, _>(rand_distr::StandardNormal),
@@ -411,8 +393,7 @@ mod tests {
         let (mut squares, mut normalised, mut innovation, repeats) = (0.0, 0.0, 0.0, 60);
         for _ in 0..repeats {
             let (results, truth) = series(8, &mut rng);
-            let options = TrackOptions { acceleration_density_m2_s3: 0.002, ..Default::default() };
-            let found = track(&results, &options).unwrap();
+            let found = tracked_with(&results, 0.002).unwrap();
             innovation += found.mean_innovation / f64::from(repeats);
             for (point, wake) in found.points.iter().zip(&truth).skip(3).take(2) {
                 let vortex = &point.vortices[0];
@@ -437,7 +418,7 @@ mod tests {
             results[k].vortices.pop();
         }
         results[9].vortices[1].height_m.value += 20.0;
-        let found = track(&results, &TrackOptions::default()).unwrap();
+        let found = tracked_with(&results, Track::ACCELERATION_DENSITY_M2_S3).unwrap();
         let alive = |k: usize| found.points[k].vortices.iter().any(|v| v.side == Side::Right);
         let living: Vec<usize> = (0..14).filter(|k| alive(*k)).collect();
         assert_eq!(living, [4, 5, 6, 7, 8, 9, 10]);
@@ -454,13 +435,18 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(7);
         let (mut results, truth) = series(9, &mut rng);
         let last = results.pop().unwrap();
-        let found = track(&results, &TrackOptions::default()).unwrap();
+        let found = tracked_with(&results, Track::ACCELERATION_DENSITY_M2_S3).unwrap();
         let wake = found.prediction(last.reference_time_s, 2.0).unwrap();
         for (a, b) in wake.to_array().iter().zip(truth[8].to_array()).take(6) {
             assert!((a - b).abs() < 0.1 * b.abs(), "{a} {b}");
         }
         results[3].reference_time_s = 5.0;
-        assert!(track(&results, &TrackOptions::default()).unwrap_err().to_string().contains("reference_time_s"));
-        assert!(track(&[], &TrackOptions::default()).is_err());
+        assert!(
+            tracked_with(&results, Track::ACCELERATION_DENSITY_M2_S3)
+                .unwrap_err()
+                .to_string()
+                .contains("reference_time_s")
+        );
+        assert!(track(&[], Track::ACCELERATION_DENSITY_M2_S3).is_err());
     }
 }

@@ -1,7 +1,7 @@
 //! `wakescope detect`: whether scans hold a wake, and how small a wake is found in scans like them.
 
 use super::Cli;
-use super::words::{AirWords, FolderWords, ScanWords, Scans, finite, rate, spacing, stride};
+use super::words::{AirWords, FolderWords, ScanWords, finite, rate, spacing, stride};
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
@@ -60,13 +60,9 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let stated = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
     let (mut scans, mut notes) = (Vec::new(), Vec::new());
     for path in &words.data {
-        match words.scans.read(path, stated.as_ref(), false)? {
-            Scans::Signals(signals) => scans.extend((0..signals.scans.len()).map(|sweep| signals.map(sweep))),
-            Scans::Maps(read, left_out) => {
-                scans.extend(read);
-                notes.extend(left_out);
-            }
-        }
+        let read = words.scans.read(path, stated.as_ref(), false)?;
+        scans.extend(read.maps);
+        notes.extend(read.left_out);
     }
     let scene = match (stated, scans.first()) {
         (None, Some(scan)) => scene_of(scan)?,

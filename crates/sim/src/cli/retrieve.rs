@@ -2,20 +2,19 @@
 
 use super::Cli;
 use super::words::{AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch};
-use crate::Error;
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
-use crate::measure::recorded::MeasuredScan;
 use crate::outputs::Outputs;
 use crate::plan::Stage;
 use crate::plan::time::{FIT_S, SIGNAL_FIT_S};
 use crate::plan::units::seconds;
-use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, StatedEstimator, Velocities, gate_of};
+use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, Velocities, gate_of};
 use crate::scene::SceneFile;
 use crate::setup::progress::{Observer, Silent};
+use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::{ArgAction, Args};
 use serde_json::json;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::{Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track};
 use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Secondary, Wake};
 
@@ -75,6 +74,9 @@ pub(super) struct RetrieveWords {
     folder: FolderWords,
 }
 
+/// Sampling of an instrument of which it is not known, Hz.
+const WIDE_HZ: f64 = 500e6;
+
 /// Few lines cross a core, and the likelihood of their speckle is no parabola.
 const HEIGHTS: &str = "fits of signals state the deviations of heights a quarter too small\n";
 
@@ -92,6 +94,31 @@ impl RetrieveWords {
         options.secondary = self.secondary.unwrap_or(options.secondary);
         let (covariance, movement, threshold) = (self.covariance, self.motion, self.threshold);
         RetrievalOptions { turbulence: self.air.turbulence, covariance, movement, threshold, ..options }
+    }
+
+    /// A scene with what is stated, else with what the file says, else with the defaults, at a high signal-to-noise ratio.
+    fn stated_scene(&self, scan: &ReadScan) -> Result<SceneFile, Error> {
+        let mut text = String::from("detector.snr.reference = \"fixed\"\ndetector.snr.snr_db = 10.0\n");
+        let mut state = |key: &str, value: Option<String>| {
+            text.extend(value.map(|value| format!("{key} = {value}\n")));
+        };
+        let word = |word: &str| Some(format!("{word:?}"));
+        let number = |value: f64| Some(format!("{value:?}"));
+        state("pulse.shape.duration_s", self.pulse.or(scan.pulse_width_s).and_then(number));
+        if let Some(method) = &self.estimator {
+            let gate_s = scan.gate_length_m.map(|length_m| 2.0 * length_m / SPEED_OF_LIGHT_M_S);
+            let samples = |seconds: f64| Some(((seconds * WIDE_HZ).round().max(1.0) as u64).to_string());
+            state("estimator.method.kind", word(method));
+            state("estimator.window_samples", self.window.or(gate_s).and_then(samples));
+            state("estimator.weighting", word(self.weighting.as_deref().unwrap_or("rectangular")));
+            // Gates of one line each, and a band that is wide enough for all instruments.
+            state("estimator.radius_m", number(0.0).filter(|_| method != "periodogram"));
+            state("estimator.padded_samples", Some("4096".into()));
+            state("detector.sampling_hz", number(WIDE_HZ));
+            state("detector.intermediate_frequency_hz", number(0.25 * WIDE_HZ));
+            state("detector.bandwidth_hz", number(0.4 * WIDE_HZ));
+        }
+        Ok(SceneFile::parse(&text, Path::new("what --estimator, --pulse, --window and --weighting state"))?)
     }
 }
 
@@ -114,17 +141,13 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
             let reason = "it is no file of raw signals, which this method needs: --method fit takes maps".into();
             return Err(Error::Input { path: path.clone(), reason });
         }
-        let scans = words.scans.read(path, stated.as_ref(), words.method == Method::Envelope)?;
-        match &scans {
-            Scans::Signals(signals) => scenes.extend(signals.scans.iter().map(|_| Some(signals.plan.scene.clone()))),
-            Scans::Maps(maps, left_out) => {
-                for scan in maps {
-                    scenes.push(stated.clone().map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene)))?);
-                }
-                left_out.iter().for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
-            }
+        let read = words.scans.read(path, stated.as_ref(), words.method == Method::Envelope)?;
+        let known = read.signals.as_ref().map(|signals| &signals.plan.scene).or(stated.as_ref());
+        for scan in &read.maps {
+            scenes.push(known.cloned().map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene)))?);
         }
-        inputs.push(scans);
+        read.left_out.iter().for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
+        inputs.push(read);
     }
     let count = scenes.len();
     words.folder.prepare(cli, |files| list(words.method, count, None, files))?;
@@ -134,17 +157,16 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         let due_s = inputs.iter().map(|input| forecast_s(words, input, stated.is_some())).sum();
         observer.reach(&format!("forecast: {} of one core, to a factor of three", seconds(due_s)));
     }
-    for input in inputs {
-        match input {
-            Scans::Maps(maps, _) => {
-                for scan in maps {
-                    let start = prediction(&found.scans, &scan);
-                    let scene = scenes[found.scans.len()].as_ref();
-                    found.scans.push(of_map(words, scene, scan, start, &*observer)?);
-                    observer.advance(1);
-                }
-            }
-            Scans::Signals(signals) => of_signals(words, *signals, &mut found, &*observer)?,
+    for Scans { maps, signals, .. } in inputs {
+        if let Some(signals) = signals {
+            of_signals(words, maps, signals, &mut found, &*observer)?;
+            continue;
+        }
+        for scan in maps {
+            let start = prediction(&found.scans, &scan);
+            let scene = scenes[found.scans.len()].as_ref();
+            found.scans.push(of_map(words, scene, scan, start, &*observer)?);
+            observer.advance(1);
         }
     }
     observer.end();
@@ -160,29 +182,18 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
 /// Velocities of means that a fit looks at: of more, some.
 const MOST: f64 = 8000.0;
 
-/// Time of the fits to one scan with so many velocities, which are means or what an estimator shows, and so many samples of signals if they are
-/// fitted, on one core, s. Good to a factor of three: scans without a wake take less.
-fn scan_s(velocities: f64, are_means: bool, samples: f64) -> f64 {
-    let of_means_s = 0.25 + 0.5 * (velocities / MOST).min(1.0) + 4e-6 * velocities;
-    of_means_s + if are_means { 0.0 } else { FIT_S * velocities } + SIGNAL_FIT_S * samples
-}
-
-/// Time of the fits to the scans of a file on one core, s.
+/// Time of the fits to the scans of a file on one core, s. Good to a factor of three: scans without a wake take less.
 fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
-    match input {
-        Scans::Maps(maps, _) => {
-            let is_shown = is_stated || words.estimator.as_deref().is_some_and(|method| method != MEANS);
-            let are_means = |scan: &ReadScan| !(is_shown || scan.is_own && words.estimator.is_none());
-            maps.iter().map(|scan| scan_s(scan.map.velocity_m_s.len() as f64, are_means(scan), 0.0)).sum()
-        }
-        Scans::Signals(signals) => {
-            let samples = if words.method == Method::Signals { signals.records.samples } else { 0 };
-            let one = |scan: &MeasuredScan| {
-                scan_s(scan.velocity_m_s.len() as f64, false, (scan.lines.elevation_rad.len() * samples) as f64)
-            };
-            signals.scans.iter().map(one).sum()
-        }
-    }
+    let is_shown = is_stated || words.estimator.as_deref().is_some_and(|method| method != MEANS);
+    let fitted = input.signals.as_ref().filter(|_| words.method == Method::Signals);
+    let one = |scan: &ReadScan| {
+        let velocities = scan.map.velocity_m_s.len() as f64;
+        let are_means = !(is_shown || scan.is_own && words.estimator.is_none());
+        let samples = fitted.map_or(0, |signals| scan.map.elevation_rad.len() * signals.records.samples) as f64;
+        let of_means_s = 0.25 + 0.5 * (velocities / MOST).min(1.0) + 4e-6 * velocities;
+        of_means_s + if are_means { 0.0 } else { FIT_S * velocities } + SIGNAL_FIT_S * samples
+    };
+    input.maps.iter().map(one).sum()
 }
 
 /// Where the track of the scans so far says that the wake is, to start from beside the blind search.
@@ -208,16 +219,13 @@ fn of_map(
     start: Option<Wake>,
     observer: &dyn Observer,
 ) -> Result<RetrievedScan, Error> {
-    let RetrieveWords { estimator, pulse: pulse_s, window: window_s, weighting, .. } = words;
-    let (method, weighting) = (estimator.clone(), weighting.clone());
-    let stated = StatedEstimator { method, pulse_s: *pulse_s, window_s: *window_s, weighting };
-    let are_means = stated.method.as_deref() == Some(MEANS) || words.air.gate_std == Some(0.0);
+    let are_means = words.estimator.as_deref() == Some(MEANS) || words.air.gate_std == Some(0.0);
     // What is stated goes before what the file says.
-    let (instrument, is_likely) = match (words.air.gate_std, &stated.method, scene) {
+    let (instrument, is_likely) = match (words.air.gate_std, &words.estimator, scene) {
         _ if are_means => (None, false),
         (None, None, Some(scene)) => (Some(scene.clone()), false),
-        (None, Some(_), _) => (Some(retrieve::stated_scene(&scan, &stated)?), false),
-        (None, None, None) if scan.is_own => (Some(retrieve::stated_scene(&scan, &stated)?), true),
+        (None, Some(_), _) => (Some(words.stated_scene(&scan)?), false),
+        (None, None, None) if scan.is_own => (Some(words.stated_scene(&scan)?), true),
         _ => (None, false),
     };
     let of_gate = instrument.as_ref().or(scene).map(|file| &file.scene);
@@ -242,12 +250,12 @@ fn of_map(
 
 fn of_signals(
     words: &RetrieveWords,
+    maps: Vec<ReadScan>,
     signals: Signals,
     found: &mut Found,
     observer: &dyn Observer,
 ) -> Result<(), Error> {
-    let maps: Vec<ReadScan> = (0..signals.scans.len()).map(|sweep| signals.map(sweep)).collect();
-    let Signals { path, mut records, plan, scans, spectra } = signals;
+    let Signals { mut records, plan, scans, spectra } = signals;
     let own = SceneResponse::of_scene(&plan.scene, &Silent)?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
@@ -269,7 +277,7 @@ fn of_signals(
             }
             (None, Method::Signals | Method::Envelope) => {
                 let reason = "this method needs noise and a Gaussian pulse without chirp in the scene".into();
-                return Err(Error::Input { path, reason });
+                return Err(records.refuse(reason));
             }
             _ => {}
         }
@@ -337,7 +345,7 @@ fn text(found: &[RetrievedScan]) -> String {
     let mut out = String::new();
     for (number, scan) in found.iter().enumerate() {
         let flags = retrieve::flags(&scan.result);
-        let flags = if flags.is_empty() { String::new() } else { format!("  [{}]", flags.join(" ")) };
+        let flags = if flags.is_empty() { String::new() } else { format!("  [{flags}]") };
         let name = format!("scan {}", number + 1);
         if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
             let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);
@@ -356,7 +364,7 @@ fn text(found: &[RetrievedScan]) -> String {
             };
             let [y, z] =
                 [vortex.lateral_position_m, vortex.height_m].map(|m| format!("{:.2} +- {:.2} m", m.value, m.std));
-            let side = retrieve::side(vortex.side);
+            let side = retrieve::name(vortex.side);
             out += &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");
         }
     }

@@ -124,41 +124,34 @@ pub(super) struct ScanWords {
 }
 
 /// What a file of scans holds.
-pub(super) enum Scans {
-    /// Maps, and what was left out.
-    Maps(Vec<ReadScan>, Vec<String>),
-    /// Raw signals with the maps of their scans.
-    Signals(Box<Signals>),
+pub(super) struct Scans {
+    pub(super) maps: Vec<ReadScan>,
+    /// What was left out, in words.
+    pub(super) left_out: Vec<String>,
+    /// The raw signals that the maps are made of.
+    pub(super) signals: Option<Signals>,
 }
 
 /// Raw signals of scans.
 pub(super) struct Signals {
-    pub(super) path: PathBuf,
     pub(super) records: RawRecords,
     pub(super) plan: Plan,
     pub(super) scans: Vec<MeasuredScan>,
     pub(super) spectra: Option<Spectra>,
 }
 
-impl Signals {
-    /// The map of a scan.
-    pub(super) fn map(&self, sweep: usize) -> ReadScan {
-        retrieve::scan_of_signals(&self.path, sweep, &self.plan, &self.scans[sweep])
-    }
-}
-
 impl ScanWords {
     /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if asked for.
     pub(super) fn read(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Scans, Error> {
         if is_signals(path) {
-            return Ok(Scans::Signals(Box::new(self.signals(path, scene, spectra)?)));
+            return self.signals(path, scene, spectra);
         }
         let format = ScanFormat { field: self.field.clone(), towards: self.towards, min_snr_db: self.min_snr };
-        let (found, left_out) = scans::read(path, &format)?;
-        Ok(Scans::Maps(found, left_out))
+        let (maps, left_out) = scans::read(path, &format)?;
+        Ok(Scans { maps, left_out, signals: None })
     }
 
-    fn signals(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Signals, Error> {
+    fn signals(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Scans, Error> {
         let Some(scene) = scene else {
             let reason = "it holds raw signals: --scene says which instrument recorded them".into();
             return Err(Error::Input { path: path.to_owned(), reason });
@@ -173,7 +166,9 @@ impl ScanWords {
             Recorded::Measured { scans, spectra } => (scans, spectra),
             Recorded::OfRun { .. } => (Vec::new(), None),
         };
-        Ok(Signals { path: path.to_owned(), records, plan, scans, spectra })
+        let map = |(sweep, scan)| retrieve::scan_of_signals(path, sweep, &plan, scan);
+        let maps = scans.iter().enumerate().map(map).collect();
+        Ok(Scans { maps, left_out: Vec::new(), signals: Some(Signals { records, plan, scans, spectra }) })
     }
 }
 

@@ -1,5 +1,4 @@
-//! What a velocity of a file is of the air about its range, and how it was estimated: by a scene, as stated, or as files of this program
-//! usually are.
+//! What a velocity of a file is of the air about its range: as stated, by a scene, or as the file says.
 //!
 //! Check: the scene's pulse and window have the weight of the estimators; gates of files as rectangles and Gaussian pulses; files of one
 //! run that keep their scene, its part or nothing, in the tests of the program.
@@ -10,14 +9,11 @@ use crate::io::scans::ReadScan;
 use crate::scene::{Scene, SceneFile};
 use crate::setup::estimators;
 use crate::setup::instrument::Instrument;
-use std::path::Path;
 use wakescope_estimate::retrieval::Gate;
 use wakescope_estimate::vortex_fit::RangeKernel;
 
 /// Points of the weight along the line, m.
 const SPACING_M: f64 = 1.25;
-/// Sampling of an instrument of which it is not known, Hz.
-const WIDE_HZ: f64 = 500e6;
 /// Root of 8 ln 2: width at half height of a Gaussian over its standard deviation.
 const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 
@@ -59,19 +55,6 @@ fn of_scene(scene: &Scene) -> Result<Gate, Error> {
     Ok(Gate::Kernel(RangeKernel::gaussian_gate(sigma_s, &window, period_s, SPACING_M)?))
 }
 
-/// What is stated of an instrument in place of a scene.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct StatedEstimator {
-    /// Name of the method, as in scenes.
-    pub method: Option<String>,
-    /// Full width of the pulse at half its maximum, s; of the file without it.
-    pub pulse_s: Option<f64>,
-    /// Length of the window, s; of the gates of the file without it.
-    pub window_s: Option<f64>,
-    /// Weighting of the window, as in scenes.
-    pub weighting: Option<String>,
-}
-
 /// The scene that a file of this program has in it.
 ///
 /// # Errors
@@ -82,34 +65,6 @@ pub fn scene_of(scan: &ReadScan) -> Result<Option<SceneFile>, Error> {
         path: scan.path.clone(),
         reason: format!("the scene in it is none that this program reads: {error}; --scene states another"),
     })
-}
-
-/// A scene with what is stated, else with what the file says, else with the defaults, at a high signal-to-noise ratio.
-///
-/// # Errors
-/// Words and numbers that no scene may have.
-pub fn stated_scene(scan: &ReadScan, stated: &StatedEstimator) -> Result<SceneFile, Error> {
-    let mut text = String::from("detector.snr.reference = \"fixed\"\ndetector.snr.snr_db = 10.0\n");
-    let mut state = |key: &str, value: Option<String>| {
-        text.extend(value.map(|value| format!("{key} = {value}\n")));
-    };
-    let word = |word: &str| Some(format!("{word:?}"));
-    let number = |value: f64| Some(format!("{value:?}"));
-    state("pulse.shape.duration_s", stated.pulse_s.or(scan.pulse_width_s).and_then(number));
-    if let Some(method) = &stated.method {
-        let gate_s = scan.gate_length_m.map(|length_m| 2.0 * length_m / SPEED_OF_LIGHT_M_S);
-        let samples = |seconds: f64| Some(((seconds * WIDE_HZ).round().max(1.0) as u64).to_string());
-        state("estimator.method.kind", word(method));
-        state("estimator.window_samples", stated.window_s.or(gate_s).and_then(samples));
-        state("estimator.weighting", word(stated.weighting.as_deref().unwrap_or("rectangular")));
-        // Gates of one line each, and a band that is wide enough for all instruments.
-        state("estimator.radius_m", number(0.0).filter(|_| method != "periodogram"));
-        state("estimator.padded_samples", Some("4096".into()));
-        state("detector.sampling_hz", number(WIDE_HZ));
-        state("detector.intermediate_frequency_hz", number(0.25 * WIDE_HZ));
-        state("detector.bandwidth_hz", number(0.4 * WIDE_HZ));
-    }
-    Ok(SceneFile::parse(&text, Path::new("what --estimator, --pulse, --window and --weighting state"))?)
 }
 
 #[cfg(test)]

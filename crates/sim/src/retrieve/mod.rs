@@ -2,7 +2,7 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `gate` | what a velocity of a file is of the air about its range, and how it was estimated |
+//! | `gate` | what a velocity of a file is of the air about its range; the scene that a file has in it |
 //! | `own` | maps and signals of a scene that is known: what its estimator makes of a wake |
 //! | `one_scan` | one map |
 //! | `others` | velocity envelopes, circulation against radius |
@@ -25,14 +25,14 @@ mod table;
 mod tracks;
 mod truth;
 
-pub use gate::{StatedEstimator, gate_of, scene_of, stated_scene};
+pub use gate::{gate_of, scene_of};
 pub use one_scan::{Velocities, options, retrieve_map};
 pub use others::{envelope_table, envelopes, profile_table};
 pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::{figure, track_figure};
 pub use realisations::{RetrievalRow, SceneRetrieval};
-pub use table::{RetrievedScan, flags, json, rows, side};
+pub use table::{RetrievedScan, flags, json, name, rows};
 pub use tracks::{track_of, track_table};
 pub use truth::TrueVortex;
 

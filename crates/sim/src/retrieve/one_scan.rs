@@ -1,6 +1,6 @@
 //! Retrieval of one map.
 
-use super::own::{retold, set};
+use super::own::retold;
 use super::table::{RetrievedScan, refused};
 use crate::Error;
 use crate::detection::strided;
@@ -108,7 +108,7 @@ pub fn retrieve_map(
         }
     };
     let are_means = matches!(velocities, Velocities::Means);
-    set(&mut result.flags, Flag::TakenForMeans, !are_means && !result.vortices.is_empty());
+    result.set(Flag::TakenForMeans, !are_means && !result.vortices.is_empty());
     Ok(RetrievedScan { scan, options, result })
 }
 

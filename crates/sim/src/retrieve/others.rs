@@ -2,7 +2,7 @@
 //!
 //! Check: a pair's envelopes, inverted, have its circulation, and raw ones more, in the tests of the program.
 
-use super::table::{RetrievedScan, refused};
+use super::table::{RetrievedScan, name, refused};
 use crate::Error;
 use crate::io::Table;
 use crate::measure::recorded::{Spectra, upward};
@@ -78,7 +78,7 @@ pub fn envelopes(
 pub fn envelope_table(all: &[(usize, EnvelopeResult)]) -> Table {
     Table::new()
         .int("scan", all.iter().map(|(scan, _)| *scan as i64))
-        .text("side", all.iter().map(|(_, r)| super::table::side(r.side)))
+        .text("side", all.iter().map(|(_, r)| name(r.side)))
         .float("raw_m2_s", all.iter().map(|(_, r)| r.raw_m2_s))
         .float("narrowed_m2_s", all.iter().map(|(_, r)| r.narrowed_m2_s))
         .float("inverted_m2_s", all.iter().map(|(_, r)| r.inverted_m2_s.value))
@@ -105,7 +105,7 @@ pub fn profile_table(scans: &[RetrievedScan]) -> Result<Table, Error> {
     let column = |get: fn(&ProfilePoint) -> f64| rows.iter().map(|(_, _, point)| get(point)).collect::<Vec<f64>>();
     Ok(Table::new()
         .int("scan", rows.iter().map(|(scan, ..)| *scan as i64))
-        .text("side", rows.iter().map(|(_, side, _)| super::table::side(*side)))
+        .text("side", rows.iter().map(|(_, side, _)| name(*side)))
         .float("radius_m", column(|p| p.radius_m))
         .float("across_m2_s", column(|p| p.across_m2_s))
         .float("across_corrected_m2_s", column(|p| p.across_corrected_m2_s))

@@ -155,8 +155,8 @@ impl Fits<'_> {
         let local = with_local_circulations(&self.view, &options.model, shown, &fit, &self.map_options).ok().flatten();
         let are_local = local.is_some();
         let mut result = of_fit(found, self.scan, &options, &local.unwrap_or(fit), moves);
-        set(&mut result.flags, Flag::SecondaryVortices, are_shown);
-        set(&mut result.flags, Flag::LocalCirculation, are_local);
+        result.set(Flag::SecondaryVortices, are_shown);
+        result.set(Flag::LocalCirculation, are_local);
         Some((result, options))
     }
 
@@ -171,8 +171,8 @@ impl Fits<'_> {
 /// The result without the vortices that are not to be told.
 fn telling(mut result: ScanResult, is_told: impl Fn(&VortexResult) -> bool) -> ScanResult {
     result.vortices.retain(is_told);
-    set(&mut result.flags, Flag::OneVortex, result.vortices.len() == 1);
-    set(&mut result.flags, Flag::CoreKept, result.vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
+    result.set(Flag::OneVortex, result.vortices.len() == 1);
+    result.set(Flag::CoreKept, result.vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
     result
 }
 
@@ -184,7 +184,7 @@ fn ends(axis: &[f64]) -> Option<std::ops::RangeInclusive<f64>> {
 fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &MapFit, moves: bool) -> ScanResult {
     let mut result = retold(found, map, options, (fit.wake, fit.covariance.clone()), fit.tops.clone(), moves);
     (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
-    set(&mut result.flags, Flag::Outliers, 10 * fit.outliers > fit.used);
+    result.set(Flag::Outliers, 10 * fit.outliers > fit.used);
     result
 }
 
@@ -235,7 +235,7 @@ impl SceneResponse {
             // what the map shows is what was found
             Err(wakescope_estimate::Error::NotConverged { .. }) => {
                 let mut result = result;
-                set(&mut result.flags, Flag::NotConverged, true);
+                result.set(Flag::NotConverged, true);
                 return Ok(RetrievedScan { scan, options, result });
             }
             fit => fit.map_err(|error| refused(&scan, &error))?,
@@ -260,48 +260,29 @@ pub(super) fn retold(
     tops: Vec<Top>,
     moves: bool,
 ) -> ScanResult {
-    let values = wake.to_array();
-    let measured = |parameter: Parameter| Measured {
-        value: values[parameter as usize],
-        std: covariance[[parameter as usize; 2]].sqrt(),
-    };
-    let sides = [Side::Left, Side::Right].into_iter().filter(|side| values[side.parameters()[0] as usize] != 0.0);
+    let is_there = |side: &Side| wake.to_array()[side.parameters()[0] as usize] != 0.0;
     let vortex = |side| VortexResult::at_its_line(map, &options.model, (&wake, &covariance), side, moves);
-    let vortices: Vec<VortexResult> = sides.map(vortex).collect();
-    let mut flags = found.flags.clone();
-    let mut chi2_per_dof = found.chi2_per_dof;
-    if vortices.len() != found.vortices.len() {
-        // What the other fit left says nothing of this one.
-        set(&mut flags, Flag::PoorFit, false);
-        chi2_per_dof = f64::NAN;
-    }
-    set(&mut flags, Flag::NoWake, false);
-    set(&mut flags, Flag::OneVortex, vortices.len() == 1);
-    let is_instant = map.has_times() && map.lasts_s() == 0.0;
-    set(&mut flags, Flag::MotionIgnored, !moves && !is_instant);
-    set(&mut flags, Flag::CoreKept, vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
-    set(&mut flags, Flag::NotConverged, false);
-    let competing = tops.iter().skip(1).any(|top: &Top| top.chi2 - tops[0].chi2 < COMPETES);
-    set(&mut flags, Flag::Ambiguous, competing);
-    ScanResult {
-        vortices,
+    let mut result = ScanResult {
+        vortices: Side::BOTH.into_iter().filter(is_there).map(vortex).collect(),
         wake: Some(wake),
-        lateral_wind_m_s: measured(Parameter::Wind),
-        wind_shear_per_s: measured(Parameter::Shear),
+        lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &wake, &covariance),
+        wind_shear_per_s: Measured::of_wake(Parameter::Shear, &wake, &covariance),
         covariance,
-        flags,
         tops,
-        chi2_per_dof,
         ..found.clone()
+    };
+    if result.vortices.len() != found.vortices.len() {
+        // What the other fit left says nothing of this one.
+        result.set(Flag::PoorFit, false);
+        result.chi2_per_dof = f64::NAN;
     }
-}
-
-pub(super) fn set(flags: &mut Vec<Flag>, flag: Flag, is_set: bool) {
-    flags.retain(|own| *own != flag);
-    if is_set {
-        flags.push(flag);
-        flags.sort();
-    }
+    result.set(Flag::NoWake, false);
+    let is_instant = map.has_times() && map.lasts_s() == 0.0;
+    result.set(Flag::MotionIgnored, !moves && !is_instant);
+    result.set(Flag::NotConverged, false);
+    let competing = result.tops.iter().skip(1).any(|top| top.chi2 - result.tops[0].chi2 < COMPETES);
+    result.set(Flag::Ambiguous, competing);
+    telling(result, |_| true)
 }
 
 /// A scan of recorded signals as a map for a retrieval.

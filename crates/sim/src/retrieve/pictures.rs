@@ -54,20 +54,18 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         plot.points_m.clone_from(&centres_m);
         panels.push(plot);
     }
-    let columns = panels.len();
-    let mut figure = Figure::stacked(panels).titled(&title(scan, number));
-    (figure.columns, figure.width) = (columns, 520.0 * columns as f64);
-    Ok(figure)
+    let width = 520.0 * panels.len() as f64;
+    Ok(Figure { width, ..Figure::side_by_side(panels).titled(&title(scan, number)) })
 }
 
 fn title(scan: &RetrievedScan, number: usize) -> String {
     let of = |side: Side| {
         let vortex = scan.result.vortex(side)?;
-        let name = super::side(side);
+        let name = super::name(side);
         let mean = vortex.circulation_5_15_m2_s;
         Some(format!("{name} Γ(5-15 m) = {:.0} ± {:.0} m²/s", mean.value, mean.std))
     };
-    let found: Vec<String> = [of(Side::Left), of(Side::Right)].into_iter().flatten().collect();
+    let found: Vec<String> = Side::BOTH.into_iter().filter_map(of).collect();
     let found = if found.is_empty() { "no wake".to_owned() } else { found.join(", ") };
     format!("Scan {number}, radial velocity [m/s]: {found}")
 }
@@ -82,7 +80,7 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
     let panel = |(title, label, column): (&str, &str, usize)| {
         let (_, _, get) = COLUMNS[column];
         let mut plot = CurvePlot::new(title, Axis::linear("time [s]"), Axis::linear(label));
-        for (colour, side) in [Side::Left, Side::Right].into_iter().enumerate() {
+        for (colour, side) in Side::BOTH.into_iter().enumerate() {
             let of_point = |point: &TrackPoint| {
                 let vortex = point.vortices.iter().find(|vortex| vortex.side == side)?;
                 Some((point.time_s, get(vortex)))
@@ -94,7 +92,7 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
                 Some((result.reference_time_s, of[column].value))
             };
             let stds: Vec<f64> = of_track.iter().map(|(_, m)| m.std).collect();
-            let line = Series::new(super::table::side(side), Style::Line, of_track.iter().map(|(t, m)| (*t, m.value)));
+            let line = Series::new(&super::name(side), Style::Line, of_track.iter().map(|(t, m)| (*t, m.value)));
             let dots = scans.iter().filter_map(|scan| of_scan(&scan.result));
             plot = plot
                 .with(line.with_band(&stds).in_colour(colour))
@@ -102,8 +100,6 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
         }
         CurvePlot { shape: 0.75, ..plot }
     };
-    let mut figure =
-        Figure::side_by_side(panels.map(panel)).titled("Track of the vortices: smoothed, with one standard deviation");
-    figure.width = 1560.0;
-    figure
+    let title = "Track of the vortices: smoothed, with one standard deviation";
+    Figure { width: 1560.0, ..Figure::side_by_side(panels.map(panel)).titled(title) }
 }

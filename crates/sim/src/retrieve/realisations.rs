@@ -179,7 +179,6 @@ fn rows_of(
         let wake = found.and_then(|found| found.result.wake);
         let place = |v: VortexResult| (v.lateral_position_m.value, v.height_m.value);
         let at_truth = (truth_of.lateral_position_m, truth_of.height_m);
-        let flags = found.map_or(Vec::new(), |found| flags(&found.result));
         Ok(RetrievalRow {
             realisation,
             sweep,
@@ -189,7 +188,7 @@ fn rows_of(
             truth: truth_of,
             rolling_moment: (moment(wake, vortex.map(place))?, moment(true_wake(truth), Some(at_truth))?),
             chi2_per_dof: found.map_or(f64::NAN, |found| found.result.chi2_per_dof),
-            flags: flags.join(" "),
+            flags: found.map_or_else(String::new, |found| flags(&found.result)),
         })
     };
     Ok([row(Side::Left, truth[0])?, row(Side::Right, truth[1])?])

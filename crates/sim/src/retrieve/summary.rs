@@ -3,7 +3,7 @@
 //! Check: means and deviations by hand; failures are counted and not averaged.
 
 use super::realisations::{RetrievalRow, SceneRetrieval};
-use super::table::{side as side_name, with};
+use super::table::{name, with};
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::retrieval::{Measured, Side, VortexResult};
@@ -42,7 +42,7 @@ impl SceneRetrieval {
             }
         }
         let mut all = Vec::new();
-        for (method, side) in methods.into_iter().flat_map(|method| [(method, Side::Left), (method, Side::Right)]) {
+        for (method, side) in methods.into_iter().flat_map(|method| Side::BOTH.map(|side| (method, side))) {
             let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == (method, side)).collect();
             for (quantity, found, truth) in QUANTITIES {
                 all.extend(
@@ -68,7 +68,7 @@ impl SceneRetrieval {
         let count = |i: usize| all.iter().map(move |(_, _, _, counts, _)| counts[i] as i64);
         Table::new()
             .text("method", all.iter().map(|(method, ..)| method.name()))
-            .text("side", all.iter().map(|(_, side, ..)| side_name(*side)))
+            .text("side", all.iter().map(|(_, side, ..)| name(side)))
             .text("quantity", all.iter().map(|(_, _, quantity, ..)| *quantity))
             .float("truth", number(0))
             .int("realisations", count(0))
@@ -90,7 +90,7 @@ impl SceneRetrieval {
         }
         table = table
             .text("method", self.rows.iter().map(|row| row.method.name()))
-            .text("side", self.rows.iter().map(|row| side_name(row.side)))
+            .text("side", self.rows.iter().map(|row| name(row.side)))
             .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));
         for (quantity, found, truth) in QUANTITIES {
             let value = |row: &RetrievalRow| found(row).unwrap_or(Measured { value: f64::NAN, std: f64::NAN });

@@ -5,7 +5,9 @@
 use crate::Error;
 use crate::io::Table;
 use crate::io::scans::ReadScan;
-use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanResult, Side, VortexResult};
+use serde::Serialize;
+use serde_json::{Value, json};
+use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanResult, VortexResult};
 
 /// One scan with what was found in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,7 +47,7 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         .text("file", text(&|scan, _| scan.scan.file_name()))
         .int("sweep", of.iter().map(|(_, scan, _)| scan.scan.sweep as i64))
         .float("time_s", number(&time))
-        .text("side", text(&|_, vortex| vortex.map_or("none", |v| side(v.side)).to_owned()));
+        .text("side", text(&|_, vortex| vortex.map_or_else(|| "none".to_owned(), |v| name(v.side))));
     for (name, get) in VORTEX {
         let of = |vortex: Option<&VortexResult>| vortex.and_then(get).unwrap_or(UNKNOWN);
         table = table.float(name, number(&|_, v| of(v).value)).float(&with(name, "std"), number(&|_, v| of(v).std));
@@ -59,7 +61,7 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         .int("cells_rejected", of.iter().map(|(_, scan, _)| scan.result.cells_rejected as i64))
         .float("statistic", number(&|result, _| result.statistic))
         .float("threshold", number(&|result, _| result.threshold))
-        .text("flags", text(&|scan, _| flags(&scan.result).join(" ")))
+        .text("flags", text(&|scan, _| flags(&scan.result)))
 }
 
 const UNKNOWN: Measured = Measured { value: f64::NAN, std: f64::NAN };
@@ -86,31 +88,26 @@ pub(super) fn with(name: &str, word: &str) -> String {
     format!("{}_{word}{unit}", name.strip_suffix(unit).unwrap_or(name))
 }
 
-/// The name of a side.
-pub fn side(side: Side) -> &'static str {
-    match side {
-        Side::Left => "left",
-        Side::Right => "right",
-    }
+/// The name that files have for a side or a flag.
+pub fn name(choice: impl Serialize) -> String {
+    json!(choice).as_str().unwrap_or_default().to_owned()
 }
 
 /// Names of what is to be thought of a result.
-pub fn flags(result: &ScanResult) -> Vec<&'static str> {
-    result.flags.iter().map(|flag| flag.name()).collect()
+pub fn flags(result: &ScanResult) -> String {
+    result.flags.iter().map(name).collect::<Vec<_>>().join(" ")
 }
 
 /// Everything that was found, with covariances and competing tops.
 pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
-    use serde_json::{Value, json};
     // JSON has no NaN: what is not known is null.
-    let measured = |m: Measured| json!({ "value": m.value, "std": m.std });
     let wake = |values: [f64; 10]| -> Value {
         PARAMETER_NAMES.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
     };
     let of_vortex = |vortex: &VortexResult| -> Value {
-        let mut object = json!({ "side": side(vortex.side), "time_s": vortex.time_s });
+        let mut object = json!({ "side": vortex.side, "time_s": vortex.time_s });
         for (name, get) in VORTEX {
-            object[name] = get(vortex).map_or(Value::Null, measured);
+            object[name] = json!(get(vortex));
         }
         object
     };
@@ -120,9 +117,9 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
         json!({
             "scan": number + 1, "file": scan.scan.path.to_string_lossy(), "sweep": scan.scan.sweep, "reference_time_s": r.reference_time_s,
             "vortices": r.vortices.iter().map(of_vortex).collect::<Vec<_>>(),
-            "wind_m_s": measured(r.lateral_wind_m_s), "shear_per_s": measured(r.wind_shear_per_s),
+            "wind_m_s": r.lateral_wind_m_s, "shear_per_s": r.wind_shear_per_s,
             "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
-            "statistic": r.statistic, "threshold": r.threshold, "flags": flags(r),
+            "statistic": r.statistic, "threshold": r.threshold, "flags": r.flags,
             "parameters": PARAMETER_NAMES, "wake": r.wake.map(|found| wake(found.to_array())), "covariance": rows,
             "secondary": scan.options.model.secondary.map(|both| both.map(|v| json!({
                 "gamma_m2_s": v.circulation_m2_s, "y_m": v.lateral_position_m, "z_m": v.height_m, "core_m": v.core_radius_m,

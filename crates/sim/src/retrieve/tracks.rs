@@ -5,7 +5,7 @@
 use super::RetrievedScan;
 use crate::Error;
 use crate::io::Table;
-use wakescope_estimate::retrieval::{Measured, ScanResult, Track, TrackOptions, TrackedVortex, track};
+use wakescope_estimate::retrieval::{Measured, ScanResult, Track, TrackedVortex, track};
 
 /// The track of several scans in the order of their times; nothing of a single scan, of scans without times, or without a wake.
 ///
@@ -19,8 +19,7 @@ pub fn track_of(scans: &[RetrievedScan]) -> Result<Option<Track>, Error> {
     if results.len() < 2 || !increase || !found {
         return Ok(None);
     }
-    let results: Vec<ScanResult> = results.into_iter().cloned().collect();
-    Ok(Some(track(&results, &TrackOptions::default())?))
+    Ok(Some(track(&results, Track::ACCELERATION_DENSITY_M2_S3)?))
 }
 
 type OfVortex = (&'static str, &'static str, fn(&TrackedVortex) -> Measured);
@@ -41,7 +40,7 @@ pub fn track_table(track: &Track) -> Table {
     let all: Vec<(f64, &TrackedVortex)> = all.collect();
     let mut table = Table::new()
         .float("time_s", all.iter().map(|(time_s, _)| *time_s))
-        .text("side", all.iter().map(|(_, vortex)| super::table::side(vortex.side)))
+        .text("side", all.iter().map(|(_, vortex)| super::name(vortex.side)))
         .int("detected", all.iter().map(|(_, vortex)| i64::from(vortex.detected)));
     for (value, std, get) in COLUMNS {
         table = table
