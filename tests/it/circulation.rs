@@ -206,7 +206,7 @@ fn a_simulated_wake_that_the_ground_has_driven_apart_is_found_with_its_circulati
     .unwrap();
     let rows = run::run(&Plan::new(file, Target::Run).unwrap(), &Silent).unwrap().retrieval.unwrap().rows;
     let errors = rows.iter().map(|row| {
-        let (found, truth) = (row.found.unwrap().circulation_5_15_m2_s, row.truth.circulation_5_15_m2_s);
+        let (found, truth) = (row.found.unwrap().circulation_5_15_m2_s, row.truth.circulation_5_15_m2_s.value);
         (found.value / truth - 1.0, (found.value - truth) / found.std)
     });
     let (errors, deviations): (Vec<f64>, Vec<f64>) = errors.unzip();

@@ -46,7 +46,7 @@ impl OfFlow {
         let rows: Vec<&RetrievalRow> =
             self.rows.iter().filter(|(name, _)| *name == method).map(|(_, row)| row).collect();
         let error = |row: &&RetrievalRow| {
-            let error = 100.0 * (row.found?.circulation_5_15_m2_s.value / row.truth.circulation_5_15_m2_s - 1.0);
+            let error = 100.0 * (row.found?.circulation_5_15_m2_s.value / row.truth.circulation_5_15_m2_s.value - 1.0);
             error.is_finite().then_some(error)
         };
         rows.chunk_by(|a, b| a.realisation == b.realisation).map(|scan| scan.iter().map(error).collect()).collect()
@@ -117,11 +117,14 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
         .text("flow", rows.iter().map(|((flow, _), _)| flow.name()))
         .int("scan", rows.iter().map(|(_, row)| row.realisation as i64))
         .text("method", rows.iter().map(|((_, name), _)| *name))
-        .float("gamma_true_m2_s", float(&|row| Some(row.truth.circulation_5_15_m2_s)))
+        .float("gamma_true_m2_s", float(&|row| Some(row.truth.circulation_5_15_m2_s.value)))
         .float("gamma_m2_s", found(|v| v.circulation_5_15_m2_s.value))
         .float("gamma_std_m2_s", found(|v| v.circulation_5_15_m2_s.std))
-        .float("y_error_m", float(&|row| Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m)))
-        .float("z_error_m", float(&|row| Some(row.found?.height_m.value - row.truth.height_m)))
+        .float(
+            "y_error_m",
+            float(&|row| Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m.value)),
+        )
+        .float("z_error_m", float(&|row| Some(row.found?.height_m.value - row.truth.height_m.value)))
         .text("vortex", rows.iter().map(|(_, row)| if row.side == Side::Left { "left" } else { "right" }))
         .float("y_std_m", found(|v| v.lateral_position_m.std))
         .float("z_std_m", found(|v| v.height_m.std))

@@ -169,8 +169,8 @@ fn of_scene(flow: Flow, added_flows: Vec<Flow>, folder: &Path, options: &Options
     let errors = |rows: &[RetrievalRow]| -> Vec<Errors> {
         let of = |row: &RetrievalRow| {
             let (found, truth) = (row.found?, row.truth);
-            let lateral_m = found.lateral_position_m.value - truth.lateral_position_m;
-            Some(Errors::of(found.circulation_5_15_m2_s, truth.circulation_5_15_m2_s, lateral_m))
+            let lateral_m = found.lateral_position_m.value - truth.lateral_position_m.value;
+            Some(Errors::of(found.circulation_5_15_m2_s, truth.circulation_5_15_m2_s.value, lateral_m))
         };
         rows.iter().map(of).collect::<Option<_>>().unwrap_or_default()
     };

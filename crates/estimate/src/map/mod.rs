@@ -4,7 +4,6 @@ pub(crate) mod accumulate;
 pub(crate) mod auto_radius;
 pub(crate) mod error_map;
 pub(crate) mod mixture;
-pub(crate) mod rays;
 pub(crate) mod region;
 pub(crate) mod shrinkage;
 

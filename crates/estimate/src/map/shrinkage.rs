@@ -116,13 +116,13 @@ pub fn shrink_to_guess(
 
 /// Mean of a map with the weights of the spline, whose taps are the steps over lines and gates apart, over the places that are not NaN.
 fn smoothed(map: &Array2<f64>, [line_step, gate_step]: [usize; 2]) -> Array2<f64> {
-    let both = |map: Array2<f64>| along_gates(&along_lines(&map, line_step), gate_step);
+    let both = |map: Array2<f64>| along_lines(along_lines(map.view(), line_step).t(), gate_step).reversed_axes();
     let sums = both(map.mapv(|value| if value.is_finite() { value } else { 0.0 }));
     sums / both(map.mapv(|value| f64::from(u8::from(value.is_finite()))))
 }
 
 /// Sums over lines with the weights of the spline; what lies outside the map is left out.
-fn along_lines(map: &Array2<f64>, step: usize) -> Array2<f64> {
+fn along_lines(map: ArrayView2<'_, f64>, step: usize) -> Array2<f64> {
     let mut out = Array2::zeros(map.dim());
     for line in 0..map.nrows() {
         for (tap, weight) in SPLINE.iter().enumerate() {
@@ -133,18 +133,6 @@ fn along_lines(map: &Array2<f64>, step: usize) -> Array2<f64> {
         }
     }
     out
-}
-
-/// The same over gates.
-fn along_gates(map: &Array2<f64>, step: usize) -> Array2<f64> {
-    let gates = map.ncols();
-    Array2::from_shape_fn(map.dim(), |(line, gate)| {
-        let taps = SPLINE.iter().enumerate().filter_map(|(tap, weight)| {
-            let source = (gate + tap * step).checked_sub(2 * step).filter(|&source| source < gates)?;
-            Some(weight * map[[line, source]])
-        });
-        taps.sum()
-    })
 }
 
 #[cfg(test)]

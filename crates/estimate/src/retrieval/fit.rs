@@ -46,27 +46,27 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     }
     let found = search.ends_of(&starts);
     let likely = least(&found, search.squares.cells.len());
-    let (thinned, before, is_noise_left) = (bounded.is_some(), all.squares.cells.len(), true);
+    all.thinned = bounded.is_some();
     let whitening = options.turbulence.as_ref().map(|turbulence| {
         likely.iter().for_each(|end| reject(&mut all, turbulence, end));
         whitening(&all, turbulence)
     });
-    let (whitening, rejected) = (whitening.transpose()?, before - all.squares.cells.len());
+    let whitening = whitening.transpose()?;
     all.squares.whitening = whitening.as_ref();
     let ends = match (&few, likely) {
         _ if whitening.is_some() => all.ends_of(&starts),
         (Some(_), Some(likely)) => {
             // the scale in which they compete
             let scale = search.residual_scale(likely).max(1.0);
-            let (stage, wind, ends) = (&search, &search.wind(&about)?, &found[..]);
-            let report = Report { stage, scale, rejected, thinned, is_noise_left, wind, ends };
+            let report = Report { stage: &search, scale, wind: &search.wind(&about)?, ends: &found };
             // where blocks show next to nothing, the best is enough to tell so
-            let is_empty = report.result()?.statistic < NOTHING * options.threshold;
+            let is_empty = report.chosen()?.statistic < NOTHING * options.threshold;
             all.again(&if is_empty { vec![likely.clone()] } else { rivals(&found, scale) })
         }
         _ => found.clone(),
     };
-    let (all, scale) = in_scale(all, least(&ends, before - rejected));
+    let cells = all.squares.cells.len();
+    let (all, scale) = in_scale(all, least(&ends, cells));
     let dense = Gates::on_grid(map, options, 1)?;
     let (moving, frozen) = (dense.clone(), dense.clone().frozen());
     let stage = all.through(&dense);
@@ -83,8 +83,7 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     ends = standing.unwrap_or(ends);
     let stage = stage.through(&fine);
     let (wind, ends) = (stage.wind(&about)?, stage.fine(&ends));
-    let (stage, wind, ends) = (&stage, &wind, &ends[..]);
-    with_alternatives(&Report { stage, scale, rejected, thinned, is_noise_left, wind, ends })
+    with_alternatives(&Report { stage: &stage, scale, wind: &wind, ends: &ends })
 }
 
 /// A stage with deviations or a loss of the scale of the residuals that a likely end leaves, and that scale over the stated deviations.
@@ -118,8 +117,10 @@ fn whitening(stage: &Stage<'_>, turbulence: &Turbulence) -> Result<Whitening, Er
 fn reject(stage: &mut Stage<'_>, turbulence: &Turbulence, end: &End) {
     let residuals = stage.squares.rows(&end.wake.to_array(), &[]).residuals;
     let mut residuals = residuals.iter();
+    let before = stage.squares.cells.len();
     stage.squares.cells.retain(|cell| {
         let deviation_m_s = cell.sigma_m_s.hypot(turbulence.deviation_m_s);
         residuals.next().is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
     });
+    stage.rejected = before - stage.squares.cells.len();
 }

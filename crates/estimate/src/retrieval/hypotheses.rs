@@ -103,6 +103,12 @@ pub(crate) struct Stage<'a> {
     pub(crate) options: &'a RetrievalOptions,
     pub(crate) gates: &'a Gates<'a>,
     pub(crate) squares: LeastSquares<'a>,
+    /// Velocities that were taken away before.
+    pub(crate) rejected: usize,
+    /// Whether its velocities stand for more.
+    pub(crate) thinned: bool,
+    /// Whether the residuals are noise, whose correlation says how many velocities count as one; not those of misplaced cores.
+    pub(crate) is_noise_left: bool,
 }
 
 impl<'a> Stage<'a> {
@@ -117,7 +123,7 @@ impl<'a> Stage<'a> {
             prior: options.core_prior,
             counted: 1.0,
         };
-        Self { map, options, gates, squares }
+        Self { map, options, gates, squares, rejected: 0, thinned: false, is_noise_left: true }
     }
 
     /// The same with other gates.

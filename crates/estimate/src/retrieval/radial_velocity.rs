@@ -10,7 +10,7 @@ use ndarray::Array2;
 
 use crate::error::{Error, enough_velocities};
 use crate::retrieval::hypotheses::{End, Kind, Stage};
-use crate::retrieval::report::Report;
+use crate::retrieval::report::{Chosen, Report};
 use crate::retrieval::{Measured, Movement, RetrievalOptions, ScanMap, ScanResult};
 use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
@@ -40,7 +40,7 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
     let unfolded = map.unfolded();
     let gates = Gates::rough(&unfolded, &linear)?.fine(&linear.gate)?;
     let mut stage = Stage::new(&unfolded, &linear, &gates);
-    stage.squares.loss = options.loss;
+    (stage.squares.loss, stage.is_noise_left) = (options.loss, false);
     let nothing = Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]);
     if map.sigma_m_s.is_none() {
         let calm = stage.wind(&nothing)?;
@@ -75,9 +75,9 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
         stage = stage.rescaled(&best);
         ends = fits(&stage);
     }
-    let (stage, wind, ends) = (&stage, &stage.wind(&calm.wake)?, &ends[..]);
-    let report = Report { stage, scale: 1.0, rejected: 0, thinned: false, is_noise_left: false, wind, ends };
-    let mut result = report.result()?;
+    let report = Report { stage: &stage, scale: 1.0, wind: &stage.wind(&calm.wake)?, ends: &ends };
+    let Chosen { end, covariance, statistic, .. } = report.chosen()?;
+    let mut result = report.told(end, covariance, statistic);
     for vortex in &mut result.vortices {
         for place in [&mut vortex.lateral_position_m, &mut vortex.height_m] {
             *place = Measured { std: f64::NAN, ..*place };

@@ -33,10 +33,6 @@ pub(crate) struct Report<'a> {
     pub(crate) stage: &'a Stage<'a>,
     /// Scale of the residuals over the stated deviations, at least 1.
     pub(crate) scale: f64,
-    pub(crate) rejected: usize,
-    pub(crate) thinned: bool,
-    /// Whether the residuals are noise, whose correlation says how many velocities count as one; not those of misplaced cores.
-    pub(crate) is_noise_left: bool,
     pub(crate) wind: &'a End,
     pub(crate) ends: &'a [End],
 }
@@ -50,18 +46,15 @@ pub(crate) struct Chosen<'a> {
 }
 
 impl<'a> Report<'a> {
-    pub(crate) fn result(&self) -> Result<ScanResult, Error> {
-        let Chosen { end, covariance, statistic, .. } = self.chosen()?;
-        Ok(self.told(end, covariance, statistic))
-    }
-
     /// The likely end if it is a wake, a lone vortex instead of a pair of which one is not seen, or the wind.
     pub(crate) fn chosen(&self) -> Result<Chosen<'a>, Error> {
         let cells = self.stage.squares.cells.len();
         let likely = least(self.ends, cells);
         let mut of_likely = likely.map(|end| self.uncertainty(end)).transpose()?;
         let alike = match (likely, &of_likely) {
-            (Some(end), Some(known)) if self.is_noise_left && self.stage.options.covariance == Covariance::Sandwich => {
+            (Some(end), Some(known))
+                if self.stage.is_noise_left && self.stage.options.covariance == Covariance::Sandwich =>
+            {
                 known.excess(&end.wake, self.scale.powi(2))
             }
             _ => 1.0,
@@ -122,7 +115,7 @@ impl<'a> Report<'a> {
         let residuals = self.stage.squares.rows(&end.wake.to_array(), &[]).residuals;
         let used = residuals.iter().filter(|r| r.abs() <= OUTLIER * self.scale);
         let (count, squares) = used.fold((0, 0.0), |(count, sum), r| (count + 1, sum + r * r));
-        let cells_rejected = self.rejected + residuals.len() - count;
+        let cells_rejected = self.stage.rejected + residuals.len() - count;
         let moves = self.stage.gates.seconds.is_some();
         let mut vortices = self.vortices(end, &covariance);
         // what is beyond the sector is hardly known, though it acts
@@ -148,8 +141,8 @@ impl<'a> Report<'a> {
             (Flag::MotionIgnored, unmoved),
             (Flag::Ambiguous, competes),
             (Flag::PoorFit, self.scale.powi(2) > POOR),
-            (Flag::Outliers, cells_rejected as f64 > MANY_OUTLIERS * (self.rejected + residuals.len()) as f64),
-            (Flag::Thinned, self.thinned),
+            (Flag::Outliers, cells_rejected as f64 > MANY_OUTLIERS * (self.stage.rejected + residuals.len()) as f64),
+            (Flag::Thinned, self.stage.thinned),
             (Flag::NotConverged, end.sigmas_left > AT_END),
         ];
         ScanResult {

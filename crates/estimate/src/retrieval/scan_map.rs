@@ -111,7 +111,8 @@ impl ScanMap {
     }
 
     /// The map for the fits that know no times.
-    pub(crate) fn view(&self) -> VelocityMap<'_> {
+    #[must_use]
+    pub fn view(&self) -> VelocityMap<'_> {
         VelocityMap {
             elevation_rad: &self.elevation_rad,
             range_m: &self.range_m,

@@ -5,11 +5,11 @@
 use ndarray::Array2;
 
 use crate::parallel::map_indexed;
+use crate::retrieval::Turbulence;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
 use crate::vortex_fit::{RangeKernel, Wake, WakeModel};
 use crate::wake_detection::cells::Cells;
-use crate::wake_detection::options::DetectorOptions;
 
 /// Distance of places \[m\] where lines and gates are closer; between them a wake loses little of its statistic.
 const STEP_M: f64 = 4.0;
@@ -22,6 +22,24 @@ const MANY: f64 = 2.0;
 const FAR_OVER_GATE: f64 = 10.0;
 /// Core radius over the distance of places: what lies between them is not missed.
 const CORE_OVER_STEP: f64 = 0.5;
+
+/// What a test takes for granted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DetectorOptions {
+    /// Least and largest distance of a pair's vortices that is tried \[m\].
+    pub spacing_m: (f64, f64),
+    /// Whether single vortices are tried, too: the partner may be out of view.
+    pub single_vortices: bool,
+    /// The background besides wind and the noise of the map's standard deviations.
+    pub turbulence: Option<Turbulence>,
+}
+
+impl Default for DetectorOptions {
+    /// Wakes of wings of 20 to 80 m (spacing pi/4 of the span), single vortices, and no turbulence.
+    fn default() -> Self {
+        Self { spacing_m: (16.0, 63.0), single_vortices: true, turbulence: None }
+    }
+}
 
 /// A wake of the bank: the places of its vortices, none where there is no such vortex.
 #[derive(Debug, Clone, Copy, PartialEq)]

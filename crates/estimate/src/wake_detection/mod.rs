@@ -15,12 +15,11 @@ mod bank;
 mod cells;
 mod detector;
 mod law;
-mod options;
 mod power;
 mod spikes;
 
+pub use bank::DetectorOptions;
 pub use detector::{WakeDetector, WakeStatistic};
 pub use law::EmptyScanLaw;
-pub use options::DetectorOptions;
 pub use power::{DetectionTrials, Share};
 pub use spikes::without_spikes;

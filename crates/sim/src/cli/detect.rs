@@ -19,6 +19,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 use wakescope_estimate::retrieval::{Gate, ScanMap};
+use wakescope_estimate::vortex_fit::WakeModel;
 use wakescope_estimate::wake_detection::DetectorOptions;
 
 /// Words of `wakescope detect`.
@@ -117,8 +118,11 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
 impl DetectWords {
     /// How wakes are looked for, but for the strides that the noise of a scene asks for.
     fn settings(&self, cli: &Cli, scene: Option<&Scene>, gate: Gate) -> DetectionSettings {
-        let mut settings = DetectionSettings {
+        let height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
+        let lidar_height_m = self.lidar_height.unwrap_or(height_m);
+        DetectionSettings {
             false_alarm: self.false_alarm,
+            model: WakeModel { lidar_height_m, images: self.air.images, ..WakeModel::default() },
             gate,
             options: DetectorOptions {
                 spacing_m: self.spacing,
@@ -128,12 +132,7 @@ impl DetectWords {
             empty_scans: self.empty_scans as usize,
             stride: self.stride.unwrap_or((1, 1)),
             seed: cli.seed.or(scene.map(|scene| scene.seed)).unwrap_or(1),
-            ..DetectionSettings::default()
-        };
-        let height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
-        settings.model.lidar_height_m = self.lidar_height.unwrap_or(height_m);
-        settings.model.images = self.air.images;
-        settings
+        }
     }
 }
 

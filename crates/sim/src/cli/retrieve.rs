@@ -199,9 +199,8 @@ fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
 /// Where the track of the scans so far says that the wake is, to start from beside the blind search.
 fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
     let last = before.last()?;
-    let times = scan.map.time_s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)));
-    let (reference, of_last) = (scan.reference.zip(last.scan.reference), 0.5 * (times.0 + times.1));
-    let time_s = of_last + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
+    let reference = scan.reference.zip(last.scan.reference);
+    let time_s = scan.map.middle_s() + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
     let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
     retrieve::track_of(before).ok().flatten()?.prediction(time_s, core_m)
 }
@@ -304,10 +303,8 @@ fn same_origin(scans: &mut [RetrievedScan]) {
 
 /// Of the one scene of all scans; those of several scenes have none in common.
 fn provenance(scenes: &[Option<SceneFile>]) -> Provenance {
-    let first = scenes.first().and_then(Option::as_ref);
-    let is_first =
-        |scene: &Option<SceneFile>| scene.as_ref().map(|scene| &scene.hash) == first.map(|first| &first.hash);
-    let one = first.filter(|_| scenes.iter().all(is_first));
+    let one =
+        scenes.iter().map(Option::as_ref).reduce(|a, b| a.filter(|a| b.is_some_and(|b| a.hash == b.hash))).flatten();
     one.map_or_else(|| Provenance::new("", "", 0), SceneFile::provenance)
 }
 

@@ -199,18 +199,17 @@ impl Calibration {
     /// # Errors
     /// What the test refuses.
     pub(crate) fn of_scan(&self, scan: &ScanMap, settings: &DetectionSettings) -> Result<ScanDetection, Error> {
-        let (map, outliers, velocities) = cleaned(scan, settings);
-        self.test(&map, (outliers, velocities))
+        self.test(&cleaned(scan, settings))
     }
 
-    fn test(&self, map: &ScanMap, (outliers, velocities): (usize, usize)) -> Result<ScanDetection, Error> {
+    fn test(&self, (map, outliers, velocities): &(ScanMap, usize, usize)) -> Result<ScanDetection, Error> {
         let statistic = self.detector.statistic(map.velocity_m_s.view())?;
         Ok(ScanDetection {
             statistic,
             threshold: self.threshold,
             false_alarm: self.law.false_alarm(statistic.value),
-            outliers,
-            velocities,
+            outliers: *outliers,
+            velocities: *velocities,
             assumed_sigma_m_s: self.assumed_sigma_m_s,
             gumbel: self.law.gumbel(),
         })
@@ -267,15 +266,13 @@ pub fn detect(
 ) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
     let (mut found, mut calibrations) = (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
     for scan in scans {
-        let (map, outliers, velocities) = cleaned(scan, settings);
-        if !calibrations.last().is_some_and(|known| known.is_for(&map)) {
+        let cleaned = cleaned(scan, settings);
+        if !calibrations.last().is_some_and(|known| known.is_for(&cleaned.0)) {
             // the first is kept for its curves, the last for the next scan
             calibrations.truncate(1);
-            calibrations.push(Calibration::new(&map, settings, observer)?);
+            calibrations.push(Calibration::new(&cleaned.0, settings, observer)?);
         }
-        if let Some(calibration) = calibrations.last() {
-            found.push(calibration.test(&map, (outliers, velocities))?);
-        }
+        found.extend(calibrations.last().map(|known| known.test(&cleaned)).transpose()?);
     }
     calibrations.truncate(1);
     Ok((found, calibrations.pop()))

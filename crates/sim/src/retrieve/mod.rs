@@ -34,7 +34,6 @@ pub use pictures::{figure, track_figure};
 pub use realisations::{RetrievalRow, SceneRetrieval};
 pub use table::{RetrievedScan, flags, json, name, rows};
 pub use tracks::{track_of, track_table};
-pub use truth::TrueVortex;
 
 pub use crate::measure::response::SceneResponse;
 pub use crate::scene::RetrievalMethod as Method;

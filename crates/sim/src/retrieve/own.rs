@@ -57,12 +57,7 @@ impl SceneResponse {
         let fits = Fits {
             scan: map,
             // Maps of one scan know no deviation, and those of a few scans hardly any.
-            view: VelocityMap {
-                elevation_rad: &map.elevation_rad,
-                range_m: &map.range_m,
-                velocity_m_s: map.velocity_m_s.view(),
-                standard_deviation_m_s: None,
-            },
+            view: VelocityMap { standard_deviation_m_s: None, ..map.view() },
             still: self.shown(range_m)?,
             moving: self.shown(range_m)?.moving(&map.elevation_rad, &map.after_middle_s()),
             options,

@@ -7,7 +7,7 @@ use super::one_scan::{Velocities, options, retrieve_map};
 use super::others::envelopes;
 use super::own::scan_of_lines;
 use super::table::{RetrievedScan, flags};
-use super::truth::{TrueVortex, true_vortices, true_wake};
+use super::truth::{true_vortices, true_wake};
 use crate::Error;
 use crate::detection::{Calibration, DetectionSettings, SceneNoise, strided};
 use crate::measure::recorded::{Spectra, upward};
@@ -39,8 +39,8 @@ pub struct RetrievalRow {
     pub side: Side,
     /// What was found; nothing where the method failed or found no such vortex.
     pub found: Option<VortexResult>,
-    /// The truth.
-    pub truth: TrueVortex,
+    /// The truth, exact; NaN and nothing where it is not known.
+    pub truth: VortexResult,
     /// Rolling-moment coefficient of the aircraft in that vortex, found and true; NaN without an aircraft, or where it is unknown.
     pub rolling_moment: (f64, f64),
     /// Sum of squares of the residuals per degree of freedom.
@@ -162,7 +162,7 @@ fn integral(mut found: RetrievedScan) -> Result<RetrievedScan, Error> {
 fn rows_of(
     scene: &Scene,
     (realisation, sweep, method): (usize, usize, Method),
-    truth: &[TrueVortex; 2],
+    truth: &[VortexResult; 2],
     found: Option<&RetrievedScan>,
     model: &WakeModel,
 ) -> Result<[RetrievalRow; 2], Error> {
@@ -174,11 +174,11 @@ fn rows_of(
         }
         _ => Ok(f64::NAN),
     };
-    let row = |side: Side, truth_of: TrueVortex| -> Result<RetrievalRow, Error> {
+    let row = |truth_of: VortexResult| -> Result<RetrievalRow, Error> {
+        let side = truth_of.side;
         let vortex = found.and_then(|found| found.result.vortex(side).copied());
         let wake = found.and_then(|found| found.result.wake);
         let place = |v: VortexResult| (v.lateral_position_m.value, v.height_m.value);
-        let at_truth = (truth_of.lateral_position_m, truth_of.height_m);
         Ok(RetrievalRow {
             realisation,
             sweep,
@@ -186,12 +186,12 @@ fn rows_of(
             side,
             found: vortex,
             truth: truth_of,
-            rolling_moment: (moment(wake, vortex.map(place))?, moment(true_wake(truth), Some(at_truth))?),
+            rolling_moment: (moment(wake, vortex.map(place))?, moment(true_wake(truth), Some(place(truth_of)))?),
             chi2_per_dof: found.map_or(f64::NAN, |found| found.result.chi2_per_dof),
             flags: found.map_or_else(String::new, |found| flags(&found.result)),
         })
     };
-    Ok([row(Side::Left, truth[0])?, row(Side::Right, truth[1])?])
+    Ok([row(truth[0])?, row(truth[1])?])
 }
 
 fn follower(aircraft: FollowingAircraft) -> Follower {

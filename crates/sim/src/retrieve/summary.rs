@@ -3,34 +3,32 @@
 //! Check: means and deviations by hand; failures are counted and not averaged.
 
 use super::realisations::{RetrievalRow, SceneRetrieval};
-use super::table::{name, with};
+use super::table::{UNKNOWN, VORTEX, name as word, with};
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
-use wakescope_estimate::retrieval::{Measured, Side, VortexResult};
+use wakescope_estimate::retrieval::{Measured, Side};
 
 /// Errors of one quantity of one vortex by one method: realisations, each as often as it has sweeps, and those without a value; the truth
 /// of the first one, mean error and its standard error, standard deviation, root mean square error, and root mean square of the
 /// deviations that the retrievals state.
 type Errors = (Method, Side, &'static str, [usize; 2], [f64; 6]);
 
-/// A quantity: its name, what was found, and the truth.
-type Quantity = (&'static str, fn(&RetrievalRow) -> Option<Measured>, fn(&RetrievalRow) -> f64);
+/// The columns of a vortex that are held against the truth; the rolling moment comes behind them.
+const COMPARED: usize = 4;
 
-fn of(row: &RetrievalRow, get: fn(&VortexResult) -> Measured) -> Option<Measured> {
-    row.found.as_ref().map(get).filter(|measured| measured.value.is_finite())
+/// Names of the quantities.
+fn quantities() -> impl Iterator<Item = (usize, &'static str)> {
+    VORTEX[..COMPARED].iter().map(|(name, _)| *name).chain(["rolling_moment"]).enumerate()
 }
 
-const QUANTITIES: [Quantity; 5] = [
-    ("gamma_m2_s", |row| of(row, |v| v.circulation_m2_s), |row| row.truth.circulation_m2_s),
-    ("gamma_5_15_m2_s", |row| of(row, |v| v.circulation_5_15_m2_s), |row| row.truth.circulation_5_15_m2_s),
-    ("y_m", |row| of(row, |v| v.lateral_position_m), |row| row.truth.lateral_position_m),
-    ("z_m", |row| of(row, |v| v.height_m), |row| row.truth.height_m),
-    (
-        "rolling_moment",
-        |row| Some(Measured { value: row.rolling_moment.0, std: f64::NAN }).filter(|m| m.value.is_finite()),
-        |row| row.rolling_moment.1,
-    ),
-];
+/// What was found of a quantity, and the truth; NaN where it is not known.
+fn quantity(row: &RetrievalRow, number: usize) -> (Measured, f64) {
+    let (found, truth) = match VORTEX[..COMPARED].get(number) {
+        Some((_, get)) => (row.found.as_ref().and_then(get), get(&row.truth).unwrap_or(UNKNOWN).value),
+        None => (Some(Measured { value: row.rolling_moment.0, ..UNKNOWN }), row.rolling_moment.1),
+    };
+    (found.filter(|found| found.value.is_finite()).unwrap_or(UNKNOWN), truth)
+}
 
 impl SceneRetrieval {
     /// The errors of all quantities whose truth is known.
@@ -44,10 +42,8 @@ impl SceneRetrieval {
         let mut all = Vec::new();
         for (method, side) in methods.into_iter().flat_map(|method| Side::BOTH.map(|side| (method, side))) {
             let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == (method, side)).collect();
-            for (quantity, found, truth) in QUANTITIES {
-                all.extend(
-                    errors(found, truth, &rows).map(|(counts, numbers)| (method, side, quantity, counts, numbers)),
-                );
+            for (number, name) in quantities() {
+                all.extend(errors(number, &rows).map(|(counts, numbers)| (method, side, name, counts, numbers)));
             }
         }
         all
@@ -68,7 +64,7 @@ impl SceneRetrieval {
         let count = |i: usize| all.iter().map(move |(_, _, _, counts, _)| counts[i] as i64);
         Table::new()
             .text("method", all.iter().map(|(method, ..)| method.name()))
-            .text("side", all.iter().map(|(_, side, ..)| name(side)))
+            .text("side", all.iter().map(|(_, side, ..)| word(side)))
             .text("quantity", all.iter().map(|(_, _, quantity, ..)| *quantity))
             .float("truth", number(0))
             .int("realisations", count(0))
@@ -90,19 +86,18 @@ impl SceneRetrieval {
         }
         table = table
             .text("method", self.rows.iter().map(|row| row.method.name()))
-            .text("side", self.rows.iter().map(|row| name(row.side)))
+            .text("side", self.rows.iter().map(|row| word(row.side)))
             .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));
-        for (quantity, found, truth) in QUANTITIES {
-            let value = |row: &RetrievalRow| found(row).unwrap_or(Measured { value: f64::NAN, std: f64::NAN });
+        for (i, name) in quantities() {
             table = table
-                .float(quantity, number(&|row| value(row).value))
-                .float(&with(quantity, "std"), number(&|row| value(row).std))
-                .float(&with(quantity, "true"), number(&truth));
+                .float(name, number(&|row| quantity(row, i).0.value))
+                .float(&with(name, "std"), number(&|row| quantity(row, i).0.std))
+                .float(&with(name, "true"), number(&|row| quantity(row, i).1));
         }
         let of_test = |row: &RetrievalRow| self.tests.get(row.realisation).copied().unwrap_or((f64::NAN, f64::NAN));
         table
-            .float("core_m", number(&|row| row.found.and_then(|v| v.core_radius_m).map_or(f64::NAN, |core| core.value)))
-            .float("core_true_m", number(&|row| row.truth.core_radius_m))
+            .float("core_m", number(&|row| row.found.and_then(|v| v.core_radius_m).unwrap_or(UNKNOWN).value))
+            .float("core_true_m", number(&|row| row.truth.core_radius_m.unwrap_or(UNKNOWN).value))
             .float("chi2_per_dof", number(&|row| row.chi2_per_dof))
             .float("statistic", number(&|row| of_test(row).0))
             .float("threshold", number(&|row| of_test(row).1))
@@ -110,17 +105,13 @@ impl SceneRetrieval {
     }
 }
 
-fn errors(
-    found: fn(&RetrievalRow) -> Option<Measured>,
-    truth: fn(&RetrievalRow) -> f64,
-    rows: &[&RetrievalRow],
-) -> Option<([usize; 2], [f64; 6])> {
-    let first = truth(rows.first()?);
+fn errors(number: usize, rows: &[&RetrievalRow]) -> Option<([usize; 2], [f64; 6])> {
+    let (_, first) = quantity(rows.first()?, number);
     if !first.is_finite() {
         return None;
     }
-    let values: Vec<(f64, f64)> =
-        rows.iter().filter_map(|row| found(row).map(|m| (m.value - truth(row), m.std))).collect();
+    let found = rows.iter().map(|row| quantity(row, number)).filter(|(found, _)| found.value.is_finite());
+    let values: Vec<(f64, f64)> = found.map(|(found, truth)| (found.value - truth, found.std)).collect();
     let n = values.len() as f64;
     let mean = |get: &dyn Fn(&(f64, f64)) -> f64| values.iter().map(get).sum::<f64>() / n;
     let bias = mean(&|v| v.0);

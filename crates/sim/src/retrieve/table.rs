@@ -29,10 +29,8 @@ pub(super) fn refused(scan: &ReadScan, error: &wakescope_estimate::Error) -> Err
 pub fn rows(scans: &[RetrievedScan]) -> Table {
     let mut of: Vec<(usize, &RetrievedScan, Option<&VortexResult>)> = Vec::new();
     for (number, scan) in scans.iter().enumerate() {
-        match scan.result.vortices.is_empty() {
-            true => of.push((number + 1, scan, None)),
-            false => of.extend(scan.result.vortices.iter().map(|vortex| (number + 1, scan, Some(vortex)))),
-        }
+        let none = scan.result.vortices.is_empty().then_some(None);
+        of.extend(scan.result.vortices.iter().map(Some).chain(none).map(|vortex| (number + 1, scan, vortex)));
     }
     let text = |get: &dyn Fn(&RetrievedScan, Option<&VortexResult>) -> String| -> Vec<String> {
         of.iter().map(|(_, scan, vortex)| get(scan, *vortex)).collect()
@@ -64,12 +62,13 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
         .text("flags", text(&|scan, _| flags(&scan.result)))
 }
 
-const UNKNOWN: Measured = Measured { value: f64::NAN, std: f64::NAN };
+/// What is not known.
+pub(super) const UNKNOWN: Measured = Measured { value: f64::NAN, std: f64::NAN };
 
-type OfVortex = (&'static str, fn(&VortexResult) -> Option<Measured>);
+pub(super) type OfVortex = (&'static str, fn(&VortexResult) -> Option<Measured>);
 
 /// Columns of a vortex.
-const VORTEX: [OfVortex; 5] = [
+pub(super) const VORTEX: [OfVortex; 5] = [
     ("gamma_m2_s", |v| Some(v.circulation_m2_s)),
     ("gamma_5_15_m2_s", |v| Some(v.circulation_5_15_m2_s)),
     ("y_m", |v| Some(v.lateral_position_m)),

@@ -8,7 +8,7 @@ use crate::Error;
 use crate::plan::Plan;
 use crate::scene::Flow;
 use crate::setup::wind::vortex_pair;
-use wakescope_estimate::retrieval::Side;
+use wakescope_estimate::retrieval::{Measured, Side, VortexResult};
 use wakescope_estimate::vortex_fit::{Vortex, Wake};
 use wakescope_les::analysis::mean_circulation_5_15_m2_s;
 
@@ -22,48 +22,39 @@ const REACH_OVER_SPACING: f64 = 0.15;
 /// Most rounds to a centre or a time.
 const ROUNDS: usize = 20;
 
-/// One vortex of the air.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TrueVortex {
-    /// Time from the start of the flow at which a line passes its centre, s.
-    pub time_s: f64,
-    /// Circulation, m^2/s; NaN in a simulated flow, where it depends on the radius.
-    pub circulation_m2_s: f64,
-    /// Its mean over radii of 5 to 15 m, m^2/s.
-    pub circulation_5_15_m2_s: f64,
-    /// Lateral coordinate of the centre, m.
-    pub lateral_position_m: f64,
-    /// Height of the centre, m.
-    pub height_m: f64,
-    /// Core radius, m; NaN in a simulated flow.
-    pub core_radius_m: f64,
+/// A number that is known; NaN where it cannot be.
+fn exact(value: f64) -> Measured {
+    Measured { value, std: 0.0 }
 }
 
-/// Both vortices, left and right, as some lines pass them.
+/// Both vortices of the air, left and right, as some lines pass them: exact numbers. In a simulated flow the circulation depends on
+/// the radius, so that it and the core radius are not known.
 ///
 /// # Errors
 /// A simulated flow in which no vortices are found; what the wind refuses.
-pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[TrueVortex; 2], Error> {
+pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
     match &plan.scene.scene.flow {
         Flow::VortexPair(pair) => {
             let (air, profile) = (vortex_pair(pair), pair.profile);
             // Behind an aircraft, the wake in the plane of the scan has its age there.
             let x_m = plan.scene.scene.scan.lidar.x_m;
             let since_s = pair.aircraft.map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
-            let of = |side: Side| -> Result<TrueVortex, Error> {
+            let of = |side: Side| -> Result<VortexResult, Error> {
                 let centre = |time_s: f64| {
                     let centres = air.centres(time_s + since_s);
                     let y_m = if side == Side::Left { centres.left_y_m } else { centres.right_y_m };
                     Ok((y_m, centres.height_m))
                 };
                 let ((lateral_position_m, height_m), time_s) = when_passed(plan, lines, centre)?;
-                Ok(TrueVortex {
+                let mean_m2_s = pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0;
+                Ok(VortexResult {
+                    side,
                     time_s,
-                    circulation_m2_s: pair.circulation_m2_s,
-                    circulation_5_15_m2_s: pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0,
-                    lateral_position_m,
-                    height_m,
-                    core_radius_m: pair.core_radius_m,
+                    circulation_m2_s: exact(pair.circulation_m2_s),
+                    circulation_5_15_m2_s: exact(mean_m2_s),
+                    lateral_position_m: exact(lateral_position_m),
+                    height_m: exact(height_m),
+                    core_radius_m: Some(exact(pair.core_radius_m)),
                 })
             };
             Ok([of(Side::Left)?, of(Side::Right)?])
@@ -73,12 +64,12 @@ pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[TrueVortex;
 }
 
 /// Both vortices as a wake; nothing in a simulated flow.
-pub(crate) fn true_wake(truth: &[TrueVortex; 2]) -> Option<Wake> {
-    let vortex = |v: &TrueVortex| Vortex {
-        circulation_m2_s: v.circulation_m2_s,
-        lateral_position_m: v.lateral_position_m,
-        height_m: v.height_m,
-        core_radius_m: v.core_radius_m,
+pub(crate) fn true_wake(truth: &[VortexResult; 2]) -> Option<Wake> {
+    let vortex = |v: &VortexResult| Vortex {
+        circulation_m2_s: v.circulation_m2_s.value,
+        lateral_position_m: v.lateral_position_m.value,
+        height_m: v.height_m.value,
+        core_radius_m: v.core_radius_m.map_or(f64::NAN, |core| core.value),
     };
     let [left, right] = truth.each_ref().map(vortex);
     let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
@@ -109,7 +100,7 @@ fn when_passed(
     Ok((place_m, time_s))
 }
 
-fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<TrueVortex, Error> {
+fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, Error> {
     let sense = if side == Side::Left { -1.0 } else { 1.0 };
     let centre = |time_s: f64| {
         let [left, right] = [-1.0, 1.0].map(|sense| strongest(plan, time_s, sense));
@@ -119,13 +110,14 @@ fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<TrueVortex, Err
     };
     let ((lateral_position_m, height_m), time_s) = when_passed(plan, lines, centre)?;
     let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [lateral_position_m, height_m], time_s, CIRCLE)?;
-    Ok(TrueVortex {
+    Ok(VortexResult {
+        side,
         time_s,
-        circulation_m2_s: f64::NAN,
-        circulation_5_15_m2_s: sense * mean_m2_s,
-        lateral_position_m,
-        height_m,
-        core_radius_m: f64::NAN,
+        circulation_m2_s: exact(f64::NAN),
+        circulation_5_15_m2_s: exact(sense * mean_m2_s),
+        lateral_position_m: exact(lateral_position_m),
+        height_m: exact(height_m),
+        core_radius_m: None,
     })
 }
 
@@ -145,19 +137,14 @@ fn vorticity(
     let points_m: Vec<[f64; 3]> = (0..columns * rows).map(place).map(|(y, z)| [0.0, y, z]).collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
     plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let mut found = Vec::new();
-    for row in 1..rows.saturating_sub(1) {
-        for column in 1..columns.saturating_sub(1) {
-            let i = row * columns + column;
-            let up = velocity_m_s[i + 1][2] - velocity_m_s[i - 1][2];
-            let across = velocity_m_s[i + columns][1] - velocity_m_s[i - columns][1];
-            let value = (up - across) / (2.0 * step_m);
-            if value.is_finite() {
-                found.push((place(i), value));
-            }
-        }
-    }
-    Ok(found)
+    let of_row = |row: usize| (1..columns.saturating_sub(1)).map(move |column| row * columns + column);
+    let value = |i: usize| {
+        let up = velocity_m_s[i + 1][2] - velocity_m_s[i - 1][2];
+        let across = velocity_m_s[i + columns][1] - velocity_m_s[i - columns][1];
+        (place(i), (up - across) / (2.0 * step_m))
+    };
+    let inner = (1..rows.saturating_sub(1)).flat_map(of_row);
+    Ok(inner.map(value).filter(|(_, value)| value.is_finite()).collect())
 }
 
 /// The place of the scan where the vorticity of a sign is strongest.
@@ -226,10 +213,11 @@ mod tests {
         let truth = true_vortices(&plan, &lines(&plan)).unwrap();
         for (side, truth) in [Side::Left, Side::Right].into_iter().zip(truth) {
             let found = simulated(&plan, &lines(&plan), side).unwrap();
-            let away = (found.lateral_position_m - truth.lateral_position_m).hypot(found.height_m - truth.height_m);
+            let apart = |get: fn(&VortexResult) -> Measured| get(&found).value - get(&truth).value;
+            let away = apart(|v| v.lateral_position_m).hypot(apart(|v| v.height_m));
             assert!(away < 0.3, "{found:?} {truth:?}");
             // the other vortex has no circulation within 15 m
-            let ratio = found.circulation_5_15_m2_s / truth.circulation_5_15_m2_s;
+            let ratio = found.circulation_5_15_m2_s.value / truth.circulation_5_15_m2_s.value;
             assert!((ratio - 1.0).abs() < 0.01, "{ratio}");
         }
     }
@@ -243,9 +231,9 @@ mod tests {
         let [left, right] = true_vortices(&moving, &lines(&moving)).unwrap();
         let Flow::VortexPair(pair) = moving.scene.scene.flow else { unreachable!() };
         let at = vortex_pair(&pair).centres(left.time_s);
-        assert_eq!((left.lateral_position_m, left.height_m), (at.left_y_m, at.height_m));
+        assert_eq!((left.lateral_position_m.value, left.height_m.value), (at.left_y_m, at.height_m));
         let line = moving.geometry.line_time_s.iter().position(|t| moving.wind.start_s + t == left.time_s).unwrap();
-        let elevation_rad = left.height_m.atan2(left.lateral_position_m);
+        let elevation_rad = left.height_m.value.atan2(left.lateral_position_m.value);
         assert!((moving.geometry.elevation_rad[line] - elevation_rad).abs() < 1.25e-3);
         // the far one is lower in elevation, and so seen at another time
         assert!(left.time_s != right.time_s);

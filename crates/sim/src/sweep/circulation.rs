@@ -11,8 +11,8 @@ use crate::setup::wind::vortex_pair;
 use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake,
-    WakeModel, fit_map_of_estimator,
+    FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake, WakeModel,
+    fit_map_of_estimator,
 };
 
 /// What fits and bound need of a case whose flow is a pair.
@@ -54,11 +54,7 @@ impl<'p> Retrieval<'p> {
 
     /// The circulation that the velocities of a map, m/s, have; NaN where the fit came to no end, nothing where none can be tried.
     pub(crate) fn circulation_m2_s(&self, velocity_m_s: &Array2<f64>) -> Option<f64> {
-        let shown = self.response.shown(self.pair.lateral_position_m);
-        shown.map(|shown| self.fit(velocity_m_s, &shown).unwrap_or(f64::NAN))
-    }
-
-    fn fit(&self, velocity_m_s: &Array2<f64>, shown: &EstimatorResponse<'_>) -> Option<f64> {
+        let shown = self.response.shown(self.pair.lateral_position_m)?;
         let (scene, g) = (&self.plan.scene.scene, &self.plan.geometry);
         let step = self.response.gate_step(&g.gate_range_m);
         let range_m: Vec<f64> = g.gate_range_m.iter().copied().step_by(step).collect();
@@ -72,8 +68,8 @@ impl<'p> Retrieval<'p> {
         let correlated_lines = self.response.correlated_lines(step_rad, self.pair.lateral_position_m);
         let core_radius_m = scene.retrieval.as_ref().and_then(|wanted| wanted.core_radius_m);
         let options = MapFitOptions { free: free(), core_radius_m, correlated_lines, ..Default::default() };
-        let wake = fit_map_of_estimator(&map, &self.model(), shown, &options).ok()?.wake;
-        Some(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s))
+        let fitted = fit_map_of_estimator(&map, &self.model(), &shown, &options);
+        Some(fitted.map_or(f64::NAN, |fit| 0.5 * (fit.wake.left.circulation_m2_s + fit.wake.right.circulation_m2_s)))
     }
 
     /// The bound on the circulation, m^2/s; the pair where it is in the middle of the scan.

@@ -5,10 +5,13 @@
 /// Values of the names in an expression. Without them all numbers are missing, and nothing but the text can be wrong.
 pub(crate) type Values<'v> = Option<&'v dyn Fn(&str) -> Result<f64, String>>;
 
-/// Deepest nesting of an expression.
-const DEEPEST: usize = 100;
+/// Deepest nesting of an expression; a bracket behind an operator counts twice.
+const DEEPEST: usize = 200;
 /// Most operators of an expression.
 const MOST_OPERATORS: usize = 1000;
+/// Operators by how tightly they bind; a sign does as products do.
+const BINDING: [&[char]; 3] = [&['+', '-'], &['*', '/'], &['^']];
+const SIGN: usize = 2;
 
 /// The value of an expression.
 ///
@@ -60,7 +63,7 @@ struct Parser<'t> {
 
 impl Parser<'_> {
     fn whole(mut self) -> Result<f64, String> {
-        let value = self.sum()?;
+        let value = self.chain(0)?;
         self.skip();
         if self.rest.is_empty() { Ok(value) } else { Err(self.wrong("an operator, one of + - * / ^")) }
     }
@@ -83,51 +86,33 @@ impl Parser<'_> {
         format!("{wanted} is needed {place}, character {}", at + 1)
     }
 
-    fn chain(&mut self, operators: &[char], part: fn(&mut Self) -> Result<f64, String>) -> Result<f64, String> {
-        let mut left = part(self)?;
-        while let Some(operator) = self.take(operators) {
-            self.operators += 1;
-            if self.operators > MOST_OPERATORS {
-                return Err(format!("it has more than {MOST_OPERATORS} operators"));
-            }
-            left = combined(left, operator, part(self)?)?;
-        }
-        Ok(left)
-    }
-
-    fn sum(&mut self) -> Result<f64, String> {
-        self.chain(&['+', '-'], Self::product)
-    }
-
-    fn product(&mut self) -> Result<f64, String> {
-        self.chain(&['*', '/'], Self::signed)
-    }
-
-    fn signed(&mut self) -> Result<f64, String> {
+    /// Operands and the operators between them that bind as tightly as `least` at least.
+    fn chain(&mut self, least: usize) -> Result<f64, String> {
         self.depth += 1;
         if self.depth > DEEPEST {
             return Err(self.wrong("less nesting"));
         }
-        let value = match self.take(&['+', '-']) {
-            Some('-') => -self.signed()?,
-            Some(_) => self.signed()?,
-            None => self.power()?,
+        let mut left = match self.take(&['+', '-']) {
+            Some('-') => -self.chain(SIGN)?,
+            Some(_) => self.chain(SIGN)?,
+            None => self.primary()?,
         };
-        self.depth -= 1;
-        Ok(value)
-    }
-
-    fn power(&mut self) -> Result<f64, String> {
-        let base = self.primary()?;
-        match self.take(&['^']) {
-            Some(operator) => combined(base, operator, self.signed()?),
-            None => Ok(base),
+        while let Some((binding, operator)) = (least..BINDING.len()).find_map(|i| Some((i, self.take(BINDING[i])?))) {
+            self.operators += 1;
+            if self.operators > MOST_OPERATORS {
+                return Err(format!("it has more than {MOST_OPERATORS} operators"));
+            }
+            // Powers are read from the right.
+            let right = self.chain(if operator == '^' { binding } else { binding + 1 })?;
+            left = combined(left, operator, right)?;
         }
+        self.depth -= 1;
+        Ok(left)
     }
 
     fn primary(&mut self) -> Result<f64, String> {
         if self.take(&['(']).is_some() {
-            let inner = self.sum()?;
+            let inner = self.chain(0)?;
             return self.take(&[')']).map(|_| inner).ok_or_else(|| self.wrong("a closing bracket"));
         }
         let (here, bytes) = (self.rest, self.rest.as_bytes());

@@ -111,25 +111,22 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
         let padded = |row: &Row| of(row).bytes().chain(std::iter::repeat(0)).take(width).collect::<Vec<u8>>();
         Variable::new(name, &["case", "string_length"], Data::text(rows.iter().flat_map(padded).collect::<Vec<u8>>()))
     };
+    let numbers = |name: &str, of: &dyn Fn(&Row) -> f64| Variable::new(name, &["case"], Data::f64(rows.iter().map(of)));
     let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX));
     let mut variables = vec![Variable::new("case", &["case"], Data::i32(case)).text("long_name", "number of the case")];
     for VaryingKey { name, holds, .. } in &definition.keys {
         // Whole numbers that a double would round, such as drawn seeds, are words.
         let is_round = rows.iter().all(|row| row.key(name).abs() < EXACT_BELOW || *holds == Holds::Numbers);
-        let variable = match holds {
-            Holds::Numbers | Holds::WholeNumbers if is_round => {
-                Variable::new(name, &["case"], Data::f64(rows.iter().map(|row| row.key(name))))
-                    .text("units", unit_of(name).unwrap_or("1"))
-            }
-            _ => words(name, &|row| row.text(name)),
+        let variable = if is_round && *holds != Holds::Texts {
+            numbers(name, &|row| row.key(name)).text("units", unit_of(name).unwrap_or("1"))
+        } else {
+            words(name, &|row| row.text(name))
         };
         variables.push(variable.text("long_name", &format!("key {name} of the scene")));
     }
     variables.push(words("scene_hash", &|row| &row.scene_hash).text("long_name", "hash of the scene of the case"));
     for (name, unit, meaning) in results() {
-        let values = rows.iter().map(|row| row.result(name));
-        let variable = Variable::new(name, &["case"], Data::f64(values));
-        let variable = variable.attr("_FillValue", Data::f64([f64::NAN]));
+        let variable = numbers(name, &|row| row.result(name)).attr("_FillValue", Data::f64([f64::NAN]));
         variables.push(variable.text("units", unit).text("long_name", meaning));
     }
     let dims = vec![("case", rows.len()), ("string_length", width)];
