@@ -56,6 +56,9 @@ pub(super) struct Bank {
     /// Distances of neighbouring places \[m\].
     pub(super) step_m: (f64, f64),
     pub(super) core_m: f64,
+    /// Lateral coordinates and heights between which the cells are \[m\].
+    pub(super) lateral_m: (f64, f64),
+    pub(super) up_m: (f64, f64),
     pub(super) templates: Vec<Template>,
 }
 
@@ -63,8 +66,15 @@ impl Bank {
     /// Pairs and, if asked for, single vortices; `gate_m` is the standard deviation of a gate.
     pub(super) fn new(cells: &Cells, model: &WakeModel, gate_m: f64, options: &DetectorOptions) -> Self {
         let spacing_m = options.spacing_m;
-        let sector = Sector::new(cells, model);
-        let [width_m, height_m] = [sector.lateral_m, sector.up_m].map(|(low, high)| (high - low).max(0.0));
+        let between = |of: fn(&(f64, f64)) -> f64| {
+            let values = cells.cells.iter().map(|cell| of(&cell.place_m));
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+        };
+        let (across_m, mut up_m) = (between(|place| place.0), between(|place| place.1));
+        if model.images {
+            up_m.0 = up_m.0.max(STEP_M);
+        }
+        let [width_m, height_m] = [across_m, up_m].map(|(low, high)| (high - low).max(0.0));
         let area = width_m * height_m;
         let apart_m = STEP_M.max((area / MOST_PLACES).sqrt());
         let lateral_m = apart_m.max(STEP_OVER_GATE * gate_m);
@@ -77,8 +87,8 @@ impl Bank {
         let mut index = Array2::from_elem((rows, columns), None);
         let mut places_m = Vec::new();
         for ((row, column), at) in index.indexed_iter_mut() {
-            let place = (sector.lateral_m.0 + column as f64 * lateral_m, sector.up_m.0 + row as f64 * apart_m);
-            if sector.holds(place) {
+            let place = (across_m.0 + column as f64 * lateral_m, up_m.0 + row as f64 * apart_m);
+            if cells.hold(model, place) {
                 *at = Some(places_m.len());
                 places_m.push(place);
             }
@@ -95,7 +105,7 @@ impl Bank {
             let partners = (least..=most).filter_map(|away| *index.get((row, column + away))?);
             templates.extend(partners.map(|partner| Template { left: Some(place), right: Some(partner) }));
         }
-        Self { places_m, step_m, core_m: CORE_OVER_STEP * apart_m, templates }
+        Self { places_m, step_m, core_m: CORE_OVER_STEP * apart_m, lateral_m: across_m, up_m, templates }
     }
 
     /// What an anticlockwise vortex of unit circulation at each place shows: cells by places.
@@ -130,32 +140,6 @@ pub(super) fn shown(
         }
     }
     cells.cells.iter().map(|cell| map[[cell.line, cell.gate]]).collect()
-}
-
-/// Where cells are.
-pub(super) struct Sector<'a> {
-    cells: &'a Cells,
-    model: &'a WakeModel,
-    pub(super) lateral_m: (f64, f64),
-    pub(super) up_m: (f64, f64),
-}
-
-impl<'a> Sector<'a> {
-    pub(super) fn new(cells: &'a Cells, model: &'a WakeModel) -> Self {
-        let ends = |of: fn(&(f64, f64)) -> f64| {
-            let values = cells.cells.iter().map(|cell| of(&cell.place_m));
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
-        };
-        let mut up_m = ends(|place| place.1);
-        if model.images {
-            up_m.0 = up_m.0.max(STEP_M);
-        }
-        Self { cells, model, lateral_m: ends(|place| place.0), up_m }
-    }
-
-    pub(super) fn holds(&self, place_m: (f64, f64)) -> bool {
-        self.model.sees((&self.cells.elevation_rad, &self.cells.range_m), place_m)
-    }
 }
 
 #[cfg(test)]

@@ -58,6 +58,11 @@ impl Cells {
         Self { elevation_rad, range_m, cells, share }
     }
 
+    /// Whether a place is in the sector of the map.
+    pub(super) fn hold(&self, model: &WakeModel, place_m: (f64, f64)) -> bool {
+        model.sees((&self.elevation_rad, &self.range_m), place_m)
+    }
+
     /// The means of a map of the same shape; NaN where no velocity of a block is left.
     ///
     /// # Errors

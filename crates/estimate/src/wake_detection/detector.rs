@@ -15,7 +15,7 @@ use crate::retrieval::{Gate, ScanMap};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
 use crate::wake_detection::background::Background;
-use crate::wake_detection::bank::{Bank, DetectorOptions, Sector, Template, shown};
+use crate::wake_detection::bank::{Bank, DetectorOptions, Template, shown};
 use crate::wake_detection::cells::Cells;
 
 /// One part in so many of the cells may be missing in a scan.
@@ -29,12 +29,12 @@ const WAKE_M: f64 = 25.0;
 /// The test of one scan's geometry, noise and background for a wake.
 #[derive(Debug, Clone)]
 pub struct WakeDetector {
-    model: WakeModel,
+    pub(super) model: WakeModel,
     kernel: RangeKernel,
-    cells: Cells,
+    pub(super) cells: Cells,
     background: Background,
-    bank: Bank,
-    spacing_m: (f64, f64),
+    pub(super) bank: Bank,
+    pub(super) spacing_m: (f64, f64),
     /// Uniform wind and shear, white and orthonormal: cells by one or two.
     wind: Array2<f64>,
     /// What single vortices show, white, without wind: places by cells.
@@ -236,11 +236,6 @@ impl WakeDetector {
             Vortex::at((lateral_m + away_m, height_m), circulation_m2_s, self.bank.core_m)
         };
         Wake::calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
-    }
-
-    /// Where wakes may be, and how far apart the vortices of a pair.
-    pub(super) fn sector(&self) -> (Sector<'_>, (f64, f64)) {
-        (Sector::new(&self.cells, &self.model), self.spacing_m)
     }
 }
 

@@ -50,17 +50,16 @@ impl WakeDetector {
     /// So many pairs of unit circulation: each as far apart as any that are asked for, anywhere in the scan with both vortices in it, with
     /// cores of 5 % of their spacing. Fewer where the scan has hardly room for a pair.
     pub fn draw_wakes<R: Rng>(&self, count: usize, stream: impl Fn(u64) -> R) -> Vec<Wake> {
-        let (sector, spacings_m) = self.sector();
         let draw = |index: usize| {
             let mut generator = stream(index as u64);
             let mut between = |(low, high): (f64, f64)| low + (high - low) * generator.random::<f64>();
             (0..TRIES.0).find_map(|_| {
-                let spacing_m = between(spacings_m);
+                let spacing_m = between(self.spacing_m);
                 (0..TRIES.1).find_map(|_| {
-                    let (left_m, height_m) = (between(sector.lateral_m), between(sector.up_m));
+                    let (left_m, height_m) = (between(self.bank.lateral_m), between(self.bank.up_m));
                     let places_m = [left_m, left_m + spacing_m].map(|lateral_m| (lateral_m, height_m));
                     let [left, right] = places_m.map(|place_m| Vortex::at(place_m, 1.0, 0.05 * spacing_m));
-                    places_m.iter().all(|place_m| sector.holds(*place_m)).then(|| Wake::calm(left, right))
+                    places_m.iter().all(|at_m| self.cells.hold(&self.model, *at_m)).then(|| Wake::calm(left, right))
                 })
             })
         };

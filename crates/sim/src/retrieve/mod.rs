@@ -6,9 +6,8 @@
 //! | `own` | maps and signals of a scene that is known: what its estimator makes of a wake |
 //! | `one_scan` | one map |
 //! | `others` | velocity envelopes, circulation against radius |
-//! | `tracks` | the vortices through several scans |
 //! | `realisations`, `truth`, `summary` | all realisations of a scene against the vortices of its flow |
-//! | `table` | what was found in a scan: rows, and everything as JSON |
+//! | `table` | what was found in a scan, and the track through several: rows, and everything as JSON |
 //! | `pictures` | velocities, the fitted wake, what is left; tracks |
 //!
 //! Check: maps of runs are retrieved within their stated deviations, from every format.
@@ -22,7 +21,6 @@ mod pictures;
 pub(crate) mod realisations;
 pub(crate) mod summary;
 mod table;
-mod tracks;
 mod truth;
 
 pub use gate::{gate_of, scene_of};
@@ -32,8 +30,7 @@ pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::{figure, track_figure};
 pub use realisations::{RetrievalRow, SceneRetrieval};
-pub use table::{RetrievedScan, flags, json, name, rows};
-pub use tracks::{track_of, track_table};
+pub use table::{RetrievedScan, flags, json, name, rows, track_of, track_table};
 
 pub use crate::measure::response::SceneResponse;
 pub use crate::scene::RetrievalMethod as Method;

@@ -2,8 +2,7 @@
 //!
 //! Check: by eye; the files of a retrieval are named in its test.
 
-use super::RetrievedScan;
-use super::tracks::COLUMNS;
+use super::table::{RetrievedScan, TRACK};
 use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
@@ -78,7 +77,7 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
         ("Height", "height [m]", 2),
     ];
     let panel = |(title, label, column): (&str, &str, usize)| {
-        let (_, _, get) = COLUMNS[column];
+        let (_, get) = TRACK[column];
         let mut plot = CurvePlot::new(title, Axis::linear("time [s]"), Axis::linear(label));
         for (colour, side) in Side::BOTH.into_iter().enumerate() {
             let of_point = |point: &TrackPoint| {

@@ -3,7 +3,7 @@
 //! Check: means and deviations by hand; failures are counted and not averaged.
 
 use super::realisations::{RetrievalRow, SceneRetrieval};
-use super::table::{UNKNOWN, VORTEX, name as word, with};
+use super::table::{UNKNOWN, VORTEX, measured, name as word, with};
 use crate::io::Table;
 use crate::scene::RetrievalMethod as Method;
 use wakescope_estimate::retrieval::{Measured, Side};
@@ -89,9 +89,7 @@ impl SceneRetrieval {
             .text("side", self.rows.iter().map(|row| word(row.side)))
             .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));
         for (i, name) in quantities() {
-            table = table
-                .float(name, number(&|row| quantity(row, i).0.value))
-                .float(&with(name, "std"), number(&|row| quantity(row, i).0.std))
+            table = measured(table, name, self.rows.iter().map(|row| quantity(row, i).0))
                 .float(&with(name, "true"), number(&|row| quantity(row, i).1));
         }
         let of_test = |row: &RetrievalRow| self.tests.get(row.realisation).copied().unwrap_or((f64::NAN, f64::NAN));

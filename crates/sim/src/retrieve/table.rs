@@ -1,13 +1,15 @@
-//! What retrievals found, as rows and as JSON.
+//! What retrievals found, as rows and as JSON: in each scan, and as the track through several, smoothed states with their bands.
 //!
-//! Check: rows of no wake, one vortex and two.
+//! Check: rows of no wake, one vortex and two; a series of scans of a pair that sinks, in the tests of the program.
 
 use crate::Error;
 use crate::io::Table;
 use crate::io::scans::ReadScan;
 use serde::Serialize;
 use serde_json::{Value, json};
-use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanResult, VortexResult};
+use wakescope_estimate::retrieval::{
+    Measured, RetrievalOptions, ScanResult, Track, TrackedVortex, VortexResult, track,
+};
 
 /// One scan with what was found in it.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,41 +27,40 @@ pub(super) fn refused(scan: &ReadScan, error: &wakescope_estimate::Error) -> Err
     Error::Input { path: scan.path.clone(), reason: format!("sweep {}: {error}", scan.sweep) }
 }
 
+/// The number of a scan from 1 on, the scan, and one of its vortices.
+type Row<'a> = (usize, &'a RetrievedScan, Option<&'a VortexResult>);
+
 /// A row for each vortex and scan; a scan without a wake has one row without a vortex.
 pub fn rows(scans: &[RetrievedScan]) -> Table {
-    let mut of: Vec<(usize, &RetrievedScan, Option<&VortexResult>)> = Vec::new();
+    let mut of: Vec<Row<'_>> = Vec::new();
     for (number, scan) in scans.iter().enumerate() {
         let none = scan.result.vortices.is_empty().then_some(None);
         of.extend(scan.result.vortices.iter().map(Some).chain(none).map(|vortex| (number + 1, scan, vortex)));
     }
-    let text = |get: &dyn Fn(&RetrievedScan, Option<&VortexResult>) -> String| -> Vec<String> {
-        of.iter().map(|(_, scan, vortex)| get(scan, *vortex)).collect()
-    };
-    let number = |get: &dyn Fn(&ScanResult, Option<&VortexResult>) -> f64| -> Vec<f64> {
-        of.iter().map(|(_, scan, vortex)| get(&scan.result, *vortex)).collect()
-    };
-    let time =
-        |result: &ScanResult, vortex: Option<&VortexResult>| vortex.map_or(result.reference_time_s, |v| v.time_s);
+    let of_scan = |get: fn(&ScanResult) -> f64| of.iter().map(move |(_, scan, _)| get(&scan.result));
+    let time_s = |(_, scan, vortex): &Row<'_>| vortex.map_or(scan.result.reference_time_s, |v| v.time_s);
     let mut table = Table::new()
         .int("scan", of.iter().map(|(number, ..)| *number as i64))
-        .text("file", text(&|scan, _| scan.scan.file_name()))
+        .text("file", of.iter().map(|(_, scan, _)| scan.scan.file_name()))
         .int("sweep", of.iter().map(|(_, scan, _)| scan.scan.sweep as i64))
-        .float("time_s", number(&time))
-        .text("side", text(&|_, vortex| vortex.map_or_else(|| "none".to_owned(), |v| name(v.side))));
+        .float("time_s", of.iter().map(time_s))
+        .text("side", of.iter().map(|(.., vortex)| vortex.map_or_else(|| "none".to_owned(), |v| name(v.side))));
     for (name, get) in VORTEX {
-        let of = |vortex: Option<&VortexResult>| vortex.and_then(get).unwrap_or(UNKNOWN);
-        table = table.float(name, number(&|_, v| of(v).value)).float(&with(name, "std"), number(&|_, v| of(v).std));
+        table = measured(table, name, of.iter().map(|(.., vortex)| vortex.and_then(get).unwrap_or(UNKNOWN)));
     }
-    for (name, get) in WIND {
-        table = table.float(name, number(&|r, _| get(r).value)).float(&with(name, "std"), number(&|r, _| get(r).std));
-    }
-    table
-        .float("chi2_per_dof", number(&|result, _| result.chi2_per_dof))
+    table = measured(table, "wind_m_s", of.iter().map(|(_, scan, _)| scan.result.lateral_wind_m_s));
+    measured(table, "shear_per_s", of.iter().map(|(_, scan, _)| scan.result.wind_shear_per_s))
+        .float("chi2_per_dof", of_scan(|result| result.chi2_per_dof))
         .int("cells_used", of.iter().map(|(_, scan, _)| scan.result.cells_used as i64))
         .int("cells_rejected", of.iter().map(|(_, scan, _)| scan.result.cells_rejected as i64))
-        .float("statistic", number(&|result, _| result.statistic))
-        .float("threshold", number(&|result, _| result.threshold))
-        .text("flags", text(&|scan, _| flags(&scan.result)))
+        .float("statistic", of_scan(|result| result.statistic))
+        .float("threshold", of_scan(|result| result.threshold))
+        .text("flags", of.iter().map(|(_, scan, _)| flags(&scan.result)))
+}
+
+/// A column of numbers and one of their deviations.
+pub(super) fn measured(table: Table, name: &str, values: impl Iterator<Item = Measured> + Clone) -> Table {
+    table.float(name, values.clone().map(|m| m.value)).float(&with(name, "std"), values.map(|m| m.std))
 }
 
 /// What is not known.
@@ -76,10 +77,43 @@ pub(super) const VORTEX: [OfVortex; 5] = [
     ("core_m", |v| v.core_radius_m),
 ];
 
-type OfScan = (&'static str, fn(&ScanResult) -> Measured);
+/// The track of several scans in the order of their times; nothing of a single scan, of scans without times, or without a wake.
+///
+/// # Errors
+/// What the filter refuses.
+pub fn track_of(scans: &[RetrievedScan]) -> Result<Option<Track>, Error> {
+    let mut results: Vec<&ScanResult> = scans.iter().map(|scan| &scan.result).collect();
+    results.sort_by(|a, b| a.reference_time_s.total_cmp(&b.reference_time_s));
+    let increase = results.windows(2).all(|pair| pair[1].reference_time_s > pair[0].reference_time_s);
+    let found = results.iter().any(|result| !result.vortices.is_empty());
+    if results.len() < 2 || !increase || !found {
+        return Ok(None);
+    }
+    Ok(Some(track(&results, Track::ACCELERATION_DENSITY_M2_S3)?))
+}
 
-/// Columns of the wind.
-const WIND: [OfScan; 2] = [("wind_m_s", |r| r.lateral_wind_m_s), ("shear_per_s", |r| r.wind_shear_per_s)];
+type OfTrack = (&'static str, fn(&TrackedVortex) -> Measured);
+
+/// Columns of a track.
+pub(super) const TRACK: [OfTrack; 6] = [
+    ("gamma_m2_s", |v| v.circulation_m2_s),
+    ("y_m", |v| v.lateral_position_m),
+    ("z_m", |v| v.height_m),
+    ("y_rate_m_s", |v| v.lateral_velocity_m_s),
+    ("z_rate_m_s", |v| v.vertical_velocity_m_s),
+    ("decay_per_s", |v| v.decay_per_s),
+];
+
+/// A row for each vortex and time of a track.
+pub fn track_table(track: &Track) -> Table {
+    let all = track.points.iter().flat_map(|point| point.vortices.iter().map(move |vortex| (point.time_s, vortex)));
+    let all: Vec<(f64, &TrackedVortex)> = all.collect();
+    let table = Table::new()
+        .float("time_s", all.iter().map(|(time_s, _)| *time_s))
+        .text("side", all.iter().map(|(_, vortex)| name(vortex.side)))
+        .int("detected", all.iter().map(|(_, vortex)| i64::from(vortex.detected)));
+    TRACK.iter().fold(table, |table, (name, get)| measured(table, name, all.iter().map(|(_, vortex)| get(vortex))))
+}
 
 /// `gamma_m2_s` to `gamma_std_m2_s`: the unit stays at the end.
 pub(super) fn with(name: &str, word: &str) -> String {
@@ -99,9 +133,10 @@ pub fn flags(result: &ScanResult) -> String {
 
 /// Everything that was found, with covariances and competing tops.
 pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
+    let names = || PARAMETER_NAMES.split(' ');
     // JSON has no NaN: what is not known is null.
     let wake = |values: [f64; 10]| -> Value {
-        PARAMETER_NAMES.iter().zip(values).map(|(name, value)| ((*name).to_owned(), json!(value))).collect()
+        names().zip(values).map(|(name, value)| (name.to_owned(), json!(value))).collect()
     };
     let of_vortex = |vortex: &VortexResult| -> Value {
         let mut object = json!({ "side": vortex.side, "time_s": vortex.time_s });
@@ -119,7 +154,7 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
             "wind_m_s": r.lateral_wind_m_s, "shear_per_s": r.wind_shear_per_s,
             "chi2_per_dof": r.chi2_per_dof, "cells_used": r.cells_used, "cells_rejected": r.cells_rejected,
             "statistic": r.statistic, "threshold": r.threshold, "flags": r.flags,
-            "parameters": PARAMETER_NAMES, "wake": r.wake.map(|found| wake(found.to_array())), "covariance": rows,
+            "parameters": names().collect::<Vec<_>>(), "wake": r.wake.map(|found| wake(found.to_array())), "covariance": rows,
             "secondary": scan.options.model.secondary.map(|both| both.map(|v| json!({
                 "gamma_m2_s": v.circulation_m2_s, "y_m": v.lateral_position_m, "z_m": v.height_m, "core_m": v.core_radius_m,
             }))),
@@ -130,15 +165,5 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
 }
 
 /// Names of the parameters of a wake in their order.
-const PARAMETER_NAMES: [&str; 10] = [
-    "gamma_left_m2_s",
-    "gamma_right_m2_s",
-    "y_left_m",
-    "z_left_m",
-    "y_right_m",
-    "z_right_m",
-    "core_left_m",
-    "core_right_m",
-    "wind_m_s",
-    "shear_per_s",
-];
+const PARAMETER_NAMES: &str = "gamma_left_m2_s gamma_right_m2_s y_left_m z_left_m y_right_m z_right_m core_left_m core_right_m wind_m_s \
+                               shear_per_s";

@@ -372,16 +372,12 @@ fn text_of(table: &Table) -> String {
 
 /// Sets a key, with the tables above it where they are missing.
 pub(crate) fn set(table: &mut Table, path: &str, value: Value) {
-    let (head, rest) = path.split_once('.').map_or((path, None), |(head, rest)| (head, Some(rest)));
-    match rest {
-        None => drop(table.insert(head.into(), value)),
-        Some(rest) => {
-            // What is no table there is refused when the scene is read.
-            if let Value::Table(inner) = table.entry(head).or_insert_with(|| Value::Table(Table::new())) {
-                set(inner, rest, value);
-            }
-        }
-    }
+    let (above, last) = path.rsplit_once('.').unwrap_or(("", path));
+    let inner = above
+        .split_terminator('.')
+        .try_fold(table, |table, key| table.entry(key).or_insert_with(|| Value::Table(Table::new())).as_table_mut());
+    // What is no table there is refused when the scene is read.
+    inner.map(|table| table.insert(last.into(), value));
 }
 
 /// The number that a name in an expression stands for.
