@@ -33,8 +33,7 @@ impl Outputs {
     /// # Errors
     /// What the list finds before it makes a file.
     pub(crate) fn names(formats: Formats, list: impl List) -> Result<Vec<String>, Error> {
-        let files = Self::of(formats, None, list)?;
-        Ok(files.into_iter().map(|(name, _)| name).collect())
+        Ok(Self::contents(formats, None, list)?.into_iter().map(|(name, _)| name).collect())
     }
 
     /// Makes the files of a list and puts them into their folder, all or none; returns their paths.
@@ -47,21 +46,18 @@ impl Outputs {
         of: (Formats, Provenance),
         list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
-        write_contents(folder, Self::contents(of, list)?, existing)
+        write_contents(folder, Self::contents(of.0, Some(of.1), list)?, existing)
     }
 
-    /// Makes the files of a list and keeps them: their names and contents.
+    /// Makes the files of a list and keeps them: their names and contents, which are empty without an origin.
     ///
     /// # Errors
     /// What the makers find.
     pub(crate) fn contents(
-        (formats, origin): (Formats, Provenance),
+        formats: Formats,
+        origin: Option<Provenance>,
         list: impl List,
     ) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        Self::of(formats, Some(origin), list)
-    }
-
-    fn of(formats: Formats, origin: Option<Provenance>, list: impl List) -> Result<Vec<(String, Vec<u8>)>, Error> {
         let mut outputs = Self { formats, origin, files: Vec::new() };
         list(&mut outputs)?;
         Ok(outputs.files)

@@ -164,8 +164,7 @@ impl<'a> Report<'a> {
 
     /// How far the sector reaches beyond a centre \[m\]; negative outside.
     fn margin_m(&self, vortex: &VortexResult) -> f64 {
-        let place_m = (vortex.lateral_position_m.value, vortex.height_m.value);
-        let (range_m, elevation_rad) = self.stage.options.model.range_and_elevation(place_m);
+        let (range_m, elevation_rad) = self.stage.options.model.range_and_elevation(vortex.place_m());
         let within = |axis: &[f64], value: f64| {
             axis.first().zip(axis.last()).map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
         };

@@ -73,6 +73,12 @@ pub struct VortexResult {
 }
 
 impl VortexResult {
+    /// Lateral coordinate and height of the centre \[m\].
+    #[must_use]
+    pub fn place_m(&self) -> (f64, f64) {
+        (self.lateral_position_m.value, self.height_m.value)
+    }
+
     /// A vortex of a wake, given with its covariance \[10, 10\] for the middle of the scan, when the line through its core is measured.
     /// A core without variance was not fitted.
     #[must_use]

@@ -153,9 +153,6 @@ impl WakeDetector {
     /// Puts the best wind into cells without a velocity; returns their number.
     fn fill(&self, means: &mut [f64]) -> Result<usize, Error> {
         let missing = means.iter().filter(|value| value.is_nan()).count();
-        if missing == 0 {
-            return Ok(0);
-        }
         enough_velocities(means.len() - missing, means.len() - means.len() / MISSING)?;
         let cells = &self.cells.cells;
         let row = |i: usize| wind_row(&self.cells, i).map(|x| x / cells[i].deviation_m_s);

@@ -71,7 +71,9 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     };
     let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
     let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
-    words.folder.prepare(cli, |files| list(words, plan.as_ref(), None, &*observer, files))?;
+    // The closed forms of single gates are those of noise.
+    let noisy = plan.as_ref().filter(|plan| plan.scene.scene.detector.noise != NoiseModel::None);
+    words.folder.prepare(cli, |files| list(words, noisy, None, files))?;
     let of_plan = plan.as_ref().map(|plan| &plan.scene.scene);
     let (gate, note) = gate_of(scans.first(), words.air.gate_std, of_plan)?;
     notes.extend(note.map(str::to_owned));
@@ -110,8 +112,8 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
         "notes": notes,
     });
-    let tested = Some((&scans[..], &found[..], power.as_ref()));
-    let list = |files: &mut Outputs| list(words, plan.as_ref(), tested, &*observer, files);
+    let tested = Some((&scans[..], &found[..], power.as_ref(), &*observer as &dyn Observer));
+    let list = |files: &mut Outputs| list(words, noisy, tested, files);
     words.folder.finish(cli, (Default::default(), origin), list, (object, text.join("\n")))
 }
 
@@ -168,28 +170,21 @@ fn told(scans: &[ReadScan], found: &[ScanDetection], power: Option<&Power>, text
     }
 }
 
-/// Scans, what was found in them, and how often wakes are found.
-type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>);
+/// Scans, what was found in them, how often wakes are found, and who is told of what is computed for the files alone.
+type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>, &'t dyn Observer);
 
-/// The files, whose content is not there before the tests.
-fn list(
-    words: &DetectWords,
-    plan: Option<&Plan>,
-    tested: Option<Tested<'_>>,
-    observer: &dyn Observer,
-    files: &mut Outputs,
-) -> Result<(), Error> {
+/// The files, whose content is not there before the tests; those of single gates for a plan with noise.
+fn list(words: &DetectWords, noisy: Option<&Plan>, of: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
     if !words.data.is_empty() {
-        files.table("detection", tested.as_ref(), |(scans, found, _)| Ok(scan_table(scans, found)))?;
+        files.table("detection", of.as_ref(), |(scans, found, ..)| Ok(scan_table(scans, found)))?;
     }
-    let power = tested.and_then(|(.., power)| power);
+    let power = of.and_then(|(_, _, power, _)| power);
     files.table("detection_power", power, |power| Ok(power_table(power)))?;
     files.table("detection_roc", power, |power| Ok(roc_table(power)))?;
     #[cfg(feature = "plots")]
     files.figure("detection", power, |power| Ok(crate::detection::picture(power)))?;
-    // The closed forms of single gates are those of noise.
-    if let Some(plan) = plan.filter(|plan| plan.scene.scene.detector.noise != NoiseModel::None) {
-        files.table("detection_gates", tested.as_ref(), |_| gate_table(plan, words.false_alarm, observer))?;
+    if let Some(plan) = noisy {
+        files.table("detection_gates", of.as_ref(), |(.., observer)| gate_table(plan, words.false_alarm, *observer))?;
     }
     Ok(())
 }

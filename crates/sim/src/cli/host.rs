@@ -185,7 +185,7 @@ impl Cli {
         list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
         let Some(call) = self.keeper() else { return Outputs::write(folder, existing, of, list) };
-        let files = Outputs::contents(of, list)?;
+        let files = Outputs::contents(of.0, Some(of.1), list)?;
         let names = files.iter().map(|(name, _)| name.into()).collect();
         call.answer().files.extend(files);
         Ok(names)

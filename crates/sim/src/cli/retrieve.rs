@@ -288,13 +288,10 @@ fn of_signals(
 
 /// Times of all scans from the date of the first one, where all have a date.
 fn same_origin(scans: &mut [RetrievedScan]) {
-    let Some(first) = scans.first().and_then(|scan| scan.scan.reference) else { return };
-    if scans.iter().any(|scan| scan.scan.reference.is_none()) {
-        return;
-    }
-    for scan in scans {
-        let Some(reference) = scan.scan.reference.replace(first) else { continue };
-        let later_s = reference.seconds_since(first);
+    let dates: Option<Vec<_>> = scans.iter().map(|scan| scan.scan.reference).collect();
+    let dates = dates.unwrap_or_default();
+    for (scan, date) in scans.iter_mut().zip(&dates) {
+        let later_s = date.seconds_since(dates[0]);
         scan.scan.map.time_s.iter_mut().for_each(|time_s| *time_s += later_s);
         scan.result.reference_time_s += later_s;
         scan.result.vortices.iter_mut().for_each(|vortex| vortex.time_s += later_s);

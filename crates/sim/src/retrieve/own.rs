@@ -47,12 +47,10 @@ impl SceneResponse {
         if found.statistic.is_nan() || found.statistic < options.threshold {
             return None;
         }
-        let place = |vortex: &VortexResult| {
-            options.model.range_and_elevation((vortex.lateral_position_m.value, vortex.height_m.value))
-        };
+        let range_of = |vortex: &VortexResult| options.model.range_and_elevation(vortex.place_m()).0;
         let range_m = match found.vortices.len() {
             0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
-            count => found.vortices.iter().map(|vortex| place(vortex).0).sum::<f64>() / count as f64,
+            count => found.vortices.iter().map(range_of).sum::<f64>() / count as f64,
         };
         let fits = Fits {
             scan: map,
@@ -70,11 +68,8 @@ impl SceneResponse {
                 ..MapFitOptions::default()
             },
         };
-        let (ranges, elevations) = (ends(&map.range_m)?, ends(&map.elevation_rad)?);
-        let is_seen = |vortex: &VortexResult| {
-            let (range_m, elevation_rad) = place(vortex);
-            ranges.contains(&range_m) && elevations.contains(&elevation_rad)
-        };
+        let sector = (&map.elevation_rad[..], &map.range_m[..]);
+        let is_seen = |vortex: &VortexResult| options.model.sees(sector, vortex.place_m());
         let is_certain =
             |vortex: &VortexResult| vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std;
         let unseen = |pair: &ScanResult| pair.vortices.iter().filter(|vortex| !is_seen(vortex)).count();
@@ -169,10 +164,6 @@ fn telling(mut result: ScanResult, is_told: impl Fn(&VortexResult) -> bool) -> S
     result.set(Flag::OneVortex, result.vortices.len() == 1);
     result.set(Flag::CoreKept, result.vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
     result
-}
-
-fn ends(axis: &[f64]) -> Option<std::ops::RangeInclusive<f64>> {
-    Some(*axis.first()?..=*axis.last()?)
 }
 
 /// The result of a fit to a map that tells other vortices than the means did.

@@ -41,8 +41,7 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         lidar_height_m: scan.options.model.lidar_height_m,
         ..VelocityMap::default()
     };
-    let centres_m: Vec<(f64, f64)> =
-        scan.result.vortices.iter().map(|v| (v.lateral_position_m.value, v.height_m.value)).collect();
+    let centres_m: Vec<(f64, f64)> = scan.result.vortices.iter().map(|vortex| vortex.place_m()).collect();
     let mut panels = Vec::new();
     for (name, title, _) in &fields {
         let mut plot = MapPlot::new(&shown, 0, name)?.titled(title).labelled("m/s");

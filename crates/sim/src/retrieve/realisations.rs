@@ -178,7 +178,6 @@ fn rows_of(
         let side = truth_of.side;
         let vortex = found.and_then(|found| found.result.vortex(side).copied());
         let wake = found.and_then(|found| found.result.wake);
-        let place = |v: VortexResult| (v.lateral_position_m.value, v.height_m.value);
         Ok(RetrievalRow {
             realisation,
             sweep,
@@ -186,7 +185,10 @@ fn rows_of(
             side,
             found: vortex,
             truth: truth_of,
-            rolling_moment: (moment(wake, vortex.map(place))?, moment(true_wake(truth), Some(place(truth_of)))?),
+            rolling_moment: (
+                moment(wake, vortex.map(|vortex| vortex.place_m()))?,
+                moment(true_wake(truth), Some(truth_of.place_m()))?,
+            ),
             chi2_per_dof: found.map_or(f64::NAN, |found| found.result.chi2_per_dof),
             flags: found.map_or_else(String::new, |found| flags(&found.result)),
         })

@@ -83,12 +83,8 @@ impl<'p> Retrieval<'p> {
             height_m: centres.height_m,
             core_radius_m: self.pair.core_radius_m,
         };
-        let truth = Wake {
-            left: vortex(centres.left_y_m),
-            right: vortex(centres.right_y_m),
-            lateral_wind_m_s: self.pair.cross_wind_m_s,
-            wind_shear_per_s: 0.0,
-        };
+        let [left, right] = [centres.left_y_m, centres.right_y_m].map(vortex);
+        let truth = Wake { left, right, lateral_wind_m_s: self.pair.cross_wind_m_s, wind_shear_per_s: 0.0 };
         let rays = |line: &f64| std::iter::repeat_n(*line, scene.scan.pulses_per_line);
         let elevation_rad = g.elevation_rad.iter().flat_map(rays).collect();
         let setup = self.response.setup(self.model(), elevation_rad)?;

@@ -35,10 +35,9 @@ impl Objective {
         Self::small(values.into_iter().map(|value| -value).collect(), standard_errors)
     }
 
-    /// By how much point `a` is better than `b`; NaN for what is not there.
+    /// By how much point `a` is better than `b`.
     fn gain(&self, a: usize, b: usize) -> f64 {
-        let cost = |i: usize| self.costs.get(i).copied().unwrap_or(f64::NAN);
-        cost(b) - cost(a)
+        self.costs[b] - self.costs[a]
     }
 
     /// Standard error of the difference of two points; without end where one is not known.

@@ -64,7 +64,8 @@ impl WakeModel {
     }
 
     /// Whether a place (y, z) \[m\] lies within the elevations \[rad\] and ranges \[m\] of a scan, both increasing.
-    pub(crate) fn sees(&self, (elevation_rad, range_m): (&[f64], &[f64]), place_m: (f64, f64)) -> bool {
+    #[must_use]
+    pub fn sees(&self, (elevation_rad, range_m): (&[f64], &[f64]), place_m: (f64, f64)) -> bool {
         let (at_m, at_rad) = self.range_and_elevation(place_m);
         let within =
             |axis: &[f64], at: f64| axis.first().zip(axis.last()).is_some_and(|(a, b)| (*a..=*b).contains(&at));
