@@ -115,7 +115,7 @@ fn table(cases: &[Case]) -> Table {
     let mut rows: Vec<(&Case, [f64; 4])> = Vec::new();
     for case in cases {
         rows.extend(case.power.roc.iter().map(|r| (case, [r.0, r.1, r.3.value, r.3.standard_error])));
-        rows.extend(case.power.found.iter().map(|r| (case, [r.0, FALSE_ALARM, r.1.value, r.1.standard_error])));
+        rows.extend(case.power.found.iter().map(|r| (case, [r.0, FALSE_ALARM, r.3.value, r.3.standard_error])));
         rows.push((case, [case.power.smallest_m2_s.0, FALSE_ALARM, 0.9, f64::NAN]));
     }
     let column = |i: usize| rows.iter().map(move |row| row.1[i]).collect::<Vec<_>>();

@@ -5,7 +5,7 @@ use super::words::{AirWords, FolderWords, ScanWords, finite, rate, spacing, stri
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
-    power_table, roc_table, scan_table, strided,
+    scan_table, share_table, strided,
 };
 use crate::io::Provenance;
 use crate::io::csv::digits;
@@ -179,8 +179,8 @@ fn list(words: &DetectWords, noisy: Option<&Plan>, of: Option<Tested<'_>>, files
         files.table("detection", of.as_ref(), |(scans, found, ..)| Ok(scan_table(scans, found)))?;
     }
     let power = of.and_then(|(_, _, power, _)| power);
-    files.table("detection_power", power, |power| Ok(power_table(power)))?;
-    files.table("detection_roc", power, |power| Ok(roc_table(power)))?;
+    files.table("detection_power", power, |power| Ok(share_table(power, &power.found, true)))?;
+    files.table("detection_roc", power, |power| Ok(share_table(power, &power.roc, false)))?;
     #[cfg(feature = "plots")]
     files.figure("detection", power, |power| Ok(crate::detection::picture(power)))?;
     if let Some(plan) = noisy {

@@ -205,11 +205,10 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     }
     let ranges_m = scan_ranges_m(&plan.scene.scene);
     let snr_db = snr_without_screens_db(&plan, &ranges_m)?;
-    let mut object = plan_json(&plan);
-    object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db });
     // What only phase screens could tell is not told.
     let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.scene) == Model::MonteCarlo;
-    object["budget"]["independent_paths"] = json!(is_less);
+    let mut object = plan_json(&plan);
+    object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db, "independent_paths": is_less });
     let screens = if is_less { AS_ON_INDEPENDENT_PATHS } else { "" };
     let ranges = ranges_m.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
     let ratios = snr_db.iter().map(|db| format!("{db:.2}")).collect::<Vec<_>>().join(", ");

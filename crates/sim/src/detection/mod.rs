@@ -18,7 +18,7 @@ pub use gates::gate_table;
 #[cfg(feature = "plots")]
 pub use pictures::picture;
 pub use scene_noise::SceneNoise;
-pub use tables::{power_table, roc_table, scan_table};
+pub use tables::{scan_table, share_table};
 
 use crate::Error;
 use crate::setup::progress::{Observer, Stage};
@@ -108,6 +108,9 @@ impl ScanDetection {
     }
 }
 
+/// Circulation, m^2/s, rate of false alarms, threshold and share of wakes that are found.
+pub type FoundShare = (f64, f64, f64, Share);
+
 /// How often wakes are found in one geometry and background.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Power {
@@ -119,10 +122,10 @@ pub struct Power {
     pub gumbel: (f64, f64),
     /// Bound on the circulation of a pair at a known place, m^2/s: root mean square over the places.
     pub circulation_std_m2_s: f64,
-    /// Circulation, m^2/s, and share that is found at the rate.
-    pub found: Vec<(f64, Share)>,
-    /// Circulation, m^2/s, rate, threshold and share.
-    pub roc: Vec<(f64, f64, f64, Share)>,
+    /// Shares that are found at the rate.
+    pub found: Vec<FoundShare>,
+    /// Those at other rates of some circulations.
+    pub roc: Vec<FoundShare>,
     /// The circulation that is found nine times in ten, m^2/s: measured, and as the bound foretells.
     pub smallest_m2_s: (f64, f64),
     /// Standard error of the measured one, m^2/s.
@@ -145,13 +148,12 @@ impl Calibration {
     /// # Errors
     /// What the test refuses.
     pub fn new(map: &ScanMap, settings: &DetectionSettings, observer: &dyn Observer) -> Result<Self, Error> {
-        let with = |map: &ScanMap| WakeDetector::new(map, &settings.model, &settings.gate, &settings.options);
+        let with = |map: &ScanMap, options| WakeDetector::new(map, &settings.model, &settings.gate, &options);
         let mut map = map.clone();
         let mut assumed_sigma_m_s = None;
         if map.sigma_m_s.is_none() {
             map.sigma_m_s = Some(ndarray::Array2::ones(map.velocity_m_s.raw_dim()));
-            let plain = DetectorOptions { turbulence: None, ..settings.options };
-            let unit = WakeDetector::new(&map, &settings.model, &settings.gate, &plain)?;
+            let unit = with(&map, DetectorOptions { turbulence: None, ..settings.options })?;
             let all = unit.statistic(map.velocity_m_s.view())?.wake_chi2_per_dof;
             let air = settings.options.turbulence.map_or(0.0, |turbulence| turbulence.deviation_m_s.powi(2));
             // turbulence has its part of what is left; some noise there must be
@@ -159,7 +161,7 @@ impl Calibration {
             map.sigma_m_s = Some(ndarray::Array2::from_elem(map.velocity_m_s.raw_dim(), sigma_m_s));
             assumed_sigma_m_s = Some(sigma_m_s);
         }
-        let detector = with(&map)?;
+        let detector = with(&map, settings.options)?;
         observer.begin(Stage::Detection, settings.empty_scans as u64);
         let law = detector.calibrate(settings.empty_scans, |scan| {
             observer.advance(1);
@@ -177,21 +179,12 @@ impl Calibration {
             return false;
         }
         let sigma = |of: &ScanMap, at: (usize, usize)| of.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at]);
-        let (mut both, mut one) = (0, 0);
-        for (at, velocity) in map.velocity_m_s.indexed_iter() {
-            match (velocity.is_finite(), self.map.velocity_m_s[at].is_finite()) {
-                (true, true) => {
-                    let ratio = sigma(map, at) / sigma(&self.map, at);
-                    if (ratio - 1.0).abs() > 0.1 {
-                        return false;
-                    }
-                    both += 1;
-                }
-                (false, false) => {}
-                _ => one += 1,
-            }
-        }
-        10 * one < both
+        let is_other = |at: &(usize, usize)| (sigma(map, *at) / sigma(&self.map, *at) - 1.0).abs() > 0.1;
+        let known = |of: &ScanMap, at: (usize, usize)| of.velocity_m_s[at].is_finite();
+        let cells = map.velocity_m_s.indexed_iter().map(|(at, _)| at);
+        let (both, rest): (Vec<_>, Vec<_>) = cells.partition(|at| known(map, *at) && known(&self.map, *at));
+        let one = rest.into_iter().filter(|at| known(map, *at) || known(&self.map, *at)).count();
+        10 * one < both.len() && !both.iter().any(is_other)
     }
 
     /// Tests a scan that the calibration is for.
@@ -230,7 +223,8 @@ impl Calibration {
         let std_m2_s = trials.circulation_std_m2_s();
         let circulations: Vec<f64> = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s).collect();
         let shares = trials.detection(&circulations, self.threshold);
-        let found = circulations.into_iter().zip(shares).collect();
+        let at_rate = |(circulation, share)| (circulation, settings.false_alarm, self.threshold, share);
+        let found = circulations.into_iter().zip(shares).map(at_rate).collect();
         // four rates in a decade
         let rates: Vec<f64> = (-16..0).map(|i| 10f64.powf(0.25 * f64::from(i))).collect();
         let mut roc = Vec::new();
@@ -368,8 +362,8 @@ mod tests {
     fn shares_grow_with_circulation_and_rate_and_reach_the_smallest_that_is_found() {
         let (_, calibration) = detect(&[map(1, 0.0)], &settings(), &Silent).unwrap();
         let power = calibration.unwrap().power(&settings(), &Silent).unwrap();
-        assert!(power.found.windows(2).all(|pair| pair[1].1.value >= pair[0].1.value - 0.01));
-        assert!(power.found[0].1.value < 0.03 && power.found[20].1.value > 0.99, "{power:?}");
+        assert!(power.found.windows(2).all(|pair| pair[1].3.value >= pair[0].3.value - 0.01));
+        assert!(power.found[0].3.value < 0.03 && power.found[20].3.value > 0.99, "{power:?}");
         let (measured, foretold) = power.smallest_m2_s;
         assert!((measured / foretold - 1.0).abs() < 0.15, "{measured} {foretold}");
         for curve in power.roc.chunks(16) {

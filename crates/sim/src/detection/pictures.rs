@@ -18,8 +18,8 @@ pub fn picture(power: &Power) -> Figure {
         let errors: Vec<f64> = curve.iter().map(|row| row.3.standard_error).collect();
         roc = roc.with(Series::new(&label, style, curve.iter().map(|row| (row.1, row.3.value))).with_band(&errors));
     }
-    let errors: Vec<f64> = power.found.iter().map(|row| row.1.standard_error).collect();
-    let found = Series::new("", Style::Line, power.found.iter().map(|row| (row.0, row.1.value))).with_band(&errors);
+    let errors: Vec<f64> = power.found.iter().map(|row| row.3.standard_error).collect();
+    let found = Series::new("", Style::Line, power.found.iter().map(|row| (row.0, row.3.value))).with_band(&errors);
     let title = format!("Found at {} false alarms; 9 in 10: {:.0} m²/s", power.false_alarm, power.smallest_m2_s.0);
     let found =
         CurvePlot::new(&title, Axis::linear("circulation [m²/s]"), Axis::linear("share of wakes found")).with(found);

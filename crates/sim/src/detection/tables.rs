@@ -1,6 +1,6 @@
 //! What detection writes: a row for each scan, and the curves of its geometry and background.
 
-use super::{Power, ScanDetection};
+use super::{FoundShare, Power, ScanDetection};
 use crate::io::Table;
 use crate::io::scans::ReadScan;
 
@@ -38,25 +38,17 @@ pub fn scan_table(scans: &[ReadScan], found: &[ScanDetection]) -> Table {
         .float("gumbel_beta", column(&|f| f.gumbel.1))
 }
 
-/// Share of wakes found against circulation, at the rate: `gamma_m2_s,gamma_over_std,false_alarm,detection,standard_error`.
+/// Shares of wakes found: `gamma_m2_s,gamma_over_std,false_alarm,threshold,detection,standard_error`, at one rate without its threshold.
 #[must_use]
-pub fn power_table(power: &Power) -> Table {
-    Table::new()
-        .float("gamma_m2_s", power.found.iter().map(|row| row.0))
-        .float("gamma_over_std", power.found.iter().map(|row| row.0 / power.circulation_std_m2_s))
-        .float("false_alarm", power.found.iter().map(|_| power.false_alarm))
-        .float("detection", power.found.iter().map(|row| row.1.value))
-        .float("standard_error", power.found.iter().map(|row| row.1.standard_error))
-}
-
-/// Operating curves: `gamma_m2_s,gamma_over_std,false_alarm,threshold,detection,standard_error`.
-#[must_use]
-pub fn roc_table(power: &Power) -> Table {
-    Table::new()
-        .float("gamma_m2_s", power.roc.iter().map(|row| row.0))
-        .float("gamma_over_std", power.roc.iter().map(|row| row.0 / power.circulation_std_m2_s))
-        .float("false_alarm", power.roc.iter().map(|row| row.1))
-        .float("threshold", power.roc.iter().map(|row| row.2))
-        .float("detection", power.roc.iter().map(|row| row.3.value))
-        .float("standard_error", power.roc.iter().map(|row| row.3.standard_error))
+pub fn share_table(power: &Power, shares: &[FoundShare], is_one_rate: bool) -> Table {
+    let mut table = Table::new()
+        .float("gamma_m2_s", shares.iter().map(|row| row.0))
+        .float("gamma_over_std", shares.iter().map(|row| row.0 / power.circulation_std_m2_s))
+        .float("false_alarm", shares.iter().map(|row| row.1));
+    if !is_one_rate {
+        table = table.float("threshold", shares.iter().map(|row| row.2));
+    }
+    table
+        .float("detection", shares.iter().map(|row| row.3.value))
+        .float("standard_error", shares.iter().map(|row| row.3.standard_error))
 }

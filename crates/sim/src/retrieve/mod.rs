@@ -2,9 +2,8 @@
 //!
 //! | module | content |
 //! |---|---|
-//! | `gate` | what a velocity of a file is of the air about its range; the scene that a file has in it |
 //! | `own` | maps and signals of a scene that is known: what its estimator makes of a wake |
-//! | `one_scan` | one map |
+//! | `one_scan` | one map, and what a velocity of it is of the air about its range |
 //! | `others` | velocity envelopes, circulation against radius |
 //! | `realisations`, `truth`, `summary` | all realisations of a scene against the vortices of its flow |
 //! | `table` | what was found in a scan, and the track through several: rows, and everything as JSON |
@@ -12,7 +11,6 @@
 //!
 //! Check: maps of runs are retrieved within their stated deviations, from every format.
 
-mod gate;
 mod one_scan;
 mod others;
 mod own;
@@ -23,8 +21,7 @@ pub(crate) mod summary;
 mod table;
 mod truth;
 
-pub use gate::{gate_of, scene_of};
-pub use one_scan::{Velocities, options, retrieve_map};
+pub use one_scan::{Velocities, gate_of, options, retrieve_map, scene_of};
 pub use others::{envelope_table, envelopes, profile_table};
 pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]

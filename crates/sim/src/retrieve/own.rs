@@ -205,35 +205,33 @@ impl SceneResponse {
         &self,
         samples: ArrayView2<'_, S>,
         elevation_rad: Vec<f64>,
-        found: RetrievedScan,
+        mut found: RetrievedScan,
         observer: &dyn Observer,
     ) -> Result<RetrievedScan, Error> {
         let Some(guess) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(found) };
-        let RetrievedScan { scan, options, result } = found;
-        let setup = self.setup(options.model, elevation_rad)?;
+        let setup = self.setup(found.options.model, elevation_rad)?;
         let snr = |range_m: f64, _: f64| {
             // Whenever the fit makes a model of the lines.
             observer.advance(0);
             self.snr_at(range_m)
         };
-        let fit_options = SignalFitOptions { free: options.free, ..SignalFitOptions::default() };
+        let fit_options = SignalFitOptions { free: found.options.free, ..SignalFitOptions::default() };
         let fit = match fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options) {
             // what the map shows is what was found
             Err(wakescope_estimate::Error::NotConverged { .. }) => {
-                let mut result = result;
-                result.set(Flag::NotConverged, true);
-                return Ok(RetrievedScan { scan, options, result });
+                found.result.set(Flag::NotConverged, true);
+                return Ok(found);
             }
-            fit => fit.map_err(|error| refused(&scan, &error))?,
+            fit => fit.map_err(|error| refused(&found.scan, &error))?,
         };
         let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
         let least = tops.iter().map(|top| top.chi2).fold(f64::INFINITY, f64::min);
         let tops = tops.iter().map(|top| Top { chi2: top.chi2 - least, ..*top }).collect();
-        let mut result = retold(&result, &scan.map, &options, (wake, covariance), tops, false);
+        let mut result = retold(&found.result, &found.scan.map, &found.options, (wake, covariance), tops, false);
         result.statistic = 2.0 * log_likelihood_gain;
         (result.cells_used, result.cells_rejected) = (used_rays, setup.elevation_rad.len() - used_rays);
         result.chi2_per_dof = f64::NAN;
-        Ok(RetrievedScan { scan, options, result })
+        Ok(RetrievedScan { result, ..found })
     }
 }
 

@@ -2,8 +2,7 @@
 //!
 //! Check: bias and scatter of a pair; a method that fails is counted; the test for a wake keeps its rate.
 
-use super::gate::gate_of;
-use super::one_scan::{Velocities, options, retrieve_map};
+use super::one_scan::{Velocities, gate_of, options, retrieve_map};
 use super::others::envelopes;
 use super::own::scan_of_lines;
 use super::table::{RetrievedScan, flags};

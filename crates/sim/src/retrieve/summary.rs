@@ -33,17 +33,13 @@ fn quantity(row: &RetrievalRow, number: usize) -> (Measured, f64) {
 impl SceneRetrieval {
     /// The errors of all quantities whose truth is known.
     fn errors(&self) -> Vec<Errors> {
-        let mut methods: Vec<Method> = Vec::new();
-        for row in &self.rows {
-            if !methods.contains(&row.method) {
-                methods.push(row.method);
-            }
-        }
         let mut all = Vec::new();
-        for (method, side) in methods.into_iter().flat_map(|method| Side::BOTH.map(|side| (method, side))) {
-            let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == (method, side)).collect();
+        // One scan has each method and side once.
+        for first in self.rows.iter().filter(|row| (row.realisation, row.sweep) == (0, 0)) {
+            let of = (first.method, first.side);
+            let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == of).collect();
             for (number, name) in quantities() {
-                all.extend(errors(number, &rows).map(|(counts, numbers)| (method, side, name, counts, numbers)));
+                all.extend(errors(number, &rows).map(|(counts, numbers)| (of.0, of.1, name, counts, numbers)));
             }
         }
         all
