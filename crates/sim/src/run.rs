@@ -66,10 +66,6 @@ fn middle_m(plan: &Plan) -> f64 {
     0.5 * (scan.range_min_m + scan.range_max_m)
 }
 
-/// One line of the summary that a person or a program reads: its name for programs, with the unit, its description for people, and the
-/// value; NaN if it cannot be given.
-pub type SummaryLine = (&'static str, &'static str, f64);
-
 /// Runs a plan.
 ///
 /// # Errors
@@ -153,8 +149,9 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
 }
 
 impl RunResult {
-    /// The results in a few numbers.
-    pub fn summary(&self) -> Vec<SummaryLine> {
+    /// The results in a few numbers: of each its name for programs, with the unit, its description for people, and the value; NaN if it
+    /// cannot be given.
+    pub fn summary(&self) -> Vec<(&'static str, &'static str, f64)> {
         let mut out = Vec::new();
         let mut line = |key, text, value| out.push((key, text, value));
         if let Some(middle) = &self.middle {

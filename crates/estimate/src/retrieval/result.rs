@@ -42,13 +42,10 @@ impl Side {
     /// Circulation, lateral coordinate, height and core radius of the vortex of that side.
     #[must_use]
     pub fn parameters(self) -> [Parameter; 4] {
+        use Parameter::*;
         match self {
-            Self::Left => {
-                [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight, Parameter::LeftCore]
-            }
-            Self::Right => {
-                [Parameter::RightCirculation, Parameter::RightLateral, Parameter::RightHeight, Parameter::RightCore]
-            }
+            Self::Left => [LeftCirculation, LeftLateral, LeftHeight, LeftCore],
+            Self::Right => [RightCirculation, RightLateral, RightHeight, RightCore],
         }
     }
 }

@@ -14,9 +14,8 @@ use crate::linalg::cholesky::cholesky;
 use crate::retrieval::{Gate, ScanMap};
 use crate::vortex_fit::damped_newton::solve;
 use crate::vortex_fit::{RangeKernel, Vortex, Wake, WakeModel};
-use crate::wake_detection::background::Background;
 use crate::wake_detection::bank::{Bank, DetectorOptions, Template, shown};
-use crate::wake_detection::cells::Cells;
+use crate::wake_detection::cells::{Background, Cells};
 
 /// One part in so many of the cells may be missing in a scan.
 const MISSING: usize = 2;

@@ -87,18 +87,14 @@ pub fn options(scene: Option<&Scene>, gate: Gate, core_radius_m: Option<f64>) ->
         _ => None,
     });
     // Long gates do not show cores: without what is known of them they run away with the circulation.
-    let is_long = match &gate {
-        Gate::Point => false,
-        Gate::Gaussian { std_m } => *std_m > LONG_GATE_M,
-        Gate::Kernel(_) => true,
-    };
+    let is_short = matches!(&gate, Gate::Point) || matches!(&gate, Gate::Gaussian { std_m } if *std_m <= LONG_GATE_M);
     let lidar_height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
     let wanted = scene.and_then(|scene| scene.retrieval.as_ref());
     let mut options = RetrievalOptions {
         model: WakeModel { profile: profile.unwrap_or_default(), lidar_height_m, ..WakeModel::default() },
         gate,
         core_radius_m,
-        core_prior: is_long.then_some(CorePrior::TYPICAL),
+        core_prior: (!is_short).then_some(CorePrior::TYPICAL),
         other_profile: profile.is_none(),
         secondary: wanted.map(|wanted| wanted.secondary).unwrap_or_default(),
         ..RetrievalOptions::default()

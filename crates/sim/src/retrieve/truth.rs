@@ -22,9 +22,21 @@ const REACH_OVER_SPACING: f64 = 0.15;
 /// Most rounds to a centre or a time.
 const ROUNDS: usize = 20;
 
-/// A number that is known; NaN where it cannot be.
-fn exact(value: f64) -> Measured {
-    Measured { value, std: 0.0 }
+/// Place (y, z), m, and time, s, of a centre when the line of sight passes it.
+type Passage = ((f64, f64), f64);
+
+/// A vortex with its circulation and the mean of that over 5 to 15 m, m^2/s; NaN for what cannot be known.
+fn exact(side: Side, (place_m, time_s): Passage, [circulation, mean]: [f64; 2], core_m: Option<f64>) -> VortexResult {
+    let known = |value: f64| Measured { value, std: 0.0 };
+    VortexResult {
+        side,
+        time_s,
+        circulation_m2_s: known(circulation),
+        circulation_5_15_m2_s: known(mean),
+        lateral_position_m: known(place_m.0),
+        height_m: known(place_m.1),
+        core_radius_m: core_m.map(known),
+    }
 }
 
 /// Both vortices of the air, left and right, as some lines pass them: exact numbers. In a simulated flow the circulation depends on
@@ -45,17 +57,9 @@ pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResul
                     let y_m = if side == Side::Left { centres.left_y_m } else { centres.right_y_m };
                     Ok((y_m, centres.height_m))
                 };
-                let ((lateral_position_m, height_m), time_s) = when_passed(plan, lines, centre)?;
                 let mean_m2_s = pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0;
-                Ok(VortexResult {
-                    side,
-                    time_s,
-                    circulation_m2_s: exact(pair.circulation_m2_s),
-                    circulation_5_15_m2_s: exact(mean_m2_s),
-                    lateral_position_m: exact(lateral_position_m),
-                    height_m: exact(height_m),
-                    core_radius_m: Some(exact(pair.core_radius_m)),
-                })
+                let passage = when_passed(plan, lines, centre)?;
+                Ok(exact(side, passage, [pair.circulation_m2_s, mean_m2_s], Some(pair.core_radius_m)))
             };
             Ok([of(Side::Left)?, of(Side::Right)?])
         }
@@ -81,7 +85,7 @@ fn when_passed(
     plan: &Plan,
     lines: &[usize],
     centre: impl Fn(f64) -> Result<(f64, f64), Error>,
-) -> Result<((f64, f64), f64), Error> {
+) -> Result<Passage, Error> {
     let (g, lidar_m) = (&plan.geometry, plan.scene.scene.scan.lidar_height_m);
     let times_s = || lines.iter().map(|line| plan.wind.start_s + g.line_time_s[*line]);
     let mut time_s = times_s().sum::<f64>() / lines.len().max(1) as f64;
@@ -108,17 +112,9 @@ fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, E
         let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
         centroid(plan, time_s, if side == Side::Left { left } else { right }, sense, reach_m)
     };
-    let ((lateral_position_m, height_m), time_s) = when_passed(plan, lines, centre)?;
-    let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [lateral_position_m, height_m], time_s, CIRCLE)?;
-    Ok(VortexResult {
-        side,
-        time_s,
-        circulation_m2_s: exact(f64::NAN),
-        circulation_5_15_m2_s: exact(sense * mean_m2_s),
-        lateral_position_m: exact(lateral_position_m),
-        height_m: exact(height_m),
-        core_radius_m: None,
-    })
+    let passage @ ((y_m, z_m), time_s) = when_passed(plan, lines, centre)?;
+    let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [y_m, z_m], time_s, CIRCLE)?;
+    Ok(exact(side, passage, [f64::NAN, sense * mean_m2_s], None))
 }
 
 /// A place (y, z), m, and the vorticity there, 1/s.
