@@ -226,7 +226,7 @@ impl Flow {
             let (_, axis, place) = self.first_not_finite()?;
             return Err(self.diverged(axis, place, "velocity"));
         }
-        let largest = self.model.as_ref().map(|model| model.largest).unwrap_or_default();
+        let [subgrid_viscosity_m2_s, decay_per_s] = self.model.as_ref().map(|model| model.largest).unwrap_or_default();
         Ok(StepReport {
             step: self.state.step,
             time_s: self.state.time_s,
@@ -236,8 +236,8 @@ impl Flow {
             viscous_power_m5_s3,
             subgrid_power_m5_s3,
             force_power_m5_s3,
-            subgrid_viscosity_m2_s: largest.viscosity_m2_s,
-            subgrid_decay: step_s * largest.decay_per_s,
+            subgrid_viscosity_m2_s,
+            subgrid_decay: step_s * decay_per_s,
             pressure_iterations: solved.map_or(0, |s| s.iterations),
             pressure_residual: solved.map(|s| s.residual),
             pressure_factor: solved.and_then(|s| s.factor),

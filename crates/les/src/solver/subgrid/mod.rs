@@ -95,7 +95,7 @@ pub(crate) struct Subgrid {
     small: Option<(Filter, [Aligned; 2])>,
     /// Eddy viscosity at the centres, in the order of memory.
     pub(super) viscosity_m2_s: Aligned,
-    /// The largest viscosity and decay rate of the last update.
+    /// Those of the last update.
     pub(super) largest: Largest,
     /// `tau_02`, `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\]: what the divergence needs of the stress.
     across: [Aligned; 3],
@@ -135,9 +135,7 @@ impl Subgrid {
         free: &mut [f64],
     ) -> Result<(), Error> {
         let Self { operators, formula, viscosity_m2_s: viscosity, small, slabs, across, .. } = self;
-        let largest = eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity);
-        let [viscosity_m2_s, decay_per_s] = slabs.largest([largest.viscosity_m2_s, largest.decay_per_s])?;
-        self.largest = Largest { viscosity_m2_s, decay_per_s };
+        self.largest = slabs.largest(eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity))?;
         let strained = match small {
             Some((filter, small)) => {
                 let [second, third] = small;

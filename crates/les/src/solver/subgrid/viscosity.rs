@@ -49,25 +49,14 @@ pub(super) fn eddy_viscosity(
     let largest = planes.map_init(scratch, |scratch, (plane, k)| {
         viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
     });
-    largest.reduce(Largest::default, Largest::or)
+    largest.reduce(Largest::default, larger)
 }
 
-/// Extremes of the eddy viscosity.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Largest {
-    /// \[m^2/s\].
-    pub(crate) viscosity_m2_s: f64,
-    /// Decay rate of the shortest waves, before the limit \[1/s\].
-    pub(crate) decay_per_s: f64,
-}
+/// The largest eddy viscosity \[m^2/s\], and the largest decay rate of the shortest waves, before the limit \[1/s\].
+pub(crate) type Largest = [f64; 2];
 
-impl Largest {
-    fn or(self, other: Self) -> Self {
-        Self {
-            viscosity_m2_s: self.viscosity_m2_s.max(other.viscosity_m2_s),
-            decay_per_s: self.decay_per_s.max(other.decay_per_s),
-        }
-    }
+fn larger(a: Largest, b: Largest) -> Largest {
+    [a[0].max(b[0]), a[1].max(b[1])]
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
@@ -91,7 +80,7 @@ fn viscosity_plane(
             Formula::Wale { square } => apply(row, gradient, square * across, width, wale),
         }
         let decay = operators.decay[1][j] + operators.decay[2][k];
-        largest = largest.or(limit(row, &operators.decay[0], decay, limit_per_s));
+        largest = larger(largest, limit(row, &operators.decay[0], decay, limit_per_s));
     }
     largest
 }
@@ -101,15 +90,15 @@ fn viscosity_plane(
 fn limit(row: &mut [f64], along: &[f64], across: f64, limit_per_s: f64) -> Largest {
     let mut largest = [Largest::default(); LANES];
     for (row, along) in row.chunks_mut(LANES).zip(along.chunks(LANES)) {
-        for ((value, along), largest) in row.iter_mut().zip(along).zip(&mut largest) {
+        for ((value, along), [most_m2_s, most_per_s]) in row.iter_mut().zip(along).zip(&mut largest) {
             let decay = *value * (along + across);
             let cut = if decay > limit_per_s { limit_per_s / (along + across) } else { *value };
             *value = cut;
-            largest.decay_per_s = if decay > largest.decay_per_s { decay } else { largest.decay_per_s };
-            largest.viscosity_m2_s = if cut > largest.viscosity_m2_s { cut } else { largest.viscosity_m2_s };
+            *most_per_s = if decay > *most_per_s { decay } else { *most_per_s };
+            *most_m2_s = if cut > *most_m2_s { cut } else { *most_m2_s };
         }
     }
-    largest.into_iter().fold(Largest::default(), Largest::or)
+    largest.into_iter().fold(Largest::default(), larger)
 }
 
 /// Maxima that are kept side by side.

@@ -104,7 +104,7 @@ fn the_stress_has_the_same_bits_with_one_two_and_seven_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| {
                 let flow = Modelled::new(directions(), model, waves(0.9, 4.0));
-                (flow.acceleration(), flow.model.viscosity_m2_s.to_vec(), flow.model.largest.viscosity_m2_s)
+                (flow.acceleration(), flow.model.viscosity_m2_s.to_vec(), flow.model.largest[0])
             })
         };
         let expected = run(1);
