@@ -2,7 +2,7 @@
 //!
 //! Check: a table of ages; before the aircraft the air is at rest.
 
-use super::vortex::{VortexPair, VortexPairWind};
+use super::vortex::VortexPair;
 use super::wind::Wind;
 use crate::Error;
 use crate::error::{check, check_lengths};
@@ -10,7 +10,7 @@ use crate::error::{check, check_lengths};
 /// The wake of an aircraft that flies along +x.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AlongFlight {
-    pair: VortexPairWind,
+    pair: VortexPair,
     speed_m_s: f64,
     aircraft_x_m: f64,
 }

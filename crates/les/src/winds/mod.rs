@@ -39,6 +39,6 @@ pub use profile::CirculationProfile;
 pub use series::Series;
 pub use two_scale::TwoScale;
 pub use volume::{VolumeComponent, VolumeSnapshot};
-pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair, VortexPairWind};
+pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair};
 pub use vortex_line::{VortexLine, VortexLines};
 pub use wind::{Sum, Wind};

@@ -88,13 +88,13 @@ impl VortexPair {
         }
     }
 
-    /// The wind of this pair.
+    /// The same pair, checked: it is the wind that it makes.
     ///
     /// # Errors
     /// As [`VortexPair::validate`].
-    pub fn wind(self) -> Result<VortexPairWind, Error> {
+    pub fn wind(self) -> Result<Self, Error> {
         self.validate()?;
-        Ok(VortexPairWind { pair: self })
+        Ok(self)
     }
 
     /// Initial speed of descent out of ground effect, `V0 = Gamma0/(2 pi b0)` \[m/s\].
@@ -149,6 +149,14 @@ impl VortexPair {
         Centres { left_y_m: self.lateral_position_m - half_m, right_y_m: self.lateral_position_m + half_m, height_m }
     }
 
+    /// Velocity `(v, w)` of one vortex of circulation `sign * Gamma0`, anticlockwise if positive, seen at `(dy, dz)`
+    /// from its centre.
+    fn vortex_velocity(&self, sign: f64, dy_m: f64, dz_m: f64) -> [f64; 2] {
+        let square_m2 = dy_m * dy_m + dz_m * dz_m;
+        let omega = sign * self.profile.angular_velocity_rad_s(self.circulation_m2_s, self.core_radius_m, square_m2);
+        [-omega * dz_m, omega * dy_m]
+    }
+
     /// Half distance and height \[m\] of the point vortices over a plane at `time_s`.
     fn path_over_ground(&self, half_m: f64, time_s: f64) -> (f64, f64) {
         let invariant = 1.0 / (half_m * half_m) + 1.0 / (self.height_m * self.height_m);
@@ -166,40 +174,18 @@ impl VortexPair {
 /// Intervals of Simpson's rule for `Gamma_5-15` (even).
 const SIMPSON_PANELS: i32 = 400;
 
-/// The velocity field of a [`VortexPair`] that has been checked.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VortexPairWind {
-    pair: VortexPair,
-}
-
-impl VortexPairWind {
-    /// The pair that makes the wind.
-    pub fn pair(&self) -> &VortexPair {
-        &self.pair
-    }
-
-    /// Velocity `(v, w)` of one vortex of circulation `sign * Gamma0`, anticlockwise if positive, seen at `(dy, dz)`
-    /// from its centre.
-    fn vortex_velocity(&self, sign: f64, dy_m: f64, dz_m: f64) -> [f64; 2] {
-        let pair = &self.pair;
-        let omega = sign
-            * pair.profile.angular_velocity_rad_s(pair.circulation_m2_s, pair.core_radius_m, dy_m * dy_m + dz_m * dz_m);
-        [-omega * dz_m, omega * dy_m]
-    }
-}
-
-impl Wind for VortexPairWind {
+impl Wind for VortexPair {
     fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         check("time_s", time_s, "finite", |_| true)?;
-        let centres = self.pair.centres(time_s);
+        let centres = self.centres(time_s);
         let vortices = [(-1.0, centres.left_y_m), (1.0, centres.right_y_m)];
         for (&[_, y_m, z_m], out) in points_m.iter().zip(out_m_s) {
             let mut sum = [0.0; 2];
             for (sign, centre_y_m) in vortices {
                 let dy_m = y_m - centre_y_m;
                 let mut velocity = self.vortex_velocity(sign, dy_m, z_m - centres.height_m);
-                if self.pair.ground == Ground::Image {
+                if self.ground == Ground::Image {
                     // Added to its own vortex first, so that the two vertical velocities cancel to the bit at z = 0.
                     let image = self.vortex_velocity(-sign, dy_m, z_m + centres.height_m);
                     velocity[0] += image[0];
@@ -216,24 +202,23 @@ impl Wind for VortexPairWind {
     /// The strain of one vortex at its own core radius ([`CirculationProfile::max_line_gradient_per_s`]) plus what the
     /// others can add where that one is the nearest. Never too small; 4 % too large for cores of 5 % of the spacing.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        let pair = &self.pair;
-        let centres = pair.centres(time_s);
+        let centres = self.centres(time_s);
         let spacing_m = centres.right_y_m - centres.left_y_m;
-        let others_m = match pair.ground {
+        let others_m = match self.ground {
             Ground::None => vec![spacing_m],
             Ground::Image => {
                 let image_m = 2.0 * centres.height_m;
                 vec![spacing_m, image_m, spacing_m.hypot(image_m)]
             }
         };
-        let own = pair.profile.max_line_gradient_per_s(pair.circulation_m2_s, pair.core_radius_m);
+        let own = self.profile.max_line_gradient_per_s(self.circulation_m2_s, self.core_radius_m);
         // A point is nearest to one vortex, so each other one is at least half their distance away; beyond the peak of
         // the strain, which lies within 1.2 core radii, the strain only falls.
         let added: f64 = others_m
             .iter()
             .map(|&distance_m| {
-                if distance_m > 2.4 * pair.core_radius_m {
-                    pair.profile.strain_rate_per_s(pair.circulation_m2_s, pair.core_radius_m, 0.5 * distance_m)
+                if distance_m > 2.4 * self.core_radius_m {
+                    self.profile.strain_rate_per_s(self.circulation_m2_s, self.core_radius_m, 0.5 * distance_m)
                 } else {
                     own
                 }
