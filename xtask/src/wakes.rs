@@ -131,7 +131,7 @@ mod tests {
 
     #[test]
     fn what_is_stored_is_of_the_case_that_is_run_and_has_its_ages() {
-        let stored_case = FinishedWake::read(&root().join(STORED)).unwrap().case_toml;
+        let stored_case = FinishedWake::read(&root().join(STORED)).unwrap().file.toml;
         let case = CaseFile::parse(&toml::to_string(&stored()).unwrap(), Path::new("wake")).unwrap();
         assert_eq!(stored_case, case.toml);
     }

@@ -9,7 +9,7 @@ const FRAME_S: f64 = 0.15;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::whole(context)?;
-    let origin = context.provenance_of_formula(&wake.case_toml);
+    let origin = context.provenance_of_formula(&wake.file.toml);
     let mut table = Table::new();
     let names = ["tau", "energy", "energy_3d", "secondary_gamma_left", "secondary_gamma_right"].map(String::from);
     for name in names.into_iter().chain((0..=8).map(|mode| format!("energy_mode_{mode}"))) {

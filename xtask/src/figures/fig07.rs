@@ -12,7 +12,7 @@ const SIDES: [&str; 2] = ["left", "right"];
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
-    let origin = context.provenance_of_formula(&wake.case_toml);
+    let origin = context.provenance_of_formula(&wake.file.toml);
     let figure = Figure::side_by_side([beside(&wake, wake.circulation_plot()?, [[0, 1], [0, 2]])?, paths(&wake)?]);
     let figure = Figure { width: 1200.0, ..figure };
     let mut out = Rendered::new(&table(&wake)?, &figure, &origin)?;

@@ -37,7 +37,7 @@ fn scene(context: &Context, (range_m, elevation_max_rad): ([f64; 2], f64)) -> Sc
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
-    let (words, reach_m) = (wake.words(), REACH * wake.flow.pair.scales()?.spacing_m);
+    let (words, reach_m) = (wake.words(), REACH * wake.scales.spacing_m);
     let (early, late) = (Sight::of_wake(&wake, EARLY_TAU)?, Sight::of_wake(&wake, LATE_TAU)?);
     let scene = scene(context, sector(&[&early.cores[..], &late.cores[..]].concat(), reach_m));
     let one = |sight: &Sight| Ok::<_, Failure>(Study::runs(context, sight, vec![scene.clone()])?.remove(0));

@@ -97,7 +97,7 @@ impl Sight {
 
     /// A simulated wake of an age.
     pub(super) fn of_wake(wake: &FinishedWake, tau: f64) -> Result<Self, Failure> {
-        let b0_m = wake.flow.pair.scales()?.spacing_m;
+        let b0_m = wake.scales.spacing_m;
         let (planes, motion, age_tau) = ("plane1".into(), SimulatedMotion::Frozen, Some(tau));
         let flow = SimulatedFlow { planes, motion, age_tau, ..SimulatedFlow::default() };
         let at = |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(name)?, tau));

@@ -136,13 +136,12 @@ fn step_errors(wake: &FinishedWake) -> Result<[f64; 2], Failure> {
     let (time, step) = (column("time_s")?, column("step_s")?);
     let (rate, residual) = (column("energy_rate_m5_s3")?, column("energy_residual_m5_s3")?);
     let viscous = column("viscous_power_m5_s3")?;
-    let scales = wake.flow.pair.scales()?;
-    let (b0_m, speed_m_s, unit_s) = (scales.spacing_m, scales.descent_speed_m_s(), scales.time_unit_s());
+    let (unit_s, power_unit) =
+        (wake.scales.time_unit_s(), wake.scales.spacing_m.powi(2) * wake.scales.descent_speed_m_s().powi(3));
     let late = |i: &usize| time[*i] - step[*i] > 0.1 * unit_s && residual[*i].is_finite();
     // What the powers leave of the rate, over what they give.
     let budget =
         (0..time.len()).filter(late).map(|i| (residual[i] / (rate[i] - residual[i])).abs()).fold(0.0, f64::max);
-    let power_unit = b0_m.powi(2) * speed_m_s.powi(3);
     let mut dissipation = 0.0_f64;
     for (tau, enstrophy) in wake.curve("enstrophy")?.into_iter().filter(|p| p.0 > 0.1) {
         // The step that begins with the record reports the power there.

@@ -7,14 +7,6 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use wakescope_les::cases::{self, TollmienSchlichting};
 use wakescope_les::{Flow, SubgridModel, TimeScheme};
 
-/// Advances a flow to a time.
-pub(super) fn advance(flow: &mut Flow, until_s: f64) -> Result<(), Failure> {
-    while flow.time_s() < until_s {
-        flow.step_towards(until_s)?;
-    }
-    Ok(())
-}
-
 const VISCOSITY_M2_S: f64 = 0.01;
 
 /// Order of the scheme: plane vortices on meshes stretched both ways, and a layer between walls.
@@ -220,7 +212,7 @@ const V_MIN: (f64, f64) = (0.9092, -0.527_077_1);
 pub(super) fn cavity(profile: Profile) -> Result<Shown, Failure> {
     let (cells, end_s) = if profile == Profile::Quick { (48, 40.0) } else { (128, 60.0) };
     let (mut flow, _) = cases::lid_driven_cavity(cells, 1.5, 1000.0)?.start()?;
-    advance(&mut flow, end_s)?;
+    flow.run_to(end_s)?;
     let (centre_y, centre_z) = (flow.mesh().centre_m(1), flow.mesh().centre_m(2));
     let (v, w) = (flow.face_velocity_m_s(1), flow.face_velocity_m_s(2));
     // The mesh is symmetric: face `cells/2` lies at 0.5.
@@ -306,7 +298,7 @@ fn dissipation(cells: usize, model: SubgridModel) -> Result<Vec<(f64, f64)>, Fai
     let volume = PI.powi(3);
     let mut energy = vec![flow.kinetic_energy_m5_s2() / volume];
     for output in 1..=OUTPUTS {
-        advance(&mut flow, EVERY_S * output as f64)?;
+        flow.run_to(EVERY_S * output as f64)?;
         energy.push(flow.kinetic_energy_m5_s2() / volume);
     }
     let slope = |i: usize| (energy[i - 1] - energy[i + 1]) / (2.0 * EVERY_S);

@@ -1,6 +1,5 @@
 //! The plane vortex pair above ground at Re 2500 against a spectral code; over a frictionless ground against the hyperbola.
 
-use super::flows::advance;
 use super::runs::*;
 use std::f64::consts::TAU;
 use wakescope_les::CirculationProfile;
@@ -29,7 +28,7 @@ pub(super) fn show(profile: Profile) -> Result<Shown, Failure> {
     let (mut meter, mut flow) = (meter, pair.case(VortexPairCase::steps(0.01))?.start()?.0);
     let mut records = vec![meter.measure(&flow)?];
     for record in 1..=(END * PER_TAU).round() as usize {
-        advance(&mut flow, record as f64 / PER_TAU)?;
+        flow.run_to(record as f64 / PER_TAU)?;
         records.push(meter.measure(&flow)?);
     }
     let curve = |of: fn(&WakeRecord) -> f64| records.iter().map(|r| (r.time_s, of(r))).collect::<Curve>();

@@ -2,10 +2,9 @@
 //!
 //! Check: the tests of `flow` interrupt runs, kill them and let two of them meet in one folder.
 
-use super::files::{Files, checkpoint_paths};
+use super::files::{Files, agree, checkpoint_paths};
 use super::forecast::{FlowForecast, refuse_too_large};
 use super::setup::{Setup, WakeSetup};
-use super::shared::agree;
 use super::wake::{Schedule, WakeRun};
 use super::writer::{DIVISIONS, Writer, growth_note};
 use super::{Begin, CaseFile, FlowCase, FlowOutcome, age_tau};
@@ -142,17 +141,17 @@ pub fn run_on(
     // Also of a run that failed: its last row is what one wants to see.
     let finished = writer.finish();
     let error = writer.error.take();
-    let summary = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
+    let is_complete = result.map_err(|e| error.unwrap_or(Error::Flow(e)))?;
     agree(ranks, finished)?;
-    if is_first && summary.is_complete {
+    if is_first && is_complete {
         observer.end();
     }
     let (files, warnings) = (writer.written, writer.warnings);
     let flow = run.flow();
     Ok(FlowOutcome {
-        steps: summary.steps,
-        time_s: summary.time_s,
-        is_complete: summary.is_complete,
+        steps: flow.steps(),
+        time_s: flow.time_s(),
+        is_complete,
         stepping: run.stepping(),
         kinetic_energy_m5_s2: flow.kinetic_energy_m5_s2(),
         relative_divergence: flow.relative_divergence(),

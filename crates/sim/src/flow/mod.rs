@@ -8,7 +8,6 @@
 //! key, value and what is allowed.
 
 mod case;
-mod examples;
 mod execute;
 mod files;
 mod forecast;
@@ -20,7 +19,6 @@ mod named;
 #[cfg(test)]
 mod ranks_tests;
 mod setup;
-mod shared;
 mod steps;
 mod text;
 #[cfg(test)]
@@ -31,13 +29,13 @@ mod wake;
 mod writer;
 
 pub use case::*;
-pub use examples::{EXAMPLES, example};
 pub use execute::{RunOptions, check_on, run, run_on};
 pub use files::FileForecast;
 pub use forecast::FlowForecast;
 pub use free::*;
 pub use kind::CaseKind;
 pub use named::*;
+pub use text::{EXAMPLES, example};
 #[cfg(feature = "plots")]
 pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};

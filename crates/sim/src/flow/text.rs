@@ -1,13 +1,27 @@
-//! The text of a case file: what it may say, with the defaults of its kind.
+//! The text of a case file: what it may say, with the defaults of its kind, and examples.
 
 use super::case::FlowCase;
-use super::examples::EXAMPLES;
 use super::kind::CaseKind;
 use crate::keys::{Document, Format, Key, SceneError, keys_of};
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::LazyLock;
 use toml::Table;
+
+macro_rules! examples {
+    ($($name:literal)*) => { [$(($name, include_str!(concat!("examples/", $name, ".toml")))),*] };
+}
+
+/// Names and texts of commented case files, one for each kind of flow, as `wakescope flow --example NAME` prints them.
+pub const EXAMPLES: [(&str, &str); 13] = examples![
+    "taylor_green_plane" "taylor_green" "poiseuille" "couette" "stokes_layer" "rayleigh_plate" "orr_sommerfeld" "dipole"
+    "lid_driven_cavity" "channel" "vortex_pair" "wake" "free"
+];
+
+/// The example of this name.
+pub fn example(name: &str) -> Option<&'static str> {
+    EXAMPLES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+}
 
 /// Values of keys that no example has.
 const MORE_EXAMPLES: &str = include_str!("more_examples.toml");

@@ -3,8 +3,7 @@
 //! Check: the tests of `flow` interrupt runs and compare the bytes.
 
 use super::CaseFile;
-use super::files::{CASE, Files, STEPS};
-use super::shared::agree;
+use super::files::{CASE, Files, STEPS, agree};
 use super::steps::StepTable;
 use super::wake::{HISTORIES, WakeRun};
 use crate::Error;

@@ -106,11 +106,6 @@ impl WakeMeter {
         self
     }
 
-    /// The scales of the pair.
-    pub fn scales(&self) -> &WakeScales {
-        &self.scales
-    }
-
     /// Radii of the circulation profile \[m\].
     pub fn radii_m(&self) -> Vec<f64> {
         (1..=PROFILE.0).map(|i| i as f64 * PROFILE.1 * self.scales.spacing_m).collect()

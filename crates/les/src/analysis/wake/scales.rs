@@ -41,6 +41,11 @@ impl WakeScales {
         self.circulation_m2_s / (TAU * self.spacing_m)
     }
 
+    /// `Gamma0/b0^2` \[1/s\].
+    pub fn vorticity_per_s(&self) -> f64 {
+        self.circulation_m2_s / self.spacing_m.powi(2)
+    }
+
     /// Time `b0/V0` in which `tau` grows by one \[s\].
     pub fn time_unit_s(&self) -> f64 {
         self.spacing_m / self.descent_speed_m_s()

@@ -136,17 +136,6 @@ pub struct Silent;
 
 impl RunObserver for Silent {}
 
-/// What a run did.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RunSummary {
-    /// Steps of the flow, those before a restart included.
-    pub steps: u64,
-    /// Time reached \[s\].
-    pub time_s: f64,
-    /// Whether that is the end, not a pause.
-    pub is_complete: bool,
-}
-
 /// Wall time that a run has spent in steps.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Stepping {
@@ -228,12 +217,12 @@ impl Run {
         &self.plan
     }
 
-    /// Runs to the end, or to the pause.
+    /// Runs to the end, or to the pause; returns whether it is the end.
     ///
     /// # Errors
     /// What [`Flow::step`] refuses, [`Error::EnergyGrew`], [`Error::StepTooShort`], [`Error::Stopped`] by the observer,
     /// [`Error::File`] for a checkpoint. The last good checkpoint stays as it was.
-    pub fn to_end(&mut self, observer: &mut dyn RunObserver) -> Result<RunSummary, Error> {
+    pub fn to_end(&mut self, observer: &mut dyn RunObserver) -> Result<bool, Error> {
         let (start_s, end_s) = (self.flow.time_s(), self.plan.end_s);
         // A fresh run gives the output of its start; a resumed one gave it before its checkpoint.
         let (was_fresh, begun_at) = (self.is_fresh, self.flow.steps());
@@ -271,7 +260,7 @@ impl Run {
         if was_fresh || self.flow.steps() > begun_at {
             self.write_checkpoint(observer)?;
         }
-        Ok(RunSummary { steps: self.flow.steps(), time_s: self.flow.time_s(), is_complete })
+        Ok(is_complete)
     }
 
     fn is_reached(&self, time_s: f64) -> bool {

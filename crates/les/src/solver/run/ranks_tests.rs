@@ -86,7 +86,7 @@ fn checkpoints_have_the_same_bytes_and_continue_on_any_other_number_of_ranks() {
 }
 
 /// The error of each rank, as words.
-fn words(found: Vec<Option<Result<RunSummary, Error>>>) -> Vec<String> {
+fn words(found: Vec<Option<Result<bool, Error>>>) -> Vec<String> {
     found.into_iter().map(|one| one.map_or("a panic".into(), |result| result.unwrap_err().to_string())).collect()
 }
 

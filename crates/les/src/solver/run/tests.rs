@@ -69,11 +69,11 @@ fn outputs_come_at_their_exact_times_and_steps_are_never_slivers() {
     ] {
         let mut run = Run::new(vortices(time_step, scheme), plan(0.5, &times_s)).unwrap();
         let mut witness = Witness::default();
-        let summary = run.to_end(&mut witness).unwrap();
+        let is_complete = run.to_end(&mut witness).unwrap();
         let expected: Vec<(usize, f64)> = times_s.iter().copied().enumerate().collect();
         assert_eq!(witness.outputs, expected);
-        assert_eq!((summary.time_s, summary.is_complete), (0.5, true));
-        assert_eq!(summary.steps, witness.records.len() as u64);
+        assert_eq!((run.flow().time_s(), is_complete), (0.5, true));
+        assert_eq!(run.flow().steps(), witness.records.len() as u64);
         let steps: Vec<f64> = witness.records.iter().map(|r| r.report.step_s).collect();
         let longest = steps.iter().copied().fold(0.0, f64::max);
         assert!(steps.iter().all(|&s| s > 0.2 * longest), "{steps:?}");
@@ -99,12 +99,12 @@ fn a_paused_and_resumed_run_gives_the_same_records_and_outputs_as_one_that_was_n
     for pause in 0..=total {
         let mut witness = Witness::default();
         let mut run = Run::new(flow(), with_checkpoint(Some(pause))).unwrap();
-        let summary = run.to_end(&mut witness).unwrap();
-        assert_eq!((summary.steps, summary.is_complete), (pause, pause == total));
+        let is_complete = run.to_end(&mut witness).unwrap();
+        assert_eq!((run.flow().steps(), is_complete), (pause, pause == total));
         let (mesh, settings) = (run.flow().mesh().clone(), run.flow().settings().clone());
         let (mut run, user_data) = Run::resume(&path, mesh, settings, with_checkpoint(None)).unwrap();
         assert_eq!(user_data, (pause as usize).to_le_bytes());
-        assert!(run.to_end(&mut witness).unwrap().is_complete);
+        assert!(run.to_end(&mut witness).unwrap());
         assert_eq!(witness, whole, "paused after step {pause}");
     }
 }
@@ -233,8 +233,9 @@ fn steady_forced_dragged_and_fading_flows_keep_within_the_energy_that_they_may_h
     for flow in flows {
         let settings = flow.settings().clone();
         let steps = RunPlan { pause_after_steps: Some(300), ..plan(1e6, &[]) };
-        let summary = Run::new(flow, steps).unwrap().to_end(&mut Silent);
-        assert_eq!(summary.unwrap_or_else(|e| panic!("{e}: {settings:?}")).steps, 300);
+        let mut run = Run::new(flow, steps).unwrap();
+        run.to_end(&mut Silent).unwrap_or_else(|e| panic!("{e}: {settings:?}"));
+        assert_eq!(run.flow().steps(), 300);
     }
 }
 
@@ -314,7 +315,7 @@ fn plans_that_cannot_be_carried_out_are_refused() {
     assert!(refused(plan(1.0, &[0.5, 1.5])).contains("output_times_s = 1.5"));
     let checkpoint = Some(CheckpointPlan { path: "unused".into(), every: Interval::Steps(0) });
     assert!(refused(RunPlan { checkpoint, ..plan(1.0, &[]) }).contains("checkpoint interval"));
-    assert_eq!(Run::new(vortices(courant(0.3), TimeScheme::default()), plan(0.0, &[])).unwrap().to_end(&mut Silent), {
-        Ok(RunSummary { steps: 0, time_s: 0.0, is_complete: true })
-    });
+    let mut run = Run::new(vortices(courant(0.3), TimeScheme::default()), plan(0.0, &[])).unwrap();
+    assert_eq!(run.to_end(&mut Silent), Ok(true));
+    assert_eq!((run.flow().steps(), run.flow().time_s()), (0, 0.0));
 }

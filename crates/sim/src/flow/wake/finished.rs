@@ -6,27 +6,25 @@ use super::super::kind::CaseKind;
 use super::super::{CaseFile, Subgrid};
 use super::case::WakeFlow;
 use crate::Error;
-use crate::io::Provenance;
 use crate::io::csv_input::TextTable;
 use std::collections::HashMap;
 use std::f64::consts::PI;
 use std::path::{Path, PathBuf};
+use wakescope_les::analysis::WakeScales;
 
 /// A finished run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FinishedWake {
     /// Where its files are.
     pub folder: PathBuf,
+    /// Its case.
+    pub file: CaseFile,
     /// The flow.
     pub flow: WakeFlow,
-    /// Which subgrid model it has, or none, in a word.
-    pub subgrid: &'static str,
-    /// The case as TOML.
-    pub case_toml: String,
+    /// The scales of its pair.
+    pub scales: WakeScales,
     /// Ages of the whole fields, in the order of the files.
     pub fields_tau: Vec<f64>,
-    /// Whom pictures of it name as their source.
-    pub origin: Provenance,
     columns: HashMap<String, Vec<f64>>,
 }
 
@@ -38,9 +36,10 @@ impl FinishedWake {
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let refuse = |reason: String| Error::Input { path: folder.to_owned(), reason };
         let file = CaseFile::read(&folder.join("case.toml"))?;
-        let (CaseKind::Wake(flow), Some(output)) = (file.case.case.clone(), &file.case.wake) else {
+        let (CaseKind::Wake(flow), Some(output)) = (&file.case.case, &file.case.wake) else {
             return Err(refuse("the case is no wake".into()));
         };
+        let (flow, output) = ((**flow).clone(), output.clone());
         let mut columns = table(&folder.join("wake.csv"))?;
         let scaled = folder.join("wake_scaled.csv");
         // Runs of earlier versions have all columns in one file.
@@ -49,16 +48,10 @@ impl FinishedWake {
         }
         let wake = Self {
             folder: folder.to_owned(),
-            flow: *flow,
-            subgrid: match file.case.solver.subgrid {
-                Subgrid::None {} => "no",
-                Subgrid::Smagorinsky { .. } => "Smagorinsky's",
-                Subgrid::Wale { .. } => "WALE as",
-                Subgrid::MultiscaleWale { .. } => "multiscale",
-            },
-            origin: file.provenance(),
-            case_toml: file.toml.clone(),
-            fields_tau: output.fields_tau.clone().unwrap_or_default(),
+            scales: flow.pair.scales().map_err(Error::Flow)?,
+            flow,
+            file,
+            fields_tau: output.fields_tau.unwrap_or_default(),
             columns,
         };
         let reached = wake.column("tau")?.last().copied().unwrap_or(0.0);
@@ -91,14 +84,17 @@ impl FinishedWake {
 
     /// The run in words, its noise among them.
     pub fn words(&self) -> String {
-        let [x, y, z] = self.flow.cells;
+        let WakeFlow { cells: [x, y, z], reynolds, core_radius, perturbation, .. } = self.flow;
+        let subgrid = match self.file.case.solver.subgrid {
+            Subgrid::None {} => "no",
+            Subgrid::Smagorinsky { .. } => "Smagorinsky's",
+            Subgrid::Wale { .. } => "WALE as",
+            Subgrid::MultiscaleWale { .. } => "multiscale",
+        };
+        let share = 25.0 * PI * core_radius;
         format!(
-            "simulated flow, {x} x {y} x {z} cells, {} subgrid model, Γ₀/ν = {}, core {} b₀ ({:.1} % of the span), noise {} V₀",
-            self.subgrid,
-            self.flow.reynolds,
-            self.flow.core_radius,
-            25.0 * PI * self.flow.core_radius,
-            self.flow.perturbation
+            "simulated flow, {x} x {y} x {z} cells, {subgrid} subgrid model, Γ₀/ν = {reynolds}, core {core_radius} b₀ ({share:.1} % of \
+             the span), noise {perturbation} V₀"
         )
     }
 }

@@ -13,8 +13,6 @@ mod output;
 mod pictures;
 mod preset;
 mod schedule;
-#[cfg(feature = "plots")]
-mod space;
 
 pub use case::{PairScale, WakeFlow, WakeProfile};
 pub use finished::{FinishedWake, table};
@@ -22,7 +20,7 @@ pub(super) use history::{HISTORIES, WakeRun};
 pub use output::WakeOutput;
 #[cfg(feature = "plots")]
 pub(super) use pictures::PICTURES;
+#[cfg(feature = "plots")]
+pub use pictures::REPEATS;
 pub use preset::WakePreset;
 pub(super) use schedule::{Due, Schedule};
-#[cfg(feature = "plots")]
-pub use space::REPEATS;
