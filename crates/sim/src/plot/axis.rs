@@ -75,22 +75,19 @@ fn back(log: bool, value: f64) -> f64 {
     if log { 10_f64.powf(value) } else { value }
 }
 
-/// A labelled tick of an axis.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Tick {
-    pub(crate) value: f64,
-    pub(crate) label: String,
-}
+/// The value of a tick of an axis, and its label.
+type Tick = (f64, String);
 
 /// An axis laid on the paper: values `range` at coordinates `paper`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Scale {
+pub(crate) struct Scale<'a> {
+    pub(crate) label: &'a str,
     pub(crate) range: (f64, f64),
     pub(crate) log: bool,
     pub(crate) paper: (f64, f64),
 }
 
-impl Scale {
+impl Scale<'_> {
     /// Coordinate of a value; NaN where it has none. Far outside it is held at a finite distance.
     pub(crate) fn place(&self, value: f64) -> f64 {
         if self.log && value <= 0.0 {
@@ -143,11 +140,11 @@ impl Scale {
                 false if factor == 1.0 => power("", e),
                 false => power(&format!("{factor}·"), e),
             };
-            Tick { value, label }
+            (value, label)
         };
         let decades = (first - 1..=last).filter(|e| e.rem_euclid(step) == 0);
         let all = decades.flat_map(|e| factors.iter().map(move |factor| (e, *factor)));
-        all.map(tick).filter(|tick| self.holds(tick.value)).collect()
+        all.map(tick).filter(|tick| self.holds(tick.0)).collect()
     }
 }
 
@@ -172,7 +169,7 @@ fn linear_ticks((low, high): (f64, f64), count: f64) -> Vec<Tick> {
         }
     };
     let (first, last) = ends(step);
-    (first as i64..=last as i64).map(|i| i as f64 * step).map(|value| Tick { value, label: label(value) }).collect()
+    (first as i64..=last as i64).map(|i| i as f64 * step).map(|value| (value, label(value))).collect()
 }
 
 /// A factor before a power of ten.
@@ -191,12 +188,12 @@ fn decimal(value: f64, digits: usize) -> String {
 mod tests {
     use super::*;
 
-    fn scale(range: (f64, f64), log: bool) -> Scale {
-        Scale { range, log, paper: (0.0, 600.0) }
+    fn scale(range: (f64, f64), log: bool) -> Scale<'static> {
+        Scale { label: "", range, log, paper: (0.0, 600.0) }
     }
 
     fn labels(range: (f64, f64), log: bool) -> Vec<String> {
-        scale(range, log).ticks(100.0).into_iter().map(|t| t.label).collect()
+        scale(range, log).ticks(100.0).into_iter().map(|t| t.1).collect()
     }
 
     #[test]
@@ -210,10 +207,10 @@ mod tests {
     #[test]
     fn even_a_low_panel_has_three_ticks() {
         for (low, high) in [(9.0, 11.0), (-3.7, 12.1), (0.02, 0.29), (-41.0, -39.5), (0.0, 0.99), (1e-3, 1.04e-3)] {
-            let low_panel = Scale { range: (low, high), log: false, paper: (0.0, 100.0) };
+            let low_panel = Scale { paper: (0.0, 100.0), ..scale((low, high), false) };
             let ticks = low_panel.ticks(48.0);
             assert!((3..=5).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
-            assert!(ticks.windows(2).all(|w| w[0].label != w[1].label), "{ticks:?}");
+            assert!(ticks.windows(2).all(|w| w[0].1 != w[1].1), "{ticks:?}");
         }
     }
 

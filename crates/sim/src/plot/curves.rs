@@ -4,7 +4,7 @@
 use super::axis::{Axis, Scale};
 use super::drawing::{Frame, Shape};
 use super::font::Font;
-use super::frame::{BOTTOM, Decor, LEFT, inner, top_room};
+use super::frame::{BOTTOM, LEFT, inner, panel, top_room};
 use super::legend;
 use super::series::{Series, Style, finite, pieces};
 use crate::io::{OutputResult, same_length};
@@ -79,8 +79,8 @@ impl CurvePlot {
         // A series without name has a colour, too.
         let mut named: Vec<(usize, &Series)> = self.coloured().collect();
         named.retain(|(_, series)| !series.label.is_empty());
-        let x = Scale { range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
-        let mut y = Scale { range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
+        let x = Scale { label: &self.x.label, range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
+        let mut y = Scale { label: &self.y.label, range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
         let (mut content, mut occupied) = self.content(&x, &y);
         let size = legend::size(&named, font);
         let (mut place, covered) = legend::place(frame, size, &occupied);
@@ -90,8 +90,7 @@ impl CurvePlot {
             (content, occupied) = self.content(&x, &y);
             place = legend::place(frame, size, &occupied).0;
         }
-        let decor = Decor { frame, x, y, x_label: &self.x.label, y_label: &self.y.label, title: &self.title };
-        decor.draw(content, font, out);
+        panel(&frame, [&x, &y], &self.title, content, font, out);
         if !named.is_empty() {
             legend::legend(&named, place, out);
         }
@@ -104,7 +103,7 @@ impl CurvePlot {
     }
 
     /// The curves on the paper, and where their ink is.
-    fn content(&self, x: &Scale, y: &Scale) -> (Vec<Shape>, Vec<(f64, f64)>) {
+    fn content(&self, x: &Scale<'_>, y: &Scale<'_>) -> (Vec<Shape>, Vec<(f64, f64)>) {
         let (mut content, mut occupied) = (Vec::new(), Vec::new());
         for (colour, series) in self.coloured() {
             let points: Vec<_> = series.points.iter().map(|p| (x.place(p.0), y.place(p.1))).collect();

@@ -25,12 +25,6 @@ pub enum Panel {
     Surfaces(IsosurfacePlot),
 }
 
-impl From<IsosurfacePlot> for Panel {
-    fn from(plot: IsosurfacePlot) -> Self {
-        Self::Surfaces(plot)
-    }
-}
-
 impl From<CurvePlot> for Panel {
     fn from(plot: CurvePlot) -> Self {
         Self::Curves(plot)

@@ -55,41 +55,35 @@ impl Side {
     }
 }
 
-/// Axes and title of one panel.
-pub(crate) struct Decor<'a> {
-    pub(crate) frame: Frame,
-    pub(crate) x: Scale,
-    pub(crate) y: Scale,
-    pub(crate) x_label: &'a str,
-    pub(crate) y_label: &'a str,
-    pub(crate) title: &'a str,
-}
-
-impl Decor<'_> {
-    /// The panel: its content over the grid, within the box.
-    pub(crate) fn draw(&self, content: Vec<Shape>, font: &Font, out: &mut Vec<Shape>) {
-        let f = &self.frame;
-        let across = |value: f64| [(self.x.place(value), f.top), (self.x.place(value), f.bottom())];
-        let along = |value: f64| [(f.left, self.y.place(value)), (f.right(), self.y.place(value))];
-        let ticks = |scale: &Scale, side: Side| scale.ticks(side.gap()).into_iter().map(|tick| tick.value);
-        let minor = self.x.minor_ticks().into_iter().map(across).chain(self.y.minor_ticks().into_iter().map(along));
-        let major = ticks(&self.x, Side::Bottom).map(across).chain(ticks(&self.y, Side::Left).map(along));
-        out.extend(minor.map(|line| Shape::line(line, FAINT_GRID, 1.0)));
-        out.extend(major.map(|line| Shape::line(line, GRID, 1.0)));
-        out.push(Shape::Clip { frame: *f, shapes: content });
-        out.push(Shape::line(f.outline(), INK, 1.2));
-        axis(Side::Bottom, &self.x, self.x_label, f, font, out);
-        axis(Side::Left, &self.y, self.y_label, f, font, out);
-        out.push(title((f.left + f.width / 2.0, f.top - 11.0), self.title, TITLE_SIZE));
-    }
+/// A panel: its content over the grid, within the box, with axes and title.
+pub(crate) fn panel(
+    f: &Frame,
+    [x, y]: [&Scale<'_>; 2],
+    text: &str,
+    content: Vec<Shape>,
+    font: &Font,
+    out: &mut Vec<Shape>,
+) {
+    let across = |value: f64| [(x.place(value), f.top), (x.place(value), f.bottom())];
+    let along = |value: f64| [(f.left, y.place(value)), (f.right(), y.place(value))];
+    let ticks = |scale: &Scale<'_>, side: Side| scale.ticks(side.gap()).into_iter().map(|tick| tick.0);
+    let minor = x.minor_ticks().into_iter().map(across).chain(y.minor_ticks().into_iter().map(along));
+    let major = ticks(x, Side::Bottom).map(across).chain(ticks(y, Side::Left).map(along));
+    out.extend(minor.map(|line| Shape::line(line, FAINT_GRID, 1.0)));
+    out.extend(major.map(|line| Shape::line(line, GRID, 1.0)));
+    out.push(Shape::Clip { frame: *f, shapes: content });
+    out.push(Shape::line(f.outline(), INK, 1.2));
+    axis(Side::Bottom, x, f, font, out);
+    axis(Side::Left, y, f, font, out);
+    out.push(title((f.left + f.width / 2.0, f.top - 11.0), text, TITLE_SIZE));
 }
 
 /// Ticks, their labels and the name of an axis at a side of a box.
-pub(crate) fn axis(side: Side, scale: &Scale, name: &str, f: &Frame, font: &Font, out: &mut Vec<Shape>) {
+pub(crate) fn axis(side: Side, scale: &Scale<'_>, f: &Frame, font: &Font, out: &mut Vec<Shape>) {
     let mut widest: f64 = 0.0;
-    for tick in scale.ticks(side.gap()) {
-        let at = scale.place(tick.value);
-        widest = widest.max(font.width(&tick.label, TICK_SIZE));
+    for (value, name) in scale.ticks(side.gap()) {
+        let at = scale.place(value);
+        widest = widest.max(font.width(&name, TICK_SIZE));
         let beyond = TICK_LENGTH + 4.0;
         let (from, to, label, anchor) = match side {
             Side::Bottom => ((at, f.bottom()), (0.0, 1.0), (at, f.bottom() + TICK_LENGTH + TICK_SIZE), Anchor::Middle),
@@ -97,7 +91,7 @@ pub(crate) fn axis(side: Side, scale: &Scale, name: &str, f: &Frame, font: &Font
             Side::Right => ((f.right(), at), (1.0, 0.0), (f.right() + beyond, at + HALF_HEIGHT), Anchor::Start),
         };
         out.push(Shape::line([from, (from.0 + TICK_LENGTH * to.0, from.1 + TICK_LENGTH * to.1)], INK, 1.2));
-        out.push(Shape::text(label, &tick.label, TICK_SIZE, anchor));
+        out.push(Shape::text(label, &name, TICK_SIZE, anchor));
     }
     let (middle, beyond) = ((f.left + f.width / 2.0, f.top + f.height / 2.0), TICK_LENGTH + widest);
     let at = match side {
@@ -106,7 +100,7 @@ pub(crate) fn axis(side: Side, scale: &Scale, name: &str, f: &Frame, font: &Font
         Side::Right => (f.right() + beyond + 24.0, middle.1),
     };
     let (upward, anchor) = (side != Side::Bottom, Anchor::Middle);
-    out.push(Shape::Text(Text { at, text: name.into(), size: LABEL_SIZE, anchor, upward, bold: false }));
+    out.push(Shape::Text(Text { at, text: scale.label.into(), size: LABEL_SIZE, anchor, upward, bold: false }));
 }
 
 /// A title, centred on the point.

@@ -173,11 +173,11 @@ impl IsosurfacePlot {
         let lamp: [f64; 3] =
             std::array::from_fn(|d| -0.75 * camera.into[d] + 0.55 * camera.up[d] - 0.37 * camera.right[d]);
         let mut met = [0.0; 4];
-        self.volume.cast(from_m, camera.into, levels, |crossing| {
-            let surface = &self.surfaces[crossing.level];
+        self.volume.cast(from_m, camera.into, levels, |_, level, normal| {
+            let surface = &self.surfaces[level];
             // Both sides of a surface are lit.
-            let facing = if dot(crossing.normal, camera.into) > 0.0 { -1.0 } else { 1.0 };
-            let lit = (facing * dot(crossing.normal, lamp)).max(0.0);
+            let facing = if dot(normal, camera.into) > 0.0 { -1.0 } else { 1.0 };
+            let lit = (facing * dot(normal, lamp)).max(0.0);
             let share = (1.0 - met[3]) * surface.opacity;
             for (sum, colour) in met.iter_mut().zip(surface.colour) {
                 let light = f64::from(colour) / 255.0 * (0.35 + 0.65 * lit) + 0.35 * lit.powi(30);
@@ -236,7 +236,7 @@ mod tests {
 
     #[test]
     fn a_panel_is_drawn_the_same_twice_and_wrong_surfaces_are_refused() {
-        let figure = |plot: IsosurfacePlot| Figure::stacked([Panel::from(plot)]);
+        let figure = |plot: IsosurfacePlot| Figure::stacked([Panel::Surfaces(plot)]);
         let good = figure(plot(&[(-0.5, [0, 0, 200], 0.5)]));
         assert_eq!(good.png(&example()).unwrap(), good.png(&example()).unwrap());
         assert!(good.svg(&example()).unwrap().contains("<image"));

@@ -6,7 +6,7 @@ use super::cells::Cells;
 use super::colour::{ColourMap, Rgb};
 use super::drawing::{Anchor, Frame, INK, Shape};
 use super::font::Font;
-use super::frame::{BOTTOM, Decor, LEFT, Side, TICK_SIZE, axis, inner, top_room};
+use super::frame::{BOTTOM, LEFT, Side, TICK_SIZE, axis, inner, panel, top_room};
 use super::png_file::pixels;
 use crate::io::{OutputError, OutputResult, Unit, VelocityMap};
 use crate::setup::beams::SweepMode;
@@ -128,29 +128,30 @@ impl MapPlot {
         }
         let frame = inner(cell, RIGHT, &self.title);
         let (y_m, z_m) = self.fitted(&frame);
-        let x = Scale { range: y_m, log: false, paper: (frame.left, frame.right()) };
-        let y = Scale { range: z_m, log: false, paper: (frame.bottom(), frame.top) };
-        let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
-        let mut content = vec![Shape::Image { frame, pixels: self.cells.pixels(y_m, z_m, size, &self.colours)? }];
         let [x_label, y_label] = match self.from_above {
             true => ["across the flight [m]", "along the flight [m]"],
-            false => {
-                let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
-                content.insert(0, Shape::area(ground.outline(), GROUND));
-                content.push(Shape::line([(frame.left, ground.top), (frame.right(), ground.top)], INK, 1.4));
-                ["distance [m]", "height [m]"]
-            }
+            false => ["distance [m]", "height [m]"],
         };
+        let scale = |label, range, paper| Scale { label, range, log: false, paper };
+        let x = scale(x_label, y_m, (frame.left, frame.right()));
+        let y = scale(y_label, z_m, (frame.bottom(), frame.top));
+        let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
+        let mut content = vec![Shape::Image { frame, pixels: self.cells.pixels(y_m, z_m, size, &self.colours)? }];
+        if !self.from_above {
+            let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
+            content.insert(0, Shape::area(ground.outline(), GROUND));
+            content.push(Shape::line([(frame.left, ground.top), (frame.right(), ground.top)], INK, 1.4));
+        }
         self.push_marks(&x, &y, &mut content);
-        Decor { frame, x, y, x_label, y_label, title: &self.title }.draw(content, font, out);
+        panel(&frame, [&x, &y], &self.title, content, font, out);
         let bar = Frame { left: frame.right() + 18.0, width: 18.0, ..frame };
         let rows = (0..BAR.1).map(|row| high - (f64::from(row) + 0.5) / f64::from(BAR.1) * (high - low));
         let rgba =
             rows.map(|value| self.colours.colour(value)).flat_map(|[r, g, b]| [r, g, b, 255].repeat(BAR.0 as usize));
         out.push(Shape::Image { frame: bar, pixels: pixels(BAR.0, BAR.1, rgba.collect())? });
         out.push(Shape::line(bar.outline(), INK, 1.2));
-        let scale = Scale { range: (low, high), log: false, paper: (bar.bottom(), bar.top) };
-        axis(Side::Right, &scale, &self.bar_label, &bar, font, out);
+        let scale = scale(&self.bar_label, (low, high), (bar.bottom(), bar.top));
+        axis(Side::Right, &scale, &bar, font, out);
         Ok(())
     }
 
@@ -163,7 +164,7 @@ impl MapPlot {
         ((y.0 - 0.5 * extra, y.1 + 0.5 * extra), (z.0, z.0 + unit * frame.height))
     }
 
-    fn push_marks(&self, x: &Scale, y: &Scale, out: &mut Vec<Shape>) {
+    fn push_marks(&self, x: &Scale<'_>, y: &Scale<'_>, out: &mut Vec<Shape>) {
         if let Some(lidar_m) = self.shown_lidar_m() {
             // A tripod on the ground, large enough to be seen when the telescope is low.
             let (at, ground) = (x.place(lidar_m.0), y.place(0.0));

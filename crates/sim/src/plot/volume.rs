@@ -17,17 +17,6 @@ pub struct Volume {
     pub values: Vec<f32>,
 }
 
-/// What a ray meets.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Crossing {
-    /// Distance along the ray \[m\].
-    pub(crate) at_m: f64,
-    /// Which of the levels.
-    pub(crate) level: usize,
-    /// Unit normal, down the gradient.
-    pub(crate) normal: [f64; 3],
-}
-
 /// Steps of a ray through a cell: along it the interpolant is a polynomial of third degree.
 const STEPS: u32 = 4;
 const BISECTIONS: usize = 10;
@@ -104,13 +93,14 @@ impl Volume {
         (span.0 < span.1).then_some(span)
     }
 
-    /// Calls `met` for each crossing of a level along the ray, in order, until it returns false.
+    /// Calls `met` for each crossing of a level along the ray, in order, until it returns false: with its distance along the ray \[m\],
+    /// the number of the level, and the unit normal of the surface, down the gradient.
     pub(crate) fn cast(
         &self,
         from_m: [f64; 3],
         along: [f64; 3],
         levels: &[f64],
-        mut met: impl FnMut(Crossing) -> bool,
+        mut met: impl FnMut(f64, usize, [f64; 3]) -> bool,
     ) {
         let Some((mut start, end)) = self.span_m(from_m, along) else { return };
         let on_ray = |t: f64| [0, 1, 2].map(|d| from_m[d] + t * along[d]);
@@ -128,7 +118,7 @@ impl Volume {
             let is_crossed = |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
             if levels.iter().any(is_crossed) {
                 for (at_m, level) in self.crossings(cell, on_ray, (start, leaves.0), levels) {
-                    if !met(Crossing { at_m, level, normal: self.normal(on_ray(at_m)) }) {
+                    if !met(at_m, level, self.normal(on_ray(at_m))) {
                         return;
                     }
                 }
@@ -231,17 +221,17 @@ pub(crate) mod tests {
         let along = [0.6, 0.48, -0.64];
         let from = [-1.8 + 0.1, -1.44, 1.92];
         let mut met = Vec::new();
-        volume.cast(from, along, &[-0.5, -0.8], |crossing| {
-            met.push(crossing);
+        volume.cast(from, along, &[-0.5, -0.8], |at_m, level, normal| {
+            met.push((at_m, level, normal));
             true
         });
-        assert_eq!(met.iter().map(|c| c.level).collect::<Vec<_>>(), [1, 0, 0, 1]);
-        for crossing in met {
-            let radius = [0.5, 0.8][crossing.level];
-            let at: Vec<f64> = (0..3).map(|d| from[d] + crossing.at_m * along[d]).collect();
+        assert_eq!(met.iter().map(|c| c.1).collect::<Vec<_>>(), [1, 0, 0, 1]);
+        for (at_m, level, normal) in met {
+            let radius = [0.5, 0.8][level];
+            let at: Vec<f64> = (0..3).map(|d| from[d] + at_m * along[d]).collect();
             let distance = at.iter().map(|a| a * a).sum::<f64>().sqrt();
             assert!((distance - radius).abs() < 1e-3, "{distance} for {radius}");
-            let cosine: f64 = (0..3).map(|d| crossing.normal[d] * at[d] / distance).sum();
+            let cosine: f64 = (0..3).map(|d| normal[d] * at[d] / distance).sum();
             assert!(cosine > 0.999, "{cosine}");
         }
     }
@@ -257,8 +247,8 @@ pub(crate) mod tests {
             let along = [a / length, b / length, if ray % 2 == 0 { 1.0 } else { -1.0 } / length];
             let from = [c, -a, 0.3 * b];
             let mut met = Vec::new();
-            volume.cast(from, along, &levels, |crossing| {
-                met.push((crossing.level, crossing.at_m));
+            volume.cast(from, along, &levels, |at_m, level, _| {
+                met.push((level, at_m));
                 true
             });
             let Some((start, end)) = volume.span_m(from, along) else {

@@ -8,7 +8,7 @@ use crate::Error;
 use crate::io::fields_input::{FieldPlace, read_scalar};
 use crate::io::{CrossPlanes, FileGroup, planes_input};
 use crate::plot::{
-    Axis, Cells, ColourMap, CurvePlot, Figure, IsosurfacePlot, MapPlot, Series, Style, Surface, Volume, apng,
+    Axis, Cells, ColourMap, CurvePlot, Figure, IsosurfacePlot, MapPlot, Panel, Series, Style, Surface, Volume, apng,
 };
 use std::path::PathBuf;
 use wakescope_les::VortexPair;
@@ -126,12 +126,12 @@ impl FinishedWake {
             let in_b0 = |axis: Vec<f64>| axis.into_iter().map(|a| a / scales.spacing_m).collect();
             let volume = Volume::new([repeated, in_b0(y), in_b0(z)], values)?;
             let surface = |level: f64, colour, opacity| Surface { level, colour, opacity };
-            panels.push(IsosurfacePlot {
+            panels.push(Panel::Surfaces(IsosurfacePlot {
                 title: format!("τ = {tau}"),
                 volume,
                 surfaces: vec![surface(1.0, [120, 170, 215], 0.35), surface(10.0, [200, 60, 40], 1.0)],
                 view_rad: [-0.55, 0.35],
-            });
+            }));
         }
         if panels.is_empty() {
             return Ok(None);
