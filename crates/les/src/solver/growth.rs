@@ -54,6 +54,7 @@ pub struct UndampedGrowth {
 #[derive(Debug, Clone)]
 pub struct Stability {
     scheme: TimeScheme,
+    time_step: TimeStep,
     transport: [f64; 3],
     viscosity_m2_s: f64,
     cells: Vec<Carrying>,
@@ -94,16 +95,16 @@ impl Stability {
             }
         }
         let transport = TRANSPORT[usize::from(sticks)];
-        let nu = settings.viscosity_m2_s;
-        let stiffness = Stiffness::new(viscous_rates_per_s(mesh, nu), implicit);
+        let &FlowSettings { scheme, time_step, viscosity_m2_s, .. } = settings;
+        let stiffness = Stiffness::new(viscous_rates_per_s(mesh, viscosity_m2_s), implicit);
         let explicit_up_to_s = explicit_up_to_s(mesh, settings);
-        Self { scheme: settings.scheme, transport, viscosity_m2_s: nu, cells, implicit, explicit_up_to_s, stiffness }
+        Self { scheme, time_step, transport, viscosity_m2_s, cells, implicit, explicit_up_to_s, stiffness }
     }
 
-    /// Length of the first step that `time_step` gives, or of the longest if the flow starts from rest \[s\].
-    pub fn first_step_s(&self, time_step: TimeStep) -> f64 {
-        let step_s = time_step.step_s(self.courant_per_s());
-        if matches!(time_step, TimeStep::Fixed { .. }) { step_s } else { step_s.min(self.stiffness.longest_s()) }
+    /// Length of the first step, or of the longest if the flow starts from rest \[s\].
+    pub fn first_step_s(&self) -> f64 {
+        let step_s = self.time_step.step_s(self.courant_per_s());
+        if matches!(self.time_step, TimeStep::Fixed { .. }) { step_s } else { step_s.min(self.stiffness.longest_s()) }
     }
 
     /// Whether steps of `step_s` are too long for implicit viscosity, in a sentence.

@@ -11,32 +11,33 @@ use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::sweep::Retrieval;
 
-/// A figure that a run writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Figure {
-    /// Efficiency in the middle of the scan.
-    Efficiency,
-    /// Root mean square over the map of the mean error against the velocity weighted with pulse and window, noise taken off.
-    Bias,
-    /// Standard deviation of one estimate, over the map.
-    Std,
-    /// Root mean square error, over the map.
-    Rms,
-    /// Wind along x of a VAD or DBS scan, averaged over sweeps and ranges, over the wind speed.
-    U,
-    /// Wind along y.
-    V,
-    /// Wind along z.
-    W,
-    /// Circulation fitted to each map; of a simulated wake that of its history.
-    Circulation,
-    /// Height of the vortices of a simulated wake.
-    Height,
-    /// Kinetic energy of a flow.
-    Energy,
-    /// What viscosity and subgrid model take from it.
-    Dissipation,
+crate::keys::keys! {
+    /// A figure that a run writes.
+    #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
+    choice Figure {
+        /// Efficiency in the middle of the scan.
+        Efficiency = "efficiency",
+        /// Root mean square over the map of the mean error against the velocity weighted with pulse and window, noise taken off.
+        Bias = "bias",
+        /// Standard deviation of one estimate, over the map.
+        Std = "std",
+        /// Root mean square error, over the map.
+        Rms = "rms",
+        /// Wind along x of a VAD or DBS scan, averaged over sweeps and ranges, over the wind speed.
+        U = "u",
+        /// Wind along y.
+        V = "v",
+        /// Wind along z.
+        W = "w",
+        /// Circulation fitted to each map; of a simulated wake that of its history.
+        Circulation = "circulation",
+        /// Height of the vortices of a simulated wake.
+        Height = "height",
+        /// Kinetic energy of a flow.
+        Energy = "energy",
+        /// What viscosity and subgrid model take from it.
+        Dissipation = "dissipation",
+    }
 }
 
 impl Figure {
@@ -45,14 +46,6 @@ impl Figure {
         use Figure::*;
         [Efficiency, Bias, Std, Rms, U, V, W, Circulation, Height, Energy, Dissipation]
     };
-
-    /// Its word on the command line and in tables.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        const NAMES: [&str; 11] =
-            ["efficiency", "bias", "std", "rms", "u", "v", "w", "circulation", "height", "energy", "dissipation"];
-        NAMES[self as usize]
-    }
 }
 
 /// A relative shift and its standard error.

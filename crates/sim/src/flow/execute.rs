@@ -232,7 +232,7 @@ pub(super) fn prepare(
 /// Refuses a step that the run would refuse at its start.
 fn refuse_unstable(file: &CaseFile, setup: &Setup) -> Result<(), Error> {
     let stability = setup.stability();
-    let step_s = setup.first_step_s(&stability);
+    let step_s = stability.first_step_s();
     let Some(limit) = stability.refused(step_s) else { return Ok(()) };
     let allowed = |most: f64| {
         format!(

@@ -60,7 +60,7 @@ impl FlowForecast {
         let case = &file.case;
         let dense = setup.settings.pressure.dense_directions(&setup.mesh);
         let stability = setup.stability();
-        let step_s = setup.first_step_s(&stability).min(plan.end_s);
+        let step_s = stability.first_step_s().min(plan.end_s);
         let to_end = steps_to(plan.end_s, step_s, setup).ceil();
         let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
         let cells = setup.mesh.cells();

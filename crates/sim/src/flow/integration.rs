@@ -21,7 +21,7 @@ impl Setup {
                 setup.integrate(case, setup.settings.scheme);
                 // What a model will take is not known at the start.
                 let stability = setup.stability();
-                setup.undamped = stability.undamped(setup.first_step_s(&stability));
+                setup.undamped = stability.undamped(stability.first_step_s());
                 if setup.undamped.is_some() {
                     setup.integrate(case, TimeScheme::RungeKutta3);
                 }

@@ -122,9 +122,8 @@ impl CaseFile {
     pub fn with_seed(&self, seed: u64) -> Result<Self, SceneError> {
         let mut case = self.case.clone();
         let CaseKind::Wake(wake) = &mut case.case else {
-            let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"".into();
-            let problem = Problem { key: "--seed".into(), value: seed.to_string(), allowed };
-            return Err(self.source.refused(vec![problem]));
+            let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"";
+            return Err(self.refuse_word("--seed", &seed.to_string(), allowed.into()));
         };
         wake.seed = Some(seed);
         Ok(Self::of(case, self.source.clone()))

@@ -38,11 +38,6 @@ impl Setup {
         Stability::of(&self.mesh, &self.settings, self.initial_velocity())
     }
 
-    /// Length of the first step, or of the longest if the flow starts from rest \[s\].
-    pub(super) fn first_step_s(&self, stability: &Stability) -> f64 {
-        stability.first_step_s(self.settings.time_step)
-    }
-
     /// Velocity of the initial field in the cell of the indices along x, y, z: at its centre, or at its low faces.
     pub(super) fn initial_velocity(&self) -> impl Fn([usize; 3]) -> [f64; 3] + Sync {
         let centre_m = [0, 1, 2].map(|axis| self.mesh.centre_m(axis));
