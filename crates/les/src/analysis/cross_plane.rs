@@ -142,7 +142,7 @@ fn nodes(direction: &Direction, centre_m: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::mesh::Mapping;
+    use crate::solver::mesh::Spread;
     use crate::solver::settings::{FlowSettings, TimeStep};
     use crate::winds::Wind;
     use std::f64::consts::TAU;
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn an_analytic_flow_on_a_stretched_mesh_is_sampled_with_the_order_of_the_kernel() {
         let error = |n: usize| {
-            let sine = |a| Direction::periodic(n, 0.0, TAU).stretched(Mapping::Sine { amplitude: a });
+            let sine = |a| Direction::periodic(n, 0.0, TAU).stretched(Spread::Sine.by(a));
             let flow = start(Direction::periodic(n, 0.0, TAU), sine(0.4), sine(-0.3), beltrami);
             let mut worst = 0.0_f64;
             for i in 0..9_u8 {
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn walls_of_the_mesh_are_walls_of_the_wind() {
         let belt = Wall::NoSlip { velocity_m_s: [0.3, 0.5, 0.0] };
-        let mapping = Mapping::TanhLow { strength: 1.0 };
+        let mapping = Spread::TanhLow.by(1.0);
         let flow = start(
             Direction::between(8, 0.0, 1.0, Wall::Slip, Wall::Slip),
             Direction::periodic(8, 0.0, 1.0),

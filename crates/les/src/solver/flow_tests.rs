@@ -1,6 +1,6 @@
 //! The discrete conservation laws, exact solutions and orders of the time step.
 
-use super::super::mesh::{Direction, Ends, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Ends, Mapping, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::*;
 
@@ -51,10 +51,12 @@ fn production(flow: &Flow) -> (f64, [f64; 3]) {
 
 #[test]
 fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_without_walls() {
-    let sine = |n, a| Direction::periodic(n, 0.0, 1.0).stretched(Mapping::Sine { amplitude: a });
-    let cluster = |n, strength, place| Direction::periodic(n, 0.0, 1.0).stretched(Mapping::Cluster { strength, place });
+    let sine = |n, a| Direction::periodic(n, 0.0, 1.0).stretched(Spread::Sine.by(a));
+    let cluster = |n, strength, place| {
+        Direction::periodic(n, 0.0, 1.0).stretched(Mapping { place, ..Spread::Cluster.by(strength) })
+    };
     let walls = |n, low, high, mapping| Direction::between(n, 0.0, 1.0, low, high).stretched(mapping);
-    let tanh = Mapping::TanhBoth { strength: 1.2 };
+    let tanh = Spread::TanhBoth.by(1.2);
     let meshes = [
         [sine(16, 0.5), sine(14, 0.4), sine(15, 0.3)],
         [cluster(16, 0.8, 0.5), cluster(21, 0.6, 0.1), sine(15, 0.3)],
@@ -64,9 +66,9 @@ fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_witho
             walls(18, Wall::AT_REST, Wall::AT_REST, tanh.clone()),
         ],
         [
-            walls(17, Wall::AT_REST, Wall::Slip, Mapping::TanhLow { strength: 1.0 }),
+            walls(17, Wall::AT_REST, Wall::Slip, Spread::TanhLow.by(1.0)),
             sine(11, 0.0),
-            walls(16, Wall::AT_REST, Wall::AT_REST, Mapping::Uniform),
+            walls(16, Wall::AT_REST, Wall::AT_REST, Mapping::default()),
         ],
         [
             walls(16, Wall::AT_REST, Wall::AT_REST, tanh.clone()),
@@ -95,8 +97,8 @@ fn flows_that_do_not_vary_along_x_are_plane_flows_bit_for_bit() {
     for scheme in [TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3] {
         let run = |x: Direction| {
             let z = Direction::between(16, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST);
-            let y = Direction::periodic(12, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.2 });
-            let mesh = Mesh::new(x, y, z.stretched(Mapping::TanhBoth { strength: 1.0 })).unwrap();
+            let y = Direction::periodic(12, 0.0, 1.0).stretched(Spread::Sine.by(0.2));
+            let mesh = Mesh::new(x, y, z.stretched(Spread::TanhBoth.by(1.0))).unwrap();
             let mut settings = FlowSettings::new(1e-3, TimeStep::Fixed { step_s: 0.01 });
             settings.scheme = scheme;
             let field = |[_, y, z]: [f64; 3]| {

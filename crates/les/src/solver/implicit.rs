@@ -175,15 +175,15 @@ fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize)
 #[cfg(test)]
 mod tests {
     use super::super::layout::Layout;
-    use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+    use super::super::mesh::{Direction, Mesh, Spread, Wall};
     use super::*;
 
     #[test]
     fn solutions_satisfy_the_explicit_operator_on_every_axis_and_kind_of_end() {
         let a_m2 = 0.02;
         let kinds = [
-            Direction::periodic(20, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.5 }),
-            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 }),
+            Direction::periodic(20, 0.0, 1.0).stretched(Spread::Sine.by(0.5)),
+            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5)),
             Direction::between(18, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST),
         ];
         for shift in 0..3 {

@@ -88,7 +88,7 @@ fn order(mesh: &Mesh) -> [usize; 3] {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::{Direction, Mapping};
+    use super::super::mesh::{Direction, Spread};
     use super::*;
 
     #[test]
@@ -97,7 +97,7 @@ mod tests {
         let order = |nx, ny, nz| Layout::new(&Mesh::new(d(nx), d(ny), d(nz)).unwrap()).direction;
         assert_eq!(order(8, 16, 32), [1, 0, 2]);
         assert_eq!(order(16, 16, 32), [0, 1, 2]);
-        let sine = d(16).stretched(Mapping::Sine { amplitude: 0.3 });
+        let sine = d(16).stretched(Spread::Sine.by(0.3));
         for y in [Direction::between(16, 0.0, 1.0, Wall::Slip, Wall::Slip), sine] {
             assert_eq!(Layout::new(&Mesh::new(d(8), y, d(32)).unwrap()).direction, [0, 1, 2]);
         }

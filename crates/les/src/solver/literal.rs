@@ -44,16 +44,16 @@ pub(crate) fn literal_convection(layout: &Layout, velocity: [&[f64]; 3], a: usiz
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+    use super::super::mesh::{Direction, Mesh, Spread, Wall};
     use super::super::momentum::{Momentum, Scratch};
     use super::*;
 
     /// Meshes of all kinds: periodic and bounded, equal and stretched, thin, in both orders of memory.
     fn layouts() -> Vec<Layout> {
         let waves = |n| Direction::periodic(n, 0.0, 1.3);
-        let sine = |n| waves(n).stretched(Mapping::Sine { amplitude: 0.25 });
+        let sine = |n| waves(n).stretched(Spread::Sine.by(0.25));
         let slip = |n| Direction::between(n, 0.0, 0.9, Wall::Slip, Wall::Slip);
-        let tanh = |strength| Mapping::TanhLow { strength };
+        let tanh = |strength| Spread::TanhLow.by(strength);
         let ground = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(tanh(1.5));
         let closed = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::AT_REST);
         let meshes = [

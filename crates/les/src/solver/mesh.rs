@@ -6,7 +6,7 @@
 //!
 //! Check: metrics against finite differences of the positions; refusal of folds and of jumps between neighbouring cells.
 
-pub use super::mapping::{Mapping, MappingFn};
+pub use super::mapping::{Mapping, MappingFn, Spread};
 use crate::Error;
 pub(crate) use crate::winds::axis::AXIS_NAMES;
 use crate::winds::axis::{self, jump_at};
@@ -78,12 +78,12 @@ pub struct Direction {
 impl Direction {
     /// Equal cells from `low_m` to `high_m` \[m\], periodic.
     pub fn periodic(cells: usize, low_m: f64, high_m: f64) -> Self {
-        Self { cells, low_m, high_m, mapping: Mapping::Uniform, ends: Ends::Periodic }
+        Self { cells, low_m, high_m, mapping: Mapping::default(), ends: Ends::Periodic }
     }
 
     /// Equal cells from `low_m` to `high_m` \[m\] between two planes.
     pub fn between(cells: usize, low_m: f64, high_m: f64, low: Wall, high: Wall) -> Self {
-        Self { cells, low_m, high_m, mapping: Mapping::Uniform, ends: Ends::Walls { low, high } }
+        Self { cells, low_m, high_m, mapping: Mapping::default(), ends: Ends::Walls { low, high } }
     }
 
     /// One cell of the given length \[m\] in which nothing varies: the third direction of a plane flow.
@@ -113,17 +113,16 @@ impl Direction {
         if !(self.low_m.is_finite() && self.high_m.is_finite() && self.length_m() > 0.0) {
             return bad("high_m - low_m", self.length_m(), "finite and positive");
         }
-        if let Some((what, value)) = self.mapping.parameter() {
-            let sine = matches!(self.mapping, Mapping::Sine { .. });
-            let fine = if sine { value.abs() < 1.0 } else { value > 0.0 && value <= 20.0 };
-            if !fine {
-                return bad(what, value, if sine { "between -1 and 1" } else { "above 0 and at most 20" });
+        let Mapping { spread, strength, place, .. } = self.mapping;
+        match spread {
+            Spread::Uniform => {}
+            Spread::Sine if strength.abs() < 1.0 => {}
+            Spread::Sine => return bad("amplitude", strength, "between -1 and 1"),
+            _ if !(strength > 0.0 && strength <= 20.0) => return bad("strength", strength, "above 0 and at most 20"),
+            Spread::Cluster if !(0.0..=1.0).contains(&place) => {
+                return bad("place", place, "a fraction of the length, 0 to 1");
             }
-        }
-        if let Mapping::Cluster { place, .. } = self.mapping
-            && !(0.0..=1.0).contains(&place)
-        {
-            return bad("place", place, "a fraction of the length, 0 to 1");
+            _ => {}
         }
         self.check_cells(axis)?;
         self.check_spacing(axis)?;
@@ -227,15 +226,15 @@ mod tests {
     fn all() -> Vec<Mapping> {
         let custom: MappingFn = Arc::new(|s| (0.5 * (s + s * s), 0.5 + s));
         vec![
-            Mapping::Uniform,
-            Mapping::Sine { amplitude: 0.7 },
-            Mapping::TanhLow { strength: 1.5 },
-            Mapping::TanhHigh { strength: 2.5 },
-            Mapping::TanhBoth { strength: 2.0 },
-            Mapping::SinhMiddle { strength: 3.0 },
-            Mapping::Cluster { strength: 0.8, place: 0.5 },
-            Mapping::Cluster { strength: 1.2, place: 0.15 },
-            Mapping::Custom(custom),
+            Mapping::default(),
+            Spread::Sine.by(0.7),
+            Spread::TanhLow.by(1.5),
+            Spread::TanhHigh.by(2.5),
+            Spread::TanhBoth.by(2.0),
+            Spread::SinhMiddle.by(3.0),
+            Mapping { place: 0.5, ..Spread::Cluster.by(0.8) },
+            Mapping { place: 0.15, ..Spread::Cluster.by(1.2) },
+            Mapping { custom: Some(custom), ..Mapping::default() },
         ]
     }
 
@@ -256,7 +255,8 @@ mod tests {
     #[test]
     fn a_cluster_is_finest_at_its_place_and_repeats_itself() {
         for (strength, place) in [(0.5, 0.5), (1.0, 0.2), (1.5, 0.0), (0.7, 0.93)] {
-            let direction = Direction::periodic(200, 0.0, 1.0).stretched(Mapping::Cluster { strength, place });
+            let direction =
+                Direction::periodic(200, 0.0, 1.0).stretched(Mapping { place, ..Spread::Cluster.by(strength) });
             direction.check(1).unwrap();
             let finest = (0..200).min_by(|&i, &j| {
                 let h = |i: usize| direction.at(i as f64 + 0.5).1;
@@ -277,20 +277,22 @@ mod tests {
     fn folds_jumps_and_too_few_cells_are_refused() {
         let fold: MappingFn = Arc::new(|s| (2.0 * s * s - s, 4.0 * s - 1.0));
         let refused = |d: Direction| Mesh::new(Direction::thin(1.0), d, Direction::thin(1.0)).unwrap_err().to_string();
-        let message = refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping::Custom(fold)));
+        let message =
+            refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping { custom: Some(fold), ..Mapping::default() }));
         assert!(message.contains("metric"), "{message}");
-        let message = refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping::TanhLow { strength: 4.0 }));
+        let message = refused(Direction::periodic(8, 0.0, 1.0).stretched(Spread::TanhLow.by(4.0)));
         assert!(message.contains("differ by a factor"), "{message}");
-        let message = refused(Direction::periodic(64, 0.0, 1.0).stretched(Mapping::TanhLow { strength: 1.0 }));
+        let message = refused(Direction::periodic(64, 0.0, 1.0).stretched(Spread::TanhLow.by(1.0)));
         assert!(message.contains("periodic direction takes"), "{message}");
-        let cluster =
-            |strength, place| Direction::periodic(64, 0.0, 1.0).stretched(Mapping::Cluster { strength, place });
+        let cluster = |strength, place| {
+            Direction::periodic(64, 0.0, 1.0).stretched(Mapping { place, ..Spread::Cluster.by(strength) })
+        };
         assert!(refused(cluster(1.0, 1.5)).contains("place = 1.5"));
         assert!(refused(cluster(0.0, 0.5)).contains("above 0"));
         assert!(refused(Direction::periodic(3, 0.0, 1.0)).contains("at least 4"));
         assert!(refused(Direction::between(15, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST)).contains("at least 16"));
         assert!(refused(Direction::periodic(8, 1.0, 1.0)).contains("positive"));
-        assert!(refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 1.0 })).contains("-1"));
+        assert!(refused(Direction::periodic(8, 0.0, 1.0).stretched(Spread::Sine.by(1.0))).contains("-1"));
         let blowing = Wall::NoSlip { velocity_m_s: [0.0, 0.1, 0.0] };
         assert!(refused(Direction::between(32, 0.0, 1.0, blowing, Wall::Slip)).contains("across"));
     }

@@ -41,7 +41,7 @@ mod transport;
 pub use checkpoint::check_checkpoint;
 pub use flow::Flow;
 pub use growth::{Stability, UndampedGrowth};
-pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Wall};
+pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Spread, Wall};
 pub use pressure::PressureMethod;
 pub use report::{StartReport, StepReport};
 pub use run::{

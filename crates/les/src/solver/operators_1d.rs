@@ -241,7 +241,7 @@ pub(crate) fn resolve_cell(n: usize, ends: Ends, index: isize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::{Mapping, Wall};
+    use super::super::mesh::{Mapping, Spread, Wall};
     use super::*;
 
     fn apply(rows: &[Taps], x: &[f64]) -> Vec<f64> {
@@ -253,13 +253,13 @@ mod tests {
     }
 
     fn every_kind() -> Vec<Direction> {
-        let tanh = Mapping::TanhBoth { strength: 2.0 };
+        let tanh = Spread::TanhBoth.by(2.0);
         vec![
-            Direction::periodic(24, 0.0, 2.0).stretched(Mapping::Sine { amplitude: 0.5 }),
+            Direction::periodic(24, 0.0, 2.0).stretched(Spread::Sine.by(0.5)),
             walls(24),
             walls(25).stretched(tanh.clone()),
             Direction::between(24, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(tanh),
-            Direction::between(24, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 }),
+            Direction::between(24, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5)),
         ]
     }
 
@@ -340,18 +340,18 @@ mod tests {
 
     #[test]
     fn laplacians_are_of_fourth_order_on_stretched_meshes() {
-        let sine = Mapping::Sine { amplitude: 0.5 };
-        let tanh = Mapping::TanhBoth { strength: 1.5 };
-        let cluster = Mapping::Cluster { strength: 0.7, place: 0.3 };
+        let sine = Spread::Sine.by(0.5);
+        let tanh = Spread::TanhBoth.by(1.5);
+        let cluster = Mapping { place: 0.3, ..Spread::Cluster.by(0.7) };
         for make in [
             |n, m| Direction::periodic(n, 0.0, 2.0).stretched(m),
             |n, m| Direction::between(n, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(m),
         ] {
             for mapping in [sine.clone(), tanh.clone(), cluster.clone()] {
-                let periodic = make(8, Mapping::Uniform).ends == Ends::Periodic;
-                let fits = match mapping {
-                    Mapping::TanhBoth { .. } => !periodic,
-                    Mapping::Cluster { .. } => periodic,
+                let periodic = make(8, Mapping::default()).ends == Ends::Periodic;
+                let fits = match mapping.spread {
+                    Spread::TanhBoth => !periodic,
+                    Spread::Cluster => periodic,
                     _ => true,
                 };
                 if !fits {

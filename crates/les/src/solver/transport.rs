@@ -232,15 +232,14 @@ mod wall_closure_tests;
 
 #[cfg(test)]
 mod tests {
-    use super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::mesh::{Direction, Spread, Wall};
     use super::*;
 
     fn kinds() -> Vec<Direction> {
         vec![
-            Direction::periodic(20, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.4 }),
-            Direction::between(20, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST)
-                .stretched(Mapping::TanhBoth { strength: 1.5 }),
-            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 }),
+            Direction::periodic(20, 0.0, 1.0).stretched(Spread::Sine.by(0.4)),
+            Direction::between(20, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST).stretched(Spread::TanhBoth.by(1.5)),
+            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5)),
             Direction::between(19, 0.0, 1.0, Wall::Slip, Wall::Slip),
         ]
     }

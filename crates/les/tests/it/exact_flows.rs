@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use wakescope_les::cases::{self, Case, TollmienSchlichting};
-use wakescope_les::{Direction, Flow, FlowSettings, Mapping, Mesh, TimeScheme, TimeStep};
+use wakescope_les::{Direction, Flow, FlowSettings, Mapping, Mesh, Spread, TimeScheme, TimeStep};
 
 fn run(case: &Case, steps: usize) -> Flow {
     let (mut flow, _) = case.start().unwrap();
@@ -128,7 +128,7 @@ fn plane_vortices_converge_with_fourth_order_on_periodic_directions_refined_abou
     let nu = 0.01;
     let error = |n: usize, step_s: f64, steps: usize| {
         let mut case = cases::taylor_green_plane(n, [0.0; 2], nu, step_s).unwrap();
-        let cluster = |strength, place| Mapping::Cluster { strength, place };
+        let cluster = |strength, place| Mapping { place, ..Spread::Cluster.by(strength) };
         let [x, y, z] = case.mesh.directions().clone();
         case.mesh = Mesh::new(x, y.stretched(cluster(0.5, 0.5)), z.stretched(cluster(0.4, 0.15))).unwrap();
         case.settings.scheme = TimeScheme::RungeKutta3;
@@ -173,7 +173,7 @@ fn without_viscosity_the_energy_error_falls_with_the_cube_of_the_step() {
     // Vortices that a mean flow carries along: their speed of change is steady, so that the error accumulates steadily. (In
     // a flow whose acceleration changes, the energy also differs by an amount of second order that does not accumulate.)
     let drift = |steps: usize| {
-        let direction = |a: f64| Direction::periodic(32, 0.0, 1.0).stretched(Mapping::Sine { amplitude: a });
+        let direction = |a: f64| Direction::periodic(32, 0.0, 1.0).stretched(Spread::Sine.by(a));
         let mesh = Mesh::new(Direction::thin(1.0), direction(0.3), direction(-0.2)).unwrap();
         let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 2.0 / steps as f64 });
         let initial = |at_m: [f64; 3]| {

@@ -4,15 +4,15 @@ use std::f64::consts::TAU;
 
 use wakescope_les::solver::PressureMethod;
 use wakescope_les::{
-    Direction, Error, Flow, FlowSettings, Mapping, Mesh, Place, SubgridModel, TimeScheme, TimeStep, Wall, cases,
+    Direction, Error, Flow, FlowSettings, Mesh, Place, Spread, SubgridModel, TimeScheme, TimeStep, Wall, cases,
 };
 
 /// A flow without symmetries between a no-slip wall and a slip wall, all lengths in `length` and velocities in `speed`.
 fn layered(length: f64, speed: f64, change: impl Fn(&mut FlowSettings)) -> Flow {
     let mesh = Mesh::new(
         Direction::periodic(6, 0.0, length),
-        Direction::periodic(8, -0.5 * length, 0.5 * length).stretched(Mapping::Sine { amplitude: 0.2 }),
-        Direction::between(13, 0.0, length, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.0 }),
+        Direction::periodic(8, -0.5 * length, 0.5 * length).stretched(Spread::Sine.by(0.2)),
+        Direction::between(13, 0.0, length, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.0)),
     )
     .unwrap();
     let mut settings = FlowSettings::new(2e-3 * length * speed, TimeStep::Fixed { step_s: 0.01 * length / speed });
@@ -126,9 +126,8 @@ fn flat_domains_and_single_cells_run() {
 #[test]
 fn divergence_after_the_start_is_round_off_on_stretched_meshes_flat_cells_and_long_domains() {
     let slip = |n, length| Direction::between(n, 0.0, length, Wall::Slip, Wall::Slip);
-    let sinh = slip(64, 6.0).stretched(Mapping::SinhMiddle { strength: 5.0 });
-    let tanh =
-        Direction::between(64, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 5.0 });
+    let sinh = slip(64, 6.0).stretched(Spread::SinhMiddle.by(5.0));
+    let tanh = Direction::between(64, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(5.0));
     let sticky = Direction::between(48, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST);
     let meshes = [
         ("sinh 5 x tanh 5", [Direction::periodic(8, 0.0, 2.0), sinh, tanh]),
@@ -371,7 +370,7 @@ fn walls_that_blow_and_meshes_that_fold_or_jump_are_refused_before_anything_is_c
     let blowing = Wall::NoSlip { velocity_m_s: [0.0, 0.0, 0.1] };
     let message = refused(Direction::between(16, 0.0, 1.0, blowing, Wall::Slip));
     assert!(message.contains("0.1") && message.contains("across"), "{message}");
-    let steep = Direction::between(12, 0.0, 1.0, Wall::Slip, Wall::Slip).stretched(Mapping::TanhLow { strength: 6.0 });
+    let steep = Direction::between(12, 0.0, 1.0, Wall::Slip, Wall::Slip).stretched(Spread::TanhLow.by(6.0));
     let message = refused(steep);
     assert!(message.contains("differ by a factor") && message.contains("node"), "{message}");
 }

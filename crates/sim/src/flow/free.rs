@@ -7,28 +7,14 @@ use crate::scene::CoreProfile;
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{
-    Direction, FlowSettings, Ground, Mapping, Mesh, Motion, TimeScheme, TimeStep, VortexPair, Wall, Wind,
+    Direction, FlowSettings, Ground, Mapping, Mesh, Motion, Spread, TimeScheme, TimeStep, VortexPair, Wall, Wind,
 };
 
-keys! {
-    /// How the cells of a direction are spread.
-    choice MappingName {
-        /// Equal cells.
-        Uniform = "uniform",
-        /// Finer and coarser by a sine; `stretch` is its amplitude, -1 to 1.
-        Sine = "sine",
-        /// Fine at the low end.
-        TanhLow = "tanh_low",
-        /// Fine at the high end.
-        TanhHigh = "tanh_high",
-        /// Fine at both ends.
-        TanhBoth = "tanh_both",
-        /// Fine in the middle.
-        SinhMiddle = "sinh_middle",
-        /// Fine about `place`, for periodic directions: the finest cell is `exp(-stretch)` times the mean.
-        Cluster = "cluster",
-    }
+crate::keys::foreign_choices! {
+    Spread: "uniform" | "sine" | "tanh_low" | "tanh_high" | "tanh_both" | "sinh_middle" | "cluster",
+}
 
+keys! {
     /// What bounds a direction at one end.
     choice EndName {
         /// The flow repeats itself; both ends must say so.
@@ -49,7 +35,7 @@ keys! {
         /// Position of the high end \[m\].
         high_m: f64 = 1.0,
         /// How the cells are spread.
-        mapping: MappingName = MappingName::Uniform,
+        mapping: Spread = Spread::Uniform,
         /// Strength of the mapping, or amplitude of the sine.
         stretch: f64 = 0.0,
         /// Where a cluster is finest, as a fraction of the length.
@@ -124,10 +110,10 @@ impl Axis {
         let ordered = self.low_m.is_finite() && self.high_m.is_finite() && self.high_m > self.low_m;
         p.require(ordered, &key("high_m"), self.high_m, "finite, above low_m");
         match self.mapping {
-            MappingName::Uniform => {
+            Spread::Uniform => {
                 p.require(self.stretch == 0.0, &key("stretch"), self.stretch, "0 for equal cells; name a mapping");
             }
-            MappingName::Sine => {
+            Spread::Sine => {
                 p.require(self.stretch.abs() < 1.0, &key("stretch"), self.stretch, "between -1 and 1 for a sine");
             }
             _ => {
@@ -135,7 +121,7 @@ impl Axis {
                 p.require(ok, &key("stretch"), self.stretch, "above 0 and at most 20 for this mapping");
             }
         }
-        let place = self.place.is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == MappingName::Cluster);
+        let place = self.place.is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == Spread::Cluster);
         p.require(
             place,
             &key("place"),
@@ -143,9 +129,9 @@ impl Axis {
             "a fraction of the length, 0 to 1, and only with mapping = \"cluster\"",
         );
         let periodic = [self.low_end, self.high_end].map(|end| end == EndName::Periodic);
-        let repeats = matches!(self.mapping, MappingName::Uniform | MappingName::Sine | MappingName::Cluster);
+        let repeats = matches!(self.mapping, Spread::Uniform | Spread::Sine | Spread::Cluster);
         let allowed = "uniform, sine or cluster in a periodic direction, and no cluster between planes";
-        let fits = if periodic[0] { repeats } else { self.mapping != MappingName::Cluster };
+        let fits = if periodic[0] { repeats } else { self.mapping != Spread::Cluster };
         p.require(fits, &key("mapping"), self.mapping, allowed);
         p.require(periodic[0] == periodic[1], &key("high_end"), self.high_end, "periodic at both ends or at none");
         for (field, end, velocity) in [
@@ -158,7 +144,6 @@ impl Axis {
     }
 
     fn direction(&self) -> Direction {
-        let strength = self.stretch;
         let wall = |end: EndName, velocity_m_s: [f64; 3]| match end {
             EndName::NoSlip => Wall::NoSlip { velocity_m_s },
             EndName::Slip | EndName::Periodic => Wall::Slip,
@@ -167,15 +152,7 @@ impl Axis {
             cells: self.cells,
             low_m: self.low_m,
             high_m: self.high_m,
-            mapping: match self.mapping {
-                MappingName::Uniform => Mapping::Uniform,
-                MappingName::Sine => Mapping::Sine { amplitude: strength },
-                MappingName::TanhLow => Mapping::TanhLow { strength },
-                MappingName::TanhHigh => Mapping::TanhHigh { strength },
-                MappingName::TanhBoth => Mapping::TanhBoth { strength },
-                MappingName::SinhMiddle => Mapping::SinhMiddle { strength },
-                MappingName::Cluster => Mapping::Cluster { strength, place: self.place.unwrap_or(0.5) },
-            },
+            mapping: Mapping { place: self.place.unwrap_or(0.5), ..self.mapping.by(self.stretch) },
             ends: match self.low_end {
                 EndName::Periodic => Ends::Periodic,
                 _ => Ends::Walls {

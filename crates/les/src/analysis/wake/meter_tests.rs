@@ -3,7 +3,7 @@
 use super::*;
 use crate::ranks::{Single, on_threads};
 use crate::solver::cases::VortexPairCase;
-use crate::solver::mesh::{Direction, Mapping, Wall};
+use crate::solver::mesh::{Direction, Spread, Wall};
 use crate::solver::settings::{FlowSettings, TimeStep};
 use crate::winds::CirculationProfile;
 use std::f64::consts::TAU;
@@ -39,7 +39,7 @@ fn vortices(
 
 fn flow(nx: usize, field: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Flow {
     let x = if nx == 1 { Direction::thin(1.0) } else { Direction::periodic(nx, 0.0, 1.0) };
-    let z = Direction::between(80, 0.0, 2.5, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 });
+    let z = Direction::between(80, 0.0, 2.5, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5));
     let mesh = Mesh::new(x, Direction::periodic(128, -2.0, 2.0), z).unwrap();
     Flow::new(mesh, FlowSettings::new(TAU / 5000.0, TimeStep::Fixed { step_s: 1e-3 }), field).unwrap().0
 }

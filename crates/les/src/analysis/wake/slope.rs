@@ -106,7 +106,7 @@ fn derivative_weights(position_m: [f64; TAPS], at_m: f64) -> [f64; TAPS] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::solver::mesh::Mapping;
+    use crate::solver::mesh::Spread;
 
     fn derive(direction: &Direction, component: usize, field: impl Fn(f64) -> f64) -> Vec<f64> {
         let slope = Slope::new(direction, component);
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn cubics_that_meet_a_moving_wall_are_exact_and_mirror_images_flat() {
         let belt = Wall::NoSlip { velocity_m_s: [0.0, 0.7, 0.0] };
-        let line = Direction::between(16, 0.0, 2.0, belt, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.5 });
+        let line = Direction::between(16, 0.0, 2.0, belt, Wall::Slip).stretched(Spread::TanhLow.by(1.5));
         let found = derive(&line, 1, |z| 0.7 + 2.0 * z - 3.0 * z * z + z.powi(3));
         // The last two faces see the mirror image in the plane at the top.
         for (k, slope) in found.iter().enumerate().take(15) {

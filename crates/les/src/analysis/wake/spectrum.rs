@@ -56,7 +56,7 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Result<Vec<f
 mod tests {
     use super::*;
     use crate::solver::layout::Layout;
-    use crate::solver::mesh::{Direction, Mapping, Mesh, Wall};
+    use crate::solver::mesh::{Direction, Mesh, Spread, Wall};
     use crate::solver::shape::Shape;
     use std::f64::consts::TAU;
 
@@ -64,9 +64,8 @@ mod tests {
     fn a_field_of_known_modes_has_their_energies() {
         for nx in [9, 12] {
             let x = Direction::periodic(nx, 0.0, 3.0);
-            let y = Direction::periodic(8, 0.0, 2.0).stretched(Mapping::Sine { amplitude: 0.3 });
-            let z = Direction::between(16, 0.0, 0.5, Wall::AT_REST, Wall::Slip)
-                .stretched(Mapping::TanhLow { strength: 1.0 });
+            let y = Direction::periodic(8, 0.0, 2.0).stretched(Spread::Sine.by(0.3));
+            let z = Direction::between(16, 0.0, 0.5, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.0));
             let mesh = Mesh::new(x, y, z).unwrap();
             let curl = Curl::new(&mesh).unwrap();
             let x_m = mesh.face_m(0);

@@ -1,6 +1,6 @@
 //! The lid-driven cavity (Ghia, Ghia and Shin 1982; Botella and Peyret 1998).
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::{Case, Initial, stretched};
 use crate::Error;
@@ -13,7 +13,7 @@ pub fn lid_driven_cavity(cells: usize, strength: f64, reynolds: f64) -> Result<C
     let lid = Wall::NoSlip { velocity_m_s: [0.0, 1.0, 0.0] };
     let direction = |high| {
         let uniform = Direction::between(cells, 0.0, 1.0, Wall::AT_REST, high);
-        stretched(uniform, strength, Mapping::TanhBoth { strength })
+        stretched(uniform, Spread::TanhBoth.by(strength))
     };
     let mesh = Mesh::new(Direction::thin(1.0), direction(Wall::AT_REST), direction(lid))?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 0.02 });

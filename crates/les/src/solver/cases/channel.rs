@@ -1,6 +1,6 @@
 //! Flows between two plates at z = -1 and z = 1: Poiseuille's, Couette's, Rayleigh's layer, and turbulent flow.
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::{Case, Initial, stretched};
 use crate::Error;
@@ -8,7 +8,7 @@ use crate::Error;
 /// The plates at z = -1 and 1 with the velocities of the walls along x, `strength` 0 giving equal cells.
 pub(super) fn between_plates(cells: usize, strength: f64, velocity_m_s: [f64; 2]) -> Direction {
     let [low, high] = velocity_m_s.map(|u| Wall::NoSlip { velocity_m_s: [u, 0.0, 0.0] });
-    stretched(Direction::between(cells, -1.0, 1.0, low, high), strength, Mapping::TanhBoth { strength })
+    stretched(Direction::between(cells, -1.0, 1.0, low, high), Spread::TanhBoth.by(strength))
 }
 
 /// A laminar flow between the plates at z = -1 and 1, one cell in x and y.

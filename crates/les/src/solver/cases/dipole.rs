@@ -1,6 +1,6 @@
 //! A dipole of two shielded vortices that runs straight against a wall (Clercx and Bruneau 2006).
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::{Case, Initial, stretched};
 use crate::Error;
@@ -11,23 +11,23 @@ const CENTRE_VORTICITY_PER_S: f64 = 299.528_385_375_226;
 pub(super) const RADIUS_M: f64 = 0.1;
 
 /// The dipole in the plane y, z of the box `[-1, 1]^2`, running along z between no-slip walls at z = -1 and 1, with y periodic;
-/// `1/reynolds` is the viscosity. `strength` refines y in its middle, where the vortices stay ([`Mapping::Cluster`]), and z
+/// `1/reynolds` is the viscosity. `strength` refines y in its middle, where the vortices stay ([`Spread::Cluster`]), and z
 /// towards its walls; 0 for equal cells.
 ///
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
 pub fn dipole_between_walls(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> Result<Case, Error> {
-    let middle = Mapping::Cluster { strength: strength[0], place: 0.5 };
-    dipole(stretched(Direction::periodic(cells[0], -1.0, 1.0), strength[0], middle), cells[1], strength[1], reynolds)
+    let middle = Spread::Cluster.by(strength[0]);
+    dipole(stretched(Direction::periodic(cells[0], -1.0, 1.0), middle), cells[1], strength[1], reynolds)
 }
 
-/// The same in a box closed by no-slip walls at y = -1 and 1 as well; y is refined by [`Mapping::SinhMiddle`].
+/// The same in a box closed by no-slip walls at y = -1 and 1 as well; y is refined by [`Spread::SinhMiddle`].
 ///
 /// # Errors
 /// As [`dipole_between_walls`].
 pub fn dipole_in_a_box(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> Result<Case, Error> {
-    let middle = Mapping::SinhMiddle { strength: strength[0] };
-    dipole(stretched(walls(cells[0]), strength[0], middle), cells[1], strength[1], reynolds)
+    let middle = Spread::SinhMiddle.by(strength[0]);
+    dipole(stretched(walls(cells[0]), middle), cells[1], strength[1], reynolds)
 }
 
 fn walls(cells: usize) -> Direction {
@@ -35,7 +35,7 @@ fn walls(cells: usize) -> Direction {
 }
 
 fn dipole(y: Direction, cells: usize, strength: f64, reynolds: f64) -> Result<Case, Error> {
-    let z = stretched(walls(cells), strength, Mapping::TanhBoth { strength });
+    let z = stretched(walls(cells), Spread::TanhBoth.by(strength));
     let mesh = Mesh::new(Direction::thin(1.0), y, z)?;
     let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 1e-3 });
     let initial = |at_m: [f64; 3]| {

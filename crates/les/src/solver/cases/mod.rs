@@ -66,8 +66,8 @@ impl Initial {
 }
 
 /// A direction with its cells spread by `mapping`, or equal ones for the strength 0.
-fn stretched(direction: Direction, strength: f64, mapping: Mapping) -> Direction {
-    if strength == 0.0 { direction } else { direction.stretched(mapping) }
+fn stretched(direction: Direction, mapping: Mapping) -> Direction {
+    if mapping.strength == 0.0 { direction } else { direction.stretched(mapping) }
 }
 
 /// A flow ready to be simulated.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::{Case, Initial, stretched};
 use crate::Error;
@@ -13,8 +13,7 @@ use crate::Error;
 /// # Errors
 /// Cells, stretching or viscosity out of range.
 pub fn taylor_green_plane(cells: usize, stretch: [f64; 2], viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
-    let direction =
-        |amplitude: f64| stretched(Direction::periodic(cells, 0.0, 1.0), amplitude, Mapping::Sine { amplitude });
+    let direction = |amplitude: f64| stretched(Direction::periodic(cells, 0.0, 1.0), Spread::Sine.by(amplitude));
     let mesh = Mesh::new(Direction::thin(1.0), direction(stretch[0]), direction(stretch[1]))?;
     let initial = move |at_m: [f64; 3]| taylor_green_plane_exact(at_m, 0.0, viscosity_m2_s);
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });

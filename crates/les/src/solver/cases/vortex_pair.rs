@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use num_complex::Complex;
 use rayon::prelude::*;
 
-use super::super::mesh::{Direction, Ends, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Ends, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::super::subgrid::SubgridModel;
 use super::perturbation::Perturbation;
@@ -32,7 +32,7 @@ pub struct VortexPairCase {
     pub cells: [usize; 3],
     /// Length, width and height of the box; y runs from minus half the width.
     pub size: [f64; 3],
-    /// Refinement of the mesh towards the ground, `a` of [`Mapping::TanhLow`]; 0 for equal cells.
+    /// Refinement of the mesh towards the ground, `a` of [`Spread::TanhLow`]; 0 for equal cells.
     pub ground_stretch: f64,
     /// Refinement of the mesh towards y = 0: its cells are `1 - a` of the mean there and `1 + a` at the sides.
     pub lateral_stretch: f64,
@@ -199,10 +199,10 @@ impl VortexPairCase {
         if self.slip_sides {
             y.ends = Ends::Walls { low: Wall::Slip, high: Wall::Slip };
         }
-        let y = stretched(y, self.lateral_stretch, Mapping::Sine { amplitude: self.lateral_stretch });
+        let y = stretched(y, Spread::Sine.by(self.lateral_stretch));
         let ground = if self.sticky_ground { Wall::AT_REST } else { Wall::Slip };
         let z = Direction::between(self.cells[2], 0.0, height, ground, Wall::Slip);
-        Mesh::new(x, y, stretched(z, self.ground_stretch, Mapping::TanhLow { strength: self.ground_stretch }))
+        Mesh::new(x, y, stretched(z, Spread::TanhLow.by(self.ground_stretch)))
     }
 
     /// The initial velocities at the low faces of the cells of the mesh, in the units of the pair.

@@ -3,15 +3,15 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use super::super::mesh::{Direction, Mapping, MappingFn, Wall};
+use super::super::mesh::{Direction, Mapping, MappingFn, Spread, Wall};
 use super::super::settings::{TimeScheme, TimeStep};
 use super::*;
 
 fn mesh() -> Mesh {
     Mesh::new(
         Direction::periodic(4, 0.0, 1.0),
-        Direction::periodic(6, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.2 }),
-        Direction::between(12, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.0 }),
+        Direction::periodic(6, 0.0, 1.0).stretched(Spread::Sine.by(0.2)),
+        Direction::between(12, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.0)),
     )
     .unwrap()
 }
@@ -143,7 +143,7 @@ fn another_mesh_or_other_physics_are_refused_by_name() {
     let expected = |what: &str, stored: &str, wanted: &str| (what.to_owned(), stored.to_owned(), wanted.to_owned());
     assert_eq!(meshed(Direction { cells: 8, ..y.clone() }), expected("the number of cells along y", "6", "8"));
     assert_eq!(meshed(Direction { high_m: 2.0, ..y.clone() }), expected("the high end of y", "1.0 m", "2.0 m"));
-    let (what, ..) = meshed(y.clone().stretched(Mapping::Sine { amplitude: 0.3 }));
+    let (what, ..) = meshed(y.clone().stretched(Spread::Sine.by(0.3)));
     assert_eq!(what, "the mapping of y");
     let changed = |change: fn(&mut FlowSettings)| {
         let mut other = settings();
@@ -163,7 +163,7 @@ fn another_mesh_or_other_physics_are_refused_by_name() {
 fn custom_mappings_are_told_apart_by_their_metrics() {
     let bent = |a: f64| -> Mapping {
         let map: MappingFn = Arc::new(move |s| (s + a * s * (1.0 - s), 1.0 + a * (1.0 - 2.0 * s)));
-        Mapping::Custom(map)
+        Mapping { custom: Some(map), ..Mapping::default() }
     };
     let mesh = |a| {
         let wall = Direction::between(8, 0.0, 1.0, Wall::Slip, Wall::Slip);

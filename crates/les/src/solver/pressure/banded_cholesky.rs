@@ -198,7 +198,7 @@ fn substitute(scratch: &mut Scratch) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::super::mesh::{Direction, Spread, Wall};
     use super::super::apply::stiffness;
     use super::*;
 
@@ -207,7 +207,7 @@ mod tests {
         let (rest, slip) = (Wall::AT_REST, Wall::Slip);
         for (n, low, high) in [(4, slip, slip), (12, rest, slip), (13, slip, rest), (16, rest, rest), (40, rest, rest)]
         {
-            let mapping = Mapping::TanhLow { strength: 0.8 };
+            let mapping = Spread::TanhLow.by(0.8);
             let line = Operators1d::new(&Direction::between(n, 0.0, n as f64, low, high).stretched(mapping));
             let band = BandedCholesky::new(&line).unwrap();
             let shifts: Vec<f64> = (0..19).map(|l| 0.05 * f64::from(l)).collect();

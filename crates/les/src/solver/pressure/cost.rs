@@ -52,14 +52,14 @@ impl PressureMethod {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::super::mesh::{Direction, Spread, Wall};
     use super::*;
 
     #[test]
     fn directions_with_a_matrix_are_those_that_the_solvers_name() {
         let periodic = |n| Direction::periodic(n, 0.0, 1.0);
         let between = |n| Direction::between(n, 0.0, 1.0, Wall::Slip, Wall::Slip);
-        let sine = |n| periodic(n).stretched(Mapping::Sine { amplitude: 0.3 });
+        let sine = |n| periodic(n).stretched(Spread::Sine.by(0.3));
         for [x, y, z] in [
             [periodic(16), periodic(20), between(24)],
             [periodic(1), sine(20), between(24)],

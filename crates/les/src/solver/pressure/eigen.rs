@@ -155,7 +155,7 @@ fn orthogonalise(columns: &mut [Vec<f64>]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::{Direction, Mapping};
+    use super::super::super::mesh::{Direction, Spread};
     use super::*;
 
     /// `K = Dw F^-1 Dw^T`, dense.
@@ -174,8 +174,8 @@ mod tests {
     }
 
     fn every_kind() -> Vec<Direction> {
-        let tanh = Mapping::TanhBoth { strength: 2.0 };
-        let sine = Mapping::Sine { amplitude: 0.8 };
+        let tanh = Spread::TanhBoth.by(2.0);
+        let sine = Spread::Sine.by(0.8);
         vec![
             Direction::periodic(15, 0.0, 2.0),
             Direction::periodic(16, 0.0, 2.0),
@@ -185,7 +185,7 @@ mod tests {
             Direction::between(4, 0.0, 2.0, Wall::Slip, Wall::Slip),
             Direction::between(33, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(tanh.clone()),
             Direction::between(32, 0.0, 2.0, Wall::AT_REST, Wall::AT_REST).stretched(tanh),
-            Direction::between(64, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 5.0 }),
+            Direction::between(64, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(5.0)),
         ]
     }
 

@@ -3,7 +3,7 @@
 
 use std::f64::consts::PI;
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mesh, Spread, Wall};
 use super::*;
 use crate::error::{Error, PressureFailure};
 use crate::solver::layout::Layout;
@@ -80,9 +80,8 @@ fn meshes() -> Vec<(String, Layout)> {
     meshes.push(("cells 1e4 times wider than high".into(), layout(flat(1e4, 1.0))));
     meshes.push(("cells 1e4 times higher than wide".into(), layout(flat(1.0, 1e4))));
     meshes.push(("long along x".into(), layout([Direction::periodic(16, 0.0, 2e4), slip(24, 6.0), slip(20, 3.0)])));
-    let sinh = slip(48, 6.0).stretched(Mapping::SinhMiddle { strength: 5.0 });
-    let tanh =
-        Direction::between(60, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 5.0 });
+    let sinh = slip(48, 6.0).stretched(Spread::SinhMiddle.by(5.0));
+    let tanh = Direction::between(60, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(5.0));
     meshes.push(("sinh 5 x tanh 5".into(), layout([Direction::periodic(16, 0.0, 2.0), sinh, tanh])));
     meshes
 }
@@ -142,10 +141,10 @@ fn waves_along_one_direction_alone_leave_round_off_however_long_they_are() {
 /// Prints the table of the book with `cargo test -p wakescope-les --lib an_iteration_of_multigrid -- --nocapture`.
 #[test]
 fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretching_and_flat_cells() {
-    let sinh = |cells, strength| slip(cells, 6.0).stretched(Mapping::SinhMiddle { strength });
+    let sinh = |cells, strength| slip(cells, 6.0).stretched(Spread::SinhMiddle.by(strength));
     let ground = |cells, strength| {
         let wall = Direction::between(cells, 0.0, 3.0, Wall::AT_REST, Wall::Slip);
-        wall.stretched(Mapping::TanhLow { strength })
+        wall.stretched(Spread::TanhLow.by(strength))
     };
     let waves = |cells, length_m| Direction::periodic(cells, 0.0, length_m);
     let meshes = [

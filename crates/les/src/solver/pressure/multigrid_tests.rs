@@ -1,6 +1,6 @@
 //! Parts of the cycle: symmetry, interpolation, colours, relaxed lines.
 
-use super::super::super::mesh::{Direction, Mapping, Wall};
+use super::super::super::mesh::{Direction, Spread, Wall};
 use super::*;
 
 /// The mesh of a direction with the operator of the coarser ones.
@@ -25,8 +25,7 @@ fn wave(n: usize, f: f32) -> Vec<Lanes> {
 
 #[test]
 fn a_cycle_is_symmetric() {
-    let ground =
-        Direction::between(25, 0.0, 25.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 2.0 });
+    let ground = Direction::between(25, 0.0, 25.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(2.0));
     let lines = [ground, Direction::periodic(14, 0.0, 14.0)].each_ref().map(Operators1d::new);
     let levels = Level::hierarchy(lines.each_ref().map(|line| Axis::finest(line, 1.0, &stiffness(line))));
     let mode: Lanes = std::array::from_fn(|l| 0.02 * (l + 1) as f32);
@@ -49,8 +48,8 @@ fn directions() -> [Direction; 3] {
     let walls = |n| Direction::between(n, 0.0, 4.0, Wall::AT_REST, Wall::Slip);
     [
         walls(24),
-        walls(37).stretched(Mapping::TanhLow { strength: 3.0 }),
-        Direction::periodic(19, 0.0, 4.0).stretched(Mapping::Sine { amplitude: 0.5 }),
+        walls(37).stretched(Spread::TanhLow.by(3.0)),
+        Direction::periodic(19, 0.0, 4.0).stretched(Spread::Sine.by(0.5)),
     ]
 }
 
@@ -100,8 +99,8 @@ fn left_over(level: &Level, mode: &Lanes, u: &[Lanes], f: &[Lanes]) -> f32 {
 #[test]
 fn relaxed_lines_leave_no_residual_in_all_kinds_of_directions() {
     let kinds = [
-        Direction::between(13, 0.0, 13.0, Wall::AT_REST, Wall::Slip).stretched(Mapping::TanhLow { strength: 1.0 }),
-        Direction::periodic(11, 0.0, 11.0).stretched(Mapping::Sine { amplitude: 0.5 }),
+        Direction::between(13, 0.0, 13.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.0)),
+        Direction::periodic(11, 0.0, 11.0).stretched(Spread::Sine.by(0.5)),
         Direction::periodic(8, 0.0, 8.0),
     ];
     let mode: Lanes = std::array::from_fn(|l| if l == 0 { 0.0 } else { 0.1 * l as f32 });

@@ -1,7 +1,7 @@
 //! Checks that concern all solvers: residuals on the meshes of the table, null space, threads.
 
 use super::super::layout::{Layout, Shape};
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mapping, Mesh, Spread, Wall};
 use super::*;
 use crate::error::{Error, PressureFailure};
 use apply::Operator;
@@ -83,17 +83,17 @@ fn closed(n: usize) -> Direction {
 }
 
 fn sinh(strength: f64) -> Mapping {
-    Mapping::SinhMiddle { strength }
+    Spread::SinhMiddle.by(strength)
 }
 
 fn tanh(strength: f64) -> Mapping {
-    Mapping::TanhLow { strength }
+    Spread::TanhLow.by(strength)
 }
 
 /// Meshes of all kinds with the residual that one solve may leave.
 fn meshes() -> Vec<(&'static str, [Direction; 3], f64)> {
     let thin = || Direction::thin(1.0);
-    let sine = || Mapping::Sine { amplitude: 0.6 };
+    let sine = || Spread::Sine.by(0.6);
     vec![
         ("uniform", [waves(32), slip(48), ground(40)], 1e-12),
         ("aspect 144", [waves(32), slip(64).stretched(sinh(3.0)), ground(48).stretched(tanh(3.0))], 1e-12),
@@ -105,7 +105,7 @@ fn meshes() -> Vec<(&'static str, [Direction; 3], f64)> {
             [waves(17).stretched(sine()), waves(19).stretched(sine()), waves(23).stretched(sine())],
             1e-12,
         ),
-        ("closed box", [closed(20), closed(17), closed(24).stretched(Mapping::TanhBoth { strength: 2.0 })], 1e-12),
+        ("closed box", [closed(20), closed(17), closed(24).stretched(Spread::TanhBoth.by(2.0))], 1e-12),
         ("long axis 1", [slip(12), ground(60).stretched(tanh(2.0)), slip(20)], 1e-12),
         ("one cell in x, y long", [thin(), waves(48), ground(40).stretched(tanh(3.0))], 1e-12),
         ("one cell in x, z long", [thin(), slip(40), closed(64)], 1e-12),
@@ -183,8 +183,7 @@ fn the_operator_is_symmetric_and_ignores_constants() {
 
 #[test]
 fn the_operator_is_the_divergence_of_the_gradient() {
-    let layout =
-        layout([waves(8).stretched(Mapping::Sine { amplitude: 0.4 }), slip(7), ground(13).stretched(tanh(1.0))]);
+    let layout = layout([waves(8).stretched(Spread::Sine.by(0.4)), slip(7), ground(13).stretched(tanh(1.0))]);
     let [n0, n1, n2] = layout.shape.n;
     let phi: Vec<f64> = (0..layout.shape.len()).map(|p| (p as f64 * 0.37).sin()).collect();
     let mut expected = vec![0.0; phi.len()];

@@ -206,7 +206,7 @@ fn largest_factor(n: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::super::mesh::{Direction, Mapping, Wall};
+    use super::super::super::mesh::{Direction, Spread, Wall};
     use super::*;
 
     #[test]
@@ -238,8 +238,8 @@ mod tests {
     #[test]
     fn folded_transforms_of_lines_are_products_with_the_eigenvectors() {
         let slip = |n| Direction::between(n, 0.0, 3.0, Wall::Slip, Wall::Slip);
-        let sine = Mapping::Sine { amplitude: 0.5 };
-        let low = Mapping::TanhLow { strength: 1.5 };
+        let sine = Spread::Sine.by(0.5);
+        let low = Spread::TanhLow.by(1.5);
         for (direction, blocks) in [
             (Direction::periodic(64, 0.0, 3.0), 5),
             (Direction::periodic(27, 0.0, 3.0), 2),
@@ -247,7 +247,7 @@ mod tests {
             (slip(32), 3),
             (slip(33), 2),
             // Of stretched cells two vectors with nearly the same eigenvalue are found in any mixture.
-            (slip(40).stretched(Mapping::TanhBoth { strength: 1.2 }), 1),
+            (slip(40).stretched(Spread::TanhBoth.by(1.2)), 1),
             (slip(40).stretched(low), 1),
             (Direction::periodic(20, 0.0, 3.0).stretched(sine), 1),
         ] {

@@ -3,7 +3,7 @@
 use super::*;
 
 fn sine(n: usize, amplitude: f64) -> Direction {
-    Direction::periodic(n, 0.0, 1.0).stretched(Mapping::Sine { amplitude })
+    Direction::periodic(n, 0.0, 1.0).stretched(Spread::Sine.by(amplitude))
 }
 
 fn between(n: usize, low: Wall, high: Wall, mapping: Mapping) -> Direction {
@@ -13,19 +13,19 @@ fn between(n: usize, low: Wall, high: Wall, mapping: Mapping) -> Direction {
 /// Meshes of every kind of end, stretching and thickness.
 fn meshes() -> Vec<[Direction; 3]> {
     let moving = Wall::NoSlip { velocity_m_s: [0.7, -0.4, 0.0] };
-    let tanh = Mapping::TanhBoth { strength: 1.5 };
-    let low = Mapping::TanhLow { strength: 1.0 };
+    let tanh = Spread::TanhBoth.by(1.5);
+    let low = Spread::TanhLow.by(1.0);
     vec![
         [sine(10, 0.5), sine(11, 0.4), sine(9, 0.3)],
         [
             sine(9, 0.3),
-            between(8, Wall::Slip, Wall::Slip, Mapping::Uniform),
+            between(8, Wall::Slip, Wall::Slip, Mapping::default()),
             between(17, Wall::AT_REST, moving, tanh.clone()),
         ],
         [
             between(16, Wall::AT_REST, Wall::AT_REST, tanh.clone()),
             between(13, Wall::AT_REST, Wall::Slip, low.clone()),
-            between(12, Wall::Slip, Wall::AT_REST, Mapping::TanhHigh { strength: 1.0 }),
+            between(12, Wall::Slip, Wall::AT_REST, Spread::TanhHigh.by(1.0)),
         ],
         [sine(4, 0.0), Direction::thin(0.2), between(16, Wall::AT_REST, Wall::AT_REST, tanh.clone())],
         [Direction::thin(0.3), between(14, Wall::Slip, Wall::AT_REST, low), sine(12, 0.2)],
@@ -98,7 +98,7 @@ fn on_the_whole_every_model_takes_energy_from_the_flow() {
 
 #[test]
 fn the_stress_has_the_same_bits_with_one_two_and_seven_threads() {
-    let directions = || [sine(10, 0.5), sine(11, 0.4), between(16, Wall::AT_REST, Wall::Slip, Mapping::Uniform)];
+    let directions = || [sine(10, 0.5), sine(11, 0.4), between(16, Wall::AT_REST, Wall::Slip, Mapping::default())];
     for model in MODELS {
         let run = |threads| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -116,7 +116,7 @@ fn the_stress_has_the_same_bits_with_one_two_and_seven_threads() {
 
 #[test]
 fn a_flow_that_does_not_vary_in_a_direction_has_the_same_bits_with_one_cell_there_as_with_four() {
-    let tanh = Mapping::TanhBoth { strength: 1.5 };
+    let tanh = Spread::TanhBoth.by(1.5);
     for axis in 0..3 {
         for model in MODELS {
             let run = |cells: usize| {

@@ -93,8 +93,8 @@ fn wale_vanishes_in_shear_flows_and_smagorinsky_does_not() {
     let top = Wall::NoSlip { velocity_m_s: [2.0, 0.0, 0.0] };
     let directions = [
         Direction::periodic(6, 0.0, 1.0),
-        Direction::periodic(12, 0.0, 1.0).stretched(Mapping::Sine { amplitude: 0.5 }),
-        Direction::between(24, 0.0, 1.0, Wall::AT_REST, top).stretched(Mapping::TanhBoth { strength: 2.0 }),
+        Direction::periodic(12, 0.0, 1.0).stretched(Spread::Sine.by(0.5)),
+        Direction::between(24, 0.0, 1.0, Wall::AT_REST, top).stretched(Spread::TanhBoth.by(2.0)),
     ];
     // Couette and Poiseuille together.
     let profile = |[_, _, z]: [f64; 3]| [2.0 * z + 3.0 * z * (1.0 - z), 0.0, 0.0];
@@ -148,11 +148,8 @@ fn laminar_shear_has_no_small_scales_right_up_to_the_walls() {
 fn wale_grows_with_the_cube_of_the_distance_from_a_wall() {
     let tau = std::f64::consts::TAU;
     let wall = Direction::between(24, 0.0, 0.02, Wall::AT_REST, Wall::Slip);
-    let directions = [
-        Direction::periodic(16, 0.0, 1.0),
-        Direction::periodic(16, 0.0, 1.0),
-        wall.stretched(Mapping::TanhLow { strength: 2.5 }),
-    ];
+    let directions =
+        [Direction::periodic(16, 0.0, 1.0), Direction::periodic(16, 0.0, 1.0), wall.stretched(Spread::TanhLow.by(2.5))];
     // Near the wall u and v grow with z, and w with z^2 so that no fluid is made.
     let field = move |[x, y, z]: [f64; 3]| {
         let (a, b) = (tau * x, tau * y);

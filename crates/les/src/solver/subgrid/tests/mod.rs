@@ -4,7 +4,7 @@ mod budget;
 mod laminar;
 mod vortex;
 
-use super::super::mesh::{Direction, Mapping, Mesh, Wall};
+use super::super::mesh::{Direction, Mapping, Mesh, Spread, Wall};
 use super::super::operators_1d::Operators1d;
 use super::*;
 
