@@ -5,8 +5,7 @@
 
 use std::f64::consts::PI;
 
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 use crate::winds::Wind;
 
 /// Circulation \[m^2/s\] of `wind` on the circle of `radius_m` about `centre_m` = `(y, z)` in the plane x = 0, by the

@@ -31,14 +31,6 @@ impl Aligned {
         memory.truncate(first + count);
         Self { memory, first }
     }
-
-    pub(crate) fn as_slice(&self) -> &[f64] {
-        self
-    }
-
-    pub(crate) fn as_mut_slice(&mut self) -> &mut [f64] {
-        self
-    }
 }
 
 impl Deref for Aligned {

@@ -17,7 +17,6 @@ use super::report::StartReport;
 use super::settings::FlowSettings;
 use super::transport::MEAN;
 use crate::error::{Error, check_lengths};
-use crate::solver::aligned::Aligned;
 
 /// Fourth-order interpolation from the faces to the first centre at a wall.
 const AT_WALL: [f64; 4] = [5.0 / 16.0, 15.0 / 16.0, -5.0 / 16.0, 1.0 / 16.0];
@@ -54,7 +53,7 @@ impl Flow {
     }
 
     pub(super) fn measure_divergence(&self) -> Result<f64, Error> {
-        let velocity = self.state.velocity.each_ref().map(Aligned::as_slice);
+        let velocity = self.state.velocity.each_ref().map(|field| &field[..]);
         let [largest] = self.layout.slabs.largest([self.divergence.largest_per_s(velocity)])?;
         Ok(if largest == 0.0 { 0.0 } else { largest / self.state.courant_per_s })
     }

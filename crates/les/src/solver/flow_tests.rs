@@ -22,7 +22,7 @@ fn rough(at_m: [f64; 3]) -> [f64; 3] {
 /// Convection of every component of the present field, and what it makes of energy and momentum over sums of moduli.
 fn production(flow: &Flow) -> (f64, [f64; 3]) {
     let shape = flow.layout.shape;
-    let velocity = flow.state.velocity.each_ref().map(Aligned::as_slice);
+    let velocity = flow.state.velocity.each_ref().map(|field| &field[..]);
     let (mut energy, mut energy_moduli) = (0.0, 0.0);
     let mut momentum = [0.0; 3];
     for axis in 0..3 {

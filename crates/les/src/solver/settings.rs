@@ -6,8 +6,7 @@ use super::layout::Layout;
 use super::mesh::{Mesh, refused};
 use super::pressure::PressureMethod;
 use super::subgrid::{self, SubgridModel};
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 use crate::ranks::{Ranks, Single};
 
 /// Growth in a step that is round-off.

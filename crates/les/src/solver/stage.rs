@@ -86,7 +86,7 @@ impl Flow {
         let explicit_per_s = self.settings.scheme.largest_decay() * fraction / stage_s;
         let limit_per_s = (SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0);
         let Self { model: Some(model), predicted, phi, .. } = self else { return Ok(()) };
-        model.update(self.state.velocity.each_ref().map(Aligned::as_slice), limit_per_s, predicted, phi)
+        model.update(self.state.velocity.each_ref().map(|field| &field[..]), limit_per_s, predicted, phi)
     }
 
     /// `predicted = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the previous terms; returns the work of each
@@ -130,7 +130,7 @@ impl Flow {
         if self.model.is_some() {
             scratch.model.copy_from_slice(out);
         }
-        scratch.convection(ops, self.state.velocity.each_ref().map(Aligned::as_slice), j, k);
+        scratch.convection(ops, self.state.velocity.each_ref().map(|field| &field[..]), j, k);
         let nu = self.settings.viscosity_m2_s;
         let force = self.settings.force_m_s2[self.layout.direction[axis]];
         if nu == 0.0 {

@@ -4,8 +4,7 @@
 
 use super::vortex::VortexPair;
 use super::wind::Wind;
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// The wake of an aircraft that flies along +x.
 #[derive(Debug, Clone, Copy, PartialEq)]

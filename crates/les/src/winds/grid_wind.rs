@@ -9,8 +9,7 @@
 
 use super::axis::{Axis, Edges, GHOSTS, Ghost, Side};
 use super::wind::Wind;
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// What a point outside the mesh gets. A periodic direction has no outside.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -4,8 +4,7 @@
 
 use super::strain::largest_strain_per_s;
 use super::wind::Wind;
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// `u + G x + a t`.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -13,8 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use super::grid_wind::GridSnapshot;
 use super::volume::VolumeSnapshot;
 use super::wind::{Wind, combine};
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// Gives field number `i`.
 type Reader = dyn Fn(usize) -> Result<Arc<dyn Wind>, Error> + Send + Sync;

@@ -7,8 +7,7 @@
 //!
 //! Check: the largest velocity is at the core radius; both limits of `q`.
 
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 
 /// `beta_o`: the outer scale.
 const OUTER: f64 = 10.0;

@@ -8,8 +8,7 @@ use super::axis::{AXIS_NAMES, Axis, Edges, GHOSTS, Side};
 use super::grid_wind::{ghost_places, ghost_value};
 use super::strain::largest_strain_per_s;
 use super::wind::Wind;
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// One component of the velocity, or a scalar, at its nodes.
 #[derive(Debug, Clone, PartialEq)]

@@ -11,8 +11,7 @@ use std::f64::consts::PI;
 
 use super::profile::CirculationProfile;
 use super::wind::Wind;
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// Standard acceleration of gravity (exact by definition).
 const GRAVITY_M_S2: f64 = 9.806_65;

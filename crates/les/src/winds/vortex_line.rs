@@ -9,8 +9,7 @@ use std::f64::consts::PI;
 use super::profile::CirculationProfile;
 use super::vortex::Ground;
 use super::wind::Wind;
-use crate::Error;
-use crate::error::{check, check_lengths};
+use crate::error::{Error, check, check_lengths};
 
 /// One vortex; anticlockwise about its axis is positive for an axis that points along +x and is seen with y to the right.
 #[derive(Debug, Clone, PartialEq)]

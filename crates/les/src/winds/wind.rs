@@ -5,8 +5,7 @@
 //! Check: a sum of winds is the sum of the velocities and carries what the first of them knows, and wrong lengths are refused by
 //! every wind.
 
-use crate::Error;
-use crate::error::check_lengths;
+use crate::error::{Error, check_lengths};
 
 /// The velocity field of the air.
 ///

@@ -9,11 +9,10 @@ use super::Begin;
 use super::case::{FileFormat, Output};
 use super::wake::{self, Due, Schedule};
 use crate::Error;
-use crate::io::cf_fields;
 use crate::io::own::refuse_foreign;
 #[cfg(feature = "vtk")]
 use crate::io::vtr;
-use crate::io::{CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, tables};
+use crate::io::{CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, cf_fields, tables};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -41,8 +41,7 @@ pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
-use crate::io::Provenance;
-use crate::io::text_file;
+use crate::io::{Provenance, text_file};
 use crate::keys::{Problem, SceneError, Source};
 use crate::scene::hash_of;
 use std::path::{Path, PathBuf};

@@ -133,7 +133,6 @@ impl RunObserver for Writer<'_> {
         let text = match warning {
             RunWarning::StepEnergy { step, energy } => format!("step {step}: {energy}"),
             RunWarning::UndampedGrowth { growth, .. } => growth_note(growth),
-            _ => format!("{warning:?}"),
         };
         self.observer.warn(&text);
         self.warnings.push(text);

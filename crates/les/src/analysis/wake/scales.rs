@@ -4,8 +4,7 @@
 
 use std::f64::consts::TAU;
 
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 use crate::winds::Aircraft;
 
 /// Initial spacing and circulation of a pair: its units.

@@ -2,18 +2,16 @@
 //!
 //! All are in the units of their literature (lengths, speeds of order one), which the solver takes as SI.
 
-mod cavity;
+mod boxes;
 mod channel;
-mod dipole;
 mod orr_sommerfeld;
 mod perturbation;
 mod resolution;
 mod taylor_green;
 mod vortex_pair;
 
-pub use cavity::lid_driven_cavity;
+pub use boxes::{dipole_between_walls, dipole_in_a_box, lid_driven_cavity};
 pub use channel::{Plates, channel};
-pub use dipole::{dipole_between_walls, dipole_in_a_box};
 pub use orr_sommerfeld::TollmienSchlichting;
 pub use resolution::{Resolution, VortexLengths};
 pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact};

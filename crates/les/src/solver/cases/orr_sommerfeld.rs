@@ -12,8 +12,7 @@ use super::super::mesh::{Direction, Mesh};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::channel::between_plates;
 use super::{Case, Initial};
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 
 type C64 = Complex<f64>;
 

@@ -88,7 +88,7 @@ impl Resolution {
 impl VortexLengths {
     /// Those of the dipole, in half widths of its box: the core 0.1, the layer `Re^-1/2`.
     pub fn dipole(reynolds: f64) -> Self {
-        let radius_m = super::dipole::RADIUS_M;
+        let radius_m = super::boxes::RADIUS_M;
         Self { core_radius_m: radius_m, core_m: [radius_m, 0.0], layer_m: reynolds.powf(-0.5), rolls_up: true }
     }
 

@@ -17,9 +17,8 @@ use super::super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::super::subgrid::SubgridModel;
 use super::perturbation::Perturbation;
 use super::{Case, Initial, stretched};
-use crate::Error;
 use crate::analysis::{WakeMeter, WakeScales};
-use crate::error::check;
+use crate::error::{Error, check};
 use crate::winds::{CirculationProfile, TwoScale};
 
 /// Where the pair is when the case ends, in `tau`.

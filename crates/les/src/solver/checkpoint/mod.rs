@@ -17,7 +17,6 @@ use super::layout::Layout;
 use super::mesh::{AXIS_NAMES, Direction, Mesh};
 use super::settings::FlowSettings;
 use crate::Error;
-use crate::solver::aligned::Aligned;
 use crate::solver::slabs::WHOLE;
 use container::{Planes, Reader, Tag};
 
@@ -104,7 +103,7 @@ impl Flow {
         let read = Self::read(path.as_ref(), &mesh, &settings);
         // The ranks that share the flow must agree on that, too.
         let (mut flow, user_data) = Layout::new(&mesh).shared(settings.ranks)?.slabs.all_agree(read)?;
-        let [u, v, w] = flow.state.velocity.each_mut().map(Aligned::as_mut_slice);
+        let [u, v, w] = flow.state.velocity.each_mut().map(|field| &mut field[..]);
         flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
         Ok((flow, user_data))
     }

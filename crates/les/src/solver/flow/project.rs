@@ -38,7 +38,7 @@ impl Flow {
         match reason {
             PressureFailure::RoundOff { .. } => {
                 let mut right = Aligned::zeros(self.layout.shape.len());
-                self.divergence.apply(self.predicted.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut right);
+                self.divergence.apply(self.predicted.each_ref().map(|field| &field[..]), 1.0 / stage_s, &mut right);
                 let size = norm(&self.layout.slabs, &right)?;
                 let left = self.repeat(stage_s, tolerance * size)?;
                 // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
@@ -57,7 +57,7 @@ impl Flow {
     /// The weighted divergence of `predicted` over `stage_s` into `phi`.
     pub(super) fn take_divergence(&mut self, stage_s: f64) -> Result<(), Error> {
         self.layout.slabs.halos(&mut [&mut self.predicted[2]], self.divergence.reach)?;
-        let predicted = self.predicted.each_ref().map(Aligned::as_slice);
+        let predicted = self.predicted.each_ref().map(|field| &field[..]);
         self.divergence.apply(predicted, 1.0 / stage_s, &mut self.phi);
         Ok(())
     }
@@ -68,7 +68,7 @@ impl Flow {
         let mut rest = Aligned::zeros(self.layout.shape.len());
         let mut last = f64::INFINITY;
         for _ in 0..=MAX_REPETITIONS {
-            self.divergence.apply(self.state.velocity.each_ref().map(Aligned::as_slice), 1.0 / stage_s, &mut rest);
+            self.divergence.apply(self.state.velocity.each_ref().map(|field| &field[..]), 1.0 / stage_s, &mut rest);
             let size = norm(&self.layout.slabs, &rest)?;
             if size <= enough || size > GAIN * last {
                 return Ok(size);
@@ -85,8 +85,8 @@ impl Flow {
 
     /// `velocity = predicted - stage_s grad(phi)`.
     fn correct(&mut self, stage_s: f64, phi: &[f64]) -> Result<(), Error> {
-        let predicted = self.predicted.each_ref().map(Aligned::as_slice);
-        let mut velocity = self.state.velocity.each_mut().map(Aligned::as_mut_slice);
+        let predicted = self.predicted.each_ref().map(|field| &field[..]);
+        let mut velocity = self.state.velocity.each_mut().map(|field| &mut field[..]);
         let planes = correct(&self.ops, predicted, phi, stage_s, &mut velocity);
         self.layout.slabs.halos(&mut velocity, WHOLE)?;
         let planes = self.layout.slabs.planes(planes)?;

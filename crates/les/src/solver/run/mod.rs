@@ -21,8 +21,7 @@ use super::mesh::Mesh;
 use super::report::StepReport;
 use super::settings::FlowSettings;
 use super::subgrid::SubgridModel;
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 use energy::EnergyBound;
 use window::Window;
 pub use window::{EnergyBudget, StepEnergy};
@@ -82,7 +81,6 @@ pub struct StepRecord {
 }
 
 /// What deserves attention but does not stop a run; each kind is told once.
-#[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RunWarning {
     /// The time step feeds the flow, or takes from it, more than a tenth of what viscosity and model take.

@@ -34,8 +34,7 @@ mod viscosity;
 
 use super::layout::Layout;
 use super::slabs::Slabs;
-use crate::Error;
-use crate::error::check;
+use crate::error::{Error, check};
 use crate::solver::aligned::Aligned;
 use filter::{Filter, HIGHEST_ORDER};
 use operators::Operators;
@@ -151,7 +150,7 @@ impl Subgrid {
             }
         };
         update_stress(operators, viscosity, strained, across, in_plane);
-        let [a, b, c] = across.each_mut().map(Aligned::as_mut_slice);
+        let [a, b, c] = across.each_mut().map(|field| &mut field[..]);
         slabs.halos(&mut [a, b, c], operators.reach)
     }
 

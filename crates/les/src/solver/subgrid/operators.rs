@@ -3,8 +3,7 @@
 //! Check: adjointness through the energy identity, linear and wall-bounded profiles (tests of the model).
 
 use super::super::layout::{Layout, Shape};
-use super::super::operators_1d::LAPLACIAN_SYMBOL;
-use super::super::operators_1d::{Operators1d, Taps};
+use super::super::operators_1d::{LAPLACIAN_SYMBOL, Operators1d, Taps};
 use super::super::row_operator::RowOperator;
 
 /// The operators of a layout.
