@@ -4,8 +4,7 @@
 
 use multiversion::multiversion;
 
-use super::flux_cache::{FluxCache, SLOTS};
-use super::momentum::{Momentum, Scratch};
+use super::momentum::{FluxCache, Momentum, SLOTS, Scratch};
 use super::rows::{HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad, round, rows_from};
 use super::transport::{MEAN, Transport};
 

@@ -10,7 +10,6 @@ mod control;
 mod convection;
 mod fields;
 pub(crate) mod flow;
-mod flux_cache;
 mod growth;
 mod implicit;
 pub(crate) mod layout;

@@ -6,14 +6,12 @@
 //!
 //! Check: energy and momentum made by the discrete convection, order on stretched meshes (tests of `flow`).
 
-use multiversion::multiversion;
-
-use super::flux_cache::FluxCache;
 use super::layout::{Layout, Shape};
 use super::operators_1d::DIFFERENCE;
 use super::row_operator::RowOperator;
 use super::rows::HALO;
 use super::transport::{Stencil, Transport};
+use multiversion::multiversion;
 
 /// The operators of one component.
 #[derive(Debug, Clone)]
@@ -198,5 +196,29 @@ impl Scratch {
     /// Gradient of one row into `self.pressure`.
     pub(crate) fn gradient(&mut self, ops: &Momentum, field: &[f64], j: usize, k: usize) {
         gradient_row(ops, field, j, k, &mut self.pressure, &mut self.padded[0]);
+    }
+}
+
+/// Fluxes along one axis that act on one row.
+pub(super) const SLOTS: usize = 4;
+
+/// Fluxes along the axes 1 and 2 of one component of one velocity field: each acts on four rows and is computed once, as long as rows
+/// are asked for in the order of memory.
+#[derive(Debug, Default)]
+pub(super) struct FluxCache {
+    /// For each axis the last four rows of each place across it.
+    pub(super) values: [Vec<f64>; 2],
+    /// Offset in the field of each row that is cached, `usize::MAX` of none.
+    pub(super) offsets: [Vec<usize>; 2],
+}
+
+impl FluxCache {
+    /// Room on a mesh of `n` cells.
+    #[inline(always)]
+    pub(super) fn fit(&mut self, n: [usize; 3]) {
+        for (axis, places) in [SLOTS, SLOTS * n[1]].into_iter().enumerate() {
+            self.offsets[axis].resize(places, usize::MAX);
+            self.values[axis].resize(places * n[0], 0.0);
+        }
     }
 }

@@ -3,8 +3,7 @@
 //! | file | what is in it |
 //! |---|---|
 //! | `wind` | the trait [`Wind`]; [`Sum`] |
-//! | `profile` | circulation against radius of one vortex, (3), (4) |
-//! | `two_scale` | the two-scale profile |
+//! | `profile` | circulation against radius of one vortex, (3), (4); the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
 //! | `vortex_line` | vortices of any axis, polylines of them, and their images |
 //! | `along_flight` | the pair, older the farther it is behind the aircraft |
@@ -24,7 +23,6 @@ mod linear;
 mod profile;
 mod series;
 mod strain;
-mod two_scale;
 mod volume;
 mod vortex;
 mod vortex_line;
@@ -35,9 +33,8 @@ pub use axis::{Edges, Side};
 pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
 pub use kernel::{m4_prime, m4_prime_weights};
 pub use linear::Linear;
-pub use profile::CirculationProfile;
+pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;
-pub use two_scale::TwoScale;
 pub use volume::{VolumeComponent, VolumeSnapshot};
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair};
 pub use vortex_line::{VortexLine, VortexLines};

@@ -13,7 +13,6 @@ mod record;
 #[cfg(test)]
 mod reduced;
 mod scales;
-mod slope;
 mod spectrum;
 mod vorticity;
 

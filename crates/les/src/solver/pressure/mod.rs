@@ -5,7 +5,6 @@
 
 mod apply;
 mod banded_cholesky;
-mod cost;
 mod direct;
 mod eigen;
 mod fold;
@@ -23,6 +22,6 @@ mod long_waves_tests;
 mod tests;
 
 pub(crate) use apply::norm;
-pub use cost::PressureMethod;
 pub(crate) use lines::{Pencil, pencils};
+pub use solver::PressureMethod;
 pub(crate) use solver::{PressureSolver, Solved, unless_stalled};

@@ -10,7 +10,6 @@
 //! up, observers that fail.
 
 mod energy;
-mod window;
 
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -22,9 +21,8 @@ use super::report::StepReport;
 use super::settings::FlowSettings;
 use super::subgrid::SubgridModel;
 use crate::error::{Error, check};
-use energy::EnergyBound;
-use window::Window;
-pub use window::{EnergyBudget, StepEnergy};
+use energy::{EnergyBound, Window};
+pub use energy::{EnergyBudget, StepEnergy};
 
 /// A step shorter than this share of the time of the run does not lead to its end.
 const SHORTEST_SHARE: f64 = 1e-10;
