@@ -5,10 +5,10 @@
 //! | [`figures`] | the figures that a run writes, and their shifts between settings |
 //! | [`keys`] | keys that trade error for time |
 //! | [`ladder`] | values of a key from fine to coarse, verdicts, the choice |
-//! | `search` | the search: what it plans, measures and spends |
-//! | `pilot`, `screens` | keys of the estimator, measured on maps; keys of phase screens |
+//! | `search` | the search: what it plans, measures and spends; keys of the estimator, measured on maps |
+//! | `screens` | keys of phase screens |
 //! | `verify` | the choice as a whole; realisations |
-//! | `flows`, `order` | meshes and steps of the case of a flow; the order of errors |
+//! | `flows` | meshes and steps of the case of a flow; the order of errors |
 //! | `report`, `pictures` | the answer as text, table and scene; drawn |
 
 pub mod figures;
@@ -16,11 +16,8 @@ pub mod figures;
 mod flows;
 pub mod keys;
 pub mod ladder;
-#[cfg(feature = "flow")]
-mod order;
 #[cfg(feature = "plots")]
 mod pictures;
-mod pilot;
 mod report;
 mod screens;
 mod search;

@@ -19,7 +19,6 @@ mod named;
 #[cfg(test)]
 mod ranks_tests;
 mod setup;
-mod steps;
 mod text;
 #[cfg(test)]
 #[path = "../../../les/src/ranks/threads.rs"]

@@ -1,12 +1,13 @@
-//! Curves over one pair of axes: lines, markers, uncertainty bands and error bars, with a legend that covers none of them.
-//! Check: a line breaks at a missing value, and a value lands at its coordinate; the rest is for the eye.
+//! Curves over one pair of axes: lines, markers, uncertainty bands and error bars, with a legend that covers none of them: it is put where
+//! it covers least, in a corner, the middle of an edge, else anywhere. Where no place is free the plot makes room above its curves.
+//! Check: a line breaks at a missing value, and a value lands at its coordinate; tests fill all places but one and find the legend there;
+//! the rest is for the eye.
 
 use super::axis::{Axis, Scale};
-use super::drawing::{Frame, Shape};
+use super::colour::curve_colour;
+use super::drawing::{Anchor, Frame, Pen, Shape};
 use super::font::Font;
-use super::frame::{BOTTOM, LEFT, inner, panel, top_room};
-use super::legend;
-use super::series::{Series, Style, finite, pieces};
+use super::frame::{BOTTOM, GRID, HALF_HEIGHT, LEFT, TICK_SIZE, inner, panel, top_room};
 use crate::io::{OutputResult, same_length};
 
 const RIGHT: f64 = 24.0;
@@ -82,17 +83,17 @@ impl CurvePlot {
         let x = Scale { label: &self.x.label, range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
         let mut y = Scale { label: &self.y.label, range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
         let (mut content, mut occupied) = self.content(&x, &y);
-        let size = legend::size(&named, font);
-        let (mut place, covered) = legend::place(frame, size, &occupied);
+        let size = legend_size(&named, font);
+        let (mut place, covered) = legend_place(frame, size, &occupied);
         if !named.is_empty() && !self.equal_scales && covered > 0 {
             // Room above the highest point, as high as the legend.
-            y.range.1 = y.above((size.1 + 3.0 * legend::INSET) / frame.height);
+            y.range.1 = y.above((size.1 + 3.0 * INSET) / frame.height);
             (content, occupied) = self.content(&x, &y);
-            place = legend::place(frame, size, &occupied).0;
+            place = legend_place(frame, size, &occupied).0;
         }
         panel(&frame, [&x, &y], &self.title, content, font, out);
         if !named.is_empty() {
-            legend::legend(&named, place, out);
+            draw_legend(&named, place, out);
         }
         Ok(())
     }
@@ -126,6 +127,189 @@ fn along(points: &[(f64, f64)], joined: bool) -> Vec<(f64, f64)> {
         out.extend((1..steps).map(|k| k as f64 / steps as f64).map(|t| (pair[0].0 + t * dx, pair[0].1 + t * dy)));
     }
     out
+}
+
+const LINE_WIDTH: f64 = 2.2;
+/// Half the width of the ends of error bars.
+const CAP: f64 = 4.0;
+
+/// How a series is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Style {
+    /// Solid line.
+    Line,
+    /// Dashed line.
+    Dash,
+    /// Dotted line.
+    Dot,
+    /// Dashes and dots in turn.
+    DashDot,
+    /// A marker at each point, no line; a band becomes error bars.
+    Markers,
+    /// Solid line with a marker at each point.
+    LineMarkers,
+}
+
+impl Style {
+    fn dash(self) -> &'static [f64] {
+        match self {
+            Self::Dash => &[9.0, 5.0],
+            Self::Dot => &[2.5, 4.0],
+            Self::DashDot => &[11.0, 4.0, 2.5, 4.0],
+            Self::Line | Self::Markers | Self::LineMarkers => &[],
+        }
+    }
+
+    fn has_line(self) -> bool {
+        self != Self::Markers
+    }
+
+    fn has_markers(self) -> bool {
+        matches!(self, Self::Markers | Self::LineMarkers)
+    }
+}
+
+/// One curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// Name in the legend; none where empty.
+    pub label: String,
+    /// Points (x, y) in the order in which they are joined; a NaN breaks the line.
+    pub points: Vec<(f64, f64)>,
+    /// Line or markers.
+    pub style: Style,
+    /// Lower and upper y at each point, drawn as a band.
+    pub band: Option<Vec<(f64, f64)>>,
+    /// Index into the palette; the position of the series in the plot where absent.
+    pub colour: Option<usize>,
+}
+
+impl Series {
+    /// A curve without band, in the next colour.
+    pub fn new(label: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
+        Self { label: label.into(), points: points.into_iter().collect(), style, band: None, colour: None }
+    }
+
+    /// The same curve with a band of +- `half_width` about each point.
+    #[must_use]
+    pub fn with_band(mut self, half_width: &[f64]) -> Self {
+        self.band = Some(self.points.iter().zip(half_width).map(|(p, h)| (p.1 - h, p.1 + h)).collect());
+        self
+    }
+
+    /// The same curve in colour `index` of the palette.
+    #[must_use]
+    pub fn in_colour(mut self, index: usize) -> Self {
+        self.colour = Some(index);
+        self
+    }
+
+    fn pen(&self, colour: usize) -> Pen {
+        Pen { colour: curve_colour(colour), width: LINE_WIDTH, dash: self.style.dash() }
+    }
+
+    /// The curve through its points on the paper, with its band between those at the same places.
+    fn shapes(&self, colour: usize, points: &[(f64, f64)], band: &[(f64, f64)], out: &mut Vec<Shape>) {
+        let fill = curve_colour(colour);
+        // x, lower and upper edge.
+        let band: Vec<_> = points.iter().zip(band).map(|(p, b)| (p.0, b.0, b.1)).collect();
+        let bands = band.split(|b| !(b.0.is_finite() && b.1.is_finite() && b.2.is_finite()));
+        if self.style == Style::Markers {
+            for &(x, low, high) in bands.flatten() {
+                let cap = |y: f64| [(x - CAP, y), (x + CAP, y)];
+                out.extend([[(x, low), (x, high)], cap(low), cap(high)].map(|line| Shape::line(line, fill, 1.4)));
+            }
+        } else {
+            // One polygon for a stretch without gap: forth along the upper edge, back along the lower.
+            for stretch in bands.filter(|stretch| stretch.len() > 1) {
+                let (upper, lower) = (stretch.iter().map(|b| (b.0, b.2)), stretch.iter().rev().map(|b| (b.0, b.1)));
+                out.push(Shape::Area { points: upper.chain(lower).collect(), fill, opacity: 0.22 });
+            }
+        }
+        if self.style.has_line() {
+            out.extend(pieces(points).map(|p| Shape::Line { points: p.to_vec(), pen: self.pen(colour) }));
+        }
+        if self.style.has_markers() {
+            out.extend(points.iter().filter(|p| finite(p)).map(|p| marker(*p, colour)));
+        }
+    }
+}
+
+/// The marker of a series: its shape differs as well as its colour.
+fn marker(at: (f64, f64), index: usize) -> Shape {
+    let (corners, radius, turn): (u32, f64, f64) =
+        [(24, 4.6, 0.0), (4, 5.6, 0.125), (3, 6.2, -0.25), (4, 5.8, 0.0)][index % 4];
+    let corner = |i: u32| {
+        let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
+        (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
+    };
+    Shape::area((0..corners).map(corner).collect::<Vec<_>>(), curve_colour(index))
+}
+
+fn finite(p: &(f64, f64)) -> bool {
+    p.0.is_finite() && p.1.is_finite()
+}
+
+/// Stretches of at least two finite points.
+fn pieces(points: &[(f64, f64)]) -> impl Iterator<Item = &[(f64, f64)]> {
+    points.split(|p| !finite(p)).filter(|s| s.len() > 1)
+}
+
+const SAMPLE: f64 = 34.0;
+const LINE: f64 = 21.0;
+const PAD: f64 = 9.0;
+/// Between legend and frame.
+const INSET: f64 = 8.0;
+/// Half of the largest marker.
+const REACH: f64 = 6.5;
+/// Steps of the places that are tried along each side.
+const GRID_PLACES: u8 = 12;
+
+/// Room that the named series need, which come with the indices of their colours.
+fn legend_size(series: &[(usize, &Series)], font: &Font) -> (f64, f64) {
+    let widest = series.iter().map(|(_, s)| font.width(&s.label, TICK_SIZE)).fold(0.0, f64::max);
+    // A seventh more than the letters need: the font of an SVG viewer may run wider.
+    (SAMPLE + 3.0 * PAD + 1.15 * widest, LINE * series.len() as f64 + PAD)
+}
+
+/// Draws samples and names of the series into their place.
+fn draw_legend(series: &[(usize, &Series)], place: Frame, out: &mut Vec<Shape>) {
+    out.push(Shape::Area { points: place.outline(), fill: [255, 255, 255], opacity: 0.88 });
+    out.push(Shape::line(place.outline(), GRID, 1.0));
+    for (row, (colour, series)) in series.iter().enumerate() {
+        let (x, y) = (place.left + PAD, place.top + 0.5 * PAD + LINE * (row as f64 + 0.5));
+        if series.style.has_line() {
+            out.push(Shape::Line { points: vec![(x, y), (x + SAMPLE, y)], pen: series.pen(*colour) });
+        }
+        if series.style.has_markers() {
+            out.push(marker((x + SAMPLE / 2.0, y), *colour));
+        }
+        out.push(Shape::text((x + SAMPLE + PAD, y + HALF_HEIGHT), &series.label, TICK_SIZE, Anchor::Start));
+    }
+}
+
+/// The place with the fewest points under the legend, and how many these are. Of equal ones it is the first: the corners
+/// from the upper right on, the middles of the edges, then all over the frame.
+fn legend_place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64, f64)]) -> (Frame, usize) {
+    let corners = [(1.0, 0.0), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
+    let edges = [(0.5, 0.0), (0.5, 1.0), (1.0, 0.5), (0.0, 0.5)];
+    let part = |step: u8| f64::from(step) / f64::from(GRID_PLACES);
+    let all = (0..=GRID_PLACES).flat_map(|row| (0..=GRID_PLACES).map(move |column| (1.0 - part(column), part(row))));
+    let places = corners.into_iter().chain(edges).chain(all).map(|(across, down)| Frame {
+        left: frame.left + INSET + across * (frame.width - 2.0 * INSET - width),
+        top: frame.top + INSET + down * (frame.height - 2.0 * INSET - height),
+        width,
+        height,
+    });
+    // Markers and the width of lines reach beyond their points.
+    let covered = |f: &Frame| {
+        let inside = |p: &&(f64, f64)| {
+            p.0 > f.left - REACH && p.0 < f.right() + REACH && p.1 > f.top - REACH && p.1 < f.bottom() + REACH
+        };
+        occupied.iter().filter(inside).count()
+    };
+    let counted = places.map(|place| (place, covered(&place)));
+    counted.min_by_key(|(_, count)| *count).unwrap_or((frame, 0))
 }
 
 #[cfg(test)]
@@ -215,5 +399,38 @@ mod tests {
         assert!(plot.draw(cell, &Font::load().unwrap(), &mut Vec::new()).is_err());
         let bars = plot.series[0].clone().with_band(&[0.1, 0.2]);
         assert_eq!(bars.band.unwrap()[1], (0.8, 1.2));
+    }
+}
+
+#[cfg(test)]
+mod legend_tests {
+    use super::*;
+
+    #[test]
+    fn the_legend_goes_to_the_empty_corner() {
+        let frame = Frame { left: 0.0, top: 0.0, width: 400.0, height: 300.0 };
+        let corners = [(390.0, 10.0), (10.0, 10.0), (390.0, 290.0), (10.0, 290.0)];
+        for empty in 0..4 {
+            let ink: Vec<(f64, f64)> =
+                corners.iter().enumerate().filter(|(i, _)| *i != empty).map(|(_, p)| *p).collect();
+            let (found, covered) = legend_place(frame, (100.0, 60.0), &ink);
+            assert_eq!(covered, 0);
+            let expected = corners[empty];
+            assert!((found.left < 200.0) == (expected.0 < 200.0) && (found.top < 150.0) == (expected.1 < 150.0));
+        }
+    }
+
+    #[test]
+    fn the_only_free_place_is_found_away_from_corners_and_edges() {
+        let frame = Frame { left: 0.0, top: 0.0, width: 400.0, height: 300.0 };
+        let grid = (0..=80).flat_map(|i| (0..=60).map(move |j| (5.0 * f64::from(i), 5.0 * f64::from(j))));
+        // A hole off the middle, a little larger than the legend.
+        let ink: Vec<(f64, f64)> =
+            grid.filter(|(x, y)| !(70.0..=210.0).contains(x) || !(60.0..=150.0).contains(y)).collect();
+        let (found, covered) = legend_place(frame, (80.0, 40.0), &ink);
+        assert_eq!(covered, 0, "{found:?}");
+        assert!(found.left > 70.0 && found.right() < 210.0 && found.top > 60.0 && found.bottom() < 150.0);
+        let (_, covered) = legend_place(frame, (200.0, 100.0), &ink);
+        assert!(covered > 0, "too large for the hole");
     }
 }

@@ -1,13 +1,17 @@
 //! Surfaces of equal value of a field in space, lit and half transparent, in a box seen from aside without perspective.
-//! Check: a sphere covers the area of its shadow; the opaque surface hides the one behind; the same bytes twice.
+//!
+//! The field is on a rectilinear mesh; between its points it is the trilinear interpolant. A ray goes from cell to cell; in those whose
+//! corners are not all on one side of a level its crossings are found by steps and bisection. Rays need no list of triangles, and the
+//! surfaces are those of the interpolant itself.
+//! Check: a sphere covers the area of its shadow; the opaque surface hides the one behind; the same bytes twice; the interpolant is
+//! exact for products of lines; a sphere is met at its radius with its own normal; small steps along a ray find no other crossings.
 
 use super::axis::extremes;
 use super::colour::Rgb;
 use super::drawing::{Anchor, Frame, Shape};
 use super::frame::{TICK_SIZE, top_room};
 use super::png_file::pixels;
-use super::volume::Volume;
-use crate::io::{OutputError, OutputResult};
+use crate::io::{OutputError, OutputResult, increasing, same_length};
 use rayon::prelude::*;
 use tiny_skia::Pixmap;
 
@@ -190,10 +194,177 @@ impl IsosurfacePlot {
     }
 }
 
+/// A field on a rectilinear mesh.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Volume {
+    /// Positions of the points along x, y, z \[m\], increasing, at least two each.
+    pub axis_m: [Vec<f64>; 3],
+    /// Values `[k][j][i]`, x fastest.
+    pub values: Vec<f32>,
+}
+
+/// Steps of a ray through a cell: along it the interpolant is a polynomial of third degree.
+const STEPS: u32 = 4;
+const BISECTIONS: usize = 10;
+
+impl Volume {
+    /// A field with the values in the order z, y, x, x fastest.
+    ///
+    /// # Errors
+    /// Axes with fewer than two points or that do not increase, another number of values than points.
+    pub fn new(axis_m: [Vec<f64>; 3], values: Vec<f32>) -> OutputResult<Self> {
+        for (name, axis) in ["x axis", "y axis", "z axis"].into_iter().zip(&axis_m) {
+            increasing(name, axis)?;
+            if axis.len() < 2 {
+                return Err(OutputError::value(name, axis.len(), "at least two positions"));
+            }
+        }
+        same_length("values", values.len(), "the points", axis_m.iter().map(Vec::len).product())?;
+        Ok(Self { axis_m, values })
+    }
+
+    /// Low and high corner \[m\].
+    fn corners_m(&self) -> [[f64; 3]; 2] {
+        [self.axis_m.each_ref().map(|axis| axis[0]), self.axis_m.each_ref().map(|axis| axis[axis.len() - 1])]
+    }
+
+    /// The cell of a position, the nearest one outside.
+    fn cell(&self, at_m: [f64; 3]) -> [usize; 3] {
+        std::array::from_fn(|d| {
+            let axis = &self.axis_m[d];
+            axis.partition_point(|a| *a <= at_m[d]).clamp(1, axis.len() - 1) - 1
+        })
+    }
+
+    /// Values at the corners of a cell, x fastest.
+    fn corners(&self, [i, j, k]: [usize; 3]) -> [f32; 8] {
+        let [nx, ny, _] = self.axis_m.each_ref().map(Vec::len);
+        let row = |j: usize, k: usize| (k * ny + j) * nx + i;
+        let [a, b, c, d] = [row(j, k), row(j + 1, k), row(j, k + 1), row(j + 1, k + 1)];
+        [a, a + 1, b, b + 1, c, c + 1, d, d + 1].map(|place| self.values[place])
+    }
+
+    /// The interpolant of a cell; positions outside are moved to its nearest face.
+    fn within(&self, cell: [usize; 3], at_m: [f64; 3]) -> f64 {
+        let part = |d: usize| {
+            let (low, high) = (self.axis_m[d][cell[d]], self.axis_m[d][cell[d] + 1]);
+            ((at_m[d] - low) / (high - low)).clamp(0.0, 1.0)
+        };
+        let between = |a: f64, b: f64, part: f64| a + part * (b - a);
+        let [a, b, c, d, e, f, g, h] = self.corners(cell).map(f64::from);
+        let [low_low, high_low, low_high, high_high] =
+            [(a, b), (c, d), (e, f), (g, h)].map(|(a, b)| between(a, b, part(0)));
+        between(between(low_low, high_low, part(1)), between(low_high, high_high, part(1)), part(2))
+    }
+
+    /// The interpolant; positions outside are moved to the nearest face.
+    fn at(&self, at_m: [f64; 3]) -> f64 {
+        self.within(self.cell(at_m), at_m)
+    }
+
+    /// Where the ray `from + t along` enters and leaves the mesh.
+    fn span_m(&self, from_m: [f64; 3], along: [f64; 3]) -> Option<(f64, f64)> {
+        let [low, high] = self.corners_m();
+        let mut span = (f64::NEG_INFINITY, f64::INFINITY);
+        for d in 0..3 {
+            if along[d].abs() < 1e-12 {
+                if from_m[d] < low[d] || from_m[d] > high[d] {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = ((low[d] - from_m[d]) / along[d], (high[d] - from_m[d]) / along[d]);
+            span = (span.0.max(a.min(b)), span.1.min(a.max(b)));
+        }
+        (span.0 < span.1).then_some(span)
+    }
+
+    /// Calls `met` for each crossing of a level along the ray, in order, until it returns false: with its distance along the ray \[m\],
+    /// the number of the level, and the unit normal of the surface, down the gradient.
+    fn cast(
+        &self,
+        from_m: [f64; 3],
+        along: [f64; 3],
+        levels: &[f64],
+        mut met: impl FnMut(f64, usize, [f64; 3]) -> bool,
+    ) {
+        let Some((mut start, end)) = self.span_m(from_m, along) else { return };
+        let on_ray = |t: f64| [0, 1, 2].map(|d| from_m[d] + t * along[d]);
+        let mut cell = self.cell(on_ray(start));
+        while start < end {
+            // The face through which the ray leaves the cell.
+            let mut leaves = (end, 0);
+            for d in 0..3 {
+                let face = (self.axis_m[d][cell[d] + usize::from(along[d] > 0.0)] - from_m[d]) / along[d];
+                if along[d].abs() >= 1e-12 && face < leaves.0 {
+                    leaves = (face.max(start), d);
+                }
+            }
+            let corners = self.corners(cell).map(f64::from);
+            let is_crossed = |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
+            if levels.iter().any(is_crossed) {
+                for (at_m, level) in self.crossings(cell, on_ray, (start, leaves.0), levels) {
+                    if !met(at_m, level, self.normal(on_ray(at_m))) {
+                        return;
+                    }
+                }
+            }
+            let (through, last) = (leaves.1, self.axis_m[leaves.1].len() - 2);
+            match along[through] > 0.0 {
+                true if cell[through] < last => cell[through] += 1,
+                false if cell[through] > 0 => cell[through] -= 1,
+                _ => return,
+            }
+            start = leaves.0;
+        }
+    }
+
+    /// Crossings of the levels in the part of a ray in a cell, in order.
+    fn crossings(
+        &self,
+        cell: [usize; 3],
+        on_ray: impl Fn(f64) -> [f64; 3],
+        (start, end): (f64, f64),
+        levels: &[f64],
+    ) -> Vec<(f64, usize)> {
+        let is_below = |t: f64, wanted: f64| self.within(cell, on_ray(t)) < wanted;
+        let place = |step: u32| start + f64::from(step) / f64::from(STEPS) * (end - start);
+        let steps = (0..STEPS).flat_map(|step| levels.iter().enumerate().map(move |level| (step, level)));
+        let crossing = |(step, (level, &wanted)): (u32, (usize, &f64))| {
+            let (mut low, mut high) = (place(step), place(step + 1));
+            let below = is_below(low, wanted);
+            if below == is_below(high, wanted) {
+                return None;
+            }
+            for _ in 0..BISECTIONS {
+                let middle = 0.5 * (low + high);
+                if is_below(middle, wanted) == below { low = middle } else { high = middle }
+            }
+            Some((0.5 * (low + high), level))
+        };
+        let mut found: Vec<(f64, usize)> = steps.filter_map(crossing).collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found
+    }
+
+    /// Unit vector down the gradient, by differences over two cells; the upright one where there is none.
+    fn normal(&self, at_m: [f64; 3]) -> [f64; 3] {
+        let cell = self.cell(at_m);
+        let slope: [f64; 3] = std::array::from_fn(|d| {
+            let reach_m = self.axis_m[d][cell[d] + 1] - self.axis_m[d][cell[d]];
+            let (mut low, mut high) = (at_m, at_m);
+            (low[d], high[d]) = (low[d] - reach_m, high[d] + reach_m);
+            (self.at(low) - self.at(high)) / reach_m
+        });
+        let length = slope.iter().map(|s| s * s).sum::<f64>().sqrt();
+        if length > 0.0 { slope.map(|s| s / length) } else { [0.0, 0.0, 1.0] }
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::volume::tests::cone;
     use super::super::{Figure, Panel};
+    use super::volume_tests::cone;
     use super::*;
     use crate::io::provenance::example;
 
@@ -242,5 +413,113 @@ mod tests {
         assert!(good.svg(&example()).unwrap().contains("<image"));
         assert!(figure(plot(&[(f64::NAN, [0, 0, 0], 1.0)])).png(&example()).is_err());
         assert!(figure(plot(&[(-0.5, [0, 0, 0], 2.0)])).png(&example()).is_err());
+    }
+}
+
+#[cfg(test)]
+mod volume_tests {
+    use super::*;
+
+    fn axis(n: usize, stretch: f64) -> Vec<f64> {
+        (0..n).map(|i| i as f64 / (n - 1) as f64).map(|s| -1.0 + 2.0 * s.powf(stretch)).collect()
+    }
+
+    /// Minus the distance from the origin.
+    pub(super) fn cone(n: usize) -> Volume {
+        let axes = [axis(n, 1.0), axis(n + 5, 1.1), axis(n + 9, 0.9)];
+        let mut values = Vec::new();
+        for z in &axes[2] {
+            for y in &axes[1] {
+                for x in &axes[0] {
+                    values.push(-(x * x + y * y + z * z).sqrt() as f32);
+                }
+            }
+        }
+        Volume::new(axes, values).unwrap()
+    }
+
+    #[test]
+    fn the_interpolant_is_exact_for_products_of_lines_on_unequal_steps() {
+        let axes = [axis(5, 1.0), axis(7, 1.7), axis(9, 0.6)];
+        let field = |x: f64, y: f64, z: f64| (1.0 + x) * (2.0 - y) * (0.5 + z);
+        let mut values = Vec::new();
+        for z in &axes[2] {
+            for y in &axes[1] {
+                values.extend(axes[0].iter().map(|x| field(*x, *y, *z) as f32));
+            }
+        }
+        let volume = Volume::new(axes, values).unwrap();
+        for i in 0..200 {
+            let [x, y, z] = [0.618, 0.755, 0.57].map(|step| -1.0 + 2.0 * (i as f64 * step).fract());
+            assert!((volume.at([x, y, z]) - field(x, y, z)).abs() < 1e-6, "{x} {y} {z}");
+        }
+        assert!((volume.at([9.0, 9.0, 9.0]) - field(1.0, 1.0, 1.0)).abs() < 1e-6, "outside: the nearest face");
+    }
+
+    #[test]
+    fn rays_meet_a_sphere_at_its_radius_with_its_normal() {
+        let volume = cone(60);
+        let along = [0.6, 0.48, -0.64];
+        let from = [-1.8 + 0.1, -1.44, 1.92];
+        let mut met = Vec::new();
+        volume.cast(from, along, &[-0.5, -0.8], |at_m, level, normal| {
+            met.push((at_m, level, normal));
+            true
+        });
+        assert_eq!(met.iter().map(|c| c.1).collect::<Vec<_>>(), [1, 0, 0, 1]);
+        for (at_m, level, normal) in met {
+            let radius = [0.5, 0.8][level];
+            let at: Vec<f64> = (0..3).map(|d| from[d] + at_m * along[d]).collect();
+            let distance = at.iter().map(|a| a * a).sum::<f64>().sqrt();
+            assert!((distance - radius).abs() < 1e-3, "{distance} for {radius}");
+            let cosine: f64 = (0..3).map(|d| normal[d] * at[d] / distance).sum();
+            assert!(cosine > 0.999, "{cosine}");
+        }
+    }
+
+    #[test]
+    fn small_steps_along_a_ray_find_the_same_crossings() {
+        let volume = cone(37);
+        let levels = [-0.5, -0.8, -1.1];
+        let mut all = 0;
+        for ray in 0..200 {
+            let [a, b, c] = [0.618, 0.755, 0.57].map(|part| 2.0 * (f64::from(ray) * part).fract() - 1.0);
+            let length = (a * a + b * b + 1.0_f64).sqrt();
+            let along = [a / length, b / length, if ray % 2 == 0 { 1.0 } else { -1.0 } / length];
+            let from = [c, -a, 0.3 * b];
+            let mut met = Vec::new();
+            volume.cast(from, along, &levels, |at_m, level, _| {
+                met.push((level, at_m));
+                true
+            });
+            let Some((start, end)) = volume.span_m(from, along) else {
+                assert!(met.is_empty());
+                continue;
+            };
+            let at = |step: u32| start + f64::from(step) * 1e-3 * (end - start);
+            let value = |step: u32| volume.at(std::array::from_fn(|d| from[d] + at(step) * along[d]));
+            let values: Vec<f64> = (0..=1000).map(value).collect();
+            let mut expected = Vec::new();
+            for (step, pair) in (0..).zip(values.windows(2)) {
+                let crossed =
+                    levels.iter().enumerate().filter(|(_, wanted)| (pair[0] < **wanted) != (pair[1] < **wanted));
+                expected.extend(crossed.map(|(level, _)| (level, at(step))));
+            }
+            assert_eq!(met.len(), expected.len(), "ray {ray}");
+            for ((level, at_m), (expected, from_m)) in met.iter().zip(&expected) {
+                let near = (from_m - 1e-9..=from_m + 1.001e-3 * (end - start)).contains(at_m);
+                assert!(level == expected && near, "ray {ray}: {at_m} after {from_m}");
+            }
+            all += met.len();
+        }
+        assert!(all > 300, "{all}");
+    }
+
+    #[test]
+    fn axes_and_values_that_do_not_fit_are_refused() {
+        let line = || vec![0.0, 1.0];
+        assert!(Volume::new([line(), line(), vec![0.0]], vec![0.0; 4]).is_err());
+        assert!(Volume::new([line(), line(), vec![1.0, 0.0]], vec![0.0; 8]).is_err());
+        assert!(Volume::new([line(), line(), line()], vec![0.0; 7]).is_err());
     }
 }

@@ -5,16 +5,13 @@
 //! | module | draws |
 //! |---|---|
 //! | [`figure`] | panels side by side or stacked, as SVG text or PNG bytes |
-//! | [`curves`], [`series`] | curves with bands and markers, linear or logarithmic |
+//! | [`curves`] | curves with bands and markers, linear or logarithmic |
 //! | [`map`] | one field of a sweep or of a plane over distance and height, equal scales, with colour bar |
-//! | [`cells`] | (inside a map) pixels from polar and rectangular cells |
-//! | [`isosurface`] | lit surfaces of equal value of a field in space |
-//! | [`volume`] | (inside it) rays through a mesh |
+//! | [`isosurface`] | lit surfaces of equal value of a field in space, by rays through a mesh |
 //! | [`apng`] | pictures one after the other |
 //! | [`colour`] | palette and colour maps |
 
 mod axis;
-pub mod cells;
 pub mod colour;
 pub mod curves;
 mod drawing;
@@ -22,20 +19,14 @@ pub mod figure;
 mod font;
 mod frame;
 pub mod isosurface;
-mod legend;
 pub mod map;
 mod png_file;
-pub mod series;
 mod svg;
-pub mod volume;
 
 pub use axis::Axis;
-pub use cells::Cells;
 pub use colour::ColourMap;
-pub use curves::CurvePlot;
+pub use curves::{CurvePlot, Series, Style};
 pub use figure::{Figure, Panel, apng};
-pub use isosurface::{IsosurfacePlot, Surface};
-pub use map::MapPlot;
-pub use series::{Series, Style};
+pub use isosurface::{IsosurfacePlot, Surface, Volume};
+pub use map::{Cells, MapPlot};
 pub use svg::escape;
-pub use volume::Volume;
