@@ -61,6 +61,11 @@ impl Trial {
         observer.advance(1);
         Ok(())
     }
+
+    fn has(&self, figure: Figure) -> bool {
+        let is_told = |value: &f64| value.is_finite() && *value != 0.0;
+        self.history.as_ref().is_some_and(|found| found[place(figure)].iter().any(is_told))
+    }
 }
 
 impl Accuracy<CaseFile> {
@@ -215,13 +220,6 @@ impl Accuracy<CaseFile> {
         let [nx, ny, nz] = finer;
         let run = seconds(self.own_s * more.powf(1.0 + 1.0 / directions));
         format!("{CELLS}: by the orders found {nx} x {ny} x {nz} reach it; such a run takes about {run} (forecast)")
-    }
-}
-
-impl Trial {
-    fn has(&self, figure: Figure) -> bool {
-        let is_told = |value: &f64| value.is_finite() && *value != 0.0;
-        self.history.as_ref().is_some_and(|found| found[place(figure)].iter().any(is_told))
     }
 }
 

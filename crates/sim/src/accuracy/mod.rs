@@ -28,7 +28,6 @@ use crate::io::Provenance;
 use crate::plan::Plan;
 use crate::scene::{Pattern, SceneFile};
 use crate::setup::efficiency_model::{drawn_turbulence, model};
-use crate::setup::progress::Observer;
 use figures::{Figure, Shift};
 use ladder::Ladder;
 use wakescope_optics::plan::Model;
@@ -191,16 +190,6 @@ pub struct Accuracy<S = SceneFile> {
     pub scene: S,
     /// Forecast of its run without pictures, s of one core.
     pub run_s: f64,
-}
-
-impl Accuracy {
-    /// The accuracy of a scene.
-    ///
-    /// # Errors
-    /// What the scene refuses; figures that it does not have.
-    pub fn of(file: &SceneFile, request: &Request, observer: &dyn Observer) -> Result<Self, Error> {
-        search::Search::run(file, request, observer)
-    }
 }
 
 impl<S: Subject> Accuracy<S> {

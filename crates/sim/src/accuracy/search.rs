@@ -48,12 +48,12 @@ pub(super) fn run_s(plan: &Plan) -> f64 {
     plan.core_s + 2.0 * PLANNING_S * plan.screens.len() as f64
 }
 
-impl<'a> Search<'a> {
-    /// Searches for a scene.
+impl Accuracy {
+    /// The accuracy of a scene.
     ///
     /// # Errors
     /// What the scene refuses; figures that it does not have.
-    pub(super) fn run(file: &SceneFile, request: &'a Request, observer: &'a dyn Observer) -> Result<Accuracy, Error> {
+    pub fn of(file: &SceneFile, request: &Request, observer: &dyn Observer) -> Result<Self, Error> {
         let begun = Instant::now();
         let mut scene = file.scene.clone();
         (scene.outputs.svg, scene.outputs.png) = (false, false);
@@ -62,10 +62,10 @@ impl<'a> Search<'a> {
         own.fits()?;
         let own_s = run_s(&own);
         let spent_s = PLANNING_S * own.screens.len() as f64;
-        let mut out = Accuracy::begun((file.clone(), &file.hash), request, [own_s, spent_s], request.figures(&own)?);
+        let mut out = Self::begun((file.clone(), &file.hash), request, [own_s, spent_s], request.figures(&own)?);
         // TOML has signed whole numbers.
         out.verified.seed = stream(file.scene.seed, "accuracy", 0).next_u64() >> 1;
-        let mut search = Self { request, observer, common, own, fine, crossed: Vec::new(), scatter: None, out };
+        let mut search = Search { request, observer, common, own, fine, crossed: Vec::new(), scatter: None, out };
         observer.begin(Stage::Cases, 3);
         if model(&file.scene) != Model::MonteCarlo {
             search.out.notes.push("efficiency: exact, by quadrature".into());
@@ -82,7 +82,9 @@ impl<'a> Search<'a> {
         search.out.took_s = begun.elapsed().as_secs_f64();
         Ok(search.out)
     }
+}
 
+impl Search<'_> {
     /// Most that the keys may shift.
     pub(super) fn limit(&self) -> f64 {
         0.5 * self.out.within

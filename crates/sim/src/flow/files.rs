@@ -366,6 +366,11 @@ fn commit(group: &FileGroup, ranks: &Arc<dyn Ranks>) -> Result<Vec<PathBuf>, Err
     agree(ranks, stage.map_or(Ok(Vec::new()), |stage| group.put(&stage).map_err(Error::from)))
 }
 
+/// The checkpoint of a run in `folder`, and the one before it.
+pub(super) fn checkpoint_paths(folder: &Path) -> [PathBuf; 2] {
+    [folder.join("flow.checkpoint"), folder.join("flow.checkpoint.previous")]
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::thread_ranks::on_threads;
@@ -412,9 +417,4 @@ mod tests {
         assert_eq!(found, [Some(true), None]);
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
     }
-}
-
-/// The checkpoint of a run in `folder`, and the one before it.
-pub(super) fn checkpoint_paths(folder: &Path) -> [PathBuf; 2] {
-    [folder.join("flow.checkpoint"), folder.join("flow.checkpoint.previous")]
 }
