@@ -76,7 +76,7 @@ pub(super) fn show_files(folder: &Path) -> Result<Shown, Failure> {
     let wake = FinishedWake::read(folder)?;
     let f = &wake.flow;
     let like = |preset: WakePreset| {
-        let pair = preset.pair();
+        let pair = preset.flow();
         f.reynolds == pair.reynolds
             && f.core_radius == pair.core_radius
             && f.perturbation == pair.perturbation

@@ -4,6 +4,8 @@ use super::*;
 use crate::setup::progress::{Observer, Silent};
 use std::collections::BTreeMap;
 use std::fs;
+use wakescope_les::SubgridModel;
+use wakescope_les::cases::VortexPairCase;
 
 /// The example with few cells and three steps.
 fn tiny(name: &str, text: &str) -> String {
@@ -213,12 +215,33 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
     (commented.time.scheme, commented.time.courant) = (None, None);
     commented.checkpoint.every_steps = None;
     assert_eq!(commented, coarse.case, "the commented example is the preset");
-    for preset in [WakePreset::Coarse, WakePreset::Medium, WakePreset::Fine, WakePreset::Chapter] {
+    let [coarse, wide] =
+        [[24, 128, 80], [48, 240, 128]].map(|cells| VortexPairCase { cells, ..VortexPairCase::coarse() });
+    let medium = VortexPairCase { size: [1.0, 5.0, 2.5], ..wide };
+    let multiscale = SubgridModel::MULTISCALE_WALE;
+    let fine = VortexPairCase {
+        cells: [64, 256, 144],
+        ground_stretch: 2.0,
+        lateral_stretch: 0.45,
+        core_radius: 0.05,
+        reynolds: 2e4,
+        subgrid: multiscale,
+        ..medium.clone()
+    };
+    let chapter = VortexPairCase { cells: [128, 432, 224], size: [2.0, 6.0, 3.0], ground_stretch: 2.2, ..fine.clone() };
+    for (preset, expected) in [
+        (WakePreset::Coarse, coarse),
+        (WakePreset::Medium, medium),
+        (WakePreset::Fine, fine),
+        (WakePreset::Chapter, chapter),
+    ] {
         let file = CaseFile::parse_over(Some(preset), "", Path::new("preset")).unwrap();
         let CaseKind::Wake(flow) = &file.case.case else { panic!("{preset:?}") };
         let mut pair = flow.pair_case().unwrap();
-        pair.subgrid = preset.pair().subgrid;
-        assert_eq!(pair, preset.pair());
+        pair.subgrid = expected.subgrid;
+        assert_eq!(pair, expected);
+        let is_multiscale = file.case.solver.subgrid == Subgrid::MultiscaleWale { constant: None, order: None };
+        assert_eq!(is_multiscale, expected.subgrid == multiscale, "{preset:?}");
     }
     let own = "[case]\nkind = \"wake\"\nreynolds = 1e4\npair = { from = \"a320\" }\n[wake]\nend_tau = 1.0\n\
                fields_tau = []\nplanes_tau = []\n";

@@ -92,31 +92,6 @@ impl VortexPairCase {
         }
     }
 
-    /// The case B of the independent reference: the flow of [`Self::coarse`] in a wider box on 48 x 240 x 128 cells.
-    pub fn medium() -> Self {
-        Self { cells: [48, 240, 128], size: [1.0, 5.0, 2.5], ..Self::coarse() }
-    }
-
-    /// `Re_Gamma` 2e4 and `r_c` 0.05 with the multiscale model on 64 x 256 x 144 cells refined about the vortices, a third of a
-    /// core radius and more: hours.
-    pub fn fine() -> Self {
-        Self {
-            cells: [64, 256, 144],
-            size: [1.0, 5.0, 2.5],
-            ground_stretch: 2.0,
-            lateral_stretch: 0.45,
-            core_radius: 0.05,
-            reynolds: 2e4,
-            subgrid: SubgridModel::MULTISCALE_WALE,
-            ..Self::coarse()
-        }
-    }
-
-    /// The chapter's flow with walls resolved: `Re_Gamma` 2e4, `r_c` 0.05, the multiscale model, 128 x 432 x 224 cells; days.
-    pub fn chapter() -> Self {
-        Self { cells: [128, 432, 224], size: [2.0, 6.0, 3.0], ground_stretch: 2.2, ..Self::fine() }
-    }
-
     /// The profile of two scales whose span is that of an elliptically loaded wing, `b = 4 b0/pi`, and core that of the case.
     ///
     /// # Errors

@@ -1,11 +1,9 @@
 //! Ready-made cases of wakes.
 
-use super::super::case::{Checkpoint, FORMAT, FileFormat, FlowCase, Output, Solver, Subgrid, Time};
+use super::super::case::{FileFormat, FlowCase, Output, Solver, Subgrid};
 use super::super::kind::CaseKind;
 use super::case::WakeFlow;
 use super::output::WakeOutput;
-use wakescope_les::SubgridModel;
-use wakescope_les::cases::VortexPairCase;
 
 /// Ready-made wakes, from the quickest to the dearest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,42 +20,39 @@ pub enum WakePreset {
 }
 
 impl WakePreset {
-    /// The case as the solver has it.
-    pub fn pair(self) -> VortexPairCase {
+    /// The flow.
+    pub fn flow(self) -> WakeFlow {
+        // Cells about the vortices are a third of a core radius and more.
+        let refined = |cells, size, ground_stretch| WakeFlow {
+            cells,
+            size,
+            ground_stretch,
+            lateral_stretch: 0.45,
+            core_radius: 0.05,
+            reynolds: 2e4,
+            ..WakeFlow::default()
+        };
         match self {
-            Self::Coarse => VortexPairCase::coarse(),
-            Self::Medium => VortexPairCase::medium(),
-            Self::Fine => VortexPairCase::fine(),
-            Self::Chapter => VortexPairCase::chapter(),
+            Self::Coarse => WakeFlow::default(),
+            // Case B of the independent reference, the same flow in a wider box.
+            Self::Medium => WakeFlow { cells: [48, 240, 128], size: [1.0, 5.0, 2.5], ..WakeFlow::default() },
+            Self::Fine => refined([64, 256, 144], [1.0, 5.0, 2.5], 2.0),
+            Self::Chapter => refined([128, 432, 224], [2.0, 6.0, 3.0], 2.2),
         }
     }
 
     /// The case with all that is written.
     pub fn case(self) -> FlowCase {
-        let pair = self.pair();
-        let multiscale = pair.subgrid == SubgridModel::MULTISCALE_WALE;
-        let subgrid =
-            if multiscale { Subgrid::MultiscaleWale { constant: None, order: None } } else { Subgrid::None {} };
-        let format = FileFormat::Netcdf;
-        let flow = WakeFlow {
-            cells: pair.cells,
-            size: pair.size,
-            ground_stretch: pair.ground_stretch,
-            lateral_stretch: pair.lateral_stretch,
-            height: pair.height,
-            core_radius: pair.core_radius,
-            reynolds: pair.reynolds,
-            perturbation: pair.perturbation,
-            ..WakeFlow::default()
+        let subgrid = match self {
+            Self::Coarse | Self::Medium => Subgrid::None {},
+            Self::Fine | Self::Chapter => Subgrid::MultiscaleWale { constant: None, order: None },
         };
         FlowCase {
-            format: FORMAT,
-            case: CaseKind::Wake(Box::new(flow)),
-            time: Time::default(),
+            case: CaseKind::Wake(Box::new(self.flow())),
             solver: Solver { subgrid, ..Solver::default() },
-            output: Output { fields: vec![format], planes: vec![format], ..Output::default() },
-            checkpoint: Checkpoint::default(),
+            output: Output { fields: vec![FileFormat::Netcdf], ..Output::default() },
             wake: Some(WakeOutput::default()),
+            ..FlowCase::default()
         }
     }
 }
