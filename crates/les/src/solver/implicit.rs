@@ -12,7 +12,7 @@ use super::layout::Shape;
 use super::momentum::Momentum;
 use super::operators_1d::Taps;
 use super::pressure::{Pencil, pencils};
-use super::row_offsets::RowOffsets;
+use super::rows::RowOffsets;
 use super::rows::add_across;
 use super::slabs::Slabs;
 use crate::Error;

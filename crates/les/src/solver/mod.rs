@@ -15,7 +15,6 @@ mod implicit;
 pub(crate) mod layout;
 #[cfg(test)]
 mod literal;
-mod mapping;
 pub(crate) mod mesh;
 mod momentum;
 mod operators_1d;
@@ -23,7 +22,6 @@ pub(crate) mod planes;
 mod pressure;
 mod projection;
 mod report;
-mod row_offsets;
 mod row_operator;
 mod rows;
 mod run;

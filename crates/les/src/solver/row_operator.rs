@@ -2,7 +2,7 @@
 
 use super::layout::{Layout, Shape};
 use super::operators_1d::Taps;
-use super::row_offsets::RowOffsets;
+use super::rows::RowOffsets;
 use super::rows::{Columns, HALO, add_across, add_even, from_places, pad, rows_from};
 
 /// A linear operator along one axis.

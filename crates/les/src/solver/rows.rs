@@ -1,8 +1,9 @@
 //! Kernels on rows of memory axis 0. They are inlined into functions that are compiled for several instruction sets;
 //! products and sums are kept apart, so that each version gives the same bits.
+//!
+//! Check: the places of a shape (tests of `shape`).
 
 use super::operators_1d::Taps;
-use super::row_offsets::RowOffsets;
 use super::transport::{MEAN, Stencil};
 
 /// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in functions that are compiled for
@@ -213,6 +214,33 @@ pub(crate) fn even_mean(out: &mut [f64], scale: f64, q: &[&[f64]; 4]) {
 pub(crate) fn add_product(out: &mut [f64], scale: f64, g: &[f64], q: &[f64]) {
     for ((out, g), q) in out.iter_mut().zip(g).zip(q) {
         *out += scale * g * q;
+    }
+}
+
+/// Where the rows of some index begin in an array: numbers that are copied, not closures, which would stay calls in functions that are
+/// compiled for several instruction sets.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RowOffsets {
+    /// That of index 0 in an array that goes on downwards.
+    pub(crate) first: usize,
+    pub(crate) step: usize,
+    /// Index below which rows lie `round` further.
+    pub(crate) lowest: usize,
+    pub(crate) round: usize,
+}
+
+impl RowOffsets {
+    /// Rows of `step` values, of which that of index `lowest` is the first.
+    #[inline(always)]
+    pub(crate) fn every(step: usize, lowest: usize) -> Self {
+        Self { first: 0_usize.wrapping_sub(lowest * step), step, lowest: 0, round: 0 }
+    }
+
+    /// That of index `i`.
+    #[inline(always)]
+    pub(crate) fn of(self, i: usize) -> usize {
+        let start = self.first.wrapping_add(i * self.step);
+        if i < self.lowest { start.wrapping_add(self.round) } else { start }
     }
 }
 

@@ -7,8 +7,8 @@
 
 use std::ops::Range;
 
-use super::row_offsets::RowOffsets;
 use super::rows::HALO;
+use super::rows::RowOffsets;
 
 /// Number of values along the three memory axes, and the slab of them that is held.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -11,14 +11,12 @@
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
 //! | `volume` | fields in three dimensions |
 //! | `series` | [`Series`]: fields at several times, a wind that moves |
-//! | `axis` | one direction of a mesh: stretching, walls, periods |
+//! | `axis` | one direction of a mesh: stretching, walls, periods; the M'4 kernel, (27) |
 //! | `strain` | the largest line gradient of a velocity gradient |
-//! | `kernel` | the M'4 kernel, (27) |
 
 mod along_flight;
 pub(crate) mod axis;
 pub(crate) mod grid_wind;
-mod kernel;
 mod linear;
 mod profile;
 mod series;
@@ -29,9 +27,8 @@ mod vortex_line;
 mod wind;
 
 pub use along_flight::AlongFlight;
-pub use axis::{Edges, Side};
+pub use axis::{Edges, Side, m4_prime, m4_prime_weights};
 pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
-pub use kernel::{m4_prime, m4_prime_weights};
 pub use linear::Linear;
 pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;

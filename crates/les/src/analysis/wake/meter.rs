@@ -5,8 +5,7 @@
 use rayon::prelude::*;
 
 use super::cores::{Core, EdgeGrid, EdgePlane};
-use super::record::{SecondaryRecord, VortexRecord, WakeRecord};
-use super::scales::WakeScales;
+use super::record::{SecondaryRecord, VortexRecord, WakeRecord, WakeScales};
 use super::spectrum::mode_energies_m4_s2;
 use super::vorticity::Curl;
 use crate::analysis::circulation::circulation_m2_s;

@@ -12,10 +12,8 @@ mod meter;
 mod record;
 #[cfg(test)]
 mod reduced;
-mod scales;
 mod spectrum;
 mod vorticity;
 
 pub use meter::WakeMeter;
-pub use record::{SecondaryRecord, VortexRecord, WakeRecord};
-pub use scales::WakeScales;
+pub use record::{SecondaryRecord, VortexRecord, WakeRecord, WakeScales};

@@ -1,7 +1,6 @@
 //! Records in the units of the pair, for tests.
 
-use super::record::{SecondaryRecord, VortexRecord, WakeRecord};
-use super::scales::WakeScales;
+use super::record::{SecondaryRecord, VortexRecord, WakeRecord, WakeScales};
 
 impl WakeRecord {
     /// The same numbers in the units of the pair: lengths in `b0`, velocities in `V0`, times in `b0/V0`; circulations in
