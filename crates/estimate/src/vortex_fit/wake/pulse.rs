@@ -1,21 +1,16 @@
 //! The envelope of the pulse as the likelihood needs it, and the weights with which a pair of samples sees the air.
 //!
 //! Samples k and l at t_k = t + tau/2 and t_l = t - tau/2 see the layer at range R with the weight
-//! f(t_k - 2R/c) f(t_l - 2R/c). Check: a sampled Gaussian gives the weights of the exact one; the weights sum to
-//! exp(-tau^2 / (4 sigma^2)).
+//! f(t_k - 2R/c) f(t_l - 2R/c). Check: the weights sum to exp(-tau^2 / (4 sigma^2)).
 
 use std::f64::consts::PI;
 
-use crate::error::{Error, finite, positive};
+use crate::error::{Error, positive};
 
 /// Real envelope f(t) of the transmitted pulse; its energy is scaled to 1.
 #[derive(Debug, Clone, PartialEq)]
-pub struct PulseShape(Form);
-
-#[derive(Debug, Clone, PartialEq)]
-enum Form {
-    Gaussian { sigma_s: f64 },
-    Sampled { first_s: f64, interval_s: f64, per_sqrt_s: Vec<f64> },
+pub struct PulseShape {
+    sigma_s: f64,
 }
 
 impl PulseShape {
@@ -25,62 +20,22 @@ impl PulseShape {
     /// [`Error::OutOfRange`] if it is not positive.
     pub fn gaussian(sigma_s: f64) -> Result<Self, Error> {
         positive("sigma_s", sigma_s)?;
-        Ok(Self(Form::Gaussian { sigma_s }))
-    }
-
-    /// Any envelope without chirp: amplitudes `interval_s` apart from `first_time_s` \[s\] on, linear between, 0 beyond. Time 0
-    /// is when the pulse is said to leave.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for a number that is not finite, an interval that is not positive or a pulse without energy.
-    pub fn sampled(first_time_s: f64, interval_s: f64, amplitudes: &[f64]) -> Result<Self, Error> {
-        finite("first_time_s", first_time_s)?;
-        positive("interval_s", interval_s)?;
-        amplitudes.iter().try_for_each(|a| finite("amplitudes", *a))?;
-        let energy: f64 = amplitudes.iter().map(|a| a * a * interval_s).sum();
-        positive("energy of the pulse", energy)?;
-        let per_sqrt_s = amplitudes.iter().map(|a| a / energy.sqrt()).collect();
-        Ok(Self(Form::Sampled { first_s: first_time_s, interval_s, per_sqrt_s }))
+        Ok(Self { sigma_s })
     }
 
     /// f \[s^-1/2\] at a time \[s\].
     pub(crate) fn at(&self, time_s: f64) -> f64 {
-        match &self.0 {
-            Form::Gaussian { sigma_s } => (-0.5 * (time_s / sigma_s).powi(2)).exp() / (PI.sqrt() * sigma_s).sqrt(),
-            Form::Sampled { first_s, interval_s, per_sqrt_s } => {
-                let place = (time_s - first_s) / interval_s;
-                if !(place >= 0.0 && place <= (per_sqrt_s.len() - 1) as f64) {
-                    return 0.0;
-                }
-                let index = (place as usize).min(per_sqrt_s.len().saturating_sub(2));
-                let next = per_sqrt_s.get(index + 1).copied().unwrap_or(0.0);
-                per_sqrt_s[index] + (place - index as f64) * (next - per_sqrt_s[index])
-            }
-        }
+        (-0.5 * (time_s / self.sigma_s).powi(2)).exp() / (PI.sqrt() * self.sigma_s).sqrt()
     }
 
-    /// Largest time \[s\] at which f^2 matters (1e-7 of its peak for the Gaussian).
+    /// Largest time \[s\] at which f^2 matters: 1e-7 of its peak.
     pub(crate) fn reach_s(&self) -> f64 {
-        match &self.0 {
-            Form::Gaussian { sigma_s } => 4.0 * sigma_s,
-            Form::Sampled { first_s, interval_s, per_sqrt_s } => {
-                first_s.abs().max((first_s + interval_s * (per_sqrt_s.len() - 1) as f64).abs())
-            }
-        }
+        4.0 * self.sigma_s
     }
 
-    /// Half-width of f^2 at 1/e of the Gaussian with the same second moment \[s\].
+    /// Half-width of f^2 at 1/e \[s\].
     pub(crate) fn sigma_s(&self) -> f64 {
-        match &self.0 {
-            Form::Gaussian { sigma_s } => *sigma_s,
-            Form::Sampled { first_s, interval_s, per_sqrt_s } => {
-                let moment = |power: i32, centre: f64| -> f64 {
-                    let times = (0..per_sqrt_s.len()).map(|i| first_s + i as f64 * interval_s - centre);
-                    times.zip(per_sqrt_s).map(|(t, f)| t.powi(power) * f * f * interval_s).sum()
-                };
-                (2.0 * moment(2, moment(1, 0.0))).sqrt().max(*interval_s)
-            }
-        }
+        self.sigma_s
     }
 }
 
@@ -148,23 +103,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn weights_of_a_gaussian_sum_to_its_autocorrelation_and_a_sampled_one_agrees() {
+    fn weights_of_a_gaussian_sum_to_its_autocorrelation() {
         let sigma_s = 120e-9;
         let exact = PairWeights::new(&PulseShape::gaussian(sigma_s).unwrap(), 20e-9, 300, 1e-6);
         assert_eq!(exact.lags, 44);
-        let amplitudes: Vec<f64> =
-            (-500..=500).map(|i| 3.0 * (-0.5 * (f64::from(i) * 1e-9 / sigma_s).powi(2)).exp()).collect();
-        let sampled = PulseShape::sampled(-500e-9, 1e-9, &amplitudes).unwrap();
-        assert!((sampled.sigma_s() / sigma_s - 1.0).abs() < 1e-3);
-        let sampled = PairWeights::new(&sampled, 20e-9, 300, 1e-6);
         for (place, lag) in exact.lag_of_place().enumerate() {
             let sum: f64 = (0..=2 * exact.half).map(|offset| exact.row(offset)[place]).sum();
             let expected = (-(lag as f64 * 20e-9 / (2.0 * sigma_s)).powi(2)).exp();
             assert!((sum - expected).abs() < 1e-6, "{lag}: {sum} {expected}");
-            let other: f64 = (0..=2 * sampled.half)
-                .map(|o| sampled.lag_of_place().position(|l| l == lag).map_or(0.0, |p| sampled.row(o)[p]))
-                .sum();
-            assert!((other - expected).abs() < 1e-4, "{lag}: {other} {expected}");
         }
     }
 
@@ -179,10 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn pulses_without_energy_or_width_are_refused() {
+    fn pulses_without_width_are_refused() {
         assert!(PulseShape::gaussian(0.0).is_err());
-        assert!(PulseShape::sampled(0.0, 1e-9, &[0.0; 4]).is_err());
-        assert!(PulseShape::sampled(0.0, 1e-9, &[]).is_err());
-        assert!(PulseShape::sampled(0.0, 1e-9, &[1.0, f64::NAN]).is_err());
     }
 }
