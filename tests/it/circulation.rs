@@ -240,7 +240,7 @@ fn circulation_over_many_scans() {
         maps.push(map.wake.to_array());
         fits.push(fit.wake.to_array());
         println!("{seed}: map {:.1?}", map.wake.to_array());
-        println!("   signals {:.2?} in {} evaluations", fit.wake.to_array(), fit.evaluations);
+        println!("   signals {:.2?}", fit.wake.to_array());
         for (name, all) in [("map", &maps), ("signals", &fits)] {
             let n = all.len() as f64;
             for (index, label) in [(0, "left Gamma"), (1, "right Gamma"), (2, "left y"), (3, "left z"), (6, "core")] {

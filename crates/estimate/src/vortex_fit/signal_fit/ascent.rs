@@ -82,16 +82,15 @@ impl Ascent<'_> {
         Ok(information)
     }
 
-    /// Goes to the top of the likelihood, which `evaluations` counts on.
+    /// Goes to the top of the likelihood.
     ///
     /// # Errors
     /// [`Error::NotConverged`]; [`Error::Linalg`] if a covariance is not positive definite.
-    pub(crate) fn climb(&self, start: State, evaluations: &mut usize) -> Result<(State, f64), Error> {
+    pub(crate) fn climb(&self, start: State) -> Result<(State, f64), Error> {
         let mut curvature = self.information(&start, self.options.information_stride)?;
         let origin = vec![0.0; curvature.nrows()];
         let mut last: Option<(Vec<f64>, Vec<f64>)> = None;
         let evaluate = |x: &Vec<f64>| {
-            *evaluations += 1;
             let (log_likelihood, mut gradient) = self.value(&self.stepped(&start, x))?;
             gradient.iter_mut().for_each(|g| *g = -*g);
             if let Some((x_before, gradient_before)) = &last {

@@ -48,8 +48,6 @@ pub struct SignalFit {
     pub log_likelihood_gain: f64,
     /// Rays that were used.
     pub used_rays: usize,
-    /// Evaluations of the likelihood.
-    pub evaluations: usize,
 }
 
 impl SignalFit {
@@ -102,7 +100,7 @@ pub fn fit_signals<S: Sample>(
     }
     let model = ScanModel::new(setup, &snr, &start)?;
     let signals = ScanSignals::new(&model, records, noise_power)?;
-    let mut search = Search { setup, snr: &snr, signals: &signals, options, evaluations: 0 };
+    let search = Search { setup, snr: &snr, signals: &signals, options };
     let mut tops = vec![search.settle((start, Powers::default()), true)?];
     if options.starts == Starts::Several {
         for other in search.others(&tops[0])? {
@@ -132,32 +130,29 @@ struct Search<'a, F> {
     snr: &'a F,
     signals: &'a ScanSignals,
     options: &'a SignalFitOptions,
-    evaluations: usize,
 }
 
 impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
     /// The top that a start leads to; with `rough` through ascents with a weaker signal if it is strong, or if the first goes astray.
-    fn settle(&mut self, start: State, rough: bool) -> Result<Settled, Error> {
+    fn settle(&self, start: State, rough: bool) -> Result<Settled, Error> {
         let (mut state, signals, options) = (start, self.signals, self.options);
         for round in 0..ROUNDS {
             let model = ScanModel::new(self.setup, self.snr, &state.0)?;
-            let evaluations = &mut self.evaluations;
             let ascent = Ascent { model: &model, signals, options, others: None };
             // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
-            let weaker = |wake: Wake, snr: f64, evaluations: &mut usize| {
+            let weaker = |wake: Wake, snr: f64| {
                 let weak = Powers { log_signal: (snr / model.largest_snr).ln(), log_noise: 0.0 };
                 let options = SignalFitOptions { fit_powers: false, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
                 let ascent = Ascent { model: &model, signals, options: &options, others: None };
-                ascent.climb((wake, weak), evaluations).map(|((wake, _), _)| (wake, Powers::default()))
+                ascent.climb((wake, weak)).map(|((wake, _), _)| (wake, Powers::default()))
             };
             if rough && round == 0 && model.largest_snr > 1.0 {
-                state = weaker(state.0, 1.0, evaluations)?;
+                state = weaker(state.0, 1.0)?;
             }
-            let end = match ascent.climb(state, evaluations) {
+            let end = match ascent.climb(state) {
                 // astray between two tops: once more, from where a weaker signal leads
                 Err(Error::NotConverged { .. }) if rough && round == 0 => {
-                    let start = weaker(state.0, 0.3 * model.largest_snr.min(1.0), evaluations)?;
-                    ascent.climb(start, evaluations)?
+                    ascent.climb(weaker(state.0, 0.3 * model.largest_snr.min(1.0))?)?
                 }
                 end => end?,
             };
@@ -166,25 +161,25 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
                 return Ok(Settled { model: Rc::new(model), state, log_likelihood: end.1 });
             }
         }
-        Err(Error::NotConverged { iterations: self.evaluations, sigmas_left: f64::INFINITY })
+        Err(Error::NotConverged { iterations: ROUNDS, sigmas_left: f64::INFINITY })
     }
 
     /// States near other tops than the first.
-    fn others(&mut self, first: &Settled) -> Result<Vec<Candidate>, Error> {
+    fn others(&self, first: &Settled) -> Result<Vec<Candidate>, Error> {
         let mut guess = first.state.0;
         if self.options.free.core_radius != Sharing::Fixed {
             guess = guess.with_cores(CORES_OVER_SPACING[1] * guess.spacing_m());
         }
         let rough = ScanModel::with_layers(self.setup, self.snr, &guess, ROUGH_LAYERS)?;
         let near = near_lines(&rough, &first.state.0);
-        other_tops((&first.model, &near), self.signals, first.state, self.options, &mut self.evaluations)
+        other_tops((&first.model, &near), self.signals, first.state, self.options)
     }
 
     /// The highest top, and what the others add to its errors.
-    fn finish(self, mut settled: Vec<Settled>) -> Result<SignalFit, Error> {
+    fn finish(&self, mut settled: Vec<Settled>) -> Result<SignalFit, Error> {
         let (options, signals) = (self.options, self.signals);
         settled.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
-        let failed = Error::NotConverged { iterations: self.evaluations, sigmas_left: f64::NAN };
+        let failed = Error::NotConverged { iterations: ROUNDS, sigmas_left: f64::NAN };
         let mut tops: Vec<&Settled> = Vec::new();
         let mut informations = Vec::new();
         for next in &settled {
@@ -225,7 +220,6 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
             log_likelihood: best.log_likelihood,
             log_likelihood_gain: best.log_likelihood - without.log_likelihood,
             used_rays: signals.used_rays(),
-            evaluations: self.evaluations,
         })
     }
 }

@@ -52,7 +52,6 @@ pub(crate) fn other_tops(
     signals: &ScanSignals,
     top: State,
     options: &SignalFitOptions,
-    evaluations: &mut usize,
 ) -> Result<Vec<Candidate>, Error> {
     let rough = SignalFitOptions { tolerance_sigmas: 0.1, information_stride: 2, ..*options };
     let mut ascent = Ascent { model: near, signals, options: &rough, others: None };
@@ -63,8 +62,8 @@ pub(crate) fn other_tops(
     let gradient = at_top.iter().map(|g| -g).collect();
     ascent.others = Some(Parabola { about: top, gradient, information });
     let information = ascent.information(&top, 1)?;
-    let starts = places(&ascent, &top, &information, evaluations);
-    let ends = starts.into_iter().filter_map(|start| ascent.climb(start, evaluations).ok());
+    let starts = places(&ascent, &top, &information);
+    let ends = starts.into_iter().filter_map(|start| ascent.climb(start).ok());
     let mut found = distinct(ends, |other, end| same(&ascent, &information, &end.0, &other.0));
     let best = found.iter().map(|(_, log_likelihood)| *log_likelihood).fold(value_at_top, f64::max);
     found.retain(|(state, value)| *value > best - FAR_BELOW && !same(&ascent, &information, state, &top));
@@ -99,7 +98,7 @@ fn axes(options: &SignalFitOptions) -> (Vec<usize>, Vec<usize>) {
 }
 
 /// Places to climb from, the most promising first: no two of them are neighbours.
-fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluations: &mut usize) -> Vec<State> {
+fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>) -> Vec<State> {
     let (heights, cores) = axes(ascent.options);
     let Ok(covariance) = inverse("information on the wake", information) else { return Vec::new() };
     let deviations: Vec<f64> = covariance.diag().iter().map(|variance| variance.max(0.0).sqrt()).collect();
@@ -111,11 +110,8 @@ fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluatio
         if !cores.is_empty() {
             at.0 = at.0.with_cores(over_spacing * top.0.spacing_m());
         }
-        let mut score = |ascent: &Ascent<'_>, state: State| {
-            *evaluations += 1;
-            stepped_quickly(ascent, state, information, &quick)
-        };
-        let Some(middle) = score(ascent, at) else { continue };
+        let score = |state: State| stepped_quickly(ascent, state, information, &quick);
+        let Some(middle) = score(at) else { continue };
         // what each height does alone, the other where it is
         let alone: Vec<Vec<Option<(f64, State)>>> = heights
             .iter()
@@ -126,7 +122,7 @@ fn places(ascent: &Ascent<'_>, top: &State, information: &Array2<f64>, evaluatio
                     }
                     let mut by = vec![0.0; deviations.len()];
                     by[axis] = f64::from(step) * STEP_SIGMAS * deviations[axis];
-                    score(ascent, ascent.stepped(&middle.1, &by))
+                    score(ascent.stepped(&middle.1, &by))
                 };
                 (-STEPS..=STEPS).map(of).collect()
             })
