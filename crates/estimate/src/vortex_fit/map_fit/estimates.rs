@@ -75,8 +75,8 @@ pub fn fit_map_of_estimator(
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
     let guess = first_guess(map, model, &all.kernel)?;
-    let coarse = all.coarse(response, LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options, COARSER_NODES)).transpose()?;
+    let coarse = all.coarse(LINES_OVER_RADIUS[0]);
+    let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
     let rough = MapFitOptions { free: FreeParameters { core_radius: Sharing::Fixed, ..options.free }, ..*options };
     let by_means = |map: &VelocityMap<'_>, kernel: &RangeKernel| {
@@ -88,8 +88,8 @@ pub fn fit_map_of_estimator(
         Some(few) => by_means(&few.map, &few.kernel),
         None => by_means(map, &all.kernel.coarser(2)),
     };
-    let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
-    let all = all.with_slopes_at(for_slopes.as_ref(), response)?;
+    let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
+    let all = all.with_slopes_at(for_slopes.as_ref())?;
     let refine = |start: &Wake| all.setting().refined(start, NEAR);
     let from = |about: &Wake| {
         let starts = starts(about, options);
@@ -122,8 +122,8 @@ pub fn refine_map_fit_of_estimator(
 ) -> Result<MapFit, Error> {
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
-    let for_slopes = all.coarse(response, LINES_OVER_RADIUS[1]);
-    all.with_slopes_at(for_slopes.as_ref(), response)?.setting().refined(guess, NEAR)
+    let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
+    all.with_slopes_at(for_slopes.as_ref())?.setting().refined(guess, NEAR)
 }
 
 /// Secondary vortices beside the pair of a fit, if the map shows them or the options want them anyway, and that pair with them: both are fitted at
@@ -142,12 +142,10 @@ pub fn fit_secondary_vortices(
     map.validate()?;
     pair.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
-    let coarse = all.coarse(response, LINES_OVER_RADIUS[0]);
-    let few = coarse.as_ref().map(|coarse| coarse.shown(model, response, options, COARSER_NODES)).transpose()?;
-    let found = match &few {
-        Some(few) => few.setting().with_secondary(pair),
-        None => all.setting().with_secondary(pair),
-    };
+    let coarse = all.coarse(LINES_OVER_RADIUS[0]);
+    let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
+    let found =
+        few.as_ref().map_or_else(|| all.setting().with_secondary(pair), |few| few.setting().with_secondary(pair));
     let Some(found) = found else { return Ok(None) };
     if !found.secondary.fitted {
         return Ok(Some((None, found.secondary)));
@@ -176,7 +174,7 @@ pub fn with_local_circulations(
         let near = Coarse::near(map, |line, gate| {
             vortices[side].away_m(model.position_m(map.range_m[gate], map.elevation_rad[line])) < REACH_M
         });
-        let shown = near.shown(model, response, options, 1.0).ok()?;
+        let shown = Shown::new(&near.map(), model, response, options, 1.0).ok()?;
         shown.setting().local_circulation(&pair.wake, side, NEAR)
     });
     Ok(joined(pair, &local))
@@ -211,17 +209,25 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 
     /// The places that tell nearly all of the map.
-    fn coarse(&self, response: &EstimatorResponse<'_>, lines_over_radius: f64) -> Option<Coarse> {
-        let line_m = lines_over_radius * response.least_radius_m(self.map.range_m);
+    fn coarse(&self, lines_over_radius: f64) -> Option<Coarse> {
+        let line_m = lines_over_radius * self.prepared.response.least_radius_m(self.map.range_m);
         Coarse::of(&self.map, line_m, GATES_OVER_WIDTH * self.kernel.width_m())
     }
 
+    /// What the estimator shows at some of the places.
+    fn at<'c>(&self, places: &'c Coarse) -> Result<Shown<'c, 'c>, Error>
+    where
+        'a: 'c,
+    {
+        let correlated_lines = self.options.correlated_lines.div_ceil(places.line_step);
+        let options = MapFitOptions { correlated_lines, ..self.options };
+        Shown::new(&places.map(), self.prepared.model, self.prepared.response, &options, COARSER_NODES)
+    }
+
     /// The same with slopes at some places.
-    fn with_slopes_at(self, places: Option<&'a Coarse>, response: &'a EstimatorResponse<'a>) -> Result<Self, Error> {
-        let model = self.prepared.model;
-        let slopes_at =
-            places.map(|coarse| Ok((coarse, coarse.shown(model, response, &self.options, COARSER_NODES)?.prepared)));
-        Ok(Self { slopes_at: slopes_at.transpose()?, ..self })
+    fn with_slopes_at(self, places: Option<&'a Coarse>) -> Result<Self, Error> {
+        let slopes_at = places.map(|places| Ok((places, self.at(places)?.prepared))).transpose()?;
+        Ok(Self { slopes_at, ..self })
     }
 
     fn setting(&self) -> Setting<'_, 'm> {
@@ -237,25 +243,9 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 }
 
-impl Coarse {
-    /// What an estimator shows there.
-    fn shown<'a>(
-        &'a self,
-        model: &'a WakeModel,
-        response: &'a EstimatorResponse<'a>,
-        options: &MapFitOptions,
-        coarser: f64,
-    ) -> Result<Shown<'a, 'a>, Error> {
-        let correlated_lines = options.correlated_lines.div_ceil(self.line_step);
-        let options = MapFitOptions { correlated_lines, ..*options };
-        Shown::new(&self.map(), model, response, &options, coarser)
-    }
-}
-
 impl Prediction for Shown<'_, '_> {
     fn allows(&self, p: &[f64]) -> bool {
-        let (model, wake) = self.prepared.model.with(p);
-        model.allows(&wake)
+        self.prepared.model.allows(p)
     }
 
     fn predict(&self, p: &[f64], groups: &[Vec<usize>]) -> Predicted {
@@ -318,11 +308,11 @@ mod tests {
             standard_deviation_m_s: None,
         };
         let whole = Shown::new(&map, &model, &response, &options, 1.0).unwrap();
-        let coarse = whole.coarse(&response, LINES_OVER_RADIUS[1]).unwrap();
+        let coarse = whole.coarse(LINES_OVER_RADIUS[1]).unwrap();
         assert!(2 * coarse.map().velocity_m_s.len() <= velocity_m_s.len());
         let groups = options.free.groups();
         let all = whole.predict(&wake.to_array(), &groups).slopes;
-        let whole = whole.with_slopes_at(Some(&coarse), &response).unwrap();
+        let whole = whole.with_slopes_at(Some(&coarse)).unwrap();
         let some = whole.predict(&wake.to_array(), &groups).slopes;
         for ((group, some), all) in groups.iter().zip(&some).zip(&all) {
             let product = |a: &Array2<f64>, b: &Array2<f64>| (a * b).sum();

@@ -200,7 +200,7 @@ impl<'a> EstimatorResponse<'a> {
 
 /// A response at the places of a map, with its weights on nodes.
 pub(crate) struct Prepared<'r> {
-    response: &'r EstimatorResponse<'r>,
+    pub(crate) response: &'r EstimatorResponse<'r>,
     pub(crate) model: &'r WakeModel,
     elevation_rad: &'r [f64],
     range_m: &'r [f64],

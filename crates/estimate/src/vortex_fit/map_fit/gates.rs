@@ -43,8 +43,7 @@ impl<'a> Gates<'a> {
 
 impl Prediction for Gates<'_> {
     fn allows(&self, p: &[f64]) -> bool {
-        let (model, wake) = self.model.with(p);
-        model.allows(&wake)
+        self.model.allows(p)
     }
 
     fn of_other_profile(&self, wake: &Wake) -> Array2<f64> {

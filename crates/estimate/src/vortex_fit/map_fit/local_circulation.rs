@@ -36,7 +36,7 @@ impl Setting<'_, '_> {
         let groups = [vec![own], vec![Parameter::Wind as usize]];
         let start = pair.to_array().to_vec();
         let settled = self.settled(start.clone(), &groups, stop, None).ok()?;
-        let (best, alone) = (&settled.linear, self.linear(&start, &groups, None).ok()?.0);
+        let (best, alone) = (&settled.linear, self.linear(&start, &groups, None).ok()?);
         if best.shared_with(&alone).len() < 10 * groups.len() || best.tangent.at[own] <= 0.0 {
             return None;
         }
@@ -45,7 +45,7 @@ impl Setting<'_, '_> {
         Some(Local {
             circulation_m2_s: best.tangent.at[own],
             variance: uncertainty.covariance(|_| true).ok()?[[own, own]],
-            gain: self.gain((best, &groups), (&alone, &groups), settled.counted),
+            gain: self.gain(best, &alone, settled.counted),
         })
     }
 }

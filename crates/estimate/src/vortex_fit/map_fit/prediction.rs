@@ -93,6 +93,8 @@ pub(crate) fn near(a: &[f64], b: &[f64]) -> bool {
 pub(crate) struct Tangent {
     pub(crate) at: Vec<f64>,
     pub(crate) here: Predicted,
+    /// Where its slopes were taken, which is near.
+    pub(crate) slopes_at: Vec<f64>,
 }
 
 impl Tangent {

@@ -85,7 +85,7 @@ impl Setting<'_, '_> {
         }
         let (lines, mut groups) = (self.options.correlated_lines, self.options.free.groups());
         let two = pair.to_array().to_vec();
-        let alone = self.linear(&two, &groups, None).ok()?.0;
+        let alone = self.linear(&two, &groups, None).ok()?;
         let counted = self.about(&alone, 1.0).alike(&two, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
         if gain < LEAST_GAIN.max(counted) && !always {
@@ -100,8 +100,7 @@ impl Setting<'_, '_> {
         let four = self.about(&settled.linear, counted);
         let counted = four.alike(p, lines).min(counted);
         let four = self.about(&settled.linear, counted);
-        let own = &groups[..groups.len() - NUMBERS];
-        let gain = self.gain((&settled.linear, &settled.groups), (&alone, own), counted) - of_profile / counted;
+        let gain = self.gain(&settled.linear, &alone, counted) - of_profile / counted;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
         let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
@@ -110,7 +109,7 @@ impl Setting<'_, '_> {
             return None;
         }
         let (model, wake) = self.model.with(p);
-        let uncertainty = four.uncertainty(p, &settled.groups, Scores::OfNeighbours { lines }).ok()?;
+        let uncertainty = four.uncertainty(p, &settled.linear.groups, Scores::OfNeighbours { lines }).ok()?;
         let secondary = SecondaryVortices { vortices: model.secondary?, shown, fitted };
         Some(Found { wake, secondary, covariance: uncertainty.covariance(|_| true).ok()? })
     }

@@ -38,6 +38,8 @@ pub(crate) struct Setting<'a, 'm> {
 /// The model made linear about some parameters, with the deviations that the residuals tell there.
 pub(crate) struct Linear {
     pub(crate) tangent: Tangent,
+    /// Its free numbers.
+    pub(crate) groups: Vec<Vec<usize>>,
     pub(crate) cells: Vec<Cell>,
     /// Of the residuals over the stated deviations in uniform wind.
     scale: f64,
@@ -46,7 +48,6 @@ pub(crate) struct Linear {
 /// The end of steps of Gauss and Newton.
 pub(crate) struct Settled {
     pub(crate) linear: Linear,
-    pub(crate) groups: Vec<Vec<usize>>,
     /// Velocities that count as one.
     pub(crate) counted: f64,
 }
@@ -70,35 +71,26 @@ impl Setting<'_, '_> {
         Ok(groups)
     }
 
-    pub(crate) fn squares<'s>(
-        &'s self,
-        prediction: &'s dyn Prediction,
-        cells: Vec<Cell>,
-        counted: f64,
-    ) -> LeastSquares<'s> {
+    fn squares<'s>(&'s self, prediction: &'s dyn Prediction, cells: Vec<Cell>) -> LeastSquares<'s> {
         let (loss, prior) = (self.options.loss, self.options.core_prior);
-        LeastSquares { prediction, fold_m_s: None, cells, whitening: None, loss, prior, counted }
+        LeastSquares { prediction, fold_m_s: None, cells, whitening: None, loss, prior, counted: 1.0 }
     }
 
     /// Least squares about the parameters at which the model was made linear.
     pub(crate) fn about<'s>(&'s self, linear: &'s Linear, counted: f64) -> LeastSquares<'s> {
-        self.squares(&linear.tangent, linear.cells.clone(), counted)
+        LeastSquares { counted, ..self.squares(&linear.tangent, linear.cells.clone()) }
     }
 
     /// What a model with these free numbers gains over another one in the logarithm of the likelihood, so many velocities counted once. Deviations
     /// are the same for both, those that it leaves: a scale that each fit takes from its own residuals changes by chance, and with it the likelihood
     /// of all.
-    pub(crate) fn gain(
-        &self,
-        (better, groups): (&Linear, &[Vec<usize>]),
-        (than, its_groups): (&Linear, &[Vec<usize>]),
-        counted: f64,
-    ) -> f64 {
+    pub(crate) fn gain(&self, better: &Linear, than: &Linear, counted: f64) -> f64 {
         let cells = better.shared_with(than);
-        let of = |linear: &Linear, groups: &[Vec<usize>]| {
-            self.squares(&linear.tangent, cells.clone(), counted).log_likelihood(&linear.tangent.at, groups)
+        let of = |linear: &Linear| {
+            let squares = LeastSquares { cells: cells.clone(), ..self.about(linear, counted) };
+            squares.log_likelihood(&linear.tangent.at, &linear.groups)
         };
-        (of(better, groups) - of(than, its_groups)) / counted
+        (of(better) - of(than)) / counted
     }
 
     /// The fit by descent from a start on, to steps of `sigmas`.
@@ -108,7 +100,7 @@ impl Setting<'_, '_> {
         let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
         let mut p = self.options.free.start(start).to_array().to_vec();
         let scaled = |p: &[f64]| {
-            let squares = self.squares(self.prediction, cells(self.map), 1.0);
+            let squares = self.squares(self.prediction, cells(self.map));
             let scale = squares.residual_scale(p);
             finite("scale of the residuals", scale)?;
             let squares = squares.rescaled(scale.max(1e-6));
@@ -134,8 +126,8 @@ impl Setting<'_, '_> {
         let groups = self.groups(start)?;
         let start = self.options.free.start(start).to_array().to_vec();
         let settled = self.settled(start, &groups, stop, None)?;
-        let squares = self.about(&settled.linear, settled.counted);
-        self.outcome(&squares, &settled.linear.tangent.at, &settled.groups, settled.linear.scale)
+        let (squares, linear) = (self.about(&settled.linear, settled.counted), &settled.linear);
+        self.outcome(&squares, &linear.tangent.at, &linear.groups, linear.scale)
     }
 
     /// Steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
@@ -148,13 +140,14 @@ impl Setting<'_, '_> {
     ) -> Result<Settled, Error> {
         let (mut groups, mut released) = (all.to_vec(), false);
         let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
-        let mut known: Option<(Vec<f64>, Vec<Array2<f64>>)> = None;
+        let mut known: Option<Tangent> = None;
         let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, stop.iterations);
         while steps < most {
             steps += 1;
-            let kept = known.take().filter(|(at, slopes)| near(at, &p) && slopes.len() == groups.len());
+            let serves = |known: &Tangent| near(&known.slopes_at, &p) && known.here.slopes.len() == groups.len();
+            let kept = known.take().filter(serves);
             let is_kept = kept.is_some();
-            let (linear, about) = self.linear(&p, &groups, kept)?;
+            let linear = self.linear(&p, &groups, kept)?;
             if !is_kept && counted.is_none() {
                 alike = self.about(&linear, 1.0).alike(&p, self.options.correlated_lines);
             }
@@ -173,30 +166,25 @@ impl Setting<'_, '_> {
                     (groups, released, most) = (all.to_vec(), true, steps + stop.iterations);
                     continue;
                 }
-                return Ok(Settled { linear, groups, counted: alike });
+                return Ok(Settled { linear, counted: alike });
             }
             let there = halved(share.min(linear.tangent.reach(&next)), |part| {
                 let trial: Vec<f64> = p.iter().zip(&way).map(|(p, way)| p + part * way).collect();
                 self.prediction.allows(&trial).then_some(trial)
             });
             p = there.ok_or(no_way(sigmas_left))?;
-            (last, known) = (way, Some((about, linear.tangent.here.slopes)));
+            (last, known) = (way, Some(linear.tangent));
             keep_small_cores(&mut p, &mut groups, self.least_core_m);
         }
         Err(Error::NotConverged { iterations: steps, sigmas_left })
     }
 
-    /// The model made linear about `p`, with slopes that are known from parameters near by or taken anew; and those parameters.
-    pub(crate) fn linear(
-        &self,
-        p: &[f64],
-        groups: &[Vec<usize>],
-        known: Option<(Vec<f64>, Vec<Array2<f64>>)>,
-    ) -> Result<(Linear, Vec<f64>), Error> {
+    /// The model made linear about `p`, with slopes that are known from parameters near by or taken anew.
+    pub(crate) fn linear(&self, p: &[f64], groups: &[Vec<usize>], known: Option<Tangent>) -> Result<Linear, Error> {
         let mut here = self.prediction.predict(p, if known.is_some() { &[] } else { groups });
-        let mut about = p.to_vec();
+        let mut slopes_at = p.to_vec();
         if let Some(known) = known {
-            (about, here.slopes) = known;
+            (slopes_at, here.slopes) = (known.slopes_at, known.here.slopes);
         }
         let mut cells = cells(self.map);
         cells.retain(|cell| {
@@ -212,7 +200,8 @@ impl Setting<'_, '_> {
         finite("scale of the residuals", scale)?;
         let scale = scale.max(1e-6);
         cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
-        Ok((Linear { tangent: Tangent { at: p.to_vec(), here }, cells, scale }, about))
+        let tangent = Tangent { at: p.to_vec(), here, slopes_at };
+        Ok(Linear { tangent, groups: groups.to_vec(), cells, scale })
     }
 
     fn outcome(

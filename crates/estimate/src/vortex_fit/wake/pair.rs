@@ -295,9 +295,10 @@ impl WakeModel {
         self.gradients(wake, &[range_m], Ray::new(elevation_rad))[0]
     }
 
-    /// Whether the model exists for a wake: with images, above the ground only.
-    pub(crate) fn allows(&self, wake: &Wake) -> bool {
-        let mut all = [&wake.left, &wake.right].into_iter().chain(self.secondary.iter().flatten());
+    /// Whether the model exists for a list of parameters: with images, above the ground only.
+    pub(crate) fn allows(&self, p: &[f64]) -> bool {
+        let (Self { secondary, .. }, wake) = self.with(p);
+        let mut all = [&wake.left, &wake.right].into_iter().chain(secondary.iter().flatten());
         wake.validate().is_ok() && (!self.images || all.all(|vortex| vortex.height_m > 0.0))
     }
 
