@@ -2,6 +2,7 @@
 
 use crate::statistics::{Bar, Estimate, Verdict};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::sync::LazyLock;
 
@@ -59,14 +60,17 @@ struct Listed {
     case: String,
 }
 
-#[derive(Deserialize)]
-struct List {
+/// All captions and claims of figures.
+#[derive(Default, Deserialize)]
+pub(crate) struct List {
+    /// By the name of the figure.
+    pub(crate) caption: BTreeMap<String, String>,
     claim: Vec<Listed>,
 }
 
-/// All claims of figures; the test reads it.
-static LIST: LazyLock<Vec<Listed>> =
-    LazyLock::new(|| toml::from_str(include_str!("claims.toml")).map_or(Vec::new(), |list: List| list.claim));
+/// The list; the tests read it.
+pub(crate) static LIST: LazyLock<List> =
+    LazyLock::new(|| toml::from_str(include_str!("claims.toml")).unwrap_or_default());
 
 impl Claim {
     /// A claim of the list that a computation without random numbers decides.
@@ -123,7 +127,7 @@ impl Claim {
     }
 
     fn listed(&self) -> Option<&'static Listed> {
-        LIST.iter().find(|listed| listed.id == self.id)
+        LIST.claim.iter().find(|listed| listed.id == self.id)
     }
 
     pub(crate) fn kind(&self) -> Kind {
@@ -236,17 +240,17 @@ mod tests {
     fn every_entry_is_a_claim_of_a_figure() {
         let folder = std::fs::read_dir(root().join("xtask/src/figures")).unwrap();
         let code: String = folder.map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap()).collect();
-        for Listed { id, .. } in LIST.iter() {
+        for Listed { id, .. } in &LIST.claim {
             assert!(code.contains(&format!("\"{id}\"")), "no figure claims {id}");
         }
-        assert_eq!(LIST.iter().filter(|listed| listed.quote.is_some()).count(), 19);
+        assert_eq!(LIST.claim.iter().filter(|listed| listed.quote.is_some()).count(), 19);
         // And every claim of a figure is on the list.
         let is_claim = |word: &&str| {
             let number = word.strip_prefix("CP").or(word.strip_prefix('F')).or(word.strip_prefix('T')).unwrap_or("");
             number.starts_with(|c: char| c.is_ascii_digit()) && number.len() < 4
         };
         for id in code.split('"').filter(is_claim) {
-            assert!(LIST.iter().any(|listed| listed.id == id), "{id} is not in claims.toml");
+            assert!(LIST.claim.iter().any(|listed| listed.id == id), "{id} is not in claims.toml");
         }
         let kinds = ["F13", "F5", "F18a"].map(|id| Claim::exact(id, String::new(), true).kind().name());
         assert_eq!(kinds, ["chapter", "check", "own"]);

@@ -29,10 +29,9 @@ mod study;
 mod tab01;
 mod tab02;
 
+use crate::claim::LIST;
 use context::{Context, Rendered};
 use fixtures::failure::Failure;
-use serde::Deserialize;
-use std::collections::BTreeMap;
 
 /// A figure that can be asked for.
 pub(crate) struct Figure {
@@ -40,12 +39,6 @@ pub(crate) struct Figure {
     pub(crate) number: u32,
     pub(crate) title: &'static str,
     pub(crate) make: Make,
-}
-
-/// The captions of the list of claims.
-#[derive(Deserialize)]
-struct Captions {
-    caption: BTreeMap<String, String>,
 }
 
 /// Which figures are drawn one after the other.
@@ -68,8 +61,7 @@ impl Figure {
 
     /// The words of its caption with the values of a run.
     pub(crate) fn caption(&self, values: &[String]) -> Result<String, Failure> {
-        let captions: Captions = toml::from_str(include_str!("claims.toml"))?;
-        let caption = captions.caption.get(self.id).and_then(|words| filled(words, values));
+        let caption = LIST.caption.get(self.id).and_then(|words| filled(words, values));
         caption.ok_or_else(|| Failure::new(format!("no caption of {} with {} values", self.id, values.len())))
     }
 
@@ -129,7 +121,7 @@ mod tests {
 
     #[test]
     fn every_figure_has_a_caption_of_its_own() {
-        let Captions { caption: captions } = toml::from_str(include_str!("claims.toml")).unwrap();
+        let captions = &LIST.caption;
         let ids: Vec<&str> = ALL.iter().map(|figure| figure.id).collect();
         assert!(captions.keys().all(|id| ids.contains(&id.as_str())) && captions.len() == ids.len());
         assert_eq!(ALL[3].caption(&["3", "1.25", "8"].map(String::from)).unwrap().matches(" 1.25 mrad;").count(), 1);
