@@ -19,21 +19,21 @@ struct Rules {
     /// Longest source file, in lines of code: what explains them may take the room that it needs.
     max_code_lines: usize,
     /// Files and folders that may stand at the top.
-    top_level: Vec<String>,
+    top_level: BTreeSet<String>,
     /// File types that may stand anywhere below, and files of others.
-    extensions: Vec<String>,
-    others: Vec<String>,
+    extensions: BTreeSet<String>,
+    others: BTreeSet<String>,
     /// What only a machine knows must not stand in the repository.
     private: Vec<String>,
     /// Words that name a physical quantity: a public number of that name needs a unit at its end; a fraction has none.
-    quantities: Vec<String>,
+    quantities: BTreeSet<String>,
     units: Vec<String>,
     /// Public numbers that name a quantity but have no unit of the SI: the path begins with the first word.
     without_unit: Vec<(String, String)>,
     /// Crates that work on one thread without their feature `rayon`.
-    with_threads: Vec<String>,
+    with_threads: BTreeSet<String>,
     /// Crates of the workspace that each crate may depend on.
-    may_depend_on: BTreeMap<String, Vec<String>>,
+    may_depend_on: BTreeMap<String, BTreeSet<String>>,
 }
 
 /// As they stand in their file, which the test reads.
@@ -90,20 +90,15 @@ fn tracked_files() -> Result<Vec<String>, Failure> {
     Ok(text.lines().filter(|f| root().join(f).exists()).map(str::to_owned).collect())
 }
 
-/// Whether a word is among those of a list.
-fn listed(list: &[String], word: &str) -> bool {
-    list.iter().any(|of| of == word)
-}
-
 fn check_place(file: &str, found: &mut Vec<String>) {
     let top = file.split('/').next().unwrap_or(file);
-    if !listed(&RULES.top_level, top) {
+    if !RULES.top_level.contains(top) {
         found.push(format!("{file}: a stray file at the top level"));
     }
     let extension = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("");
     // Files that other programs wrote, for readers to be held against.
     let of_others = file.starts_with("tests/reference/") && ["nc", "npz"].contains(&extension);
-    if !of_others && !listed(&RULES.extensions, extension) && !listed(&RULES.others, file) {
+    if !of_others && !RULES.extensions.contains(extension) && !RULES.others.contains(file) {
         found.push(format!("{file}: no file of this type belongs here"));
     }
 }
@@ -178,7 +173,7 @@ fn public_number(line: &str) -> Option<&str> {
 }
 
 fn lacks_unit(name: &str) -> bool {
-    let names_quantity = name.split('_').any(|word| listed(&RULES.quantities, word));
+    let names_quantity = name.split('_').any(|word| RULES.quantities.contains(word));
     names_quantity && !RULES.units.iter().any(|unit| name.ends_with(unit))
 }
 
@@ -205,7 +200,7 @@ fn check_private(file: &str, text: &str, found: &mut Vec<String>) {
     }
 }
 
-fn check_manifest(folder: &str, allowed: &[String], text: &str, found: &mut Vec<String>) {
+fn check_manifest(folder: &str, allowed: &BTreeSet<String>, text: &str, found: &mut Vec<String>) {
     let mut section = "";
     for (i, line) in text.lines().enumerate() {
         if line.starts_with('[') {
@@ -220,7 +215,7 @@ fn check_manifest(folder: &str, allowed: &[String], text: &str, found: &mut Vec<
                 value.trim()
             ));
         }
-        if name.strip_prefix("wakescope-").is_some_and(|own| !listed(allowed, own)) {
+        if name.strip_prefix("wakescope-").is_some_and(|own| !allowed.contains(own)) {
             found.push(format!("{folder}/Cargo.toml:{}: must not know `{name}`", i + 1));
         }
         if name == "ndarray-linalg" && folder != "crates/estimate" {
@@ -228,7 +223,7 @@ fn check_manifest(folder: &str, allowed: &[String], text: &str, found: &mut Vec<
         }
         // The workspace turns their default features off, and builds of the whole workspace hide that one is missing.
         let program = folder == "crates/sim" || folder == "xtask";
-        if program && listed(&RULES.with_threads, name) && !line.contains("\"rayon\"") {
+        if program && RULES.with_threads.contains(name) && !line.contains("\"rayon\"") {
             found.push(format!("{folder}/Cargo.toml:{}: `{name}` without `rayon` works on one thread", i + 1));
         }
     }
@@ -254,13 +249,13 @@ mod tests {
     #[test]
     fn a_forbidden_dependency_is_found() {
         let manifest = "[dependencies]\nwakescope-les.workspace = true\n";
-        assert_eq!(complaints(|f| check_manifest("crates/optics", &[], manifest, f)).len(), 1);
-        assert!(complaints(|f| check_manifest("crates/sim", &["les".into()], manifest, f)).is_empty());
+        assert_eq!(complaints(|f| check_manifest("crates/optics", &BTreeSet::new(), manifest, f)).len(), 1);
+        assert!(complaints(|f| check_manifest("crates/sim", &["les".into()].into(), manifest, f)).is_empty());
         let one_thread = "[dependencies]\nwakescope-signal.workspace = true\n";
-        assert_eq!(complaints(|f| check_manifest("crates/sim", &["signal".into()], one_thread, f)).len(), 1);
-        assert!(complaints(|f| check_manifest("crates/estimate", &["signal".into()], one_thread, f)).is_empty());
+        assert_eq!(complaints(|f| check_manifest("crates/sim", &["signal".into()].into(), one_thread, f)).len(), 1);
+        assert!(complaints(|f| check_manifest("crates/estimate", &["signal".into()].into(), one_thread, f)).is_empty());
         let version = "[dependencies]\nserde = \"1\"\n";
-        assert_eq!(complaints(|f| check_manifest("crates/sim", &[], version, f)).len(), 1);
+        assert_eq!(complaints(|f| check_manifest("crates/sim", &BTreeSet::new(), version, f)).len(), 1);
     }
 
     #[test]
