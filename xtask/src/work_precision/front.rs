@@ -1,16 +1,14 @@
 //! Error against run time: which of the measured settings are worth their time, and which of them reaches an error for the least.
 
 use super::Found;
+use wakescope_sim::sweep::pareto::{Objective, Place, front};
 
 /// Whether no other setting is at least as good in error and in time and better in one of them; equal settings stay together,
 /// and one that failed is never on the front.
 pub(super) fn on_front(settings: &[&Found]) -> Vec<bool> {
-    let known = |s: &Found| s.error.is_finite() && s.cost.cpu_s.is_finite();
-    let beats = |a: &Found, b: &Found| {
-        let ((a, a_s), (b, b_s)) = ((a.error, a.cost.cpu_s), (b.error, b.cost.cpu_s));
-        a <= b && a_s <= b_s && (a < b || a_s < b_s)
-    };
-    settings.iter().map(|s| known(s) && !settings.iter().any(|other| known(other) && beats(other, s))).collect()
+    let column = |of: fn(&Found) -> f64| Objective::small(settings.iter().map(|s| of(s)).collect(), Vec::new());
+    let places = front(&[column(|s| s.error), column(|s| s.cost.cpu_s)]);
+    places.iter().map(|place| *place != Place::Off).collect()
 }
 
 /// Place of the setting of least time whose error and two standard errors are at most `target`; none if no setting is so good.
