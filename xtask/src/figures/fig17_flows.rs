@@ -13,20 +13,14 @@ use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPa
 /// Ages of the simulated wake; the pair has none.
 const AGES: [Option<f64>; 4] = [None, Some(1.0), Some(2.5), Some(4.0)];
 /// The method that is judged: what `[retrieval]` does unless it is told otherwise.
-const JUDGED: &str = METHODS[0].1;
-const METHODS: [(Method, &str); 5] = [
-    (Method::Fit, "fit"),
-    (Method::Rv, "rv"),
-    (Method::Envelope, "envelope"),
-    (Method::Integral, "integral"),
-    (Method::Signals, "signals"),
-];
+const JUDGED: &str = "fit";
+const METHODS: [Method; 5] = [Method::Fit, Method::Rv, Method::Envelope, Method::Integral, Method::Signals];
 /// The operational method on what it is made for: radial velocities that are means over the gate, which peaks of spectra are not.
 const OF_MEANS: &str = "rv of first moments";
 
 /// All rows by name, in their order.
 fn names() -> impl Iterator<Item = &'static str> {
-    METHODS.iter().map(|(_, name)| *name).chain([OF_MEANS])
+    METHODS.into_iter().map(Method::name).chain([OF_MEANS])
 }
 const SNR_DB: f64 = 10.0;
 
@@ -82,10 +76,9 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<O
     }
     scene.scan.realisations = context.profile.choose(3, 12, 32);
     // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
-    let some = METHODS[..context.profile.choose(4, 4, 5)].iter().map(|(method, _)| *method).collect();
-    let name = |method: Method| METHODS.iter().find(|(of, _)| *of == method).map_or("", |(_, name)| *name);
+    let some = METHODS[..context.profile.choose(4, 4, 5)].to_vec();
     let by = |scene: &Scene, methods| retrieved(scene, Retrieval { methods, ..Retrieval::default() }, &sight.folder);
-    let mut rows: Vec<_> = by(&scene, some)?.into_iter().map(|row| (name(row.method), row)).collect();
+    let mut rows: Vec<_> = by(&scene, some)?.into_iter().map(|row| (row.method.name(), row)).collect();
     scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
     scene.estimator.weighting = Weighting::Rectangular;
     rows.extend(by(&scene, vec![Method::Rv])?.into_iter().map(|row| (OF_MEANS, row)));
