@@ -66,8 +66,9 @@ pub(super) struct MapBound {
     covariance: Banded,
 }
 
-/// The grid of the complex samples.
-struct Grid {
+/// The grid of the complex samples of a map.
+struct Grid<'a> {
+    of: &'a MapSetting<'a>,
     period_s: f64,
     first_s: f64,
     window: usize,
@@ -101,19 +102,15 @@ struct Cell {
 impl MapBound {
     pub(super) fn new(setting: &MapSetting<'_>, wake: &Wake) -> Result<Self, Failure> {
         let grid = Grid::new(setting)?;
-        let lines: Vec<Line> = setting
-            .elevation_rad
-            .par_iter()
-            .map(|&elevation_rad| Line::new(setting, &grid, wake, elevation_rad))
+        let lines = setting.elevation_rad.par_iter().map(|&elevation_rad| Line::new(&grid, wake, elevation_rad));
+        let lines: Vec<Line> = lines
             .collect::<Option<_>>()
             .ok_or_else(|| Failure::new("the covariance of a line is not positive definite".to_owned()))?;
         let gates = setting.range_m.len();
         let cells: Vec<Cell> =
-            (0..lines.len() * gates).map(|i| Cell::new(setting, &grid, &lines, (i / gates, i % gates))).collect();
-        let reach = cells
-            .iter()
-            .enumerate()
-            .flat_map(|(i, cell)| cell.shares.iter().map(move |(line, _)| line.abs_diff(i / gates)));
+            (0..lines.len() * gates).map(|i| Cell::new(&grid, &lines, (i / gates, i % gates))).collect();
+        let away = |(i, cell): (usize, &Cell)| cell.shares.iter().map(move |(line, _)| line.abs_diff(i / gates)).max();
+        let reach = cells.iter().enumerate().filter_map(away);
         // two regions share a line if they are up to twice their reach apart
         let lines_apart = 2 * reach.max().unwrap_or(0);
         let order = cells.len() * KINDS;
@@ -121,7 +118,7 @@ impl MapBound {
         let numbers: Vec<usize> = (0..lines.len()).collect();
         for some in numbers.chunks(AT_ONCE) {
             let parts: Vec<_> =
-                some.par_iter().map(|&line| covariance_of_line(setting, &grid, (&lines[line], line), &cells)).collect();
+                some.par_iter().map(|&line| covariance_of_line(&grid, (&lines[line], line), &cells)).collect();
             for (places, part) in parts {
                 for (a, &i) in places.iter().enumerate() {
                     for (b, &j) in places[..=a].iter().enumerate() {
@@ -171,8 +168,8 @@ fn inverse(a: &Array2<f64>) -> Option<Array2<f64>> {
     Some(Array2::from_shape_fn(a.dim(), |(i, j)| columns[i].dot(&columns[j])))
 }
 
-impl Grid {
-    fn new(setting: &MapSetting<'_>) -> Result<Self, Failure> {
+impl<'a> Grid<'a> {
+    fn new(setting: &'a MapSetting<'a>) -> Result<Self, Failure> {
         let (period_s, window) = (4.0 * setting.sampling.period_s(), setting.window / 4);
         let gap_m = setting.range_m.windows(2).next().map_or(0.0, |pair| pair[1] - pair[0]);
         let step = 2.0 * gap_m / SPEED_OF_LIGHT_M_S / period_s;
@@ -200,12 +197,13 @@ impl Grid {
             }
         };
         let first_s = 2.0 * setting.range_m[0] / SPEED_OF_LIGHT_M_S - 0.5 * window as f64 * period_s;
-        Ok(Self { period_s, first_s, window, samples, step, tapers, noise: (0..samples).map(noise).collect() })
+        let noise = (0..samples).map(noise).collect();
+        Ok(Self { of: setting, period_s, first_s, window, samples, step, tapers, noise })
     }
 
     /// Phase per velocity of a lag, k T m \[rad s/m\].
-    fn turn(&self, wavelength_m: f64, lag: f64) -> f64 {
-        4.0 * PI / wavelength_m * self.period_s * lag
+    fn turn(&self, lag: f64) -> f64 {
+        4.0 * PI / self.of.sampling.wavelength_m * self.period_s * lag
     }
 
     /// Mean correlogram of a gate of a line with that covariance, lags from 0 on.
@@ -219,7 +217,8 @@ impl Grid {
 }
 
 impl Line {
-    fn new(setting: &MapSetting<'_>, grid: &Grid, wake: &Wake, elevation_rad: f64) -> Option<Self> {
+    fn new(grid: &Grid<'_>, wake: &Wake, elevation_rad: f64) -> Option<Self> {
+        let setting = grid.of;
         let reach_m = 0.5 * SPEED_OF_LIGHT_M_S * 4.0 * setting.sigma_s;
         let length_m = 0.5 * SPEED_OF_LIGHT_M_S * grid.samples as f64 * grid.period_s + 2.0 * reach_m;
         let layers = (length_m / LAYER_M).ceil() as usize;
@@ -230,7 +229,7 @@ impl Line {
         let seen = |(k, layer): (usize, usize)| {
             let time_s = grid.first_s + k as f64 * grid.period_s - 2.0 * at_m(layer) / SPEED_OF_LIGHT_M_S;
             let power = setting.snr * LAYER_M * 2.0 / SPEED_OF_LIGHT_M_S / (PI.sqrt() * setting.sigma_s);
-            let phase = -grid.turn(setting.sampling.wavelength_m, k as f64 - middle) * winds[layer].0;
+            let phase = -grid.turn(k as f64 - middle) * winds[layer].0;
             C64::from_polar(power.sqrt() * (-0.5 * (time_s / setting.sigma_s).powi(2)).exp(), phase)
         };
         let seen = Array2::from_shape_fn((grid.samples, layers), seen);
@@ -249,7 +248,7 @@ impl Line {
         for place in 0..PARAMETERS {
             let mut slope = summed(&|layer| winds[layer].1[place]);
             slope.indexed_iter_mut().for_each(|((p, q), s)| {
-                *s *= C64::new(0.0, -grid.turn(setting.sampling.wavelength_m, p as f64 - q as f64));
+                *s *= C64::new(0.0, -grid.turn(p as f64 - q as f64));
             });
             numbers.push(slope);
         }
@@ -261,7 +260,8 @@ impl Line {
 }
 
 impl Cell {
-    fn new(setting: &MapSetting<'_>, grid: &Grid, lines: &[Line], (line, gate): (usize, usize)) -> Self {
+    fn new(grid: &Grid<'_>, lines: &[Line], (line, gate): (usize, usize)) -> Self {
+        let setting = grid.of;
         let shares = shares(setting, line, setting.range_m[gate]);
         let numbers = lines[line].lags[gate].len();
         let mut lags = vec![vec![C64::ZERO; grid.window]; numbers];
@@ -274,7 +274,7 @@ impl Cell {
         let spectrum = |lags: &[C64], velocity_m_s: f64| -> [f64; 3] {
             let mut sums = [lags[0].re, 0.0, 0.0];
             for (m, lag) in lags.iter().enumerate().skip(1) {
-                let turn = grid.turn(setting.sampling.wavelength_m, m as f64);
+                let turn = grid.turn(m as f64);
                 let turned = 2.0 * lag * C64::cis(turn * velocity_m_s);
                 sums[0] += turned.re;
                 sums[1] -= turn * turned.im;
@@ -317,24 +317,17 @@ fn shares(setting: &MapSetting<'_>, line: usize, range_m: f64) -> Vec<(usize, f6
 }
 
 /// Places of the numbers of a map that see a line, and what the line adds to their covariance.
-fn covariance_of_line(
-    setting: &MapSetting<'_>,
-    grid: &Grid,
-    (line, number): (&Line, usize),
-    cells: &[Cell],
-) -> (Vec<usize>, Array2<f64>) {
-    let (gates, n) = (setting.range_m.len(), grid.samples);
-    let seen = cells.iter().enumerate().filter_map(|(i, cell)| {
-        cell.shares.iter().find(|(other, _)| *other == number).map(|(_, share)| (i, cell, *share))
-    });
-    let seen: Vec<_> = seen.collect();
+fn covariance_of_line(grid: &Grid<'_>, (line, number): (&Line, usize), cells: &[Cell]) -> (Vec<usize>, Array2<f64>) {
+    let (gates, n) = (grid.of.range_m.len(), grid.samples);
+    let share = |cell: &Cell| cell.shares.iter().find(|(other, _)| *other == number).map(|(_, share)| *share);
+    let seen: Vec<_> = cells.iter().enumerate().filter_map(|(i, cell)| Some((i, cell, share(cell)?))).collect();
     let mut forms = Array2::zeros((seen.len() * KINDS, n * n));
     let mut places = Vec::with_capacity(seen.len() * KINDS);
     for (row, (i, cell, share)) in seen.into_iter().enumerate() {
         let first = i % gates * grid.step;
         for kind in 0..KINDS {
             let form = |p: usize, q: usize| {
-                let turn = grid.turn(setting.sampling.wavelength_m, p as f64 - q as f64);
+                let turn = grid.turn(p as f64 - q as f64);
                 let weight = match kind {
                     0 => C64::new(0.0, -turn / cell.curvature),
                     _ => C64::new(-turn * turn / cell.curvature - cell.level.recip(), 0.0),
