@@ -3,9 +3,6 @@
 use super::context::*;
 use wakescope_estimate::map::{PolarPoint, ScanGeometry, WindowCorrelation};
 use wakescope_sim::setup::estimators;
-use wakescope_sim::setup::geometry::Geometry;
-use wakescope_sim::setup::instrument::Instrument;
-use wakescope_sim::setup::wind::SceneWind;
 
 const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
@@ -18,12 +15,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let half_window = 0.5 * scene.estimator.window_samples as f64;
     scene.scan.range_min_m = CHAPTER_RANGE_M - (400.0 + half_window) * scene.sample_spacing_m();
     scene.scan.range_max_m = 650.0;
-    let file = context.scene_file(scene)?;
-    let scene = &file.scene;
+    let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
+    let (scene, elevation_rad) = (&plan.scene.scene, &plan.geometry.elevation_rad);
     let gates = estimators::gates(scene)?;
-    let elevation_rad = Geometry::new(&file, &Instrument::new(scene)?.pulse, &SceneWind::new(&file)?)?.elevation_rad;
     let samples = scene.samples_per_record();
-    let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, &elevation_rad, samples)?;
+    let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, elevation_rad, samples)?;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     // n_eff as the speckle has it: independent of the noise within a few per cent.
     let correlation = WindowCorrelation::gaussian_pulse(
@@ -55,7 +51,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("range_m", rows.iter().map(|r| r.1))
         .int("level", rows.iter().map(|r| r.2 as i64))
         .float("n_eff", rows.iter().map(|r| r.3));
-    let origin = file.provenance();
+    let origin = plan.scene.provenance();
     let (x, y) = (Axis::linear("range [m]"), Axis::log("windows accumulated"));
     let plot = CurvePlot { series, ..CurvePlot::new("Accumulation level", x, y) };
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
