@@ -6,8 +6,10 @@ use crate::fit_trials::trial::{FitTrial, RADIUS_M};
 use crate::statistics::mean;
 use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use rayon::prelude::*;
+use wakescope_estimate::retrieval::Side;
 use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
 use wakescope_signal::NoiseModel;
+use wakescope_sim::retrieve::side;
 
 const METHODS: [&str; 4] = ["map, typical core", "map, core fitted", "signals, core known", "signals, core fitted"];
 
@@ -92,12 +94,6 @@ fn bound(pair: &PairScan) -> Result<[f64; 2], Failure> {
     Ok([of(Sharing::Fixed)?, of(Sharing::Common)?])
 }
 
-/// Parameters of a vortex: circulation, lateral position, height.
-const VORTICES: [(&str, [Parameter; 3]); 2] = [
-    ("left", [Parameter::LeftCirculation, Parameter::LeftLateral, Parameter::LeftHeight]),
-    ("right", [Parameter::RightCirculation, Parameter::RightLateral, Parameter::RightHeight]),
-];
-
 /// Value and standard deviation of a parameter; NaN where the fit failed.
 fn value(found: &Found, parameter: Parameter) -> (f64, f64) {
     let place = parameter as usize;
@@ -107,10 +103,11 @@ fn value(found: &Found, parameter: Parameter) -> (f64, f64) {
 }
 
 fn table(fits: &[Fits]) -> Table {
-    let rows: Vec<(&Fits, usize, usize)> =
-        fits.iter().flat_map(|f| (0..f.by_method.len()).flat_map(move |m| (0..2).map(move |v| (f, m, v)))).collect();
-    let float = |get: &dyn Fn(&Found, [Parameter; 3]) -> f64| -> Vec<f64> {
-        rows.iter().map(|(f, m, v)| get(&f.by_method[*m], VORTICES[*v].1)).collect()
+    let of_method = |f, m| [Side::Left, Side::Right].map(|vortex| (f, m, vortex));
+    let rows: Vec<(&Fits, usize, Side)> =
+        fits.iter().flat_map(|f| (0..f.by_method.len()).flat_map(move |m| of_method(f, m))).collect();
+    let float = |get: &dyn Fn(&Found, [Parameter; 4]) -> f64| -> Vec<f64> {
+        rows.iter().map(|(f, m, vortex)| get(&f.by_method[*m], vortex.parameters())).collect()
     };
     let error = |found: &Found, p: Parameter| value(found, p).0 - truth().to_array()[p as usize];
     Table::new()
@@ -122,7 +119,7 @@ fn table(fits: &[Fits]) -> Table {
         .float("gamma_std_m2_s", float(&|f, p| value(f, p[0]).1))
         .float("y_error_m", float(&|f, p| error(f, p[1])))
         .float("z_error_m", float(&|f, p| error(f, p[2])))
-        .text("vortex", rows.iter().map(|r| VORTICES[r.2].0))
+        .text("vortex", rows.iter().map(|r| side(r.2)))
         .float("y_std_m", float(&|f, p| value(f, p[1]).1))
         .float("z_std_m", float(&|f, p| value(f, p[2]).1))
         .float("snr_db", rows.iter().map(|r| r.0.snr_db))

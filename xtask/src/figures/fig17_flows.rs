@@ -6,8 +6,8 @@ use crate::statistics::mean;
 use crate::wakes;
 use rayon::prelude::*;
 use std::path::Path;
-use wakescope_estimate::retrieval::{Side, VortexResult};
-use wakescope_sim::retrieve::{Method, RetrievalRow};
+use wakescope_estimate::retrieval::VortexResult;
+use wakescope_sim::retrieve::{Method, RetrievalRow, side};
 use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPair, Weighting};
 
 /// Ages of the simulated wake; the pair has none.
@@ -35,30 +35,21 @@ impl OfFlow {
         self.tau.map_or("analytic pair".into(), |tau| format!("simulated wake, tau = {tau}"))
     }
 
-    /// Errors of the circulation over 5 to 15 m in per cent of the truth, scan by scan; nothing where a vortex is missing.
-    fn errors(&self, method: &str) -> Vec<Vec<Option<f64>>> {
+    /// Errors of the circulation over 5 to 15 m in per cent of the truth, how many vortices are missing, and the mean of the errors, each scan
+    /// a batch.
+    fn errors(&self, method: &str) -> (Vec<f64>, usize, Estimate) {
         let rows: Vec<&RetrievalRow> =
             self.rows.iter().filter(|(name, _)| *name == method).map(|(_, row)| row).collect();
         let error = |row: &&RetrievalRow| {
             let error = 100.0 * (row.found?.circulation_5_15_m2_s.value / row.truth.circulation_5_15_m2_s.value - 1.0);
             error.is_finite().then_some(error)
         };
-        rows.chunk_by(|a, b| a.realisation == b.realisation).map(|scan| scan.iter().map(error).collect()).collect()
-    }
-
-    /// Those that are known, and how many are not.
-    fn known(&self, method: &str) -> (Vec<f64>, usize) {
-        let all = self.errors(method).concat();
-        let known: Vec<f64> = all.iter().copied().flatten().collect();
-        let missing = all.len() - known.len();
-        (known, missing)
-    }
-
-    /// Their mean, each scan a batch.
-    fn bias(&self, method: &str) -> Estimate {
-        let of_scan = |errors: &Vec<Option<f64>>| mean(&errors.iter().copied().flatten().collect::<Vec<_>>(), None);
-        let of_scans = self.errors(method).iter().map(of_scan).filter(|mean| mean.is_finite()).collect::<Vec<_>>();
-        Estimate::mean(&of_scans)
+        let scans = rows.chunk_by(|a, b| a.realisation == b.realisation);
+        let scans: Vec<Vec<f64>> = scans.map(|scan| scan.iter().filter_map(error).collect()).collect();
+        let means = scans.iter().filter(|errors| !errors.is_empty()).map(|errors| mean(errors, None));
+        let (known, bias) = (scans.concat(), Estimate::mean(&means.collect::<Vec<_>>()));
+        let missing = rows.len() - known.len();
+        (known, missing, bias)
     }
 }
 
@@ -118,7 +109,7 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
             float(&|row| Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m.value)),
         )
         .float("z_error_m", float(&|row| Some(row.found?.height_m.value - row.truth.height_m.value)))
-        .text("vortex", rows.iter().map(|(_, row)| if row.side == Side::Left { "left" } else { "right" }))
+        .text("vortex", rows.iter().map(|(_, row)| side(row.side)))
         .float("y_std_m", found(|v| v.lateral_position_m.std))
         .float("z_std_m", found(|v| v.height_m.std))
         .float("snr_db", rows.iter().map(|_| SNR_DB))
@@ -129,7 +120,7 @@ pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
     let title = "all methods: bias and scatter of Γ_{5-15} (age 0: analytic pair)";
     let mut plot = CurvePlot::new(title, Axis::linear("τ"), Axis::linear("error [%]"));
     for (k, name) in names().enumerate() {
-        let known = flows.iter().map(|flow| (flow.tau.unwrap_or(0.0), flow.known(name).0));
+        let known = flows.iter().map(|flow| (flow.tau.unwrap_or(0.0), flow.errors(name).0));
         let points: Vec<(f64, Vec<f64>)> = known.filter(|(_, errors)| !errors.is_empty()).collect();
         if points.is_empty() {
             continue;
@@ -148,12 +139,12 @@ pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
 
 /// The bias of the method that is judged; all are told.
 fn claim(id: &str, flow: &OfFlow) -> Claim {
-    let told = names().filter(|name| *name != JUDGED && !flow.known(name).0.is_empty()).map(|name| {
-        let (errors, failures) = flow.known(name);
+    let others = names().filter(|name| *name != JUDGED).map(|name| (name, flow.errors(name)));
+    let told = others.filter(|(_, (errors, ..))| !errors.is_empty()).map(|(name, (errors, failures, bias))| {
         let scatter = Estimate::deviation(&errors);
-        format!("{name} {} %, scatter {scatter:.1} %, {failures} failed", flow.bias(name).words())
+        format!("{name} {} %, scatter {scatter:.1} %, {failures} failed", bias.words())
     });
-    let failures = flow.known(JUDGED).1;
+    let (_, failures, bias) = flow.errors(JUDGED);
     let words = format!("{failures} failed; {}", told.collect::<Vec<_>>().join("; "));
-    Claim::judged_alone(id, flow.bias(JUDGED), " %", Bar::Between(-5.0, 5.0)).of_fits(failures, &words)
+    Claim::judged_alone(id, bias, " %", Bar::Between(-5.0, 5.0)).of_fits(failures, &words)
 }
