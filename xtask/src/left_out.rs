@@ -55,8 +55,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-left-out"));
     std::fs::create_dir_all(&folder)?;
     let mut text = String::from("| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n");
-    let all = Without { name: "whole".into(), keys: Table::new() };
-    for Without { name, keys } in std::iter::once(&all).chain(&without) {
+    for Without { name, keys } in &without {
         let mut scene = whole.clone();
         keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value))?;
         let run = run_scene(&program, &folder, &toml::to_string(&scene)?, &["run"])?;
