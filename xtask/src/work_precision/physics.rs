@@ -31,7 +31,8 @@ const RANGE_M: f64 = 1000.0;
 pub(super) fn optics(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = phase_screens::<f32>("f32, one of a pair")?;
     rows.extend(phase_screens::<f64>("f64, one of a pair")?);
-    rows.extend(free_space()?);
+    rows.extend(free_space::<f32>("f32, ten steps")?);
+    rows.extend(free_space::<f64>("f64, ten steps")?);
     rows.extend(bistatic(quick)?);
     Ok(rows)
 }
@@ -58,20 +59,14 @@ fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
 }
 
 /// Table 2's beam in ten steps, before what its grid does is taken off.
-fn free_space() -> Result<Vec<Row>, Failure> {
+fn free_space<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
     let exact = theory::free_space_efficiency(&Telescope::table2(), RANGE_M)?;
-    let mut rows = Vec::new();
-    for (method, double) in [("f32, ten steps", false), ("f64, ten steps", true)] {
-        let knob = Knob::new(["free-space propagation", method, "points a side"]);
-        rows.extend(knob.rows(&[128.0, 256.0, 512.0, 1024.0], |points| {
-            let screens = screens(10, Grid::square(points as usize, 1.024 / points)?)?;
-            let free =
-                || Ok(if double { screens.grid_free_space::<f64>()? } else { screens.grid_free_space::<f32>()? });
-            let (found, cost) = fastest(free)?;
-            Ok(Found::exact((found[0] / exact - 1.0).abs(), cost))
-        })?);
-    }
-    Ok(rows)
+    let knob = Knob::new(["free-space propagation", method, "points a side"]);
+    knob.rows(&[128.0, 256.0, 512.0, 1024.0], |points| {
+        let screens = screens(10, Grid::square(points as usize, 1.024 / points)?)?;
+        let (found, cost) = fastest(|| Ok(screens.grid_free_space::<T>()?))?;
+        Ok(Found::exact((found[0] / exact - 1.0).abs(), cost))
+    })
 }
 
 /// The bias of five layers by exact theory and the standard error of a mean, which falls from that of one run; the time is that of a

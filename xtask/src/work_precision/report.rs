@@ -1,6 +1,6 @@
 //! The panels of error against run time, this program beside others, and what they say in words.
 
-use super::cases::{CASES, Case, Guide, Panel};
+use super::cases::{CASES, Guide, Panel};
 use super::{Row, TARGETS};
 use crate::cost::machine;
 use std::fmt::Write as _;
@@ -9,29 +9,22 @@ use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 /// Of more methods than these a panel shows the best settings.
 const MOST_METHODS: usize = 4;
 
-/// The cases that are drawn.
-fn panels() -> impl Iterator<Item = (&'static Case, &'static Panel)> {
-    CASES.iter().filter_map(|case| Some((case, case.panel.as_ref()?)))
-}
-
-/// Rows of a case in the order of their times, those that failed left out.
-fn drawn<'r>(rows: &'r [Row], case: &Case) -> Vec<&'r Row> {
-    let good = |row: &&Row| row.knob.case == case.name && row.found.error > 0.0 && row.found.cost.cpu_s > 0.0;
-    let mut found: Vec<&Row> = rows.iter().filter(good).collect();
-    found.sort_by(|a, b| a.found.cost.cpu_s.total_cmp(&b.found.cost.cpu_s));
-    found
-}
-
-/// Rows of a case that have no error, for the setting fails.
-fn failed<'r>(rows: &'r [Row], case: &Case) -> Vec<&'r Row> {
-    rows.iter().filter(|row| row.knob.case == case.name && row.found.error.is_nan()).collect()
+/// The panels of the cases that are drawn, the rows of each in the order of their times, and those that have no error, for the setting fails.
+fn panels(rows: &[Row]) -> impl Iterator<Item = (&'static Panel, Vec<&Row>, Vec<&Row>)> {
+    CASES.iter().filter_map(|case| {
+        let of_case = rows.iter().filter(|row| row.knob.case == case.name);
+        let (failed, mut drawn): (Vec<&Row>, Vec<&Row>) = of_case.partition(|row| row.found.error.is_nan());
+        drawn.retain(|row| row.found.error > 0.0 && row.found.cost.cpu_s > 0.0);
+        drawn.sort_by(|a, b| a.found.cost.cpu_s.total_cmp(&b.found.cost.cpu_s));
+        let panel = case.panel.as_ref().filter(|_| !drawn.is_empty())?;
+        Some((panel, drawn, failed))
+    })
 }
 
 /// The six panels: a curve for each method, one colour for each program.
 pub(crate) fn picture(rows: &[Row]) -> Figure {
-    let panels = panels().filter(|(case, _)| !drawn(rows, case).is_empty());
-    let drawn = panels.map(|(case, panel)| curves(panel, &drawn(rows, case), &failed(rows, case)));
-    Figure { columns: 2, width: 1300.0, ..Figure::stacked(drawn) }
+    let panels = panels(rows).map(|(panel, drawn, failed)| curves(panel, &drawn, &failed));
+    Figure { columns: 2, width: 1300.0, ..Figure::stacked(panels) }
 }
 
 fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
@@ -95,12 +88,8 @@ fn widened(rows: &[&Row], value: fn(&Row) -> f64, decades: f64) -> (f64, f64) {
 /// Under each panel: what is compared, what this program costs, what others cost at their errors.
 pub(crate) fn text(rows: &[Row]) -> String {
     let mut out = format!("Measured on {}.\n\n", machine());
-    for (case, panel) in panels() {
-        let of = drawn(rows, case);
-        if of.is_empty() {
-            continue;
-        }
-        let (own, others): (Vec<&Row>, Vec<&Row>) = of.into_iter().partition(|row| row.is_own());
+    for (panel, drawn, failed) in panels(rows) {
+        let (own, others): (Vec<&Row>, Vec<&Row>) = drawn.into_iter().partition(|row| row.is_own());
         let _ = writeln!(out, "**{}.** {}\n", panel.title, panel.compared);
         let costs = TARGETS.iter().enumerate().map(|(place, (_, target))| {
             let best = own.iter().find(|row| row.is_cheapest[place]);
@@ -109,7 +98,7 @@ pub(crate) fn text(rows: &[Row]) -> String {
             format!("{} % {cost}", 100.0 * target)
         });
         let _ = writeln!(out, "This program reaches {}.\n", costs.collect::<Vec<_>>().join(", "));
-        let fails: Vec<String> = failed(rows, case).into_iter().map(setting).collect();
+        let fails: Vec<String> = failed.into_iter().map(setting).collect();
         if !fails.is_empty() {
             let _ = writeln!(out, "No error, for the setting fails: {}.\n", fails.join("; "));
         }
