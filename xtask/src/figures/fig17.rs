@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use wakescope_estimate::retrieval::Side;
 use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
 use wakescope_signal::NoiseModel;
-use wakescope_sim::retrieve::side;
+use wakescope_sim::retrieve::name;
 
 const METHODS: [&str; 4] = ["map, typical core", "map, core fitted", "signals, core known", "signals, core fitted"];
 
@@ -119,7 +119,7 @@ fn table(fits: &[Fits]) -> Table {
         .float("gamma_std_m2_s", float(&|f, p| value(f, p[0]).1))
         .float("y_error_m", float(&|f, p| error(f, p[1])))
         .float("z_error_m", float(&|f, p| error(f, p[2])))
-        .text("vortex", rows.iter().map(|r| side(r.2)))
+        .text("vortex", rows.iter().map(|r| name(r.2)))
         .float("y_std_m", float(&|f, p| value(f, p[1]).1))
         .float("z_std_m", float(&|f, p| value(f, p[2]).1))
         .float("snr_db", rows.iter().map(|r| r.0.snr_db))

@@ -7,7 +7,7 @@ use crate::wakes;
 use rayon::prelude::*;
 use std::path::Path;
 use wakescope_estimate::retrieval::VortexResult;
-use wakescope_sim::retrieve::{Method, RetrievalRow, side};
+use wakescope_sim::retrieve::{Method, RetrievalRow, name};
 use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPair, Weighting};
 
 /// Ages of the simulated wake; the pair has none.
@@ -109,7 +109,7 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
             float(&|row| Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m.value)),
         )
         .float("z_error_m", float(&|row| Some(row.found?.height_m.value - row.truth.height_m.value)))
-        .text("vortex", rows.iter().map(|(_, row)| side(row.side)))
+        .text("vortex", rows.iter().map(|(_, row)| name(row.side)))
         .float("y_std_m", found(|v| v.lateral_position_m.std))
         .float("z_std_m", found(|v| v.height_m.std))
         .float("snr_db", rows.iter().map(|_| SNR_DB))
