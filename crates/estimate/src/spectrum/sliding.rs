@@ -40,28 +40,19 @@ impl<S: Sample> ShortCorrelogram<S> {
         weights
     }
 
-    /// The sums of products of one window, not divided by N.
-    fn sums(&self, window: &[S], out: &mut [f64]) {
-        for (m, parts) in out.chunks_mut(S::KIND.lag_numbers(1)).enumerate() {
-            let products = window[m..].iter().zip(window).map(|(a, b)| a.to_complex() * b.to_complex().conj());
-            let sum: num_complex::Complex<f64> = products.sum();
-            parts.copy_from_slice(&[sum.re, sum.im][..parts.len()]);
-        }
-    }
-
-    /// The same of all windows of a record, `step` samples apart, each after the other. Blocks begin at the multiples of their
+    /// The lags of all windows of a record, `step` samples apart, each after the other. Blocks begin at the multiples of their
     /// length in the whole record, of which this one is the part from `first_sample` on.
-    fn sums_of_all(&self, record: &[S], first_sample: usize, step: usize, out: &mut [f64]) {
+    fn evaluate_all(&self, record: &[S], first_sample: usize, step: usize, out: &mut [f64]) {
         let numbers = S::KIND.lag_numbers(self.lags);
-        let per_lag = S::KIND.lag_numbers(1);
+        let (per_lag, share) = (S::KIND.lag_numbers(1), 1.0 / self.window_samples as f64);
         let (mut products, mut running) = (Vec::new(), Running::default());
         for m in 0..self.lags {
             let length = self.window_samples - m;
             for part in 0..per_lag {
                 form_products(&record[m..], record, part, &mut products);
                 running.form(&products, first_sample % length, length);
-                for (gate, sums) in out.chunks_mut(numbers).enumerate() {
-                    sums[per_lag * m + part] = running.of(gate * step, first_sample % length, length);
+                for (gate, lags) in out.chunks_mut(numbers).enumerate() {
+                    lags[per_lag * m + part] = running.of(gate * step, first_sample % length, length) * share;
                 }
             }
         }
@@ -78,9 +69,12 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
     }
 
     fn evaluate(&self, window: &[S], _: &mut Scratch, out: &mut [f64]) {
-        self.sums(window, out);
         let share = 1.0 / self.window_samples as f64;
-        out.iter_mut().for_each(|value| *value *= share);
+        for (m, parts) in out.chunks_mut(S::KIND.lag_numbers(1)).enumerate() {
+            let products = window[m..].iter().zip(window).map(|(a, b)| a.to_complex() * b.to_complex().conj());
+            let mean = products.sum::<num_complex::Complex<f64>>() * share;
+            parts.copy_from_slice(&[mean.re, mean.im][..parts.len()]);
+        }
     }
 
     fn evaluate_record(
@@ -89,28 +83,20 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
         first_sample: usize,
         step_samples: usize,
         valid: &dyn Fn(usize) -> bool,
-        _: &mut Scratch,
+        scratch: &mut Scratch,
         each: &mut dyn FnMut(usize, &[f64]),
     ) {
-        let n = self.window_samples;
-        if record.len() < n {
-            return;
-        }
-        let gates = (record.len() - n) / step_samples + 1;
-        let numbers = self.statistic_len();
+        let (n, numbers) = (self.window_samples, self.statistic_len());
+        let windows = record.windows(n).step_by(step_samples);
+        let mut means = vec![0.0; windows.len() * numbers];
         // far apart, windows are cheaper one by one
-        let mut means = vec![0.0; gates * numbers];
-        if 3 * step_samples <= n {
-            self.sums_of_all(record, first_sample, step_samples, &mut means);
+        if 3 * step_samples <= n && !means.is_empty() {
+            self.evaluate_all(record, first_sample, step_samples, &mut means);
         } else {
-            let windows = record.windows(n).step_by(step_samples);
-            windows.zip(means.chunks_mut(numbers)).for_each(|(window, sums)| self.sums(window, sums));
+            windows.zip(means.chunks_mut(numbers)).for_each(|(window, mean)| self.evaluate(window, scratch, mean));
         }
-        let share = 1.0 / n as f64;
-        for (gate, mean) in means.chunks_mut(numbers).enumerate().filter(|(gate, _)| valid(*gate)) {
-            mean.iter_mut().for_each(|value| *value *= share);
-            each(gate, mean);
-        }
+        let means = means.chunks(numbers).enumerate();
+        means.filter(|(gate, _)| valid(*gate)).for_each(|(gate, mean)| each(gate, mean));
     }
 }
 

@@ -41,9 +41,8 @@ impl VelocityMap<'_> {
 
     /// Distance of neighbouring lines in the middle of the map.
     pub(crate) fn line_spacing_m(&self) -> f64 {
-        let length = |axis: &[f64]| axis.last().copied().unwrap_or(0.0) - axis.first().copied().unwrap_or(0.0);
-        let middle_m = self.range_m.first().copied().unwrap_or(0.0) + 0.5 * length(self.range_m);
-        middle_m * length(self.elevation_rad) / self.elevation_rad.len() as f64
+        let ((near_m, far_m), (low_rad, high_rad)) = (ends(self.range_m), ends(self.elevation_rad));
+        (near_m + 0.5 * (far_m - near_m)) * (high_rad - low_rad) / self.elevation_rad.len() as f64
     }
 
     /// Mean distance of neighbouring gates.
@@ -78,6 +77,11 @@ impl VelocityMap<'_> {
     pub(crate) fn deviation(&self, line: usize, gate: usize) -> f64 {
         self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])
     }
+}
+
+/// The first and the last number of an axis; zeros if it has none.
+pub(crate) fn ends(axis: &[f64]) -> (f64, f64) {
+    (axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(0.0))
 }
 
 /// Means of an axis over blocks of so many.

@@ -74,7 +74,7 @@ pub fn fit_map_of_estimator(
 ) -> Result<MapFit, Error> {
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
-    let guess = first_guess(map, model, &all.kernel)?;
+    let guess = first_guess(map, model, &all.prepared.kernel)?;
     let coarse = all.coarse(LINES_OVER_RADIUS[0]);
     let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
@@ -85,8 +85,8 @@ pub fn fit_map_of_estimator(
         setting.descended(&guess, ROUGH_SIGMAS)
     };
     let by_means = match &few {
-        Some(few) => by_means(&few.map, &few.kernel),
-        None => by_means(map, &all.kernel.coarser(2)),
+        Some(few) => by_means(&few.map, &few.prepared.kernel),
+        None => by_means(map, &all.prepared.kernel.coarser(2)),
     };
     let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
     let all = all.with_slopes_at(for_slopes.as_ref())?;
@@ -186,8 +186,6 @@ struct Shown<'a, 'm> {
     prepared: Prepared<'a>,
     /// Some places at which slopes are taken, if not at all of them; between they are linear.
     slopes_at: Option<(&'a Coarse, Prepared<'a>)>,
-    /// What gates see in the mean.
-    kernel: RangeKernel,
     options: MapFitOptions,
     /// Core radii below this do not show \[m\].
     least_core_m: f64,
@@ -202,16 +200,15 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         options: &MapFitOptions,
         coarser: f64,
     ) -> Result<Self, Error> {
-        let prepared = response.prepared(model, (map.elevation_rad, map.range_m), coarser);
-        let kernel = prepared.kernel()?;
+        let prepared = response.prepared(model, (map.elevation_rad, map.range_m), coarser)?;
         let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.least_radius_m(map.range_m));
-        Ok(Self { map: *map, prepared, slopes_at: None, kernel, options: *options, least_core_m })
+        Ok(Self { map: *map, prepared, slopes_at: None, options: *options, least_core_m })
     }
 
     /// The places that tell nearly all of the map.
     fn coarse(&self, lines_over_radius: f64) -> Option<Coarse> {
         let line_m = lines_over_radius * self.prepared.response.least_radius_m(self.map.range_m);
-        Coarse::of(&self.map, line_m, GATES_OVER_WIDTH * self.kernel.width_m())
+        Coarse::of(&self.map, line_m, GATES_OVER_WIDTH * self.prepared.kernel.width_m())
     }
 
     /// What the estimator shows at some of the places.
@@ -231,8 +228,8 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
     }
 
     fn setting(&self) -> Setting<'_, 'm> {
-        let Self { map, prepared, kernel, options, least_core_m, .. } = self;
-        Setting { map, model: prepared.model, prediction: self, kernel, options, least_core_m: *least_core_m }
+        let Self { map, prepared: Prepared { model, kernel, .. }, options, least_core_m, .. } = self;
+        Setting { map, model, prediction: self, kernel, options, least_core_m: *least_core_m }
     }
 
     /// Where the fits from some starts end that do, without those that are one.

@@ -126,7 +126,7 @@ impl<'a> EstimatorResponse<'a> {
     ) -> Result<Array2<f64>, Error> {
         wake.validate()?;
         crate::vortex_fit::map_fit::data::validate_axes(elevation_rad, range_m)?;
-        Ok(self.prepared(model, (elevation_rad, range_m), 1.0).velocities(model, wake))
+        Ok(self.prepared(model, (elevation_rad, range_m), 1.0)?.velocities(model, wake))
     }
 
     /// Least radius of the regions at those ranges \[m\].
@@ -140,12 +140,15 @@ impl<'a> EstimatorResponse<'a> {
     }
 
     /// The weights of the air on nodes that fit the gates of those elevations and ranges, `coarser` times as far apart as maps need.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] if the weights have no power.
     pub(crate) fn prepared<'r>(
         &'r self,
         model: &'r WakeModel,
         (elevation_rad, range_m): (&'r [f64], &'r [f64]),
         coarser: f64,
-    ) -> Prepared<'r> {
+    ) -> Result<Prepared<'r>, Error> {
         let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s());
         let lags = self.tapers[0].weights.len();
         let gap_m = range_m.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
@@ -178,23 +181,13 @@ impl<'a> EstimatorResponse<'a> {
         let regions = Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
             region(elevation_rad, line, range_m[gate], (self.radius_m)(range_m[gate])).collect()
         });
-        let first_offset_m = (before as f64 - reach as f64) * spacing_m;
+        let of_lag_0: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
+        let kernel = RangeKernel::new((before as f64 - reach as f64) * spacing_m, spacing_m, &of_lag_0)?;
         let seconds = match self.line_times.is_empty() {
             true => Vec::new(),
             false => elevation_rad.iter().map(|elevation_rad| self.seconds_of(*elevation_rad)).collect(),
         };
-        Prepared {
-            response: self,
-            model,
-            elevation_rad,
-            range_m,
-            first_offset_m,
-            spacing_m,
-            numbers,
-            weights,
-            regions,
-            seconds,
-        }
+        Ok(Prepared { response: self, model, elevation_rad, range_m, kernel, numbers, weights, regions, seconds })
     }
 }
 
@@ -204,8 +197,8 @@ pub(crate) struct Prepared<'r> {
     pub(crate) model: &'r WakeModel,
     elevation_rad: &'r [f64],
     range_m: &'r [f64],
-    first_offset_m: f64,
-    spacing_m: f64,
+    /// The mean over a gate, which a wide line would show.
+    pub(crate) kernel: RangeKernel,
     /// Numbers of one correlogram.
     numbers: usize,
     /// \[node, number\]
@@ -217,15 +210,6 @@ pub(crate) struct Prepared<'r> {
 }
 
 impl Prepared<'_> {
-    /// The mean over a gate, which a wide line would show.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] if the weights have no power.
-    pub(crate) fn kernel(&self) -> Result<RangeKernel, Error> {
-        let weights: Vec<f64> = self.weights.iter().step_by(self.numbers).copied().collect();
-        RangeKernel::new(self.first_offset_m, self.spacing_m, &weights)
-    }
-
     /// The wake when each line is measured.
     fn wakes(&self, model: &WakeModel, wake: &Wake) -> Vec<Wake> {
         if self.seconds.is_empty() {
@@ -265,7 +249,8 @@ impl Prepared<'_> {
         let moments = map_each(lines, |line| {
             let velocities = self.velocities_on((self.model, &wakes[line]), Ray::new(self.elevation_rad[line]));
             let one = |range_m: &f64| {
-                let index = ((range_m - nearest_m) / self.spacing_m).round() as usize;
+                let (index, part) = self.kernel.place(range_m - nearest_m);
+                let index = index + usize::from(part >= 0.5);
                 let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
                 seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
             };
@@ -283,14 +268,8 @@ impl Prepared<'_> {
 
     /// Velocities of the air at the nodes of a line that its gates see.
     fn velocities_on(&self, (model, wake): (&WakeModel, &Wake), ray: Ray) -> Vec<f64> {
-        let (Some(&nearest_m), Some(&farthest_m)) = (self.range_m.first(), self.range_m.last()) else {
-            return Vec::new();
-        };
-        let nodes = self.weights.len() / self.numbers;
-        let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + nodes + 1;
-        let at_m = |point: usize| nearest_m + self.first_offset_m + point as f64 * self.spacing_m;
         let mut velocities = [Vec::new()];
-        model.along(wake, &(0..points).map(at_m).collect::<Vec<f64>>(), ray, &mut velocities);
+        model.along(wake, &self.kernel.points_m(self.range_m).collect::<Vec<f64>>(), ray, &mut velocities);
         let [velocities] = velocities;
         velocities
     }
@@ -305,13 +284,11 @@ impl Prepared<'_> {
         fill_powers(phasors, &turns, self.response.kind);
         let mut lags = vec![0.0; self.range_m.len() * self.numbers];
         for (range_m, lags) in self.range_m.iter().zip(lags.chunks_exact_mut(self.numbers)) {
-            let place = (range_m - nearest_m) / self.spacing_m;
-            let index = (place + 1e-9).floor();
-            let part = (place - index).max(0.0);
+            let (index, part) = self.kernel.place(range_m - nearest_m);
             // ranges between two nodes see something of both
             for (shift, share) in [(0, 1.0 - part), (1, part)] {
                 if share > 1e-6 {
-                    let seen = &phasors[(index as usize + shift) * self.numbers..];
+                    let seen = &phasors[(index + shift) * self.numbers..];
                     add_seen(lags, &self.weights, seen, share);
                 }
             }

@@ -73,13 +73,10 @@ impl Prediction for Gates<'_> {
                 }
             };
             let seen = (&model, &now, ray);
-            if self.shared_points {
-                self.kernel.apply(seen, self.range_m, !own.is_empty(), scratch, take);
-            } else {
-                for (gate, range_m) in self.range_m.iter().enumerate() {
-                    let range_m = std::slice::from_ref(range_m);
-                    self.kernel.apply(seen, range_m, !own.is_empty(), scratch, |_, v, s| take(gate, v, s));
-                }
+            let together = if self.shared_points { self.range_m.len().max(1) } else { 1 };
+            for (part, range_m) in self.range_m.chunks(together).enumerate() {
+                let first = part * together;
+                self.kernel.apply(seen, range_m, !own.is_empty(), scratch, |gate, v, s| take(first + gate, v, s));
             }
             numbers
         });

@@ -10,7 +10,7 @@ use ndarray::{Array1, Array2};
 use crate::error::{Error, enough_velocities};
 use crate::parallel::{map_each, map_indexed};
 use crate::vortex_fit::map_fit::cells::{orthonormal, remove, scaled};
-use crate::vortex_fit::map_fit::data::{block_means, median, robust_scale};
+use crate::vortex_fit::map_fit::data::{block_means, ends, median, robust_scale};
 use crate::vortex_fit::map_fit::starts::CORE_OVER_SPACING;
 use crate::vortex_fit::wake::pair::Ray;
 use crate::vortex_fit::wake::range_kernel::LineScratch;
@@ -187,10 +187,6 @@ fn places(thinned: &Thinned, model: &WakeModel, kernel: &RangeKernel) -> Vec<((f
     .into_iter()
     .filter(|((_, height_m), _)| !model.images || *height_m > 0.0)
     .collect()
-}
-
-fn ends(axis: &[f64]) -> (f64, f64) {
-    (axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(0.0))
 }
 
 /// What uniform wind and shear show.

@@ -149,11 +149,8 @@ impl ScanModel {
         factor.clone_from(signal);
         factor.scale(powers.log_signal.exp());
         let noise_power = powers.log_noise.exp();
-        for column in 0..factor.order {
-            for lag in 0..=factor.width.min(factor.order - 1 - column) {
-                let place = factor.at(column, lag);
-                factor.re[place] += noise_power * self.noise[lag];
-            }
+        for column in factor.re.chunks_exact_mut(factor.width + 1) {
+            column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c += noise_power * n);
         }
     }
 

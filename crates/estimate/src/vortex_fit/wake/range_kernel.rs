@@ -121,6 +121,21 @@ impl RangeKernel {
         out
     }
 
+    /// Points of the air that gates at those ranges see.
+    pub(crate) fn points_m(&self, range_m: &[f64]) -> impl Iterator<Item = f64> {
+        let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
+        let farthest_m = range_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + self.weights.len() + 1;
+        (0..points).map(move |i| nearest_m + self.first_offset_m + i as f64 * self.spacing_m)
+    }
+
+    /// The first of these points that a gate so far from the nearest one sees, and the part of the way to the next one at which it lies.
+    pub(crate) fn place(&self, away_m: f64) -> (usize, f64) {
+        let place = away_m / self.spacing_m;
+        let index = (place + 1e-9).floor();
+        (index as usize, (place - index).max(0.0))
+    }
+
     /// Gate velocities of a line, and with `slopes` their derivatives: `out(gate, velocity, derivatives)` for each range.
     pub(crate) fn apply(
         &self,
@@ -131,19 +146,14 @@ impl RangeKernel {
         mut out: impl FnMut(usize, f64, &[f64; PARAMETERS]),
     ) {
         let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
-        let farthest_m = range_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + self.weights.len() + 1;
         scratch.points_m.clear();
-        let point_m = |i: usize| nearest_m + self.first_offset_m + i as f64 * self.spacing_m;
-        scratch.points_m.extend((0..points).map(point_m));
+        scratch.points_m.extend(self.points_m(range_m));
         scratch.rows.resize_with(if slopes { PARAMETERS + 1 } else { 1 }, Vec::new);
         model.along(wake, &scratch.points_m, ray, &mut scratch.rows);
         for (gate, &r_m) in range_m.iter().enumerate() {
-            let place = (r_m - nearest_m) / self.spacing_m;
-            let index = (place + 1e-9).floor();
-            let part = (place - index).max(0.0);
+            let (index, part) = self.place(r_m - nearest_m);
             let weights = if part > 1e-6 { self.between(part, &mut scratch.weights) } else { &self.weights };
-            let found = means(weights, &scratch.rows, index as usize);
+            let found = means(weights, &scratch.rows, index);
             let mut slope = [0.0; PARAMETERS];
             slope.copy_from_slice(&found[1..]);
             out(gate, found[0], &slope);
