@@ -134,11 +134,6 @@ impl<'a> EstimatorResponse<'a> {
         range_m.iter().map(|range_m| (self.radius_m)(*range_m)).fold(f64::INFINITY, f64::min)
     }
 
-    fn seconds_of(&self, elevation_rad: f64) -> f64 {
-        let line = self.line_times.iter().find(|(elevation, _)| *elevation == elevation_rad);
-        line.map_or(0.0, |(_, seconds)| *seconds)
-    }
-
     /// The weights of the air on nodes that fit the gates of those elevations and ranges, `coarser` times as far apart as maps need.
     ///
     /// # Errors
@@ -149,7 +144,7 @@ impl<'a> EstimatorResponse<'a> {
         (elevation_rad, range_m): (&'r [f64], &'r [f64]),
         coarser: f64,
     ) -> Result<Prepared<'r>, Error> {
-        let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s());
+        let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s);
         let lags = self.tapers[0].weights.len();
         let gap_m = range_m.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
         let widest_m = coarser * NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
@@ -183,10 +178,11 @@ impl<'a> EstimatorResponse<'a> {
         });
         let of_lag_0: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
         let kernel = RangeKernel::new((before as f64 - reach as f64) * spacing_m, spacing_m, &of_lag_0)?;
-        let seconds = match self.line_times.is_empty() {
-            true => Vec::new(),
-            false => elevation_rad.iter().map(|elevation_rad| self.seconds_of(*elevation_rad)).collect(),
+        let seconds_of = |elevation_rad: &f64| {
+            let line = self.line_times.iter().find(|(elevation, _)| elevation == elevation_rad);
+            line.map_or(0.0, |(_, seconds)| *seconds)
         };
+        let seconds = elevation_rad.iter().map(seconds_of).collect();
         Ok(Prepared { response: self, model, elevation_rad, range_m, kernel, numbers, weights, regions, seconds })
     }
 }
@@ -205,16 +201,13 @@ pub(crate) struct Prepared<'r> {
     weights: Vec<f64>,
     /// Lines of the region of each place \[line, gate\] with their shares.
     regions: Array2<Vec<(usize, f64)>>,
-    /// Time of each line after that of the wake \[s\]; empty if it stands still.
+    /// Time of each line after that of the wake \[s\].
     seconds: Vec<f64>,
 }
 
 impl Prepared<'_> {
     /// The wake when each line is measured.
     fn wakes(&self, model: &WakeModel, wake: &Wake) -> Vec<Wake> {
-        if self.seconds.is_empty() {
-            return vec![*wake; self.elevation_rad.len()];
-        }
         let motion = Motion::new(model, wake);
         self.seconds.iter().map(|seconds| motion.wake_after(wake, *seconds)).collect()
     }
@@ -303,24 +296,19 @@ const LANES: usize = 8;
 /// Powers 0, 1, ... of unit phasors, given as sine and cosine: a row for each.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn fill_powers(phasors: &mut [f64], turns: &[(f64, f64)], kind: SignalKind) {
-    let count = phasors.len() / turns.len().max(1);
+    let (count, parts) = (phasors.len() / turns.len().max(1), kind.lag_numbers(1));
     for (rows, turns) in phasors.chunks_mut(LANES * count).zip(turns.chunks(LANES)) {
         let (mut sin, mut cos) = ([0.0; LANES], [1.0; LANES]);
         for (lane, turn) in turns.iter().enumerate() {
             (sin[lane], cos[lane]) = *turn;
         }
         let (mut re, mut im) = ([1.0; LANES], [0.0; LANES]);
-        let mut number = 0;
-        while number < count {
+        for number in (0..count).step_by(parts) {
             for lane in 0..turns.len() {
                 rows[lane * count + number] = re[lane];
-            }
-            number += 1;
-            if kind == SignalKind::Complex {
-                for lane in 0..turns.len() {
-                    rows[lane * count + number] = im[lane];
+                if parts == 2 {
+                    rows[lane * count + number + 1] = im[lane];
                 }
-                number += 1;
             }
             for lane in 0..LANES {
                 let (x, y) = (re[lane], im[lane]);

@@ -10,7 +10,7 @@ use std::rc::Rc;
 use crate::error::Error;
 use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, State};
-use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines, other_tops, same};
+use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines};
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{
     FreeParameters, PARAMETERS, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing, SignalFitOptions,
@@ -172,7 +172,8 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         }
         let rough = ScanModel::with_layers(self.setup, self.snr, &guess, ROUGH_LAYERS)?;
         let near = near_lines(&rough, &first.state.0);
-        other_tops((&first.model, &near), self.signals, first.state, self.options)
+        let ascent = Ascent { model: &first.model, signals: self.signals, options: self.options, others: None };
+        ascent.other_tops(&near, first.state)
     }
 
     /// The highest top, and what the others add to its errors.
@@ -180,42 +181,40 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         let (options, signals) = (self.options, self.signals);
         settled.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
         let failed = Error::NotConverged { iterations: ROUNDS, sigmas_left: f64::NAN };
-        let mut tops: Vec<&Settled> = Vec::new();
-        let mut informations = Vec::new();
+        let mut tops: Vec<(&Settled, Array2<f64>)> = Vec::new();
         for next in &settled {
             let ascent = Ascent { model: &next.model, signals, options, others: None };
-            let known = tops
-                .iter()
-                .zip(&informations)
-                .any(|(top, information)| same(&ascent, information, &top.state, &next.state));
-            if !known {
-                let stride = if tops.is_empty() { 1 } else { options.information_stride };
-                let share = signals.used_rays() as f64 / next.model.rays as f64;
-                informations.push(ascent.information(&next.state, stride)? * share);
-                tops.push(next);
+            if tops.iter().any(|(top, information)| ascent.same(information, &top.state, &next.state)) {
+                continue;
             }
+            let stride = if tops.is_empty() { 1 } else { options.information_stride };
+            let share = signals.used_rays() as f64 / next.model.rays as f64;
+            tops.push((next, ascent.information(&next.state, stride)? * share));
         }
-        let best = *tops.first().ok_or(failed.clone())?;
+        let (best, information) = tops.first().ok_or(failed.clone())?;
+        let within = |information: &Array2<f64>| {
+            inverse("information on the wake", information).map(|inverse| spread(&options.free.groups(), &inverse))
+        };
+        let bound = within(information)?;
         let (wake, powers) = best.state;
         let without = best.model.log_likelihood(signals, &wake.wind_alone(), powers).ok_or(failed)?;
-        let (mut covariance, mut bound, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), None, 0.0);
-        for (top, information) in tops.iter().zip(&informations) {
-            let within = spread(&options.free.groups(), &inverse("information on the wake", information)?);
+        let (mut covariance, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), 0.0);
+        for (top, information) in &tops {
+            let within = within(information)?;
             let weight = (top.log_likelihood - best.log_likelihood).exp();
             weights += weight;
             let (a, b) = (top.state.0.to_array(), wake.to_array());
             for ((i, j), c) in covariance.indexed_iter_mut() {
                 *c += weight * (within[[i, j]] + (a[i] - b[i]) * (a[j] - b[j]));
             }
-            bound.get_or_insert(within);
         }
         covariance /= weights;
-        let top = |top: &&Settled| Top { wake: top.state.0, chi2: -2.0 * top.log_likelihood };
+        let top = |(top, _): &(&Settled, _)| Top { wake: top.state.0, chi2: -2.0 * top.log_likelihood };
         Ok(SignalFit {
             wake,
             powers,
             covariance,
-            bound: bound.unwrap_or_default(),
+            bound,
             tops: tops.iter().map(top).collect(),
             log_likelihood: best.log_likelihood,
             log_likelihood_gain: best.log_likelihood - without.log_likelihood,

@@ -11,7 +11,7 @@ use num_complex::Complex;
 
 use crate::error::{Error, length, not_empty, positive};
 use crate::linalg::dot;
-use crate::parallel::map_indexed;
+use crate::parallel::{map_each, map_indexed};
 use crate::vortex_fit::signal_fit::banded_cholesky::{Banded, factorize, forward, inverse_into};
 use crate::vortex_fit::signal_fit::line_covariance::Work;
 use crate::vortex_fit::signal_fit::scan_model::Line;
@@ -59,14 +59,11 @@ impl ScanSignals {
         positive("noise_power", noise_power)?;
         let scale = noise_power.sqrt().recip();
         positive("1 / sqrt(noise_power)", scale)?;
-        let rays: Vec<_> = map_indexed(records.nrows(), Vec::new, |row: &mut Vec<S>, ray| {
-            row.clear();
-            row.extend(records.row(ray).iter().map(|sample| sample.scaled(scale)));
-            if row.iter().all(|sample| sample.is_finite()) { model.baseband.convert(row).map(Some) } else { Ok(None) }
-        })
-        .into_iter()
-        .collect::<Result<_, _>>()?;
-        let signals = Self { rays };
+        let rays = map_each(records.nrows(), |ray| {
+            let row: Vec<S> = records.row(ray).iter().map(|sample| sample.scaled(scale)).collect();
+            if row.iter().all(|sample| sample.is_finite()) { model.baseband.convert(&row).map(Some) } else { Ok(None) }
+        });
+        let signals = Self { rays: rays.into_iter().collect::<Result<_, _>>()? };
         not_empty("rays without missing samples", signals.used_rays())?;
         Ok(signals)
     }
@@ -93,52 +90,41 @@ impl ScanModel {
     #[must_use]
     pub fn log_likelihood(&self, signals: &ScanSignals, wake: &Wake, powers: Powers) -> Option<LikelihoodValue> {
         wake.validate().ok()?;
-        let lines = map_indexed(self.lines.len(), Space::default, |space, index| {
-            self.line_likelihood(&self.lines[index], signals, wake, powers, space)
-        });
+        let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
+        let of_line = |space: &mut Space, index: usize| {
+            let (mut value, line) = (LikelihoodValue::default(), &self.lines[index]);
+            let of_ray = |ray: &usize| signals.rays[*ray].as_ref();
+            let rays: Vec<&Vec<Complex<f64>>> = line.rays.iter().filter_map(of_ray).collect();
+            if rays.is_empty() {
+                return Some(value);
+            }
+            self.covariance_into(line, wake, powers, space);
+            let log_determinant = factorize(&mut space.factor)?;
+            inverse_into(&space.factor, &mut space.inverse);
+            // the inverse becomes the weight of the gradient: sum of x x^H - R^-1, off the diagonal for both triangles
+            let Space { work, signal, factor, inverse: weight } = space;
+            weight.scale(-(rays.len() as f64));
+            for z in rays {
+                let x = solve(factor, z);
+                let quadratic: f64 = x.iter().zip(z).map(|(x, z)| x.re * z.re + x.im * z.im).sum();
+                value.log_likelihood -= log_determinant + quadratic;
+                add_outer(weight, &x);
+            }
+            double_off_diagonal(weight);
+            value.by_powers = [signal_power * product(weight, signal), noise_power * self.noise_product(weight)];
+            weight.scale(signal_power);
+            self.pull_back(line, weight, work, &mut value.by_wake);
+            Some(value)
+        };
         let mut sum = LikelihoodValue::default();
         // in the order of the lines, whoever computed them
-        for line in lines {
+        for line in map_indexed(self.lines.len(), Space::default, of_line) {
             let line = line?;
             sum.log_likelihood += line.log_likelihood;
             sum.by_wake.iter_mut().zip(line.by_wake).for_each(|(s, l)| *s += l);
             sum.by_powers.iter_mut().zip(line.by_powers).for_each(|(s, l)| *s += l);
         }
         sum.log_likelihood.is_finite().then_some(sum)
-    }
-
-    fn line_likelihood(
-        &self,
-        line: &Line,
-        signals: &ScanSignals,
-        wake: &Wake,
-        powers: Powers,
-        space: &mut Space,
-    ) -> Option<LikelihoodValue> {
-        let mut value = LikelihoodValue::default();
-        let rays: Vec<&Vec<Complex<f64>>> = line.rays.iter().filter_map(|&ray| signals.rays[ray].as_ref()).collect();
-        if rays.is_empty() {
-            return Some(value);
-        }
-        let count = rays.len() as f64;
-        self.covariance_into(line, wake, powers, space);
-        let log_determinant = factorize(&mut space.factor)?;
-        inverse_into(&space.factor, &mut space.inverse);
-        // the inverse becomes the weight of the gradient: sum of x x^H - R^-1, off the diagonal for both triangles
-        let Space { work, signal, factor, inverse: weight } = space;
-        weight.scale(-count);
-        for z in rays {
-            let x = solve(factor, z);
-            let quadratic: f64 = x.iter().zip(z).map(|(x, z)| x.re * z.re + x.im * z.im).sum();
-            value.log_likelihood -= log_determinant + quadratic;
-            add_outer(weight, &x);
-        }
-        double_off_diagonal(weight);
-        let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
-        value.by_powers = [signal_power * product(weight, signal), noise_power * self.noise_product(weight)];
-        weight.scale(signal_power);
-        self.pull_back(line, weight, work, &mut value.by_wake);
-        Some(value)
     }
 
     /// Covariance of a line in `space.factor`, that of its signal for unit noise power in `space.signal`.
@@ -148,9 +134,13 @@ impl ScanModel {
         self.signal_into(line, work, signal);
         factor.clone_from(signal);
         factor.scale(powers.log_signal.exp());
-        let noise_power = powers.log_noise.exp();
-        for column in factor.re.chunks_exact_mut(factor.width + 1) {
-            column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c += noise_power * n);
+        self.add_noise(powers.log_noise.exp(), factor);
+    }
+
+    /// Adds the covariance of noise of that power.
+    fn add_noise(&self, power: f64, band: &mut Banded) {
+        for column in band.re.chunks_exact_mut(band.width + 1) {
+            column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c += power * n);
         }
     }
 
@@ -179,62 +169,41 @@ impl ScanModel {
         positive("stride", stride as f64)?;
         let groups = groups(free, powers_free);
         let lines: Vec<&Line> = self.lines.iter().step_by(stride).collect();
-        let parts = map_indexed(lines.len(), Space::default, |space, index| {
-            self.line_information(lines[index], wake, powers, &groups, space)
-        });
+        let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
+        let of_line = |space: &mut Space, index: usize| {
+            self.covariance_into(lines[index], wake, powers, space);
+            let order = space.factor.order;
+            let indefinite =
+                Error::Linalg { what: "covariance of a line of sight", order, reason: "is not positive definite" };
+            factorize(&mut space.factor).ok_or(indefinite)?;
+            let whitened = groups.iter().map(|group| {
+                let change = &mut space.inverse;
+                match group[0] {
+                    SIGNAL => {
+                        change.clone_from(&space.signal);
+                        change.scale(signal_power);
+                    }
+                    NOISE => {
+                        change.reset(order, space.signal.width);
+                        self.add_noise(noise_power, change);
+                    }
+                    _ => {
+                        let slope = |slopes: &[f64; PARAMETERS]| group.iter().map(|&place| slopes[place]).sum::<f64>();
+                        self.change_into(lines[index], &mut space.work, |slopes| signal_power * slope(slopes), change);
+                    }
+                }
+                whiten(&space.factor, change)
+            });
+            let (whitened, rays) = (whitened.collect::<Vec<_>>(), lines[index].rays.len() as f64);
+            let product = |(i, j): (usize, usize)| rays * dot(&whitened[i.max(j)], &whitened[i.min(j)]);
+            Ok(Array2::from_shape_fn((groups.len(), groups.len()), product))
+        };
         let mut sum = Array2::zeros((groups.len(), groups.len()));
-        for part in parts {
+        for part in map_indexed(lines.len(), Space::default, of_line) {
             sum += &part?;
         }
         let rays: usize = lines.iter().map(|line| line.rays.len()).sum();
         Ok(sum * (self.rays as f64 / rays as f64))
-    }
-
-    fn line_information(
-        &self,
-        line: &Line,
-        wake: &Wake,
-        powers: Powers,
-        groups: &[Vec<usize>],
-        space: &mut Space,
-    ) -> Result<Array2<f64>, Error> {
-        self.covariance_into(line, wake, powers, space);
-        let order = space.factor.order;
-        let indefinite =
-            Error::Linalg { what: "covariance of a line of sight", order, reason: "is not positive definite" };
-        factorize(&mut space.factor).ok_or(indefinite)?;
-        let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
-        let mut whitened = Vec::new();
-        for group in groups {
-            let change = &mut space.inverse;
-            match group[0] {
-                SIGNAL => {
-                    change.clone_from(&space.signal);
-                    change.scale(signal_power);
-                }
-                NOISE => {
-                    change.reset(order, space.signal.width);
-                    for column in change.re.chunks_exact_mut(self.noise.len().min(order)) {
-                        column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c = noise_power * n);
-                    }
-                }
-                _ => {
-                    let slope = |slopes: &[f64; PARAMETERS]| group.iter().map(|&place| slopes[place]).sum::<f64>();
-                    self.change_into(line, &mut space.work, |slopes| signal_power * slope(slopes), change);
-                }
-            }
-            whitened.push(whiten(&space.factor, change));
-        }
-        let rays = line.rays.len() as f64;
-        let count = whitened.len();
-        let mut information = Array2::zeros((count, count));
-        for i in 0..count {
-            for j in 0..=i {
-                information[[i, j]] = rays * dot(&whitened[i], &whitened[j]);
-                information[[j, i]] = information[[i, j]];
-            }
-        }
-        Ok(information)
     }
 }
 

@@ -164,11 +164,6 @@ impl ScanModel {
     pub(crate) fn has(&self, line: &Line) -> bool {
         self.lines.iter().any(|own| own.rays == line.rays)
     }
-
-    /// Distance at which a line passes the nearer vortex \[m\].
-    pub(crate) fn passes_m(&self, line: &Line, wake: &Wake) -> f64 {
-        self.wake.passes_m(line.ray, &wake.left).min(self.wake.passes_m(line.ray, &wake.right))
-    }
 }
 
 /// Cuts lines of sight into layers.
@@ -207,7 +202,7 @@ impl Cutter<'_> {
                 vortex.circulation_m2_s.abs() / (2.0 * PI * radius_m * radius_m)
             })
             .sum();
-        let limit_m = self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s() * gradient_per_s);
+        let limit_m = self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s * gradient_per_s);
         (self.spacing_m / (self.thicker * limit_m)).ceil().clamp(1.0, MOST_LAYERS)
     }
 

@@ -5,13 +5,8 @@
 
 use crate::vortex_fit::{PARAMETERS, Parameter, Wake, WakeModel};
 
-/// Places of the moving coordinates among the parameters.
-const MOVING: [usize; 4] = [
-    Parameter::LeftLateral as usize,
-    Parameter::LeftHeight as usize,
-    Parameter::RightLateral as usize,
-    Parameter::RightHeight as usize,
-];
+/// Places of the moving coordinates among the parameters: lateral position and height of the left, then of the right vortex.
+const MOVING: std::ops::Range<usize> = Parameter::LeftLateral as usize..Parameter::LeftCore as usize;
 
 /// Velocities of the centres and their derivatives by all parameters.
 #[derive(Debug, Clone)]
@@ -42,15 +37,15 @@ impl Motion {
     /// The wake after so many seconds.
     pub(crate) fn wake_after(&self, wake: &Wake, seconds: f64) -> Wake {
         let mut p = wake.to_array();
-        MOVING.iter().zip(self.velocity_m_s).for_each(|(&place, velocity)| p[place] += seconds * velocity);
+        MOVING.zip(self.velocity_m_s).for_each(|(place, velocity)| p[place] += seconds * velocity);
         Wake::from_array(&p)
     }
 
     /// Turns derivatives by the parameters of the wake after so many seconds into those by the parameters of the wake at first.
     pub(crate) fn carry_back(&self, seconds: f64, slope: &mut [f64; PARAMETERS]) {
         let then = *slope;
-        for (place, row) in MOVING.iter().zip(&self.slopes) {
-            slope.iter_mut().zip(row).for_each(|(slope, by)| *slope += then[*place] * seconds * by);
+        for (place, row) in MOVING.zip(&self.slopes) {
+            slope.iter_mut().zip(row).for_each(|(slope, by)| *slope += then[place] * seconds * by);
         }
     }
 }

@@ -10,7 +10,8 @@ use crate::error::{Error, positive};
 /// Real envelope f(t) of the transmitted pulse; its energy is scaled to 1.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PulseShape {
-    sigma_s: f64,
+    /// Half-width of f^2 at 1/e \[s\].
+    pub(crate) sigma_s: f64,
 }
 
 impl PulseShape {
@@ -31,11 +32,6 @@ impl PulseShape {
     /// Largest time \[s\] at which f^2 matters: 1e-7 of its peak.
     pub(crate) fn reach_s(&self) -> f64 {
         4.0 * self.sigma_s
-    }
-
-    /// Half-width of f^2 at 1/e \[s\].
-    pub(crate) fn sigma_s(&self) -> f64 {
-        self.sigma_s
     }
 }
 
@@ -66,14 +62,10 @@ impl PairWeights {
         let nodes = -(half as i64)..=half as i64;
         let covariance = |lag: usize| nodes.clone().map(|node| weight(node, lag) * step_s).sum::<f64>().abs();
         let longest = (0..samples).rev().find(|&lag| covariance(lag) > cut).unwrap_or(0);
-        let even = longest / 2 + 1;
-        let order = (0..=longest).step_by(2).chain((1..=longest).step_by(2));
-        let rows = nodes
-            .clone()
-            .flat_map(|node| order.clone().map(move |lag| (node, lag)))
-            .map(|(node, lag)| weight(node, lag) * step_s)
-            .collect();
-        Self { lags: longest, half, even, rows }
+        let mut weights = Self { lags: longest, half, even: longest / 2 + 1, rows: Vec::new() };
+        let places = nodes.flat_map(|node| weights.lag_of_place().map(move |lag| (node, lag)));
+        weights.rows = places.map(|(node, lag)| weight(node, lag) * step_s).collect();
+        weights
     }
 
     /// Weights of all lags for the node `offset - half` from the middle.
