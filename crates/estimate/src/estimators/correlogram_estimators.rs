@@ -63,13 +63,9 @@ impl Estimator for LagWindowPeak {
         let sampling = self.peak.sampling();
         let resolution_m_s = 0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.weights.len() as f64;
         // the width of another peak is not that of this one
-        match (sharp.velocity_m_s - estimate.velocity_m_s).abs() < resolution_m_s {
-            true => {
-                let GateVelocity { spread_m2_s2, resolution_m2_s2, .. } = sharp;
-                GateVelocity { spread_m2_s2, resolution_m2_s2, ..estimate }
-            }
-            false => estimate,
-        }
+        let is_one = (sharp.velocity_m_s - estimate.velocity_m_s).abs() < resolution_m_s;
+        let GateVelocity { spread_m2_s2, resolution_m2_s2, .. } = if is_one { sharp } else { estimate };
+        GateVelocity { spread_m2_s2, resolution_m2_s2, ..estimate }
     }
 }
 

@@ -104,7 +104,7 @@ impl<S: Sample> GradientLikelihood<S> {
             true => std::iter::once(Complex::from(sides)).chain(std::iter::repeat_n(Complex::ZERO, n - 1)).collect(),
             false => (0..n).map(|m| band_lag(sampling, m, share)).collect(),
         };
-        let mut estimator = GradientPeak {
+        let estimator = GradientPeak {
             corrections: Vec::new(),
             gradient_readings: Vec::new(),
             gradient_per_s: gradient_per_s.to_vec(),
@@ -113,14 +113,15 @@ impl<S: Sample> GradientLikelihood<S> {
             samples_in_band: if white { sides * n as f64 } else { share * n as f64 },
             search,
         };
-        if S::KIND == SignalKind::Real {
-            let read = gradient_per_s.iter().zip(&tapers).map(|(&g, tapers)| estimator.readings(model, g, snr, tapers));
-            estimator.corrections = read.collect::<Result<_, _>>()?;
-        }
         let transform = WindowTransform::new(SignalKind::Complex, 2 * n);
         let statistic = GradientStatistic { tapers, band_lags, transform, sample: std::marker::PhantomData };
-        estimator.gradient_readings = statistic.gradient_readings(&estimator, model, snr)?;
-        Ok(Self { statistic, estimator })
+        let mut planned = Self { statistic, estimator };
+        if S::KIND == SignalKind::Real {
+            let read = (0..gradient_per_s.len()).map(|k| planned.readings(model, snr, k));
+            planned.estimator.corrections = read.collect::<Result<_, _>>()?;
+        }
+        planned.estimator.gradient_readings = planned.gradient_readings(model, snr)?;
+        Ok(planned)
     }
 }
 
@@ -148,6 +149,56 @@ impl<S: Sample> GradientLikelihood<S> {
             if i >= j { lag } else { lag.conj() }
         });
         Ok(self.statistic.expected(&covariance, &self.statistic.lag_weights()))
+    }
+
+    /// What the peak of the expected statistic of a gradient of the list reads for true velocities all over the band.
+    fn readings(&self, model: &GradientModel, snr: f64, k: usize) -> Result<Vec<(f64, f64)>, Error> {
+        let search = &self.estimator.search;
+        let sampling = &search.sampling;
+        let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
+        // the sidelobes of a taper pass the image twice as fast as the velocity changes: a quarter of one per step
+        let step_m_s = 0.0625 * sampling.wavelength_m * sampling.sample_rate_hz / model.window_samples as f64;
+        let steps = ((high_m_s - low_m_s) / step_m_s).ceil().max(1.0);
+        let weights = LagWeights::new(&self.statistic.tapers[k], model.window_samples);
+        let [envelope, _] = model.envelope(self.estimator.gradient_per_s[k]);
+        let mut scratch = Scratch::new();
+        let mut readings = Vec::<(f64, f64)>::with_capacity(steps as usize + 1);
+        for k in 0..=steps as usize {
+            let velocity_m_s = low_m_s + (high_m_s - low_m_s) * k as f64 / steps;
+            let lags = weights.expected_lags(&model.of_samples(&envelope, velocity_m_s, snr, SignalKind::Real)?);
+            search.zoom.density_into(&lags, &mut scratch.band)?;
+            let found = search.locate(&scratch.band, Refinement::Parabola, &[], || None);
+            let read_m_s = sampling.velocity_m_s(search.band.frequency_hz(found.bin));
+            // at the edges of the band the peak leaves it: only increasing readings can be inverted
+            if found.flag == Quality::Good && readings.last().is_none_or(|last| last.0 < read_m_s) {
+                readings.push((read_m_s, velocity_m_s));
+            }
+        }
+        Ok(readings)
+    }
+
+    /// What the estimator reads for true gradients between the first and the last, in the middle of the band.
+    fn gradient_readings(&self, model: &GradientModel, snr: f64) -> Result<Vec<(f64, f64)>, Error> {
+        let Self { statistic, estimator } = self;
+        let sampling = &estimator.search.sampling;
+        let velocity_m_s = sampling.velocity_m_s(0.5 * (sampling.band_hz.0 + sampling.band_hz.1));
+        let weights = statistic.lag_weights();
+        let mut readings = Vec::<(f64, f64)>::new();
+        for pair in estimator.gradient_per_s.windows(2) {
+            for part in 0..=READINGS {
+                let gradient_per_s = pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
+                let [envelope, _] = model.envelope(gradient_per_s);
+                let covariance = model.of_samples(&envelope, velocity_m_s, snr, S::KIND)?;
+                let found =
+                    estimator.velocity_and_gradient(&statistic.expected(&covariance, &weights), &mut Scratch::new());
+                // the ends of the list read themselves however far off the wind: only increasing readings can be inverted
+                if found.gradient_per_s.is_finite() && readings.last().is_none_or(|last| last.0 < found.gradient_per_s)
+                {
+                    readings.push((found.gradient_per_s, gradient_per_s));
+                }
+            }
+        }
+        Ok(readings)
     }
 }
 
@@ -195,67 +246,9 @@ impl<S: Sample> GradientStatistic<S> {
         numbers.push(self.band_lags.iter().enumerate().map(|(m, weight)| (lag(m) * weight).re).sum());
         numbers
     }
-
-    /// What the estimator reads for true gradients between the first and the last, in the middle of the band.
-    fn gradient_readings(
-        &self,
-        estimator: &GradientPeak,
-        model: &GradientModel,
-        snr: f64,
-    ) -> Result<Vec<(f64, f64)>, Error> {
-        let sampling = &estimator.search.sampling;
-        let velocity_m_s = sampling.velocity_m_s(0.5 * (sampling.band_hz.0 + sampling.band_hz.1));
-        let weights = self.lag_weights();
-        let mut readings = Vec::<(f64, f64)>::new();
-        for pair in estimator.gradient_per_s.windows(2) {
-            for part in 0..=READINGS {
-                let gradient_per_s = pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
-                let [envelope, _] = model.envelope(gradient_per_s);
-                let covariance = model.of_samples(&envelope, velocity_m_s, snr, S::KIND)?;
-                let found = estimator.velocity_and_gradient(&self.expected(&covariance, &weights), &mut Scratch::new());
-                // the ends of the list read themselves however far off the wind: only increasing readings can be inverted
-                if found.gradient_per_s.is_finite() && readings.last().is_none_or(|last| last.0 < found.gradient_per_s)
-                {
-                    readings.push((found.gradient_per_s, gradient_per_s));
-                }
-            }
-        }
-        Ok(readings)
-    }
 }
 
 impl GradientPeak {
-    /// What the peak of the expected statistic reads for true velocities all over the band.
-    fn readings(
-        &self,
-        model: &GradientModel,
-        gradient_per_s: f64,
-        snr: f64,
-        tapers: &Tapers,
-    ) -> Result<Vec<(f64, f64)>, Error> {
-        let sampling = &self.search.sampling;
-        let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
-        // the sidelobes of a taper pass the image twice as fast as the velocity changes: a quarter of one per step
-        let step_m_s = 0.0625 * sampling.wavelength_m * sampling.sample_rate_hz / model.window_samples as f64;
-        let steps = ((high_m_s - low_m_s) / step_m_s).ceil().max(1.0);
-        let weights = LagWeights::new(tapers, model.window_samples);
-        let [envelope, _] = model.envelope(gradient_per_s);
-        let mut scratch = Scratch::new();
-        let mut readings = Vec::<(f64, f64)>::with_capacity(steps as usize + 1);
-        for k in 0..=steps as usize {
-            let velocity_m_s = low_m_s + (high_m_s - low_m_s) * k as f64 / steps;
-            let lags = weights.expected_lags(&model.of_samples(&envelope, velocity_m_s, snr, SignalKind::Real)?);
-            self.search.zoom.density_into(&lags, &mut scratch.band)?;
-            let found = self.search.locate(&scratch.band, Refinement::Parabola, &[], || None);
-            let read_m_s = sampling.velocity_m_s(self.search.band.frequency_hz(found.bin));
-            // at the edges of the band the peak leaves it: only increasing readings can be inverted
-            if found.flag == Quality::Good && readings.last().is_none_or(|last| last.0 < read_m_s) {
-                readings.push((read_m_s, velocity_m_s));
-            }
-        }
-        Ok(readings)
-    }
-
     /// Velocity and gradient for the mean statistic `mean`.
     pub fn velocity_and_gradient(&self, mean: &[f64], scratch: &mut Scratch) -> GradientVelocity {
         let none = |flag| GradientVelocity { velocity: GateVelocity::none(flag), gradient_per_s: f64::NAN };

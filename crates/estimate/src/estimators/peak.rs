@@ -70,11 +70,7 @@ impl SpectralPeak {
         let mut bin = start;
         for _ in 0..60 {
             let [_, slope, curvature] = at(bin);
-            if slope > 0.0 {
-                low = bin
-            } else {
-                high = bin
-            }
+            (low, high) = if slope > 0.0 { (bin, high) } else { (low, bin) };
             let newton = bin - slope / (curvature * per_bin);
             let next = if curvature < 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
             let moved = (next - bin).abs();

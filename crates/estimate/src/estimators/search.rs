@@ -329,10 +329,7 @@ fn second_peak(density: &[f64], top: usize, reach: [f64; 2]) -> Option<(usize, f
         let (place, value) = highest(&density[k + 1..]);
         (k + 1 + place, value)
     });
-    match (below, above) {
-        (Some(a), Some(b)) => Some(if b.1 > a.1 { b } else { a }),
-        (one, other) => one.or(other),
-    }
+    below.into_iter().chain(above).reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
 /// Fractional bin of the peak next to bin `top`, by parabola; `density` begins one bin early.

@@ -15,19 +15,14 @@ const SWEEPS: usize = 60;
 pub(crate) fn jacobi<T: Scalar<Real = f64>>(mut a: Vec<T>, order: usize) -> Option<(Vec<f64>, Vec<T>)> {
     let mut v = vec![T::zero(); order * order];
     (0..order).for_each(|k| v[k * (order + 1)] = T::one());
-    let mut sweeps = 0;
-    loop {
-        let mut rotated = false;
+    let (mut sweeps, mut rotated) = (0..SWEEPS, true);
+    while rotated {
+        sweeps.next()?;
+        rotated = false;
         for q in 1..order {
             for p in 0..q {
                 rotated |= rotate(&mut a, &mut v, order, p, q)?;
             }
-        }
-        sweeps += 1;
-        match rotated {
-            false => break,
-            true if sweeps == SWEEPS => return None,
-            true => {}
         }
     }
     let diagonal: Vec<f64> = (0..order).map(|k| a[k * (order + 1)].re()).collect();

@@ -64,9 +64,7 @@ impl<S: Sample> Correlogram<S> {
     pub fn with_tapers(tapers: Vec<Taper>) -> Result<Self, Error> {
         let window_samples = tapers.first().map_or(0, |taper| taper.weights.len());
         not_empty("tapers", window_samples)?;
-        for taper in &tapers {
-            length("taper", window_samples, taper.weights.len())?;
-        }
+        tapers.iter().try_for_each(|taper| length("taper", window_samples, taper.weights.len()))?;
         Ok(Self { tapers, transform: WindowTransform::new(S::KIND, 2 * window_samples), sample: PhantomData })
     }
 
