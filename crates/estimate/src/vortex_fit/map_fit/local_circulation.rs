@@ -35,17 +35,17 @@ impl Setting<'_, '_> {
         let own = CIRCULATIONS[side] as usize;
         let groups = [vec![own], vec![Parameter::Wind as usize]];
         let start = pair.to_array().to_vec();
-        let settled = self.settled(start.clone(), &groups, stop, None).ok()?;
-        let (best, alone) = (&settled.linear, self.linear(&start, &groups, None).ok()?);
+        let best = self.settled(start.clone(), &groups, stop, None).ok()?;
+        let alone = self.linear(&start, &groups, None).ok()?;
         if best.shared_with(&alone).len() < 10 * groups.len() || best.tangent.at[own] <= 0.0 {
             return None;
         }
         let scores = Scores::OfNeighbours { lines: self.options.correlated_lines };
-        let uncertainty = self.about(best, settled.counted).uncertainty(&best.tangent.at, &groups, scores).ok()?;
+        let uncertainty = self.about(&best).uncertainty(&best.tangent.at, &groups, scores).ok()?;
         Some(Local {
             circulation_m2_s: best.tangent.at[own],
             variance: uncertainty.covariance(|_| true).ok()?[[own, own]],
-            gain: self.gain(best, &alone, settled.counted),
+            gain: self.gain(&best, &alone),
         })
     }
 }

@@ -230,8 +230,14 @@ impl<'a> Correlogram<'a> {
     /// White noise alone.
     fn white_alone(&self) -> Fitted {
         let white = self.product(&self.sums, &self.white) / self.product(&self.white, &self.white);
-        let left: Vec<f64> = self.sums.iter().zip(&self.white).map(|(sum, of)| sum - white * of).collect();
-        Fitted { white, correlated: 0.0, lengths: (0.0, 0.0), left: self.product(&left, &left) }
+        Fitted { white, correlated: 0.0, lengths: (0.0, 0.0), left: self.left(white, 0.0, &self.white) }
+    }
+
+    /// Sum of squares of what white noise and a correlated part of that shape leave of the correlogram.
+    fn left(&self, white: f64, correlated: f64, shape: &[f64]) -> f64 {
+        let left = self.sums.iter().zip(&self.white).zip(shape);
+        let left: Vec<f64> = left.map(|((sum, w), s)| sum - white * w - correlated * s).collect();
+        self.product(&left, &left)
     }
 
     /// The best strengths at given lengths.
@@ -245,9 +251,7 @@ impl<'a> Correlogram<'a> {
         if white < 0.0 {
             (white, correlated) = (0.0, b / bb);
         }
-        let left = self.sums.iter().zip(&self.white).zip(&shape);
-        let left: Vec<f64> = left.map(|((sum, w), s)| sum - white * w - correlated * s).collect();
-        let left = if correlated > 0.0 { self.product(&left, &left) } else { f64::INFINITY };
+        let left = if correlated > 0.0 { self.left(white, correlated, &shape) } else { f64::INFINITY };
         Fitted { white, correlated, lengths, left }
     }
 

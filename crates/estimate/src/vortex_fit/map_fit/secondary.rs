@@ -53,6 +53,7 @@ pub(crate) struct Found {
 
 /// Residuals of a pair, over their deviations, and what its free numbers can do about them.
 struct Residuals<'a> {
+    pair: &'a Wake,
     linear: &'a Linear,
     weights: Vec<f64>,
     /// Weighted.
@@ -86,7 +87,7 @@ impl Setting<'_, '_> {
         let (lines, mut groups) = (self.options.correlated_lines, self.options.free.groups());
         let two = pair.to_array().to_vec();
         let alone = self.linear(&two, &groups, None).ok()?;
-        let counted = self.about(&alone, 1.0).alike(&two, lines);
+        let counted = self.about(&alone).alike(&two, lines);
         let (secondary, gain, of_profile) = self.search(pair, &alone)?;
         if gain < LEAST_GAIN.max(counted) && !always {
             return None;
@@ -94,13 +95,11 @@ impl Setting<'_, '_> {
         let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m, KNOWN_CORE.0.ln()];
         let start: Vec<f64> = two.iter().copied().chain(secondary.iter().flat_map(numbers)).collect();
         groups.extend((PARAMETERS..PARAMETERS + NUMBERS).map(|place| vec![place]));
-        let settled = self.settled(start, &groups, NEAR, Some(counted)).ok()?;
-        let p = &settled.linear.tangent.at;
+        let mut settled = self.settled(start, &groups, NEAR, Some(counted)).ok()?;
         // what two vortices miss looks like noise that neighbours share: what four leave tells how many velocities count as one
-        let four = self.about(&settled.linear, counted);
-        let counted = four.alike(p, lines).min(counted);
-        let four = self.about(&settled.linear, counted);
-        let gain = self.gain(&settled.linear, &alone, counted) - of_profile / counted;
+        settled.counted = self.about(&settled).alike(&settled.tangent.at, lines).min(counted);
+        let p = &settled.tangent.at;
+        let gain = self.gain(&settled, &alone) - of_profile / settled.counted;
         // one far from its vortex stands for something else; a little beyond the scan it may be
         let stands = |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
         let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
@@ -109,7 +108,8 @@ impl Setting<'_, '_> {
             return None;
         }
         let (model, wake) = self.model.with(p);
-        let uncertainty = four.uncertainty(p, &settled.linear.groups, Scores::OfNeighbours { lines }).ok()?;
+        let scores = Scores::OfNeighbours { lines };
+        let uncertainty = self.about(&settled).uncertainty(p, &settled.groups, scores).ok()?;
         let secondary = SecondaryVortices { vortices: model.secondary?, shown, fitted };
         Some(Found { wake, secondary, covariance: uncertainty.covariance(|_| true).ok()? })
     }
@@ -118,7 +118,7 @@ impl Setting<'_, '_> {
     /// may move along its slopes, how much of the logarithm of the likelihood, and how much these slopes explain.
     fn search(&self, pair: &Wake, alone: &Linear) -> Option<([Vortex; 2], f64, f64)> {
         let groups = self.options.free.groups();
-        let rows = self.about(alone, 1.0).rows(&alone.tangent.at, &groups);
+        let rows = self.about(alone).rows(&alone.tangent.at, &groups);
         let mut slopes = rows.slopes;
         // a profile that does not fit is not mended by vortices
         let other = self.prediction.of_other_profile(pair) - &alone.tangent.here.velocity_m_s;
@@ -130,17 +130,17 @@ impl Setting<'_, '_> {
         let gradient: Array1<f64> = slopes.iter().map(|slope| crate::linalg::dot(slope, &residuals)).collect();
         let step = inverse.dot(&gradient);
         let explained = 0.5 * gradient.dot(&step);
-        let free = Residuals { linear: alone, weights, residuals, slopes, inverse, step };
-        let ((left, a), (right, b)) = (self.beside(pair, 0, &free)?, self.beside(pair, 1, &free)?);
+        let free = Residuals { pair, linear: alone, weights, residuals, slopes, inverse, step };
+        let ((left, a), (right, b)) = (self.beside(0, &free)?, self.beside(1, &free)?);
         Some(([left, right], a + b, explained))
     }
 
     /// Every second place of a grid first, then those about the best of them.
-    fn beside(&self, pair: &Wake, side: usize, free: &Residuals<'_>) -> Option<(Vortex, f64)> {
+    fn beside(&self, side: usize, free: &Residuals<'_>) -> Option<(Vortex, f64)> {
         let count = (DISTANCES.1 / GRID_OVER_HEIGHT).ceil() as i64;
         let best = |rows: Range<i64>, columns: Range<i64>, step: usize| {
             let places = rows.step_by(step).flat_map(|i| columns.clone().step_by(step).map(move |j| (i, j)));
-            let gains = places.filter_map(|at| Some((at, self.at_place((pair, side), at, free)?)));
+            let gains = places.filter_map(|at| Some((at, self.at_place(side, at, free)?)));
             gains.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
         };
         let ((i, j), _) = best(-count..count + 1, -count..count + 1, 2)?;
@@ -148,13 +148,8 @@ impl Setting<'_, '_> {
     }
 
     /// The best vortex at a place of the grid about one of the pair, and what it gains; nothing where there can be none.
-    fn at_place(
-        &self,
-        (pair, side): (&Wake, usize),
-        (i, j): (i64, i64),
-        free: &Residuals<'_>,
-    ) -> Option<(Vortex, f64)> {
-        let own = [pair.left, pair.right][side];
+    fn at_place(&self, side: usize, (i, j): (i64, i64), free: &Residuals<'_>) -> Option<(Vortex, f64)> {
+        let own = [free.pair.left, free.pair.right][side];
         let step_m = GRID_OVER_HEIGHT * own.height_m;
         let place_m = (own.lateral_position_m + i as f64 * step_m, own.height_m + j as f64 * step_m);
         let vortex = Vortex::at(place_m, 1.0, KNOWN_CORE.0 * own.height_m);

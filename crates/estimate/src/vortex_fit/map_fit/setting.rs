@@ -43,11 +43,6 @@ pub(crate) struct Linear {
     pub(crate) cells: Vec<Cell>,
     /// Of the residuals over the stated deviations in uniform wind.
     scale: f64,
-}
-
-/// The end of steps of Gauss and Newton.
-pub(crate) struct Settled {
-    pub(crate) linear: Linear,
     /// Velocities that count as one.
     pub(crate) counted: f64,
 }
@@ -77,17 +72,17 @@ impl Setting<'_, '_> {
     }
 
     /// Least squares about the parameters at which the model was made linear.
-    pub(crate) fn about<'s>(&'s self, linear: &'s Linear, counted: f64) -> LeastSquares<'s> {
-        LeastSquares { counted, ..self.squares(&linear.tangent, linear.cells.clone()) }
+    pub(crate) fn about<'s>(&'s self, linear: &'s Linear) -> LeastSquares<'s> {
+        LeastSquares { counted: linear.counted, ..self.squares(&linear.tangent, linear.cells.clone()) }
     }
 
-    /// What a model with these free numbers gains over another one in the logarithm of the likelihood, so many velocities counted once. Deviations
+    /// What a model gains over another one in the logarithm of the likelihood, with as many velocities counted once for both as for it. Deviations
     /// are the same for both, those that it leaves: a scale that each fit takes from its own residuals changes by chance, and with it the likelihood
     /// of all.
-    pub(crate) fn gain(&self, better: &Linear, than: &Linear, counted: f64) -> f64 {
-        let cells = better.shared_with(than);
+    pub(crate) fn gain(&self, better: &Linear, than: &Linear) -> f64 {
+        let (cells, counted) = (better.shared_with(than), better.counted);
         let of = |linear: &Linear| {
-            let squares = LeastSquares { cells: cells.clone(), ..self.about(linear, counted) };
+            let squares = LeastSquares { cells: cells.clone(), counted, ..self.about(linear) };
             squares.log_likelihood(&linear.tangent.at, &linear.groups)
         };
         (of(better) - of(than)) / counted
@@ -125,9 +120,8 @@ impl Setting<'_, '_> {
     pub(crate) fn refined(&self, start: &Wake, stop: Stop) -> Result<MapFit, Error> {
         let groups = self.groups(start)?;
         let start = self.options.free.start(start).to_array().to_vec();
-        let settled = self.settled(start, &groups, stop, None)?;
-        let (squares, linear) = (self.about(&settled.linear, settled.counted), &settled.linear);
-        self.outcome(&squares, &linear.tangent.at, &linear.groups, linear.scale)
+        let linear = self.settled(start, &groups, stop, None)?;
+        self.outcome(&self.about(&linear), &linear.tangent.at, &linear.groups, linear.scale)
     }
 
     /// Steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
@@ -137,7 +131,7 @@ impl Setting<'_, '_> {
         all: &[Vec<usize>],
         stop: Stop,
         counted: Option<f64>,
-    ) -> Result<Settled, Error> {
+    ) -> Result<Linear, Error> {
         let (mut groups, mut released) = (all.to_vec(), false);
         let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
         let mut known: Option<Tangent> = None;
@@ -147,11 +141,12 @@ impl Setting<'_, '_> {
             let serves = |known: &Tangent| near(&known.slopes_at, &p) && known.here.slopes.len() == groups.len();
             let kept = known.take().filter(serves);
             let is_kept = kept.is_some();
-            let linear = self.linear(&p, &groups, kept)?;
+            let mut linear = self.linear(&p, &groups, kept)?;
             if !is_kept && counted.is_none() {
-                alike = self.about(&linear, 1.0).alike(&p, self.options.correlated_lines);
+                alike = self.about(&linear).alike(&p, self.options.correlated_lines);
             }
-            let squares = self.about(&linear, alike);
+            linear.counted = alike;
+            let squares = self.about(&linear);
             let no_way = |sigmas_left| Error::NotConverged { iterations: steps, sigmas_left };
             let next = squares.reweighted(&p, &groups, DESCENT)?;
             let curvature = squares.normal(&p, &groups).ok_or(no_way(sigmas_left))?.curvature;
@@ -166,7 +161,7 @@ impl Setting<'_, '_> {
                     (groups, released, most) = (all.to_vec(), true, steps + stop.iterations);
                     continue;
                 }
-                return Ok(Settled { linear, counted: alike });
+                return Ok(linear);
             }
             let there = halved(share.min(linear.tangent.reach(&next)), |part| {
                 let trial: Vec<f64> = p.iter().zip(&way).map(|(p, way)| p + part * way).collect();
@@ -201,7 +196,7 @@ impl Setting<'_, '_> {
         let scale = scale.max(1e-6);
         cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
         let tangent = Tangent { at: p.to_vec(), here, slopes_at };
-        Ok(Linear { tangent, groups: groups.to_vec(), cells, scale })
+        Ok(Linear { tangent, groups: groups.to_vec(), cells, scale, counted: 1.0 })
     }
 
     fn outcome(
