@@ -1,6 +1,8 @@
 //! Tops of the likelihood that fits come to from different starts.
 
-use crate::vortex_fit::Wake;
+use ndarray::Array2;
+
+use crate::vortex_fit::{PARAMETERS, Wake};
 
 /// Tops closer than this many standard deviations are one.
 pub(crate) const SAME_SIGMAS: f64 = 0.3;
@@ -14,6 +16,19 @@ pub(crate) fn distinct<T>(all: impl IntoIterator<Item = T>, same: impl Fn(&T, &T
         }
     }
     kept
+}
+
+/// Covariance \[10, 10\] about a wake of tops with their weights: what is known within each of them, and the distances between them.
+pub(crate) fn mixed<'t>(tops: impl Iterator<Item = (f64, &'t Wake, &'t Array2<f64>)>, about: &Wake) -> Array2<f64> {
+    let (mut mixed, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), 0.0);
+    for (weight, wake, within) in tops {
+        let (a, b) = (wake.to_array(), about.to_array());
+        for ((i, j), c) in mixed.indexed_iter_mut() {
+            *c += weight * (within[[i, j]] + (a[i] - b[i]) * (a[j] - b[j]));
+        }
+        weights += weight;
+    }
+    mixed / weights
 }
 
 /// A top of the likelihood: an end of a fit.

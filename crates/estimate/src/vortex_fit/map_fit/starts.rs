@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use crate::vortex_fit::map_fit::prediction::LONE_M;
-use crate::vortex_fit::top::{SAME_SIGMAS, distinct};
+use crate::vortex_fit::top::{SAME_SIGMAS, distinct, mixed};
 use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Sharing, Vortex, Wake};
 
 /// Core radius of a wake over its spacing (the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the spacing).
@@ -89,11 +89,10 @@ fn chi2(end: &MapFit) -> f64 {
     end.tops.first().map_or(f64::INFINITY, |top| top.chi2)
 }
 
-/// Distance of two ends by parameter, and whether they are closer than so many errors of the first.
-fn apart(a: &MapFit, b: &MapFit, sigmas: f64) -> (Vec<f64>, bool) {
-    let apart: Vec<f64> = b.wake.to_array().iter().zip(a.wake.to_array()).map(|(b, a)| b - a).collect();
-    let same = apart.iter().enumerate().all(|(i, d)| d.powi(2) <= sigmas.powi(2) * a.covariance[[i, i]]);
-    (apart, same)
+/// Whether two ends are closer than so many errors of the first.
+fn same(a: &MapFit, b: &MapFit, sigmas: f64) -> bool {
+    let apart = b.wake.to_array().into_iter().zip(a.wake.to_array()).map(|(b, a)| b - a);
+    apart.enumerate().all(|(i, d)| d.powi(2) <= sigmas.powi(2) * a.covariance[[i, i]])
 }
 
 /// The wakes of those ends of rough fits that lead to different ends, the best first, but for those that are hopeless.
@@ -101,29 +100,18 @@ pub(crate) fn rivals(mut ends: Vec<MapFit>) -> Vec<Wake> {
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
     let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS;
     ends.retain(|end| chi2(end) <= hopeless);
-    distinct(ends, |better, end| apart(better, end, ONE_SIGMAS).1).into_iter().map(|end| end.wake).collect()
+    distinct(ends, |better, end| same(better, end, ONE_SIGMAS)).into_iter().map(|end| end.wake).collect()
 }
 
 /// The best of some ends with the others as its competing tops.
 fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
-    let mut ends = ends.into_iter();
-    let mut best = ends.next()?;
-    let (alone, least, mut weights) = (best.clone(), chi2(&best), 1.0);
-    for end in ends {
-        let (apart, same) = apart(&alone, &end, SAME_SIGMAS);
-        if same {
-            continue;
-        }
-        let weight = (0.5 * (least - chi2(&end))).exp();
-        weights += weight;
-        for ((i, j), c) in best.covariance.indexed_iter_mut() {
-            *c += weight * (end.covariance[[i, j]] + apart[i] * apart[j]);
-        }
-        best.tops.extend(end.tops);
-    }
-    best.covariance /= weights;
-    Some(best)
+    let (best, others) = ends.split_first()?;
+    let others = others.iter().filter(|end| !same(best, end, SAME_SIGMAS));
+    let all: Vec<&MapFit> = std::iter::once(best).chain(others).collect();
+    let weighted = all.iter().map(|end| ((0.5 * (chi2(best) - chi2(end))).exp(), &end.wake, &end.covariance));
+    let (covariance, tops) = (mixed(weighted, &best.wake), all.iter().flat_map(|end| end.tops.clone()).collect());
+    Some(MapFit { covariance, tops, ..best.clone() })
 }
 
 #[cfg(test)]

@@ -11,10 +11,10 @@ use crate::error::Error;
 use crate::vortex_fit::damped_newton::inverse;
 use crate::vortex_fit::signal_fit::ascent::{Ascent, State};
 use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_lines};
+use crate::vortex_fit::top::mixed;
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{
-    FreeParameters, PARAMETERS, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing, SignalFitOptions,
-    Starts, Top, Wake,
+    FreeParameters, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing, SignalFitOptions, Starts, Top, Wake,
 };
 use crate::window::Sample;
 
@@ -181,40 +181,29 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         let (options, signals) = (self.options, self.signals);
         settled.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
         let failed = Error::NotConverged { iterations: ROUNDS, sigmas_left: f64::NAN };
-        let mut tops: Vec<(&Settled, Array2<f64>)> = Vec::new();
+        let mut tops: Vec<(&Settled, Array2<f64>, Array2<f64>)> = Vec::new();
         for next in &settled {
             let ascent = Ascent { model: &next.model, signals, options, others: None };
-            if tops.iter().any(|(top, information)| ascent.same(information, &top.state, &next.state)) {
+            if tops.iter().any(|(top, information, _)| ascent.same(information, &top.state, &next.state)) {
                 continue;
             }
             let stride = if tops.is_empty() { 1 } else { options.information_stride };
             let share = signals.used_rays() as f64 / next.model.rays as f64;
-            tops.push((next, ascent.information(&next.state, stride)? * share));
+            let information = ascent.information(&next.state, stride)? * share;
+            let within = spread(&options.free.groups(), &inverse("information on the wake", &information)?);
+            tops.push((next, information, within));
         }
-        let (best, information) = tops.first().ok_or(failed.clone())?;
-        let within = |information: &Array2<f64>| {
-            inverse("information on the wake", information).map(|inverse| spread(&options.free.groups(), &inverse))
-        };
-        let bound = within(information)?;
+        let (best, _, bound) = tops.first().ok_or(failed.clone())?;
         let (wake, powers) = best.state;
         let without = best.model.log_likelihood(signals, &wake.wind_alone(), powers).ok_or(failed)?;
-        let (mut covariance, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), 0.0);
-        for (top, information) in &tops {
-            let within = within(information)?;
-            let weight = (top.log_likelihood - best.log_likelihood).exp();
-            weights += weight;
-            let (a, b) = (top.state.0.to_array(), wake.to_array());
-            for ((i, j), c) in covariance.indexed_iter_mut() {
-                *c += weight * (within[[i, j]] + (a[i] - b[i]) * (a[j] - b[j]));
-            }
-        }
-        covariance /= weights;
-        let top = |(top, _): &(&Settled, _)| Top { wake: top.state.0, chi2: -2.0 * top.log_likelihood };
+        let weight = |top: &Settled| (top.log_likelihood - best.log_likelihood).exp();
+        let weighted = tops.iter().map(|(top, _, within)| (weight(top), &top.state.0, within));
+        let top = |(top, ..): &(&Settled, _, _)| Top { wake: top.state.0, chi2: -2.0 * top.log_likelihood };
         Ok(SignalFit {
             wake,
             powers,
-            covariance,
-            bound,
+            covariance: mixed(weighted, &wake),
+            bound: bound.clone(),
             tops: tops.iter().map(top).collect(),
             log_likelihood: best.log_likelihood,
             log_likelihood_gain: best.log_likelihood - without.log_likelihood,
