@@ -212,12 +212,10 @@ impl Table {
 /// Shortest text that reads back to the same value; empty for NaN, and one zero for both signs, which no reader
 /// should have to tell apart.
 pub(crate) fn float_text(value: f64) -> String {
-    if value.is_nan() {
-        String::new()
-    } else if value == 0.0 {
-        "0.0".into()
-    } else {
-        format!("{value:?}")
+    match value {
+        v if v.is_nan() => String::new(),
+        0.0 => "0.0".into(),
+        v => format!("{v:?}"),
     }
 }
 

@@ -31,7 +31,7 @@ impl UtcTime {
     pub fn parse(text: &str) -> Option<Self> {
         let time = Self(text.parse().ok()?);
         // The library knows other forms, too.
-        (time.to_string() == text && (1900..2200).contains(&time.civil().year())).then_some(time)
+        (time.to_string() == text && (1900..2200).contains(&time.date().year())).then_some(time)
     }
 
     /// Seconds from an earlier date to this one.
@@ -47,16 +47,12 @@ impl UtcTime {
 
     /// Year, month and day.
     pub fn date(self) -> jiff::civil::Date {
-        self.civil().date()
+        Offset::UTC.to_datetime(self.0).date()
     }
 
     /// Seconds since midnight.
     pub fn second_of_day(self) -> i64 {
         self.0.as_second().rem_euclid(DAY_S as i64)
-    }
-
-    fn civil(self) -> jiff::civil::DateTime {
-        Offset::UTC.to_datetime(self.0)
     }
 }
 

@@ -265,19 +265,18 @@ impl Walk<'_> {
         for key in keys.iter().filter(|key| key.is_required && !table.contains_key(key.name)) {
             match default(key.name) {
                 Some(default) => out.extend([(key.name.to_owned(), default.clone())]),
-                None => self.missing(&join(path, key.name), key, line),
+                None => {
+                    let path = join(path, key.name);
+                    // Of a table with a tag, the tag is what must be said.
+                    let (path, allowed) = match &key.kind {
+                        Kind::Tagged { tag, kinds } => (join(&path, tag), one_of(&names(kinds), "")),
+                        kind => (path.clone(), self.wanted(&path, kind, "")),
+                    };
+                    self.refuse(path, Problem::ABSENT.into(), allowed, line);
+                }
             }
         }
         out
-    }
-
-    fn missing(&mut self, path: &str, key: &Key, line: usize) {
-        // Of a table with a tag, the tag is what must be said.
-        let (path, allowed) = match &key.kind {
-            Kind::Tagged { tag, kinds } => (join(path, tag), one_of(&names(kinds), "")),
-            kind => (path.to_owned(), self.wanted(path, kind, "")),
-        };
-        self.refuse(path, Problem::ABSENT.into(), allowed, line);
     }
 
     fn value(&mut self, kind: &Kind, value: &Spanned<DeValue<'_>>, at: Place<'_>) -> Option<Value> {

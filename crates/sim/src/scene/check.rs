@@ -252,14 +252,13 @@ impl Scene {
         let window_m = (window as f64 - 1.0) * spacing_m;
         let why = format!("so that the record, {samples} samples, holds estimator.window_samples, {window}");
         // Rounded to the side that is accepted.
-        let up = |x: f64| (x * 1e3).ceil() / 1e3;
-        let down = |x: f64| (x * 1e3).floor() / 1e3;
+        let (up_m, down_m) = (((first_m + window_m) * 1e3).ceil() / 1e3, ((last_m - window_m) * 1e3).floor() / 1e3);
         let all = format!("at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m");
         let faster_hz = sampling_hz * (window_m / (last_m - first_m)) * (1.0 + 1e-6);
         let sides = [
             ("estimator.window_samples", window.to_string(), all),
-            side("scan.range_max_m", last_m, format!("at least {} m, {why}", up(first_m + window_m))),
-            side("scan.range_min_m", first_m, format!("at most {} m, {why}", down(last_m - window_m))),
+            side("scan.range_max_m", last_m, format!("at least {up_m} m, {why}")),
+            side("scan.range_min_m", first_m, format!("at most {down_m} m, {why}")),
             side("detector.sampling_hz", sampling_hz, format!("at least {faster_hz:.6e} Hz, {why}")),
         ];
         c.between(window <= samples, &sides);

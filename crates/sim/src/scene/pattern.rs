@@ -231,18 +231,12 @@ impl Scene {
             }
         }
         let moves = s.head.motion == HeadMotion::Continuous;
-        let rows = (s.elevation_max_rad - s.elevation_min_rad) / s.elevation_step_rad + 1.0;
+        let (up_rad, across_rad) = (s.elevation_max_rad - s.elevation_min_rad, azimuths.map_or(0.0, |(a, b, _)| b - a));
+        let across = "scan.pattern.azimuth_step_rad";
         let (turn_rad, step_rad, rows, key) = match &s.pattern {
-            Pattern::Rhi {} => {
-                (s.elevation_max_rad - s.elevation_min_rad, s.elevation_step_rad, 1.0, "scan.elevation_step_rad")
-            }
-            Pattern::Ppi(p) => {
-                let rows = p.elevations_rad.len() as f64;
-                (p.azimuth_max_rad - p.azimuth_min_rad, p.azimuth_step_rad, rows, "scan.pattern.azimuth_step_rad")
-            }
-            Pattern::Axial(p) => {
-                (p.azimuth_max_rad - p.azimuth_min_rad, p.azimuth_step_rad, rows, "scan.pattern.azimuth_step_rad")
-            }
+            Pattern::Rhi {} => (up_rad, s.elevation_step_rad, 1.0, "scan.elevation_step_rad"),
+            Pattern::Ppi(p) => (across_rad, p.azimuth_step_rad, p.elevations_rad.len() as f64, across),
+            Pattern::Axial(p) => (across_rad, p.azimuth_step_rad, up_rad / s.elevation_step_rad + 1.0, across),
             Pattern::Vad(p) => (p.beams as f64 - 1.0, 1.0, 1.0, "scan.pattern.beams"),
             Pattern::Stare(p) => (p.lines as f64 - 1.0, 1.0, 1.0, "scan.pattern.lines"),
             Pattern::Dbs(_) => (4.0, 1.0, 1.0, "scan.head.sweeps"),

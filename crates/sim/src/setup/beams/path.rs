@@ -2,7 +2,7 @@
 //!
 //! Check: counts, ends and orders of the lines of each kind.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
 crate::keys::choice! {
     /// A kind of sweep, by the word of CfRadial 1.4 for it.
@@ -95,15 +95,12 @@ pub fn rhi(azimuth_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, moving:
 
 /// Round at one elevation; a full turn has no line twice.
 pub fn ppi(elevation_rad: f64, low_rad: f64, high_rad: f64, step_rad: f64, moving: bool) -> Vec<Stop> {
-    let full = is_full_turn(high_rad - low_rad);
+    // One turn, or several.
+    let turns = (high_rad - low_rad) / TAU;
+    let full = turns > 0.5 && (turns - turns.round()).abs() < 1e-9;
     let last_rad = if full && !moving { high_rad - 1e-3 * step_rad } else { high_rad };
     let mode = if full { SweepMode::AzimuthSurveillance } else { SweepMode::Sector };
     sweep(mode, [low_rad, last_rad], step_rad, moving, |azimuth_rad| [azimuth_rad, elevation_rad])
-}
-
-/// Whether an angle is a full turn, or several.
-pub fn is_full_turn(angle_rad: f64) -> bool {
-    angle_rad > PI && (angle_rad / TAU - (angle_rad / TAU).round()).abs() < 1e-9
 }
 
 /// One turn of evenly spaced beams on a cone.
