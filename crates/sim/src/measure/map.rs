@@ -95,7 +95,7 @@ impl<'p, S: Sample> Mapper<'p, S> {
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
         let points = polar_points(places.line_elevation_rad(), &g.gate_range_m);
-        let radius_m = g.gate_range_m.iter().map(|range_m| estimator.radius_m(*range_m));
+        let radius_m = g.gate_range_m.iter().map(|range_m| estimator.radius.at_m(*range_m));
         let map = VelocityEstimates {
             elevation_rad: g.elevation_rad.clone(),
             range_m: g.gate_range_m.clone(),

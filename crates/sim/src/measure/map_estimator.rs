@@ -28,7 +28,7 @@ pub(crate) struct MapEstimator<'p, S> {
     pub(crate) tools: Toolkit<S>,
     covariance: WindowCovariance,
     of_rays: RayInformation<'p>,
-    radius: Radius,
+    pub(crate) radius: Radius,
 }
 
 /// Sums over the windows of a scan.
@@ -62,11 +62,6 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         let known = WindowStatistics { snr: median_snr(layer_snr), n_eff };
         let tools = Toolkit::new(scene, &plan.instrument, &known)?;
         Ok(Self { plan, tools, covariance, of_rays, radius })
-    }
-
-    /// Radius of the region at a range, m.
-    pub(crate) fn radius_m(&self, range_m: f64) -> Result<f64, Error> {
-        Ok(self.radius.at_m(range_m)?)
     }
 
     /// Sums over the windows of some lines, still without any record; over those of some gates if these are given.

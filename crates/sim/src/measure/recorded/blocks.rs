@@ -80,7 +80,7 @@ impl<S: FromParts> Blocks<'_, S> {
         let none = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
         let [power_a2, gain, detection_ratio, deviation] = [f64::NAN; 4];
         let empty = GateEstimate { found: none, power_a2, gain, detection_ratio, deviation };
-        let radius_m = range_m.iter().map(|range_m| self.estimator.radius_m(*range_m)).collect::<Result<_, _>>()?;
+        let radius_m = range_m.iter().map(|range_m| self.estimator.radius.at_m(*range_m)).collect::<Result<_, _>>()?;
         let mut cells = ScanCells {
             lines: lines.clone(),
             gates: Array2::from_elem(shape, empty),

@@ -62,7 +62,7 @@ impl Spectra {
         let (scan, of_gate, mut density) = (sums.finish(), GateSpectra::new(plan, S::KIND)?, Vec::new());
         for &elevation_rad in &g.elevation_rad {
             for &range_m in &g.gate_range_m {
-                let (point, radius_m) = (PolarPoint { range_m, elevation_rad }, estimator.radius_m(range_m)?);
+                let (point, radius_m) = (PolarPoint { range_m, elevation_rad }, estimator.radius.at_m(range_m)?);
                 density.extend(of_gate.density(&scan, point, radius_m, estimator.tools.noise.density_a2)?);
             }
         }

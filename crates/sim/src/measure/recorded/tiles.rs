@@ -48,7 +48,7 @@ fn reaches<S: Sample>(
     range_m: &[f64],
 ) -> Result<Vec<Reach>, Error> {
     let own = range_m.iter().enumerate().map(|(gate, range_m)| {
-        let radius_m = estimator.radius_m(*range_m)?;
+        let radius_m = estimator.radius.at_m(*range_m)?;
         let windows = places.gates_between(range_m - radius_m, range_m + radius_m);
         let windows_rad = if radius_m < *range_m { (radius_m / range_m).asin() } else { std::f64::consts::PI };
         Ok(Reach { guessed_rad: 0.0, guessed: gate..gate + 1, windows_rad, windows })
@@ -59,7 +59,7 @@ fn reaches<S: Sample>(
     }
     let followed = reach.iter().zip(range_m).map(|(own, at_m)| {
         // The gates between which the wind is interpolated.
-        let radius_m = estimator.radius_m(*at_m)?;
+        let radius_m = estimator.radius.at_m(*at_m)?;
         let start = range_m.partition_point(|range_m| *range_m <= at_m - radius_m).saturating_sub(1);
         let end = range_m.partition_point(|range_m| *range_m < at_m + radius_m) + 1;
         let guessed = start..end.min(range_m.len());
