@@ -14,16 +14,38 @@ use super::signals::RawSignals;
 pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> OutputResult<Vec<u8>> {
     signals.check()?;
     let (rays, samples) = signals.current_a.dim();
-    let mut values = of_rays(signals, rays);
-    values.extend(recording(signals));
+    // Which line, pulse and realisation each record belongs to.
+    let scan = signals.elevation_rad.len().max(1);
+    let line_of = |ray: usize| signals.first_pulse.partition_point(|first| *first <= ray % scan).saturating_sub(1);
+    let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
+    let number =
+        |of: &dyn Fn(usize) -> usize| Data::i32((0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)));
+    let value = |of: &[f64]| Data::f64((0..rays).map(|ray| of[ray % scan]));
     let elevation = signals.first_pulse.iter().filter_map(|first| signals.elevation_rad.get(*first));
-    values.extend([
+    let r = &signals.recording;
+    let mut values = vec![
         ("time", Data::f64(signals.time_s.iter().copied())),
+        ("ray", number(&|ray| ray)),
+        ("ray_line", number(&line_of)),
+        ("ray_pulse", number(&|ray| ray % scan - before(ray))),
+        ("realization", number(&|ray| ray / scan)),
+        ("elevation", value(&signals.elevation_rad)),
+        ("pulse_time", value(&signals.pulse_time_s)),
         ("current_a", Data::f64(signals.current_a.iter().copied())),
+        ("sampling_frequency", Data::f64([r.sampling_hz])),
+        ("intermediate_frequency", Data::f64([r.intermediate_frequency_hz])),
+        ("bandwidth", Data::f64([r.bandwidth_hz])),
+        ("wavelength", Data::f64([r.wavelength_m])),
+        ("pulse_repetition_frequency", Data::f64([r.pulse_repetition_hz])),
+        ("pulse_sigma", Data::f64([r.pulse_sigma_s])),
+        ("noise_power", Data::f64([r.noise_power_a2])),
         ("range", Data::f64(signals.range_m.iter().copied())),
         ("line_elevation", Data::f64(elevation.copied())),
         ("radial_velocity", Data::filled(signals.radial_velocity_m_s)),
-    ]);
+    ];
+    if !signals.azimuth_rad.is_empty() {
+        values.push(("azimuth", value(&signals.azimuth_rad)));
+    }
     values.extend(signals.quadrature_a.map(|second| ("quadrature_a", Data::f64(second.iter().copied()))));
     let (lines, ranges) = signals.radial_velocity_m_s.dim();
     let dims = vec![("ray", rays), ("time", samples), ("line", lines), ("range", ranges)];
@@ -35,42 +57,6 @@ pub fn cf_signals_bytes(signals: &RawSignals<'_>, provenance: &Provenance) -> Ou
 /// ranges.
 pub(crate) fn data_bytes([pulses, samples, quadratures]: [f64; 3], [lines, ranges]: [f64; 2]) -> f64 {
     8.0 * pulses * samples * quadratures + 28.0 * pulses + 4.0 * lines * ranges
-}
-
-/// Which line, pulse and realisation each record belongs to.
-fn of_rays(signals: &RawSignals<'_>, rays: usize) -> Vec<(&'static str, Data)> {
-    let scan = signals.elevation_rad.len().max(1);
-    let line_of = |ray: usize| signals.first_pulse.partition_point(|first| *first <= ray % scan).saturating_sub(1);
-    let before = |ray: usize| signals.first_pulse.get(line_of(ray)).copied().unwrap_or(0);
-    let number =
-        |of: &dyn Fn(usize) -> usize| Data::i32((0..rays).map(|ray| i32::try_from(of(ray)).unwrap_or(i32::MAX)));
-    let value = |of: &[f64]| Data::f64((0..rays).map(|ray| of[ray % scan]));
-    let mut out = vec![
-        ("ray", number(&|ray| ray)),
-        ("ray_line", number(&line_of)),
-        ("ray_pulse", number(&|ray| ray % scan - before(ray))),
-        ("realization", number(&|ray| ray / scan)),
-        ("elevation", value(&signals.elevation_rad)),
-        ("pulse_time", value(&signals.pulse_time_s)),
-    ];
-    if !signals.azimuth_rad.is_empty() {
-        out.push(("azimuth", value(&signals.azimuth_rad)));
-    }
-    out
-}
-
-fn recording(signals: &RawSignals<'_>) -> [(&'static str, Data); 7] {
-    let r = &signals.recording;
-    let scalars = [
-        ("sampling_frequency", r.sampling_hz),
-        ("intermediate_frequency", r.intermediate_frequency_hz),
-        ("bandwidth", r.bandwidth_hz),
-        ("wavelength", r.wavelength_m),
-        ("pulse_repetition_frequency", r.pulse_repetition_hz),
-        ("pulse_sigma", r.pulse_sigma_s),
-        ("noise_power", r.noise_power_a2),
-    ];
-    scalars.map(|(name, value)| (name, Data::f64([value])))
 }
 
 #[cfg(test)]

@@ -156,14 +156,11 @@ impl Layout {
         }
         // The places of the data do not change the length of the head.
         let mut length = self.head(&sizes, &vec![0; sizes.len()]).len() as u64;
-        let begins: Vec<u64> = sizes
-            .iter()
-            .map(|size| {
-                let begin = length;
-                length += size.next_multiple_of(4);
-                begin
-            })
-            .collect();
+        let mut begins = Vec::with_capacity(sizes.len());
+        for size in &sizes {
+            begins.push(length);
+            length += size.next_multiple_of(4);
+        }
         let mut parts = Vec::new();
         if is_first {
             parts.push((0, self.head(&sizes, &begins)));

@@ -17,10 +17,8 @@ pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
         return Err(Error::new(ErrorKind::IsADirectory, "it is a folder, a file is needed"));
     }
     if !about.is_file() {
-        return Err(Error::new(
-            ErrorKind::InvalidInput,
-            "it is no regular file but a device or a pipe: write its content to a file first",
-        ));
+        let reason = "it is no regular file but a device or a pipe: write its content to a file first";
+        return Err(Error::new(ErrorKind::InvalidInput, reason));
     }
     Ok((File::open(path)?, about.len()))
 }

@@ -147,16 +147,11 @@ impl Scene {
         let d = &self.detector;
         let (centre_hz, half_hz, nyquist_hz) = (d.intermediate_frequency_hz, 0.5 * d.bandwidth_hz, 0.5 * d.sampling_hz);
         let is_baseband = d.signal == DetectorSignal::Baseband;
-        let (sampled_hz, highest_hz, why) = match is_baseband {
-            true => (
-                0.0,
-                f64::INFINITY,
-                "two quadratures of the sampling frequency hold the band about the intermediate one",
-            ),
-            false => {
-                (centre_hz, nyquist_hz - half_hz, "the detector band lies between 0 and half of detector.sampling_hz")
-            }
-        };
+        // Two quadratures hold the band about 0, whose upper end then bounds no frequency.
+        let (sampled_hz, highest_hz) =
+            if is_baseband { (0.0, f64::INFINITY) } else { (centre_hz, nyquist_hz - half_hz) };
+        let why =
+            "the detector band lies above 0 and in half of detector.sampling_hz, that of two quadratures in all of it";
         let narrowest_hz = centre_hz.min(nyquist_hz - sampled_hz);
         let mut sides = Vec::new();
         // Only a key that can mend it, or has to.

@@ -33,15 +33,12 @@ pub struct Spectra {
 impl Spectra {
     /// Of the lines and the densities of each scan.
     pub(super) fn of(plan: &Plan, scans: &[(&ScanLines, &[f32])]) -> Result<Self, Error> {
-        let velocity_m_s = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.scene))?.velocity_m_s;
+        let of_gate = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.scene))?;
         let lines = || scans.iter().map(|(lines, _)| lines);
-        Ok(Self {
-            velocity_m_s,
-            range_m: plan.geometry.gate_range_m.clone(),
-            elevation_rad: lines().flat_map(|lines| lines.elevation_rad.iter().copied()).collect(),
-            time_s: lines().flat_map(|lines| lines.time_s.iter().copied()).collect(),
-            density: scans.iter().flat_map(|(_, density)| density.iter().copied()).collect(),
-        })
+        let elevation_rad = lines().flat_map(|lines| lines.elevation_rad.iter().copied()).collect();
+        let time_s = lines().flat_map(|lines| lines.time_s.iter().copied()).collect();
+        let density = scans.iter().flat_map(|(_, density)| density.iter().copied()).collect();
+        Ok(of_gate.spectra(plan, [elevation_rad, time_s], density))
     }
 
     /// Of the samples of one realisation of a scene whose lines rise, pulse by pulse; `layer_snr` holds range, m, and expected
@@ -66,13 +63,7 @@ impl Spectra {
                 density.extend(of_gate.density(&scan, point, radius_m, estimator.tools.noise.density_a2)?);
             }
         }
-        Ok(Self {
-            velocity_m_s: of_gate.velocity_m_s,
-            range_m: g.gate_range_m.clone(),
-            elevation_rad: g.elevation_rad.clone(),
-            time_s: g.line_time_s.clone(),
-            density,
-        })
+        Ok(of_gate.spectra(plan, [g.elevation_rad.clone(), g.line_time_s.clone()], density))
     }
 }
 
@@ -113,6 +104,12 @@ impl GateSpectra {
         bins.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (bins, velocity_m_s) = bins.into_iter().unzip();
         Ok(Self { spectrum, bins, velocity_m_s })
+    }
+
+    /// Those of lines at elevations, rad, and times, s, with these densities.
+    fn spectra(self, plan: &Plan, [elevation_rad, time_s]: [Vec<f64>; 2], density: Vec<f32>) -> Spectra {
+        let (velocity_m_s, range_m) = (self.velocity_m_s, plan.geometry.gate_range_m.clone());
+        Spectra { velocity_m_s, range_m, elevation_rad, time_s, density }
     }
 
     /// Refuses more spectra than a file holds.

@@ -83,10 +83,9 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
         }
         let step_m = second - first;
         if nodes_m.windows(2).any(|pair| (pair[1] - pair[0] - step_m).abs() > 1e-6 * step_m) {
-            return Err(refuse(
-                "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\""
-                    .into(),
-            ));
+            let needed =
+                "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\"";
+            return Err(refuse(needed.into()));
         }
         Ok(Edges::Periodic { period_m: last - first + step_m })
     };
