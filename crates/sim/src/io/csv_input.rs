@@ -64,6 +64,12 @@ impl TextTable {
         self.header.iter().position(|column| column == name)
     }
 
+    /// Place of the column of an angle, and its unit, rad: that in radians, or else that in degrees.
+    pub(crate) fn angle(&self, name: &str) -> Option<(usize, f64)> {
+        let in_degrees = || Some((self.column(&format!("{name}_deg"))?, 1f64.to_radians()));
+        self.column(&format!("{name}_rad")).map(|column| (column, 1.0)).or_else(in_degrees)
+    }
+
     /// A cell as a number; NaN where it is empty or none.
     pub fn number(&self, row: usize, column: usize) -> f64 {
         let cell = self.rows.get(row).and_then(|cells| cells.get(column));

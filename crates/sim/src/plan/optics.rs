@@ -31,10 +31,7 @@ pub(super) fn stages(
 ) -> Result<([PlannedStage; 2], f64, ScreenPlans), Error> {
     let Setup { scene: file, instrument, geometry, .. } = setup;
     let scene = &file.scene;
-    let fixed = match scene.detector.snr {
-        SnrReference::Fixed { snr_db } => Some(snr_db),
-        _ => None,
-    };
+    let fixed = if let SnrReference::Fixed { snr_db } = scene.detector.snr { Some(snr_db) } else { None };
     let o = &scene.outputs;
     let model = model(scene);
     // Ranges at which the efficiency is wanted: for the table, and for the layers of the signals.

@@ -110,22 +110,6 @@ impl Scene {
 impl Scene {
     /// Limits that make sense only where each key is within its own.
     pub(super) fn check_between(&self, c: &mut Checker<'_>) {
-        self.check_instrument_between(c);
-        self.check_band(c);
-        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial(_)) {
-            self.check_lines(c);
-        }
-        self.check_scan_between(c);
-        self.check_ranges(c);
-        if self.outputs.hpl {
-            self.check_hpl(c);
-        }
-        let o = &self.outputs;
-        let ends = [o.profile_range_max_m, o.profile_range_min_m];
-        c.compare(["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, "above");
-    }
-
-    fn check_instrument_between(&self, c: &mut Checker<'_>) {
         let t = &self.telescope;
         let radii = [t.obscuration_radius_m, t.aperture_radius_m];
         c.compare(["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, "below");
@@ -140,6 +124,18 @@ impl Scene {
             let sides = [side("flow.core_radius_m", core_m, below), side("flow.spacing_m", spacing_m, above)];
             c.between(core_m < 0.5 * spacing_m, &sides);
         }
+        self.check_band(c);
+        if matches!(self.scan.pattern, Pattern::Rhi {} | Pattern::Axial(_)) {
+            self.check_lines(c);
+        }
+        self.check_scan_between(c);
+        self.check_ranges(c);
+        if self.outputs.hpl {
+            self.check_hpl(c);
+        }
+        let o = &self.outputs;
+        let ends = [o.profile_range_max_m, o.profile_range_min_m];
+        c.compare(["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, "above");
     }
 
     /// The detector band lies between 0 and half the sampling frequency; that of two quadratures, which are made of it, within the whole one.

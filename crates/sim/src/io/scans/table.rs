@@ -70,16 +70,13 @@ fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<BTreeMap
             )
         })
     };
-    let angle = |name: &str| {
-        let in_degrees = || Some((table.column(&format!("{name}_deg"))?, 1f64.to_radians()));
-        table.column(&format!("{name}_rad")).map(|column| (column, 1.0)).or_else(in_degrees)
-    };
     let velocity = match &format.field {
         Some(name) => needed(&[name])?,
         None => needed(&VELOCITIES)?,
     };
-    let elevation = angle("elevation").map_or_else(|| needed(&["elevation_rad"]).map(|column| (column, 1.0)), Ok)?;
-    let (range, azimuth, time) = (needed(&["range_m"])?, angle("azimuth"), table.column("time_s"));
+    let elevation =
+        table.angle("elevation").map_or_else(|| needed(&["elevation_rad"]).map(|column| (column, 1.0)), Ok)?;
+    let (range, azimuth, time) = (needed(&["range_m"])?, table.angle("azimuth"), table.column("time_s"));
     let (sweep, snr, flagged) = (one_of(&["sweep", "scan"]), table.column("snr_db"), table.column("flagged"));
     let is_mean = table.header[velocity] == OWN;
     let (sigma, count) = (one_of(&SIGMAS), table.column("count").filter(|_| is_mean));

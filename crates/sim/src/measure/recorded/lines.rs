@@ -30,20 +30,17 @@ impl RayTable {
     pub fn read(path: &Path) -> Result<Self, Error> {
         let table = TextTable::read(path)?;
         let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
-        let column = |name: &str| -> Result<Option<Vec<f64>>, Error> {
-            let Some(column) = table.column(name) else { return Ok(None) };
-            let values: Vec<f64> = (0..table.rows.len()).map(|row| table.number(row, column)).collect();
+        let values = |(column, unit): (usize, f64)| -> Result<Vec<f64>, Error> {
+            let values: Vec<f64> = (0..table.rows.len()).map(|row| unit * table.number(row, column)).collect();
             match values.iter().position(|value| !value.is_finite()) {
-                Some(row) => Err(refuse(format!("row {}: {name} is no number", row + 1))),
-                None => Ok(Some(values)),
+                Some(row) => Err(refuse(format!("row {}: {} is no number", row + 1, table.header[column]))),
+                None => Ok(values),
             }
         };
-        let elevation_rad = match (column("elevation_rad")?, column("elevation_deg")?) {
-            (Some(values), _) => values,
-            (None, Some(values)) => values.into_iter().map(f64::to_radians).collect(),
-            (None, None) => return Err(refuse("it has no column elevation_rad or elevation_deg".into())),
-        };
-        Ok(Self { path: path.to_owned(), elevation_rad, time_s: column("time_s")? })
+        let missing = || refuse("it has no column elevation_rad or elevation_deg".into());
+        let elevation_rad = values(table.angle("elevation").ok_or_else(missing)?)?;
+        let time_s = table.column("time_s").map(|column| values((column, 1.0))).transpose()?;
+        Ok(Self { path: path.to_owned(), elevation_rad, time_s })
     }
 }
 
