@@ -133,26 +133,21 @@ impl DetectionTrials<'_> {
         (squares / self.circulation_std_m2_s.len() as f64).sqrt()
     }
 
-    /// The circulation that is found nine times in ten \[m^2/s\]: measured, and as the bound foretells, sigma_Gamma (sqrt(T_c) + 1.28).
+    /// The circulation that is found nine times in ten \[m^2/s\]: measured; its standard error, from its scatter between groups of wakes,
+    /// NaN with less than twenty wakes; and as the bound foretells, sigma_Gamma (sqrt(T_c) + 1.28).
     #[must_use]
-    pub fn smallest_detectable_m2_s(&self, threshold: f64) -> (f64, f64) {
+    pub fn smallest_detectable_m2_s(&self, threshold: f64) -> [f64; 3] {
         let foretold = self.circulation_std_m2_s() * (threshold.max(0.0).sqrt() + NINE_OF_TEN);
-        (found_nine_times(&self.missed_m2_s(threshold), foretold), foretold)
-    }
-
-    /// Standard error of the former, from its scatter between groups of wakes; NaN with less than twenty wakes.
-    #[must_use]
-    pub fn smallest_detectable_error_m2_s(&self, threshold: f64) -> f64 {
-        let (missed, about) = (self.missed_m2_s(threshold), self.smallest_detectable_m2_s(threshold).1);
+        let missed = self.missed_m2_s(threshold);
         let of_group = |group: usize| {
             let own = |i: &usize| i % self.wakes.len() % GROUPS == group;
-            found_nine_times(&(0..missed.len()).filter(own).map(|i| missed[i]).collect::<Vec<_>>(), about)
+            found_nine_times(&(0..missed.len()).filter(own).map(|i| missed[i]).collect::<Vec<_>>(), foretold)
         };
         let groups: Vec<f64> = (0..GROUPS).filter(|_| self.wakes.len() >= 2 * GROUPS).map(of_group).collect();
         let count = groups.len() as f64;
         let mean = groups.iter().sum::<f64>() / count;
         let squares: f64 = groups.iter().map(|x| (x - mean).powi(2)).sum();
-        (squares / (count - 1.0) / count).sqrt()
+        [found_nine_times(&missed, foretold), (squares / (count - 1.0) / count).sqrt(), foretold]
     }
 }
 

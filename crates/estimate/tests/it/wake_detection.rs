@@ -253,7 +253,7 @@ fn a_threshold_for_white_noise_alarms_in_all_but_a_few_of_a_thousand_turbulent_s
             let detector = case.detector(&options);
             let threshold = detector.calibrate(10_000, stream(5)).unwrap().threshold(1e-2).unwrap();
             let trials = detector.trials(&[wake], 2000, stream(6)).unwrap();
-            (threshold, trials.smallest_detectable_m2_s(threshold).0)
+            (threshold, trials.smallest_detectable_m2_s(threshold)[0])
         };
         let pairs = of(DetectorOptions { spacing_m: (47.0, 47.0), single_vortices: false, turbulence });
         let all = of(DetectorOptions { turbulence, ..Default::default() });
@@ -295,7 +295,7 @@ fn thresholds_are_those_of_an_independent_study_and_wakes_are_found_as_often_as_
             assert!(found.value > known - errors && found.value < known + 0.14 + errors, "{bounds}: {found:?} {known}");
         }
         // near the form for known places: the best of many places is a little better than one
-        let (smallest, foretold) = trials.smallest_detectable_m2_s(threshold);
+        let [smallest, _, foretold] = trials.smallest_detectable_m2_s(threshold);
         assert!((smallest / foretold - 1.0).abs() < 0.08, "{smallest} {foretold}");
     }
 }
@@ -349,7 +349,8 @@ fn wakes_to_find_are_as_wide_as_was_asked_and_what_is_found_of_them_has_its_scat
         .map(|seed| {
             let wakes = detector.draw_wakes(60, stream(30 + seed));
             let trials = detector.trials(&wakes, 600, stream(50 + seed)).unwrap();
-            (trials.smallest_detectable_m2_s(threshold).0, trials.smallest_detectable_error_m2_s(threshold))
+            let [measured, error, _] = trials.smallest_detectable_m2_s(threshold);
+            (measured, error)
         })
         .collect();
     let mean = found.iter().map(|f| f.0).sum::<f64>() / 8.0;

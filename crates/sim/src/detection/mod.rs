@@ -236,6 +236,7 @@ impl Calibration {
                 roc.push((circulation_m2_s, rate, threshold, Share::of(hits, TRIALS)));
             }
         }
+        let [measured, smallest_error_m2_s, foretold] = trials.smallest_detectable_m2_s(self.threshold);
         Ok(Power {
             false_alarm: settings.false_alarm,
             threshold: self.threshold,
@@ -243,8 +244,8 @@ impl Calibration {
             circulation_std_m2_s: std_m2_s,
             found,
             roc,
-            smallest_m2_s: trials.smallest_detectable_m2_s(self.threshold),
-            smallest_error_m2_s: trials.smallest_detectable_error_m2_s(self.threshold),
+            smallest_m2_s: (measured, foretold),
+            smallest_error_m2_s,
         })
     }
 }

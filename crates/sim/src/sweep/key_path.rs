@@ -47,15 +47,12 @@ fn all() -> &'static [SceneKey] {
 /// Whether the tables that `short` names stand in this order in `path`, the first first, before the same last name.
 fn shortens(short: &str, path: &str) -> bool {
     let (mut rest, mut whole) = (short.split('.').peekable(), path.split('.'));
-    if rest.next() != whole.next() {
-        return false;
-    }
-    let mut last = "";
-    for part in whole {
+    let is_begun = rest.next() == whole.next();
+    let last = whole.fold("", |_, part| {
         rest.next_if_eq(&part);
-        last = part;
-    }
-    rest.next().is_none() && short.ends_with(last)
+        part
+    });
+    is_begun && rest.next().is_none() && short.ends_with(last)
 }
 
 /// The key that a path names; `value` is what it was to be, for the message.
