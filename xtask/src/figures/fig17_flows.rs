@@ -109,7 +109,7 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
             float(&|row| Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m.value)),
         )
         .float("z_error_m", float(&|row| Some(row.found?.height_m.value - row.truth.height_m.value)))
-        .text("vortex", rows.iter().map(|(_, row)| name(row.side)))
+        .text("vortex", rows.iter().map(|(_, row)| name(row.truth.side)))
         .float("y_std_m", found(|v| v.lateral_position_m.std))
         .float("z_std_m", found(|v| v.height_m.std))
         .float("snr_db", rows.iter().map(|_| SNR_DB))

@@ -16,7 +16,7 @@ use crate::plan::{Plan, Stage};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
 use ndarray::{Array2, ArrayView2};
-use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, Side, VortexResult, circulation_profile};
+use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, VortexResult, circulation_profile};
 use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
@@ -34,11 +34,9 @@ pub struct RetrievalRow {
     pub sweep: usize,
     /// How it was found.
     pub method: Method,
-    /// Which vortex.
-    pub side: Side,
     /// What was found; nothing where the method failed or found no such vortex.
     pub found: Option<VortexResult>,
-    /// The truth, exact; NaN and nothing where it is not known.
+    /// The truth, which also says which vortex it is: exact; NaN and nothing where it is not known.
     pub truth: VortexResult,
     /// Rolling-moment coefficient of the aircraft in that vortex, found and true; NaN without an aircraft, or where it is unknown.
     pub rolling_moment: (f64, f64),
@@ -165,7 +163,10 @@ fn rows_of(
     found: Option<&RetrievedScan>,
     model: &WakeModel,
 ) -> Result<[RetrievalRow; 2], Error> {
-    let follower = scene.retrieval.as_ref().and_then(|r| r.follower).map(follower);
+    let follower = scene.retrieval.as_ref().and_then(|r| r.follower).map(|aircraft| {
+        let FollowingAircraft { span_m, aspect_ratio, speed_m_s, slope } = aircraft;
+        Follower { span_m, aspect_ratio, speed_m_s, slope }
+    });
     let moment = |wake: Option<Wake>, at: Option<(f64, f64)>| match (&follower, wake.zip(at)) {
         // the coefficient is known for the profile (3)
         (Some(follower), Some((wake, at))) if model.profile == CoreProfile::Algebraic => {
@@ -174,14 +175,12 @@ fn rows_of(
         _ => Ok(f64::NAN),
     };
     let row = |truth_of: VortexResult| -> Result<RetrievalRow, Error> {
-        let side = truth_of.side;
-        let vortex = found.and_then(|found| found.result.vortex(side).copied());
+        let vortex = found.and_then(|found| found.result.vortex(truth_of.side).copied());
         let wake = found.and_then(|found| found.result.wake);
         Ok(RetrievalRow {
             realisation,
             sweep,
             method,
-            side,
             found: vortex,
             truth: truth_of,
             rolling_moment: (
@@ -193,11 +192,6 @@ fn rows_of(
         })
     };
     Ok([row(truth[0])?, row(truth[1])?])
-}
-
-fn follower(aircraft: FollowingAircraft) -> Follower {
-    let FollowingAircraft { span_m, aspect_ratio, speed_m_s, slope } = aircraft;
-    Follower { span_m, aspect_ratio, speed_m_s, slope }
 }
 
 /// Tests of all maps for a wake, calibrated on the noise of the scene.

@@ -36,8 +36,8 @@ impl SceneRetrieval {
         let mut all = Vec::new();
         // One scan has each method and side once.
         for first in self.rows.iter().filter(|row| (row.realisation, row.sweep) == (0, 0)) {
-            let of = (first.method, first.side);
-            let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.side) == of).collect();
+            let of = (first.method, first.truth.side);
+            let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.truth.side) == of).collect();
             for (number, name) in quantities() {
                 all.extend(errors(number, &rows).map(|(counts, numbers)| (of.0, of.1, name, counts, numbers)));
             }
@@ -82,7 +82,7 @@ impl SceneRetrieval {
         }
         table = table
             .text("method", self.rows.iter().map(|row| row.method.name()))
-            .text("side", self.rows.iter().map(|row| word(row.side)))
+            .text("side", self.rows.iter().map(|row| word(row.truth.side)))
             .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));
         for (i, name) in quantities() {
             table = measured(table, name, self.rows.iter().map(|row| quantity(row, i).0))
