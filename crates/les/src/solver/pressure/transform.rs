@@ -46,7 +46,11 @@ pub(crate) enum RowTransform {
 
 impl fmt::Debug for RowTransform {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("RowTransform")
+        f.write_str(match self {
+            Self::Thin => "Thin",
+            Self::Fourier { .. } => "Fourier",
+            Self::Dense(_) => "Dense",
+        })
     }
 }
 
