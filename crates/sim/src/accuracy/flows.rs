@@ -15,6 +15,7 @@ use super::ladder::{Ladder, Step, Verdict};
 use super::{Accuracy, Request, Subject};
 use crate::Error;
 use crate::flow::CaseFile;
+use crate::flow::forecast::count;
 use crate::flow::trial::{History, of_history};
 use crate::io::Provenance;
 use crate::plan::units::seconds;
@@ -226,10 +227,6 @@ impl Accuracy<CaseFile> {
 /// Where a history has a figure.
 fn place(figure: Figure) -> usize {
     FIGURES.iter().position(|own| *own == figure).unwrap_or(0)
-}
-
-fn count(cells: [usize; 3]) -> f64 {
-    cells.iter().map(|n| *n as f64).product()
 }
 
 /// The case with its cells and with fewer.

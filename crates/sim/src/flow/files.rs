@@ -254,8 +254,9 @@ impl Files {
         let of_planes = file.plane.is_some();
         let names: Vec<String> = (0..=file.index).map(|i| numbered(&file.stem, i, "vtr")).collect();
         let per_s = if of_planes { self.tau_per_s } else { 1.0 };
-        let times_s = self.schedule.times_of(|due| if of_planes { due.planes } else { due.fields });
-        let members = times_s.iter().map(|t| t * per_s);
+        let due = |due: &Due| if of_planes { due.planes.is_some() } else { due.fields.is_some() };
+        let outputs = self.schedule.times_s.iter().zip(&self.schedule.due).filter(|(_, own)| due(own));
+        let members = outputs.map(|(time_s, _)| time_s * per_s);
         vtr::pvd_bytes(members.zip(names.iter().map(String::as_str)), &self.origin)
     }
 

@@ -63,7 +63,12 @@ impl FlowForecast {
         let step_s = stability.first_step_s().min(plan.end_s);
         let to_end = steps_to(plan.end_s, step_s, setup).ceil();
         let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
-        let cells = setup.mesh.cells();
+        let (cells, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
+        // Of a rank with its halos.
+        let mut held = cells;
+        if ranks > 1 {
+            held[2] = (cells[2].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[2]);
+        }
         let scheme = setup.settings.scheme;
         let passes = if scheme == TimeScheme::RungeKutta3 { 3.0 } else { 1.0 };
         let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
@@ -91,8 +96,8 @@ impl FlowForecast {
             core_s: eigen_s + (steps * passes + 2.0) * pass_s,
             program_s: START_S + pictures_s,
             memory_bytes: memory_bytes(case, [cells; 2], &dense),
-            ranks: setup.settings.ranks.count(),
-            rank_bytes: rank_bytes(case, setup, &dense),
+            ranks,
+            rank_bytes: memory_bytes(case, [held, cells], &dense),
             files: files.forecast(cells, steps, case.checkpoint.write),
         }
     }
@@ -132,7 +137,7 @@ impl fmt::Display for FlowForecast {
     }
 }
 
-fn count(cells: [usize; 3]) -> f64 {
+pub(crate) fn count(cells: [usize; 3]) -> f64 {
     cells.iter().map(|n| *n as f64).product()
 }
 
@@ -220,16 +225,6 @@ fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize
     let later = count(cells) * [FIRST_STEP_ARRAYS, outputs, meter].into_iter().fold(0.0, f64::max);
     let values = count(cells) * (FLOW_ARRAYS + model) + f64::max(count(whole) * given, later);
     8.0 * values + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
-}
-
-/// Memory of one of the ranks with its halos \[bytes\].
-fn rank_bytes(case: &FlowCase, setup: &Setup, dense: &[usize]) -> f64 {
-    let (whole, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
-    let mut cells = whole;
-    if ranks > 1 {
-        cells[2] = (cells[2].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[2]);
-    }
-    memory_bytes(case, [cells, whole], dense)
 }
 
 /// The eigenvectors of a direction, what finds them, and its two transforms.

@@ -10,7 +10,7 @@
 mod case;
 mod execute;
 mod files;
-mod forecast;
+pub(crate) mod forecast;
 mod free;
 mod initial_file;
 mod integration;

@@ -66,12 +66,6 @@ impl Schedule {
         }
         schedule
     }
-
-    /// Times of the fields or planes that `number` picks \[s\].
-    #[cfg(feature = "vtk")]
-    pub(in super::super) fn times_of(&self, number: impl Fn(&Due) -> Option<usize>) -> Vec<f64> {
-        self.times_s.iter().zip(&self.due).filter(|(_, due)| number(due).is_some()).map(|(time_s, _)| *time_s).collect()
-    }
 }
 
 #[cfg(test)]
