@@ -65,9 +65,11 @@ const EXACT: usize = 3;
 /// Of a wave of which a step leaves less the solver's round-off is left.
 const ROUND_OFF: f64 = 1e-9;
 
+type Measurement = fn() -> Result<Vec<Panel>, Failure>;
+
 /// All panels, in their order.
 pub(crate) fn measure() -> Result<Vec<Panel>, Failure> {
-    let panels: [fn() -> Result<Vec<Panel>, Failure>; 13] = [
+    let panels: [Measurement; 13] = [
         flow::growth,
         flow::limits,
         flow::stiff,
