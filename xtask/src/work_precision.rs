@@ -55,14 +55,6 @@ const GROUPS: [(&str, Rows); 5] = [
 const TARGETS: [(&str, f64); 3] =
     [("is_cheapest_for_0.1", 0.10), ("is_cheapest_for_0.03", 0.03), ("is_cheapest_for_0.01", 0.01)];
 
-/// What the settings of a knob have in common.
-#[derive(Clone)]
-struct Knob {
-    case: String,
-    method: String,
-    knob: &'static str,
-}
-
 /// What a setting came to.
 struct Found {
     /// Relative; NaN where the setting fails.
@@ -77,7 +69,9 @@ struct Found {
 
 /// One measurement.
 pub(crate) struct Row {
-    knob: Knob,
+    case: String,
+    method: String,
+    knob: String,
     value: f64,
     found: Found,
     /// Of another program; empty for this one.
@@ -95,30 +89,29 @@ impl Found {
     }
 }
 
-impl Knob {
-    fn new([case, method, knob]: [&'static str; 3]) -> Self {
-        Self { case: case.into(), method: method.into(), knob }
-    }
-
-    fn row(&self, value: f64, found: Found) -> Row {
-        let version = String::new();
-        Row { knob: self.clone(), value, found, version, group: "", is_on_front: false, is_cheapest: [false; 3] }
-    }
-
-    /// A row for each value.
-    fn rows(&self, values: &[f64], measure: impl Fn(f64) -> Result<Found, Failure>) -> Result<Vec<Row>, Failure> {
-        values.iter().map(|value| Ok(self.row(*value, measure(*value)?))).collect()
-    }
+/// A row for each value of a knob of a method in a case.
+fn settings(
+    of: [&str; 3],
+    values: &[f64],
+    measure: impl Fn(f64) -> Result<Found, Failure>,
+) -> Result<Vec<Row>, Failure> {
+    values.iter().map(|value| Ok(Row::new(of, *value, measure(*value)?))).collect()
 }
 
 impl Row {
+    /// Of a case, a method and a knob.
+    fn new(of: [&str; 3], value: f64, found: Found) -> Self {
+        let ([case, method, knob], version) = (of.map(String::from), String::new());
+        Self { case, method, knob, value, found, version, group: "", is_on_front: false, is_cheapest: [false; 3] }
+    }
+
     fn is_own(&self) -> bool {
         self.version.is_empty()
     }
 
     /// What the error is, and against what.
     fn compared(&self) -> [&'static str; 2] {
-        let case = CASES.iter().find(|case| case.name == self.knob.case);
+        let case = CASES.iter().find(|case| case.name == self.case);
         case.map_or([""; 2], |case| [&case.metric, &case.reference])
     }
 }
@@ -135,11 +128,11 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
     let mut all = Vec::new();
     for (name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
         let mut rows = pool.install(|| rows(quick))?;
-        let cases: Vec<String> = rows.iter().map(|row| row.knob.case.clone()).collect();
-        rows.extend(others.extract_if(.., |row| cases.contains(&row.knob.case)));
+        let cases: Vec<String> = rows.iter().map(|row| row.case.clone()).collect();
+        rows.extend(others.extract_if(.., |row| cases.contains(&row.case)));
         // In the order in which they were measured, those of other programs after this program's.
-        rows.sort_by_key(|row| (cases.iter().position(|case| *case == row.knob.case), !row.is_own()));
-        for of_case in rows.chunk_by_mut(|a, b| a.knob.case == b.knob.case) {
+        rows.sort_by_key(|row| (cases.iter().position(|case| *case == row.case), !row.is_own()));
+        for of_case in rows.chunk_by_mut(|a, b| a.case == b.case) {
             let own = of_case.iter().filter(|row| row.is_own()).count();
             let own = &mut of_case[..own];
             let found: Vec<&Found> = own.iter().map(|row| &row.found).collect();
@@ -159,9 +152,9 @@ pub(crate) fn table(rows: &[Row]) -> Table {
     let text = |get: fn(&Row) -> &str| rows.iter().map(get);
     let float = |get: fn(&Row) -> f64| rows.iter().map(get);
     let table = Table::new()
-        .text("case", text(|r| &r.knob.case))
-        .text("method", text(|r| &r.knob.method))
-        .text("knob", text(|r| r.knob.knob))
+        .text("case", text(|r| &r.case))
+        .text("method", text(|r| &r.method))
+        .text("knob", text(|r| &r.knob))
         .float("value", float(|r| r.value))
         .float("error", float(|r| r.found.error))
         .text("metric", text(|r| r.compared()[0]))
@@ -191,7 +184,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let rows = measure(options.group.as_deref(), options.quick)?;
     println!("{:<28} {:<34} {:<24} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
     for row in &rows {
-        let Row { knob: Knob { case, method, knob }, value, found, version, .. } = row;
+        let Row { case, method, knob, value, found, version, .. } = row;
         let Found { error, standard_error, cost, .. } = found;
         let [metric, reference] = row.compared();
         let (error, cost) = (format!("{error:.2e} +- {standard_error:.1e}"), format!("{:.1e} s", cost.cpu_s));

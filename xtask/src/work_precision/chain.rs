@@ -1,7 +1,7 @@
 //! Error against run time of the whole chain: the standard deviation of a map by the realisations of the scan and by the step between
 //! windows, as `wakescope accuracy` tells its shift and its noise.
 
-use super::{Found, Knob, Row, few};
+use super::{Found, Row, few, settings};
 use crate::cost::fastest;
 use fixtures::failure::Failure;
 use std::path::Path;
@@ -34,7 +34,6 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
             1.0 => "windows at every sample".into(),
             value => format!("windows {value} samples apart"),
         };
-        let knob = Knob { case: "one whole map".into(), method, knob: "realisations" };
         let shift = match step.verdict {
             Verdict::Finest => Some(Shift::default()),
             // What is left of the gates tells nothing of the map.
@@ -42,7 +41,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
             _ => step.shift(Figure::Std),
         };
         let counts = if shift.is_some() { few(&COUNTS, quick) } else { &COUNTS[..1] };
-        rows.extend(knob.rows(counts, |count| {
+        rows.extend(settings(["one whole map", &method, "realisations"], counts, |count| {
             let plan = Plan::new(with(&fine, &[(WINDOW_STEP, step.value), (REALISATIONS, count)])?, Target::Map)?;
             let (_, cost) = fastest(|| Ok(run::run(&plan, &Silent)?))?;
             let Some(Shift { shift, error: of_shift }) = shift else { return Ok(Found::exact(f64::NAN, cost)) };

@@ -3,7 +3,7 @@
 //! In a uniform wind the error is by how much the standard deviation of the good estimates exceeds the Cramer-Rao bound; a method of
 //! which more than a fifth of the estimates are bad has no number.
 
-use super::{Found, Knob, Row, physics::SEED};
+use super::{Found, Row, physics::SEED};
 use crate::cost::fastest;
 use fixtures::failure::Failure;
 use fixtures::methods::{Known, Methods};
@@ -85,8 +85,8 @@ impl Uniform {
     /// One setting: the time is that of one estimate from all its windows.
     fn row(
         &self,
-        [case, method]: [&'static str; 2],
-        (knob, value): (&'static str, f64),
+        of: [&str; 3],
+        value: f64,
         statistic: &dyn Statistic<f64>,
         estimator: &dyn Estimator,
     ) -> Result<Row, Failure> {
@@ -94,43 +94,42 @@ impl Uniform {
         let errors: Vec<f64> = errors.into_iter().map(|(error, good)| if good { error } else { f64::NAN }).collect();
         let found = good_and_bad(&errors, BAND_M_S);
         let excess = if found.bad_fraction > 0.2 { f64::NAN } else { found.std_good_m_s / self.bound_m_s - 1.0 };
-        let knob = Knob::new([case, method, knob]);
         let (standard_error, cost) =
             (found.std_good_error_m_s / self.bound_m_s, cost.scaled(1.0 / self.trials.len() as f64));
-        Ok(knob.row(value, Found { error: excess, standard_error, cost, set_up_s: 0.0 }))
+        Ok(Row::new(of, value, Found { error: excess, standard_error, cost, set_up_s: 0.0 }))
     }
 
     fn rows(&self, case: &'static str, quick: bool) -> Result<Vec<Row>, Failure> {
         let all = Methods::all(&self.known, &[WINDOWS])?;
         let of = all.methods.iter().map(|method| {
             let statistic = all.statistics[method.statistic].as_ref();
-            self.row([case, method.name], ("none", 0.0), statistic, method.estimators[0].as_ref())
+            self.row([case, method.name, "none"], 0.0, statistic, method.estimators[0].as_ref())
         });
         let mut rows = of.collect::<Result<Vec<_>, _>>()?;
         let (s, kind) = (sampling()?, SignalKind::Real);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
         for padded in [64, 128, 256, 1024, 4096] {
             let peak = SpectralPeak::new(&s, kind, &unweighted_lags(WINDOW), padded, Refinement::Parabola)?;
-            rows.push(self.row([case, "PA by padding"], ("padded_samples", padded as f64), &plain, &peak)?);
+            rows.push(self.row([case, "PA by padding", "padded_samples"], padded as f64, &plain, &peak)?);
         }
         if quick {
             return Ok(rows);
         }
         for order in [4, 8, 16, 32] {
-            let knob = ("order", order as f64);
+            let value = order as f64;
             let ca = ModelPeak::new(ModelReading::Spectrum, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
             let capon = ModelPeak::new(ModelReading::Capon, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
             let lags = LagWindowPeak::new(&s, kind, &unweighted_lags(WINDOW), order, 1024, Refinement::Parabola)?;
-            rows.push(self.row([case, "CA by order"], knob, &plain, &ca)?);
-            rows.push(self.row([case, "Capon by order"], knob, &plain, &capon)?);
-            rows.push(self.row([case, "CA-BT by lags"], ("lags", order as f64), &plain, &lags)?);
+            rows.push(self.row([case, "CA by order", "order"], value, &plain, &ca)?);
+            rows.push(self.row([case, "Capon by order", "order"], value, &plain, &capon)?);
+            rows.push(self.row([case, "CA-BT by lags", "lags"], value, &plain, &lags)?);
         }
         let wind = GradientModel::new(&s, WINDOW, self.known.sigma_s, self.known.estimate_noise())?;
         for gradients in [1, 3, 5, 9] {
             let list: Vec<f64> = (0..gradients).map(|k| 0.1 * (k as f64 - 0.5 * (gradients - 1) as f64)).collect();
             let plan = GradientLikelihood::<f64>::new(&wind, self.known.snr, &list, 1024)?;
-            let knob = ("gradients", gradients as f64);
-            rows.push(self.row([case, "likelihood by gradients"], knob, &plan.statistic, &plan.estimator)?);
+            let of = [case, "likelihood by gradients", "gradients"];
+            rows.push(self.row(of, gradients as f64, &plan.statistic, &plan.estimator)?);
         }
         Ok(rows)
     }

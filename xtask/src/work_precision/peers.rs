@@ -1,6 +1,6 @@
 //! What other programs need for the same work: the tables of `docs/peers`, measured by hand, their times scaled to this machine.
 
-use super::{Found, Knob, Row, physics};
+use super::{Found, Row, physics};
 use crate::cost::Cost;
 use crate::workspace::root;
 use fixtures::failure::Failure;
@@ -30,10 +30,9 @@ fn row(cells: &[String], scale: f64) -> Option<Row> {
     let [case, method, version, numbers @ ..] = cells else { return None };
     let numbers: Vec<f64> = numbers.iter().map(|n| n.parse().ok()).collect::<Option<_>>()?;
     let &[value, error, standard_error, cpu_s] = &numbers[..] else { return None };
-    let knob = Knob { case: case.clone(), method: method.clone(), knob: "" };
     let cost = Cost { cpu_s: cpu_s * scale, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
     let found = Found { error, standard_error, cost, set_up_s: f64::NAN };
-    (!version.is_empty()).then(|| Row { version: version.clone(), ..knob.row(value, found) })
+    (!version.is_empty()).then(|| Row { version: version.clone(), ..Row::new([case, method, ""], value, found) })
 }
 
 #[cfg(test)]
@@ -47,7 +46,7 @@ mod tests {
             row(TextTable::parse(&format!("{head}\n{line}")).ok()?.rows.first()?, 0.5)
         };
         let found = row("\"0 dB, white\",\"numpy, PA\",2.4.6,128,0.15,0.02,4e-6").unwrap();
-        assert_eq!((found.knob.case.as_str(), found.knob.method.as_str()), ("0 dB, white", "numpy, PA"));
+        assert_eq!((found.case.as_str(), found.method.as_str()), ("0 dB, white", "numpy, PA"));
         assert_eq!((found.version.as_str(), found.value, found.found.cost.cpu_s), ("2.4.6", 128.0, 2e-6));
         assert!(row("a,b,c").is_none() && row("screens,numpy,,128,0.15,0.02,4e-6").is_none());
     }

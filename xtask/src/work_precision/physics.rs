@@ -1,7 +1,7 @@
 //! Error against run time of optics, flow and signal: phase screens, free-space propagation, bistatic efficiency; vortices of Taylor and
 //! Green, pressure solve; layers of air.
 
-use super::{Found, Knob, Row, few};
+use super::{Found, Row, few, settings};
 use crate::cost::{fastest, measured};
 use crate::workspace::numbers;
 use fixtures::failure::Failure;
@@ -39,9 +39,9 @@ pub(super) fn optics(quick: bool) -> Result<Vec<Row>, Failure> {
 
 /// The expected structure function against quadrature: its worst error from two spacings to half the grid.
 fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
-    let knob = Knob::new(["phase screens", method, "points a side"]);
+    let knob = ["phase screens", method, "points a side"];
     let spectrum = Turbulence::table2(CN2_M_M23)?.spectrum;
-    knob.rows(&[128.0, 256.0, 512.0], |points| {
+    settings(knob, &[128.0, 256.0, 512.0], |points| {
         let points = points as usize;
         let (generator, set_up) =
             measured(|| Ok(ScreenGenerator::<T>::new(Grid::square(points, 2e-3)?, Arc::clone(&spectrum))?))?;
@@ -61,8 +61,8 @@ fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
 /// Table 2's beam in ten steps, before what its grid does is taken off.
 fn free_space<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
     let exact = theory::free_space_efficiency(&Telescope::table2(), RANGE_M)?;
-    let knob = Knob::new(["free-space propagation", method, "points a side"]);
-    knob.rows(&[128.0, 256.0, 512.0, 1024.0], |points| {
+    let knob = ["free-space propagation", method, "points a side"];
+    settings(knob, &[128.0, 256.0, 512.0, 1024.0], |points| {
         let screens = screens(10, Grid::square(points as usize, 1.024 / points)?)?;
         let (found, cost) = fastest(|| Ok(screens.grid_free_space::<T>()?))?;
         Ok(Found::exact((found[0] / exact - 1.0).abs(), cost))
@@ -80,8 +80,8 @@ fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
     let found = long.0.bistatic.ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
     let deviation = found.standard_error[0] / found.mean[0] * (many as f64).sqrt();
     let set_up_s = (short.1.cpu_s - few as f64 * one.cpu_s).max(0.0);
-    let knob = Knob::new(["bistatic efficiency", "5 layers, 256 points", "realisations"]);
-    knob.rows(&DRAWN_REALISATIONS, |count| {
+    let knob = ["bistatic efficiency", "5 layers, 256 points", "realisations"];
+    settings(knob, &DRAWN_REALISATIONS, |count| {
         let noise = deviation / count.sqrt();
         let error = bias.hypot(noise);
         let standard_error = noise * noise / error / (2.0 * many as f64).sqrt();
@@ -110,8 +110,8 @@ fn screens(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
 pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = taylor_green(quick)?;
     for (method, pressure) in [("direct", PressureMethod::Direct), ("multigrid", PressureMethod::Multigrid)] {
-        let knob = Knob::new(["pressure", method, "tolerance"]);
-        rows.extend(knob.rows(few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick), |tolerance| {
+        let knob = ["pressure", method, "tolerance"];
+        rows.extend(settings(knob, few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick), |tolerance| {
             let mut case = cases::taylor_green_3d(32, 1600.0)?;
             (case.settings.pressure, case.settings.pressure_tolerance) = (pressure, tolerance);
             let (divergence, cost) = fastest(|| {
@@ -140,8 +140,8 @@ fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
     // Steps that divide the outputs, at a Courant number of about one half.
     let cells: &[f64] =
         if quick { &[12.0, 16.0, 24.0, 32.0, 48.0] } else { &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0] };
-    let knob = Knob::new(["Taylor-Green vortices, Re 200", "Runge-Kutta 3", "cells a side"]);
-    knob.rows(cells, |cells| {
+    let knob = ["Taylor-Green vortices, Re 200", "Runge-Kutta 3", "cells a side"];
+    settings(knob, cells, |cells| {
         let substeps = (cells / 24.0).ceil();
         let mut case = cases::taylor_green_3d(cells as usize, 200.0)?;
         case.settings.scheme = TimeScheme::RungeKutta3;
@@ -188,11 +188,11 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
     let records = if quick { 4 } else { 40 };
     let mut rows = Vec::new();
     for (case, pulse_s) in [("records, 200 ns", 200e-9), ("records, 400 ns", 400e-9)] {
-        let knob = Knob::new([case, "record of 300 samples", "layers for each sample"]);
+        let knob = [case, "record of 300 samples", "layers for each sample"];
         let (gate, long) = (simulator(pulse_s, GATE)?, simulator(pulse_s, SAMPLES)?);
         let exact = gate.covariance_a2(&line(&gate, GATE, 8)?)?;
         let largest = exact.iter().map(|value| value.norm()).fold(0.0, f64::max);
-        rows.extend(knob.rows(few(&[1.0, 2.0, 3.0, 4.0, 6.0], quick), |parts| {
+        rows.extend(settings(knob, few(&[1.0, 2.0, 3.0, 4.0, 6.0], quick), |parts| {
             let found = gate.covariance_a2(&line(&gate, GATE, parts as usize)?)?;
             let error = (&found - &exact).iter().map(|value| value.norm()).fold(0.0, f64::max) / largest;
             let air = line(&long, SAMPLES, parts as usize)?;

@@ -12,7 +12,7 @@ const MOST_METHODS: usize = 4;
 /// The panels of the cases that are drawn, the rows of each in the order of their times, and those that have no error, for the setting fails.
 fn panels(rows: &[Row]) -> impl Iterator<Item = (&'static Panel, Vec<&Row>, Vec<&Row>)> {
     CASES.iter().filter_map(|case| {
-        let of_case = rows.iter().filter(|row| row.knob.case == case.name);
+        let of_case = rows.iter().filter(|row| row.case == case.name);
         let (failed, mut drawn): (Vec<&Row>, Vec<&Row>) = of_case.partition(|row| row.found.error.is_nan());
         drawn.retain(|row| row.found.error > 0.0 && row.found.cost.cpu_s > 0.0);
         drawn.sort_by(|a, b| a.found.cost.cpu_s.total_cmp(&b.found.cost.cpu_s));
@@ -34,7 +34,7 @@ fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
     let x = Axis { range: Some(x_range), ..Axis::log("processor time, one thread [s]") };
     let y = Axis { range: Some(y_range), ..Axis::log("relative error") };
     let mut plot = CurvePlot { shape: 0.78, ..CurvePlot::new(&panel.title, x, y) };
-    let mut own: Vec<&str> = rows.iter().filter(|row| row.is_own()).map(|row| row.knob.method.as_str()).collect();
+    let mut own: Vec<&str> = rows.iter().filter(|row| row.is_own()).map(|row| row.method.as_str()).collect();
     own.sort_unstable();
     own.dedup();
     // Of many methods only the settings that no other beats are drawn.
@@ -46,8 +46,8 @@ fn curves(panel: &Panel, rows: &[&Row], failed: &[&Row]) -> CurvePlot {
                 String::new()
             }
         }
-        true => format!("wakescope, {}", row.knob.method),
-        false => row.knob.method.clone(),
+        true => format!("wakescope, {}", row.method),
+        false => row.method.clone(),
     };
     let mut methods: Vec<(bool, String)> = rows.iter().map(|row| (!row.is_own(), name(row))).collect();
     methods.sort_unstable();
@@ -109,10 +109,10 @@ pub(crate) fn text(rows: &[Row]) -> String {
         for row in &others {
             let ratio =
                 ratio(&own, row).map_or("this program has no setting so near".into(), |ratio| format!("{ratio:.2}"));
-            let _ = writeln!(out, "| {} {} | {:.2e} | {ratio} |", row.knob.method, row.version, row.found.error);
+            let _ = writeln!(out, "| {} {} | {:.2e} | {ratio} |", row.method, row.version, row.found.error);
         }
         let better = others.iter().filter(|row| ratio(&own, row).is_none_or(|ratio| ratio < 1.0));
-        let better: Vec<String> = better.map(|row| format!("{} at {:.1e}", row.knob.method, row.found.error)).collect();
+        let better: Vec<String> = better.map(|row| format!("{} at {:.1e}", row.method, row.found.error)).collect();
         let better = if better.is_empty() { "none of them".into() } else { better.join(", ") };
         let _ = writeln!(out, "\nThe better buy: {better}.\n");
     }
@@ -120,7 +120,7 @@ pub(crate) fn text(rows: &[Row]) -> String {
 }
 
 fn setting(row: &Row) -> String {
-    format!("{}, {} {}", row.knob.method, row.value, row.knob.knob).trim_end().to_owned()
+    format!("{}, {} {}", row.method, row.value, row.knob).trim_end().to_owned()
 }
 
 fn seconds(s: f64) -> String {
@@ -149,14 +149,17 @@ fn ratio(own: &[&Row], other: &Row) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Found, Knob};
+    use super::super::Found;
     use super::*;
     use crate::cost::Cost;
 
     fn rows(settings: &[(f64, f64, f64)]) -> Vec<Row> {
-        let knob = Knob::new(["case", "method", "points"]);
         let row = |&(value, error, cpu_s): &(f64, f64, f64)| {
-            let mut row = knob.row(value, Found::exact(error, Cost { cpu_s, wall_s: 0.0, peak_mem_bytes: 0.0 }));
+            let mut row = Row::new(
+                ["case", "method", "points"],
+                value,
+                Found::exact(error, Cost { cpu_s, wall_s: 0.0, peak_mem_bytes: 0.0 }),
+            );
             row.is_on_front = true;
             row
         };
