@@ -3,7 +3,8 @@
 use crate::sources::is_test_file;
 use fixtures::failure::Failure;
 use sha2::{Digest, Sha256};
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use walkdir::WalkDir;
 
 /// Twelve bytes in hexadecimal of the parameters and of the files and folders in `places`, below `root`; tests do not count.
 ///
@@ -16,29 +17,15 @@ pub(crate) fn cause(root: &Path, parameters: &[&str], places: &[&str]) -> Result
         hash.update(bytes);
     };
     parameters.iter().for_each(|parameter| add(parameter.as_bytes()));
-    let mut files = Vec::new();
-    places.iter().try_for_each(|place| collect(&root.join(place), &mut files))?;
-    for file in files {
-        let name = file.strip_prefix(root)?.to_string_lossy().into_owned();
-        if !is_test_file(&name) {
+    for file in places.iter().flat_map(|place| WalkDir::new(root.join(place)).sort_by_file_name()) {
+        let file = file?;
+        let name = file.path().strip_prefix(root)?.to_string_lossy();
+        if file.file_type().is_file() && !is_test_file(&name) {
             add(name.as_bytes());
-            add(&std::fs::read(&file)?);
+            add(&std::fs::read(file.path())?);
         }
     }
     Ok(hash.finalize().iter().take(12).map(|b| format!("{b:02x}")).collect())
-}
-
-/// Files of a place, in the order of their names.
-fn collect(place: &Path, files: &mut Vec<PathBuf>) -> Result<(), Failure> {
-    if place.is_file() {
-        files.push(place.to_owned());
-        return Ok(());
-    }
-    let entries =
-        std::fs::read_dir(place).map_err(|e| Failure::new(format!("no files in {}: {e}", place.display())))?;
-    let mut paths = entries.map(|entry| Ok(entry?.path())).collect::<std::io::Result<Vec<_>>>()?;
-    paths.sort();
-    paths.iter().try_for_each(|path| collect(path, files))
 }
 
 #[cfg(test)]

@@ -39,16 +39,15 @@ struct Scene {
 }
 
 pub(crate) fn run(options: &Options) -> Outcome {
-    let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-forecast"));
-    std::fs::create_dir_all(&folder)?;
+    let (program, folder) = (program(options.program.as_deref())?, tempfile::tempdir()?);
     let Scenes { empty, scene } = toml::from_str(include_str!("forecast.toml"))?;
-    let [_, [_, empty_bytes]] = measured(&program, &folder, &empty, "run")?;
+    let [_, [_, empty_bytes]] = measured(&program, folder.path(), &empty, "run")?;
     println!("a run of next to nothing: {:.1} MB", empty_bytes / 1e6);
     println!("{:<28} time: forecast, run [s], ratio; memory: forecast, run [MB], ratio", "scene");
     let mut beyond = Vec::new();
     let wanted = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
     for Scene { name, command, text } in scene.iter().filter(|s| wanted(&s.name)) {
-        let [[forecast_s, forecast_bytes], [time_s, bytes]] = measured(&program, &folder, text, command)?;
+        let [[forecast_s, forecast_bytes], [time_s, bytes]] = measured(&program, folder.path(), text, command)?;
         let bytes = (bytes - empty_bytes).max(1e5);
         let ratios = [forecast_s / time_s, forecast_bytes / bytes];
         let time = format!("{forecast_s:>10.2} {time_s:>10.2} {:>6.2}", ratios[0]);
@@ -57,7 +56,6 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let inside = ratios.iter().zip(MOST).all(|(ratio, most)| (1.0 / most..=most).contains(ratio));
         beyond.extend((!inside).then_some(name));
     }
-    std::fs::remove_dir_all(&folder)?;
     unless(&format!("beyond {} in time or {} in memory", MOST[0], MOST[1]), &beyond)
 }
 

@@ -34,20 +34,20 @@ pub(crate) struct Options {
 }
 
 pub(crate) fn run(options: &Options) -> Outcome {
-    let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-fuzz"));
-    std::fs::create_dir_all(&folder)?;
+    let (program, folder) = (program(options.program.as_deref())?, tempfile::tempdir()?);
+    let folder = folder.path();
     let (mut good, mut ran, mut faults) = (0, 0, Vec::new());
     for index in options.first..options.first + options.count {
         let text = scene(options.seed, index);
         std::fs::write(folder.join("s.toml"), &text)?;
-        let check = watch(&program, &["check", "s.toml", "--json", "--threads", "1"], &folder, options.limit_s)?;
+        let check = watch(&program, &["check", "s.toml", "--json", "--threads", "1"], folder, options.limit_s)?;
         good += u64::from(check.code == Some(0));
         let is_short = check.code == Some(0) && forecast_s(&check.stdout) < options.run_below_s;
         ran += u64::from(is_short);
         let fault = match (fault_of(&check, &[Some(0), Some(2)]), is_short) {
             (None, true) => {
                 let words = ["run", "s.toml", "--out", "out", "--quiet", "--threads", "1"];
-                let run = watch(&program, &words, &folder, options.limit_s)?;
+                let run = watch(&program, &words, folder, options.limit_s)?;
                 std::fs::remove_dir_all(folder.join("out")).ok();
                 fault_of(&run, &[Some(0)]).map(|fault| format!("check passes it, run {fault}"))
             }
@@ -58,7 +58,6 @@ pub(crate) fn run(options: &Options) -> Outcome {
             faults.push(index);
         }
     }
-    std::fs::remove_dir_all(&folder)?;
     let refused = options.count - good;
     println!("{} scenes: {refused} refused, {good} good, {ran} of these run; {} faults", options.count, faults.len());
     unless(&format!("faults in the scenes of seed {}", options.seed), &faults)

@@ -52,13 +52,13 @@ struct Package {
 
 pub(crate) fn run(options: &Options) -> Outcome {
     let Scenes { whole, without, package } = toml::from_str(include_str!("left_out.toml"))?;
-    let (program, folder) = (program(options.program.as_deref())?, std::env::temp_dir().join("wakescope-left-out"));
-    std::fs::create_dir_all(&folder)?;
+    let (program, folder) = (program(options.program.as_deref())?, tempfile::tempdir()?);
+    let folder = folder.path();
     let mut text = String::from("| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n");
     for Without { name, keys } in &without {
         let mut scene = whole.clone();
         keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value))?;
-        let run = run_scene(&program, &folder, &toml::to_string(&scene)?, &["run"])?;
+        let run = run_scene(&program, folder, &toml::to_string(&scene)?, &["run"])?;
         let sizes = std::fs::read_dir(folder.join("out"))?.map(|file| Ok(file?.metadata()?.len()));
         let bytes = sizes.sum::<std::io::Result<u64>>()? as f64;
         let name = if keys.is_empty() { name.clone() } else { format!("without {name}") };
