@@ -80,10 +80,9 @@ pub(crate) fn run_scene(program: &Path, folder: &Path, scene: &str, words: &[&st
 
 /// Runs `program` with `words` in `folder` for at most `seconds` of processor or six times as much of the clock.
 pub(crate) fn watch(program: &Path, words: &[&str], folder: &Path, seconds: f64) -> Result<Watched, Failure> {
-    let io = |e: std::io::Error| Failure::new(format!("cannot run {}: {e}", program.display()));
     // Output to files: a pipe that nobody reads would stop the process.
     let (out, err) = (folder.join("stdout"), folder.join("stderr"));
-    let to = |path: &Path| std::fs::File::create(path).map(Stdio::from).map_err(io);
+    let to = |path: &Path| std::fs::File::create(path).map(Stdio::from);
     let mut child = Command::new(program)
         .args(words)
         .current_dir(folder)
@@ -91,25 +90,20 @@ pub(crate) fn watch(program: &Path, words: &[&str], folder: &Path, seconds: f64)
         .stdout(to(&out)?)
         .stderr(to(&err)?)
         .spawn()
-        .map_err(io)?;
+        .map_err(|e| Failure::new(format!("cannot run {}: {e}", program.display())))?;
     let begun = Instant::now();
     let (mut cpu_s, mut peak_bytes, mut hung) = (0.0, 0.0_f64, false);
-    loop {
-        // A process that has ended keeps its times until it is waited for.
-        let ended = sample(&child, &mut cpu_s, &mut peak_bytes);
-        if ended {
-            break;
-        }
-        if cpu_s > seconds || begun.elapsed().as_secs_f64() > 6.0 * seconds {
-            hung = true;
-            child.kill().map_err(io)?;
-            break;
-        }
+    // A process that has ended keeps its times until it is waited for.
+    while !hung && !sample(&child, &mut cpu_s, &mut peak_bytes) {
+        hung = cpu_s > seconds || begun.elapsed().as_secs_f64() > 6.0 * seconds;
         std::thread::sleep(Duration::from_millis(1));
     }
-    let code = child.wait().map_err(io)?.code();
-    let read = |path: &Path| Ok::<_, Failure>(String::from_utf8_lossy(&std::fs::read(path).map_err(io)?).into_owned());
-    Ok(Watched { code, hung, cpu_s, peak_bytes, stdout: read(&out)?, stderr: read(&err)? })
+    if hung {
+        child.kill()?;
+    }
+    let code = child.wait()?.code();
+    let [stdout, stderr] = [std::fs::read(out)?, std::fs::read(err)?].map(|text| String::from_utf8_lossy(&text).into());
+    Ok(Watched { code, hung, cpu_s, peak_bytes, stdout, stderr })
 }
 
 /// Brings time and memory up to date; whether the process has ended.
