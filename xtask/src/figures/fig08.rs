@@ -59,7 +59,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut figure = Figure::stacked(panels).titled(&title);
     (figure.columns, figure.width) = (2, 1300.0);
     let table = Table::stack([map_table(&early)?, map_table(&late)?])?;
-    let mut out = Rendered::new(&table, &figure, &studies[1].provenance())?;
+    let mut out = Rendered::new(&table, &figure, &studies[1].plan.scene.provenance())?;
     out.values = vec![words];
     out.claims.push(Claim::exact(
         "F8",

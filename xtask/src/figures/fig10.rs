@@ -30,7 +30,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         };
         found.push((name, Estimate::of(BATCHES, of_rms), correlation(&study.map.std_m_s, &gradient)));
     }
-    let origin = studies[0].provenance();
+    let origin = studies[0].plan.scene.provenance();
     let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.values = vec![realisations.to_string(), sight.words];

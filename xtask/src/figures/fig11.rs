@@ -44,7 +44,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             parts = of_map;
         }
     }
-    let origin = studies[0].provenance();
+    let origin = studies[0].plan.scene.provenance();
     let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
     out.marks = vec![sight.mark];
     out.values = vec![studies[0].map.scans.len().to_string(), sight.words];

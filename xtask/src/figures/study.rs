@@ -4,7 +4,6 @@ use super::context::*;
 use crate::statistics::MOST_BATCHES;
 use crate::wakes;
 use std::path::PathBuf;
-use wakescope_sim::io::Provenance;
 use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
@@ -172,10 +171,6 @@ impl Study {
         let row = |el: &f64| map.range_m.iter().map(|&r| distance(*el, r)).collect();
         let distance_m = map.elevation_rad.iter().map(row).collect();
         Self { cores, plan, map, distance_m }
-    }
-
-    pub(super) fn provenance(&self) -> Provenance {
-        self.plan.scene.provenance()
     }
 
     /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).
