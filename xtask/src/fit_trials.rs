@@ -11,7 +11,6 @@ pub(crate) mod trial;
 
 use crate::cost::measured;
 use crate::statistics::{Estimate, mean};
-use fixtures::WINDOW;
 use fixtures::failure::{Failure, Outcome};
 use fixtures::pair::{PairCase, PairScan};
 use map_bound::{MapBound, MapSetting};
@@ -151,17 +150,8 @@ impl Fits {
 /// What a map tells of the circulation at best, beside the bound of the signals.
 fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation: Sharing) -> Outcome {
     let setup = pair.setup()?;
-    let setting = MapSetting {
-        model: setup.wake,
-        sampling: pair.sampling,
-        window: WINDOW,
-        sigma_s: pair.sigma_s(),
-        snr: pair.snr,
-        noise: setup.noise,
-        radius_m: options.radius_m,
-        elevation_rad: &pair.elevation_rad,
-        range_m: &pair.range_m,
-    };
+    let (snr, radius_m, range_m) = (pair.snr, options.radius_m, &pair.range_m);
+    let setting = MapSetting { scan: &setup, sigma_s: pair.sigma_s(), snr, radius_m, range_m };
     let (model, map) = (ScanModel::new(&setup, |_, _| pair.snr, truth)?, MapBound::new(&setting, truth)?);
     let strongest = Parameter::LeftCirculation as usize;
     let show = |name: &str, deviation: f64| {

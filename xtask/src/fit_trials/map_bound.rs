@@ -14,6 +14,7 @@
 //! per cent. Check: one window of uniform wind against its Cramer-Rao bound; lines far apart.
 
 use super::banded::Banded;
+use fixtures::WINDOW;
 use fixtures::failure::Failure;
 use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
 use num_complex::Complex;
@@ -22,7 +23,7 @@ use std::f64::consts::{PI, SQRT_2};
 use wakescope_estimate::Sampling;
 use wakescope_estimate::bound::{Noise, WindowModel};
 use wakescope_estimate::estimators::likelihood_tapers;
-use wakescope_estimate::vortex_fit::{PARAMETERS, Wake, WakeModel};
+use wakescope_estimate::vortex_fit::{PARAMETERS, ScanSetup, Wake};
 use wakescope_estimate::window::SPEED_OF_LIGHT_M_S;
 
 type C64 = Complex<f64>;
@@ -43,18 +44,13 @@ const KINDS: usize = 2;
 
 /// How a map is made.
 pub(super) struct MapSetting<'a> {
-    pub(super) model: WakeModel,
-    /// Real samples as they are recorded.
-    pub(super) sampling: Sampling,
-    /// Samples of a window; a multiple of 4.
-    pub(super) window: usize,
+    /// Wake, lines, and real samples as they are recorded.
+    pub(super) scan: &'a ScanSetup,
     /// Half-width of |f|^2 at 1/e \[s\].
     pub(super) sigma_s: f64,
     pub(super) snr: f64,
-    pub(super) noise: Noise,
     /// Of the regions \[m\].
     pub(super) radius_m: f64,
-    pub(super) elevation_rad: &'a [f64],
     /// A multiple of 4 samples apart.
     pub(super) range_m: &'a [f64],
 }
@@ -102,7 +98,7 @@ struct Cell {
 impl MapBound {
     pub(super) fn new(setting: &MapSetting<'_>, wake: &Wake) -> Result<Self, Failure> {
         let grid = Grid::new(setting)?;
-        let lines = setting.elevation_rad.par_iter().map(|&elevation_rad| Line::new(&grid, wake, elevation_rad));
+        let lines = setting.scan.elevation_rad.par_iter().map(|&elevation_rad| Line::new(&grid, wake, elevation_rad));
         let lines: Vec<Line> = lines
             .collect::<Option<_>>()
             .ok_or_else(|| Failure::new("the covariance of a line is not positive definite".to_owned()))?;
@@ -170,15 +166,15 @@ fn inverse(a: &Array2<f64>) -> Option<Array2<f64>> {
 
 impl<'a> Grid<'a> {
     fn new(setting: &'a MapSetting<'a>) -> Result<Self, Failure> {
-        let (period_s, window) = (4.0 * setting.sampling.period_s(), setting.window / 4);
+        let (period_s, window) = (4.0 * setting.scan.sampling.period_s(), WINDOW / 4);
         let gap_m = setting.range_m.windows(2).next().map_or(0.0, |pair| pair[1] - pair[0]);
         let step = 2.0 * gap_m / SPEED_OF_LIGHT_M_S / period_s;
-        if !setting.window.is_multiple_of(4) || window == 0 || (step - step.round()).abs() > 1e-6 {
-            return Err(Failure::new("the bound of a map wants windows and gates of a multiple of 4 samples".into()));
+        if (step - step.round()).abs() > 1e-6 {
+            return Err(Failure::new("the bound of a map wants gates of a multiple of 4 samples".into()));
         }
         let step = step.round() as usize;
-        let band_hz = setting.sampling.band_hz.1 - setting.sampling.band_hz.0;
-        let baseband = Sampling::baseband(period_s.recip(), setting.sampling.wavelength_m, band_hz)?;
+        let band_hz = setting.scan.sampling.band_hz.1 - setting.scan.sampling.band_hz.0;
+        let baseband = Sampling::baseband(period_s.recip(), setting.scan.sampling.wavelength_m, band_hz)?;
         let model = WindowModel::gaussian_pulse(&baseband, window, setting.sigma_s, Noise::White)?;
         let mut tapers = Array2::zeros((window, window));
         for taper in likelihood_tapers(&model, setting.snr)? {
@@ -187,7 +183,7 @@ impl<'a> Grid<'a> {
             });
         }
         let samples = window + (setting.range_m.len() - 1) * step;
-        let noise = |lag: usize| match (setting.noise, lag) {
+        let noise = |lag: usize| match (setting.scan.noise, lag) {
             (Noise::White, 0) => (band_hz * period_s).recip(),
             (Noise::White, _) => 0.0,
             (_, 0) => 1.0,
@@ -203,7 +199,7 @@ impl<'a> Grid<'a> {
 
     /// Phase per velocity of a lag, k T m \[rad s/m\].
     fn turn(&self, lag: f64) -> f64 {
-        4.0 * PI / self.of.sampling.wavelength_m * self.period_s * lag
+        4.0 * PI / self.of.scan.sampling.wavelength_m * self.period_s * lag
     }
 
     /// Mean correlogram of a gate of a line with that covariance, lags from 0 on.
@@ -224,7 +220,7 @@ impl Line {
         let layers = (length_m / LAYER_M).ceil() as usize;
         let at_m = |layer: usize| 0.5 * SPEED_OF_LIGHT_M_S * grid.first_s - reach_m + (layer as f64 + 0.5) * LAYER_M;
         let winds: Vec<(f64, [f64; PARAMETERS])> =
-            (0..layers).map(|layer| setting.model.gradient(wake, at_m(layer), elevation_rad)).collect();
+            (0..layers).map(|layer| setting.scan.wake.gradient(wake, at_m(layer), elevation_rad)).collect();
         let middle = 0.5 * grid.samples as f64;
         let seen = |(k, layer): (usize, usize)| {
             let time_s = grid.first_s + k as f64 * grid.period_s - 2.0 * at_m(layer) / SPEED_OF_LIGHT_M_S;
@@ -282,8 +278,8 @@ impl Cell {
             }
             sums
         };
-        let band_hz = setting.sampling.band_hz.1 - setting.sampling.band_hz.0;
-        let fastest_m_s = 0.25 * setting.sampling.wavelength_m * band_hz;
+        let band_hz = setting.scan.sampling.band_hz.1 - setting.scan.sampling.band_hz.0;
+        let fastest_m_s = 0.25 * setting.scan.sampling.wavelength_m * band_hz;
         let place = |i: usize| fastest_m_s * (2.0 * i as f64 / PLACES as f64 - 1.0);
         let highest = |a: &f64, b: &f64| spectrum(&lags[0], *a)[0].total_cmp(&spectrum(&lags[0], *b)[0]);
         let mut velocity_m_s = (0..PLACES).map(place).max_by(highest).unwrap_or(0.0);
@@ -304,14 +300,14 @@ impl Cell {
 
 /// Lines of a region with their shares: the windows of each chord over those of all.
 fn shares(setting: &MapSetting<'_>, line: usize, range_m: f64) -> Vec<(usize, f64)> {
-    let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * setting.sampling.period_s();
+    let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * setting.scan.sampling.period_s();
     let windows = |other: usize| {
-        let away_m = range_m * (setting.elevation_rad[other] - setting.elevation_rad[line]).abs();
+        let away_m = range_m * (setting.scan.elevation_rad[other] - setting.scan.elevation_rad[line]).abs();
         let chord_m2 = setting.radius_m * setting.radius_m - away_m * away_m;
         if chord_m2 >= 0.0 || other == line { 2.0 * (chord_m2.max(0.0).sqrt() / sample_m).floor() + 1.0 } else { 0.0 }
     };
     let all: Vec<(usize, f64)> =
-        (0..setting.elevation_rad.len()).map(|other| (other, windows(other))).filter(|(_, n)| *n > 0.0).collect();
+        (0..setting.scan.elevation_rad.len()).map(|other| (other, windows(other))).filter(|(_, n)| *n > 0.0).collect();
     let sum: f64 = all.iter().map(|(_, n)| n).sum();
     all.into_iter().map(|(other, n)| (other, n / sum)).collect()
 }
@@ -388,8 +384,9 @@ fn cholesky(mut a: Array2<C64>) -> Option<Array2<C64>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use fixtures::{WINDOW, sampling};
+    use fixtures::sampling;
     use wakescope_estimate::SignalKind;
+    use wakescope_estimate::vortex_fit::{PulseShape, WakeModel};
 
     const SIGMA_S: f64 = 120.112e-9;
     const WIND: [[usize; 1]; 1] = [[8]];
@@ -399,18 +396,17 @@ mod tests {
     }
 
     fn deviation(noise: Noise, radius_m: f64, elevation_rad: &[f64], range_m: &[f64]) -> [f64; 2] {
-        let sampling = sampling().unwrap();
-        let setting = MapSetting {
-            model: WakeModel::default(),
-            sampling,
-            window: WINDOW,
-            sigma_s: SIGMA_S,
-            snr: 2.0,
+        let scan = ScanSetup {
+            sampling: sampling().unwrap(),
+            kind: SignalKind::Real,
             noise,
-            radius_m,
-            elevation_rad,
-            range_m,
+            pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
+            wake: WakeModel::default(),
+            elevation_rad: elevation_rad.to_vec(),
+            first_sample_time_s: 0.0,
+            record_samples: 0,
         };
+        let setting = MapSetting { scan: &scan, sigma_s: SIGMA_S, snr: 2.0, radius_m, range_m };
         let groups: Vec<Vec<usize>> = WIND.iter().map(|g| g.to_vec()).collect();
         MapBound::new(&setting, &calm()).unwrap().deviations(&groups, false).unwrap()
     }
