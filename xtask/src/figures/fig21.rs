@@ -51,16 +51,10 @@ fn true_m2_s() -> f64 {
     scene::VortexPair::default().circulation_m2_s
 }
 
-/// One way to look at the wake, as it stands in the list.
-#[derive(Deserialize)]
-struct Listed {
-    name: String,
-    scene: String,
-}
-
+/// The ways to look at the wake, each with its scene.
 #[derive(Deserialize)]
 struct List {
-    view: Vec<Listed>,
+    view: Vec<(String, String)>,
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
@@ -75,7 +69,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-fn view(context: &Context, Listed { name, scene }: Listed, scans: u64) -> Result<View, Failure> {
+fn view(context: &Context, (name, scene): (String, String), scans: u64) -> Result<View, Failure> {
     let scene = SceneFile::parse(&scene, Path::new("fig21.toml"))?.scene;
     let one = |scan: u64| -> Result<Scan, Failure> {
         let mut file = context.scene_file(scene.clone())?;

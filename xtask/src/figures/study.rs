@@ -140,8 +140,8 @@ pub(super) struct Study {
     cores: Vec<(f64, f64)>,
     pub(super) plan: Plan,
     pub(super) map: VelocityEstimates,
-    /// Distance to the nearer core, m, and range from it along the line, m: `[line][gate]`.
-    pub(super) distance_m: Vec<Vec<f64>>,
+    /// Distance to the nearer core, m: \[line, gate\].
+    distance_m: Array2<f64>,
 }
 
 impl Study {
@@ -164,12 +164,12 @@ impl Study {
 
     fn of(sight: &Sight, plan: Plan, map: VelocityEstimates) -> Self {
         let cores = sight.cores.clone();
-        let distance = |el: f64, r: f64| {
+        let distance = |(line, gate): (usize, usize)| {
+            let (el, r) = (map.elevation_rad[line], map.range_m[gate]);
             let (y, z) = (r * el.cos(), plan.scene.scene.scan.lidar_height_m + r * el.sin());
             cores.iter().map(|c| (y - c.0).hypot(z - c.1)).fold(f64::INFINITY, f64::min)
         };
-        let row = |el: &f64| map.range_m.iter().map(|&r| distance(*el, r)).collect();
-        let distance_m = map.elevation_rad.iter().map(row).collect();
+        let distance_m = Array2::from_shape_fn((map.elevation_rad.len(), map.range_m.len()), distance);
         Self { cores, plan, map, distance_m }
     }
 
@@ -185,9 +185,8 @@ impl Study {
         let level = &self.map.level;
         let most: Vec<f64> = level.columns().into_iter().map(|gate| gate.iter().copied().fold(0.0, f64::max)).collect();
         let is_whole = |(i, j): (usize, usize)| level[[i, j]] >= 0.9 * most[j] && j > 0 && j + 1 < most.len();
-        let rows = self.distance_m.iter().enumerate();
-        let all = rows.flat_map(|(i, row)| row.iter().enumerate().map(move |(j, d)| ((i, j), *d)));
-        all.filter(|(cell, d)| accept(*d, cell.1) && is_whole(*cell)).map(|(cell, _)| cell).collect()
+        let all = self.distance_m.indexed_iter();
+        all.filter(|(cell, d)| accept(**d, cell.1) && is_whole(*cell)).map(|(cell, _)| cell).collect()
     }
 
     /// Mean of a function of the errors of a cell over the scans, without those of one batch.
