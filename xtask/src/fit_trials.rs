@@ -15,6 +15,7 @@ use fixtures::failure::{Failure, Outcome};
 use fixtures::pair::{PairCase, PairScan};
 use map_bound::{MapBound, MapSetting};
 use ndarray::Array2;
+use std::fmt::Display;
 use std::path::PathBuf;
 use trial::{FitTrial, RADIUS_M};
 use wakescope_estimate::vortex_fit::{
@@ -109,19 +110,13 @@ struct Fits {
 
 impl Fits {
     /// Keeps a fit, or tells why there is none.
-    fn keep(&mut self, scan: usize, fit: Result<Found, String>, cpu_s: f64) -> Option<Wake> {
-        match fit {
-            Ok(found) => {
-                self.cpu_s += cpu_s;
-                self.found.push(found);
-                self.found.last().map(|found| found.0)
-            }
-            Err(error) => {
-                println!("scan {scan}, {}: {error}", self.name);
-                self.failures += 1;
-                None
-            }
-        }
+    fn keep(&mut self, scan: usize, fit: Result<Found, impl Display>, cpu_s: f64) -> Option<Wake> {
+        let found = fit.inspect_err(|error| println!("scan {scan}, {}: {error}", self.name)).ok();
+        let wake = found.as_ref().map(|(wake, _)| *wake);
+        self.failures += usize::from(wake.is_none());
+        self.cpu_s += wake.map_or(0.0, |_| cpu_s);
+        self.found.extend(found);
+        wake
     }
 
     fn show(&self, truth: &Wake, bound: &[f64; PARAMETERS]) {
@@ -204,7 +199,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
         for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
             let (fit, cost) = measured(|| Ok(trial.map(free(core), prior)))?;
-            let found = fit.map(|MapFit { wake, covariance, .. }| (wake, covariance)).map_err(|e| e.to_string());
+            let found = fit.map(|MapFit { wake, covariance, .. }| (wake, covariance));
             let kept = fits.keep(scan, found, cost.cpu_s);
             guess = guess.or(kept);
         }
@@ -214,8 +209,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
             let (fit, cost) = measured(|| Ok(trial.signals(of_signals, guess, starts)))?;
-            let found = fit.as_ref().map(|fit| (fit.wake, fit.covariance.clone())).map_err(ToString::to_string);
-            signals[place].keep(scan, found, cost.cpu_s);
+            signals[place].keep(scan, fit.as_ref().map(|fit| (fit.wake, fit.covariance.clone())), cost.cpu_s);
             Ok(fit.ok())
         };
         let (Some(found), at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?) else {

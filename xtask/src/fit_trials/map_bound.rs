@@ -16,7 +16,7 @@
 use super::banded::Banded;
 use fixtures::WINDOW;
 use fixtures::failure::Failure;
-use ndarray::{Array1, Array2, ArrayView1, ArrayView2, Axis, Zip};
+use ndarray::{Array1, Array2, ArrayView2};
 use num_complex::Complex;
 use rayon::prelude::*;
 use std::f64::consts::{PI, SQRT_2};
@@ -137,21 +137,22 @@ impl MapBound {
             // what varies so much tells nothing
             (1..self.slopes.len()).step_by(KINDS).for_each(|i| *covariance.at(i, i) *= USELESS);
         }
-        let slope = |(i, group): (usize, usize)| groups[group].iter().map(|&place| self.slopes[i][place]).sum::<f64>();
-        let slopes = Array2::from_shape_fn((self.slopes.len(), groups.len()), slope);
-        let weighted = &slopes / &covariance.diagonal().insert_axis(Axis(1));
-        let of_columns = |a: &Array2<f64>, of: &dyn Fn(ArrayView1<'_, f64>) -> Array1<f64>| {
-            let mut out = a.clone();
-            Zip::from(out.columns_mut()).and(a.columns()).for_each(|mut out, column| out.assign(&of(column)));
-            out
-        };
-        let bread = inverse(&weighted.t().dot(&slopes))?;
-        let about = of_columns(&weighted, &|x| covariance.times(x));
-        let sandwich = bread.dot(&weighted.t().dot(&about)).dot(&bread);
+        let slope =
+            |group: &Vec<usize>| self.slopes.iter().map(|of| group.iter().map(|&place| of[place]).sum()).collect();
+        let slopes: Vec<Array1<f64>> = groups.iter().map(slope).collect();
+        let weighted: Vec<_> = slopes.iter().map(|slopes| slopes / &covariance.diagonal()).collect();
+        let about: Vec<_> = weighted.iter().map(|x| covariance.times(x.view())).collect();
+        let bread = inverse(&products(&weighted, &slopes))?;
+        let sandwich = bread.dot(&products(&weighted, &about)).dot(&bread);
         let factor = covariance.factor()?;
-        let white = of_columns(&slopes, &|j| factor.forward(j.to_owned()));
-        Some([inverse(&white.t().dot(&white))?, sandwich].map(|variances| variances[[0, 0]].sqrt()))
+        let white: Vec<_> = slopes.into_iter().map(|slopes| factor.forward(slopes)).collect();
+        Some([inverse(&products(&white, &white))?, sandwich].map(|variances| variances[[0, 0]].sqrt()))
     }
+}
+
+/// The scalar products of all columns of one matrix with all of another.
+fn products(a: &[Array1<f64>], b: &[Array1<f64>]) -> Array2<f64> {
+    Array2::from_shape_fn((a.len(), b.len()), |(i, j)| a[i].dot(&b[j]))
 }
 
 /// Inverse of a small positive definite matrix.
@@ -161,7 +162,7 @@ fn inverse(a: &Array2<f64>) -> Option<Array2<f64>> {
     let factor = band.factor()?;
     let unit = Array2::<f64>::eye(a.nrows());
     let columns: Vec<Array1<f64>> = unit.rows().into_iter().map(|row| factor.forward(row.to_owned())).collect();
-    Some(Array2::from_shape_fn(a.dim(), |(i, j)| columns[i].dot(&columns[j])))
+    Some(products(&columns, &columns))
 }
 
 impl<'a> Grid<'a> {
