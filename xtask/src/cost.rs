@@ -32,23 +32,14 @@ impl Cost {
 
 /// Runs a piece of work and measures it.
 pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
-    let (before_s, start) = (cpu_s(), Instant::now());
+    let (before_s, start) = (clock_s(ClockId::ProcessCPUTime), Instant::now());
     let value = work()?;
-    let cpu_s = cpu_s() - before_s;
+    let cpu_s = clock_s(ClockId::ProcessCPUTime) - before_s;
     Ok((value, Cost { cpu_s, wall_s: start.elapsed().as_secs_f64(), peak_mem_bytes: resident_peak_bytes("self") }))
 }
 
-/// Processor time of the process so far, s: of all its threads, those that have ended included.
-pub(crate) fn cpu_s() -> f64 {
-    seconds(ClockId::ProcessCPUTime)
-}
-
-/// Processor time of this thread so far, s.
-pub(crate) fn thread_cpu_s() -> f64 {
-    seconds(ClockId::ThreadCPUTime)
-}
-
-fn seconds(clock: ClockId) -> f64 {
+/// What a clock says, s: that of the process counts all its threads, those that have ended included.
+pub(crate) fn clock_s(clock: ClockId) -> f64 {
     let time = clock_gettime(clock);
     time.tv_sec as f64 + 1e-9 * time.tv_nsec as f64
 }

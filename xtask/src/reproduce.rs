@@ -8,13 +8,14 @@ mod cache;
 mod report;
 
 use crate::claim::{Claim, Kind};
-use crate::cost::{cpu_s, thread_cpu_s};
+use crate::cost::clock_s;
 use crate::figures::context::{Context, Rendered};
 use crate::figures::{self, Figure, Lane};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use rayon::ThreadPool;
+use rustix::time::ClockId;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use wakescope_sim::io::{Table, write_atomic};
@@ -86,8 +87,8 @@ fn drawn(
         None => {
             // Of the other lane the process's own clock would count the work, too.
             let used_s = || match figure.lane() {
-                Lane::Alone => cpu_s(),
-                Lane::Wake | Lane::Formula => pool.broadcast(|_| thread_cpu_s()).into_iter().sum(),
+                Lane::Alone => clock_s(ClockId::ProcessCPUTime),
+                Lane::Wake | Lane::Formula => pool.broadcast(|_| clock_s(ClockId::ThreadCPUTime)).into_iter().sum(),
             };
             let (before_s, start) = (used_s(), Instant::now());
             let mut rendered = pool.install(|| (figure.make)(context))?;
