@@ -18,7 +18,7 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
         scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
         scene
     })?;
-    let parts = profiles::parts(&chapter, " m/s", Profiles::inside_m_s);
+    let parts = profiles::parts(&chapter, " m/s", |p, without| p.excess_m_s(&p.inside, without));
     let whole = profiles::parts(&chapter, " m/s", |p, without| p.inside.rms_m_s(without));
     out.words = format!(
         "Does correlogram accumulation err less than periodogram accumulation inside the vortices, as the chapter has it, at its ratio? As it is: \
@@ -33,8 +33,8 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
 pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.profile.choose([[8; 2], [168; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
     let (mut out, chapter) = compare(context, (2, scans), |scene| with_turbulence(context, scene, 1e-15))?;
-    let peaks = profiles::parts(&chapter, " m/s", Profiles::peak_m_s);
-    let widths = profiles::parts(&chapter, " m", Profiles::width_m);
+    let peaks = profiles::parts(&chapter, " m/s", |p, without| profiles::peak(&p.across_m_s(without)).1);
+    let widths = profiles::parts(&chapter, " m", |p, without| profiles::width_m(&p.across_m_s(without)));
     out.words = format!("Is its profile across a core narrower, too? {} (figure 14).", profiles::told(&widths));
     out.claims = vec![Claim::judged("F14a", &peaks), Claim::judged("F14b", &widths)];
     Ok(out)

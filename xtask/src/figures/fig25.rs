@@ -235,7 +235,7 @@ fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
     let between = |name: &str, a: Case, b: Case| {
         let [a, b] = [find(all, a)?, find(all, b)?];
         let share = |m: &Measured, without| m.of[2].inside.rms_m_s(without) / m.of[0].inside.rms_m_s(without);
-        let found = Estimate::of(a.of[0].inside.batches(), |without| share(a, without) - share(b, without));
+        let found = Estimate::of(a.of[0].inside.of_batch.len(), |without| share(a, without) - share(b, without));
         Ok::<_, Failure>(vec![(name.into(), found, "", Bar::Below(0.0))])
     };
     let turned = [strong, Case { seen: pair.seen, ..strong }];

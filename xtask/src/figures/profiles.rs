@@ -74,33 +74,20 @@ impl Profiles {
     }
 
     /// The error at a mean range less what it is outside there, without one batch, m/s.
-    fn excess_m_s(&self, zone: &Zone, without: Option<usize>) -> f64 {
-        let gates = self.evolution.iter().filter(|gate| gate.estimates(without) > 0.0);
-        let outside = gates.map(|gate| [gate.range_m, gate.rms_m_s(without), gate.estimates(without)]);
+    pub(super) fn excess_m_s(&self, zone: &Zone, without: Option<usize>) -> f64 {
+        let gates = self.evolution.iter().map(|gate| [gate.range_m, gate.rms_m_s(without), gate.sums(without).1]);
+        let outside = gates.filter(|[.., estimates]| *estimates > 0.0);
         zone.rms_m_s(without) - on_line(outside, zone.range_m)
     }
 
-    /// The same inside the vortices.
-    pub(super) fn inside_m_s(&self, without: Option<usize>) -> f64 {
-        self.excess_m_s(&self.inside, without)
-    }
-
     /// The same along the lines that pass a core.
-    fn across_m_s(&self, without: Option<usize>) -> Vec<(f64, f64)> {
+    pub(super) fn across_m_s(&self, without: Option<usize>) -> Vec<(f64, f64)> {
         self.across.iter().map(|(range_m, zone)| (*range_m, self.excess_m_s(zone, without))).collect()
-    }
-
-    pub(super) fn peak_m_s(&self, without: Option<usize>) -> f64 {
-        peak(&self.across_m_s(without)).1
-    }
-
-    pub(super) fn width_m(&self, without: Option<usize>) -> f64 {
-        width_m(&self.across_m_s(without))
     }
 
     /// How far it is from another method on the same signals in a number that both have.
     pub(super) fn less(&self, other: &Self, of: fn(&Self, Option<usize>) -> f64) -> Estimate {
-        Estimate::of(self.inside.batches(), |without| of(self, without) - of(other, without))
+        Estimate::of(self.inside.of_batch.len(), |without| of(self, without) - of(other, without))
     }
 }
 
@@ -122,13 +109,13 @@ pub(super) fn snr_db(study: &Study) -> Result<f64, Failure> {
 }
 
 /// Place and value of the largest number inside a vortex.
-fn peak(across: &[(f64, f64)]) -> (usize, f64) {
+pub(super) fn peak(across: &[(f64, f64)]) -> (usize, f64) {
     let inside = across.iter().enumerate().filter(|(_, p)| p.0.abs() <= INSIDE_M);
     inside.map(|(k, p)| (k, p.1)).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, f64::NAN))
 }
 
 /// Full width at half of the peak, m; straight lines between the gates. NaN where it does not fall that far.
-fn width_m(across: &[(f64, f64)]) -> f64 {
+pub(super) fn width_m(across: &[(f64, f64)]) -> f64 {
     let (top, value) = peak(across);
     let half = 0.5 * value;
     let crossing = |from: (f64, f64), to: (f64, f64)| from.0 + (to.0 - from.0) * (from.1 - half) / (from.1 - to.1);

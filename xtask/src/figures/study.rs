@@ -217,24 +217,16 @@ pub(super) struct Zone {
     /// Mean range of the cells, m.
     pub(super) range_m: f64,
     /// Sum of the squares of each batch, m^2/s^2, and how many they are.
-    of_batch: Vec<(f64, f64)>,
+    pub(super) of_batch: Vec<(f64, f64)>,
     /// Bias and standard deviation.
     pub(super) average: CellAverage,
 }
 
 impl Zone {
     /// Sum of the squares and number of the estimates without one batch.
-    fn sums(&self, without: Option<usize>) -> (f64, f64) {
+    pub(super) fn sums(&self, without: Option<usize>) -> (f64, f64) {
         let kept = self.of_batch.iter().enumerate().filter(|(batch, _)| Some(*batch) != without);
         kept.fold((0.0, 0.0), |sums, (_, of)| (sums.0 + of.0, sums.1 + of.1))
-    }
-
-    pub(super) fn batches(&self) -> usize {
-        self.of_batch.len()
-    }
-
-    pub(super) fn estimates(&self, without: Option<usize>) -> f64 {
-        self.sums(without).1
     }
 
     /// Root mean square error without one batch, m/s.
@@ -244,12 +236,12 @@ impl Zone {
     }
 
     pub(super) fn rms(&self) -> Estimate {
-        Estimate::of(self.batches(), |without| self.rms_m_s(without))
+        Estimate::of(self.of_batch.len(), |without| self.rms_m_s(without))
     }
 
     /// How far its error is from that of another on the same scans, as a share of the latter.
     pub(super) fn over(&self, other: &Self) -> Estimate {
-        Estimate::of(self.batches(), |without| self.rms_m_s(without) / other.rms_m_s(without) - 1.0)
+        Estimate::of(self.of_batch.len(), |without| self.rms_m_s(without) / other.rms_m_s(without) - 1.0)
     }
 }
 
