@@ -3,13 +3,14 @@
 //! A case is a number within bounds or a refusal in stated words; a panic is neither. What the cases are: the lists of the
 //! numerics, which a solver that fears nothing would pass.
 
+use crate::figures::context::Rendered;
 use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::{provenance, root, unless};
 use fixtures::failure::Outcome;
 use std::path::PathBuf;
 use std::time::Instant;
-use wakescope_sim::io::{FileGroup, Table};
+use wakescope_sim::io::Table;
 use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 use wakescope_tests::extreme::{Ended, PARTS, Row, rows};
 
@@ -42,10 +43,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     let folder = options.out.clone().unwrap_or_else(|| root().join("target/stability"));
     let origin = provenance(&format!("profile = \"{}\"\n", options.profile.name()), 1);
-    let mut files = FileGroup::new(&folder);
-    files.add("stability.csv", table(&rows).to_csv(&origin)?)?;
-    files.add("stability.svg", picture(&rows).svg(&origin)?)?;
-    files.commit()?;
+    Rendered::new(&table(&rows), &picture(&rows), &origin)?.files_in(&folder, "stability")?.commit()?;
     let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
     println!(
         "{} of {} cases end as they must, in {:.1} s; {}",
