@@ -14,9 +14,9 @@ struct Changes {
     /// By section: a short scan, so that a change may make it longer and yet let it end soon.
     short: BTreeMap<String, Table>,
     /// Section, key in it, table of another kind.
-    kinds: Vec<(String, String, Table)>,
+    kinds: Vec<(String, String, Value)>,
     /// Section and key that the default scene does not have, and a usual value.
-    absent: Vec<(String, String, f64)>,
+    absent: Vec<(String, String, Value)>,
     /// What a key takes.
     words: BTreeMap<String, Vec<String>>,
 }
@@ -35,10 +35,13 @@ pub(super) fn scene(seed: u64, index: u64) -> String {
     let changes = 1 + pick(&mut rng, 3) * pick(&mut rng, 2) + 6 * (pick(&mut rng, 12) / 11);
     for _ in 0..changes {
         match pick(&mut rng, 10) {
-            0..2 => other_kind(&mut scene, &mut rng),
+            0..2 => {
+                let (section, key, kind) = &CHANGES.kinds[pick(&mut rng, CHANGES.kinds.len())];
+                put(&mut scene, section, key, kind.clone());
+            }
             2 => {
                 let (section, key, value) = &CHANGES.absent[pick(&mut rng, CHANGES.absent.len())];
-                let value = changed(&Value::Float(*value), key, &mut rng);
+                let value = changed(value, key, &mut rng);
                 put(&mut scene, section, key, value);
             }
             _ => change_a_key(&mut scene, &mut rng),
@@ -79,11 +82,6 @@ fn put(scene: &mut Table, section: &str, key: &str, value: Value) {
         Value::Table(table) => drop(table.insert(key.into(), value)),
         other => *other = Value::Table(Table::from_iter([(key.into(), value)])),
     }
-}
-
-fn other_kind(scene: &mut Table, rng: &mut Xoshiro256PlusPlus) {
-    let (section, key, table) = &CHANGES.kinds[pick(rng, CHANGES.kinds.len())];
-    put(scene, section, key, Value::Table(table.clone()));
 }
 
 /// Goes down the tables at random until it meets a value.
