@@ -15,6 +15,7 @@ mod method;
 mod multigrid;
 mod solver;
 mod transform;
+mod v_cycle;
 
 #[cfg(test)]
 mod long_waves_tests;

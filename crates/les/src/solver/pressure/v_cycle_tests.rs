@@ -1,6 +1,7 @@
 //! Parts of the cycle: symmetry, interpolation, colours, relaxed lines.
 
 use super::super::super::mesh::{Direction, Spread, Wall};
+use super::super::apply::stiffness;
 use super::*;
 
 /// The mesh of a direction with the operator of the coarser ones.
