@@ -294,8 +294,17 @@ impl WindowModel {
         Ok(Self { gaussian_sigma_s: Some(pulse_sigma_s), ..Self::with_envelope(sampling, envelope, noise)? })
     }
 
-    /// Any real, symmetric envelope \[n, m\] of the covariance, the carrier at 0 Hz removed. A point target with a deterministic amplitude
-    /// a(n) in the window and a random phase and strength has a(n) a(m).
+    /// Point target with a deterministic amplitude a(n) in the window and a random phase and strength: envelope a(n) a(m).
+    ///
+    /// # Errors
+    /// As [`WindowModel::gaussian_pulse`].
+    pub fn point_target(sampling: &Sampling, amplitude: &[f64], noise: Noise) -> Result<Self, Error> {
+        let window_samples = amplitude.len();
+        let envelope = Array2::from_shape_fn((window_samples, window_samples), |(n, m)| amplitude[n] * amplitude[m]);
+        Self::with_envelope(sampling, envelope, noise)
+    }
+
+    /// Any real, symmetric envelope \[n, m\] of the covariance, the carrier at 0 Hz removed.
     ///
     /// # Errors
     /// [`Error::Empty`], [`Error::Length`], [`Error::Band`] or [`Error::OutOfRange`] for impossible input.

@@ -141,8 +141,7 @@ fn point_target_bound_is_its_closed_form() {
     // R = u u^H + q I: information per (m/s)^2 = 2 gain^2 / (1 + gain) * spread * (4 pi / lambda)^2, with gain = |u|^2 / q and
     // spread the variance of time weighted by |u|^2
     let amplitude: Vec<f64> = (0..64).map(|n| (-((n as f64 - 20.0) / 17.0).powi(2)).exp()).collect();
-    let envelope = Array2::from_shape_fn((64, 64), |(n, m)| amplitude[n] * amplitude[m]);
-    let model = WindowModel::with_envelope(&table_2(), envelope, Noise::White).unwrap();
+    let model = WindowModel::point_target(&table_2(), &amplitude, Noise::White).unwrap();
     let energy: f64 = amplitude.iter().map(|a| a * a).sum();
     let moment =
         |p: i32| amplitude.iter().enumerate().map(|(n, a)| a * a * (n as f64 / 250e6).powi(p)).sum::<f64>() / energy;
@@ -211,7 +210,7 @@ fn any_covariance_is_accepted_and_impossible_ones_are_refused() {
     assert!(WindowModel::gaussian_pulse(&sampling, 0, 1e-7, Noise::White).is_err());
     assert!(WindowModel::gaussian_pulse(&sampling, 8, f64::NAN, Noise::White).is_err());
     assert!(WindowModel::gaussian_pulse(&sampling, 8, 1e-7, Noise::Band { floor: 2.0 }).is_err());
-    assert!(WindowModel::with_envelope(&sampling, Array2::zeros((4, 4)), Noise::White).is_err());
+    assert!(WindowModel::point_target(&sampling, &[0.0; 4], Noise::White).is_err());
     let model = WindowModel::gaussian_pulse(&sampling, 8, 1e-7, Noise::White).unwrap();
     assert!(model.bound_m_s(0.0, 0.0, SignalKind::Real, 1.0).is_err());
 }
