@@ -97,17 +97,7 @@ pub fn run_on(
     let tau_per_s = setup.tau_per_s;
     let wake = setup.wake.take();
     let (mut run, kept) = match &checkpoint {
-        None => {
-            let (flow, start) = setup.start()?;
-            let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
-            if removed > 0.01 {
-                warnings.push(format!(
-                    "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",
-                    100.0 * removed
-                ));
-            }
-            (Run::new(flow, plan).map_err(Error::Flow)?, Vec::new())
-        }
+        None => (start(setup, plan, &mut warnings)?, Vec::new()),
         Some(path) => resume(path, setup, plan, &file.case)?,
     };
     let (reached_s, end_s) = (run.flow().time_s(), run.plan().end_s);
@@ -158,6 +148,19 @@ pub fn run_on(
         files,
         warnings,
     })
+}
+
+/// A run from the initial field of its case, and a warning where the projection takes much from that.
+fn start(setup: Setup, plan: RunPlan, warnings: &mut Vec<String>) -> Result<Run, Error> {
+    let (flow, start) = setup.start()?;
+    let removed = 1.0 - start.kinetic_energy_m5_s2 / start.given_energy_m5_s2;
+    if removed > 0.01 {
+        warnings.push(format!(
+            "the projection of the initial field onto fields without divergence removed {:.3} % of its energy",
+            100.0 * removed
+        ));
+    }
+    Run::new(flow, plan).map_err(Error::Flow)
 }
 
 /// Takes the folder, and finds from which checkpoint the run goes on: the newer one, 1, or the one before it where that is gone or
