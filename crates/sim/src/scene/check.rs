@@ -146,8 +146,10 @@ impl Scene {
         // Two quadratures hold the band about 0, whose upper end then bounds no frequency.
         let (sampled_hz, highest_hz) =
             if is_baseband { (0.0, f64::INFINITY) } else { (centre_hz, nyquist_hz - half_hz) };
-        let why =
-            "the detector band lies above 0 and in half of detector.sampling_hz, that of two quadratures in all of it";
+        let why = match is_baseband {
+            true => "two quadratures of the sampling frequency hold the band about the intermediate one",
+            false => "the detector band lies between 0 and half of detector.sampling_hz",
+        };
         let narrowest_hz = centre_hz.min(nyquist_hz - sampled_hz);
         let mut sides = Vec::new();
         // Only a key that can mend it, or has to.
