@@ -88,7 +88,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
 /// Names of the files that estimates from records may have.
 ///
 /// # Errors
-/// As [`super::write`], but for what the files hold.
+/// As [`write()`], but for what the files hold.
 pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
     let mut names = Outputs::names(plan.scene.scene.outputs, |files| of_run(plan, &RunResult::default(), None, files))?;
     // Those that are estimated stay where they are.
@@ -99,7 +99,7 @@ pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
 /// Writes what records gave; returns the paths of the files.
 ///
 /// # Errors
-/// As [`super::write`].
+/// As [`write()`].
 pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
     let of = (plan.scene.scene.outputs, plan.scene.provenance());
     Outputs::write(folder, existing, of, |files| list_recorded(plan, found, files))

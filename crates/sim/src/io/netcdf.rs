@@ -93,17 +93,20 @@ impl Variable {
 /// Variables as `cdl` describes them in the notation of `ncdump`, in its order: their dimensions and attributes. Values stand by the name
 /// of their variable; variables without are left out. An attribute `?` has the value of the name `variable:attribute`, or is left out, too.
 pub(crate) fn described(cdl: &'static str, values: impl IntoIterator<Item = (&'static str, Data)>) -> Vec<Variable> {
-    // Their types are those of the values.
+    // Types in the order of their codes.
+    let types = ["byte", "char", "short", "int", "float", "double"];
     let mut values: BTreeMap<&str, Data> = values.into_iter().collect();
     let mut out: Vec<Variable> = Vec::new();
     for line in cdl.lines().filter_map(|line| line.trim().strip_suffix(" ;")) {
         match line.split_once(" = ") {
             // Such as `float azimuth(time)`.
             None => {
+                let (kind, line) = line.split_once(' ').unwrap_or_default();
                 let (name, dims) = line.trim_end_matches(')').split_once('(').unwrap_or((line, ""));
-                let name = name.rsplit(' ').next().unwrap_or(name);
                 let dims: Vec<&str> = dims.split(", ").filter(|dim| !dim.is_empty()).collect();
-                out.extend(values.remove(name).map(|data| Variable::new(name, &dims, data)));
+                let data = values.remove(name);
+                debug_assert!(data.iter().all(|data| types[data.code - 1] == kind), "{name} is no {kind}");
+                out.extend(data.map(|data| Variable::new(name, &dims, data)));
             }
             Some((key, value)) => {
                 let (name, attribute) = key.split_once(':').unwrap_or_default();
