@@ -184,7 +184,7 @@ fn doubt(result: &mut ScanResult, other: &ScanResult, scan: &ReadScan, options: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::path::PathBuf;
+    use std::path::Path;
     use wakescope_estimate::retrieval::ScanMap;
 
     #[test]
@@ -197,17 +197,7 @@ mod tests {
             sigma_m_s: None,
             fold_m_s: None,
         };
-        let mut scan = ReadScan {
-            path: PathBuf::new(),
-            sweep: 0,
-            map,
-            reference: None,
-            gate_length_m: None,
-            pulse_width_s: None,
-            scene_toml: None,
-            is_own: false,
-            scans: 1.0,
-        };
+        let mut scan = ReadScan::new(Path::new(""), 0, map);
         let std_m = |scan: &ReadScan, stated| match gate_of(Some(scan), stated, None).unwrap() {
             (Gate::Gaussian { std_m }, told) => (std_m, told.is_some()),
             (_, told) => (0.0, told.is_some()),

@@ -152,13 +152,13 @@ impl Scene {
         };
         let narrowest_hz = centre_hz.min(nyquist_hz - sampled_hz);
         let mut sides = Vec::new();
-        // Only a key that can mend it, or has to.
+        // A key that can mend it alone; of sampling and intermediate frequency one that has to, where none can.
         if half_hz < highest_hz && (centre_hz <= half_hz || centre_hz >= highest_hz) {
             let below = if is_baseband { String::new() } else { format!(" and below {highest_hz:e}") };
             let allowed = format!("above {half_hz:e}{below} Hz, so that {why}");
             sides.push(side("detector.intermediate_frequency_hz", centre_hz, allowed));
         }
-        if nyquist_hz <= sampled_hz + half_hz {
+        if nyquist_hz <= sampled_hz + half_hz && (centre_hz > half_hz || narrowest_hz <= 0.0) {
             let allowed = format!("above {:e} Hz, so that {why}", 2.0 * (sampled_hz + half_hz));
             sides.push(side("detector.sampling_hz", d.sampling_hz, allowed));
         }

@@ -9,8 +9,9 @@ pub(crate) type Values<'v> = Option<&'v dyn Fn(&str) -> Result<f64, String>>;
 const DEEPEST: usize = 200;
 /// Most operators of an expression.
 const MOST_OPERATORS: usize = 1000;
-/// Operators by how tightly they bind; a sign does as products do.
+/// Operators by how tightly they bind.
 const BINDING: [&[char]; 3] = [&['+', '-'], &['*', '/'], &['^']];
+/// Of these a sign holds for powers alone: -2^2 is -4.
 const SIGN: usize = 2;
 
 /// The value of an expression.

@@ -77,7 +77,7 @@ impl ReadScan {
     }
 
     /// A map of which nothing else is known.
-    fn new(path: &Path, sweep: usize, map: ScanMap) -> Self {
+    pub(crate) fn new(path: &Path, sweep: usize, map: ScanMap) -> Self {
         Self {
             path: path.to_owned(),
             sweep,
