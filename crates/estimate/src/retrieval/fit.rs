@@ -6,7 +6,7 @@
 
 use crate::error::Error;
 use crate::retrieval::alternatives::with_alternatives;
-use crate::retrieval::hypotheses::{End, ROUGH, Stage, least, rivals};
+use crate::retrieval::hypotheses::{End, Kind, ROUGH, Stage, least, rivals};
 use crate::retrieval::report::{OUTLIER, Report};
 use crate::retrieval::whitening::Whitening;
 use crate::retrieval::{Movement, RetrievalOptions, ScanMap, ScanResult, Turbulence};
@@ -53,18 +53,7 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     });
     let whitening = whitening.transpose()?;
     all.squares.whitening = whitening.as_ref();
-    let ends = match (&few, likely) {
-        _ if whitening.is_some() => all.ends_of(&starts),
-        (Some(_), Some(likely)) => {
-            // the scale in which they compete
-            let scale = search.residual_scale(likely).max(1.0);
-            let report = Report { stage: &search, scale, wind: &search.wind(&about)?, ends: &found };
-            // where blocks show next to nothing, the best is enough to tell so
-            let is_empty = report.chosen()?.statistic < NOTHING * options.threshold;
-            all.again(&if is_empty { vec![likely.clone()] } else { rivals(&found, scale) })
-        }
-        _ => found.clone(),
-    };
+    let ends = ends_in_all(&all, &search, (&starts, &found), (few.is_some(), &about), options)?;
     let cells = all.squares.cells.len();
     let (all, scale) = in_scale(all, least(&ends, cells));
     let dense = Gates::on_grid(map, options, 1)?;
@@ -72,18 +61,43 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     let stage = all.through(&dense);
     let mut ends = stage.onwards(&rivals(&ends, scale), |_| ROUGH);
     let may_stand = options.movement == Movement::Auto && dense.seconds.is_some();
-    let standing = least(&ends, stage.squares.cells.len()).filter(|_| may_stand).and_then(|likely| {
-        let still = stage.clone().through(&frozen);
-        let end = still.onwards(std::slice::from_ref(likely), |_| ROUGH).pop()?;
-        let sense = if map.lasts_s() < RetrievalOptions::SHORT_S { -1.0 } else { 1.0 };
-        let margin = RetrievalOptions::MOVES * scale.powi(2) * sense;
-        (end.chi2 + margin < likely.chi2).then(|| still.onwards(&ends, |_| ROUGH))
-    });
+    let standing = if may_stand { ends_at_rest(&stage, &stage.clone().through(&frozen), &ends, scale) } else { None };
     let fine = if standing.is_some() { frozen.clone() } else { moving }.fine(&options.gate)?;
     ends = standing.unwrap_or(ends);
     let stage = stage.through(&fine);
     let (wind, ends) = (stage.wind(&about)?, stage.fine(&ends));
     with_alternatives(&Report { stage: &stage, scale, wind: &wind, ends: &ends })
+}
+
+/// The ends in all velocities that come of a search, whose blocks stand for them if they are many.
+fn ends_in_all(
+    all: &Stage<'_>,
+    search: &Stage<'_>,
+    (starts, found): (&[(Kind, Wake)], &[End]),
+    (is_of_blocks, about): (bool, &Wake),
+    options: &RetrievalOptions,
+) -> Result<Vec<End>, Error> {
+    if all.squares.whitening.is_some() {
+        return Ok(all.ends_of(starts));
+    }
+    let Some(likely) = least(found, search.squares.cells.len()).filter(|_| is_of_blocks) else {
+        return Ok(found.to_vec());
+    };
+    // the scale in which they compete
+    let scale = search.residual_scale(likely).max(1.0);
+    let report = Report { stage: search, scale, wind: &search.wind(about)?, ends: found };
+    // where blocks show next to nothing, the best is enough to tell so
+    let is_empty = report.chosen()?.statistic < NOTHING * options.threshold;
+    Ok(all.again(&if is_empty { vec![likely.clone()] } else { rivals(found, scale) }))
+}
+
+/// The ends of vortices at rest, where they explain the velocities better than those that move by more than motion costs.
+fn ends_at_rest(moving: &Stage<'_>, still: &Stage<'_>, ends: &[End], scale: f64) -> Option<Vec<End>> {
+    let likely = least(ends, moving.squares.cells.len())?;
+    let end = still.onwards(std::slice::from_ref(likely), |_| ROUGH).pop()?;
+    let sense = if moving.map.lasts_s() < RetrievalOptions::SHORT_S { -1.0 } else { 1.0 };
+    let margin = RetrievalOptions::MOVES * scale.powi(2) * sense;
+    (end.chi2 + margin < likely.chi2).then(|| still.onwards(ends, |_| ROUGH))
 }
 
 /// A stage with deviations or a loss of the scale of the residuals that a likely end leaves, and that scale over the stated deviations.

@@ -1,4 +1,4 @@
-//! Damped Newton steps on a handful of parameters: Cholesky of a small symmetric matrix and the iteration of Levenberg and
+//! Damped Newton steps on a handful of parameters: equations scaled to a unit diagonal and the iteration of Levenberg and
 //! Marquardt (Marquardt 1963), shared by the fit of a map and the fit of signals; how fits to what is not smooth shorten their steps.
 //!
 //! Check: inverse times matrix; a curved valley (Rosenbrock) is followed to its end; a point that cannot be evaluated is
@@ -7,6 +7,7 @@
 use ndarray::Array2;
 
 use crate::error::Error;
+use crate::linalg::cholesky::{cholesky, forward_one};
 
 /// Cost, gradient and a positive approximation of the second derivatives at one point.
 #[derive(Debug, Clone)]
@@ -16,24 +17,8 @@ pub(crate) struct Normal {
     pub(crate) curvature: Array2<f64>,
 }
 
-/// Lower Cholesky factor, or nothing if the matrix is not positive definite to working precision.
-fn cholesky(a: &Array2<f64>) -> Option<Array2<f64>> {
-    let n = a.nrows();
-    let mut l = Array2::zeros((n, n));
-    for j in 0..n {
-        let pivot = a[[j, j]] - (0..j).map(|k| l[[j, k]] * l[[j, k]]).sum::<f64>();
-        // also false for NaN
-        if !(pivot > 1e-14 * a[[j, j]] && pivot.is_finite()) {
-            return None;
-        }
-        l[[j, j]] = pivot.sqrt();
-        for i in j + 1..n {
-            let sum: f64 = (0..j).map(|k| l[[i, k]] * l[[j, k]]).sum();
-            l[[i, j]] = (a[[i, j]] - sum) / l[[j, j]];
-        }
-    }
-    Some(l)
-}
+/// A pivot below this, of a matrix with a unit diagonal, is rounding.
+const SINGULAR: f64 = 1e-14;
 
 /// x of a x = b for a symmetric positive definite a.
 pub(crate) fn solve(a: &Array2<f64>, b: &[f64]) -> Option<Vec<f64>> {
@@ -43,15 +28,16 @@ pub(crate) fn solve(a: &Array2<f64>, b: &[f64]) -> Option<Vec<f64>> {
     if scale.iter().any(|s| !s.is_finite()) {
         return None;
     }
-    let l = cholesky(&Array2::from_shape_fn((n, n), |(i, j)| a[[i, j]] * scale[i] * scale[j]))?;
-    let mut x: Vec<f64> = b.iter().zip(&scale).map(|(b, s)| b * s).collect();
-    for i in 0..n {
-        let sum: f64 = (0..i).map(|k| l[[i, k]] * x[k]).sum();
-        x[i] = (x[i] - sum) / l[[i, i]];
+    let lower = cholesky(Array2::from_shape_fn((n, n), |(i, j)| a[[i, j]] * scale[i] * scale[j]))?;
+    // what is left of a diagonal of ones
+    if lower.diag().iter().any(|pivot| pivot * pivot < SINGULAR) {
+        return None;
     }
+    let mut x: Vec<f64> = b.iter().zip(&scale).map(|(b, s)| b * s).collect();
+    forward_one(lower.as_slice()?, &mut x);
     for i in (0..n).rev() {
-        let sum: f64 = (i + 1..n).map(|k| l[[k, i]] * x[k]).sum();
-        x[i] = (x[i] - sum) / l[[i, i]];
+        let sum: f64 = (i + 1..n).map(|k| lower[[k, i]] * x[k]).sum();
+        x[i] = (x[i] - sum) / lower[[i, i]];
     }
     x.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
     Some(x)
