@@ -9,7 +9,7 @@ use crate::plan::Stage;
 use crate::plan::time::{FIT_S, SIGNAL_FIT_S};
 use crate::plan::units::seconds;
 use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, Velocities, gate_of};
-use crate::scene::SceneFile;
+use crate::scene::{Estimator, SceneFile};
 use crate::setup::progress::{Observer, Silent};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::{ArgAction, Args};
@@ -112,7 +112,7 @@ impl RetrieveWords {
             state("estimator.window_samples", self.window.or(gate_s).and_then(samples));
             state("estimator.weighting", word(self.weighting.as_deref().unwrap_or("rectangular")));
             // Gates of one line each, and a band that is wide enough for all instruments.
-            state("estimator.radius_m", number(0.0).filter(|_| method != "periodogram"));
+            state(Estimator::RADIUS, number(0.0).filter(|_| method != "periodogram"));
             state("estimator.padded_samples", Some("4096".into()));
             state("detector.sampling_hz", number(WIDE_HZ));
             state("detector.intermediate_frequency_hz", number(0.25 * WIDE_HZ));

@@ -108,15 +108,7 @@ fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
 
 fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let e = &scene.estimator;
-    let region = match (&e.method, &e.radius) {
-        (Method::Periodogram {}, _) => "no region".to_owned(),
-        (_, RegionRadius::Fixed {}) => format!("regions of {} m", e.radius_m),
-        (_, RegionRadius::OfRange { .. }) => "regions whose radius depends on range".to_owned(),
-        (_, RegionRadius::Target { standard_deviation_m_s, .. }) => {
-            format!("regions for a standard deviation of {standard_deviation_m_s} m/s")
-        }
-    };
-    let reason = format!("{} x {} gates, {region}", n.lines, g.gate_range_m.len());
+    let reason = format!("{} x {} gates, {}", n.lines, g.gate_range_m.len(), e.regions());
     let sums_bytes = n.lines * n.windows * n.numbers * 8.0;
     let (planned_bytes, planning_bytes) = planning(scene, n);
     // Of each point: sums over the realisations, their errors, truth and thresholds; then the velocities of one realisation.

@@ -3,7 +3,7 @@
 //! Check: each warning appears with what it warns of, and not without; remedies that it names leave none; the number of empty gates is that
 //! of the gates which a run leaves empty.
 
-use crate::scene::{Method, Weighting};
+use crate::scene::{Estimator, Method, Weighting};
 use crate::setup::Setup;
 use crate::setup::estimators::grid_step_and_bias_m_s;
 use crate::setup::region::places;
@@ -114,11 +114,12 @@ pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
     Ok((empty > 0).then(|| {
         format!(
             "{empty} of {} gates of a line have no window in their region and stay empty: windows are {step_m:.2} m apart \
-             (estimator.window_step_samples = {}), regions are {:.2} m wide; none is empty with an estimator.radius_m of {:.3} or more, or \
+             (estimator.window_step_samples = {}), regions are {:.2} m wide; none is empty with an {} of {:.3} or more, or \
              with windows that gates are a multiple of apart",
             g.gate_range_m.len(),
             e.window_step_samples,
             2.0 * e.largest_radius_m(g.gate_range_m[0]),
+            Estimator::RADIUS,
             // rounded up, so that the number given is good
             (1000.0 * farthest_m).ceil() / 1000.0,
         )

@@ -158,6 +158,21 @@ keys! {
 }
 
 impl Estimator {
+    /// The key of the radius of all regions.
+    pub(crate) const RADIUS: &str = "estimator.radius_m";
+
+    /// What says how large the regions are.
+    pub(crate) fn regions(&self) -> String {
+        match &self.radius {
+            _ if self.method == (Method::Periodogram {}) => "no region".to_owned(),
+            RegionRadius::Fixed {} => format!("regions of {} m", self.radius_m),
+            RegionRadius::OfRange { .. } => "regions whose radius depends on range".to_owned(),
+            RegionRadius::Target { standard_deviation_m_s, .. } => {
+                format!("regions for a standard deviation of {standard_deviation_m_s} m/s")
+            }
+        }
+    }
+
     /// Radius of the regions at a range, m; the largest that is allowed where it is sought.
     pub(crate) fn largest_radius_m(&self, range_m: f64) -> f64 {
         match &self.radius {

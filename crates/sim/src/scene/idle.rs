@@ -32,9 +32,9 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
     unused(without_spectrum, &["estimator.padded_samples"], format!("{kind} has no spectrum"));
     unused(method.has_own_tapers(), &["estimator.weighting"], format!("{kind} has tapers of its own"));
     let without_region = *method == (Method::Periodogram {});
-    unused(without_region, &["estimator.radius_m"], format!("{kind} has no region"));
+    unused(without_region, &[Estimator::RADIUS], format!("{kind} has no region"));
     let own_radius = !without_region && scene.estimator.radius != RegionRadius::Fixed {};
-    unused(own_radius, &["estimator.radius_m"], "this key is for estimator.radius.kind = \"fixed\"".into());
+    unused(own_radius, &[Estimator::RADIUS], "this key is for estimator.radius.kind = \"fixed\"".into());
     let air = ["atmosphere.backscatter_per_m_sr", "atmosphere.extinction_per_m"];
     unused(scene.atmosphere.profile.is_some(), &air, "atmosphere.profile takes its place".into());
     unused(scene.laser.amplifier.is_some(), &["pulse.energy_j"], "laser.amplifier takes its place".into());
