@@ -40,7 +40,7 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
     scene.scan.realisations = 1;
     change(&mut scene);
     let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Signal).unwrap();
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let setup = ScanSetup {
         sampling: estimators::sampling(scene).unwrap(),
         kind: SignalKind::Real,
@@ -68,7 +68,7 @@ enum Velocities {
 /// Accumulated map with regions of 2 m, and the fit to it without prior knowledge.
 fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> MapFit {
     let (sampling, kind) = (taken.setup.sampling, SignalKind::Real);
-    let gates = estimators::gates(&taken.plan.scene.scene).unwrap();
+    let gates = estimators::gates(&taken.plan.scene.content).unwrap();
     let pulse = &taken.plan.instrument.pulse;
     let window = WindowModel::gaussian_pulse(&sampling, 64, pulse.sigma_s(), Noise::White).unwrap();
     let (statistic, estimator): (Correlogram<f64>, Box<dyn Estimator>) = match velocities {

@@ -62,7 +62,7 @@ impl ScanMiddle {
 }
 
 fn middle_m(plan: &Plan) -> f64 {
-    let scan = &plan.scene.scene.scan;
+    let scan = &plan.scene.content.scan;
     0.5 * (scan.range_min_m + scan.range_max_m)
 }
 
@@ -72,7 +72,7 @@ fn middle_m(plan: &Plan) -> f64 {
 /// What the crates refuse; a checked scene gives none.
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
-    let (o, known, mut there) = (&plan.scene.scene.outputs, Efficiencies::default(), None);
+    let (o, known, mut there) = (&plan.scene.content.outputs, Efficiencies::default(), None);
     let optics = LineOptics { plan, known: &known, observer };
     if matches!(plan.target, Target::Run | Target::Efficiency) {
         let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
@@ -89,7 +89,7 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let scanner = plan.runs(Stage::Signals).then(|| Scanner::with(plan, &known, observer)).transpose()?;
     result.middle = ScanMiddle::of(plan, there.as_ref(), scanner.as_ref());
     if let Some(scanner) = scanner {
-        match plan.scene.scene.detector.signal {
+        match plan.scene.content.detector.signal {
             DetectorSignal::IntermediateFrequency => signals_and_map::<f64>(plan, &scanner, observer, &mut result)?,
             DetectorSignal::Baseband => signals_and_map::<Complex<f64>>(plan, &scanner, observer, &mut result)?,
         }

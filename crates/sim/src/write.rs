@@ -29,7 +29,7 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// As [`write()`], but for what the files hold.
 pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
-    Outputs::names(plan.scene.scene.outputs, |files| list(plan, &RunResult::default(), files))
+    Outputs::names(plan.scene.content.outputs, |files| list(plan, &RunResult::default(), files))
 }
 
 /// Writes the results that the plan's scene asks for; returns the paths of the files.
@@ -38,7 +38,7 @@ pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
 /// A result that a format cannot hold, a file in the way that may not be replaced, or what the system says. Nothing is
 /// left half-written.
 pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    let formats = plan.scene.scene.outputs;
+    let formats = plan.scene.content.outputs;
     Outputs::write(folder, existing, (formats, plan.scene.provenance()), |files| list(plan, result, files))
 }
 
@@ -64,7 +64,7 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
         })?;
     }
     if plan.runs(Stage::Estimates) {
-        let pattern = &plan.scene.scene.scan.pattern;
+        let pattern = &plan.scene.content.scan.pattern;
         let map = result.map.as_ref().map(|estimates| velocity_map(plan, estimates));
         list_map(plan, map.as_ref(), files)?;
         let winds = result.map.as_ref().map(|estimates| beam_winds::beam_winds(plan, estimates)).transpose()?.flatten();
@@ -90,7 +90,8 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
 /// # Errors
 /// As [`write()`], but for what the files hold.
 pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
-    let mut names = Outputs::names(plan.scene.scene.outputs, |files| of_run(plan, &RunResult::default(), None, files))?;
+    let mut names =
+        Outputs::names(plan.scene.content.outputs, |files| of_run(plan, &RunResult::default(), None, files))?;
     // Those that are estimated stay where they are.
     names.retain(|name| !name.starts_with("signals."));
     Ok(names)
@@ -101,7 +102,7 @@ pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
 /// # Errors
 /// As [`write()`].
 pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    let of = (plan.scene.content.outputs, plan.scene.provenance());
     Outputs::write(folder, existing, of, |files| list_recorded(plan, found, files))
 }
 
@@ -153,7 +154,7 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
         files.netcdf(&stem, own.as_deref(), |map, origin| Ok(crate::io::cfradial::cfradial_bytes(map, origin)?))?;
     }
     let sweeps = map.map_or(schedule.sweeps.len(), |map| map.sweeps.len());
-    for sweep in (0..sweeps).filter(|_| plan.scene.scene.outputs.hpl) {
+    for sweep in (0..sweeps).filter(|_| plan.scene.content.outputs.hpl) {
         let stem = if sweeps == 1 { "halo".to_owned() } else { format!("halo_{:04}", sweep + 1) };
         let name = format!("{stem}.hpl");
         files.add(&name, map, |map, _| Ok(hpl::hpl_bytes(map, sweep, &name)?))?;
@@ -209,7 +210,7 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 
 /// The raw signals of a run, with what makes them readable.
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let (scene, g) = (&plan.scene.content, &plan.geometry);
     let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
     let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
@@ -228,7 +229,7 @@ fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>>
 }
 
 fn recording(plan: &Plan) -> Recording {
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let (d, receiver) = (&scene.detector, &plan.instrument.receiver);
     let is_baseband = d.signal == DetectorSignal::Baseband;
     // (13) in the band; white noise goes to half the sampling frequency, and to both sides of zero in two quadratures.

@@ -9,7 +9,7 @@ const DRAWN: usize = 8;
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let plan = Plan::new(context.scene_file(Scene::default())?, Target::Run)?;
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let elevation_rad = &plan.geometry.elevation_rad;
     let far_m = scene.scan.range_max_m;
     let at = |range_m: f64, el: f64| (range_m * el.cos(), scene.scan.lidar_height_m + range_m * el.sin());

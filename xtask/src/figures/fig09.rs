@@ -16,7 +16,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     scene.scan.range_min_m = CHAPTER_RANGE_M - (400.0 + half_window) * scene.sample_spacing_m();
     scene.scan.range_max_m = 650.0;
     let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
-    let (scene, elevation_rad) = (&plan.scene.scene, &plan.geometry.elevation_rad);
+    let (scene, elevation_rad) = (&plan.scene.content, &plan.geometry.elevation_rad);
     let gates = estimators::gates(scene)?;
     let samples = scene.samples_per_record();
     let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, elevation_rad, samples)?;

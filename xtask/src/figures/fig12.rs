@@ -135,7 +135,7 @@ fn levels(curves: &[Curve], zone: fn(&Curve) -> &Zone) -> String {
 }
 
 fn outside_claim(curves: &[Curve], study: &Study) -> Claim {
-    let s = &study.plan.scene.scene;
+    let s = &study.plan.scene.content;
     // What guesses all over the band err; an energy whose estimates are half of that has no signal.
     let guesses_m_s = 0.5 * s.laser.wavelength_m * s.detector.bandwidth_hz / 12_f64.sqrt();
     let energies = of_chapter(curves).into_iter().filter(|c| c.outside.rms_m_s(None) < 0.5 * guesses_m_s);

@@ -78,7 +78,7 @@ fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<O
 
 /// The scan, of which quick has all.
 pub(crate) fn scene() -> Result<Scene, Failure> {
-    Ok(SceneFile::parse(include_str!("retrieved.toml"), Path::new("retrieved.toml"))?.scene)
+    Ok(SceneFile::parse(include_str!("retrieved.toml"), Path::new("retrieved.toml"))?.content)
 }
 
 /// What retrievals find in the scans of a scene beside a wake.

@@ -47,10 +47,10 @@ fn settings(
 ) -> Result<DetectionSettings, Failure> {
     Ok(DetectionSettings {
         false_alarm: rate,
-        gate: gate_of(None, None, Some(&plan.scene.scene))?.0,
+        gate: gate_of(None, None, Some(&plan.scene.content))?.0,
         options: DetectorOptions { turbulence, ..DetectorOptions::default() },
         stride: noise.stride,
-        seed: plan.scene.scene.seed,
+        seed: plan.scene.content.seed,
         ..DetectionSettings::default()
     })
 }
@@ -101,7 +101,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 fn alarms(plan: &Plan, noise: &SceneNoise, (scans, rate): (usize, f64)) -> Result<(Share, [f64; 2]), Failure> {
     let settings = settings(plan, noise, None, rate)?;
     let mut file = plan.scene.clone();
-    file.scene.scan.realisations = scans;
+    file.content.scan.realisations = scans;
     let shown_m_s = velocities(&Plan::new(file, Target::Map)?, &Silent)?;
     let maps: Vec<_> =
         shown_m_s.into_iter().map(|velocity_m_s| ScanMap { velocity_m_s, ..noise.empty_scan(plan) }).collect();

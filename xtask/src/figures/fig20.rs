@@ -26,7 +26,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     };
     let scan = ReadScan::own("scan", map);
     let options = RetrievalOptions {
-        gate: gate_of(None, None, Some(&plan.scene.scene))?.0,
+        gate: gate_of(None, None, Some(&plan.scene.content))?.0,
         core_prior: Some(CorePrior::TYPICAL),
         ..RetrievalOptions::default()
     };

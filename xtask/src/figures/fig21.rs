@@ -70,10 +70,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 }
 
 fn view(context: &Context, (name, scene): (String, String), scans: u64) -> Result<View, Failure> {
-    let scene = SceneFile::parse(&scene, Path::new("fig21.toml"))?.scene;
+    let scene = SceneFile::parse(&scene, Path::new("fig21.toml"))?.content;
     let one = |scan: u64| -> Result<Scan, Failure> {
         let mut file = context.scene_file(scene.clone())?;
-        file.scene.seed += scan;
+        file.content.seed += scan;
         let plan = Plan::new(file, if scene.retrieval.is_some() { Target::Run } else { Target::Map })?;
         let result = wakescope_sim::run(&plan, &Silent)?;
         let map = result.map.ok_or_else(|| Failure::new("a run without a map".into()))?;
@@ -92,7 +92,7 @@ fn retrieved(rows: &[RetrievalRow]) -> Option<f64> {
 
 /// The circulation of which means of gates fit a scan best, m^2/s; nothing where the fit leaves what it can know.
 fn fit(plan: &Plan, seen_m_s: &Array2<f64>) -> Result<Option<f64>, Failure> {
-    let Flow::VortexPair(pair) = plan.scene.scene.flow else { return Ok(None) };
+    let Flow::VortexPair(pair) = plan.scene.content.flow else { return Ok(None) };
     let truth = vortex_pair(&pair);
     // Not from the truth itself.
     let mut at: Parameters =
@@ -144,7 +144,7 @@ fn model_m_s(plan: &Plan, pair: &VortexPair, parameters: &Parameters) -> Result<
     let [circulation_m2_s, lateral_position_m, height_m, pair_spacing_m] = *parameters;
     let wind =
         VortexPair { circulation_m2_s, lateral_position_m, height_m, spacing_m: pair_spacing_m, ..*pair }.wind()?;
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let (scene, g) = (&plan.scene.content, &plan.geometry);
     let window = weighting(scene).weights(scene.estimator.window_samples)?;
     // Every fourth layer is enough for means over gates of some 40 m.
     let spacing_m = 4.0 * g.layer_thickness_m;
@@ -180,7 +180,7 @@ fn solved(mut m: [[f64; 5]; 4]) -> Parameters {
 impl View {
     fn energy_j(&self) -> f64 {
         let plan = &self.scans[0].plan;
-        plan.geometry.schedule.pulses() as f64 * plan.scene.scene.pulse_energy_j()
+        plan.geometry.schedule.pulses() as f64 * plan.scene.content.pulse_energy_j()
     }
 
     /// By method.

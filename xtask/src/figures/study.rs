@@ -166,7 +166,7 @@ impl Study {
         let cores = sight.cores.clone();
         let distance = |(line, gate): (usize, usize)| {
             let (el, r) = (map.elevation_rad[line], map.range_m[gate]);
-            let (y, z) = (r * el.cos(), plan.scene.scene.scan.lidar_height_m + r * el.sin());
+            let (y, z) = (r * el.cos(), plan.scene.content.scan.lidar_height_m + r * el.sin());
             cores.iter().map(|c| (y - c.0).hypot(z - c.1)).fold(f64::INFINITY, f64::min)
         };
         let distance_m = Array2::from_shape_fn((map.elevation_rad.len(), map.range_m.len()), distance);
@@ -175,7 +175,7 @@ impl Study {
 
     /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).
     pub(super) fn cores_polar(&self) -> Vec<(f64, f64)> {
-        let height_m = self.plan.scene.scene.scan.lidar_height_m;
+        let height_m = self.plan.scene.content.scan.lidar_height_m;
         self.cores.iter().map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0))).collect()
     }
 

@@ -23,9 +23,9 @@ const ROWS: [Row; 11] = [
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let file = SceneFile::parse(TABLE2_TOML, Path::new("table2.toml"))?;
-    let plan = Plan::new(context.scene_file(file.scene)?, Target::Run)?;
+    let plan = Plan::new(context.scene_file(file.content)?, Target::Run)?;
     // What counts is the scene as the run writes it down, not as it was read.
-    let back = SceneFile::parse(&plan.scene.toml, Path::new("scene.toml"))?.scene;
+    let back = SceneFile::parse(&plan.scene.toml, Path::new("scene.toml"))?.content;
     let values: Vec<f64> = ROWS.iter().map(|r| (r.2)(&back)).collect();
     let table = Table::new()
         .text("parameter", ROWS.iter().map(|r| r.0))

@@ -25,7 +25,7 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let request = Request { budget: SEARCH.1, ..Request::new(SEARCH.0, &[Figure::Std]) };
     let found = Accuracy::of(&file, &request, &Silent)?;
     let lacking = || Failure::new("the search tells no standard deviation of the map".into());
-    let of_one = 0.5 * found.noises.first().ok_or_else(lacking)?.now * (file.scene.scan.realisations as f64).sqrt();
+    let of_one = 0.5 * found.noises.first().ok_or_else(lacking)?.now * (file.content.scan.realisations as f64).sqrt();
     let finest = found.ladders.iter().filter_map(|ladder| Some((ladder.key, ladder.steps.first()?.value)));
     let fine = with(&file, &finest.collect::<Vec<_>>())?;
     let mut rows = Vec::new();

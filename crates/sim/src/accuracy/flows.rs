@@ -215,7 +215,7 @@ impl Accuracy<CaseFile> {
             }
             ratio = ratio.max((of_mesh / rest).powf(1.0 / order));
         }
-        let finer = self.scene.coarser(1.0 / ratio).case.case.cells();
+        let finer = self.scene.coarser(1.0 / ratio).content.case.cells();
         let more = count(finer) / meshes.now;
         let directions = finer.iter().filter(|n| **n > 1).count() as f64;
         let [nx, ny, nz] = finer;
@@ -231,12 +231,12 @@ fn place(figure: Figure) -> usize {
 
 /// The case with its cells and with fewer.
 fn meshes(own: &CaseFile) -> Result<Vec<Trial>, Error> {
-    let whole = own.case.case.cells();
+    let whole = own.content.case.cells();
     let directions = whole.iter().filter(|n| **n > 1).count().max(1) as f64;
     let mut meshes: Vec<Trial> = Vec::new();
     for ratio in MESHES {
         let file = if ratio == 1.0 { own.clone() } else { own.coarser(ratio) };
-        let cells = file.case.case.cells();
+        let cells = file.content.case.cells();
         let forecast = file.forecast().map_err(|error| match ratio {
             1.0 => error,
             _ => own.refuse_cells(format!("so many that half of them along each direction are enough: {error}")),
@@ -255,7 +255,7 @@ fn meshes(own: &CaseFile) -> Result<Vec<Trial>, Error> {
 
 /// The figures that are judged.
 fn figures(own: &CaseFile, request: &Request) -> Result<Vec<Figure>, Error> {
-    let is_wake = own.case.wake.is_some();
+    let is_wake = own.content.wake.is_some();
     let has = |figure: &Figure| FIGURES[..if is_wake { 4 } else { 2 }].contains(figure);
     if let Some(figure) = request.of.iter().find(|figure| !has(figure)) {
         let allowed = "energy, dissipation; of case.kind = \"wake\" circulation, height besides";
@@ -352,7 +352,7 @@ mod tests {
         // Viscous steps hardly matter, cells neither, at 1 %: the cheapest is taken, and is a case.
         assert!(found.is_reached() && meshes.chosen == 2 && found.spent_s <= 1.2 * found.allowed_s);
         assert!(found.scene.forecast().unwrap().core_s < found.own_s);
-        assert_eq!(found.scene.case.case.cells(), [1, 16, 16]);
+        assert_eq!(found.scene.content.case.cells(), [1, 16, 16]);
     }
 
     #[test]
@@ -364,7 +364,7 @@ mod tests {
         let cells: f64 = words.split(" x ").nth(1).unwrap().parse().unwrap();
         let expected = 32.0 * (off / 2e-6).powf(1.0 / order);
         assert!(cells > 32.0 && (cells / expected - 1.0).abs() < 0.1, "{words}: {expected}");
-        assert_eq!(found.scene.case.case.cells(), [1, 32, 32], "the cells stay");
+        assert_eq!(found.scene.content.case.cells(), [1, 32, 32], "the cells stay");
     }
 
     #[test]

@@ -40,7 +40,7 @@ pub(super) fn value(scene: &Scene, key: &str) -> f64 {
 /// # Errors
 /// What the scene does not allow.
 pub fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFile, Error> {
-    let mut scene = file.scene.clone();
+    let mut scene = file.content.clone();
     for &(key, number) in values {
         let whole = |number: f64| Value::Integer(number.round() as i64);
         let mut table = Table::try_from(&scene).unwrap_or_default();

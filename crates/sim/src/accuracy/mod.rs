@@ -59,7 +59,7 @@ impl Request {
     /// # Errors
     /// One that the scene does not have.
     fn figures(&self, own: &Plan) -> Result<Vec<Figure>, Error> {
-        let scene = &own.scene.scene;
+        let scene = &own.scene.content;
         let tells_winds = matches!(scene.scan.pattern, Pattern::Vad(_) | Pattern::Dbs(_));
         let lacking = |figure: Figure| match figure {
             Figure::U | Figure::V | Figure::W if !tells_winds => {

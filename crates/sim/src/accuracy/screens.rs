@@ -27,7 +27,7 @@ const TOGETHER: usize = 4;
 impl Search<'_> {
     /// The keys of the phase screens, where these make the efficiency.
     pub(super) fn screens(&mut self) -> Result<(), Error> {
-        let scene = self.own.scene.scene.clone();
+        let scene = self.own.scene.content.clone();
         let Some(t) = turbulence(&scene).filter(|_| model(&scene) == Model::MonteCarlo) else { return Ok(()) };
         if drawn_turbulence(&scene).is_some() {
             self.out.notes.push("keys of the turbulence are not varied: pulses have efficiencies of their own".into());
@@ -66,7 +66,7 @@ impl Search<'_> {
 
     /// The same realisations on every grid, with so few layers as do.
     fn compare_grids(&mut self, t: &RefractiveTurbulence) -> Result<(), Error> {
-        let seed = self.own.scene.scene.seed;
+        let seed = self.own.scene.content.seed;
         let Some(fine) = self.efficiency(t, seed, 0.0)? else {
             self.out.notes.push("grids of the screens are not varied: the budget is spent".into());
             return Ok(());
@@ -78,7 +78,7 @@ impl Search<'_> {
             for step in open {
                 let scene = with(&self.own.scene, &[(LAYERS, t.layers as f64), (ladder.key, step.value)])?;
                 // What is refused on so short a path stays not decided.
-                let t = turbulence(&scene.scene).unwrap_or_default();
+                let t = turbulence(&scene.content).unwrap_or_default();
                 let Ok(Some(found)) = self.efficiency(&t, seed, 0.0) else { break };
                 let shift = found.shift(&fine, &fine);
                 step.shifts = self.of_efficiency(shift, shift);
@@ -94,7 +94,7 @@ impl Search<'_> {
 
     /// Range in the middle of the scan, m.
     fn middle_m(&self) -> f64 {
-        0.5 * (self.own.scene.scene.scan.range_min_m + self.own.scene.scene.scan.range_max_m)
+        0.5 * (self.own.scene.content.scan.range_min_m + self.own.scene.content.scan.range_max_m)
     }
 
     /// What the layers of a plan do to the efficiency in the middle of the scan, and at most over the stretch of range that has it.

@@ -55,7 +55,7 @@ impl Accuracy {
     /// What the scene refuses; figures that it does not have.
     pub fn of(file: &SceneFile, request: &Request, observer: &dyn Observer) -> Result<Self, Error> {
         let begun = Instant::now();
-        let mut scene = file.scene.clone();
+        let mut scene = file.content.clone();
         (scene.outputs.svg, scene.outputs.png) = (false, false);
         let (fine, common) = (file.with(scene)?, Common::default());
         let own = common.plan(&fine, Target::Run)?;
@@ -64,10 +64,10 @@ impl Accuracy {
         let spent_s = PLANNING_S * own.screens.len() as f64;
         let mut out = Self::begun((file.clone(), &file.hash), request, [own_s, spent_s], request.figures(&own)?);
         // TOML has signed whole numbers.
-        out.verified.seed = stream(file.scene.seed, "accuracy", 0).next_u64() >> 1;
+        out.verified.seed = stream(file.content.seed, "accuracy", 0).next_u64() >> 1;
         let mut search = Search { request, observer, common, own, fine, crossed: Vec::new(), scatter: None, out };
         observer.begin(Stage::Cases, 3);
-        if model(&file.scene) != Model::MonteCarlo {
+        if model(&file.content) != Model::MonteCarlo {
             search.out.notes.push("efficiency: exact, by quadrature".into());
         }
         let pilot = search.pilot()?;
@@ -159,7 +159,7 @@ impl Search<'_> {
         let (mut sum_s, mut crossed, mut before) = (0.0, self.crossed.clone(), None);
         for file in scenes {
             let plan = self.plan(file, Target::Map)?;
-            let (scene, share) = (&file.scene, count as f64 / file.scene.scan.realisations as f64);
+            let (scene, share) = (&file.content, count as f64 / file.content.scan.realisations as f64);
             let air = (scene.atmosphere.clone(), scene.seed);
             if !crossed.contains(&air) {
                 sum_s += plan.times.optics_s + PLANNING_S * plan.screens.len() as f64;
@@ -187,7 +187,7 @@ impl Search<'_> {
         if !self.affords(cost_s, kept_s) {
             return Ok(None);
         }
-        self.crossed.extend(scenes.iter().map(|file| (file.scene.atmosphere.clone(), file.scene.seed)));
+        self.crossed.extend(scenes.iter().map(|file| (file.content.atmosphere.clone(), file.content.seed)));
         let scenes = scenes.iter().map(|scene| with(scene, &[(REALISATIONS, count as f64)]));
         let circulation = self.out.figures.contains(&Figure::Circulation);
         let scenes: Vec<SceneFile> = scenes.collect::<Result<_, _>>()?;
@@ -266,7 +266,7 @@ impl Search<'_> {
 
     /// The keys of the estimator, from the finest values on.
     fn estimator_keys(&mut self) -> Result<(), Error> {
-        let scene = self.fine.scene.clone();
+        let scene = self.fine.content.clone();
         let window = scene.estimator.window_samples;
         let most = (FINE_PADDING * window).next_power_of_two().min(1 << 20).max(scene.estimator.padded_samples) as f64;
         let has_spectrum = !matches!(scene.estimator.method, Method::PulsePair {} | Method::AutoregressivePole(_));
@@ -310,10 +310,10 @@ impl Search<'_> {
 
     /// What a change of the efficiency does to the map, where screens change that of the signals.
     fn respond(&mut self, pilot: &Option<Shown>) -> Result<(), Error> {
-        if pilot.is_none() || !signals_cross_screens(&self.fine.scene) {
+        if pilot.is_none() || !signals_cross_screens(&self.fine.content) {
             return Ok(());
         }
-        let mut scene = self.fine.scene.clone();
+        let mut scene = self.fine.content.clone();
         match &mut scene.laser.amplifier {
             Some(amplifier) => {
                 amplifier.mean_power_w *= 1.0 + RAISED;

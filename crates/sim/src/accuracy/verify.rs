@@ -58,8 +58,8 @@ impl Search<'_> {
         let mut found = Vec::new();
         if self.out.figures.contains(&Figure::Efficiency) {
             let plan = self.plan(&chosen, Target::Run)?;
-            let coarse = turbulence(&chosen.scene).unwrap_or_default();
-            let fine = turbulence(&self.own.scene.scene).unwrap_or_default();
+            let coarse = turbulence(&chosen.content).unwrap_or_default();
+            let fine = turbulence(&self.own.scene.content).unwrap_or_default();
             let mut shift = Shift { shift: self.of_layers(&plan)[0], error: 0.0 };
             if (fine.grid_points, fine.grid_spacing_m) != (coarse.grid_points, coarse.grid_spacing_m) {
                 let mut on = |t| self.efficiency(&t, self.out.verified.seed, beyond_s);
@@ -73,7 +73,7 @@ impl Search<'_> {
         let figures = self.of_map();
         if !figures.is_empty() {
             let seed = self.out.verified.seed;
-            let seeded = |file: &SceneFile| file.with(Scene { seed, ..file.scene.clone() });
+            let seeded = |file: &SceneFile| file.with(Scene { seed, ..file.content.clone() });
             let scenes = [seeded(&self.fine)?, seeded(&chosen)?];
             let Some(shown) = self.measure(&scenes, 0, count, beyond_s)? else { return Ok(None) };
             found.extend(figures.into_iter().map(|figure| (figure, shown[1].shift(&shown[0], figure))));
@@ -105,7 +105,7 @@ impl Search<'_> {
         let (mut whole_s, times) = (run_s(&plan), plan.times);
         let mut of_paths = 0.0;
         if let Some(scatter) = self.scatter {
-            let (one, now) = (2.0 * scatter, value(&chosen.scene, PATHS));
+            let (one, now) = (2.0 * scatter, value(&chosen.content, PATHS));
             let (each_s, fixed_s) = (times.optics_s / now, whole_s - times.optics_s);
             let of = OfNoise { key: PATHS, now, each_s, fixed_s, least: LEAST_PATHS };
             let judged = self.out.figures.contains(&Figure::Efficiency);
@@ -123,7 +123,7 @@ impl Search<'_> {
             values.push((PATHS, paths));
             self.out.noises.extend(own);
         }
-        let now = value(&chosen.scene, REALISATIONS);
+        let now = value(&chosen.content, REALISATIONS);
         let scans_s = times.signals_s + times.maps_s + times.retrieval_s;
         let of = OfNoise { key: REALISATIONS, now, each_s: scans_s / now, fixed_s: whole_s - scans_s, least: LEAST };
         let mut realisations = None;

@@ -65,7 +65,7 @@ pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
     if let Some(folder) = &words.out {
         cli.prepare(folder, &["budget.csv".into()], existing)?;
     }
-    let ranges_m = if words.range.is_empty() { scan_ranges_m(&plan.scene.scene) } else { words.range.clone() };
+    let ranges_m = if words.range.is_empty() { scan_ranges_m(&plan.scene.content) } else { words.range.clone() };
     let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
     let mut text = found.text();
     let mut files = Vec::new();

@@ -72,9 +72,9 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
     let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
     // The closed forms of single gates are those of noise.
-    let noisy = plan.as_ref().filter(|plan| plan.scene.scene.detector.noise != NoiseModel::None);
+    let noisy = plan.as_ref().filter(|plan| plan.scene.content.detector.noise != NoiseModel::None);
     words.folder.prepare(cli, |files| list(words, noisy, None, files))?;
-    let of_plan = plan.as_ref().map(|plan| &plan.scene.scene);
+    let of_plan = plan.as_ref().map(|plan| &plan.scene.content);
     let (gate, note) = gate_of(scans.first(), words.air.gate_std, of_plan)?;
     notes.extend(note.map(str::to_owned));
     let mut settings = words.settings(cli, of_plan, gate);

@@ -41,7 +41,7 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let scene = cli.scene(&words.scene)?;
     let mut records = match cli.signals(&words.data) {
         Some(records) => records.not_empty()?,
-        None => RawRecords::open(&words.data, &words.format, record_shape(&scene.scene))?,
+        None => RawRecords::open(&words.data, &words.format, record_shape(&scene.content))?,
     };
     records.scale = words.scale;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
@@ -50,7 +50,7 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     let options = RecordedOptions { rays, noise: words.noise, spectra: words.spectra, block_bytes: None };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
     let (text, results) = told(&plan, &found, records.records);
-    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    let of = (plan.scene.content.outputs, plan.scene.provenance());
     let object = json!({ "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results });
     words.folder.finish(cli, of, |files| write::list_recorded(&plan, found, files), (object, text))
 }

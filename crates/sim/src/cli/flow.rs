@@ -77,7 +77,7 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
 
 pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     let file = case_file(words.case.as_deref(), words.preset, cli)?;
-    if !matches!(file.case.case, CaseKind::Wake(_)) {
+    if !matches!(file.content.case, CaseKind::Wake(_)) {
         let path = words.case.clone().unwrap_or_default();
         return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
     }
@@ -131,7 +131,7 @@ fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ran
         return Ok(());
     }
     #[cfg(feature = "plots")]
-    if outcome.is_complete && file.case.wake.is_some() {
+    if outcome.is_complete && file.content.wake.is_some() {
         match FinishedWake::read(out).and_then(|wake| wake.draw()) {
             Ok(files) => outcome.files.extend(files),
             // The run is done all the same.

@@ -140,7 +140,7 @@ impl Cli {
     pub(super) fn scene(&self, path: &Path) -> Result<SceneFile, Error> {
         let file = SceneFile::parse(&self.text(path)?, path)?;
         match self.seed {
-            Some(seed) => Ok(file.with(crate::scene::Scene { seed, ..file.scene.clone() })?),
+            Some(seed) => Ok(file.with(crate::scene::Scene { seed, ..file.content.clone() })?),
             None => Ok(file),
         }
     }

@@ -203,10 +203,10 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     if cli.quiet && !cli.json {
         return Ok(());
     }
-    let ranges_m = scan_ranges_m(&plan.scene.scene);
+    let ranges_m = scan_ranges_m(&plan.scene.content);
     let snr_db = snr_without_screens_db(&plan, &ranges_m)?;
     // What only phase screens could tell is not told.
-    let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.scene) == Model::MonteCarlo;
+    let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.content) == Model::MonteCarlo;
     let mut object = plan_json(&plan);
     object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db, "independent_paths": is_less });
     let screens = if is_less { AS_ON_INDEPENDENT_PATHS } else { "" };
@@ -244,7 +244,7 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         text.extend(detected.map(|found| format!("{share:<44} {}\n", digits(found))));
         object["retrieval"] = json!({ "errors": errors.objects(), "detected": detected });
     }
-    let of = (plan.scene.scene.outputs, plan.scene.provenance());
+    let of = (plan.scene.content.outputs, plan.scene.provenance());
     io.folder.finish(cli, of, |files| write::list(&plan, &outcome, files), (object, text))
 }
 
@@ -264,7 +264,7 @@ fn plan_json(plan: &Plan) -> Value {
     });
     let stages: Vec<Value> = stages.collect();
     json!({
-        "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.scene.seed,
+        "version": crate::VERSION, "scene_hash": plan.scene.hash, "seed": plan.scene.content.seed,
         "scan": plan.schedule(), "stages": stages, "core_s": plan.core_s, "memory_bytes": plan.total().memory_bytes, "warnings": plan.warnings,
     })
 }

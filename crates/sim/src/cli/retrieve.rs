@@ -82,7 +82,7 @@ const HEIGHTS: &str = "fits of signals state the deviations of heights a quarter
 
 impl RetrieveWords {
     fn options(&self, scene: Option<&SceneFile>, gate: Gate) -> RetrievalOptions {
-        let mut options = retrieve::options(scene.map(|file| &file.scene), gate, self.core);
+        let mut options = retrieve::options(scene.map(|file| &file.content), gate, self.core);
         if let Some(profile) = self.profile {
             (options.model.profile, options.other_profile) = (profile, false);
         }
@@ -227,7 +227,7 @@ fn of_map(
         (None, None, None) if scan.is_own => (Some(words.stated_scene(&scan)?), true),
         _ => (None, false),
     };
-    let of_gate = instrument.as_ref().or(scene).map(|file| &file.scene);
+    let of_gate = instrument.as_ref().or(scene).map(|file| &file.content);
     let (gate, remark) = gate_of(Some(&scan), words.air.gate_std, of_gate)?;
     let own = instrument.as_ref().map(|scene| SceneResponse::of_scene(scene, &Silent)).transpose()?.flatten();
     let velocities = match &own {
@@ -259,7 +259,7 @@ fn of_signals(
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
     for (scan, measured) in maps.into_iter().zip(&scans) {
-        let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.scene))?;
+        let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.content))?;
         let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), velocities)?;
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;

@@ -156,7 +156,7 @@ impl ScanWords {
             let reason = "it holds raw signals: --scene says which instrument recorded them".into();
             return Err(Error::Input { path: path.to_owned(), reason });
         };
-        let mut records = RawRecords::open(path, &RawFormat::default(), record_shape(&scene.scene))?;
+        let mut records = RawRecords::open(path, &RawFormat::default(), record_shape(&scene.content))?;
         records.scale = self.scale.unwrap_or(1.0);
         let (plan, is_own) = recorded::plan(scene.clone(), &records)?;
         let noise = if is_own || self.scale.is_some() { NoiseLevel::OfScene } else { NoiseLevel::Quietest };

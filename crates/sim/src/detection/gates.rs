@@ -35,7 +35,7 @@ fn peak_gain(window: &[f64], sigma: f64, band: f64) -> f64 {
 /// # Errors
 /// A scene without noise; what the crates refuse.
 pub fn gate_table(plan: &Plan, false_alarm: f64, observer: &dyn Observer) -> Result<Table, Error> {
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let d = &scene.detector;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let gain = peak_gain(&window, plan.instrument.pulse.sigma_s() * d.sampling_hz, d.bandwidth_hz / d.sampling_hz);

@@ -98,7 +98,7 @@ pub fn run_on(
     let wake = setup.wake.take();
     let (mut run, kept) = match &checkpoint {
         None => (start(setup, plan, &mut warnings)?, Vec::new()),
-        Some(path) => resume(path, setup, plan, &file.case)?,
+        Some(path) => resume(path, setup, plan, &file.content)?,
     };
     let (reached_s, end_s) = (run.flow().time_s(), run.plan().end_s);
     if reached_s > (1.0 + 1e-9) * end_s {
@@ -106,7 +106,7 @@ pub fn run_on(
         let reason = format!(
             "the end, {end_s:?} s, lies before {reached_s:?} s (tau = {reached_tau:?}), which the checkpoint has reached"
         );
-        return Err(Error::Input { path: file.source.path().to_owned(), reason });
+        return Err(Error::Input { path: file.path().to_owned(), reason });
     }
     if is_first {
         warnings.iter().for_each(|text| observer.warn(text));
@@ -208,17 +208,15 @@ pub(super) fn prepare(
     let machines = ranks.count() as f64;
     let available = machine::available_memory_bytes().filter(|_| !options.allow_large).map(|bytes| bytes * machines);
     // Before the setup, which holds the initial field.
-    refuse_too_large(&file.case, file.case.case.cells(), &[], available)?;
+    refuse_too_large(&file.content, file.content.case.cells(), &[], available)?;
     // What the solver refuses of a case is a matter of its file.
-    let of_file = |error: wakescope_les::Error| Error::Input {
-        path: file.source.path().to_owned(),
-        reason: format!("[case]: {error}"),
-    };
-    let setup = Setup::new(&file.case, file.source.folder());
+    let of_file =
+        |error: wakescope_les::Error| Error::Input { path: file.path().to_owned(), reason: format!("[case]: {error}") };
+    let setup = Setup::new(&file.content, file.folder());
     let mut setup = setup.map_err(|error| if let Error::Flow(error) = error { of_file(error) } else { error })?;
     setup.settings.ranks = ranks.clone();
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
-    refuse_too_large(&file.case, setup.mesh.cells(), &dense, available)?;
+    refuse_too_large(&file.content, setup.mesh.cells(), &dense, available)?;
     setup.settings.validate(&setup.mesh).map_err(|error| match error {
         wakescope_les::Error::TooManyRanks { .. } => Error::Flow(error),
         error => of_file(error),
@@ -266,12 +264,12 @@ fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(
 
 /// The plan of the run and of its files, with all that can be refused before the computing.
 fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files), Error> {
-    let case = &file.case;
+    let case = &file.content;
     let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
     let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
         let allowed = "a number in s, e.g. 30.0, is needed for a flow of one's own".into();
         let problem = Problem { key: "time.end_s".into(), value: Problem::ABSENT.into(), allowed };
-        return Err(Error::Scene(file.located(problem)));
+        return Err(Error::Scene(file.located(vec![problem])));
     };
     let mut output = case.output.clone();
     let schedule = match (&case.wake, &setup.wake) {
@@ -279,7 +277,7 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
             output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
             Schedule::of_wake(wake, setup.tau_per_s, end_s)
         }
-        _ => Schedule::plain(case.output_times_s(end_s).map_err(|problem| Error::Scene(file.located(problem)))?),
+        _ => Schedule::plain(case.output_times_s(end_s).map_err(|problem| Error::Scene(file.located(vec![problem])))?),
     };
     if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
         return Err(file.refuse("output.times_s", late, format!("at most the end, {end_s:?} s")));

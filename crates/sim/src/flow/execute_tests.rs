@@ -65,7 +65,7 @@ fn a_run_killed_before_its_first_checkpoint_begins_anew_and_says_so() {
 
 #[test]
 fn the_ages_of_outputs_follow_the_end_of_a_wake() {
-    let wake = |keys: &str| parse(&format!("[case]\nkind = \"wake\"\n[wake]\n{keys}")).case.wake.unwrap();
+    let wake = |keys: &str| parse(&format!("[case]\nkind = \"wake\"\n[wake]\n{keys}")).content.wake.unwrap();
     let lists = |keys: &str| {
         let wake = wake(keys);
         (wake.fields_tau.unwrap(), wake.planes_tau.unwrap())
@@ -76,12 +76,12 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
     assert_eq!(lists("end_tau = 1.7\nfields_tau = []\n"), (vec![], vec![0.85, 1.7]));
     let own = "[case]\nkind = \"wake\"\n[wake]\nend_tau = 0.5\n";
     let over = CaseFile::parse_over(Some(WakePreset::Medium), own, Path::new("case.toml")).unwrap();
-    assert_eq!(over.case.wake.unwrap().fields_tau, Some(vec![0.5]));
+    assert_eq!(over.content.wake.unwrap().fields_tau, Some(vec![0.5]));
     // An end from the command line: lists of the case lose what lies behind it.
     let ended = |keys: &str, end: f64| {
         let file = parse(&format!("[case]\nkind = \"wake\"\n[wake]\n{keys}")).with_end(end).unwrap();
-        assert_eq!(parse(&file.toml).case, file.case);
-        let wake = file.case.wake.unwrap();
+        assert_eq!(parse(&file.toml).content, file.content);
+        let wake = file.content.wake.unwrap();
         assert_eq!(wake.end_tau, end);
         (wake.fields_tau.unwrap(), wake.planes_tau.unwrap(), wake.series_tau)
     };
@@ -91,7 +91,7 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
     let own = "fields_tau = [0.2, 0.9]\nseries_tau = [0.1, 0.8]\n";
     assert_eq!(ended(own, 0.4), (vec![0.2], vec![0.2, 0.4], Some([0.1, 0.4])));
     let plane = vortices("", "end_s = 0.5\n").with_end(0.25).unwrap();
-    assert_eq!(plane.case.time.end_s, Some(0.25));
+    assert_eq!(plane.content.time.end_s, Some(0.25));
     let refused = plane.with_end(-1.0).unwrap_err().to_string();
     assert!(refused.contains("--end = -1.0") && refused.contains("above 0"), "{refused}");
 }
@@ -126,7 +126,7 @@ fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     // Cells of Reynolds number 42: damped at a Courant number of 0.2, not at 0.35.
     let case = |time: &str| vortices("viscosity_m2_s = 0.0015\nstretch = [0.0, 0.0]\n", time);
-    let scheme = |file: &CaseFile| Setup::new(&file.case, Path::new("")).unwrap().settings.scheme;
+    let scheme = |file: &CaseFile| Setup::new(&file.content, Path::new("")).unwrap().settings.scheme;
     let [slow, fast] = ["end_s = 0.1\ncourant = 0.2\n", "end_s = 0.2\ncourant = 0.35\n"].map(case);
     assert_eq!(
         [scheme(&slow), scheme(&fast)],
@@ -166,7 +166,7 @@ fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosit
     let error = with(thin, "adams_bashforth2", 0.45, "multiscale_wale").unwrap_err().to_string();
     assert!(error.contains("time.courant = 0.45"), "{error}");
     let own = parse(&format!("[case]\nkind = {thin}\n[solver]\nsubgrid = {{ model = \"wale\", constant = 0.02 }}\n"));
-    let scheme = Setup::new(&own.case, Path::new("")).unwrap().settings.scheme;
+    let scheme = Setup::new(&own.content, Path::new("")).unwrap().settings.scheme;
     assert_eq!(scheme, wakescope_les::TimeScheme::RungeKutta3);
     // A note that a run would give is given by the check, too.
     let noted = with(thin, "adams_bashforth2", 0.35, "none").unwrap_or_else(|e| panic!("{e}"));

@@ -57,7 +57,7 @@ pub struct FlowForecast {
 
 impl FlowForecast {
     pub(super) fn new(file: &CaseFile, setup: &Setup, plan: &RunPlan, files: &Files) -> Self {
-        let case = &file.case;
+        let case = &file.content;
         let dense = setup.settings.pressure.dense_directions(&setup.mesh);
         let stability = setup.stability();
         let step_s = stability.first_step_s().min(plan.end_s);
@@ -263,7 +263,7 @@ mod tests {
     use std::path::Path;
 
     fn case(text: &str) -> FlowCase {
-        CaseFile::parse(text, Path::new("case.toml")).unwrap().case
+        CaseFile::parse(text, Path::new("case.toml")).unwrap().content
     }
 
     #[test]

@@ -40,45 +40,32 @@ pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
-use crate::io::{Provenance, text_file};
-use crate::keys::{Problem, SceneError, Source};
-use crate::scene::hash_of;
+use crate::keys::{Content, Document, Problem, SceneError};
 use std::path::{Path, PathBuf};
 use wakescope_les::solver::Stepping;
 
 /// A valid case, with what names it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct CaseFile {
-    /// The case.
-    pub case: FlowCase,
-    /// The case as TOML, every default written out.
-    pub toml: String,
-    /// First 16 hexadecimal digits of the SHA-256 of `toml`.
-    pub hash: String,
-    source: Source,
+pub type CaseFile = Document<FlowCase>;
+
+impl Content for FlowCase {
+    fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
+        text::read(text, path, None)
+    }
+
+    fn to_toml(&self) -> String {
+        toml::to_string(self).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"))
+    }
+
+    fn seed(&self) -> u64 {
+        // 0 stands for noise by a closed formula, and for none.
+        if let CaseKind::Wake(wake) = &self.case { wake.seed.unwrap_or(0) } else { 0 }
+    }
 }
 
 impl CaseFile {
-    /// Reads and checks a case file.
-    ///
-    /// # Errors
-    /// What the system says; [`SceneError`] names the file, the line, the key, the value and what is allowed.
-    pub fn read(path: &Path) -> Result<Self, Error> {
-        let text = text_file::read(path).map_err(Error::io("read the case", path))?;
-        Ok(Self::parse(&text, path)?)
-    }
-
     /// Whether a text is a case, by its keys, and no scene.
     pub fn is_of(text: &str) -> bool {
         text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("case"))
-    }
-
-    /// Checks the text of a case file; `path` serves the messages, and its folder is where files of the case are looked for.
-    ///
-    /// # Errors
-    /// As [`CaseFile::read`].
-    pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        Self::parse_over(None, text, path)
     }
 
     /// The text of a case file over the preset of a wake, if there is one: keys that it does not have are those of the preset.
@@ -87,7 +74,7 @@ impl CaseFile {
     /// As [`CaseFile::parse`].
     pub fn parse_over(preset: Option<WakePreset>, text: &str, path: &Path) -> Result<Self, SceneError> {
         let base = preset.map(WakePreset::case);
-        Ok(Self::of(text::read(text, path, base.as_ref())?, Source::new(path, text)))
+        Ok(Self::of(text::read(text, path, base.as_ref())?, path, text))
     }
 
     /// The same case with another end: the age `tau` of a wake, of other flows a time \[s\]. Outputs behind it are left out.
@@ -95,10 +82,10 @@ impl CaseFile {
     /// # Errors
     /// An end that is no finite number above 0.
     pub fn with_end(&self, end: f64) -> Result<Self, SceneError> {
-        let mut case = self.case.clone();
+        let mut case = self.content.clone();
         case.time.end_s = None;
         match &mut case.wake {
-            Some(wake) => wake.end_at(end, ["wake.fields_tau", "wake.planes_tau"].map(|key| self.source.has(key))),
+            Some(wake) => wake.end_at(end, ["wake.fields_tau", "wake.planes_tau"].map(|key| self.states(key))),
             None => {
                 case.time.end_s = Some(end);
                 case.output.times_s.retain(|time_s| *time_s <= end);
@@ -110,7 +97,7 @@ impl CaseFile {
             _ => problem,
         };
         let problems: Vec<Problem> = case.problems().into_iter().map(of_command).collect();
-        if problems.is_empty() { Ok(Self::of(case, self.source.clone())) } else { Err(self.source.refused(problems)) }
+        if problems.is_empty() { Ok(self.changed(case)) } else { Err(self.refused(problems)) }
     }
 
     /// The same case with another seed of its noise.
@@ -118,34 +105,17 @@ impl CaseFile {
     /// # Errors
     /// A flow whose noise has no seed.
     pub fn with_seed(&self, seed: u64) -> Result<Self, SceneError> {
-        let mut case = self.case.clone();
+        let mut case = self.content.clone();
         let CaseKind::Wake(wake) = &mut case.case else {
             let allowed = "absent: this flow has no noise; it is for case.kind = \"wake\"";
             return Err(self.refuse_word("--seed", &seed.to_string(), allowed.into()));
         };
         wake.seed = Some(seed);
-        Ok(Self::of(case, self.source.clone()))
-    }
-
-    fn of(case: FlowCase, source: Source) -> Self {
-        let toml = toml::to_string(&case).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"));
-        let hash = hash_of(&toml);
-        Self { case, toml, hash, source }
+        Ok(self.changed(case))
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
-        Error::Scene(self.located(Problem { key: key.into(), value: format!("{value:?}"), allowed }))
-    }
-
-    /// A problem with the line of its key.
-    fn located(&self, problem: Problem) -> SceneError {
-        self.source.located(vec![problem])
-    }
-
-    pub(crate) fn provenance(&self) -> Provenance {
-        // 0 stands for noise by a closed formula, and for none.
-        let seed = if let CaseKind::Wake(wake) = &self.case.case { wake.seed.unwrap_or(0) } else { 0 };
-        Provenance::new(&self.toml, &self.hash, seed)
+        Error::Scene(self.located(vec![Problem { key: key.into(), value: format!("{value:?}"), allowed }]))
     }
 }
 

@@ -69,7 +69,7 @@ fn every_example_is_a_good_case_that_keeps_its_meaning_and_runs() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in EXAMPLES {
         let file = parse(text);
-        assert_eq!(parse(&file.toml).case, file.case, "{name} written out and read again");
+        assert_eq!(parse(&file.toml).content, file.content, "{name} written out and read again");
         assert!(text.contains(&format!("kind = \"{name}\"")), "{name}");
         let out = folder.path().join(name);
         let outcome =
@@ -211,10 +211,10 @@ fn the_history_of_a_wake_opens_with_its_axes() {
 fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
     let coarse = CaseFile::parse_over(Some(WakePreset::Coarse), "", Path::new("preset")).unwrap();
     let text = example("wake").unwrap();
-    let mut commented = parse(text).case;
+    let mut commented = parse(text).content;
     (commented.time.scheme, commented.time.courant) = (None, None);
     commented.checkpoint.every_steps = None;
-    assert_eq!(commented, coarse.case, "the commented example is the preset");
+    assert_eq!(commented, coarse.content, "the commented example is the preset");
     let [coarse, wide] =
         [[24, 128, 80], [48, 240, 128]].map(|cells| VortexPairCase { cells, ..VortexPairCase::coarse() });
     let medium = VortexPairCase { size: [1.0, 5.0, 2.5], ..wide };
@@ -236,17 +236,17 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
         (WakePreset::Chapter, chapter),
     ] {
         let file = CaseFile::parse_over(Some(preset), "", Path::new("preset")).unwrap();
-        let CaseKind::Wake(flow) = &file.case.case else { panic!("{preset:?}") };
+        let CaseKind::Wake(flow) = &file.content.case else { panic!("{preset:?}") };
         let mut pair = flow.pair_case().unwrap();
         pair.subgrid = expected.subgrid;
         assert_eq!(pair, expected);
-        let is_multiscale = file.case.solver.subgrid == Subgrid::MultiscaleWale { constant: None, order: None };
+        let is_multiscale = file.content.solver.subgrid == Subgrid::MultiscaleWale { constant: None, order: None };
         assert_eq!(is_multiscale, expected.subgrid == multiscale, "{preset:?}");
     }
     let own = "[case]\nkind = \"wake\"\nreynolds = 1e4\npair = { from = \"a320\" }\n[wake]\nend_tau = 1.0\n\
                fields_tau = []\nplanes_tau = []\n";
     let file = CaseFile::parse_over(Some(WakePreset::Medium), own, Path::new("case.toml")).unwrap();
-    let CaseKind::Wake(flow) = &file.case.case else { panic!() };
+    let CaseKind::Wake(flow) = &file.content.case else { panic!() };
     assert_eq!((flow.cells, flow.reynolds, flow.pair), ([48, 240, 128], 1e4, PairScale::A320 {}));
     let over =
         |text: &str| CaseFile::parse_over(Some(WakePreset::Coarse), text, Path::new("c.toml")).unwrap_err().to_string();

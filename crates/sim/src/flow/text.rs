@@ -2,7 +2,7 @@
 
 use super::case::FlowCase;
 use super::kind::CaseKind;
-use crate::keys::{Document, Format, Key, SceneError, keys_of};
+use crate::keys::{Format, Key, SceneError, Text, keys_of};
 use serde::Deserialize;
 use std::path::Path;
 use std::sync::LazyLock;
@@ -40,7 +40,7 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
         keys.iter_mut().for_each(|key| key.is_required = key.name == "case");
         keys
     });
-    let document = Document::parse(text, path)?;
+    let document = Text::parse(text, path)?;
     let kind = document.value("case.kind").and_then(|kind| kind.as_str());
     let defaults = match (base, kind) {
         (Some(base), _) => table_of(base),

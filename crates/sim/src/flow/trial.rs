@@ -34,12 +34,12 @@ impl CaseFile {
     /// The same case with cells `ratio` times as long, at most so where they are shorter: even numbers, but for directions in which
     /// nothing varies.
     pub(crate) fn coarser(&self, ratio: f64) -> Self {
-        let mut case = self.case.clone();
+        let mut case = self.content.clone();
         for cells in case.case.cells_mut().into_iter().filter(|cells| **cells > 1) {
             let pairs = 0.5 * *cells as f64 / ratio;
             *cells = 2 * (if ratio < 1.0 { pairs.ceil() } else { pairs.round() }) as usize;
         }
-        Self::of(case, self.source.clone())
+        self.changed(case)
     }
 
     /// The same case and time scheme with steps so many times as long; the key of the step, and its value.
@@ -48,7 +48,7 @@ impl CaseFile {
     /// As [`CaseFile::forecast`].
     pub(crate) fn with_longer_steps(&self, times: f64) -> Result<(Self, &'static str, f64), Error> {
         let settings = prepare(self, Path::new(""), RunOptions::default(), &alone())?.0.settings;
-        let mut case = self.case.clone();
+        let mut case = self.content.clone();
         let time = &mut case.time;
         time.scheme = Some(settings.scheme);
         let (key, value) = match settings.time_step {
@@ -58,12 +58,12 @@ impl CaseFile {
                 ("time.courant", *time.courant.insert(times * courant))
             }
         };
-        Ok((Self::of(case, self.source.clone()), key, value))
+        Ok((self.changed(case), key, value))
     }
 
     /// The same case for a history, at so many times that it can be compared; the case's own file is written nowhere near it.
     fn for_history(&self, end_s: f64) -> Self {
-        let mut case = self.case.clone();
+        let mut case = self.content.clone();
         (case.output.fields, case.output.planes) = Default::default();
         (case.checkpoint.write, case.time.pause_after_steps) = (false, None);
         if let Some(wake) = &mut case.wake {
@@ -72,7 +72,7 @@ impl CaseFile {
         } else if case.output.every_s.is_none() && case.output.times_s.len() < 4 {
             case.output.times_s = (0..=TIMES as usize).map(|i| end_s * i as f64 / TIMES).collect();
         }
-        Self::of(case, self.source.clone())
+        self.changed(case)
     }
 
     /// The same case for another folder: files that it names are found from everywhere.
@@ -80,25 +80,25 @@ impl CaseFile {
     /// # Errors
     /// What the system says of its folder.
     pub(crate) fn portable(&self) -> Result<Self, Error> {
-        let mut case = self.case.clone();
+        let mut case = self.content.clone();
         if let CaseKind::Free(free) = &mut case.case
             && let InitialName::Netcdf { path } = &mut free.initial
         {
-            let whole = self.source.folder().join(&*path);
+            let whole = self.folder().join(&*path);
             *path = std::path::absolute(&whole).map_err(Error::io("find", &whole))?.to_string_lossy().into_owned();
         }
-        Ok(Self::of(case, self.source.clone()))
+        Ok(self.changed(case))
     }
 
     /// A refusal of its cells.
     pub(crate) fn refuse_cells(&self, allowed: String) -> Error {
-        let is_free = matches!(self.case.case, CaseKind::Free(_));
-        self.refuse(if is_free { "case" } else { "case.cells" }, self.case.case.cells(), allowed)
+        let is_free = matches!(self.content.case, CaseKind::Free(_));
+        self.refuse(if is_free { "case" } else { "case.cells" }, self.content.case.cells(), allowed)
     }
 
     /// A refusal of a word of the command line.
     pub(crate) fn refuse_word(&self, key: &str, value: &str, allowed: String) -> SceneError {
-        self.source.refused(vec![crate::keys::Problem { key: key.into(), value: value.into(), allowed }])
+        self.refused(vec![crate::keys::Problem { key: key.into(), value: value.into(), allowed }])
     }
 }
 

@@ -6,7 +6,7 @@ use super::problem::{Located, Problem, SceneError};
 use super::words::{near, one_of, quote, table_with, wanted};
 use serde::de::DeserializeOwned;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use toml::Spanned;
 use toml::Value;
 use toml::de::{DeTable, DeValue};
@@ -22,7 +22,7 @@ pub(crate) struct Format<'a> {
 }
 
 /// A text that is TOML.
-pub(crate) struct Document<'a> {
+pub(crate) struct Text<'a> {
     text: &'a str,
     path: &'a Path,
     table: DeTable<'a>,
@@ -30,7 +30,7 @@ pub(crate) struct Document<'a> {
     breaks: Vec<usize>,
 }
 
-impl<'a> Document<'a> {
+impl<'a> Text<'a> {
     /// Reads the text of the file `path`.
     ///
     /// # Errors
@@ -130,49 +130,6 @@ impl<'a> Document<'a> {
     }
 }
 
-/// The text of a scene or a case; empty for one that was made in memory.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Source {
-    path: PathBuf,
-    text: String,
-}
-
-impl Source {
-    pub(crate) fn new(path: &Path, text: &str) -> Self {
-        Self { path: path.to_owned(), text: text.to_owned() }
-    }
-
-    #[cfg(feature = "flow")]
-    pub(crate) fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// The folder from which files that the text names are looked for.
-    pub(crate) fn folder(&self) -> &Path {
-        self.path.parent().unwrap_or(Path::new(""))
-    }
-
-    /// Problems of what was asked for beside the text.
-    #[cfg(feature = "flow")]
-    pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
-        let problems = problems.into_iter().map(|problem| Located { problem, line: None }).collect();
-        SceneError::Invalid { path: self.path.clone(), problems }
-    }
-
-    /// Whether the text gives a value to a key.
-    pub(crate) fn has(&self, key: &str) -> bool {
-        Document::parse(&self.text, &self.path).is_ok_and(|document| document.value(key).is_some())
-    }
-
-    /// Problems with the lines of the text.
-    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
-        match Document::parse(&self.text, &self.path) {
-            Ok(document) => document.located(problems),
-            Err(error) => error,
-        }
-    }
-}
-
 /// Where the key with this path stands, and its value; the path may lead through a table of a list.
 fn find<'t, 'a>(table: &'t DeTable<'a>, path: &str) -> Option<(Range<usize>, &'t Spanned<DeValue<'a>>)> {
     let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
@@ -223,7 +180,7 @@ struct Place<'p> {
 }
 
 struct Walk<'w> {
-    document: &'w Document<'w>,
+    document: &'w Text<'w>,
     format: &'w Format<'w>,
     found: Vec<Located>,
 }
@@ -397,7 +354,7 @@ impl Format<'_> {
         let (whole, element) = path.split_once('[').map_or((path, false), |(whole, _)| (whole, true));
         let at = if element { format!("{whole}[0]") } else { whole.to_owned() };
         let of_text = |text: &&str| {
-            let document = Document::parse(text, Path::new("")).ok()?;
+            let document = Text::parse(text, Path::new("")).ok()?;
             let (_, value) = find(&document.table, &at)?;
             let has_values = value.get_ref().as_array().map(|values| !values.is_empty());
             let fits = has_values == matches!(kind, Kind::List { .. }).then_some(true);

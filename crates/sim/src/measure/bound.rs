@@ -60,7 +60,7 @@ struct Setting<'p> {
 
 impl<'p> Setting<'p> {
     fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let scene = &plan.scene.scene;
+        let scene = &plan.scene.content;
         if scene.detector.noise == NoiseModel::None {
             return Err(Error::NoBound);
         }
@@ -342,7 +342,7 @@ mod tests {
         // Two windows of 24 samples, 8 samples apart, and one of 32 between them.
         let step_m = 4.0 * SPEED_OF_LIGHT_M_S / 250e6;
         let gates = plan("[estimator]\nwindow_samples = 24\nwindow_step_samples = 8\n[scan]\nrange_min_m = 300.0\n");
-        let gate_m = places(&gates.scene.scene, &gates.geometry).unwrap().gate_ranges_m()[10];
+        let gate_m = places(&gates.scene.content, &gates.geometry).unwrap().gate_ranges_m()[10];
         let middle_m = gate_m + 0.5 * step_m;
         let two = at("window_samples = 24\nwindow_step_samples = 8", 0.6 * step_m, middle_m);
         let one = at("window_samples = 32", 0.0, middle_m);

@@ -90,7 +90,7 @@ struct Mapper<'p, S> {
 
 impl<'p, S: Sample> Mapper<'p, S> {
     fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let (scene, g) = (&plan.scene.content, &plan.geometry);
         let shape = (g.elevation_rad.len(), g.gate_range_m.len());
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
@@ -256,7 +256,7 @@ pub(crate) fn of_plans(
     seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
     let Some(first) = plans.first() else { return Ok(Vec::new()) };
-    match first.scene.scene.detector.signal {
+    match first.scene.content.detector.signal {
         DetectorSignal::IntermediateFrequency => estimates::<f64>(plans, scanner, observer, |_| (), seen),
         DetectorSignal::Baseband => estimates::<Complex<f64>>(plans, scanner, observer, |_| (), seen),
     }

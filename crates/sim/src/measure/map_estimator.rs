@@ -39,7 +39,7 @@ pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
-    let (scene, samples) = (&plan.scene.scene, plan.geometry.samples);
+    let (scene, samples) = (&plan.scene.content, plan.geometry.samples);
     let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
     Ok(ScanGeometry::new(&sampling, &gates, record_elevation_rad, samples)?)
 }
@@ -50,7 +50,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
     pub(crate) fn new(plan: &'p Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let (scene, g) = (&plan.scene.content, &plan.geometry);
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let of_rays = RayInformation::new(plan, layer_snr)?;
         let radius = region_radius(&of_rays, places)?;
@@ -66,7 +66,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
 
     /// Sums over the windows of some lines, still without any record; over those of some gates if these are given.
     pub(crate) fn sums(&self, places: ScanGeometry, held: Option<Range<usize>>) -> Result<WindowSums<'_, S>, Error> {
-        let (statistic, gates) = (&*self.tools.statistic, estimators::gates(&self.plan.scene.scene)?);
+        let (statistic, gates) = (&*self.tools.statistic, estimators::gates(&self.plan.scene.content)?);
         Ok(match held {
             None => ScanSums::new(statistic, &gates, places, self.plan.geometry.samples)?,
             Some(held) => ScanSums::of_gates(statistic, &gates, places, held)?,
@@ -87,7 +87,7 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
             let shape = (points.len() / gates, gates);
             let velocity_m_s = Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
             let guess = interpolated(points, velocity_m_s);
-            let sampling = estimators::sampling(&self.plan.scene.scene)?;
+            let sampling = estimators::sampling(&self.plan.scene.content)?;
             found = scan.map_following(points, &self.radius, S::KIND, &sampling, &guess, &**following)?;
         }
         // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.
@@ -116,14 +116,14 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         };
         let region = |point: &PolarPoint| Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?));
         let regions = points.iter().map(region).collect::<Result<Vec<RegionNoise>, Error>>()?;
-        let rate = self.plan.scene.scene.estimator.false_alarm;
+        let rate = self.plan.scene.content.estimator.false_alarm;
         let threshold = if rate > 0.0 { self.thresholds(test, &regions)? } else { vec![f64::NAN; points.len()] };
         Ok(NoiseAtPoints { threshold, deviation: regions.iter().map(|at| test.band_deviation(at.n_eff)).collect() })
     }
 
     /// Densities, A^2, that noise exceeds with the rate of false alarms; NaN where there is no window.
     fn thresholds(&self, test: &NoiseTest, regions: &[RegionNoise]) -> Result<Vec<f64>, Error> {
-        let (density_a2, rate) = (self.tools.noise.density_a2, self.plan.scene.scene.estimator.false_alarm);
+        let (density_a2, rate) = (self.tools.noise.density_a2, self.plan.scene.content.estimator.false_alarm);
         // Many points share their windows.
         let mut known = HashMap::new();
         let of = |region: &RegionNoise| {

@@ -12,7 +12,7 @@ use ndarray::Array3;
 /// # Errors
 /// What the wind refuses; a checked scene gives none.
 pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let top_rad = scene.scan.elevation_max_rad.max(0.0);
     let bottom_rad = scene.scan.elevation_min_rad.abs().max(top_rad.abs());
     let far_m = scene.scan.range_max_m;

@@ -63,7 +63,7 @@ impl LineOptics<'_> {
     /// What the optics refuse, such as a grid too small for the beam; in turbulence that phase screens cross, ranges beyond the signals and
     /// the profile of the scene.
     pub(crate) fn profile_at(&self, range_m: &[f64]) -> Result<RangeProfile, Error> {
-        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
         let theory = efficiency_by_theory(instrument, range_m)?;
         let (mut others, mut lost_power_fraction) = (Vec::new(), None);
         let mut efficiency = theory.clone();
@@ -91,7 +91,7 @@ impl LineOptics<'_> {
     /// As [`Self::profile_at`].
     pub(crate) fn efficiency_at(&self, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
         let theory = efficiency_by_theory(&self.plan.instrument, range_m)?;
-        match model(&self.plan.scene.scene) {
+        match model(&self.plan.scene.content) {
             Model::MonteCarlo => Ok(self.across_screens(&theory)?.0[0].clone()),
             _ => Ok(theory),
         }
@@ -100,7 +100,7 @@ impl LineOptics<'_> {
     /// The efficiency at the layers of the lines, as [`Self::efficiency_at`].
     pub(crate) fn of_layers(&self) -> Result<Arc<EfficiencyProfile>, Error> {
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        self.known.layers.of(cause(&self.plan.scene.scene, &ranges_m), || {
+        self.known.layers.of(cause(&self.plan.scene.content, &ranges_m), || {
             self.observer.begin(Stage::Efficiency, 1);
             let profile = self.efficiency_at(&ranges_m)?;
             self.observer.end();
@@ -111,14 +111,14 @@ impl LineOptics<'_> {
     /// The phase screens of a stretch of range, m.
     pub(crate) fn screens(&self, [from_m, to_m]: [f64; 2]) -> Result<Arc<Screens>, Error> {
         let range_m = curved_ranges_m(&self.plan.instrument.telescope, from_m, to_m, OF_SCREENS);
-        self.known.screens.of(cause(&self.plan.scene.scene, &range_m), || self.run_screens(range_m))
+        self.known.screens.of(cause(&self.plan.scene.content, &range_m), || self.run_screens(range_m))
     }
 
     /// The monostatic and the bistatic efficiency across phase screens at the ranges of `theory`, and the light lost at the border: the
     /// ratio to theory, which is smooth, on straight lines between the ranges of the screens, times theory.
     fn across_screens(&self, theory: &EfficiencyProfile) -> Result<([EfficiencyProfile; 2], f64), Error> {
         let (mut found, mut done, mut lost) = ([const { Vec::new() }; 6], 0, 0f64);
-        for (ends_m, inside) in stretches(&self.plan.scene.scene, &self.plan.geometry, &theory.range_m) {
+        for (ends_m, inside) in stretches(&self.plan.scene.content, &self.plan.geometry, &theory.range_m) {
             let screens = self.screens(ends_m)?;
             lost = lost.max(screens.lost_power_fraction);
             if theory.range_m.get(done) != inside.first() {
@@ -132,7 +132,7 @@ impl LineOptics<'_> {
             }
         }
         if let Some(&range_m) = theory.range_m.get(done) {
-            let o = &self.plan.scene.scene.outputs;
+            let o = &self.plan.scene.content.outputs;
             let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
             return Err(wakescope_optics::Error::Extrapolation { range_m, first_m, last_m }.into());
         }
@@ -151,7 +151,7 @@ impl LineOptics<'_> {
     /// # Errors
     /// What the optics refuse, such as a grid too small for the beam.
     fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
-        let (scene, instrument, observer) = (&self.plan.scene.scene, &self.plan.instrument, self.observer);
+        let (scene, instrument, observer) = (&self.plan.scene.content, &self.plan.instrument, self.observer);
         let t = turbulence(scene).unwrap_or_default();
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
@@ -193,7 +193,7 @@ impl LineOptics<'_> {
 
 /// Mean signal-to-noise ratio (14) in the detector band at the ranges of an efficiency, dB, or what the scene fixes.
 pub(crate) fn snr_db(setup: &Setup, efficiency: &EfficiencyProfile) -> Result<Vec<f64>, Error> {
-    let (scene, instrument) = (&setup.scene.scene, &setup.instrument);
+    let (scene, instrument) = (&setup.scene.content, &setup.instrument);
     let snr_db = |(&range_m, &mean): (&f64, &f64)| match scene.detector.snr {
         SnrReference::Fixed { snr_db } => Ok(snr_db),
         _ => {
@@ -283,7 +283,7 @@ mod tests {
     /// (14) as it is written, for a return that changes slowly over the pulse, in even air.
     fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
         const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
-        let (scene, air) = (&plan.scene.scene, &plan.scene.scene.atmosphere);
+        let (scene, air) = (&plan.scene.content, &plan.scene.content.atmosphere);
         let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
         let photons = scene.detector.quantum_efficiency * scene.pulse_energy_j() / photon_j;
         let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
@@ -362,7 +362,8 @@ mod tests {
             let plan = plan("focus_m = 300.0", [200.0, 540.0], &more, Target::Run);
             let mut ranges_m: Vec<f64> = plan.geometry.layer_range_m().chain([first_m, last_m]).collect();
             ranges_m.sort_by(f64::total_cmp);
-            let found: usize = stretches(&plan.scene.scene, &plan.geometry, &ranges_m).iter().map(|s| s.1.len()).sum();
+            let found: usize =
+                stretches(&plan.scene.content, &plan.geometry, &ranges_m).iter().map(|s| s.1.len()).sum();
             assert_eq!(found, ranges_m.len(), "{first_m} {last_m}");
         }
     }
@@ -372,7 +373,7 @@ mod tests {
         let more = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-13\ngrid_points = 160\n\
              grid_spacing_m = 0.0022\nlayers = 5\nrealisations = 8\n[outputs]\nprofile_range_max_m = 560.0\n";
         let plan = plan("focus_m = 300.0", [200.0, 500.0], more, Target::Map);
-        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let (scene, instrument) = (&plan.scene.content, &plan.instrument);
         let (ends_m, _) = stretches(scene, &plan.geometry, &[300.0])[0];
         let nodes_m = curved_ranges_m(&instrument.telescope, ends_m[0], ends_m[1], OF_SCREENS);
         let between_m: Vec<f64> = nodes_m.windows(2).map(|r| 0.5 * (r[0] + r[1])).collect();

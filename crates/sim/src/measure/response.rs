@@ -42,7 +42,7 @@ impl SceneResponse {
     /// # Errors
     /// What the regions refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
-        let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
+        let (scene, pulse) = (&plan.scene.content, &plan.instrument.pulse);
         let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else { return Ok(None) };
         let of_rays = RayInformation::new(plan, &layer_snr)?;
         let radius = region_radius(&of_rays, &places(scene, &plan.geometry)?)?;

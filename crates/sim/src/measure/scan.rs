@@ -57,7 +57,7 @@ impl<'a> Scanner<'a> {
     /// # Errors
     /// As [`Scanner::new`].
     pub(crate) fn with(plan: &'a Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Self, Error> {
-        let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+        let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
         let optics = LineOptics { plan, known, observer };
         let returns = layer_returns(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
@@ -98,7 +98,7 @@ impl<'a> Scanner<'a> {
             let mean = |layer: usize| self.lines.iter().map(|line| line.weight_per_m[layer]).sum::<f64>() / count;
             line.weight_per_m = (0..line.layers()).map(mean).collect();
         }
-        layer_snr(&self.plan.scene.scene, &self.plan.instrument, &line)
+        layer_snr(&self.plan.scene.content, &self.plan.instrument, &line)
     }
 
     /// The same without any wind, for records that were not made here.
@@ -110,7 +110,7 @@ impl<'a> Scanner<'a> {
         let radial_velocity_m_s = vec![0.0; plan.geometry.layers];
         let still = Air { radial_velocity_m_s, backscatter_per_m_sr: None, spread_m_s: None };
         let line = layer_returns(&optics)?.line(&still, &plan.geometry);
-        Ok(layer_snr(&plan.scene.scene, &plan.instrument, &line))
+        Ok(layer_snr(&plan.scene.content, &plan.instrument, &line))
     }
 
     /// Pulses of one realisation.
@@ -172,11 +172,11 @@ impl<'a> Scanner<'a> {
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
-                let impairment_seed = stream(self.plan.scene.scene.seed, "asides", index(key) as u64).next_u64();
+                let impairment_seed = stream(self.plan.scene.content.seed, "asides", index(key) as u64).next_u64();
                 let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
                 Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, impairment_seed }
             },
-            generator: |key| stream(self.plan.scene.scene.seed, "signal", index(key) as u64),
+            generator: |key| stream(self.plan.scene.content.seed, "signal", index(key) as u64),
             digitiser: self.plan.instrument.digitiser,
         };
         Ok(scan.collect()?)
@@ -187,7 +187,7 @@ impl<'a> Scanner<'a> {
         if self.spread_m_s.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
-        let (schedule, of) = (&self.plan.geometry.schedule, self.plan.scene.scene.scan.wind_of_pulses);
+        let (schedule, of) = (&self.plan.geometry.schedule, self.plan.scene.content.scan.wind_of_pulses);
         let mut wanted: Vec<(usize, usize)> = Vec::new();
         let air_of = pulses
             .clone()
@@ -265,7 +265,7 @@ impl Returns {
 /// The returns of the layers; a signal-to-noise ratio that the scene states takes the place of all of it.
 fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
     let plan = optics.plan;
-    let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+    let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), 1.0);
         let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
@@ -287,7 +287,7 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
 
 /// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
 fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfSight>>, Error> {
-    let (scene, instrument, geometry) = (&plan.scene.scene, &plan.instrument, &plan.geometry);
+    let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
     let Some(SecondTrip { radial_velocity_m_s: elsewhere_m_s }) = scene.scan.second_trip else { return Ok(None) };
     let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
     let ranges_m: Vec<f64> = geometry.layer_range_m().map(|range_m| range_m + apart_m).collect();
@@ -304,7 +304,7 @@ fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfS
 
 /// Efficiencies of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
 fn drawn_efficiency(optics: &LineOptics<'_>, lines: &[LineOfSight]) -> Result<Option<LayerEfficiency>, Error> {
-    let (scene, geometry) = (&optics.plan.scene.scene, &optics.plan.geometry);
+    let (scene, geometry) = (&optics.plan.scene.content, &optics.plan.geometry);
     let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
     let first_m = [geometry.first_layer_range_m];
     let Some(&(ends_m, _)) = stretches(scene, geometry, &first_m).first() else { return Ok(None) };

@@ -16,7 +16,7 @@ const MOST_PLACES: usize = 100_000;
 /// # Errors
 /// What the wind refuses.
 pub(super) fn fastest_m_s(setup: &Setup) -> Result<f64, Error> {
-    let (scan, schedule, wind) = (&setup.scene.scene.scan, &setup.geometry.schedule, &setup.wind);
+    let (scan, schedule, wind) = (&setup.scene.content.scan, &setup.geometry.schedule, &setup.wind);
     let fastest_of = |line: usize, range_m: &[f64]| -> Result<(f64, f64), Error> {
         let mut beam = schedule.middle(line);
         if wind.max_speed_m_s > 0.0 {

@@ -33,7 +33,7 @@ impl Plan {
 
     /// What makes a stage smaller, by the keys that this scene has a use for.
     fn smaller(&self, stage: Stage) -> String {
-        let scene = &self.scene.scene;
+        let scene = &self.scene.content;
         let lines = match scene.scan.pattern {
             Pattern::Rhi {} => "a larger scan.elevation_step_rad",
             Pattern::Ppi(_) | Pattern::Axial(_) => "a larger scan.pattern.azimuth_step_rad",
@@ -69,7 +69,7 @@ impl Plan {
     /// # Errors
     /// As [`Plan::fits`].
     pub fn bound_fits_in(&self, available_bytes: f64) -> Result<(), Error> {
-        let stages = of_bound(&self.stages, &Sizes::new(&self.scene.scene, self.target, &self.geometry));
+        let stages = of_bound(&self.stages, &Sizes::new(&self.scene.content, self.target, &self.geometry));
         hold(&stages, available_bytes, |_| "fewer estimator.window_samples".into())
     }
 }

@@ -75,7 +75,7 @@ impl Plan {
         let file = scene.clone();
         let made = || {
             let setup = Setup::new(scene, wind)?;
-            let scene = &setup.scene.scene;
+            let scene = &setup.scene.content;
             let fastest_m_s = fastest::fastest_m_s(&setup)?;
             let mut warnings = warnings::of_scene(&setup, fastest_m_s)?;
             let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
@@ -105,12 +105,12 @@ impl Plan {
 
     /// Realisations whose raw signals are kept for the files.
     pub fn kept_realisations(&self) -> usize {
-        sizes::kept_realisations(&self.scene.scene, self.target)
+        sizes::kept_realisations(&self.scene.content, self.target)
     }
 
     /// Realisations to run: the raw signals alone need those that are kept.
     pub fn realisations(&self) -> usize {
-        if self.runs(Stage::Estimates) { self.scene.scene.scan.realisations } else { self.kept_realisations() }
+        if self.runs(Stage::Estimates) { self.scene.content.scan.realisations } else { self.kept_realisations() }
     }
 }
 
@@ -124,7 +124,7 @@ impl Deref for Plan {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.scene.seed)?;
+        writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.content.seed)?;
         for s in &self.stages {
             let (word, memory) = if s.runs { ("run", units::bytes(s.memory_bytes)) } else { ("skip", String::new()) };
             writeln!(f, "  {word:<5} {:<16} {memory:>10}   {}", s.stage.name(), s.reason)?;
@@ -252,7 +252,7 @@ mod tests {
         ] {
             let plan = of(words);
             // Each line at every five centimetres.
-            let (scan, schedule) = (&plan.scene.scene.scan, &plan.geometry.schedule);
+            let (scan, schedule) = (&plan.scene.content.scan, &plan.geometry.schedule);
             let mut dense_m_s = 0.0_f64;
             for line in 0..schedule.lines.len() {
                 let beam = schedule.middle(line);

@@ -30,7 +30,7 @@ pub(super) fn stages(
     warnings: &mut Vec<String>,
 ) -> Result<([PlannedStage; 2], f64, ScreenPlans), Error> {
     let Setup { scene: file, instrument, geometry, .. } = setup;
-    let scene = &file.scene;
+    let scene = &file.content;
     let fixed = if let SnrReference::Fixed { snr_db } = scene.detector.snr { Some(snr_db) } else { None };
     let o = &scene.outputs;
     let model = model(scene);

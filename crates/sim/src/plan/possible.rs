@@ -16,7 +16,7 @@ use wakescope_estimate::wake_detection::WakeDetector;
 /// # Errors
 /// The first place outside, in the words of the run; what files cannot hold.
 pub(super) fn check(plan: &Plan) -> Result<(), Error> {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let (scene, g) = (&plan.scene.content, &plan.geometry);
     let velocities = g.elevation_rad.len() * g.gate_range_m.len();
     let is_tested = plan.target == Target::Run && scene.retrieval.as_ref().is_some_and(|r| r.false_alarm.is_some());
     if is_tested && velocities < WakeDetector::NEEDED {
@@ -38,7 +38,7 @@ const LAYERS_LOOKED_AT: usize = 1_000_000;
 /// A simulated flow is known in a rectangle, so a line is inside if both its ends above the ground are; the line of which one
 /// is not is looked at layer by layer.
 fn lines_stay_inside(plan: &Plan) -> Result<(), Error> {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let (scene, g) = (&plan.scene.content, &plan.geometry);
     if !matches!(scene.flow, Flow::Simulated(_) | Flow::Fields(_)) || scene.scan.outside_flow != (Outside::Error {}) {
         return Ok(());
     }
@@ -64,7 +64,7 @@ fn lines_stay_inside(plan: &Plan) -> Result<(), Error> {
 /// # Errors
 /// The key, the size or the times, and what is allowed.
 fn files_hold_it(plan: &Plan) -> Result<(), Error> {
-    let (scene, has_map) = (&plan.scene.scene, plan.runs(Stage::Estimates));
+    let (scene, has_map) = (&plan.scene.content, plan.runs(Stage::Estimates));
     let (first_s, last_s) = (plan.wind.start_s, plan.scan_end_s());
     if scene.outputs.netcdf {
         let (g, kept_realisations) = (&plan.geometry, plan.kept_realisations());

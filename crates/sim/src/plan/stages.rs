@@ -16,7 +16,7 @@ const RETRIEVED_NUMBERS: f64 = 60.0;
 
 /// All stages, in the order in which they run.
 pub(super) fn stages(setup: &Setup, target: Target, n: &Sizes, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
-    let (scene, g) = (&setup.scene.scene, &setup.geometry);
+    let (scene, g) = (&setup.scene.content, &setup.geometry);
     let mut out = vec![skip(Stage::FlowSimulation, &setup.wind.source), cross_plane(scene, target)];
     out.extend(optics);
     if target == Target::Efficiency {

@@ -15,7 +15,7 @@ use wakescope_estimate::map::PolarPoint;
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, Error> {
-    let scene = &setup.scene.scene;
+    let scene = &setup.scene.content;
     let (e, method) = (&scene.estimator, scene.estimator.method);
     let mut out = Vec::from_iter(of_fast_air(setup, fastest_m_s));
     if e.padded_samples < 4 * e.window_samples {
@@ -45,7 +45,7 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
 
 /// Air that the detector band does not hold.
 fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
-    let scene = &setup.scene.scene;
+    let scene = &setup.scene.content;
     let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
     let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] { "" } else { ", seen from the lidar," };
     (fastest_m_s > half_band_m_s).then(|| {
@@ -60,7 +60,7 @@ fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
 /// a time T after another one has its light come back with that from c T/2 farther away. The signals of a scene hold one pulse each,
 /// as if the one before were long gone.
 fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
-    let scene = &setup.scene.scene;
+    let scene = &setup.scene.content;
     let rate_hz = scene.laser.pulse_repetition_hz;
     let apart_m = 0.5 * SPEED_OF_LIGHT_M_S / rate_hz;
     let (first_s, _) = setup.instrument.pulse.support_s();
@@ -82,7 +82,7 @@ fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
 
 /// Brillouin scattering in the fibre of the amplifier.
 fn of_scattering(setup: &Setup) -> Option<String> {
-    let (fibre, instrument) = (setup.scene.scene.laser.fibre?, &setup.instrument);
+    let (fibre, instrument) = (setup.scene.content.laser.fibre?, &setup.instrument);
     let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
     let peak_w = instrument.peak_power_w();
     (peak_w > threshold_w).then(|| {
@@ -100,7 +100,7 @@ fn of_scattering(setup: &Setup) -> Option<String> {
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
-    let (scene, g) = (&setup.scene.scene, &setup.geometry);
+    let (scene, g) = (&setup.scene.content, &setup.geometry);
     let (e, places) = (&scene.estimator, places(scene, g)?);
     let elevation_rad = places.line_elevation_rad()[0];
     let is_empty = |range_m: f64| {
@@ -149,7 +149,7 @@ mod tests {
             let text = found.first().unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", planned.warnings));
             let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
             // by the distances themselves
-            let (g, scene) = (&planned.geometry, &planned.scene.scene);
+            let (g, scene) = (&planned.geometry, &planned.scene.content);
             let places: ScanGeometry = crate::setup::region::places(scene, g).unwrap();
             let windows_m = places.gate_ranges_m();
             let near = |gate_m: &f64| windows_m.iter().any(|window_m| (window_m - gate_m).abs() <= radius_m + 1e-5);

@@ -33,7 +33,7 @@ pub fn envelopes(
     snr: f64,
     found: &mut RetrievedScan,
 ) -> Result<Vec<EnvelopeResult>, Error> {
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let refuse = |reason: &str| Error::Input { path: found.scan.path.clone(), reason: reason.into() };
     let (true, Weighting::Gaussian { relative_half_width }) = (scene.pulse.is_gaussian(), estimators::weighting(scene))
     else {

@@ -282,7 +282,7 @@ pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: 
     ReadScan {
         path: path.to_owned(),
         sweep,
-        reference: crate::io::UtcTime::parse(&plan.scene.scene.site.start_utc),
+        reference: crate::io::UtcTime::parse(&plan.scene.content.site.start_utc),
         scene_toml: Some(plan.scene.toml.clone()),
         ..scan_of_lines("", plan, &order, [&lines.elevation_rad, &lines.time_s], &velocity_m_s)
     }

@@ -65,7 +65,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     maps: &[Array2<f64>],
     observer: &dyn Observer,
 ) -> Result<Option<SceneRetrieval>, Error> {
-    let scene = &plan.scene.scene;
+    let scene = &plan.scene.content;
     let Some(wanted) = &scene.retrieval else { return Ok(None) };
     let sweeps = upward_sweeps(plan);
     let truths = sweeps.iter().map(|lines| true_vortices(plan, lines)).collect::<Result<Vec<_>, _>>()?;
@@ -209,7 +209,7 @@ fn tests(
         gate: options.gate.clone(),
         empty_scans: EMPTY_SCANS,
         stride: noise.stride,
-        seed: plan.scene.scene.seed,
+        seed: plan.scene.content.seed,
         ..DetectionSettings::default()
     };
     let empty = noise.empty_scan(plan);

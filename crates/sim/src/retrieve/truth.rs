@@ -45,11 +45,11 @@ fn exact(side: Side, (place_m, time_s): Passage, [circulation, mean]: [f64; 2], 
 /// # Errors
 /// A simulated flow in which no vortices are found; what the wind refuses.
 pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResult; 2], Error> {
-    match &plan.scene.scene.flow {
+    match &plan.scene.content.flow {
         Flow::VortexPair(pair) => {
             let (air, profile) = (vortex_pair(pair), pair.profile);
             // Behind an aircraft, the wake in the plane of the scan has its age there.
-            let x_m = plan.scene.scene.scan.lidar.x_m;
+            let x_m = plan.scene.content.scan.lidar.x_m;
             let since_s = pair.aircraft.map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
             let of = |side: Side| -> Result<VortexResult, Error> {
                 let centre = |time_s: f64| {
@@ -86,7 +86,7 @@ fn when_passed(
     lines: &[usize],
     centre: impl Fn(f64) -> Result<(f64, f64), Error>,
 ) -> Result<Passage, Error> {
-    let (g, lidar_m) = (&plan.geometry, plan.scene.scene.scan.lidar_height_m);
+    let (g, lidar_m) = (&plan.geometry, plan.scene.content.scan.lidar_height_m);
     let times_s = || lines.iter().map(|line| plan.wind.start_s + g.line_time_s[*line]);
     let mut time_s = times_s().sum::<f64>() / lines.len().max(1) as f64;
     let mut place_m = centre(time_s)?;
@@ -145,7 +145,7 @@ fn vorticity(
 
 /// The place of the scan where the vorticity of a sign is strongest.
 fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
-    let (scan, g) = (&plan.scene.scene.scan, &plan.geometry);
+    let (scan, g) = (&plan.scene.content.scan, &plan.geometry);
     let top = g.elevation_rad.iter().fold(0.0_f64, |top, e| top.max(*e)).min(std::f64::consts::FRAC_PI_2);
     let sector = (
         (scan.range_min_m * top.cos(), COARSE_M),
@@ -225,7 +225,7 @@ mod tests {
             pair.age_tau = 0.5;
         });
         let [left, right] = true_vortices(&moving, &lines(&moving)).unwrap();
-        let Flow::VortexPair(pair) = moving.scene.scene.flow else { unreachable!() };
+        let Flow::VortexPair(pair) = moving.scene.content.flow else { unreachable!() };
         let at = vortex_pair(&pair).centres(left.time_s);
         assert_eq!((left.lateral_position_m.value, left.height_m.value), (at.left_y_m, at.height_m));
         let line = moving.geometry.line_time_s.iter().position(|t| moving.wind.start_s + t == left.time_s).unwrap();

@@ -6,7 +6,7 @@
 use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{Refinement, RegionRadius, SignalsOf};
-use crate::keys::{Document, lines_with_keys, value_at};
+use crate::keys::{Text, lines_with_keys, value_at};
 
 /// Keys of a scene without use: what each is for, and what the scene has instead.
 fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
@@ -98,7 +98,7 @@ impl Scene {
 }
 
 /// What a text states in vain.
-pub(super) fn problems(scene: &Scene, document: &Document<'_>) -> Vec<Problem> {
+pub(super) fn problems(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
     let mut idle = idle(scene);
     idle.retain(|(key, _)| document.line(key).is_some());
     if idle.is_empty() {
@@ -171,6 +171,6 @@ mod tests {
         }
         let fitted = parse("[estimator.method]\nkind = \"capon\"\norder = 8\n").unwrap();
         assert!(fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("gradients"), "{}", fitted.toml);
-        assert_eq!(parse(&fitted.toml).unwrap().scene, fitted.scene);
+        assert_eq!(parse(&fitted.toml).unwrap().content, fitted.content);
     }
 }

@@ -314,7 +314,7 @@ mod tests {
             "[laser]\namplifier = { mean_power_w = 0.06 }\nfibre = {}\n[detector.front_end]\nload_ohm = 50.0\n[scan]\nsecond_trip = {}\n",
         )
         .unwrap();
-        assert_eq!(parse(&real.toml).unwrap().scene.to_toml(), real.toml);
+        assert_eq!(parse(&real.toml).unwrap().content.to_toml(), real.toml);
         assert!(!real.toml.contains("rejection_db") && !real.toml.contains("\nenergy_j = "), "{}", real.toml);
     }
 

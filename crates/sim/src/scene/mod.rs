@@ -16,7 +16,7 @@ mod presets;
 mod read;
 mod retrieval;
 
-pub use crate::keys::{Located, Problem, SceneError};
+pub use crate::keys::{Content, Document, Located, Problem, SceneError, hash_of};
 pub use atmosphere::*;
 pub use estimator::*;
 pub use flow::*;
@@ -32,7 +32,6 @@ pub use wakescope_signal::{NoiseModel, sampled::Resampling};
 
 use crate::io::UtcTime;
 use crate::keys::{Is, keys};
-use sha2::{Digest, Sha256};
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 crate::keys::foreign_choices! {
@@ -184,11 +183,6 @@ keys! {
             format!("a date from 1900 to 2199 like \"{}\"", UtcTime::FORM),
         ),
     }
-}
-
-/// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
-pub fn hash_of(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]

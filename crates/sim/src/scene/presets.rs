@@ -67,7 +67,7 @@ mod tests {
             let text = preset_toml(row[0]).unwrap();
             assert!(text.contains("Nominal") && text.contains(row[17]), "{text}");
             let file = SceneFile::parse(&text, Path::new(row[0])).unwrap();
-            let scene = file.scene.clone();
+            let scene = file.content.clone();
             let found = [
                 scene.laser.wavelength_m,
                 scene.pulse_energy_j(),
@@ -94,7 +94,7 @@ mod tests {
                 assert!((sum - snr_db).abs() < 1e-9, "{}: {sum} {snr_db}", row[0]);
             }
         }
-        let table2 = SceneFile::parse(&preset_toml("chapter_table2").unwrap(), Path::new("s")).unwrap().scene;
+        let table2 = SceneFile::parse(&preset_toml("chapter_table2").unwrap(), Path::new("s")).unwrap().content;
         let same = Scene { scan: crate::scene::Scan { elevation_step_rad: 1.25e-3, ..table2.scan }, ..table2 };
         assert_eq!(same, Scene::default());
         assert_eq!(preset_toml("lidar"), None);
@@ -110,16 +110,16 @@ mod tests {
             let mut file = SceneFile::parse(&preset_toml(row[0]).unwrap(), Path::new(row[0])).unwrap();
             let airs = [(1e-7, 7e-5), (1e-6, 1e-4)];
             for (reach_km, (backscatter_per_m_sr, extinction_per_m)) in cells[1..].iter().zip(airs) {
-                let air = &mut file.scene.atmosphere;
+                let air = &mut file.content.atmosphere;
                 (air.backscatter_per_m_sr, air.extinction_per_m) = (backscatter_per_m_sr, extinction_per_m);
-                let plan = Plan::new(SceneFile::new(file.scene.clone()).unwrap(), Target::Run).unwrap();
+                let plan = Plan::new(SceneFile::new(file.content.clone()).unwrap(), Target::Run).unwrap();
                 // The ratio is told to 0.05 dB and the reach to 50 m.
                 let budget = Budget::new(&plan, &[1e3 * reach_km - 51.0, 1e3 * reach_km + 51.0], &Silent).unwrap();
                 let around = budget.snr_db();
                 assert!(around[0] > cells[0] - 0.06 && around[1] < cells[0] + 0.06, "{line}: {around:?}");
             }
             let plan = Plan::new(file, Target::Run).unwrap();
-            let root_of_pulses = (plan.scene.scene.scan.pulses_per_line as f64).sqrt();
+            let root_of_pulses = (plan.scene.content.scan.pulses_per_line as f64).sqrt();
             let by_snr = bound(&plan, &Silent).unwrap().by_snr;
             // The first ratio of whole decibels at which the bound is small enough.
             let enough = by_snr.iter().find(|p| p.window_m_s <= 0.5 * root_of_pulses).unwrap().snr_db;

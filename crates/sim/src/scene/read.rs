@@ -2,60 +2,32 @@
 
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
-use crate::io::{Provenance, text_file};
-use crate::keys::{Document, Format, Key, Source, keys_of, value_at};
-use std::path::{Path, PathBuf};
+use crate::keys::{Content, Document, Format, Key, Text, keys_of, value_at};
+use std::path::Path;
 use std::sync::LazyLock;
 
 /// A valid scene, with what names it.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SceneFile {
-    /// The scene.
-    pub scene: Scene,
-    /// The scene as TOML, every default written out.
-    pub toml: String,
-    /// First 16 hexadecimal digits of the SHA-256 of `toml`.
-    pub hash: String,
-    /// Folder to which names of files in the scene are relative.
-    pub folder: PathBuf,
-    source: Source,
+pub type SceneFile = Document<Scene>;
+
+impl Content for Scene {
+    fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
+        let read = Text::parse(text, path)?;
+        let scene: Self = read.read(read.vet(&scene_format())?)?;
+        let mut problems = scene.problems_where(&|key| read.line(key).is_some());
+        problems.extend(idle::problems(&scene, &read));
+        if problems.is_empty() { Ok(scene) } else { Err(read.located(problems)) }
+    }
+
+    fn to_toml(&self) -> String {
+        self.to_toml()
+    }
+
+    fn seed(&self) -> u64 {
+        self.seed
+    }
 }
 
 impl SceneFile {
-    /// Where the files of this scene come from.
-    pub fn provenance(&self) -> Provenance {
-        Provenance::new(&self.toml, &self.hash, self.scene.seed)
-    }
-
-    /// Reads and checks a scene file.
-    ///
-    /// # Errors
-    /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
-    pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = text_file::read(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
-        Self::parse(&text, path)
-    }
-
-    /// Checks the text of a scene file; `path` serves the error messages, and its folder is where files of the scene
-    /// are looked for.
-    ///
-    /// # Errors
-    /// As [`SceneFile::read`].
-    pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
-        let document = Document::parse(text, path)?;
-        let scene: Scene = document.read(document.vet(&scene_format())?)?;
-        let mut problems = scene.problems_where(&|key| document.line(key).is_some());
-        problems.extend(idle::problems(&scene, &document));
-        if problems.is_empty() { Ok(Self::of(scene, Source::new(path, text))) } else { Err(document.located(problems)) }
-    }
-
-    /// A scene whose limits were checked.
-    fn of(scene: Scene, source: Source) -> Self {
-        let toml = scene.to_toml();
-        let (hash, folder) = (super::hash_of(&toml), source.folder().to_owned());
-        Self { scene, toml, hash, folder, source }
-    }
-
     /// The keys that a scene may state.
     pub(crate) fn keys() -> &'static [Key] {
         scene_format().keys
@@ -66,8 +38,8 @@ impl SceneFile {
     /// # Errors
     /// Keys that do not exist, values of the wrong kind.
     pub(crate) fn without_limits(text: &str, path: &Path) -> Result<Scene, SceneError> {
-        let document = Document::parse(text, path)?;
-        document.read(document.vet(&scene_format())?)
+        let read = Text::parse(text, path)?;
+        read.read(read.vet(&scene_format())?)
     }
 
     /// Checks a scene that was made in memory; its files are relative to the working folder.
@@ -76,7 +48,7 @@ impl SceneFile {
     /// All problems of the scene.
     pub fn new(scene: Scene) -> Result<Self, Vec<Problem>> {
         let problems = scene.problems();
-        if problems.is_empty() { Ok(Self::of(scene, Source::new(Path::new("scene"), ""))) } else { Err(problems) }
+        if problems.is_empty() { Ok(Self::of(scene, Path::new("scene"), "")) } else { Err(problems) }
     }
 
     /// A scene that comes of this one, with the folder and the lines of its file.
@@ -85,7 +57,7 @@ impl SceneFile {
     /// All problems of the scene.
     pub(crate) fn with(&self, scene: Scene) -> Result<Self, SceneError> {
         let problems = scene.problems();
-        if problems.is_empty() { Ok(Self::of(scene, self.source.clone())) } else { Err(self.located(problems)) }
+        if problems.is_empty() { Ok(self.changed(scene)) } else { Err(self.located(problems)) }
     }
 
     /// The same instrument and scan in still air, of which nothing is retrieved: what says how velocities were measured, without the
@@ -94,26 +66,16 @@ impl SceneFile {
     /// # Errors
     /// What is not allowed in still air; a checked scene gives none.
     pub(crate) fn in_still_air(&self) -> Result<Self, SceneError> {
-        let mut scene = self.scene.clone();
+        let mut scene = self.content.clone();
         (scene.flow, scene.added_flows, scene.retrieval) = (super::Flow::Calm {}, Vec::new(), None);
         scene.outputs.signals = false;
         self.with(scene)
     }
 
-    /// Whether the file gives a value to a key.
-    pub(crate) fn states(&self, key: &str) -> bool {
-        self.source.has(key)
-    }
-
-    /// Problems that only a plan could find, with the lines of the file that this scene was read from.
-    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
-        self.source.located(problems)
-    }
-
     /// An error of a key with the line of the file that states it.
     pub(crate) fn of_key(&self, error: Error) -> Error {
         let Error::Key { key, reason } = error else { return error };
-        let whole = toml::Value::try_from(&self.scene).ok();
+        let whole = toml::Value::try_from(&self.content).ok();
         let value = whole.as_ref().and_then(|whole| value_at(whole, key)).filter(|value| !value.is_table());
         let value = value.map(|value| value.to_string()).unwrap_or_default();
         self.located(vec![Problem { key: key.into(), value, allowed: reason }]).into()
@@ -192,7 +154,7 @@ mod tests {
 
     #[test]
     fn a_table_without_its_kind_has_the_default_kind() {
-        let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap().scene;
+        let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap().content;
         let Flow::VortexPair(pair) = scene("[flow]\nlateral_position_m = 1500\n").flow else { panic!("a pair") };
         assert_eq!(pair, VortexPair { lateral_position_m: 1500.0, ..VortexPair::default() });
         assert_eq!(scene("[scan]\nbelow_ground = {}\n[detector]\nsnr = {}\n"), Scene::default());

@@ -46,7 +46,7 @@ pub(crate) fn seen_m_s(
 pub(crate) fn beam_of_air(setup: &Setup, line: usize, air: usize) -> Beam {
     let schedule = &setup.geometry.schedule;
     let pulses = schedule.lines[line].pulses;
-    let airs = setup.scene.scene.scan.wind_of_pulses.of_line(pulses);
+    let airs = setup.scene.content.scan.wind_of_pulses.of_line(pulses);
     if airs == pulses {
         return schedule.beam_of_pulse(line, air);
     }
@@ -60,7 +60,7 @@ pub(crate) fn air_of_line(setup: &Setup, filter: &RangeFilter, range_m: &[f64], 
     let g = &setup.geometry;
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
-    let of = setup.scene.scene.scan.wind_of_pulses;
+    let of = setup.scene.content.scan.wind_of_pulses;
     if of == WindOfPulses::default() {
         return air_along(setup, &schedule.middle(line), range_m);
     }
@@ -123,7 +123,7 @@ pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<A
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
 fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, Error> {
     let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
-    let scan = &setup.scene.scene.scan;
+    let scan = &setup.scene.content.scan;
     let elevation_rad = beam.elevation_rad;
     let checked = |((&[x_m, y_m, z_m], known_m_s), &range_m): ((&[f64; 3], f64), &f64)| {
         let outside = match (z_m < 0.0, known_m_s.is_nan()) {

@@ -42,7 +42,7 @@ impl Geometry {
     /// What the wind or the layers refuse, which is nothing for a checked scene; a list of lines that cannot be read or followed,
     /// beams below the ground.
     pub fn new(file: &SceneFile, pulse: &Pulse, wind: &SceneWind) -> Result<Self, Error> {
-        let (scene, scan) = (&file.scene, &file.scene.scan);
+        let (scene, scan) = (&file.content, &file.content.scan);
         let schedule = scan_lines::schedule(file)?;
         let middles: Vec<_> = (0..schedule.lines.len()).map(|line| schedule.middle(line)).collect();
         let line_time_s: Vec<f64> = middles.iter().map(|beam| beam.time_s).collect();

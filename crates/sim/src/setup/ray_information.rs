@@ -14,7 +14,7 @@ const SNR: std::ops::RangeInclusive<f64> = 1e-8..=1e6;
 
 /// Weight of the air about the range of a gate: of the pulse and of the window.
 pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
-    let scene = &setup.scene.scene;
+    let scene = &setup.scene.content;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let thickness_m = setup.geometry.layer_thickness_m;
     Ok(RangeFilter::gate(&setup.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
@@ -37,7 +37,7 @@ impl<'a> RayInformation<'a> {
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
     pub(crate) fn new(setup: &'a Setup, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
-        let (scene, g, pulse) = (&setup.scene.scene, &setup.geometry, &setup.instrument.pulse);
+        let (scene, g, pulse) = (&setup.scene.content, &setup.geometry, &setup.instrument.pulse);
         let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
         let model = estimators::record_model(scene, pulse)?;
         let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
@@ -53,7 +53,7 @@ impl<'a> RayInformation<'a> {
 
     /// Information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows about a range, each sample having the ratio that it sees.
     pub(crate) fn at(&self, range_m: f64, count: usize) -> Result<Vec<f64>, Error> {
-        let (scene, g) = (&self.setup.scene.scene, &self.setup.geometry);
+        let (scene, g) = (&self.setup.scene.content, &self.setup.geometry);
         if scene.detector.noise == NoiseModel::None {
             return self.of_snr(*SNR.end(), count);
         }
@@ -69,7 +69,7 @@ impl<'a> RayInformation<'a> {
     /// The same where all samples have one signal-to-noise ratio.
     pub(crate) fn of_snr(&self, snr: f64, count: usize) -> Result<Vec<f64>, Error> {
         let snr = snr.clamp(*SNR.start(), *SNR.end());
-        Ok(self.model.information(&estimators::gates(&self.setup.scene.scene)?, count, |_| snr)?)
+        Ok(self.model.information(&estimators::gates(&self.setup.scene.content)?, count, |_| snr)?)
     }
 }
 

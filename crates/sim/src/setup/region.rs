@@ -34,7 +34,7 @@ pub(crate) fn places(scene: &Scene, g: &Geometry) -> Result<ScanGeometry, Error>
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn region_radius(of_rays: &RayInformation<'_>, geometry: &ScanGeometry) -> Result<Radius, Error> {
-    let estimator = &of_rays.setup.scene.scene.estimator;
+    let estimator = &of_rays.setup.scene.content.estimator;
     let RegionRadius::Target { standard_deviation_m_s, largest_m } = estimator.radius else {
         let own = estimator.clone();
         return Ok(Radius::OfRange(Box::new(move |range_m| own.largest_radius_m(range_m))));

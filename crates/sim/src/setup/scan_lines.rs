@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// # Errors
 /// A list that cannot be read or followed; beams that meet the ground where the scene does not allow it.
 pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
-    let scene = &file.scene;
+    let scene = &file.content;
     let (s, head) = (&scene.scan, &scene.scan.head);
     let pace = Pace {
         prt_s: 1.0 / scene.laser.pulse_repetition_hz,
@@ -27,7 +27,7 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     let of_key = Error::of_key("scan.pattern.file");
     let (stops, path) = match &s.pattern {
         Pattern::List { file: list } => {
-            let path = file.folder.join(list);
+            let path = file.folder().join(list);
             (scan_list::read(&path).map_err(of_key)?, path)
         }
         // Only a list asks for times, which may be too early.
@@ -96,7 +96,7 @@ fn stops(scene: &Scene) -> Vec<Stop> {
 
 /// Refuses beams below the ground.
 fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
-    let s = &file.scene.scan;
+    let s = &file.content.scan;
     if s.below_ground != (Outside::Error {}) {
         return Ok(());
     }

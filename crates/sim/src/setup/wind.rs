@@ -43,8 +43,8 @@ impl SceneWind {
     /// # Errors
     /// What the wind refuses; files that cannot be read, or do not hold the time that is asked for.
     pub fn new(file: &SceneFile) -> Result<Self, Error> {
-        let mut whole = Self::of_flow(&file.scene.flow, file)?;
-        for (i, flow) in file.scene.added_flows.iter().enumerate() {
+        let mut whole = Self::of_flow(&file.content.flow, file)?;
+        for (i, flow) in file.content.added_flows.iter().enumerate() {
             let added = Self::of_flow(flow, file)
                 .map_err(|source| Error::OfAddedFlow { number: i, source: Box::new(source) })?;
             whole = whole.plus(added);

@@ -82,7 +82,7 @@ pub(super) fn rows(
 
 impl<'p> Collected<'p> {
     fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.scene, &plan.geometry);
+        let (scene, g) = (&plan.scene.content, &plan.geometry);
         let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
             let (elevation_rad, range_m) = (g.elevation_rad[i], g.gate_range_m[j]);
             let (y_m, z_m) = (range_m * elevation_rad.cos(), scene.scan.lidar_height_m + range_m * elevation_rad.sin());
@@ -116,7 +116,7 @@ impl<'p> Collected<'p> {
     }
 
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
-        let (plan, scene) = (self.plan, &self.plan.scene.scene);
+        let (plan, scene) = (self.plan, &self.plan.scene.content);
         let middle = ScanMiddle::of(plan, None, Some(scanner))
             .ok_or(wakescope_estimate::Error::Empty { field: "layers of a line" })?;
         // The bound of velocity alone is none on a velocity beside a gradient.
@@ -140,7 +140,7 @@ impl<'p> Collected<'p> {
 /// Part of the estimates that say nothing of the air, and its standard error: those farther from it than any part of a peak, and
 /// as many of the others as a level floor over the band has there.
 fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
-    let (scene, pulse) = (&plan.scene.scene, &plan.instrument.pulse);
+    let (scene, pulse) = (&plan.scene.content, &plan.instrument.pulse);
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let moment = |power: i32| window.iter().enumerate().map(|(n, h)| h * h * (n as f64).powi(power)).sum::<f64>();
     let mean = moment(1) / moment(0);

@@ -170,7 +170,7 @@ impl Common {
     /// # Errors
     /// As [`Plan::new`].
     pub(crate) fn plan(&self, scene: &SceneFile, target: Target) -> Result<Plan, Error> {
-        let cause = hash_of(&format!("{:?}", (&scene.scene.flow, &scene.scene.added_flows, &scene.folder)));
+        let cause = hash_of(&format!("{:?}", (&scene.content.flow, &scene.content.added_flows, scene.folder())));
         let wind = self.winds.of(cause, || SceneWind::new(scene))?;
         Plan::sharing(scene.clone(), target, wind, &self.screens)
     }
@@ -226,12 +226,12 @@ fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
             estimator: Estimator::default(),
             outputs: Outputs::default(),
             site: Site::default(),
-            ..file.scene.clone()
+            ..file.content.clone()
         };
         // Where pulses have airs of their own, a scan holds what they spread over at the gates.
-        let (e, of_pulses) = (&file.scene.estimator, file.scene.scan.wind_of_pulses);
+        let (e, of_pulses) = (&file.content.estimator, file.content.scan.wind_of_pulses);
         let gates = (of_pulses != WindOfPulses::default()).then_some((e.window_samples, e.gate_step_samples));
-        let cause = hash_of(&format!("{:?}", (signals, gates, &file.folder)));
+        let cause = hash_of(&format!("{:?}", (signals, gates, file.folder())));
         match groups.iter_mut().find(|(known, _)| *known == cause) {
             Some((_, group)) => group.push(place),
             None => groups.push((cause, vec![place])),

@@ -41,7 +41,7 @@ fn cases_are_the_stored_ones_to_the_last_bit() {
         }
         // The scene has the value, not only the table.
         let last = found.cases.last().unwrap();
-        assert!(words.starts_with("laser") == (last.scene.scene.laser.pulse_repetition_hz == 40e3));
+        assert!(words.starts_with("laser") == (last.scene.content.laser.pulse_repetition_hz == 40e3));
     }
     assert_eq!(compared, table.rows.len());
 }
@@ -59,7 +59,7 @@ fn constant_mean_power_gives_the_stored_energies_pulses_and_ratios() {
     let found = sweep("", &request).unwrap();
     for (i, case) in found.cases.iter().enumerate() {
         let of = |name: &str| table.number(i, table.column(name).unwrap());
-        let scene = &case.scene.scene;
+        let scene = &case.scene.content;
         assert_eq!(scene.pulse.energy_j.to_bits(), of("energy_j").to_bits());
         assert_eq!(scene.scan.pulses_per_line as f64, of("pulses"));
         let instrument = crate::setup::instrument::Instrument::new(scene).unwrap();
@@ -249,7 +249,7 @@ fn maps_of_scenes_together_are_those_of_each_alone() {
     let scenes = [SMALL, &other, &narrow, &windy, &few, &moving, &moving_few].map(scene);
     let together = maps(&scenes, &crate::Silent).unwrap();
     for (scene, (plan, map)) in scenes.iter().zip(&together) {
-        assert_eq!(plan.scene.scene, scene.scene);
+        assert_eq!(plan.scene.content, scene.content);
         let alone = crate::plan::Plan::new(scene.clone(), crate::plan::Target::Map).unwrap();
         let alone = crate::run(&alone, &crate::Silent).unwrap().map.unwrap();
         let bits = |of: &crate::measure::map::VelocityEstimates| {
@@ -291,10 +291,10 @@ fn results_are_those_of_the_map_of_the_case() {
 #[test]
 fn seeds_are_shared_unless_each_case_is_to_have_its_own() {
     let same = sweep("seed = 7\n", &vary(&["pulse.energy_j=50e-6,150e-6"])).unwrap();
-    assert!(same.cases.iter().all(|case| case.scene.scene.seed == 7));
+    assert!(same.cases.iter().all(|case| case.scene.content.seed == 7));
     let own = Request { independent: true, ..vary(&["pulse.energy_j=50e-6,150e-6"]) };
     let own = sweep("seed = 7\n", &own).unwrap();
-    let seeds: Vec<u64> = own.cases.iter().map(|case| case.scene.scene.seed).collect();
+    let seeds: Vec<u64> = own.cases.iter().map(|case| case.scene.content.seed).collect();
     assert!(seeds[0] != seeds[1] && !seeds.contains(&7), "{seeds:?}");
     assert_eq!(own.keys().collect::<Vec<_>>(), ["pulse.energy_j", "seed"]);
     assert_eq!(own.cases[0].values[1], seeds[0].to_string());

@@ -15,7 +15,7 @@ const JUDGES: &str =
 
 /// The map of a run in the form that files and pictures take.
 pub fn velocity_map(plan: &Plan, e: &VelocityEstimates) -> VelocityMap {
-    let (scene, g) = (&plan.scene.scene, &plan.geometry);
+    let (scene, g) = (&plan.scene.content, &plan.geometry);
     let (mount, lines) = (&g.schedule.mount, &g.schedule.lines);
     let (zero_rad, from_x_rad) = mount.reference_rad;
     let moves = lines.iter().any(|line| line.velocity_m_s != [0.0; 3] || line.position_m != mount.position_m);

@@ -33,7 +33,7 @@ fn settings_that_lose_gates_are_never_chosen_and_the_budget_is_kept() {
     let found = of(SCENE, &Request::new(0.5, &[Figure::Rms, Figure::Std]));
     let step = found.ladders.iter().find(|ladder| ladder.key == WINDOW_STEP).unwrap();
     let lost = step.steps.iter().find(|step| matches!(step.verdict, Verdict::Lost(_)));
-    assert!(lost.is_some_and(|step| step.value > found.scene.scene.estimator.window_step_samples as f64), "{step:?}");
+    assert!(lost.is_some_and(|step| step.value > found.scene.content.estimator.window_step_samples as f64), "{step:?}");
     assert!(found.spent_s <= 1.2 * found.allowed_s, "{} {}", found.spent_s, found.allowed_s);
     assert!(found.verified.is_confirmed);
     for (figure, _, shift) in &found.verified.rows {
@@ -50,7 +50,7 @@ fn a_target_out_of_reach_is_answered_with_a_forecast() {
     let expected = 8.0 * (noise.now / 1e-3).powi(2);
     assert!((noise.needed / expected - 1.0).abs() < 0.2, "{} {expected}", noise.needed);
     assert!(noise.forecast_s > found.allowed_s && found.spent_s <= 1.2 * found.allowed_s);
-    assert_eq!(found.scene.scene.scan.realisations, 8, "the noise stays as it is");
+    assert_eq!(found.scene.content.scan.realisations, 8, "the noise stays as it is");
 }
 
 #[test]

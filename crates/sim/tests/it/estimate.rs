@@ -208,7 +208,7 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
     // np.savez("numpy.npz", signals=np.arange(24, dtype="<i2").reshape(4, 6), elevation_rad=[0.1, 0.1, 0.2, 0.2])
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference/sim/numpy.npz");
     let scene = SceneFile::parse(SMALL, Path::new("s.toml")).unwrap();
-    let mut records = RawRecords::open(&path, &RawFormat::default(), record_shape(&scene.scene)).unwrap();
+    let mut records = RawRecords::open(&path, &RawFormat::default(), record_shape(&scene.content)).unwrap();
     assert_eq!((records.records, records.samples, records.is_complex), (4, 6, false));
     assert_eq!(records.about.elevation_rad, Some(vec![0.1, 0.1, 0.2, 0.2]));
     let found: Vec<f64> = records.read(1..3).unwrap().iter().map(|z| z.re).collect();
@@ -226,7 +226,7 @@ fn tiles_change_no_bit(words: &str) {
     let temp = recorded_run(words);
     let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
     let with = |block_bytes: Option<usize>| {
-        let (path, shape) = (temp.path().join("o/signals.nc"), record_shape(&scene.scene));
+        let (path, shape) = (temp.path().join("o/signals.nc"), record_shape(&scene.content));
         let mut records = RawRecords::open(&path, &RawFormat::default(), shape).unwrap();
         let plan = Plan::new(scene.clone(), wakescope_sim::Target::Map).unwrap();
         let options = RecordedOptions { block_bytes, ..RecordedOptions::default() };

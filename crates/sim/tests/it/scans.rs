@@ -224,7 +224,7 @@ fn winds_add_up_each_from_its_own_start() {
         .replace("OUTPUTS", "");
     let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap();
     let again = SceneFile::parse(&file.toml, Path::new("s.toml")).unwrap();
-    assert_eq!((again.scene, again.hash), (file.scene.clone(), file.hash.clone()));
+    assert_eq!((again.content, again.hash), (file.content.clone(), file.hash.clone()));
     let plan = Plan::new(file, Target::Map).unwrap();
     let mut out = [[0.0; 3]];
     plan.wind.wind().velocity_into(&[[10.0, 20.0, 30.0]], 0.0, &mut out).unwrap();

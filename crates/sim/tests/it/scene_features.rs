@@ -208,7 +208,7 @@ fn the_test_against_noise_flags_noise_and_passes_a_signal() {
 /// A map of that many realisations with single pulses, regions of 2 m and a fixed signal-to-noise ratio.
 fn single_pulses(snr_db: f64, realisations: usize, detector: &str, estimator: &str) -> VelocityEstimates {
     let detector = format!("{detector}\nsnr = {{ reference = \"fixed\", snr_db = {snr_db:?} }}\n");
-    let mut scene = file(Words { detector: detector.leak(), estimator: estimator.to_owned().leak(), ..PLAIN }).scene;
+    let mut scene = file(Words { detector: detector.leak(), estimator: estimator.to_owned().leak(), ..PLAIN }).content;
     scene.scan.elevation_step_rad = 1e-3;
     (scene.scan.pulses_per_line, scene.scan.realisations) = (1, realisations);
     run(&Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap(), &Silent).unwrap().map.unwrap()
@@ -245,7 +245,7 @@ fn by_default_noise_passes_one_time_in_a_hundred_and_estimates_at_minus_14_db_ar
 /// A statistic is quadratic in the samples, so its mean is the sum of those of sinusoids with the powers that signal and noise have at
 /// their frequencies.
 fn shown_db<S: Sample>(plan: &Plan, velocity_m_s: f64, sinusoid: fn(f64, f64) -> S) -> [f64; 2] {
-    let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+    let (scene, instrument) = (&plan.scene.content, &plan.instrument);
     let known = WindowStatistics { snr: 1.0, n_eff: 8.0 };
     let tools = Toolkit::<S>::new(scene, instrument, &known).unwrap();
     let sampling = estimators::sampling(scene).unwrap();
@@ -463,8 +463,8 @@ fn pulses_have_the_efficiency_of_a_realisation_each_and_their_mean_power_is_that
         let air: &'static str = turbulence(efficiency).leak();
         let words = Words { air, detector: "noise = \"none\"\n", scan: "", ..PLAIN };
         let mut file = file(words);
-        file.scene.scan.pulses_per_line = 64;
-        let plan = Plan::new(SceneFile::new(file.scene).unwrap(), Target::Signal).unwrap();
+        file.content.scan.pulses_per_line = 64;
+        let plan = Plan::new(SceneFile::new(file.content).unwrap(), Target::Signal).unwrap();
         let signals = run(&plan, &Silent).unwrap().signals_a.unwrap();
         signals.outer_iter().map(|row| row.mapv(|x| x * x).mean().unwrap()).collect::<Vec<f64>>()
     };

@@ -36,7 +36,7 @@ impl FinishedWake {
     pub fn read(folder: &Path) -> Result<Self, Error> {
         let refuse = |reason: String| Error::Input { path: folder.to_owned(), reason };
         let file = CaseFile::read(&folder.join("case.toml"))?;
-        let (CaseKind::Wake(flow), Some(output)) = (&file.case.case, &file.case.wake) else {
+        let (CaseKind::Wake(flow), Some(output)) = (&file.content.case, &file.content.wake) else {
             return Err(refuse("the case is no wake".into()));
         };
         let (flow, output) = ((**flow).clone(), output.clone());
@@ -85,7 +85,7 @@ impl FinishedWake {
     /// The run in words, its noise among them.
     pub fn words(&self) -> String {
         let WakeFlow { cells: [x, y, z], reynolds, core_radius, perturbation, .. } = self.flow;
-        let subgrid = match self.file.case.solver.subgrid {
+        let subgrid = match self.file.content.solver.subgrid {
             Subgrid::None {} => "no",
             Subgrid::Smagorinsky { .. } => "Smagorinsky's",
             Subgrid::Wale { .. } => "WALE as",

@@ -30,7 +30,7 @@ impl Limits {
     /// # Errors
     /// What estimators and signals refuse; a checked scene gives none.
     pub fn new(plan: &Plan) -> Result<Self, Error> {
-        let (scene, instrument) = (&plan.scene.scene, &plan.instrument);
+        let (scene, instrument) = (&plan.scene.content, &plan.instrument);
         let (receiver, pulse, d) = (&instrument.receiver, &instrument.pulse, &scene.detector);
         let mut found = Self { values: Vec::new(), lines: Vec::new() };
         let mean_w = scene.pulse_energy_j() * scene.laser.pulse_repetition_hz;
@@ -94,9 +94,9 @@ impl Limits {
     }
 
     fn velocities(&mut self, plan: &Plan) {
-        let (d, half_m) = (&plan.scene.scene.detector, 0.5 * plan.scene.scene.laser.wavelength_m);
+        let (d, half_m) = (&plan.scene.content.detector, 0.5 * plan.scene.content.laser.wavelength_m);
         let band_m_s = 0.5 * half_m * d.bandwidth_hz;
-        let (low_m_s, high_m_s) = sampled_velocities_m_s(&plan.scene.scene);
+        let (low_m_s, high_m_s) = sampled_velocities_m_s(&plan.scene.content);
         let flow_m_s = plan.fastest_m_s;
         self.values.extend([("band_m_s", band_m_s), ("sampled_from_m_s", low_m_s), ("sampled_to_m_s", high_m_s)]);
         self.lines.push(format!(
@@ -105,7 +105,7 @@ impl Limits {
     }
 
     fn phase_noise(&mut self, plan: &Plan) -> Result<(), Error> {
-        let scene = &plan.scene.scene;
+        let scene = &plan.scene.content;
         let (wavelength_m, linewidth_hz) = (scene.laser.wavelength_m, scene.laser.linewidth_hz);
         let window_s = scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
         let delay_s = 2.0 * scene.scan.range_min_m / SPEED_OF_LIGHT_M_S;
@@ -125,7 +125,7 @@ impl Limits {
     }
 
     fn resolution(&mut self, plan: &Plan) -> Result<(), Error> {
-        let scene = &plan.scene.scene;
+        let scene = &plan.scene.content;
         let gate_m = range_filter(plan)?.full_width_half_maximum_m();
         let pulse = RangeFilter::pulse(&plan.instrument.pulse, plan.geometry.layer_thickness_m)?;
         let pulse_m = pulse.full_width_half_maximum_m();

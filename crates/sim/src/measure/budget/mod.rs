@@ -144,7 +144,7 @@ impl<'a> Rows<'a> {
         efficiency: impl FnOnce(&[f64]) -> Result<EfficiencyProfile, Error>,
     ) -> Result<Self, Error> {
         let mut rows = Self { plan, range_m, rows: Vec::new() };
-        match plan.scene.scene.detector.snr {
+        match plan.scene.content.detector.snr {
             SnrReference::Fixed { snr_db } => rows.same("stated by the scene", "", "detector.snr".into(), snr_db),
             _ => {
                 rows.transmitter_and_path(&efficiency(&increasing(range_m))?)?;
@@ -158,7 +158,7 @@ impl<'a> Rows<'a> {
 
     /// The ratio in the width of the pulse, and the echo of the pulse before.
     fn beside_the_ratio(&mut self) -> Result<(), Error> {
-        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
         let width_hz = instrument.pulse.spectral_full_width_half_maximum_hz();
         let gain_db = decibels(scene.detector.bandwidth_hz / width_hz);
         let fwhm_s = instrument.gaussian_fwhm_s();
@@ -215,7 +215,7 @@ impl<'a> Rows<'a> {
 
     /// From the photons of the pulse to the electrons that it gives.
     fn transmitter_and_path(&mut self, efficiency: &EfficiencyProfile) -> Result<(), Error> {
-        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
         let (telescope, receiver, t) = (&instrument.telescope, &instrument.receiver, &scene.telescope);
         let (energy_j, photon_j) = (scene.pulse_energy_j(), receiver.photon_energy_j());
         let area_m2 = telescope.aperture_area_m2();
@@ -263,7 +263,7 @@ impl<'a> Rows<'a> {
 
     /// What the receiver loses against the shot-noise limit.
     fn receiver(&mut self) {
-        let (scene, instrument) = (&self.plan.scene.scene, &self.plan.instrument);
+        let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
         let (receiver, front) = (&instrument.receiver, scene.detector.front_end.unwrap_or_default());
         let (lost, n) = (receiver.penalties(), receiver.noise_densities());
         let FrontEnd { saturation_w, half_power_hz, dark_current_a, intensity_noise_db_hz, rejection_db, .. } = front;

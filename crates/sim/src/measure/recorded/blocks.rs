@@ -100,7 +100,7 @@ impl<S: FromParts> Blocks<'_, S> {
     fn tile(&self, records: &mut RawRecords, tile: &Tile, cells: &mut ScanCells) -> Result<(), Error> {
         let (plan, estimator, (read, held), lines) = (self.plan, &self.estimator, &tile.windows, &cells.lines);
         let of_records = lines.records(read);
-        let of_samples = estimators::gates(&plan.scene.scene)?.samples(held);
+        let of_samples = estimators::gates(&plan.scene.content)?.samples(held);
         let places = places_of(plan, &lines.record_elevation_rad(read))?;
         let mut sums = estimator.sums(places, Some(held.clone()))?.scaled_for(self.largest);
         for piece in pieces(of_records.clone(), of_samples.len()) {

@@ -91,7 +91,7 @@ pub(crate) fn upward(lines: impl IntoIterator<Item = usize>, elevation_rad: &[f6
 /// Records that do not fit the angles, angles that are none, times that do not increase.
 pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>) -> Result<Vec<ScanLines>, Error> {
     let count = records.records;
-    let per_line = plan.scene.scene.scan.pulses_per_line;
+    let per_line = plan.scene.content.scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
         Some(table) => of_table(table, count, per_line)?,
         None => match &records.about.elevation_rad {
@@ -99,7 +99,7 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
             None => (of_scene(plan, records)?, records.about.time_s.clone()),
         },
     };
-    let prt_s = 1.0 / plan.scene.scene.laser.pulse_repetition_hz;
+    let prt_s = 1.0 / plan.scene.content.laser.pulse_repetition_hz;
     let time_s = time_s.unwrap_or_else(|| (0..count).map(|i| plan.wind.start_s + i as f64 * prt_s).collect());
     if let Some(bad) = elevation_rad.iter().find(|angle| !(-MOST_RAD..=MOST_RAD).contains(*angle)) {
         return Err(records.refuse(format!(
@@ -184,7 +184,7 @@ fn of_table(table: &RayTable, count: usize, per_line: usize) -> Result<(Vec<f64>
 /// Angles as the scene has them.
 fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
     let (count, lines) = (records.records, &plan.geometry.elevation_rad);
-    let per_line = plan.scene.scene.scan.pulses_per_line;
+    let per_line = plan.scene.content.scan.pulses_per_line;
     let whole = lines.len() * per_line;
     if !count.is_multiple_of(whole) {
         return Err(records.refuse(format!(

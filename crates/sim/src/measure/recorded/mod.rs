@@ -106,14 +106,14 @@ pub fn record_shape(scene: &Scene) -> RecordShape {
 /// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says; signals of the same
 /// scene that were drawn with another seed, or of another number of realisations.
 pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Error> {
-    fits(&scene.scene, records)?;
+    fits(&scene.content, records)?;
     let whole = scan_lines::schedule(&scene)?.pulses();
     let own = records.about.scene_toml.as_deref().and_then(|toml| SceneFile::parse(toml, "scene".as_ref()).ok());
-    let own = own.filter(|own| signals_of(&own.scene) == signals_of(&scene.scene));
+    let own = own.filter(|own| signals_of(&own.content) == signals_of(&scene.content));
     if let Some(own) = &own {
         let drawn = |s: &Scene| [("seed", s.seed), ("scan.realisations", s.scan.realisations as u64)];
         if let Some(((key, of_file), (_, stated))) =
-            drawn(&own.scene).into_iter().zip(drawn(&scene.scene)).find(|(a, b)| a != b)
+            drawn(&own.content).into_iter().zip(drawn(&scene.content)).find(|(a, b)| a != b)
         {
             return Err(records.refuse(format!(
                 "it has the signals of this scene with {key} = {of_file}, and {key} is {stated}: only estimator, outputs and site may differ"
@@ -122,10 +122,10 @@ pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Erro
     }
     let is_own = own.is_some() && records.records.is_multiple_of(whole);
     let repetitions = records.records / whole.max(1);
-    let file = if !is_own || repetitions == scene.scene.scan.realisations {
+    let file = if !is_own || repetitions == scene.content.scan.realisations {
         scene
     } else {
-        let mut own = scene.scene.clone();
+        let mut own = scene.content.clone();
         own.scan.realisations = repetitions;
         scene.with(own)?
     };
@@ -194,7 +194,7 @@ pub fn estimate(
     options: &RecordedOptions,
     observer: &dyn Observer,
 ) -> Result<Recorded, Error> {
-    match plan.scene.scene.detector.signal {
+    match plan.scene.content.detector.signal {
         DetectorSignal::IntermediateFrequency => of_samples::<f64>(plan, is_own, records, options, observer),
         DetectorSignal::Baseband => of_samples::<Complex<f64>>(plan, is_own, records, options, observer),
     }
@@ -217,7 +217,7 @@ fn of_samples<S: FromParts>(
         return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra: None });
     }
     if !plan.geometry.schedule.keeps_to_a_plane() {
-        let kind = plan.scene.scene.scan.pattern.name();
+        let kind = plan.scene.content.scan.pattern.name();
         return Err(records.refuse(format!(
             "the lines of the scene (scan.pattern.kind = \"{kind}\") are not those of one vertical plane from a lidar and a head that \
              stand still: such records are estimated where they are a simulation's own, by its scene, without --rays and --spectra; \
@@ -295,7 +295,7 @@ fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
     if largest == 0.0 {
         return Err(records.refuse("all of its samples are 0".into()));
     }
-    if let Digitiser::Quantised { bits, .. } = plan.scene.scene.detector.digitiser
+    if let Digitiser::Quantised { bits, .. } = plan.scene.content.detector.digitiser
         && records.are_integers
         && largest / records.whole_scale() > (f64::from(bits) - 1.0).exp2()
     {

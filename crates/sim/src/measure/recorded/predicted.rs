@@ -30,13 +30,13 @@ pub(super) struct PredictedError {
 impl PredictedError {
     /// For regions of a scan of a scene that have at most the radius `largest_m` and about `n_eff` independent windows.
     pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64, n_eff: f64) -> Result<Self, Error> {
-        let is_noisy = plan.scene.scene.detector.noise != NoiseModel::None;
+        let is_noisy = plan.scene.content.detector.noise != NoiseModel::None;
         let (of_rays, count) = (RayInformation::new(plan, &[])?, places.most_gates(largest_m));
         let of_snr = |db: f64| of_rays.of_snr(10f64.powf(0.1 * db), count);
         // Without noise no estimate has a ratio.
         let snr_db: Vec<f64> = SNR_DB.filter(|_| is_noisy).map(f64::from).collect();
         let by_gates = snr_db.iter().map(|db| of_snr(*db)).collect::<Result<_, Error>>()?;
-        let bias = ExpectedBias::new(&plan.scene.scene, &plan.instrument, &WindowStatistics { snr: 1.0, n_eff })?;
+        let bias = ExpectedBias::new(&plan.scene.content, &plan.instrument, &WindowStatistics { snr: 1.0, n_eff })?;
         Ok(Self { bias, places, snr_db, by_gates })
     }
 
@@ -69,7 +69,7 @@ impl PredictedError {
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub fn predicted_table(plan: &Plan, map: &VelocityEstimates) -> Result<Table, Error> {
-    let places = places(&plan.scene.scene, &plan.geometry)?;
+    let places = places(&plan.scene.content, &plan.geometry)?;
     let points = polar_points(places.line_elevation_rad(), &map.range_m);
     let largest_m = map.radius_m.iter().copied().fold(0.0, f64::max);
     let n_eff = map.n_eff.mean().unwrap_or(1.0);
@@ -118,7 +118,7 @@ mod tests {
         ] {
             let plan = plan(detector, method);
             let map = run(&plan, &Silent).unwrap().map.unwrap();
-            let places = places(&plan.scene.scene, &plan.geometry).unwrap();
+            let places = places(&plan.scene.content, &plan.geometry).unwrap();
             let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
             let count = map.bias_m_s.len() as f64;
             let (mut found_m_s, mut stated_m_s) = (0.0, 0.0);
@@ -141,7 +141,7 @@ mod tests {
         for estimator in ["", "window_samples = 16\n"] {
             let plan = plan("", estimator);
             let found = bound(&plan, &Silent).unwrap().by_range[3];
-            let places = places(&plan.scene.scene, &plan.geometry).unwrap();
+            let places = places(&plan.scene.content, &plan.geometry).unwrap();
             let elevation_rad = places.line_elevation_rad()[2];
             let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
             let point = PolarPoint { range_m: found.range_m, elevation_rad };

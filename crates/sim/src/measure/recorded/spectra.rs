@@ -33,7 +33,7 @@ pub struct Spectra {
 impl Spectra {
     /// Of the lines and the densities of each scan.
     pub(super) fn of(plan: &Plan, scans: &[(&ScanLines, &[f32])]) -> Result<Self, Error> {
-        let of_gate = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.scene))?;
+        let of_gate = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.content))?;
         let lines = || scans.iter().map(|(lines, _)| lines);
         let elevation_rad = lines().flat_map(|lines| lines.elevation_rad.iter().copied()).collect();
         let time_s = lines().flat_map(|lines| lines.time_s.iter().copied()).collect();
@@ -81,7 +81,7 @@ impl GateSpectra {
     /// # Errors
     /// A method whose numbers are no correlogram of the whole window.
     pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
-        let scene = &plan.scene.scene;
+        let scene = &plan.scene.content;
         // Gradients are no correlogram, and models of windows without weighting take the first lags alone.
         let e = &scene.estimator;
         if matches!(e.method, Method::GradientLikelihood(_)) || e.few_lags().is_some() {

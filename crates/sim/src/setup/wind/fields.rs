@@ -103,7 +103,7 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
 
 /// Reads fields: their times, and once each for its gradient; the rest when it is needed.
 pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
-    let path = file.folder.join(&flow.files);
+    let path = file.folder().join(&flow.files);
     let of_key = Error::of_key("flow.files");
     let refuse = |reason: String| Error::Input { path: path.clone(), reason };
     let mut all = Vec::new();

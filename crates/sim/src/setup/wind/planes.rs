@@ -47,7 +47,7 @@ fn snapshots(flow: &SimulatedFlow, planes: &CrossPlanes) -> Result<Vec<(f64, Gri
 
 /// Reads the planes of a simulated flow.
 pub(super) fn simulated(flow: &SimulatedFlow, file: &SceneFile) -> Result<SceneWind, Error> {
-    let path = file.folder.join(&flow.planes);
+    let path = file.folder().join(&flow.planes);
     let of_key = Error::of_key("flow.planes");
     let refuse = |reason: String| Error::Input { path: path.clone(), reason };
     let (mut times, mut all) = (Vec::new(), Vec::new());

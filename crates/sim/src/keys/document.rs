@@ -1,0 +1,110 @@
+//! A scene or a case that was checked, with what names it and where its lines stand.
+
+#[cfg(feature = "flow")]
+use super::problem::Located;
+use super::problem::{Problem, SceneError};
+use super::vet::Text;
+use crate::io::{Provenance, text_file};
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// What a file says: a scene or a case.
+pub trait Content: Sized {
+    /// Reads and checks a text; `path` serves the messages.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
+    fn parse(text: &str, path: &Path) -> Result<Self, SceneError>;
+
+    /// The same as TOML, every default written out.
+    fn to_toml(&self) -> String;
+
+    /// The seed of its random numbers; 0 where there are none.
+    fn seed(&self) -> u64;
+}
+
+/// A valid scene or case, with what names it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Document<T> {
+    /// The scene or the case.
+    pub content: T,
+    /// The same as TOML, every default written out.
+    pub toml: String,
+    /// First 16 hexadecimal digits of the SHA-256 of `toml`.
+    pub hash: String,
+    path: PathBuf,
+    /// As it was read; empty if it was made in memory.
+    text: String,
+}
+
+impl<T: Content> Document<T> {
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
+    pub fn read(path: &Path) -> Result<Self, SceneError> {
+        let text = text_file::read(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// Checks the text of a file; `path` serves the error messages, and its folder is where files that the text names are
+    /// looked for.
+    ///
+    /// # Errors
+    /// As [`Document::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
+        Ok(Self::of(T::parse(text, path)?, path, text))
+    }
+
+    /// What was checked of a text.
+    pub(crate) fn of(content: T, path: &Path, text: &str) -> Self {
+        let toml = content.to_toml();
+        Self { hash: hash_of(&toml), toml, content, path: path.to_owned(), text: text.to_owned() }
+    }
+
+    /// What comes of this and needs no check, with the folder and the lines of its file.
+    pub(crate) fn changed(&self, content: T) -> Self {
+        Self::of(content, &self.path, &self.text)
+    }
+
+    /// Where the files that come of this come from.
+    pub fn provenance(&self) -> Provenance {
+        Provenance::new(&self.toml, &self.hash, self.content.seed())
+    }
+
+    /// The file that it was read from.
+    #[cfg(feature = "flow")]
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Folder to which names of files in it are relative.
+    pub fn folder(&self) -> &Path {
+        self.path.parent().unwrap_or(Path::new(""))
+    }
+
+    /// Whether the file gives a value to a key.
+    pub(crate) fn states(&self, key: &str) -> bool {
+        Text::parse(&self.text, &self.path).is_ok_and(|text| text.value(key).is_some())
+    }
+
+    /// Problems that are found later, with the lines of the file.
+    pub(crate) fn located(&self, problems: Vec<Problem>) -> SceneError {
+        match Text::parse(&self.text, &self.path) {
+            Ok(text) => text.located(problems),
+            Err(error) => error,
+        }
+    }
+
+    /// Problems of what was asked for beside the file.
+    #[cfg(feature = "flow")]
+    pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
+        let problems = problems.into_iter().map(|problem| Located { problem, line: None }).collect();
+        SceneError::Invalid { path: self.path.clone(), problems }
+    }
+}
+
+/// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
+pub fn hash_of(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
+}
