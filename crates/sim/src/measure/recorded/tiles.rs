@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn tiles_hold_each_gate_once_with_all_that_it_reaches_and_do_not_grow_with_the_record() {
-        for (samples, words) in [(5_000, ""), (5_000, "follow_wind = true"), (1_000_000, "gate_step_samples = 100")] {
+        for (samples, words) in [(5_000, ""), (5_000, "follow_wind = true"), (250_000, "gate_step_samples = 100")] {
             let plan = scene(samples, words);
             let elevation_rad = plan.geometry.elevation_rad.clone();
             let places = places_of(&plan, &elevation_rad).unwrap();
