@@ -74,9 +74,12 @@ impl EdgePlane<'_> {
             }
             let row = &self.vorticity_per_s[k * ny..(k + 1) * ny];
             for (j, (value, y_length_m)) in row.iter().zip(&grid.y_length_m).enumerate() {
-                let dy_m = grid.lateral_m(centre_m[0], grid.y_m[j]);
                 let value = sign * value;
-                if value <= 0.0 || dy_m.abs() > radius_m + y_length_m {
+                if value <= 0.0 {
+                    continue;
+                }
+                let dy_m = grid.lateral_m(centre_m[0], grid.y_m[j]);
+                if dy_m.abs() > radius_m + y_length_m {
                     continue;
                 }
                 let area_m2 = y_length_m * z_length_m;
