@@ -282,16 +282,17 @@ fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f
 
 impl Lobe {
     fn new(density: &[f64], top: usize, peak: f64) -> Self {
-        let lowest = density.iter().copied().fold(f64::INFINITY, f64::min);
-        let mut floor = 0.0;
+        let lowest = || lanes(density, f64::INFINITY, |lowest, value| if value < lowest { value } else { lowest });
+        let (mut floor, mut beside) = (0.0, None);
         let mut reach = [0.0; 2];
         // the half height needs the floor and the floor the half height: one repetition settles it
         for _ in 0..2 {
             reach = half_widths(density, top, floor + 0.5 * (peak - floor));
-            floor = mean_beside(density, top, reach).unwrap_or(lowest);
+            beside = mean_beside(density, top, reach);
+            floor = beside.unwrap_or_else(lowest);
         }
         let second = second_peak(density, top, reach);
-        let is_bare = mean_beside(density, top, reach).is_some() || lowest < BARE * peak;
+        let is_bare = beside.is_some() || lowest() < BARE * peak;
         let width = if is_bare { (reach[0] + reach[1]) / FULL_WIDTH } else { f64::NAN };
         Self { floor, width, second }
     }
@@ -340,28 +341,26 @@ fn parabola(density: &[f64], top: usize) -> f64 {
     if curvature < 0.0 { top as f64 + (0.5 * (left - right) / curvature).clamp(-0.5, 0.5) } else { top as f64 }
 }
 
-/// Sum in independent lanes, so that the additions need not wait for each other.
-pub(crate) fn lanes_sum(values: &[f64]) -> f64 {
+/// Folds numbers in independent lanes, so that no step waits for the one before.
+fn lanes(values: &[f64], start: f64, fold: impl Fn(f64, f64) -> f64) -> f64 {
     let (chunks, rest) = values.as_chunks::<8>();
-    let mut lanes = [0.0; 8];
+    let mut lanes = [start; 8];
     for chunk in chunks {
         for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane += value;
+            *lane = fold(*lane, *value);
         }
     }
-    lanes.iter().chain(rest).sum()
+    lanes.iter().chain(rest).copied().fold(start, fold)
+}
+
+/// The sum of numbers.
+pub(crate) fn lanes_sum(values: &[f64]) -> f64 {
+    lanes(values, 0.0, |sum, value| sum + value)
 }
 
 /// Place and value of the first highest number; (0, -inf) if there is none.
 pub(crate) fn highest(values: &[f64]) -> (usize, f64) {
-    let mut lanes = [f64::NEG_INFINITY; 8];
-    let (chunks, rest) = values.as_chunks::<8>();
-    for chunk in chunks {
-        for (lane, value) in lanes.iter_mut().zip(chunk) {
-            *lane = if *value > *lane { *value } else { *lane };
-        }
-    }
-    let highest = lanes.iter().chain(rest).copied().fold(f64::NEG_INFINITY, f64::max);
+    let highest = lanes(values, f64::NEG_INFINITY, |highest, value| if value > highest { value } else { highest });
     (values.iter().position(|value| *value == highest).unwrap_or(0), highest)
 }
 
