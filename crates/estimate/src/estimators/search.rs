@@ -4,6 +4,7 @@
 //! out-of-band signals are flagged; width and SNR of simulated wind (in the tests of the estimators).
 
 use num_complex::Complex;
+use std::cell::LazyCell;
 
 use crate::error::Error;
 use crate::estimators::{GateVelocity, Quality, Refinement, RunnerUp};
@@ -282,17 +283,18 @@ fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f
 
 impl Lobe {
     fn new(density: &[f64], top: usize, peak: f64) -> Self {
-        let lowest = || lanes(density, f64::INFINITY, |lowest, value| if value < lowest { value } else { lowest });
+        let lowest =
+            LazyCell::new(|| lanes(density, f64::INFINITY, |low, value| if value < low { value } else { low }));
         let (mut floor, mut beside) = (0.0, None);
         let mut reach = [0.0; 2];
         // the half height needs the floor and the floor the half height: one repetition settles it
         for _ in 0..2 {
             reach = half_widths(density, top, floor + 0.5 * (peak - floor));
             beside = mean_beside(density, top, reach);
-            floor = beside.unwrap_or_else(lowest);
+            floor = beside.unwrap_or_else(|| *lowest);
         }
         let second = second_peak(density, top, reach);
-        let is_bare = beside.is_some() || lowest() < BARE * peak;
+        let is_bare = beside.is_some() || *lowest < BARE * peak;
         let width = if is_bare { (reach[0] + reach[1]) / FULL_WIDTH } else { f64::NAN };
         Self { floor, width, second }
     }
