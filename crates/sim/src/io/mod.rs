@@ -69,7 +69,7 @@ pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
 pub use own::Existing;
 pub use parts::{FileParts, Share};
-pub use provenance::Provenance;
+pub use provenance::{Provenance, hash_of};
 pub(crate) use utc::MAX_TIME_S;
 pub use utc::UtcTime;
 

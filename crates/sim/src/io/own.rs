@@ -4,7 +4,7 @@
 
 use super::error::{OutputError, OutputResult};
 use super::hpl::SYSTEM_ID;
-use crate::scene::hash_of;
+use super::provenance::hash_of;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;

@@ -2,6 +2,8 @@
 //! There is no creation time, so that the same run gives the same bytes.
 //! Check: each writer's test finds scene, hash, seed and version in its bytes.
 
+use sha2::{Digest, Sha256};
+
 /// Origin of a result, enough to make it again.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Provenance {
@@ -45,6 +47,11 @@ impl Provenance {
         let entries: String = [source, seed, hash].map(entry).concat();
         entries + "# scene:\n" + &scene.lines().map(line).collect::<String>()
     }
+}
+
+/// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
+pub fn hash_of(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -4,8 +4,7 @@
 use super::problem::Located;
 use super::problem::{Problem, SceneError};
 use super::vet::Text;
-use crate::io::{Provenance, text_file};
-use sha2::{Digest, Sha256};
+use crate::io::{Provenance, hash_of, text_file};
 use std::path::{Path, PathBuf};
 
 /// What a file says: a scene or a case.
@@ -102,9 +101,4 @@ impl<T: Content> Document<T> {
         let problems = problems.into_iter().map(|problem| Located { problem, line: None }).collect();
         SceneError::Invalid { path: self.path.clone(), problems }
     }
-}
-
-/// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
-pub fn hash_of(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
 }

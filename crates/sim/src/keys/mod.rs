@@ -16,7 +16,7 @@ mod vet;
 mod words;
 
 pub(crate) use declare::{Declared, choice, foreign_choices, held, keys, keys_of, kinds, second, table};
-pub use document::{Content, Document, hash_of};
+pub use document::{Content, Document};
 pub(crate) use key::{Key, Kind, join};
 #[cfg(feature = "flow")]
 pub(crate) use limit::{ABOVE_ZERO, FINITE};

@@ -16,7 +16,8 @@ mod presets;
 mod read;
 mod retrieval;
 
-pub use crate::keys::{Content, Document, Located, Problem, SceneError, hash_of};
+pub use crate::io::hash_of;
+pub use crate::keys::{Content, Document, Located, Problem, SceneError};
 pub use atmosphere::*;
 pub use estimator::*;
 pub use flow::*;
