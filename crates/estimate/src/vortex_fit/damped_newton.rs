@@ -191,6 +191,9 @@ mod tests {
         }
         assert!(inverse("test", &array![[1.0, 1.0], [1.0, 1.0]]).is_err());
         assert!(inverse("test", &array![[1.0, 0.0], [0.0, 0.0]]).is_err());
+        // what is left of the second pivot is rounding, and just is not
+        assert!(inverse("test", &array![[1.0, 1.0], [1.0, 1.0 + 4e-15]]).is_err());
+        assert!(inverse("test", &array![[1.0, 1.0], [1.0, 1.0 + 4e-14]]).is_ok());
     }
 
     /// Rosenbrock's valley as a sum of squares, which does not exist beyond a wall.

@@ -19,6 +19,7 @@ impl Content for Scene {
     }
 
     fn to_toml(&self) -> String {
+        // that of the scene itself, which leaves out keys without a use
         self.to_toml()
     }
 
