@@ -15,7 +15,9 @@ fn main() {
             "cargo::error=feature `openblas-system`: the linker finds no OpenBLAS (-lopenblas). \
              Install it (Debian, Ubuntu: apt install libopenblas-dev),"
         );
-        println!("cargo::error=or drop the feature: the bundled routines (feature `bundled-lapack`) need nothing.");
+        println!(
+            "cargo::error=or drop the feature: the bundled routines (feature `bundled-lapack`) need nothing."
+        );
     }
 }
 

@@ -44,7 +44,10 @@ pub(crate) fn call<'py>(
     let stopped = Arc::new(AtomicBool::new(false));
     let host = Host {
         observer: Arc::new(Teller::new(sender.clone(), stopped.clone())),
-        texts: texts.into_iter().map(|(word, of)| Ok((word, toml_of(&of)?))).collect::<PyResult<_>>()?,
+        texts: texts
+            .into_iter()
+            .map(|(word, of)| Ok((word, toml_of(&of)?)))
+            .collect::<PyResult<_>>()?,
         signals: Mutex::new(signals.map(|array| samples(&array)).transpose()?),
         keeps_files: keep,
     };
@@ -52,7 +55,10 @@ pub(crate) fn call<'py>(
         // Nobody may hear it any more.
         let _ = sender.send(Event::Done(Box::new(cli::call(&words, host))));
     };
-    thread::Builder::new().name("wakescope".into()).stack_size(STACK_BYTES).spawn(work)?;
+    thread::Builder::new()
+        .name("wakescope".into())
+        .stack_size(STACK_BYTES)
+        .spawn(work)?;
     let events = Mutex::new(events);
     let answer = match wait(py, &events, progress.as_ref()) {
         Ok(answer) => answer,
@@ -62,8 +68,16 @@ pub(crate) fn call<'py>(
             return Err(error);
         }
     };
-    let Answer { code, object, text, files } = answer.map_err(|refusal| raised(py, &refusal))?;
-    let files = files.into_iter().map(|(name, content)| (name, PyBytes::new(py, &content))).collect();
+    let Answer {
+        code,
+        object,
+        text,
+        files,
+    } = answer.map_err(|refusal| raised(py, &refusal))?;
+    let files = files
+        .into_iter()
+        .map(|(name, content)| (name, PyBytes::new(py, &content)))
+        .collect();
     Ok((code, object.to_string(), text, files))
 }
 
@@ -78,11 +92,15 @@ fn wait(
             Ok(Event::Done(answer)) => return Ok(*answer),
             Ok(Event::Warning(text)) => warn(py, &text)?,
             Ok(Event::Progress { stage, part, text }) => {
-                progress.map(|progress| progress.call1((stage, part, text))).transpose()?;
+                progress
+                    .map(|progress| progress.call1((stage, part, text)))
+                    .transpose()?;
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
-                return Err(PyRuntimeError::new_err("the command broke off: this is a fault of wakescope"));
+                return Err(PyRuntimeError::new_err(
+                    "the command broke off: this is a fault of wakescope",
+                ));
             }
         }
         py.check_signals()?;
@@ -90,14 +108,20 @@ fn wait(
 }
 
 fn next(events: &Mutex<Receiver<Event>>, longest: Duration) -> Result<Event, RecvTimeoutError> {
-    events.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(longest)
+    events
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .recv_timeout(longest)
 }
 
 /// Waits until a command that was told to stop has ended, but not for long.
 fn let_end(events: &Mutex<Receiver<Event>>) {
     let begun = std::time::Instant::now();
     while begun.elapsed() < PATIENCE
-        && !matches!(next(events, LOOK), Ok(Event::Done(_)) | Err(RecvTimeoutError::Disconnected))
+        && !matches!(
+            next(events, LOOK),
+            Ok(Event::Done(_)) | Err(RecvTimeoutError::Disconnected)
+        )
     {}
 }
 
@@ -105,5 +129,7 @@ fn warn(py: Python<'_>, text: &str) -> PyResult<()> {
     // At the line that called the function of the layer.
     let level = PyDict::new(py);
     level.set_item("stacklevel", 3)?;
-    py.import("warnings")?.call_method("warn", (text,), Some(&level)).map(drop)
+    py.import("warnings")?
+        .call_method("warn", (text,), Some(&level))
+        .map(drop)
 }

@@ -45,8 +45,15 @@ mod _wakescope {
 
     /// Writes files to a folder, all or none, and returns their paths; files of others are replaced only with `overwrite`.
     #[pyfunction]
-    fn write(files: Vec<(String, Bound<'_, PyBytes>)>, folder: PathBuf, overwrite: bool) -> PyResult<Vec<PathBuf>> {
-        let files = files.into_iter().map(|(name, content)| (name, content.as_bytes().to_vec())).collect();
+    fn write(
+        files: Vec<(String, Bound<'_, PyBytes>)>,
+        folder: PathBuf,
+        overwrite: bool,
+    ) -> PyResult<Vec<PathBuf>> {
+        let files = files
+            .into_iter()
+            .map(|(name, content)| (name, content.as_bytes().to_vec()))
+            .collect();
         write_contents(&folder, files, Existing::with_overwrite(overwrite))
             .map_err(|error| pyo3::exceptions::PyOSError::new_err(error.to_string()))
     }

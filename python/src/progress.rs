@@ -10,7 +10,11 @@ use wakescope_sim::setup::progress::{Observer, Stage, stop};
 /// What is told.
 pub(crate) enum Event {
     /// Part of a stage that is done, from 0 to 1.
-    Progress { stage: &'static str, part: f64, text: String },
+    Progress {
+        stage: &'static str,
+        part: f64,
+        text: String,
+    },
     /// Something that deserves attention.
     Warning(String),
     /// The command has ended.
@@ -44,12 +48,20 @@ pub(crate) struct Teller {
 
 impl Teller {
     pub(crate) fn new(events: Sender<Event>, stopped: Arc<AtomicBool>) -> Self {
-        Self { events: Mutex::new(events), stopped, state: Mutex::default() }
+        Self {
+            events: Mutex::new(events),
+            stopped,
+            state: Mutex::default(),
+        }
     }
 
     fn send(&self, event: Event) {
         // Nobody may hear it any more.
-        let _ = self.events.lock().unwrap_or_else(PoisonError::into_inner).send(event);
+        let _ = self
+            .events
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .send(event);
     }
 
     /// Changes the stages and tells of the first one, of which the others are parts.
@@ -59,28 +71,55 @@ impl Teller {
         }
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         change(&mut state.running);
-        let Some(first) = state.running.first() else { return };
+        let Some(first) = state.running.first() else {
+            return;
+        };
         if seldom && state.told.is_some_and(|told| told.elapsed() < SELDOM) {
             return;
         }
-        let part = if first.steps == 0 { 0.0 } else { (first.done as f64 / first.steps as f64).min(1.0) };
-        self.send(Event::Progress { stage: first.stage.name(), part, text: first.text.clone() });
+        let part = if first.steps == 0 {
+            0.0
+        } else {
+            (first.done as f64 / first.steps as f64).min(1.0)
+        };
+        self.send(Event::Progress {
+            stage: first.stage.name(),
+            part,
+            text: first.text.clone(),
+        });
         state.told = Some(Instant::now());
     }
 }
 
 impl Observer for Teller {
     fn begin(&self, stage: Stage, steps: u64) {
-        self.change(false, |running| running.push(Running { stage, steps, done: 0, text: String::new() }));
+        self.change(false, |running| {
+            running.push(Running {
+                stage,
+                steps,
+                done: 0,
+                text: String::new(),
+            })
+        });
     }
 
     fn advance(&self, steps: u64) {
-        self.change(true, |running| running.iter_mut().last().into_iter().for_each(|last| last.done += steps));
+        self.change(true, |running| {
+            running
+                .iter_mut()
+                .last()
+                .into_iter()
+                .for_each(|last| last.done += steps)
+        });
     }
 
     fn reach(&self, text: &str) {
         self.change(true, |running| {
-            running.iter_mut().last().into_iter().for_each(|last| text.clone_into(&mut last.text))
+            running
+                .iter_mut()
+                .last()
+                .into_iter()
+                .for_each(|last| text.clone_into(&mut last.text))
         });
     }
 

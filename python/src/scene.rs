@@ -29,15 +29,24 @@ pub(crate) fn scene<'py>(
         Some(name) => preset_toml(name).ok_or_else(|| {
             let known: Vec<&str> = preset_names().collect();
             let allowed = format!("one of {}", known.join(", "));
-            raised(py, &Refusal::of(Problem { key: "preset".into(), value: name.into(), allowed }))
+            raised(
+                py,
+                &Refusal::of(Problem {
+                    key: "preset".into(),
+                    value: name.into(),
+                    allowed,
+                }),
+            )
         })?,
     };
-    let mut table: Table = toml::from_str(&text).map_err(|error| PyTypeError::new_err(error.to_string()))?;
+    let mut table: Table =
+        toml::from_str(&text).map_err(|error| PyTypeError::new_err(error.to_string()))?;
     for (key, value) in keys {
         let key: String = key.extract()?;
         set(&mut table, &key, value_of(&key, &value)?);
     }
-    let file = SceneFile::parse(&table.to_string(), Path::new("scene")).map_err(|error| refused(error.into()))?;
+    let file = SceneFile::parse(&table.to_string(), Path::new("scene"))
+        .map_err(|error| refused(error.into()))?;
     self::table(py, &file.toml)
 }
 
@@ -45,7 +54,10 @@ pub(crate) fn scene<'py>(
 #[pyfunction]
 #[pyo3(signature = (text) -> "dict[str, object]")]
 pub(crate) fn table<'py>(py: Python<'py>, text: &str) -> PyResult<Bound<'py, PyDict>> {
-    dict_of(py, toml::from_str(text).map_err(|error| PyTypeError::new_err(error.to_string()))?)
+    dict_of(
+        py,
+        toml::from_str(text).map_err(|error| PyTypeError::new_err(error.to_string()))?,
+    )
 }
 
 /// Puts a value where the path of its key says, in place of what there is; none takes it away.
@@ -57,10 +69,16 @@ fn set(table: &mut Table, path: &str, value: Option<Value>) {
         }
         return;
     };
-    let inner = table.entry(section).or_insert_with(|| Value::Table(Table::new()));
+    let inner = table
+        .entry(section)
+        .or_insert_with(|| Value::Table(Table::new()));
     match inner {
         Value::Table(inner) => set(inner, rest, value),
-        other => *other = Value::Table(Table::from_iter(value.map(|value| (rest.to_owned(), value)))),
+        other => {
+            *other = Value::Table(Table::from_iter(
+                value.map(|value| (rest.to_owned(), value)),
+            ))
+        }
     }
 }
 
@@ -73,7 +91,11 @@ fn table_of(path: &str, dict: &Bound<'_, PyDict>) -> PyResult<Table> {
     let mut table = Table::new();
     for (key, value) in dict {
         let key: String = key.extract()?;
-        let here = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
+        let here = if path.is_empty() {
+            key.clone()
+        } else {
+            format!("{path}.{key}")
+        };
         table.extend(value_of(&here, &value)?.map(|value| (key, value)));
     }
     Ok(table)
@@ -102,8 +124,11 @@ fn value_of(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
     if let Ok(path) = value.extract::<std::path::PathBuf>() {
         return Ok(Some(Value::String(path.to_string_lossy().into_owned())));
     }
-    let no_value =
-        || PyTypeError::new_err(format!("{key}: {value} is neither a number, a text, a list nor a dictionary"));
+    let no_value = || {
+        PyTypeError::new_err(format!(
+            "{key}: {value} is neither a number, a text, a list nor a dictionary"
+        ))
+    };
     let mut list = Vec::new();
     for (place, value) in value.try_iter().map_err(|_| no_value())?.enumerate() {
         list.extend(value_of(&format!("{key}[{place}]"), &value?)?);
@@ -113,7 +138,9 @@ fn value_of(key: &str, value: &Bound<'_, PyAny>) -> PyResult<Option<Value>> {
 
 fn dict_of(py: Python<'_>, table: Table) -> PyResult<Bound<'_, PyDict>> {
     let dict = PyDict::new(py);
-    table.into_iter().try_for_each(|(key, value)| dict.set_item(key, object_of(py, value)?))?;
+    table
+        .into_iter()
+        .try_for_each(|(key, value)| dict.set_item(key, object_of(py, value)?))?;
     Ok(dict)
 }
 
@@ -121,7 +148,10 @@ fn object_of(py: Python<'_>, value: Value) -> PyResult<Bound<'_, PyAny>> {
     Ok(match value {
         Value::Table(table) => dict_of(py, table)?.into_any(),
         Value::Array(values) => {
-            let values = values.into_iter().map(|value| object_of(py, value)).collect::<PyResult<Vec<_>>>()?;
+            let values = values
+                .into_iter()
+                .map(|value| object_of(py, value))
+                .collect::<PyResult<Vec<_>>>()?;
             PyList::new(py, values)?.into_any()
         }
         Value::Boolean(value) => value.into_pyobject(py)?.to_owned().into_any(),

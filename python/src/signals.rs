@@ -14,18 +14,31 @@ use wakescope_sim::io::raw::{RawRecords, Source};
 struct NumpyRecords(Py<PyAny>);
 
 impl NumpyRecords {
-    fn piece(&self, py: Python<'_>, records: Range<usize>, samples: Range<usize>) -> PyResult<Vec<Complex<f64>>> {
-        let slice = |part: Range<usize>| PySlice::new(py, part.start as isize, part.end as isize, 1);
+    fn piece(
+        &self,
+        py: Python<'_>,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> PyResult<Vec<Complex<f64>>> {
+        let slice =
+            |part: Range<usize>| PySlice::new(py, part.start as isize, part.end as isize, 1);
         let piece = self.0.bind(py).get_item((slice(records), slice(samples)))?;
-        let piece: PyReadonlyArray2<'_, Complex64> = piece.call_method1("astype", ("complex128",))?.extract()?;
+        let piece: PyReadonlyArray2<'_, Complex64> =
+            piece.call_method1("astype", ("complex128",))?.extract()?;
         Ok(piece.as_array().iter().copied().collect())
     }
 }
 
 impl Source for NumpyRecords {
-    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+    fn read(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> Result<Vec<Complex<f64>>, String> {
         let piece = Python::try_attach(|py| self.piece(py, records, samples));
-        piece.ok_or("Python has ended")?.map_err(|error| error.to_string())
+        piece
+            .ok_or("Python has ended")?
+            .map_err(|error| error.to_string())
     }
 }
 
@@ -39,10 +52,13 @@ pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<RawRecords> {
     }
     let shape: Vec<usize> = array.getattr("shape")?.extract()?;
     let Some((&samples, before)) = shape.split_last() else {
-        return Err(PyValueError::new_err("signals: a single number is no record"));
+        return Err(PyValueError::new_err(
+            "signals: a single number is no record",
+        ));
     };
     // Two dimensions are taken as they lie in memory; more than these are one after the other.
-    let is_plain = before.len() < 2 || array.getattr("flags")?.getattr("c_contiguous")?.extract()?;
+    let is_plain =
+        before.len() < 2 || array.getattr("flags")?.getattr("c_contiguous")?.extract()?;
     if !is_plain {
         return Err(PyValueError::new_err(
             "signals: numpy.ascontiguousarray makes an array that is read without a copy",
@@ -52,5 +68,11 @@ pub(crate) fn samples(array: &Bound<'_, PyAny>) -> PyResult<RawRecords> {
     let plane = array.call_method1("reshape", (records, samples))?;
     let are_integers = kind == "i" || kind == "u";
     let source = NumpyRecords(plane.unbind());
-    Ok(RawRecords::new(Path::new("signals"), source, [records, samples], kind == "c", are_integers))
+    Ok(RawRecords::new(
+        Path::new("signals"),
+        source,
+        [records, samples],
+        kind == "c",
+        are_integers,
+    ))
 }

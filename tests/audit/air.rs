@@ -12,11 +12,19 @@ use toml::Value;
 struct Wind<'a>(&'a dyn Fn(&str) -> Option<Value>);
 
 fn number(value: &Value) -> f64 {
-    value.as_float().or(value.as_integer().map(|n| n as f64)).unwrap_or(f64::NAN)
+    value
+        .as_float()
+        .or(value.as_integer().map(|n| n as f64))
+        .unwrap_or(f64::NAN)
 }
 
 fn numbers(value: Option<Value>) -> Vec<f64> {
-    value.and_then(|v| v.as_array().cloned()).unwrap_or_default().iter().map(number).collect()
+    value
+        .and_then(|v| v.as_array().cloned())
+        .unwrap_or_default()
+        .iter()
+        .map(number)
+        .collect()
 }
 
 /// Gamma(r) of a vortex, (V1) or (V2).
@@ -38,7 +46,9 @@ impl Wind<'_> {
     }
 
     fn s(&self, key: &str) -> String {
-        (self.0)(key).and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+        (self.0)(key)
+            .and_then(|v| v.as_str().map(str::to_owned))
+            .unwrap_or_default()
     }
 
     /// Velocity (u, v, w) at a point, `time_s` after the scan began.
@@ -47,12 +57,17 @@ impl Wind<'_> {
             "calm" => [0.0; 3],
             "uniform" => [0.0, self.f("lateral_m_s"), self.f("vertical_m_s")],
             "linear" => {
-                let (start, a) = (numbers((self.0)("velocity_m_s")), numbers((self.0)("acceleration_m_s2")));
+                let (start, a) = (
+                    numbers((self.0)("velocity_m_s")),
+                    numbers((self.0)("acceleration_m_s2")),
+                );
                 let of = |list: &[f64], i: usize| list.get(i).copied().unwrap_or(0.0);
                 let gradients = ["gradient_u_per_s", "gradient_v_per_s", "gradient_w_per_s"];
                 std::array::from_fn(|i| {
                     let g = numbers((self.0)(gradients[i]));
-                    of(&start, i) + of(&a, i) * time_s + (0..3).map(|j| of(&g, j) * p[j]).sum::<f64>()
+                    of(&start, i)
+                        + of(&a, i) * time_s
+                        + (0..3).map(|j| of(&g, j) * p[j]).sum::<f64>()
                 })
             }
             "vortex_lines" => self.lines(p),
@@ -62,8 +77,11 @@ impl Wind<'_> {
 
     /// Half the distance, and the height, of the vortices at a time: (V8) to (V10).
     fn path_m(&self, time_s: f64) -> (f64, f64) {
-        let (b0, z0, gamma) =
-            (self.or("spacing_m", 47.0), self.or("height_m", 47.0), self.or("circulation_m2_s", 500.0));
+        let (b0, z0, gamma) = (
+            self.or("spacing_m", 47.0),
+            self.or("height_m", 47.0),
+            self.or("circulation_m2_s", 500.0),
+        );
         if self.s("motion") != "inviscid" || gamma == 0.0 {
             return (0.5 * b0, z0);
         }
@@ -80,16 +98,23 @@ impl Wind<'_> {
     /// (V5): two vortices and their images.
     fn pair(&self, p: [f64; 3], time_s: f64) -> [f64; 3] {
         let (half, z) = self.path_m(time_s);
-        let (gamma, core) = (self.or("circulation_m2_s", 500.0), self.or("core_radius_m", 2.35));
+        let (gamma, core) = (
+            self.or("circulation_m2_s", 500.0),
+            self.or("core_radius_m", 2.35),
+        );
         let middle = self.or("lateral_position_m", 400.0);
         let mut out = [0.0, self.or("cross_wind_m_s", 0.0), 0.0];
-        for (y0, z0, sign) in
-            [(middle - half, z, -1.0), (middle + half, z, 1.0), (middle - half, -z, 1.0), (middle + half, -z, -1.0)]
-        {
+        for (y0, z0, sign) in [
+            (middle - half, z, -1.0),
+            (middle + half, z, 1.0),
+            (middle - half, -z, 1.0),
+            (middle + half, -z, -1.0),
+        ] {
             let (dy, dz) = (p[1] - y0, p[2] - z0);
             let r2 = dy * dy + dz * dz;
             if r2 > 0.0 {
-                let strength = sign * circulation_m2_s(&self.s("profile"), gamma, core, r2.sqrt()) / (2.0 * PI * r2);
+                let strength = sign * circulation_m2_s(&self.s("profile"), gamma, core, r2.sqrt())
+                    / (2.0 * PI * r2);
                 out[1] -= strength * dz;
                 out[2] += strength * dy;
             }
@@ -99,22 +124,33 @@ impl Wind<'_> {
 
     /// Endless straight vortices with images: Gamma/(2 pi) t x d/(d^2 + r_c^2).
     fn lines(&self, p: [f64; 3]) -> [f64; 3] {
-        let nodes = (self.0)("nodes_m").and_then(|v| v.as_array().cloned()).unwrap_or_default();
+        let nodes = (self.0)("nodes_m")
+            .and_then(|v| v.as_array().cloned())
+            .unwrap_or_default();
         let gamma = numbers((self.0)("circulation_m2_s"));
         let core = self.or("core_radius_m", 2.35);
         let mut out = [0.0; 3];
         for (vortex, gamma) in nodes.iter().zip(gamma) {
-            let ends: Vec<Vec<f64>> =
-                vortex.as_array().into_iter().flatten().map(|node| numbers(Some(node.clone()))).collect();
+            let ends: Vec<Vec<f64>> = vortex
+                .as_array()
+                .into_iter()
+                .flatten()
+                .map(|node| numbers(Some(node.clone())))
+                .collect();
             for (mirror, sign) in [(1.0, 1.0), (-1.0, -1.0)] {
                 let a = [ends[0][0], ends[0][1], mirror * ends[0][2]];
-                let t: [f64; 3] = [ends[1][0] - a[0], ends[1][1] - a[1], mirror * ends[1][2] - a[2]];
+                let t: [f64; 3] = [
+                    ends[1][0] - a[0],
+                    ends[1][1] - a[1],
+                    mirror * ends[1][2] - a[2],
+                ];
                 let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
                 let t = t.map(|x| x / length);
                 let x: [f64; 3] = std::array::from_fn(|i| p[i] - a[i]);
                 let along: f64 = (0..3).map(|i| x[i] * t[i]).sum();
                 let d: [f64; 3] = std::array::from_fn(|i| x[i] - along * t[i]);
-                let strength = sign * gamma / (2.0 * PI * (d.iter().map(|x| x * x).sum::<f64>() + core * core));
+                let strength = sign * gamma
+                    / (2.0 * PI * (d.iter().map(|x| x * x).sum::<f64>() + core * core));
                 // Components as if the axes were right-handed, as the book defines the product.
                 out[0] += strength * (t[1] * d[2] - t[2] * d[1]);
                 out[1] += strength * (t[2] * d[0] - t[0] * d[2]);
@@ -128,7 +164,11 @@ impl Wind<'_> {
 /// Velocity of the air of a scene at a point, `time_s` after the scan began: all its winds added.
 pub(crate) fn velocity_m_s(s: &Scene, p: [f64; 3], time_s: f64) -> [f64; 3] {
     let mut out = Wind(&|key| s.get(&format!("flow.{key}"))).at(p, time_s);
-    for added in s.get("added_flows").and_then(|v| v.as_array().cloned()).unwrap_or_default() {
+    for added in s
+        .get("added_flows")
+        .and_then(|v| v.as_array().cloned())
+        .unwrap_or_default()
+    {
         let more = Wind(&|key| added.get(key).cloned()).at(p, time_s);
         (0..3).for_each(|i| out[i] += more[i]);
     }
@@ -137,8 +177,14 @@ pub(crate) fn velocity_m_s(s: &Scene, p: [f64; 3], time_s: f64) -> [f64; 3] {
 
 /// How old the flow is when the scan begins, s (V8).
 pub(crate) fn start_s(s: &Scene) -> f64 {
-    match s.s("flow.kind") == "vortex_pair" && s.s("flow.motion") == "inviscid" && s.f("flow.circulation_m2_s") > 0.0 {
-        true => s.f("flow.age_tau") * s.f("flow.spacing_m").powi(2) * 2.0 * PI / s.f("flow.circulation_m2_s"),
+    match s.s("flow.kind") == "vortex_pair"
+        && s.s("flow.motion") == "inviscid"
+        && s.f("flow.circulation_m2_s") > 0.0
+    {
+        true => {
+            s.f("flow.age_tau") * s.f("flow.spacing_m").powi(2) * 2.0 * PI
+                / s.f("flow.circulation_m2_s")
+        }
         false => 0.0,
     }
 }
@@ -151,10 +197,20 @@ pub(crate) struct Line {
 
 impl Line {
     /// The line, known every `step_m` from `from_m` to `to_m`.
-    pub(crate) fn new(s: &Scene, elevation_rad: f64, time_s: f64, from_m: f64, to_m: f64, step_m: f64) -> Self {
+    pub(crate) fn new(
+        s: &Scene,
+        elevation_rad: f64,
+        time_s: f64,
+        from_m: f64,
+        to_m: f64,
+        step_m: f64,
+    ) -> Self {
         let count = ((to_m - from_m) / step_m).ceil() as usize + 1;
         let range_m: Vec<f64> = (0..count).map(|i| from_m + i as f64 * step_m).collect();
-        let v_m_s = range_m.iter().map(|&r| radial_m_s(s, elevation_rad, time_s, r)).collect();
+        let v_m_s = range_m
+            .iter()
+            .map(|&r| radial_m_s(s, elevation_rad, time_s, r))
+            .collect();
         Self { range_m, v_m_s }
     }
 
@@ -177,34 +233,68 @@ impl Line {
 /// (M3), m/s.
 pub(crate) fn radial_m_s(s: &Scene, elevation_rad: f64, time_s: f64, range_m: f64) -> f64 {
     let (sin, cos) = elevation_rad.sin_cos();
-    let p = [0.0, s.f("scan.lidar.y_m") + range_m * cos, s.f("scan.lidar_height_m") + range_m * sin];
+    let p = [
+        0.0,
+        s.f("scan.lidar.y_m") + range_m * cos,
+        s.f("scan.lidar_height_m") + range_m * sin,
+    ];
     let u = velocity_m_s(s, p, time_s);
     u[1] * cos + u[2] * sin
 }
 
 /// Exact and weighted velocities of a few lines of a map.
 pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
-    let Some(pulse) = Pulse::gaussian(s) else { return };
-    let (exact, of_pulse, of_gate) = (map.f("v_exact_m_s"), map.f("v_pulse_m_s"), map.f("v_gate_m_s"));
+    let Some(pulse) = Pulse::gaussian(s) else {
+        return;
+    };
+    let (exact, of_pulse, of_gate) = (
+        map.f("v_exact_m_s"),
+        map.f("v_pulse_m_s"),
+        map.f("v_gate_m_s"),
+    );
     let h2 = super::power::window_powers(s);
     let reach_m = 4.5 * pulse.scale_m();
     let gates = scan.gate_m.len();
     let step_m = (pulse.scale_m() / 40.0).min(0.12);
     for line in [0, scan.elevation_rad.len() / 2] {
         let (e, time_s) = (scan.elevation_rad[line], line_time_s(s, line));
-        let (first_m, last_m) = (scan.sample_m[0] - reach_m, scan.sample_m[scan.sample_m.len() - 1] + reach_m);
+        let (first_m, last_m) = (
+            scan.sample_m[0] - reach_m,
+            scan.sample_m[scan.sample_m.len() - 1] + reach_m,
+        );
         let air = Line::new(s, e, time_s, first_m, last_m, step_m);
         let fast = air.largest_m_s().max(1e-3);
         for gate in (0..gates).step_by(1 + gates / 5) {
             let (row, r) = (line * gates + gate, scan.gate_m[gate]);
-            ledger.equal("map.csv: v_exact_m_s", exact[row], radial_m_s(s, e, time_s, r), 1e-11 * fast.max(1.0));
+            ledger.equal(
+                "map.csv: v_exact_m_s",
+                exact[row],
+                radial_m_s(s, e, time_s, r),
+                1e-11 * fast.max(1.0),
+            );
             // (S11); what the sum of (S7) leaves out bears on the seventh digit.
             let weight = |rho: f64| pulse.power_over_range(r - rho);
-            ledger.equal("map.csv: v_pulse_m_s", of_pulse[row], air.mean(weight), 2e-6 * fast);
+            ledger.equal(
+                "map.csv: v_pulse_m_s",
+                of_pulse[row],
+                air.mean(weight),
+                2e-6 * fast,
+            );
             // (S12): each sample of the window has the pulse's weight about its own range.
             let samples = &scan.sample_m[scan.gate_start[gate]..];
-            let weight = |rho: f64| samples.iter().zip(&h2).map(|(&m, h2)| h2 * pulse.power_over_range(m - rho)).sum();
-            ledger.equal("map.csv: v_gate_m_s", of_gate[row], air.mean(weight), 2e-6 * fast);
+            let weight = |rho: f64| {
+                samples
+                    .iter()
+                    .zip(&h2)
+                    .map(|(&m, h2)| h2 * pulse.power_over_range(m - rho))
+                    .sum()
+            };
+            ledger.equal(
+                "map.csv: v_gate_m_s",
+                of_gate[row],
+                air.mean(weight),
+                2e-6 * fast,
+            );
         }
     }
 }

@@ -16,27 +16,44 @@ const FLOOR: f64 = 1e-6;
 /// signal the ratio so many samples behind the middle of the record.
 fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: impl Fn(f64) -> f64) -> f64 {
     let (ts, lambda) = (1.0 / s.f("detector.sampling_hz"), s.f("laser.wavelength_m"));
-    let (b, fc) = (s.f("detector.bandwidth_hz") * ts, s.f("detector.intermediate_frequency_hz") * ts);
+    let (b, fc) = (
+        s.f("detector.bandwidth_hz") * ts,
+        s.f("detector.intermediate_frequency_hz") * ts,
+    );
     let is_baseband = s.s("detector.signal") == "baseband";
     let is_band = s.s("detector.noise") == "band";
     // c(l) of the signal, of unit power, chirp included.
     let spread = 1.0 + (2.0 * PI * pulse.chirp_hz_s * pulse.sigma_s.powi(2)).powi(2);
     let c = |l: f64| (-spread * (l * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
-    let sinc = |x: f64| if x == 0.0 { 1.0 } else { (PI * x).sin() / (PI * x) };
+    let sinc = |x: f64| {
+        if x == 0.0 {
+            1.0
+        } else {
+            (PI * x).sin() / (PI * x)
+        }
+    };
     let delta = |l: f64| if l == 0.0 { 1.0 } else { 0.0 };
     // The density of the noise goes on beyond the band where it is white.
     let noise = |l: f64| match (is_band, is_baseband) {
         (false, true) => delta(l) / b,
         (false, false) => delta(l) * 0.5 / b,
         (true, true) => (1.0 - FLOOR) * sinc(b * l) + FLOOR / b * delta(l),
-        (true, false) => (1.0 - FLOOR) * sinc(b * l) * (2.0 * PI * fc * l).cos() + 0.5 * FLOOR / b * delta(l),
+        (true, false) => {
+            (1.0 - FLOOR) * sinc(b * l) * (2.0 * PI * fc * l).cos() + 0.5 * FLOOR / b * delta(l)
+        }
     };
     // Two samples of a Gaussian pulse share the air about the middle between them.
-    let between: Vec<f64> = (0..2 * n).map(|sum| snr(0.5 * sum as f64 - 0.5 * (n as f64 - 1.0))).collect();
+    let between: Vec<f64> = (0..2 * n)
+        .map(|sum| snr(0.5 * sum as f64 - 0.5 * (n as f64 - 1.0)))
+        .collect();
     let rate = 4.0 * PI * ts / lambda;
     // Of lag and power.
     let matrix = |of: &dyn Fn(f64, f64) -> Complex| {
-        let row = |i: usize| (0..n).map(|j| of(i as f64 - j as f64, between[i + j])).collect();
+        let row = |i: usize| {
+            (0..n)
+                .map(|j| of(i as f64 - j as f64, between[i + j]))
+                .collect()
+        };
         (0..n).map(row).collect::<Vec<Vec<_>>>()
     };
     let (r, d, share) = match is_baseband {
@@ -86,7 +103,13 @@ fn correlation2(s: &Scene, pulse: &Pulse, apart: usize, snr: f64) -> f64 {
 }
 
 /// n_eff of a region (E8): `windows` are the first samples of the windows of each line.
-pub(crate) fn independent(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], pulses: usize, snr: f64) -> f64 {
+pub(crate) fn independent(
+    s: &Scene,
+    pulse: &Pulse,
+    windows: &[Vec<usize>],
+    pulses: usize,
+    snr: f64,
+) -> f64 {
     let mut known = BTreeMap::new();
     let (mut count, mut pairs) = (0.0, 0.0);
     for starts in windows {
@@ -94,7 +117,9 @@ pub(crate) fn independent(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], puls
             count += 1.0;
             for b in starts {
                 let apart = a.abs_diff(*b);
-                pairs += *known.entry(apart).or_insert_with(|| correlation2(s, pulse, apart, snr));
+                pairs += *known
+                    .entry(apart)
+                    .or_insert_with(|| correlation2(s, pulse, apart, snr));
             }
         }
     }
@@ -103,34 +128,57 @@ pub(crate) fn independent(s: &Scene, pulse: &Pulse, windows: &[Vec<usize>], puls
 
 /// The bound of a region: each line's record that its windows cover, every pulse of it, (E12) for independent records; `record` takes its
 /// length, and how far its middle is behind that of the windows that begin at a sample.
-fn region_m_s(n: usize, windows: &[Vec<usize>], pulses: usize, record: impl Fn(usize, f64) -> f64, begin: f64) -> f64 {
+fn region_m_s(
+    n: usize,
+    windows: &[Vec<usize>],
+    pulses: usize,
+    record: impl Fn(usize, f64) -> f64,
+    begin: f64,
+) -> f64 {
     let mut known = BTreeMap::new();
     let mut sum = 0.0;
     for starts in windows.iter().filter(|starts| !starts.is_empty()) {
         let (first, last) = (starts[0], starts[starts.len() - 1]);
         let behind = 0.5 * (first + last) as f64 - begin;
-        sum += *known.entry((first, last)).or_insert_with(|| record(last - first + n, behind));
+        sum += *known
+            .entry((first, last))
+            .or_insert_with(|| record(last - first + n, behind));
     }
     1.0 / (pulses as f64 * sum).sqrt()
 }
 
 /// `bound --json`: windows, levels, n_eff and regions at a few ratios and ranges.
 pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
-    let Some(pulse) = Pulse::gaussian(s) else { return };
+    let Some(pulse) = Pulse::gaussian(s) else {
+        return;
+    };
     let n = s.n("estimator.window_samples");
     let line = scan.elevation_rad.len() / 2;
     let gates = scan.gate_m.len();
     let by_snr = json["by_snr"].as_array().cloned().unwrap_or_default();
     let by_range = json["by_range"].as_array().cloned().unwrap_or_default();
-    ledger.equal("bound: rows", (by_snr.len() + by_range.len()) as f64, (91 + gates) as f64, 0.0);
+    ledger.equal(
+        "bound: rows",
+        (by_snr.len() + by_range.len()) as f64,
+        (91 + gates) as f64,
+        0.0,
+    );
     for point in by_snr.first().into_iter() {
         super::program::see(ledger, "bound", point);
     }
-    let chosen =
-        |points: &[Value], rows: &[usize]| rows.iter().filter_map(|&i| points.get(i).cloned()).collect::<Vec<_>>();
-    let at_ratio = chosen(&by_snr, &[10, 30, 50]).into_iter().map(|p| (p, gates / 2, false));
+    let chosen = |points: &[Value], rows: &[usize]| {
+        rows.iter()
+            .filter_map(|&i| points.get(i).cloned())
+            .collect::<Vec<_>>()
+    };
+    let at_ratio = chosen(&by_snr, &[10, 30, 50])
+        .into_iter()
+        .map(|p| (p, gates / 2, false));
     let ends = [0, gates / 2, gates - 1];
-    let at_range = chosen(&by_range, &ends).into_iter().zip(ends).map(|(p, gate)| (p, gate, true));
+    let at_range = chosen(&by_range, &ends)
+        .into_iter()
+        .zip(ends)
+        .map(|(p, gate)| (p, gate, true));
     let ratios = Ratios::new(s, pulse, scan, 3.0);
     for (point, gate, is_of_range) in at_ratio.chain(at_range) {
         let f = |key: &str| point[key].as_f64().unwrap_or(f64::NAN);
@@ -139,22 +187,42 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
         if air.is_nan() {
             continue;
         }
-        let Some(radius) = radius_m(s, scan.gate_m[gate]) else { continue };
+        let Some(radius) = radius_m(s, scan.gate_m[gate]) else {
+            continue;
+        };
         let windows = match s.s("estimator.method.kind") == "periodogram" {
             true => vec![scan.own_window(gate)],
             false => scan.region(line, gate, radius, n),
         };
         let count = windows.iter().map(Vec::len).sum::<usize>();
-        ledger.equal("bound: level", f("level"), (count * scan.pulses) as f64, 0.5);
+        ledger.equal(
+            "bound: level",
+            f("level"),
+            (count * scan.pulses) as f64,
+            0.5,
+        );
         if count == 0 {
             ledger.equal("bound: n_eff", f("n_eff"), 0.0, 0.0);
-            ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), f64::NAN, 0.0);
+            ledger.equal(
+                "bound: bound_region_m_s",
+                f("bound_region_m_s"),
+                f64::NAN,
+                0.0,
+            );
             continue;
         }
-        let here = if is_of_range { ratios.of_window(s, scan, gate) } else { air };
+        let here = if is_of_range {
+            ratios.of_window(s, scan, gate)
+        } else {
+            air
+        };
         let right = independent(s, &pulse, &windows, scan.pulses, here);
         ledger.equal("bound: n_eff", f("n_eff"), right, 1e-3 * right);
-        let longest = windows.iter().filter_map(|w| Some(w.last()? - w.first()? + n)).max().unwrap_or(n);
+        let longest = windows
+            .iter()
+            .filter_map(|w| Some(w.last()? - w.first()? + n))
+            .max()
+            .unwrap_or(n);
         if f("snr_db") > 30.0 || longest > 200 {
             continue;
         }
@@ -162,16 +230,31 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
             continue; // the middle between two samples is turned by the chirp
         }
         let begin = (scan.gate_m[gate] - scan.sample_m[0]) / scan.sample_step_m() - 0.5 * n as f64;
-        let seen = |samples: f64| ratios.seen(scan.gate_m[gate] + (samples - 0.5) * scan.sample_step_m());
+        let seen =
+            |samples: f64| ratios.seen(scan.gate_m[gate] + (samples - 0.5) * scan.sample_step_m());
         let information = |n: usize, behind: f64| match is_of_range {
             true => record_information(s, &pulse, n, |samples| seen(samples + behind)),
             false => record_information(s, &pulse, n, |_| here),
         };
         // Ratios are held to a hundredth of a decibel, and where the noise rules the bound goes as their inverse.
-        let tolerance = if is_of_range { 10_f64.powf(1e-3) - 1.0 } else { 1e-4 };
+        let tolerance = if is_of_range {
+            10_f64.powf(1e-3) - 1.0
+        } else {
+            1e-4
+        };
         let right = 1.0 / information(n, 0.0).sqrt();
-        ledger.equal("bound: bound_window_m_s", f("bound_window_m_s"), right, tolerance * right);
+        ledger.equal(
+            "bound: bound_window_m_s",
+            f("bound_window_m_s"),
+            right,
+            tolerance * right,
+        );
         let right = region_m_s(n, &windows, scan.pulses, information, begin);
-        ledger.equal("bound: bound_region_m_s", f("bound_region_m_s"), right, tolerance.max(1e-3) * right);
+        ledger.equal(
+            "bound: bound_region_m_s",
+            f("bound_region_m_s"),
+            right,
+            tolerance.max(1e-3) * right,
+        );
     }
 }

@@ -7,7 +7,9 @@ use super::scene::Scene;
 pub(crate) fn scene(r: &mut Random) -> Scene {
     let mut s = Scene::default();
     s.set("seed", r.whole(1, 1_000_000));
-    s.set("outputs.svg", false).set("outputs.png", false).set("outputs.flow", false);
+    s.set("outputs.svg", false)
+        .set("outputs.png", false)
+        .set("outputs.flow", false);
     s.set("outputs.profile_points", r.whole(2, 9));
     instrument(r, &mut s);
     pulse(r, &mut s);
@@ -26,10 +28,16 @@ pub(crate) fn instrument(r: &mut Random, s: &mut Scene) {
     let aperture_m = r.log(0.02, 0.12);
     s.number("telescope.aperture_radius_m", aperture_m);
     s.number("telescope.beam_radius_m", aperture_m * r.between(0.4, 1.2));
-    s.word("telescope.beam_radius_definition", r.pick(&["intensity", "field"]));
+    s.word(
+        "telescope.beam_radius_definition",
+        r.pick(&["intensity", "field"]),
+    );
     s.word("telescope.receiver", r.pick(&["monostatic", "bistatic"]));
     if r.chance(0.2) {
-        s.number("telescope.obscuration_radius_m", aperture_m * r.between(0.05, 0.4));
+        s.number(
+            "telescope.obscuration_radius_m",
+            aperture_m * r.between(0.05, 0.4),
+        );
     }
     if r.chance(0.6) {
         s.number("telescope.focus_m", r.log(250.0, 3000.0));
@@ -44,7 +52,10 @@ pub(crate) fn instrument(r: &mut Random, s: &mut Scene) {
 
 fn pulse(r: &mut Random, s: &mut Scene) {
     s.number("pulse.shape.duration_s", r.log(8e-8, 5e-7));
-    s.word("pulse.shape.definition", r.pick(&["fwhm", "one_over_e_half_width"]));
+    s.word(
+        "pulse.shape.definition",
+        r.pick(&["fwhm", "one_over_e_half_width"]),
+    );
     if r.chance(0.1) {
         s.number("pulse.chirp_hz_s", r.log(1e12, 2e13));
     }
@@ -54,16 +65,23 @@ pub(crate) fn detector(r: &mut Random, s: &mut Scene) {
     s.word("detector.noise", r.pick(&["band", "band", "white"]));
     s.number("detector.quantum_efficiency", r.between(0.3, 1.0))
         .number("detector.local_oscillator_w", r.log(1e-4, 1e-2));
-    let (sampling_hz, bandwidth_hz) = r.pick(&[(250e6, 50e6), (200e6, 60e6), (400e6, 80e6), (125e6, 40e6)]);
-    s.number("detector.sampling_hz", sampling_hz).number("detector.bandwidth_hz", bandwidth_hz);
+    let (sampling_hz, bandwidth_hz) =
+        r.pick(&[(250e6, 50e6), (200e6, 60e6), (400e6, 80e6), (125e6, 40e6)]);
+    s.number("detector.sampling_hz", sampling_hz)
+        .number("detector.bandwidth_hz", bandwidth_hz);
     let lowest_hz = 0.52 * bandwidth_hz;
-    s.number("detector.intermediate_frequency_hz", r.between(lowest_hz, 0.5 * sampling_hz - lowest_hz));
+    s.number(
+        "detector.intermediate_frequency_hz",
+        r.between(lowest_hz, 0.5 * sampling_hz - lowest_hz),
+    );
     if r.chance(0.3) {
         s.word("detector.signal", "baseband");
     }
     match r.whole(0, 5) {
         0 => s.word("detector.snr.reference", "chapter"),
-        1 | 2 => s.word("detector.snr.reference", "fixed").number("detector.snr.snr_db", r.between(-8.0, 20.0)),
+        1 | 2 => s
+            .word("detector.snr.reference", "fixed")
+            .number("detector.snr.snr_db", r.between(-8.0, 20.0)),
         _ => {
             if r.chance(0.4) {
                 front_end(r, s);
@@ -72,52 +90,81 @@ pub(crate) fn detector(r: &mut Random, s: &mut Scene) {
         }
     };
     if s.s("detector.snr.reference") == "fixed" {
-        s.unset("telescope.optics_loss_db").unset("telescope.polarisation_loss_db");
+        s.unset("telescope.optics_loss_db")
+            .unset("telescope.polarisation_loss_db");
     } else if r.chance(0.15) && s.s("detector.signal") != "baseband" {
-        s.word("detector.digitiser.kind", "quantised").set("detector.digitiser.bits", r.whole(6, 14));
-        s.number("detector.digitiser.full_scale_over_noise", r.between(14.0, 30.0));
+        s.word("detector.digitiser.kind", "quantised")
+            .set("detector.digitiser.bits", r.whole(6, 14));
+        s.number(
+            "detector.digitiser.full_scale_over_noise",
+            r.between(14.0, 30.0),
+        );
     }
 }
 
 /// The same ratio at every range, and no loss that would change it.
 pub(crate) fn fixed_ratio(s: &mut Scene, snr_db: f64) {
-    s.unset("detector.front_end").unset("detector.digitiser").unset("detector.snr");
-    s.unset("telescope.optics_loss_db").unset("telescope.polarisation_loss_db");
-    s.word("detector.snr.reference", "fixed").number("detector.snr.snr_db", snr_db);
+    s.unset("detector.front_end")
+        .unset("detector.digitiser")
+        .unset("detector.snr");
+    s.unset("telescope.optics_loss_db")
+        .unset("telescope.polarisation_loss_db");
+    s.word("detector.snr.reference", "fixed")
+        .number("detector.snr.snr_db", snr_db);
 }
 
 fn front_end(r: &mut Random, s: &mut Scene) {
     if r.chance(0.5) {
-        s.number("detector.front_end.amplifier_noise_a_rthz", r.log(1e-12, 3e-11));
+        s.number(
+            "detector.front_end.amplifier_noise_a_rthz",
+            r.log(1e-12, 3e-11),
+        );
     }
     if r.chance(0.5) {
         s.number("detector.front_end.load_ohm", r.log(30.0, 1e4))
-            .number("detector.front_end.load_temperature_k", r.between(200.0, 320.0));
+            .number(
+                "detector.front_end.load_temperature_k",
+                r.between(200.0, 320.0),
+            );
     }
     if r.chance(0.5) {
         s.number("detector.front_end.dark_current_a", r.log(1e-9, 1e-4));
     }
     if r.chance(0.5) {
-        s.number("detector.front_end.intensity_noise_db_hz", r.between(-170.0, -150.0))
-            .number("detector.front_end.rejection_db", r.between(0.0, 30.0));
+        s.number(
+            "detector.front_end.intensity_noise_db_hz",
+            r.between(-170.0, -150.0),
+        )
+        .number("detector.front_end.rejection_db", r.between(0.0, 30.0));
     }
     if r.chance(0.4) {
         s.number("detector.front_end.saturation_w", r.log(1e-3, 1e-1));
     }
     if r.chance(0.4) {
-        s.number("detector.front_end.half_power_hz", r.log(5e7, 5e8)).set("detector.front_end.poles", r.whole(1, 4));
+        s.number("detector.front_end.half_power_hz", r.log(5e7, 5e8))
+            .set("detector.front_end.poles", r.whole(1, 4));
     }
 }
 
 fn atmosphere(r: &mut Random, s: &mut Scene) {
     match r.chance(0.2) {
         true => s
-            .set("atmosphere.profile.range_m", "[100.0, 400.0, 900.0, 2000.0]")
+            .set(
+                "atmosphere.profile.range_m",
+                "[100.0, 400.0, 900.0, 2000.0]",
+            )
             .set(
                 "atmosphere.profile.backscatter_per_m_sr",
-                format!("[1e-7, {:?}, {:?}, 1e-8]", r.log(1e-8, 1e-6), r.log(1e-8, 1e-6)),
+                format!(
+                    "[1e-7, {:?}, {:?}, 1e-8]",
+                    r.log(1e-8, 1e-6),
+                    r.log(1e-8, 1e-6)
+                ),
             )
-            .set("atmosphere.profile.extinction_per_m", format!("[7e-5, {:?}, 1e-4, 1e-5]", r.log(1e-5, 1e-3))),
+            .set(
+                "atmosphere.profile.extinction_per_m",
+                format!("[7e-5, {:?}, 1e-4, 1e-5]", r.log(1e-5, 1e-3)),
+            ),
         false => s
             .number("atmosphere.backscatter_per_m_sr", r.log(1e-8, 1e-6))
             .number("atmosphere.extinction_per_m", r.log(1e-5, 5e-4)),
@@ -127,12 +174,15 @@ fn atmosphere(r: &mut Random, s: &mut Scene) {
 pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
     match r.whole(0, 9) {
         0..=4 => {
-            s.number("flow.circulation_m2_s", r.log(100.0, 700.0)).number("flow.spacing_m", r.between(20.0, 60.0));
+            s.number("flow.circulation_m2_s", r.log(100.0, 700.0))
+                .number("flow.spacing_m", r.between(20.0, 60.0));
             s.number("flow.core_radius_m", r.between(1.2, 5.0))
                 .number("flow.lateral_position_m", r.between(370.0, 420.0));
-            s.number("flow.height_m", r.between(25.0, 60.0)).word("flow.profile", r.pick(&["algebraic", "lamb_oseen"]));
+            s.number("flow.height_m", r.between(25.0, 60.0))
+                .word("flow.profile", r.pick(&["algebraic", "lamb_oseen"]));
             if r.chance(0.5) {
-                s.word("flow.motion", "inviscid").number("flow.age_tau", r.between(0.0, 3.0));
+                s.word("flow.motion", "inviscid")
+                    .number("flow.age_tau", r.between(0.0, 3.0));
             }
             if r.chance(0.5) {
                 s.number("flow.cross_wind_m_s", r.between(-5.0, 5.0));
@@ -147,17 +197,29 @@ pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
                 .number("flow.vertical_m_s", r.between(-1.0, 1.0));
         }
         7 => {
-            s.word("flow.kind", "linear").set("flow.velocity_m_s", format!("[1.0, {:?}, 0.1]", r.between(-5.0, 5.0)));
+            s.word("flow.kind", "linear").set(
+                "flow.velocity_m_s",
+                format!("[1.0, {:?}, 0.1]", r.between(-5.0, 5.0)),
+            );
             s.set(
                 "flow.gradient_v_per_s",
-                format!("[0.0, {:?}, {:?}]", r.between(-0.02, 0.02), r.between(-0.02, 0.02)),
+                format!(
+                    "[0.0, {:?}, {:?}]",
+                    r.between(-0.02, 0.02),
+                    r.between(-0.02, 0.02)
+                ),
             );
-            s.set("flow.acceleration_m_s2", format!("[0.0, {:?}, 0.0]", r.between(-3.0, 3.0)));
+            s.set(
+                "flow.acceleration_m_s2",
+                format!("[0.0, {:?}, 0.0]", r.between(-3.0, 3.0)),
+            );
         }
         _ => {
             let gamma = r.between(-400.0, 400.0);
-            s.word("flow.kind", "vortex_lines")
-                .set("flow.circulation_m2_s", format!("[{gamma:?}, {:?}]", -0.7 * gamma));
+            s.word("flow.kind", "vortex_lines").set(
+                "flow.circulation_m2_s",
+                format!("[{gamma:?}, {:?}]", -0.7 * gamma),
+            );
             s.set(
                 "flow.nodes_m",
                 "[[[0.0, 380.0, 50.0], [10.0, 380.0, 52.0]], [[0.0, 405.0, 45.0], [10.0, 406.0, 45.0]]]",
@@ -168,17 +230,26 @@ pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
     if r.chance(0.2) {
         s.set(
             "added_flows",
-            format!("[{{ kind = \"uniform\", lateral_m_s = {:?}, vertical_m_s = 0.0 }}]", r.between(-6.0, 6.0)),
+            format!(
+                "[{{ kind = \"uniform\", lateral_m_s = {:?}, vertical_m_s = 0.0 }}]",
+                r.between(-6.0, 6.0)
+            ),
         );
     }
 }
 
 fn scan(r: &mut Random, s: &mut Scene) {
     let (first, step) = (r.between(0.06, 0.11), r.pick(&[1.25e-3, 2.5e-3, 5e-3]));
-    s.number("scan.elevation_min_rad", first).number("scan.elevation_step_rad", step);
-    s.number("scan.elevation_max_rad", first + step * (r.whole(2, 14) as f64 + 0.3));
-    s.number("scan.range_min_m", r.between(250.0, 340.0)).number("scan.range_max_m", r.between(430.0, 520.0));
-    s.set("scan.pulses_per_line", r.whole(1, 5)).set("scan.realisations", r.whole(1, 5));
+    s.number("scan.elevation_min_rad", first)
+        .number("scan.elevation_step_rad", step);
+    s.number(
+        "scan.elevation_max_rad",
+        first + step * (r.whole(2, 14) as f64 + 0.3),
+    );
+    s.number("scan.range_min_m", r.between(250.0, 340.0))
+        .number("scan.range_max_m", r.between(430.0, 520.0));
+    s.set("scan.pulses_per_line", r.whole(1, 5))
+        .set("scan.realisations", r.whole(1, 5));
     if r.chance(0.5) {
         s.number("scan.lidar_height_m", r.between(0.0, 10.0));
     }
@@ -186,7 +257,8 @@ fn scan(r: &mut Random, s: &mut Scene) {
         s.number("scan.azimuth_rad", r.between(0.0, 6.0));
     }
     if r.chance(0.3) {
-        s.number("site.latitude_deg", r.between(-60.0, 60.0)).number("site.longitude_deg", r.between(-170.0, 170.0));
+        s.number("site.latitude_deg", r.between(-60.0, 60.0))
+            .number("site.longitude_deg", r.between(-170.0, 170.0));
         s.number("site.altitude_m", r.between(0.0, 500.0));
     }
 }
@@ -204,14 +276,25 @@ fn estimator(r: &mut Random, s: &mut Scene) {
         "first_moment",
         "likelihood",
     ]);
-    s.set("estimator.window_samples", r.pick(&[16, 24, 32, 48, 64, 96]))
-        .set("estimator.window_step_samples", r.whole(1, 4));
+    s.set(
+        "estimator.window_samples",
+        r.pick(&[16, 24, 32, 48, 64, 96]),
+    )
+    .set("estimator.window_step_samples", r.whole(1, 4));
     s.set("estimator.gate_step_samples", r.pick(&[5, 8, 12, 20]))
         .set("estimator.padded_samples", r.pick(&[256, 512, 1024]));
     let weighting = r.pick(&["gaussian", "rectangular", "hann"]);
     // The likelihood has tapers of its own.
-    s.word("estimator.weighting", if method == "likelihood" { "gaussian" } else { weighting });
-    s.word("estimator.method.kind", method).number("estimator.false_alarm", r.pick(&[0.01, 0.0, 0.1]));
+    s.word(
+        "estimator.weighting",
+        if method == "likelihood" {
+            "gaussian"
+        } else {
+            weighting
+        },
+    );
+    s.word("estimator.method.kind", method)
+        .number("estimator.false_alarm", r.pick(&[0.01, 0.0, 0.1]));
     if ["autoregressive", "autoregressive_pole", "capon"].contains(&method) {
         s.set("estimator.method.order", r.whole(2, 15));
     }
@@ -224,7 +307,10 @@ fn estimator(r: &mut Random, s: &mut Scene) {
             false => s
                 .word("estimator.radius.kind", "of_range")
                 .set("estimator.radius.range_m", "[300.0, 450.0]")
-                .set("estimator.radius.radius_m", format!("[{:?}, {:?}]", r.between(1.0, 3.0), r.between(2.0, 6.0))),
+                .set(
+                    "estimator.radius.radius_m",
+                    format!("[{:?}, {:?}]", r.between(1.0, 3.0), r.between(2.0, 6.0)),
+                ),
         };
     }
 }

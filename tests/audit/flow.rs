@@ -9,13 +9,28 @@ use std::f64::consts::PI;
 fn hold_steps(ledger: &mut Ledger, steps: &Csv) {
     let f = |name: &str| steps.f(name);
     let (time, step, energy) = (f("time_s"), f("step_s"), f("kinetic_energy_m5_s2"));
-    let powers = ["viscous_power_m5_s3", "subgrid_power_m5_s3", "force_power_m5_s3"].map(f);
+    let powers = [
+        "viscous_power_m5_s3",
+        "subgrid_power_m5_s3",
+        "force_power_m5_s3",
+    ]
+    .map(f);
     let (rate, residual) = (f("energy_rate_m5_s3"), f("energy_residual_m5_s3"));
     let power = |i: usize| powers.iter().map(|p| p[i]).sum::<f64>();
     for i in 1..steps.len() {
         ledger.equal("steps.csv: step", f("step")[i], f("step")[i - 1] + 1.0, 0.0);
-        ledger.equal("steps.csv: time_s", time[i], time[i - 1] + step[i], 1e-9 * time[i]);
-        ledger.equal("steps.csv: step_s", step[i], time[i] - time[i - 1], 1e-9 * time[i]);
+        ledger.equal(
+            "steps.csv: time_s",
+            time[i],
+            time[i - 1] + step[i],
+            1e-9 * time[i],
+        );
+        ledger.equal(
+            "steps.csv: step_s",
+            step[i],
+            time[i] - time[i - 1],
+            1e-9 * time[i],
+        );
         let right = (energy[i] - energy[i - 1]) / step[i];
         let round_off = 1e-12 * energy[i] / step[i];
         // The last row has no step behind it, whose powers it would need.
@@ -25,11 +40,33 @@ fn hold_steps(ledger: &mut Ledger, steps: &Csv) {
         ledger.equal("steps.csv: energy_rate_m5_s3", rate[i], right, round_off);
         // The mean of the powers at both ends: the next step's row has those at its start.
         let right = rate[i] - 0.5 * (power(i) + power(i + 1));
-        ledger.equal("steps.csv: energy_residual_m5_s3", residual[i], right, round_off);
-        ledger.holds("steps.csv: relative_divergence", f("relative_divergence")[i] < 1e-8, "the flow has sources");
-        ledger.holds("steps.csv: viscous_power_m5_s3", powers[0][i] <= 0.0, "viscosity that feeds");
-        ledger.holds("steps.csv: subgrid_power_m5_s3", powers[1][i] <= 0.0, "a model that feeds");
-        ledger.equal("steps.csv: force_power_m5_s3, without force", powers[2][i], 0.0, 0.0);
+        ledger.equal(
+            "steps.csv: energy_residual_m5_s3",
+            residual[i],
+            right,
+            round_off,
+        );
+        ledger.holds(
+            "steps.csv: relative_divergence",
+            f("relative_divergence")[i] < 1e-8,
+            "the flow has sources",
+        );
+        ledger.holds(
+            "steps.csv: viscous_power_m5_s3",
+            powers[0][i] <= 0.0,
+            "viscosity that feeds",
+        );
+        ledger.holds(
+            "steps.csv: subgrid_power_m5_s3",
+            powers[1][i] <= 0.0,
+            "a model that feeds",
+        );
+        ledger.equal(
+            "steps.csv: force_power_m5_s3, without force",
+            powers[2][i],
+            0.0,
+            0.0,
+        );
     }
 }
 
@@ -49,11 +86,17 @@ pub(crate) fn hold_wake(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         )
     };
     bench.write("w.toml", &case(5));
-    if bench.must(ledger, &["wake", "w.toml", "--out", "w"]).is_none() {
+    if bench
+        .must(ledger, &["wake", "w.toml", "--out", "w"])
+        .is_none()
+    {
         return;
     }
-    let (si, scaled, steps) =
-        (bench.csv(ledger, "w/wake.csv"), bench.csv(ledger, "w/wake_scaled.csv"), bench.csv(ledger, "w/steps.csv"));
+    let (si, scaled, steps) = (
+        bench.csv(ledger, "w/wake.csv"),
+        bench.csv(ledger, "w/wake_scaled.csv"),
+        bench.csv(ledger, "w/steps.csv"),
+    );
     hold_steps(ledger, &steps);
     let v0 = gamma / (2.0 * PI * b0);
     let mut nc = bench.netcdf(ledger, "w/wake.nc");
@@ -67,29 +110,58 @@ pub(crate) fn hold_wake(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
             ("_hz", v0 / b0),
             ("", 1.0),
         ];
-        let Some((tag, unit)) = units.iter().find(|(tag, _)| si.has(&format!("{name}{tag}"))) else { continue };
+        let Some((tag, unit)) = units
+            .iter()
+            .find(|(tag, _)| si.has(&format!("{name}{tag}")))
+        else {
+            continue;
+        };
         let (a, b) = (si.f(&format!("{name}{tag}")), scaled.f(name));
-        let variable = if nc.names().contains(name) { name.clone() } else { format!("{name}{tag}") };
+        let variable = if nc.names().contains(name) {
+            name.clone()
+        } else {
+            format!("{name}{tag}")
+        };
         let c = nc.f(&variable);
         for i in 0..a.len() {
             let round_off = 1e-9 * a[i].abs() + 1e-12 * unit;
-            ledger.equal(&format!("wake_scaled.csv: {name}"), b[i] * unit, a[i], round_off);
-            ledger.equal(&format!("wake.csv: {name}{tag}"), a[i], b[i] * unit, round_off);
+            ledger.equal(
+                &format!("wake_scaled.csv: {name}"),
+                b[i] * unit,
+                a[i],
+                round_off,
+            );
+            ledger.equal(
+                &format!("wake.csv: {name}{tag}"),
+                a[i],
+                b[i] * unit,
+                round_off,
+            );
             if c.len() == a.len() {
-                ledger.equal(&format!("wake.nc: {variable}"), c[i], a[i], 2e-7 * a[i].abs() + 1e-9 * unit);
+                ledger.equal(
+                    &format!("wake.nc: {variable}"),
+                    c[i],
+                    a[i],
+                    2e-7 * a[i].abs() + 1e-9 * unit,
+                );
             }
         }
     }
     let (tau, time) = (si.f("tau"), si.f("time_s"));
     for i in 0..si.len() {
         ledger.equal("wake.csv: tau", tau[i], (0.05 * i as f64).min(end), 1e-9);
-        ledger.equal("wake.csv: time_s", time[i], tau[i] * b0 / v0, 1e-9 * time[i].abs());
+        ledger.equal(
+            "wake.csv: time_s",
+            time[i],
+            tau[i] * b0 / v0,
+            1e-9 * time[i].abs(),
+        );
         for side in ["left", "right"] {
-            if let Some(name) = si
-                .names
-                .iter()
-                .find(|n| n.starts_with("gamma") && n.ends_with(&format!("{side}_m2_s")) && !n.contains("opposite"))
-            {
+            if let Some(name) = si.names.iter().find(|n| {
+                n.starts_with("gamma")
+                    && n.ends_with(&format!("{side}_m2_s"))
+                    && !n.contains("opposite")
+            }) {
                 let g = si.f(name);
                 ledger.equal(
                     &format!("wake.csv: gamma_ratio_{side}"),
@@ -99,7 +171,12 @@ pub(crate) fn hold_wake(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
                 );
             }
         }
-        let modes: f64 = si.names.iter().filter(|n| n.starts_with("energy_mode_")).map(|n| si.f(n)[i]).sum();
+        let modes: f64 = si
+            .names
+            .iter()
+            .filter(|n| n.starts_with("energy_mode_"))
+            .map(|n| si.f(n)[i])
+            .sum();
         // The modes that are left out of the table are the short ones.
         let energy = si.f("energy_m4_s2")[i];
         ledger.equal("wake.csv: energy_m4_s2", energy, modes, 2e-3 * energy);
@@ -112,18 +189,30 @@ pub(crate) fn hold_wake(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         .sum::<f64>()
         / 21.0;
     let name = si.names.iter().find(|n| {
-        n.starts_with("gamma") && n.ends_with("left_m2_s") && !n.contains("opposite") && !n.contains("secondary")
+        n.starts_with("gamma")
+            && n.ends_with("left_m2_s")
+            && !n.contains("opposite")
+            && !n.contains("secondary")
     });
     if let Some(name) = name {
         let found = si.f(name)[0].abs();
         ledger.equal("wake.csv: gamma over the radii", found, mean, 0.12 * mean);
         let word = nc.text(name.trim_end_matches("_m2_s"), "long_name");
-        let is_named = word.contains(&format!("{low:.1}")) || (name.contains("5_15") && radii == "[5.0, 15.0]");
-        ledger.holds("wake.nc: gamma says its radii", is_named, &format!("{name}: {word}, radii {radii}"));
+        let is_named = word.contains(&format!("{low:.1}"))
+            || (name.contains("5_15") && radii == "[5.0, 15.0]");
+        ledger.holds(
+            "wake.nc: gamma says its radii",
+            is_named,
+            &format!("{name}: {word}, radii {radii}"),
+        );
     }
     for file in ["w/wake.csv", "w/steps.csv", "w/wake_scaled.csv"] {
         let text = std::fs::read_to_string(bench.folder.join(file)).unwrap_or_default();
-        ledger.holds("wake: seed of the files", text.contains("# seed: 5\n"), file);
+        ledger.holds(
+            "wake: seed of the files",
+            text.contains("# seed: 5\n"),
+            file,
+        );
     }
     let other = bench.must(ledger, &["wake", "w.toml", "--seed", "7", "--out", "w7"]);
     let energies = bench.csv(ledger, "w7/wake.csv").f("energy_3d_m4_s2");
@@ -142,7 +231,11 @@ pub(crate) fn hold_wake(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         ),
     );
     let check = bench.run(&["check", "p.toml"]);
-    ledger.holds("wake: a plane at the age that was asked for", check.is_good, &check.stderr);
+    ledger.holds(
+        "wake: a plane at the age that was asked for",
+        check.is_good,
+        &check.stderr,
+    );
     // A finished run has no earlier end.
     let ended = bench.run(&["wake", "w.toml", "--restart", "--end", "0.1", "--out", "w"]);
     let text = std::fs::read_to_string(bench.folder.join("w/case.toml")).unwrap_or_default();
@@ -177,31 +270,50 @@ pub(crate) fn hold_growth(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let steps = bench.csv(ledger, "g/steps.csv");
     hold_steps(ledger, &steps);
     let half = steps.len() / 2;
-    let sum = |name: &str| steps.f(name)[half..].iter().filter(|v| v.is_finite()).sum::<f64>();
-    let fed = sum("energy_residual_m5_s3") / (sum("viscous_power_m5_s3") + sum("subgrid_power_m5_s3")).abs();
+    let sum = |name: &str| {
+        steps.f(name)[half..]
+            .iter()
+            .filter(|v| v.is_finite())
+            .sum::<f64>()
+    };
+    let fed = sum("energy_residual_m5_s3")
+        / (sum("viscous_power_m5_s3") + sum("subgrid_power_m5_s3")).abs();
     let told = !ended.is_good || is_told(&ended);
     ledger.holds(
         "flow: what the step feeds is told",
         told || fed < 0.25,
-        &format!("{model} {constant}: {fed:.2} of what is taken is fed, no word: {}", ended.stderr.trim()),
+        &format!(
+            "{model} {constant}: {fed:.2} of what is taken is fed, no word: {}",
+            ended.stderr.trim()
+        ),
     );
     let energy = steps.f("kinetic_energy_m5_s2");
     let largest = energy.iter().fold(0.0_f64, |a, &e| a.max(e));
     ledger.holds(
         "flow: energy that nothing gave is told",
         told || largest < 1.0002 * energy[0],
-        &format!("{model} {constant}: {:.5} of the start", largest / energy[0]),
+        &format!(
+            "{model} {constant}: {:.5} of the start",
+            largest / energy[0]
+        ),
     );
     // RK3 with slip walls has the linear limit sqrt(3)/1.5860.
     let limit = 3_f64.sqrt() / 1.586;
     for (share, is_stable) in [(0.9, true), (1.12, false)] {
-        bench.write("l.toml", &pair_case("runge_kutta3", share * limit, "none", 0.2, 1));
+        bench.write(
+            "l.toml",
+            &pair_case("runge_kutta3", share * limit, "none", 0.2, 1),
+        );
         let check = bench.run(&["flow", "l.toml", "--check"]);
         let told = !check.is_good || is_told(&check);
         ledger.holds(
             "flow: Courant numbers of Runge-Kutta",
             is_stable || told,
-            &format!("{:.3} is beyond {limit:.3}: {}", share * limit, check.stdout.trim()),
+            &format!(
+                "{:.3} is beyond {limit:.3}: {}",
+                share * limit,
+                check.stdout.trim()
+            ),
         );
         ledger.holds(
             "flow: Courant numbers that are right pass",
@@ -213,7 +325,9 @@ pub(crate) fn hold_growth(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
 
 /// A warning or a note was printed.
 fn is_told(ended: &Ended) -> bool {
-    ["warning", "note"].iter().any(|word| ended.stderr.contains(word) || ended.stdout.contains(word))
+    ["warning", "note"]
+        .iter()
+        .any(|word| ended.stderr.contains(word) || ended.stdout.contains(word))
 }
 
 /// A cavity of little Reynolds number: its steady energy whatever the step, with damped first steps and without.
@@ -226,14 +340,24 @@ pub(crate) fn hold_cavity(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         );
         let ended = bench.run(&["flow", "c.toml", "--out", name]);
         let steps = bench.csv(ledger, &format!("{name}/steps.csv"));
-        let last = steps.f("kinetic_energy_m5_s2").last().copied().unwrap_or(f64::NAN);
+        let last = steps
+            .f("kinetic_energy_m5_s2")
+            .last()
+            .copied()
+            .unwrap_or(f64::NAN);
         (if ended.is_good { last } else { f64::NAN }, is_told(&ended))
     };
     let (right, _) = energy("fine", "step_s = 1e-3\nscheme = \"runge_kutta3\"\n");
     let (usual, told) = energy("usual", "");
     let (damped, told_damped) = energy("damped", "damped_steps = 20\n");
-    let at = |found: f64| format!("Reynolds number {reynolds}: energy {found}, {right} with short steps, no word");
-    ledger.holds("flow: the default step of a creeping flow", told || (usual / right - 1.0).abs() < 2e-3, &at(usual));
+    let at = |found: f64| {
+        format!("Reynolds number {reynolds}: energy {found}, {right} with short steps, no word")
+    };
+    ledger.holds(
+        "flow: the default step of a creeping flow",
+        told || (usual / right - 1.0).abs() < 2e-3,
+        &at(usual),
+    );
     ledger.holds(
         "flow: damped first steps do no harm",
         told_damped || (damped / right - 1.0).abs() < 2e-3,

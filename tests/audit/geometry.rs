@@ -22,8 +22,11 @@ pub(crate) struct Scan {
 impl Scan {
     /// A plain RHI: from the lowest line up, all with as many pulses.
     pub(crate) fn new(s: &Scene) -> Self {
-        let (low, high, step) =
-            (s.f("scan.elevation_min_rad"), s.f("scan.elevation_max_rad"), s.f("scan.elevation_step_rad"));
+        let (low, high, step) = (
+            s.f("scan.elevation_min_rad"),
+            s.f("scan.elevation_max_rad"),
+            s.f("scan.elevation_step_rad"),
+        );
         let lines = ((high - low) / step + 1e-9).floor() as usize + 1;
         let sample_step_m = 0.5 * C_M_S / s.f("detector.sampling_hz");
         let (near_m, far_m) = (s.f("scan.range_min_m"), s.f("scan.range_max_m"));
@@ -35,7 +38,9 @@ impl Scan {
         let centre_m = |start: usize| near_m + sample_step_m * (start as f64 + 0.5 * n as f64);
         Self {
             elevation_rad: (0..lines).map(|i| low + i as f64 * step).collect(),
-            sample_m: (0..samples).map(|k| near_m + k as f64 * sample_step_m).collect(),
+            sample_m: (0..samples)
+                .map(|k| near_m + k as f64 * sample_step_m)
+                .collect(),
             gate_m: gate_start.iter().map(|&g| centre_m(g)).collect(),
             gate_start,
             window_start: starts(s.n("estimator.window_step_samples")),
@@ -50,11 +55,21 @@ impl Scan {
 
     /// The window of a gate alone: its first sample, if windows lie there.
     pub(crate) fn own_window(&self, gate: usize) -> Vec<usize> {
-        self.window_start.iter().copied().filter(|start| *start == self.gate_start[gate]).collect()
+        self.window_start
+            .iter()
+            .copied()
+            .filter(|start| *start == self.gate_start[gate])
+            .collect()
     }
 
     /// Windows within `radius_m` of a gate (E7), for each line: their first samples.
-    pub(crate) fn region(&self, line: usize, gate: usize, radius_m: f64, n: usize) -> Vec<Vec<usize>> {
+    pub(crate) fn region(
+        &self,
+        line: usize,
+        gate: usize,
+        radius_m: f64,
+        n: usize,
+    ) -> Vec<Vec<usize>> {
         let (r1, e1) = (self.gate_m[gate], self.elevation_rad[line]);
         let near = |e2: f64, start: usize| {
             let r2 = self.sample_m[0] + self.sample_step_m() * (start as f64 + 0.5 * n as f64);
@@ -62,7 +77,13 @@ impl Scan {
             // On the very edge round-off decides; it is taken as within.
             across.max(0.0).sqrt() <= radius_m + 1e-6
         };
-        let of_line = |&e2: &f64| self.window_start.iter().copied().filter(|&start| near(e2, start)).collect();
+        let of_line = |&e2: &f64| {
+            self.window_start
+                .iter()
+                .copied()
+                .filter(|&start| near(e2, start))
+                .collect()
+        };
         self.elevation_rad.iter().map(of_line).collect()
     }
 }
@@ -89,10 +110,23 @@ pub(crate) fn line_time_s(s: &Scene, line: usize) -> f64 {
 /// The places of a map of a plain RHI.
 pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv, start_s: f64) {
     let gates = scan.gate_m.len();
-    ledger.equal("map.csv: rows", map.len() as f64, (gates * scan.elevation_rad.len()) as f64, 0.5);
+    ledger.equal(
+        "map.csv: rows",
+        map.len() as f64,
+        (gates * scan.elevation_rad.len()) as f64,
+        0.5,
+    );
     let f = |name: &str| map.f(name);
-    let (range, elevation, y, z, azimuth, time, sweep, ray) =
-        (f("range_m"), f("elevation_rad"), f("y_m"), f("z_m"), f("azimuth_rad"), f("time_s"), f("sweep"), f("ray"));
+    let (range, elevation, y, z, azimuth, time, sweep, ray) = (
+        f("range_m"),
+        f("elevation_rad"),
+        f("y_m"),
+        f("z_m"),
+        f("azimuth_rad"),
+        f("time_s"),
+        f("sweep"),
+        f("ray"),
+    );
     let height_m = s.f("scan.lidar_height_m");
     let place_y_m = s.f("scan.lidar.y_m");
     for row in 0..map.len() {
@@ -102,8 +136,18 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv, start
         ledger.equal("map.csv: elevation_rad", elevation[row], e, 1e-12);
         ledger.equal("map.csv: y_m", y[row], place_y_m + r * e.cos(), 1e-9 * r);
         ledger.equal("map.csv: z_m", z[row], height_m + r * e.sin(), 1e-9 * r);
-        ledger.equal("map.csv: azimuth_rad", azimuth[row], s.f("scan.azimuth_rad"), 1e-12);
-        ledger.equal("map.csv: time_s", time[row], start_s + line_time_s(s, line), 1e-9);
+        ledger.equal(
+            "map.csv: azimuth_rad",
+            azimuth[row],
+            s.f("scan.azimuth_rad"),
+            1e-12,
+        );
+        ledger.equal(
+            "map.csv: time_s",
+            time[row],
+            start_s + line_time_s(s, line),
+            1e-9,
+        );
         ledger.equal("map.csv: sweep", sweep[row], 0.0, 0.0);
         ledger.equal("map.csv: ray", ray[row], line as f64, 0.0);
     }
@@ -111,15 +155,30 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv, start
 
 /// The levels of a map: all pulses counted (a periodogram alone has no region).
 pub(crate) fn hold_levels(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
-    let (gates, n, level) = (scan.gate_m.len(), s.n("estimator.window_samples"), map.f("level"));
+    let (gates, n, level) = (
+        scan.gate_m.len(),
+        s.n("estimator.window_samples"),
+        map.f("level"),
+    );
     let is_alone = s.s("estimator.method.kind") == "periodogram";
     for row in (0..map.len()).step_by(1 + map.len() / 60) {
         let (line, gate) = (row / gates, row % gates);
-        let Some(radius) = radius_m(s, scan.gate_m[gate]) else { return };
+        let Some(radius) = radius_m(s, scan.gate_m[gate]) else {
+            return;
+        };
         let windows = match is_alone {
             true => scan.own_window(gate).len(),
-            false => scan.region(line, gate, radius, n).iter().map(Vec::len).sum::<usize>(),
+            false => scan
+                .region(line, gate, radius, n)
+                .iter()
+                .map(Vec::len)
+                .sum::<usize>(),
         };
-        ledger.equal("map.csv: level", level[row], (windows * scan.pulses) as f64, 0.5);
+        ledger.equal(
+            "map.csv: level",
+            level[row],
+            (windows * scan.pulses) as f64,
+            0.5,
+        );
     }
 }

@@ -7,7 +7,13 @@ use super::scene::Scene;
 
 /// A key, what the scene needs for it, its two values (empty: not stated), the command, and what differs between them: a column of a file, or all
 /// that is printed.
-type Key = (&'static str, &'static [(&'static str, &'static str)], [&'static str; 2], &'static str, &'static str);
+type Key = (
+    &'static str,
+    &'static [(&'static str, &'static str)],
+    [&'static str; 2],
+    &'static str,
+    &'static str,
+);
 
 const FIXED: (&str, &str) = ("detector.snr", "{ reference = \"fixed\", snr_db = 6.0 }");
 const REFRACTIVE: [(&str, &str); 7] = [
@@ -29,18 +35,72 @@ const PPI: [(&str, &str); 1] = [("scan.lidar_height_m", "20.0")];
 
 const KEYS: [Key; 78] = [
     ("seed", &[], ["1", "2"], "map", "v_mean_m_s"),
-    ("laser.wavelength_m", &[], ["1.5e-6", "2e-6"], "map", "v_mean_m_s"),
-    ("laser.pulse_repetition_hz", &[], ["400.0", "500.0"], "map", "time_s"),
-    ("laser.linewidth_hz", &[], ["0.0", "1e6"], "map", "v_mean_m_s"),
-    ("laser.amplifier", &[], ["{ mean_power_w = 0.1 }", "{ mean_power_w = 0.2 }"], "budget", ""),
-    ("laser.amplifier", &[], ["{ storage_time_s = 1e-4 }", "{ storage_time_s = 2e-3 }"], "budget", ""),
-    ("laser.amplifier", &[], ["{ largest_energy_j = 1e-6 }", "{ largest_energy_j = 2e-6 }"], "budget", ""),
-    ("laser.fibre", &[], ["{ length_m = 2.0 }", "{ length_m = 4.0 }"], "budget", ""),
-    ("laser.fibre", &[], ["{ gain_db = 0.0 }", "{ gain_db = 20.0 }"], "budget", ""),
+    (
+        "laser.wavelength_m",
+        &[],
+        ["1.5e-6", "2e-6"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "laser.pulse_repetition_hz",
+        &[],
+        ["400.0", "500.0"],
+        "map",
+        "time_s",
+    ),
+    (
+        "laser.linewidth_hz",
+        &[],
+        ["0.0", "1e6"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "laser.amplifier",
+        &[],
+        ["{ mean_power_w = 0.1 }", "{ mean_power_w = 0.2 }"],
+        "budget",
+        "",
+    ),
+    (
+        "laser.amplifier",
+        &[],
+        ["{ storage_time_s = 1e-4 }", "{ storage_time_s = 2e-3 }"],
+        "budget",
+        "",
+    ),
+    (
+        "laser.amplifier",
+        &[],
+        ["{ largest_energy_j = 1e-6 }", "{ largest_energy_j = 2e-6 }"],
+        "budget",
+        "",
+    ),
+    (
+        "laser.fibre",
+        &[],
+        ["{ length_m = 2.0 }", "{ length_m = 4.0 }"],
+        "budget",
+        "",
+    ),
+    (
+        "laser.fibre",
+        &[],
+        ["{ gain_db = 0.0 }", "{ gain_db = 20.0 }"],
+        "budget",
+        "",
+    ),
     ("pulse.energy_j", &[], ["1e-4", "3e-4"], "budget", ""),
     ("pulse.chirp_hz_s", &[], ["0.0", "1e13"], "bound", ""),
     ("pulse.shape.duration_s", &[], ["1e-7", "3e-7"], "bound", ""),
-    ("pulse.shape.definition", &[], ["\"fwhm\"", "\"one_over_e_half_width\""], "bound", ""),
+    (
+        "pulse.shape.definition",
+        &[],
+        ["\"fwhm\"", "\"one_over_e_half_width\""],
+        "bound",
+        "",
+    ),
     (
         "pulse.shape",
         &[],
@@ -62,21 +122,72 @@ const KEYS: [Key; 78] = [
         "v_pulse_m_s",
     ),
     ("detector.bandwidth_hz", &[], ["4e7", "5e7"], "budget", ""),
-    ("detector.intermediate_frequency_hz", &[], ["7e7", "8e7"], "map", "v_mean_m_s"),
-    ("detector.sampling_hz", &[], ["2.5e8", "3e8"], "map", "range_m"),
-    ("detector.quantum_efficiency", &[], ["0.5", "1.0"], "budget", ""),
-    ("detector.local_oscillator_w", &[("detector.front_end.dark_current_a", "1e-5")], ["1e-3", "2e-3"], "budget", ""),
-    ("detector.noise", &[], ["\"band\"", "\"white\""], "bound", ""),
-    ("detector.signal", &[], ["\"intermediate_frequency\"", "\"baseband\""], "bound", ""),
     (
-        "detector.digitiser",
+        "detector.intermediate_frequency_hz",
         &[],
-        ["{ kind = \"none\" }", "{ kind = \"quantised\", bits = 4, full_scale_over_noise = 4.0 }"],
+        ["7e7", "8e7"],
         "map",
         "v_mean_m_s",
     ),
-    ("detector.front_end.amplifier_noise_a_rthz", &[], ["0.0", "1e-11"], "map", "v_mean_m_s"),
-    ("detector.front_end.load_ohm", &[], ["inf", "50.0"], "map", "v_mean_m_s"),
+    (
+        "detector.sampling_hz",
+        &[],
+        ["2.5e8", "3e8"],
+        "map",
+        "range_m",
+    ),
+    (
+        "detector.quantum_efficiency",
+        &[],
+        ["0.5", "1.0"],
+        "budget",
+        "",
+    ),
+    (
+        "detector.local_oscillator_w",
+        &[("detector.front_end.dark_current_a", "1e-5")],
+        ["1e-3", "2e-3"],
+        "budget",
+        "",
+    ),
+    (
+        "detector.noise",
+        &[],
+        ["\"band\"", "\"white\""],
+        "bound",
+        "",
+    ),
+    (
+        "detector.signal",
+        &[],
+        ["\"intermediate_frequency\"", "\"baseband\""],
+        "bound",
+        "",
+    ),
+    (
+        "detector.digitiser",
+        &[],
+        [
+            "{ kind = \"none\" }",
+            "{ kind = \"quantised\", bits = 4, full_scale_over_noise = 4.0 }",
+        ],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "detector.front_end.amplifier_noise_a_rthz",
+        &[],
+        ["0.0", "1e-11"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "detector.front_end.load_ohm",
+        &[],
+        ["inf", "50.0"],
+        "map",
+        "v_mean_m_s",
+    ),
     (
         "detector.front_end.load_temperature_k",
         &[("detector.front_end.load_ohm", "50.0")],
@@ -84,8 +195,20 @@ const KEYS: [Key; 78] = [
         "budget",
         "",
     ),
-    ("detector.front_end.dark_current_a", &[], ["0.0", "1e-4"], "map", "v_mean_m_s"),
-    ("detector.front_end.intensity_noise_db_hz", &[], ["-inf", "-150.0"], "map", "v_mean_m_s"),
+    (
+        "detector.front_end.dark_current_a",
+        &[],
+        ["0.0", "1e-4"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "detector.front_end.intensity_noise_db_hz",
+        &[],
+        ["-inf", "-150.0"],
+        "map",
+        "v_mean_m_s",
+    ),
     (
         "detector.front_end.rejection_db",
         &[("detector.front_end.intensity_noise_db_hz", "-150.0")],
@@ -93,7 +216,13 @@ const KEYS: [Key; 78] = [
         "budget",
         "",
     ),
-    ("detector.front_end.saturation_w", &[], ["inf", "5e-3"], "budget", ""),
+    (
+        "detector.front_end.saturation_w",
+        &[],
+        ["inf", "5e-3"],
+        "budget",
+        "",
+    ),
     (
         "detector.front_end.half_power_hz",
         &[("detector.front_end.amplifier_noise_a_rthz", "1e-11")],
@@ -101,59 +230,248 @@ const KEYS: [Key; 78] = [
         "budget",
         "",
     ),
-    ("detector.front_end.poles", &FRONT, ["1", "3"], "map", "v_mean_m_s"),
-    ("detector.snr.reference", &[], ["\"physical\"", "\"chapter\""], "map", "v_mean_m_s"),
     (
-        "detector.snr",
-        &[],
-        ["{ reference = \"fixed\", snr_db = 0.0 }", "{ reference = \"fixed\", snr_db = 9.0 }"],
+        "detector.front_end.poles",
+        &FRONT,
+        ["1", "3"],
         "map",
         "v_mean_m_s",
     ),
-    ("telescope.aperture_radius_m", &[], ["0.05", "0.06"], "budget", ""),
-    ("telescope.obscuration_radius_m", &[], ["0.0", "0.01"], "budget", ""),
-    ("telescope.beam_radius_m", &[], ["0.03", "0.04"], "budget", ""),
-    ("telescope.beam_radius_definition", &[], ["\"intensity\"", "\"field\""], "budget", ""),
-    ("telescope.focus_m", &[], ["inf", "400.0"], "map", "v_mean_m_s"),
-    ("telescope.receiver", &REFRACTIVE, ["\"monostatic\"", "\"bistatic\""], "efficiency", "efficiency"),
-    ("telescope.optics_loss_db", &[], ["0.0", "3.0"], "map", "v_mean_m_s"),
-    ("telescope.polarisation_loss_db", &[], ["0.0", "3.0"], "map", "v_mean_m_s"),
-    ("telescope.reflection_db", &[], ["-inf", "-50.0"], "budget", ""),
-    ("telescope.blind_range_m", &[], ["0.0", "330.0"], "map", "v_mean_m_s"),
-    ("atmosphere.backscatter_per_m_sr", &[], ["1e-7", "1e-6"], "map", "v_mean_m_s"),
-    ("atmosphere.extinction_per_m", &[], ["1e-5", "1e-3"], "map", "v_mean_m_s"),
-    ("atmosphere.turbulence.cn2_m_m23", &REFRACTIVE, ["1e-13", "2e-13"], "efficiency", "efficiency"),
-    ("atmosphere.turbulence.spectrum", &BISTATIC, ["\"von_karman\"", "\"kolmogorov\""], "budget", ""),
-    ("atmosphere.turbulence.inner_scale_m", &BISTATIC, ["0.01", "0.03"], "budget", ""),
-    ("atmosphere.turbulence.outer_scale_m", &BISTATIC, ["1.0", "0.2"], "budget", ""),
-    ("atmosphere.turbulence.outer_scale_wavenumber", &BISTATIC, ["\"inverse\"", "\"two_pi_over\""], "budget", ""),
-    ("atmosphere.turbulence.layers", &REFRACTIVE, ["5", "6"], "efficiency", "efficiency"),
-    ("atmosphere.turbulence.realisations", &REFRACTIVE, ["8", "12"], "efficiency", "efficiency"),
-    ("atmosphere.turbulence.efficiency", &REFRACTIVE, ["\"mean\"", "\"realisation\""], "map", "v_mean_m_s"),
-    ("flow.profile", &[], ["\"algebraic\"", "\"lamb_oseen\""], "map", "v_exact_m_s"),
-    ("flow.motion", &[], ["\"frozen\"", "\"inviscid\""], "map", "v_exact_m_s"),
-    ("flow.cross_wind_m_s", &[], ["0.0", "2.0"], "map", "v_exact_m_s"),
     (
-        "flow.aircraft",
-        &[("flow.motion", "\"inviscid\"")],
-        ["{ speed_m_s = 70.0, x_m = 200.0 }", "{ speed_m_s = 90.0, x_m = 200.0 }"],
+        "detector.snr.reference",
+        &[],
+        ["\"physical\"", "\"chapter\""],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "detector.snr",
+        &[],
+        [
+            "{ reference = \"fixed\", snr_db = 0.0 }",
+            "{ reference = \"fixed\", snr_db = 9.0 }",
+        ],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "telescope.aperture_radius_m",
+        &[],
+        ["0.05", "0.06"],
+        "budget",
+        "",
+    ),
+    (
+        "telescope.obscuration_radius_m",
+        &[],
+        ["0.0", "0.01"],
+        "budget",
+        "",
+    ),
+    (
+        "telescope.beam_radius_m",
+        &[],
+        ["0.03", "0.04"],
+        "budget",
+        "",
+    ),
+    (
+        "telescope.beam_radius_definition",
+        &[],
+        ["\"intensity\"", "\"field\""],
+        "budget",
+        "",
+    ),
+    (
+        "telescope.focus_m",
+        &[],
+        ["inf", "400.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "telescope.receiver",
+        &REFRACTIVE,
+        ["\"monostatic\"", "\"bistatic\""],
+        "efficiency",
+        "efficiency",
+    ),
+    (
+        "telescope.optics_loss_db",
+        &[],
+        ["0.0", "3.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "telescope.polarisation_loss_db",
+        &[],
+        ["0.0", "3.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "telescope.reflection_db",
+        &[],
+        ["-inf", "-50.0"],
+        "budget",
+        "",
+    ),
+    (
+        "telescope.blind_range_m",
+        &[],
+        ["0.0", "330.0"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.backscatter_per_m_sr",
+        &[],
+        ["1e-7", "1e-6"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.extinction_per_m",
+        &[],
+        ["1e-5", "1e-3"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "atmosphere.turbulence.cn2_m_m23",
+        &REFRACTIVE,
+        ["1e-13", "2e-13"],
+        "efficiency",
+        "efficiency",
+    ),
+    (
+        "atmosphere.turbulence.spectrum",
+        &BISTATIC,
+        ["\"von_karman\"", "\"kolmogorov\""],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.inner_scale_m",
+        &BISTATIC,
+        ["0.01", "0.03"],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.outer_scale_m",
+        &BISTATIC,
+        ["1.0", "0.2"],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.outer_scale_wavenumber",
+        &BISTATIC,
+        ["\"inverse\"", "\"two_pi_over\""],
+        "budget",
+        "",
+    ),
+    (
+        "atmosphere.turbulence.layers",
+        &REFRACTIVE,
+        ["5", "6"],
+        "efficiency",
+        "efficiency",
+    ),
+    (
+        "atmosphere.turbulence.realisations",
+        &REFRACTIVE,
+        ["8", "12"],
+        "efficiency",
+        "efficiency",
+    ),
+    (
+        "atmosphere.turbulence.efficiency",
+        &REFRACTIVE,
+        ["\"mean\"", "\"realisation\""],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "flow.profile",
+        &[],
+        ["\"algebraic\"", "\"lamb_oseen\""],
         "map",
         "v_exact_m_s",
     ),
-    ("scan.lidar_height_m", &[], ["0.0", "5.0"], "map", "v_exact_m_s"),
-    ("scan.azimuth_rad", &[], ["1.0", "2.0"], "map", "azimuth_rad"),
+    (
+        "flow.motion",
+        &[],
+        ["\"frozen\"", "\"inviscid\""],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.cross_wind_m_s",
+        &[],
+        ["0.0", "2.0"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "flow.aircraft",
+        &[("flow.motion", "\"inviscid\"")],
+        [
+            "{ speed_m_s = 70.0, x_m = 200.0 }",
+            "{ speed_m_s = 90.0, x_m = 200.0 }",
+        ],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "scan.lidar_height_m",
+        &[],
+        ["0.0", "5.0"],
+        "map",
+        "v_exact_m_s",
+    ),
+    (
+        "scan.azimuth_rad",
+        &[],
+        ["1.0", "2.0"],
+        "map",
+        "azimuth_rad",
+    ),
     ("scan.pulses_per_line", &[], ["2", "3"], "map", "level"),
-    ("scan.second_trip", &[("laser.pulse_repetition_hz", "200e3")], ["", "{}"], "map", "v_mean_m_s"),
+    (
+        "scan.second_trip",
+        &[("laser.pulse_repetition_hz", "200e3")],
+        ["", "{}"],
+        "map",
+        "v_mean_m_s",
+    ),
     (
         "scan.below_ground",
         &[("scan.elevation_min_rad", "-0.02")],
-        ["{ policy = \"mask\" }", "{ policy = \"constant\", radial_velocity_m_s = 3.0 }"],
+        [
+            "{ policy = \"mask\" }",
+            "{ policy = \"constant\", radial_velocity_m_s = 3.0 }",
+        ],
         "map",
         "v_exact_m_s",
     ),
     ("scan.head.sweeps", &[], ["1", "2"], "map", "sweep"),
-    ("scan.head.dead_time_s", &[], ["0.0", "0.5"], "map", "time_s"),
-    ("scan.head.direction", &[("scan.head.sweeps", "2")], ["\"same\"", "\"alternate\""], "map", "elevation_rad"),
+    (
+        "scan.head.dead_time_s",
+        &[],
+        ["0.0", "0.5"],
+        "map",
+        "time_s",
+    ),
+    (
+        "scan.head.direction",
+        &[("scan.head.sweeps", "2")],
+        ["\"same\"", "\"alternate\""],
+        "map",
+        "elevation_rad",
+    ),
     (
         "scan.head.pointing_jitter_rad",
         &[("scan.wind_of_pulses.kind", "\"pulse\"")],
@@ -162,19 +480,58 @@ const KEYS: [Key; 78] = [
         "v_pulse_m_s",
     ),
     ("scan.lidar.y_m", &[], ["0.0", "30.0"], "map", "v_exact_m_s"),
-    ("scan.lidar.velocity_m_s", &PPI, ["[0.0, 0.0, 0.0]", "[70.0, 0.0, 0.0]"], "map", "x_m"),
-    ("estimator.window_step_samples", &[], ["1", "3"], "map", "level"),
-    ("estimator.refinement", &[FIXED], ["\"parabola\"", "\"none\""], "map", "v_mean_m_s"),
+    (
+        "scan.lidar.velocity_m_s",
+        &PPI,
+        ["[0.0, 0.0, 0.0]", "[70.0, 0.0, 0.0]"],
+        "map",
+        "x_m",
+    ),
+    (
+        "estimator.window_step_samples",
+        &[],
+        ["1", "3"],
+        "map",
+        "level",
+    ),
+    (
+        "estimator.refinement",
+        &[FIXED],
+        ["\"parabola\"", "\"none\""],
+        "map",
+        "v_mean_m_s",
+    ),
     (
         "estimator.correlogram",
-        &[("estimator.method.kind", "\"lag_window\""), ("estimator.weighting", "\"rectangular\"")],
+        &[
+            ("estimator.method.kind", "\"lag_window\""),
+            ("estimator.weighting", "\"rectangular\""),
+        ],
         ["\"biased\"", "\"unbiased\""],
         "map",
         "v_mean_m_s",
     ),
-    ("estimator.follow_wind", &[FIXED], ["false", "true"], "map", "v_mean_m_s"),
-    ("estimator.false_alarm", &[], ["0.0", "0.1"], "map", "flagged"),
-    ("estimator.method.order", &[("estimator.method.kind", "\"capon\"")], ["4", "8"], "map", "v_mean_m_s"),
+    (
+        "estimator.follow_wind",
+        &[FIXED],
+        ["false", "true"],
+        "map",
+        "v_mean_m_s",
+    ),
+    (
+        "estimator.false_alarm",
+        &[],
+        ["0.0", "0.1"],
+        "map",
+        "flagged",
+    ),
+    (
+        "estimator.method.order",
+        &[("estimator.method.kind", "\"capon\"")],
+        ["4", "8"],
+        "map",
+        "v_mean_m_s",
+    ),
     (
         "estimator.method.lag_window_lags",
         &[("estimator.method.kind", "\"lag_window\"")],
@@ -200,13 +557,20 @@ const KEYS: [Key; 78] = [
 
 fn small() -> Scene {
     let mut s = Scene::default();
-    s.set("outputs.svg", false).set("outputs.png", false).set("outputs.netcdf", false).set("outputs.flow", false);
-    s.set("outputs.profile_points", 3).set("outputs.profile_range_min_m", "200.0");
+    s.set("outputs.svg", false)
+        .set("outputs.png", false)
+        .set("outputs.netcdf", false)
+        .set("outputs.flow", false);
+    s.set("outputs.profile_points", 3)
+        .set("outputs.profile_range_min_m", "200.0");
     s.number("scan.elevation_min_rad", 0.1)
         .number("scan.elevation_max_rad", 0.112)
         .number("scan.elevation_step_rad", 4e-3);
-    s.number("scan.range_min_m", 300.0).number("scan.range_max_m", 420.0);
-    s.set("scan.pulses_per_line", 2).set("scan.realisations", 1).set("estimator.gate_step_samples", 20);
+    s.number("scan.range_min_m", 300.0)
+        .number("scan.range_max_m", 420.0);
+    s.set("scan.pulses_per_line", 2)
+        .set("scan.realisations", 1)
+        .set("estimator.gate_step_samples", 20);
     s
 }
 
@@ -233,13 +597,24 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
                 ended.is_good,
                 &format!("{key} = {value}: {}", ended.stderr),
             );
-            let file = if command == "map" { "k/map.csv" } else { "k/profile.csv" };
-            if column.is_empty() { vec![ended.stdout] } else { bench.csv(ledger, file).words(column) }
+            let file = if command == "map" {
+                "k/map.csv"
+            } else {
+                "k/profile.csv"
+            };
+            if column.is_empty() {
+                vec![ended.stdout]
+            } else {
+                bench.csv(ledger, file).words(column)
+            }
         });
         ledger.holds(
             "every key changes what it should",
             shown[0] != shown[1] && !shown[0].is_empty(),
-            &format!("{key} = {} and {}: {command} {column} is the same", values[0], values[1]),
+            &format!(
+                "{key} = {} and {}: {command} {column} is the same",
+                values[0], values[1]
+            ),
         );
     }
     for command in ["map", "signal"] {
@@ -247,10 +622,21 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
             bench.write("k.toml", &small().text());
             let folder = format!("{command}{seed}");
             let ended = bench.run(&[command, "k.toml", "--seed", seed, "--out", &folder]);
-            let file = if command == "map" { "map.csv" } else { "signals.csv" };
-            (ended.is_good, std::fs::read_to_string(bench.folder.join(folder).join(file)).unwrap_or_default())
+            let file = if command == "map" {
+                "map.csv"
+            } else {
+                "signals.csv"
+            };
+            (
+                ended.is_good,
+                std::fs::read_to_string(bench.folder.join(folder).join(file)).unwrap_or_default(),
+            )
         };
         let [(first, a), (_, b)] = [out("7"), out("8")];
-        ledger.holds("the seed of the command line", first && a != b && a.contains("# seed: 7\n"), command);
+        ledger.holds(
+            "the seed of the command line",
+            first && a != b && a.contains("# seed: 7\n"),
+            command,
+        );
     }
 }

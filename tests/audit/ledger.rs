@@ -66,7 +66,10 @@ pub(crate) struct Ledger {
 
 impl Ledger {
     pub(crate) fn new(draw: String) -> Self {
-        Self { draw, ..Self::default() }
+        Self {
+            draw,
+            ..Self::default()
+        }
     }
 
     /// A number and its definition, apart by at most `tolerance`; both may be missing (NaN).
@@ -88,7 +91,12 @@ impl Ledger {
         let z = if z.is_nan() { f64::INFINITY } else { z };
         let (sum, count) = self.drift.entry(number.into()).or_default();
         (*sum, *count) = (*sum + z, *count + 1.0);
-        self.enter(number, z.abs(), true, &format!("{found:.6} for {right:.6} +- {standard_error:.6}"));
+        self.enter(
+            number,
+            z.abs(),
+            true,
+            &format!("{found:.6} for {right:.6} +- {standard_error:.6}"),
+        );
     }
 
     /// Something that holds or does not.
@@ -105,7 +113,15 @@ impl Ledger {
     #[track_caller]
     fn enter(&mut self, number: &str, apart: f64, is_random: bool, at: &str) {
         let (place, at) = (Location::caller(), format!("draw {}: {at}", self.draw));
-        let one = Tally { place, draws: 1, comparisons: 1, worst: apart, at, is_random, drift: 0.0 };
+        let one = Tally {
+            place,
+            draws: 1,
+            comparisons: 1,
+            worst: apart,
+            at,
+            is_random,
+            drift: 0.0,
+        };
         match self.tallies.get_mut(number) {
             Some(tally) => {
                 tally.add(one);
@@ -118,7 +134,10 @@ impl Ledger {
     /// Takes the comparisons of a draw in.
     pub(crate) fn add(&mut self, draw: Self) {
         for (number, mut tally) in draw.tallies {
-            tally.drift = draw.drift.get(&number).map_or(0.0, |(sum, count)| sum / count);
+            tally.drift = draw
+                .drift
+                .get(&number)
+                .map_or(0.0, |(sum, count)| sum / count);
             match self.tallies.get_mut(&number) {
                 Some(known) => known.add(tally),
                 None => drop(self.tallies.insert(number, tally)),

@@ -96,7 +96,14 @@ const RARE: usize = 16;
 
 /// Runs draws number `first` to `first + count - 1` of a seed with a program, on as many threads as are told; `keep` is a folder in
 /// which their scenes and outputs stay.
-pub fn audit(program: &Path, seed: u64, first: usize, count: usize, threads: usize, keep: Option<&Path>) -> Report {
+pub fn audit(
+    program: &Path,
+    seed: u64,
+    first: usize,
+    count: usize,
+    threads: usize,
+    keep: Option<&Path>,
+) -> Report {
     let next = AtomicUsize::new(first);
     let found = Mutex::new(Vec::new());
     let work = || {
@@ -122,13 +129,16 @@ fn draw_of(program: &Path, seed: u64, number: usize, keep: Option<&Path>) -> Led
         15 => LONG[number / RARE % LONG.len()],
         _ => SUBJECTS[number % SUBJECTS.len()],
     };
-    let temporary = || std::env::temp_dir().join(format!("wakescope-audit-{}-{number}", std::process::id()));
+    let temporary =
+        || std::env::temp_dir().join(format!("wakescope-audit-{}-{number}", std::process::id()));
     let folder = keep.map_or_else(temporary, |keep| keep.join(number.to_string()));
     std::fs::create_dir_all(&folder).unwrap();
     let bench = Bench { program, folder };
     let mut ledger = Ledger::new(format!("{number} ({name})"));
     let mut random = Random::new(seed, number as u64);
-    let ended = catch_unwind(AssertUnwindSafe(|| subject(&mut random, &bench, &mut ledger)));
+    let ended = catch_unwind(AssertUnwindSafe(|| {
+        subject(&mut random, &bench, &mut ledger)
+    }));
     ledger.holds("every draw comes to its end", ended.is_ok(), "it panicked");
     if keep.is_none() {
         std::fs::remove_dir_all(&bench.folder).unwrap();
@@ -162,8 +172,12 @@ fn map(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         s.set("outputs.flow", r.chance(0.3));
         s
     };
-    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
-    let Some(run) = bench.must(ledger, &["run", "s.toml", "--out", "o", "--json"]) else { return };
+    let Some(s) = good_scene(r, bench, ledger, draw) else {
+        return;
+    };
+    let Some(run) = bench.must(ledger, &["run", "s.toml", "--out", "o", "--json"]) else {
+        return;
+    };
     let scan = Scan::new(&s);
     let map = bench.csv(ledger, "o/map.csv");
     geometry::hold(ledger, &s, &scan, &map, air::start_s(&s));
@@ -185,12 +199,16 @@ fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let draw = |r: &mut Random| {
         let mut s = draw::scene(r);
         let first_m = r.between(150.0, 400.0);
-        s.number("scan.range_min_m", first_m).number("scan.range_max_m", first_m + r.between(200.0, 500.0));
+        s.number("scan.range_min_m", first_m)
+            .number("scan.range_max_m", first_m + r.between(200.0, 500.0));
         if s.f("telescope.focus_m").is_finite() {
             s.number("telescope.focus_m", r.between(200.0, 900.0));
         }
-        s.number("scan.elevation_min_rad", 0.1).number("scan.elevation_max_rad", 0.1);
-        s.set("scan.pulses_per_line", 150).set("scan.realisations", 2).word("flow.kind", "calm");
+        s.number("scan.elevation_min_rad", 0.1)
+            .number("scan.elevation_max_rad", 0.1);
+        s.set("scan.pulses_per_line", 150)
+            .set("scan.realisations", 2)
+            .word("flow.kind", "calm");
         s.set("estimator.gate_step_samples", 25);
         s.unset("flow").word("flow.kind", "calm");
         // Light that the telescope sends back at once: the signals of long pulses begin with it.
@@ -199,20 +217,37 @@ fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         }
         if r.chance(0.3) {
             let (rise, top) = (r.log(2e-8, 8e-8), r.log(1e-7, 4e-7));
-            s.unset("pulse.shape").unset("pulse.chirp_hz_s").word("pulse.shape.kind", "sampled");
-            s.set("pulse.shape.time_s", format!("[0.0, {rise:?}, {:?}, {:?}]", rise + top, 2.0 * rise + top));
-            s.set("pulse.shape.power", "[0.0, 1.0, 1.0, 0.0]").word("pulse.shape.resampling", "linear");
+            s.unset("pulse.shape")
+                .unset("pulse.chirp_hz_s")
+                .word("pulse.shape.kind", "sampled");
+            s.set(
+                "pulse.shape.time_s",
+                format!("[0.0, {rise:?}, {:?}, {:?}]", rise + top, 2.0 * rise + top),
+            );
+            s.set("pulse.shape.power", "[0.0, 1.0, 1.0, 0.0]")
+                .word("pulse.shape.resampling", "linear");
         }
         s
     };
-    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
+    let Some(s) = good_scene(r, bench, ledger, draw) else {
+        return;
+    };
     let scan = Scan::new(&s);
-    let ranges: Vec<f64> = (0..4).map(|_| r.between(s.f("scan.range_min_m"), s.f("scan.range_max_m"))).collect();
-    let words = ranges.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let ranges: Vec<f64> = (0..4)
+        .map(|_| r.between(s.f("scan.range_min_m"), s.f("scan.range_max_m")))
+        .collect();
+    let words = ranges
+        .iter()
+        .map(f64::to_string)
+        .collect::<Vec<_>>()
+        .join(",");
     if let Some(budget) = bench.must(ledger, &["budget", "s.toml", "--json", "--range", &words]) {
         power::hold_budget(ledger, &s, &budget.json());
     }
-    if bench.must(ledger, &["signal", "s.toml", "--out", "o"]).is_some() {
+    if bench
+        .must(ledger, &["signal", "s.toml", "--out", "o"])
+        .is_some()
+    {
         power::hold_signals(ledger, bench, &s, &scan, "o/signals.nc");
         files::hold_signals(ledger, bench, &s, &scan, air::start_s(&s));
     }
@@ -221,7 +256,13 @@ fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     }
     if let Some(bound) = bench.must(ledger, &["bound", "s.toml", "--json"]) {
         let json = bound.json();
-        for (gate, point) in json["by_range"].as_array().into_iter().flatten().enumerate().step_by(5) {
+        for (gate, point) in json["by_range"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .enumerate()
+            .step_by(5)
+        {
             let found = point["snr_db"].as_f64().unwrap_or(f64::NAN);
             let right = power::free_space_snr_db(&s, scan.gate_m[gate]);
             ledger.equal("bound: snr_db", found, right, 0.01);
@@ -233,11 +274,16 @@ fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
 fn bound_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let draw = |r: &mut Random| {
         let mut s = draw::scene(r);
-        s.set("estimator.gate_step_samples", 16).set("estimator.window_samples", r.pick(&[12, 16, 24, 32, 48, 64]));
+        s.set("estimator.gate_step_samples", 16).set(
+            "estimator.window_samples",
+            r.pick(&[12, 16, 24, 32, 48, 64]),
+        );
         s.number("pulse.shape.duration_s", r.log(6e-8, 4e-7));
         s
     };
-    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
+    let Some(s) = good_scene(r, bench, ledger, draw) else {
+        return;
+    };
     if let Some(found) = bench.must(ledger, &["bound", "s.toml", "--json"]) {
         bound::hold(ledger, &s, &Scan::new(&s), &found.json());
     }
@@ -248,18 +294,29 @@ fn spectra(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let draw = |r: &mut Random| {
         let mut s = draw::scene(r);
         draw::fixed_ratio(&mut s, r.between(0.0, 10.0));
-        s.unset("flow").unset("added_flows").word("flow.kind", "uniform");
+        s.unset("flow")
+            .unset("added_flows")
+            .word("flow.kind", "uniform");
         let reach_m_s = 0.25 * s.f("laser.wavelength_m") * s.f("detector.bandwidth_hz");
-        s.number("flow.lateral_m_s", reach_m_s * r.between(-0.5, 0.5)).number("flow.vertical_m_s", 0.0);
+        s.number("flow.lateral_m_s", reach_m_s * r.between(-0.5, 0.5))
+            .number("flow.vertical_m_s", 0.0);
         s.number("scan.elevation_min_rad", 0.0)
             .number("scan.elevation_step_rad", 0.01)
             .number("scan.elevation_max_rad", 0.2);
-        s.set("scan.pulses_per_line", 10).set("scan.realisations", 20).set("estimator.gate_step_samples", 20);
-        s.unset("pulse.chirp_hz_s").number("estimator.false_alarm", 0.0);
+        s.set("scan.pulses_per_line", 10)
+            .set("scan.realisations", 20)
+            .set("estimator.gate_step_samples", 20);
+        s.unset("pulse.chirp_hz_s")
+            .number("estimator.false_alarm", 0.0);
         s
     };
-    let Some(s) = good_scene(r, bench, ledger, draw) else { return };
-    if bench.must(ledger, &["map", "s.toml", "--out", "o"]).is_some() {
+    let Some(s) = good_scene(r, bench, ledger, draw) else {
+        return;
+    };
+    if bench
+        .must(ledger, &["map", "s.toml", "--out", "o"])
+        .is_some()
+    {
         let map = bench.csv(ledger, "o/map.csv");
         statistics::hold_spectra(ledger, &s, &Scan::new(&s), &map);
     }
@@ -270,13 +327,18 @@ fn seeds(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let draw = |r: &mut Random| {
         let mut s = draw::scene(r);
         draw::fixed_ratio(&mut s, r.between(0.0, 12.0));
-        s.unset("flow").unset("added_flows").number("flow.cross_wind_m_s", r.between(-3.0, 3.0));
+        s.unset("flow")
+            .unset("added_flows")
+            .number("flow.cross_wind_m_s", r.between(-3.0, 3.0));
         s.number("scan.elevation_min_rad", 0.08)
             .number("scan.elevation_step_rad", 4e-3)
             .number("scan.elevation_max_rad", 0.16);
-        s.number("scan.range_min_m", 350.0).number("scan.range_max_m", 450.0).set("estimator.window_samples", 32);
+        s.number("scan.range_min_m", 350.0)
+            .number("scan.range_max_m", 450.0)
+            .set("estimator.window_samples", 32);
         let realisations = r.whole(2, 6);
-        s.set("scan.pulses_per_line", if realisations > 3 { 1 } else { 2 }).set("scan.realisations", realisations);
+        s.set("scan.pulses_per_line", if realisations > 3 { 1 } else { 2 })
+            .set("scan.realisations", realisations);
         s.set("estimator.gate_step_samples", 12);
         s
     };
@@ -288,42 +350,86 @@ fn seeds(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
 /// Through a focus in turbulence: the ratio of the signals and that of the budget, each a Monte Carlo of its own.
 fn through_turbulence(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     let mut s = Scene::default();
-    s.number("telescope.focus_m", r.between(260.0, 500.0)).word("atmosphere.turbulence.kind", "refractive");
-    s.number("atmosphere.turbulence.cn2_m_m23", 1e-14).set("atmosphere.turbulence.grid_points", 320);
-    s.set("atmosphere.turbulence.layers", 10).set("atmosphere.turbulence.realisations", 24);
-    s.number("scan.elevation_min_rad", 0.1).number("scan.elevation_max_rad", 0.1).set("scan.pulses_per_line", 1);
-    s.number("scan.range_min_m", 150.0).number("scan.range_max_m", 1400.0).set("estimator.gate_step_samples", 60);
+    s.number("telescope.focus_m", r.between(260.0, 500.0))
+        .word("atmosphere.turbulence.kind", "refractive");
+    s.number("atmosphere.turbulence.cn2_m_m23", 1e-14)
+        .set("atmosphere.turbulence.grid_points", 320);
+    s.set("atmosphere.turbulence.layers", 10)
+        .set("atmosphere.turbulence.realisations", 24);
+    s.number("scan.elevation_min_rad", 0.1)
+        .number("scan.elevation_max_rad", 0.1)
+        .set("scan.pulses_per_line", 1);
+    s.number("scan.range_min_m", 150.0)
+        .number("scan.range_max_m", 1400.0)
+        .set("estimator.gate_step_samples", 60);
     s.number("outputs.profile_range_min_m", 170.0)
         .number("outputs.profile_range_max_m", 1400.0)
         .set("outputs.profile_points", 42);
     bench.write("s.toml", &s.text());
     let gates = Scan::new(&s).gate_m;
-    let ranges: Vec<f64> = gates.iter().copied().filter(|m| (170.0..1400.0).contains(m)).collect();
-    let words = ranges.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
+    let ranges: Vec<f64> = gates
+        .iter()
+        .copied()
+        .filter(|m| (170.0..1400.0).contains(m))
+        .collect();
+    let words = ranges
+        .iter()
+        .map(f64::to_string)
+        .collect::<Vec<_>>()
+        .join(",");
     let bound = bench.run(&["bound", "s.toml", "--json"]);
     let number = "through turbulence: a scan that begins before the profile";
-    ledger.holds(number, bound.is_good || !bench.run(&["check", "s.toml"]).is_good, &bound.stderr);
-    let Some(budget) = bench.must(ledger, &["budget", "s.toml", "--json", "--range", &words]) else { return };
+    ledger.holds(
+        number,
+        bound.is_good || !bench.run(&["check", "s.toml"]).is_good,
+        &bound.stderr,
+    );
+    let Some(budget) = bench.must(ledger, &["budget", "s.toml", "--json", "--range", &words])
+    else {
+        return;
+    };
     // Free space does not hang on how many realisations are beside it, nor does independent turbulence without scales.
-    s.set("atmosphere.turbulence.realisations", 5).word("atmosphere.turbulence.spectrum", "kolmogorov");
+    s.set("atmosphere.turbulence.realisations", 5)
+        .word("atmosphere.turbulence.spectrum", "kolmogorov");
     bench.write("s.toml", &s.text());
-    if bench.must(ledger, &["efficiency", "s.toml", "--out", "o"]).is_some() {
+    if bench
+        .must(ledger, &["efficiency", "s.toml", "--out", "o"])
+        .is_some()
+    {
         let profile = bench.csv(ledger, "o/profile.csv");
         let (range, free) = (profile.f("range_m"), profile.f("efficiency_free_space"));
         let independent = profile.f("efficiency_bistatic_exact");
         for i in (0..range.len()).step_by(7) {
             let right = power::free_space_efficiency(&s, range[i]);
-            ledger.equal("profile.csv: efficiency_free_space", free[i], right, 1e-6 * right);
+            ledger.equal(
+                "profile.csv: efficiency_free_space",
+                free[i],
+                right,
+                1e-6 * right,
+            );
             let right = power::independent_efficiency(&s, range[i]);
-            ledger.equal("profile.csv: efficiency_bistatic_exact", independent[i], right, 1e-5 * right);
+            ledger.equal(
+                "profile.csv: efficiency_bistatic_exact",
+                independent[i],
+                right,
+                1e-5 * right,
+            );
         }
     }
     let (budget, bound) = (budget.json(), bound.json());
     let rows = budget["rows"].as_array().cloned().unwrap_or_default();
-    let total = rows.iter().find(|row| row["row"] == "= SNR in the band").cloned().unwrap_or_default();
+    let total = rows
+        .iter()
+        .find(|row| row["row"] == "= SNR in the band")
+        .cloned()
+        .unwrap_or_default();
     for (i, range_m) in ranges.iter().enumerate().filter(|_| !bound.is_null()) {
         let points = bound["by_range"].as_array().cloned().unwrap_or_default();
-        let here = points.iter().find(|p| p["range_m"].as_f64().is_some_and(|m| (m - range_m).abs() < 1e-3));
+        let here = points.iter().find(|p| {
+            p["range_m"]
+                .as_f64()
+                .is_some_and(|m| (m - range_m).abs() < 1e-3)
+        });
         let found = here.and_then(|p| p["snr_db"].as_f64()).unwrap_or(f64::NAN);
         // 24 realisations of either leave some 0.3 dB.
         ledger.equal(

@@ -2,10 +2,18 @@
 
 /// Integral by Gauss-Legendre rules of eight points on equal panels.
 pub(crate) fn integral(from: f64, to: f64, panels: usize, f: impl Fn(f64) -> f64) -> f64 {
-    const NODES: [f64; 4] =
-        [0.183_434_642_495_649_8, 0.525_532_409_916_329, 0.796_666_477_413_626_7, 0.960_289_856_497_536_3];
-    const WEIGHTS: [f64; 4] =
-        [0.362_683_783_378_362, 0.313_706_645_877_887_3, 0.222_381_034_453_374_48, 0.101_228_536_290_376_26];
+    const NODES: [f64; 4] = [
+        0.183_434_642_495_649_8,
+        0.525_532_409_916_329,
+        0.796_666_477_413_626_7,
+        0.960_289_856_497_536_3,
+    ];
+    const WEIGHTS: [f64; 4] = [
+        0.362_683_783_378_362,
+        0.313_706_645_877_887_3,
+        0.222_381_034_453_374_48,
+        0.101_228_536_290_376_26,
+    ];
     let half = 0.5 * (to - from) / panels as f64;
     let mut sum = 0.0;
     for panel in 0..panels {
@@ -39,7 +47,11 @@ pub(crate) fn information(r: &[Vec<Complex>], d: &[Vec<Complex>]) -> f64 {
             for k in 0..j {
                 sum -= l[i][k] * l[j][k].conj();
             }
-            l[i][j] = if i == j { Complex::from(sum.re.sqrt()) } else { sum / l[j][j] };
+            l[i][j] = if i == j {
+                Complex::from(sum.re.sqrt())
+            } else {
+                sum / l[j][j]
+            };
         }
     }
     // L^-1 D, column by column; then L^-1 (L^-1 D)^H = L^-1 D L^-H, whose squares sum to the trace.

@@ -23,7 +23,10 @@ impl Pulse {
             "fwhm" => duration_s / (2.0 * LN_2.sqrt()),
             _ => duration_s,
         };
-        (s.s("pulse.shape.kind") == "gaussian").then(|| Self { sigma_s, chirp_hz_s: s.f("pulse.chirp_hz_s") })
+        (s.s("pulse.shape.kind") == "gaussian").then(|| Self {
+            sigma_s,
+            chirp_hz_s: s.f("pulse.chirp_hz_s"),
+        })
     }
 
     /// |f(t)|^2, 1/s (S1).
@@ -80,7 +83,11 @@ struct Beam {
 impl Beam {
     fn new(s: &Scene) -> Self {
         let radius_m = s.f("telescope.beam_radius_m");
-        let s_m = if s.s("telescope.beam_radius_definition") == "field" { radius_m / 2_f64.sqrt() } else { radius_m };
+        let s_m = if s.s("telescope.beam_radius_definition") == "field" {
+            radius_m / 2_f64.sqrt()
+        } else {
+            radius_m
+        };
         Self {
             a_m: s.f("telescope.aperture_radius_m"),
             b_m: s.f("telescope.obscuration_radius_m"),
@@ -119,7 +126,9 @@ impl Beam {
         let of_piece = |ends: &[f64]| {
             let (middle, half) = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[1] - ends[0]));
             let panels = 2 + (q * half).abs() as usize / 3;
-            integral(-0.5 * PI, 0.5 * PI, panels, |t| half * t.cos() * of_x(middle + half * t.sin()))
+            integral(-0.5 * PI, 0.5 * PI, panels, |t| {
+                half * t.cos() * of_x(middle + half * t.sin())
+            })
         };
         ends.windows(2).map(of_piece).sum()
     }
@@ -128,7 +137,11 @@ impl Beam {
     fn efficiency(&self, range_m: f64, structure: impl Fn(f64) -> f64) -> f64 {
         let waves = self.k * self.a_m.powi(2) * (1.0 / range_m - self.curvature).abs();
         let f = |rho: f64| rho * self.overlap(rho, range_m).powi(2) * (-structure(rho)).exp();
-        let ends = between(0.0, 2.0 * self.a_m, &[self.a_m - self.b_m, 2.0 * self.b_m, self.a_m + self.b_m]);
+        let ends = between(
+            0.0,
+            2.0 * self.a_m,
+            &[self.a_m - self.b_m, 2.0 * self.b_m, self.a_m + self.b_m],
+        );
         let of_piece = |ends: &[f64]| {
             let share = 0.5 * (ends[1] - ends[0]) / self.a_m;
             integral(ends[0], ends[1], 3 + (share * waves) as usize / 4, f)
@@ -139,7 +152,12 @@ impl Beam {
 
 /// The ends of an interval with the places between them, in order, each once.
 fn between(low: f64, high: f64, places: &[f64]) -> Vec<f64> {
-    let mut out: Vec<f64> = places.iter().copied().filter(|x| low < *x && *x < high).chain([low, high]).collect();
+    let mut out: Vec<f64> = places
+        .iter()
+        .copied()
+        .filter(|x| low < *x && *x < high)
+        .chain([low, high])
+        .collect();
     out.sort_by(f64::total_cmp);
     out.dedup();
     out
@@ -162,16 +180,28 @@ pub(crate) fn independent_efficiency(s: &Scene, range_m: f64) -> f64 {
 /// K^2 beta at a range: backscatter, and extinction out and back.
 fn air(s: &Scene, range_m: f64) -> (f64, f64) {
     if !s.has("atmosphere.profile") {
-        let (beta, alpha) = (s.f("atmosphere.backscatter_per_m_sr"), s.f("atmosphere.extinction_per_m"));
+        let (beta, alpha) = (
+            s.f("atmosphere.backscatter_per_m_sr"),
+            s.f("atmosphere.extinction_per_m"),
+        );
         return (beta, (-2.0 * alpha * range_m).exp());
     }
     let list = |key: &str| s.list(&format!("atmosphere.profile.{key}"));
-    let (r, beta, alpha) = (list("range_m"), list("backscatter_per_m_sr"), list("extinction_per_m"));
+    let (r, beta, alpha) = (
+        list("range_m"),
+        list("backscatter_per_m_sr"),
+        list("extinction_per_m"),
+    );
     // Straight lines: the trapezoids between the knots are exact.
-    let mut knots: Vec<f64> = [0.0].into_iter().chain(r.iter().copied().filter(|&x| x < range_m)).collect();
+    let mut knots: Vec<f64> = [0.0]
+        .into_iter()
+        .chain(r.iter().copied().filter(|&x| x < range_m))
+        .collect();
     knots.push(range_m);
-    let depth: f64 =
-        knots.windows(2).map(|k| 0.5 * (k[1] - k[0]) * (straight(&r, &alpha, k[0]) + straight(&r, &alpha, k[1]))).sum();
+    let depth: f64 = knots
+        .windows(2)
+        .map(|k| 0.5 * (k[1] - k[0]) * (straight(&r, &alpha, k[0]) + straight(&r, &alpha, k[1])))
+        .sum();
     (straight(&r, &beta, range_m), (-2.0 * depth).exp())
 }
 
@@ -197,16 +227,23 @@ impl Receiver {
         let amplifier = f("front_end.amplifier_noise_a_rthz").powi(2)
             + 4.0 * K_J_K * f("front_end.load_temperature_k") / f("front_end.load_ohm");
         let dark = 2.0 * E_C * f("front_end.dark_current_a");
-        let relative = 10_f64.powf(0.1 * (f("front_end.intensity_noise_db_hz") - f("front_end.rejection_db")));
+        let relative =
+            10_f64.powf(0.1 * (f("front_end.intensity_noise_db_hz") - f("front_end.rejection_db")));
         let intensity = (responsivity * lo_w).powi(2) * saturated.powi(-4) * relative;
         let poles = f("front_end.poles");
         // Butterworth.
-        let g = 1.0 / (1.0 + (f("intermediate_frequency_hz") / f("front_end.half_power_hz")).powf(2.0 * poles));
+        let g = 1.0
+            / (1.0
+                + (f("intermediate_frequency_hz") / f("front_end.half_power_hz"))
+                    .powf(2.0 * poles));
         let sum = shot + amplifier + dark + intensity;
         let filtered = g * (shot + dark + intensity) + amplifier;
         let converter = match s.s("detector.digitiser.kind").as_str() {
             "quantised" => {
-                let (bits, k) = (s.f("detector.digitiser.bits"), s.f("detector.digitiser.full_scale_over_noise"));
+                let (bits, k) = (
+                    s.f("detector.digitiser.bits"),
+                    s.f("detector.digitiser.full_scale_over_noise"),
+                );
                 k * k / (3.0 * 4_f64.powf(bits)) * 2.0 * f("bandwidth_hz") / f("sampling_hz")
             }
             _ => 0.0,
@@ -234,9 +271,14 @@ fn losses(s: &Scene) -> f64 {
 
 /// Photons that a detector counts of a whole pulse, over the bandwidth, s.
 fn photons(s: &Scene) -> f64 {
-    let h = if s.s("detector.snr.reference") == "chapter" { H_J_S / (2.0 * PI) } else { H_J_S };
+    let h = if s.s("detector.snr.reference") == "chapter" {
+        H_J_S / (2.0 * PI)
+    } else {
+        H_J_S
+    };
     let nu = C_M_S / s.f("laser.wavelength_m");
-    s.f("detector.quantum_efficiency") * s.f("pulse.energy_j") / (h * nu * s.f("detector.bandwidth_hz"))
+    s.f("detector.quantum_efficiency") * s.f("pulse.energy_j")
+        / (h * nu * s.f("detector.bandwidth_hz"))
 }
 
 /// Signal-to-noise ratio of the reflex (R7) over |f(t)|^2, s.
@@ -262,7 +304,11 @@ pub(crate) fn snr(s: &Scene, range_m: f64, efficiency: f64) -> f64 {
 
 /// (O10) in free space, dB; missing where nothing returns.
 pub(crate) fn free_space_snr_db(s: &Scene, range_m: f64) -> f64 {
-    let efficiency = if s.s("detector.snr.reference") == "fixed" { 1.0 } else { free_space_efficiency(s, range_m) };
+    let efficiency = if s.s("detector.snr.reference") == "fixed" {
+        1.0
+    } else {
+        free_space_efficiency(s, range_m)
+    };
     let ratio = snr(s, range_m, efficiency);
     if ratio > 0.0 { db(ratio) } else { f64::NAN }
 }
@@ -277,28 +323,50 @@ pub(crate) struct Ratios {
 impl Ratios {
     pub(crate) fn new(s: &Scene, pulse: Pulse, scan: &Scan, step_m: f64) -> Self {
         let reach_m = 4.5 * pulse.scale_m();
-        let (near_m, far_m) =
-            ((scan.sample_m[0] - reach_m).max(30.0), scan.sample_m[scan.sample_m.len() - 1] + reach_m);
+        let (near_m, far_m) = (
+            (scan.sample_m[0] - reach_m).max(30.0),
+            scan.sample_m[scan.sample_m.len() - 1] + reach_m,
+        );
         let count = 4 + ((far_m - near_m) / step_m) as usize;
-        let range_m: Vec<f64> = (0..count).map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64).collect();
+        let range_m: Vec<f64> = (0..count)
+            .map(|i| near_m + (far_m - near_m) * i as f64 / (count - 1) as f64)
+            .collect();
         // Away from a focus the efficiency over the square of the range is smooth; near the lidar, where next to nothing of the pulse is, its
         // quadrature is long. What the air returns may have kinks anywhere.
         let is_focused = (0.5 * near_m..2.0 * far_m).contains(&s.f("telescope.focus_m"));
         let is_dense = |r: f64| is_focused && r > 0.7 * scan.sample_m[0];
         let last = range_m.len() - 1;
-        let known = range_m.iter().enumerate().filter(|&(i, &r)| is_dense(r) || i % 8 == 0 || i == last);
+        let known = range_m
+            .iter()
+            .enumerate()
+            .filter(|&(i, &r)| is_dense(r) || i % 8 == 0 || i == last);
         let known_m: Vec<f64> = known.map(|(_, &r)| r).collect();
         let is_fixed = s.s("detector.snr.reference") == "fixed";
-        let smooth = |&r: &f64| if is_fixed { 1.0 } else { free_space_efficiency(s, r) / r.powi(2) };
+        let smooth = |&r: &f64| {
+            if is_fixed {
+                1.0
+            } else {
+                free_space_efficiency(s, r) / r.powi(2)
+            }
+        };
         let known: Vec<f64> = known_m.iter().map(smooth).collect();
-        let snr = range_m.iter().map(|&r| snr(s, r, straight(&known_m, &known, r) * r.powi(2))).collect();
-        Self { pulse, range_m, snr }
+        let snr = range_m
+            .iter()
+            .map(|&r| snr(s, r, straight(&known_m, &known, r) * r.powi(2)))
+            .collect();
+        Self {
+            pulse,
+            range_m,
+            snr,
+        }
     }
 
     /// Mean ratio of a sample that sees a range: a sum over layers, so that records of them have a covariance.
     pub(crate) fn seen(&self, r: f64) -> f64 {
         let of_layers = self.range_m.iter().zip(&self.snr);
-        let sum: f64 = of_layers.map(|(&x, snr)| snr * self.pulse.power_over_range(r - x)).sum();
+        let sum: f64 = of_layers
+            .map(|(&x, snr)| snr * self.pulse.power_over_range(r - x))
+            .sum();
         sum * (self.range_m[1] - self.range_m[0])
     }
 
@@ -316,13 +384,20 @@ pub(crate) fn db(ratio: f64) -> f64 {
 
 /// Relative error that the own quadrature may have: with an obscuration its panels end at kinks.
 fn quadrature_error(s: &Scene) -> f64 {
-    if s.f("telescope.obscuration_radius_m") > 0.0 { 3e-4 } else { 1e-6 }
+    if s.f("telescope.obscuration_radius_m") > 0.0 {
+        3e-4
+    } else {
+        1e-6
+    }
 }
 
 /// profile.csv in free space, at a few of its ranges.
 pub(crate) fn hold_profile(ledger: &mut Ledger, s: &Scene, profile: &Csv) {
     let ranges = profile.f("range_m");
-    let (first, last) = (s.f("outputs.profile_range_min_m"), s.f("outputs.profile_range_max_m"));
+    let (first, last) = (
+        s.f("outputs.profile_range_min_m"),
+        s.f("outputs.profile_range_max_m"),
+    );
     let points = s.n("outputs.profile_points");
     ledger.equal("profile.csv: rows", ranges.len() as f64, points as f64, 0.0);
     let (efficiency, snr_db) = (profile.f("efficiency"), profile.f("snr_db"));
@@ -334,16 +409,41 @@ pub(crate) fn hold_profile(ledger: &mut Ledger, s: &Scene, profile: &Csv) {
         let right = free_space_efficiency(s, r);
         // In a null of the efficiency by the quadrature of its parts, which cancel there.
         let error = quadrature_error(s) * (1.0 + 1e-5 / right);
-        ledger.equal("profile.csv: efficiency", efficiency[i], right, error * right);
-        ledger.equal("profile.csv: snr_db", snr_db[i], free_space_snr_db(s, r), 5.0 * error);
-        ledger.equal("profile.csv: efficiency_standard_deviation, of theory", deviation[i], 0.0, 0.0);
-        ledger.equal("profile.csv: efficiency_standard_error, of theory", standard_error[i], 0.0, 0.0);
+        ledger.equal(
+            "profile.csv: efficiency",
+            efficiency[i],
+            right,
+            error * right,
+        );
+        ledger.equal(
+            "profile.csv: snr_db",
+            snr_db[i],
+            free_space_snr_db(s, r),
+            5.0 * error,
+        );
+        ledger.equal(
+            "profile.csv: efficiency_standard_deviation, of theory",
+            deviation[i],
+            0.0,
+            0.0,
+        );
+        ledger.equal(
+            "profile.csv: efficiency_standard_error, of theory",
+            standard_error[i],
+            0.0,
+            0.0,
+        );
     }
 }
 
 /// Every row of a budget in free space, and its limits.
 pub(crate) fn hold_budget(ledger: &mut Ledger, s: &Scene, json: &Value) {
-    let ranges: Vec<f64> = json["range_m"].as_array().into_iter().flatten().filter_map(Value::as_f64).collect();
+    let ranges: Vec<f64> = json["range_m"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_f64)
+        .collect();
     let receiver = Receiver::new(s);
     let beam = Beam::new(s);
     let nu = C_M_S / s.f("laser.wavelength_m");
@@ -379,14 +479,21 @@ pub(crate) fn hold_budget(ledger: &mut Ledger, s: &Scene, json: &Value) {
                 "= SNR in the band" if is_fixed => fixed_db,
                 "= SNR in the band" => db(snr(s, r, efficiency())),
                 "= in the width of the pulse" => match spectral_fwhm_hz(s) {
-                    Some(width_hz) => free_space_snr_db(s, r) + db(s.f("detector.bandwidth_hz") / width_hz),
+                    Some(width_hz) => {
+                        free_space_snr_db(s, r) + db(s.f("detector.bandwidth_hz") / width_hz)
+                    }
                     None => continue,
                 },
                 _ => continue,
             };
             // The width of a sampled pulse is read off a transform of either side.
-            let is_read = name.starts_with("= in the width") && s.s("pulse.shape.kind") == "sampled";
-            let tolerance = if is_read { 0.01 } else { 5.0 * quadrature_error(s) };
+            let is_read =
+                name.starts_with("= in the width") && s.s("pulse.shape.kind") == "sampled";
+            let tolerance = if is_read {
+                0.01
+            } else {
+                5.0 * quadrature_error(s)
+            };
             ledger.equal(&format!("budget: {name}"), found, right, tolerance);
         }
     }
@@ -399,7 +506,10 @@ pub(crate) fn spectral_fwhm_hz(s: &Scene) -> Option<f64> {
         return Some(2.0 * (2.0 * LN_2).sqrt() * pulse.spectral_deviation_hz());
     }
     // A sampled pulse whose amplitude has straight lines, without phase: |F|^2 by quadrature, the first frequency where it is a half.
-    if s.s("pulse.shape.resampling") != "linear" || s.has("pulse.shape.phase_rad") || s.f("pulse.chirp_hz_s") != 0.0 {
+    if s.s("pulse.shape.resampling") != "linear"
+        || s.has("pulse.shape.phase_rad")
+        || s.f("pulse.chirp_hz_s") != 0.0
+    {
         return None;
     }
     let (t, power) = (s.list("pulse.shape.time_s"), s.list("pulse.shape.power"));
@@ -412,11 +522,17 @@ pub(crate) fn spectral_fwhm_hz(s: &Scene) -> Option<f64> {
     let power = |f: f64| part(f, 0.0).powi(2) + part(f, 0.5 * PI).powi(2);
     // The largest is not at zero where the phase turns; here it is.
     let (half, step) = (0.5 * power(0.0), 1e-2 / (t[t.len() - 1] - t[0]));
-    let beyond = (1..10_000).map(|i| i as f64 * step).find(|&f| power(f) < half)?;
+    let beyond = (1..10_000)
+        .map(|i| i as f64 * step)
+        .find(|&f| power(f) < half)?;
     let (mut low, mut high) = (beyond - step, beyond);
     for _ in 0..40 {
         let mid = 0.5 * (low + high);
-        if power(mid) < half { high = mid } else { low = mid }
+        if power(mid) < half {
+            high = mid
+        } else {
+            low = mid
+        }
     }
     Some(low + high)
 }
@@ -424,13 +540,25 @@ pub(crate) fn spectral_fwhm_hz(s: &Scene) -> Option<f64> {
 fn hold_limits(ledger: &mut Ledger, s: &Scene, limits: &Value) {
     super::program::see(ledger, "budget limits", limits);
     let (lambda, prf) = (s.f("laser.wavelength_m"), s.f("laser.pulse_repetition_hz"));
-    let (fc, fs) = (s.f("detector.intermediate_frequency_hz"), s.f("detector.sampling_hz"));
+    let (fc, fs) = (
+        s.f("detector.intermediate_frequency_hz"),
+        s.f("detector.sampling_hz"),
+    );
     let is_baseband = s.s("detector.signal") == "baseband";
     let mut hold = |key: &str, right: f64, tolerance: f64| {
-        ledger.equal(&format!("budget limits: {key}"), at(limits, key), right, tolerance * right.abs());
+        ledger.equal(
+            &format!("budget limits: {key}"),
+            at(limits, key),
+            right,
+            tolerance * right.abs(),
+        );
     };
     hold("ambiguous_range_m", C_M_S / (2.0 * prf), 1e-9);
-    hold("band_m_s", 0.25 * lambda * s.f("detector.bandwidth_hz"), 1e-9);
+    hold(
+        "band_m_s",
+        0.25 * lambda * s.f("detector.bandwidth_hz"),
+        1e-9,
+    );
     hold("mean_power_w", s.f("pulse.energy_j") * prf, 1e-9);
     // (E2) at the ends of the unambiguous interval: 0 and half the sampling frequency, or half of it to each side.
     let (from, to) = if is_baseband {
@@ -441,7 +569,11 @@ fn hold_limits(ledger: &mut Ledger, s: &Scene, limits: &Value) {
     hold("sampled_from_m_s", from, 1e-9);
     hold("sampled_to_m_s", to, 1e-9);
     if let Some(pulse) = Pulse::gaussian(s) {
-        hold("peak_power_w", s.f("pulse.energy_j") * pulse.power(0.0), 1e-9);
+        hold(
+            "peak_power_w",
+            s.f("pulse.energy_j") * pulse.power(0.0),
+            1e-9,
+        );
         hold("pulse_resolution_m", 0.5 * C_M_S * pulse.fwhm_s(), 1e-6);
         hold("gate_resolution_m", gate_fwhm_m(s, &pulse), 1e-5);
         // Where (R7) falls to -20 dB.
@@ -455,12 +587,19 @@ pub(crate) fn gate_fwhm_m(s: &Scene, pulse: &Pulse) -> f64 {
     let (h2, step_m) = (window_powers(s), 0.5 * C_M_S / s.f("detector.sampling_hz"));
     let middle = 0.5 * (h2.len() as f64 - 1.0);
     let weight = |r: f64| -> f64 {
-        h2.iter().enumerate().map(|(n, h2)| h2 * pulse.power_over_range(r - (n as f64 - middle) * step_m)).sum()
+        h2.iter()
+            .enumerate()
+            .map(|(n, h2)| h2 * pulse.power_over_range(r - (n as f64 - middle) * step_m))
+            .sum()
     };
     let (mut low, mut high) = (0.0, 10.0 * pulse.scale_m() + step_m * h2.len() as f64);
     for _ in 0..60 {
         let mid = 0.5 * (low + high);
-        if weight(mid) > 0.5 * weight(0.0) { low = mid } else { high = mid }
+        if weight(mid) > 0.5 * weight(0.0) {
+            low = mid
+        } else {
+            high = mid
+        }
     }
     low + high
 }
@@ -470,13 +609,19 @@ pub(crate) fn gate_deviation_m(s: &Scene, pulse: &Pulse) -> f64 {
     let (h2, step_m) = (window_powers(s), 0.5 * C_M_S / s.f("detector.sampling_hz"));
     let middle = 0.5 * (h2.len() as f64 - 1.0);
     let total: f64 = h2.iter().sum();
-    let square: f64 = h2.iter().enumerate().map(|(n, h2)| h2 * ((n as f64 - middle) * step_m).powi(2)).sum();
+    let square: f64 = h2
+        .iter()
+        .enumerate()
+        .map(|(n, h2)| h2 * ((n as f64 - middle) * step_m).powi(2))
+        .sum();
     (square / total + 0.5 * pulse.scale_m().powi(2)).sqrt()
 }
 
 /// The mean power of the signals of `signals.nc` over range, against (O9) and (S10).
 pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: &Scan, file: &str) {
-    let Some(pulse) = Pulse::gaussian(s) else { return };
+    let Some(pulse) = Pulse::gaussian(s) else {
+        return;
+    };
     let mut nc = bench.netcdf(ledger, file);
     let (current, quadrature) = (nc.f("current_a"), nc.f("quadrature_a"));
     let is_baseband = s.s("detector.signal") == "baseband";
@@ -490,10 +635,20 @@ pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: 
         _ => 0.5 * fs / b,
     };
     let noise_a2 = receiver.noise_a2 * wider;
-    ledger.equal("signals.nc: noise_power", nc.f("noise_power")[0], noise_a2, 1e-6 * noise_a2.max(1e-40));
+    ledger.equal(
+        "signals.nc: noise_power",
+        nc.f("noise_power")[0],
+        noise_a2,
+        1e-6 * noise_a2.max(1e-40),
+    );
     let samples = scan.sample_m.len();
     let pulses = current.len() / samples;
-    ledger.equal("signals.nc: current_a, rows", pulses as f64, (scan.elevation_rad.len() * scan.pulses) as f64, 0.0);
+    ledger.equal(
+        "signals.nc: current_a, rows",
+        pulses as f64,
+        (scan.elevation_rad.len() * scan.pulses) as f64,
+        0.0,
+    );
     let power = |p: usize, k: usize| {
         let at = p * samples + k;
         current[at].powi(2) + quadrature.get(at).map_or(0.0, |q| q * q)
@@ -502,10 +657,15 @@ pub(crate) fn hold_signals(ledger: &mut Ledger, bench: &Bench, s: &Scene, scan: 
     const BINS: usize = 6;
     for bin in 0..BINS {
         let ks: Vec<usize> = (bin * samples / BINS..(bin + 1) * samples / BINS).collect();
-        let of_pulse: Vec<f64> =
-            (0..pulses).map(|p| ks.iter().map(|&k| power(p, k)).sum::<f64>() / ks.len() as f64).collect();
+        let of_pulse: Vec<f64> = (0..pulses)
+            .map(|p| ks.iter().map(|&k| power(p, k)).sum::<f64>() / ks.len() as f64)
+            .collect();
         let (mean, error) = average_and_error(&of_pulse);
-        let expected = ks.iter().step_by(4).map(|&k| ratios.seen(scan.sample_m[k])).sum::<f64>()
+        let expected = ks
+            .iter()
+            .step_by(4)
+            .map(|&k| ratios.seen(scan.sample_m[k]))
+            .sum::<f64>()
             / ks.iter().step_by(4).count() as f64;
         let of_reflex = |&k: &usize| reflex * pulse.power(2.0 * scan.sample_m[k] / C_M_S);
         let expected = expected + ks.iter().map(of_reflex).sum::<f64>() / ks.len() as f64;

@@ -40,7 +40,11 @@ impl Bench<'_> {
             .output()
             .unwrap();
         let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
-        Ended { is_good: done.status.success(), stdout: text(&done.stdout), stderr: text(&done.stderr) }
+        Ended {
+            is_good: done.status.success(),
+            stdout: text(&done.stdout),
+            stderr: text(&done.stderr),
+        }
     }
 
     pub(crate) fn write(&self, name: &str, text: &str) {
@@ -50,7 +54,11 @@ impl Bench<'_> {
     /// A command that a good scene must pass; where it does not, that is a fault of its own.
     pub(crate) fn must(&self, ledger: &mut Ledger, words: &[&str]) -> Option<Ended> {
         let ended = self.run(words);
-        ledger.holds("a scene that check passes runs", ended.is_good, &format!("{words:?}: {}", ended.stderr.trim()));
+        ledger.holds(
+            "a scene that check passes runs",
+            ended.is_good,
+            &format!("{words:?}: {}", ended.stderr.trim()),
+        );
         ended.is_good.then_some(ended)
     }
 
@@ -58,8 +66,14 @@ impl Bench<'_> {
     pub(crate) fn csv(&self, ledger: &mut Ledger, file: &str) -> Csv {
         let path = self.folder.join(file);
         let csv = Csv::parse(&std::fs::read_to_string(&path).unwrap_or_default());
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        csv.names.iter().for_each(|column| ledger.saw(&name, column));
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        csv.names
+            .iter()
+            .for_each(|column| ledger.saw(&name, column));
         csv
     }
 
@@ -67,8 +81,17 @@ impl Bench<'_> {
     pub(crate) fn netcdf(&self, ledger: &mut Ledger, file: &str) -> Netcdf {
         let path = self.folder.join(file);
         let netcdf = Netcdf(FileReader::open(&path).unwrap());
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-        netcdf.0.data_set().get_var_names().iter().for_each(|variable| ledger.saw(&name, variable));
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
+        netcdf
+            .0
+            .data_set()
+            .get_var_names()
+            .iter()
+            .for_each(|variable| ledger.saw(&name, variable));
         netcdf
     }
 }
@@ -84,7 +107,10 @@ impl Csv {
     fn parse(text: &str) -> Self {
         let mut lines = text.lines().filter(|l| !l.starts_with('#'));
         let cells = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
-        Self { names: lines.next().map(cells).unwrap_or_default(), rows: lines.map(cells).collect() }
+        Self {
+            names: lines.next().map(cells).unwrap_or_default(),
+            rows: lines.map(cells).collect(),
+        }
     }
 
     pub(crate) fn len(&self) -> usize {
@@ -98,12 +124,23 @@ impl Csv {
     /// The words of a column.
     pub(crate) fn words(&self, name: &str) -> Vec<String> {
         let place = self.names.iter().position(|n| n == name);
-        self.rows.iter().map(|row| place.and_then(|at| row.get(at)).cloned().unwrap_or_default()).collect()
+        self.rows
+            .iter()
+            .map(|row| {
+                place
+                    .and_then(|at| row.get(at))
+                    .cloned()
+                    .unwrap_or_default()
+            })
+            .collect()
     }
 
     /// The numbers of a column; NaN where a cell is empty.
     pub(crate) fn f(&self, name: &str) -> Vec<f64> {
-        self.words(name).iter().map(|word| word.parse().unwrap_or(f64::NAN)).collect()
+        self.words(name)
+            .iter()
+            .map(|word| word.parse().unwrap_or(f64::NAN))
+            .collect()
     }
 }
 
@@ -122,18 +159,29 @@ impl Netcdf {
             Ok(DataVector::I8(v)) => v.into_iter().map(f64::from).collect(),
             _ => Vec::new(),
         };
-        values.into_iter().map(|v| if Some(v) == fill { f64::NAN } else { v }).collect()
+        values
+            .into_iter()
+            .map(|v| if Some(v) == fill { f64::NAN } else { v })
+            .collect()
     }
 
     fn attribute(&self, name: &str, attribute: &str) -> Option<f64> {
         let set = self.0.data_set();
-        let doubles = set.get_var_attr_f64(name, attribute).and_then(|v| v.first().copied());
-        doubles.or_else(|| set.get_var_attr_f32(name, attribute).and_then(|v| v.first().map(|x| f64::from(*x))))
+        let doubles = set
+            .get_var_attr_f64(name, attribute)
+            .and_then(|v| v.first().copied());
+        doubles.or_else(|| {
+            set.get_var_attr_f32(name, attribute)
+                .and_then(|v| v.first().map(|x| f64::from(*x)))
+        })
     }
 
     /// A text of a variable.
     pub(crate) fn text(&self, name: &str, attribute: &str) -> String {
-        self.0.data_set().get_var_attr_as_string(name, attribute).unwrap_or_default()
+        self.0
+            .data_set()
+            .get_var_attr_as_string(name, attribute)
+            .unwrap_or_default()
     }
 
     pub(crate) fn names(&self) -> Vec<String> {
@@ -143,7 +191,10 @@ impl Netcdf {
 
 /// A number of a JSON object, by the path of its keys; NaN where it is null or absent.
 pub(crate) fn at(json: &Value, path: &str) -> f64 {
-    path.split('.').fold(json, |value, key| &value[key]).as_f64().unwrap_or(f64::NAN)
+    path.split('.')
+        .fold(json, |value, key| &value[key])
+        .as_f64()
+        .unwrap_or(f64::NAN)
 }
 
 /// The keys of a JSON object count as seen.

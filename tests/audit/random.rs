@@ -5,7 +5,9 @@ pub(crate) struct Random(u64);
 
 impl Random {
     pub(crate) fn new(seed: u64, draw: u64) -> Self {
-        let mut out = Self(seed.wrapping_mul(0xa076_1d64_78bd_642f) ^ draw.wrapping_mul(0xe703_7ed1_a0b4_28db));
+        let mut out = Self(
+            seed.wrapping_mul(0xa076_1d64_78bd_642f) ^ draw.wrapping_mul(0xe703_7ed1_a0b4_28db),
+        );
         out.next();
         out
     }

@@ -73,18 +73,24 @@ impl Scene {
     /// Takes a key, and all below it, back.
     pub(crate) fn unset(&mut self, key: &str) -> &mut Self {
         self.stated = OnceLock::new();
-        self.keys.retain(|(known, _)| known != key && !known.starts_with(&format!("{key}.")));
+        self.keys
+            .retain(|(known, _)| known != key && !known.starts_with(&format!("{key}.")));
         self
     }
 
     pub(crate) fn text(&self) -> String {
-        self.keys.iter().map(|(key, value)| format!("{key} = {value}\n")).collect()
+        self.keys
+            .iter()
+            .map(|(key, value)| format!("{key} = {value}\n"))
+            .collect()
     }
 
     /// The value of a key: what is stated, else the default; nothing where there is neither.
     pub(crate) fn get(&self, key: &str) -> Option<Value> {
         static READ: LazyLock<Table> = LazyLock::new(|| dotted(DEFAULTS));
-        let stated = self.stated.get_or_init(|| self.text().parse().unwrap_or_default());
+        let stated = self
+            .stated
+            .get_or_init(|| self.text().parse().unwrap_or_default());
         below(stated, key).or_else(|| below(&READ, key))
     }
 
@@ -104,12 +110,17 @@ impl Scene {
 
     /// A word; empty where there is none.
     pub(crate) fn s(&self, key: &str) -> String {
-        self.get(key).and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default()
+        self.get(key)
+            .and_then(|v| v.as_str().map(str::to_owned))
+            .unwrap_or_default()
     }
 
     /// A list of numbers.
     pub(crate) fn list(&self, key: &str) -> Vec<f64> {
-        let list = self.get(key).and_then(|v| v.as_array().cloned()).unwrap_or_default();
+        let list = self
+            .get(key)
+            .and_then(|v| v.as_array().cloned())
+            .unwrap_or_default();
         list.iter().filter_map(number).collect()
     }
 }
@@ -120,13 +131,17 @@ fn dotted(text: &str) -> Table {
     for line in text.lines().filter(|l| !l.is_empty()) {
         let (path, _) = line.split_once(" = ").unwrap_or_default();
         let one: Table = line.parse().unwrap_or_default();
-        let Some(value) = below(&one, path) else { continue };
+        let Some(value) = below(&one, path) else {
+            continue;
+        };
         let mut at = &mut out;
         let mut parts: Vec<&str> = path.split('.').collect();
         let last = parts.pop().unwrap_or_default();
         for part in parts {
             let inner = at.entry(part).or_insert_with(|| Value::Table(Table::new()));
-            let Value::Table(inner) = inner else { return out };
+            let Value::Table(inner) = inner else {
+                return out;
+            };
             at = inner;
         }
         at.insert(last.into(), value);
@@ -142,5 +157,7 @@ fn below(table: &Table, key: &str) -> Option<Value> {
 }
 
 fn number(value: &Value) -> Option<f64> {
-    value.as_float().or_else(|| value.as_integer().map(|n| n as f64))
+    value
+        .as_float()
+        .or_else(|| value.as_integer().map(|n| n as f64))
 }

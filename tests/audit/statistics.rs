@@ -5,7 +5,9 @@ use super::bound::independent;
 use super::geometry::{Scan, line_time_s, radius_m};
 use super::ledger::Ledger;
 use super::numerics::{average, average_and_error};
-use super::power::{Pulse, Ratios, db, free_space_efficiency, free_space_snr_db, gate_deviation_m, gate_fwhm_m};
+use super::power::{
+    Pulse, Ratios, db, free_space_efficiency, free_space_snr_db, gate_deviation_m, gate_fwhm_m,
+};
 use super::program::{Bench, Csv, at, see};
 use super::scene::{C_M_S, Scene};
 use serde_json::Value;
@@ -24,17 +26,31 @@ fn quadratic(values: &[f64]) -> f64 {
 pub(crate) fn hold_map(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
     let f = |name: &str| map.f(name);
     let (mean, bias, std, rms) = (f("v_mean_m_s"), f("bias_m_s"), f("std_m_s"), f("rms_m_s"));
-    let (truth, count, flagged, first) = (f("v_pulse_m_s"), f("count"), f("flagged"), f("v_scan_m_s"));
+    let (truth, count, flagged, first) =
+        (f("v_pulse_m_s"), f("count"), f("flagged"), f("v_scan_m_s"));
     let (n_eff, tau, quality) = (f("n_eff"), f("tau"), f("quality"));
     let (realisations, gates) = (s.n("scan.realisations"), scan.gate_m.len());
     let n = realisations as f64;
-    let age = if s.s("flow.kind") == "vortex_pair" { s.f("flow.age_tau") } else { 0.0 };
+    let age = if s.s("flow.kind") == "vortex_pair" {
+        s.f("flow.age_tau")
+    } else {
+        0.0
+    };
     for row in 0..map.len() {
         ledger.equal("map.csv: tau", tau[row], age, 1e-12);
         ledger.equal("map.csv: bias_m_s", bias[row], mean[row] - truth[row], 1e-9);
         // Of each realisation, one velocity.
-        ledger.holds("map.csv: count", count[row] <= n && count[row].fract() == 0.0, "not a number of realisations");
-        ledger.equal("map.csv: flagged", (flagged[row] * n).round() / n, flagged[row], 1e-9);
+        ledger.holds(
+            "map.csv: count",
+            count[row] <= n && count[row].fract() == 0.0,
+            "not a number of realisations",
+        );
+        ledger.equal(
+            "map.csv: flagged",
+            (flagged[row] * n).round() / n,
+            flagged[row],
+            1e-9,
+        );
         ledger.holds(
             "map.csv: quality",
             quality[row].is_nan() || quality[row] >= 1.0 - 1e-9,
@@ -45,7 +61,11 @@ pub(crate) fn hold_map(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
             let share = (count[row] - 1.0) / count[row];
             let right = (bias[row].powi(2) + share * std[row].powi(2)).sqrt();
             ledger.equal("map.csv: rms_m_s", rms[row], right, 1e-9);
-            ledger.holds("map.csv: std_m_s", std[row] >= 0.0, "no deviation of several estimates");
+            ledger.holds(
+                "map.csv: std_m_s",
+                std[row] >= 0.0,
+                "no deviation of several estimates",
+            );
         } else if count[row] == 1.0 {
             ledger.equal("map.csv: rms_m_s", rms[row], bias[row].abs(), 1e-9);
             ledger.equal("map.csv: std_m_s", std[row], f64::NAN, 0.0);
@@ -54,11 +74,15 @@ pub(crate) fn hold_map(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
             }
         }
     }
-    let Some(pulse) = Pulse::gaussian(s) else { return };
+    let Some(pulse) = Pulse::gaussian(s) else {
+        return;
+    };
     let ratios = Ratios::new(s, pulse, scan, 3.0);
     for row in (0..map.len()).step_by(1 + map.len() / 8) {
         let (line, gate) = (row / gates, row % gates);
-        let Some(radius) = radius_m(s, scan.gate_m[gate]) else { return };
+        let Some(radius) = radius_m(s, scan.gate_m[gate]) else {
+            return;
+        };
         let windows = match s.s("estimator.method.kind") == "periodogram" {
             true => vec![scan.own_window(gate)],
             false => scan.region(line, gate, radius, s.n("estimator.window_samples")),
@@ -67,7 +91,13 @@ pub(crate) fn hold_map(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
             ledger.equal("map.csv: n_eff", n_eff[row], 0.0, 0.0);
             continue;
         }
-        let right = independent(s, &pulse, &windows, scan.pulses, ratios.of_window(s, scan, gate));
+        let right = independent(
+            s,
+            &pulse,
+            &windows,
+            scan.pulses,
+            ratios.of_window(s, scan, gate),
+        );
         ledger.equal("map.csv: n_eff", n_eff[row], right, 2e-3 * right);
     }
 }
@@ -78,9 +108,15 @@ pub(crate) fn hold_summary(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
     see(ledger, "run results", results);
     let f = |name: &str| finite(&map.f(name));
     let mut hold = |key: &str, right: f64, tolerance: f64| {
-        ledger.equal(&format!("run results: {key}"), at(results, key), right, tolerance * right.abs().max(1e-3));
+        ledger.equal(
+            &format!("run results: {key}"),
+            at(results, key),
+            right,
+            tolerance * right.abs().max(1e-3),
+        );
     };
-    let largest = |values: Vec<f64>, sign: f64| sign * values.iter().fold(f64::MIN, |a, v| a.max(sign * v));
+    let largest =
+        |values: Vec<f64>, sign: f64| sign * values.iter().fold(f64::MIN, |a, v| a.max(sign * v));
     hold("v_max_m_s", largest(f("v_mean_m_s"), 1.0), 1e-9);
     hold("v_min_m_s", largest(f("v_mean_m_s"), -1.0), 1e-9);
     hold("bias_mean_m_s", average(&f("bias_m_s")), 1e-9);
@@ -92,7 +128,10 @@ pub(crate) fn hold_summary(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
     let middle_m = 0.5 * (s.f("scan.range_min_m") + s.f("scan.range_max_m"));
     hold("scan_range_m", middle_m, 1e-12);
     if s.s("atmosphere.turbulence.kind") == "none" {
-        let (first, last) = (s.f("outputs.profile_range_min_m"), s.f("outputs.profile_range_max_m"));
+        let (first, last) = (
+            s.f("outputs.profile_range_min_m"),
+            s.f("outputs.profile_range_max_m"),
+        );
         if (first..=last).contains(&middle_m) {
             hold("scan_efficiency", free_space_efficiency(s, middle_m), 1e-2);
         }
@@ -109,8 +148,9 @@ fn hold_schedule(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
     let lines = scan.elevation_rad.len() as f64;
     let prf = s.f("laser.pulse_repetition_hz");
     let pulses = lines * scan.pulses as f64;
-    let mut hold =
-        |key: &str, right: f64, tolerance: f64| ledger.equal(&format!("scan: {key}"), at(json, key), right, tolerance);
+    let mut hold = |key: &str, right: f64, tolerance: f64| {
+        ledger.equal(&format!("scan: {key}"), at(json, key), right, tolerance)
+    };
     hold("lines", lines, 0.0);
     hold("sweeps", 1.0, 0.0);
     hold("pulses", pulses, 0.0);
@@ -123,31 +163,56 @@ fn hold_schedule(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
     if s.s("flow.kind") == "vortex_pair" && s.f("flow.circulation_m2_s") > 0.0 {
         // In free air: down with V0 (V8), across with all uniform winds.
         let down = s.f("flow.circulation_m2_s") / (2.0 * PI * s.f("flow.spacing_m"));
-        let added = s.get("added_flows").and_then(|v| v.as_array().cloned()).unwrap_or_default();
+        let added = s
+            .get("added_flows")
+            .and_then(|v| v.as_array().cloned())
+            .unwrap_or_default();
         let across = s.f("flow.cross_wind_m_s")
-            + added.iter().filter_map(|a| a.get("lateral_m_s").and_then(toml::Value::as_float)).sum::<f64>();
+            + added
+                .iter()
+                .filter_map(|a| a.get("lateral_m_s").and_then(toml::Value::as_float))
+                .sum::<f64>();
         hold("wake_moves_m", down.hypot(across) * duration_s, 1e-6);
     }
 }
 
 /// "flow reaches": the largest radial velocity of the lines of sight, as a budget prints it.
 pub(crate) fn hold_reach(ledger: &mut Ledger, s: &Scene, scan: &Scan, budget: &str) {
-    let Some(word) = budget.split("flow reaches ").nth(1).and_then(|rest| rest.split_whitespace().next()) else {
+    let Some(word) = budget
+        .split("flow reaches ")
+        .nth(1)
+        .and_then(|rest| rest.split_whitespace().next())
+    else {
         return;
     };
     ledger.saw("budget text", "flow reaches");
     let found: f64 = word.parse().unwrap_or(f64::NAN);
     let (near_m, far_m) = (scan.sample_m[0], scan.sample_m[scan.sample_m.len() - 1]);
-    let of_line = |(line, &e): (usize, &f64)| Line::new(s, e, line_time_s(s, line), near_m, far_m, 0.5).largest_m_s();
-    let largest = scan.elevation_rad.iter().enumerate().map(of_line).fold(0.0, f64::max);
+    let of_line = |(line, &e): (usize, &f64)| {
+        Line::new(s, e, line_time_s(s, line), near_m, far_m, 0.5).largest_m_s()
+    };
+    let largest = scan
+        .elevation_rad
+        .iter()
+        .enumerate()
+        .map(of_line)
+        .fold(0.0, f64::max);
     // Two digits are printed; the program may look farther than the scan, by a pulse, and between its lines.
-    ledger.equal("budget text: flow reaches", found, largest, 0.6 + 0.1 * largest);
+    ledger.equal(
+        "budget text: flow reaches",
+        found,
+        largest,
+        0.6 + 0.1 * largest,
+    );
 }
 
 /// Deviations of the values of independent maps from a truth that is a mean of them: what it takes of their scatter is given back.
 fn apart(values: &[f64], truth: f64) -> Vec<f64> {
     let n = values.len() as f64;
-    values.iter().map(|v| (v - truth) * (n / (n - 1.0)).sqrt()).collect()
+    values
+        .iter()
+        .map(|v| (v - truth) * (n / (n - 1.0)).sqrt())
+        .collect()
 }
 
 /// Shares of a normal law within one and two.
@@ -162,9 +227,20 @@ const OF_A_HANDFUL: [f64; 2] = [0.0, 0.0];
 /// The share of errors within one and two of what is stated of them, and how far the stated ones are too large or small; `alike` of them in a
 /// row share what they are made of.
 #[track_caller]
-fn hold_stated(ledger: &mut Ledger, number: &str, errors: &[f64], stated: &[f64], shares: [f64; 2], alike: usize) {
-    let pairs: Vec<(f64, f64)> =
-        errors.iter().copied().zip(stated.iter().copied()).filter(|(e, s)| e.is_finite() && s.is_finite()).collect();
+fn hold_stated(
+    ledger: &mut Ledger,
+    number: &str,
+    errors: &[f64],
+    stated: &[f64],
+    shares: [f64; 2],
+    alike: usize,
+) {
+    let pairs: Vec<(f64, f64)> = errors
+        .iter()
+        .copied()
+        .zip(stated.iter().copied())
+        .filter(|(e, s)| e.is_finite() && s.is_finite())
+        .collect();
     let (count, n) = (pairs.len() as f64, pairs.len() as f64 / alike as f64);
     // What happened in no seed at all has a stated error, and no scatter to hold it against.
     if n < 20.0 || pairs.iter().all(|(e, _)| e.abs() < 1e-12) {
@@ -179,12 +255,22 @@ fn hold_stated(ledger: &mut Ledger, number: &str, errors: &[f64], stated: &[f64]
     let stated_power = |p: i32| pairs.iter().map(|(_, s)| s.powi(p)).sum::<f64>() / count;
     let excess = power(4) / power(2).powi(2) + stated_power(4) / stated_power(2).powi(2) - 2.0;
     let slack = 4.0 * 0.5 * (excess / n).sqrt();
-    ledger.equal(&format!("{number}, scatter over stated"), scatter / told, middle, half + slack * high);
+    ledger.equal(
+        &format!("{number}, scatter over stated"),
+        scatter / told,
+        middle,
+        half + slack * high,
+    );
     let within = |k: f64| pairs.iter().filter(|(e, s)| e.abs() <= k * s).count() as f64 / count;
     // At least as many as the book says, less what chance takes.
     for (k, p) in [1.0, 2.0].into_iter().zip(shares) {
         let short = (p - within(k)).max(0.0);
-        ledger.equal(&format!("{number}, share within {k}"), short, 0.0, p - least_share(p, n));
+        ledger.equal(
+            &format!("{number}, share within {k}"),
+            short,
+            0.0,
+            p - least_share(p, n),
+        );
     }
 }
 
@@ -222,14 +308,31 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
     // Cells are many: the maps of some seeds tell as much of them.
     const MAPS: usize = 16;
     let vary = format!("seed=lin:1:{SEEDS}:{SEEDS}");
-    if bench.must(ledger, &["sweep", "s.toml", "--vary", &vary, "--no-circulation", "--out", "w"]).is_none() {
+    if bench
+        .must(
+            ledger,
+            &[
+                "sweep",
+                "s.toml",
+                "--vary",
+                &vary,
+                "--no-circulation",
+                "--out",
+                "w",
+            ],
+        )
+        .is_none()
+    {
         return;
     }
     let results = bench.csv(ledger, "w/results.csv");
     let mut maps = Vec::new();
     for seed in 1..=MAPS {
         let out = format!("m{seed}");
-        let Some(_) = bench.must(ledger, &["map", "s.toml", "--seed", &seed.to_string(), "--out", &out]) else {
+        let Some(_) = bench.must(
+            ledger,
+            &["map", "s.toml", "--seed", &seed.to_string(), "--out", &out],
+        ) else {
             return;
         };
         maps.push(bench.csv(ledger, &format!("{out}/map.csv")));
@@ -248,9 +351,19 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
     ] {
         let (values, errors) = (results.f(value), results.f(error));
         // Of what most seeds do not show, the stated error is that of what could be, and counts of none and one do not scatter as widely.
-        if value.starts_with("flagged") && 2 * values.iter().filter(|value| **value == 0.0).count() > values.len() {
-            let without = errors.iter().filter(|error| error.is_nan() || **error <= 0.0).count();
-            ledger.equal(&format!("results.csv: {error}, none told"), without as f64, 0.0, 0.0);
+        if value.starts_with("flagged")
+            && 2 * values.iter().filter(|value| **value == 0.0).count() > values.len()
+        {
+            let without = errors
+                .iter()
+                .filter(|error| error.is_nan() || **error <= 0.0)
+                .count();
+            ledger.equal(
+                &format!("results.csv: {error}, none told"),
+                without as f64,
+                0.0,
+                0.0,
+            );
             continue;
         }
         // Squares have means without bias; roots of them do not.
@@ -264,7 +377,14 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
             _ if value.starts_with("std") || value.starts_with("rms") => OF_SQUARES,
             _ => NORMAL,
         };
-        hold_stated(ledger, &format!("results.csv: {error}"), &apart(&values, truth), &errors, shares, 1);
+        hold_stated(
+            ledger,
+            &format!("results.csv: {error}"),
+            &apart(&values, truth),
+            &errors,
+            shares,
+            1,
+        );
     }
     // Of the maps of some of the same seeds each cell's rms against that of all of them.
     let of_seed = |name: &str| maps.iter().map(|map| map.f(name)).collect::<Vec<_>>();
@@ -276,29 +396,51 @@ pub(crate) fn hold_seeds(ledger: &mut Ledger, bench: &Bench, s: &Scene) {
         errors.extend(apart(&of_cell, quadratic(&of_cell)));
         stated.extend(error.iter().map(|map| map[cell]));
     }
-    hold_stated(ledger, "map.csv: standard_error_m_s", &errors, &stated, OF_CELLS, 1 + rms[0].len() / 12);
+    hold_stated(
+        ledger,
+        "map.csv: standard_error_m_s",
+        &errors,
+        &stated,
+        OF_CELLS,
+        1 + rms[0].len() / 12,
+    );
     hold_parts(ledger, bench, s, &results, &maps);
-    ledger.equal("results.csv: snr_db", results.f("snr_db")[0], s.f("detector.snr.snr_db"), 1e-9);
+    ledger.equal(
+        "results.csv: snr_db",
+        results.f("snr_db")[0],
+        s.f("detector.snr.snr_db"),
+        1e-9,
+    );
 }
 
 /// Distance of each cell from the nearer centre, m.
 fn distances_m(s: &Scene, map: &Csv) -> Vec<f64> {
-    let (b0, middle, height) = (s.f("flow.spacing_m"), s.f("flow.lateral_position_m"), s.f("flow.height_m"));
+    let (b0, middle, height) = (
+        s.f("flow.spacing_m"),
+        s.f("flow.lateral_position_m"),
+        s.f("flow.height_m"),
+    );
     let apart = |y: f64, z: f64, side: f64| (y - middle - side * 0.5 * b0).hypot(z - height);
     let places = map.f("y_m").into_iter().zip(map.f("z_m"));
-    places.map(|(y, z)| apart(y, z, -1.0).min(apart(y, z, 1.0))).collect()
+    places
+        .map(|(y, z)| apart(y, z, -1.0).min(apart(y, z, 1.0)))
+        .collect()
 }
 
 /// Whether a cell so far from the nearer centre belongs to the part that a column is of: within 8/47 spacings, beyond 30/47, or all.
 fn is_in(s: &Scene, column: &str, distance_m: f64) -> bool {
     let of_spacing = 47.0 * distance_m / s.f("flow.spacing_m");
-    (!column.contains("_inside") || of_spacing < 8.0) && (!column.contains("_outside") || of_spacing > 30.0)
+    (!column.contains("_inside") || of_spacing < 8.0)
+        && (!column.contains("_outside") || of_spacing > 30.0)
 }
 
 /// Estimates that a number of a sweep is the average of.
 fn estimates_of(s: &Scene, column: &str, map: &Csv) -> f64 {
     let cells = distances_m(s, map).into_iter().zip(map.f("rms_m_s"));
-    cells.filter(|(d, rms)| is_in(s, column, *d) && rms.is_finite()).count() as f64 * s.f("scan.realisations")
+    cells
+        .filter(|(d, rms)| is_in(s, column, *d) && rms.is_finite())
+        .count() as f64
+        * s.f("scan.realisations")
 }
 
 /// Means over parts of the map of each case.
@@ -307,7 +449,10 @@ fn hold_parts(ledger: &mut Ledger, bench: &Bench, s: &Scene, results: &Csv, maps
         let distances_m = distances_m(s, map);
         let part = |name: &str, column: &str| -> Vec<f64> {
             let cells = map.f(name).into_iter().zip(&distances_m);
-            cells.filter(|(_, d)| is_in(s, column, **d)).map(|(value, _)| value).collect()
+            cells
+                .filter(|(_, d)| is_in(s, column, **d))
+                .map(|(value, _)| value)
+                .collect()
         };
         for name in ["", "_inside", "_outside"] {
             let column = |what: &str| format!("{what}{name}_m_s");
@@ -316,43 +461,93 @@ fn hold_parts(ledger: &mut Ledger, bench: &Bench, s: &Scene, results: &Csv, maps
                 continue;
             }
             let mut hold = |what: &str, right: f64| {
-                ledger.equal(&format!("results.csv: {}", column(what)), results.f(&column(what))[case], right, 1e-9);
+                ledger.equal(
+                    &format!("results.csv: {}", column(what)),
+                    results.f(&column(what))[case],
+                    right,
+                    1e-9,
+                );
             };
             hold("bias", average(&bias));
             hold("std", quadratic(&part("std_m_s", name)));
             hold("rms", quadratic(&part("rms_m_s", name)));
         }
         let flagged = average(&map.f("flagged"));
-        ledger.equal("results.csv: flagged_fraction", results.f("flagged_fraction")[case], flagged, 1e-9);
-        ledger.equal("results.csv: case", results.f("case")[case], case as f64, 0.0);
-        ledger.equal("results.csv: seed", results.f("seed")[case], (case + 1) as f64, 0.0);
+        ledger.equal(
+            "results.csv: flagged_fraction",
+            results.f("flagged_fraction")[case],
+            flagged,
+            1e-9,
+        );
+        ledger.equal(
+            "results.csv: case",
+            results.f("case")[case],
+            case as f64,
+            0.0,
+        );
+        ledger.equal(
+            "results.csv: seed",
+            results.f("seed")[case],
+            (case + 1) as f64,
+            0.0,
+        );
     }
     // The bound of `bound` in the middle of its gates.
     if let Some(bound) = bench.must(ledger, &["bound", "s.toml", "--json"]) {
         let json = bound.json();
         let points = json["by_range"].as_array().cloned().unwrap_or_default();
-        let right = points.get(points.len() / 2).map_or(f64::NAN, |p| at(p, "bound_region_m_s"));
-        ledger.equal("results.csv: bound_m_s", results.f("bound_m_s")[0], right, 1e-6 * right);
+        let right = points
+            .get(points.len() / 2)
+            .map_or(f64::NAN, |p| at(p, "bound_region_m_s"));
+        ledger.equal(
+            "results.csv: bound_m_s",
+            results.f("bound_m_s")[0],
+            right,
+            1e-6 * right,
+        );
     }
     if let Some(pulse) = Pulse::gaussian(s) {
         let (wide, deviation) = (gate_fwhm_m(s, &pulse), gate_deviation_m(s, &pulse));
-        ledger.equal("results.csv: resolution_m", results.f("resolution_m")[0], wide, 1e-5 * wide);
-        ledger.equal("results.csv: resolution_sd_m", results.f("resolution_sd_m")[0], deviation, 1e-5 * deviation);
+        ledger.equal(
+            "results.csv: resolution_m",
+            results.f("resolution_m")[0],
+            wide,
+            1e-5 * wide,
+        );
+        ledger.equal(
+            "results.csv: resolution_sd_m",
+            results.f("resolution_sd_m")[0],
+            deviation,
+            1e-5 * deviation,
+        );
     }
 }
 
 /// Ratio and width that a map shows of a uniform wind at a fixed ratio.
 pub(crate) fn hold_spectra(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Csv) {
-    let Some(pulse) = Pulse::gaussian(s) else { return };
+    let Some(pulse) = Pulse::gaussian(s) else {
+        return;
+    };
     let gates = scan.gate_m.len();
     let of_lines = |name: &str, shown: &dyn Fn(f64) -> f64| {
         let values = map.f(name);
         // Lines are independent, gates of one line are not; ends of the scan have half regions, which change nothing here.
         let of_line = |line: usize| {
-            let shown: Vec<f64> = values[line * gates..(line + 1) * gates].iter().map(|v| shown(*v)).collect();
-            average(&if name == "width_m_s" { finite(&shown) } else { shown })
+            let shown: Vec<f64> = values[line * gates..(line + 1) * gates]
+                .iter()
+                .map(|v| shown(*v))
+                .collect();
+            average(&if name == "width_m_s" {
+                finite(&shown)
+            } else {
+                shown
+            })
         };
-        average_and_error(&(0..scan.elevation_rad.len()).map(of_line).collect::<Vec<_>>())
+        average_and_error(
+            &(0..scan.elevation_rad.len())
+                .map(of_line)
+                .collect::<Vec<_>>(),
+        )
     };
     let method = s.s("estimator.method.kind");
     let (ratio, error) = of_lines("snr_db", &|v| 10_f64.powf(0.1 * v));
@@ -363,8 +558,17 @@ pub(crate) fn hold_spectra(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
     if ratio.is_finite() && average(&map.f("flagged")) < 0.1 && is_right {
         // The velocity of models of few lags is wrong more often, if not on average.
         let own_db =
-            if ["autoregressive_pole", "autoregressive", "pulse_pair"].contains(&method.as_str()) { 0.2 } else { 0.05 };
-        ledger.equal("map.csv: snr_db", db(ratio), db(right), own_db + 4.0 * db(1.0 + error / right));
+            if ["autoregressive_pole", "autoregressive", "pulse_pair"].contains(&method.as_str()) {
+                0.2
+            } else {
+                0.05
+            };
+        ledger.equal(
+            "map.csv: snr_db",
+            db(ratio),
+            db(right),
+            own_db + 4.0 * db(1.0 + error / right),
+        );
     }
     let (width, error) = of_lines("width_m_s", &|v| v);
     if ["autoregressive", "autoregressive_pole", "capon"].contains(&method.as_str()) {
@@ -373,14 +577,27 @@ pub(crate) fn hold_spectra(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
     }
     // A uniform wind has the width of the pulse's spectrum (E2). Empty: where a line's peak fills the band, or for broad tapers.
     let right = 0.5 * s.f("laser.wavelength_m") * pulse.spectral_deviation_hz();
-    let step = 0.5 * s.f("laser.wavelength_m") * s.f("detector.sampling_hz") / s.f("estimator.window_samples");
+    let step = 0.5 * s.f("laser.wavelength_m") * s.f("detector.sampling_hz")
+        / s.f("estimator.window_samples");
     let fits = 0.5 * s.f("laser.wavelength_m") * s.f("detector.bandwidth_hz") / step
-        > if s.s("estimator.weighting") == "hann" { 8.0 } else { 4.0 };
-    let is_shown = fits && s.f("detector.snr.snr_db") >= 5.0 && right > 0.2 * step && !method.contains("likelihood");
+        > if s.s("estimator.weighting") == "hann" {
+            8.0
+        } else {
+            4.0
+        };
+    let is_shown = fits
+        && s.f("detector.snr.snr_db") >= 5.0
+        && right > 0.2 * step
+        && !method.contains("likelihood");
     // Where many cells show none, the others are those that came out broad.
     let widths = map.f("width_m_s");
     let are_most = finite(&widths).len() as f64 > 0.9 * widths.len() as f64;
     if is_shown || are_most {
-        ledger.equal("map.csv: width_m_s", width, right, 0.15 * right + 4.0 * error);
+        ledger.equal(
+            "map.csv: width_m_s",
+            width,
+            right,
+            0.15 * right + 4.0 * error,
+        );
     }
 }

@@ -9,7 +9,12 @@ fn all_end_as_they_must(part: &str) {
     let missed: Vec<String> = rows
         .iter()
         .filter(|row| !row.ended.passes)
-        .map(|row| format!("{}: {}, expected {}", row.case.name, row.ended.outcome, row.case.expected))
+        .map(|row| {
+            format!(
+                "{}: {}, expected {}",
+                row.case.name, row.ended.outcome, row.case.expected
+            )
+        })
         .collect();
     assert!(missed.is_empty(), "{}", missed.join("\n"));
 }

@@ -8,7 +8,10 @@ use wakescope_sim::scene::{Flow, NoiseModel, Scene, SceneFile};
 use wakescope_sim::setup::progress::Silent;
 
 fn plan(change: impl Fn(&mut Scene)) -> Plan {
-    let mut scene = Scene { flow: Flow::Calm {}, ..Scene::default() };
+    let mut scene = Scene {
+        flow: Flow::Calm {},
+        ..Scene::default()
+    };
     scene.scan.elevation_max_rad = 0.1;
     scene.scan.elevation_step_rad = 0.01;
     scene.scan.pulses_per_line = 300;
@@ -24,14 +27,23 @@ fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
     let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
     let photons = scene.detector.quantum_efficiency * scene.pulse_energy_j() / photon_j;
     let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
-    let seen = (-2.0 * air.extinction_per_m * range_m).exp() * area_m2 / (range_m * range_m) * efficiency;
-    photons / scene.detector.bandwidth_hz * 0.5 * SPEED_OF_LIGHT_M_S * air.backscatter_per_m_sr * seen
+    let seen =
+        (-2.0 * air.extinction_per_m * range_m).exp() * area_m2 / (range_m * range_m) * efficiency;
+    photons / scene.detector.bandwidth_hz
+        * 0.5
+        * SPEED_OF_LIGHT_M_S
+        * air.backscatter_per_m_sr
+        * seen
 }
 
 /// Mean square of the current and its standard error over the pulses, A^2.
 fn mean_square_a2(plan: &Plan) -> (f64, f64) {
     let signals = run::run(plan, &Silent).unwrap().signals_a.unwrap();
-    let of_pulse: Vec<f64> = signals.rows().into_iter().map(|r| r.dot(&r) / r.len() as f64).collect();
+    let of_pulse: Vec<f64> = signals
+        .rows()
+        .into_iter()
+        .map(|r| r.dot(&r) / r.len() as f64)
+        .collect();
     let n = of_pulse.len() as f64;
     let mean = of_pulse.iter().sum::<f64>() / n;
     let variance = of_pulse.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0);
@@ -52,8 +64,14 @@ fn mean_signal_power_over_noise_power_is_the_snr_of_14() {
         .sum::<f64>()
         / g.samples as f64;
     let (snr, error) = (power_a2 / noise_a2, error_a2 / noise_a2);
-    assert!(error / expected < 0.01, "the test resolves a per cent: {error}");
-    assert!((snr - expected).abs() < 3.5 * error, "SNR {snr} +- {error}, (14) gives {expected}");
+    assert!(
+        error / expected < 0.01,
+        "the test resolves a per cent: {error}"
+    );
+    assert!(
+        (snr - expected).abs() < 3.5 * error,
+        "SNR {snr} +- {error}, (14) gives {expected}"
+    );
 }
 
 #[test]
@@ -83,14 +101,18 @@ fn power_does_not_depend_on_the_layer_thickness() {
     g.layers *= factor;
     g.layers_per_sample = (g.layers_per_sample - 1) * factor + 1;
     let ((a, a_error), (b, b_error)) = (mean_square_a2(&thick), mean_square_a2(&thin));
-    assert!((a - b).abs() < 3.5 * a_error.hypot(b_error), "{a} +- {a_error} and {b} +- {b_error}");
+    assert!(
+        (a - b).abs() < 3.5 * a_error.hypot(b_error),
+        "{a} +- {a_error} and {b} +- {b_error}"
+    );
 }
 
 #[test]
 fn power_through_a_near_focus_is_14_over_the_pulse() {
-    for (focus_m, radii_m, ends_m, at_m) in
-        [(300.0, [0.05, 0.03], [150.0, 900.0], 180.0), (600.0, [0.15, 0.09], [200.0, 1500.0], 555.0)]
-    {
+    for (focus_m, radii_m, ends_m, at_m) in [
+        (300.0, [0.05, 0.03], [150.0, 900.0], 180.0),
+        (600.0, [0.15, 0.09], [200.0, 1500.0], 555.0),
+    ] {
         let plan = plan(|s| {
             s.detector.noise = NoiseModel::None;
             s.telescope.focus_m = focus_m;
@@ -99,8 +121,11 @@ fn power_through_a_near_focus_is_14_over_the_pulse() {
             s.scan.pulses_per_line = 200;
         });
         let g = &plan.geometry;
-        let range_m = |k: usize| plan.scene.content.scan.range_min_m + k as f64 * g.sample_spacing_m;
-        let near: Vec<usize> = (0..g.samples).filter(|k| (range_m(*k) - at_m).abs() < 8.0).collect();
+        let range_m =
+            |k: usize| plan.scene.content.scan.range_min_m + k as f64 * g.sample_spacing_m;
+        let near: Vec<usize> = (0..g.samples)
+            .filter(|k| (range_m(*k) - at_m).abs() < 8.0)
+            .collect();
         let signals = run::run(&plan, &Silent).unwrap().signals_a.unwrap();
         let of_pulse: Vec<f64> = signals
             .rows()
@@ -109,26 +134,43 @@ fn power_through_a_near_focus_is_14_over_the_pulse() {
             .collect();
         let n = of_pulse.len() as f64;
         let mean = of_pulse.iter().sum::<f64>() / n;
-        let error = (of_pulse.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+        let error =
+            (of_pulse.iter().map(|p| (p - mean).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
         // The air that the pulse lights, quadrature by quadrature a metre apart.
         let telescope = &plan.instrument.telescope;
         let (first_m, last_m) = (at_m - 120.0, at_m + 120.0);
-        let metres: Vec<f64> = (0..=240).map(|i| first_m + f64::from(i) * (last_m - first_m) / 240.0).collect();
-        let eta = EfficiencyProfile::from_theory(&metres, |r| free_space_efficiency(telescope, r)).unwrap();
+        let metres: Vec<f64> = (0..=240)
+            .map(|i| first_m + f64::from(i) * (last_m - first_m) / 240.0)
+            .collect();
+        let eta = EfficiencyProfile::from_theory(&metres, |r| free_space_efficiency(telescope, r))
+            .unwrap();
         // (14) as it is written: the mean over the pulse, in steps of a fifth of a metre.
         let sigma_m = 0.5 * SPEED_OF_LIGHT_M_S * plan.instrument.pulse.sigma_s();
         let snr = |k: &usize| {
             let weighted = (-500..=500).map(|i| 0.2 * f64::from(i)).map(|offset_m| {
                 let r = range_m(*k) + offset_m;
-                let weight = (-(offset_m / sigma_m).powi(2)).exp() / (std::f64::consts::PI.sqrt() * sigma_m) * 0.2;
-                weight * of_14(&plan, r, eta.interpolated(r.clamp(first_m, last_m)).unwrap())
+                let weight = (-(offset_m / sigma_m).powi(2)).exp()
+                    / (std::f64::consts::PI.sqrt() * sigma_m)
+                    * 0.2;
+                weight
+                    * of_14(
+                        &plan,
+                        r,
+                        eta.interpolated(r.clamp(first_m, last_m)).unwrap(),
+                    )
             });
             weighted.sum::<f64>()
         };
         let expected = near.iter().map(snr).sum::<f64>() / near.len() as f64;
         let noise_a2 = plan.instrument.receiver.noise_variance_a2();
         let (found, error) = (mean / noise_a2, error / noise_a2);
-        assert!(error / expected < 0.04, "the test resolves a fifth of a decibel: {error} {expected}");
-        assert!((found - expected).abs() < 3.5 * error, "{focus_m}: {found} +- {error}, (14) gives {expected}");
+        assert!(
+            error / expected < 0.04,
+            "the test resolves a fifth of a decibel: {error} {expected}"
+        );
+        assert!(
+            (found - expected).abs() < 3.5 * error,
+            "{focus_m}: {found} +- {error}, (14) gives {expected}"
+        );
     }
 }

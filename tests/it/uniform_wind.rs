@@ -8,7 +8,13 @@ use wakescope_sim::setup::progress::Silent;
 
 /// Errors of the map of a uniform wind.
 fn map(lateral_m_s: f64, change: impl Fn(&mut Scene)) -> VelocityEstimates {
-    let mut scene = Scene { flow: Flow::Uniform { lateral_m_s, vertical_m_s: 0.0 }, ..Scene::default() };
+    let mut scene = Scene {
+        flow: Flow::Uniform {
+            lateral_m_s,
+            vertical_m_s: 0.0,
+        },
+        ..Scene::default()
+    };
     scene.detector.snr = SnrReference::Fixed { snr_db: 10.0 };
     // Lines far apart and gates a pulse apart: the cells of the map are independent.
     scene.scan.elevation_max_rad = 0.2;
@@ -34,7 +40,10 @@ fn uniform_wind_has_no_bias_above_5_cm_per_second() {
     for speed_m_s in [-15.3, -3.7, 0.0, 0.4, 7.1, 14.9] {
         let (bias, error) = bias_m_s(&map(speed_m_s, |_| {}));
         assert!(error < 0.02, "the test resolves the bar: {error}");
-        assert!(bias.abs() + error < 0.05, "{speed_m_s} m/s: bias {bias} +- {error} m/s");
+        assert!(
+            bias.abs() + error < 0.05,
+            "{speed_m_s} m/s: bias {bias} +- {error} m/s"
+        );
     }
 }
 
@@ -45,7 +54,18 @@ fn without_interpolation_calm_air_never_reads_zero() {
         s.estimator.padded_samples = 64;
         s.estimator.refinement = Refinement::None;
     });
-    assert!(literal.rms_m_s.iter().all(|&rms| (1.45..1.58).contains(&rms)), "{}", literal.rms_m_s);
+    assert!(
+        literal
+            .rms_m_s
+            .iter()
+            .all(|&rms| (1.45..1.58).contains(&rms)),
+        "{}",
+        literal.rms_m_s
+    );
     let interpolated = map(0.0, |_| {});
-    assert!(interpolated.rms_m_s.iter().all(|&rms| rms < 0.5), "{}", interpolated.rms_m_s);
+    assert!(
+        interpolated.rms_m_s.iter().all(|&rms| rms < 0.5),
+        "{}",
+        interpolated.rms_m_s
+    );
 }

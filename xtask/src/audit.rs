@@ -36,17 +36,30 @@ const STORED: &str = "docs/src/audit-table.md";
 pub(crate) fn run(options: &Options) -> Outcome {
     let program = program(options.program.as_deref())?;
     let threads = std::thread::available_parallelism()?.get();
-    let Options { seed, first, scenes, .. } = *options;
+    let Options {
+        seed,
+        first,
+        scenes,
+        ..
+    } = *options;
     let keep = options.keep.as_ref().map(std::path::absolute).transpose()?;
-    let report = wakescope_tests::audit::audit(&program, seed, first, scenes, threads, keep.as_deref());
+    let report =
+        wakescope_tests::audit::audit(&program, seed, first, scenes, threads, keep.as_deref());
     print!("{}", report.text);
     if options.store {
-        let page = format!("Draws {first} to {} of seed {seed}: {}", first + scenes - 1, report.page);
+        let page = format!(
+            "Draws {first} to {} of seed {seed}: {}",
+            first + scenes - 1,
+            report.page
+        );
         wakescope_sim::io::write_atomic(&root().join(STORED), page.as_bytes())?;
         println!("stored {STORED}");
     }
     match report.faults.is_empty() {
         true => Ok(()),
-        false => Err(Failure::new(format!("{} numbers are wrong or have no definition", report.faults.len()))),
+        false => Err(Failure::new(format!(
+            "{} numbers are wrong or have no definition",
+            report.faults.len()
+        ))),
     }
 }

@@ -28,7 +28,11 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
         let curve = ALL.iter().find(|c| c.name == name).ok_or_else(|| {
             let known: Vec<&str> = ALL.iter().map(|c| c.name).collect();
-            Failure::new(format!("bless {name}: no such curve; there are {}, {}", wakes::NAME, known.join(", ")))
+            Failure::new(format!(
+                "bless {name}: no such curve; there are {}, {}",
+                wakes::NAME,
+                known.join(", ")
+            ))
         })?;
         let Origin::Blessed { quantity, grid } = curve.origin else {
             let why = "it comes from an independent source and is not ours to write";
@@ -43,7 +47,9 @@ pub(crate) fn run(options: &Options) -> Outcome {
         text.extend(x.iter().zip(&y).map(|(x, y)| format!("{x:?},{y:?}\n")));
         write_atomic(&root().join(curve.file), text)?;
         let (points, file) = (x.len(), curve.file);
-        println!("wrote {points} points to {file}: say in CHANGELOG.md, under Numerics, why the curve changed");
+        println!(
+            "wrote {points} points to {file}: say in CHANGELOG.md, under Numerics, why the curve changed"
+        );
     }
     Ok(())
 }

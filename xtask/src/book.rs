@@ -16,8 +16,17 @@ pub(crate) fn run() -> Outcome {
     // First, for it empties the folder.
     call(Command::new("mdbook").args(["build", "docs"]))?;
     let without = NOT_FOR_OTHERS.iter().flat_map(|name| ["--exclude", *name]);
-    call(Command::new(env!("CARGO")).args(["doc", "--workspace", "--no-deps"]).args(without))?;
-    call(Command::new("cp").arg("-r").arg(built().join("doc")).arg("target/book/api"))?;
+    call(
+        Command::new(env!("CARGO"))
+            .args(["doc", "--workspace", "--no-deps"])
+            .args(without),
+    )?;
+    call(
+        Command::new("cp")
+            .arg("-r")
+            .arg(built().join("doc"))
+            .arg("target/book/api"),
+    )?;
     println!("target/book/index.html");
     Ok(())
 }

@@ -16,8 +16,13 @@ pub(crate) fn cause(root: &Path, parameters: &[&str], places: &[&str]) -> Result
         hash.update(bytes.len().to_le_bytes());
         hash.update(bytes);
     };
-    parameters.iter().for_each(|parameter| add(parameter.as_bytes()));
-    for file in places.iter().flat_map(|place| WalkDir::new(root.join(place)).sort_by_file_name()) {
+    parameters
+        .iter()
+        .for_each(|parameter| add(parameter.as_bytes()));
+    for file in places
+        .iter()
+        .flat_map(|place| WalkDir::new(root.join(place)).sort_by_file_name())
+    {
         let file = file?;
         let name = file.path().strip_prefix(root)?.to_string_lossy();
         if file.file_type().is_file() && !is_test_file(&name) {
@@ -25,7 +30,12 @@ pub(crate) fn cause(root: &Path, parameters: &[&str], places: &[&str]) -> Result
             add(&std::fs::read(file.path())?);
         }
     }
-    Ok(hash.finalize().iter().take(12).map(|b| format!("{b:02x}")).collect())
+    Ok(hash
+        .finalize()
+        .iter()
+        .take(12)
+        .map(|b| format!("{b:02x}"))
+        .collect())
 }
 
 #[cfg(test)]
@@ -41,12 +51,15 @@ mod tests {
     #[test]
     fn files_and_parameters_change_it_tests_and_other_places_keep_it() {
         let temp = tempfile::tempdir().unwrap();
-        for (file, text) in
-            [("Cargo.lock", "1.0.0"), ("one/src/lib.rs", "fn one() {}"), ("two/src/a/b.rs", "fn two() {}")]
-        {
+        for (file, text) in [
+            ("Cargo.lock", "1.0.0"),
+            ("one/src/lib.rs", "fn one() {}"),
+            ("two/src/a/b.rs", "fn two() {}"),
+        ] {
             write(&temp, file, text);
         }
-        let of = |parameter: &str, places: &[&str]| cause(temp.path(), &[parameter], places).unwrap();
+        let of =
+            |parameter: &str, places: &[&str]| cause(temp.path(), &[parameter], places).unwrap();
         let one = || of("quick", &["one", "Cargo.lock"]);
         let before = one();
         write(&temp, "one/src/one_tests.rs", "fn test() {}");

@@ -50,20 +50,40 @@ pub(crate) fn run(options: &Options) -> Outcome {
     let own = std::env::current_exe()?;
     let words = [
         ("{xtask}", format!("'{}'", own.display())),
-        ("{wakescope}", format!("'{}'", own.with_file_name("wakescope").display())),
-        ("{bins}", if cfg!(debug_assertions) { "--bins --tests" } else { "--bins --release" }.into()),
+        (
+            "{wakescope}",
+            format!("'{}'", own.with_file_name("wakescope").display()),
+        ),
+        (
+            "{bins}",
+            if cfg!(debug_assertions) {
+                "--bins --tests"
+            } else {
+                "--bins --release"
+            }
+            .into(),
+        ),
         ("{test}", readme_test_command(&read("README.md")?)?),
     ];
     let Steps { step } = toml::from_str(include_str!("ci.toml"))?;
     for Step { name, commands } in step {
-        for command in commands.iter().filter(|_| options.only.as_ref().is_none_or(|word| name.contains(word.as_str())))
-        {
-            let command = words.iter().fold(command.clone(), |command, (word, text)| command.replace(word, text));
+        for command in commands.iter().filter(|_| {
+            options
+                .only
+                .as_ref()
+                .is_none_or(|word| name.contains(word.as_str()))
+        }) {
+            let command = words.iter().fold(command.clone(), |command, (word, text)| {
+                command.replace(word, text)
+            });
             println!("== {name}: {command}");
             let start = Instant::now();
             call(Command::new("sh").args(["-c", &command]))
                 .map_err(|failure| Failure::new(format!("ci: {name}: {failure}")))?;
-            println!("== {name}: passed in {:.0} s", start.elapsed().as_secs_f64());
+            println!(
+                "== {name}: passed in {:.0} s",
+                start.elapsed().as_secs_f64()
+            );
         }
     }
     Ok(())
@@ -76,7 +96,10 @@ mod tests {
     #[test]
     fn the_test_command_is_the_readmes() {
         let readme = "text\n```sh\ncargo xtask reproduce-figs   # figures\ncargo test --workspace   # tests\n```\n";
-        assert_eq!(readme_test_command(readme).unwrap(), "cargo test --workspace");
+        assert_eq!(
+            readme_test_command(readme).unwrap(),
+            "cargo test --workspace"
+        );
         assert!(readme_test_command("nothing").is_err());
     }
 }

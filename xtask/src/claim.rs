@@ -75,9 +75,23 @@ pub(crate) static LIST: LazyLock<List> =
 impl Claim {
     /// A claim of the list that a computation without random numbers decides.
     pub(crate) fn exact(id: &str, measured: String, pass: bool) -> Self {
-        let claim = Self { id: id.into(), ..Self::of("", "", measured, pass) };
-        let Some(Listed { statement, expected, .. }) = claim.listed() else { return claim };
-        Self { statement: statement.clone(), expected: expected.clone(), ..claim }
+        let claim = Self {
+            id: id.into(),
+            ..Self::of("", "", measured, pass)
+        };
+        let Some(Listed {
+            statement,
+            expected,
+            ..
+        }) = claim.listed()
+        else {
+            return claim;
+        };
+        Self {
+            statement: statement.clone(),
+            expected: expected.clone(),
+            ..claim
+        }
     }
 
     fn of(statement: &str, expected: &str, measured: String, pass: bool) -> Self {
@@ -99,20 +113,37 @@ impl Claim {
         let mut told: Vec<&Part> = parts.iter().collect();
         told.sort_by_key(|part| std::cmp::Reverse(verdict(part)));
         let words = told.iter().map(|(name, found, unit, _)| {
-            let name = if name.is_empty() { String::new() } else { format!("{name}: ") };
+            let name = if name.is_empty() {
+                String::new()
+            } else {
+                format!("{name}: ")
+            };
             format!("{name}{}{unit}", found.words())
         });
         let open = parts.iter().filter(|part| verdict(part) == Verdict::Open);
         // Of nothing, no sample tells anything.
         let least = if parts.is_empty() { f64::INFINITY } else { 0.0 };
-        let times = open.map(|part| part.3.times_the_data(&part.1)).fold(least, f64::max);
+        let times = open
+            .map(|part| part.3.times_the_data(&part.1))
+            .fold(least, f64::max);
         let claim = Self {
             verdict: told.first().map_or(Verdict::Open, verdict),
-            standard_error: parts.iter().map(|part| part.1.standard_error).fold(0.0, f64::max),
+            standard_error: parts
+                .iter()
+                .map(|part| part.1.standard_error)
+                .fold(0.0, f64::max),
             ..Self::exact(id, words.collect::<Vec<_>>().join("; "), false)
         };
-        let more = if times < 100.0 { format!("about {times:.1} times the data") } else { "no sample in reach".into() };
-        if claim.verdict == Verdict::Open { claim.open(&more) } else { claim }
+        let more = if times < 100.0 {
+            format!("about {times:.1} times the data")
+        } else {
+            "no sample in reach".into()
+        };
+        if claim.verdict == Verdict::Open {
+            claim.open(&more)
+        } else {
+            claim
+        }
     }
 
     /// The same of one part, which needs no name.
@@ -122,7 +153,11 @@ impl Claim {
 
     /// The claim, which fails if a fit failed, with their number beside it.
     pub(crate) fn of_fits(self, failures: usize, words: &str) -> Self {
-        let verdict = if failures > 0 { Verdict::Fail } else { self.verdict };
+        let verdict = if failures > 0 {
+            Verdict::Fail
+        } else {
+            self.verdict
+        };
         Self { verdict, ..self }.beside(words)
     }
 
@@ -141,10 +176,19 @@ impl Claim {
     /// The sentence and its case, or what else the claim comes from.
     pub(crate) fn source(&self) -> String {
         match (self.kind(), self.listed()) {
-            (Kind::Chapter, Some(Listed { quote: Some(quote), case, .. })) => {
+            (
+                Kind::Chapter,
+                Some(Listed {
+                    quote: Some(quote),
+                    case,
+                    ..
+                }),
+            ) => {
                 format!("\"{quote}\" Judged at: {case}.")
             }
-            (Kind::Check, _) => "arithmetic, a copy or geometry: cannot fail unless the program is wrong".into(),
+            (Kind::Check, _) => {
+                "arithmetic, a copy or geometry: cannot fail unless the program is wrong".into()
+            }
             _ => "of this program".into(),
         }
     }
@@ -156,18 +200,30 @@ impl Claim {
 
     /// The claim as one that this run does not decide.
     pub(crate) fn open(self, decided_by: &str) -> Self {
-        Self { verdict: Verdict::Open, decided_by: decided_by.into(), ..self }
+        Self {
+            verdict: Verdict::Open,
+            decided_by: decided_by.into(),
+            ..self
+        }
     }
 
     /// The claim with what is told beside it.
     pub(crate) fn beside(self, words: &str) -> Self {
-        Self { measured: format!("{} ({words})", self.measured), ..self }
+        Self {
+            measured: format!("{} ({words})", self.measured),
+            ..self
+        }
     }
 
     /// A quantity that may be `allowed` from its reference, in its own unit; what is not a number passes no bar.
     pub(crate) fn within(quantity: &str, measured: f64, reference: f64, allowed: f64) -> Self {
         let expected = format!("{} ± {allowed:.2e}", number(reference));
-        Self::of(quantity, &expected, number(measured), (measured - reference).abs() <= allowed)
+        Self::of(
+            quantity,
+            &expected,
+            number(measured),
+            (measured - reference).abs() <= allowed,
+        )
     }
 
     /// Within `share` of the reference.
@@ -194,13 +250,27 @@ impl Claim {
 
 /// Six digits after the point, or of a small number.
 fn number(x: f64) -> String {
-    if x == 0.0 || x.abs() >= 1e-3 { format!("{x:.6}") } else { format!("{x:.6e}") }
+    if x == 0.0 || x.abs() >= 1e-3 {
+        format!("{x:.6}")
+    } else {
+        format!("{x:.6e}")
+    }
 }
 
 impl fmt::Display for Claim {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { id, statement, expected, measured, .. } = self;
-        write!(f, "{:<12} {id:<4} {statement}: expected {expected}, measured {measured}", self.verdict.name())
+        let Self {
+            id,
+            statement,
+            expected,
+            measured,
+            ..
+        } = self;
+        write!(
+            f,
+            "{:<12} {id:<4} {statement}: expected {expected}, measured {measured}",
+            self.verdict.name()
+        )
     }
 }
 
@@ -211,10 +281,18 @@ mod tests {
 
     #[test]
     fn bars_hold_their_ends_and_nothing_that_is_no_number() {
-        assert!(Claim::relative("q", 1.01, 1.0, 0.0101).passes() && !Claim::relative("q", 1.02, 1.0, 0.01).passes());
-        assert!(Claim::at_least("q", 2.0, 2.0).passes() && !Claim::at_least("q", 1.9, 2.0).passes());
+        assert!(
+            Claim::relative("q", 1.01, 1.0, 0.0101).passes()
+                && !Claim::relative("q", 1.02, 1.0, 0.01).passes()
+        );
+        assert!(
+            Claim::at_least("q", 2.0, 2.0).passes() && !Claim::at_least("q", 1.9, 2.0).passes()
+        );
         assert!(Claim::at_most("q", 2.0, 2.0).passes() && !Claim::at_most("q", 2.1, 2.0).passes());
-        for claim in [Claim::within("q", f64::NAN, 0.0, 1.0), Claim::at_least("q", f64::NAN, 0.0)] {
+        for claim in [
+            Claim::within("q", f64::NAN, 0.0, 1.0),
+            Claim::at_least("q", f64::NAN, 0.0),
+        ] {
             assert!(!claim.passes() && claim.measured == "NaN");
         }
         assert_eq!(
@@ -225,34 +303,74 @@ mod tests {
 
     #[test]
     fn a_claim_of_parts_holds_if_all_do_and_tells_first_what_does_not() {
-        let part = |name: &str, value: f64| (name.into(), Estimate::stated(value, 0.1), " m/s", Bar::Below(1.0));
-        let of = |values: &[f64]| Claim::judged("F8", &values.iter().map(|v| part("p", *v)).collect::<Vec<_>>());
-        assert_eq!([of(&[0.5, 0.6]).verdict, of(&[0.5, 1.1]).verdict], [Verdict::Pass, Verdict::Open]);
+        let part = |name: &str, value: f64| {
+            (
+                name.into(),
+                Estimate::stated(value, 0.1),
+                " m/s",
+                Bar::Below(1.0),
+            )
+        };
+        let of = |values: &[f64]| {
+            Claim::judged(
+                "F8",
+                &values.iter().map(|v| part("p", *v)).collect::<Vec<_>>(),
+            )
+        };
+        assert_eq!(
+            [of(&[0.5, 0.6]).verdict, of(&[0.5, 1.1]).verdict],
+            [Verdict::Pass, Verdict::Open]
+        );
         let claim = of(&[0.5, 1.1, 2.0]);
-        assert_eq!((claim.verdict, claim.decided_by.as_str()), (Verdict::Fail, ""));
-        assert_eq!(claim.measured, "p: 2.00 ± 0.10 m/s; p: 1.10 ± 0.10 m/s; p: 0.50 ± 0.10 m/s");
+        assert_eq!(
+            (claim.verdict, claim.decided_by.as_str()),
+            (Verdict::Fail, "")
+        );
+        assert_eq!(
+            claim.measured,
+            "p: 2.00 ± 0.10 m/s; p: 1.10 ± 0.10 m/s; p: 0.50 ± 0.10 m/s"
+        );
         assert_eq!(of(&[0.9]).decided_by, "about 3.8 times the data");
         assert_eq!(of(&[f64::NAN]).decided_by, "no sample in reach");
-        assert_eq!((of(&[]).verdict, of(&[]).decided_by.as_str()), (Verdict::Open, "no sample in reach"));
+        assert_eq!(
+            (of(&[]).verdict, of(&[]).decided_by.as_str()),
+            (Verdict::Open, "no sample in reach")
+        );
     }
 
     #[test]
     fn every_entry_is_a_claim_of_a_figure() {
         let folder = std::fs::read_dir(root().join("xtask/src/figures")).unwrap();
-        let code: String = folder.map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap()).collect();
+        let code: String = folder
+            .map(|file| std::fs::read_to_string(file.unwrap().path()).unwrap())
+            .collect();
         for Listed { id, .. } in &LIST.claim {
             assert!(code.contains(&format!("\"{id}\"")), "no figure claims {id}");
         }
-        assert_eq!(LIST.claim.iter().filter(|listed| listed.quote.is_some()).count(), 19);
+        assert_eq!(
+            LIST.claim
+                .iter()
+                .filter(|listed| listed.quote.is_some())
+                .count(),
+            19
+        );
         // And every claim of a figure is on the list.
         let is_claim = |word: &&str| {
-            let number = word.strip_prefix("CP").or(word.strip_prefix('F')).or(word.strip_prefix('T')).unwrap_or("");
+            let number = word
+                .strip_prefix("CP")
+                .or(word.strip_prefix('F'))
+                .or(word.strip_prefix('T'))
+                .unwrap_or("");
             number.starts_with(|c: char| c.is_ascii_digit()) && number.len() < 4
         };
         for id in code.split('"').filter(is_claim) {
-            assert!(LIST.claim.iter().any(|listed| listed.id == id), "{id} is not in claims.toml");
+            assert!(
+                LIST.claim.iter().any(|listed| listed.id == id),
+                "{id} is not in claims.toml"
+            );
         }
-        let kinds = ["F13", "F5", "F18a"].map(|id| Claim::exact(id, String::new(), true).kind().name());
+        let kinds =
+            ["F13", "F5", "F18a"].map(|id| Claim::exact(id, String::new(), true).kind().name());
         assert_eq!(kinds, ["chapter", "check", "own"]);
     }
 }

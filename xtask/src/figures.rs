@@ -55,14 +55,27 @@ pub(crate) enum Lane {
 impl Figure {
     /// Its own number, by which `--only` asks for it, and what it is called.
     pub(crate) fn heading(&self) -> String {
-        let kind = if self.id.starts_with("tab") { "Table" } else { "Figure" };
+        let kind = if self.id.starts_with("tab") {
+            "Table"
+        } else {
+            "Figure"
+        };
         format!("{kind} {}: {}", self.number, self.title)
     }
 
     /// The words of its caption with the values of a run.
     pub(crate) fn caption(&self, values: &[String]) -> Result<String, Failure> {
-        let caption = LIST.caption.get(self.id).and_then(|words| filled(words, values));
-        caption.ok_or_else(|| Failure::new(format!("no caption of {} with {} values", self.id, values.len())))
+        let caption = LIST
+            .caption
+            .get(self.id)
+            .and_then(|words| filled(words, values));
+        caption.ok_or_else(|| {
+            Failure::new(format!(
+                "no caption of {} with {} values",
+                self.id,
+                values.len()
+            ))
+        })
     }
 
     pub(crate) fn lane(&self) -> Lane {
@@ -78,41 +91,115 @@ impl Figure {
 pub(crate) fn filled(text: &str, values: &[String]) -> Option<String> {
     let parts: Vec<&str> = text.split("{}").collect();
     let between = values.iter().map(String::as_str).chain([""]);
-    let all = parts.iter().zip(between).flat_map(|(part, value)| [part, value]).collect();
+    let all = parts
+        .iter()
+        .zip(between)
+        .flat_map(|(part, value)| [part, value])
+        .collect();
     (parts.len() == values.len() + 1).then_some(all)
 }
 
 type Make = fn(&Context) -> Result<Rendered, Failure>;
 
 const fn figure(id: &'static str, number: u32, title: &'static str, make: Make) -> Figure {
-    Figure { id, number, title, make }
+    Figure {
+        id,
+        number,
+        title,
+        make,
+    }
 }
 
 /// All figures, in the order of the report.
 pub(crate) const ALL: [Figure; 23] = [
-    figure("fig01", 1, "Vertical velocity through the cores of the pair", fig01::make),
-    figure("tab01", 1, "ICAO separations behind a landing aircraft", tab01::make),
-    figure("tab02", 2, "Lidar parameters as read back from the scene that was run", tab02::make),
+    figure(
+        "fig01",
+        1,
+        "Vertical velocity through the cores of the pair",
+        fig01::make,
+    ),
+    figure(
+        "tab01",
+        1,
+        "ICAO separations behind a landing aircraft",
+        tab01::make,
+    ),
+    figure(
+        "tab02",
+        2,
+        "Lidar parameters as read back from the scene that was run",
+        tab02::make,
+    ),
     figure("fig03", 3, "Scan pattern across the runway", fig03::make),
-    figure("fig04", 4, "Signal-to-noise ratio and system efficiency", fig04::make),
+    figure(
+        "fig04",
+        4,
+        "Signal-to-noise ratio and system efficiency",
+        fig04::make,
+    ),
     figure("fig05", 5, "M'4 stencil on a line of sight", fig05::make),
     figure("fig06", 6, "Surfaces of equal vorticity", fig06::make),
-    figure("fig07", 7, "Circulation and paths of the vortices", fig07::make),
-    figure("fig08", 8, "Radial velocity of the wake, early and late", fig08::make),
+    figure(
+        "fig07",
+        7,
+        "Circulation and paths of the vortices",
+        fig07::make,
+    ),
+    figure(
+        "fig08",
+        8,
+        "Radial velocity of the wake, early and late",
+        fig08::make,
+    ),
     figure("fig09", 9, "Accumulation level against range", fig09::make),
     figure("fig10", 10, "Estimation error and gradient", fig10::make),
     figure("fig11", 11, "Estimated map, late, 400 ns", fig11::make),
     figure("fig12", 12, "Error against pulse energy", fig12::make),
-    figure("fig13", 13, "Correlogram against periodogram accumulation", fig13_14::make_13),
-    figure("fig14", 14, "The same at 200 and 400 ns about the centre", fig13_14::make_14),
+    figure(
+        "fig13",
+        13,
+        "Correlogram against periodogram accumulation",
+        fig13_14::make_13,
+    ),
+    figure(
+        "fig14",
+        14,
+        "The same at 200 and 400 ns about the centre",
+        fig13_14::make_14,
+    ),
     figure("fig15", 15, "Error against run time", fig15::make),
     figure("fig16", 16, "Stiff and extreme cases", fig16::make),
-    figure("fig17", 17, "Circulation and positions from single scans", fig17::make),
-    figure("fig18", 18, "Velocity estimators against the Cramer-Rao bound", fig18::make),
+    figure(
+        "fig17",
+        17,
+        "Circulation and positions from single scans",
+        fig17::make,
+    ),
+    figure(
+        "fig18",
+        18,
+        "Velocity estimators against the Cramer-Rao bound",
+        fig18::make,
+    ),
     figure("fig19", 19, "Detection of wakes", fig19::make),
-    figure("fig20", 20, "Map, model and residual of one scan", fig20::make),
-    figure("fig21", 21, "One wake across, round and along the flight", fig21::make),
-    figure("fig25", 25, "Where correlogram accumulation errs less", fig25::make),
+    figure(
+        "fig20",
+        20,
+        "Map, model and residual of one scan",
+        fig20::make,
+    ),
+    figure(
+        "fig21",
+        21,
+        "One wake across, round and along the flight",
+        fig21::make,
+    ),
+    figure(
+        "fig25",
+        25,
+        "Where correlogram accumulation errs less",
+        fig25::make,
+    ),
 ];
 
 #[cfg(test)]
@@ -123,8 +210,17 @@ mod tests {
     fn every_figure_has_a_caption_of_its_own() {
         let captions = &LIST.caption;
         let ids: Vec<&str> = ALL.iter().map(|figure| figure.id).collect();
-        assert!(captions.keys().all(|id| ids.contains(&id.as_str())) && captions.len() == ids.len());
-        assert_eq!(ALL[3].caption(&["3", "1.25", "8"].map(String::from)).unwrap().matches(" 1.25 mrad;").count(), 1);
+        assert!(
+            captions.keys().all(|id| ids.contains(&id.as_str())) && captions.len() == ids.len()
+        );
+        assert_eq!(
+            ALL[3]
+                .caption(&["3", "1.25", "8"].map(String::from))
+                .unwrap()
+                .matches(" 1.25 mrad;")
+                .count(),
+            1
+        );
         assert!(ALL[3].caption(&[]).is_err());
     }
 }

@@ -19,8 +19,8 @@ use std::fmt::Display;
 use std::path::PathBuf;
 use trial::{FitTrial, RADIUS_M};
 use wakescope_estimate::vortex_fit::{
-    CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing, SignalFit, Starts, Wake,
-    WindFit,
+    CorePrior, FreeParameters, MapFit, PARAMETERS, Parameter, Powers, ScanModel, Sharing,
+    SignalFit, Starts, Wake, WindFit,
 };
 use wakescope_signal::NoiseModel;
 
@@ -94,7 +94,10 @@ const TOLD: [(&str, Parameter); 7] = [
 ];
 
 /// Whose likelihood is looked at scan by scan.
-const HEIGHTS: [(&str, Parameter); 2] = [("left", Parameter::LeftHeight), ("right", Parameter::RightHeight)];
+const HEIGHTS: [(&str, Parameter); 2] = [
+    ("left", Parameter::LeftHeight),
+    ("right", Parameter::RightHeight),
+];
 
 /// Wake and covariance of a fit.
 type Found = (Wake, Array2<f64>);
@@ -111,7 +114,9 @@ struct Fits {
 impl Fits {
     /// Keeps a fit, or tells why there is none.
     fn keep(&mut self, scan: usize, fit: Result<Found, impl Display>, cpu_s: f64) -> Option<Wake> {
-        let found = fit.inspect_err(|error| println!("scan {scan}, {}: {error}", self.name)).ok();
+        let found = fit
+            .inspect_err(|error| println!("scan {scan}, {}: {error}", self.name))
+            .ok();
         let wake = found.as_ref().map(|(wake, _)| *wake);
         self.failures += usize::from(wake.is_none());
         self.cpu_s += wake.map_or(0.0, |_| cpu_s);
@@ -125,11 +130,18 @@ impl Fits {
         println!("{name}: {n} fits, {failures} failed, {each_s:.2} s of processor each");
         for (label, parameter) in TOLD {
             let place = parameter as usize;
-            let errors: Vec<f64> =
-                self.found.iter().map(|(wake, _)| wake.to_array()[place] - truth.to_array()[place]).collect();
+            let errors: Vec<f64> = self
+                .found
+                .iter()
+                .map(|(wake, _)| wake.to_array()[place] - truth.to_array()[place])
+                .collect();
             let bias = Estimate::mean(&errors);
             let scatter = Estimate::deviation(&errors);
-            let variances: Vec<f64> = self.found.iter().map(|(_, covariance)| covariance[[place; 2]]).collect();
+            let variances: Vec<f64> = self
+                .found
+                .iter()
+                .map(|(_, covariance)| covariance[[place; 2]])
+                .collect();
             println!(
                 "  {label:<25} bias {:8.3} +- {:.3}, scatter {scatter:7.3} +- {:.3}, stated {:7.3}, bound {:.3}",
                 bias.value,
@@ -143,27 +155,64 @@ impl Fits {
 }
 
 /// What a map tells of the circulation at best, beside the bound of the signals.
-fn show_map_bound(options: &Options, pair: &PairScan, truth: &Wake, circulation: Sharing) -> Outcome {
+fn show_map_bound(
+    options: &Options,
+    pair: &PairScan,
+    truth: &Wake,
+    circulation: Sharing,
+) -> Outcome {
     let setup = pair.setup()?;
     let (snr, radius_m, range_m) = (pair.snr, options.radius_m, &pair.range_m);
-    let setting = MapSetting { scan: &setup, sigma_s: pair.sigma_s(), snr, radius_m, range_m };
-    let (model, map) = (ScanModel::new(&setup, |_, _| pair.snr, truth)?, MapBound::new(&setting, truth)?);
+    let setting = MapSetting {
+        scan: &setup,
+        sigma_s: pair.sigma_s(),
+        snr,
+        radius_m,
+        range_m,
+    };
+    let (model, map) = (
+        ScanModel::new(&setup, |_, _| pair.snr, truth)?,
+        MapBound::new(&setting, truth)?,
+    );
     let strongest = Parameter::LeftCirculation as usize;
     let show = |name: &str, deviation: f64| {
-        println!("  {name:<56} {deviation:6.2} m^2/s, {:.2} %", 100.0 * deviation / truth.to_array()[strongest]);
+        println!(
+            "  {name:<56} {deviation:6.2} m^2/s, {:.2} %",
+            100.0 * deviation / truth.to_array()[strongest]
+        );
     };
-    for (name, core_radius) in [("one core radius free", Sharing::Common), ("core known", Sharing::Fixed)] {
+    for (name, core_radius) in [
+        ("one core radius free", Sharing::Common),
+        ("core known", Sharing::Fixed),
+    ] {
         println!("left circulation, {name}:");
-        let free = FreeParameters { circulation, core_radius, ..Default::default() };
+        let free = FreeParameters {
+            circulation,
+            core_radius,
+            ..Default::default()
+        };
         let bound = model.bound(truth, Powers::default(), &free, true)?;
-        show("all signals, Cramer-Rao bound", bound[[strongest; 2]].sqrt());
-        let groups = FreeParameters { wind: WindFit::Linear, ..free }.groups();
+        show(
+            "all signals, Cramer-Rao bound",
+            bound[[strongest; 2]].sqrt(),
+        );
+        let groups = FreeParameters {
+            wind: WindFit::Linear,
+            ..free
+        }
+        .groups();
         for (what, widths) in [("velocities", false), ("velocities and widths", true)] {
             let found = map.deviations(&groups, widths);
-            let [best, by_variance] =
-                found.ok_or_else(|| Failure::new("the covariance of the map is singular".into()))?;
-            show(&format!("{what} of the map, weights of their covariance"), best);
-            show(&format!("{what} of the map, weights of their variances"), by_variance);
+            let [best, by_variance] = found
+                .ok_or_else(|| Failure::new("the covariance of the map is singular".into()))?;
+            show(
+                &format!("{what} of the map, weights of their covariance"),
+                best,
+            );
+            show(
+                &format!("{what} of the map, weights of their variances"),
+                by_variance,
+            );
         }
     }
     Ok(())
@@ -179,58 +228,125 @@ pub(crate) fn run(options: &Options) -> Outcome {
         Case::SmallCores => (PairCase::SMALL_CORES, Sharing::Separate),
     };
     let truth = case.truth();
-    let pair =
-        PairScan::of(&case, NoiseModel::BandLimited, (200e-9, options.snr_db), options.gate_step.into(), options.seed)?;
+    let pair = PairScan::of(
+        &case,
+        NoiseModel::BandLimited,
+        (200e-9, options.snr_db),
+        options.gate_step.into(),
+        options.seed,
+    )?;
     if options.map_bound {
         return show_map_bound(options, &pair, &truth, circulation);
     }
-    let free = |core_radius| FreeParameters { circulation, core_radius, ..Default::default() };
-    let of_signals = free(if options.known_core { Sharing::Fixed } else { Sharing::Common });
+    let free = |core_radius| FreeParameters {
+        circulation,
+        core_radius,
+        ..Default::default()
+    };
+    let of_signals = free(if options.known_core {
+        Sharing::Fixed
+    } else {
+        Sharing::Common
+    });
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth)?;
     let covariance = model.bound(&truth, Powers::default(), &of_signals, true)?;
     let bound: [f64; PARAMETERS] = std::array::from_fn(|i| covariance[[i, i]].sqrt());
-    let of = |name| Fits { name, ..Default::default() };
-    let mut maps = ["map, core kept", "map, core about the typical one", "map, core fitted freely"].map(of);
+    let of = |name| Fits {
+        name,
+        ..Default::default()
+    };
+    let mut maps = [
+        "map, core kept",
+        "map, core about the typical one",
+        "map, core fitted freely",
+    ]
+    .map(of);
     let mut signals = ["signals", "signals, started at the truth"].map(of);
     let (mut below, mut widths) = (Vec::new(), HEIGHTS.map(|_| Vec::new()));
     for scan in 0..options.scans as usize {
         let trial = FitTrial::new(&pair, scan, options.radius_m)?;
         let mut guess = None;
-        let cores = [(Sharing::Fixed, None), (Sharing::Common, Some(CorePrior::TYPICAL)), (Sharing::Common, None)];
-        for (fits, (core, prior)) in maps.iter_mut().zip(cores).take(if options.signals_only { 1 } else { 3 }) {
+        let cores = [
+            (Sharing::Fixed, None),
+            (Sharing::Common, Some(CorePrior::TYPICAL)),
+            (Sharing::Common, None),
+        ];
+        for (fits, (core, prior)) in
+            maps.iter_mut()
+                .zip(cores)
+                .take(if options.signals_only { 1 } else { 3 })
+        {
             let (fit, cost) = measured(|| Ok(trial.map(free(core), prior)))?;
-            let found = fit.map(|MapFit { wake, covariance, .. }| (wake, covariance));
+            let found = fit.map(
+                |MapFit {
+                     wake, covariance, ..
+                 }| (wake, covariance),
+            );
             let kept = fits.keep(scan, found, cost.cpu_s);
             guess = guess.or(kept);
         }
-        let (false, Some(mut guess)) = (options.maps_only, guess) else { continue };
+        let (false, Some(mut guess)) = (options.maps_only, guess) else {
+            continue;
+        };
         if options.known_core {
-            (guess.left.core_radius_m, guess.right.core_radius_m) = (case.core_radius_m, case.core_radius_m);
+            (guess.left.core_radius_m, guess.right.core_radius_m) =
+                (case.core_radius_m, case.core_radius_m);
         }
         let mut fit = |place: usize, guess: &Wake, starts| -> Result<Option<SignalFit>, Failure> {
             let (fit, cost) = measured(|| Ok(trial.signals(of_signals, guess, starts)))?;
-            signals[place].keep(scan, fit.as_ref().map(|fit| (fit.wake, fit.covariance.clone())), cost.cpu_s);
+            signals[place].keep(
+                scan,
+                fit.as_ref().map(|fit| (fit.wake, fit.covariance.clone())),
+                cost.cpu_s,
+            );
             Ok(fit.ok())
         };
-        let (Some(found), at_truth) = (fit(0, &guess, Starts::Several)?, fit(1, &truth, Starts::Guess)?) else {
+        let (Some(found), at_truth) = (
+            fit(0, &guess, Starts::Several)?,
+            fit(1, &truth, Starts::Guess)?,
+        ) else {
             continue;
         };
         for (widths, (_, height)) in widths.iter_mut().zip(HEIGHTS).filter(|_| options.widths) {
-            widths.extend(trial.width(&model, &found, height as usize, (&covariance, &of_signals.groups()))?);
+            widths.extend(trial.width(
+                &model,
+                &found,
+                height as usize,
+                (&covariance, &of_signals.groups()),
+            )?);
         }
         if let Some(at_truth) = at_truth {
             let less = at_truth.log_likelihood - found.log_likelihood;
-            let tops: Vec<f64> = found.tops.iter().map(|top| -0.5 * top.chi2 - found.log_likelihood).collect();
-            println!("scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {tops:.2?}");
+            let tops: Vec<f64> = found
+                .tops
+                .iter()
+                .map(|top| -0.5 * top.chi2 - found.log_likelihood)
+                .collect();
+            println!(
+                "scan {scan}: ln p {less:+.2} below that of the start at the truth; tops {tops:.2?}"
+            );
             below.push(less);
         }
     }
-    maps.iter().chain(&signals).filter(|fits| fits.found.len() > 1).for_each(|fits| fits.show(&truth, &bound));
-    for (widths, (name, height)) in widths.iter().zip(HEIGHTS).filter(|(widths, _)| widths.len() > 1) {
-        let mut over: Vec<f64> = widths.iter().map(|width| width / bound[height as usize]).collect();
+    maps.iter()
+        .chain(&signals)
+        .filter(|fits| fits.found.len() > 1)
+        .for_each(|fits| fits.show(&truth, &bound));
+    for (widths, (name, height)) in widths
+        .iter()
+        .zip(HEIGHTS)
+        .filter(|(widths, _)| widths.len() > 1)
+    {
+        let mut over: Vec<f64> = widths
+            .iter()
+            .map(|width| width / bound[height as usize])
+            .collect();
         over.sort_by(f64::total_cmp);
         let square = Estimate::mean(&over.iter().map(|o| o * o).collect::<Vec<_>>());
-        let (root, error) = (square.value.sqrt(), 0.5 * square.standard_error / square.value.sqrt());
+        let (root, error) = (
+            square.value.sqrt(),
+            0.5 * square.standard_error / square.value.sqrt(),
+        );
         let (least, most) = (over[0], over[over.len() - 1]);
         println!(
             "posterior of the {name} height: {root:.2} +- {error:.2} of the bound, from {least:.2} to {most:.2} by scan"
@@ -238,7 +354,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     if let Some(most) = below.iter().copied().max_by(f64::total_cmp) {
         let lower = below.iter().filter(|less| **less > 0.1).count();
-        println!("{lower} of {} fits of signals end on a top lower by 0.1 or more; the most is {most:.2}", below.len());
+        println!(
+            "{lower} of {} fits of signals end on a top lower by 0.1 or more; the most is {most:.2}",
+            below.len()
+        );
     }
     Ok(())
 }

@@ -40,7 +40,12 @@ pub(crate) fn run(options: &Options) -> Outcome {
     for index in options.first..options.first + options.count {
         let text = scene(options.seed, index);
         std::fs::write(folder.join("s.toml"), &text)?;
-        let check = watch(&program, &["check", "s.toml", "--json", "--threads", "1"], folder, options.limit_s)?;
+        let check = watch(
+            &program,
+            &["check", "s.toml", "--json", "--threads", "1"],
+            folder,
+            options.limit_s,
+        )?;
         good += u64::from(check.code == Some(0));
         let is_short = check.code == Some(0) && forecast_s(&check.stdout) < options.run_below_s;
         ran += u64::from(is_short);
@@ -59,8 +64,15 @@ pub(crate) fn run(options: &Options) -> Outcome {
         }
     }
     let refused = options.count - good;
-    println!("{} scenes: {refused} refused, {good} good, {ran} of these run; {} faults", options.count, faults.len());
-    unless(&format!("faults in the scenes of seed {}", options.seed), &faults)
+    println!(
+        "{} scenes: {refused} refused, {good} good, {ran} of these run; {} faults",
+        options.count,
+        faults.len()
+    );
+    unless(
+        &format!("faults in the scenes of seed {}", options.seed),
+        &faults,
+    )
 }
 
 /// What is wrong with an end that is not among the `allowed` ones.
@@ -68,14 +80,25 @@ fn fault_of(found: &Watched, allowed: &[Option<i32>]) -> Option<String> {
     match found.hung {
         true => Some(format!("takes more than {:.1} s", found.cpu_s)),
         false if allowed.contains(&found.code) => None,
-        false => Some(format!("ends with {:?}: {}", found.code, found.stderr.trim_end())),
+        false => Some(format!(
+            "ends with {:?}: {}",
+            found.code,
+            found.stderr.trim_end()
+        )),
     }
 }
 
 /// Time that a plan forecasts, s.
 fn forecast_s(json: &str) -> f64 {
     json.lines()
-        .filter_map(|l| l.trim().strip_prefix("\"core_s\":")?.trim().trim_end_matches(',').parse::<f64>().ok())
+        .filter_map(|l| {
+            l.trim()
+                .strip_prefix("\"core_s\":")?
+                .trim()
+                .trim_end_matches(',')
+                .parse::<f64>()
+                .ok()
+        })
         .sum()
 }
 
@@ -93,10 +116,17 @@ mod tests {
         let mut good = 0;
         for index in 0..SCENES {
             let text = scene(1, index);
-            let Ok(file) = SceneFile::parse(&text, Path::new("s.toml")) else { continue };
-            let Ok(plan) = Plan::new(file, Target::Run) else { continue };
+            let Ok(file) = SceneFile::parse(&text, Path::new("s.toml")) else {
+                continue;
+            };
+            let Ok(plan) = Plan::new(file, Target::Run) else {
+                continue;
+            };
             let (core_s, memory_bytes) = (plan.core_s, plan.total().memory_bytes);
-            assert!(core_s >= 0.0 && memory_bytes >= 0.0, "{index}: {core_s} {memory_bytes}\n{text}");
+            assert!(
+                core_s >= 0.0 && memory_bytes >= 0.0,
+                "{index}: {core_s} {memory_bytes}\n{text}"
+            );
             good += 1;
         }
         assert!(good > 400, "{good}");

@@ -51,25 +51,62 @@ struct Package {
 }
 
 pub(crate) fn run(options: &Options) -> Outcome {
-    let Scenes { whole, without, package } = toml::from_str(include_str!("left_out.toml"))?;
+    let Scenes {
+        whole,
+        without,
+        package,
+    } = toml::from_str(include_str!("left_out.toml"))?;
     let (program, folder) = (program(options.program.as_deref())?, tempfile::tempdir()?);
     let folder = folder.path();
-    let mut text = String::from("| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n");
+    let mut text = String::from(
+        "| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n",
+    );
     for Without { name, keys } in &without {
         let mut scene = whole.clone();
-        keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value))?;
+        keys.iter()
+            .try_for_each(|(key, value)| set(&mut scene, key, value))?;
         let run = run_scene(&program, folder, &toml::to_string(&scene)?, &["run"])?;
         let sizes = std::fs::read_dir(folder.join("out"))?.map(|file| Ok(file?.metadata()?.len()));
         let bytes = sizes.sum::<std::io::Result<u64>>()? as f64;
-        let name = if keys.is_empty() { name.clone() } else { format!("without {name}") };
-        let _ = writeln!(text, "| {name} | {:.2} | {:.1} | {:.2} |", run.cpu_s, run.peak_bytes / 1e6, bytes / 1e6);
+        let name = if keys.is_empty() {
+            name.clone()
+        } else {
+            format!("without {name}")
+        };
+        let _ = writeln!(
+            text,
+            "| {name} | {:.2} | {:.1} | {:.2} |",
+            run.cpu_s,
+            run.peak_bytes / 1e6,
+            bytes / 1e6
+        );
     }
-    let heads = if options.compile { " processor time of compiling [s] | program [MB] |" } else { "" };
+    let heads = if options.compile {
+        " processor time of compiling [s] | program [MB] |"
+    } else {
+        ""
+    };
     let lines = if options.compile { "---|---|" } else { "" };
-    let _ = writeln!(text, "\n| crate | features | gives | crates compiled |{heads}\n|---|---|---|---|{lines}");
-    for Package { name, features, gives } in &package {
-        let named = if features.is_empty() { "none" } else { features };
-        let _ = write!(text, "| `{name}` | {named} | {gives} | {} |", crates(name, features)?);
+    let _ = writeln!(
+        text,
+        "\n| crate | features | gives | crates compiled |{heads}\n|---|---|---|---|{lines}"
+    );
+    for Package {
+        name,
+        features,
+        gives,
+    } in &package
+    {
+        let named = if features.is_empty() {
+            "none"
+        } else {
+            features
+        };
+        let _ = write!(
+            text,
+            "| `{name}` | {named} | {gives} | {} |",
+            crates(name, features)?
+        );
         if options.compile {
             let (seconds, bytes) = compiled(name, features, &folder.join("target"))?;
             let size = bytes.map_or("none".into(), |bytes| format!("{:.1}", bytes / 1e6));
@@ -79,7 +116,10 @@ pub(crate) fn run(options: &Options) -> Outcome {
     }
     print!("{text}");
     if options.store {
-        wakescope_sim::io::write_atomic(&root().join("docs/src/left-out-results.md"), text.as_bytes())?;
+        wakescope_sim::io::write_atomic(
+            &root().join("docs/src/left-out-results.md"),
+            text.as_bytes(),
+        )?;
     }
     Ok(())
 }
@@ -93,8 +133,16 @@ fn set(scene: &mut Table, key: &str, value: &Value) -> Outcome {
         };
         return Ok(());
     };
-    let inner = scene.entry(table).or_insert_with(|| Value::Table(Table::new()));
-    set(inner.as_table_mut().ok_or_else(|| Failure::new(format!("{table} is no table")))?, rest, value)
+    let inner = scene
+        .entry(table)
+        .or_insert_with(|| Value::Table(Table::new()));
+    set(
+        inner
+            .as_table_mut()
+            .ok_or_else(|| Failure::new(format!("{table} is no table")))?,
+        rest,
+        value,
+    )
 }
 
 /// Processor time of compiling a crate and all that it needs from nothing, s, and the size of its program, bytes.
@@ -103,18 +151,44 @@ fn compiled(package: &str, features: &str, target: &Path) -> Result<(f64, Option
         std::fs::remove_dir_all(target)?;
     }
     let before_s = children_cpu_s();
-    let words =
-        ["build", "--release", "--quiet", "--package", package, "--no-default-features", "--features", features];
-    call(Command::new(env!("CARGO")).args(words).env("CARGO_TARGET_DIR", target))?;
+    let words = [
+        "build",
+        "--release",
+        "--quiet",
+        "--package",
+        package,
+        "--no-default-features",
+        "--features",
+        features,
+    ];
+    call(
+        Command::new(env!("CARGO"))
+            .args(words)
+            .env("CARGO_TARGET_DIR", target),
+    )?;
     let program = std::fs::metadata(target.join("release/wakescope")).ok();
-    Ok((children_cpu_s() - before_s, program.map(|file| file.len() as f64)))
+    Ok((
+        children_cpu_s() - before_s,
+        program.map(|file| file.len() as f64),
+    ))
 }
 
 /// How many crates cargo compiles for a library, itself among them, without those that only build it.
 fn crates(package: &str, features: &str) -> Result<usize, Failure> {
-    let of = ["tree", "--edges=normal", "--prefix=none", "--no-default-features", "--package", package, "--features"];
+    let of = [
+        "tree",
+        "--edges=normal",
+        "--prefix=none",
+        "--no-default-features",
+        "--package",
+        package,
+        "--features",
+    ];
     let text = output(Command::new(env!("CARGO")).args(of).arg(features))?;
-    let names: BTreeSet<&str> = text.lines().filter_map(|line| line.split(" (").next()).collect();
+    let names: BTreeSet<&str> = text
+        .lines()
+        .filter_map(|line| line.split(" (").next())
+        .collect();
     Ok(names.iter().filter(|name| !name.is_empty()).count())
 }
 
@@ -129,7 +203,9 @@ mod tests {
         let Scenes { whole, without, .. } = toml::from_str(include_str!("left_out.toml")).unwrap();
         for Without { name, keys } in &without {
             let mut scene = whole.clone();
-            keys.iter().try_for_each(|(key, value)| set(&mut scene, key, value)).unwrap();
+            keys.iter()
+                .try_for_each(|(key, value)| set(&mut scene, key, value))
+                .unwrap();
             let text = toml::to_string(&scene).unwrap();
             let read = SceneFile::parse(&text, Path::new("scene.toml")).unwrap();
             let plan = Plan::new(read, Target::Run);

@@ -39,7 +39,11 @@ mod workspace;
 use clap::{Parser, Subcommand};
 
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask", bin_name = "cargo xtask", about = "Tasks of the wakescope workspace")]
+#[command(
+    name = "cargo xtask",
+    bin_name = "cargo xtask",
+    about = "Tasks of the wakescope workspace"
+)]
 struct Cli {
     #[command(subcommand)]
     task: Task,

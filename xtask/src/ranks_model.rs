@@ -29,9 +29,15 @@ struct Halos {
 
 impl Halos {
     /// Three of the third component before the divergence; whole halos, eight planes, of the pressure and of the velocity.
-    const PLAIN: Self = Self { planes: 3.0 + 4.0 * 8.0, exchanges: 3.0 };
+    const PLAIN: Self = Self {
+        planes: 3.0 + 4.0 * 8.0,
+        exchanges: 3.0,
+    };
     /// Before them four of the eddy viscosity and of each component of the small scales; four of each stress that acts across planes.
-    const MULTISCALE: Self = Self { planes: PLANES, exchanges: 5.0 };
+    const MULTISCALE: Self = Self {
+        planes: PLANES,
+        exchanges: 5.0,
+    };
 }
 
 /// Time of a stage in which nothing is exchanged, and of turns and halos \[s\], on `ranks`.
@@ -55,7 +61,8 @@ fn table() -> String {
         .to_owned();
     for ranks in [1.0, 2.0, 4.0, 16.0, 64.0, 256.0, 1024.0] {
         let [plain, model] = [Halos::PLAIN, Halos::MULTISCALE].map(|halos| stage_s(ranks, halos));
-        let efficiency = |stage: [f64; 3]| stage_s(1.0, Halos::PLAIN)[0] / stage.iter().sum::<f64>();
+        let efficiency =
+            |stage: [f64; 3]| stage_s(1.0, Halos::PLAIN)[0] / stage.iter().sum::<f64>();
         text += &format!(
             "| {ranks} | {} | {:.1} | {:.1} | {:.2} | {:.1} | {:.2} |\n",
             ranks * SLAB[2],
@@ -87,7 +94,13 @@ impl Ranks for Counting {
         self.ranks.count()
     }
 
-    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+    fn all_to_all(
+        &self,
+        send: &[f64],
+        to: &[usize],
+        receive: &mut [f64],
+        from: &[usize],
+    ) -> Result<(), Error> {
         let leaving = to.iter().sum::<usize>() - to[self.rank()];
         if leaving > self.least {
             self.values.fetch_add(leaving, Ordering::Relaxed);
@@ -100,14 +113,28 @@ impl Ranks for Counting {
 #[test]
 fn the_solver_sends_what_the_model_says() {
     let n = 24;
-    for (subgrid, halos) in [(SubgridModel::None, Halos::PLAIN), (SubgridModel::MULTISCALE_WALE, Halos::MULTISCALE)] {
+    for (subgrid, halos) in [
+        (SubgridModel::None, Halos::PLAIN),
+        (SubgridModel::MULTISCALE_WALE, Halos::MULTISCALE),
+    ] {
         let sent = on_threads(2, |ranks| {
-            let counting = Arc::new(Counting { ranks, least: n * n, values: 0.into(), messages: AtomicUsize::new(0) });
+            let counting = Arc::new(Counting {
+                ranks,
+                least: n * n,
+                values: 0.into(),
+                messages: AtomicUsize::new(0),
+            });
             let mut case = taylor_green_3d(n, 1600.0).unwrap();
-            case.settings =
-                FlowSettings { ranks: counting.clone(), scheme: TimeScheme::RungeKutta3, subgrid, ..case.settings };
+            case.settings = FlowSettings {
+                ranks: counting.clone(),
+                scheme: TimeScheme::RungeKutta3,
+                subgrid,
+                ..case.settings
+            };
             let (mut flow, _) = case.initial.start(case.mesh, case.settings).unwrap();
-            let seen = || [&counting.values, &counting.messages].map(|count| count.load(Ordering::Relaxed));
+            let seen = || {
+                [&counting.values, &counting.messages].map(|count| count.load(Ordering::Relaxed))
+            };
             let before = seen();
             flow.step().unwrap();
             let after = seen();
@@ -117,12 +144,20 @@ fn the_solver_sends_what_the_model_says() {
         // half of the slab of one rank leaves it in a turn
         let values = stages * (n * n) as f64 * (halos.planes + TURNS * n as f64 / 4.0);
         let messages = stages * (halos.exchanges + TURNS);
-        assert_eq!(sent, vec![Some([values as usize, messages as usize]); 2], "{subgrid:?}");
+        assert_eq!(
+            sent,
+            vec![Some([values as usize, messages as usize]); 2],
+            "{subgrid:?}"
+        );
     }
 }
 
 #[test]
 fn the_book_has_the_table_of_the_model() {
     let page = std::fs::read_to_string(crate::workspace::root().join("docs/src/ranks.md")).unwrap();
-    assert!(page.contains(&table()), "docs/src/ranks.md lacks\n{}", table());
+    assert!(
+        page.contains(&table()),
+        "docs/src/ranks.md lacks\n{}",
+        table()
+    );
 }

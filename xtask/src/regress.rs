@@ -20,7 +20,12 @@ pub(crate) struct Options {
 /// # Errors
 /// When a curve is out of tolerance or cannot be read or computed.
 pub(crate) fn run(options: &Options) -> Outcome {
-    let wanted = |c: &&Curve| options.only.as_ref().is_none_or(|word| c.name.contains(word.as_str()));
+    let wanted = |c: &&Curve| {
+        options
+            .only
+            .as_ref()
+            .is_none_or(|word| c.name.contains(word.as_str()))
+    };
     let mut failed = Vec::new();
     for curve in ALL.iter().filter(wanted) {
         let start = Instant::now();
@@ -39,11 +44,19 @@ pub(crate) fn run(options: &Options) -> Outcome {
 
 fn told(curve: &Curve, c: &Comparison) -> String {
     let (points, error, place) = (c.x.len(), c.worst_error, c.x[c.worst]);
-    format!("{points} points, error {error:.3e} of {:.1e} at most, worst at {} = {place}", curve.tolerance, curve.x)
+    format!(
+        "{points} points, error {error:.3e} of {:.1e} at most, worst at {} = {place}",
+        curve.tolerance, curve.x
+    )
 }
 
 fn draw(curve: &Curve, c: &Comparison) -> Result<String, Failure> {
-    let points = |y: &[f64]| c.x.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
+    let points = |y: &[f64]| {
+        c.x.iter()
+            .copied()
+            .zip(y.iter().copied())
+            .collect::<Vec<_>>()
+    };
     let plot = CurvePlot::new(curve.name, Axis::linear(curve.x), Axis::linear(curve.y))
         .with(Series::new("stored", Style::Line, points(&c.stored)))
         .with(Series::new("computed", Style::Dash, points(&c.computed)));

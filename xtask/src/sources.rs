@@ -5,7 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether a source file of a crate holds nothing but tests.
 pub(crate) fn is_test_file(file: &str) -> bool {
-    file.ends_with(".rs") && file.contains("/tests/") || file.ends_with("/tests.rs") || file.ends_with("_tests.rs")
+    file.ends_with(".rs") && file.contains("/tests/")
+        || file.ends_with("/tests.rs")
+        || file.ends_with("_tests.rs")
 }
 
 /// A file of a crate: its folder and the path of its module.
@@ -33,11 +35,25 @@ impl<'a> Modules<'a> {
     /// Of source files and their texts; what is not below a `src` is left out, and what is no Rust has no imports.
     pub(crate) fn new(files: &[(&'a str, &str)]) -> Self {
         let module = |file: &'a str, text: &str| {
-            let mut module = Module { file, ..Module::default() };
-            module.read(&text.parse::<TokenStream>().unwrap_or_default().into_iter().collect::<Vec<_>>());
+            let mut module = Module {
+                file,
+                ..Module::default()
+            };
+            module.read(
+                &text
+                    .parse::<TokenStream>()
+                    .unwrap_or_default()
+                    .into_iter()
+                    .collect::<Vec<_>>(),
+            );
             module
         };
-        Self(files.iter().filter_map(|(file, text)| Some((place(file)?, module(file, text)))).collect())
+        Self(
+            files
+                .iter()
+                .filter_map(|(file, text)| Some((place(file)?, module(file, text))))
+                .collect(),
+        )
     }
 
     /// Which file takes which names from which; constants that a module takes from the one above it do not count if
@@ -47,13 +63,20 @@ impl<'a> Modules<'a> {
         for (from, module) in &self.0 {
             for path in &module.taken {
                 let name = path.last().cloned().unwrap_or_default();
-                let Some(to) = self.absolute(from, path).and_then(|path| self.resolve(from, &path, 0)) else {
+                let Some(to) = self
+                    .absolute(from, path)
+                    .and_then(|path| self.resolve(from, &path, 0))
+                else {
                     continue;
                 };
                 let is_above = to.1.len() < from.1.len() && from.1.starts_with(&to.1);
                 let is_constant = self.0[to].items.get(&name) == Some(&true);
                 if to != from && !(but_constants && is_above && is_constant) {
-                    out.entry(module.file).or_default().entry(self.0[to].file).or_default().insert(name);
+                    out.entry(module.file)
+                        .or_default()
+                        .entry(self.0[to].file)
+                        .or_default()
+                        .insert(name);
                 }
             }
         }
@@ -74,7 +97,10 @@ impl<'a> Modules<'a> {
             }
             rest = more;
         }
-        let is_child = || self.0.contains_key(&(at.0.clone(), [&base[..], &rest[..1]].concat()));
+        let is_child = || {
+            self.0
+                .contains_key(&(at.0.clone(), [&base[..], &rest[..1]].concat()))
+        };
         (rest.len() < path.len() || is_child()).then(|| [&base[..], rest].concat())
     }
 
@@ -84,26 +110,45 @@ impl<'a> Modules<'a> {
             let (to, module) = self.0.get_key_value(&(at.0.clone(), path[..n].to_vec()))?;
             Some((to, module, &path[n..]))
         })?;
-        let Some(name) = rest.first().filter(|name| !module.items.contains_key(*name) && depth < 6) else {
+        let Some(name) = rest
+            .first()
+            .filter(|name| !module.items.contains_key(*name) && depth < 6)
+        else {
             return Some(to);
         };
-        let mut handed = module.handed.iter().filter(|path| path.last() == Some(name));
-        handed.find_map(|path| self.resolve(to, &self.absolute(to, path)?, depth + 1)).or(Some(to))
+        let mut handed = module
+            .handed
+            .iter()
+            .filter(|path| path.last() == Some(name));
+        handed
+            .find_map(|path| self.resolve(to, &self.absolute(to, path)?, depth + 1))
+            .or(Some(to))
     }
 }
 
 /// Groups of files each of which imports every other, in one step or several; a module and those right below it may.
 pub(crate) fn circles<'a>(imports: &Imports<'a>) -> Vec<Vec<&'a str>> {
-    let all: BTreeMap<&str, BTreeSet<&str>> = imports.keys().map(|file| (*file, reached(imports, file))).collect();
+    let all: BTreeMap<&str, BTreeSet<&str>> = imports
+        .keys()
+        .map(|file| (*file, reached(imports, file)))
+        .collect();
     let mut out: Vec<Vec<&str>> = Vec::new();
     for (file, seen) in all.iter().filter(|(file, seen)| seen.contains(*file)) {
         if !out.iter().any(|circle| circle.contains(file)) {
-            out.push(seen.iter().copied().filter(|to| all.get(to).is_some_and(|back| back.contains(file))).collect());
+            out.push(
+                seen.iter()
+                    .copied()
+                    .filter(|to| all.get(to).is_some_and(|back| back.contains(file)))
+                    .collect(),
+            );
         }
     }
-    let above = |file: &str| place(file).map(|(folder, mut path)| path.pop().map(|_| (folder, path)));
+    let above =
+        |file: &str| place(file).map(|(folder, mut path)| path.pop().map(|_| (folder, path)));
     let is_family = |circle: &Vec<&str>, parent: &str| {
-        circle.iter().all(|file| *file == parent || above(file).is_some_and(|of| of == place(parent)))
+        circle
+            .iter()
+            .all(|file| *file == parent || above(file).is_some_and(|of| of == place(parent)))
     };
     out.retain(|circle| !circle.iter().any(|parent| is_family(circle, parent)));
     out
@@ -113,7 +158,14 @@ pub(crate) fn circles<'a>(imports: &Imports<'a>) -> Vec<Vec<&'a str>> {
 fn reached<'a>(imports: &Imports<'a>, from: &'a str) -> BTreeSet<&'a str> {
     let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
     while let Some(file) = open.pop() {
-        open.extend(imports.get(file).into_iter().flat_map(BTreeMap::keys).copied().filter(|to| seen.insert(*to)));
+        open.extend(
+            imports
+                .get(file)
+                .into_iter()
+                .flat_map(BTreeMap::keys)
+                .copied()
+                .filter(|to| seen.insert(*to)),
+        );
     }
     seen
 }
@@ -153,24 +205,38 @@ impl Module<'_> {
         while let Some(token) = tokens.get(at) {
             let (word, next) = (name(tokens, at), name(tokens, at + 1));
             match (token, word.as_str()) {
-                (TokenTree::Group(group), _) if group.to_string().replace(' ', "") == "[cfg(test)]" => {
+                (TokenTree::Group(group), _)
+                    if group.to_string().replace(' ', "") == "[cfg(test)]" =>
+                {
                     let ends = |t: &TokenTree| matches!(t, TokenTree::Group(g) if g.delimiter() == Delimiter::Brace);
-                    at += tokens[at..].iter().position(|t| is_end(t) || ends(t)).unwrap_or(tokens.len());
+                    at += tokens[at..]
+                        .iter()
+                        .position(|t| is_end(t) || ends(t))
+                        .unwrap_or(tokens.len());
                 }
                 // who may see an item
                 (TokenTree::Group(_), _) if at > 0 && name(tokens, at - 1) == "pub" => {}
-                (TokenTree::Group(group), _) => self.read(&group.stream().into_iter().collect::<Vec<_>>()),
+                (TokenTree::Group(group), _) => {
+                    self.read(&group.stream().into_iter().collect::<Vec<_>>())
+                }
                 (_, "use") => {
-                    let end = tokens[at..].iter().position(is_end).map_or(tokens.len(), |length| at + length);
+                    let end = tokens[at..]
+                        .iter()
+                        .position(is_end)
+                        .map_or(tokens.len(), |length| at + length);
                     let is_exported = at > 0 && name(tokens, at - 1) == "pub";
                     let is_public = is_exported || at > 1 && name(tokens, at - 2) == "pub";
                     let mut paths = Vec::new();
                     write_out(&tokens[at + 1..end], &[], &mut paths);
-                    self.handed.extend(paths.iter().filter(|_| is_public).cloned());
-                    self.taken.extend(paths.into_iter().filter(|_| !is_exported));
+                    self.handed
+                        .extend(paths.iter().filter(|_| is_public).cloned());
+                    self.taken
+                        .extend(paths.into_iter().filter(|_| !is_exported));
                     at = end;
                 }
-                (_, "const" | "static" | "type") if !["fn", "unsafe", "async", ""].contains(&next.as_str()) => {
+                (_, "const" | "static" | "type")
+                    if !["fn", "unsafe", "async", ""].contains(&next.as_str()) =>
+                {
                     self.items.insert(next, true);
                 }
                 (_, "fn" | "struct" | "enum" | "trait" | "mod") if !next.is_empty() => {
@@ -224,8 +290,14 @@ mod tests {
     #[test]
     fn a_circle_through_a_name_that_is_handed_on_is_found() {
         let a = ("c/src/a.rs", "use crate::{Thing, other};\nfn make() {}\n");
-        let root = ("c/src/lib.rs", "mod a;\nmod b;\npub use b::{Thing as Thing,\n    more};\n");
-        let b = ("c/src/b.rs", "pub struct Thing;\nfn f() { super::a::make() }\n");
+        let root = (
+            "c/src/lib.rs",
+            "mod a;\nmod b;\npub use b::{Thing as Thing,\n    more};\n",
+        );
+        let b = (
+            "c/src/b.rs",
+            "pub struct Thing;\nfn f() { super::a::make() }\n",
+        );
         assert_eq!(found(&[a, root, b], false), [["c/src/a.rs", "c/src/b.rs"]]);
         let apart = ("c/src/b.rs", "pub struct Thing;\n// super::a::make()\n");
         assert!(found(&[a, root, apart], false).is_empty());
@@ -233,24 +305,49 @@ mod tests {
 
     #[test]
     fn a_path_that_begins_with_a_child_module_is_an_import() {
-        let parent = ("c/src/a/mod.rs", "mod b;\npub(in super::super) fn f() { b::c::g() }\n");
-        let (between, below) = (("c/src/a/b/mod.rs", "pub mod c;\n"), |text| ("c/src/a/b/c.rs", text));
+        let parent = (
+            "c/src/a/mod.rs",
+            "mod b;\npub(in super::super) fn f() { b::c::g() }\n",
+        );
+        let (between, below) = (("c/src/a/b/mod.rs", "pub mod c;\n"), |text| {
+            ("c/src/a/b/c.rs", text)
+        });
         let circle = [["c/src/a/b/c.rs", "c/src/a/mod.rs"]];
-        assert_eq!(found(&[parent, between, below("fn g() { super::super::f() }\n")], true), circle);
+        assert_eq!(
+            found(
+                &[parent, between, below("fn g() { super::super::f() }\n")],
+                true
+            ),
+            circle
+        );
         assert!(found(&[parent, between, below("fn g() {}\n")], true).is_empty());
         // A word of a `use` is no child of the file that it stands in.
         let user = ("c/src/a/mod.rs", "mod b;\nuse crate::{\n    b::h,\n};\n");
-        let files = [user, between, below("fn g() { super::super::f() }\n"), ("c/src/b.rs", "fn h() {}\n")];
+        let files = [
+            user,
+            between,
+            below("fn g() { super::super::f() }\n"),
+            ("c/src/b.rs", "fn h() {}\n"),
+        ];
         assert!(found(&files, true).is_empty());
     }
 
     #[test]
     fn a_module_and_those_right_below_it_may_import_one_another_and_others_may_not() {
-        let parent = ("c/src/a/mod.rs", "mod b;\nuse b::wide;\npub(crate) fn lanes() {}\n");
-        let child = ("c/src/a/b.rs", "use super::lanes;\npub(super) fn wide() {}\n");
+        let parent = (
+            "c/src/a/mod.rs",
+            "mod b;\nuse b::wide;\npub(crate) fn lanes() {}\n",
+        );
+        let child = (
+            "c/src/a/b.rs",
+            "use super::lanes;\npub(super) fn wide() {}\n",
+        );
         assert!(found(&[parent, child], true).is_empty());
         let aside = ("c/src/d.rs", "pub fn more() { crate::a::lanes() }\n");
-        let with_aside = ("c/src/a/b.rs", "use crate::d::more;\npub(super) fn wide() {}\n");
+        let with_aside = (
+            "c/src/a/b.rs",
+            "use crate::d::more;\npub(super) fn wide() {}\n",
+        );
         assert_eq!(found(&[parent, with_aside, aside], true).concat().len(), 3);
     }
 
@@ -258,17 +355,38 @@ mod tests {
     fn a_module_may_take_constants_from_above_and_nothing_else() {
         let of = |item: &str, but_constants| {
             let above = format!("mod d;\nuse d::b::wide;\n{item}\n");
-            let below = ("c/src/a/d/b.rs", "use crate::a::LANES;\npub(super) fn wide() {}\n");
-            found(&[("c/src/a/mod.rs", &above), ("c/src/a/d/mod.rs", "mod b;\n"), below], but_constants).len()
+            let below = (
+                "c/src/a/d/b.rs",
+                "use crate::a::LANES;\npub(super) fn wide() {}\n",
+            );
+            found(
+                &[
+                    ("c/src/a/mod.rs", &above),
+                    ("c/src/a/d/mod.rs", "mod b;\n"),
+                    below,
+                ],
+                but_constants,
+            )
+            .len()
         };
         let constant = "const LANES: usize = 16;";
-        assert_eq!([of(constant, true), of(constant, false), of("pub(crate) fn LANES() {}", true)], [0, 1, 1]);
+        assert_eq!(
+            [
+                of(constant, true),
+                of(constant, false),
+                of("pub(crate) fn LANES() {}", true)
+            ],
+            [0, 1, 1]
+        );
     }
 
     #[test]
     fn tests_make_no_circle() {
         let a = ("c/src/a.rs", "use super::b::f;\nfn g() {}\n");
-        let b = ("c/src/b.rs", "pub fn f() {}\n\n#[cfg(test)]\nmod tests {\n    use crate::a::g;\n}\n");
+        let b = (
+            "c/src/b.rs",
+            "pub fn f() {}\n\n#[cfg(test)]\nmod tests {\n    use crate::a::g;\n}\n",
+        );
         assert!(found(&[a, b], false).is_empty());
         let c = (
             "c/src/b.rs",

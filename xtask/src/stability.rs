@@ -34,17 +34,38 @@ pub(crate) struct Options {
 /// A case that did not end as it must, an unusable output.
 pub(crate) fn run(options: &Options) -> Outcome {
     let start = Instant::now();
-    println!("{:<8} {:<50} {:<7} {:>7}  {:<30} outcome", "crate", "case", "verdict", "time", "expected");
-    let named = |name: &str| options.only.as_ref().is_none_or(|word| name.contains(word.as_str()));
-    let rows = rows(|_, case| named(case.name) && !(case.long && options.profile == Profile::Quick));
+    println!(
+        "{:<8} {:<50} {:<7} {:>7}  {:<30} outcome",
+        "crate", "case", "verdict", "time", "expected"
+    );
+    let named = |name: &str| {
+        options
+            .only
+            .as_ref()
+            .is_none_or(|word| name.contains(word.as_str()))
+    };
+    let rows =
+        rows(|_, case| named(case.name) && !(case.long && options.profile == Profile::Quick));
     for Row { part, case, ended } in &rows {
         let (name, verdict, expected) = (case.name, verdict(ended), case.expected.to_string());
-        println!("{part:<8} {name:<50} {verdict:<7} {:>5.1} s  {expected:<30} {}", ended.took_s, ended.outcome);
+        println!(
+            "{part:<8} {name:<50} {verdict:<7} {:>5.1} s  {expected:<30} {}",
+            ended.took_s, ended.outcome
+        );
     }
-    let folder = options.out.clone().unwrap_or_else(|| root().join("target/stability"));
+    let folder = options
+        .out
+        .clone()
+        .unwrap_or_else(|| root().join("target/stability"));
     let origin = provenance(&format!("profile = \"{}\"\n", options.profile.name()), 1);
-    Rendered::new(&table(&rows), &picture(&rows), &origin)?.files_in(&folder, "stability")?.commit()?;
-    let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
+    Rendered::new(&table(&rows), &picture(&rows), &origin)?
+        .files_in(&folder, "stability")?
+        .commit()?;
+    let missed: Vec<&str> = rows
+        .iter()
+        .filter(|row| !row.ended.passes)
+        .map(|row| row.case.name)
+        .collect();
     println!(
         "{} of {} cases end as they must, in {:.1} s; {}",
         rows.len() - missed.len(),
@@ -83,12 +104,16 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
     );
     let of = |accept: &dyn Fn(&Row) -> bool, height: &dyn Fn(&Row) -> f64| -> Vec<(f64, f64)> {
         let chosen = rows.iter().enumerate().filter(|(_, row)| accept(row));
-        chosen.map(|(number, row)| (number as f64 + 1.0, height(row))).collect()
+        chosen
+            .map(|(number, row)| (number as f64 + 1.0, height(row)))
+            .collect()
     };
     let is_number = |row: &Row| row.ended.used.is_finite();
     for (colour, (part, _)) in PARTS.into_iter().enumerate() {
-        let numbers =
-            of(&|row| row.part == part && row.ended.passes && is_number(row), &|row| row.ended.used.max(FLOOR));
+        let numbers = of(
+            &|row| row.part == part && row.ended.passes && is_number(row),
+            &|row| row.ended.used.max(FLOOR),
+        );
         plot = plot.with(Series::new(part, Style::Markers, numbers).in_colour(colour));
     }
     let refused = of(&|row| row.ended.passes && !is_number(row), &|_| 0.5 * FLOOR);
@@ -109,10 +134,19 @@ mod tests {
     #[test]
     fn a_case_that_is_missed_stands_in_the_table_and_in_the_picture() {
         let case = Extreme::at_most("a", "b", "c", 1.0, || Ok(2.0));
-        let rows = [Row { part: "les", ended: case.run(), case }];
+        let rows = [Row {
+            part: "les",
+            ended: case.run(),
+            case,
+        }];
         let origin = provenance("", 0);
         let text = table(&rows).to_csv(&origin).unwrap();
         assert!(text.ends_with("a,les,b,2,at most 1,fail,c,2.0\n"), "{text}");
-        assert!(picture(&rows).svg(&origin).unwrap().contains("not as it must be"));
+        assert!(
+            picture(&rows)
+                .svg(&origin)
+                .unwrap()
+                .contains("not as it must be")
+        );
     }
 }

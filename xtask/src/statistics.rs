@@ -49,7 +49,11 @@ impl Estimate {
         let without: Vec<f64> = (0..batches).map(|batch| function(Some(batch))).collect();
         let mean = without.iter().sum::<f64>() / n;
         let squares: f64 = without.iter().map(|x| (x - mean).powi(2)).sum();
-        Self { value: function(None), standard_error: ((n - 1.0) / n * squares).sqrt(), freedom: n - 1.0 }
+        Self {
+            value: function(None),
+            standard_error: ((n - 1.0) / n * squares).sqrt(),
+            freedom: n - 1.0,
+        }
     }
 
     /// The mean of independent numbers.
@@ -64,12 +68,20 @@ impl Estimate {
 
     /// A number of many parts whose error is known from their law.
     pub(crate) fn stated(value: f64, standard_error: f64) -> Self {
-        Self { value, standard_error, freedom: f64::INFINITY }
+        Self {
+            value,
+            standard_error,
+            freedom: f64::INFINITY,
+        }
     }
 
     /// The same in another unit.
     pub(crate) fn times(self, factor: f64) -> Self {
-        Self { value: factor * self.value, standard_error: factor.abs() * self.standard_error, ..self }
+        Self {
+            value: factor * self.value,
+            standard_error: factor.abs() * self.standard_error,
+            ..self
+        }
     }
 
     /// Half of the interval that holds the truth with 95 %.
@@ -89,7 +101,12 @@ impl Estimate {
 
 /// The mean of some numbers without one of them.
 pub(crate) fn mean(of: &[f64], without: Option<usize>) -> f64 {
-    let kept = || of.iter().enumerate().filter(|(i, _)| Some(*i) != without).map(|(_, x)| x);
+    let kept = || {
+        of.iter()
+            .enumerate()
+            .filter(|(i, _)| Some(*i) != without)
+            .map(|(_, x)| x)
+    };
     kept().sum::<f64>() / kept().count() as f64
 }
 
@@ -112,11 +129,14 @@ impl Bar {
     /// them fails by chance is not, so it fails by the interval of all.
     pub(crate) fn verdict_among(self, of: &Estimate, parts: usize) -> Verdict {
         let ends = |half_width: f64| (of.value - half_width, of.value + half_width);
-        let ((low, high), (lowest, highest)) = (ends(of.half_width()), ends(of.half_width_of(parts)));
+        let ((low, high), (lowest, highest)) =
+            (ends(of.half_width()), ends(of.half_width_of(parts)));
         let (holds, fails) = match self {
             Self::Below(bar) => (high < bar, lowest > bar),
             Self::Above(bar) => (low > bar, highest < bar),
-            Self::Between(least, most) => (low > least && high < most, highest < least || lowest > most),
+            Self::Between(least, most) => {
+                (low > least && high < most, highest < least || lowest > most)
+            }
             Self::Less(trifle) => (high < 0.0, lowest > -trifle),
         };
         match (of.freedom + 1.5 > BATCHES as f64, holds, fails) {
@@ -135,7 +155,11 @@ impl Bar {
             Self::Less(trifle) => off(0.0).max(off(-trifle)),
         };
         let times = (of.half_width() / reach).powi(2);
-        if times.is_nan() { f64::INFINITY } else { times.max(BATCHES as f64 / (of.freedom + 1.0)) }
+        if times.is_nan() {
+            f64::INFINITY
+        } else {
+            times.max(BATCHES as f64 / (of.freedom + 1.0))
+        }
     }
 }
 
@@ -155,12 +179,17 @@ pub(crate) fn with_error(value: f64, error: f64) -> String {
 
 /// Decimals of a number of two digits; of what is zero or no number, three.
 fn decimals(error: f64) -> usize {
-    if error.is_finite() && error > 0.0 { (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize } else { 3 }
+    if error.is_finite() && error > 0.0 {
+        (1.0 - error.log10().floor()).clamp(0.0, 12.0) as usize
+    } else {
+        3
+    }
 }
 
 /// Student's factor of a two-sided interval.
 fn student(confidence: f64, freedom: f64) -> f64 {
-    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, 1e4)).map_or(f64::NAN, |law| law.inverse_cdf(0.5 + 0.5 * confidence))
+    StudentsT::new(0.0, 1.0, freedom.clamp(1.0, 1e4))
+        .map_or(f64::NAN, |law| law.inverse_cdf(0.5 + 0.5 * confidence))
 }
 
 #[cfg(test)]
@@ -171,7 +200,12 @@ mod tests {
 
     #[test]
     fn numbers_have_the_digits_of_their_error() {
-        let found = [with_error(12.3456, 0.0321), with_error(-1.0, 4.56), with_error(1234.5, 67.0), two_digits(0.2)];
+        let found = [
+            with_error(12.3456, 0.0321),
+            with_error(-1.0, 4.56),
+            with_error(1234.5, 67.0),
+            two_digits(0.2),
+        ];
         assert_eq!(found, ["12.346 ± 0.032", "-1.0 ± 4.6", "1234 ± 67", "0.20"]);
         assert_eq!(with_error(0.5, f64::NAN), "0.500 ± unknown");
         assert_eq!(with_error(f64::NAN, 0.1), "not known");
@@ -179,9 +213,17 @@ mod tests {
 
     #[test]
     fn factors_are_those_of_tables() {
-        let tables = [(0.95, 1.0, 12.706), (0.95, 7.0, 2.3646), (0.95, 30.0, 2.0423), (0.99, 7.0, 3.4995)];
+        let tables = [
+            (0.95, 1.0, 12.706),
+            (0.95, 7.0, 2.3646),
+            (0.95, 30.0, 2.0423),
+            (0.99, 7.0, 3.4995),
+        ];
         for (confidence, freedom, factor) in tables {
-            assert!((student(confidence, freedom) / factor - 1.0).abs() < 2e-4, "{confidence} {freedom}");
+            assert!(
+                (student(confidence, freedom) / factor - 1.0).abs() < 2e-4,
+                "{confidence} {freedom}"
+            );
         }
         assert!((student(0.95, f64::INFINITY) - 1.96).abs() < 1e-3);
     }
@@ -197,17 +239,25 @@ mod tests {
         let trials = 2000;
         let covered = (0..trials).filter(|_| {
             let mut batch = || (0..60).map(|_| square()).sum::<f64>() / 60.0;
-            let (a, b): (Vec<f64>, Vec<f64>) = (0..BATCHES).map(|_| (2.0 * batch(), batch())).unzip();
+            let (a, b): (Vec<f64>, Vec<f64>) =
+                (0..BATCHES).map(|_| (2.0 * batch(), batch())).unzip();
             let ratio = Estimate::of(BATCHES, |without| mean(&a, without) / mean(&b, without));
             (ratio.value - 2.0).abs() < ratio.half_width()
         });
         let share = covered.count() as f64 / f64::from(trials);
-        assert!((share - 0.95).abs() < 3.0 * (0.95_f64 * 0.05 / f64::from(trials)).sqrt() + 0.005, "{share}");
+        assert!(
+            (share - 0.95).abs() < 3.0 * (0.95_f64 * 0.05 / f64::from(trials)).sqrt() + 0.005,
+            "{share}"
+        );
     }
 
     #[test]
     fn bars_decide_beyond_the_interval_only_and_with_eight_batches() {
-        let of = |value: f64, standard_error: f64, freedom: f64| Estimate { value, standard_error, freedom };
+        let of = |value: f64, standard_error: f64, freedom: f64| Estimate {
+            value,
+            standard_error,
+            freedom,
+        };
         let cases = [
             (Bar::Less(0.03), of(-0.3, 0.1, 7.0), Verdict::Pass),
             (Bar::Less(0.03), of(-0.3, 0.1, 6.0), Verdict::Open),
@@ -224,7 +274,8 @@ mod tests {
             assert_eq!(bar.verdict(&estimate), verdict, "{bar:?} {estimate:?}");
         }
         // Of four that must hold together one fails beyond the interval of all, and holds beyond its own.
-        let [fails, holds] = [of(1.09, 0.03, 7.0), of(0.92, 0.03, 7.0)].map(|e| Bar::Below(1.0).verdict_among(&e, 4));
+        let [fails, holds] = [of(1.09, 0.03, 7.0), of(0.92, 0.03, 7.0)]
+            .map(|e| Bar::Below(1.0).verdict_among(&e, 4));
         assert_eq!([fails, holds], [Verdict::Open, Verdict::Pass]);
         // Four times the data halve the interval.
         let estimate = of(0.9, 0.1, 7.0);

@@ -16,12 +16,19 @@ use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use wakescope_sim::Silent;
-use wakescope_sim::flow::{self, Begin, CaseFile, CaseKind, FileFormat, FinishedWake, FlowCase, Subgrid, WakePreset};
+use wakescope_sim::flow::{
+    self, Begin, CaseFile, CaseKind, FileFormat, FinishedWake, FlowCase, Subgrid, WakePreset,
+};
 
 /// Ages of the cross-planes that are kept, for pictures that move.
 const SERIES_EVERY: f64 = 0.1;
 /// What computes and writes a wake.
-const COMPUTED_BY: [&str; 4] = ["crates/les/src", "crates/sim/src/flow", "crates/sim/src/io", "Cargo.lock"];
+const COMPUTED_BY: [&str; 4] = [
+    "crates/les/src",
+    "crates/sim/src/flow",
+    "crates/sim/src/io",
+    "Cargo.lock",
+];
 /// What `bless` calls the stored wake; where it is, and the ages of its cross-planes.
 pub(crate) const NAME: &str = "wake";
 const STORED: &str = "tests/reference/wake";
@@ -61,7 +68,11 @@ pub(crate) fn of(context: &Context) -> Result<FinishedWake, Failure> {
         (Some(folder), _) => Ok(FinishedWake::read(folder)?),
         (None, Profile::Quick) => Ok(FinishedWake::read(&root().join(STORED))?),
         (None, Profile::Standard) => run(&pictured(stored()), &context.stages, context.anew),
-        (None, Profile::Full) => run(&pictured(WakePreset::Chapter.case()), &context.stages, context.anew),
+        (None, Profile::Full) => run(
+            &pictured(WakePreset::Chapter.case()),
+            &context.stages,
+            context.anew,
+        ),
     }
 }
 
@@ -71,7 +82,10 @@ pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
         return of(context);
     }
     let mut case = WakePreset::Coarse.case();
-    case.solver.subgrid = Subgrid::MultiscaleWale { constant: None, order: None };
+    case.solver.subgrid = Subgrid::MultiscaleWale {
+        constant: None,
+        order: None,
+    };
     if let Some(output) = &mut case.wake {
         (output.end_tau, output.planes_tau) = (EARLY_TAU, Some(vec![EARLY_TAU]));
     }
@@ -80,8 +94,15 @@ pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
 
 /// Mean of both vortices against tau, the left one times a sign.
 pub(crate) fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
-    let (left, right) = (wake.curve(&format!("{name}_left"))?, wake.curve(&format!("{name}_right"))?);
-    Ok(left.iter().zip(right).map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1))).collect())
+    let (left, right) = (
+        wake.curve(&format!("{name}_left"))?,
+        wake.curve(&format!("{name}_right"))?,
+    );
+    Ok(left
+        .iter()
+        .zip(right)
+        .map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1)))
+        .collect())
 }
 
 /// Writes the stored wake anew.
@@ -89,11 +110,20 @@ pub(crate) fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f6
 /// # Errors
 /// A run that fails, a folder that cannot be written.
 pub(crate) fn bless() -> Outcome {
-    let from = run(&stored(), &root().join("target/figures-cache/stages"), false)?.folder;
+    let from = run(
+        &stored(),
+        &root().join("target/figures-cache/stages"),
+        false,
+    )?
+    .folder;
     let to = root().join(STORED);
     std::fs::create_dir_all(&to)?;
     let planes = (1..=STORED_TAU.len()).map(|k| format!("plane1_{k:04}.nc"));
-    for name in ["case.toml", "wake.csv", "wake_scaled.csv"].map(String::from).into_iter().chain(planes) {
+    for name in ["case.toml", "wake.csv", "wake_scaled.csv"]
+        .map(String::from)
+        .into_iter()
+        .chain(planes)
+    {
         std::fs::copy(from.join(&name), to.join(&name))?;
     }
     Ok(())
@@ -102,10 +132,15 @@ pub(crate) fn bless() -> Outcome {
 /// A wake from the cache, or run.
 pub(crate) fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<FinishedWake, Failure> {
     let file = CaseFile::parse(&toml::to_string(case)?, Path::new("wake"))?;
-    let folder = stages.join(format!("wake-{}", cause(&root(), &[&file.hash], &COMPUTED_BY)?));
+    let folder = stages.join(format!(
+        "wake-{}",
+        cause(&root(), &[&file.hash], &COMPUTED_BY)?
+    ));
     let done = folder.join("done");
     {
-        let mut made = MADE.lock().map_err(|_| Failure::new("another figure failed".into()))?;
+        let mut made = MADE
+            .lock()
+            .map_err(|_| Failure::new("another figure failed".into()))?;
         if anew && !made.contains(&folder) && folder.exists() {
             std::fs::remove_dir_all(&folder)?;
         }
@@ -132,7 +167,8 @@ mod tests {
     #[test]
     fn what_is_stored_is_of_the_case_that_is_run_and_has_its_ages() {
         let stored_case = FinishedWake::read(&root().join(STORED)).unwrap().file.toml;
-        let case = CaseFile::parse(&toml::to_string(&stored()).unwrap(), Path::new("wake")).unwrap();
+        let case =
+            CaseFile::parse(&toml::to_string(&stored()).unwrap(), Path::new("wake")).unwrap();
         assert_eq!(stored_case, case.toml);
     }
 }

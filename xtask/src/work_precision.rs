@@ -52,8 +52,11 @@ const GROUPS: [(&str, Rows); 5] = [
 ];
 
 /// Relative errors for which the cheapest settings are sought.
-const TARGETS: [(&str, f64); 3] =
-    [("is_cheapest_for_0.1", 0.10), ("is_cheapest_for_0.03", 0.03), ("is_cheapest_for_0.01", 0.01)];
+const TARGETS: [(&str, f64); 3] = [
+    ("is_cheapest_for_0.1", 0.10),
+    ("is_cheapest_for_0.03", 0.03),
+    ("is_cheapest_for_0.01", 0.01),
+];
 
 /// What a setting came to.
 struct Found {
@@ -85,7 +88,12 @@ pub(crate) struct Row {
 impl Found {
     /// An exact error, all of whose time is told together.
     fn exact(error: f64, cost: Cost) -> Self {
-        Self { error, standard_error: 0.0, cost, set_up_s: 0.0 }
+        Self {
+            error,
+            standard_error: 0.0,
+            cost,
+            set_up_s: 0.0,
+        }
     }
 }
 
@@ -95,14 +103,27 @@ fn settings(
     values: &[f64],
     measure: impl Fn(f64) -> Result<Found, Failure>,
 ) -> Result<Vec<Row>, Failure> {
-    values.iter().map(|value| Ok(Row::new(of, *value, measure(*value)?))).collect()
+    values
+        .iter()
+        .map(|value| Ok(Row::new(of, *value, measure(*value)?)))
+        .collect()
 }
 
 impl Row {
     /// Of a case, a method and a knob.
     fn new(of: [&str; 3], value: f64, found: Found) -> Self {
         let ([case, method, knob], version) = (of.map(String::from), String::new());
-        Self { case, method, knob, value, found, version, group: "", is_on_front: false, is_cheapest: [false; 3] }
+        Self {
+            case,
+            method,
+            knob,
+            value,
+            found,
+            version,
+            group: "",
+            is_on_front: false,
+            is_cheapest: [false; 3],
+        }
     }
 
     fn is_own(&self) -> bool {
@@ -118,7 +139,11 @@ impl Row {
 
 /// The first three of the values if `quick`.
 fn few<T>(values: &[T], quick: bool) -> &[T] {
-    if quick { &values[..values.len().min(3)] } else { values }
+    if quick {
+        &values[..values.len().min(3)]
+    } else {
+        values
+    }
 }
 
 /// The rows of a group or of all, on one thread, with those of other programs; each case at a stretch, this program's judged among their own.
@@ -126,19 +151,31 @@ pub(crate) fn measure(wanted: Option<&str>, quick: bool) -> Result<Vec<Row>, Fai
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build()?;
     let mut others = peers::rows()?;
     let mut all = Vec::new();
-    for (name, rows) in GROUPS.into_iter().filter(|group| wanted.is_none_or(|wanted| wanted == group.0)) {
+    for (name, rows) in GROUPS
+        .into_iter()
+        .filter(|group| wanted.is_none_or(|wanted| wanted == group.0))
+    {
         let mut rows = pool.install(|| rows(quick))?;
         let cases: Vec<String> = rows.iter().map(|row| row.case.clone()).collect();
         rows.extend(others.extract_if(.., |row| cases.contains(&row.case)));
         // In the order in which they were measured, those of other programs after this program's.
-        rows.sort_by_key(|row| (cases.iter().position(|case| *case == row.case), !row.is_own()));
+        rows.sort_by_key(|row| {
+            (
+                cases.iter().position(|case| *case == row.case),
+                !row.is_own(),
+            )
+        });
         for of_case in rows.chunk_by_mut(|a, b| a.case == b.case) {
             let own = of_case.iter().filter(|row| row.is_own()).count();
             let own = &mut of_case[..own];
             let found: Vec<&Found> = own.iter().map(|row| &row.found).collect();
-            let (front, best) = (on_front(&found), TARGETS.map(|(_, target)| cheapest(&found, target)));
+            let (front, best) = (
+                on_front(&found),
+                TARGETS.map(|(_, target)| cheapest(&found, target)),
+            );
             for (place, row) in own.iter_mut().enumerate() {
-                (row.is_on_front, row.is_cheapest) = (front[place], best.map(|best| best == Some(place)));
+                (row.is_on_front, row.is_cheapest) =
+                    (front[place], best.map(|best| best == Some(place)));
             }
         }
         rows.iter_mut().for_each(|row| row.group = name);
@@ -169,7 +206,9 @@ pub(crate) fn table(rows: &[Row]) -> Table {
         .text("group", text(|r| r.group))
         .int("is_on_front", rows.iter().map(|r| r.is_on_front.into()));
     let targets = TARGETS.iter().enumerate();
-    targets.fold(table, |table, (k, target)| table.int(target.0, rows.iter().map(|r| r.is_cheapest[k].into())))
+    targets.fold(table, |table, (k, target)| {
+        table.int(target.0, rows.iter().map(|r| r.is_cheapest[k].into()))
+    })
 }
 
 /// Measures, prints and writes.
@@ -182,26 +221,72 @@ pub(crate) fn run(options: &Options) -> Outcome {
         return Ok(());
     }
     let rows = measure(options.group.as_deref(), options.quick)?;
-    println!("{:<28} {:<34} {:<24} {:>8} {:>22} {:>10}", "case", "method", "knob", "value", "error", "cpu");
+    println!(
+        "{:<28} {:<34} {:<24} {:>8} {:>22} {:>10}",
+        "case", "method", "knob", "value", "error", "cpu"
+    );
     for row in &rows {
-        let Row { case, method, knob, value, found, version, .. } = row;
-        let Found { error, standard_error, cost, .. } = found;
+        let Row {
+            case,
+            method,
+            knob,
+            value,
+            found,
+            version,
+            ..
+        } = row;
+        let Found {
+            error,
+            standard_error,
+            cost,
+            ..
+        } = found;
         let [metric, reference] = row.compared();
-        let (error, cost) = (format!("{error:.2e} +- {standard_error:.1e}"), format!("{:.1e} s", cost.cpu_s));
+        let (error, cost) = (
+            format!("{error:.2e} +- {standard_error:.1e}"),
+            format!("{:.1e} s", cost.cpu_s),
+        );
         let method = format!("{method} {version}");
-        println!("{case:<28} {method:<34} {knob:<24} {value:>8} {error:>22} {cost:>10} {metric}, {reference}");
+        println!(
+            "{case:<28} {method:<34} {knob:<24} {value:>8} {error:>22} {cost:>10} {metric}, {reference}"
+        );
     }
-    let parameters = format!("machine = {:?}\nthreads = 1\nquick = {}\n", machine(), options.quick);
+    let parameters = format!(
+        "machine = {:?}\nthreads = 1\nquick = {}\n",
+        machine(),
+        options.quick
+    );
     let origin = provenance(&parameters, physics::SEED);
-    let folder = options.out.clone().unwrap_or_else(|| root().join("target/work-precision"));
-    Rendered::new(&table(&rows), &picture(&rows), &origin)?.files_in(&folder, "work_precision")?.commit()?;
-    println!("{}\nwrote {}", text(&rows), folder.join("work_precision.csv").display());
+    let folder = options
+        .out
+        .clone()
+        .unwrap_or_else(|| root().join("target/work-precision"));
+    Rendered::new(&table(&rows), &picture(&rows), &origin)?
+        .files_in(&folder, "work_precision")?
+        .commit()?;
+    println!(
+        "{}\nwrote {}",
+        text(&rows),
+        folder.join("work_precision.csv").display()
+    );
     if options.store {
         let book = root().join("docs/src");
-        write_atomic(&book.join("work-precision-results.md"), text(&rows).as_bytes())?;
-        write_atomic(&book.join("images/work_precision.svg"), picture(&rows).svg(&origin)?.as_bytes())?;
-        write_atomic(&book.join("images/work_precision.csv"), table(&rows).to_csv(&origin)?.into_bytes())?;
-        println!("stored the page's text, picture and table in {}", book.display());
+        write_atomic(
+            &book.join("work-precision-results.md"),
+            text(&rows).as_bytes(),
+        )?;
+        write_atomic(
+            &book.join("images/work_precision.svg"),
+            picture(&rows).svg(&origin)?.as_bytes(),
+        )?;
+        write_atomic(
+            &book.join("images/work_precision.csv"),
+            table(&rows).to_csv(&origin)?.into_bytes(),
+        )?;
+        println!(
+            "stored the page's text, picture and table in {}",
+            book.display()
+        );
     }
     Ok(())
 }

@@ -6,19 +6,34 @@ use wakescope_sim::io::Provenance;
 
 /// Provenance of what follows from formulas and the parameters given as TOML.
 pub(crate) fn provenance(parameters: &str, seed: u64) -> Provenance {
-    let (program, scene_hash) = (wakescope_sim::PROGRAM.into(), wakescope_sim::scene::hash_of(parameters));
-    Provenance { program, scene_toml: parameters.into(), scene_hash, seed }
+    let (program, scene_hash) = (
+        wakescope_sim::PROGRAM.into(),
+        wakescope_sim::scene::hash_of(parameters),
+    );
+    Provenance {
+        program,
+        scene_toml: parameters.into(),
+        scene_hash,
+        seed,
+    }
 }
 
 /// Well, unless some are named: then what is wrong with them, in words.
 pub(crate) fn unless(what: &str, named: &[impl ToString]) -> Outcome {
     let named: Vec<String> = named.iter().map(ToString::to_string).collect();
-    if named.is_empty() { Ok(()) } else { Err(Failure::new(format!("{what}: {}", named.join("; ")))) }
+    if named.is_empty() {
+        Ok(())
+    } else {
+        Err(Failure::new(format!("{what}: {}", named.join("; "))))
+    }
 }
 
 /// The root folder of the workspace.
 pub(crate) fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap_or(Path::new(".")).to_owned()
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .unwrap_or(Path::new("."))
+        .to_owned()
 }
 
 /// The folder of what cargo builds.
@@ -28,13 +43,18 @@ pub(crate) fn built() -> PathBuf {
 
 /// The text of a file, by its path from the root.
 pub(crate) fn read(file: &str) -> Result<String, Failure> {
-    std::fs::read_to_string(root().join(file)).map_err(|e| Failure::new(format!("cannot read {file}: {e}")))
+    std::fs::read_to_string(root().join(file))
+        .map_err(|e| Failure::new(format!("cannot read {file}: {e}")))
 }
 
 /// Numbers of a reference file without its comments, row by row.
 pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {
     let text = read(&format!("tests/reference/les/{file}"))?;
     let rows = text.lines().filter(|line| !line.starts_with('#'));
-    let parse = |line: &str| line.split(',').map(|cell| cell.trim().parse().ok()).collect::<Option<Vec<f64>>>();
+    let parse = |line: &str| {
+        line.split(',')
+            .map(|cell| cell.trim().parse().ok())
+            .collect::<Option<Vec<f64>>>()
+    };
     Ok(rows.filter_map(parse).collect())
 }

@@ -23,16 +23,29 @@ fn likelihood(criterion: &mut Criterion) {
         record_samples: 1000,
     };
     let model = ScanModel::new(&setup, |_, _| 1.0, &wake).unwrap();
-    let records = Array2::from_shape_fn((185, 1000), |(i, k)| ((1 + i * 1000 + k) as f64 * 12.9898).sin());
+    let records = Array2::from_shape_fn((185, 1000), |(i, k)| {
+        ((1 + i * 1000 + k) as f64 * 12.9898).sin()
+    });
     let signals = ScanSignals::new(&model, records.view(), 0.5).unwrap();
     let mut group = criterion.benchmark_group("vortex fit");
     group.sample_size(10);
-    group.bench_function("likelihood of 185 lines of 1000 samples with its gradient", |b| {
-        b.iter(|| model.log_likelihood(&signals, &wake, Powers::default()).unwrap());
-    });
+    group.bench_function(
+        "likelihood of 185 lines of 1000 samples with its gradient",
+        |b| {
+            b.iter(|| {
+                model
+                    .log_likelihood(&signals, &wake, Powers::default())
+                    .unwrap()
+            });
+        },
+    );
     let free = FreeParameters::common_circulation();
     group.bench_function("information of every eighth of these lines", |b| {
-        b.iter(|| model.information(&wake, Powers::default(), &free, true, 8).unwrap());
+        b.iter(|| {
+            model
+                .information(&wake, Powers::default(), &free, true, 8)
+                .unwrap()
+        });
     });
     group.finish();
 }

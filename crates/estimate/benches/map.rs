@@ -16,7 +16,16 @@ fn map(criterion: &mut Criterion) {
         x - x.floor() - 0.5 + (2.0106 * n as f64 + ray as f64).cos()
     });
     let elevation_rad: Vec<f64> = (0..200).map(|i| i as f64 * 1.25e-3).collect();
-    let new = || Scan::new(&plan.statistic, &sampling, &gates, &elevation_rad, records.view()).unwrap();
+    let new = || {
+        Scan::new(
+            &plan.statistic,
+            &sampling,
+            &gates,
+            &elevation_rad,
+            records.view(),
+        )
+        .unwrap()
+    };
     let scan = new();
     let points = polar_points(&elevation_rad, &scan.geometry().gate_ranges_m());
     let mut group = criterion.benchmark_group("map of 200 x 200 points");
@@ -24,18 +33,36 @@ fn map(criterion: &mut Criterion) {
     group.bench_function("statistics of all windows", |b| b.iter(new));
     let mut mean = vec![0.0; 64];
     group.bench_function("region means alone, rho = 2 m", |b| {
-        b.iter(|| points.iter().map(|point| scan.region_mean(*point, 2.0, &mut mean).unwrap()).sum::<usize>());
+        b.iter(|| {
+            points
+                .iter()
+                .map(|point| scan.region_mean(*point, 2.0, &mut mean).unwrap())
+                .sum::<usize>()
+        });
     });
     let radius = Radius::Fixed { radius_m: 2.0 };
     group.bench_function("means and velocities, rho = 2 m", |b| {
         b.iter(|| scan.map(&points, &radius, None, &plan.estimator).unwrap());
     });
     let found = scan.map(&points, &radius, None, &plan.estimator).unwrap();
-    let map = Array2::from_shape_vec((200, 200), found.iter().map(|p| p.estimate.velocity_m_s).collect()).unwrap();
+    let map = Array2::from_shape_vec(
+        (200, 200),
+        found.iter().map(|p| p.estimate.velocity_m_s).collect(),
+    )
+    .unwrap();
     let (noise, guess) = (map.mapv(|v| 0.1 * v), Array2::zeros(map.dim()));
     let options = ShrinkageOptions::for_map(0.5, 0.6, 2.0, 15.0).unwrap();
     group.bench_function("shrinkage to a guess", |b| {
-        b.iter(|| shrink_to_guess(map.view(), noise.view(), guess.view(), guess.view(), &options).unwrap());
+        b.iter(|| {
+            shrink_to_guess(
+                map.view(),
+                noise.view(),
+                guess.view(),
+                guess.view(),
+                &options,
+            )
+            .unwrap()
+        });
     });
     group.finish();
 }

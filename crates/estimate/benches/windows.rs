@@ -5,11 +5,15 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use num_complex::Complex;
 use std::hint::black_box;
-use wakescope_estimate::{Sampling, Scratch, SignalKind, Weighting, bound::*, estimators::*, models::*, spectrum::*};
+use wakescope_estimate::{
+    Sampling, Scratch, SignalKind, Weighting, bound::*, estimators::*, models::*, spectrum::*,
+};
 
 fn window() -> Vec<f64> {
     let turn = std::f64::consts::TAU * 80e6 / 250e6;
-    (0..64).map(|n| (turn * n as f64).cos() + 0.3 * (n as f64 * 12.9898).sin()).collect()
+    (0..64)
+        .map(|n| (turn * n as f64).cos() + 0.3 * (n as f64 * 12.9898).sin())
+        .collect()
 }
 
 fn windows(criterion: &mut Criterion) {
@@ -20,7 +24,10 @@ fn windows(criterion: &mut Criterion) {
     let mut lags = vec![0.0; 64];
     plan.statistic.evaluate(&real, &mut scratch, &mut lags);
     criterion.bench_function("correlogram, 64 real samples", |b| {
-        b.iter(|| plan.statistic.evaluate(black_box(&real), &mut scratch, &mut lags));
+        b.iter(|| {
+            plan.statistic
+                .evaluate(black_box(&real), &mut scratch, &mut lags)
+        });
     });
     let statistic = Correlogram::<Complex<f64>>::new(Weighting::default(), 64).unwrap();
     let mut complex_lags = vec![0.0; 128];
@@ -30,31 +37,62 @@ fn windows(criterion: &mut Criterion) {
     criterion.bench_function("spectrum of 1024 points and peak", |b| {
         b.iter(|| plan.estimator.estimate(black_box(&lags), &mut scratch));
     });
-    let exact = PeriodogramOptions { refinement: Refinement::Exact, ..PeriodogramOptions::default() };
+    let exact = PeriodogramOptions {
+        refinement: Refinement::Exact,
+        ..PeriodogramOptions::default()
+    };
     let exact = PeriodogramPlan::<f64>::new(&sampling, 64, &exact).unwrap();
     criterion.bench_function("the same with exact refinement", |b| {
         b.iter(|| exact.estimator.estimate(black_box(&lags), &mut scratch));
     });
     let (mut model, mut work) = (Autoregression::default(), Vec::new());
     criterion.bench_function("Levinson recursion of order 16", |b| {
-        b.iter(|| model.fit(black_box(&lags), SignalKind::Real, 16, &mut work).unwrap());
+        b.iter(|| {
+            model
+                .fit(black_box(&lags), SignalKind::Real, 16, &mut work)
+                .unwrap()
+        });
     });
     let sliding = ShortCorrelogram::<f64>::new(64, 17).unwrap();
-    let record: Vec<f64> = (0..1063).map(|n| (2.0106 * n as f64).cos() + 0.3 * (n as f64 * 12.9898).sin()).collect();
+    let record: Vec<f64> = (0..1063)
+        .map(|n| (2.0106 * n as f64).cos() + 0.3 * (n as f64 * 12.9898).sin())
+        .collect();
     criterion.bench_function("sliding correlogram of 17 lags, 1000 windows", |b| {
         b.iter(|| {
             let mut sum = 0.0;
-            sliding.evaluate_record(black_box(&record), 0, 1, &|_| true, &mut scratch, &mut |_, lags| sum += lags[16]);
+            sliding.evaluate_record(
+                black_box(&record),
+                0,
+                1,
+                &|_| true,
+                &mut scratch,
+                &mut |_, lags| sum += lags[16],
+            );
             sum
         });
     });
-    let ca = ModelPeak::new(ModelReading::Spectrum, &sampling, SignalKind::Real, 64, 16, 2048, Refinement::Parabola)
-        .unwrap();
+    let ca = ModelPeak::new(
+        ModelReading::Spectrum,
+        &sampling,
+        SignalKind::Real,
+        64,
+        16,
+        2048,
+        Refinement::Parabola,
+    )
+    .unwrap();
     criterion.bench_function("AR(16), spectrum of 2048 points and peak", |b| {
         b.iter(|| ca.estimate(black_box(&lags), &mut scratch));
     });
-    let lag_window =
-        LagWindowPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 16, 1024, Refinement::Parabola).unwrap();
+    let lag_window = LagWindowPeak::new(
+        &sampling,
+        SignalKind::Real,
+        &unweighted_lags(64),
+        16,
+        1024,
+        Refinement::Parabola,
+    )
+    .unwrap();
     criterion.bench_function("Hann lag window, spectrum of 1024 points and peak", |b| {
         b.iter(|| lag_window.estimate(black_box(&lags), &mut scratch));
     });
@@ -62,14 +100,25 @@ fn windows(criterion: &mut Criterion) {
     let mut tapers = likelihood_tapers(&model, 10.0).unwrap();
     tapers.truncate(4);
     let likelihood = Correlogram::<f64>::with_tapers(tapers).unwrap();
-    criterion.bench_function("likelihood of 4 tapers, with the peak of 1024 points", |b| {
-        b.iter(|| {
-            likelihood.evaluate(black_box(&real), &mut scratch, &mut lags);
-            plan.estimator.estimate(&lags, &mut scratch)
-        });
-    });
-    let capon =
-        ModelPeak::new(ModelReading::Capon, &sampling, SignalKind::Real, 64, 16, 1024, Refinement::Parabola).unwrap();
+    criterion.bench_function(
+        "likelihood of 4 tapers, with the peak of 1024 points",
+        |b| {
+            b.iter(|| {
+                likelihood.evaluate(black_box(&real), &mut scratch, &mut lags);
+                plan.estimator.estimate(&lags, &mut scratch)
+            });
+        },
+    );
+    let capon = ModelPeak::new(
+        ModelReading::Capon,
+        &sampling,
+        SignalKind::Real,
+        64,
+        16,
+        1024,
+        Refinement::Parabola,
+    )
+    .unwrap();
     criterion.bench_function("Capon of 17 samples, 1024 points and peak", |b| {
         b.iter(|| capon.estimate(black_box(&lags), &mut scratch));
     });

@@ -9,8 +9,8 @@
 use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::{
-    Error, Estimator, GateVelocity, Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sampling, Scan, Scratch,
-    Statistic, estimators::Quality, polar_points,
+    Error, Estimator, GateVelocity, Gates, PeriodogramOptions, PeriodogramPlan, Radius, Sampling,
+    Scan, Scratch, Statistic, estimators::Quality, polar_points,
 };
 
 /// Lags 1 and 2 of complex windows: the phase of the second is finer, the first says in which turn it is.
@@ -29,7 +29,11 @@ impl Statistic<Complex<f64>> for TwoLags {
     fn evaluate(&self, window: &[Complex<f64>], _: &mut Scratch, out: &mut [f64]) {
         for (lag, place) in out.chunks_mut(2).enumerate() {
             let ahead = &window[lag + 1..];
-            let sum: Complex<f64> = ahead.iter().zip(window).map(|(ahead, behind)| ahead * behind.conj()).sum();
+            let sum: Complex<f64> = ahead
+                .iter()
+                .zip(window)
+                .map(|(ahead, behind)| ahead * behind.conj())
+                .sum();
             place.copy_from_slice(&[sum.re, sum.im]);
         }
     }
@@ -40,7 +44,10 @@ impl Estimator for TwoLags {
         4
     }
     fn estimate(&self, mean: &[f64], _: &mut Scratch) -> GateVelocity {
-        let (first, second) = (Complex::new(mean[0], mean[1]), Complex::new(mean[2], mean[3]));
+        let (first, second) = (
+            Complex::new(mean[0], mean[1]),
+            Complex::new(mean[2], mean[3]),
+        );
         if first.norm() == 0.0 {
             return GateVelocity::none(Quality::NoSignal);
         }
@@ -71,20 +78,40 @@ fn main() -> Result<(), Error> {
     let gates = Gates::new(48, 4, 3e-6)?;
     let elevation_rad: Vec<f64> = (0..8).map(|line| 2e-3 * f64::from(line)).collect();
     let records = made_up(&sampling);
-    let own = TwoLags { sampling, window_samples: gates.window_samples };
-    let plan = PeriodogramPlan::<Complex<f64>>::new(&sampling, gates.window_samples, &PeriodogramOptions::default())?;
+    let own = TwoLags {
+        sampling,
+        window_samples: gates.window_samples,
+    };
+    let plan = PeriodogramPlan::<Complex<f64>>::new(
+        &sampling,
+        gates.window_samples,
+        &PeriodogramOptions::default(),
+    )?;
     let scans = (
         Scan::new(&own, &sampling, &gates, &elevation_rad, records.view())?,
-        Scan::new(&plan.statistic, &sampling, &gates, &elevation_rad, records.view())?,
+        Scan::new(
+            &plan.statistic,
+            &sampling,
+            &gates,
+            &elevation_rad,
+            records.view(),
+        )?,
     );
     let points = polar_points(&elevation_rad, &[550.0, 600.0]);
     let radius = Radius::Fixed { radius_m: 2.0 };
-    let maps = (scans.0.map(&points, &radius, None, &own)?, scans.1.map(&points, &radius, None, &plan.estimator)?);
+    let maps = (
+        scans.0.map(&points, &radius, None, &own)?,
+        scans.1.map(&points, &radius, None, &plan.estimator)?,
+    );
     println!("elevation_rad,range_m,level,own_m_s,periodogram_m_s");
     for ((point, own), other) in points.iter().zip(&maps.0).zip(&maps.1) {
         println!(
             "{:.3},{:.0},{},{:.3},{:.3}",
-            point.elevation_rad, point.range_m, own.level, own.estimate.velocity_m_s, other.estimate.velocity_m_s
+            point.elevation_rad,
+            point.range_m,
+            own.level,
+            own.estimate.velocity_m_s,
+            other.estimate.velocity_m_s
         );
     }
     Ok(())

@@ -16,20 +16,36 @@ use wakescope_estimate::vortex_fit::{Follower, LiftSlope, RangeKernel, Wake, Wak
 fn main() -> Result<(), Box<dyn Error>> {
     // What an instrument's data sheet says: a 200 ns pulse, windows of 64 samples at 250 MHz.
     let (pulse_sigma_s, window, period_s) = (120.1e-9, [1.0; 64], 4e-9);
-    let gate = Gate::Kernel(RangeKernel::gaussian_gate(pulse_sigma_s, &window, period_s, 1.2)?);
-    let options = RetrievalOptions { gate, ..Default::default() };
+    let gate = Gate::Kernel(RangeKernel::gaussian_gate(
+        pulse_sigma_s,
+        &window,
+        period_s,
+        1.2,
+    )?);
+    let options = RetrievalOptions {
+        gate,
+        ..Default::default()
+    };
     let map = match std::env::args().nth(1) {
         Some(path) => read(&path)?,
         None => made_up(&options.model)?,
     };
     let begin = std::time::Instant::now();
     let found = fit_scan(&map, &options)?;
-    println!("vortex,circulation_m2_s,std,gamma_5_15_m2_s,std,lateral_position_m,std,height_m,std,core_radius_m,std");
+    println!(
+        "vortex,circulation_m2_s,std,gamma_5_15_m2_s,std,lateral_position_m,std,height_m,std,core_radius_m,std"
+    );
     for vortex in &found.vortices {
         print!("{:?}", vortex.side);
         let (circulation, mean) = (vortex.circulation_m2_s, vortex.circulation_5_15_m2_s);
-        for number in
-            [circulation, mean, vortex.lateral_position_m, vortex.height_m].into_iter().chain(vortex.core_radius_m)
+        for number in [
+            circulation,
+            mean,
+            vortex.lateral_position_m,
+            vortex.height_m,
+        ]
+        .into_iter()
+        .chain(vortex.core_radius_m)
         {
             print!(",{:.2},{:.2}", number.value, number.std);
         }
@@ -46,7 +62,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         begin.elapsed().as_secs_f64()
     );
     if let Some(wake) = found.wake {
-        let follower = Follower { span_m: 34.0, aspect_ratio: 9.4, speed_m_s: 70.0, slope: LiftSlope::Span };
+        let follower = Follower {
+            span_m: 34.0,
+            aspect_ratio: 9.4,
+            speed_m_s: 70.0,
+            slope: LiftSlope::Span,
+        };
         let at_m = (wake.right.lateral_position_m, wake.right.height_m);
         println!(
             "# rolling-moment coefficient of a wing of 34 m in the right vortex: {:.3} (slope of the lift 2 pi A/(A + 2))",
@@ -58,10 +79,14 @@ fn main() -> Result<(), Box<dyn Error>> {
 
 fn read(path: &str) -> Result<ScanMap, Box<dyn Error>> {
     let (mut elevations_rad, mut ranges_m, mut velocities) = (vec![], vec![], vec![]);
-    for line in
-        std::fs::read_to_string(path)?.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
+    for line in std::fs::read_to_string(path)?
+        .lines()
+        .filter(|l| l.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
     {
-        let numbers: Vec<f64> = line.split(',').map(|field| field.trim().parse()).collect::<Result<_, _>>()?;
+        let numbers: Vec<f64> = line
+            .split(',')
+            .map(|field| field.trim().parse())
+            .collect::<Result<_, _>>()?;
         let [elevation_rad, range_m, velocity_m_s] = numbers[..] else {
             return Err(format!("\"{line}\": three numbers are needed").into());
         };
@@ -80,7 +105,14 @@ fn read(path: &str) -> Result<ScanMap, Box<dyn Error>> {
 /// A map without times of its lines and without deviations, which are then those of the residuals.
 fn scan(elevation_rad: Vec<f64>, range_m: Vec<f64>, velocity_m_s: Array2<f64>) -> ScanMap {
     let time_s = vec![f64::NAN; elevation_rad.len()];
-    ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s: None, fold_m_s: None }
+    ScanMap {
+        elevation_rad,
+        time_s,
+        range_m,
+        velocity_m_s,
+        sigma_m_s: None,
+        fold_m_s: None,
+    }
 }
 
 /// A wake of 500 m^2/s in a cross wind, with errors of about 1 m/s.
@@ -92,8 +124,14 @@ fn made_up(model: &WakeModel) -> Result<ScanMap, Box<dyn Error>> {
     let velocity_m_s = Array2::from_shape_fn((93, 40), |(line, gate)| {
         // the mean over the gate, roughly, and a number between -1.5 and 1.5
         let seen = (-60..=60).map(|i| {
-            let weight = (-(f64::from(i) / 24.0).powi(2)).exp() / (24.0 * std::f64::consts::PI.sqrt());
-            weight * model.radial_velocity_m_s(&wake, range_m[gate] + f64::from(i), elevation_rad[line])
+            let weight =
+                (-(f64::from(i) / 24.0).powi(2)).exp() / (24.0 * std::f64::consts::PI.sqrt());
+            weight
+                * model.radial_velocity_m_s(
+                    &wake,
+                    range_m[gate] + f64::from(i),
+                    elevation_rad[line],
+                )
         });
         place += 1.0;
         let disturbance = (place * 12.9898).sin() * 43_758.545;

@@ -103,7 +103,9 @@ pub enum Error {
         sigmas_left: f64,
     },
     /// The velocity map shows no vortex pair.
-    #[error("no vortex pair found: the best one has a significance of {significance:.1}, at least {needed} is needed")]
+    #[error(
+        "no vortex pair found: the best one has a significance of {significance:.1}, at least {needed} is needed"
+    )]
     NoVortex {
         /// Significance of the best pair.
         significance: f64,
@@ -121,13 +123,31 @@ pub enum Error {
 }
 
 /// Refuses a number that is not as `allowed` tells.
-pub(crate) fn check(field: &'static str, value: f64, allowed: &'static str, is_allowed: bool) -> Result<(), Error> {
-    if is_allowed { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed }) }
+pub(crate) fn check(
+    field: &'static str,
+    value: f64,
+    allowed: &'static str,
+    is_allowed: bool,
+) -> Result<(), Error> {
+    if is_allowed {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange {
+            field,
+            value,
+            allowed,
+        })
+    }
 }
 
 /// Checks that a number is finite and positive.
 pub(crate) fn positive(field: &'static str, value: f64) -> Result<(), Error> {
-    check(field, value, "finite and above 0", value.is_finite() && value > 0.0)
+    check(
+        field,
+        value,
+        "finite and above 0",
+        value.is_finite() && value > 0.0,
+    )
 }
 
 /// Checks that a number is finite.
@@ -137,7 +157,12 @@ pub(crate) fn finite(field: &'static str, value: f64) -> Result<(), Error> {
 
 /// Checks that a number is finite and not negative.
 pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<(), Error> {
-    check(field, value, "finite and at least 0", value.is_finite() && value >= 0.0)
+    check(
+        field,
+        value,
+        "finite and at least 0",
+        value.is_finite() && value >= 0.0,
+    )
 }
 
 /// Checks that there is at least one.
@@ -152,12 +177,20 @@ pub(crate) fn probability(field: &'static str, value: f64) -> Result<(), Error> 
 
 /// Checks that an argument has elements.
 pub(crate) fn not_empty(field: &'static str, count: usize) -> Result<(), Error> {
-    if count > 0 { Ok(()) } else { Err(Error::Empty { field }) }
+    if count > 0 {
+        Ok(())
+    } else {
+        Err(Error::Empty { field })
+    }
 }
 
 /// Checks that a fit or a test has the velocities that it needs.
 pub(crate) fn enough_velocities(found: usize, needed: usize) -> Result<(), Error> {
-    if found >= needed { Ok(()) } else { Err(Error::TooFewVelocities { found, needed }) }
+    if found >= needed {
+        Ok(())
+    } else {
+        Err(Error::TooFewVelocities { found, needed })
+    }
 }
 
 /// Checks that finite numbers increase.
@@ -168,7 +201,15 @@ pub(crate) fn increasing(field: &'static str, numbers: &[f64]) -> Result<(), Err
 
 /// Checks the length of an array.
 pub(crate) fn length(field: &'static str, expected: usize, found: usize) -> Result<(), Error> {
-    if expected == found { Ok(()) } else { Err(Error::Length { field, expected, found }) }
+    if expected == found {
+        Ok(())
+    } else {
+        Err(Error::Length {
+            field,
+            expected,
+            found,
+        })
+    }
 }
 
 #[cfg(test)]
@@ -177,8 +218,20 @@ mod tests {
 
     #[test]
     fn tiny_and_huge_values_are_told_in_few_digits() {
-        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
-        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+        let told = |value| {
+            Error::OutOfRange {
+                field: "a_m",
+                value,
+                allowed: "positive",
+            }
+            .to_string()
+        };
+        for (value, text) in [
+            (1e-201, "1e-201"),
+            (-3e300, "-3e300"),
+            (0.5, "0.5"),
+            (f64::NAN, "NaN"),
+        ] {
             assert_eq!(told(value), format!("a_m = {text}: must be positive"));
         }
     }

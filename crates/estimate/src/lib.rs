@@ -71,7 +71,8 @@ pub mod window;
 
 pub use error::Error;
 pub use estimators::{
-    Estimator, GateVelocity, PeriodogramOptions, PeriodogramPlan, Refinement, SpectralPeak, Statistic,
+    Estimator, GateVelocity, PeriodogramOptions, PeriodogramPlan, Refinement, SpectralPeak,
+    Statistic,
 };
 pub use map::{Radius, Scan, polar_points};
 pub use spectrum::Correlogram;

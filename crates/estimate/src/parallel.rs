@@ -35,7 +35,9 @@ pub(crate) fn for_each_chunk<W>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        data.par_chunks_mut(size).enumerate().for_each_init(state, |worker, (index, chunk)| f(worker, index, chunk));
+        data.par_chunks_mut(size)
+            .enumerate()
+            .for_each_init(state, |worker, (index, chunk)| f(worker, index, chunk));
     }
     #[cfg(not(feature = "rayon"))]
     {

@@ -17,14 +17,19 @@ fn bench_case(c: &mut Criterion, name: &str, case: &Case) -> Result<(), Error> {
     let (mut flow, _) = case.start()?;
     let cells: usize = flow.mesh().cells().iter().product();
     let mut group = c.benchmark_group("step");
-    group.sample_size(10).throughput(Throughput::Elements(cells as u64));
-    group.bench_function(name, |bench| bench.iter(|| black_box(energy_after(&mut flow))));
+    group
+        .sample_size(10)
+        .throughput(Throughput::Elements(cells as u64));
+    group.bench_function(name, |bench| {
+        bench.iter(|| black_box(energy_after(&mut flow)))
+    });
     group.finish();
     Ok(())
 }
 
 fn energy_after(flow: &mut Flow) -> f64 {
-    flow.step().map_or(f64::NAN, |report| report.kinetic_energy_m5_s2)
+    flow.step()
+        .map_or(f64::NAN, |report| report.kinetic_energy_m5_s2)
 }
 
 fn memory_pass(c: &mut Criterion) {
@@ -48,7 +53,11 @@ fn all(c: &mut Criterion) -> Result<(), Error> {
     bench_case(c, "Taylor-Green 64^3, no model", &vortices)?;
     vortices.settings.subgrid = MULTISCALE;
     bench_case(c, "Taylor-Green 64^3, multiscale model", &vortices)?;
-    let pair = VortexPairCase { cells: [48, 96, 64], slip_sides: true, ..VortexPairCase::coarse() };
+    let pair = VortexPairCase {
+        cells: [48, 96, 64],
+        slip_sides: true,
+        ..VortexPairCase::coarse()
+    };
     let mut wake = pair.case(TimeStep::Fixed { step_s: 1e-3 })?;
     wake.settings.subgrid = MULTISCALE;
     // One pressure solve per step, as in the other flows.
@@ -56,7 +65,11 @@ fn all(c: &mut Criterion) -> Result<(), Error> {
     bench_case(c, "pair above ground 48 x 96 x 64, multiscale model", &wake)?;
     wake.settings.pressure = PressureMethod::Multigrid;
     wake.settings.pressure_tolerance = 1e-6;
-    bench_case(c, "pair above ground 48 x 96 x 64, multiscale model, multigrid", &wake)?;
+    bench_case(
+        c,
+        "pair above ground 48 x 96 x 64, multiscale model, multigrid",
+        &wake,
+    )?;
     coarse_wake(c)
 }
 
@@ -69,18 +82,31 @@ fn coarse_wake(c: &mut Criterion) -> Result<(), Error> {
     let (flow, _) = case.start()?;
     let cells: usize = flow.mesh().cells().iter().product();
     let mut group = c.benchmark_group("step");
-    group.sample_size(10).throughput(Throughput::Elements(cells as u64));
+    group
+        .sample_size(10)
+        .throughput(Throughput::Elements(cells as u64));
     group.bench_function("coarse wake, record", |bench| {
-        bench.iter(|| black_box(meter.measure(&flow).map_or(f64::NAN, |record| record.energy_m4_s2)))
+        bench.iter(|| {
+            black_box(
+                meter
+                    .measure(&flow)
+                    .map_or(f64::NAN, |record| record.energy_m4_s2),
+            )
+        })
     });
     group.finish();
     Ok(())
 }
 
 fn steps(c: &mut Criterion) {
-    let threads = std::env::var("WAKESCOPE_BENCH_THREADS").ok().and_then(|t| t.parse().ok()).unwrap_or(1);
+    let threads = std::env::var("WAKESCOPE_BENCH_THREADS")
+        .ok()
+        .and_then(|t| t.parse().ok())
+        .unwrap_or(1);
     // A second pool cannot be made; the first benchmark decides.
-    let _ = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    let _ = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build_global();
     memory_pass(c);
     all(c).expect("the cases are fixed and valid");
 }

@@ -51,7 +51,11 @@ const BOX_M: f64 = 0.09 * TAU;
 /// Energy of the shell of wave number `shell` \[m^2/s^2\] at a station, by linear interpolation of the logarithms.
 fn measured(shell: usize, station: usize) -> f64 {
     let per_cm = shell as f64 / 9.0;
-    let upper = MEASURED.iter().position(|row| row.0 >= per_cm).unwrap_or(MEASURED.len() - 1).max(1);
+    let upper = MEASURED
+        .iter()
+        .position(|row| row.0 >= per_cm)
+        .unwrap_or(MEASURED.len() - 1)
+        .max(1);
     let (low, high) = (MEASURED[upper - 1], MEASURED[upper]);
     let fraction = (per_cm / low.0).ln() / (high.0 / low.0).ln();
     let logarithm = (1.0 - fraction) * low.1[station].ln() + fraction * high.1[station].ln();
@@ -63,7 +67,11 @@ type Waves = [Vec<Complex<f64>>; 3];
 /// Transforms along all three directions, without scaling.
 fn transform(n: usize, field: &mut [Complex<f64>], forward: bool) {
     let mut planner = FftPlanner::new();
-    let fft = if forward { planner.plan_fft_forward(n) } else { planner.plan_fft_inverse(n) };
+    let fft = if forward {
+        planner.plan_fft_forward(n)
+    } else {
+        planner.plan_fft_inverse(n)
+    };
     let mut line = vec![Complex::default(); n];
     for stride in [1, n, n * n] {
         for start in (0..n * n * n).filter(|place| place / stride % n == 0) {
@@ -80,11 +88,22 @@ fn transform(n: usize, field: &mut [Complex<f64>], forward: bool) {
 
 /// Signed wave numbers of a place in the spectrum.
 fn wave_numbers(n: usize, place: usize) -> [f64; 3] {
-    [place % n, place / n % n, place / (n * n)].map(|i| if 2 * i < n { i as f64 } else { i as f64 - n as f64 })
+    [place % n, place / n % n, place / (n * n)].map(|i| {
+        if 2 * i < n {
+            i as f64
+        } else {
+            i as f64 - n as f64
+        }
+    })
 }
 
 fn shell(n: usize, place: usize) -> usize {
-    wave_numbers(n, place).iter().map(|k| k * k).sum::<f64>().sqrt().round() as usize
+    wave_numbers(n, place)
+        .iter()
+        .map(|k| k * k)
+        .sum::<f64>()
+        .sqrt()
+        .round() as usize
 }
 
 /// Energy of each shell below the cutoff \[m^2/s^2\].
@@ -103,7 +122,8 @@ fn spectrum(n: usize, waves: &Waves) -> Vec<f64> {
 fn waves_of(n: usize, velocity_m_s: &[Vec<f64>; 3]) -> Waves {
     velocity_m_s.each_ref().map(|field| {
         let scale = 1.0 / field.len() as f64;
-        let mut waves: Vec<Complex<f64>> = field.iter().map(|u| Complex::new(scale * u, 0.0)).collect();
+        let mut waves: Vec<Complex<f64>> =
+            field.iter().map(|u| Complex::new(scale * u, 0.0)).collect();
         transform(n, &mut waves, true);
         waves
     })
@@ -115,7 +135,11 @@ fn with_measured_spectrum(n: usize, mut waves: Waves) -> [Vec<f64>; 3] {
     for component in &mut waves {
         for (place, amplitude) in component.iter_mut().enumerate() {
             let shell = shell(n, place);
-            let factor = if shell == 0 || shell >= n / 2 { 0.0 } else { (measured(shell, 0) / present[shell]).sqrt() };
+            let factor = if shell == 0 || shell >= n / 2 {
+                0.0
+            } else {
+                (measured(shell, 0) / present[shell]).sqrt()
+            };
             *amplitude *= factor;
         }
         transform(n, component, false);
@@ -142,10 +166,15 @@ fn faces(flow: &Flow) -> [Vec<f64>; 3] {
 fn start(n: usize, velocity_m_s: &[Vec<f64>; 3], model: SubgridModel) -> Result<Flow, Error> {
     let side = || Direction::periodic(n, 0.0, BOX_M);
     let mesh = Mesh::new(side(), side(), side())?;
-    let time_step = TimeStep::Courant { courant: 0.35, longest_s: 0.01 };
+    let time_step = TimeStep::Courant {
+        courant: 0.35,
+        longest_s: 0.01,
+    };
     let mut settings = FlowSettings::new(VISCOSITY_M2_S, time_step);
     settings.subgrid = model;
-    Ok(Initial::Faces(velocity_m_s.clone()).start(mesh, settings)?.0)
+    Ok(Initial::Faces(velocity_m_s.clone())
+        .start(mesh, settings)?
+        .0)
 }
 
 fn run_to(flow: &mut Flow, end_s: f64) -> Result<(), Error> {
@@ -176,9 +205,10 @@ fn parse(text: &str) -> Option<SubgridModel> {
         ("none", _) => Some(SubgridModel::None),
         ("smagorinsky", Some(constant)) => Some(SubgridModel::Smagorinsky { constant }),
         ("wale", Some(constant)) => Some(SubgridModel::Wale { constant }),
-        ("multi", Some(constant)) => {
-            Some(SubgridModel::MultiscaleWale { constant, order: parts.next()?.parse().ok()? })
-        }
+        ("multi", Some(constant)) => Some(SubgridModel::MultiscaleWale {
+            constant,
+            order: parts.next()?.parse().ok()?,
+        }),
         _ => None,
     }
 }
@@ -187,11 +217,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut arguments = std::env::args().skip(1);
     let n: usize = arguments.next().map_or(Ok(32), |n| n.parse())?;
     let given: Vec<String> = arguments.collect();
-    let models = if given.is_empty() { ["none", "wale:0.5", "multi:0.98:3"].map(String::from).to_vec() } else { given };
+    let models = if given.is_empty() {
+        ["none", "wale:0.5", "multi:0.98:3"]
+            .map(String::from)
+            .to_vec()
+    } else {
+        given
+    };
     let initial = prepare(n)?;
-    println!("model             all 98, 171 M/U   upper third 98, 171 M/U   (resolved energy over measured)");
+    println!(
+        "model             all 98, 171 M/U   upper third 98, 171 M/U   (resolved energy over measured)"
+    );
     for text in models {
-        let model = parse(&text).ok_or_else(|| format!("{text}: none, smagorinsky:C, wale:C or multi:C:ORDER"))?;
+        let model = parse(&text)
+            .ok_or_else(|| format!("{text}: none, smagorinsky:C, wale:C or multi:C:ORDER"))?;
         let mut flow = start(n, &initial, model)?;
         let mut ratios = [[0.0; 2]; 2];
         for station in [1, 2] {
@@ -203,7 +242,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             }
         }
         let [[a, b], [c, d]] = ratios;
-        println!("{text:18}{a:6.3} {b:6.3}      {c:6.3} {d:6.3}     {} steps", flow.steps());
+        println!(
+            "{text:18}{a:6.3} {b:6.3}      {c:6.3} {d:6.3}     {} steps",
+            flow.steps()
+        );
     }
     Ok(())
 }

@@ -269,7 +269,9 @@ pub enum PressureFailure {
         attainable: f64,
     },
     /// The iteration no longer reduces the residual.
-    #[error("the residual no longer falls; take the direct solver, or a mesh whose cells are less flat")]
+    #[error(
+        "the residual no longer falls; take the direct solver, or a mesh whose cells are less flat"
+    )]
     Stalled,
     /// The right side holds a value that is not finite.
     #[error("the right side holds a value that is not finite")]
@@ -283,12 +285,24 @@ pub(crate) fn check(
     allowed: &'static str,
     accept: impl Fn(f64) -> bool,
 ) -> Result<(), Error> {
-    if value.is_finite() && accept(value) { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed }) }
+    if value.is_finite() && accept(value) {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange {
+            field,
+            value,
+            allowed,
+        })
+    }
 }
 
 /// Equal lengths of points and outputs, or [`Error::LengthMismatch`].
 pub(crate) fn check_lengths(points: usize, out: usize) -> Result<(), Error> {
-    if points == out { Ok(()) } else { Err(Error::LengthMismatch { points, out }) }
+    if points == out {
+        Ok(())
+    } else {
+        Err(Error::LengthMismatch { points, out })
+    }
 }
 
 #[cfg(test)]
@@ -297,11 +311,28 @@ mod tests {
 
     #[test]
     fn tiny_and_huge_values_are_told_in_few_digits() {
-        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
-            let error = Error::OutOfRange { field: "a_m", value, allowed: "positive" };
+        for (value, text) in [
+            (1e-201, "1e-201"),
+            (-3e300, "-3e300"),
+            (0.5, "0.5"),
+            (f64::NAN, "NaN"),
+        ] {
+            let error = Error::OutOfRange {
+                field: "a_m",
+                value,
+                allowed: "positive",
+            };
             assert_eq!(error.to_string(), format!("a_m = {text}: must be positive"));
-            let error = Error::BadDirection { axis: "y", what: "length_m".into(), value, allowed: "positive" };
-            assert_eq!(error.to_string(), format!("y direction: length_m = {text}: must be positive"));
+            let error = Error::BadDirection {
+                axis: "y",
+                what: "length_m".into(),
+                value,
+                allowed: "positive",
+            };
+            assert_eq!(
+                error.to_string(),
+                format!("y direction: length_m = {text}: must be positive")
+            );
         }
     }
 }

@@ -55,6 +55,7 @@ pub mod winds;
 pub use error::{EnergyGrowth, Error, Place, PressureFailure};
 #[cfg(feature = "solver")]
 pub use solver::{
-    Direction, Flow, FlowSettings, Mapping, Mesh, Spread, SubgridModel, TimeScheme, TimeStep, Wall, cases,
+    Direction, Flow, FlowSettings, Mapping, Mesh, Spread, SubgridModel, TimeScheme, TimeStep, Wall,
+    cases,
 };
 pub use winds::{CirculationProfile, GridSnapshot, Ground, Motion, VortexPair, Wind};

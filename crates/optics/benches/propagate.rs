@@ -13,8 +13,12 @@ const N: usize = 512;
 fn transform_pair<T: Real>(c: &mut Criterion, name: &str) {
     let mut planner = FftPlanner::<T>::new();
     let (forward, inverse) = (planner.plan_fft_forward(N), planner.plan_fft_inverse(N));
-    let mut scratch =
-        vec![Complex::default(); forward.get_inplace_scratch_len().max(inverse.get_inplace_scratch_len())];
+    let mut scratch = vec![
+        Complex::default();
+        forward
+            .get_inplace_scratch_len()
+            .max(inverse.get_inplace_scratch_len())
+    ];
     let mut a = vec![Complex::new(T::of(1.0), T::of(0.0)); N * N];
     let mut b = a.clone();
     let transpose = |from: &[Complex<T>], to: &mut [Complex<T>]| {
@@ -47,15 +51,25 @@ fn transform_pair<T: Real>(c: &mut Criterion, name: &str) {
 
 fn layer<T: Real>(c: &mut Criterion, name: &str) {
     let grid = Grid::table2();
-    let Ok(propagator) = Propagator::<T>::new(grid, 1.55e-6) else { return };
-    let Ok(transfer) = propagator.transfer(150.0) else { return };
+    let Ok(propagator) = Propagator::<T>::new(grid, 1.55e-6) else {
+        return;
+    };
+    let Ok(transfer) = propagator.transfer(150.0) else {
+        return;
+    };
     let mut work = propagator.work();
-    let phase: Vec<T> = (0..grid.points()).map(|i| T::of((i as f64 * 0.01).sin() * 7.0)).collect();
+    let phase: Vec<T> = (0..grid.points())
+        .map(|i| T::of((i as f64 * 0.01).sin() * 7.0))
+        .collect();
     let mut field = vec![Complex::new(T::of(1.0), T::of(0.0)); grid.points()];
     c.bench_function(name, |bench| {
         bench.iter(|| {
             field[0] = Complex::new(T::of(1.0), T::of(0.0));
-            black_box(propagator.step(&mut field, Some((&phase, T::of(1.0))), &transfer, &mut work).ok())
+            black_box(
+                propagator
+                    .step(&mut field, Some((&phase, T::of(1.0))), &transfer, &mut work)
+                    .ok(),
+            )
         });
     });
 }

@@ -8,7 +8,9 @@ use wakescope_optics::{Grid, VonKarman};
 
 fn pair<T: Real>(c: &mut Criterion, name: &str) {
     let grid = Grid::table2();
-    let Ok(generator) = ScreenGenerator::<T>::new(grid, Arc::new(VonKarman::table2())) else { return };
+    let Ok(generator) = ScreenGenerator::<T>::new(grid, Arc::new(VonKarman::table2())) else {
+        return;
+    };
     let mut work = generator.work();
     let mut first = vec![T::zero(); grid.points()];
     let mut second = first.clone();
@@ -17,7 +19,11 @@ fn pair<T: Real>(c: &mut Criterion, name: &str) {
         bench.iter(|| {
             index += 1;
             let mut rng = stream(1, index, 0);
-            black_box(generator.fill_pair(&mut rng, &mut work, &mut first, &mut second).ok())
+            black_box(
+                generator
+                    .fill_pair(&mut rng, &mut work, &mut first, &mut second)
+                    .ok(),
+            )
         });
     });
 }

@@ -20,14 +20,30 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let seconds = start.elapsed().as_secs_f64();
 
     let table = StructureTable::new(&*run.turbulence.spectrum);
-    println!("Cn2 = {cn2_m_m23:e} m^(-2/3), {} realisations, {seconds:.1} s", estimate.realisations);
-    println!("  R/m  free     grid/exact-1 monostatic          bistatic            exact    z     lost");
+    println!(
+        "Cn2 = {cn2_m_m23:e} m^(-2/3), {} realisations, {seconds:.1} s",
+        estimate.realisations
+    );
+    println!(
+        "  R/m  free     grid/exact-1 monostatic          bistatic            exact    z     lost"
+    );
     for (i, &range_m) in run.range_m.iter().enumerate() {
-        let screens = run.layers.split_at(&run.range_m).screens_to(range_m, &run.turbulence.cn2)?;
-        let exact = theory::bistatic_efficiency_screens(&run.telescope, &run.misalignment, &screens, &table, range_m)?;
+        let screens = run
+            .layers
+            .split_at(&run.range_m)
+            .screens_to(range_m, &run.turbulence.cn2)?;
+        let exact = theory::bistatic_efficiency_screens(
+            &run.telescope,
+            &run.misalignment,
+            &screens,
+            &table,
+            range_m,
+        )?;
         let mono = &estimate.monostatic;
-        let (bi, bi_error) =
-            estimate.bistatic.as_ref().map_or((f64::NAN, f64::NAN), |b| (b.mean[i], b.standard_error[i]));
+        let (bi, bi_error) = estimate
+            .bistatic
+            .as_ref()
+            .map_or((f64::NAN, f64::NAN), |b| (b.mean[i], b.standard_error[i]));
         println!(
             "{range_m:6.0} {:.6} {:+.2e}  {:.6} +- {:.6} {bi:.6} +- {bi_error:.6} {exact:.6} {:+.2} {:.4}",
             estimate.exact_free_space[i],

@@ -12,7 +12,8 @@ use wakescope_optics::{Cn2Path, Misalignment, MonteCarlo, Stop, Telescope, Turbu
 
 /// Cn2 \[m^(-2/3)\] of Hufnagel and Valley, 5/7.
 fn hufnagel_valley(height_m: f64) -> f64 {
-    let high = 0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * height_m).powi(10) * (-height_m / 1000.0).exp();
+    let high =
+        0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * height_m).powi(10) * (-height_m / 1000.0).exp();
     high + 2.7e-16 * (-height_m / 1500.0).exp() + 1.7e-14 * (-height_m / 100.0).exp()
 }
 
@@ -21,16 +22,36 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut next = |default: f64| arguments.next().map_or(Ok(default), |a| a.parse::<f64>());
     let (elevation_deg, tilt_rad, relative_error) = (next(30.0)?, next(5e-6)?, next(0.02)?);
 
-    let height_m: Vec<f64> = (0..=200).map(|i| 3100.0 * (f64::from(i) / 200.0).powi(2)).collect();
+    let height_m: Vec<f64> = (0..=200)
+        .map(|i| 3100.0 * (f64::from(i) / 200.0).powi(2))
+        .collect();
     let cn2_m_m23 = height_m.iter().map(|&h| hufnagel_valley(h)).collect();
     let elevation_rad = elevation_deg.to_radians();
-    let cn2 = Cn2Path::Heights { height_m, cn2_m_m23, telescope_height_m: 2.0, elevation_rad };
-    let turbulence = Turbulence { cn2, ..Turbulence::none() };
-    let (telescope, misalignment) =
-        (Telescope::table2(), Misalignment { tilt_rad: [tilt_rad, 0.0], ..Misalignment::NONE });
+    let cn2 = Cn2Path::Heights {
+        height_m,
+        cn2_m_m23,
+        telescope_height_m: 2.0,
+        elevation_rad,
+    };
+    let turbulence = Turbulence {
+        cn2,
+        ..Turbulence::none()
+    };
+    let (telescope, misalignment) = (
+        Telescope::table2(),
+        Misalignment {
+            tilt_rad: [tilt_rad, 0.0],
+            ..Misalignment::NONE
+        },
+    );
 
     let range_m = vec![500.0, 1000.0, 2000.0];
-    let case = Case { telescope, misalignment, turbulence: turbulence.clone(), realisations: 400 };
+    let case = Case {
+        telescope,
+        misalignment,
+        turbulence: turbulence.clone(),
+        realisations: 400,
+    };
     let plan = case.plan(&range_m)?;
     let run = MonteCarlo {
         misalignment,
@@ -41,9 +62,15 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         sampling: Sampling::Antithetic,
         ..MonteCarlo::table2(0.0, 1)?
     };
-    let stop = Stop { realisations: 4000, relative_standard_error: Some(relative_error) };
+    let stop = Stop {
+        realisations: 4000,
+        relative_standard_error: Some(relative_error),
+    };
     let found = run.run_in::<f32>(stop, |_| ControlFlow::Continue(()))?;
-    println!("{} realisations on {} x {} points", found.realisations, run.grid.nx, run.grid.ny);
+    println!(
+        "{} realisations on {} x {} points",
+        found.realisations, run.grid.nx, run.grid.ny
+    );
     println!("  R/m  free space  independent paths  one path out and back");
     for (i, &range_m) in range_m.iter().enumerate() {
         let free = free_space_efficiency_misaligned(&telescope, &misalignment, range_m)?;

@@ -29,7 +29,10 @@ impl EfficiencyProfile {
     ///
     /// # Errors
     /// What the function returns, and as [`EfficiencyProfile::validated`].
-    pub fn from_theory(range_m: &[f64], mut efficiency: impl FnMut(f64) -> Result<f64, Error>) -> Result<Self, Error> {
+    pub fn from_theory(
+        range_m: &[f64],
+        mut efficiency: impl FnMut(f64) -> Result<f64, Error>,
+    ) -> Result<Self, Error> {
         let mut profile = Self::default();
         for &range_m in range_m {
             profile.push(range_m, [efficiency(range_m)?, 0.0, 0.0]);
@@ -38,7 +41,11 @@ impl EfficiencyProfile {
     }
 
     /// Adds a range with its mean, standard deviation and standard error.
-    pub(crate) fn push(&mut self, range_m: f64, [mean, standard_deviation, standard_error]: [f64; 3]) {
+    pub(crate) fn push(
+        &mut self,
+        range_m: f64,
+        [mean, standard_deviation, standard_error]: [f64; 3],
+    ) {
         self.range_m.push(range_m);
         self.mean.push(mean);
         self.standard_deviation.push(standard_deviation);
@@ -48,7 +55,10 @@ impl EfficiencyProfile {
     /// Range \[m\], mean and standard error, range by range.
     pub fn rows(&self) -> impl Iterator<Item = (f64, f64, f64)> {
         let errors = self.mean.iter().zip(&self.standard_error);
-        self.range_m.iter().zip(errors).map(|(range_m, (mean, error))| (*range_m, *mean, *error))
+        self.range_m
+            .iter()
+            .zip(errors)
+            .map(|(range_m, (mean, error))| (*range_m, *mean, *error))
     }
 
     /// The profile itself when its lists belong together and hold allowed numbers.
@@ -58,7 +68,11 @@ impl EfficiencyProfile {
     pub fn validated(self) -> Result<Self, Error> {
         let expected = self.range_m.len();
         if expected == 0 {
-            return Err(Error::Length { field: "range_m", found: 0, expected: 1 });
+            return Err(Error::Length {
+                field: "range_m",
+                found: 0,
+                expected: 1,
+            });
         }
         let lists = [
             ("mean", &self.mean),
@@ -85,12 +99,20 @@ impl EfficiencyProfile {
     pub fn interpolated(&self, range_m: f64) -> Result<f64, Error> {
         let (x, y) = (&self.range_m, &self.mean);
         if x.is_empty() || y.len() != x.len() {
-            return Err(Error::Length { field: "mean", found: y.len(), expected: x.len().max(1) });
+            return Err(Error::Length {
+                field: "mean",
+                found: y.len(),
+                expected: x.len().max(1),
+            });
         }
         let at = finite("range_m", range_m)?;
         let (first_m, last_m) = (x[0], x[x.len() - 1]);
         if !(first_m..=last_m).contains(&at) {
-            return Err(Error::Extrapolation { range_m: at, first_m, last_m });
+            return Err(Error::Extrapolation {
+                range_m: at,
+                first_m,
+                last_m,
+            });
         }
         if x.len() == 1 {
             return Ok(y[0]);
@@ -111,7 +133,9 @@ impl EfficiencyProfile {
 /// the beam's width changes, about a focus above all; `density` times as many. At a density of 12 monotone cubics between them are
 /// within 1e-3 of the function.
 pub fn curved_ranges_m(telescope: &Telescope, first_m: f64, last_m: f64, density: f64) -> Vec<f64> {
-    let width_m = telescope.intensity_radius_m().min(telescope.aperture_radius_m / SQRT_2);
+    let width_m = telescope
+        .intensity_radius_m()
+        .min(telescope.aperture_radius_m / SQRT_2);
     let rayleigh_m = telescope.wavenumber_rad_m() * width_m * width_m;
     // The efficiency is a bell of (1/R - 1/F) rayleigh_m, about 1 wide, that falls with its square: even steps in its area sine.
     let place = |range_m: f64| {
@@ -125,7 +149,11 @@ pub fn curved_ranges_m(telescope: &Telescope, first_m: f64, last_m: f64, density
         for _ in 0..60 {
             let middle_m = 0.5 * (low_m + high_m);
             let is_before = place(middle_m) < start + (end - start) * step / steps;
-            if is_before { low_m = middle_m } else { high_m = middle_m }
+            if is_before {
+                low_m = middle_m
+            } else {
+                high_m = middle_m
+            }
         }
         high_m
     };
@@ -170,7 +198,11 @@ pub(crate) fn check_increasing(field: &'static str, list: &[f64]) -> Result<(), 
     for (index, &value) in list.iter().enumerate() {
         positive(field, value)?;
         if index > 0 && value <= list[index - 1] {
-            return Err(Error::NotIncreasing { field, index, value });
+            return Err(Error::NotIncreasing {
+                field,
+                index,
+                value,
+            });
         }
     }
     Ok(())
@@ -218,21 +250,38 @@ mod tests {
     #[test]
     fn ranges_that_follow_the_curvature_give_the_function_at_and_beside_any_focus() {
         use crate::theory::free_space_efficiency;
-        let wide = Telescope { aperture_radius_m: 0.15, beam_radius_m: 0.09, ..Telescope::table2() };
+        let wide = Telescope {
+            aperture_radius_m: 0.15,
+            beam_radius_m: 0.09,
+            ..Telescope::table2()
+        };
         for (telescope, focus, first_m, last_m) in [
             (Telescope::table2(), crate::Focus::At(300.0), 150.0, 3000.0),
             (wide, crate::Focus::At(600.0), 200.0, 3000.0),
-            (Telescope { beam_radius_m: f64::INFINITY, ..wide }, crate::Focus::At(450.0), 250.0, 900.0),
+            (
+                Telescope {
+                    beam_radius_m: f64::INFINITY,
+                    ..wide
+                },
+                crate::Focus::At(450.0),
+                250.0,
+                900.0,
+            ),
         ] {
             let telescope = Telescope { focus, ..telescope };
             let ranges_m = curved_ranges_m(&telescope, first_m, last_m, 12.0);
-            assert!(ranges_m.len() < 600 && ranges_m.windows(2).all(|r| r[1] > r[0]), "{ranges_m:?}");
+            assert!(
+                ranges_m.len() < 600 && ranges_m.windows(2).all(|r| r[1] > r[0]),
+                "{ranges_m:?}"
+            );
             let exact = |r| free_space_efficiency(&telescope, r);
             let profile = EfficiencyProfile::from_theory(&ranges_m, exact).unwrap();
             let mut worst = 0f64;
             for i in 0..80 {
                 let range_m = first_m * (last_m / first_m).powf((f64::from(i) + 0.37) / 80.0);
-                worst = worst.max((profile.interpolated(range_m).unwrap() / exact(range_m).unwrap() - 1.0).abs());
+                worst = worst.max(
+                    (profile.interpolated(range_m).unwrap() / exact(range_m).unwrap() - 1.0).abs(),
+                );
             }
             assert!(worst < 1e-3, "{focus:?}: {worst}");
         }
@@ -241,7 +290,14 @@ mod tests {
     #[test]
     fn extrapolation_is_refused_with_the_limits() {
         let p = profile(&[100.0, 200.0], &[0.1, 0.2]);
-        assert_eq!(p.interpolated(99.0), Err(Error::Extrapolation { range_m: 99.0, first_m: 100.0, last_m: 200.0 }));
+        assert_eq!(
+            p.interpolated(99.0),
+            Err(Error::Extrapolation {
+                range_m: 99.0,
+                first_m: 100.0,
+                last_m: 200.0
+            })
+        );
         assert_eq!(refused(p.interpolated(f64::NAN)), "range_m");
         assert!((p.interpolated(150.0).unwrap() - 0.15).abs() < 1e-15);
     }
@@ -251,7 +307,10 @@ mod tests {
         let mut p = profile(&[100.0, 200.0], &[0.1, 0.2]);
         p.standard_error.pop();
         assert_eq!(refused(p.validated()), "standard_error");
-        assert_eq!(refused(profile(&[200.0, 100.0], &[0.1, 0.2]).validated()), "range_m");
+        assert_eq!(
+            refused(profile(&[200.0, 100.0], &[0.1, 0.2]).validated()),
+            "range_m"
+        );
         assert_eq!(refused(profile(&[100.0], &[f64::NAN]).validated()), "mean");
         let mut p = profile(&[100.0, 200.0], &[0.1, 0.2]);
         p.standard_error = vec![f64::NAN; 2];

@@ -29,7 +29,9 @@ pub enum Error {
         expected: usize,
     },
     /// A list that must increase strictly does not.
-    #[error("{field} must increase strictly, but entry {index} = {value:?} does not exceed the one before")]
+    #[error(
+        "{field} must increase strictly, but entry {index} = {value:?} does not exceed the one before"
+    )]
     NotIncreasing {
         /// Name of the list.
         field: &'static str,
@@ -110,7 +112,9 @@ pub enum Error {
         largest: f64,
     },
     /// A quadrature did not reach its tolerance.
-    #[error("quadrature of {quantity} stopped at a relative error of {error:.1e}, {tolerance:.1e} was asked for")]
+    #[error(
+        "quadrature of {quantity} stopped at a relative error of {error:.1e}, {tolerance:.1e} was asked for"
+    )]
     Convergence {
         /// What was integrated.
         quantity: &'static str,
@@ -122,18 +126,41 @@ pub enum Error {
 }
 
 /// `value` where it is `good`, else an error that names `field` and says what is `allowed`.
-pub(crate) fn within(field: &'static str, value: f64, good: bool, allowed: &'static str) -> Result<f64, Error> {
-    if good { Ok(value) } else { Err(Error::OutOfRange { field, value, allowed }) }
+pub(crate) fn within(
+    field: &'static str,
+    value: f64,
+    good: bool,
+    allowed: &'static str,
+) -> Result<f64, Error> {
+    if good {
+        Ok(value)
+    } else {
+        Err(Error::OutOfRange {
+            field,
+            value,
+            allowed,
+        })
+    }
 }
 
 /// `value` when it is finite and positive, else an error that names `field`.
 pub(crate) fn positive(field: &'static str, value: f64) -> Result<f64, Error> {
-    within(field, value, value.is_finite() && value > 0.0, "a finite number above 0")
+    within(
+        field,
+        value,
+        value.is_finite() && value > 0.0,
+        "a finite number above 0",
+    )
 }
 
 /// `value` when it is finite and not negative, else an error that names `field`.
 pub(crate) fn not_negative(field: &'static str, value: f64) -> Result<f64, Error> {
-    within(field, value, value.is_finite() && value >= 0.0, "a finite number, 0 or above")
+    within(
+        field,
+        value,
+        value.is_finite() && value >= 0.0,
+        "a finite number, 0 or above",
+    )
 }
 
 /// `value` when it is finite, else an error that names `field`.
@@ -142,17 +169,31 @@ pub(crate) fn finite(field: &'static str, value: f64) -> Result<f64, Error> {
 }
 
 /// Nothing where a list has as many entries as it must, else an error that names `field`.
-pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -> Result<(), Error> {
-    if found == expected { Ok(()) } else { Err(Error::Length { field, found, expected }) }
+pub(crate) fn check_length(
+    field: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), Error> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(Error::Length {
+            field,
+            found,
+            expected,
+        })
+    }
 }
 
 /// The field that an error names.
 #[cfg(test)]
 pub(crate) fn refused<T>(result: Result<T, Error>) -> &'static str {
     match result.err() {
-        Some(Error::OutOfRange { field, .. } | Error::Length { field, .. } | Error::NotIncreasing { field, .. }) => {
-            field
-        }
+        Some(
+            Error::OutOfRange { field, .. }
+            | Error::Length { field, .. }
+            | Error::NotIncreasing { field, .. },
+        ) => field,
         other => panic!("a refusal by name, not {other:?}"),
     }
 }
@@ -163,9 +204,24 @@ mod tests {
 
     #[test]
     fn tiny_and_huge_values_are_told_in_few_digits() {
-        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
-        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
-            assert_eq!(told(value), format!("a_m = {text} is not allowed: positive"));
+        let told = |value| {
+            Error::OutOfRange {
+                field: "a_m",
+                value,
+                allowed: "positive",
+            }
+            .to_string()
+        };
+        for (value, text) in [
+            (1e-201, "1e-201"),
+            (-3e300, "-3e300"),
+            (0.5, "0.5"),
+            (f64::NAN, "NaN"),
+        ] {
+            assert_eq!(
+                told(value),
+                format!("a_m = {text} is not allowed: positive")
+            );
         }
     }
 }

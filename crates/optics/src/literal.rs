@@ -45,18 +45,38 @@ pub fn phase_screen(
     rng: &mut impl Rng,
 ) -> Vec<f64> {
     let k_rad_m = 2.0 * PI / wavelength_m;
-    let cell = [2.0 * PI / (grid.nx as f64 * grid.dx_m), 2.0 * PI / (grid.ny as f64 * grid.dy_m)];
+    let cell = [
+        2.0 * PI / (grid.nx as f64 * grid.dx_m),
+        2.0 * PI / (grid.ny as f64 * grid.dy_m),
+    ];
     let mut waves = Vec::new();
     for (nx, ny) in frequencies(grid).filter(|f| *f != (0.0, 0.0)) {
         let kappa = [nx * cell[0], ny * cell[1]];
-        let density =
-            2.0 * PI * k_rad_m.powi(2) * cn2_thickness_m13 * spectrum.density_per_cn2(kappa[0].hypot(kappa[1]));
-        waves.push((kappa, normal_pair(rng) * (density * cell[0] * cell[1]).sqrt()));
+        let density = 2.0
+            * PI
+            * k_rad_m.powi(2)
+            * cn2_thickness_m13
+            * spectrum.density_per_cn2(kappa[0].hypot(kappa[1]));
+        waves.push((
+            kappa,
+            normal_pair(rng) * (density * cell[0] * cell[1]).sqrt(),
+        ));
     }
     let psi = |(x_m, y_m): (f64, f64)| {
-        waves.iter().map(|(kappa, c)| (c * Complex::cis(kappa[0] * x_m + kappa[1] * y_m)).re).sum()
+        waves
+            .iter()
+            .map(|(kappa, c)| (c * Complex::cis(kappa[0] * x_m + kappa[1] * y_m)).re)
+            .sum()
     };
-    (0..grid.points()).map(|i| ((i % grid.nx) as f64 * grid.dx_m, (i / grid.nx) as f64 * grid.dy_m)).map(psi).collect()
+    (0..grid.points())
+        .map(|i| {
+            (
+                (i % grid.nx) as f64 * grid.dx_m,
+                (i / grid.nx) as f64 * grid.dy_m,
+            )
+        })
+        .map(psi)
+        .collect()
 }
 
 /// Irradiance \[1/m^2\] of the telescope's beam at the end of the layers, `[y][x]`, for unit power before truncation: (16),
@@ -64,15 +84,26 @@ pub fn phase_screen(
 ///
 /// # Errors
 /// [`Error`] for a telescope or a grid that is none; [`Error::Length`] for a screen that has not the size of the grid.
-pub fn irradiance_per_m2(telescope: &Telescope, grid: &Grid, layers: &[Layer]) -> Result<Vec<f64>, Error> {
+pub fn irradiance_per_m2(
+    telescope: &Telescope,
+    grid: &Grid,
+    layers: &[Layer],
+) -> Result<Vec<f64>, Error> {
     let (telescope, grid) = (telescope.validated()?, grid.validated()?);
     let mut field = aperture_field(&telescope, &Misalignment::NONE, &grid);
     let (mut here_m, mut start_m) = (0.0, 0.0);
-    for Layer { thickness_m, phase_rad } in layers {
+    for Layer {
+        thickness_m,
+        phase_rad,
+    } in layers
+    {
         check_length("phase_rad", phase_rad.len(), field.len())?;
         let middle_m = start_m + 0.5 * thickness_m;
         field = step(&grid, &field, telescope.wavelength_m, middle_m - here_m);
-        field.iter_mut().zip(phase_rad).for_each(|(e, psi)| *e *= Complex::cis(*psi));
+        field
+            .iter_mut()
+            .zip(phase_rad)
+            .for_each(|(e, psi)| *e *= Complex::cis(*psi));
         (here_m, start_m) = (middle_m, start_m + thickness_m);
     }
     let field = step(&grid, &field, telescope.wavelength_m, start_m - here_m);
@@ -81,8 +112,18 @@ pub fn irradiance_per_m2(telescope: &Telescope, grid: &Grid, layers: &[Layer]) -
 
 /// Efficiency eta_s of one realisation, (19): lambda^2 R^2/A_R times the integral of j_T j_BPLO, the irradiances at `range_m`
 /// of the transmitted beam and of the local oscillator. Monostatic: both of one path; bistatic: of two different ones.
-pub fn efficiency(telescope: &Telescope, grid: &Grid, range_m: f64, sent: &[f64], received: &[f64]) -> f64 {
-    let overlap: f64 = sent.iter().zip(received).map(|(t, b)| t * b * grid.dx_m * grid.dy_m).sum();
+pub fn efficiency(
+    telescope: &Telescope,
+    grid: &Grid,
+    range_m: f64,
+    sent: &[f64],
+    received: &[f64],
+) -> f64 {
+    let overlap: f64 = sent
+        .iter()
+        .zip(received)
+        .map(|(t, b)| t * b * grid.dx_m * grid.dy_m)
+        .sum();
     (telescope.wavelength_m * range_m).powi(2) / telescope.aperture_area_m2() * overlap
 }
 
@@ -91,27 +132,48 @@ pub fn efficiency(telescope: &Telescope, grid: &Grid, range_m: f64, sent: &[f64]
 fn step(grid: &Grid, field: &Field, wavelength_m: f64, distance_m: f64) -> Field {
     let mut spectrum = transform(grid, field, -1.0);
     for (value, (nx, ny)) in spectrum.iter_mut().zip(frequencies(grid)) {
-        let f2 = (nx / (grid.nx as f64 * grid.dx_m)).powi(2) + (ny / (grid.ny as f64 * grid.dy_m)).powi(2);
+        let f2 = (nx / (grid.nx as f64 * grid.dx_m)).powi(2)
+            + (ny / (grid.ny as f64 * grid.dy_m)).powi(2);
         *value *= Complex::cis(-PI * wavelength_m * distance_m * f2) / grid.points() as f64;
     }
-    let border = |i: usize, n: usize| (-((2.0 * i as f64 + 1.0 - n as f64).abs() / (0.95 * n as f64)).powi(40)).exp();
+    let border = |i: usize, n: usize| {
+        (-((2.0 * i as f64 + 1.0 - n as f64).abs() / (0.95 * n as f64)).powi(40)).exp()
+    };
     let mut field = transform(grid, &spectrum, 1.0);
-    field.iter_mut().enumerate().for_each(|(i, e)| *e *= border(i % grid.nx, grid.nx) * border(i / grid.nx, grid.ny));
+    field
+        .iter_mut()
+        .enumerate()
+        .for_each(|(i, e)| *e *= border(i % grid.nx, grid.nx) * border(i / grid.nx, grid.ny));
     field
 }
 
 /// Whole numbers of waves across the grid along x and y of each frequency, in the order of a transform.
 fn frequencies(grid: &Grid) -> impl Iterator<Item = (f64, f64)> {
     let Grid { nx, ny, .. } = *grid;
-    (0..nx * ny).map(move |i| (Grid::frequency_index(nx, i % nx), Grid::frequency_index(ny, i / nx)))
+    (0..nx * ny).map(move |i| {
+        (
+            Grid::frequency_index(nx, i % nx),
+            Grid::frequency_index(ny, i / nx),
+        )
+    })
 }
 
 /// Fourier sums along x, then along y, with the factors exp(`sign` 2 pi j m i/n).
 fn transform(grid: &Grid, field: &Field, sign: f64) -> Field {
     let Grid { nx, ny, .. } = *grid;
-    let wave = |m: usize, i: usize, n: usize| Complex::cis(sign * 2.0 * PI * (m * i % n) as f64 / n as f64);
-    let along_x = |k: usize| (0..nx).map(|x| field[k / nx * nx + x] * wave(k % nx, x, nx)).sum();
+    let wave = |m: usize, i: usize, n: usize| {
+        Complex::cis(sign * 2.0 * PI * (m * i % n) as f64 / n as f64)
+    };
+    let along_x = |k: usize| {
+        (0..nx)
+            .map(|x| field[k / nx * nx + x] * wave(k % nx, x, nx))
+            .sum()
+    };
     let rows: Field = (0..nx * ny).map(along_x).collect();
-    let along_y = |k: usize| (0..ny).map(|y| rows[y * nx + k % nx] * wave(k / nx, y, ny)).sum();
+    let along_y = |k: usize| {
+        (0..ny)
+            .map(|y| rows[y * nx + k % nx] * wave(k / nx, y, ny))
+            .sum()
+    };
     (0..nx * ny).map(along_y).collect()
 }

@@ -48,21 +48,38 @@ impl GaussLegendre {
     }
 
     /// Integral of `f` from `a` to `b` on `panels` equal panels.
-    pub(crate) fn composite(&self, a: f64, b: f64, panels: usize, mut f: impl FnMut(f64) -> f64) -> f64 {
+    pub(crate) fn composite(
+        &self,
+        a: f64,
+        b: f64,
+        panels: usize,
+        mut f: impl FnMut(f64) -> f64,
+    ) -> f64 {
         let h = (b - a) / panels as f64;
-        (0..panels).map(|i| self.integrate(a + h * i as f64, a + h * (i + 1) as f64, &mut f)).sum()
+        (0..panels)
+            .map(|i| self.integrate(a + h * i as f64, a + h * (i + 1) as f64, &mut f))
+            .sum()
     }
 
     /// Nodes and weights on `panels` equal panels of \[a, b\].
-    pub(crate) fn on_panels(&self, a: f64, b: f64, panels: usize) -> impl Iterator<Item = (f64, f64)> + '_ {
+    pub(crate) fn on_panels(
+        &self,
+        a: f64,
+        b: f64,
+        panels: usize,
+    ) -> impl Iterator<Item = (f64, f64)> + '_ {
         let h = (b - a) / panels as f64;
-        (0..panels).map(move |i| a + h * i as f64).flat_map(move |low| self.mapped(low, low + h))
+        (0..panels)
+            .map(move |i| a + h * i as f64)
+            .flat_map(move |low| self.mapped(low, low + h))
     }
 
     /// Nodes and weights mapped to \[a, b\].
     pub(crate) fn mapped(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
         let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
-        self.rule.iter().map(move |(x, w)| (mid + half * x, half * w))
+        self.rule
+            .iter()
+            .map(move |(x, w)| (mid + half * x, half * w))
     }
 }
 
@@ -105,7 +122,11 @@ pub(crate) fn adaptive(
         let right = rule.integrate(mid, b, &mut *f);
         let halves = left + right;
         // A first panel may have stepped over a narrow peak: the scale follows what is found.
-        scale = if halves.abs() > scale || halves.is_nan() { halves.abs() } else { scale };
+        scale = if halves.abs() > scale || halves.is_nan() {
+            halves.abs()
+        } else {
+            scale
+        };
         let gap = (halves - whole).abs();
         if gap <= tolerance * scale || depth >= DEEPEST {
             if gap > tolerance * scale {
@@ -121,13 +142,21 @@ pub(crate) fn adaptive(
     if missed <= 100.0 * tolerance * scale && scale.is_finite() {
         Ok(sum)
     } else {
-        Err(Error::Convergence { quantity, error: missed / scale, tolerance })
+        Err(Error::Convergence {
+            quantity,
+            error: missed / scale,
+            tolerance,
+        })
     }
 }
 
 /// Value at `x` of the polynomial that is 1 at `node[j]` and 0 at the other nodes.
 pub(crate) fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
-    node.iter().enumerate().filter(|(i, _)| *i != j).map(|(_, z)| (x - z) / (node[j] - z)).product()
+    node.iter()
+        .enumerate()
+        .filter(|(i, _)| *i != j)
+        .map(|(_, z)| (x - z) / (node[j] - z))
+        .product()
 }
 
 /// Cubic interpolation at `t` between the four neighbours in a table of values at 0, 1, 2, ...
@@ -135,8 +164,17 @@ pub(crate) fn cubic<T: Copy + Mul<f64, Output = T> + Sum>(t: f64, table: &[T]) -
     let at = (t as usize).clamp(1, table.len() - 3);
     let u = t - at as f64;
     let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
-    let weight = [-u * b * c / 6.0, a * b * c / 2.0, -a * u * c / 2.0, a * u * b / 6.0];
-    weight.iter().zip(&table[at - 1..]).map(|(w, v)| *v * *w).sum()
+    let weight = [
+        -u * b * c / 6.0,
+        a * b * c / 2.0,
+        -a * u * c / 2.0,
+        a * u * b / 6.0,
+    ];
+    weight
+        .iter()
+        .zip(&table[at - 1..])
+        .map(|(w, v)| *v * *w)
+        .sum()
 }
 
 #[cfg(test)]
@@ -150,7 +188,10 @@ mod tests {
             let degree = 2 * n as i32 - 1;
             let exact = 2f64.powi(degree + 1) / f64::from(degree + 1);
             let found = rule.integrate(0.0, 2.0, |x| x.powi(degree));
-            assert!((found / exact - 1.0).abs() < 1e-13, "n = {n}: {found} {exact}");
+            assert!(
+                (found / exact - 1.0).abs() < 1e-13,
+                "n = {n}: {found} {exact}"
+            );
         }
     }
 
@@ -158,7 +199,10 @@ mod tests {
     fn adaptive_integral_finds_a_narrow_peak() {
         let rule = GaussLegendre::new(16);
         let width = 1e-4;
-        let found = adaptive(&rule, &[0.0, 1.0], 1e-12, "test", &mut |x| 1.0 / (1.0 + (x / width).powi(2))).unwrap();
+        let found = adaptive(&rule, &[0.0, 1.0], 1e-12, "test", &mut |x| {
+            1.0 / (1.0 + (x / width).powi(2))
+        })
+        .unwrap();
         let exact = width * (1.0 / width).atan();
         assert!((found / exact - 1.0).abs() < 1e-11, "{found} {exact}");
     }
@@ -167,6 +211,12 @@ mod tests {
     fn nan_integrand_is_an_error() {
         let rule = GaussLegendre::new(4);
         let error = adaptive(&rule, &[0.0, 1.0], 1e-9, "test", &mut |_| f64::NAN);
-        assert!(matches!(error, Err(Error::Convergence { quantity: "test", .. })));
+        assert!(matches!(
+            error,
+            Err(Error::Convergence {
+                quantity: "test",
+                ..
+            })
+        ));
     }
 }

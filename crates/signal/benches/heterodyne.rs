@@ -10,8 +10,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::literal::literal_envelope;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record, SPEED_OF_LIGHT_M_S, Scan, Scratch, Shot,
-    Simulator,
+    Error, GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record, SPEED_OF_LIGHT_M_S,
+    Scan, Scratch, Shot, Simulator,
 };
 
 const SAMPLES: usize = 1000;
@@ -19,8 +19,18 @@ const LINES: usize = 185;
 
 fn simulator(noise: NoiseModel, chirp_hz_s: f64) -> Result<Simulator, Error> {
     let pulse = Pulse::from(GaussianPulse::table2()).with_chirp(chirp_hz_s)?;
-    let receiver = Receiver { noise, ..Receiver::table2() };
-    Simulator::new(pulse, receiver, Record { time_of_first_sample_s: 1.0e-6, samples: SAMPLES })
+    let receiver = Receiver {
+        noise,
+        ..Receiver::table2()
+    };
+    Simulator::new(
+        pulse,
+        receiver,
+        Record {
+            time_of_first_sample_s: 1.0e-6,
+            samples: SAMPLES,
+        },
+    )
 }
 
 /// A line that covers the record and the pulse around it, `parts` layers per sample: 225 `parts` scatterers in the sum.
@@ -48,18 +58,25 @@ fn heterodyne(criterion: &mut Criterion) {
         let line = line(parts);
         let speckle = vec![Complex::new(0.6, -0.8); line.layers()];
         group.bench_function(format!("envelope, {} scatterers", 225 * parts), |bench| {
-            bench.iter(|| bare.envelope_of_speckle_into(&line, &speckle, &mut scratch, &mut envelope_a));
+            bench.iter(|| {
+                bare.envelope_of_speckle_into(&line, &speckle, &mut scratch, &mut envelope_a)
+            });
         });
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
-        group.bench_function(format!("record with noise, {} scatterers", 225 * parts), |bench| {
-            bench.iter(|| noisy.record_into(&line, &mut rng, &mut scratch, &mut current_a));
-        });
+        group.bench_function(
+            format!("record with noise, {} scatterers", 225 * parts),
+            |bench| {
+                bench.iter(|| noisy.record_into(&line, &mut rng, &mut scratch, &mut current_a));
+            },
+        );
     }
     let line = line(1);
     let speckle = vec![Complex::new(0.6, -0.8); line.layers()];
     let chirped = simulator(NoiseModel::None, 1e14).expect("valid settings");
     group.bench_function("envelope of a chirped pulse, 225 scatterers", |bench| {
-        bench.iter(|| chirped.envelope_of_speckle_into(&line, &speckle, &mut scratch, &mut envelope_a));
+        bench.iter(|| {
+            chirped.envelope_of_speckle_into(&line, &speckle, &mut scratch, &mut envelope_a)
+        });
     });
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
     group.bench_function("baseband with noise, 225 scatterers", |bench| {
@@ -76,7 +93,11 @@ fn heterodyne(criterion: &mut Criterion) {
 fn on_one_thread<T: Send>(f: impl FnOnce() -> T + Send) -> T {
     #[cfg(feature = "rayon")]
     {
-        rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread").install(f)
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(1)
+            .build()
+            .expect("a thread")
+            .install(f)
     }
     #[cfg(not(feature = "rayon"))]
     {
@@ -105,8 +126,13 @@ fn scan(criterion: &mut Criterion) {
                 Ok(())
             })
         };
-        let name = format!("185 lines with speckle and noise, {} scatterers", 225 * parts);
-        group.bench_function(format!("{name}, one thread"), |bench| on_one_thread(|| bench.iter(run)));
+        let name = format!(
+            "185 lines with speckle and noise, {} scatterers",
+            225 * parts
+        );
+        group.bench_function(format!("{name}, one thread"), |bench| {
+            on_one_thread(|| bench.iter(run))
+        });
         group.bench_function(format!("{name}, all threads"), |bench| bench.iter(run));
     }
     group.finish();

@@ -15,8 +15,8 @@ use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::sampled::{Resampling, SampledPulse};
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    Error, LayerLimits, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record, SPEED_OF_LIGHT_M_S, Scan, Shot,
-    Simulator,
+    Error, LayerLimits, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record,
+    SPEED_OF_LIGHT_M_S, Scan, Shot, Simulator,
 };
 
 const LINES: usize = 9;
@@ -26,12 +26,18 @@ const FIRST_M: f64 = 360.0;
 /// Samples averaged for one velocity.
 const GATE: std::ops::Range<usize> = 60..76;
 
-const RECEIVER: Receiver = Receiver { quantum_efficiency: 0.8, ..Receiver::table2() };
+const RECEIVER: Receiver = Receiver {
+    quantum_efficiency: 0.8,
+    ..Receiver::table2()
+};
 
 /// Power of a pulse with a fast rise and a slow fall, every 4 ns, in any unit.
 fn measured_pulse() -> Result<Pulse, Error> {
     let time_s: Vec<f64> = (0..200).map(|i| f64::from(i) * 4e-9).collect();
-    let power: Vec<f64> = time_s.iter().map(|t| (t / 6e-8).powi(2) * (-t / 6e-8).exp()).collect();
+    let power: Vec<f64> = time_s
+        .iter()
+        .map(|t| (t / 6e-8).powi(2) * (-t / 6e-8).exp())
+        .collect();
     let pulse = SampledPulse::from_power(&time_s, &power, Resampling::CubicSpline, 300e-6)?;
     Pulse::from(pulse.centred()).with_chirp(2e13)
 }
@@ -44,12 +50,23 @@ fn wind_m_s(distance_m: f64, range_m: f64) -> f64 {
 
 fn main() -> Result<(), Error> {
     let pulse = measured_pulse()?;
-    let record = Record { time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S, samples: SAMPLES };
+    let record = Record {
+        time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S,
+        samples: SAMPLES,
+    };
     let simulator = Simulator::new(&pulse, RECEIVER, record)?;
 
     let (sample_rate_hz, wavelength_m) = (RECEIVER.sample_rate_hz, RECEIVER.wavelength_m);
-    let thickness_m = pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s: 3.0 })?;
-    let haze = Medium::new(vec![0.0, 300.0, 700.0], vec![8e-7, 5e-7, 2e-7], vec![5e-4, 3e-4, 1e-4])?;
+    let thickness_m = pulse.layer_thickness_m(LayerLimits {
+        sample_rate_hz,
+        wavelength_m,
+        max_gradient_per_s: 3.0,
+    })?;
+    let haze = Medium::new(
+        vec![0.0, 300.0, 700.0],
+        vec![8e-7, 5e-7, 2e-7],
+        vec![5e-4, 3e-4, 1e-4],
+    )?;
     let distances_m: Vec<f64> = (0..LINES).map(|i| 5.0 * (i as f64 - 4.0)).collect();
     let mut lines = Vec::new();
     for distance_m in &distances_m {
@@ -66,7 +83,12 @@ fn main() -> Result<(), Error> {
         lines.push(line);
     }
     // Four realisations stand for the hundreds that optics would give.
-    let realisations = [[0.012, 0.004], [0.008, 0.009], [0.015, 0.002], [0.006, 0.005]];
+    let realisations = [
+        [0.012, 0.004],
+        [0.008, 0.009],
+        [0.015, 0.002],
+        [0.006, 0.005],
+    ];
     let efficiency = LayerEfficiency::new(&[100.0, 700.0], &realisations, &lines[0])?;
 
     let scan = Scan {
@@ -78,37 +100,60 @@ fn main() -> Result<(), Error> {
             ..Shot::from(&lines[key.line])
         },
         generator: |key| pulse_generator(2024, key),
-        digitiser: Some(Digitiser::new(8, 4.0 * RECEIVER.noise_variance_a2().sqrt())?),
+        digitiser: Some(Digitiser::new(
+            8,
+            4.0 * RECEIVER.noise_variance_a2().sqrt(),
+        )?),
     };
     // One complex number per line is all that is kept. Noise of 50 MHz is uncorrelated at a lag of 5 samples, 20 ns.
     let mut lags = [Complex::<f64>::ZERO; LINES];
     let clipped = scan.for_each::<Complex<f64>, Error>(|key, baseband| {
-        lags[key.line] += GATE.map(|k| baseband[k + 5] * baseband[k].conj()).sum::<Complex<f64>>();
+        lags[key.line] += GATE
+            .map(|k| baseband[k + 5] * baseband[k].conj())
+            .sum::<Complex<f64>>();
         Ok(())
     })?;
 
     // What the gate sees: its samples, and those 5 later, weighted alike.
     let window = vec![1.0; GATE.len() + 5];
     let filter = RangeFilter::gate(&pulse, &window, RECEIVER.sample_rate_hz, thickness_m)?;
-    let middle_s = simulator.time_s(GATE.start) + 0.5 * window.len() as f64 / RECEIVER.sample_rate_hz;
+    let middle_s =
+        simulator.time_s(GATE.start) + 0.5 * window.len() as f64 / RECEIVER.sample_rate_hz;
     let range_m = 0.5 * SPEED_OF_LIGHT_M_S * middle_s;
     let mut mean_efficiency = vec![0.0; lines[0].layers()];
     for pulse in 0..realisations.len() {
         let own = efficiency.of_pulse(pulse);
-        mean_efficiency.iter_mut().zip(own).for_each(|(mean, e)| *mean += e / realisations.len() as f64);
+        mean_efficiency
+            .iter_mut()
+            .zip(own)
+            .for_each(|(mean, e)| *mean += e / realisations.len() as f64);
     }
-    let velocity_m_s = |lag: Complex<f64>| -lag.arg() * RECEIVER.wavelength_m * RECEIVER.sample_rate_hz / (20.0 * PI);
+    let velocity_m_s = |lag: Complex<f64>| {
+        -lag.arg() * RECEIVER.wavelength_m * RECEIVER.sample_rate_hz / (20.0 * PI)
+    };
     println!(
         "Velocities at {range_m:.1} m [m/s], {PULSES} pulses per line. Near air returns more, and at any moment it returns"
     );
-    println!("light that was sent later: the chirp lowers what is measured below what the gate sees.");
+    println!(
+        "light that was sent later: the chirp lowers what is measured below what the gate sees."
+    );
     println!("distance [m]  v_gate  expected of pulse pair  pulse pair");
     for ((distance_m, lag), line) in distances_m.iter().zip(lags).zip(&lines) {
         let seen = filter.at_range(range_m, |r| wind_m_s(*distance_m, r));
-        let covariance = simulator.covariance_a2(Shot { efficiency: Some(&mean_efficiency), ..Shot::from(line) })?;
+        let covariance = simulator.covariance_a2(Shot {
+            efficiency: Some(&mean_efficiency),
+            ..Shot::from(line)
+        })?;
         let expected = velocity_m_s(GATE.map(|k| covariance[(k + 5, k)]).sum());
-        println!("{distance_m:12.1}  {seen:6.2}  {expected:22.2}  {:10.2}", velocity_m_s(lag));
+        println!(
+            "{distance_m:12.1}  {seen:6.2}  {expected:22.2}  {:10.2}",
+            velocity_m_s(lag)
+        );
     }
-    println!("{} of {} parts of samples clipped", clipped.total(), 2 * scan.records() * SAMPLES);
+    println!(
+        "{} of {} parts of samples clipped",
+        clipped.total(),
+        2 * scan.records() * SAMPLES
+    );
     Ok(())
 }

@@ -43,13 +43,21 @@ impl Digitiser {
     /// # Errors
     /// [`Error::OutOfRange`] unless there are 1 to 32 bits and the full scale is finite and positive.
     pub fn new(bits: u32, full_scale_a: f64) -> Result<Self, Error> {
-        check("bits", f64::from(bits), "1 to 32", |b| (1.0..=32.0).contains(&b))?;
-        check_positive("full_scale_a", full_scale_a)?;
-        check("full_scale_a", full_scale_a, "large enough for its steps to be normal numbers", |s| {
-            (s / 2f64.powi(31)).is_normal()
+        check("bits", f64::from(bits), "1 to 32", |b| {
+            (1.0..=32.0).contains(&b)
         })?;
+        check_positive("full_scale_a", full_scale_a)?;
+        check(
+            "full_scale_a",
+            full_scale_a,
+            "large enough for its steps to be normal numbers",
+            |s| (s / 2f64.powi(31)).is_normal(),
+        )?;
         let levels = f64::from(bits).exp2();
-        Ok(Self { step_a: 2.0 * full_scale_a / levels, half: 0.5 * levels })
+        Ok(Self {
+            step_a: 2.0 * full_scale_a / levels,
+            half: 0.5 * levels,
+        })
     }
 
     /// Current from one code to the next \[A\], `2 full_scale/2^bits`.
@@ -72,7 +80,12 @@ impl Digitiser {
             });
         }
         if let Some((index, value)) = bad {
-            return Err(Error::ElementOutOfRange { field: "samples_a", index, value, allowed: "a number" });
+            return Err(Error::ElementOutOfRange {
+                field: "samples_a",
+                index,
+                value,
+                allowed: "a number",
+            });
         }
         let mut clipped = Clipped::default();
         for sample in samples_a {
@@ -100,22 +113,46 @@ mod tests {
         for bits in [8, 10, 12, 14] {
             let digitiser = Digitiser::new(bits, 2e-3).unwrap();
             let amplitude_a = 2e-3 - 2.0 * digitiser.step_a();
-            let tone: Vec<f64> = (0..100_000).map(|k| amplitude_a * (0.737_123 * f64::from(k)).sin()).collect();
+            let tone: Vec<f64> = (0..100_000)
+                .map(|k| amplitude_a * (0.737_123 * f64::from(k)).sin())
+                .collect();
             let mut digital = tone.clone();
-            assert_eq!(digitiser.digitise(&mut digital).unwrap(), Clipped::default());
-            let error: f64 = tone.iter().zip(&digital).map(|(a, b)| (a - b).powi(2)).sum::<f64>() / 1e5;
-            assert_relative_eq!(error, digitiser.step_a().powi(2) / 12.0, max_relative = 0.03);
+            assert_eq!(
+                digitiser.digitise(&mut digital).unwrap(),
+                Clipped::default()
+            );
+            let error: f64 = tone
+                .iter()
+                .zip(&digital)
+                .map(|(a, b)| (a - b).powi(2))
+                .sum::<f64>()
+                / 1e5;
+            assert_relative_eq!(
+                error,
+                digitiser.step_a().powi(2) / 12.0,
+                max_relative = 0.03
+            );
             let ratio_db = 10.0 * (0.5 * amplitude_a * amplitude_a / error).log10();
-            assert!((ratio_db - (6.02 * f64::from(bits) + 1.76)).abs() < 0.3, "{bits} bits: {ratio_db} dB");
+            assert!(
+                (ratio_db - (6.02 * f64::from(bits) + 1.76)).abs() < 0.3,
+                "{bits} bits: {ratio_db} dB"
+            );
         }
     }
 
     #[test]
     fn what_lies_beyond_full_scale_is_clipped_and_counted() {
         let digitiser = Digitiser::new(3, 4.0).unwrap();
-        let mut samples = [-9.0, -4.4, -4.6, -4.0, -0.4, 0.0, 0.6, 2.5, 3.0, 3.4, 3.6, 1e300];
+        let mut samples = [
+            -9.0, -4.4, -4.6, -4.0, -0.4, 0.0, 0.6, 2.5, 3.0, 3.4, 3.6, 1e300,
+        ];
         let clipped = digitiser.digitise(&mut samples).unwrap();
-        assert_eq!(samples, [-4.0, -4.0, -4.0, -4.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0]);
+        assert_eq!(
+            samples,
+            [
+                -4.0, -4.0, -4.0, -4.0, 0.0, 0.0, 1.0, 2.0, 3.0, 3.0, 3.0, 3.0
+            ]
+        );
         assert_eq!((clipped, clipped.total()), (Clipped { low: 2, high: 2 }, 4));
         let mut others = [f64::INFINITY, -2.2];
         digitiser.digitise(&mut others).unwrap();
@@ -136,13 +173,22 @@ mod tests {
     #[test]
     fn what_is_no_converter_or_no_sample_is_refused() {
         for (bits, scale) in [(0, 1.0), (33, 1.0), (8, 0.0), (8, f64::NAN), (8, 1e-305)] {
-            assert!(matches!(Digitiser::new(bits, scale), Err(Error::OutOfRange { .. })));
+            assert!(matches!(
+                Digitiser::new(bits, scale),
+                Err(Error::OutOfRange { .. })
+            ));
         }
         let digitiser = Digitiser::new(8, 1.0).unwrap();
         let mut samples = [0.123, f64::NAN];
-        assert!(matches!(digitiser.digitise(&mut samples), Err(Error::ElementOutOfRange { index: 1, .. })));
+        assert!(matches!(
+            digitiser.digitise(&mut samples),
+            Err(Error::ElementOutOfRange { index: 1, .. })
+        ));
         assert_eq!(samples[0], 0.123);
         let complex = digitiser.digitise(&mut [Complex::new(0.0, f64::NAN)]);
-        assert!(matches!(complex, Err(Error::ElementOutOfRange { index: 0, .. })));
+        assert!(matches!(
+            complex,
+            Err(Error::ElementOutOfRange { index: 0, .. })
+        ));
     }
 }

@@ -24,22 +24,40 @@ impl LayerEfficiency {
     /// [`Error::Empty`] without ranges, realisations or layers; [`Error::ElementOutOfRange`] for ranges that do not increase, or
     /// an efficiency that is negative or not finite; [`Error::LengthMismatch`] for a realisation of another length;
     /// [`Error::OutOfRange`] if a layer lies beyond the ranges.
-    pub fn new<E: AsRef<[f64]>>(range_m: &[f64], realisations: &[E], line: &LineOfSight) -> Result<Self, Error> {
+    pub fn new<E: AsRef<[f64]>>(
+        range_m: &[f64],
+        realisations: &[E],
+        line: &LineOfSight,
+    ) -> Result<Self, Error> {
         check_ranges(range_m)?;
         check_any("realisations", realisations.len())?;
         for realisation in realisations {
             check_values("efficiency", realisation.as_ref(), range_m.len())?;
         }
-        let (field, allowed) = ("range of a layer, m", "within the ranges of the efficiency table");
+        let (field, allowed) = (
+            "range of a layer, m",
+            "within the ranges of the efficiency table",
+        );
         let place = |layer| {
             let value = line.range_m(layer);
-            locate(range_m, value).ok_or(Error::OutOfRange { field, value, allowed })
+            locate(range_m, value).ok_or(Error::OutOfRange {
+                field,
+                value,
+                allowed,
+            })
         };
-        let places = (0..line.layers()).map(place).collect::<Result<Vec<_>, _>>()?;
+        let places = (0..line.layers())
+            .map(place)
+            .collect::<Result<Vec<_>, _>>()?;
         check_any("radial_velocity_m_s", places.len())?;
         let rows = realisations.iter().map(AsRef::as_ref);
-        let efficiency = rows.flat_map(|row| places.iter().map(|&place| value(row, place))).collect();
-        Ok(Self { layers: places.len(), efficiency })
+        let efficiency = rows
+            .flat_map(|row| places.iter().map(|&place| value(row, place)))
+            .collect();
+        Ok(Self {
+            layers: places.len(),
+            efficiency,
+        })
     }
 
     /// Number of realisations.
@@ -72,7 +90,8 @@ mod tests {
 
     #[test]
     fn layers_lie_on_straight_lines_between_the_ranges() {
-        let layers = LayerEfficiency::new(&[100.0, 200.0, 300.0], &[[0.1, 0.3, 0.2]], &line()).unwrap();
+        let layers =
+            LayerEfficiency::new(&[100.0, 200.0, 300.0], &[[0.1, 0.3, 0.2]], &line()).unwrap();
         let expected = [0.1, 0.15, 0.2, 0.25, 0.3, 0.275, 0.25, 0.225, 0.2];
         for (found, expected) in layers.of_pulse(0).iter().zip(expected) {
             assert_relative_eq!(*found, expected, max_relative = 1e-14);
@@ -81,21 +100,43 @@ mod tests {
 
     #[test]
     fn each_pulse_has_its_realisation() {
-        let layers = LayerEfficiency::new(&[50.0, 400.0], &[[0.1, 0.1], [0.2, 0.2], [0.6, 0.6]], &line()).unwrap();
+        let layers = LayerEfficiency::new(
+            &[50.0, 400.0],
+            &[[0.1, 0.1], [0.2, 0.2], [0.6, 0.6]],
+            &line(),
+        )
+        .unwrap();
         assert_eq!(layers.realisations(), 3);
         for (pulse, expected) in [(0, 0.1), (1, 0.2), (2, 0.6), (3, 0.1), (7, 0.2)] {
-            assert!(layers.of_pulse(pulse).iter().all(|e| (e - expected).abs() < 1e-15));
+            assert!(
+                layers
+                    .of_pulse(pulse)
+                    .iter()
+                    .all(|e| (e - expected).abs() < 1e-15)
+            );
         }
     }
 
     #[test]
     fn tables_that_are_none_and_layers_beyond_them_are_refused() {
-        let make = |range_m: &[f64], realisations: &[&[f64]]| LayerEfficiency::new(range_m, realisations, &line());
+        let make = |range_m: &[f64], realisations: &[&[f64]]| {
+            LayerEfficiency::new(range_m, realisations, &line())
+        };
         assert!(matches!(make(&[], &[&[]]), Err(Error::Empty { .. })));
         assert!(matches!(make(&[1.0], &[]), Err(Error::Empty { .. })));
-        assert!(matches!(make(&[1.0], &[&[0.1, 0.2]]), Err(Error::LengthMismatch { .. })));
+        assert!(matches!(
+            make(&[1.0], &[&[0.1, 0.2]]),
+            Err(Error::LengthMismatch { .. })
+        ));
         let negative = make(&[1.0, 2.0], &[&[0.1, -0.2]]);
-        assert!(matches!(negative, Err(Error::ElementOutOfRange { field: "efficiency", index: 1, .. })));
+        assert!(matches!(
+            negative,
+            Err(Error::ElementOutOfRange {
+                field: "efficiency",
+                index: 1,
+                ..
+            })
+        ));
         let short = make(&[100.0, 200.0], &[&[0.1, 0.2]]);
         assert!(matches!(short, Err(Error::OutOfRange { value: 225.0, .. })));
     }

@@ -72,7 +72,15 @@ pub(crate) fn check(
     allowed: &'static str,
     accept: impl Fn(f64) -> bool,
 ) -> Result<(), Error> {
-    if value.is_finite() && accept(value) { Ok(()) } else { Err(Error::OutOfRange { field, value, allowed }) }
+    if value.is_finite() && accept(value) {
+        Ok(())
+    } else {
+        Err(Error::OutOfRange {
+            field,
+            value,
+            allowed,
+        })
+    }
 }
 
 /// A finite number above zero, or [`Error::OutOfRange`].
@@ -81,13 +89,29 @@ pub(crate) fn check_positive(field: &'static str, value: f64) -> Result<(), Erro
 }
 
 /// A slice of the expected length, or [`Error::LengthMismatch`].
-pub(crate) fn check_length(field: &'static str, found: usize, expected: usize) -> Result<(), Error> {
-    if found == expected { Ok(()) } else { Err(Error::LengthMismatch { field, found, expected }) }
+pub(crate) fn check_length(
+    field: &'static str,
+    found: usize,
+    expected: usize,
+) -> Result<(), Error> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(Error::LengthMismatch {
+            field,
+            found,
+            expected,
+        })
+    }
 }
 
 /// As many elements as there must be of what needs one, or [`Error::Empty`].
 pub(crate) fn check_any(field: &'static str, found: usize) -> Result<(), Error> {
-    if found > 0 { Ok(()) } else { Err(Error::Empty { field }) }
+    if found > 0 {
+        Ok(())
+    } else {
+        Err(Error::Empty { field })
+    }
 }
 
 /// Elements that `accept` holds for, or [`Error::ElementOutOfRange`] with the first of which it does not.
@@ -98,26 +122,52 @@ pub(crate) fn check_each(
     accept: impl Fn(f64) -> bool,
 ) -> Result<(), Error> {
     match values.iter().position(|v| !accept(*v)) {
-        Some(index) => Err(Error::ElementOutOfRange { field, index, value: values[index], allowed }),
+        Some(index) => Err(Error::ElementOutOfRange {
+            field,
+            index,
+            value: values[index],
+            allowed,
+        }),
         None => Ok(()),
     }
 }
 
 /// Finite elements of which each is larger than the one before, or [`Error::ElementOutOfRange`].
-pub(crate) fn check_increasing(field: &'static str, values: &[f64], allowed: &'static str) -> Result<(), Error> {
+pub(crate) fn check_increasing(
+    field: &'static str,
+    values: &[f64],
+    allowed: &'static str,
+) -> Result<(), Error> {
     check_each(field, values, "finite", f64::is_finite)?;
-    let late = values.windows(2).position(|pair| pair[1] <= pair[0]).map(|before| before + 1);
-    late.map_or(Ok(()), |index| Err(Error::ElementOutOfRange { field, index, value: values[index], allowed }))
+    let late = values
+        .windows(2)
+        .position(|pair| pair[1] <= pair[0])
+        .map(|before| before + 1);
+    late.map_or(Ok(()), |index| {
+        Err(Error::ElementOutOfRange {
+            field,
+            index,
+            value: values[index],
+            allowed,
+        })
+    })
 }
 
 /// [`Error::Overflow`] at the first element of a result that is not finite.
-pub(crate) fn check_overflow(field: &'static str, mut finite: impl Iterator<Item = bool>) -> Result<(), Error> {
-    finite.position(|finite| !finite).map_or(Ok(()), |index| Err(Error::Overflow { field, index }))
+pub(crate) fn check_overflow(
+    field: &'static str,
+    mut finite: impl Iterator<Item = bool>,
+) -> Result<(), Error> {
+    finite
+        .position(|finite| !finite)
+        .map_or(Ok(()), |index| Err(Error::Overflow { field, index }))
 }
 
 /// Elements that are finite and not negative, or [`Error::ElementOutOfRange`].
 pub(crate) fn check_amounts(field: &'static str, values: &[f64]) -> Result<(), Error> {
-    check_each(field, values, "finite and not negative", |v| v.is_finite() && v >= 0.0)
+    check_each(field, values, "finite and not negative", |v| {
+        v.is_finite() && v >= 0.0
+    })
 }
 
 #[cfg(test)]
@@ -126,8 +176,20 @@ mod tests {
 
     #[test]
     fn tiny_and_huge_values_are_told_in_few_digits() {
-        let told = |value| Error::OutOfRange { field: "a_m", value, allowed: "positive" }.to_string();
-        for (value, text) in [(1e-201, "1e-201"), (-3e300, "-3e300"), (0.5, "0.5"), (f64::NAN, "NaN")] {
+        let told = |value| {
+            Error::OutOfRange {
+                field: "a_m",
+                value,
+                allowed: "positive",
+            }
+            .to_string()
+        };
+        for (value, text) in [
+            (1e-201, "1e-201"),
+            (-3e300, "-3e300"),
+            (0.5, "0.5"),
+            (f64::NAN, "NaN"),
+        ] {
             assert_eq!(told(value), format!("a_m = {text}: must be positive"));
         }
     }

@@ -27,9 +27,16 @@ impl Simulator {
         self.illuminate(shot.line, &[], scratch)?;
         let gain = self.amplitude_gain_a_sqrt_s(shot.line).powi(2);
         for (k, out) in out_a2.iter_mut().enumerate() {
-            let lit = scratch.window.amplitudes_at(self.pulse(), shot.line.layer_thickness_m, k);
-            let layers = lit.amplitudes().filter(|(layer, _)| !shot.line.is_masked(*layer));
-            *out = gain * layers.map(|(layer, f)| f.norm_sqr() * shot.weight_per_m(layer)).sum::<f64>();
+            let lit = scratch
+                .window
+                .amplitudes_at(self.pulse(), shot.line.layer_thickness_m, k);
+            let layers = lit
+                .amplitudes()
+                .filter(|(layer, _)| !shot.line.is_masked(*layer));
+            *out = gain
+                * layers
+                    .map(|(layer, f)| f.norm_sqr() * shot.weight_per_m(layer))
+                    .sum::<f64>();
         }
         check_overflow("out_a2", out_a2.iter().map(|power| power.is_finite()))
     }
@@ -39,7 +46,12 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
-    pub fn snr_into<'a>(&self, shot: impl Into<Shot<'a>>, scratch: &mut Scratch, out: &mut [f64]) -> Result<(), Error> {
+    pub fn snr_into<'a>(
+        &self,
+        shot: impl Into<Shot<'a>>,
+        scratch: &mut Scratch,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
         self.mean_power_into(shot, scratch, out)?;
         let noise_a2 = self.receiver().snr_noise_a2();
         out.iter_mut().for_each(|power| *power /= noise_a2);
@@ -53,7 +65,10 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
-    pub fn covariance_a2<'a>(&self, shot: impl Into<Shot<'a>>) -> Result<Array2<Complex<f64>>, Error> {
+    pub fn covariance_a2<'a>(
+        &self,
+        shot: impl Into<Shot<'a>>,
+    ) -> Result<Array2<Complex<f64>>, Error> {
         let shot = shot.into();
         shot.validate()?;
         let (line, samples) = (shot.line, self.record().samples);
@@ -62,15 +77,21 @@ impl Simulator {
         let gain = self.amplitude_gain_a_sqrt_s(line);
         let mut responses = Vec::with_capacity(samples);
         for k in 0..samples {
-            let lit = scratch.window.amplitudes_at(self.pulse(), line.layer_thickness_m, k);
+            let lit = scratch
+                .window
+                .amplitudes_at(self.pulse(), line.layer_thickness_m, k);
             let response = |(layer, envelope): (usize, Complex<f64>)| {
                 if line.is_masked(layer) {
                     return Complex::ZERO;
                 }
-                let phase_rad = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]) * self.time_s(k);
+                let phase_rad =
+                    self.phase_rate_rad_s(line.radial_velocity_m_s[layer]) * self.time_s(k);
                 envelope * Complex::cis(phase_rad) * (gain * shot.weight_per_m(layer).sqrt())
             };
-            responses.push((lit.first, lit.amplitudes().map(response).collect::<Vec<_>>()));
+            responses.push((
+                lit.first,
+                lit.amplitudes().map(response).collect::<Vec<_>>(),
+            ));
         }
         let mut covariance = Array2::zeros((samples, samples));
         for (m, (first_m, row)) in responses.iter().enumerate() {
@@ -83,7 +104,10 @@ impl Simulator {
                 covariance[(n, m)] = sum.conj();
             }
         }
-        check_overflow("covariance_a2", covariance.iter().map(|c: &Complex<f64>| c.is_finite()))?;
+        check_overflow(
+            "covariance_a2",
+            covariance.iter().map(|c: &Complex<f64>| c.is_finite()),
+        )?;
         Ok(covariance)
     }
 }

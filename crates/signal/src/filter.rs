@@ -57,21 +57,38 @@ impl RangeFilter {
         check_positive("sample_rate_hz", sample_rate_hz)?;
         check_any("window", window.len())?;
         check_each("window", window, "finite", f64::is_finite)?;
-        let largest = window.iter().fold(0.0_f64, |largest, h| largest.max(h.abs()));
-        check_each("window", &window[..1], "not zero in every place", |_| largest > 0.0)?;
+        let largest = window
+            .iter()
+            .fold(0.0_f64, |largest, h| largest.max(h.abs()));
+        check_each("window", &window[..1], "not zero in every place", |_| {
+            largest > 0.0
+        })?;
         let half = 0.5 * window.len() as f64;
         let squares = window.iter().map(|h| (h / largest) * (h / largest));
         let sum: f64 = squares.clone().sum();
-        let taps = squares.enumerate().map(|(n, square)| ((n as f64 - half) / sample_rate_hz, square / sum)).collect();
+        let taps = squares
+            .enumerate()
+            .map(|(n, square)| ((n as f64 - half) / sample_rate_hz, square / sum))
+            .collect();
         Self::new(pulse.into(), taps, layer_thickness_m)
     }
 
     fn new(pulse: Pulse, taps: Vec<(f64, f64)>, layer_thickness_m: f64) -> Result<Self, Error> {
         check_positive("layer_thickness_m", layer_thickness_m)?;
-        let (length_m, thickest_m) = (pulse.sigma_m(), pulse.sigma_m().min(pulse.max_layer_thickness_m()));
+        let (length_m, thickest_m) = (
+            pulse.sigma_m(),
+            pulse.sigma_m().min(pulse.max_layer_thickness_m()),
+        );
         let allowed = "at most c sigma/2 (less for a pulse with steep edges) and above 1e-7 of it";
-        check("layer_thickness_m", layer_thickness_m, allowed, |t| t <= thickest_m && t > 1e-7 * length_m)?;
-        let mut filter = Self { pulse, layer_thickness_m, taps, centred: (0, Vec::new()) };
+        check("layer_thickness_m", layer_thickness_m, allowed, |t| {
+            t <= thickest_m && t > 1e-7 * length_m
+        })?;
+        let mut filter = Self {
+            pulse,
+            layer_thickness_m,
+            taps,
+            centred: (0, Vec::new()),
+        };
         filter.centred = filter.weights(0.0);
         Ok(filter)
     }
@@ -87,7 +104,12 @@ impl RangeFilter {
 
     /// Standard deviation of the weights in range \[m\]: that of the pulse and that of the window, squared and added.
     pub fn standard_deviation_m(&self) -> f64 {
-        let moment = |power: i32| self.taps.iter().map(|&(time_s, weight)| weight * time_s.powi(power)).sum::<f64>();
+        let moment = |power: i32| {
+            self.taps
+                .iter()
+                .map(|&(time_s, weight)| weight * time_s.powi(power))
+                .sum::<f64>()
+        };
         let window_m = 0.5 * SPEED_OF_LIGHT_M_S * (moment(2) - moment(1).powi(2)).max(0.0).sqrt();
         window_m.hypot(self.pulse.sigma_m() * std::f64::consts::FRAC_1_SQRT_2)
     }
@@ -99,22 +121,45 @@ impl RangeFilter {
         let length_m = last_m - first_m;
         // Half a sample at most, so that samples apart are not passed over.
         let apart_m = sample_m(self.taps.get(1)) - sample_m(self.taps.first());
-        let fine_m = if apart_m > 0.0 { 0.5 * apart_m } else { length_m };
-        let step_m = fine_m.min(0.125 * self.pulse.sigma_m()).max(5e-5 * length_m);
+        let fine_m = if apart_m > 0.0 {
+            0.5 * apart_m
+        } else {
+            length_m
+        };
+        let step_m = fine_m
+            .min(0.125 * self.pulse.sigma_m())
+            .max(5e-5 * length_m);
         let at_m = |i: usize| first_m + i as f64 * step_m;
-        let weights: Vec<f64> = (0..=(length_m / step_m).ceil() as usize).map(|i| self.weight_per_m(at_m(i))).collect();
-        let top = weights.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(i, _)| i);
+        let weights: Vec<f64> = (0..=(length_m / step_m).ceil() as usize)
+            .map(|i| self.weight_per_m(at_m(i)))
+            .collect();
+        let top = weights
+            .iter()
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(b.1))
+            .map_or(0, |(i, _)| i);
         // The maximum by halving, between the neighbours of the highest point.
         let (mut low_m, mut high_m) = (at_m(top) - step_m, at_m(top) + step_m);
         for _ in 0..HALVINGS {
-            let (a_m, b_m) = (low_m + (high_m - low_m) / 3.0, high_m - (high_m - low_m) / 3.0);
-            if self.weight_per_m(a_m) < self.weight_per_m(b_m) { low_m = a_m } else { high_m = b_m }
+            let (a_m, b_m) = (
+                low_m + (high_m - low_m) / 3.0,
+                high_m - (high_m - low_m) / 3.0,
+            );
+            if self.weight_per_m(a_m) < self.weight_per_m(b_m) {
+                low_m = a_m
+            } else {
+                high_m = b_m
+            }
         }
         let half = 0.5 * self.weight_per_m(0.5 * (low_m + high_m));
         let crossing_m = |mut outside_m: f64, mut inside_m: f64| {
             for _ in 0..HALVINGS {
                 let middle_m = 0.5 * (outside_m + inside_m);
-                if self.weight_per_m(middle_m) < half { outside_m = middle_m } else { inside_m = middle_m }
+                if self.weight_per_m(middle_m) < half {
+                    outside_m = middle_m
+                } else {
+                    inside_m = middle_m
+                }
             }
             inside_m
         };
@@ -128,7 +173,10 @@ impl RangeFilter {
     pub fn at_range(&self, range_m: f64, radial_velocity_m_s: impl Fn(f64) -> f64) -> f64 {
         let (first, weights) = &self.centred;
         let offset_m = |i: usize| (first + i as i64) as f64 * self.layer_thickness_m;
-        weighted_mean(weights, (0..weights.len()).map(|i| radial_velocity_m_s(range_m + offset_m(i))))
+        weighted_mean(
+            weights,
+            (0..weights.len()).map(|i| radial_velocity_m_s(range_m + offset_m(i))),
+        )
     }
 
     /// Writes the filtered velocity at each of `range_m` of a profile on layers whose centres are `first_range_m`,
@@ -155,7 +203,12 @@ impl RangeFilter {
         let mut between = (0.0, self.centred.clone());
         for (index, (&range_m, out)) in range_m.iter().zip(out_m_s).enumerate() {
             if !range_m.is_finite() {
-                return Err(Error::ElementOutOfRange { field: "range_m", index, value: range_m, allowed: "finite" });
+                return Err(Error::ElementOutOfRange {
+                    field: "range_m",
+                    index,
+                    value: range_m,
+                    allowed: "finite",
+                });
             }
             let position = (range_m - first_range_m) / self.layer_thickness_m;
             let nearest = position.round();
@@ -164,7 +217,11 @@ impl RangeFilter {
                 between = (part, self.weights(part));
             }
             let (offset, weights) = &between.1;
-            *out = mean_of_profile(weights, (nearest as i64).saturating_add(*offset), radial_velocity_m_s);
+            *out = mean_of_profile(
+                weights,
+                (nearest as i64).saturating_add(*offset),
+                radial_velocity_m_s,
+            );
         }
         Ok(())
     }
@@ -172,7 +229,10 @@ impl RangeFilter {
     /// Offsets \[m\] beyond a range between which the weights are not negligible.
     fn reach_m(&self) -> (f64, f64) {
         let (near_m, far_m) = self.pulse.weight_reach_m();
-        (sample_m(self.taps.first()) + near_m, sample_m(self.taps.last()) + far_m)
+        (
+            sample_m(self.taps.first()) + near_m,
+            sample_m(self.taps.last()) + far_m,
+        )
     }
 
     /// Weights for a range that lies `part` of a layer beyond the centre of one: offset of the first in layers from that
@@ -181,8 +241,9 @@ impl RangeFilter {
         let (first_m, last_m) = self.reach_m();
         let first = (first_m / self.layer_thickness_m) as i64 - 1;
         let last = (last_m / self.layer_thickness_m) as i64 + 1;
-        let mut weights: Vec<f64> =
-            (first..=last).map(|l| self.weight_per_m((l as f64 - part) * self.layer_thickness_m)).collect();
+        let mut weights: Vec<f64> = (first..=last)
+            .map(|l| self.weight_per_m((l as f64 - part) * self.layer_thickness_m))
+            .collect();
         let sum: f64 = weights.iter().sum();
         weights.iter_mut().for_each(|weight| *weight /= sum);
         (first, weights)
@@ -198,7 +259,9 @@ fn sample_m(tap: Option<&(f64, f64)>) -> f64 {
 fn mean_of_profile(weights: &[f64], first: i64, radial_velocity_m_s: &[f64]) -> f64 {
     let layers = radial_velocity_m_s.len() as i64;
     let start = first.clamp(0, layers);
-    let end = first.saturating_add(weights.len() as i64).clamp(start, layers);
+    let end = first
+        .saturating_add(weights.len() as i64)
+        .clamp(start, layers);
     if start == end {
         return f64::NAN;
     }
@@ -216,7 +279,11 @@ fn weighted_mean(weights: &[f64], velocities_m_s: impl Iterator<Item = f64>) -> 
             known += weight;
         }
     }
-    if known < LEAST_KNOWN_WEIGHT { f64::NAN } else { sum / known }
+    if known < LEAST_KNOWN_WEIGHT {
+        f64::NAN
+    } else {
+        sum / known
+    }
 }
 
 #[cfg(test)]
@@ -232,11 +299,18 @@ mod tests {
     }
 
     fn hann(n: usize) -> Vec<f64> {
-        (0..n).map(|i| (std::f64::consts::PI * (i as f64 + 0.5) / n as f64).sin().powi(2)).collect()
+        (0..n)
+            .map(|i| {
+                (std::f64::consts::PI * (i as f64 + 0.5) / n as f64)
+                    .sin()
+                    .powi(2)
+            })
+            .collect()
     }
 
     fn filters() -> [(RangeFilter, f64); 3] {
-        let gate = |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, STEP_M / 3.0).unwrap();
+        let gate =
+            |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, STEP_M / 3.0).unwrap();
         // A gate is seen half a sample before its range.
         [
             (RangeFilter::pulse(pulse(), STEP_M / 3.0).unwrap(), 0.0),
@@ -252,9 +326,14 @@ mod tests {
             profile[700..720].fill(f64::NAN);
             let ranges: Vec<f64> = (0..400).map(|i| 105.0 + 0.973 * f64::from(i)).collect();
             let mut out = vec![0.0; ranges.len()];
-            filter.apply_into(100.0, &profile, &ranges, &mut out).unwrap();
+            filter
+                .apply_into(100.0, &profile, &ranges, &mut out)
+                .unwrap();
             let worst = out.iter().map(|v| (v - 3.7).abs()).fold(0.0, f64::max);
-            assert!(worst < 1e-13 && out.iter().all(|v| v.is_finite()), "{worst}");
+            assert!(
+                worst < 1e-13 && out.iter().all(|v| v.is_finite()),
+                "{worst}"
+            );
         }
     }
 
@@ -262,7 +341,9 @@ mod tests {
     fn a_linear_profile_is_kept_on_and_between_layers() {
         for (filter, shift_m) in filters() {
             let thickness = STEP_M / 3.0;
-            let profile: Vec<f64> = (0..9000).map(|l| 0.02 * (f64::from(l) * thickness - 900.0)).collect();
+            let profile: Vec<f64> = (0..9000)
+                .map(|l| 0.02 * (f64::from(l) * thickness - 900.0))
+                .collect();
             let ranges = [700.0, 700.1, 812.345, 900.0 + 17.0 * thickness];
             let mut out = [0.0; 4];
             filter.apply_into(0.0, &profile, &ranges, &mut out).unwrap();
@@ -279,7 +360,11 @@ mod tests {
         // The second moment of |f(2 x/c)|^2 2/c is (c sigma/2)^2/2: fails if the Jacobian or a factor 2 were wrong.
         let filter = RangeFilter::pulse(pulse(), 0.2).unwrap();
         let at_centre = filter.at_range(500.0, |rho| (rho - 500.0).powi(2));
-        assert_relative_eq!(at_centre, 0.5 * pulse().sigma_m().powi(2), max_relative = 1e-12);
+        assert_relative_eq!(
+            at_centre,
+            0.5 * pulse().sigma_m().powi(2),
+            max_relative = 1e-12
+        );
     }
 
     #[test]
@@ -288,13 +373,19 @@ mod tests {
         let centre = 500.0 - 0.5 * STEP_M;
         let spread = filter.at_range(500.0, |rho| (rho - centre).powi(2));
         let window = STEP_M * STEP_M * (64.0 * 64.0 - 1.0) / 12.0;
-        assert_relative_eq!(spread, 0.5 * pulse().sigma_m().powi(2) + window, max_relative = 1e-12);
+        assert_relative_eq!(
+            spread,
+            0.5 * pulse().sigma_m().powi(2) + window,
+            max_relative = 1e-12
+        );
     }
 
     #[test]
     fn weights_integrate_to_one_per_metre() {
         for (filter, _) in filters() {
-            let sum: f64 = (-6000..6000).map(|i| 0.05 * filter.weight_per_m(0.05 * f64::from(i))).sum();
+            let sum: f64 = (-6000..6000)
+                .map(|i| 0.05 * filter.weight_per_m(0.05 * f64::from(i)))
+                .sum();
             assert_relative_eq!(sum, 1.0, max_relative = 1e-12);
         }
     }
@@ -303,10 +394,14 @@ mod tests {
     fn ranges_that_see_too_little_air_are_not_numbers() {
         let filter = RangeFilter::pulse(pulse(), 0.5).unwrap();
         let mut out = [0.0; 4];
-        filter.apply_into(100.0, &[1.0; 1000], &[20.0, 90.0, 110.0, 1e18], &mut out).unwrap();
+        filter
+            .apply_into(100.0, &[1.0; 1000], &[20.0, 90.0, 110.0, 1e18], &mut out)
+            .unwrap();
         assert!(out[0].is_nan() && out[1].is_nan() && out[3].is_nan());
         assert_abs_diff_eq!(out[2], 1.0, epsilon = 1e-14);
-        filter.apply_into(100.0, &[f64::NAN; 1000], &[300.0; 4], &mut out).unwrap();
+        filter
+            .apply_into(100.0, &[f64::NAN; 1000], &[300.0; 4], &mut out)
+            .unwrap();
         assert!(out.iter().all(|v| v.is_nan()));
     }
 
@@ -314,17 +409,52 @@ mod tests {
     fn input_that_makes_no_filter_is_refused() {
         for thickness_m in [0.0, 1000.0, 1e-9] {
             let filter = RangeFilter::pulse(pulse(), thickness_m);
-            assert!(matches!(filter, Err(Error::OutOfRange { field: "layer_thickness_m", .. })), "{thickness_m}");
+            assert!(
+                matches!(
+                    filter,
+                    Err(Error::OutOfRange {
+                        field: "layer_thickness_m",
+                        ..
+                    })
+                ),
+                "{thickness_m}"
+            );
         }
         let gate = |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, 0.5);
         assert!(matches!(gate(&[]), Err(Error::Empty { .. })));
-        assert!(matches!(gate(&[0.0; 3]), Err(Error::ElementOutOfRange { .. })));
-        assert!(matches!(gate(&[1.0, f64::NAN]), Err(Error::ElementOutOfRange { index: 1, .. })));
+        assert!(matches!(
+            gate(&[0.0; 3]),
+            Err(Error::ElementOutOfRange { .. })
+        ));
+        assert!(matches!(
+            gate(&[1.0, f64::NAN]),
+            Err(Error::ElementOutOfRange { index: 1, .. })
+        ));
         let filter = RangeFilter::pulse(pulse(), 0.5).unwrap();
-        let apply = |profile: &[f64], range_m: f64, out: &mut [f64]| filter.apply_into(0.0, profile, &[range_m], out);
-        assert!(matches!(apply(&[], 1.0, &mut [0.0]), Err(Error::Empty { field: "radial_velocity_m_s" })));
-        assert!(matches!(apply(&[1.0], 1.0, &mut [0.0; 2]), Err(Error::LengthMismatch { field: "out_m_s", .. })));
+        let apply = |profile: &[f64], range_m: f64, out: &mut [f64]| {
+            filter.apply_into(0.0, profile, &[range_m], out)
+        };
+        assert!(matches!(
+            apply(&[], 1.0, &mut [0.0]),
+            Err(Error::Empty {
+                field: "radial_velocity_m_s"
+            })
+        ));
+        assert!(matches!(
+            apply(&[1.0], 1.0, &mut [0.0; 2]),
+            Err(Error::LengthMismatch {
+                field: "out_m_s",
+                ..
+            })
+        ));
         let refused = apply(&[1.0], f64::NAN, &mut [0.0]);
-        assert!(matches!(refused, Err(Error::ElementOutOfRange { field: "range_m", index: 0, .. })));
+        assert!(matches!(
+            refused,
+            Err(Error::ElementOutOfRange {
+                field: "range_m",
+                index: 0,
+                ..
+            })
+        ));
     }
 }

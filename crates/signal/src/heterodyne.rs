@@ -53,9 +53,18 @@ pub struct Simulator {
 
 impl fmt::Debug for Simulator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { pulse, receiver, record, .. } = self;
+        let Self {
+            pulse,
+            receiver,
+            record,
+            ..
+        } = self;
         let mut shown = f.debug_struct("Simulator");
-        shown.field("pulse", pulse).field("receiver", receiver).field("record", record).finish_non_exhaustive()
+        shown
+            .field("pulse", pulse)
+            .field("receiver", receiver)
+            .field("record", record)
+            .finish_non_exhaustive()
     }
 }
 
@@ -73,9 +82,18 @@ impl Simulator {
     ///
     /// # Errors
     /// As [`Simulator::new`], with [`Receiver::validate_baseband`].
-    pub fn for_baseband(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
+    pub fn for_baseband(
+        pulse: impl Into<Pulse>,
+        receiver: Receiver,
+        record: Record,
+    ) -> Result<Self, Error> {
         receiver.validate_baseband()?;
-        check("time_of_first_sample_s", record.time_of_first_sample_s, "finite", |_| true)?;
+        check(
+            "time_of_first_sample_s",
+            record.time_of_first_sample_s,
+            "finite",
+            |_| true,
+        )?;
         check("samples", record.samples as f64, "1 or more", |n| n >= 1.0)?;
         let interval_s = 1.0 / receiver.sample_rate_hz;
         let carrier = (0..record.samples)
@@ -89,7 +107,16 @@ impl Simulator {
         let noise = RealNoise::new(&receiver, record.samples);
         let baseband_noise = BasebandNoise::new(&receiver, record.samples);
         let pulse = pulse.into();
-        Ok(Self { pulse, receiver, record, detector: Arc::new(Detector { carrier, noise, baseband_noise }) })
+        Ok(Self {
+            pulse,
+            receiver,
+            record,
+            detector: Arc::new(Detector {
+                carrier,
+                noise,
+                baseband_noise,
+            }),
+        })
     }
 
     /// The pulse.
@@ -215,7 +242,9 @@ impl Simulator {
     ) -> Result<(), Error> {
         let line = shot.line;
         self.illuminate(line, phases, scratch)?;
-        let Scratch { window, phasors, .. } = scratch;
+        let Scratch {
+            window, phasors, ..
+        } = scratch;
         phasors.resize(line.layers());
         for (block, outs) in out_a.chunks_mut(RENEWAL_SAMPLES).enumerate() {
             let start = block * RENEWAL_SAMPLES;
@@ -247,7 +276,13 @@ impl Simulator {
         phases: &[Complex<f64>],
         scratch: &mut Scratch,
     ) -> Result<(), Error> {
-        scratch.window.prepare(&self.pulse, line, phases, &self.record, self.receiver.sample_rate_hz)
+        scratch.window.prepare(
+            &self.pulse,
+            line,
+            phases,
+            &self.record,
+            self.receiver.sample_rate_hz,
+        )
     }
 
     /// Sets the phasors of all layers that are lit in some samples, each as it is at the first of them that lights it, and their
@@ -273,10 +308,14 @@ impl Simulator {
                 let rate_rad_s = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]);
                 let (phasor, rotation) = match rate_rad_s.is_nan() {
                     true => (Complex::ZERO, Complex::ONE),
-                    false => (amplitude * Complex::cis(rate_rad_s * time_s), Complex::cis(rate_rad_s * interval_s)),
+                    false => (
+                        amplitude * Complex::cis(rate_rad_s * time_s),
+                        Complex::cis(rate_rad_s * interval_s),
+                    ),
                 };
                 (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
-                (phasors.rotation_re[layer], phasors.rotation_im[layer]) = (rotation.re, rotation.im);
+                (phasors.rotation_re[layer], phasors.rotation_im[layer]) =
+                    (rotation.re, rotation.im);
             }
             next = next.max(end);
         }
@@ -284,7 +323,11 @@ impl Simulator {
 }
 
 /// Circular complex normal numbers of mean square 1.
-pub(crate) fn draw_speckle<R: Rng + ?Sized>(layers: usize, rng: &mut R, out: &mut Vec<Complex<f64>>) {
+pub(crate) fn draw_speckle<R: Rng + ?Sized>(
+    layers: usize,
+    rng: &mut R,
+    out: &mut Vec<Complex<f64>>,
+) {
     out.clear();
     out.extend((0..layers).map(|_| {
         let re: f64 = rng.sample(StandardNormal);

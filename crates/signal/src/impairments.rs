@@ -36,12 +36,18 @@ impl Simulator {
         let front = self.receiver().front_end;
         let thickness_m = shot.line.layer_thickness_m;
         let mut oscillator = vec![Complex::ONE; out_a.len()];
-        walk(front.linewidth_hz, 1.0 / self.receiver().sample_rate_hz, &mut rng, &mut oscillator);
+        walk(
+            front.linewidth_hz,
+            1.0 / self.receiver().sample_rate_hz,
+            &mut rng,
+            &mut oscillator,
+        );
         let phases = self.laser_phases(shot.line, &mut rng)?;
         self.sum_into(shot, speckle, &phases, scratch, out_a)?;
         let reflex_rad = 2.0 * PI * rng.random::<f64>();
         if front.reflection > 0.0 {
-            let gain = self.receiver().heterodyne_gain_a2_w() * self.pulse().energy_j() * front.reflection;
+            let gain =
+                self.receiver().heterodyne_gain_a2_w() * self.pulse().energy_j() * front.reflection;
             let amplitude = Complex::from_polar(gain.sqrt(), reflex_rad);
             for (k, out) in out_a.iter_mut().enumerate() {
                 let time_s = self.time_s(k);
@@ -54,16 +60,32 @@ impl Simulator {
             let (mut speckle, mut echo) = (Vec::new(), vec![Complex::ZERO; out_a.len()]);
             draw_speckle(previous.layers(), &mut rng, &mut speckle);
             self.sum_into(Shot::from(previous), &speckle, &phases, scratch, &mut echo)?;
-            out_a.iter_mut().zip(&echo).for_each(|(out, echo)| *out += echo);
+            out_a
+                .iter_mut()
+                .zip(&echo)
+                .for_each(|(out, echo)| *out += echo);
         }
-        out_a.iter_mut().zip(&oscillator).for_each(|(out, turn)| *out *= turn.conj());
+        out_a
+            .iter_mut()
+            .zip(&oscillator)
+            .for_each(|(out, turn)| *out *= turn.conj());
         Ok(())
     }
     /// Factors `exp(j phase)` of the laser while it sends a pulse, one for each layer that a sample sees.
-    fn laser_phases(&self, line: &LineOfSight, rng: &mut Xoshiro256PlusPlus) -> Result<Vec<Complex<f64>>, Error> {
-        let mut phases = vec![Complex::ONE; lit_layers(reach(self.pulse(), line.layer_thickness_m)?)];
+    fn laser_phases(
+        &self,
+        line: &LineOfSight,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Result<Vec<Complex<f64>>, Error> {
+        let mut phases =
+            vec![Complex::ONE; lit_layers(reach(self.pulse(), line.layer_thickness_m)?)];
         let layer_s = 2.0 * line.layer_thickness_m / SPEED_OF_LIGHT_M_S;
-        walk(self.receiver().front_end.linewidth_hz, layer_s, rng, &mut phases);
+        walk(
+            self.receiver().front_end.linewidth_hz,
+            layer_s,
+            rng,
+            &mut phases,
+        );
         Ok(phases)
     }
 }

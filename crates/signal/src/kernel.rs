@@ -23,7 +23,12 @@ pub(crate) struct Phasors {
 
 impl Phasors {
     pub(crate) fn resize(&mut self, layers: usize) {
-        for part in [&mut self.re, &mut self.im, &mut self.rotation_re, &mut self.rotation_im] {
+        for part in [
+            &mut self.re,
+            &mut self.im,
+            &mut self.rotation_re,
+            &mut self.rotation_im,
+        ] {
             part.resize(layers, 0.0);
         }
     }
@@ -33,12 +38,20 @@ impl Phasors {
     pub(crate) fn sum_and_rotate(&mut self, envelope: Lit<'_>) -> (f64, f64) {
         let window = envelope.first..envelope.first + envelope.re.len();
         let phasors = (&mut self.re[window.clone()], &mut self.im[window.clone()]);
-        sum_and_rotate(envelope, phasors, (&self.rotation_re[window.clone()], &self.rotation_im[window]))
+        sum_and_rotate(
+            envelope,
+            phasors,
+            (&self.rotation_re[window.clone()], &self.rotation_im[window]),
+        )
     }
 }
 
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn sum_and_rotate(envelope: Lit<'_>, phasors: (&mut [f64], &mut [f64]), rotation: (&[f64], &[f64])) -> (f64, f64) {
+fn sum_and_rotate(
+    envelope: Lit<'_>,
+    phasors: (&mut [f64], &mut [f64]),
+    rotation: (&[f64], &[f64]),
+) -> (f64, f64) {
     match envelope.im.is_empty() {
         true => sum::<false>((envelope.re, envelope.re), phasors, rotation),
         false => sum::<true>((envelope.re, envelope.im), phasors, rotation),
@@ -59,15 +72,26 @@ fn sum<const COMPLEX: bool>(
     let (rotation_re, rotation_re_rest) = rotation.0.as_chunks::<LANES>();
     let (rotation_im, rotation_im_rest) = rotation.1.as_chunks::<LANES>();
     let mut sums = ([0.0; LANES], [0.0; LANES]);
-    let layers = re.iter_mut().zip(im).zip(rotation_re.iter().zip(rotation_im));
+    let layers = re
+        .iter_mut()
+        .zip(im)
+        .zip(rotation_re.iter().zip(rotation_im));
     for ((a, b), ((re, im), (rotation_re, rotation_im))) in a.iter().zip(b).zip(layers) {
         add::<COMPLEX, LANES>((a, b), (re, im), (rotation_re, rotation_im), &mut sums);
     }
     let mut total = ([sums.0.iter().sum::<f64>()], [sums.1.iter().sum::<f64>()]);
-    let layers = re_rest.iter_mut().zip(im_rest).zip(rotation_re_rest.iter().zip(rotation_im_rest));
+    let layers = re_rest
+        .iter_mut()
+        .zip(im_rest)
+        .zip(rotation_re_rest.iter().zip(rotation_im_rest));
     for ((a, b), ((re, im), (rotation_re, rotation_im))) in a_rest.iter().zip(b_rest).zip(layers) {
         let phasor = (std::array::from_mut(re), std::array::from_mut(im));
-        add::<COMPLEX, 1>((&[*a], &[*b]), phasor, (&[*rotation_re], &[*rotation_im]), &mut total);
+        add::<COMPLEX, 1>(
+            (&[*a], &[*b]),
+            phasor,
+            (&[*rotation_re], &[*rotation_im]),
+            &mut total,
+        );
     }
     (total.0[0], total.1[0])
 }
@@ -82,8 +106,16 @@ fn add<const COMPLEX: bool, const N: usize>(
 ) {
     for i in 0..N {
         let (x, y) = (re[i], im[i]);
-        sum_re[i] += if COMPLEX { a[i] * x - b[i] * y } else { a[i] * x };
-        sum_im[i] += if COMPLEX { a[i] * y + b[i] * x } else { a[i] * y };
+        sum_re[i] += if COMPLEX {
+            a[i] * x - b[i] * y
+        } else {
+            a[i] * x
+        };
+        sum_im[i] += if COMPLEX {
+            a[i] * y + b[i] * x
+        } else {
+            a[i] * y
+        };
         re[i] = x * rotation_re[i] - y * rotation_im[i];
         im[i] = x * rotation_im[i] + y * rotation_re[i];
     }

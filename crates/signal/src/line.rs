@@ -31,9 +31,18 @@ impl LineOfSight {
         check("first_range_m", self.first_range_m, "finite", |_| true)?;
         check_positive("layer_thickness_m", self.layer_thickness_m)?;
         check_any("radial_velocity_m_s", self.radial_velocity_m_s.len())?;
-        check_length("weight_per_m", self.weight_per_m.len(), self.radial_velocity_m_s.len())?;
+        check_length(
+            "weight_per_m",
+            self.weight_per_m.len(),
+            self.radial_velocity_m_s.len(),
+        )?;
         let allowed = "finite, or NaN where there are no scatterers";
-        check_each("radial_velocity_m_s", &self.radial_velocity_m_s, allowed, |v| !v.is_infinite())?;
+        check_each(
+            "radial_velocity_m_s",
+            &self.radial_velocity_m_s,
+            allowed,
+            |v| !v.is_infinite(),
+        )?;
         check_amounts("weight_per_m", &self.weight_per_m)
     }
 
@@ -76,11 +85,20 @@ impl LayerLimits {
     /// # Errors
     /// [`Error::OutOfRange`] if a field or `sigma_s` is not positive (the gradient may be zero).
     pub(crate) fn thickness_m(self, sigma_s: f64) -> Result<f64, Error> {
-        let Self { sample_rate_hz, wavelength_m, max_gradient_per_s } = self;
+        let Self {
+            sample_rate_hz,
+            wavelength_m,
+            max_gradient_per_s,
+        } = self;
         check_positive("sample_rate_hz", sample_rate_hz)?;
         check_positive("wavelength_m", wavelength_m)?;
         check_positive("sigma_s", sigma_s)?;
-        check("max_gradient_per_s", max_gradient_per_s, "finite and not negative", |g| g >= 0.0)?;
+        check(
+            "max_gradient_per_s",
+            max_gradient_per_s,
+            "finite and not negative",
+            |g| g >= 0.0,
+        )?;
         let step_m = SPEED_OF_LIGHT_M_S / (2.0 * sample_rate_hz);
         let by_gradient = step_m * 16.0 * sigma_s * max_gradient_per_s / wavelength_m;
         let by_pulse = step_m / (0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
@@ -94,7 +112,11 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn limits(max_gradient_per_s: f64) -> LayerLimits {
-        LayerLimits { sample_rate_hz: 250e6, wavelength_m: 1.55e-6, max_gradient_per_s }
+        LayerLimits {
+            sample_rate_hz: 250e6,
+            wavelength_m: 1.55e-6,
+            max_gradient_per_s,
+        }
     }
 
     fn line() -> LineOfSight {
@@ -139,17 +161,57 @@ mod tests {
     fn a_line_may_be_masked_but_not_empty_ragged_or_infinite() {
         assert_eq!(line().validate(), Ok(()));
         assert_eq!(line().range_m(2), 101.0);
-        let empty = LineOfSight { radial_velocity_m_s: vec![], weight_per_m: vec![], ..line() };
-        assert_eq!(empty.validate(), Err(Error::Empty { field: "radial_velocity_m_s" }));
-        let ragged = LineOfSight { weight_per_m: vec![1.0], ..line() };
-        assert!(matches!(ragged.validate(), Err(Error::LengthMismatch { found: 1, expected: 3, .. })));
-        let infinite = LineOfSight { radial_velocity_m_s: vec![0.0, f64::INFINITY, 0.0], ..line() };
-        assert!(matches!(infinite.validate(), Err(Error::ElementOutOfRange { index: 1, .. })));
+        let empty = LineOfSight {
+            radial_velocity_m_s: vec![],
+            weight_per_m: vec![],
+            ..line()
+        };
+        assert_eq!(
+            empty.validate(),
+            Err(Error::Empty {
+                field: "radial_velocity_m_s"
+            })
+        );
+        let ragged = LineOfSight {
+            weight_per_m: vec![1.0],
+            ..line()
+        };
+        assert!(matches!(
+            ragged.validate(),
+            Err(Error::LengthMismatch {
+                found: 1,
+                expected: 3,
+                ..
+            })
+        ));
+        let infinite = LineOfSight {
+            radial_velocity_m_s: vec![0.0, f64::INFINITY, 0.0],
+            ..line()
+        };
+        assert!(matches!(
+            infinite.validate(),
+            Err(Error::ElementOutOfRange { index: 1, .. })
+        ));
         for bad in [-1.0, f64::NAN] {
-            let negative = LineOfSight { weight_per_m: vec![1.0, 1.0, bad], ..line() };
-            assert!(matches!(negative.validate(), Err(Error::ElementOutOfRange { index: 2, .. })));
+            let negative = LineOfSight {
+                weight_per_m: vec![1.0, 1.0, bad],
+                ..line()
+            };
+            assert!(matches!(
+                negative.validate(),
+                Err(Error::ElementOutOfRange { index: 2, .. })
+            ));
         }
-        let flat = LineOfSight { layer_thickness_m: 0.0, ..line() };
-        assert!(matches!(flat.validate(), Err(Error::OutOfRange { field: "layer_thickness_m", .. })));
+        let flat = LineOfSight {
+            layer_thickness_m: 0.0,
+            ..line()
+        };
+        assert!(matches!(
+            flat.validate(),
+            Err(Error::OutOfRange {
+                field: "layer_thickness_m",
+                ..
+            })
+        ));
     }
 }

@@ -25,7 +25,11 @@ impl Medium {
     /// # Errors
     /// [`Error::Empty`] without ranges; [`Error::ElementOutOfRange`] for ranges that are negative or do not increase, or a
     /// value that is negative or not finite; [`Error::LengthMismatch`] unless there is one value per range.
-    pub fn new(range_m: Vec<f64>, backscatter_per_m_sr: Vec<f64>, extinction_per_m: Vec<f64>) -> Result<Self, Error> {
+    pub fn new(
+        range_m: Vec<f64>,
+        backscatter_per_m_sr: Vec<f64>,
+        extinction_per_m: Vec<f64>,
+    ) -> Result<Self, Error> {
         check_ranges(&range_m)?;
         check_each("range_m", &range_m, "not negative", |r| r >= 0.0)?;
         check_values("backscatter_per_m_sr", &backscatter_per_m_sr, range_m.len())?;
@@ -34,7 +38,13 @@ impl Medium {
         for (r, alpha) in range_m.windows(2).zip(extinction_per_m.windows(2)) {
             depth.push(depth[depth.len() - 1] + 0.5 * (alpha[0] + alpha[1]) * (r[1] - r[0]));
         }
-        Ok(Self { range_m, backscatter_per_m_sr, extinction_per_m, depth, uniform: false })
+        Ok(Self {
+            range_m,
+            backscatter_per_m_sr,
+            extinction_per_m,
+            depth,
+            uniform: false,
+        })
     }
 
     /// The same air everywhere.
@@ -42,25 +52,45 @@ impl Medium {
     /// # Errors
     /// As [`Medium::new`].
     pub fn uniform(backscatter_per_m_sr: f64, extinction_per_m: f64) -> Result<Self, Error> {
-        let medium = Self::new(vec![0.0], vec![backscatter_per_m_sr], vec![extinction_per_m])?;
-        Ok(Self { uniform: true, ..medium })
+        let medium = Self::new(
+            vec![0.0],
+            vec![backscatter_per_m_sr],
+            vec![extinction_per_m],
+        )?;
+        Ok(Self {
+            uniform: true,
+            ..medium
+        })
     }
 
     /// The air of the chapter's Table 2: 1e-7 per m and sr, an extinction of 7e-5 per m.
     pub fn table2() -> Self {
         let (range_m, depth) = (vec![0.0], vec![0.0]);
-        Self { range_m, backscatter_per_m_sr: vec![1e-7], extinction_per_m: vec![7e-5], depth, uniform: true }
+        Self {
+            range_m,
+            backscatter_per_m_sr: vec![1e-7],
+            extinction_per_m: vec![7e-5],
+            depth,
+            uniform: true,
+        }
     }
 
     /// Backscatter `beta` \[1/(m sr)\] and one-way optical depth at a range.
     fn at(&self, range_m: f64) -> Result<(f64, f64), Error> {
         let first_m = self.range_m[0];
-        let beyond = |allowed| Error::OutOfRange { field: "range_m", value: range_m, allowed };
+        let beyond = |allowed| Error::OutOfRange {
+            field: "range_m",
+            value: range_m,
+            allowed,
+        };
         if !(range_m > 0.0 && range_m.is_finite()) {
             return Err(beyond("finite and positive"));
         }
         if self.uniform || range_m <= first_m {
-            return Ok((self.backscatter_per_m_sr[0], range_m * self.extinction_per_m[0]));
+            return Ok((
+                self.backscatter_per_m_sr[0],
+                range_m * self.extinction_per_m[0],
+            ));
         }
         let Some((index, part)) = locate(&self.range_m, range_m) else {
             return Err(beyond("within the table of the medium"));
@@ -105,7 +135,9 @@ impl Medium {
     /// As [`Medium::return_per_m`].
     pub fn weigh(&self, line: &mut LineOfSight, aperture_area_m2: f64) -> Result<(), Error> {
         let weight_per_m = |layer| self.return_per_m(line.range_m(layer), aperture_area_m2);
-        line.weight_per_m = (0..line.layers()).map(weight_per_m).collect::<Result<_, _>>()?;
+        line.weight_per_m = (0..line.layers())
+            .map(weight_per_m)
+            .collect::<Result<_, _>>()?;
         Ok(())
     }
 }
@@ -121,7 +153,11 @@ mod tests {
         let uniform = Medium::uniform(1e-7, 7e-5).unwrap();
         let table = Medium::new(vec![50.0, 120.0, 900.0], vec![1e-7; 3], vec![7e-5; 3]).unwrap();
         for medium in [uniform, table] {
-            assert_relative_eq!(medium.return_per_m(400.0, 7.85e-3).unwrap(), expected, max_relative = 1e-13);
+            assert_relative_eq!(
+                medium.return_per_m(400.0, 7.85e-3).unwrap(),
+                expected,
+                max_relative = 1e-13
+            );
         }
     }
 
@@ -131,25 +167,40 @@ mod tests {
         // alpha = 2e-6 R, so the depth is 1e-6 R^2.
         for range_m in [1.0, 250.0, 1000.0] {
             let transmission = medium.transmission(range_m).unwrap();
-            assert_relative_eq!(transmission, (-1e-6 * range_m * range_m).exp(), max_relative = 1e-13);
+            assert_relative_eq!(
+                transmission,
+                (-1e-6 * range_m * range_m).exp(),
+                max_relative = 1e-13
+            );
         }
-        let ratio = medium.return_per_m(500.0, 1.0).unwrap() / medium.return_per_m(250.0, 1.0).unwrap();
-        let expected = 2e-7 / 1.5e-7 / 4.0 * (-2.0 * 1e-6 * (500.0_f64.powi(2) - 250.0_f64.powi(2))).exp();
+        let ratio =
+            medium.return_per_m(500.0, 1.0).unwrap() / medium.return_per_m(250.0, 1.0).unwrap();
+        let expected =
+            2e-7 / 1.5e-7 / 4.0 * (-2.0 * 1e-6 * (500.0_f64.powi(2) - 250.0_f64.powi(2))).exp();
         assert_relative_eq!(ratio, expected, max_relative = 1e-12);
     }
 
     #[test]
     fn a_cloud_is_bright_and_darkens_what_lies_behind_it() {
         let ranges = vec![0.0, 400.0, 401.0, 420.0, 421.0, 800.0];
-        let cloudy =
-            Medium::new(ranges, vec![1e-7, 1e-7, 1e-5, 1e-5, 1e-7, 1e-7], vec![1e-4, 1e-4, 2e-2, 2e-2, 1e-4, 1e-4])
-                .unwrap();
+        let cloudy = Medium::new(
+            ranges,
+            vec![1e-7, 1e-7, 1e-5, 1e-5, 1e-7, 1e-7],
+            vec![1e-4, 1e-4, 2e-2, 2e-2, 1e-4, 1e-4],
+        )
+        .unwrap();
         let clear = Medium::uniform(1e-7, 1e-4).unwrap();
-        let ratio = |range_m| cloudy.return_per_m(range_m, 1.0).unwrap() / clear.return_per_m(range_m, 1.0).unwrap();
+        let ratio = |range_m| {
+            cloudy.return_per_m(range_m, 1.0).unwrap() / clear.return_per_m(range_m, 1.0).unwrap()
+        };
         assert_relative_eq!(ratio(300.0), 1.0, max_relative = 1e-13);
         assert!(ratio(401.0) > 90.0);
         // 20 m (half of each edge counts) with 0.0199 more per metre, there and back.
-        assert_relative_eq!(ratio(600.0), (-2.0 * 0.0199 * 20.0_f64).exp(), max_relative = 1e-12);
+        assert_relative_eq!(
+            ratio(600.0),
+            (-2.0 * 0.0199 * 20.0_f64).exp(),
+            max_relative = 1e-12
+        );
     }
 
     #[test]
@@ -165,21 +216,62 @@ mod tests {
         let expected = medium.return_per_m(120.0, 8e-3).unwrap();
         assert_relative_eq!(line.weight_per_m[2], expected, max_relative = 1e-15);
         line.first_range_m = -5.0;
-        assert!(matches!(medium.weigh(&mut line, 8e-3), Err(Error::OutOfRange { field: "range_m", .. })));
+        assert!(matches!(
+            medium.weigh(&mut line, 8e-3),
+            Err(Error::OutOfRange {
+                field: "range_m",
+                ..
+            })
+        ));
     }
 
     #[test]
     fn tables_that_are_none_and_ranges_beyond_them_are_refused() {
-        let make = |r: &[f64], b: &[f64], a: &[f64]| Medium::new(r.to_vec(), b.to_vec(), a.to_vec());
+        let make =
+            |r: &[f64], b: &[f64], a: &[f64]| Medium::new(r.to_vec(), b.to_vec(), a.to_vec());
         assert!(matches!(make(&[], &[], &[]), Err(Error::Empty { .. })));
-        assert!(matches!(make(&[1.0, 1.0], &[1.0; 2], &[1.0; 2]), Err(Error::ElementOutOfRange { index: 1, .. })));
-        assert!(matches!(make(&[-1.0], &[1.0], &[1.0]), Err(Error::ElementOutOfRange { index: 0, .. })));
-        assert!(matches!(make(&[1.0], &[1.0, 2.0], &[1.0]), Err(Error::LengthMismatch { .. })));
+        assert!(matches!(
+            make(&[1.0, 1.0], &[1.0; 2], &[1.0; 2]),
+            Err(Error::ElementOutOfRange { index: 1, .. })
+        ));
+        assert!(matches!(
+            make(&[-1.0], &[1.0], &[1.0]),
+            Err(Error::ElementOutOfRange { index: 0, .. })
+        ));
+        assert!(matches!(
+            make(&[1.0], &[1.0, 2.0], &[1.0]),
+            Err(Error::LengthMismatch { .. })
+        ));
         let negative = make(&[1.0, 2.0], &[1.0, -1.0], &[1.0; 2]);
-        assert!(matches!(negative, Err(Error::ElementOutOfRange { field: "backscatter_per_m_sr", index: 1, .. })));
+        assert!(matches!(
+            negative,
+            Err(Error::ElementOutOfRange {
+                field: "backscatter_per_m_sr",
+                index: 1,
+                ..
+            })
+        ));
         let table = make(&[1.0, 2.0], &[1.0; 2], &[1.0; 2]).unwrap();
-        assert!(matches!(table.return_per_m(2.1, 1.0), Err(Error::OutOfRange { field: "range_m", .. })));
-        assert!(matches!(table.return_per_m(0.0, 1.0), Err(Error::OutOfRange { field: "range_m", .. })));
-        assert!(matches!(table.return_per_m(1.5, 0.0), Err(Error::OutOfRange { field: "aperture_area_m2", .. })));
+        assert!(matches!(
+            table.return_per_m(2.1, 1.0),
+            Err(Error::OutOfRange {
+                field: "range_m",
+                ..
+            })
+        ));
+        assert!(matches!(
+            table.return_per_m(0.0, 1.0),
+            Err(Error::OutOfRange {
+                field: "range_m",
+                ..
+            })
+        ));
+        assert!(matches!(
+            table.return_per_m(1.5, 0.0),
+            Err(Error::OutOfRange {
+                field: "aperture_area_m2",
+                ..
+            })
+        ));
     }
 }

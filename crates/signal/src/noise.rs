@@ -60,18 +60,27 @@ impl<T: ?Sized> Noise<T> {
         let density_a2_hz = receiver.noise_density_a2_hz();
         match receiver.noise {
             NoiseModel::None => Self::None,
-            NoiseModel::White => Self::White { sd_a: (0.5 * density_a2_hz * receiver.sample_rate_hz).sqrt() },
+            NoiseModel::White => Self::White {
+                sd_a: (0.5 * density_a2_hz * receiver.sample_rate_hz).sqrt(),
+            },
             NoiseModel::BandLimited => {
                 let length = smooth_even_length(2 * samples);
                 let cell_hz = receiver.sample_rate_hz / length as f64;
-                let [low_hz, high_hz] = [-0.5, 0.5].map(|side| centre_hz + side * receiver.bandwidth_hz);
+                let [low_hz, high_hz] =
+                    [-0.5, 0.5].map(|side| centre_hz + side * receiver.bandwidth_hz);
                 let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last(length));
                 let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last(length));
                 let sd_a = |cell: usize| {
-                    let [from_hz, to_hz] = [-0.5, 0.5].map(|side| cell as f64 * cell_hz + side * cell_hz);
-                    (share * density_a2_hz * (to_hz.min(high_hz) - from_hz.max(low_hz)).max(0.0)).sqrt()
+                    let [from_hz, to_hz] =
+                        [-0.5, 0.5].map(|side| cell as f64 * cell_hz + side * cell_hz);
+                    (share * density_a2_hz * (to_hz.min(high_hz) - from_hz.max(low_hz)).max(0.0))
+                        .sqrt()
                 };
-                Self::Band { transform: plan(length), first, sd_a: (first..=end).map(sd_a).collect() }
+                Self::Band {
+                    transform: plan(length),
+                    first,
+                    sd_a: (first..=end).map(sd_a).collect(),
+                }
             }
         }
     }
@@ -86,27 +95,51 @@ impl RealNoise {
     }
 
     /// Adds the noise of one record to `out_a`.
-    pub(crate) fn add_to<R: Rng + ?Sized>(&self, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [f64]) {
+    pub(crate) fn add_to<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        scratch: &mut NoiseScratch,
+        out_a: &mut [f64],
+    ) {
         match self {
             Self::None => {}
             Self::White { sd_a } => {
-                out_a.iter_mut().for_each(|out| *out += sd_a * rng.sample::<f64, _>(StandardNormal));
+                out_a
+                    .iter_mut()
+                    .for_each(|out| *out += sd_a * rng.sample::<f64, _>(StandardNormal));
             }
-            Self::Band { transform, first, sd_a } => {
-                let NoiseScratch { spectrum, circular, transform: work } = scratch;
+            Self::Band {
+                transform,
+                first,
+                sd_a,
+            } => {
+                let NoiseScratch {
+                    spectrum,
+                    circular,
+                    transform: work,
+                } = scratch;
                 let length = transform.len();
                 spectrum.clear();
                 spectrum.resize(length / 2 + 1, Complex::ZERO);
                 circular.resize(length, 0.0);
                 work.resize(transform.get_scratch_len(), Complex::ZERO);
-                spectrum[*first..].iter_mut().zip(sd_a).for_each(|(value, sd_a)| *value = normal(rng, *sd_a));
+                spectrum[*first..]
+                    .iter_mut()
+                    .zip(sd_a)
+                    .for_each(|(value, sd_a)| *value = normal(rng, *sd_a));
                 // The two ends have no mirror.
                 for end in [0, length / 2] {
                     spectrum[end] = Complex::new(2.0 * spectrum[end].re, 0.0);
                 }
                 let done = transform.process_with_scratch(spectrum, circular, work);
-                debug_assert!(done.is_ok(), "buffers have the lengths of the plan and the end frequencies are real");
-                out_a.iter_mut().zip(circular).for_each(|(out, noise)| *out += *noise);
+                debug_assert!(
+                    done.is_ok(),
+                    "buffers have the lengths of the plan and the end frequencies are real"
+                );
+                out_a
+                    .iter_mut()
+                    .zip(circular)
+                    .for_each(|(out, noise)| *out += *noise);
             }
         }
     }
@@ -120,12 +153,25 @@ impl BasebandNoise {
     }
 
     /// Adds the noise of one record to `out_a`.
-    pub(crate) fn add_to<R: Rng + ?Sized>(&self, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Complex<f64>]) {
+    pub(crate) fn add_to<R: Rng + ?Sized>(
+        &self,
+        rng: &mut R,
+        scratch: &mut NoiseScratch,
+        out_a: &mut [Complex<f64>],
+    ) {
         match self {
             Self::None => {}
             Self::White { sd_a } => out_a.iter_mut().for_each(|out| *out += normal(rng, *sd_a)),
-            Self::Band { transform, first, sd_a } => {
-                let NoiseScratch { spectrum, transform: work, .. } = scratch;
+            Self::Band {
+                transform,
+                first,
+                sd_a,
+            } => {
+                let NoiseScratch {
+                    spectrum,
+                    transform: work,
+                    ..
+                } = scratch;
                 let length = transform.len();
                 spectrum.clear();
                 spectrum.resize(length, Complex::ZERO);
@@ -137,7 +183,10 @@ impl BasebandNoise {
                     }
                 }
                 transform.process_with_scratch(spectrum, work);
-                out_a.iter_mut().zip(spectrum).for_each(|(out, noise)| *out += *noise);
+                out_a
+                    .iter_mut()
+                    .zip(spectrum)
+                    .for_each(|(out, noise)| *out += *noise);
             }
         }
     }
@@ -161,5 +210,8 @@ fn smooth_even_length(least: usize) -> usize {
             rest
         }) == 1
     };
-    (least.max(512).next_multiple_of(2)..).step_by(2).find(is_smooth).unwrap_or(least)
+    (least.max(512).next_multiple_of(2)..)
+        .step_by(2)
+        .find(is_smooth)
+        .unwrap_or(least)
 }

@@ -14,11 +14,16 @@ pub(crate) fn map_chunks<T: Send, S, O: Send>(
     {
         use rayon::prelude::*;
         let chunks = data.par_chunks_mut(size).enumerate();
-        chunks.map_init(state, |worker, (index, chunk)| f(worker, index, chunk)).collect()
+        chunks
+            .map_init(state, |worker, (index, chunk)| f(worker, index, chunk))
+            .collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
         let mut worker = state();
-        data.chunks_mut(size).enumerate().map(|(index, chunk)| f(&mut worker, index, chunk)).collect()
+        data.chunks_mut(size)
+            .enumerate()
+            .map(|(index, chunk)| f(&mut worker, index, chunk))
+            .collect()
     }
 }

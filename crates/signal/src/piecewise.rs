@@ -46,8 +46,15 @@ pub(crate) struct Piecewise {
 impl Piecewise {
     /// Straight lines between the values. The knots increase; there are as many values, two or more.
     pub(crate) fn linear(knots_s: Vec<f64>, values: &[Complex<f64>]) -> Self {
-        let pieces = values.windows(2).map(|v| [v[0], v[1] - v[0], Complex::ZERO, Complex::ZERO]).collect();
-        Self { even: is_even(&knots_s), knots_s, pieces }
+        let pieces = values
+            .windows(2)
+            .map(|v| [v[0], v[1] - v[0], Complex::ZERO, Complex::ZERO])
+            .collect();
+        Self {
+            even: is_even(&knots_s),
+            knots_s,
+            pieces,
+        }
     }
 
     /// The cubic spline through the values, without curvature at both ends.
@@ -57,10 +64,19 @@ impl Piecewise {
             .map(|i| {
                 let square = (knots_s[i + 1] - knots_s[i]).powi(2);
                 let (a, b) = (curvature[i] * square, curvature[i + 1] * square);
-                [values[i], values[i + 1] - values[i] - (a * 2.0 + b) / 6.0, a * 0.5, (b - a) / 6.0]
+                [
+                    values[i],
+                    values[i + 1] - values[i] - (a * 2.0 + b) / 6.0,
+                    a * 0.5,
+                    (b - a) / 6.0,
+                ]
             })
             .collect();
-        Self { even: is_even(&knots_s), knots_s, pieces }
+        Self {
+            even: is_even(&knots_s),
+            knots_s,
+            pieces,
+        }
     }
 
     /// First and last knot \[s\].
@@ -78,7 +94,9 @@ impl Piecewise {
         let index = if self.even {
             ((time_s - first) / (last - first) * self.pieces.len() as f64) as usize
         } else {
-            self.knots_s.partition_point(|knot| *knot <= time_s).saturating_sub(1)
+            self.knots_s
+                .partition_point(|knot| *knot <= time_s)
+                .saturating_sub(1)
         };
         let index = index.min(end);
         let start = self.knots_s[index];
@@ -99,9 +117,17 @@ impl Piecewise {
     /// Energy of each piece.
     fn energies(&self) -> Vec<f64> {
         let energy = |(piece, knots): (&[Complex<f64>; 4], &[f64])| {
-            (knots[1] - knots[0]) * GAUSS.iter().map(|&(u, weight)| weight * at(piece, u).norm_sqr()).sum::<f64>()
+            (knots[1] - knots[0])
+                * GAUSS
+                    .iter()
+                    .map(|&(u, weight)| weight * at(piece, u).norm_sqr())
+                    .sum::<f64>()
         };
-        self.pieces.iter().zip(self.knots_s.windows(2)).map(energy).collect()
+        self.pieces
+            .iter()
+            .zip(self.knots_s.windows(2))
+            .map(energy)
+            .collect()
     }
 
     /// Drops pieces from both ends that hold at most the part `lost` of the energy each side.
@@ -201,7 +227,10 @@ mod tests {
         // Natural at x = 1 is right, at x = 0 it is wrong by 6; the error dies out by 3.7 per knot.
         assert!((spline.value(0.9) - cubic(0.9)).norm() < 0.02);
         assert_relative_eq!(curvature[3].re, 6.0 * (0.7 - 1.0), epsilon = 0.5);
-        let straight = Piecewise::spline(vec![0.0, 0.3, 1.0], &[0.0, 0.6, 2.0].map(|x| Complex::new(x, -x)));
+        let straight = Piecewise::spline(
+            vec![0.0, 0.3, 1.0],
+            &[0.0, 0.6, 2.0].map(|x| Complex::new(x, -x)),
+        );
         assert!((straight.value(0.8) - Complex::new(1.6, -1.6)).norm() < 1e-15);
     }
 
@@ -209,10 +238,15 @@ mod tests {
     fn a_spline_converges_with_the_fourth_power_of_the_step() {
         let f = |t: f64| Complex::from_polar((-t * t).exp(), 2.0 * t);
         let error = |points: usize| {
-            let knots: Vec<f64> = (0..points).map(|i| -6.0 + 12.0 * i as f64 / (points - 1) as f64).collect();
+            let knots: Vec<f64> = (0..points)
+                .map(|i| -6.0 + 12.0 * i as f64 / (points - 1) as f64)
+                .collect();
             let values: Vec<_> = knots.iter().map(|t| f(*t)).collect();
             let spline = Piecewise::spline(knots, &values);
-            (0..997).map(|i| f64::from(i) / 166.1 - 3.0).map(|t| (spline.value(t) - f(t)).norm()).fold(0.0, f64::max)
+            (0..997)
+                .map(|i| f64::from(i) / 166.1 - 3.0)
+                .map(|t| (spline.value(t) - f(t)).norm())
+                .fold(0.0, f64::max)
         };
         let order = (error(61) / error(121)).log2();
         assert!((order - 4.0).abs() < 0.3, "{order}");
@@ -223,7 +257,10 @@ mod tests {
         let (sigma, chirp, offset, delay) = (1.3, 0.4, 0.7, 0.5);
         let f = |t: f64| {
             let x = t - delay;
-            Complex::from_polar((-0.5 * (x / sigma).powi(2)).exp(), PI * chirp * x * x + 2.0 * PI * offset * x)
+            Complex::from_polar(
+                (-0.5 * (x / sigma).powi(2)).exp(),
+                PI * chirp * x * x + 2.0 * PI * offset * x,
+            )
         };
         let knots: Vec<f64> = (0..4001).map(|i| -10.0 + f64::from(i) / 200.0).collect();
         let values: Vec<_> = knots.iter().map(|t| f(*t)).collect();
@@ -231,23 +268,45 @@ mod tests {
         let variance = 0.5 * sigma * sigma;
         assert_relative_eq!(moments.energy, PI.sqrt() * sigma, max_relative = 1e-6);
         assert_relative_eq!(moments.mean_s, delay, max_relative = 1e-6);
-        assert_relative_eq!(moments.square_s2, variance + delay * delay, max_relative = 1e-6);
+        assert_relative_eq!(
+            moments.square_s2,
+            variance + delay * delay,
+            max_relative = 1e-6
+        );
         assert_relative_eq!(moments.mean_hz, offset, max_relative = 1e-6);
         let spread = 1.0 / (8.0 * PI * PI * sigma * sigma) + chirp * chirp * variance;
-        assert_relative_eq!(moments.square_hz2, spread + offset * offset, max_relative = 1e-6);
-        assert_relative_eq!(moments.cross, chirp * variance + offset * delay, max_relative = 1e-6);
+        assert_relative_eq!(
+            moments.square_hz2,
+            spread + offset * offset,
+            max_relative = 1e-6
+        );
+        assert_relative_eq!(
+            moments.cross,
+            chirp * variance + offset * delay,
+            max_relative = 1e-6
+        );
     }
 
     #[test]
     fn trimming_keeps_the_energy_but_the_part_given_up() {
         let knots: Vec<f64> = (0..=200).map(|i| f64::from(i) * 0.1).collect();
-        let values: Vec<_> = knots.iter().map(|t| Complex::new((-0.5 * (t - 10.0).powi(2)).exp(), 0.0)).collect();
+        let values: Vec<_> = knots
+            .iter()
+            .map(|t| Complex::new((-0.5 * (t - 10.0).powi(2)).exp(), 0.0))
+            .collect();
         let whole = Piecewise::spline(knots, &values);
         let mut cut = whole.clone();
         cut.trim(1e-6);
         let (first, last) = cut.support_s();
         // erfc(x)/2 = 1e-6 at x = 3.36.
-        assert!((10.0 - first - 3.4).abs() < 0.11 && (last - 10.0 - 3.4).abs() < 0.11, "{first} {last}");
-        assert_relative_eq!(cut.moments().energy, whole.moments().energy, max_relative = 2e-6);
+        assert!(
+            (10.0 - first - 3.4).abs() < 0.11 && (last - 10.0 - 3.4).abs() < 0.11,
+            "{first} {last}"
+        );
+        assert_relative_eq!(
+            cut.moments().energy,
+            whole.moments().energy,
+            max_relative = 2e-6
+        );
     }
 }

@@ -53,7 +53,10 @@ pub struct GaussianPulse {
 impl GaussianPulse {
     /// Table 2's 150 uJ in 200 ns (full width at half maximum), the shorter of the chapter's two pulses.
     pub fn table2() -> Self {
-        Self { sigma_s: PulseDuration::FullWidthHalfMaximum(200e-9).sigma_s(), energy_j: 150e-6 }
+        Self {
+            sigma_s: PulseDuration::FullWidthHalfMaximum(200e-9).sigma_s(),
+            energy_j: 150e-6,
+        }
     }
 
     /// A pulse of the given duration and energy.
@@ -63,7 +66,10 @@ impl GaussianPulse {
     pub fn new(duration: PulseDuration, energy_j: f64) -> Result<Self, Error> {
         check_positive("pulse duration_s", duration.sigma_s())?;
         check_positive("energy_j", energy_j)?;
-        Ok(Self { sigma_s: duration.sigma_s(), energy_j })
+        Ok(Self {
+            sigma_s: duration.sigma_s(),
+            energy_j,
+        })
     }
 
     /// The 1/e half-width of the power, `sigma` \[s\].
@@ -132,16 +138,43 @@ impl From<GaussianPulse> for Pulse {
         let allowed_s = PI * sigma_s / (2.0 / ALLOWED_ENERGY_ERROR).ln().sqrt();
         let support_s = (-HALF_LENGTH_SIGMAS * sigma_s, HALF_LENGTH_SIGMAS * sigma_s);
         let (shape, advised_s) = (Shape::Gaussian(pulse), sigma_s);
-        Self { shape, energy_j, real: true, moments, support_s, allowed_s, advised_s, chirp_hz_s: 0.0 }
+        Self {
+            shape,
+            energy_j,
+            real: true,
+            moments,
+            support_s,
+            allowed_s,
+            advised_s,
+            chirp_hz_s: 0.0,
+        }
     }
 }
 
 impl From<SampledPulse> for Pulse {
-    fn from(SampledPulse { envelope, moments, energy_j, real }: SampledPulse) -> Self {
-        let (allowed_s, advised_s) =
-            (thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR), thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR));
+    fn from(
+        SampledPulse {
+            envelope,
+            moments,
+            energy_j,
+            real,
+        }: SampledPulse,
+    ) -> Self {
+        let (allowed_s, advised_s) = (
+            thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR),
+            thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR),
+        );
         let (support_s, shape) = (envelope.support_s(), Shape::Sampled(envelope));
-        Self { shape, energy_j, real, moments, support_s, allowed_s, advised_s, chirp_hz_s: 0.0 }
+        Self {
+            shape,
+            energy_j,
+            real,
+            moments,
+            support_s,
+            allowed_s,
+            advised_s,
+            chirp_hz_s: 0.0,
+        }
     }
 }
 
@@ -204,7 +237,9 @@ impl Pulse {
     /// The 1/e half-width `sigma` \[s\] of the Gaussian with the same spread in time: `sqrt 2` times the standard deviation
     /// of `|f|^2`.
     pub fn sigma_s(&self) -> f64 {
-        (2.0 * (self.moments.square_s2 - self.moments.mean_s.powi(2))).max(0.0).sqrt()
+        (2.0 * (self.moments.square_s2 - self.moments.mean_s.powi(2)))
+            .max(0.0)
+            .sqrt()
     }
 
     /// `sigma` of (7) \[s\], if the power is Gaussian.
@@ -247,19 +282,32 @@ impl Pulse {
         // Sixteen frequencies in the finest structure of a pulse of this length, and eight points in the fastest of its waves.
         let times = (8.0 * reach_hz * length_s).max(2000.0) as u32;
         let point = |i: u32| first_s + length_s * (f64::from(i) + 0.5) / f64::from(times);
-        let envelope: Vec<_> = (0..times).map(point).map(|s| (s, self.envelope_per_sqrt_s(s))).collect();
+        let envelope: Vec<_> = (0..times)
+            .map(point)
+            .map(|s| (s, self.envelope_per_sqrt_s(s)))
+            .collect();
         let frequencies = (32.0 * reach_hz * length_s).ceil() as u32;
         let step_hz = 2.0 * reach_hz / f64::from(frequencies);
         let power = |i: u32| {
             let hz = self.mean_frequency_hz() - reach_hz + f64::from(i) * step_hz;
-            envelope.iter().map(|(s, f)| f * Complex::cis(-2.0 * PI * hz * s)).sum::<Complex<f64>>().norm_sqr()
+            envelope
+                .iter()
+                .map(|(s, f)| f * Complex::cis(-2.0 * PI * hz * s))
+                .sum::<Complex<f64>>()
+                .norm_sqr()
         };
         let found: Vec<f64> = (0..=frequencies).map(power).collect();
         let half = 0.5 * found.iter().copied().fold(0.0, f64::max);
         // From one outer neighbour below half to the other, less what of these steps lies below.
         let first = found.iter().position(|p| *p >= half).unwrap_or(0).max(1);
-        let last = found.iter().rposition(|p| *p >= half).unwrap_or(0).min(found.len() - 2);
-        let below = |inside: usize, outside: usize| (half - found[outside]) / (found[inside] - found[outside]);
+        let last = found
+            .iter()
+            .rposition(|p| *p >= half)
+            .unwrap_or(0)
+            .min(found.len() - 2);
+        let below = |inside: usize, outside: usize| {
+            (half - found[outside]) / (found[inside] - found[outside])
+        };
         step_hz * ((last - first) as f64 + 2.0 - below(first, first - 1) - below(last, last + 1))
     }
 
@@ -275,8 +323,11 @@ impl Pulse {
             return Ok(by_gradient_m);
         }
         let step_m = SPEED_OF_LIGHT_M_S / (2.0 * limits.sample_rate_hz);
-        let limit_m = 0.5 * SPEED_OF_LIGHT_M_S * self.advised_s.min(0.125 / self.spectral_width_hz());
-        let parts = (step_m / by_gradient_m).round().max((step_m / limit_m).ceil());
+        let limit_m =
+            0.5 * SPEED_OF_LIGHT_M_S * self.advised_s.min(0.125 / self.spectral_width_hz());
+        let parts = (step_m / by_gradient_m)
+            .round()
+            .max((step_m / limit_m).ceil());
         Ok(step_m / parts)
     }
 
@@ -296,9 +347,10 @@ impl Pulse {
         match &self.shape {
             // |f|^2 is 2e-16 of its peak there.
             Shape::Gaussian(_) => (-6.0 * self.sigma_m(), 6.0 * self.sigma_m()),
-            Shape::Sampled(_) => {
-                (-0.5 * SPEED_OF_LIGHT_M_S * self.support_s.1, -0.5 * SPEED_OF_LIGHT_M_S * self.support_s.0)
-            }
+            Shape::Sampled(_) => (
+                -0.5 * SPEED_OF_LIGHT_M_S * self.support_s.1,
+                -0.5 * SPEED_OF_LIGHT_M_S * self.support_s.0,
+            ),
         }
     }
 }
@@ -320,7 +372,11 @@ fn thickest_layer_s(envelope: &Piecewise, limit: f64) -> f64 {
     let mut step_s = last_s - first_s;
     for octave in 0..12 * PER_OCTAVE {
         step_s = (last_s - first_s) * (-f64::from(octave) / f64::from(PER_OCTAVE)).exp2();
-        good = if (0..PLACES).all(|place| (sum(step_s, place) - 1.0).abs() <= limit) { good + 1 } else { 0 };
+        good = if (0..PLACES).all(|place| (sum(step_s, place) - 1.0).abs() <= limit) {
+            good + 1
+        } else {
+            0
+        };
         if good == PER_OCTAVE {
             return step_s * (f64::from(PER_OCTAVE - 1) / f64::from(PER_OCTAVE)).exp2();
         }
@@ -335,7 +391,11 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn limits(max_gradient_per_s: f64) -> LayerLimits {
-        LayerLimits { sample_rate_hz: 250e6, wavelength_m: 1.55e-6, max_gradient_per_s }
+        LayerLimits {
+            sample_rate_hz: 250e6,
+            wavelength_m: 1.55e-6,
+            max_gradient_per_s,
+        }
     }
 
     fn gaussian() -> GaussianPulse {
@@ -345,9 +405,13 @@ mod tests {
     /// A rise of 40 ns, a flat top, a long tail.
     fn skewed() -> SampledPulse {
         let times: Vec<f64> = (0..400).map(|i| f64::from(i) * 2e-9).collect();
-        let power: Vec<f64> =
-            times.iter().map(|t| (1.0 - (-(t / 4e-8).powi(2)).exp()) * (-(t / 2.5e-7).powi(3)).exp()).collect();
-        SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap().centred()
+        let power: Vec<f64> = times
+            .iter()
+            .map(|t| (1.0 - (-(t / 4e-8).powi(2)).exp()) * (-(t / 2.5e-7).powi(3)).exp())
+            .collect();
+        SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4)
+            .unwrap()
+            .centred()
     }
 
     #[test]
@@ -355,7 +419,11 @@ mod tests {
         let half = gaussian().intensity_per_s(100e-9) / gaussian().intensity_per_s(0.0);
         assert_relative_eq!(half, 0.5, max_relative = 1e-14);
         assert_relative_eq!(gaussian().sigma_s(), 120.112_241e-9, max_relative = 1e-8);
-        assert_relative_eq!(2.0 * 2.0_f64.ln().sqrt() * gaussian().sigma_s(), 200e-9, max_relative = 1e-15);
+        assert_relative_eq!(
+            2.0 * 2.0_f64.ln().sqrt() * gaussian().sigma_s(),
+            200e-9,
+            max_relative = 1e-15
+        );
     }
 
     #[test]
@@ -369,7 +437,10 @@ mod tests {
     fn power_integrates_to_one_and_is_the_square_of_the_envelope() {
         let (pulse, step_s) = (gaussian(), 10e-9);
         let times = (-200..=200).map(|i| f64::from(i) * step_s);
-        let sum: f64 = times.clone().map(|t| pulse.intensity_per_s(t) * step_s).sum();
+        let sum: f64 = times
+            .clone()
+            .map(|t| pulse.intensity_per_s(t) * step_s)
+            .sum();
         assert_relative_eq!(sum, 1.0, max_relative = 1e-13);
         for t in times.filter(|t| t.abs() < 1e-6) {
             let squared = pulse.envelope_per_sqrt_s(t).powi(2);
@@ -380,7 +451,9 @@ mod tests {
     #[test]
     fn range_weight_integrates_to_one_and_its_half_width_is_half_the_pulse_length() {
         let (pulse, step_m) = (Pulse::from(gaussian()), 1.5);
-        let sum: f64 = (-200..=200).map(|i| pulse.range_weight_per_m(f64::from(i) * step_m) * step_m).sum();
+        let sum: f64 = (-200..=200)
+            .map(|i| pulse.range_weight_per_m(f64::from(i) * step_m) * step_m)
+            .sum();
         assert_relative_eq!(sum, 1.0, max_relative = 1e-13);
         let half_power_m = 0.5 * SPEED_OF_LIGHT_M_S * 100e-9;
         let ratio = pulse.range_weight_per_m(half_power_m) / pulse.range_weight_per_m(0.0);
@@ -391,9 +464,21 @@ mod tests {
     fn durations_and_energies_that_are_not_positive_are_refused() {
         for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
             let duration = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(bad), 1.0);
-            assert!(matches!(duration, Err(Error::OutOfRange { field: "pulse duration_s", .. })));
+            assert!(matches!(
+                duration,
+                Err(Error::OutOfRange {
+                    field: "pulse duration_s",
+                    ..
+                })
+            ));
             let energy = GaussianPulse::new(PulseDuration::OneOverEHalfWidth(1e-7), bad);
-            assert!(matches!(energy, Err(Error::OutOfRange { field: "energy_j", .. })));
+            assert!(matches!(
+                energy,
+                Err(Error::OutOfRange {
+                    field: "energy_j",
+                    ..
+                })
+            ));
         }
     }
 
@@ -404,42 +489,83 @@ mod tests {
         let sigma_s = gaussian().sigma_s();
         for time_s in [-1e-7, 0.0, 3e-8] {
             let expected = gaussian().envelope_per_sqrt_s(time_s);
-            assert_relative_eq!(chirped.envelope_per_sqrt_s(time_s).norm(), expected, max_relative = 1e-14);
-            assert_relative_eq!(chirped.intensity_per_s(time_s), plain.intensity_per_s(time_s));
+            assert_relative_eq!(
+                chirped.envelope_per_sqrt_s(time_s).norm(),
+                expected,
+                max_relative = 1e-14
+            );
+            assert_relative_eq!(
+                chirped.intensity_per_s(time_s),
+                plain.intensity_per_s(time_s)
+            );
         }
         let unchirped_hz = 1.0 / (8.0_f64.sqrt() * PI * sigma_s);
-        assert_relative_eq!(plain.spectral_width_hz(), unchirped_hz, max_relative = 1e-14);
+        assert_relative_eq!(
+            plain.spectral_width_hz(),
+            unchirped_hz,
+            max_relative = 1e-14
+        );
         let expected = unchirped_hz.hypot(chirp_hz_s * sigma_s / 2f64.sqrt());
         assert_relative_eq!(chirped.spectral_width_hz(), expected, max_relative = 1e-14);
-        assert!(matches!(plain.with_chirp(f64::INFINITY), Err(Error::OutOfRange { field: "chirp_hz_s", .. })));
+        assert!(matches!(
+            plain.with_chirp(f64::INFINITY),
+            Err(Error::OutOfRange {
+                field: "chirp_hz_s",
+                ..
+            })
+        ));
     }
 
     #[test]
     fn the_spectrum_of_samples_is_as_wide_as_that_of_what_they_were_taken_of() {
         let times: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 2.5e-9).collect();
-        let power: Vec<f64> = times.iter().map(|t| gaussian().intensity_per_s(*t)).collect();
-        let sampled = Pulse::from(SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap());
+        let power: Vec<f64> = times
+            .iter()
+            .map(|t| gaussian().intensity_per_s(*t))
+            .collect();
+        let sampled = Pulse::from(
+            SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap(),
+        );
         for chirp_hz_s in [0.0, 3e13, -1e14] {
-            let [closed, found] = [Pulse::from(gaussian()), sampled.clone()]
-                .map(|p| p.with_chirp(chirp_hz_s).unwrap().spectral_full_width_half_maximum_hz());
+            let [closed, found] = [Pulse::from(gaussian()), sampled.clone()].map(|p| {
+                p.with_chirp(chirp_hz_s)
+                    .unwrap()
+                    .spectral_full_width_half_maximum_hz()
+            });
             // What the samples leave out of the energy, 1e-4, has the widest frequencies.
             assert_relative_eq!(found, closed, max_relative = 1e-3);
         }
         // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is half at 0.4429/T.
-        let (times, power) = ([-1.0005e-7, -0.9995e-7, 0.9995e-7, 1.0005e-7], [0.0, 1.0, 1.0, 0.0]);
-        let flat = Pulse::from(SampledPulse::from_power(&times, &power, Resampling::Linear, 1e-4).unwrap());
+        let (times, power) = (
+            [-1.0005e-7, -0.9995e-7, 0.9995e-7, 1.0005e-7],
+            [0.0, 1.0, 1.0, 0.0],
+        );
+        let flat = Pulse::from(
+            SampledPulse::from_power(&times, &power, Resampling::Linear, 1e-4).unwrap(),
+        );
         // What is left out of the energy at both ends shortens it.
-        assert_relative_eq!(flat.spectral_full_width_half_maximum_hz(), 0.885_89 / 200e-9, max_relative = 3e-3);
+        assert_relative_eq!(
+            flat.spectral_full_width_half_maximum_hz(),
+            0.885_89 / 200e-9,
+            max_relative = 3e-3
+        );
         assert!(flat.spectral_width_hz() > 5.0 * flat.spectral_full_width_half_maximum_hz());
     }
 
     #[test]
     fn a_chirp_raises_the_mean_frequency_of_a_late_pulse() {
         let times: Vec<f64> = (-200..=200).map(|i| 5e-8 + f64::from(i) * 4e-9).collect();
-        let power: Vec<f64> = times.iter().map(|t| gaussian().intensity_per_s(t - 5e-8)).collect();
+        let power: Vec<f64> = times
+            .iter()
+            .map(|t| gaussian().intensity_per_s(t - 5e-8))
+            .collect();
         let late = SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap();
         let chirped = Pulse::from(late.clone()).with_chirp(1e14).unwrap();
-        assert_relative_eq!(chirped.mean_frequency_hz(), 1e14 * 5e-8, max_relative = 1e-6);
+        assert_relative_eq!(
+            chirped.mean_frequency_hz(),
+            1e14 * 5e-8,
+            max_relative = 1e-6
+        );
         let centred = Pulse::from(late.centred()).with_chirp(1e14).unwrap();
         assert!(centred.mean_frequency_hz().abs() < 1.0);
     }
@@ -449,22 +575,41 @@ mod tests {
         let chirp_hz_s = -1.5e14;
         let whole = Pulse::from(gaussian()).with_chirp(chirp_hz_s).unwrap();
         let times: Vec<f64> = (-400..=400).map(|i| f64::from(i) * 2e-9).collect();
-        let amplitude: Vec<_> = times.iter().map(|t| whole.envelope_per_sqrt_s(*t)).collect();
-        let sampled = Pulse::from(SampledPulse::new(&times, &amplitude, Resampling::BandLimited, 1e-4).unwrap());
+        let amplitude: Vec<_> = times
+            .iter()
+            .map(|t| whole.envelope_per_sqrt_s(*t))
+            .collect();
+        let sampled = Pulse::from(
+            SampledPulse::new(&times, &amplitude, Resampling::BandLimited, 1e-4).unwrap(),
+        );
         assert!(!sampled.is_real() && !whole.is_real());
         for time_s in [-2.3e-7, 1.1e-9, 1.77e-7] {
-            let (a, b) = (sampled.envelope_per_sqrt_s(time_s), whole.envelope_per_sqrt_s(time_s));
+            let (a, b) = (
+                sampled.envelope_per_sqrt_s(time_s),
+                whole.envelope_per_sqrt_s(time_s),
+            );
             assert!((a - b).norm() < 1e-5 * whole.envelope_per_sqrt_s(0.0).norm());
         }
-        assert_relative_eq!(sampled.spectral_width_hz(), whole.spectral_width_hz(), max_relative = 1e-4);
+        assert_relative_eq!(
+            sampled.spectral_width_hz(),
+            whole.spectral_width_hz(),
+            max_relative = 1e-4
+        );
     }
 
     #[test]
     fn advised_layers_hold_the_energy_of_every_shape() {
         let corners = [-1.01e-7, -1e-7, 1e-7, 1.01e-7];
-        let box_shaped = SampledPulse::from_power(&corners, &[0.0, 1.0, 1.0, 0.0], Resampling::Linear, 1e-4).unwrap();
+        let box_shaped =
+            SampledPulse::from_power(&corners, &[0.0, 1.0, 1.0, 0.0], Resampling::Linear, 1e-4)
+                .unwrap();
         let short = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(2e-9), 1e-4).unwrap();
-        for pulse in [gaussian().into(), short.into(), skewed().into(), Pulse::from(box_shaped)] {
+        for pulse in [
+            gaussian().into(),
+            short.into(),
+            skewed().into(),
+            Pulse::from(box_shaped),
+        ] {
             let thickness_m = pulse.layer_thickness_m(limits(0.0)).unwrap();
             assert!(thickness_m <= pulse.max_layer_thickness_m());
             let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
@@ -472,7 +617,9 @@ mod tests {
             for place in [0.0, 0.13, 0.5, 0.77] {
                 let steps = ((last_s - first_s) / layer_s) as i32 + 1;
                 let sum: f64 = (0..=steps)
-                    .map(|i| layer_s * pulse.intensity_per_s(first_s + (f64::from(i) + place) * layer_s))
+                    .map(|i| {
+                        layer_s * pulse.intensity_per_s(first_s + (f64::from(i) + place) * layer_s)
+                    })
                     .sum();
                 assert!((sum - 1.0).abs() < 1e-3, "{sum}");
             }
@@ -482,7 +629,10 @@ mod tests {
     #[test]
     fn a_gaussian_needs_the_layers_of_its_sigma_and_a_chirp_thinner_ones() {
         let plain = Pulse::from(gaussian());
-        assert_eq!(plain.layer_thickness_m(limits(3.6)), limits(3.6).thickness_m(gaussian().sigma_s()));
+        assert_eq!(
+            plain.layer_thickness_m(limits(3.6)),
+            limits(3.6).thickness_m(gaussian().sigma_s())
+        );
         let chirped = plain.with_chirp(8e14).unwrap();
         let thickness_m = chirped.layer_thickness_m(limits(0.0)).unwrap();
         assert!(2.0 * thickness_m / SPEED_OF_LIGHT_M_S <= 0.125 / chirped.spectral_width_hz());
@@ -497,10 +647,18 @@ mod tests {
         let moment = |power: i32| {
             let steps = ((last_s - first_s) / step_s) as i32;
             let at = |i: i32| first_s + f64::from(i) * step_s;
-            (0..=steps).map(|i| step_s * at(i).powi(power) * pulse.intensity_per_s(at(i))).sum::<f64>()
+            (0..=steps)
+                .map(|i| step_s * at(i).powi(power) * pulse.intensity_per_s(at(i)))
+                .sum::<f64>()
         };
         assert_relative_eq!(moment(0), 1.0, max_relative = 1e-5);
-        assert!((moment(1) - pulse.mean_time_s()).abs() < 1e-12 && pulse.mean_time_s().abs() < 1e-14);
-        assert_relative_eq!(pulse.sigma_s(), (2.0 * moment(2)).sqrt(), max_relative = 1e-5);
+        assert!(
+            (moment(1) - pulse.mean_time_s()).abs() < 1e-12 && pulse.mean_time_s().abs() < 1e-14
+        );
+        assert_relative_eq!(
+            pulse.sigma_s(),
+            (2.0 * moment(2)).sqrt(),
+            max_relative = 1e-5
+        );
     }
 }

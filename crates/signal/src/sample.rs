@@ -34,7 +34,12 @@ pub(crate) mod sealed {
         fn receive(detector: &Detector, envelope_a: &[Complex<f64>], out_a: &mut [Self]);
 
         /// Adds the noise of one record.
-        fn add_noise<R: Rng + ?Sized>(from: &Detector, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Self]);
+        fn add_noise<R: Rng + ?Sized>(
+            from: &Detector,
+            rng: &mut R,
+            scratch: &mut NoiseScratch,
+            out_a: &mut [Self],
+        );
 
         /// Real numbers that the sample consists of.
         fn for_each_part(&mut self, act: impl FnMut(&mut f64));
@@ -51,7 +56,12 @@ pub(crate) mod sealed {
             }
         }
 
-        fn add_noise<R: Rng + ?Sized>(from: &Detector, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Self]) {
+        fn add_noise<R: Rng + ?Sized>(
+            from: &Detector,
+            rng: &mut R,
+            scratch: &mut NoiseScratch,
+            out_a: &mut [Self],
+        ) {
             from.noise.add_to(rng, scratch, out_a);
         }
 
@@ -69,7 +79,12 @@ pub(crate) mod sealed {
             out_a.copy_from_slice(envelope_a);
         }
 
-        fn add_noise<R: Rng + ?Sized>(from: &Detector, rng: &mut R, scratch: &mut NoiseScratch, out_a: &mut [Self]) {
+        fn add_noise<R: Rng + ?Sized>(
+            from: &Detector,
+            rng: &mut R,
+            scratch: &mut NoiseScratch,
+            out_a: &mut [Self],
+        ) {
             from.baseband_noise.add_to(rng, scratch, out_a);
         }
 

@@ -26,7 +26,11 @@ const UNEVEN: f64 = 1e-2;
 
 /// How an envelope is continued between its samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Resampling {
     /// The cubic spline through the samples, at any times. Error of order `(step/scale)^4`: 3e-6 of the peak for a
     /// Gaussian with five samples in `sigma`.
@@ -77,17 +81,32 @@ impl SampledPulse {
         };
         envelope.trim(CUT_ENERGY);
         let energy = envelope.moments().energy;
-        check("integral of the power, s", energy, "finite and positive", |e| e > 0.0)?;
+        check(
+            "integral of the power, s",
+            energy,
+            "finite and positive",
+            |e| e > 0.0,
+        )?;
         envelope.scale(energy.sqrt().recip());
         let moments = envelope.moments();
-        Ok(Self { envelope, moments, energy_j, real: amplitude.iter().all(|a| a.im == 0.0) })
+        Ok(Self {
+            envelope,
+            moments,
+            energy_j,
+            real: amplitude.iter().all(|a| a.im == 0.0),
+        })
     }
 
     /// A pulse from its power at increasing times \[s\], as a photodiode shows it, without phase; any unit.
     ///
     /// # Errors
     /// As [`SampledPulse::new`]; [`Error::ElementOutOfRange`] for a negative power.
-    pub fn from_power(time_s: &[f64], power: &[f64], resampling: Resampling, energy_j: f64) -> Result<Self, Error> {
+    pub fn from_power(
+        time_s: &[f64],
+        power: &[f64],
+        resampling: Resampling,
+        energy_j: f64,
+    ) -> Result<Self, Error> {
         check_amounts("power", power)?;
         let amplitude: Vec<_> = power.iter().map(|p| Complex::new(p.sqrt(), 0.0)).collect();
         Self::new(time_s, &amplitude, resampling, energy_j)
@@ -105,14 +124,30 @@ impl SampledPulse {
 
 /// The largest modulus, if the samples are an envelope.
 fn check_samples(time_s: &[f64], amplitude: &[Complex<f64>]) -> Result<f64, Error> {
-    check("samples of the envelope", time_s.len() as f64, "2 or more", |n| n >= 2.0)?;
+    check(
+        "samples of the envelope",
+        time_s.len() as f64,
+        "2 or more",
+        |n| n >= 2.0,
+    )?;
     check_length("amplitude", amplitude.len(), time_s.len())?;
     check_increasing("time_s", time_s, "later than the time before")?;
-    let bad_value = |index, value, allowed| Error::ElementOutOfRange { field: "amplitude", index, value, allowed };
+    let bad_value = |index, value, allowed| Error::ElementOutOfRange {
+        field: "amplitude",
+        index,
+        value,
+        allowed,
+    };
     if let Some((index, a)) = amplitude.iter().enumerate().find(|(_, a)| !a.is_finite()) {
-        return Err(bad_value(index, if a.re.is_finite() { a.im } else { a.re }, "finite"));
+        return Err(bad_value(
+            index,
+            if a.re.is_finite() { a.im } else { a.re },
+            "finite",
+        ));
     }
-    let largest = amplitude.iter().fold(0.0_f64, |m, a| m.max(a.re.abs()).max(a.im.abs()));
+    let largest = amplitude
+        .iter()
+        .fold(0.0_f64, |m, a| m.max(a.re.abs()).max(a.im.abs()));
     if largest == 0.0 {
         return Err(bad_value(0, 0.0, "not zero in every place"));
     }
@@ -123,14 +158,22 @@ fn check_samples(time_s: &[f64], amplitude: &[Complex<f64>]) -> Result<f64, Erro
 /// rate.
 fn band_limited(time_s: &[f64], values: &[Complex<f64>]) -> Result<Piecewise, Error> {
     let count = values.len();
-    check("samples of the envelope", count as f64, "at most 8192 for band-limited resampling", |n| {
-        n <= MAX_BAND_LIMITED as f64
-    })?;
+    check(
+        "samples of the envelope",
+        count as f64,
+        "at most 8192 for band-limited resampling",
+        |n| n <= MAX_BAND_LIMITED as f64,
+    )?;
     let step_s = (time_s[count - 1] - time_s[0]) / (count - 1) as f64;
     let off = |(i, t): (usize, &f64)| (t - time_s[0] - i as f64 * step_s).abs() > UNEVEN * step_s;
     if let Some(index) = time_s.iter().enumerate().position(off) {
         let allowed = "evenly spaced within 1 % of a step for band-limited resampling";
-        return Err(Error::ElementOutOfRange { field: "time_s", index, value: time_s[index], allowed });
+        return Err(Error::ElementOutOfRange {
+            field: "time_s",
+            index,
+            value: time_s[index],
+            allowed,
+        });
     }
     let side = (count / 2).max(16);
     // An odd length has no frequency that is its own mirror.
@@ -149,7 +192,9 @@ fn band_limited(time_s: &[f64], values: &[Complex<f64>]) -> Result<Piecewise, Er
     // What follows the last padded sample is the way back to the first.
     samples.truncate((padded - 1) * OVERSAMPLING + 1);
     let first_s = time_s[0] - side as f64 * step_s;
-    let knots_s = (0..samples.len()).map(|i| first_s + i as f64 * step_s / OVERSAMPLING as f64).collect();
+    let knots_s = (0..samples.len())
+        .map(|i| first_s + i as f64 * step_s / OVERSAMPLING as f64)
+        .collect();
     Ok(Piecewise::spline(knots_s, &samples))
 }
 
@@ -165,8 +210,10 @@ mod tests {
 
     /// Largest difference from the Gaussian, in parts of its peak, of one sampled at `times` and resampled.
     fn error_of(times: &[f64], resampling: Resampling) -> f64 {
-        let amplitude: Vec<_> =
-            times.iter().map(|t| Complex::new(3e4 * gaussian().envelope_per_sqrt_s(*t), 0.0)).collect();
+        let amplitude: Vec<_> = times
+            .iter()
+            .map(|t| Complex::new(3e4 * gaussian().envelope_per_sqrt_s(*t), 0.0))
+            .collect();
         let pulse = SampledPulse::new(times, &amplitude, resampling, 150e-6).unwrap();
         let peak = gaussian().envelope_per_sqrt_s(0.0);
         (0..2000)
@@ -188,20 +235,30 @@ mod tests {
         assert!(error_of(&even(60e-9), Resampling::CubicSpline) > 1e-4);
         assert!(error_of(&even(60e-9), Resampling::BandLimited) < 2e-6);
         assert!(error_of(&even(2e-9), Resampling::Linear) < 1e-4);
-        let uneven: Vec<f64> = even(10e-9).iter().map(|t| t + 4e-9 * (t * 3e7).sin()).collect();
+        let uneven: Vec<f64> = even(10e-9)
+            .iter()
+            .map(|t| t + 4e-9 * (t * 3e7).sin())
+            .collect();
         assert!(error_of(&uneven, Resampling::CubicSpline) < 2e-5);
     }
 
     #[test]
     fn moments_and_support_of_a_sampled_gaussian_are_its_own() {
         let times = even(5e-9);
-        let power: Vec<f64> = times.iter().map(|t| gaussian().intensity_per_s(*t)).collect();
+        let power: Vec<f64> = times
+            .iter()
+            .map(|t| gaussian().intensity_per_s(*t))
+            .collect();
         let late: Vec<f64> = times.iter().map(|t| t + 3e-6).collect();
         let pulse = SampledPulse::from_power(&late, &power, Resampling::CubicSpline, 1e-4).unwrap();
         assert_relative_eq!(pulse.moments.mean_s, 3e-6, max_relative = 1e-9);
         let centred = pulse.centred();
         assert!(centred.moments.mean_s.abs() < 1e-15);
-        assert_relative_eq!(centred.moments.square_s2, 0.5 * gaussian().sigma_s().powi(2), max_relative = 1e-5);
+        assert_relative_eq!(
+            centred.moments.square_s2,
+            0.5 * gaussian().sigma_s().powi(2),
+            max_relative = 1e-5
+        );
         let (first, last) = centred.envelope.support_s();
         assert!(first < -3.7 * gaussian().sigma_s() && last > 3.7 * gaussian().sigma_s());
         assert!(first > -4.0 * gaussian().sigma_s() && last < 4.0 * gaussian().sigma_s());
@@ -211,12 +268,17 @@ mod tests {
     fn amplitudes_of_any_size_give_the_same_pulse() {
         let times = even(10e-9);
         let of_size = |size: f64| {
-            let amplitude: Vec<_> =
-                times.iter().map(|t| Complex::new(size * (-0.5 * (t / 1e-7).powi(2)).exp(), 0.0)).collect();
+            let amplitude: Vec<_> = times
+                .iter()
+                .map(|t| Complex::new(size * (-0.5 * (t / 1e-7).powi(2)).exp(), 0.0))
+                .collect();
             SampledPulse::new(&times, &amplitude, Resampling::CubicSpline, 1e-4).unwrap()
         };
         for size in [1e-200, 1e200] {
-            let (found, expected) = (of_size(size).envelope.value(3e-8), of_size(1.0).envelope.value(3e-8));
+            let (found, expected) = (
+                of_size(size).envelope.value(3e-8),
+                of_size(1.0).envelope.value(3e-8),
+            );
             assert_relative_eq!(found.re, expected.re, max_relative = 1e-13);
         }
     }
@@ -228,19 +290,53 @@ mod tests {
             SampledPulse::new(times, values, resampling, 1e-4).map(|_| ())
         };
         let spline = Resampling::CubicSpline;
-        assert!(matches!(make(&[0.0], &[one], spline), Err(Error::OutOfRange { .. })));
-        assert!(matches!(make(&[0.0, 1e-8], &[one], spline), Err(Error::LengthMismatch { .. })));
+        assert!(matches!(
+            make(&[0.0], &[one], spline),
+            Err(Error::OutOfRange { .. })
+        ));
+        assert!(matches!(
+            make(&[0.0, 1e-8], &[one], spline),
+            Err(Error::LengthMismatch { .. })
+        ));
         for (times, index) in [([0.0, 1e-8, 1e-8], 2), ([0.0, f64::NAN, 1.0], 1)] {
             let error = make(&times, &[one; 3], spline);
-            assert!(matches!(error, Err(Error::ElementOutOfRange { field: "time_s", index: i, .. }) if i == index));
+            assert!(
+                matches!(error, Err(Error::ElementOutOfRange { field: "time_s", index: i, .. }) if i == index)
+            );
         }
         let silent = make(&[0.0, 1e-8], &[Complex::ZERO; 2], spline);
-        assert!(matches!(silent, Err(Error::ElementOutOfRange { field: "amplitude", .. })));
+        assert!(matches!(
+            silent,
+            Err(Error::ElementOutOfRange {
+                field: "amplitude",
+                ..
+            })
+        ));
         let broken = make(&[0.0, 1e-8], &[one, Complex::new(0.0, f64::NAN)], spline);
-        assert!(matches!(broken, Err(Error::ElementOutOfRange { field: "amplitude", index: 1, .. })));
+        assert!(matches!(
+            broken,
+            Err(Error::ElementOutOfRange {
+                field: "amplitude",
+                index: 1,
+                ..
+            })
+        ));
         let uneven = make(&[0.0, 1e-8, 3e-8], &[one; 3], Resampling::BandLimited);
-        assert!(matches!(uneven, Err(Error::ElementOutOfRange { field: "time_s", .. })));
+        assert!(matches!(
+            uneven,
+            Err(Error::ElementOutOfRange {
+                field: "time_s",
+                ..
+            })
+        ));
         let negative = SampledPulse::from_power(&[0.0, 1e-8], &[1.0, -1.0], spline, 1e-4);
-        assert!(matches!(negative, Err(Error::ElementOutOfRange { field: "power", index: 1, .. })));
+        assert!(matches!(
+            negative,
+            Err(Error::ElementOutOfRange {
+                field: "power",
+                index: 1,
+                ..
+            })
+        ));
     }
 }

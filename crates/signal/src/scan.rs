@@ -90,7 +90,12 @@ where
         for first in (0..self.records()).step_by(BATCH) {
             let count = BATCH.min(self.records() - first);
             let rows = &mut batch_a[..count * samples];
-            for ((i, result), row) in self.make(first, rows).into_iter().enumerate().zip(rows.chunks(samples)) {
+            for ((i, result), row) in self
+                .make(first, rows)
+                .into_iter()
+                .enumerate()
+                .zip(rows.chunks(samples))
+            {
                 clipped += result?;
                 sink(self.key(first + i), row)?;
             }
@@ -103,8 +108,13 @@ where
     /// # Errors
     /// As [`Scan::for_each`].
     pub fn collect<T: Sample>(&self) -> Result<(Array2<T>, Clipped), Error> {
-        let mut records_a = Array2::from_elem((self.records(), self.simulator.record().samples), T::default());
-        let made = records_a.as_slice_mut().map_or_else(Vec::new, |rows| self.make(0, rows));
+        let mut records_a = Array2::from_elem(
+            (self.records(), self.simulator.record().samples),
+            T::default(),
+        );
+        let made = records_a
+            .as_slice_mut()
+            .map_or_else(Vec::new, |rows| self.make(0, rows));
         let mut clipped = Clipped::default();
         for result in made {
             clipped += result?;
@@ -113,15 +123,30 @@ where
     }
 
     fn key(&self, record: usize) -> PulseKey {
-        PulseKey { line: record / self.pulses_per_line, pulse: record % self.pulses_per_line }
+        PulseKey {
+            line: record / self.pulses_per_line,
+            pulse: record % self.pulses_per_line,
+        }
     }
 
     /// Makes the records from `first` on, in parallel.
     fn make<T: Sample>(&self, first: usize, rows_a: &mut [T]) -> Vec<Result<Clipped, Error>> {
-        map_chunks(rows_a, self.simulator.record().samples, Scratch::default, |scratch, i, out_a| {
-            let key = self.key(first + i);
-            self.simulator.record_into((self.shot)(key), &mut (self.generator)(key), scratch, out_a)?;
-            self.digitiser.map_or(Ok(Clipped::default()), |digitiser| digitiser.digitise(out_a))
-        })
+        map_chunks(
+            rows_a,
+            self.simulator.record().samples,
+            Scratch::default,
+            |scratch, i, out_a| {
+                let key = self.key(first + i);
+                self.simulator.record_into(
+                    (self.shot)(key),
+                    &mut (self.generator)(key),
+                    scratch,
+                    out_a,
+                )?;
+                self.digitiser.map_or(Ok(Clipped::default()), |digitiser| {
+                    digitiser.digitise(out_a)
+                })
+            },
+        )
     }
 }

@@ -25,7 +25,12 @@ pub struct Shot<'a> {
 
 impl<'a> From<&'a LineOfSight> for Shot<'a> {
     fn from(line: &'a LineOfSight) -> Self {
-        Self { line, efficiency: None, previous: None, impairment_seed: 0 }
+        Self {
+            line,
+            efficiency: None,
+            previous: None,
+            impairment_seed: 0,
+        }
     }
 }
 
@@ -38,7 +43,9 @@ impl Shot<'_> {
     pub fn validate(&self) -> Result<(), Error> {
         self.line.validate()?;
         self.previous.map_or(Ok(()), LineOfSight::validate)?;
-        let Some(efficiency) = self.efficiency else { return Ok(()) };
+        let Some(efficiency) = self.efficiency else {
+            return Ok(());
+        };
         check_length("efficiency", efficiency.len(), self.line.layers())?;
         check_amounts("efficiency", efficiency)
     }

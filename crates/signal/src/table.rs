@@ -12,7 +12,11 @@ pub(crate) fn check_ranges(range_m: &[f64]) -> Result<(), Error> {
 }
 
 /// One value per range, finite and not negative.
-pub(crate) fn check_values(field: &'static str, values: &[f64], ranges: usize) -> Result<(), Error> {
+pub(crate) fn check_values(
+    field: &'static str,
+    values: &[f64],
+    ranges: usize,
+) -> Result<(), Error> {
     check_length(field, values.len(), ranges)?;
     check_amounts(field, values)
 }
@@ -23,7 +27,10 @@ pub(crate) fn locate(table_m: &[f64], range_m: f64) -> Option<(usize, f64)> {
     if !(range_m >= *first && range_m <= *last) {
         return None;
     }
-    let index = table_m.partition_point(|r| *r <= range_m).saturating_sub(1).min(table_m.len().saturating_sub(2));
+    let index = table_m
+        .partition_point(|r| *r <= range_m)
+        .saturating_sub(1)
+        .min(table_m.len().saturating_sub(2));
     match table_m.get(index + 1) {
         Some(next) => Some((index, (range_m - table_m[index]) / (next - table_m[index]))),
         None => Some((index, 0.0)),

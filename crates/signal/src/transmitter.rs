@@ -58,7 +58,11 @@ impl Fibre {
     /// Length over which the wave grows, `min(L (1 - 1/G)/ln G, c FWHM/(2 n))` \[m\].
     pub fn effective_length_m(&self, pulse_fwhm_s: f64) -> f64 {
         let exponent = self.gain_db * 0.1 * std::f64::consts::LN_10;
-        let share = if exponent == 0.0 { 1.0 } else { -(-exponent).exp_m1() / exponent };
+        let share = if exponent == 0.0 {
+            1.0
+        } else {
+            -(-exponent).exp_m1() / exponent
+        };
         (self.length_m * share).min(0.5 * SPEED_OF_LIGHT_M_S * pulse_fwhm_s / self.refractive_index)
     }
 

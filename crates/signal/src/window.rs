@@ -26,9 +26,13 @@ pub(crate) fn reach(pulse: &Pulse, layer_thickness_m: f64) -> Result<(i64, i64),
     let layers = |time_s: f64| (0.5 * SPEED_OF_LIGHT_M_S * time_s / layer_thickness_m).ceil();
     let (near, far) = (layers(last_s), layers(-first_s));
     let allowed = "at least 4e-7 of the length of the pulse in range";
-    check("layer_thickness_m", layer_thickness_m, allowed, |_| near.abs().max(far.abs()) <= MAX_REACH)?;
+    check("layer_thickness_m", layer_thickness_m, allowed, |_| {
+        near.abs().max(far.abs()) <= MAX_REACH
+    })?;
     let allowed = "at most max_layer_thickness_m() of the pulse";
-    check("layer_thickness_m", layer_thickness_m, allowed, |t| t <= pulse.max_layer_thickness_m())?;
+    check("layer_thickness_m", layer_thickness_m, allowed, |t| {
+        t <= pulse.max_layer_thickness_m()
+    })?;
     Ok((near as i64, far as i64))
 }
 
@@ -68,7 +72,8 @@ pub(crate) struct Lit<'a> {
 impl Lit<'_> {
     /// The layers and their amplitudes as complex numbers.
     pub(crate) fn amplitudes(&self) -> impl Iterator<Item = (usize, Complex<f64>)> {
-        let amplitude = |(j, re): (usize, &f64)| Complex::new(*re, self.im.get(j).copied().unwrap_or(0.0));
+        let amplitude =
+            |(j, re): (usize, &f64)| Complex::new(*re, self.im.get(j).copied().unwrap_or(0.0));
         (self.first..).zip(self.re.iter().enumerate().map(amplitude))
     }
 }
@@ -86,7 +91,9 @@ impl Window {
         let thickness_m = line.layer_thickness_m;
         self.layers = line.layers();
         (self.near, self.far) = reach(pulse, thickness_m)?;
-        self.start = (0.5 * SPEED_OF_LIGHT_M_S * record.time_of_first_sample_s - line.first_range_m) / thickness_m;
+        self.start = (0.5 * SPEED_OF_LIGHT_M_S * record.time_of_first_sample_s
+            - line.first_range_m)
+            / thickness_m;
         self.step = 0.5 * SPEED_OF_LIGHT_M_S * (1.0 / sample_rate_hz) / thickness_m;
         let whole = self.step.round();
         let aligned = (self.step - whole).abs() * record.samples as f64 <= ALIGNMENT_TOLERANCE;
@@ -113,9 +120,14 @@ impl Window {
     fn fill_amplitudes(&mut self, pulse: &Pulse, thickness_m: f64, offset: f64) {
         let layer_s = 2.0 * thickness_m / SPEED_OF_LIGHT_M_S;
         let near = self.near as f64;
-        let at = |j: usize| -> Complex<f64> { pulse.envelope_per_sqrt_s((offset + near - j as f64) * layer_s) };
+        let at = |j: usize| -> Complex<f64> {
+            pulse.envelope_per_sqrt_s((offset + near - j as f64) * layer_s)
+        };
         if self.im.is_empty() {
-            self.re.iter_mut().enumerate().for_each(|(j, re)| *re = at(j).re);
+            self.re
+                .iter_mut()
+                .enumerate()
+                .for_each(|(j, re)| *re = at(j).re);
             return;
         }
         for (j, (re, im)) in self.re.iter_mut().zip(&mut self.im).enumerate() {
@@ -127,7 +139,9 @@ impl Window {
     /// Index of the layer nearest to the range of sample `k`, which may lie outside the line.
     fn centre(&self, k: usize) -> i64 {
         match self.aligned_step {
-            Some(step) => (self.start.round() as i64).saturating_add((k as i64).saturating_mul(step)),
+            Some(step) => {
+                (self.start.round() as i64).saturating_add((k as i64).saturating_mul(step))
+            }
             None => (self.start + k as f64 * self.step).round() as i64,
         }
     }
@@ -148,10 +162,18 @@ impl Window {
         }
         let (first, end) = self.layers_at(k);
         if first == end {
-            return Lit { first, re: &[], im: &[] };
+            return Lit {
+                first,
+                re: &[],
+                im: &[],
+            };
         }
         let shift = (first as i64 - (self.centre(k) - self.near)) as usize;
         let lit = shift..shift + (end - first);
-        Lit { first, re: &self.re[lit.clone()], im: self.im.get(lit).unwrap_or(&[]) }
+        Lit {
+            first,
+            re: &self.re[lit.clone()],
+            im: self.im.get(lit).unwrap_or(&[]),
+        }
     }
 }

@@ -45,9 +45,13 @@ fn median_s(ranks: &dyn Ranks, lengths: &[usize]) -> Result<f64, Box<dyn Error>>
     let mut receive = vec![0.0; send.len()];
     let mut once = || {
         let begun = Instant::now();
-        ranks.all_to_all(&send, lengths, &mut receive, lengths).map(|()| begun.elapsed().as_secs_f64())
+        ranks
+            .all_to_all(&send, lengths, &mut receive, lengths)
+            .map(|()| begun.elapsed().as_secs_f64())
     };
-    let mut times = (0..REPETITIONS).map(|_| once()).collect::<Result<Vec<f64>, _>>()?;
+    let mut times = (0..REPETITIONS)
+        .map(|_| once())
+        .collect::<Result<Vec<f64>, _>>()?;
     times.sort_by(f64::total_cmp);
     Ok(times[REPETITIONS / 2])
 }

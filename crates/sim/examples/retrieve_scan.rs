@@ -16,13 +16,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     let std_m = if stated.is_some() { 14.4 } else { 0.0 };
     let path = stated.map_or_else(made_up, Ok)?;
     let (scans, left_out) = read(&path, &ScanFormat::default())?;
-    left_out.iter().for_each(|text| println!("left out: {text}"));
-    let options = RetrievalOptions { gate: Gate::Gaussian { std_m }, ..RetrievalOptions::default() };
+    left_out
+        .iter()
+        .for_each(|text| println!("left out: {text}"));
+    let options = RetrievalOptions {
+        gate: Gate::Gaussian { std_m },
+        ..RetrievalOptions::default()
+    };
     for scan in scans {
         let found = fit_scan(&scan.map, &options)?;
-        println!("sweep {}: statistic {:.1}, {:?}", scan.sweep, found.statistic, found.flags);
+        println!(
+            "sweep {}: statistic {:.1}, {:?}",
+            scan.sweep, found.statistic, found.flags
+        );
         for vortex in &found.vortices {
-            let (mean, y_m, z_m) = (vortex.circulation_5_15_m2_s, vortex.lateral_position_m, vortex.height_m);
+            let (mean, y_m, z_m) = (
+                vortex.circulation_5_15_m2_s,
+                vortex.lateral_position_m,
+                vortex.height_m,
+            );
             println!(
                 "  {:?}: {:.0} +- {:.0} m^2/s at {:.1} m, {:.1} m high",
                 vortex.side, mean.value, mean.std, y_m.value, z_m.value
@@ -38,9 +50,11 @@ fn made_up() -> Result<PathBuf, Box<dyn Error>> {
     let mut text = String::from("range_m,elevation_rad,velocity_m_s,sigma_m_s\n");
     let mut place = 0.5_f64;
     for (line, gate) in (0..60).flat_map(|line| (0..30).map(move |gate| (line, gate))) {
-        let (range_m, elevation_rad) = (330.0 + 5.0 * f64::from(gate), 0.06 + 3e-3 * f64::from(line));
+        let (range_m, elevation_rad) =
+            (330.0 + 5.0 * f64::from(gate), 0.06 + 3e-3 * f64::from(line));
         place = (place * 997.13 + 0.123).fract();
-        let velocity = WakeModel::default().radial_velocity_m_s(&wake, range_m, elevation_rad) + place - 0.5;
+        let velocity =
+            WakeModel::default().radial_velocity_m_s(&wake, range_m, elevation_rad) + place - 0.5;
         text += &format!("{range_m},{elevation_rad},{velocity},0.29\n");
     }
     let path = std::env::temp_dir().join("wakescope-example-scan.csv");

@@ -13,17 +13,25 @@ use wakescope_sim::io::tables::{map_table, planes_table};
 use wakescope_sim::io::{FileGroup, OutputResult, Table, VelocityMap};
 
 fn main() -> OutputResult<()> {
-    let folder = std::env::args().nth(1).unwrap_or_else(|| "target/sample-files".into());
+    let folder = std::env::args()
+        .nth(1)
+        .unwrap_or_else(|| "target/sample-files".into());
     let origin = origin();
     let mut files = FileGroup::new(Path::new(&folder));
     let both = map(&[2.5, 5.0], true);
     files.add("map.csv", map_table(&both)?.to_csv(&origin)?)?;
     let one = map(&[2.5], false);
     files.add("one.csv", halo_table(&one)?.to_csv(&origin)?)?;
-    files.add("one.hpl", wakescope_sim::io::hpl::hpl_bytes(&one, 0, "one.hpl")?)?;
+    files.add(
+        "one.hpl",
+        wakescope_sim::io::hpl::hpl_bytes(&one, 0, "one.hpl")?,
+    )?;
     let wind = planes();
     for stem in ["planes", "wake"] {
-        files.add(&format!("{stem}.csv"), planes_table(&wind)?.to_csv(&origin)?)?;
+        files.add(
+            &format!("{stem}.csv"),
+            planes_table(&wind)?.to_csv(&origin)?,
+        )?;
     }
     {
         use wakescope_sim::io::{cf_planes::cf_planes_bytes, cfradial::cfradial_bytes};
@@ -37,11 +45,17 @@ fn main() -> OutputResult<()> {
     #[cfg(feature = "vtk")]
     {
         use wakescope_sim::io::vtr::{plane_bytes, pvd_bytes};
-        let names: Vec<String> = (1..=wind.tau.len()).map(|number| format!("wake_{number:04}.vtr")).collect();
+        let names: Vec<String> = (1..=wind.tau.len())
+            .map(|number| format!("wake_{number:04}.vtr"))
+            .collect();
         for (age, name) in names.iter().enumerate() {
             files.add(name, plane_bytes(&wind, age, &origin)?)?;
         }
-        let members = wind.tau.iter().copied().zip(names.iter().map(String::as_str));
+        let members = wind
+            .tau
+            .iter()
+            .copied()
+            .zip(names.iter().map(String::as_str));
         files.add("wake.pvd", pvd_bytes(members, &origin))?;
     }
     files.commit()?;
@@ -51,6 +65,7 @@ fn main() -> OutputResult<()> {
 /// What an `.hpl` file holds: velocity and signal-to-noise ratio of one sweep.
 fn halo_table(map: &VelocityMap) -> OutputResult<Table> {
     let mut map = map.clone();
-    map.fields.retain(|f| ["radial_velocity", "signal_to_noise_ratio"].contains(&f.name.as_str()));
+    map.fields
+        .retain(|f| ["radial_velocity", "signal_to_noise_ratio"].contains(&f.name.as_str()));
     map_table(&map)
 }

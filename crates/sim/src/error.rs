@@ -90,7 +90,9 @@ pub enum Error {
     #[error("signal: {0}")]
     Signal(#[from] wakescope_signal::Error),
     /// A scene without noise has no bound.
-    #[error("detector.noise = \"none\": without noise nothing bounds the velocity; \"band\" or \"white\" is needed")]
+    #[error(
+        "detector.noise = \"none\": without noise nothing bounds the velocity; \"band\" or \"white\" is needed"
+    )]
     NoBound,
     /// An estimator refused its input.
     #[error("estimate: {0}")]
@@ -139,16 +141,30 @@ pub enum Error {
 impl Error {
     /// The error of a file that a key names.
     pub(crate) fn of_key(key: &'static str) -> impl Fn(Self) -> Self + Copy {
-        move |source| Self::OfKey { key, source: Box::new(source) }
+        move |source| Self::OfKey {
+            key,
+            source: Box::new(source),
+        }
     }
 
     /// What the system says of a file or folder.
-    pub(crate) fn io(action: &'static str, path: &std::path::Path) -> impl FnOnce(std::io::Error) -> Self {
+    pub(crate) fn io(
+        action: &'static str,
+        path: &std::path::Path,
+    ) -> impl FnOnce(std::io::Error) -> Self {
         let path = path.to_owned();
-        move |source| Self::Io { action, path, source }
+        move |source| Self::Io {
+            action,
+            path,
+            source,
+        }
     }
 }
 
 fn others_in_words(others: usize) -> String {
-    if others == 0 { String::new() } else { format!("\nand {others} more cases are refused") }
+    if others == 0 {
+        String::new()
+    } else {
+        format!("\nand {others} more cases are refused")
+    }
 }

@@ -16,9 +16,15 @@ pub(crate) fn available_memory_bytes() -> Option<f64> {
     let of_group = |[limit, usage]: [&str; 2]| Some(number(read(limit)?)? - number(read(usage)?)?);
     let groups = [
         ["/sys/fs/cgroup/memory.max", "/sys/fs/cgroup/memory.current"],
-        ["/sys/fs/cgroup/memory/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.usage_in_bytes"],
+        [
+            "/sys/fs/cgroup/memory/memory.limit_in_bytes",
+            "/sys/fs/cgroup/memory/memory.usage_in_bytes",
+        ],
     ];
-    let known = [of_system(), of_shell()].into_iter().chain(groups.map(of_group)).flatten();
+    let known = [of_system(), of_shell()]
+        .into_iter()
+        .chain(groups.map(of_group))
+        .flatten();
     known.map(|bytes| bytes.max(0.0)).reduce(f64::min)
 }
 
@@ -29,10 +35,15 @@ pub(crate) fn available_memory_bytes() -> Option<f64> {
 pub(crate) fn holds(what: &str, bytes: f64) -> Result<(), String> {
     // So little is not worth the question.
     const LITTLE_BYTES: f64 = 1e7;
-    let too_much = (bytes > LITTLE_BYTES).then(available_memory_bytes).flatten().filter(|available| bytes > *available);
+    let too_much = (bytes > LITTLE_BYTES)
+        .then(available_memory_bytes)
+        .flatten()
+        .filter(|available| bytes > *available);
     let needed = units::bytes(bytes);
     match too_much.map(units::bytes) {
-        Some(available) => Err(format!("{what} would take {needed} of memory, and {available} are available")),
+        Some(available) => Err(format!(
+            "{what} would take {needed} of memory, and {available} are available"
+        )),
         None => Ok(()),
     }
 }
@@ -45,7 +56,9 @@ fn kilobytes(text: &str, name: &str) -> Option<f64> {
 
 /// The limit of the addresses of a process in the text of /proc/self/limits, bytes; none where there is no limit.
 fn of_addresses(text: &str) -> Option<f64> {
-    let line = text.lines().find_map(|line| line.strip_prefix("Max address space"))?;
+    let line = text
+        .lines()
+        .find_map(|line| line.strip_prefix("Max address space"))?;
     number(line.split_whitespace().next()?.to_owned())
 }
 
@@ -64,12 +77,20 @@ mod tests {
         assert_eq!(kilobytes(text, "MemAvailable:"), Some(2.048e10));
         assert_eq!(kilobytes("MemTotal: 1 kB\n", "MemAvailable:"), None);
         let limit = |soft: &str| {
-            format!("Max cpu time  1  2  seconds\nMax address space         {soft}   unlimited    bytes\n")
+            format!(
+                "Max cpu time  1  2  seconds\nMax address space         {soft}   unlimited    bytes\n"
+            )
         };
         assert_eq!(of_addresses(&limit("8192000")), Some(8_192_000.0));
         assert_eq!(of_addresses(&limit("unlimited")), None);
-        assert!(holds("a list", 1e18).is_err_and(|e| e.contains("a list would take")) || !cfg!(target_os = "linux"));
-        assert_eq!((number("max\n".into()), number("1024\n".into())), (None, Some(1024.0)));
+        assert!(
+            holds("a list", 1e18).is_err_and(|e| e.contains("a list would take"))
+                || !cfg!(target_os = "linux")
+        );
+        assert_eq!(
+            (number("max\n".into()), number("1024\n".into())),
+            (None, Some(1024.0))
+        );
         if cfg!(target_os = "linux") {
             assert!(available_memory_bytes().is_some_and(|bytes| bytes > 1e6));
         }

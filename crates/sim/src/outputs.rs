@@ -33,7 +33,10 @@ impl Outputs {
     /// # Errors
     /// What the list finds before it makes a file.
     pub(crate) fn names(formats: Formats, list: impl List) -> Result<Vec<String>, Error> {
-        Ok(Self::contents(formats, None, list)?.into_iter().map(|(name, _)| name).collect())
+        Ok(Self::contents(formats, None, list)?
+            .into_iter()
+            .map(|(name, _)| name)
+            .collect())
     }
 
     /// Makes the files of a list and puts them into their folder, all or none; returns their paths.
@@ -58,7 +61,11 @@ impl Outputs {
         origin: Option<Provenance>,
         list: impl List,
     ) -> Result<Vec<(String, Vec<u8>)>, Error> {
-        let mut outputs = Self { formats, origin, files: Vec::new() };
+        let mut outputs = Self {
+            formats,
+            origin,
+            files: Vec::new(),
+        };
         list(&mut outputs)?;
         Ok(outputs.files)
     }
@@ -92,7 +99,9 @@ impl Outputs {
         make: impl FnOnce(&T) -> Result<Table, Error>,
     ) -> Result<(), Error> {
         match self.formats.csv {
-            true => self.add(&format!("{stem}.csv"), of, |of, origin| Ok(make(of)?.to_csv(origin)?)),
+            true => self.add(&format!("{stem}.csv"), of, |of, origin| {
+                Ok(make(of)?.to_csv(origin)?)
+            }),
             false => Ok(()),
         }
     }
@@ -107,7 +116,11 @@ impl Outputs {
         of: Option<&T>,
         make: impl FnOnce(&T, &Provenance) -> Result<Vec<u8>, Error>,
     ) -> Result<(), Error> {
-        if self.formats.netcdf { self.add(&format!("{stem}.nc"), of, make) } else { Ok(()) }
+        if self.formats.netcdf {
+            self.add(&format!("{stem}.nc"), of, make)
+        } else {
+            Ok(())
+        }
     }
 
     /// Adds a figure as `STEM.svg` and `STEM.png`, as far as these are wanted.
@@ -124,10 +137,14 @@ impl Outputs {
         let Formats { svg, png, .. } = self.formats;
         let figure = of.filter(|_| svg || png).map(make).transpose()?;
         if svg {
-            self.add(&format!("{stem}.svg"), figure.as_ref(), |figure, origin| Ok(figure.svg(origin)?))?;
+            self.add(&format!("{stem}.svg"), figure.as_ref(), |figure, origin| {
+                Ok(figure.svg(origin)?)
+            })?;
         }
         if png {
-            self.add(&format!("{stem}.png"), figure.as_ref(), |figure, origin| Ok(figure.png(origin)?))?;
+            self.add(&format!("{stem}.png"), figure.as_ref(), |figure, origin| {
+                Ok(figure.png(origin)?)
+            })?;
         }
         Ok(())
     }
@@ -137,12 +154,25 @@ impl Outputs {
 ///
 /// # Errors
 /// Names that are not plain; a file in the way that may not be replaced; another run that writes there; what the system says.
-pub fn write_contents(folder: &Path, files: Vec<(String, Vec<u8>)>, existing: Existing) -> Result<Vec<PathBuf>, Error> {
-    let lock = folder.exists().then(|| FolderLock::take(folder)).transpose()?;
+pub fn write_contents(
+    folder: &Path,
+    files: Vec<(String, Vec<u8>)>,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
+    let lock = folder
+        .exists()
+        .then(|| FolderLock::take(folder))
+        .transpose()?;
     // Again: a file may have come while the run computed.
-    refuse_foreign(folder, files.iter().map(|(name, _)| name.as_str()), existing)?;
+    refuse_foreign(
+        folder,
+        files.iter().map(|(name, _)| name.as_str()),
+        existing,
+    )?;
     let mut group = FileGroup::new(folder);
-    files.into_iter().try_for_each(|(name, content)| group.add(&name, content))?;
+    files
+        .into_iter()
+        .try_for_each(|(name, content)| group.add(&name, content))?;
     let written = group.commit()?;
     drop(lock);
     Ok(written)
@@ -154,10 +184,18 @@ pub fn write_contents(folder: &Path, files: Vec<(String, Vec<u8>)>, existing: Ex
 /// # Errors
 /// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
 /// or a file that this program did not write and may not replace.
-pub(crate) fn prepare(folder: &Path, names: &[String], existing: Existing, alone: bool) -> Result<(), Error> {
+pub(crate) fn prepare(
+    folder: &Path,
+    names: &[String],
+    existing: Existing,
+    alone: bool,
+) -> Result<(), Error> {
     refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
     in_folder(folder, false, || {
         drop(Stage::make(folder)?);
-        Ok(alone.then(|| FolderLock::take(folder)).transpose().map(drop)?)
+        Ok(alone
+            .then(|| FolderLock::take(folder))
+            .transpose()
+            .map(drop)?)
     })
 }

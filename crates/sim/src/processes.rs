@@ -32,8 +32,8 @@ impl World {
     /// # Errors
     /// [`Error::Input`] if MPI runs already, or allows no threads beside its own.
     pub fn join() -> Result<Self, Error> {
-        let (universe, threads) =
-            mpi::initialize_with_threading(Threading::Funneled).ok_or_else(|| refused("MPI runs already"))?;
+        let (universe, threads) = mpi::initialize_with_threading(Threading::Funneled)
+            .ok_or_else(|| refused("MPI runs already"))?;
         if threads < Threading::Funneled {
             return Err(refused(
                 "the MPI library allows no threads beside its own: take one built with MPI_THREAD_FUNNELED",
@@ -44,14 +44,19 @@ impl World {
             usual(panic);
             SimpleCommunicator::world().abort(FAILED)
         }));
-        Ok(Self { _universe: universe })
+        Ok(Self {
+            _universe: universe,
+        })
     }
 
     /// The processes as ranks.
     #[must_use]
     pub fn ranks(&self) -> Arc<dyn Ranks> {
         let world = SimpleCommunicator::world();
-        Arc::new(Processes { rank: world.rank() as usize, count: world.size() as usize })
+        Arc::new(Processes {
+            rank: world.rank() as usize,
+            count: world.size() as usize,
+        })
     }
 
     /// Ends all processes after `say` has told why: that of rank 0, or, where it has nothing to say, that of another one.
@@ -66,7 +71,10 @@ impl World {
 }
 
 fn refused(reason: &str) -> Error {
-    Error::Input { path: PathBuf::from("mpirun"), reason: reason.into() }
+    Error::Input {
+        path: PathBuf::from("mpirun"),
+        reason: reason.into(),
+    }
 }
 
 #[derive(Debug)]
@@ -110,8 +118,18 @@ fn parts(lengths: &[usize]) -> Result<(Vec<Count>, Vec<Count>), wakescope_les::E
     let starts = lengths.iter().map(start).collect();
     let most = Count::MAX as usize;
     if end > most {
-        let (field, allowed) = ("values in a message between ranks", "at most 2147483647: take more ranks");
-        return Err(wakescope_les::Error::OutOfRange { field, value: end as f64, allowed });
+        let (field, allowed) = (
+            "values in a message between ranks",
+            "at most 2147483647: take more ranks",
+        );
+        return Err(wakescope_les::Error::OutOfRange {
+            field,
+            value: end as f64,
+            allowed,
+        });
     }
-    Ok((lengths.iter().map(|length| *length as Count).collect(), starts))
+    Ok((
+        lengths.iter().map(|length| *length as Count).collect(),
+        starts,
+    ))
 }

@@ -49,7 +49,11 @@ pub struct ScanMiddle {
 
 impl ScanMiddle {
     /// From the profile at that range, and from the layers of the signals where there are any.
-    pub(crate) fn of(plan: &Plan, there: Option<&RangeProfile>, scanner: Option<&Scanner<'_>>) -> Option<Self> {
+    pub(crate) fn of(
+        plan: &Plan,
+        there: Option<&RangeProfile>,
+        scanner: Option<&Scanner<'_>>,
+    ) -> Option<Self> {
         let range_m = middle_m(plan);
         let of_signals = scanner.map(|scanner| {
             let (layer_m, snr): (Vec<f64>, Vec<f64>) = scanner.layer_snr().into_iter().unzip();
@@ -57,7 +61,11 @@ impl ScanMiddle {
         });
         let efficiency = there.and_then(|p| p.efficiency.mean.first().copied());
         let snr_db = of_signals.or_else(|| there?.snr_db.first().copied())?;
-        Some(Self { range_m, efficiency: efficiency.unwrap_or(f64::NAN), snr_db })
+        Some(Self {
+            range_m,
+            efficiency: efficiency.unwrap_or(f64::NAN),
+            snr_db,
+        })
     }
 }
 
@@ -73,9 +81,17 @@ fn middle_m(plan: &Plan) -> f64 {
 pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
     let mut result = RunResult::default();
     let (o, known, mut there) = (&plan.scene.content.outputs, Efficiencies::default(), None);
-    let optics = LineOptics { plan, known: &known, observer };
+    let optics = LineOptics {
+        plan,
+        known: &known,
+        observer,
+    };
     if matches!(plan.target, Target::Run | Target::Efficiency) {
-        let range_m = spaced(o.profile_range_min_m, o.profile_range_max_m, o.profile_points);
+        let range_m = spaced(
+            o.profile_range_min_m,
+            o.profile_range_max_m,
+            o.profile_points,
+        );
         result.profile = Some(optics.profile_at(&range_m)?);
         if (o.profile_range_min_m..=o.profile_range_max_m).contains(&middle_m(plan)) {
             there = Some(optics.profile_at(&[middle_m(plan)])?);
@@ -86,12 +102,19 @@ pub fn run(plan: &Plan, observer: &dyn Observer) -> Result<RunResult, Error> {
         result.plane = Some(plane::cross_plane(plan)?);
         observer.end();
     }
-    let scanner = plan.runs(Stage::Signals).then(|| Scanner::with(plan, &known, observer)).transpose()?;
+    let scanner = plan
+        .runs(Stage::Signals)
+        .then(|| Scanner::with(plan, &known, observer))
+        .transpose()?;
     result.middle = ScanMiddle::of(plan, there.as_ref(), scanner.as_ref());
     if let Some(scanner) = scanner {
         match plan.scene.content.detector.signal {
-            DetectorSignal::IntermediateFrequency => signals_and_map::<f64>(plan, &scanner, observer, &mut result)?,
-            DetectorSignal::Baseband => signals_and_map::<Complex<f64>>(plan, &scanner, observer, &mut result)?,
+            DetectorSignal::IntermediateFrequency => {
+                signals_and_map::<f64>(plan, &scanner, observer, &mut result)?
+            }
+            DetectorSignal::Baseband => {
+                signals_and_map::<Complex<f64>>(plan, &scanner, observer, &mut result)?
+            }
         }
     }
     Ok(result)
@@ -105,14 +128,19 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     result: &mut RunResult,
 ) -> Result<(), Error> {
     // The records that are kept for the files, as real numbers.
-    let shape = (plan.kept_realisations() * scanner.pulses(), plan.geometry.samples);
+    let shape = (
+        plan.kept_realisations() * scanner.pulses(),
+        plan.geometry.samples,
+    );
     let samples = shape.0 * shape.1;
     let mut in_phase = Vec::with_capacity(samples);
     let mut quadrature = (S::KIND == SignalKind::Complex).then(|| Vec::with_capacity(samples));
     let mut keep = |records: ArrayView2<'_, S>| {
         if samples > 0 {
             in_phase.extend(records.iter().map(|sample| sample.to_complex().re));
-            quadrature.iter_mut().for_each(|q| q.extend(records.iter().map(|sample| sample.to_complex().im)));
+            quadrature
+                .iter_mut()
+                .for_each(|q| q.extend(records.iter().map(|sample| sample.to_complex().im)));
         }
     };
     if plan.runs(Stage::Estimates) {
@@ -139,9 +167,12 @@ fn signals_and_map<S: Sample + wakescope_signal::Sample>(
     }
     if samples > 0 {
         result.signals_a = Array2::from_shape_vec(shape, in_phase).ok();
-        result.quadrature_a = quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
+        result.quadrature_a =
+            quadrature.and_then(|values| Array2::from_shape_vec(shape, values).ok());
         let lines = &scanner.lines;
-        let layers = lines.first().map_or(0, |line| line.radial_velocity_m_s.len());
+        let layers = lines
+            .first()
+            .map_or(0, |line| line.radial_velocity_m_s.len());
         let velocity_m_s = |(i, l): (usize, usize)| lines[i].radial_velocity_m_s[l];
         result.line_velocity_m_s = Some(Array2::from_shape_fn((lines.len(), layers), velocity_m_s));
     }
@@ -157,25 +188,69 @@ impl RunResult {
         if let Some(middle) = &self.middle {
             line("scan_range_m", "middle of the scan [m]", middle.range_m);
             line("scan_efficiency", "efficiency there", middle.efficiency);
-            line("scan_snr_db", "signal-to-noise ratio there [dB]", middle.snr_db);
+            line(
+                "scan_snr_db",
+                "signal-to-noise ratio there [dB]",
+                middle.snr_db,
+            );
         }
-        if let Some(fraction) = self.profile.as_ref().and_then(|profile| profile.lost_power_fraction) {
-            line("lost_power_fraction", "power lost at the screens' border (< 0.01)", fraction);
+        if let Some(fraction) = self
+            .profile
+            .as_ref()
+            .and_then(|profile| profile.lost_power_fraction)
+        {
+            line(
+                "lost_power_fraction",
+                "power lost at the screens' border (< 0.01)",
+                fraction,
+            );
         }
         if let Some(a) = &self.signals_a {
             let mean_square = a.iter().map(|x| x * x).sum::<f64>() / a.len() as f64;
-            line("signal_rms_a", "rms of the raw signals [A]", mean_square.sqrt());
+            line(
+                "signal_rms_a",
+                "rms of the raw signals [A]",
+                mean_square.sqrt(),
+            );
         }
         if let Some(m) = &self.map {
-            line("v_max_m_s", "largest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::max));
-            line("v_min_m_s", "smallest estimated velocity [m/s]", fold(&m.v_mean_m_s, f64::min));
-            line("bias_mean_m_s", "mean bias against v_pulse [m/s]", mean(&m.bias_m_s));
+            line(
+                "v_max_m_s",
+                "largest estimated velocity [m/s]",
+                fold(&m.v_mean_m_s, f64::max),
+            );
+            line(
+                "v_min_m_s",
+                "smallest estimated velocity [m/s]",
+                fold(&m.v_mean_m_s, f64::min),
+            );
+            line(
+                "bias_mean_m_s",
+                "mean bias against v_pulse [m/s]",
+                mean(&m.bias_m_s),
+            );
             let root_mean_square = |field: &Array2<f64>| mean(&field.mapv(|x| x * x)).sqrt();
-            line("rms_mean_m_s", "root mean square error against v_pulse [m/s]", root_mean_square(&m.rms_m_s));
-            line("std_mean_m_s", "standard deviation of one estimate [m/s]", root_mean_square(&m.std_m_s));
-            line("flagged_fraction", "fraction of flagged estimates", mean(&m.flagged));
+            line(
+                "rms_mean_m_s",
+                "root mean square error against v_pulse [m/s]",
+                root_mean_square(&m.rms_m_s),
+            );
+            line(
+                "std_mean_m_s",
+                "standard deviation of one estimate [m/s]",
+                root_mean_square(&m.std_m_s),
+            );
+            line(
+                "flagged_fraction",
+                "fraction of flagged estimates",
+                mean(&m.flagged),
+            );
             if m.clipped_fraction > 0.0 {
-                line("clipped_fraction", "fraction of clipped samples", m.clipped_fraction);
+                line(
+                    "clipped_fraction",
+                    "fraction of clipped samples",
+                    m.clipped_fraction,
+                );
             }
             line("level_mean", "windows accumulated, mean", mean(&m.level));
         }

@@ -29,7 +29,9 @@ use std::path::{Path, PathBuf};
 /// # Errors
 /// As [`write()`], but for what the files hold.
 pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
-    Outputs::names(plan.scene.content.outputs, |files| list(plan, &RunResult::default(), files))
+    Outputs::names(plan.scene.content.outputs, |files| {
+        list(plan, &RunResult::default(), files)
+    })
 }
 
 /// Writes the results that the plan's scene asks for; returns the paths of the files.
@@ -37,24 +39,42 @@ pub fn names(plan: &Plan) -> Result<Vec<String>, Error> {
 /// # Errors
 /// A result that a format cannot hold, a file in the way that may not be replaced, or what the system says. Nothing is
 /// left half-written.
-pub fn write(plan: &Plan, result: &RunResult, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+pub fn write(
+    plan: &Plan,
+    result: &RunResult,
+    folder: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
     let formats = plan.scene.content.outputs;
-    Outputs::write(folder, existing, (formats, plan.scene.provenance()), |files| list(plan, result, files))
+    Outputs::write(
+        folder,
+        existing,
+        (formats, plan.scene.provenance()),
+        |files| list(plan, result, files),
+    )
 }
 
 /// The files of a run.
 pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Result<(), Error> {
-    files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
+    files.add(
+        "scene.toml",
+        Some(plan),
+        |_, origin| Ok(origin.scene_file()),
+    )?;
     if matches!(plan.target, Target::Run | Target::Efficiency) {
         let profile = result.profile.as_ref();
         files.table("profile", profile, |profile| Ok(profile_table(profile)))?;
         #[cfg(feature = "plots")]
-        files.figure("profile", profile, |profile| Ok(pictures::profile(plan, profile)))?;
+        files.figure("profile", profile, |profile| {
+            Ok(pictures::profile(plan, profile))
+        })?;
     }
     if plan.runs(Stage::CrossPlane) {
         let plane = result.plane.as_ref();
         files.table("flow", plane, |plane| Ok(tables::planes_table(plane)?))?;
-        files.netcdf("flow", plane, |plane, origin| Ok(crate::io::cf_planes::cf_planes_bytes(plane, origin)?))?;
+        files.netcdf("flow", plane, |plane, origin| {
+            Ok(crate::io::cf_planes::cf_planes_bytes(plane, origin)?)
+        })?;
     }
     if plan.kept_realisations() > 0 {
         let signals = raw_signals(plan, result);
@@ -65,22 +85,38 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
     }
     if plan.runs(Stage::Estimates) {
         let pattern = &plan.scene.content.scan.pattern;
-        let map = result.map.as_ref().map(|estimates| velocity_map(plan, estimates));
+        let map = result
+            .map
+            .as_ref()
+            .map(|estimates| velocity_map(plan, estimates));
         list_map(plan, map.as_ref(), files)?;
-        let winds = result.map.as_ref().map(|estimates| beam_winds::beam_winds(plan, estimates)).transpose()?.flatten();
+        let winds = result
+            .map
+            .as_ref()
+            .map(|estimates| beam_winds::beam_winds(plan, estimates))
+            .transpose()?
+            .flatten();
         if matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
-            files.table("wind", winds.as_deref(), |winds| Ok(beam_winds::table(winds)))?;
+            files.table("wind", winds.as_deref(), |winds| {
+                Ok(beam_winds::table(winds))
+            })?;
         }
         #[cfg(feature = "plots")]
-        files.figure("map", map.as_ref(), |map| pictures::map(plan, map, winds.as_deref()))?;
+        files.figure("map", map.as_ref(), |map| {
+            pictures::map(plan, map, winds.as_deref())
+        })?;
         #[cfg(feature = "plots")]
         if *pattern != Pattern::default() {
             files.figure("scan", map.as_ref(), |_| Ok(pictures::scan(plan)))?;
         }
     }
     if plan.runs(Stage::Retrieval) {
-        files.table("retrieval", result.retrieval.as_ref(), |found| Ok(found.table()))?;
-        files.table("retrieval_summary", result.retrieval.as_ref(), |found| Ok(found.error_table()))?;
+        files.table("retrieval", result.retrieval.as_ref(), |found| {
+            Ok(found.table())
+        })?;
+        files.table("retrieval_summary", result.retrieval.as_ref(), |found| {
+            Ok(found.error_table())
+        })?;
     }
     Ok(())
 }
@@ -90,8 +126,9 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
 /// # Errors
 /// As [`write()`], but for what the files hold.
 pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
-    let mut names =
-        Outputs::names(plan.scene.content.outputs, |files| of_run(plan, &RunResult::default(), None, files))?;
+    let mut names = Outputs::names(plan.scene.content.outputs, |files| {
+        of_run(plan, &RunResult::default(), None, files)
+    })?;
     // Those that are estimated stay where they are.
     names.retain(|name| !name.starts_with("signals."));
     Ok(names)
@@ -101,21 +138,42 @@ pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
 ///
 /// # Errors
 /// As [`write()`].
-pub fn write_recorded(plan: &Plan, found: Recorded, folder: &Path, existing: Existing) -> Result<Vec<PathBuf>, Error> {
+pub fn write_recorded(
+    plan: &Plan,
+    found: Recorded,
+    folder: &Path,
+    existing: Existing,
+) -> Result<Vec<PathBuf>, Error> {
     let of = (plan.scene.content.outputs, plan.scene.provenance());
-    Outputs::write(folder, existing, of, |files| list_recorded(plan, found, files))
+    Outputs::write(folder, existing, of, |files| {
+        list_recorded(plan, found, files)
+    })
 }
 
 /// The files of what records gave.
-pub(crate) fn list_recorded(plan: &Plan, found: Recorded, files: &mut Outputs) -> Result<(), Error> {
+pub(crate) fn list_recorded(
+    plan: &Plan,
+    found: Recorded,
+    files: &mut Outputs,
+) -> Result<(), Error> {
     match found {
-        Recorded::OfRun { map, spectra } => {
-            of_run(plan, &RunResult { map: Some(*map), ..RunResult::default() }, spectra, files)
-        }
+        Recorded::OfRun { map, spectra } => of_run(
+            plan,
+            &RunResult {
+                map: Some(*map),
+                ..RunResult::default()
+            },
+            spectra,
+            files,
+        ),
         Recorded::Measured { scans, spectra } => {
             let map = measured_map(plan, &scans)?;
             drop(scans);
-            files.add("scene.toml", Some(plan), |_, origin| Ok(origin.scene_file()))?;
+            files.add(
+                "scene.toml",
+                Some(plan),
+                |_, origin| Ok(origin.scene_file()),
+            )?;
             list_map(plan, Some(&map), files)?;
             #[cfg(feature = "plots")]
             files.figure("map", Some(&map), pictures::measured)?;
@@ -125,9 +183,16 @@ pub(crate) fn list_recorded(plan: &Plan, found: Recorded, files: &mut Outputs) -
 }
 
 /// Of signals whose truth is known: what a run gives, and what is predicted of its errors.
-fn of_run(plan: &Plan, result: &RunResult, spectra: Option<Spectra>, files: &mut Outputs) -> Result<(), Error> {
+fn of_run(
+    plan: &Plan,
+    result: &RunResult,
+    spectra: Option<Spectra>,
+    files: &mut Outputs,
+) -> Result<(), Error> {
     list(plan, result, files)?;
-    files.table("predicted", result.map.as_ref(), |map| predicted_table(plan, map))?;
+    files.table("predicted", result.map.as_ref(), |map| {
+        predicted_table(plan, map)
+    })?;
     list_spectra(spectra, files)
 }
 
@@ -146,16 +211,25 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
         // Readers take the kind of a CfRadial file from its first sweep: one for each kind.
         let (stem, own) = match modes.len() {
             1 => ("map".to_owned(), map.map(Cow::Borrowed)),
-            _ => (format!("map_{}", mode.name()), map.map(|map| Cow::Owned(map.of_mode(*mode)))),
+            _ => (
+                format!("map_{}", mode.name()),
+                map.map(|map| Cow::Owned(map.of_mode(*mode))),
+            ),
         };
         if modes.len() > 1 {
             files.table(&stem, own.as_deref(), |map| Ok(tables::map_table(map)?))?;
         }
-        files.netcdf(&stem, own.as_deref(), |map, origin| Ok(crate::io::cfradial::cfradial_bytes(map, origin)?))?;
+        files.netcdf(&stem, own.as_deref(), |map, origin| {
+            Ok(crate::io::cfradial::cfradial_bytes(map, origin)?)
+        })?;
     }
     let sweeps = map.map_or(schedule.sweeps.len(), |map| map.sweeps.len());
     for sweep in (0..sweeps).filter(|_| plan.scene.content.outputs.hpl) {
-        let stem = if sweeps == 1 { "halo".to_owned() } else { format!("halo_{:04}", sweep + 1) };
+        let stem = if sweeps == 1 {
+            "halo".to_owned()
+        } else {
+            format!("halo_{:04}", sweep + 1)
+        };
         let name = format!("{stem}.hpl");
         files.add(&name, map, |map, _| Ok(hpl::hpl_bytes(map, sweep, &name)?))?;
         files.table(&stem, map, |map| Ok(hpl::hpl_table(map, sweep)?))?;
@@ -175,14 +249,22 @@ pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
         Some("png") => figure.png(&origin)?,
         _ => {
             let reason = "a picture ends in .svg or .png, such as set-up.svg".into();
-            return Err(Error::Input { path: path.to_owned(), reason });
+            return Err(Error::Input {
+                path: path.to_owned(),
+                reason,
+            });
         }
     };
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     refuse_foreign(folder, [name.as_ref()], Existing::Own).map_err(|error| match error {
         OutputError::Foreign { path } => {
-            let reason = "it was not written by this program, or was changed since: name another file".into();
+            let reason =
+                "it was not written by this program, or was changed since: name another file"
+                    .into();
             Error::Input { path, reason }
         }
         other => other.into(),
@@ -196,13 +278,19 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
     let table = Table::new()
         .float("range_m", e.range_m.clone())
         .float("efficiency", e.mean.clone())
-        .float("efficiency_standard_deviation", e.standard_deviation.clone())
+        .float(
+            "efficiency_standard_deviation",
+            e.standard_deviation.clone(),
+        )
         .float("efficiency_standard_error", e.standard_error.clone())
         .float("snr_db", profile.snr_db.clone());
     profile.others.iter().fold(table, |table, (name, other)| {
         let table = table.float(name, other.mean.clone());
         match other.standard_error.iter().any(|&error| error > 0.0) {
-            true => table.float(&format!("{name}_standard_error"), other.standard_error.clone()),
+            true => table.float(
+                &format!("{name}_standard_error"),
+                other.standard_error.clone(),
+            ),
             false => table,
         }
     })
@@ -212,18 +300,29 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let (scene, g) = (&plan.scene.content, &plan.geometry);
     let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
-    let beam = |(line, pulse): (usize, usize)| g.schedule.beam_of_pulse(line, pulse - g.schedule.lines[line].first);
+    let beam = |(line, pulse): (usize, usize)| {
+        g.schedule
+            .beam_of_pulse(line, pulse - g.schedule.lines[line].first)
+    };
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
     Some(RawSignals {
         recording: recording(plan),
         range_m: g.layer_range_m().collect(),
         radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
-        pulse_time_s: all().map(|at| plan.wind.start_s + beam(at).time_s).collect(),
+        pulse_time_s: all()
+            .map(|at| plan.wind.start_s + beam(at).time_s)
+            .collect(),
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
         elevation_rad: all().map(|at| beam(at).elevation_rad).collect(),
-        azimuth_rad: if g.schedule.is_plane() { Vec::new() } else { all().map(|at| beam(at).azimuth_rad).collect() },
-        time_s: (0..g.samples).map(|k| first_s + k as f64 / scene.detector.sampling_hz).collect(),
+        azimuth_rad: if g.schedule.is_plane() {
+            Vec::new()
+        } else {
+            all().map(|at| beam(at).azimuth_rad).collect()
+        },
+        time_s: (0..g.samples)
+            .map(|k| first_s + k as f64 / scene.detector.sampling_hz)
+            .collect(),
         first_pulse: g.schedule.lines.iter().map(|line| line.first).collect(),
     })
 }
@@ -241,7 +340,11 @@ fn recording(plan: &Plan) -> Recording {
     };
     Recording {
         sampling_hz: d.sampling_hz,
-        intermediate_frequency_hz: if is_baseband { 0.0 } else { d.intermediate_frequency_hz },
+        intermediate_frequency_hz: if is_baseband {
+            0.0
+        } else {
+            d.intermediate_frequency_hz
+        },
         bandwidth_hz: d.bandwidth_hz,
         wavelength_m: scene.laser.wavelength_m,
         pulse_repetition_hz: scene.laser.pulse_repetition_hz,

@@ -51,8 +51,15 @@ impl Context {
     /// The scene of a figure as a checked file, with this run's seed.
     pub(crate) fn scene_file(&self, mut scene: Scene) -> Result<SceneFile, Failure> {
         scene.seed = self.seed;
-        SceneFile::new(scene)
-            .map_err(|problems| Failure::new(problems.iter().map(ToString::to_string).collect::<Vec<_>>().join("; ")))
+        SceneFile::new(scene).map_err(|problems| {
+            Failure::new(
+                problems
+                    .iter()
+                    .map(ToString::to_string)
+                    .collect::<Vec<_>>()
+                    .join("; "),
+            )
+        })
     }
 
     /// Provenance of what belongs to no scene: the tables over all figures.
@@ -88,7 +95,11 @@ pub(crate) struct Rendered {
 
 impl Rendered {
     /// A table as CSV, and the picture as SVG and PNG.
-    pub(crate) fn new(table: &Table, figure: &Figure, origin: &Provenance) -> Result<Self, Failure> {
+    pub(crate) fn new(
+        table: &Table,
+        figure: &Figure,
+        origin: &Provenance,
+    ) -> Result<Self, Failure> {
         let mut out = Self::of_table(table, origin)?;
         let (svg, png) = figure.svg_and_png(origin)?;
         out.files.push(("svg".into(), svg.into_bytes()));
@@ -98,12 +109,21 @@ impl Rendered {
 
     /// A table as CSV.
     pub(crate) fn of_table(table: &Table, origin: &Provenance) -> Result<Self, Failure> {
-        Ok(Self { files: vec![("csv".into(), table.to_csv(origin)?.into_bytes())], ..Self::default() })
+        Ok(Self {
+            files: vec![("csv".into(), table.to_csv(origin)?.into_bytes())],
+            ..Self::default()
+        })
     }
 
     /// One more table, as `figNN.` and the name.
-    pub(crate) fn add(&mut self, name: &str, table: &Table, origin: &Provenance) -> Result<(), Failure> {
-        self.files.push((name.into(), table.to_csv(origin)?.into_bytes()));
+    pub(crate) fn add(
+        &mut self,
+        name: &str,
+        table: &Table,
+        origin: &Provenance,
+    ) -> Result<(), Failure> {
+        self.files
+            .push((name.into(), table.to_csv(origin)?.into_bytes()));
         Ok(())
     }
 
@@ -117,18 +137,30 @@ impl Rendered {
     }
 
     pub(crate) fn file(&self, extension: &str) -> Option<&[u8]> {
-        self.files.iter().find(|(e, _)| e == extension).map(|(_, bytes)| bytes.as_slice())
+        self.files
+            .iter()
+            .find(|(e, _)| e == extension)
+            .map(|(_, bytes)| bytes.as_slice())
     }
 }
 
 /// A curve of points with the error of each.
-pub(super) fn banded(label: &str, style: Style, points: impl IntoIterator<Item = (f64, Estimate)>) -> Series {
-    let (points, errors): (Vec<_>, Vec<_>) = points.into_iter().map(|(x, y)| ((x, y.value), y.standard_error)).unzip();
+pub(super) fn banded(
+    label: &str,
+    style: Style,
+    points: impl IntoIterator<Item = (f64, Estimate)>,
+) -> Series {
+    let (points, errors): (Vec<_>, Vec<_>) = points
+        .into_iter()
+        .map(|(x, y)| ((x, y.value), y.standard_error))
+        .unzip();
     Series::new(label, style, points).with_band(&errors)
 }
 
 /// A table of numbers, row by row, with the names of its columns between spaces.
 pub(super) fn numbers_table<const N: usize>(names: &str, rows: &[[f64; N]]) -> Table {
     let columns = names.split(' ').enumerate();
-    columns.fold(Table::new(), |table, (k, name)| table.float(name, rows.iter().map(|row| row[k])))
+    columns.fold(Table::new(), |table, (k, name)| {
+        table.float(name, rows.iter().map(|row| row[k]))
+    })
 }

@@ -12,10 +12,17 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scene = &plan.scene.content;
     let elevation_rad = &plan.geometry.elevation_rad;
     let far_m = scene.scan.range_max_m;
-    let at = |range_m: f64, el: f64| (range_m * el.cos(), scene.scan.lidar_height_m + range_m * el.sin());
+    let at = |range_m: f64, el: f64| {
+        (
+            range_m * el.cos(),
+            scene.scan.lidar_height_m + range_m * el.sin(),
+        )
+    };
     let near_m = scene.scan.range_min_m;
 
-    let column = |f: fn((f64, f64)) -> f64, range_m: f64| elevation_rad.iter().map(move |&el| f(at(range_m, el)));
+    let column = |f: fn((f64, f64)) -> f64, range_m: f64| {
+        elevation_rad.iter().map(move |&el| f(at(range_m, el)))
+    };
     let table = Table::new()
         .int("line", (0..elevation_rad.len()).map(|i| i as i64))
         .float("elevation_rad", elevation_rad.iter().copied())
@@ -37,12 +44,26 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         Series::new("first and last sample", Style::Dash, recorded),
         Series::new("", Style::Dash, last).in_colour(1),
         Series::new("ground", Style::Line, vec![(0.0, 0.0), (1.05 * far_m, 0.0)]),
-        Series::new("vortices", Style::Markers, Sight::of_pair(VortexPair::default()).cores),
+        Series::new(
+            "vortices",
+            Style::Markers,
+            Sight::of_pair(VortexPair::default()).cores,
+        ),
     ];
-    let (x, y) = (Axis::linear("distance from the lidar [m]"), Axis::linear("height [m]"));
-    let plot = CurvePlot { series, equal_scales: true, ..CurvePlot::new("Scan across the runway", x, y) };
+    let (x, y) = (
+        Axis::linear("distance from the lidar [m]"),
+        Axis::linear("height [m]"),
+    );
+    let plot = CurvePlot {
+        series,
+        equal_scales: true,
+        ..CurvePlot::new("Scan across the runway", x, y)
+    };
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    out.values =
-        vec![elevation_rad.len().to_string(), (1e3 * scene.scan.elevation_step_rad).to_string(), DRAWN.to_string()];
+    out.values = vec![
+        elevation_rad.len().to_string(),
+        (1e3 * scene.scan.elevation_step_rad).to_string(),
+        DRAWN.to_string(),
+    ];
     Ok(out)
 }

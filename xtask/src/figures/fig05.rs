@@ -15,7 +15,14 @@ fn stencil(target: (f64, f64)) -> Vec<[f64; 3]> {
     let weight = |at: f64, node: usize| m4_prime((at - place(at, node)) / SPACING_M);
     let node = |n: usize| (n % 4, n / 4);
     let all = (0..16).map(node);
-    all.map(|(j, k)| [place(target.0, j), place(target.1, k), weight(target.0, j) * weight(target.1, k)]).collect()
+    all.map(|(j, k)| {
+        [
+            place(target.0, j),
+            place(target.1, k),
+            weight(target.0, j) * weight(target.1, k),
+        ]
+    })
+    .collect()
 }
 
 /// Largest error of interpolating the nine products of 1, y, y^2 with 1, z, z^2 about the target; the first is that of the sum.
@@ -32,8 +39,10 @@ fn errors(nodes: &[[f64; 3]], target: (f64, f64)) -> [f64; 9] {
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let nodes = stencil(TARGET_M);
     let table = numbers_table("y_m z_m weight", &nodes);
-    let parameters =
-        format!("spacing_m = {SPACING_M:?}\ntarget_y_m = {:?}\ntarget_z_m = {:?}\n", TARGET_M.0, TARGET_M.1);
+    let parameters = format!(
+        "spacing_m = {SPACING_M:?}\ntarget_y_m = {:?}\ntarget_z_m = {:?}\n",
+        TARGET_M.0, TARGET_M.1
+    );
     let origin = context.provenance_of_formula(&parameters);
 
     let grid = |inside: bool| {
@@ -44,13 +53,20 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             .collect::<Vec<_>>()
     };
     let slope = TARGET_M.1 / TARGET_M.0;
-    let line: Vec<(f64, f64)> = [-3.5, 4.5].iter().map(|d| (TARGET_M.0 + d, TARGET_M.1 + slope * d)).collect();
+    let line: Vec<(f64, f64)> = [-3.5, 4.5]
+        .iter()
+        .map(|d| (TARGET_M.0 + d, TARGET_M.1 + slope * d))
+        .collect();
     let title = "M'4 stencil: 16 grid points for one point of a line of sight";
-    let mut plot = CurvePlot::new(title, Axis::linear("y [m]").between(396.5, 406.5), Axis::linear("z [m]"))
-        .with(Series::new("line of sight", Style::Line, line))
-        .with(Series::new("grid", Style::Markers, grid(false)))
-        .with(Series::new("stencil", Style::Markers, grid(true)))
-        .with(Series::new("target", Style::Markers, [TARGET_M]));
+    let mut plot = CurvePlot::new(
+        title,
+        Axis::linear("y [m]").between(396.5, 406.5),
+        Axis::linear("z [m]"),
+    )
+    .with(Series::new("line of sight", Style::Line, line))
+    .with(Series::new("grid", Style::Markers, grid(false)))
+    .with(Series::new("stencil", Style::Markers, grid(true)))
+    .with(Series::new("target", Style::Markers, [TARGET_M]));
     plot.equal_scales = true;
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
     // The claim holds for any target: a grid of offsets is tried.
@@ -63,7 +79,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     }
     out.claims.push(Claim::exact(
         "F5",
-        format!("{}; {sum_error:.1e} in the sum, {quadratic:.1e} in quadratics", nodes.len()),
+        format!(
+            "{}; {sum_error:.1e} in the sum, {quadratic:.1e} in quadratics",
+            nodes.len()
+        ),
         nodes.len() == 16 && sum_error < 1e-12 && quadratic < 1e-12,
     ));
     Ok(out)

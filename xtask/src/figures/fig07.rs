@@ -13,8 +13,14 @@ const SIDES: [&str; 2] = ["left", "right"];
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
     let origin = context.provenance_of_formula(&wake.file.toml);
-    let figure = Figure::side_by_side([beside(&wake, wake.circulation_plot()?, [[0, 1], [0, 2]])?, paths(&wake)?]);
-    let figure = Figure { width: 1200.0, ..figure };
+    let figure = Figure::side_by_side([
+        beside(&wake, wake.circulation_plot()?, [[0, 1], [0, 2]])?,
+        paths(&wake)?,
+    ]);
+    let figure = Figure {
+        width: 1200.0,
+        ..figure
+    };
     let mut out = Rendered::new(&table(&wake)?, &figure, &origin)?;
     out.values = vec![wake.words()];
     out.claims = claims(&wake)?;
@@ -39,23 +45,41 @@ fn table(wake: &FinishedWake) -> Result<Table, Failure> {
 /// The independent simulation in the box of this profile.
 fn reference(wake: &FinishedWake) -> Result<Vec<Vec<f64>>, Failure> {
     let narrow = wake.flow.size[1] < 4.5;
-    numbers(if narrow { "wake_3d_ground_re5000_coarse_box4_cans.csv" } else { "wake_3d_ground_re5000_cans.csv" })
+    numbers(if narrow {
+        "wake_3d_ground_re5000_coarse_box4_cans.csv"
+    } else {
+        "wake_3d_ground_re5000_cans.csv"
+    })
 }
 
 /// A plot with two columns of the independent simulation for each vortex.
-fn beside(wake: &FinishedWake, plot: CurvePlot, columns: [[usize; 2]; 2]) -> Result<CurvePlot, Failure> {
+fn beside(
+    wake: &FinishedWake,
+    plot: CurvePlot,
+    columns: [[usize; 2]; 2],
+) -> Result<CurvePlot, Failure> {
     let stored = reference(wake)?;
-    Ok(SIDES.iter().zip(columns).enumerate().fold(plot, |plot, (place, (side, [x, y]))| {
-        let points = stored.iter().step_by(4).map(|r| (r[x], r[y]));
-        plot.with(Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points).in_colour(place))
-    }))
+    Ok(SIDES
+        .iter()
+        .zip(columns)
+        .enumerate()
+        .fold(plot, |plot, (place, (side, [x, y]))| {
+            let points = stored.iter().step_by(4).map(|r| (r[x], r[y]));
+            plot.with(
+                Series::new(&format!("Γ₀/ν = 5000, {side}"), Style::Markers, points)
+                    .in_colour(place),
+            )
+        }))
 }
 
 fn paths(wake: &FinishedWake) -> Result<CurvePlot, Failure> {
     let mut plot = beside(wake, wake.path_plot()?, [[3, 4], [5, 6]])?;
     let hyperbola = inviscid()?;
     for (name, sign) in [("inviscid", 1.0), ("", -1.0)] {
-        let path = hyperbola.iter().filter(|r| r[1] <= 2.0).map(|r| (sign * r[1], r[2]));
+        let path = hyperbola
+            .iter()
+            .filter(|r| r[1] <= 2.0)
+            .map(|r| (sign * r[1], r[2]));
         plot = plot.with(Series::new(name, Style::Dash, path.collect::<Vec<_>>()));
     }
     Ok(plot)
@@ -65,18 +89,31 @@ fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     let gamma = mean(wake, "gamma_ratio", 1.0)?;
     let at = |tau: f64| value_at(&gamma, tau);
     let onset = onset(&gamma);
-    let noise = format!("noise {} V₀, Γ₀/ν = {}", wake.flow.perturbation, wake.flow.reynolds);
+    let noise = format!(
+        "noise {} V₀, Γ₀/ν = {}",
+        wake.flow.perturbation, wake.flow.reynolds
+    );
     let like_chapter = wake.flow.reynolds >= CHAPTER.0 && wake.flow.core_radius <= CHAPTER.1;
     // What depends on the Reynolds number of the chapter is measured, but not judged, at another.
     let needed = "a wake at 2e4 with a core of 0.05 b₀: `--wake` of preset fine (an hour), profile full (days)";
-    let of_chapter = |claim: Claim| if like_chapter { claim } else { claim.open(needed) };
+    let of_chapter = |claim: Claim| {
+        if like_chapter {
+            claim
+        } else {
+            claim.open(needed)
+        }
+    };
     let by_noise = by_noise()?;
     let meets = knee(&gamma).map_or("never".into(), |tau| format!("at {tau:.2}"));
     let onset_words = onset.map_or("never".into(), |tau| format!("tau = {tau:.2}"));
     let before = onset.map_or(f64::NAN, |tau| 1.0 - at(tau - 0.1));
     let (y, z) = (mean(wake, "y", -1.0)?, mean(wake, "z", 1.0)?);
     Ok(vec![
-        of_chapter(Claim::exact("F7a", format!("{before:.3} at the onset, {onset_words} ({noise})"), before < 0.1)),
+        of_chapter(Claim::exact(
+            "F7a",
+            format!("{before:.3} at the onset, {onset_words} ({noise})"),
+            before < 0.1,
+        )),
         of_chapter(Claim::exact(
             "F7b",
             format!(
@@ -94,25 +131,47 @@ fn claims(wake: &FinishedWake) -> Result<Vec<Claim>, Failure> {
     ])
 }
 
-fn inviscid_path(wake: &FinishedWake, y: &[(f64, f64)], z: &[(f64, f64)]) -> Result<Claim, Failure> {
+fn inviscid_path(
+    wake: &FinishedWake,
+    y: &[(f64, f64)],
+    z: &[(f64, f64)],
+) -> Result<Claim, Failure> {
     let shear = mean(wake, "outward_shear", 1.0)?;
     let largest = wake.column("wall_shear")?;
     // On the lines of symmetry the shear is zero to round-off and noise from the start.
-    let turned = shear.iter().zip(largest).find(|(p, largest)| p.0 > 0.1 && p.1 < -0.01 * **largest);
+    let turned = shear
+        .iter()
+        .zip(largest)
+        .find(|(p, largest)| p.0 > 0.1 && p.1 < -0.01 * **largest);
     let separation = turned.map_or(f64::NAN, |(p, _)| p.0);
     let hyperbola = inviscid()?;
     let path: Vec<[f64; 2]> = hyperbola.iter().map(|r| [r[1], r[2]]).collect();
     let at = |tau: f64| [value_at(y, tau), value_at(z, tau)];
-    let exact = |tau: f64| [1, 2].map(|k| value_at(&hyperbola.iter().map(|r| (r[0], r[k])).collect::<Vec<_>>(), tau));
+    let exact = |tau: f64| {
+        [1, 2].map(|k| {
+            value_at(
+                &hyperbola.iter().map(|r| (r[0], r[k])).collect::<Vec<_>>(),
+                tau,
+            )
+        })
+    };
     let worst = |distance: &dyn Fn(f64) -> f64| {
-        y.iter().map(|p| p.0).filter(|tau| *tau <= separation).map(distance).fold(0.0, f64::max)
+        y.iter()
+            .map(|p| p.0)
+            .filter(|tau| *tau <= separation)
+            .map(distance)
+            .fold(0.0, f64::max)
     };
     let lag = worst(&|tau| (at(tau)[0] - exact(tau)[0]).hypot(at(tau)[1] - exact(tau)[1]));
     let worst = worst(&|tau| off_curve(at(tau), &path));
     let measured = format!(
         "{worst:.4} b₀ between the curves until tau = {separation:.2}, where the shear at the ground turns; {lag:.4} b₀ at equal times"
     );
-    Ok(Claim::exact("F7d", measured, separation.is_finite() && worst < 0.03))
+    Ok(Claim::exact(
+        "F7d",
+        measured,
+        separation.is_finite() && worst < 0.03,
+    ))
 }
 
 /// The path of point vortices: tau, y, z.
@@ -123,8 +182,10 @@ fn inviscid() -> Result<Vec<Vec<f64>>, Failure> {
 /// Distance of a point from a curve of straight pieces.
 fn off_curve(point: [f64; 2], curve: &[[f64; 2]]) -> f64 {
     let to_piece = |ends: &[[f64; 2]]| {
-        let [along, from] =
-            [[ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]], [point[0] - ends[0][0], point[1] - ends[0][1]]];
+        let [along, from] = [
+            [ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]],
+            [point[0] - ends[0][0], point[1] - ends[0][1]],
+        ];
         let length2 = along[0].powi(2) + along[1].powi(2);
         let share = ((along[0] * from[0] + along[1] * from[1]) / length2).clamp(0.0, 1.0);
         (from[0] - share * along[0]).hypot(from[1] - share * along[1])
@@ -133,8 +194,14 @@ fn off_curve(point: [f64; 2], curve: &[[f64; 2]]) -> f64 {
 }
 
 fn rebound(y: &[(f64, f64)], z: &[(f64, f64)]) -> Claim {
-    let lowest = z.iter().filter(|p| p.0 < 2.0).fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
-    let top = z.iter().filter(|p| p.0 > lowest.0 && p.0 < 3.5).fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
+    let lowest = z
+        .iter()
+        .filter(|p| p.0 < 2.0)
+        .fold((0.0, f64::INFINITY), |m, p| if p.1 < m.1 { *p } else { m });
+    let top = z
+        .iter()
+        .filter(|p| p.0 > lowest.0 && p.0 < 3.5)
+        .fold((0.0, 0.0), |m, p| if p.1 > m.1 { *p } else { m });
     let [widest, inner] = swing(y);
     let measured = format!(
         "lowest {:.3} at tau = {:.2}, top {:.3} at {:.2}; widest {:.3} at {:.2}, then inward to {:.3} at {:.2}",
@@ -151,7 +218,12 @@ mod tests {
     #[test]
     fn a_path_that_lags_is_on_the_curve() {
         let curve = [[0.0, 0.0], [1.0, 0.0], [1.0, 2.0]];
-        for (point, distance) in [([0.5, 0.0], 0.0), ([0.5, 0.3], 0.3), ([1.2, 1.9], 0.2), ([1.3, 2.4], 0.5)] {
+        for (point, distance) in [
+            ([0.5, 0.0], 0.0),
+            ([0.5, 0.3], 0.3),
+            ([1.2, 1.9], 0.2),
+            ([1.3, 2.4], 0.5),
+        ] {
             assert!((off_curve(point, &curve) - distance).abs() < 1e-12);
         }
     }

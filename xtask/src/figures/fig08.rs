@@ -13,7 +13,9 @@ const REACH: f64 = 0.5;
 /// Ranges and highest elevation of the smallest sector from the ground up about the boxes that reach `reach_m` beyond the centres of
 /// vortices, (y, z).
 fn sector(cores: &[(f64, f64)], reach_m: f64) -> ([f64; 2], f64) {
-    let extreme = |of: fn(&(f64, f64)) -> f64, pick: fn(f64, f64) -> f64| cores.iter().map(of).fold(f64::NAN, pick);
+    let extreme = |of: fn(&(f64, f64)) -> f64, pick: fn(f64, f64) -> f64| {
+        cores.iter().map(of).fold(f64::NAN, pick)
+    };
     let near_m = extreme(|core| core.0, f64::min) - reach_m;
     let far_m = extreme(|core| core.0, f64::max) + reach_m;
     let top_m = extreme(|core| core.1, f64::max) + reach_m;
@@ -23,7 +25,10 @@ fn sector(cores: &[(f64, f64)], reach_m: f64) -> ([f64; 2], f64) {
 
 /// A scan of both vortices whole at both ages, with the same sector: air beyond the box of the flow is masked.
 fn scene(context: &Context, (range_m, elevation_max_rad): ([f64; 2], f64)) -> Scene {
-    let mut scene = Scene { seed: 0, ..Scene::default() };
+    let mut scene = Scene {
+        seed: 0,
+        ..Scene::default()
+    };
     // Gates begin and end half a window inside the samples.
     let half_window_m = 0.5 * scene.estimator.window_samples as f64 * scene.sample_spacing_m();
     scene.scan.range_min_m = range_m[0] - half_window_m;
@@ -38,24 +43,37 @@ fn scene(context: &Context, (range_m, elevation_max_rad): ([f64; 2], f64)) -> Sc
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
     let (words, reach_m) = (wake.words(), REACH * wake.scales.spacing_m);
-    let (early, late) = (Sight::of_wake(&wake, EARLY_TAU)?, Sight::of_wake(&wake, LATE_TAU)?);
-    let scene = scene(context, sector(&[&early.cores[..], &late.cores[..]].concat(), reach_m));
-    let one = |sight: &Sight| Ok::<_, Failure>(Study::runs(context, sight, vec![scene.clone()])?.remove(0));
+    let (early, late) = (
+        Sight::of_wake(&wake, EARLY_TAU)?,
+        Sight::of_wake(&wake, LATE_TAU)?,
+    );
+    let scene = scene(
+        context,
+        sector(&[&early.cores[..], &late.cores[..]].concat(), reach_m),
+    );
+    let one = |sight: &Sight| {
+        Ok::<_, Failure>(Study::runs(context, sight, vec![scene.clone()])?.remove(0))
+    };
     let studies = [one(&early)?, one(&late)?];
-    let [early, late] = studies.each_ref().map(|study| write::velocity_map(&study.plan, &study.map));
+    let [early, late] = studies
+        .each_ref()
+        .map(|study| write::velocity_map(&study.plan, &study.map));
     let colours = MapPlot::new(&early, 0, "v_exact")?.colours;
     let mut panels = Vec::new();
     for (map, tau) in [(&early, EARLY_TAU), (&late, LATE_TAU)] {
         for (field, title) in [("v_exact", "exact"), ("radial_velocity", "estimated")] {
-            let plot = MapPlot::new(map, 0, field)?.titled(&format!("{title}, τ = {tau}")).labelled("v_R [m/s]");
+            let plot = MapPlot::new(map, 0, field)?
+                .titled(&format!("{title}, τ = {tau}"))
+                .labelled("v_R [m/s]");
             panels.push(plot.coloured(colours));
         }
     }
     let [early_low, early_high] = extremes(&early)?;
     let [late_low, late_high] = extremes(&late)?;
     let realisations = scene.scan.realisations;
-    let title =
-        format!("Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations");
+    let title = format!(
+        "Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations"
+    );
     let mut figure = Figure::stacked(panels).titled(&title);
     (figure.columns, figure.width) = (2, 1300.0);
     let table = Table::stack([map_table(&early)?, map_table(&late)?])?;
@@ -75,7 +93,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 /// The least and the largest exact radial velocity.
 fn extremes(map: &VelocityMap) -> Result<[f64; 2], Failure> {
-    let field = map.field("v_exact").ok_or_else(|| Failure::new("the map has no exact velocity".into()))?;
+    let field = map
+        .field("v_exact")
+        .ok_or_else(|| Failure::new("the map has no exact velocity".into()))?;
     Ok([f64::min, f64::max].map(|pick| field.values.iter().copied().fold(f64::NAN, pick)))
 }
 
@@ -88,14 +108,23 @@ mod tests {
         // The coarse wake: the late vortices are 1.2 spacings from the middle, the early ones 0.9 and lower.
         for (extent_m, reach_m) in [([-56.0, 57.0, 45.0], 23.5), ([-80.0, 75.0, 30.0], 30.0)] {
             let [low_m, high_m, top_m]: [f64; 3] = extent_m;
-            let ([near_m, far_m], highest_rad) =
-                sector(&[(400.0 + low_m, top_m), (400.0 + high_m, 0.5 * top_m)], reach_m);
-            for (y_m, z_m) in [low_m, high_m].into_iter().flat_map(|y_m| [(y_m, 0.5 * top_m), (y_m, top_m)]) {
+            let ([near_m, far_m], highest_rad) = sector(
+                &[(400.0 + low_m, top_m), (400.0 + high_m, 0.5 * top_m)],
+                reach_m,
+            );
+            for (y_m, z_m) in [low_m, high_m]
+                .into_iter()
+                .flat_map(|y_m| [(y_m, 0.5 * top_m), (y_m, top_m)])
+            {
                 for (dy, dz) in [(-1.0, -1.0), (-1.0, 1.0), (1.0, -1.0), (1.0, 1.0)] {
                     let corner = (400.0 + y_m + dy * reach_m, (z_m + dz * reach_m).max(0.0));
-                    let (range_m, elevation_rad) = (corner.0.hypot(corner.1), corner.1.atan2(corner.0));
+                    let (range_m, elevation_rad) =
+                        (corner.0.hypot(corner.1), corner.1.atan2(corner.0));
                     let slack = 1e-9;
-                    assert!(range_m > near_m - slack && range_m < far_m + slack, "{corner:?}");
+                    assert!(
+                        range_m > near_m - slack && range_m < far_m + slack,
+                        "{corner:?}"
+                    );
                     assert!(elevation_rad < highest_rad + slack, "{corner:?}");
                 }
             }

@@ -19,7 +19,12 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let (scene, elevation_rad) = (&plan.scene.content, &plan.geometry.elevation_rad);
     let gates = estimators::gates(scene)?;
     let samples = scene.samples_per_record();
-    let geometry = ScanGeometry::new(&estimators::sampling(scene)?, &gates, elevation_rad, samples)?;
+    let geometry = ScanGeometry::new(
+        &estimators::sampling(scene)?,
+        &gates,
+        elevation_rad,
+        samples,
+    )?;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     // n_eff as the speckle has it: independent of the noise within a few per cent.
     let correlation = WindowCorrelation::gaussian_pulse(
@@ -30,18 +35,35 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         scene.pulse_sigma_s(),
         0.0,
     )?;
-    let gates_m = geometry.gate_ranges_m().into_iter().filter(|r| (200.0..=600.0).contains(r)).step_by(8);
+    let gates_m = geometry
+        .gate_ranges_m()
+        .into_iter()
+        .filter(|r| (200.0..=600.0).contains(r))
+        .step_by(8);
     let mut ranges_m: Vec<f64> = gates_m.chain([CHAPTER_RANGE_M]).collect();
     ranges_m.sort_by(f64::total_cmp);
     let middle_rad = elevation_rad[elevation_rad.len() / 2];
     let at = |range_m: f64, radius_m: f64| {
-        geometry.level(PolarPoint { range_m, elevation_rad: middle_rad }, radius_m, &correlation)
+        geometry.level(
+            PolarPoint {
+                range_m,
+                elevation_rad: middle_rad,
+            },
+            radius_m,
+            &correlation,
+        )
     };
 
     let mut rows: Vec<(f64, f64, usize, f64)> = Vec::new();
     let mut series = Vec::new();
-    for (radius_m, style) in RADII_M.into_iter().zip([Style::Dot, Style::DashDot, Style::Line]) {
-        let curve: Vec<_> = ranges_m.iter().map(|&r| (radius_m, r, at(r, radius_m).0, at(r, radius_m).1)).collect();
+    for (radius_m, style) in RADII_M
+        .into_iter()
+        .zip([Style::Dot, Style::DashDot, Style::Line])
+    {
+        let curve: Vec<_> = ranges_m
+            .iter()
+            .map(|&r| (radius_m, r, at(r, radius_m).0, at(r, radius_m).1))
+            .collect();
         let points: Vec<_> = curve.iter().map(|c| (c.1, c.2 as f64)).collect();
         series.push(Series::new(&format!("rho = {radius_m} m"), style, points));
         rows.extend(curve);
@@ -53,9 +75,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("n_eff", rows.iter().map(|r| r.3));
     let origin = plan.scene.provenance();
     let (x, y) = (Axis::linear("range [m]"), Axis::log("windows accumulated"));
-    let plot = CurvePlot { series, ..CurvePlot::new("Accumulation level", x, y) };
+    let plot = CurvePlot {
+        series,
+        ..CurvePlot::new("Accumulation level", x, y)
+    };
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    let here: Vec<(usize, f64)> = RADII_M.iter().map(|&rho| at(CHAPTER_RANGE_M, rho)).collect();
+    let here: Vec<(usize, f64)> = RADII_M
+        .iter()
+        .map(|&rho| at(CHAPTER_RANGE_M, rho))
+        .collect();
     out.claims = claims(&rows, &here);
     Ok(out)
 }
@@ -65,17 +93,34 @@ fn claims(rows: &[(f64, f64, usize, f64)], here: &[(usize, f64)]) -> Vec<Claim> 
     let mut falls = true;
     let mut shown = Vec::new();
     for radius_m in RADII_M {
-        let levels: Vec<f64> = rows.iter().filter(|r| r.0 == radius_m).map(|r| r.2 as f64).collect();
-        let means: Vec<f64> =
-            levels.chunks(levels.len().div_ceil(4)).map(|c| c.iter().sum::<f64>() / c.len() as f64).collect();
+        let levels: Vec<f64> = rows
+            .iter()
+            .filter(|r| r.0 == radius_m)
+            .map(|r| r.2 as f64)
+            .collect();
+        let means: Vec<f64> = levels
+            .chunks(levels.len().div_ceil(4))
+            .map(|c| c.iter().sum::<f64>() / c.len() as f64)
+            .collect();
         falls &= means.windows(2).all(|w| w[1] <= w[0]) && means[means.len() - 1] < means[0];
-        shown.push(format!("{radius_m} m: {:.1} to {:.1}", means[0], means[means.len() - 1]));
+        shown.push(format!(
+            "{radius_m} m: {:.1} to {:.1}",
+            means[0],
+            means[means.len() - 1]
+        ));
     }
     let levels: Vec<String> = here.iter().map(|h| h.0.to_string()).collect();
     let n_eff: Vec<String> = here.iter().map(|h| format!("{:.1}", h.1)).collect();
-    let agrees = here.iter().zip([20.0, 60.0, 120.0]).all(|(h, chapter)| (h.0 as f64 / chapter - 1.0).abs() < 0.1);
+    let agrees = here
+        .iter()
+        .zip([20.0, 60.0, 120.0])
+        .all(|(h, chapter)| (h.0 as f64 / chapter - 1.0).abs() < 0.1);
     vec![
         Claim::exact("F9a", shown.join("; "), falls),
-        Claim::exact("F9b", format!("{} (n_eff {})", levels.join(", "), n_eff.join(", ")), agrees),
+        Claim::exact(
+            "F9b",
+            format!("{} (n_eff {})", levels.join(", "), n_eff.join(", ")),
+            agrees,
+        ),
     ]
 }

@@ -1,7 +1,9 @@
 //! Figure 10: the radial velocity of the early pair, the scatter of its estimates, and their relation to the gradient.
 
 use super::context::*;
-use super::study::{EARLY_TAU, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method};
+use super::study::{
+    EARLY_TAU, METHODS, REFERENCES, Sight, Study, early_scene, stacked, with_method,
+};
 use wakescope_sim::io::tables::map_table;
 use wakescope_sim::write;
 
@@ -22,23 +24,45 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             );
         }
         let title = format!("Standard deviation of the estimate, {name} signal-to-noise ratio");
-        panels.push(MapPlot::new(&map, 0, "velocity_standard_deviation")?.titled(&title).labelled("std [m/s]"));
+        panels.push(
+            MapPlot::new(&map, 0, "velocity_standard_deviation")?
+                .titled(&title)
+                .labelled("std [m/s]"),
+        );
         let gradient = gradient_per_s(study);
         let of_rms = |without| {
-            let rms = |cell| study.over_scans(cell, without, |error| error * error).sqrt();
+            let rms = |cell| {
+                study
+                    .over_scans(cell, without, |error| error * error)
+                    .sqrt()
+            };
             correlation(&Array2::from_shape_fn(gradient.dim(), rms), &gradient)
         };
-        found.push((name, Estimate::of(BATCHES, of_rms), correlation(&study.map.std_m_s, &gradient)));
+        found.push((
+            name,
+            Estimate::of(BATCHES, of_rms),
+            correlation(&study.map.std_m_s, &gradient),
+        ));
     }
     let origin = studies[0].plan.scene.provenance();
-    let mut out = Rendered::new(&stacked("snr_reference", tables)?, &Figure::stacked(panels), &origin)?;
+    let mut out = Rendered::new(
+        &stacked("snr_reference", tables)?,
+        &Figure::stacked(panels),
+        &origin,
+    )?;
     out.marks = vec![sight.mark];
     out.values = vec![realisations.to_string(), sight.words];
-    let beside =
-        found.iter().map(|(name, rms, std)| format!("{name}: {}, of the standard deviation {std:.2}", rms.words()));
+    let beside = found.iter().map(|(name, rms, std)| {
+        format!(
+            "{name}: {}, of the standard deviation {std:.2}",
+            rms.words()
+        )
+    });
     let beside = beside.collect::<Vec<_>>().join("; ");
     let chapter = found.iter().filter(|of| of.0 == "chapter");
-    out.claims = chapter.map(|of| Claim::judged_alone("F10", of.1, "", Bar::Above(0.0)).beside(&beside)).collect();
+    out.claims = chapter
+        .map(|of| Claim::judged_alone("F10", of.1, "", Bar::Above(0.0)).beside(&beside))
+        .collect();
     Ok(out)
 }
 
@@ -54,14 +78,22 @@ fn gradient_per_s(study: &Study) -> Array2<f64> {
 
 /// Pearson's correlation over the cells where both are numbers.
 fn correlation(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
-    let pairs: Vec<(f64, f64)> =
-        a.iter().copied().zip(b.iter().copied()).filter(|(a, b)| (a + b).is_finite()).collect();
+    let pairs: Vec<(f64, f64)> = a
+        .iter()
+        .copied()
+        .zip(b.iter().copied())
+        .filter(|(a, b)| (a + b).is_finite())
+        .collect();
     let n = pairs.len() as f64;
-    let mean = pairs.iter().fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
+    let mean = pairs
+        .iter()
+        .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
     let sums = pairs
         .iter()
         .map(|p| (p.0 - mean.0, p.1 - mean.1))
-        .fold([0.0; 3], |s, (x, y)| [s[0] + x * x, s[1] + y * y, s[2] + x * y]);
+        .fold([0.0; 3], |s, (x, y)| {
+            [s[0] + x * x, s[1] + y * y, s[2] + x * y]
+        });
     sums[2] / (sums[0] * sums[1]).sqrt()
 }
 
@@ -73,6 +105,8 @@ mod tests {
     fn correlation_of_a_line_is_one_and_missing_cells_do_not_count() {
         let a = Array2::from_shape_vec((1, 4), vec![1.0, 2.0, 3.0, f64::NAN]).unwrap();
         let b = Array2::from_shape_vec((1, 4), vec![5.0, 3.0, 1.0, 9.0]).unwrap();
-        assert!((correlation(&a, &a) - 1.0).abs() < 1e-12 && (correlation(&a, &b) + 1.0).abs() < 1e-12);
+        assert!(
+            (correlation(&a, &a) - 1.0).abs() < 1e-12 && (correlation(&a, &b) + 1.0).abs() < 1e-12
+        );
     }
 }

@@ -13,15 +13,27 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let origin = context.provenance_of_run();
     let mut out = Rendered::new(&stability::table(&rows), &maps::picture(&panels), &origin)?;
     out.add("maps.csv", &maps::table(&panels), &origin)?;
-    let missed: Vec<&str> = rows.iter().filter(|row| !row.ended.passes).map(|row| row.case.name).collect();
+    let missed: Vec<&str> = rows
+        .iter()
+        .filter(|row| !row.ended.passes)
+        .map(|row| row.case.name)
+        .collect();
     out.values = vec![rows.len().to_string()];
     let measured = match missed.is_empty() {
         true => format!("{} cases", rows.len()),
-        false => format!("{} cases; not: {}", rows.len() - missed.len(), missed.join(", ")),
+        false => format!(
+            "{} cases; not: {}",
+            rows.len() - missed.len(),
+            missed.join(", ")
+        ),
     };
     let cases = Claim::exact("F16", measured, missed.is_empty());
     let furthest = maps::furthest(&panels);
-    let on_theory = Claim::exact("F16b", format!("at most {:.2} %", 100.0 * furthest), furthest <= APART);
+    let on_theory = Claim::exact(
+        "F16b",
+        format!("at most {:.2} %", 100.0 * furthest),
+        furthest <= APART,
+    );
     out.claims = vec![cases.expecting(format!("{} cases", rows.len())), on_theory];
     Ok(out)
 }

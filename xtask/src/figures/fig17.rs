@@ -7,11 +7,18 @@ use crate::statistics::mean;
 use fixtures::pair::{CIRCULATION_M2_S, PairScan, truth};
 use rayon::prelude::*;
 use wakescope_estimate::retrieval::Side;
-use wakescope_estimate::vortex_fit::{CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake};
+use wakescope_estimate::vortex_fit::{
+    CorePrior, FreeParameters, Parameter, Powers, ScanModel, Sharing, Starts, Wake,
+};
 use wakescope_signal::NoiseModel;
 use wakescope_sim::retrieve::name;
 
-const METHODS: [&str; 4] = ["map, typical core", "map, core fitted", "signals, core known", "signals, core fitted"];
+const METHODS: [&str; 4] = [
+    "map, typical core",
+    "map, core fitted",
+    "signals, core known",
+    "signals, core fitted",
+];
 
 /// A fitted wake with its covariance; nothing where a fit failed.
 type Found = Option<(Wake, Array2<f64>)>;
@@ -25,14 +32,22 @@ struct Fits {
 
 /// One circulation and one core radius for both vortices.
 fn free() -> FreeParameters {
-    FreeParameters { core_radius: Sharing::Common, ..FreeParameters::common_circulation() }
+    FreeParameters {
+        core_radius: Sharing::Common,
+        ..FreeParameters::common_circulation()
+    }
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     // Eight scans decide the claims on maps; of gates every 8 samples, which overlap, every third is taken in quick. Fits of signals
     // take longest: the few that quick could make decide no claim on their scatter.
-    let (scans, of_signals, every) = context.profile.choose((BATCHES, 0, 24), (48, 12, 8), (100, 100, 8));
-    let levels_db = context.profile.choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
+    let (scans, of_signals, every) =
+        context
+            .profile
+            .choose((BATCHES, 0, 24), (48, 12, 8), (100, 100, 8));
+    let levels_db = context
+        .profile
+        .choose(vec![0.0], vec![0.0], vec![0.0, 10.0]);
     let mut fits = Vec::new();
     let mut bounds = Vec::new();
     for &snr_db in &levels_db {
@@ -40,7 +55,13 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         bounds.push(bound(&pair)?);
         let found: Vec<Fits> = (0..scans)
             .into_par_iter()
-            .map(|scan| Ok(Fits { snr_db, scan, by_method: fit(&pair, scan, scan < of_signals)? }))
+            .map(|scan| {
+                Ok(Fits {
+                    snr_db,
+                    scan,
+                    by_method: fit(&pair, scan, scan < of_signals)?,
+                })
+            })
             .collect::<Result<_, Failure>>()?;
         fits.extend(found);
     }
@@ -64,7 +85,15 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 fn fit(pair: &PairScan, scan: usize, signals: bool) -> Result<Vec<Found>, Failure> {
     let trial = FitTrial::new(pair, scan, RADIUS_M)?;
     let from_map = |core_radius: Sharing| -> Found {
-        let fit = trial.map(FreeParameters { core_radius, ..free() }, Some(CorePrior::TYPICAL)).ok()?;
+        let fit = trial
+            .map(
+                FreeParameters {
+                    core_radius,
+                    ..free()
+                },
+                Some(CorePrior::TYPICAL),
+            )
+            .ok()?;
         Some((fit.wake, fit.covariance))
     };
     let (typical, resolved) = (from_map(Sharing::Fixed), from_map(Sharing::Common));
@@ -77,7 +106,16 @@ fn fit(pair: &PairScan, scan: usize, signals: bool) -> Result<Vec<Found>, Failur
             guess.left.core_radius_m = truth().left.core_radius_m;
             guess.right.core_radius_m = truth().right.core_radius_m;
         }
-        let fit = trial.signals(FreeParameters { core_radius, ..free() }, &guess, Starts::Several).ok()?;
+        let fit = trial
+            .signals(
+                FreeParameters {
+                    core_radius,
+                    ..free()
+                },
+                &guess,
+                Starts::Several,
+            )
+            .ok()?;
         Some((fit.wake, fit.covariance))
     };
     let (known, fitted) = (from_signals(Sharing::Fixed), from_signals(Sharing::Common));
@@ -88,7 +126,15 @@ fn fit(pair: &PairScan, scan: usize, signals: bool) -> Result<Vec<Found>, Failur
 fn bound(pair: &PairScan) -> Result<[f64; 2], Failure> {
     let model = ScanModel::new(&pair.setup()?, |_, _| pair.snr, &truth())?;
     let of = |core_radius| -> Result<f64, Failure> {
-        let covariance = model.bound(&truth(), Powers::default(), &FreeParameters { core_radius, ..free() }, true)?;
+        let covariance = model.bound(
+            &truth(),
+            Powers::default(),
+            &FreeParameters {
+                core_radius,
+                ..free()
+            },
+            true,
+        )?;
         Ok(covariance[[Parameter::LeftCirculation as usize; 2]].sqrt())
     };
     Ok([of(Sharing::Fixed)?, of(Sharing::Common)?])
@@ -99,15 +145,21 @@ fn value(found: &Found, parameter: Parameter) -> (f64, f64) {
     let place = parameter as usize;
     found
         .as_ref()
-        .map_or((f64::NAN, f64::NAN), |(wake, covariance)| (wake.to_array()[place], covariance[[place; 2]].sqrt()))
+        .map_or((f64::NAN, f64::NAN), |(wake, covariance)| {
+            (wake.to_array()[place], covariance[[place; 2]].sqrt())
+        })
 }
 
 fn table(fits: &[Fits]) -> Table {
     let of_method = |f, m| [Side::Left, Side::Right].map(|vortex| (f, m, vortex));
-    let rows: Vec<(&Fits, usize, Side)> =
-        fits.iter().flat_map(|f| (0..f.by_method.len()).flat_map(move |m| of_method(f, m))).collect();
+    let rows: Vec<(&Fits, usize, Side)> = fits
+        .iter()
+        .flat_map(|f| (0..f.by_method.len()).flat_map(move |m| of_method(f, m)))
+        .collect();
     let float = |get: &dyn Fn(&Found, [Parameter; 4]) -> f64| -> Vec<f64> {
-        rows.iter().map(|(f, m, vortex)| get(&f.by_method[*m], vortex.parameters())).collect()
+        rows.iter()
+            .map(|(f, m, vortex)| get(&f.by_method[*m], vortex.parameters()))
+            .collect()
     };
     let error = |found: &Found, p: Parameter| value(found, p).0 - truth().to_array()[p as usize];
     Table::new()
@@ -135,13 +187,17 @@ fn picture(fits: &[Fits]) -> [CurvePlot; 3] {
     .map(|(title, label, parameter)| {
         let mut plot = CurvePlot::new(title, Axis::linear("scan"), Axis::linear(label));
         for (k, method) in METHODS.into_iter().enumerate() {
-            let fitted: Vec<(usize, (f64, f64))> =
-                first.iter().filter_map(|f| Some((f.scan, value(f.by_method.get(k)?, parameter)))).collect();
+            let fitted: Vec<(usize, (f64, f64))> = first
+                .iter()
+                .filter_map(|f| Some((f.scan, value(f.by_method.get(k)?, parameter))))
+                .collect();
             if fitted.is_empty() {
                 continue;
             }
             let place = |scan: usize| scan as f64 + 0.12 * (k as f64 - 1.5);
-            let points = fitted.into_iter().map(|(scan, (found, std))| (place(scan), Estimate::stated(found, std)));
+            let points = fitted
+                .into_iter()
+                .map(|(scan, (found, std))| (place(scan), Estimate::stated(found, std)));
             plot = plot.with(banded(method, Style::Markers, points).in_colour(k));
         }
         let exact = truth().to_array()[parameter as usize];
@@ -153,7 +209,9 @@ fn picture(fits: &[Fits]) -> [CurvePlot; 3] {
 /// Errors of the circulation of the fits that came to their end, m^2/s.
 fn errors(fits: &[Fits], method: usize) -> Vec<f64> {
     let first = fits.iter().filter(|f| f.snr_db == fits[0].snr_db);
-    let error = |f: &Fits| Some(value(f.by_method.get(method)?, Parameter::LeftCirculation).0 - CIRCULATION_M2_S);
+    let error = |f: &Fits| {
+        Some(value(f.by_method.get(method)?, Parameter::LeftCirculation).0 - CIRCULATION_M2_S)
+    };
     first.filter_map(error).filter(|e| e.is_finite()).collect()
 }
 
@@ -166,26 +224,47 @@ fn root_mean_square(of: &[f64], about: impl Fn(Option<usize>) -> f64) -> Estimat
 }
 
 fn claims(fits: &[Fits], [known_m2_s, fitted_m2_s]: [f64; 2]) -> Vec<Claim> {
-    let at_most = |id: &str, bar: f64, unit, found: Estimate| Claim::judged_alone(id, found, unit, Bar::Below(bar));
+    let at_most = |id: &str, bar: f64, unit, found: Estimate| {
+        Claim::judged_alone(id, found, unit, Bar::Below(bar))
+    };
     let [map, resolved, known, fitted] = [0, 1, 2, 3].map(|method| errors(fits, method));
     let per_cent = 100.0 / CIRCULATION_M2_S;
     let rms = |of: &[f64]| root_mean_square(of, |_| 0.0).times(per_cent);
     // of n numbers about their own mean: n - 1 are free
     let deviation = |of: &[f64]| {
-        root_mean_square(of, |without| mean(of, without)).times((of.len() as f64 / (of.len() as f64 - 1.0)).sqrt())
+        root_mean_square(of, |without| mean(of, without))
+            .times((of.len() as f64 / (of.len() as f64 - 1.0)).sqrt())
     };
     let done = map.len() + resolved.len() + known.len() + fitted.len();
-    let tried: usize = fits.iter().filter(|f| f.snr_db == fits[0].snr_db).map(|f| f.by_method.len()).sum();
+    let tried: usize = fits
+        .iter()
+        .filter(|f| f.snr_db == fits[0].snr_db)
+        .map(|f| f.by_method.len())
+        .sum();
     let mut claims = vec![
         at_most("F17a", 5.0, " %", rms(&map)),
         at_most("F17f", 5.0, " %", rms(&resolved)),
-        Claim::exact("F17e", format!("{done} fits"), done == tried).expecting(format!("{tried} fits")),
+        Claim::exact("F17e", format!("{done} fits"), done == tried)
+            .expecting(format!("{tried} fits")),
     ];
     let bias = Estimate::mean(&fitted);
     let of_signals = [
         at_most("F17b", 1.5, "", deviation(&known).times(known_m2_s.recip())),
-        at_most("F17c", 1.5, "", deviation(&fitted).times(fitted_m2_s.recip())),
-        at_most("F17d", 2.0, " m²/s", Estimate { value: bias.value.abs(), ..bias }),
+        at_most(
+            "F17c",
+            1.5,
+            "",
+            deviation(&fitted).times(fitted_m2_s.recip()),
+        ),
+        at_most(
+            "F17d",
+            2.0,
+            " m²/s",
+            Estimate {
+                value: bias.value.abs(),
+                ..bias
+            },
+        ),
     ];
     let tried = !known.is_empty();
     let longest = "profile full, which fits the signals of 100 scans";

@@ -8,8 +8,8 @@ use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::scene::{
-    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion, Turbulence, VortexMotion,
-    VortexPair, Weighting,
+    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion,
+    Turbulence, VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::setup::wind;
 use wakescope_sim::sweep;
@@ -24,12 +24,17 @@ pub(super) const EARLY_TAU: f64 = 2.5;
 pub(super) const LATE_TAU: f64 = 5.0;
 
 /// The two references of the signal-to-noise ratio for which the chapter's figures are drawn.
-pub(super) const REFERENCES: [(&str, SnrReference); 2] =
-    [("physical", SnrReference::Physical {}), ("chapter", SnrReference::Chapter {})];
+pub(super) const REFERENCES: [(&str, SnrReference); 2] = [
+    ("physical", SnrReference::Physical {}),
+    ("chapter", SnrReference::Chapter {}),
+];
 
 /// One pulse a line, regions of 2 m, the pair 400 m away; the first seed.
 pub(super) fn early_scene(realisations: usize) -> Scene {
-    let mut scene = Scene { seed: 0, ..Scene::default() };
+    let mut scene = Scene {
+        seed: 0,
+        ..Scene::default()
+    };
     (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.2);
     (scene.scan.range_min_m, scene.scan.range_max_m) = (310.0, 500.0);
     (scene.scan.pulses_per_line, scene.scan.realisations) = (1, realisations);
@@ -45,7 +50,11 @@ pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
         "CA" => Method::Autoregressive(ModelOrder::default()),
         _ => Method::PeriodogramAccumulation {},
     };
-    scene.estimator.weighting = if method == METHODS[1] { Weighting::Gaussian } else { Weighting::Rectangular };
+    scene.estimator.weighting = if method == METHODS[1] {
+        Weighting::Gaussian
+    } else {
+        Weighting::Rectangular
+    };
     scene.estimator.padded_samples = if method == "CA" { 2048 } else { 1024 };
     scene
 }
@@ -89,7 +98,11 @@ impl Sight {
         let (motion, pair) = (VortexMotion::Inviscid, VortexPair::default());
         match (context.analytic, tau) {
             (true, EARLY_TAU) => Ok(Self::of_pair(pair)),
-            (true, age_tau) => Ok(Self::of_pair(VortexPair { motion, age_tau, ..pair })),
+            (true, age_tau) => Ok(Self::of_pair(VortexPair {
+                motion,
+                age_tau,
+                ..pair
+            })),
             (false, tau) => Self::of_wake(&wakes::of(context)?, tau),
         }
     }
@@ -98,7 +111,12 @@ impl Sight {
     pub(super) fn of_wake(wake: &FinishedWake, tau: f64) -> Result<Self, Failure> {
         let b0_m = wake.scales.spacing_m;
         let (planes, motion, age_tau) = ("plane1".into(), SimulatedMotion::Frozen, Some(tau));
-        let flow = SimulatedFlow { planes, motion, age_tau, ..SimulatedFlow::default() };
+        let flow = SimulatedFlow {
+            planes,
+            motion,
+            age_tau,
+            ..SimulatedFlow::default()
+        };
         let at = |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(name)?, tau));
         let core = |y, z| Ok::<_, Failure>((flow.lateral_position_m + at(y)?, at(z)?));
         let cores = vec![core("y_left", "z_left")?, core("y_right", "z_right")?];
@@ -116,12 +134,24 @@ impl Sight {
     pub(super) fn of_pair(pair: VortexPair) -> Self {
         let words = match pair.age_tau {
             0.0 => format!("ANALYTIC PAIR, core {} m", pair.core_radius_m),
-            tau => format!("ANALYTIC PAIR at tau = {tau} on its inviscid path, core {} m", pair.core_radius_m),
+            tau => format!(
+                "ANALYTIC PAIR at tau = {tau} on its inviscid path, core {} m",
+                pair.core_radius_m
+            ),
         };
-        let scene = Scene { flow: Flow::VortexPair(pair), ..Scene::default() };
+        let scene = Scene {
+            flow: Flow::VortexPair(pair),
+            ..Scene::default()
+        };
         let c = wind::vortex_pair(&pair).centres(wind::start_s(&scene.flow));
         let cores = vec![(c.left_y_m, c.height_m), (c.right_y_m, c.height_m)];
-        Self { flow: scene.flow, folder: PathBuf::new(), cores, words, mark: "analytic pair".into() }
+        Self {
+            flow: scene.flow,
+            folder: PathBuf::new(),
+            cores,
+            words,
+            mark: "analytic pair".into(),
+        }
     }
 
     /// The scene with this flow; its seed is counted from that of the figures.
@@ -146,14 +176,33 @@ pub(super) struct Study {
 
 impl Study {
     /// Runs the maps of scenes; what they have in common is computed once.
-    pub(super) fn runs(context: &Context, sight: &Sight, scenes: Vec<Scene>) -> Result<Vec<Self>, Failure> {
-        let file = |scene| SceneFile::parse(&sight.scene(context, scene).to_toml(), &sight.folder.join("scene.toml"));
-        let files = scenes.into_iter().map(file).collect::<Result<Vec<_>, _>>()?;
-        Ok(sweep::maps(&files, &Silent)?.into_iter().map(|(plan, map)| Self::of(sight, plan, map)).collect())
+    pub(super) fn runs(
+        context: &Context,
+        sight: &Sight,
+        scenes: Vec<Scene>,
+    ) -> Result<Vec<Self>, Failure> {
+        let file = |scene| {
+            SceneFile::parse(
+                &sight.scene(context, scene).to_toml(),
+                &sight.folder.join("scene.toml"),
+            )
+        };
+        let files = scenes
+            .into_iter()
+            .map(file)
+            .collect::<Result<Vec<_>, _>>()?;
+        Ok(sweep::maps(&files, &Silent)?
+            .into_iter()
+            .map(|(plan, map)| Self::of(sight, plan, map))
+            .collect())
     }
 
     /// The same for both references of the signal-to-noise ratio.
-    pub(super) fn at_references(context: &Context, sight: &Sight, scene: &Scene) -> Result<Vec<Self>, Failure> {
+    pub(super) fn at_references(
+        context: &Context,
+        sight: &Sight,
+        scene: &Scene,
+    ) -> Result<Vec<Self>, Failure> {
         let at = |(_, reference)| {
             let mut scene = scene.clone();
             scene.detector.snr = reference;
@@ -166,34 +215,64 @@ impl Study {
         let cores = sight.cores.clone();
         let distance = |(line, gate): (usize, usize)| {
             let (el, r) = (map.elevation_rad[line], map.range_m[gate]);
-            let (y, z) = (r * el.cos(), plan.scene.content.scan.lidar_height_m + r * el.sin());
-            cores.iter().map(|c| (y - c.0).hypot(z - c.1)).fold(f64::INFINITY, f64::min)
+            let (y, z) = (
+                r * el.cos(),
+                plan.scene.content.scan.lidar_height_m + r * el.sin(),
+            );
+            cores
+                .iter()
+                .map(|c| (y - c.0).hypot(z - c.1))
+                .fold(f64::INFINITY, f64::min)
         };
-        let distance_m = Array2::from_shape_fn((map.elevation_rad.len(), map.range_m.len()), distance);
-        Self { cores, plan, map, distance_m }
+        let distance_m =
+            Array2::from_shape_fn((map.elevation_rad.len(), map.range_m.len()), distance);
+        Self {
+            cores,
+            plan,
+            map,
+            distance_m,
+        }
     }
 
     /// Centres of the vortices in the polar coordinates of the scan: (range, elevation).
     pub(super) fn cores_polar(&self) -> Vec<(f64, f64)> {
         let height_m = self.plan.scene.content.scan.lidar_height_m;
-        self.cores.iter().map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0))).collect()
+        self.cores
+            .iter()
+            .map(|c| (c.0.hypot(c.1 - height_m), (c.1 - height_m).atan2(c.0)))
+            .collect()
     }
 
     /// The cells with whole regions of accumulation, which the border of the sector does not cut, whose distance to the nearer core, m,
     /// and gate are accepted: cells of fewer windows err more, wherever they are.
     pub(super) fn cells(&self, accept: impl Fn(f64, usize) -> bool) -> Vec<(usize, usize)> {
         let level = &self.map.level;
-        let most: Vec<f64> = level.columns().into_iter().map(|gate| gate.iter().copied().fold(0.0, f64::max)).collect();
-        let is_whole = |(i, j): (usize, usize)| level[[i, j]] >= 0.9 * most[j] && j > 0 && j + 1 < most.len();
+        let most: Vec<f64> = level
+            .columns()
+            .into_iter()
+            .map(|gate| gate.iter().copied().fold(0.0, f64::max))
+            .collect();
+        let is_whole =
+            |(i, j): (usize, usize)| level[[i, j]] >= 0.9 * most[j] && j > 0 && j + 1 < most.len();
         let all = self.distance_m.indexed_iter();
-        all.filter(|(cell, d)| accept(**d, cell.1) && is_whole(*cell)).map(|(cell, _)| cell).collect()
+        all.filter(|(cell, d)| accept(**d, cell.1) && is_whole(*cell))
+            .map(|(cell, _)| cell)
+            .collect()
     }
 
     /// Mean of a function of the errors of a cell over the scans, without those of one batch.
-    pub(super) fn over_scans(&self, cell: (usize, usize), without: Option<usize>, of: fn(f64) -> f64) -> f64 {
+    pub(super) fn over_scans(
+        &self,
+        cell: (usize, usize),
+        without: Option<usize>,
+        of: fn(f64) -> f64,
+    ) -> f64 {
         let scans = self.map.scans.iter().enumerate();
         let kept = scans.filter(|(k, _)| Some(k * BATCHES / self.map.scans.len()) != without);
-        let errors: Vec<f64> = kept.map(|(_, scan)| of(scan.error_m_s[cell])).filter(|e| e.is_finite()).collect();
+        let errors: Vec<f64> = kept
+            .map(|(_, scan)| of(scan.error_m_s[cell]))
+            .filter(|e| e.is_finite())
+            .collect();
         errors.iter().sum::<f64>() / errors.len() as f64
     }
 
@@ -203,12 +282,24 @@ impl Study {
         let batches = of_batch.len();
         for (k, scan) in self.map.scans.iter().enumerate() {
             let (sum, count) = &mut of_batch[k * batches / self.map.scans.len()];
-            for error in cells.iter().map(|cell| scan.error_m_s[*cell]).filter(|error| error.is_finite()) {
+            for error in cells
+                .iter()
+                .map(|cell| scan.error_m_s[*cell])
+                .filter(|error| error.is_finite())
+            {
                 (*sum, *count) = (*sum + error * error, *count + 1.0);
             }
         }
-        let range_m = cells.iter().map(|cell| self.map.range_m[cell.1]).sum::<f64>() / cells.len() as f64;
-        Zone { range_m, of_batch, average: CellAverage::without_errors(&self.map, cells) }
+        let range_m = cells
+            .iter()
+            .map(|cell| self.map.range_m[cell.1])
+            .sum::<f64>()
+            / cells.len() as f64;
+        Zone {
+            range_m,
+            of_batch,
+            average: CellAverage::without_errors(&self.map, cells),
+        }
     }
 }
 
@@ -225,7 +316,11 @@ pub(super) struct Zone {
 impl Zone {
     /// Sum of the squares and number of the estimates without one batch.
     pub(super) fn sums(&self, without: Option<usize>) -> (f64, f64) {
-        let kept = self.of_batch.iter().enumerate().filter(|(batch, _)| Some(*batch) != without);
+        let kept = self
+            .of_batch
+            .iter()
+            .enumerate()
+            .filter(|(batch, _)| Some(*batch) != without);
         kept.fold((0.0, 0.0), |sums, (_, of)| (sums.0 + of.0, sums.1 + of.1))
     }
 
@@ -241,15 +336,21 @@ impl Zone {
 
     /// How far its error is from that of another on the same scans, as a share of the latter.
     pub(super) fn over(&self, other: &Self) -> Estimate {
-        Estimate::of(self.of_batch.len(), |without| self.rms_m_s(without) / other.rms_m_s(without) - 1.0)
+        Estimate::of(self.of_batch.len(), |without| {
+            self.rms_m_s(without) / other.rms_m_s(without) - 1.0
+        })
     }
 }
 
 /// All that claims on zones need: case, zone, its place in the figure, the zone.
-pub(super) fn batches<'z>(zones: impl Iterator<Item = (String, &'static str, f64, &'z Zone)>) -> Table {
+pub(super) fn batches<'z>(
+    zones: impl Iterator<Item = (String, &'static str, f64, &'z Zone)>,
+) -> Table {
     let of_zone = |(case, name, place, zone): (String, &'static str, f64, &'z Zone)| {
         let batches = zone.of_batch.iter().enumerate();
-        batches.map(move |(batch, sums)| (case.clone(), name, place, zone.range_m, batch, *sums)).collect::<Vec<_>>()
+        batches
+            .map(move |(batch, sums)| (case.clone(), name, place, zone.range_m, batch, *sums))
+            .collect::<Vec<_>>()
     };
     let rows: Vec<_> = zones.flat_map(of_zone).collect();
     Table::new()
@@ -265,11 +366,14 @@ pub(super) fn batches<'z>(zones: impl Iterator<Item = (String, &'static str, f64
 /// Tables of the same columns one below the other, with a last column that tells them apart.
 pub(super) fn stacked(name: &str, parts: Vec<(&str, Table)>) -> Result<Table, Failure> {
     let labelled = parts.into_iter().map(|(label, table)| {
-        let rows = table.columns().first().map_or(0, |(_, column)| match column {
-            Column::Float(v) => v.len(),
-            Column::Int(v) => v.len(),
-            Column::Text(v) => v.len(),
-        });
+        let rows = table
+            .columns()
+            .first()
+            .map_or(0, |(_, column)| match column {
+                Column::Float(v) => v.len(),
+                Column::Int(v) => v.len(),
+                Column::Text(v) => v.len(),
+            });
         table.text(name, std::iter::repeat_n(label, rows))
     });
     Ok(Table::stack(labelled)?)
@@ -281,9 +385,17 @@ mod tests {
 
     #[test]
     fn stacked_tables_keep_their_rows_and_say_which_is_which() {
-        let part = |x: f64| Table::new().float("x_m", [x, x + 1.0]).int("n", [1, 2]).text("t", ["a", "b"]);
+        let part = |x: f64| {
+            Table::new()
+                .float("x_m", [x, x + 1.0])
+                .int("n", [1, 2])
+                .text("t", ["a", "b"])
+        };
         let both = stacked("which", vec![("one", part(1.0)), ("two", part(5.0))]).unwrap();
         let text = both.to_csv(&crate::workspace::provenance("", 0)).unwrap();
-        assert!(text.ends_with("x_m,n,t,which\n1.0,1,a,one\n2.0,2,b,one\n5.0,1,a,two\n6.0,2,b,two\n"), "{text}");
+        assert!(
+            text.ends_with("x_m,n,t,which\n1.0,1,a,one\n2.0,2,b,one\n5.0,1,a,two\n6.0,2,b,two\n"),
+            "{text}"
+        );
     }
 }

@@ -23,9 +23,16 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("delay_chapter_s", ROWS.iter().map(|r| r.3));
     let parameters = format!("approach_speed_m_s = {APPROACH_SPEED_M_S:?}\n");
     let mut out = Rendered::of_table(&table, &context.provenance_of_formula(&parameters))?;
-    let measured: Vec<String> = ROWS.iter().map(|r| format!("{:.1}", delay_s(r.2))).collect();
+    let measured: Vec<String> = ROWS
+        .iter()
+        .map(|r| format!("{:.1}", delay_s(r.2)))
+        .collect();
     // The chapter prints whole seconds.
     let pass = ROWS.iter().all(|r| (delay_s(r.2) - r.3).abs() <= 0.5);
-    out.claims.push(Claim::exact("T1", format!("{} s", measured.join(", ")), pass));
+    out.claims.push(Claim::exact(
+        "T1",
+        format!("{} s", measured.join(", ")),
+        pass,
+    ));
     Ok(out)
 }

@@ -11,13 +11,21 @@ const ROWS: [Row; 11] = [
     ("wavelength_m", 1.55e-6, |s| s.laser.wavelength_m),
     ("pulse_energy_j", 150e-6, |s| s.pulse.energy_j),
     ("detector_bandwidth_hz", 50e6, |s| s.detector.bandwidth_hz),
-    ("pulse_repetition_hz", 400.0, |s| s.laser.pulse_repetition_hz),
-    ("intermediate_frequency_hz", 80e6, |s| s.detector.intermediate_frequency_hz),
+    ("pulse_repetition_hz", 400.0, |s| {
+        s.laser.pulse_repetition_hz
+    }),
+    ("intermediate_frequency_hz", 80e6, |s| {
+        s.detector.intermediate_frequency_hz
+    }),
     ("sampling_hz", 250e6, |s| s.detector.sampling_hz),
-    ("angular_resolution_rad", 1.25e-3, |s| s.scan.elevation_step_rad),
+    ("angular_resolution_rad", 1.25e-3, |s| {
+        s.scan.elevation_step_rad
+    }),
     ("beam_radius_m", 0.03, |s| s.telescope.beam_radius_m),
     ("aperture_radius_m", 0.05, |s| s.telescope.aperture_radius_m),
-    ("backscatter_per_m_sr", 1e-7, |s| s.atmosphere.backscatter_per_m_sr),
+    ("backscatter_per_m_sr", 1e-7, |s| {
+        s.atmosphere.backscatter_per_m_sr
+    }),
     ("extinction_per_m", 7e-5, |s| s.atmosphere.extinction_per_m),
 ];
 
@@ -33,6 +41,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         .float("scene", values.iter().copied());
     let mut out = Rendered::of_table(&table, &plan.scene.provenance())?;
     let equal = ROWS.iter().zip(&values).filter(|(r, v)| r.1 == **v).count();
-    out.claims.push(Claim::exact("T2", format!("{equal} of {} equal", ROWS.len()), equal == ROWS.len()));
+    out.claims.push(Claim::exact(
+        "T2",
+        format!("{equal} of {} equal", ROWS.len()),
+        equal == ROWS.len(),
+    ));
     Ok(out)
 }

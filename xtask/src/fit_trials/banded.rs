@@ -10,7 +10,10 @@ pub(super) struct Banded(Array2<f64>);
 
 impl Banded {
     pub(super) fn zeros(order: usize, width: usize) -> Self {
-        Self(Array2::zeros((order, width.min(order.saturating_sub(1)) + 1)))
+        Self(Array2::zeros((
+            order,
+            width.min(order.saturating_sub(1)) + 1,
+        )))
     }
 
     fn width(&self) -> usize {
@@ -55,7 +58,11 @@ impl Banded {
             for j in self.first(i)..=i {
                 let from = self.first(i).max(self.first(j));
                 let sum = *self.at(i, j) - self.row(i, from, j).dot(&self.row(j, from, j));
-                let value = if i == j { sum.sqrt() } else { sum / *self.at(j, j) };
+                let value = if i == j {
+                    sum.sqrt()
+                } else {
+                    sum / *self.at(j, j)
+                };
                 // the root of a pivot that is not positive is no number, or zero
                 if i == j && (value.is_nan() || value == 0.0) {
                     return None;
@@ -85,7 +92,8 @@ mod tests {
         let mut a = Banded::zeros(order, width);
         for i in 0..order {
             for j in i.saturating_sub(width)..=i {
-                *a.at(i, j) = 0.9_f64.powi((i - j) as i32) + if i == j { width as f64 } else { 0.0 };
+                *a.at(i, j) =
+                    0.9_f64.powi((i - j) as i32) + if i == j { width as f64 } else { 0.0 };
             }
         }
         a
@@ -99,7 +107,10 @@ mod tests {
             let white = a.clone().factor().unwrap().forward(x.clone());
             let back = a.clone().factor().unwrap().forward(a.times(x.view()));
             // x^T x = (L^-1 x)^T (L^-1 A x)
-            assert!((white.dot(&back) - x.dot(&x)).abs() < 1e-11, "{order} {width}");
+            assert!(
+                (white.dot(&back) - x.dot(&x)).abs() < 1e-11,
+                "{order} {width}"
+            );
         }
         let mut bad = matrix(4, 2);
         *bad.at(2, 2) = -1.0;

@@ -98,14 +98,24 @@ struct Cell {
 impl MapBound {
     pub(super) fn new(setting: &MapSetting<'_>, wake: &Wake) -> Result<Self, Failure> {
         let grid = Grid::new(setting)?;
-        let lines = setting.scan.elevation_rad.par_iter().map(|&elevation_rad| Line::new(&grid, wake, elevation_rad));
-        let lines: Vec<Line> = lines
-            .collect::<Option<_>>()
-            .ok_or_else(|| Failure::new("the covariance of a line is not positive definite".to_owned()))?;
+        let lines = setting
+            .scan
+            .elevation_rad
+            .par_iter()
+            .map(|&elevation_rad| Line::new(&grid, wake, elevation_rad));
+        let lines: Vec<Line> = lines.collect::<Option<_>>().ok_or_else(|| {
+            Failure::new("the covariance of a line is not positive definite".to_owned())
+        })?;
         let gates = setting.range_m.len();
-        let cells: Vec<Cell> =
-            (0..lines.len() * gates).map(|i| Cell::new(&grid, &lines, (i / gates, i % gates))).collect();
-        let away = |(i, cell): (usize, &Cell)| cell.shares.iter().map(move |(line, _)| line.abs_diff(i / gates)).max();
+        let cells: Vec<Cell> = (0..lines.len() * gates)
+            .map(|i| Cell::new(&grid, &lines, (i / gates, i % gates)))
+            .collect();
+        let away = |(i, cell): (usize, &Cell)| {
+            cell.shares
+                .iter()
+                .map(move |(line, _)| line.abs_diff(i / gates))
+                .max()
+        };
         let reach = cells.iter().enumerate().filter_map(away);
         // two regions share a line if they are up to twice their reach apart
         let lines_apart = 2 * reach.max().unwrap_or(0);
@@ -113,8 +123,10 @@ impl MapBound {
         let mut covariance = Banded::zeros(order, (lines_apart + 1) * gates * KINDS - 1);
         let numbers: Vec<usize> = (0..lines.len()).collect();
         for some in numbers.chunks(AT_ONCE) {
-            let parts: Vec<_> =
-                some.par_iter().map(|&line| covariance_of_line(&grid, (&lines[line], line), &cells)).collect();
+            let parts: Vec<_> = some
+                .par_iter()
+                .map(|&line| covariance_of_line(&grid, (&lines[line], line), &cells))
+                .collect();
             for (places, part) in parts {
                 for (a, &i) in places.iter().enumerate() {
                     for (b, &j) in places[..=a].iter().enumerate() {
@@ -126,7 +138,10 @@ impl MapBound {
         for i in 0..order {
             *covariance.at(i, i) *= 1.0 + ROUNDING;
         }
-        Ok(Self { slopes: cells.iter().flat_map(|cell| cell.slopes).collect(), covariance })
+        Ok(Self {
+            slopes: cells.iter().flat_map(|cell| cell.slopes).collect(),
+            covariance,
+        })
     }
 
     /// Standard deviation of the first of some free numbers, each of which moves some parameters: with the best weights, those of the
@@ -135,18 +150,36 @@ impl MapBound {
         let mut covariance = self.covariance.clone();
         if !widths {
             // what varies so much tells nothing
-            (1..self.slopes.len()).step_by(KINDS).for_each(|i| *covariance.at(i, i) *= USELESS);
+            (1..self.slopes.len())
+                .step_by(KINDS)
+                .for_each(|i| *covariance.at(i, i) *= USELESS);
         }
-        let slope =
-            |group: &Vec<usize>| self.slopes.iter().map(|of| group.iter().map(|&place| of[place]).sum()).collect();
+        let slope = |group: &Vec<usize>| {
+            self.slopes
+                .iter()
+                .map(|of| group.iter().map(|&place| of[place]).sum())
+                .collect()
+        };
         let slopes: Vec<Array1<f64>> = groups.iter().map(slope).collect();
-        let weighted: Vec<_> = slopes.iter().map(|slopes| slopes / &covariance.diagonal()).collect();
-        let about: Vec<_> = weighted.iter().map(|x| covariance.times(x.view())).collect();
+        let weighted: Vec<_> = slopes
+            .iter()
+            .map(|slopes| slopes / &covariance.diagonal())
+            .collect();
+        let about: Vec<_> = weighted
+            .iter()
+            .map(|x| covariance.times(x.view()))
+            .collect();
         let bread = inverse(&products(&weighted, &slopes))?;
         let sandwich = bread.dot(&products(&weighted, &about)).dot(&bread);
         let factor = covariance.factor()?;
-        let white: Vec<_> = slopes.into_iter().map(|slopes| factor.forward(slopes)).collect();
-        Some([inverse(&products(&white, &white))?, sandwich].map(|variances| variances[[0, 0]].sqrt()))
+        let white: Vec<_> = slopes
+            .into_iter()
+            .map(|slopes| factor.forward(slopes))
+            .collect();
+        Some(
+            [inverse(&products(&white, &white))?, sandwich]
+                .map(|variances| variances[[0, 0]].sqrt()),
+        )
     }
 }
 
@@ -158,24 +191,40 @@ fn products(a: &[Array1<f64>], b: &[Array1<f64>]) -> Array2<f64> {
 /// Inverse of a small positive definite matrix.
 fn inverse(a: &Array2<f64>) -> Option<Array2<f64>> {
     let mut band = Banded::zeros(a.nrows(), a.nrows());
-    a.indexed_iter().filter(|((i, j), _)| j <= i).for_each(|((i, j), value)| *band.at(i, j) = *value);
+    a.indexed_iter()
+        .filter(|((i, j), _)| j <= i)
+        .for_each(|((i, j), value)| *band.at(i, j) = *value);
     let factor = band.factor()?;
     let unit = Array2::<f64>::eye(a.nrows());
-    let columns: Vec<Array1<f64>> = unit.rows().into_iter().map(|row| factor.forward(row.to_owned())).collect();
+    let columns: Vec<Array1<f64>> = unit
+        .rows()
+        .into_iter()
+        .map(|row| factor.forward(row.to_owned()))
+        .collect();
     Some(products(&columns, &columns))
 }
 
 impl<'a> Grid<'a> {
     fn new(setting: &'a MapSetting<'a>) -> Result<Self, Failure> {
         let (period_s, window) = (4.0 * setting.scan.sampling.period_s(), WINDOW / 4);
-        let gap_m = setting.range_m.windows(2).next().map_or(0.0, |pair| pair[1] - pair[0]);
+        let gap_m = setting
+            .range_m
+            .windows(2)
+            .next()
+            .map_or(0.0, |pair| pair[1] - pair[0]);
         let step = 2.0 * gap_m / SPEED_OF_LIGHT_M_S / period_s;
         if (step - step.round()).abs() > 1e-6 {
-            return Err(Failure::new("the bound of a map wants gates of a multiple of 4 samples".into()));
+            return Err(Failure::new(
+                "the bound of a map wants gates of a multiple of 4 samples".into(),
+            ));
         }
         let step = step.round() as usize;
         let band_hz = setting.scan.sampling.band_hz.1 - setting.scan.sampling.band_hz.0;
-        let baseband = Sampling::baseband(period_s.recip(), setting.scan.sampling.wavelength_m, band_hz)?;
+        let baseband = Sampling::baseband(
+            period_s.recip(),
+            setting.scan.sampling.wavelength_m,
+            band_hz,
+        )?;
         let model = WindowModel::gaussian_pulse(&baseband, window, setting.sigma_s, Noise::White)?;
         let mut tapers = Array2::zeros((window, window));
         for taper in likelihood_tapers(&model, setting.snr)? {
@@ -193,9 +242,19 @@ impl<'a> Grid<'a> {
                 turns.sin() / turns
             }
         };
-        let first_s = 2.0 * setting.range_m[0] / SPEED_OF_LIGHT_M_S - 0.5 * window as f64 * period_s;
+        let first_s =
+            2.0 * setting.range_m[0] / SPEED_OF_LIGHT_M_S - 0.5 * window as f64 * period_s;
         let noise = (0..samples).map(noise).collect();
-        Ok(Self { of: setting, period_s, first_s, window, samples, step, tapers, noise })
+        Ok(Self {
+            of: setting,
+            period_s,
+            first_s,
+            window,
+            samples,
+            step,
+            tapers,
+            noise,
+        })
     }
 
     /// Phase per velocity of a lag, k T m \[rad s/m\].
@@ -207,7 +266,9 @@ impl<'a> Grid<'a> {
     fn lags(&self, covariance: ArrayView2<'_, C64>, gate: usize) -> Vec<C64> {
         let first = gate * self.step;
         let one = |lag: usize| {
-            (0..self.window - lag).map(|q| covariance[[first + q + lag, first + q]] * self.tapers[[q + lag, q]]).sum()
+            (0..self.window - lag)
+                .map(|q| covariance[[first + q + lag, first + q]] * self.tapers[[q + lag, q]])
+                .sum()
         };
         (0..self.window).map(one).collect()
     }
@@ -217,17 +278,26 @@ impl Line {
     fn new(grid: &Grid<'_>, wake: &Wake, elevation_rad: f64) -> Option<Self> {
         let setting = grid.of;
         let reach_m = 0.5 * SPEED_OF_LIGHT_M_S * 4.0 * setting.sigma_s;
-        let length_m = 0.5 * SPEED_OF_LIGHT_M_S * grid.samples as f64 * grid.period_s + 2.0 * reach_m;
+        let length_m =
+            0.5 * SPEED_OF_LIGHT_M_S * grid.samples as f64 * grid.period_s + 2.0 * reach_m;
         let layers = (length_m / LAYER_M).ceil() as usize;
-        let at_m = |layer: usize| 0.5 * SPEED_OF_LIGHT_M_S * grid.first_s - reach_m + (layer as f64 + 0.5) * LAYER_M;
-        let winds: Vec<(f64, [f64; PARAMETERS])> =
-            (0..layers).map(|layer| setting.scan.wake.gradient(wake, at_m(layer), elevation_rad)).collect();
+        let at_m = |layer: usize| {
+            0.5 * SPEED_OF_LIGHT_M_S * grid.first_s - reach_m + (layer as f64 + 0.5) * LAYER_M
+        };
+        let winds: Vec<(f64, [f64; PARAMETERS])> = (0..layers)
+            .map(|layer| setting.scan.wake.gradient(wake, at_m(layer), elevation_rad))
+            .collect();
         let middle = 0.5 * grid.samples as f64;
         let seen = |(k, layer): (usize, usize)| {
-            let time_s = grid.first_s + k as f64 * grid.period_s - 2.0 * at_m(layer) / SPEED_OF_LIGHT_M_S;
-            let power = setting.snr * LAYER_M * 2.0 / SPEED_OF_LIGHT_M_S / (PI.sqrt() * setting.sigma_s);
+            let time_s =
+                grid.first_s + k as f64 * grid.period_s - 2.0 * at_m(layer) / SPEED_OF_LIGHT_M_S;
+            let power =
+                setting.snr * LAYER_M * 2.0 / SPEED_OF_LIGHT_M_S / (PI.sqrt() * setting.sigma_s);
             let phase = -grid.turn(k as f64 - middle) * winds[layer].0;
-            C64::from_polar(power.sqrt() * (-0.5 * (time_s / setting.sigma_s).powi(2)).exp(), phase)
+            C64::from_polar(
+                power.sqrt() * (-0.5 * (time_s / setting.sigma_s).powi(2)).exp(),
+                phase,
+            )
         };
         let seen = Array2::from_shape_fn((grid.samples, layers), seen);
         let adjoint = seen.t().mapv(|s| s.conj());
@@ -240,7 +310,9 @@ impl Line {
             weighted.dot(&adjoint)
         };
         let mut covariance = summed(&|_| 1.0);
-        covariance.indexed_iter_mut().for_each(|((p, q), c)| *c += grid.noise[p.abs_diff(q)]);
+        covariance
+            .indexed_iter_mut()
+            .for_each(|((p, q), c)| *c += grid.noise[p.abs_diff(q)]);
         let mut numbers = vec![covariance.clone()];
         for place in 0..PARAMETERS {
             let mut slope = summed(&|layer| winds[layer].1[place]);
@@ -249,10 +321,18 @@ impl Line {
             });
             numbers.push(slope);
         }
-        let gate = |gate: usize| -> Vec<Vec<C64>> { numbers.iter().map(|x| grid.lags(x.view(), gate)).collect() };
+        let gate = |gate: usize| -> Vec<Vec<C64>> {
+            numbers.iter().map(|x| grid.lags(x.view(), gate)).collect()
+        };
         // a factor of noise that fills its band alone: a part of 1e-9 outside of it
-        covariance.diag_mut().iter_mut().for_each(|c| *c *= 1.0 + 1e-9);
-        Some(Self { lags: (0..setting.range_m.len()).map(gate).collect(), factor: cholesky(covariance)? })
+        covariance
+            .diag_mut()
+            .iter_mut()
+            .for_each(|c| *c *= 1.0 + 1e-9);
+        Some(Self {
+            lags: (0..setting.range_m.len()).map(gate).collect(),
+            factor: cholesky(covariance)?,
+        })
     }
 }
 
@@ -264,7 +344,9 @@ impl Cell {
         let mut lags = vec![vec![C64::ZERO; grid.window]; numbers];
         for &(other, share) in &shares {
             for (sum, one) in lags.iter_mut().zip(&lines[other].lags[gate]) {
-                sum.iter_mut().zip(one).for_each(|(sum, one)| *sum += share * one);
+                sum.iter_mut()
+                    .zip(one)
+                    .for_each(|(sum, one)| *sum += share * one);
             }
         }
         // spectrum and its first and second derivatives by velocity
@@ -282,11 +364,16 @@ impl Cell {
         let band_hz = setting.scan.sampling.band_hz.1 - setting.scan.sampling.band_hz.0;
         let fastest_m_s = 0.25 * setting.scan.sampling.wavelength_m * band_hz;
         let place = |i: usize| fastest_m_s * (2.0 * i as f64 / PLACES as f64 - 1.0);
-        let highest = |a: &f64, b: &f64| spectrum(&lags[0], *a)[0].total_cmp(&spectrum(&lags[0], *b)[0]);
+        let highest =
+            |a: &f64, b: &f64| spectrum(&lags[0], *a)[0].total_cmp(&spectrum(&lags[0], *b)[0]);
         let mut velocity_m_s = (0..PLACES).map(place).max_by(highest).unwrap_or(0.0);
         for _ in 0..8 {
             let [_, first, second] = spectrum(&lags[0], velocity_m_s);
-            velocity_m_s -= if second < 0.0 { (first / second).clamp(-0.1, 0.1) } else { 0.0 };
+            velocity_m_s -= if second < 0.0 {
+                (first / second).clamp(-0.1, 0.1)
+            } else {
+                0.0
+            };
         }
         let [level, _, curvature] = spectrum(&lags[0], velocity_m_s);
         let mut slopes = [[0.0; PARAMETERS]; KINDS];
@@ -295,7 +382,13 @@ impl Cell {
             slopes[0][place] = -of_slope / curvature;
             slopes[1][place] = of_curvature / curvature - of_level / level;
         }
-        Self { velocity_m_s, level, curvature, slopes, shares }
+        Self {
+            velocity_m_s,
+            level,
+            curvature,
+            slopes,
+            shares,
+        }
     }
 }
 
@@ -303,21 +396,41 @@ impl Cell {
 fn shares(setting: &MapSetting<'_>, line: usize, range_m: f64) -> Vec<(usize, f64)> {
     let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * setting.scan.sampling.period_s();
     let windows = |other: usize| {
-        let away_m = range_m * (setting.scan.elevation_rad[other] - setting.scan.elevation_rad[line]).abs();
+        let away_m =
+            range_m * (setting.scan.elevation_rad[other] - setting.scan.elevation_rad[line]).abs();
         let chord_m2 = setting.radius_m * setting.radius_m - away_m * away_m;
-        if chord_m2 >= 0.0 || other == line { 2.0 * (chord_m2.max(0.0).sqrt() / sample_m).floor() + 1.0 } else { 0.0 }
+        if chord_m2 >= 0.0 || other == line {
+            2.0 * (chord_m2.max(0.0).sqrt() / sample_m).floor() + 1.0
+        } else {
+            0.0
+        }
     };
-    let all: Vec<(usize, f64)> =
-        (0..setting.scan.elevation_rad.len()).map(|other| (other, windows(other))).filter(|(_, n)| *n > 0.0).collect();
+    let all: Vec<(usize, f64)> = (0..setting.scan.elevation_rad.len())
+        .map(|other| (other, windows(other)))
+        .filter(|(_, n)| *n > 0.0)
+        .collect();
     let sum: f64 = all.iter().map(|(_, n)| n).sum();
     all.into_iter().map(|(other, n)| (other, n / sum)).collect()
 }
 
 /// Places of the numbers of a map that see a line, and what the line adds to their covariance.
-fn covariance_of_line(grid: &Grid<'_>, (line, number): (&Line, usize), cells: &[Cell]) -> (Vec<usize>, Array2<f64>) {
+fn covariance_of_line(
+    grid: &Grid<'_>,
+    (line, number): (&Line, usize),
+    cells: &[Cell],
+) -> (Vec<usize>, Array2<f64>) {
     let (gates, n) = (grid.of.range_m.len(), grid.samples);
-    let share = |cell: &Cell| cell.shares.iter().find(|(other, _)| *other == number).map(|(_, share)| *share);
-    let seen: Vec<_> = cells.iter().enumerate().filter_map(|(i, cell)| Some((i, cell, share(cell)?))).collect();
+    let share = |cell: &Cell| {
+        cell.shares
+            .iter()
+            .find(|(other, _)| *other == number)
+            .map(|(_, share)| *share)
+    };
+    let seen: Vec<_> = cells
+        .iter()
+        .enumerate()
+        .filter_map(|(i, cell)| Some((i, cell, share(cell)?)))
+        .collect();
     let mut forms = Array2::zeros((seen.len() * KINDS, n * n));
     let mut places = Vec::with_capacity(seen.len() * KINDS);
     for (row, (i, cell, share)) in seen.into_iter().enumerate() {
@@ -407,9 +520,18 @@ mod tests {
             first_sample_time_s: 0.0,
             record_samples: 0,
         };
-        let setting = MapSetting { scan: &scan, sigma_s: SIGMA_S, snr: 2.0, radius_m, range_m };
+        let setting = MapSetting {
+            scan: &scan,
+            sigma_s: SIGMA_S,
+            snr: 2.0,
+            radius_m,
+            range_m,
+        };
         let groups: Vec<Vec<usize>> = WIND.iter().map(|g| g.to_vec()).collect();
-        MapBound::new(&setting, &calm()).unwrap().deviations(&groups, false).unwrap()
+        MapBound::new(&setting, &calm())
+            .unwrap()
+            .deviations(&groups, false)
+            .unwrap()
     }
 
     /// In white noise the highest place of the spectrum with those tapers is the likelihood's own, and one line of elevation 0 the wind itself.
@@ -417,10 +539,14 @@ mod tests {
     fn one_window_of_wind_has_its_cramer_rao_bound() {
         let found = deviation(Noise::White, 0.0, &[0.0], &[400.0]);
         let baseband = Sampling::baseband(62.5e6, 1.55e-6, 50e6).unwrap();
-        let model = WindowModel::gaussian_pulse(&baseband, WINDOW / 4, SIGMA_S, Noise::White).unwrap();
+        let model =
+            WindowModel::gaussian_pulse(&baseband, WINDOW / 4, SIGMA_S, Noise::White).unwrap();
         let bound_m_s = model.bound_m_s(3.0, 2.0, SignalKind::Complex, 1.0).unwrap();
         for deviation in found {
-            assert!((deviation / bound_m_s - 1.0).abs() < 2e-3, "{deviation} {bound_m_s}");
+            assert!(
+                (deviation / bound_m_s - 1.0).abs() < 2e-3,
+                "{deviation} {bound_m_s}"
+            );
         }
     }
 
@@ -431,7 +557,10 @@ mod tests {
         let one = deviation(Noise::White, 0.0, &lines[..1], &[400.0])[0];
         for radius_m in [0.0, 50.0] {
             for deviation in deviation(Noise::White, radius_m, &lines, &[400.0]) {
-                assert!((2.0 * deviation / one - 1.0).abs() < 2e-3, "{radius_m} {deviation} {one}");
+                assert!(
+                    (2.0 * deviation / one - 1.0).abs() < 2e-3,
+                    "{radius_m} {deviation} {one}"
+                );
             }
         }
     }
@@ -442,9 +571,15 @@ mod tests {
         let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * 4e-9;
         let band = Noise::Band { floor: 0.0 };
         let of = |range_m: &[f64]| deviation(band, 0.0, &[0.0], range_m)[0];
-        let (one, two, apart) =
-            (of(&[400.0]), of(&[400.0, 400.0 + 32.0 * sample_m]), of(&[400.0, 400.0 + 400.0 * sample_m]));
+        let (one, two, apart) = (
+            of(&[400.0]),
+            of(&[400.0, 400.0 + 32.0 * sample_m]),
+            of(&[400.0, 400.0 + 400.0 * sample_m]),
+        );
         assert!((apart / one - 0.5_f64.sqrt()).abs() < 1e-6, "{one} {apart}");
-        assert!(two < 0.95 * one && two > 1.05 * apart, "{one} {two} {apart}");
+        assert!(
+            two < 0.95 * one && two > 1.05 * apart,
+            "{one} {two} {apart}"
+        );
     }
 }

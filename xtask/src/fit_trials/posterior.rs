@@ -24,14 +24,23 @@ pub(super) fn posterior_deviation(
 ) -> Option<f64> {
     let variance = covariance[[place, place]];
     let along: ArrayView1<'_, f64> = covariance.column(place);
-    let others: Vec<&Vec<usize>> = groups.iter().filter(|group| !group.contains(&place)).collect();
+    let others: Vec<&Vec<usize>> = groups
+        .iter()
+        .filter(|group| !group.contains(&place))
+        .collect();
     let steps = (REACH / STEP) as i32;
     let offset = |step: i32| f64::from(step) * STEP * variance.sqrt();
     let height = |step: i32| {
         let mut parameters = top.to_array();
-        parameters.iter_mut().zip(along).for_each(|(p, c)| *p += c / variance * offset(step));
+        parameters
+            .iter_mut()
+            .zip(along)
+            .for_each(|(p, c)| *p += c / variance * offset(step));
         let (log_likelihood, slopes) = likelihood(&Wake::from_array(&parameters))?;
-        let pull: Vec<f64> = others.iter().map(|group| group.iter().map(|&i| slopes[i]).sum()).collect();
+        let pull: Vec<f64> = others
+            .iter()
+            .map(|group| group.iter().map(|&i| slopes[i]).sum())
+            .collect();
         let mut gain = 0.0;
         for (a, by_a) in others.iter().zip(&pull) {
             for (b, by_b) in others.iter().zip(&pull) {
@@ -43,11 +52,18 @@ pub(super) fn posterior_deviation(
         Some((offset(step), log_likelihood + gain.clamp(0.0, MOST_GAIN)))
     };
     let places: Vec<(f64, f64)> = (-steps..=steps).filter_map(height).collect();
-    let highest = places.iter().map(|(_, height)| *height).fold(f64::NEG_INFINITY, f64::max);
+    let highest = places
+        .iter()
+        .map(|(_, height)| *height)
+        .fold(f64::NEG_INFINITY, f64::max);
     let mean = |of: &dyn Fn(f64) -> f64| {
         let weights = places.iter().map(|(_, height)| (height - highest).exp());
         let sum: f64 = weights.clone().sum();
-        weights.zip(&places).map(|(weight, (at, _))| weight * of(*at)).sum::<f64>() / sum
+        weights
+            .zip(&places)
+            .map(|(weight, (at, _))| weight * of(*at))
+            .sum::<f64>()
+            / sum
     };
     let middle = mean(&|at| at);
     let deviation = mean(&|at| (at - middle).powi(2)).sqrt();
@@ -67,12 +83,19 @@ mod tests {
         let mut covariance = Array2::zeros((PARAMETERS, PARAMETERS));
         covariance[[height, height]] = variances[0];
         covariance[[circulation, circulation]] = variances[1];
-        (covariance[[height, circulation]], covariance[[circulation, height]]) = (shared, shared);
+        (
+            covariance[[height, circulation]],
+            covariance[[circulation, height]],
+        ) = (shared, shared);
         let determinant = variances[0] * variances[1] - shared * shared;
         let likelihood = |wake: &Wake| {
             let (at, best) = (wake.to_array(), top.to_array());
-            let (h, c) = (at[height] - best[height] - 0.2, at[circulation] - best[circulation] + 3.0);
-            let pull = [variances[1] * h - shared * c, variances[0] * c - shared * h].map(|p| p / determinant);
+            let (h, c) = (
+                at[height] - best[height] - 0.2,
+                at[circulation] - best[circulation] + 3.0,
+            );
+            let pull = [variances[1] * h - shared * c, variances[0] * c - shared * h]
+                .map(|p| p / determinant);
             let mut slopes = [0.0; PARAMETERS];
             (slopes[height], slopes[circulation]) = (-pull[0], -pull[1]);
             Some((-0.5 * (h * pull[0] + c * pull[1]), slopes))

@@ -6,8 +6,9 @@ use fixtures::failure::Failure;
 use fixtures::pair::PairScan;
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanModel, ScanSetup, ScanSignals, SignalFit,
-    SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
+    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanModel, ScanSetup,
+    ScanSignals, SignalFit, SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator,
+    fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, SignalKind, SpectralPeak,
@@ -34,17 +35,41 @@ pub(crate) struct FitTrial<'a> {
 impl<'a> FitTrial<'a> {
     pub(crate) fn new(pair: &'a PairScan, scan: usize, radius_m: f64) -> Result<Self, Failure> {
         let records = pair.records(scan)?;
-        let window = WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
+        let window =
+            WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
         let tapered = Correlogram::with_tapers(likelihood_tapers(&window, pair.snr)?)?;
-        let peak =
-            SpectralPeak::new(&pair.sampling, SignalKind::Real, &unweighted_lags(WINDOW), 1024, Refinement::Parabola)?;
-        let velocities = pair.velocities(&pair.statistics(&records, &tapered)?, &pair.points, radius_m, &peak)?;
-        let velocity_m_s = Array2::from_shape_vec((pair.elevation_rad.len(), pair.range_m.len()), velocities)?;
-        Ok(Self { pair, setup: pair.setup()?, radius_m, records, tapered, peak, velocity_m_s })
+        let peak = SpectralPeak::new(
+            &pair.sampling,
+            SignalKind::Real,
+            &unweighted_lags(WINDOW),
+            1024,
+            Refinement::Parabola,
+        )?;
+        let velocities = pair.velocities(
+            &pair.statistics(&records, &tapered)?,
+            &pair.points,
+            radius_m,
+            &peak,
+        )?;
+        let velocity_m_s =
+            Array2::from_shape_vec((pair.elevation_rad.len(), pair.range_m.len()), velocities)?;
+        Ok(Self {
+            pair,
+            setup: pair.setup()?,
+            radius_m,
+            records,
+            tapered,
+            peak,
+            velocity_m_s,
+        })
     }
 
     /// The fit of the map, with nothing known but what typical cores are.
-    pub(crate) fn map(&self, free: FreeParameters, core_prior: Option<CorePrior>) -> Result<MapFit, Error> {
+    pub(crate) fn map(
+        &self,
+        free: FreeParameters,
+        core_prior: Option<CorePrior>,
+    ) -> Result<MapFit, Error> {
         let Self { pair, setup, .. } = self;
         let map = VelocityMap {
             elevation_rad: &pair.elevation_rad,
@@ -53,9 +78,19 @@ impl<'a> FitTrial<'a> {
             standard_deviation_m_s: None,
         };
         let noise = (setup.noise, pair.snr);
-        let shown =
-            EstimatorResponse::new(&self.tapered, &self.peak, &setup.sampling, &setup.pulse, noise, self.radius_m)?;
-        let options = MapFitOptions { free, core_prior, ..Default::default() };
+        let shown = EstimatorResponse::new(
+            &self.tapered,
+            &self.peak,
+            &setup.sampling,
+            &setup.pulse,
+            noise,
+            self.radius_m,
+        )?;
+        let options = MapFitOptions {
+            free,
+            core_prior,
+            ..Default::default()
+        };
         fit_map_of_estimator(&map, &setup.wake, &shown, &options)
     }
 
@@ -76,9 +111,25 @@ impl<'a> FitTrial<'a> {
     }
 
     /// The fit of all signals from a guess on.
-    pub(crate) fn signals(&self, free: FreeParameters, guess: &Wake, starts: Starts) -> Result<SignalFit, Error> {
-        let options = SignalFitOptions { free, starts, ..Default::default() };
+    pub(crate) fn signals(
+        &self,
+        free: FreeParameters,
+        guess: &Wake,
+        starts: Starts,
+    ) -> Result<SignalFit, Error> {
+        let options = SignalFitOptions {
+            free,
+            starts,
+            ..Default::default()
+        };
         let (records, noise_a2) = (self.records.view(), self.pair.noise_power_a2());
-        fit_signals(&self.setup, |_, _| self.pair.snr, records, noise_a2, guess, &options)
+        fit_signals(
+            &self.setup,
+            |_, _| self.pair.snr,
+            records,
+            noise_a2,
+            guess,
+            &options,
+        )
     }
 }

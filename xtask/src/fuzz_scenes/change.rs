@@ -22,14 +22,18 @@ struct Changes {
 }
 
 /// The list of them; the test draws from it.
-static CHANGES: LazyLock<Changes> = LazyLock::new(|| toml::from_str(include_str!("changes.toml")).unwrap_or_default());
+static CHANGES: LazyLock<Changes> =
+    LazyLock::new(|| toml::from_str(include_str!("changes.toml")).unwrap_or_default());
 
 /// The scene of that number.
 pub(super) fn scene(seed: u64, index: u64) -> String {
-    let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index));
+    let mut rng = Xoshiro256PlusPlus::seed_from_u64(
+        seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(index),
+    );
     let mut scene = Table::try_from(Scene::default()).unwrap_or_default();
     for (section, keys) in &CHANGES.short {
-        keys.iter().for_each(|(key, value)| put(&mut scene, section, key, value.clone()));
+        keys.iter()
+            .for_each(|(key, value)| put(&mut scene, section, key, value.clone()));
     }
     // Mostly one or two changes, now and then many.
     let changes = 1 + pick(&mut rng, 3) * pick(&mut rng, 2) + 6 * (pick(&mut rng, 12) / 11);
@@ -56,7 +60,9 @@ fn stated(scene: &Table, usual: &Table) -> Table {
     let mut out = Table::new();
     for (key, value) in scene {
         match (value, usual.get(key)) {
-            (Value::Table(inner), Some(Value::Table(usual))) if inner.get("kind") == usual.get("kind") => {
+            (Value::Table(inner), Some(Value::Table(usual)))
+                if inner.get("kind") == usual.get("kind") =>
+            {
                 let inner = stated(inner, usual);
                 out.extend((!inner.is_empty()).then(|| (key.clone(), Value::Table(inner))));
             }
@@ -77,7 +83,9 @@ fn put(scene: &mut Table, section: &str, key: &str, value: Value) {
         scene.insert(key.into(), value);
         return;
     }
-    let inside = scene.entry(section).or_insert_with(|| Value::Table(Table::new()));
+    let inside = scene
+        .entry(section)
+        .or_insert_with(|| Value::Table(Table::new()));
     match inside {
         Value::Table(table) => drop(table.insert(key.into(), value)),
         other => *other = Value::Table(Table::from_iter([(key.into(), value)])),
@@ -101,7 +109,11 @@ fn changed(value: &Value, key: &str, rng: &mut Xoshiro256PlusPlus) -> Value {
         Value::Boolean(is_on) => Value::Boolean(!is_on),
         Value::String(_) => {
             let words = CHANGES.words.get(key).map_or(&[][..], Vec::as_slice);
-            Value::String(words.get(pick(rng, words.len())).map_or("nonsense".into(), Clone::clone))
+            Value::String(
+                words
+                    .get(pick(rng, words.len()))
+                    .map_or("nonsense".into(), Clone::clone),
+            )
         }
         Value::Array(list) => Value::Array(list.iter().map(|v| changed(v, key, rng)).collect()),
         other => other.clone(),
@@ -109,8 +121,20 @@ fn changed(value: &Value, key: &str, rng: &mut Xoshiro256PlusPlus) -> Value {
 }
 
 fn changed_number(x: f64, rng: &mut Xoshiro256PlusPlus) -> f64 {
-    const EXTREMES: [f64; 12] =
-        [0.0, -0.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e308, 5e-324, 1e-300, -1.0, 1.0, 1e9, 1e-9];
+    const EXTREMES: [f64; 12] = [
+        0.0,
+        -0.0,
+        f64::NAN,
+        f64::INFINITY,
+        f64::NEG_INFINITY,
+        1e308,
+        5e-324,
+        1e-300,
+        -1.0,
+        1.0,
+        1e9,
+        1e-9,
+    ];
     let unit = (rng.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     match pick(rng, 8) {
         0 => EXTREMES[pick(rng, EXTREMES.len())],
@@ -126,6 +150,8 @@ fn changed_count(n: i64, rng: &mut Xoshiro256PlusPlus) -> i64 {
     match pick(rng, 4) {
         0 => EXTREMES[pick(rng, EXTREMES.len())],
         1 => n.saturating_mul(1 << pick(rng, 12)),
-        _ => n.saturating_sub(n / 2).saturating_add(pick(rng, 2 * n.clamp(1, 1 << 40) as usize) as i64),
+        _ => n
+            .saturating_sub(n / 2)
+            .saturating_add(pick(rng, 2 * n.clamp(1, 1 << 40) as usize) as i64),
     }
 }

@@ -11,7 +11,14 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// What figures come from.
-const DRAWN_BY: [&str; 6] = ["crates", "xtask", "tests/curves", "tests/extreme", "tests/reference", "Cargo.lock"];
+const DRAWN_BY: [&str; 6] = [
+    "crates",
+    "xtask",
+    "tests/curves",
+    "tests/extreme",
+    "tests/reference",
+    "Cargo.lock",
+];
 
 /// Where one figure is kept.
 pub(super) struct Place {
@@ -27,14 +34,24 @@ struct Index {
 
 impl Place {
     pub(super) fn new(id: &'static str, context: &Context) -> Result<Self, Failure> {
-        let (root, seed, flow) = (root(), context.seed.to_string(), if context.analytic { "analytic" } else { "" });
+        let (root, seed, flow) = (
+            root(),
+            context.seed.to_string(),
+            if context.analytic { "analytic" } else { "" },
+        );
         let key = cause(&root, &[id, context.profile.name(), &seed, flow], &DRAWN_BY)?;
-        Ok(Self { id, folder: Context::cache().join(format!("{id}-{key}")) })
+        Ok(Self {
+            id,
+            folder: Context::cache().join(format!("{id}-{key}")),
+        })
     }
 
     /// The figure, if it was made before and can be read.
     pub(super) fn load(&self) -> Option<Rendered> {
-        let Index { extensions, rendered }: Index =
+        let Index {
+            extensions,
+            rendered,
+        }: Index =
             toml::from_str(&std::fs::read_to_string(self.folder.join("index.toml")).ok()?).ok()?;
         let name = |extension: &String| format!("{}.{extension}", self.id);
         let file = |e: &String| Some((e.clone(), std::fs::read(self.folder.join(name(e))).ok()?));
@@ -44,8 +61,18 @@ impl Place {
 
     pub(super) fn store(&self, rendered: &Rendered) -> Outcome {
         let mut group = rendered.files_in(&self.folder, self.id)?;
-        let extensions = rendered.files.iter().map(|(extension, _)| extension.clone()).collect();
-        group.add("index.toml", toml::to_string(&Index { extensions, rendered: rendered.clone() })?)?;
+        let extensions = rendered
+            .files
+            .iter()
+            .map(|(extension, _)| extension.clone())
+            .collect();
+        group.add(
+            "index.toml",
+            toml::to_string(&Index {
+                extensions,
+                rendered: rendered.clone(),
+            })?,
+        )?;
         group.commit()?;
         Ok(())
     }
@@ -59,10 +86,19 @@ mod tests {
     #[test]
     fn what_is_stored_comes_back_and_damage_is_no_hit() {
         let temp = tempfile::tempdir().unwrap();
-        let place = Place { id: "fig00", folder: temp.path().to_owned() };
-        let mut rendered = Rendered { caption: "a caption".into(), ..Rendered::default() };
+        let place = Place {
+            id: "fig00",
+            folder: temp.path().to_owned(),
+        };
+        let mut rendered = Rendered {
+            caption: "a caption".into(),
+            ..Rendered::default()
+        };
         rendered.files.push(("csv".into(), b"a\n1\n".to_vec()));
-        rendered.claims.push(Claim { standard_error: 0.25, ..Claim::exact("F5", "2".into(), false) });
+        rendered.claims.push(Claim {
+            standard_error: 0.25,
+            ..Claim::exact("F5", "2".into(), false)
+        });
         rendered.took_s = [1.5, 2.5];
         assert!(place.load().is_none());
         place.store(&rendered).unwrap();

@@ -5,12 +5,16 @@ use fixtures::failure::Failure;
 use num_complex::Complex;
 use std::f64::consts::{PI, TAU};
 use wakescope_les::solver::{PressureMethod, StepReport};
-use wakescope_les::{Direction, Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases};
+use wakescope_les::{
+    Direction, Flow, FlowSettings, Mesh, SubgridModel, TimeScheme, TimeStep, Wall, cases,
+};
 use wakescope_sim::plot::Axis;
 use wakescope_tests::extreme::les::{energy_drift, energy_left};
 
-const SCHEMES: [(&str, TimeScheme); 2] =
-    [("Adams-Bashforth 2", TimeScheme::AdamsBashforth2), ("Runge-Kutta 3", TimeScheme::RungeKutta3)];
+const SCHEMES: [(&str, TimeScheme); 2] = [
+    ("Adams-Bashforth 2", TimeScheme::AdamsBashforth2),
+    ("Runge-Kutta 3", TimeScheme::RungeKutta3),
+];
 
 /// Cells of the periodic line.
 const CELLS: usize = 48;
@@ -22,15 +26,27 @@ fn line(
     step_s: f64,
     across: impl Fn(f64) -> f64 + Sync,
 ) -> Result<Flow, Failure> {
-    let mesh = Mesh::new(Direction::thin(1.0), Direction::periodic(CELLS, 0.0, 1.0), Direction::thin(1.0))?;
-    let settings = FlowSettings { scheme, ..FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s }) };
+    let mesh = Mesh::new(
+        Direction::thin(1.0),
+        Direction::periodic(CELLS, 0.0, 1.0),
+        Direction::thin(1.0),
+    )?;
+    let settings = FlowSettings {
+        scheme,
+        ..FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s })
+    };
     Ok(Flow::new(mesh, settings, |[_, y, _]| [1e-3 * across(y), 1.0, 0.0])?.0)
 }
 
 /// Amplitude of a wave of the wind across.
 fn amplitude(flow: &Flow, wave: usize) -> f64 {
     let at = |(j, u): (usize, &f64)| u * Complex::cis(-TAU * (wave * j) as f64 / CELLS as f64);
-    flow.face_velocity_m_s(0).iter().enumerate().map(at).sum::<Complex<f64>>().norm()
+    flow.face_velocity_m_s(0)
+        .iter()
+        .enumerate()
+        .map(at)
+        .sum::<Complex<f64>>()
+        .norm()
 }
 
 /// The wave number that convection sees of a wave that turns by `theta` from one cell to the next, times the length of a cell.
@@ -54,11 +70,18 @@ pub(super) fn growth() -> Result<Vec<Panel>, Failure> {
             let before = amplitude(&flow, WAVE);
             (0..40).try_for_each(|_| flow.step().map(drop))?;
             let measured = ((amplitude(&flow, WAVE) / before).powf(1.0 / 40.0) - 1.0).abs();
-            Ok([measured, (root(scheme, Complex::new(0.0, angle), 0.0) - 1.0).abs()])
+            Ok([
+                measured,
+                (root(scheme, Complex::new(0.0, angle), 0.0) - 1.0).abs(),
+            ])
         })
     });
     let axes = logs(["angle in a step [rad]", "||G| − 1|"]);
-    Ok(vec![Panel::new("growth of a wave in a step", axes, curves)?])
+    Ok(vec![Panel::new(
+        "growth of a wave in a step",
+        axes,
+        curves,
+    )?])
 }
 
 /// The largest Courant number, to a thousandth, at which a step is not refused and no wave grows, against the root of the scheme. Waves of all lengths
@@ -69,14 +92,24 @@ pub(super) fn limits() -> Result<Vec<Panel>, Failure> {
             // nu = viscous h^2/dt, with dt = courant h.
             let holds = |courant: f64| -> Result<bool, Failure> {
                 let (h, step_s) = (1.0 / CELLS as f64, courant / CELLS as f64);
-                let spike = |y: f64| if (y * CELLS as f64).floor() == 7.0 { 1.0 } else { 0.0 };
+                let spike = |y: f64| {
+                    if (y * CELLS as f64).floor() == 7.0 {
+                        1.0
+                    } else {
+                        0.0
+                    }
+                };
                 let mut flow = line(scheme, viscous * h * h / step_s, step_s, spike)?;
                 let mut largest = || -> Result<Option<f64>, Failure> {
                     for _ in 0..600 {
                         // A refusal is an answer.
                         let Ok(_) = flow.step() else { return Ok(None) };
                     }
-                    Ok(Some((1..=CELLS / 2).map(|wave| amplitude(&flow, wave)).fold(0.0, f64::max)))
+                    Ok(Some(
+                        (1..=CELLS / 2)
+                            .map(|wave| amplitude(&flow, wave))
+                            .fold(0.0, f64::max),
+                    ))
                 };
                 let (first, last) = (largest()?, largest()?);
                 Ok(matches!((first, last), (Some(first), Some(last)) if last <= first))
@@ -84,12 +117,20 @@ pub(super) fn limits() -> Result<Vec<Panel>, Failure> {
             let (mut low, mut high) = (0.05, 2.0);
             while high - low > 5e-4 * low {
                 let middle = 0.5 * (low + high);
-                if holds(middle)? { low = middle } else { high = middle }
+                if holds(middle)? {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             Ok([low, limit(scheme, viscous)])
         })
     });
-    Ok(vec![Panel::new("largest stable Courant number", logs(["ν Δt/h²", "Courant number"]), curves)?])
+    Ok(vec![Panel::new(
+        "largest stable Courant number",
+        logs(["ν Δt/h²", "Courant number"]),
+        curves,
+    )?])
 }
 
 /// Decay of the shortest wave in a step up to which the solver takes viscosity explicitly.
@@ -102,20 +143,36 @@ fn limit(scheme: TimeScheme, viscous: f64) -> f64 {
             let theta = PI * f64::from(k) / 180.0;
             let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
             let decay = viscous * kappa * kappa;
-            let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT { [0.0, decay] } else { [decay, 0.0] };
-            root(scheme, Complex::new(-explicit, courant * symbol(theta)), implicit) <= 1.0
+            let [explicit, implicit] = if viscous * KAPPA2 > EXPLICIT {
+                [0.0, decay]
+            } else {
+                [decay, 0.0]
+            };
+            root(
+                scheme,
+                Complex::new(-explicit, courant * symbol(theta)),
+                implicit,
+            ) <= 1.0
         })
     };
     let (mut low, mut high) = (0.0, 2.5);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if decays(middle) { low = middle } else { high = middle }
+        if decays(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     low
 }
 
 /// Shares of a step that Wray's stages give the present rate and the one before.
-const STAGES: [(f64, f64); 3] = [(8.0 / 15.0, 0.0), (5.0 / 12.0, -17.0 / 60.0), (3.0 / 4.0, -5.0 / 12.0)];
+const STAGES: [(f64, f64); 3] = [
+    (8.0 / 15.0, 0.0),
+    (5.0 / 12.0, -17.0 / 60.0),
+    (3.0 / 4.0, -5.0 / 12.0),
+];
 
 /// Amplification of `du/dt = (z u - d u)/dt` in a step, the decay `d` by Crank-Nicolson, in each stage of Wray's Runge-Kutta.
 fn root(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
@@ -153,52 +210,107 @@ pub(super) fn stiff() -> Result<Vec<Panel>, Failure> {
     let curves = cases.map(|(name, damped_steps, both)| {
         Curve::new(name, &[1e1, 1e2, 1e3, 1e4, 1e5, 1e6], |viscous| {
             let periodic = || Direction::periodic(N, 0.0, 1.0);
-            let mesh =
-                Mesh::new(Direction::thin(1.0), periodic(), if both { periodic() } else { Direction::thin(1.0) })?;
+            let mesh = Mesh::new(
+                Direction::thin(1.0),
+                periodic(),
+                if both {
+                    periodic()
+                } else {
+                    Direction::thin(1.0)
+                },
+            )?;
             let step_s = 1e-3;
             let settings = FlowSettings {
                 damped_steps,
-                ..FlowSettings::new(viscous / (N * N) as f64 / step_s, TimeStep::Fixed { step_s })
+                ..FlowSettings::new(
+                    viscous / (N * N) as f64 / step_s,
+                    TimeStep::Fixed { step_s },
+                )
             };
-            let short = |a: f64| if ((a * N as f64) as usize).is_multiple_of(2) { 1.0 } else { -1.0 };
-            let mut flow =
-                Flow::new(mesh, settings, |[_, y, z]| [short(y) * if both { short(z) } else { 1.0 }, 0.0, 0.0])?.0;
+            let short = |a: f64| {
+                if ((a * N as f64) as usize).is_multiple_of(2) {
+                    1.0
+                } else {
+                    -1.0
+                }
+            };
+            let mut flow = Flow::new(mesh, settings, |[_, y, z]| {
+                [short(y) * if both { short(z) } else { 1.0 }, 0.0, 0.0]
+            })?
+            .0;
             flow.step()?;
             let (d, directions) = (viscous * KAPPA2, if both { 2.0 } else { 1.0 });
             // The first step of either scheme is one of Runge-Kutta.
             let theory =
-                STAGES.iter().map(|(now, last)| (now + last) * d).fold(1.0, |left: f64, d| match damped_steps {
-                    0 => left * (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs(),
-                    _ => left * (1.0 + d).powf(-directions),
-                });
+                STAGES
+                    .iter()
+                    .map(|(now, last)| (now + last) * d)
+                    .fold(1.0, |left: f64, d| match damped_steps {
+                        0 => left * (1.0 - directions * d / (1.0 + 0.5 * d).powf(directions)).abs(),
+                        _ => left * (1.0 + d).powf(-directions),
+                    });
             Ok([flow.face_velocity_m_s(0)[0].abs(), theory])
         })
     });
     let axes = logs(["ν Δt/h²", "share of the wave"]);
     let panel = Panel::new("what the first step leaves of a stiff wave", axes, curves)?;
-    Ok(vec![Panel { least: 1e-12, ..panel }])
+    Ok(vec![Panel {
+        least: 1e-12,
+        ..panel
+    }])
 }
 
 /// The residual that an iteration of multigrid leaves, and what the direct solver leaves, on cells longer along y, or along x and y.
 pub(super) fn pressure() -> Result<Vec<Panel>, Failure> {
     let cases = [
-        ("multigrid, cells long along y", PressureMethod::Multigrid, false),
-        ("multigrid, cells long along x and y", PressureMethod::Multigrid, true),
-        ("direct, what it leaves, long along y", PressureMethod::Direct, false),
-        ("direct, what it leaves, long along x and y", PressureMethod::Direct, true),
+        (
+            "multigrid, cells long along y",
+            PressureMethod::Multigrid,
+            false,
+        ),
+        (
+            "multigrid, cells long along x and y",
+            PressureMethod::Multigrid,
+            true,
+        ),
+        (
+            "direct, what it leaves, long along y",
+            PressureMethod::Direct,
+            false,
+        ),
+        (
+            "direct, what it leaves, long along x and y",
+            PressureMethod::Direct,
+            true,
+        ),
     ];
     let curves = cases.map(|(name, pressure, both)| {
         Curve::new(name, &[1.0, 1e1, 1e2, 1e3, 1e4, 1e5], |aspect| {
-            let slip = |cells, length_m| Direction::between(cells, 0.0, length_m, Wall::Slip, Wall::Slip);
+            let slip =
+                |cells, length_m| Direction::between(cells, 0.0, length_m, Wall::Slip, Wall::Slip);
             let [length_m, width_m] = [if both { aspect } else { 1.0 }, aspect];
-            let mesh = Mesh::new(Direction::periodic(8, 0.0, length_m / 6.0), slip(48, width_m), slip(48, 1.0))?;
+            let mesh = Mesh::new(
+                Direction::periodic(8, 0.0, length_m / 6.0),
+                slip(48, width_m),
+                slip(48, 1.0),
+            )?;
             let settings = FlowSettings {
                 pressure,
                 pressure_tolerance: 1e-10,
-                ..FlowSettings::new(1e-4, TimeStep::Courant { courant: 0.3, longest_s: 1e-3 })
+                ..FlowSettings::new(
+                    1e-4,
+                    TimeStep::Courant {
+                        courant: 0.3,
+                        longest_s: 1e-3,
+                    },
+                )
             };
             let eddies = move |[x, y, z]: [f64; 3]| {
-                let (a, b, c) = (TAU * 6.0 * x / length_m, TAU * y / width_m + 0.3, TAU * z + 0.5);
+                let (a, b, c) = (
+                    TAU * 6.0 * x / length_m,
+                    TAU * y / width_m + 0.3,
+                    TAU * z + 0.5,
+                );
                 [
                     0.2 * a.cos() * b.sin(),
                     b.cos() * c.sin() + 0.3 * (5.0 * b).cos() * c.cos(),
@@ -209,15 +321,25 @@ pub(super) fn pressure() -> Result<Vec<Panel>, Failure> {
             let mut worst = f64::NAN;
             for _ in 0..3 {
                 let report = flow.step()?;
-                let of =
-                    if pressure == PressureMethod::Direct { report.pressure_residual } else { report.pressure_factor };
+                let of = if pressure == PressureMethod::Direct {
+                    report.pressure_residual
+                } else {
+                    report.pressure_factor
+                };
                 worst = worst.max(of.unwrap_or(f64::NAN));
             }
             Ok([worst, NO_THEORY])
         })
     });
-    let panel = Panel::new("pressure solvers on flat cells", logs(["aspect of the cells", "residual left"]), curves)?;
-    Ok(vec![Panel { limit: Some(("at most 0.10 an iteration", 0.1, true)), ..panel }])
+    let panel = Panel::new(
+        "pressure solvers on flat cells",
+        logs(["aspect of the cells", "residual left"]),
+        curves,
+    )?;
+    Ok(vec![Panel {
+        limit: Some(("at most 0.10 an iteration", 0.1, true)),
+        ..panel
+    }])
 }
 
 /// Energy that a flow without viscosity gains or loses in half a second, against a cube through the shortest step.
@@ -226,33 +348,64 @@ pub(super) fn drift() -> Result<Vec<Panel>, Failure> {
     let curves = SCHEMES.map(|(name, scheme)| {
         let found = STEPS_S.map(|step_s| (step_s, energy_drift(scheme, step_s).ok()));
         let last = found[4].1.unwrap_or(f64::NAN);
-        let point = |(step_s, drift): (f64, Option<f64>)| Some([step_s, drift?, last * (step_s / STEPS_S[4]).powi(3)]);
-        Ok(Curve { name: name.into(), points: found.into_iter().filter_map(point).collect() })
+        let point = |(step_s, drift): (f64, Option<f64>)| {
+            Some([step_s, drift?, last * (step_s / STEPS_S[4]).powi(3)])
+        };
+        Ok(Curve {
+            name: name.into(),
+            points: found.into_iter().filter_map(point).collect(),
+        })
     });
-    Ok(vec![Panel::new("energy lost without viscosity", logs(["step [s]", "energy lost, relative"]), curves)?])
+    Ok(vec![Panel::new(
+        "energy lost without viscosity",
+        logs(["step [s]", "energy lost, relative"]),
+        curves,
+    )?])
 }
 
 /// Energy that steps feed beyond the powers of viscosity and subgrid stress, over what these take, as vortices break up into turbulence.
 pub(super) fn fed() -> Result<Vec<Panel>, Failure> {
-    let models = [("no model", SubgridModel::None), ("multiscale WALE", SubgridModel::MULTISCALE_WALE)];
+    let models = [
+        ("no model", SubgridModel::None),
+        ("multiscale WALE", SubgridModel::MULTISCALE_WALE),
+    ];
     let curves = SCHEMES.into_iter().flat_map(|(scheme_name, scheme)| {
         models.map(|(model_name, subgrid)| {
             let courants = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0];
             // Where steps are refused there is no point.
-            let point = |courant| Some([courant, fed_over_taken(scheme, subgrid, courant).ok()?, NO_THEORY]);
+            let point = |courant| {
+                Some([
+                    courant,
+                    fed_over_taken(scheme, subgrid, courant).ok()?,
+                    NO_THEORY,
+                ])
+            };
             let points = courants.into_iter().filter_map(point).collect();
-            Ok(Curve { name: format!("{scheme_name}, {model_name}"), points })
+            Ok(Curve {
+                name: format!("{scheme_name}, {model_name}"),
+                points,
+            })
         })
     });
     let axes = ["Courant number", "fed over taken"].map(Axis::linear);
     let panel = Panel::new("energy that steps feed, over what is taken", axes, curves)?;
-    Ok(vec![Panel { limit: Some(("nothing fed", 0.0, true)), ..panel }])
+    Ok(vec![Panel {
+        limit: Some(("nothing fed", 0.0, true)),
+        ..panel
+    }])
 }
 
 fn fed_over_taken(scheme: TimeScheme, subgrid: SubgridModel, courant: f64) -> Result<f64, Failure> {
     let mut case = cases::taylor_green_3d(16, 1e4)?;
-    let time_step = TimeStep::Courant { courant, longest_s: 1.0 };
-    (case.settings.scheme, case.settings.subgrid, case.settings.time_step) = (scheme, subgrid, time_step);
+    let time_step = TimeStep::Courant {
+        courant,
+        longest_s: 1.0,
+    };
+    (
+        case.settings.scheme,
+        case.settings.subgrid,
+        case.settings.time_step,
+    ) = (scheme, subgrid, time_step);
     let (mut flow, start) = case.start()?;
     let mut steps = Vec::new();
     while flow.time_s() < 5.0 {
@@ -260,7 +413,10 @@ fn fed_over_taken(scheme: TimeScheme, subgrid: SubgridModel, courant: f64) -> Re
     }
     // Powers are those at the start of a step: at its end they are those of the next one.
     let power = |step: &StepReport| step.viscous_power_m5_s3 + step.subgrid_power_m5_s3;
-    let taken: f64 = steps.windows(2).map(|pair| -0.5 * pair[0].step_s * (power(&pair[0]) + power(&pair[1]))).sum();
+    let taken: f64 = steps
+        .windows(2)
+        .map(|pair| -0.5 * pair[0].step_s * (power(&pair[0]) + power(&pair[1])))
+        .sum();
     let last = steps.len().saturating_sub(2);
     Ok((steps[last].kinetic_energy_m5_s2 - start.kinetic_energy_m5_s2 + taken) / taken)
 }
@@ -274,9 +430,16 @@ pub(super) fn reynolds() -> Result<Vec<Panel>, Failure> {
     ];
     let curves = models.map(|(name, subgrid)| {
         Curve::new(name, &[1e3, 1e5, 1e8, 1e12], |reynolds| {
-            Ok([energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?, NO_THEORY])
+            Ok([
+                energy_left(16, reynolds, TimeScheme::RungeKutta3, subgrid, 150)?,
+                NO_THEORY,
+            ])
         })
     });
     let axes = logs(["Reynolds number", "energy over that of the start"]);
-    Ok(vec![Panel::new("energy of turbulent vortices", axes, curves)?])
+    Ok(vec![Panel::new(
+        "energy of turbulent vortices",
+        axes,
+        curves,
+    )?])
 }

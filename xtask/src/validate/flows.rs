@@ -11,26 +11,63 @@ const VISCOSITY_M2_S: f64 = 0.01;
 
 /// Order of the scheme: plane vortices on meshes stretched both ways, and a layer between walls.
 pub(super) fn order(profile: Profile) -> Result<Shown, Failure> {
-    let sizes: &[usize] = if profile == Profile::Quick { &[32, 64, 128] } else { &[32, 64, 128, 256] };
-    let inside = sizes.iter().map(|&n| Ok((n as f64, vortices(n)?))).collect::<Result<Vec<_>, Failure>>()?;
-    let walls = sizes.iter().map(|&n| Ok((n as f64, layer(n)?))).collect::<Result<Vec<_>, Failure>>()?;
+    let sizes: &[usize] = if profile == Profile::Quick {
+        &[32, 64, 128]
+    } else {
+        &[32, 64, 128, 256]
+    };
+    let inside = sizes
+        .iter()
+        .map(|&n| Ok((n as f64, vortices(n)?)))
+        .collect::<Result<Vec<_>, Failure>>()?;
+    let walls = sizes
+        .iter()
+        .map(|&n| Ok((n as f64, layer(n)?)))
+        .collect::<Result<Vec<_>, Failure>>()?;
     let order = |points: &[(f64, f64)]| {
         let last = points.len() - 1;
         (points[last - 1].1 / points[last].1).log2()
     };
     let checks = vec![
-        Claim::at_least("order inside, both directions stretched", order(&inside), 3.9),
+        Claim::at_least(
+            "order inside, both directions stretched",
+            order(&inside),
+            3.9,
+        ),
         Claim::at_least("order between no-slip walls", order(&walls), 2.8),
     ];
-    let table = table_of("cells", &[("error_vortices_m_s", &inside), ("error_layer_m_s", &walls)]);
+    let table = table_of(
+        "cells",
+        &[("error_vortices_m_s", &inside), ("error_layer_m_s", &walls)],
+    );
     let first = inside[0];
-    let slope = |power: i32| sizes.iter().map(move |&n| (n as f64, first.1 * (first.0 / n as f64).powi(power)));
-    let plot = CurvePlot::new("Largest error", Axis::log("cells in each direction"), Axis::log("error [m/s]"))
-        .with(Series::new("plane vortices, stretched", Style::LineMarkers, inside.clone()))
-        .with(Series::new("decaying layer between walls", Style::LineMarkers, walls))
-        .with(Series::new("fourth order", Style::Dash, slope(4)))
-        .with(Series::new("third order", Style::Dot, slope(3)));
-    Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
+    let slope = |power: i32| {
+        sizes
+            .iter()
+            .map(move |&n| (n as f64, first.1 * (first.0 / n as f64).powi(power)))
+    };
+    let plot = CurvePlot::new(
+        "Largest error",
+        Axis::log("cells in each direction"),
+        Axis::log("error [m/s]"),
+    )
+    .with(Series::new(
+        "plane vortices, stretched",
+        Style::LineMarkers,
+        inside.clone(),
+    ))
+    .with(Series::new(
+        "decaying layer between walls",
+        Style::LineMarkers,
+        walls,
+    ))
+    .with(Series::new("fourth order", Style::Dash, slope(4)))
+    .with(Series::new("third order", Style::Dot, slope(3)));
+    Ok(Shown {
+        checks,
+        table,
+        figure: Figure::stacked([plot]),
+    })
 }
 
 /// Largest error of plane vortices on a mesh stretched both ways.
@@ -44,24 +81,44 @@ fn vortices(n: usize) -> Result<f64, Failure> {
     }
     let n = flow.mesh().cells()[1];
     let (y_m, z_m) = (flow.mesh().face_m(1), flow.mesh().centre_m(2));
-    let exact =
-        |i: usize| cases::taylor_green_plane_exact([0.0, y_m[i % n], z_m[i / n]], flow.time_s(), VISCOSITY_M2_S)[1];
-    Ok(flow.face_velocity_m_s(1).iter().enumerate().map(|(i, v)| (v - exact(i)).abs()).fold(0.0, f64::max))
+    let exact = |i: usize| {
+        cases::taylor_green_plane_exact(
+            [0.0, y_m[i % n], z_m[i / n]],
+            flow.time_s(),
+            VISCOSITY_M2_S,
+        )[1]
+    };
+    Ok(flow
+        .face_velocity_m_s(1)
+        .iter()
+        .enumerate()
+        .map(|(i, v)| (v - exact(i)).abs())
+        .fold(0.0, f64::max))
 }
 
 /// A layer that decays between no-slip walls.
 fn layer(n: usize) -> Result<f64, Failure> {
     let (nu, end_s) = (0.1, 1.0);
     let steps = 20 * n;
-    let (mut flow, _) = cases::Plates { cells: n, strength: 1.5, viscosity_m2_s: nu, step_s: end_s / steps as f64 }
-        .decaying_layer()?
-        .start()?;
+    let (mut flow, _) = cases::Plates {
+        cells: n,
+        strength: 1.5,
+        viscosity_m2_s: nu,
+        step_s: end_s / steps as f64,
+    }
+    .decaying_layer()?
+    .start()?;
     for _ in 0..steps {
         flow.step()?;
     }
     let decay = (-nu * FRAC_PI_2 * FRAC_PI_2 * end_s).exp();
-    let errors = flow.face_velocity_m_s(0).into_iter().zip(flow.mesh().centre_m(2));
-    Ok(errors.map(|(u, z)| (u - (FRAC_PI_2 * z).cos() * decay).abs()).fold(0.0, f64::max))
+    let errors = flow
+        .face_velocity_m_s(0)
+        .into_iter()
+        .zip(flow.mesh().centre_m(2));
+    Ok(errors
+        .map(|(u, z)| (u - (FRAC_PI_2 * z).cos() * decay).abs())
+        .fold(0.0, f64::max))
 }
 
 /// The wave is followed from here, when what is not the wave has died, to the end.
@@ -71,32 +128,68 @@ const WAVE_TO_S: f64 = 25.0;
 /// Growth of Tollmien-Schlichting waves at Re 7500, alpha 1, against linear theory.
 pub(super) fn waves(profile: Profile) -> Result<Shown, Failure> {
     let stored = numbers("orr_sommerfeld.csv")?;
-    let expected = stored.first().and_then(|row| row.get(3)).copied().unwrap_or(f64::NAN);
+    let expected = stored
+        .first()
+        .and_then(|row| row.get(3))
+        .copied()
+        .unwrap_or(f64::NAN);
     let coarse = amplitudes([64, 128], 0.01)?;
-    let mut checks = vec![Claim::relative("growth rate on 64 x 128 [1/s]", rate(&coarse), expected, 0.01)];
-    let mut plot = CurvePlot::new("Amplitude of the wave", Axis::linear("time [s]"), Axis::linear("ln a/a(5 s)"))
-        .with(Series::new(
-            "linear theory",
-            Style::Line,
-            [(WAVE_FROM_S, 0.0), (WAVE_TO_S, expected * (WAVE_TO_S - WAVE_FROM_S))],
-        ))
-        .with(Series::new("64 x 128", Style::Markers, coarse.iter().copied().step_by(10)));
+    let mut checks = vec![Claim::relative(
+        "growth rate on 64 x 128 [1/s]",
+        rate(&coarse),
+        expected,
+        0.01,
+    )];
+    let mut plot = CurvePlot::new(
+        "Amplitude of the wave",
+        Axis::linear("time [s]"),
+        Axis::linear("ln a/a(5 s)"),
+    )
+    .with(Series::new(
+        "linear theory",
+        Style::Line,
+        [
+            (WAVE_FROM_S, 0.0),
+            (WAVE_TO_S, expected * (WAVE_TO_S - WAVE_FROM_S)),
+        ],
+    ))
+    .with(Series::new(
+        "64 x 128",
+        Style::Markers,
+        coarse.iter().copied().step_by(10),
+    ));
     let mut table = table_of("time_s", &[("log_amplitude_64", &coarse)]);
     if profile != Profile::Quick {
         let fine = amplitudes([128, 256], 0.005)?;
-        checks.push(Claim::relative("growth rate on 128 x 256 [1/s]", rate(&fine), expected, 0.002));
+        checks.push(Claim::relative(
+            "growth rate on 128 x 256 [1/s]",
+            rate(&fine),
+            expected,
+            0.002,
+        ));
         let every: Vec<(f64, f64)> = fine.into_iter().skip(1).step_by(2).collect();
-        table = table.float("log_amplitude_128", coarse.iter().map(|p| value_at(&every, p.0)));
+        table = table.float(
+            "log_amplitude_128",
+            coarse.iter().map(|p| value_at(&every, p.0)),
+        );
         plot = plot.with(Series::new("128 x 256", Style::Dash, every));
     }
-    Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
+    Ok(Shown {
+        checks,
+        table,
+        figure: Figure::stacked([plot]),
+    })
 }
 
 /// Least-squares slope.
 fn rate(points: &[(f64, f64)]) -> f64 {
     let count = points.len() as f64;
-    let (t, a) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + p.0 / count, s.1 + p.1 / count));
-    let (above, below) = points.iter().fold((0.0, 0.0), |s, p| (s.0 + (p.0 - t) * (p.1 - a), s.1 + (p.0 - t).powi(2)));
+    let (t, a) = points
+        .iter()
+        .fold((0.0, 0.0), |s, p| (s.0 + p.0 / count, s.1 + p.1 / count));
+    let (above, below) = points.iter().fold((0.0, 0.0), |s, p| {
+        (s.0 + (p.0 - t) * (p.1 - a), s.1 + (p.0 - t).powi(2))
+    });
     above / below
 }
 
@@ -104,7 +197,10 @@ fn rate(points: &[(f64, f64)]) -> f64 {
 fn amplitudes(cells: [usize; 2], step_s: f64) -> Result<Vec<(f64, f64)>, Failure> {
     let case = TollmienSchlichting::new(7500.0, 1.0)?.case(cells, 1.8, 1e-4, step_s)?;
     let (mut flow, _) = case.start()?;
-    let (steps, every) = ((WAVE_TO_S / step_s).round() as usize, (0.1 / step_s).round() as usize);
+    let (steps, every) = (
+        (WAVE_TO_S / step_s).round() as usize,
+        (0.1 / step_s).round() as usize,
+    );
     let mut points = Vec::new();
     for step in 1..=steps {
         flow.step()?;
@@ -123,7 +219,10 @@ fn wave_energy(flow: &Flow) -> f64 {
     let row = |k: usize| {
         let (cos, sin) = (0..nx).fold((0.0, 0.0), |sum, i| {
             let phase = TAU * i as f64 / nx as f64;
-            (sum.0 + w[k * nx + i] * phase.cos(), sum.1 + w[k * nx + i] * phase.sin())
+            (
+                sum.0 + w[k * nx + i] * phase.cos(),
+                sum.1 + w[k * nx + i] * phase.sin(),
+            )
         });
         0.5 * (face_m[k + 1] - face_m[k - 1]) * (cos * cos + sin * sin)
     };
@@ -157,38 +256,82 @@ pub(super) fn dipole(reynolds: f64, profile: Profile) -> Result<Shown, Failure> 
     let share = if profile == Profile::Quick { 0.1 } else { 0.01 };
     let peak = |i: usize| peaks.get(i).copied().unwrap_or((f64::NAN, f64::NAN));
     let checks = vec![
-        Claim::relative("time of the first maximum [s]", peak(0).0, first.0, 0.5 * share),
+        Claim::relative(
+            "time of the first maximum [s]",
+            peak(0).0,
+            first.0,
+            0.5 * share,
+        ),
         Claim::relative("first maximum of the enstrophy", peak(0).1, first.1, share),
-        Claim::relative("time of the second maximum [s]", peak(1).0, second.0, 0.5 * share),
-        Claim::relative("second maximum of the enstrophy", peak(1).1, second.1, share),
+        Claim::relative(
+            "time of the second maximum [s]",
+            peak(1).0,
+            second.0,
+            0.5 * share,
+        ),
+        Claim::relative(
+            "second maximum of the enstrophy",
+            peak(1).1,
+            second.1,
+            share,
+        ),
     ];
     let table = Table::new()
         .float("time_s", history.iter().map(|p| p.0))
         .float("enstrophy_m2_s2", history.iter().map(|p| p.1))
         .float("kinetic_energy_m4_s2", history.iter().map(|p| p.2));
-    let mut curve = CurvePlot::new("Enstrophy", Axis::linear("time [s]"), Axis::linear("enstrophy")).with(Series::new(
+    let mut curve = CurvePlot::new(
+        "Enstrophy",
+        Axis::linear("time [s]"),
+        Axis::linear("enstrophy"),
+    )
+    .with(Series::new(
         &format!("{cells} x {cells}"),
         Style::Line,
         history.iter().map(|p| (p.0, p.1)),
     ));
     if reynolds == 625.0 {
         let stored = numbers("dipole_wall_re625_history.csv")?;
-        curve = curve.with(Series::new("spectral code", Style::Dash, stored.iter().map(|row| (row[0], row[1]))));
+        curve = curve.with(Series::new(
+            "spectral code",
+            Style::Dash,
+            stored.iter().map(|row| (row[0], row[1])),
+        ));
     }
-    let curve = curve.with(Series::new("Clercx and Bruneau", Style::Markers, [first, second]));
-    let wall = CurvePlot::new("At the wall, first maximum", Axis::linear("y [m]"), Axis::linear("vorticity [1/s]"))
-        .with(Series::new("", Style::Line, wall));
-    Ok(Shown { checks, table, figure: Figure::stacked([curve, wall]) })
+    let curve = curve.with(Series::new(
+        "Clercx and Bruneau",
+        Style::Markers,
+        [first, second],
+    ));
+    let wall = CurvePlot::new(
+        "At the wall, first maximum",
+        Axis::linear("y [m]"),
+        Axis::linear("vorticity [1/s]"),
+    )
+    .with(Series::new("", Style::Line, wall));
+    Ok(Shown {
+        checks,
+        table,
+        figure: Figure::stacked([curve, wall]),
+    })
 }
 
 /// Times and values of the two maxima in the literature.
 fn literature(reynolds: f64) -> Result<[(f64, f64); 2], Failure> {
     let text = read("tests/reference/les/dipole_wall_normal.csv")?;
-    let row = text.lines().find(|line| line.starts_with(&format!("{reynolds},")) && line.ends_with("C&B2006"));
-    let cells = row.map(|line| line.split(',').filter_map(|cell| cell.trim().parse().ok()).collect::<Vec<f64>>());
+    let row = text
+        .lines()
+        .find(|line| line.starts_with(&format!("{reynolds},")) && line.ends_with("C&B2006"));
+    let cells = row.map(|line| {
+        line.split(',')
+            .filter_map(|cell| cell.trim().parse().ok())
+            .collect::<Vec<f64>>()
+    });
     match cells.as_deref() {
         Some(&[_, t1, omega1, t2, omega2]) => Ok([(t1, omega1), (t2, omega2)]),
-        _ => Err(Failure::new(format!("no row of Reynolds number {reynolds}"))),
+        _ => Err(Failure::new(format!(
+            "no row of Reynolds number {reynolds}"
+        ))),
     }
 }
 
@@ -200,7 +343,10 @@ fn wall_vorticity(flow: &Flow) -> Vec<(f64, f64)> {
     let (a, b) = (1.0 + z_m[0], 1.0 + z_m[1]);
     // The vorticity is -dv/dz at the wall, where v is zero.
     let slope = |j: usize| (v[j] * b * b - v[ny + j] * a * a) / (a * b * (b - a));
-    (0..ny).map(|j| (y_m[j], -slope(j))).filter(|p| p.0.abs() < 0.6).collect()
+    (0..ny)
+        .map(|j| (y_m[j], -slope(j)))
+        .filter(|p| p.0.abs() < 0.6)
+        .collect()
 }
 
 /// Extrema of Botella and Peyret: velocity along the lid's direction on the vertical centre line, and across on the other.
@@ -210,35 +356,79 @@ const V_MIN: (f64, f64) = (0.9092, -0.527_077_1);
 
 /// The lid-driven cavity at Re 1000 against Ghia, Ghia and Shin (1982) and Botella and Peyret (1998).
 pub(super) fn cavity(profile: Profile) -> Result<Shown, Failure> {
-    let (cells, end_s) = if profile == Profile::Quick { (48, 40.0) } else { (128, 60.0) };
+    let (cells, end_s) = if profile == Profile::Quick {
+        (48, 40.0)
+    } else {
+        (128, 60.0)
+    };
     let (mut flow, _) = cases::lid_driven_cavity(cells, 1.5, 1000.0)?.start()?;
     flow.run_to(end_s)?;
     let (centre_y, centre_z) = (flow.mesh().centre_m(1), flow.mesh().centre_m(2));
     let (v, w) = (flow.face_velocity_m_s(1), flow.face_velocity_m_s(2));
     // The mesh is symmetric: face `cells/2` lies at 0.5.
-    let column: Vec<(f64, f64)> = (0..cells).map(|k| (centre_z[k], v[k * cells + cells / 2])).collect();
-    let row: Vec<(f64, f64)> = (0..cells).map(|j| (centre_y[j], w[cells / 2 * cells + j])).collect();
-    let share = if profile == Profile::Quick { 0.05 } else { 0.002 };
-    let (u_min, v_max, v_min) = (extremum(&column, -1.0), extremum(&row, 1.0), extremum(&row, -1.0));
+    let column: Vec<(f64, f64)> = (0..cells)
+        .map(|k| (centre_z[k], v[k * cells + cells / 2]))
+        .collect();
+    let row: Vec<(f64, f64)> = (0..cells)
+        .map(|j| (centre_y[j], w[cells / 2 * cells + j]))
+        .collect();
+    let share = if profile == Profile::Quick {
+        0.05
+    } else {
+        0.002
+    };
+    let (u_min, v_max, v_min) = (
+        extremum(&column, -1.0),
+        extremum(&row, 1.0),
+        extremum(&row, -1.0),
+    );
     let mut checks = Vec::new();
-    for (name, found, expected) in [("least u", u_min, U_MIN), ("largest v", v_max, V_MAX), ("least v", v_min, V_MIN)] {
+    for (name, found, expected) in [
+        ("least u", u_min, U_MIN),
+        ("largest v", v_max, V_MAX),
+        ("least v", v_min, V_MIN),
+    ] {
         checks.push(Claim::relative(name, found.1, expected.1, share));
-        checks.push(Claim::relative(&format!("place of the {name}"), found.0, expected.0, 2.0 * share));
+        checks.push(Claim::relative(
+            &format!("place of the {name}"),
+            found.0,
+            expected.0,
+            2.0 * share,
+        ));
     }
     let stored = numbers("ghia_cavity_u.csv")?;
     let ghia: Vec<(f64, f64)> = stored.iter().map(|r| (r[0], r[3])).collect();
-    let table = table_of("position_m", &[("u_on_vertical_m_s", &column), ("v_on_horizontal_m_s", &row)]);
-    let plot = CurvePlot::new("Centre lines", Axis::linear("position [m]"), Axis::linear("velocity [m/s]"))
-        .with(Series::new("u, vertical line", Style::Line, column))
-        .with(Series::new("v, horizontal line", Style::Dash, row))
-        .with(Series::new("u, Ghia et al.", Style::Markers, ghia))
-        .with(Series::new("extrema, Botella and Peyret", Style::Markers, [U_MIN, V_MAX, V_MIN]));
-    Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
+    let table = table_of(
+        "position_m",
+        &[
+            ("u_on_vertical_m_s", &column),
+            ("v_on_horizontal_m_s", &row),
+        ],
+    );
+    let plot = CurvePlot::new(
+        "Centre lines",
+        Axis::linear("position [m]"),
+        Axis::linear("velocity [m/s]"),
+    )
+    .with(Series::new("u, vertical line", Style::Line, column))
+    .with(Series::new("v, horizontal line", Style::Dash, row))
+    .with(Series::new("u, Ghia et al.", Style::Markers, ghia))
+    .with(Series::new(
+        "extrema, Botella and Peyret",
+        Style::Markers,
+        [U_MIN, V_MAX, V_MIN],
+    ));
+    Ok(Shown {
+        checks,
+        table,
+        figure: Figure::stacked([plot]),
+    })
 }
 
 fn extremum(points: &[(f64, f64)], sign: f64) -> (f64, f64) {
-    let best =
-        (1..points.len() - 1).max_by(|&a, &b| (sign * points[a].1).total_cmp(&(sign * points[b].1))).unwrap_or(1);
+    let best = (1..points.len() - 1)
+        .max_by(|&a, &b| (sign * points[a].1).total_cmp(&(sign * points[b].1)))
+        .unwrap_or(1);
     parabola_vertex([points[best - 1], points[best], points[best + 1]])
 }
 
@@ -257,36 +447,88 @@ const MODELS: [(&str, SubgridModel); 4] = [
 
 /// The vortices of Taylor and Green at Re 1600: direct simulation against a stored one, and the subgrid models.
 pub(super) fn turbulent_vortices(profile: Profile) -> Result<Shown, Failure> {
-    let stored: Vec<(f64, f64)> = numbers("tgv_re1600_dns.csv")?.iter().map(|r| (r[0], r[2])).collect();
+    let stored: Vec<(f64, f64)> = numbers("tgv_re1600_dns.csv")?
+        .iter()
+        .map(|r| (r[0], r[2]))
+        .collect();
     let peak = stored.iter().map(|p| p.1).fold(0.0, f64::max);
-    let (fine, coarse) = if profile == Profile::Quick { (64, 32) } else { (128, 64) };
-    let mut plot = CurvePlot::new("Loss of energy, Re 1600", Axis::linear("time [s]"), Axis::linear("-dE/dt [m²/s³]"))
-        .with(Series::new("stored simulation, 512^3", Style::Line, stored.iter().copied().filter(|p| p.0 <= END_S)));
+    let (fine, coarse) = if profile == Profile::Quick {
+        (64, 32)
+    } else {
+        (128, 64)
+    };
+    let mut plot = CurvePlot::new(
+        "Loss of energy, Re 1600",
+        Axis::linear("time [s]"),
+        Axis::linear("-dE/dt [m²/s³]"),
+    )
+    .with(Series::new(
+        "stored simulation, 512^3",
+        Style::Line,
+        stored.iter().copied().filter(|p| p.0 <= END_S),
+    ));
     let mut table = Table::new().float("time_s", (1..OUTPUTS).map(|i| EVERY_S * i as f64));
     let mut errors = Vec::new();
     let fine_models = [MODELS[0], MODELS[3]].map(|model| (fine, model));
-    for (cells, (name, model)) in fine_models.into_iter().chain(MODELS.map(|model| (coarse, model))) {
+    for (cells, (name, model)) in fine_models
+        .into_iter()
+        .chain(MODELS.map(|model| (coarse, model)))
+    {
         let curve = dissipation(cells, model)?;
         errors.push(error(&curve, &stored, peak));
-        table = table.float(&format!("dissipation_{cells}_{}", name.replace(' ', "_")), curve.iter().map(|p| p.1));
-        let style = if cells == fine { Style::Dash } else { Style::DashDot };
+        table = table.float(
+            &format!("dissipation_{cells}_{}", name.replace(' ', "_")),
+            curve.iter().map(|p| p.1),
+        );
+        let style = if cells == fine {
+            Style::Dash
+        } else {
+            Style::DashDot
+        };
         plot = plot.with(Series::new(&format!("{cells}^3, {name}"), style, curve));
     }
     let bar = if profile == Profile::Quick { 0.1 } else { 0.02 };
     let mut checks = vec![
-        Claim::at_most(&format!("{fine}^3, no model: rms error over peak"), errors[0], bar),
-        Claim::at_most(&format!("{fine}^3, multiscale: rms error over peak"), errors[1], bar),
+        Claim::at_most(
+            &format!("{fine}^3, no model: rms error over peak"),
+            errors[0],
+            bar,
+        ),
+        Claim::at_most(
+            &format!("{fine}^3, multiscale: rms error over peak"),
+            errors[1],
+            bar,
+        ),
     ];
     for (i, (name, _)) in MODELS.iter().enumerate().skip(1) {
-        checks.push(Claim::at_most(&format!("{coarse}^3: {name} against no model"), errors[2 + i], errors[2]));
+        checks.push(Claim::at_most(
+            &format!("{coarse}^3: {name} against no model"),
+            errors[2 + i],
+            errors[2],
+        ));
     }
-    checks.push(Claim::at_most(&format!("{coarse}^3: multiscale against WALE 0.5"), errors[5], errors[3]));
-    checks.push(Claim::at_most(&format!("{coarse}^3: multiscale against WALE 0.325"), errors[5], errors[4]));
-    Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
+    checks.push(Claim::at_most(
+        &format!("{coarse}^3: multiscale against WALE 0.5"),
+        errors[5],
+        errors[3],
+    ));
+    checks.push(Claim::at_most(
+        &format!("{coarse}^3: multiscale against WALE 0.325"),
+        errors[5],
+        errors[4],
+    ));
+    Ok(Shown {
+        checks,
+        table,
+        figure: Figure::stacked([plot]),
+    })
 }
 
 fn error(curve: &[(f64, f64)], stored: &[(f64, f64)], peak: f64) -> f64 {
-    let squares: f64 = curve.iter().map(|p| (p.1 - value_at(stored, p.0)).powi(2)).sum();
+    let squares: f64 = curve
+        .iter()
+        .map(|p| (p.1 - value_at(stored, p.0)).powi(2))
+        .sum();
     (squares / curve.len() as f64).sqrt() / peak
 }
 
@@ -302,7 +544,9 @@ fn dissipation(cells: usize, model: SubgridModel) -> Result<Vec<(f64, f64)>, Fai
         energy.push(flow.kinetic_energy_m5_s2() / volume);
     }
     let slope = |i: usize| (energy[i - 1] - energy[i + 1]) / (2.0 * EVERY_S);
-    Ok((1..OUTPUTS).map(|i| (EVERY_S * i as f64, slope(i))).collect())
+    Ok((1..OUTPUTS)
+        .map(|i| (EVERY_S * i as f64, slope(i)))
+        .collect())
 }
 
 const REYNOLDS_TAU: f64 = 178.12;
@@ -322,7 +566,10 @@ pub(super) fn channel() -> Result<Shown, Failure> {
     while flow.time_s() < MEAN_TO_S {
         flow.step()?;
         if flow.time_s() >= next_s {
-            for (sum, plane) in mean.iter_mut().zip(flow.face_velocity_m_s(0).chunks(per_plane)) {
+            for (sum, plane) in mean
+                .iter_mut()
+                .zip(flow.face_velocity_m_s(0).chunks(per_plane))
+            {
                 *sum += plane.iter().sum::<f64>() / per_plane as f64;
             }
             samples += 1.0;
@@ -332,15 +579,43 @@ pub(super) fn channel() -> Result<Shown, Failure> {
     let half = cells[2] / 2;
     let z_m = flow.mesh().centre_m(2);
     let at = |k: usize| 0.5 * (mean[k] + mean[cells[2] - 1 - k]) / samples;
-    let profile: Vec<(f64, f64)> = (0..half).map(|k| ((1.0 + z_m[k]) * REYNOLDS_TAU, at(k))).collect();
-    let stored: Vec<(f64, f64)> = numbers("channel_retau180_mean.csv")?.iter().map(|r| (r[0], r[1])).collect();
-    let worst = stored.iter().map(|p| (value_at(&profile, p.0) / p.1 - 1.0).abs()).fold(0.0, f64::max);
-    let checks = vec![Claim::at_most("largest error of the mean velocity, relative", worst, 0.05)];
+    let profile: Vec<(f64, f64)> = (0..half)
+        .map(|k| ((1.0 + z_m[k]) * REYNOLDS_TAU, at(k)))
+        .collect();
+    let stored: Vec<(f64, f64)> = numbers("channel_retau180_mean.csv")?
+        .iter()
+        .map(|r| (r[0], r[1]))
+        .collect();
+    let worst = stored
+        .iter()
+        .map(|p| (value_at(&profile, p.0) / p.1 - 1.0).abs())
+        .fold(0.0, f64::max);
+    let checks = vec![Claim::at_most(
+        "largest error of the mean velocity, relative",
+        worst,
+        0.05,
+    )];
     let table = table_of("z_plus", &[("mean_velocity_plus", &profile)]);
-    let plot = CurvePlot::new("Mean velocity, Re_tau 178", Axis::log("z+"), Axis::linear("U+"))
-        .with(Series::new("48 x 48 x 64, multiscale model", Style::Line, profile))
-        .with(Series::new("Moser, Kim and Mansour", Style::Markers, stored));
-    Ok(Shown { checks, table, figure: Figure::stacked([plot]) })
+    let plot = CurvePlot::new(
+        "Mean velocity, Re_tau 178",
+        Axis::log("z+"),
+        Axis::linear("U+"),
+    )
+    .with(Series::new(
+        "48 x 48 x 64, multiscale model",
+        Style::Line,
+        profile,
+    ))
+    .with(Series::new(
+        "Moser, Kim and Mansour",
+        Style::Markers,
+        stored,
+    ));
+    Ok(Shown {
+        checks,
+        table,
+        figure: Figure::stacked([plot]),
+    })
 }
 
 /// The extremum of the parabola through three points.
@@ -357,7 +632,8 @@ mod tests {
 
     #[test]
     fn the_vertex_of_a_parabola_is_found_from_uneven_points() {
-        let (x, y) = parabola_vertex([0.0, 1.0, 4.0].map(|x: f64| (x, 3.0 - 2.0 * (x - 1.5).powi(2))));
+        let (x, y) =
+            parabola_vertex([0.0, 1.0, 4.0].map(|x: f64| (x, 3.0 - 2.0 * (x - 1.5).powi(2))));
         assert!((x - 1.5).abs() < 1e-12 && (y - 3.0).abs() < 1e-12);
     }
 }

@@ -19,7 +19,10 @@ pub(super) use wakescope_sim::plot::{Axis, CurvePlot, Figure, Series, Style};
 pub(super) type Curve = Vec<(f64, f64)>;
 
 /// The multiscale model as it is by default.
-pub(super) const MULTISCALE: Subgrid = Subgrid::MultiscaleWale { constant: None, order: None };
+pub(super) const MULTISCALE: Subgrid = Subgrid::MultiscaleWale {
+    constant: None,
+    order: None,
+};
 
 /// The history of a preset's flow with a change, without a model unless one is given, to an age.
 pub(super) fn run(
@@ -32,7 +35,8 @@ pub(super) fn run(
     case.solver.subgrid = subgrid;
     (case.output.fields, case.output.planes) = (Vec::new(), Vec::new());
     if let Some(output) = &mut case.wake {
-        (output.end_tau, output.fields_tau, output.planes_tau) = (end_tau, Some(Vec::new()), Some(Vec::new()));
+        (output.end_tau, output.fields_tau, output.planes_tau) =
+            (end_tau, Some(Vec::new()), Some(Vec::new()));
     }
     if let CaseKind::Wake(flow) = &mut case.case {
         change(flow);
@@ -48,7 +52,9 @@ pub(super) fn plane(flow: &mut WakeFlow) {
 /// A table of curves at the same places, a column for each.
 pub(super) fn table_of(places: &str, curves: &[(&str, &Curve)]) -> Table {
     let table = Table::new().float(places, curves[0].1.iter().map(|p| p.0));
-    curves.iter().fold(table, |table, (name, curve)| table.float(name, curve.iter().map(|p| p.1)))
+    curves.iter().fold(table, |table, (name, curve)| {
+        table.float(name, curve.iter().map(|p| p.1))
+    })
 }
 
 /// A column of stored rows against the first.
@@ -63,7 +69,9 @@ pub(super) fn worst(
     [from, to]: [f64; 2],
     difference: impl Fn(f64, f64) -> f64,
 ) -> f64 {
-    let within = stored.iter().filter(|p| p.0 > from - 1e-9 && p.0 < to + 1e-9);
+    let within = stored
+        .iter()
+        .filter(|p| p.0 > from - 1e-9 && p.0 < to + 1e-9);
     // What is no number is no agreement.
     within
         .map(|p| difference(value_at(measured, p.0), p.1))

@@ -22,14 +22,27 @@ const SEARCH: (f64, f64) = (0.03, 100.0);
 /// All measurements; few realisations if `quick`.
 pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
     let file = SceneFile::parse(include_str!("chain.toml"), Path::new("chain.toml"))?;
-    let request = Request { budget: SEARCH.1, ..Request::new(SEARCH.0, &[Figure::Std]) };
+    let request = Request {
+        budget: SEARCH.1,
+        ..Request::new(SEARCH.0, &[Figure::Std])
+    };
     let found = Accuracy::of(&file, &request, &Silent)?;
     let lacking = || Failure::new("the search tells no standard deviation of the map".into());
-    let of_one = 0.5 * found.noises.first().ok_or_else(lacking)?.now * (file.content.scan.realisations as f64).sqrt();
-    let finest = found.ladders.iter().filter_map(|ladder| Some((ladder.key, ladder.steps.first()?.value)));
+    let of_one = 0.5
+        * found.noises.first().ok_or_else(lacking)?.now
+        * (file.content.scan.realisations as f64).sqrt();
+    let finest = found
+        .ladders
+        .iter()
+        .filter_map(|ladder| Some((ladder.key, ladder.steps.first()?.value)));
     let fine = with(&file, &finest.collect::<Vec<_>>())?;
     let mut rows = Vec::new();
-    for step in found.ladders.iter().filter(|ladder| ladder.key == WINDOW_STEP).flat_map(|ladder| &ladder.steps) {
+    for step in found
+        .ladders
+        .iter()
+        .filter(|ladder| ladder.key == WINDOW_STEP)
+        .flat_map(|ladder| &ladder.steps)
+    {
         let method = match step.value {
             1.0 => "windows at every sample".into(),
             value => format!("windows {value} samples apart"),
@@ -40,14 +53,36 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
             Verdict::Lost(_) => None,
             _ => step.shift(Figure::Std),
         };
-        let counts = if shift.is_some() { few(&COUNTS, quick) } else { &COUNTS[..1] };
-        rows.extend(settings(["one whole map", &method, "realisations"], counts, |count| {
-            let plan = Plan::new(with(&fine, &[(WINDOW_STEP, step.value), (REALISATIONS, count)])?, Target::Map)?;
-            let (_, cost) = fastest(|| Ok(run::run(&plan, &Silent)?))?;
-            let Some(Shift { shift, error: of_shift }) = shift else { return Ok(Found::exact(f64::NAN, cost)) };
-            let error = shift.hypot(of_one / count.sqrt());
-            Ok(Found { error, standard_error: (shift / error * of_shift).abs(), cost, set_up_s: 0.0 })
-        })?);
+        let counts = if shift.is_some() {
+            few(&COUNTS, quick)
+        } else {
+            &COUNTS[..1]
+        };
+        rows.extend(settings(
+            ["one whole map", &method, "realisations"],
+            counts,
+            |count| {
+                let plan = Plan::new(
+                    with(&fine, &[(WINDOW_STEP, step.value), (REALISATIONS, count)])?,
+                    Target::Map,
+                )?;
+                let (_, cost) = fastest(|| Ok(run::run(&plan, &Silent)?))?;
+                let Some(Shift {
+                    shift,
+                    error: of_shift,
+                }) = shift
+                else {
+                    return Ok(Found::exact(f64::NAN, cost));
+                };
+                let error = shift.hypot(of_one / count.sqrt());
+                Ok(Found {
+                    error,
+                    standard_error: (shift / error * of_shift).abs(),
+                    cost,
+                    set_up_s: 0.0,
+                })
+            },
+        )?);
     }
     Ok(rows)
 }

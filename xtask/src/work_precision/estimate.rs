@@ -35,7 +35,11 @@ pub(super) fn rows(quick: bool) -> Result<Vec<Row>, Failure> {
         ("0 dB, band", NoiseModel::BandLimited, 0.0),
         ("20 dB, band", NoiseModel::BandLimited, 20.0),
     ];
-    let (cases, trials) = if quick { (&cases[..1], 2000) } else { (&cases[..], 6000) };
+    let (cases, trials) = if quick {
+        (&cases[..1], 2000)
+    } else {
+        (&cases[..], 6000)
+    };
     let mut rows = Vec::new();
     for &(case, noise, snr_db) in cases {
         rows.extend(Uniform::new(noise, snr_db, trials)?.rows(case, quick)?);
@@ -63,18 +67,28 @@ impl Uniform {
             }
             drawn.push((velocity_m_s, windows));
         }
-        Ok(Self { known: air.known, bound_m_s: bound_m_s(&air.known, WINDOWS)?, trials: drawn })
+        Ok(Self {
+            known: air.known,
+            bound_m_s: bound_m_s(&air.known, WINDOWS)?,
+            trials: drawn,
+        })
     }
 
     /// Errors of all trials \[m/s\], and whether the estimator says that it has a velocity.
-    pub(crate) fn errors(&self, statistic: &dyn Statistic<f64>, estimator: &dyn Estimator) -> Vec<(f64, bool)> {
+    pub(crate) fn errors(
+        &self,
+        statistic: &dyn Statistic<f64>,
+        estimator: &dyn Estimator,
+    ) -> Vec<(f64, bool)> {
         let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.statistic_len()]);
         let mut mean = vec![0.0; one.len()];
         let error = |(velocity_m_s, windows): &(f64, Vec<Vec<f64>>)| {
             mean.fill(0.0);
             for window in windows {
                 statistic.evaluate(window, &mut scratch, &mut one);
-                mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / WINDOWS as f64);
+                mean.iter_mut()
+                    .zip(&one)
+                    .for_each(|(sum, value)| *sum += value / WINDOWS as f64);
             }
             let found = estimator.estimate(&mean, &mut scratch);
             (found.velocity_m_s - velocity_m_s, found.is_good())
@@ -91,42 +105,101 @@ impl Uniform {
         estimator: &dyn Estimator,
     ) -> Result<Row, Failure> {
         let (errors, cost) = fastest(|| Ok(self.errors(statistic, estimator)))?;
-        let errors: Vec<f64> = errors.into_iter().map(|(error, good)| if good { error } else { f64::NAN }).collect();
+        let errors: Vec<f64> = errors
+            .into_iter()
+            .map(|(error, good)| if good { error } else { f64::NAN })
+            .collect();
         let found = good_and_bad(&errors, BAND_M_S);
-        let excess = if found.bad_fraction > 0.2 { f64::NAN } else { found.std_good_m_s / self.bound_m_s - 1.0 };
-        let (standard_error, cost) =
-            (found.std_good_error_m_s / self.bound_m_s, cost.scaled(1.0 / self.trials.len() as f64));
-        Ok(Row::new(of, value, Found { error: excess, standard_error, cost, set_up_s: 0.0 }))
+        let excess = if found.bad_fraction > 0.2 {
+            f64::NAN
+        } else {
+            found.std_good_m_s / self.bound_m_s - 1.0
+        };
+        let (standard_error, cost) = (
+            found.std_good_error_m_s / self.bound_m_s,
+            cost.scaled(1.0 / self.trials.len() as f64),
+        );
+        Ok(Row::new(
+            of,
+            value,
+            Found {
+                error: excess,
+                standard_error,
+                cost,
+                set_up_s: 0.0,
+            },
+        ))
     }
 
     fn rows(&self, case: &'static str, quick: bool) -> Result<Vec<Row>, Failure> {
         let all = Methods::all(&self.known, &[WINDOWS])?;
         let of = all.methods.iter().map(|method| {
             let statistic = all.statistics[method.statistic].as_ref();
-            self.row([case, method.name, "none"], 0.0, statistic, method.estimators[0].as_ref())
+            self.row(
+                [case, method.name, "none"],
+                0.0,
+                statistic,
+                method.estimators[0].as_ref(),
+            )
         });
         let mut rows = of.collect::<Result<Vec<_>, _>>()?;
         let (s, kind) = (sampling()?, SignalKind::Real);
         let plain = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW)?;
         for padded in [64, 128, 256, 1024, 4096] {
-            let peak = SpectralPeak::new(&s, kind, &unweighted_lags(WINDOW), padded, Refinement::Parabola)?;
-            rows.push(self.row([case, "PA by padding", "padded_samples"], padded as f64, &plain, &peak)?);
+            let peak = SpectralPeak::new(
+                &s,
+                kind,
+                &unweighted_lags(WINDOW),
+                padded,
+                Refinement::Parabola,
+            )?;
+            rows.push(self.row(
+                [case, "PA by padding", "padded_samples"],
+                padded as f64,
+                &plain,
+                &peak,
+            )?);
         }
         if quick {
             return Ok(rows);
         }
         for order in [4, 8, 16, 32] {
             let value = order as f64;
-            let ca = ModelPeak::new(ModelReading::Spectrum, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
-            let capon = ModelPeak::new(ModelReading::Capon, &s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
-            let lags = LagWindowPeak::new(&s, kind, &unweighted_lags(WINDOW), order, 1024, Refinement::Parabola)?;
+            let ca = ModelPeak::new(
+                ModelReading::Spectrum,
+                &s,
+                kind,
+                WINDOW,
+                order,
+                2048,
+                Refinement::Parabola,
+            )?;
+            let capon = ModelPeak::new(
+                ModelReading::Capon,
+                &s,
+                kind,
+                WINDOW,
+                order,
+                2048,
+                Refinement::Parabola,
+            )?;
+            let lags = LagWindowPeak::new(
+                &s,
+                kind,
+                &unweighted_lags(WINDOW),
+                order,
+                1024,
+                Refinement::Parabola,
+            )?;
             rows.push(self.row([case, "CA by order", "order"], value, &plain, &ca)?);
             rows.push(self.row([case, "Capon by order", "order"], value, &plain, &capon)?);
             rows.push(self.row([case, "CA-BT by lags", "lags"], value, &plain, &lags)?);
         }
         let wind = GradientModel::new(&s, WINDOW, self.known.sigma_s, self.known.estimate_noise())?;
         for gradients in [1, 3, 5, 9] {
-            let list: Vec<f64> = (0..gradients).map(|k| 0.1 * (k as f64 - 0.5 * (gradients - 1) as f64)).collect();
+            let list: Vec<f64> = (0..gradients)
+                .map(|k| 0.1 * (k as f64 - 0.5 * (gradients - 1) as f64))
+                .collect();
             let plan = GradientLikelihood::<f64>::new(&wind, self.known.snr, &list, 1024)?;
             let of = [case, "likelihood by gradients", "gradients"];
             rows.push(self.row(of, gradients as f64, &plan.statistic, &plan.estimator)?);

@@ -10,16 +10,26 @@ use wakescope_sim::io::csv_input::TextTable;
 pub(super) fn rows() -> Result<Vec<Row>, Failure> {
     let kernel_s = physics::kernel_s()?;
     let mut rows = Vec::new();
-    let mut files: Vec<_> = std::fs::read_dir(root().join("docs/peers"))?.collect::<Result<_, _>>()?;
+    let mut files: Vec<_> =
+        std::fs::read_dir(root().join("docs/peers"))?.collect::<Result<_, _>>()?;
     files.sort_by_key(std::fs::DirEntry::path);
-    for path in files.iter().map(std::fs::DirEntry::path).filter(|path| path.extension().is_some_and(|e| e == "csv")) {
+    for path in files
+        .iter()
+        .map(std::fs::DirEntry::path)
+        .filter(|path| path.extension().is_some_and(|e| e == "csv"))
+    {
         let (table, name) = (TextTable::read(&path)?, path.display());
-        let there_s =
-            table.comment.lines().find_map(|line| line.trim().strip_prefix("kernel_s = ")?.parse::<f64>().ok());
-        let there_s = there_s.ok_or_else(|| Failure::new(format!("{name}: its head does not say kernel_s")))?;
+        let there_s = table
+            .comment
+            .lines()
+            .find_map(|line| line.trim().strip_prefix("kernel_s = ")?.parse::<f64>().ok());
+        let there_s = there_s
+            .ok_or_else(|| Failure::new(format!("{name}: its head does not say kernel_s")))?;
         for cells in &table.rows {
             let row = row(cells, kernel_s / there_s);
-            rows.push(row.ok_or_else(|| Failure::new(format!("{name}: not a row: {}", cells.join(","))))?);
+            rows.push(
+                row.ok_or_else(|| Failure::new(format!("{name}: not a row: {}", cells.join(","))))?,
+            );
         }
     }
     Ok(rows)
@@ -27,12 +37,31 @@ pub(super) fn rows() -> Result<Vec<Row>, Failure> {
 
 /// `panel,method,version,value,error,standard_error,cpu_s`.
 fn row(cells: &[String], scale: f64) -> Option<Row> {
-    let [case, method, version, numbers @ ..] = cells else { return None };
-    let numbers: Vec<f64> = numbers.iter().map(|n| n.parse().ok()).collect::<Option<_>>()?;
-    let &[value, error, standard_error, cpu_s] = &numbers[..] else { return None };
-    let cost = Cost { cpu_s: cpu_s * scale, wall_s: f64::NAN, peak_mem_bytes: f64::NAN };
-    let found = Found { error, standard_error, cost, set_up_s: f64::NAN };
-    (!version.is_empty()).then(|| Row { version: version.clone(), ..Row::new([case, method, ""], value, found) })
+    let [case, method, version, numbers @ ..] = cells else {
+        return None;
+    };
+    let numbers: Vec<f64> = numbers
+        .iter()
+        .map(|n| n.parse().ok())
+        .collect::<Option<_>>()?;
+    let &[value, error, standard_error, cpu_s] = &numbers[..] else {
+        return None;
+    };
+    let cost = Cost {
+        cpu_s: cpu_s * scale,
+        wall_s: f64::NAN,
+        peak_mem_bytes: f64::NAN,
+    };
+    let found = Found {
+        error,
+        standard_error,
+        cost,
+        set_up_s: f64::NAN,
+    };
+    (!version.is_empty()).then(|| Row {
+        version: version.clone(),
+        ..Row::new([case, method, ""], value, found)
+    })
 }
 
 #[cfg(test)]
@@ -43,11 +72,23 @@ mod tests {
     fn a_row_keeps_its_commas_and_its_time_is_scaled() {
         let row = |line: &str| {
             let head = "panel,method,version,value,error,standard_error,cpu_s";
-            row(TextTable::parse(&format!("{head}\n{line}")).ok()?.rows.first()?, 0.5)
+            row(
+                TextTable::parse(&format!("{head}\n{line}"))
+                    .ok()?
+                    .rows
+                    .first()?,
+                0.5,
+            )
         };
         let found = row("\"0 dB, white\",\"numpy, PA\",2.4.6,128,0.15,0.02,4e-6").unwrap();
-        assert_eq!((found.case.as_str(), found.method.as_str()), ("0 dB, white", "numpy, PA"));
-        assert_eq!((found.version.as_str(), found.value, found.found.cost.cpu_s), ("2.4.6", 128.0, 2e-6));
+        assert_eq!(
+            (found.case.as_str(), found.method.as_str()),
+            ("0 dB, white", "numpy, PA")
+        );
+        assert_eq!(
+            (found.version.as_str(), found.value, found.found.cost.cpu_s),
+            ("2.4.6", 128.0, 2e-6)
+        );
         assert!(row("a,b,c").is_none() && row("screens,numpy,,128,0.15,0.02,4e-6").is_none());
     }
 }

@@ -20,7 +20,8 @@ use wakescope_optics::screens::{Real, ScreenGenerator};
 use wakescope_optics::{Grid, Layers, Misalignment, MonteCarlo, Telescope, Turbulence, theory};
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch, Simulator,
+    GaussianPulse, LineOfSight, NoiseModel, PulseDuration, Record, SPEED_OF_LIGHT_M_S, Scratch,
+    Simulator,
 };
 
 pub(super) const SEED: u64 = 1;
@@ -43,18 +44,29 @@ fn phase_screens<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
     let spectrum = Turbulence::table2(CN2_M_M23)?.spectrum;
     settings(knob, &[128.0, 256.0, 512.0], |points| {
         let points = points as usize;
-        let (generator, set_up) =
-            measured(|| Ok(ScreenGenerator::<T>::new(Grid::square(points, 2e-3)?, Arc::clone(&spectrum))?))?;
+        let (generator, set_up) = measured(|| {
+            Ok(ScreenGenerator::<T>::new(
+                Grid::square(points, 2e-3)?,
+                Arc::clone(&spectrum),
+            )?)
+        })?;
         let mut worst = 0.0_f64;
-        for steps in [2, 4, 8, 16, 32, 64, 128, 256].into_iter().filter(|&steps| steps <= points / 2) {
+        for steps in [2, 4, 8, 16, 32, 64, 128, 256]
+            .into_iter()
+            .filter(|&steps| steps <= points / 2)
+        {
             let exact = structure_function_m53(&*spectrum, steps as f64 * 2e-3)?;
             worst = worst.max((generator.expected_structure_m53(steps, 0) / exact - 1.0).abs());
         }
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(SEED);
         let (mut work, mut first) = (generator.work(), vec![T::zero(); points * points]);
         let mut second = first.clone();
-        let ((), cost) = fastest(|| Ok(generator.fill_pair(&mut rng, &mut work, &mut first, &mut second)?))?;
-        Ok(Found { set_up_s: set_up.cpu_s, ..Found::exact(worst, cost.scaled(0.5)) })
+        let ((), cost) =
+            fastest(|| Ok(generator.fill_pair(&mut rng, &mut work, &mut first, &mut second)?))?;
+        Ok(Found {
+            set_up_s: set_up.cpu_s,
+            ..Found::exact(worst, cost.scaled(0.5))
+        })
     })
 }
 
@@ -74,18 +86,31 @@ fn free_space<T: Real>(method: &'static str) -> Result<Vec<Row>, Failure> {
 fn bistatic(quick: bool) -> Result<Vec<Row>, Failure> {
     let (few, many) = (40, if quick { 200 } else { 800 });
     let bias = layers_bias(5)?;
-    let of = |realisations| measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(realisations)?));
+    let of =
+        |realisations| measured(|| Ok(screens(5, Grid::square(256, 4e-3)?)?.run(realisations)?));
     let (short, long) = (of(few)?, of(many)?);
     let one = long.1.less(short.1).scaled(1.0 / (many - few) as f64);
-    let found = long.0.bistatic.ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
+    let found = long
+        .0
+        .bistatic
+        .ok_or_else(|| Failure::new("the run gave no bistatic efficiency".into()))?;
     let deviation = found.standard_error[0] / found.mean[0] * (many as f64).sqrt();
     let set_up_s = (short.1.cpu_s - few as f64 * one.cpu_s).max(0.0);
-    let knob = ["bistatic efficiency", "5 layers, 256 points", "realisations"];
+    let knob = [
+        "bistatic efficiency",
+        "5 layers, 256 points",
+        "realisations",
+    ];
     settings(knob, &DRAWN_REALISATIONS, |count| {
         let noise = deviation / count.sqrt();
         let error = bias.hypot(noise);
         let standard_error = noise * noise / error / (2.0 * many as f64).sqrt();
-        Ok(Found { error, standard_error, cost: one.scaled(count), set_up_s })
+        Ok(Found {
+            error,
+            standard_error,
+            cost: one.scaled(count),
+            set_up_s,
+        })
     })
 }
 
@@ -94,35 +119,57 @@ const DRAWN_REALISATIONS: [f64; 6] = [50.0, 200.0, 800.0, 3200.0, 12800.0, 51200
 
 /// What a finite number of screens in the middles of their layers does to the bistatic efficiency, relative, by exact theory.
 pub(super) fn layers_bias(count: usize) -> Result<f64, Failure> {
-    let (telescope, turbulence, none) = (Telescope::table2(), Turbulence::table2(CN2_M_M23)?, Misalignment::NONE);
+    let (telescope, turbulence, none) = (
+        Telescope::table2(),
+        Turbulence::table2(CN2_M_M23)?,
+        Misalignment::NONE,
+    );
     let table = StructureTable::new(&*turbulence.spectrum);
-    let continuous = theory::bistatic_efficiency_with(&telescope, &none, &turbulence.cn2, &table, RANGE_M)?;
+    let continuous =
+        theory::bistatic_efficiency_with(&telescope, &none, &turbulence.cn2, &table, RANGE_M)?;
     let layers = Layers::equal(count, RANGE_M)?.screens_to(RANGE_M, &turbulence.cn2)?;
-    Ok((theory::bistatic_efficiency_screens(&telescope, &none, &layers, &table, RANGE_M)? / continuous - 1.0).abs())
+    Ok(
+        (theory::bistatic_efficiency_screens(&telescope, &none, &layers, &table, RANGE_M)?
+            / continuous
+            - 1.0)
+            .abs(),
+    )
 }
 
 fn screens(layers: usize, grid: Grid) -> Result<MonteCarlo, Failure> {
     let layers = Layers::equal(layers, RANGE_M)?;
-    Ok(MonteCarlo { layers, range_m: vec![RANGE_M], grid, ..MonteCarlo::table2(CN2_M_M23, SEED)? })
+    Ok(MonteCarlo {
+        layers,
+        range_m: vec![RANGE_M],
+        grid,
+        ..MonteCarlo::table2(CN2_M_M23, SEED)?
+    })
 }
 
 /// Vortices that become turbulent, and what an unfinished pressure solve costs and leaves.
 pub(super) fn les(quick: bool) -> Result<Vec<Row>, Failure> {
     let mut rows = taylor_green(quick)?;
-    for (method, pressure) in [("direct", PressureMethod::Direct), ("multigrid", PressureMethod::Multigrid)] {
+    for (method, pressure) in [
+        ("direct", PressureMethod::Direct),
+        ("multigrid", PressureMethod::Multigrid),
+    ] {
         let knob = ["pressure", method, "tolerance"];
-        rows.extend(settings(knob, few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick), |tolerance| {
-            let mut case = cases::taylor_green_3d(32, 1600.0)?;
-            (case.settings.pressure, case.settings.pressure_tolerance) = (pressure, tolerance);
-            let (divergence, cost) = fastest(|| {
-                let mut flow = case.start()?.0;
-                for _ in 0..10 {
-                    flow.step()?;
-                }
-                Ok(flow.relative_divergence())
-            })?;
-            Ok(Found::exact(divergence, cost))
-        })?);
+        rows.extend(settings(
+            knob,
+            few(&[1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12], quick),
+            |tolerance| {
+                let mut case = cases::taylor_green_3d(32, 1600.0)?;
+                (case.settings.pressure, case.settings.pressure_tolerance) = (pressure, tolerance);
+                let (divergence, cost) = fastest(|| {
+                    let mut flow = case.start()?.0;
+                    for _ in 0..10 {
+                        flow.step()?;
+                    }
+                    Ok(flow.relative_divergence())
+                })?;
+                Ok(Found::exact(divergence, cost))
+            },
+        )?);
     }
     Ok(rows)
 }
@@ -134,18 +181,32 @@ const APART_S: f64 = 0.2;
 fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
     let stored = numbers("tgv_re200_fourier96.csv")?;
     let reference: Vec<f64> = stored.iter().step_by(2).map(|row| row[1]).collect();
-    let lost = |energy: &[f64]| -> Vec<f64> { energy.windows(3).map(|e| (e[0] - e[2]) / (2.0 * APART_S)).collect() };
+    let lost = |energy: &[f64]| -> Vec<f64> {
+        energy
+            .windows(3)
+            .map(|e| (e[0] - e[2]) / (2.0 * APART_S))
+            .collect()
+    };
     let exact = lost(&reference);
     let peak = exact.iter().copied().fold(0.0, f64::max);
     // Steps that divide the outputs, at a Courant number of about one half.
-    let cells: &[f64] =
-        if quick { &[12.0, 16.0, 24.0, 32.0, 48.0] } else { &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0] };
-    let knob = ["Taylor-Green vortices, Re 200", "Runge-Kutta 3", "cells a side"];
+    let cells: &[f64] = if quick {
+        &[12.0, 16.0, 24.0, 32.0, 48.0]
+    } else {
+        &[12.0, 16.0, 24.0, 32.0, 48.0, 64.0, 96.0]
+    };
+    let knob = [
+        "Taylor-Green vortices, Re 200",
+        "Runge-Kutta 3",
+        "cells a side",
+    ];
     settings(knob, cells, |cells| {
         let substeps = (cells / 24.0).ceil();
         let mut case = cases::taylor_green_3d(cells as usize, 200.0)?;
         case.settings.scheme = TimeScheme::RungeKutta3;
-        case.settings.time_step = TimeStep::Fixed { step_s: APART_S / substeps };
+        case.settings.time_step = TimeStep::Fixed {
+            step_s: APART_S / substeps,
+        };
         let (flow, set_up) = measured(|| Ok(case.start()?.0))?;
         drop(flow);
         let (energy, cost) = fastest(|| {
@@ -157,9 +218,16 @@ fn taylor_green(quick: bool) -> Result<Vec<Row>, Failure> {
             }
             Ok(energy)
         })?;
-        let squares: f64 = lost(&energy).iter().zip(&exact).map(|(a, b)| (a - b).powi(2)).sum();
+        let squares: f64 = lost(&energy)
+            .iter()
+            .zip(&exact)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum();
         let error = (squares / exact.len() as f64).sqrt() / peak;
-        Ok(Found { set_up_s: set_up.cpu_s, ..Found::exact(error, cost.less(set_up)) })
+        Ok(Found {
+            set_up_s: set_up.cpu_s,
+            ..Found::exact(error, cost.less(set_up))
+        })
     })
 }
 
@@ -167,7 +235,10 @@ const FIRST_M: f64 = 340.0;
 
 fn simulator(pulse_s: f64, samples: usize) -> Result<Simulator, Failure> {
     let pulse = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(pulse_s), ENERGY_J)?;
-    let record = Record { time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S, samples };
+    let record = Record {
+        time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S,
+        samples,
+    };
     Ok(Simulator::new(pulse, receiver(NoiseModel::None), record)?)
 }
 
@@ -175,10 +246,19 @@ fn simulator(pulse_s: f64, samples: usize) -> Result<Simulator, Failure> {
 fn line(simulator: &Simulator, samples: usize, parts: usize) -> Result<LineOfSight, Failure> {
     let thickness_m = 0.5 * SPEED_OF_LIGHT_M_S / simulator.receiver().sample_rate_hz / parts as f64;
     let before = 256 * parts;
-    let weight_per_m = simulator.receiver().slowly_varying_snr(ENERGY_J, 1.0).recip();
+    let weight_per_m = simulator
+        .receiver()
+        .slowly_varying_snr(ENERGY_J, 1.0)
+        .recip();
     let layers = (FIRST_M - before as f64 * thickness_m, thickness_m);
     let wind = PairCase::FIGURES.even().wind()?;
-    Ok(line_of_sight(&wind, (49.0_f64 / 376.5).atan(), layers, weight_per_m, samples * parts + 2 * before)?)
+    Ok(line_of_sight(
+        &wind,
+        (49.0_f64 / 376.5).atan(),
+        layers,
+        weight_per_m,
+        samples * parts + 2 * before,
+    )?)
 }
 
 /// What the thickness of layers does to the covariance of a gate in a core, and costs a record.
@@ -192,20 +272,28 @@ pub(super) fn signal(quick: bool) -> Result<Vec<Row>, Failure> {
         let (gate, long) = (simulator(pulse_s, GATE)?, simulator(pulse_s, SAMPLES)?);
         let exact = gate.covariance_a2(&line(&gate, GATE, 8)?)?;
         let largest = exact.iter().map(|value| value.norm()).fold(0.0, f64::max);
-        rows.extend(settings(knob, few(&[1.0, 2.0, 3.0, 4.0, 6.0], quick), |parts| {
-            let found = gate.covariance_a2(&line(&gate, GATE, parts as usize)?)?;
-            let error = (&found - &exact).iter().map(|value| value.norm()).fold(0.0, f64::max) / largest;
-            let air = line(&long, SAMPLES, parts as usize)?;
-            let ((), cost) = fastest(|| {
-                let (mut scratch, mut out_a) = (Scratch::default(), vec![0.0; SAMPLES]);
-                for pulse in 0..records {
-                    let mut rng = pulse_generator(SEED, PulseKey { line: 0, pulse });
-                    long.record_into(&air, &mut rng, &mut scratch, &mut out_a)?;
-                }
-                Ok(())
-            })?;
-            Ok(Found::exact(error, cost.scaled(1.0 / records as f64)))
-        })?);
+        rows.extend(settings(
+            knob,
+            few(&[1.0, 2.0, 3.0, 4.0, 6.0], quick),
+            |parts| {
+                let found = gate.covariance_a2(&line(&gate, GATE, parts as usize)?)?;
+                let error = (&found - &exact)
+                    .iter()
+                    .map(|value| value.norm())
+                    .fold(0.0, f64::max)
+                    / largest;
+                let air = line(&long, SAMPLES, parts as usize)?;
+                let ((), cost) = fastest(|| {
+                    let (mut scratch, mut out_a) = (Scratch::default(), vec![0.0; SAMPLES]);
+                    for pulse in 0..records {
+                        let mut rng = pulse_generator(SEED, PulseKey { line: 0, pulse });
+                        long.record_into(&air, &mut rng, &mut scratch, &mut out_a)?;
+                    }
+                    Ok(())
+                })?;
+                Ok(Found::exact(error, cost.scaled(1.0 / records as f64)))
+            },
+        )?);
     }
     Ok(rows)
 }
@@ -216,7 +304,10 @@ const KERNEL_RUNS: usize = 20;
 /// Processor time of the lines of twenty transforms of 512 x 512 points \[s\]: by it times of another machine are scaled to this one.
 pub(super) fn kernel_s() -> Result<f64, Failure> {
     let fft = FftPlanner::<f64>::new().plan_fft_forward(512);
-    let (mut field, mut scratch) = (vec![Complex::new(1.0, 0.0); 512 * 512], vec![Complex::default(); 512]);
+    let (mut field, mut scratch) = (
+        vec![Complex::new(1.0, 0.0); 512 * 512],
+        vec![Complex::default(); 512],
+    );
     let both_ways = 2 * 20;
     let mut least_s = f64::INFINITY;
     for _ in 0..KERNEL_RUNS {

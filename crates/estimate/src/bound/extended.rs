@@ -34,7 +34,10 @@ pub(super) fn information(
     if samples > MOST_SAMPLES || smallest < f64::EPSILON * largest {
         return None;
     }
-    let (sigma, cycles) = (sigma_s * rate_hz, sampling.frequency_hz(velocity_m_s) / rate_hz);
+    let (sigma, cycles) = (
+        sigma_s * rate_hz,
+        sampling.frequency_hz(velocity_m_s) / rate_hz,
+    );
     let slope = sampling.phase_slope();
     let phasor = |cycles: TwoFloat, size: TwoFloat| {
         let (sine, cosine) = (twofloat::consts::TAU * (cycles - cycles.round())).sin_cos();
@@ -51,11 +54,20 @@ pub(super) fn information(
             0 => (Long::from(high - low), kind.one_sided_share() * floor),
             _ => {
                 let half = phasor(steps * (high - low) * 0.5, TwoFloat::from(1.0)).im;
-                (phasor(steps * (high + low) * 0.5, half / (twofloat::consts::PI * steps)), 0.0)
+                (
+                    phasor(
+                        steps * (high + low) * 0.5,
+                        half / (twofloat::consts::PI * steps),
+                    ),
+                    0.0,
+                )
             }
         };
         let noise = in_band.scale(TwoFloat::from(1.0) - floor) + TwoFloat::from(white);
-        let parts = (signal + noise.scale(TwoFloat::from(density)), signal * Long::new(0.0.into(), steps * slope));
+        let parts = (
+            signal + noise.scale(TwoFloat::from(density)),
+            signal * Long::new(0.0.into(), steps * slope),
+        );
         match kind {
             SignalKind::Real => (Long::from(parts.0.re), Long::from(parts.1.re)),
             SignalKind::Complex => parts,
@@ -64,18 +76,30 @@ pub(super) fn information(
     let (covariance, derivative): (Vec<Long>, Vec<Long>) = (0..samples).map(at_lag).unzip();
     let factor = cholesky(&covariance)?;
     let square = |of: &dyn Fn(usize, usize) -> Long| -> Vec<Vec<Long>> {
-        (0..samples).map(|n| (0..samples).map(|m| of(n, m)).collect()).collect()
+        (0..samples)
+            .map(|n| (0..samples).map(|m| of(n, m)).collect())
+            .collect()
     };
     let mut whitened = square(&|n, m| element(&derivative, n, m));
     for _ in 0..2 {
         solve_lower(&factor, &mut whitened);
         whitened = square(&|n, m| whitened[m][n].conj());
     }
-    Some(whitened.iter().flatten().map(|value| f64::from(value.norm_sqr())).sum())
+    Some(
+        whitened
+            .iter()
+            .flatten()
+            .map(|value| f64::from(value.norm_sqr()))
+            .sum(),
+    )
 }
 
 fn element(by_lag: &[Long], n: usize, m: usize) -> Long {
-    if n >= m { by_lag[n - m] } else { by_lag[m - n].conj() }
+    if n >= m {
+        by_lag[n - m]
+    } else {
+        by_lag[m - n].conj()
+    }
 }
 
 fn cholesky(by_lag: &[Long]) -> Option<Vec<Vec<Long>>> {
@@ -106,8 +130,13 @@ fn solve_lower(factor: &[Vec<Long>], columns: &mut [Vec<Long>]) {
     for (n, row) in factor.iter().enumerate() {
         let (done, rest) = columns.split_at_mut(n);
         for (m, solved) in done.iter().enumerate() {
-            rest[0].iter_mut().zip(solved).for_each(|(value, x)| *value -= row[m] * x);
+            rest[0]
+                .iter_mut()
+                .zip(solved)
+                .for_each(|(value, x)| *value -= row[m] * x);
         }
-        rest[0].iter_mut().for_each(|value| *value = value.unscale(row[n].re));
+        rest[0]
+            .iter_mut()
+            .for_each(|value| *value = value.unscale(row[n].re));
     }
 }

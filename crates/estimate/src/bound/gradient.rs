@@ -39,12 +39,22 @@ impl GradientModel {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] or [`Error::Band`] for a pulse, window, noise or sampling that makes no sense.
-    pub fn new(sampling: &Sampling, window_samples: usize, pulse_sigma_s: f64, noise: Noise) -> Result<Self, Error> {
+    pub fn new(
+        sampling: &Sampling,
+        window_samples: usize,
+        pulse_sigma_s: f64,
+        noise: Noise,
+    ) -> Result<Self, Error> {
         sampling.validate()?;
         positive("pulse_sigma_s", pulse_sigma_s)?;
         noise.validate()?;
         at_least_one("window_samples", window_samples)?;
-        Ok(Self { sampling: *sampling, window_samples, pulse_sigma_s, noise })
+        Ok(Self {
+            sampling: *sampling,
+            window_samples,
+            pulse_sigma_s,
+            noise,
+        })
     }
 
     /// Signal covariance at rest with unit power and its derivative per 1/s of gradient, with the carrier removed.
@@ -62,16 +72,27 @@ impl GradientModel {
             let phase = -wave * half_speed * middle_s * tau_s;
             let broadening = -(0.5 * wave * half_speed * self.pulse_sigma_s * tau_s).powi(2);
             let pulse = -(0.5 * tau_s / self.pulse_sigma_s).powi(2);
-            let value =
-                Complex::from_polar((pulse + broadening * gradient_per_s.powi(2)).exp(), phase * gradient_per_s);
-            [value, value * Complex::new(2.0 * broadening * gradient_per_s, phase)]
+            let value = Complex::from_polar(
+                (pulse + broadening * gradient_per_s.powi(2)).exp(),
+                phase * gradient_per_s,
+            );
+            [
+                value,
+                value * Complex::new(2.0 * broadening * gradient_per_s, phase),
+            ]
         };
         let both = Array2::from_shape_fn(shape, parts);
         [0, 1].map(|k| both.mapv(|pair| pair[k]))
     }
 
     fn carrier(&self, velocity_m_s: f64, snr: f64, kind: SignalKind) -> Result<Carrier, Error> {
-        Carrier::new((&self.sampling, self.noise), self.window_samples, velocity_m_s, (1.0, snr), kind)
+        Carrier::new(
+            (&self.sampling, self.noise),
+            self.window_samples,
+            velocity_m_s,
+            (1.0, snr),
+            kind,
+        )
     }
 
     /// Covariance of samples of unit signal power, from the [`envelope`](Self::envelope) of a gradient.
@@ -109,7 +130,9 @@ impl GradientModel {
     ) -> Result<[Array2<Complex<f64>>; 3], Error> {
         finite("gradient_per_s", gradient_per_s)?;
         let carrier = self.carrier(velocity_m_s, snr, kind)?;
-        let [signal, by_gradient] = self.envelope(gradient_per_s).map(|envelope| carrier.signal(&envelope));
+        let [signal, by_gradient] = self
+            .envelope(gradient_per_s)
+            .map(|envelope| carrier.signal(&envelope));
         let by_velocity = carrier.by_velocity(&signal);
         Ok([carrier.covariance(signal), by_velocity, by_gradient])
     }
@@ -128,14 +151,26 @@ impl GradientModel {
     ) -> Result<GradientBound, Error> {
         with_floor_named(self.noise, self.window_samples, |noise| {
             positive("windows", windows)?;
-            let model = Self { noise, ..self.clone() };
-            let [covariance, by_velocity, by_gradient] = model.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
-            let information = information(kind, &covariance, &[by_velocity, by_gradient])? * windows;
-            let [vv, vg, gg] = [information[[0, 0]], information[[0, 1]], information[[1, 1]]];
+            let model = Self {
+                noise,
+                ..self.clone()
+            };
+            let [covariance, by_velocity, by_gradient] =
+                model.covariance(velocity_m_s, gradient_per_s, snr, kind)?;
+            let information =
+                information(kind, &covariance, &[by_velocity, by_gradient])? * windows;
+            let [vv, vg, gg] = [
+                information[[0, 0]],
+                information[[0, 1]],
+                information[[1, 1]],
+            ];
             let determinant = vv * gg - vg * vg;
             positive("information on velocity", vv)?;
             // what is left after rounding of the two products
-            positive("information on velocity and gradient apart", determinant - 8.0 * f64::EPSILON * vv * gg)?;
+            positive(
+                "information on velocity and gradient apart",
+                determinant - 8.0 * f64::EPSILON * vv * gg,
+            )?;
             Ok(GradientBound {
                 velocity_m_s: (gg / determinant).sqrt(),
                 gradient_per_s: (vv / determinant).sqrt(),

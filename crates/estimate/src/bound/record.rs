@@ -46,7 +46,13 @@ impl RecordModel {
         sampling.validate_for(kind)?;
         noise.validate()?;
         not_empty("correlation", correlation.len())?;
-        Ok(Self { sampling: *sampling, kind, noise, correlation, is_gaussian })
+        Ok(Self {
+            sampling: *sampling,
+            kind,
+            noise,
+            correlation,
+            is_gaussian,
+        })
     }
 
     /// Fisher information on the velocity, 1/(m/s)^2, in 1, 2, .. `count` windows in a row about a place.
@@ -58,15 +64,28 @@ impl RecordModel {
     /// # Errors
     /// [`Error::OutOfRange`] for no window, [`Error::Linalg`] for a covariance that has no factor, such as that of a ratio that is not a
     /// number.
-    pub fn information(&self, gates: &Gates, count: usize, snr: impl Fn(f64) -> f64) -> Result<Vec<f64>, Error> {
+    pub fn information(
+        &self,
+        gates: &Gates,
+        count: usize,
+        snr: impl Fn(f64) -> f64,
+    ) -> Result<Vec<f64>, Error> {
         gates.validate()?;
         at_least_one("count", count)?;
-        let memory = self.correlation.iter().rposition(|c| c.abs() > FORGOTTEN).unwrap_or(0);
+        let memory = self
+            .correlation
+            .iter()
+            .rposition(|c| c.abs() > FORGOTTEN)
+            .unwrap_or(0);
         let most = WHOLE_SAMPLES.max(gates.window_samples + memory);
         let (places, ends) = rows(gates, count, most);
         let [covariance, mut derivative] = self.matrices(&places, snr);
         let order = places.len();
-        let failed = Error::Linalg { what: "covariance of a record", order, reason: "is not positive" };
+        let failed = Error::Linalg {
+            what: "covariance of a record",
+            order,
+            reason: "is not positive",
+        };
         let factor = cholesky(covariance).ok_or(failed)?;
         for _ in 0..2 {
             forward(factor.view(), &mut derivative);
@@ -81,7 +100,8 @@ impl RecordModel {
         }
         let mut information: Vec<f64> = ends.iter().map(|end| so_far[end - 1]).collect();
         if let (last, &[.., first, _, _, _, end]) = (information.len(), &information[..]) {
-            information.extend((1..=count - last).map(|more| end + 0.25 * (end - first) * more as f64));
+            information
+                .extend((1..=count - last).map(|more| end + 0.25 * (end - first) * more as f64));
         }
         Ok(information)
     }
@@ -96,41 +116,71 @@ impl RecordModel {
         let slope = sampling.phase_slope();
         let density = sampling.sample_rate_hz / (sampling.band_hz.1 - sampling.band_hz.0);
         // Two samples of a Gaussian pulse share the air in the middle between them: ratios at every half sample.
-        let [first, last] = [f64::min, f64::max].map(|of| places.iter().copied().fold(places[0], of));
+        let [first, last] =
+            [f64::min, f64::max].map(|of| places.iter().copied().fold(places[0], of));
         let halves = 0..=(2.0 * (last - first)) as usize;
         let ratios: Vec<f64> = halves.map(|half| snr(first + 0.5 * half as f64)).collect();
         let between = |n: usize, m: usize| ratios[(places[n] + places[m] - 2.0 * first) as usize];
-        let of_lag = |lag: f64, noise: Noise| noise.covariance(sampling, lag, self.kind).re * density;
+        let of_lag =
+            |lag: f64, noise: Noise| noise.covariance(sampling, lag, self.kind).re * density;
         let signal = |(n, m): (usize, usize)| {
             let lag = (places[n] - places[m]).abs() as usize;
             let correlation = self.correlation.get(lag).copied().unwrap_or(0.0);
             if correlation == 0.0 {
                 return 0.0;
             }
-            correlation * if self.is_gaussian { between(n, m) } else { (between(n, n) * between(m, m)).sqrt() }
+            correlation
+                * if self.is_gaussian {
+                    between(n, m)
+                } else {
+                    (between(n, n) * between(m, m)).sqrt()
+                }
         };
         let order = places.len();
         let signal = Array2::from_shape_fn((order, order), |(n, m)| signal((n.max(m), n.min(m))));
         let lag = |(n, m): (usize, usize)| places[n] - places[m];
         let covariance = |noise: Noise| {
-            let longest = places.iter().fold(0.0_f64, |most, place| most.max(place.abs())) * 2.0;
-            let of_noise: Vec<f64> = (0..=longest as usize).map(|lag| of_lag(lag as f64, noise)).collect();
+            let longest = places
+                .iter()
+                .fold(0.0_f64, |most, place| most.max(place.abs()))
+                * 2.0;
+            let of_noise: Vec<f64> = (0..=longest as usize)
+                .map(|lag| of_lag(lag as f64, noise))
+                .collect();
             Array2::from_shape_fn((order, order), |place| {
-                let turn = if self.kind == SignalKind::Real { turned(cycles, lag(place)).cos() } else { 1.0 };
+                let turn = if self.kind == SignalKind::Real {
+                    turned(cycles, lag(place)).cos()
+                } else {
+                    1.0
+                };
                 signal[place] * turn + of_noise[lag(place).abs() as usize]
             })
         };
         let derivative = Array2::from_shape_fn((order, order), |place| {
-            let turn = if self.kind == SignalKind::Real { -turned(cycles, lag(place)).sin() } else { 1.0 };
+            let turn = if self.kind == SignalKind::Real {
+                -turned(cycles, lag(place)).sin()
+            } else {
+                1.0
+            };
             slope * lag(place) * signal[place] * turn
         });
         let covariance_as_it_is = covariance(self.noise);
-        let Noise::Band { floor } = self.noise else { return [covariance_as_it_is, derivative] };
+        let Noise::Band { floor } = self.noise else {
+            return [covariance_as_it_is, derivative];
+        };
         let row = |row: ndarray::ArrayView1<'_, f64>| row.iter().map(|x| x.abs()).sum::<f64>();
-        let largest = covariance_as_it_is.rows().into_iter().map(row).fold(0.0, f64::max);
+        let largest = covariance_as_it_is
+            .rows()
+            .into_iter()
+            .map(row)
+            .fold(0.0, f64::max);
         let white = of_lag(0.0, Noise::White);
         let least = LEAST_CONDITION * order as f64 * largest / white;
-        let raised = (floor < least).then(|| covariance(Noise::Band { floor: least.min(1.0) }));
+        let raised = (floor < least).then(|| {
+            covariance(Noise::Band {
+                floor: least.min(1.0),
+            })
+        });
         [raised.unwrap_or(covariance_as_it_is), derivative]
     }
 }
@@ -149,7 +199,10 @@ fn rows(gates: &Gates, count: usize, most: usize) -> (Vec<f64>, Vec<usize>) {
             break;
         }
         known.extend(&new);
-        places.extend(new.into_iter().map(|place| place as f64 - 0.5 * (window - 1) as f64));
+        places.extend(
+            new.into_iter()
+                .map(|place| place as f64 - 0.5 * (window - 1) as f64),
+        );
         ends.push(places.len());
     }
     (places, ends)

@@ -30,7 +30,10 @@ pub fn bound_m_s(
     derivative: &Array2<Complex<f64>>,
     windows: f64,
 ) -> Result<f64, Error> {
-    from_information(information(kind, covariance, std::slice::from_ref(derivative))?[[0, 0]], windows)
+    from_information(
+        information(kind, covariance, std::slice::from_ref(derivative))?[[0, 0]],
+        windows,
+    )
 }
 
 /// Fisher information of one window on any parameters, \[i, j\]: tr(R^-1 dR_i R^-1 dR_j) if circular complex, half of that if real.
@@ -46,7 +49,11 @@ pub(crate) fn information(
         return traces(covariance, derivatives);
     }
     let real = |matrix: &Array2<Complex<f64>>| matrix.mapv(|value| value.re);
-    Ok(kind.one_sided_share() * traces(&real(covariance), &derivatives.iter().map(real).collect::<Vec<_>>())?)
+    Ok(kind.one_sided_share()
+        * traces(
+            &real(covariance),
+            &derivatives.iter().map(real).collect::<Vec<_>>(),
+        )?)
 }
 
 /// Least reciprocal condition of a covariance that is inverted, per unit of its order.
@@ -63,12 +70,30 @@ fn traces<T: Scalar<Real = f64> + Lapack>(
 ) -> Result<Array2<f64>, Error> {
     let (what, order) = ("covariance", covariance.nrows());
     length(what, order, covariance.ncols())?;
-    let difference = |((i, j), value): ((usize, usize), &T)| (*value - covariance[[j, i]].conj()).abs();
-    let value = covariance.indexed_iter().map(difference).fold(0.0, f64::max);
-    let rounding = 1e-10 * covariance.iter().map(|value| value.abs()).fold(0.0, f64::max);
-    check("covariance minus its adjoint", value, "0 up to rounding", value <= rounding)?;
+    let difference =
+        |((i, j), value): ((usize, usize), &T)| (*value - covariance[[j, i]].conj()).abs();
+    let value = covariance
+        .indexed_iter()
+        .map(difference)
+        .fold(0.0, f64::max);
+    let rounding = 1e-10
+        * covariance
+            .iter()
+            .map(|value| value.abs())
+            .fold(0.0, f64::max);
+    check(
+        "covariance minus its adjoint",
+        value,
+        "0 up to rounding",
+        value <= rounding,
+    )?;
     let least = LEAST_CONDITION * order as f64;
-    let refused = |reciprocal_condition| Error::IllConditioned { what, order, reciprocal_condition, least };
+    let refused = |reciprocal_condition| Error::IllConditioned {
+        what,
+        order,
+        reciprocal_condition,
+        least,
+    };
     // in its eigenvectors the inverse is a division by each eigenvalue
     let (values, vectors) = hermitian_eigen(what, covariance.view())?;
     let reciprocal_condition = (values[0] / values[order - 1]).max(0.0);
@@ -81,9 +106,14 @@ fn traces<T: Scalar<Real = f64> + Lapack>(
         length("derivative", order, derivative.ncols())?;
         Ok(adjoint.dot(derivative).dot(&vectors))
     };
-    let x = derivatives.iter().map(turned).collect::<Result<Vec<_>, Error>>()?;
+    let x = derivatives
+        .iter()
+        .map(turned)
+        .collect::<Result<Vec<_>, Error>>()?;
     let trace = |(i, j): (usize, usize)| {
-        let of_pair = |((n, m), value): ((usize, usize), &T)| (*value * x[j][[m, n]]).re() / (values[n] * values[m]);
+        let of_pair = |((n, m), value): ((usize, usize), &T)| {
+            (*value * x[j][[m, n]]).re() / (values[n] * values[m])
+        };
         x[i].indexed_iter().map(of_pair).sum()
     };
     Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
@@ -98,7 +128,14 @@ pub(crate) fn with_floor_named<B>(
     bound: impl Fn(Noise) -> Result<B, Error>,
 ) -> Result<B, Error> {
     let found = bound(noise);
-    let (Noise::Band { floor }, Err(Error::IllConditioned { reciprocal_condition, least, .. })) = (noise, &found)
+    let (
+        Noise::Band { floor },
+        Err(Error::IllConditioned {
+            reciprocal_condition,
+            least,
+            ..
+        }),
+    ) = (noise, &found)
     else {
         return found;
     };
@@ -111,7 +148,12 @@ pub(crate) fn with_floor_named<B>(
         match bound(Noise::Band { floor: printed }) {
             Ok(_) => {
                 let reciprocal_condition = *reciprocal_condition;
-                return Err(Error::NoiseFloor { floor, window_samples, reciprocal_condition, least: printed });
+                return Err(Error::NoiseFloor {
+                    floor,
+                    window_samples,
+                    reciprocal_condition,
+                    least: printed,
+                });
             }
             Err(Error::IllConditioned { .. }) => tried = printed * 1.5,
             Err(_) => break,
@@ -146,19 +188,41 @@ pub enum Noise {
 impl Noise {
     /// Checks the floor.
     pub(crate) fn validate(self) -> Result<(), Error> {
-        let Self::Band { floor } = self else { return Ok(()) };
-        check("floor", floor, "between 0 and 1", (0.0..=1.0).contains(&floor))
+        let Self::Band { floor } = self else {
+            return Ok(());
+        };
+        check(
+            "floor",
+            floor,
+            "between 0 and 1",
+            (0.0..=1.0).contains(&floor),
+        )
     }
 
     /// Covariance of the noise, complex and for two-sided density 1 in the band, at a lag \[samples\].
-    pub(crate) fn covariance(self, sampling: &Sampling, lag: f64, kind: SignalKind) -> Complex<f64> {
-        let (low, high) = (sampling.band_hz.0 / sampling.sample_rate_hz, sampling.band_hz.1 / sampling.sample_rate_hz);
-        let white = if lag == 0.0 { kind.one_sided_share() } else { 0.0 };
+    pub(crate) fn covariance(
+        self,
+        sampling: &Sampling,
+        lag: f64,
+        kind: SignalKind,
+    ) -> Complex<f64> {
+        let (low, high) = (
+            sampling.band_hz.0 / sampling.sample_rate_hz,
+            sampling.band_hz.1 / sampling.sample_rate_hz,
+        );
+        let white = if lag == 0.0 {
+            kind.one_sided_share()
+        } else {
+            0.0
+        };
         let in_band = match lag {
             0.0 => Complex::new(high - low, 0.0),
             _ => {
                 let half = turned(0.5 * (high - low), lag);
-                Complex::from_polar(half.sin() / (std::f64::consts::PI * lag), turned(0.5 * (high + low), lag))
+                Complex::from_polar(
+                    half.sin() / (std::f64::consts::PI * lag),
+                    turned(0.5 * (high + low), lag),
+                )
             }
         };
         match self {
@@ -230,10 +294,17 @@ impl Carrier {
         let longest = window_samples as i64 - 1;
         let of_lag = |lag: i64| {
             let lag = lag as f64;
-            [Complex::from_polar(1.0, turned(cycles, lag)), noise.covariance(sampling, lag, kind) * density]
+            [
+                Complex::from_polar(1.0, turned(cycles, lag)),
+                noise.covariance(sampling, lag, kind) * density,
+            ]
         };
         let lags = (-longest..=longest).map(of_lag).collect();
-        Ok(Self { window_samples, lags, phase_slope: sampling.phase_slope() })
+        Ok(Self {
+            window_samples,
+            lags,
+            phase_slope: sampling.phase_slope(),
+        })
     }
 
     fn at(&self, (n, m): (usize, usize)) -> &[Complex<f64>; 2] {
@@ -250,13 +321,16 @@ impl Carrier {
 
     /// Covariance of signal and noise.
     pub(crate) fn covariance(&self, mut signal: Array2<Complex<f64>>) -> Array2<Complex<f64>> {
-        signal.indexed_iter_mut().for_each(|(place, value)| *value += self.at(place)[1]);
+        signal
+            .indexed_iter_mut()
+            .for_each(|(place, value)| *value += self.at(place)[1]);
         signal
     }
 
     /// Derivative of that with respect to velocity \[per m/s\].
     pub(crate) fn by_velocity(&self, signal: &Array2<Complex<f64>>) -> Array2<Complex<f64>> {
-        let turn = |(n, m): (usize, usize)| Complex::new(0.0, self.phase_slope * (n as f64 - m as f64));
+        let turn =
+            |(n, m): (usize, usize)| Complex::new(0.0, self.phase_slope * (n as f64 - m as f64));
         Array2::from_shape_fn(signal.dim(), |place| signal[place] * turn(place))
     }
 }
@@ -291,16 +365,25 @@ impl WindowModel {
             let lag_s = (n as f64 - m as f64) * sampling.period_s();
             (-0.25 * (lag_s / pulse_sigma_s).powi(2)).exp()
         });
-        Ok(Self { gaussian_sigma_s: Some(pulse_sigma_s), ..Self::with_envelope(sampling, envelope, noise)? })
+        Ok(Self {
+            gaussian_sigma_s: Some(pulse_sigma_s),
+            ..Self::with_envelope(sampling, envelope, noise)?
+        })
     }
 
     /// Point target with a deterministic amplitude a(n) in the window and a random phase and strength: envelope a(n) a(m).
     ///
     /// # Errors
     /// As [`WindowModel::gaussian_pulse`].
-    pub fn point_target(sampling: &Sampling, amplitude: &[f64], noise: Noise) -> Result<Self, Error> {
+    pub fn point_target(
+        sampling: &Sampling,
+        amplitude: &[f64],
+        noise: Noise,
+    ) -> Result<Self, Error> {
         let window_samples = amplitude.len();
-        let envelope = Array2::from_shape_fn((window_samples, window_samples), |(n, m)| amplitude[n] * amplitude[m]);
+        let envelope = Array2::from_shape_fn((window_samples, window_samples), |(n, m)| {
+            amplitude[n] * amplitude[m]
+        });
         Self::with_envelope(sampling, envelope, noise)
     }
 
@@ -308,13 +391,25 @@ impl WindowModel {
     ///
     /// # Errors
     /// [`Error::Empty`], [`Error::Length`], [`Error::Band`] or [`Error::OutOfRange`] for impossible input.
-    pub fn with_envelope(sampling: &Sampling, envelope: Array2<f64>, noise: Noise) -> Result<Self, Error> {
+    pub fn with_envelope(
+        sampling: &Sampling,
+        envelope: Array2<f64>,
+        noise: Noise,
+    ) -> Result<Self, Error> {
         sampling.validate()?;
         not_empty("envelope", envelope.len())?;
         length("envelope", envelope.nrows(), envelope.ncols())?;
-        positive("mean of the envelope's diagonal", envelope.diag().mean().unwrap_or(0.0))?;
+        positive(
+            "mean of the envelope's diagonal",
+            envelope.diag().mean().unwrap_or(0.0),
+        )?;
         noise.validate()?;
-        Ok(Self { sampling: *sampling, envelope, gaussian_sigma_s: None, noise })
+        Ok(Self {
+            sampling: *sampling,
+            envelope,
+            gaussian_sigma_s: None,
+            noise,
+        })
     }
 
     /// The envelope of the covariance \[n, m\].
@@ -336,8 +431,17 @@ impl WindowModel {
         snr: f64,
         kind: SignalKind,
     ) -> Result<[Array2<Complex<f64>>; 2], Error> {
-        let (power, samples) = (self.envelope.diag().mean().unwrap_or(0.0), self.envelope.nrows());
-        let carrier = Carrier::new((&self.sampling, self.noise), samples, velocity_m_s, (power, snr), kind)?;
+        let (power, samples) = (
+            self.envelope.diag().mean().unwrap_or(0.0),
+            self.envelope.nrows(),
+        );
+        let carrier = Carrier::new(
+            (&self.sampling, self.noise),
+            samples,
+            velocity_m_s,
+            (power, snr),
+            kind,
+        )?;
         let signal = carrier.signal(&self.envelope);
         let derivative = carrier.by_velocity(&signal);
         Ok([carrier.covariance(signal), derivative])
@@ -347,9 +451,19 @@ impl WindowModel {
     ///
     /// # Errors
     /// As [`WindowModel::covariance`] and [`bound_m_s`]; [`Error::NoiseFloor`] for too small a floor of the noise.
-    pub fn bound_m_s(&self, velocity_m_s: f64, snr: f64, kind: SignalKind, windows: f64) -> Result<f64, Error> {
+    pub fn bound_m_s(
+        &self,
+        velocity_m_s: f64,
+        snr: f64,
+        kind: SignalKind,
+        windows: f64,
+    ) -> Result<f64, Error> {
         with_floor_named(self.noise, self.envelope.nrows(), |noise| {
-            let [covariance, derivative] = Self { noise, ..self.clone() }.covariance(velocity_m_s, snr, kind)?;
+            let [covariance, derivative] = Self {
+                noise,
+                ..self.clone()
+            }
+            .covariance(velocity_m_s, snr, kind)?;
             let found = bound_m_s(kind, &covariance, &derivative, windows);
             let (Err(Error::IllConditioned { .. }), Noise::Band { floor }, Some(sigma_s)) =
                 (&found, noise, self.gaussian_sigma_s)
@@ -358,7 +472,9 @@ impl WindowModel {
             };
             let window = (&self.sampling, self.envelope.nrows(), sigma_s);
             match extended::information(window, floor, velocity_m_s, snr, kind) {
-                Some(information) => from_information(kind.one_sided_share() * information, windows),
+                Some(information) => {
+                    from_information(kind.one_sided_share() * information, windows)
+                }
                 None => found,
             }
         })

@@ -33,7 +33,10 @@ impl CellTest {
     /// [`Error::OutOfRange`] unless `windows` is above 0.
     pub fn known_noise(windows: f64) -> Result<Self, Error> {
         positive("windows", windows)?;
-        Ok(Self { windows, reference_cells: None })
+        Ok(Self {
+            windows,
+            reference_cells: None,
+        })
     }
 
     /// With the mean of `reference_cells` cells of the same windows for the noise, which keeps the rate of false alarms whatever
@@ -43,9 +46,20 @@ impl CellTest {
     /// [`Error::OutOfRange`] unless both are above 0 and their product at most 10 000: with more cells the noise is known.
     pub fn against_cells(windows: f64, reference_cells: f64) -> Result<Self, Error> {
         positive("reference_cells", reference_cells)?;
-        let (cells, allowed) = (windows * reference_cells, "at most 10000: with more cells the noise is known");
-        check("windows times reference_cells", cells, allowed, cells.is_nan() || cells <= MOST_REFERENCES)?;
-        Ok(Self { reference_cells: Some(reference_cells), ..Self::known_noise(windows)? })
+        let (cells, allowed) = (
+            windows * reference_cells,
+            "at most 10000: with more cells the noise is known",
+        );
+        check(
+            "windows times reference_cells",
+            cells,
+            allowed,
+            cells.is_nan() || cells <= MOST_REFERENCES,
+        )?;
+        Ok(Self {
+            reference_cells: Some(reference_cells),
+            ..Self::known_noise(windows)?
+        })
     }
 
     /// Probability that a cell with `snr` times the power of the noise (0: noise alone) exceeds `threshold` times the noise.
@@ -77,7 +91,11 @@ impl CellTest {
             if middle <= low || middle >= high {
                 break;
             }
-            if self.exceeds(middle.exp()) > false_alarm { low = middle } else { high = middle }
+            if self.exceeds(middle.exp()) > false_alarm {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         Ok((0.5 * (low + high)).exp())
     }

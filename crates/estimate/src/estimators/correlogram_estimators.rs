@@ -6,7 +6,9 @@
 use num_complex::Complex;
 
 use crate::error::Error;
-use crate::estimators::{Estimator, GateVelocity, Quality, Refinement, SpectralPeak, model_lag_weights};
+use crate::estimators::{
+    Estimator, GateVelocity, Quality, Refinement, SpectralPeak, model_lag_weights,
+};
 use crate::models::autoregressive::check_order;
 use crate::window::{Sampling, Scratch, SignalKind};
 
@@ -35,10 +37,19 @@ impl LagWindowPeak {
     ) -> Result<Self, Error> {
         check_order(reach_lags, lag_weights.len())?;
         let weights = model_lag_weights(reach_lags - 1);
-        let seen: Vec<f64> = weights.iter().zip(lag_weights).map(|(weight, own)| weight * own).collect();
-        let [peak, sharp] = [&seen, lag_weights]
-            .map(|lag_weights| SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement));
-        Ok(Self { weights, peak: peak?, sharp: sharp? })
+        let seen: Vec<f64> = weights
+            .iter()
+            .zip(lag_weights)
+            .map(|(weight, own)| weight * own)
+            .collect();
+        let [peak, sharp] = [&seen, lag_weights].map(|lag_weights| {
+            SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement)
+        });
+        Ok(Self {
+            weights,
+            peak: peak?,
+            sharp: sharp?,
+        })
     }
 
     /// The peak of the lag-windowed spectrum alone, without a width.
@@ -48,7 +59,10 @@ impl LagWindowPeak {
         numbers.extend(self.peak.search.kind.weighted_lags(mean, &self.weights));
         let estimate = self.peak.estimate(&numbers, scratch);
         scratch.numbers = numbers;
-        GateVelocity { spread_m2_s2: f64::NAN, ..estimate }
+        GateVelocity {
+            spread_m2_s2: f64::NAN,
+            ..estimate
+        }
     }
 }
 
@@ -61,11 +75,20 @@ impl Estimator for LagWindowPeak {
         let estimate = self.smooth(mean, scratch);
         let sharp = self.sharp.estimate(mean, scratch);
         let sampling = self.peak.sampling();
-        let resolution_m_s = 0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.weights.len() as f64;
+        let resolution_m_s =
+            0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.weights.len() as f64;
         // the width of another peak is not that of this one
         let is_one = (sharp.velocity_m_s - estimate.velocity_m_s).abs() < resolution_m_s;
-        let GateVelocity { spread_m2_s2, resolution_m2_s2, .. } = if is_one { sharp } else { estimate };
-        GateVelocity { spread_m2_s2, resolution_m2_s2, ..estimate }
+        let GateVelocity {
+            spread_m2_s2,
+            resolution_m2_s2,
+            ..
+        } = if is_one { sharp } else { estimate };
+        GateVelocity {
+            spread_m2_s2,
+            resolution_m2_s2,
+            ..estimate
+        }
     }
 }
 
@@ -88,7 +111,13 @@ impl PulsePair {
     /// [`Error::OutOfRange`] with less than 2 lags; [`Error::Band`] for an impossible band.
     pub fn new(sampling: &Sampling, kind: SignalKind, lag_weights: &[f64]) -> Result<Self, Error> {
         check_order(1, lag_weights.len())?;
-        let band = SpectralPeak::new(sampling, kind, lag_weights, 4 * lag_weights.len(), Refinement::None)?;
+        let band = SpectralPeak::new(
+            sampling,
+            kind,
+            lag_weights,
+            4 * lag_weights.len(),
+            Refinement::None,
+        )?;
         let rad_per_hz = std::f64::consts::TAU * sampling.period_s();
         let phasor = |f_hz: f64| Complex::from_polar(1.0, rad_per_hz * f_hz);
         let phasors = band.band_frequencies_hz().into_iter().map(phasor).collect();
@@ -111,7 +140,11 @@ impl Estimator for PulsePair {
             SignalKind::Complex => SignalKind::Complex.lag(mean, 1),
             // lag 1 of the band-limited analytic signal
             SignalKind::Real => match self.band.band_density(mean, scratch) {
-                Ok(density) => density.iter().zip(&self.phasors).map(|(s, phasor)| phasor * s).sum(),
+                Ok(density) => density
+                    .iter()
+                    .zip(&self.phasors)
+                    .map(|(s, phasor)| phasor * s)
+                    .sum(),
                 Err(_) => return GateVelocity::none(Quality::Invalid),
             },
         };
@@ -121,7 +154,11 @@ impl Estimator for PulsePair {
         let inside = (low_hz..=high_hz).contains(&frequency_hz);
         GateVelocity {
             velocity_m_s: sampling.velocity_m_s(frequency_hz),
-            flag: if inside { peak.flag } else { Quality::OutOfBand },
+            flag: if inside {
+                peak.flag
+            } else {
+                Quality::OutOfBand
+            },
             ..peak
         }
     }

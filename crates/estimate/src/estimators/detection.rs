@@ -101,7 +101,11 @@ impl NoiseTest {
     ) -> Result<Self, Error> {
         let complex = |taper: &Taper| {
             let root = taper.factor.abs().sqrt();
-            taper.weights.iter().map(|h| Complex::from(h * root)).collect::<Vec<_>>()
+            taper
+                .weights
+                .iter()
+                .map(|h| Complex::from(h * root))
+                .collect::<Vec<_>>()
         };
         let tapers: Vec<_> = tapers.iter().map(complex).collect();
         Self::of_complex(sampling, gates, &tapers, lag_weights, padded_samples, noise)
@@ -119,17 +123,26 @@ impl NoiseTest {
         let samples = tapers.first().map_or(0, Vec::len);
         gates.validate()?;
         not_empty("tapers", samples)?;
-        tapers.iter().try_for_each(|taper| length("tapers", samples, taper.len()))?;
+        tapers
+            .iter()
+            .try_for_each(|taper| length("tapers", samples, taper.len()))?;
         not_empty("lag_weights", lag_weights.map_or(samples, <[f64]>::len))?;
         let bins = Band::new(sampling, SignalKind::Complex, padded_samples)?;
-        let (padded, band) =
-            (padded_samples as f64, (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz);
-        let within = if bins.cyclic { 1.0 } else { bins.bins.saturating_sub(2) as f64 / padded };
+        let (padded, band) = (
+            padded_samples as f64,
+            (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz,
+        );
+        let within = if bins.cyclic {
+            1.0
+        } else {
+            bins.bins.saturating_sub(2) as f64 / padded
+        };
         let form = Form::new(sampling, tapers, lag_weights, noise)?;
         let (mean, deviation) = form.seen(0.0);
         positive("power of the weights of the lags", deviation)?;
         let part = |part: usize| {
-            let (own_mean, own_deviation) = form.seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
+            let (own_mean, own_deviation) =
+                form.seen(0.5 * band * (part as f64 + 0.5) / PARTS as f64);
             (own_mean / mean, own_deviation / deviation)
         };
         // Windows see noise of their own where they are so far apart that even noise of the band alone has forgotten: sinc(20)^2 is below
@@ -139,14 +152,21 @@ impl NoiseTest {
         let rows = lengths(2 * samples / gates.step_samples + 2).into_iter();
         let in_band = form.matrix.indexed_iter().map(|((i, j), q)| {
             let turn = PI * band * (i.abs_diff(j) * form.every) as f64;
-            q.norm_sqr() * if i == j { 1.0 } else { (turn.sin() / turn).powi(2) }
+            q.norm_sqr()
+                * if i == j {
+                    1.0
+                } else {
+                    (turn.sin() / turn).powi(2)
+                }
         });
         let power: f64 = form.matrix.diag().iter().map(|q| q.re).sum();
         Ok(Self {
             band_variance: in_band.sum::<f64>() / (power * power * form.shorter as f64),
             band: (band, within),
             padded,
-            moments: rows.map(|gates| (gates, form.moments(gates, step, mean))).collect(),
+            moments: rows
+                .map(|gates| (gates, form.moments(gates, step, mean)))
+                .collect(),
             profile: (0..PARTS).map(part).collect(),
         })
     }
@@ -157,10 +177,17 @@ impl NoiseTest {
         let (mut level, mut sums) = (0.0, [0.0; 4]);
         for (gates, pulses) in chords {
             level += (pulses * gates) as f64;
-            sums.iter_mut().zip(self.row(gates)).for_each(|(sum, moment)| *sum += pulses as f64 * moment);
+            sums.iter_mut()
+                .zip(self.row(gates))
+                .for_each(|(sum, moment)| *sum += pulses as f64 * moment);
         }
         if level == 0.0 {
-            return RegionNoise { n_eff: 0.0, shape: f64::NAN, scale: f64::NAN, gradient: f64::NAN };
+            return RegionNoise {
+                n_eff: 0.0,
+                shape: f64::NAN,
+                scale: f64::NAN,
+                gradient: f64::NAN,
+            };
         }
         let [second, third, fourth, gradient] = sums;
         let scale = fourth / (third * level);
@@ -175,13 +202,25 @@ impl NoiseTest {
 
     /// The same in the region of that radius about a point of a scan, all of whose samples are valid.
     #[must_use]
-    pub fn region_at(&self, places: &ScanGeometry, point: PolarPoint, radius_m: f64) -> RegionNoise {
-        self.region(places.chords(point, radius_m).map(|chord| (chord.gates(), places.rays.count(chord.line))))
+    pub fn region_at(
+        &self,
+        places: &ScanGeometry,
+        point: PolarPoint,
+        radius_m: f64,
+    ) -> RegionNoise {
+        self.region(
+            places
+                .chords(point, radius_m)
+                .map(|chord| (chord.gates(), places.rays.count(chord.line))),
+        )
     }
 
     /// The moments of that many windows in a row: powers of their number at first, linear in it once rows are longer than a window.
     fn row(&self, gates: usize) -> [f64; 4] {
-        let above = self.moments.partition_point(|(at, _)| *at < gates).clamp(1, self.moments.len() - 1);
+        let above = self
+            .moments
+            .partition_point(|(at, _)| *at < gates)
+            .clamp(1, self.moments.len() - 1);
         let ((low, a), (high, b)) = (&self.moments[above - 1], &self.moments[above]);
         let (at, low, high) = (gates as f64, *low as f64, *high as f64);
         [0, 1, 2, 3].map(|k| match at > high {
@@ -199,9 +238,18 @@ impl NoiseTest {
     /// Probability that noise alone has a peak of more than `level` times its density in a region, within the band and not at its edge.
     #[must_use]
     pub fn false_alarm(&self, region: &RegionNoise, level: f64) -> f64 {
-        let RegionNoise { shape, scale, gradient, .. } = *region;
+        let RegionNoise {
+            shape,
+            scale,
+            gradient,
+            ..
+        } = *region;
         let of_part = |(mean, deviation): &(f64, f64)| 1.0 + (level - mean) / deviation;
-        let sums: Vec<f64> = self.profile.iter().map(|part| (of_part(part) - 1.0 + scale * shape) / scale).collect();
+        let sums: Vec<f64> = self
+            .profile
+            .iter()
+            .map(|part| (of_part(part) - 1.0 + scale * shape) / scale)
+            .collect();
         // below the mean it is always above
         if level <= 1.0 || sums.iter().any(|sum| *sum <= 0.0) {
             return 1.0;
@@ -209,15 +257,16 @@ impl NoiseTest {
         let rate = |part: usize| {
             let (sum, excess) = (sums[part], of_part(&self.profile[part]) - 1.0);
             let (before, after) = (part.saturating_sub(1), (part + 1).min(PARTS - 1));
-            let slope =
-                (sums[after] - sums[before]).abs() / ((after - before) as f64 * 0.5 * self.band.0 / PARTS as f64);
+            let slope = (sums[after] - sums[before]).abs()
+                / ((after - before) as f64 * 0.5 * self.band.0 / PARTS as f64);
             let spread = (2.0 * sum).sqrt() * gradient;
             let steepness = (1.0 - (shape - 1.0) / sum).max(0.0) / scale;
             let half_step = (0.5 * gradient / self.padded * (excess * steepness).sqrt()).max(1e-3);
             let seen = 0.5 * PI.sqrt() * erf(half_step) / half_step;
             let level_off = seen * spread / TAU.sqrt() * (-0.5 * (slope / spread).powi(2)).exp();
             let across = 0.5 * slope * erf(FRAC_1_SQRT_2 * slope / spread);
-            let crossings = ((shape - 1.0) * sum.ln() - sum - ln_gamma(shape)).exp() * (level_off + across);
+            let crossings =
+                ((shape - 1.0) * sum.ln() - sum - ln_gamma(shape)).exp() * (level_off + across);
             // no more chances than frequencies looked at
             crossings.min(-self.padded * (-gamma_tail(shape, sum)).ln_1p())
         };
@@ -234,8 +283,14 @@ impl NoiseTest {
         while self.false_alarm(region, high) > rate && high < f64::MAX {
             (low, high) = (high, 2.0 * high);
         }
-        let [low, high] = bisected(low, high, 60, |level| self.false_alarm(region, level) > rate);
-        Ok(if region.n_eff > 0.0 { 0.5 * (low + high) } else { f64::NAN })
+        let [low, high] = bisected(low, high, 60, |level| {
+            self.false_alarm(region, level) > rate
+        });
+        Ok(if region.n_eff > 0.0 {
+            0.5 * (low + high)
+        } else {
+            f64::NAN
+        })
     }
 }
 
@@ -264,17 +319,35 @@ impl<'a> Form<'a> {
         let size = samples.div_ceil(every * shorter);
         let matrix = Array2::from_shape_fn((size, size), |(i, j)| {
             let lag = i.abs_diff(j) * every;
-            let weight = if lag < lags { lag_weights.map_or(1.0, |weights| weights[lag]) } else { 0.0 };
+            let weight = if lag < lags {
+                lag_weights.map_or(1.0, |weights| weights[lag])
+            } else {
+                0.0
+            };
             let product = |h: &Vec<C64>| h[i * every * shorter] * h[j * every * shorter].conj();
             tapers.iter().map(product).sum::<C64>() * weight
         });
-        positive("power of the tapers", matrix.diag().iter().map(|q| q.re).sum())?;
-        Ok(Self { matrix, every, shorter, sampling, noise })
+        positive(
+            "power of the tapers",
+            matrix.diag().iter().map(|q| q.re).sum(),
+        )?;
+        Ok(Self {
+            matrix,
+            every,
+            shorter,
+            sampling,
+            noise,
+        })
     }
 
     /// Covariance C of the noise in `size` places, as it is `offset` cycles per sample from the middle of the band.
     fn covariance(&self, size: usize, offset: f64) -> Array2<C64> {
-        let Self { every, sampling, noise, .. } = *self;
+        let Self {
+            every,
+            sampling,
+            noise,
+            ..
+        } = *self;
         let (low_hz, high_hz) = sampling.band_hz;
         let band = (high_hz - low_hz) / sampling.sample_rate_hz;
         let middle = 0.5 * (low_hz + high_hz) / sampling.sample_rate_hz;
@@ -292,19 +365,31 @@ impl<'a> Form<'a> {
             within * every as f64 * Complex::from_polar(1.0, -TAU * (middle + offset) * apart) + own
         };
         let lags: Vec<C64> = (0..size).map(lag).collect();
-        Array2::from_shape_fn((size, size), |(i, j)| if i >= j { lags[i - j] } else { lags[j - i].conj() })
+        Array2::from_shape_fn((size, size), |(i, j)| {
+            if i >= j {
+                lags[i - j]
+            } else {
+                lags[j - i].conj()
+            }
+        })
     }
 
     /// Mean tr CA and deviation of the density of one window so far from the middle of the band.
     fn seen(&self, offset: f64) -> (f64, f64) {
-        let product = self.covariance(self.matrix.nrows(), offset).dot(&self.matrix);
-        (product.diag().iter().map(|q| q.re).sum(), trace(&product, &product).sqrt())
+        let product = self
+            .covariance(self.matrix.nrows(), offset)
+            .dot(&self.matrix);
+        (
+            product.diag().iter().map(|q| q.re).sum(),
+            trace(&product, &product).sqrt(),
+        )
     }
 
     /// The traces of [`NoiseTest`] for that many windows in a row, `step` samples apart, where a window has the mean `mean`.
     fn moments(&self, gates: usize, step: usize, mean: f64) -> [f64; 4] {
         let (size, every) = (self.matrix.nrows(), self.every);
-        let start = |gate: usize| ((gate * step) as f64 / (every * self.shorter) as f64).round() as usize;
+        let start =
+            |gate: usize| ((gate * step) as f64 / (every * self.shorter) as f64).round() as usize;
         let length = size + start(gates - 1);
         let mut sum = Array2::<C64>::zeros((length, length));
         for at in (0..gates).map(start) {
@@ -350,19 +435,42 @@ mod tests {
 
     fn of(weighting: Weighting, step: usize) -> NoiseTest {
         let taper = Taper::unit(weighting.weights(64).unwrap()).unwrap();
-        NoiseTest::new(&table_2(), &Gates::new(64, step, 0.0).unwrap(), &[taper], None, 1 << 16, Noise::White).unwrap()
+        NoiseTest::new(
+            &table_2(),
+            &Gates::new(64, step, 0.0).unwrap(),
+            &[taper],
+            None,
+            1 << 16,
+            Noise::White,
+        )
+        .unwrap()
     }
 
     #[test]
     fn one_taper_has_the_shape_of_one_exponential_and_known_cells() {
         let flat = of(Weighting::Rectangular, 1);
         // B N, and a little for what the edges of the band let in
-        assert!((12.8..14.5).contains(&flat.band_variance.recip()), "{}", flat.band_variance);
+        assert!(
+            (12.8..14.5).contains(&flat.band_variance.recip()),
+            "{}",
+            flat.band_variance
+        );
         for gates in [1_usize, 2, 5, 20, 63, 100, 400] {
-            let overlap = |k: usize| if k < 64 { (1.0 - k as f64 / 64.0).powi(2) } else { 0.0 };
-            let pairs: f64 = (0..gates).flat_map(|i| (0..gates).map(move |j| overlap(i.abs_diff(j)))).sum();
+            let overlap = |k: usize| {
+                if k < 64 {
+                    (1.0 - k as f64 / 64.0).powi(2)
+                } else {
+                    0.0
+                }
+            };
+            let pairs: f64 = (0..gates)
+                .flat_map(|i| (0..gates).map(move |j| overlap(i.abs_diff(j))))
+                .sum();
             let n_eff = flat.region([(gates, 1)].into_iter()).n_eff;
-            assert!((n_eff * pairs / (gates * gates) as f64 - 1.0).abs() < 0.03, "{gates}: {n_eff}");
+            assert!(
+                (n_eff * pairs / (gates * gates) as f64 - 1.0).abs() < 0.03,
+                "{gates}: {n_eff}"
+            );
         }
         assert!(of(Weighting::default(), 3).band_variance > flat.band_variance / 0.8);
     }
@@ -371,16 +479,26 @@ mod tests {
     fn one_window_has_the_tail_of_an_exponential_and_crosses_a_level_at_rices_rate() {
         let test = of(Weighting::Rectangular, 1);
         let window = test.region([(1, 1)].into_iter());
-        assert!((window.n_eff - 1.0).abs() < 1e-9 && (window.scale - 1.0).abs() < 1e-9, "{window:?}");
+        assert!(
+            (window.n_eff - 1.0).abs() < 1e-9 && (window.scale - 1.0).abs() < 1e-9,
+            "{window:?}"
+        );
         for level in [3.0_f64, 5.0, 9.0] {
             let single = (-level).exp();
             let crossings = 12.8 * (PI / 3.0).sqrt() * level.sqrt() * single;
             let found = test.false_alarm(&window, level) / (1.0 - (-crossings).exp());
             assert!((found - 1.0).abs() < 2e-3, "{level}: {found}");
             // frequencies so far apart that each is a chance of its own
-            let few = NoiseTest { padded: 5.0, band: (1.0, 1.0), ..test.clone() };
+            let few = NoiseTest {
+                padded: 5.0,
+                band: (1.0, 1.0),
+                ..test.clone()
+            };
             let expected = 1.0 - (1.0 - single).powi(5);
-            assert!((few.false_alarm(&window, level) / expected - 1.0).abs() < 1e-6, "{level}");
+            assert!(
+                (few.false_alarm(&window, level) / expected - 1.0).abs() < 1e-6,
+                "{level}"
+            );
         }
     }
 
@@ -390,43 +508,84 @@ mod tests {
             let taper = Taper::unit(Weighting::Hann.weights(samples).unwrap()).unwrap();
             let gates = Gates::new(samples, samples / 16, 0.0).unwrap();
             let lags: Vec<f64> = (0..5).map(|m| 1.0 - 0.2 * f64::from(m)).collect();
-            NoiseTest::new(&table_2(), &gates, &[taper], Some(&lags), 1 << 16, Noise::White).unwrap()
+            NoiseTest::new(
+                &table_2(),
+                &gates,
+                &[taper],
+                Some(&lags),
+                1 << 16,
+                Noise::White,
+            )
+            .unwrap()
         };
         for gates in [1, 10] {
-            let of = |samples: usize, pulses: usize| test(samples).region([(gates, pulses)].into_iter());
+            let of =
+                |samples: usize, pulses: usize| test(samples).region([(gates, pulses)].into_iter());
             let (one, four) = (of(1024, 1), of(256, 4));
-            assert!((one.shape / four.shape - 1.0).abs() < 0.03 && (one.scale / four.scale - 1.0).abs() < 0.03);
-            assert!((one.gradient / four.gradient - 1.0).abs() < 0.03, "{one:?} {four:?}");
+            assert!(
+                (one.shape / four.shape - 1.0).abs() < 0.03
+                    && (one.scale / four.scale - 1.0).abs() < 0.03
+            );
+            assert!(
+                (one.gradient / four.gradient - 1.0).abs() < 0.03,
+                "{one:?} {four:?}"
+            );
         }
     }
 
     #[test]
     fn thresholds_have_their_probability_and_fall_to_1_with_averaging() {
         let test = of(Weighting::default(), 1);
-        let level = |gates, pulses, rate| test.threshold(&test.region([(gates, pulses)].into_iter()), rate).unwrap();
+        let level = |gates, pulses, rate| {
+            test.threshold(&test.region([(gates, pulses)].into_iter()), rate)
+                .unwrap()
+        };
         for (gates, pulses) in [(1, 1), (7, 1), (7, 40), (400, 1), (1, 10_000)] {
             for rate in [0.3, 0.01, 1e-6] {
                 let region = test.region([(gates, pulses)].into_iter());
                 let level = level(gates, pulses, rate);
                 let found = test.false_alarm(&region, level);
-                assert!((found / rate - 1.0).abs() < 1e-6, "{gates} {pulses} {rate}: {level} {found}");
+                assert!(
+                    (found / rate - 1.0).abs() < 1e-6,
+                    "{gates} {pulses} {rate}: {level} {found}"
+                );
             }
         }
         assert!(level(1, 1_000_000, 0.01) < 1.01 && level(1, 8, 0.01) < level(1, 1, 0.01));
         let window = test.region([(1, 1)].into_iter());
-        assert!(test.threshold(&window, 1.0).is_err() && test.threshold(&window, f64::NAN).is_err());
-        let (taper, other) = (Taper::unit(vec![1.0; 8]).unwrap(), Taper::unit(vec![1.0; 4]).unwrap());
+        assert!(
+            test.threshold(&window, 1.0).is_err() && test.threshold(&window, f64::NAN).is_err()
+        );
+        let (taper, other) = (
+            Taper::unit(vec![1.0; 8]).unwrap(),
+            Taper::unit(vec![1.0; 4]).unwrap(),
+        );
         let gates = Gates::new(8, 1, 0.0).unwrap();
         let of = |tapers: &[Taper], lags: Option<&[f64]>, gates: &Gates| {
             NoiseTest::new(&table_2(), gates, tapers, lags, 64, Noise::White)
         };
         assert!(of(std::slice::from_ref(&taper), None, &gates).is_ok());
-        assert!(matches!(of(&[taper.clone(), other], None, &gates), Err(Error::Length { .. })));
+        assert!(matches!(
+            of(&[taper.clone(), other], None, &gates),
+            Err(Error::Length { .. })
+        ));
         assert!(matches!(
             of(std::slice::from_ref(&taper), Some(&[]), &gates),
-            Err(Error::Empty { field: "lag_weights" })
+            Err(Error::Empty {
+                field: "lag_weights"
+            })
         ));
-        assert!(of(&[taper], None, &Gates { step_samples: 0, ..gates }).is_err());
+        assert!(
+            of(
+                &[taper],
+                None,
+                &Gates {
+                    step_samples: 0,
+                    ..gates
+                }
+            )
+            .is_err()
+        );
         let empty = test.region(std::iter::empty());
         assert!(empty.n_eff == 0.0 && test.threshold(&empty, 0.01).unwrap().is_nan());
     }
@@ -437,16 +596,25 @@ mod tests {
             let taper = [Taper::unit(vec![1.0; samples]).unwrap()];
             let gates = Gates::new(samples, step, 0.0).unwrap();
             let test = NoiseTest::new(&table_2(), &gates, &taper, None, 64, noise).unwrap();
-            let level = |gates, pulses| test.threshold(&test.region([(gates, pulses)].into_iter()), 0.01).unwrap();
+            let level = |gates, pulses| {
+                test.threshold(&test.region([(gates, pulses)].into_iter()), 0.01)
+                    .unwrap()
+            };
             level(2, 1) / level(1, 2) - 1.0
         };
         // White noise has forgotten at once, that of a fifth of the frequencies after some 100 samples.
-        assert!(of_two(16, 40, Noise::White).abs() < 1e-9 && of_two(16, 1_000_000_000, Noise::White).abs() < 1e-9);
+        assert!(
+            of_two(16, 40, Noise::White).abs() < 1e-9
+                && of_two(16, 1_000_000_000, Noise::White).abs() < 1e-9
+        );
         for samples in [4, 16, 64] {
             let band = |step| of_two(samples, step, Noise::Band { floor: 1e-3 }).abs();
             let (near, far) = (band(2 * samples), band(1_000_000_000));
             // Four samples apart it remembers.
-            assert!(far < 5e-4 && (samples > 4 || near > 1e-2), "{samples}: {near} {far}");
+            assert!(
+                far < 5e-4 && (samples > 4 || near > 1e-2),
+                "{samples}: {near} {far}"
+            );
         }
     }
 }

@@ -11,7 +11,9 @@
 //! 0.2 m/s in a vortex and halves that. The book has the numbers.
 
 use crate::error::{Error, positive};
-use crate::estimators::{Estimator, GateVelocity, LagWindowPeak, Quality, Refinement, SpectralPeak, search};
+use crate::estimators::{
+    Estimator, GateVelocity, LagWindowPeak, Quality, Refinement, SpectralPeak, search,
+};
 use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Iterations of the window about the centroid.
@@ -45,7 +47,14 @@ impl FirstMoment {
         positive("reach", reach)?;
         let (refinement, lags) = (Refinement::Parabola, lag_weights.len());
         Ok(Self {
-            start: LagWindowPeak::new(sampling, kind, lag_weights, (lags / 4).max(1), padded_samples, refinement)?,
+            start: LagWindowPeak::new(
+                sampling,
+                kind,
+                lag_weights,
+                (lags / 4).max(1),
+                padded_samples,
+                refinement,
+            )?,
             spectrum: SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement)?,
             reach,
             // the main lobe of the window
@@ -71,7 +80,8 @@ impl Estimator for FirstMoment {
         let Ok(density) = self.spectrum.band_density(mean, scratch) else {
             return GateVelocity::none(Quality::Invalid);
         };
-        let floor = search::lanes_sum(density) / density.len() as f64 / (1.0 + smooth.snr.max(peak.snr));
+        let floor =
+            search::lanes_sum(density) / density.len() as f64 / (1.0 + smooth.snr.max(peak.snr));
         let mut centre = (sampling.frequency_hz(smooth.velocity_m_s) - low_hz) / spacing_hz;
         let mut half = 0.5 * density.len() as f64;
         for _ in 0..ITERATIONS {
@@ -81,19 +91,29 @@ impl Estimator for FirstMoment {
             centre = centroid;
             half = (self.reach * variance.max(0.0).sqrt()).max(self.least);
         }
-        GateVelocity { velocity_m_s: sampling.velocity_m_s(low_hz + centre * spacing_hz), ..peak }
+        GateVelocity {
+            velocity_m_s: sampling.velocity_m_s(low_hz + centre * spacing_hz),
+            ..peak
+        }
     }
 }
 
 /// Centroid and variance of the density above `floor` within `half` of `centre`; `None` if nothing is above it there.
 fn moments(density: &[f64], centre: f64, half: f64, floor: f64) -> Option<(f64, f64)> {
     // as far to both sides, so that the floor and its errors do not pull the centroid
-    let half = half.min(centre.max(0.0)).min((density.len() as f64 - 1.0 - centre).max(0.0)).max(1.0);
+    let half = half
+        .min(centre.max(0.0))
+        .min((density.len() as f64 - 1.0 - centre).max(0.0))
+        .max(1.0);
     let first = (centre - half).ceil().max(0.0) as usize;
     let last = ((centre + half).floor() as usize).min(density.len() - 1);
     let sums = (first..=last).fold([0.0; 3], |[sum, once, twice], k| {
         let (excess, place) = (density[k] - floor, k as f64 - centre);
-        [sum + excess, once + excess * place, twice + excess * place * place]
+        [
+            sum + excess,
+            once + excess * place,
+            twice + excess * place * place,
+        ]
     });
     let [sum, once, twice] = sums;
     let mean = once / sum;

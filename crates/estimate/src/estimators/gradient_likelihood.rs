@@ -82,26 +82,52 @@ impl<S: Sample> GradientLikelihood<S> {
     /// # Errors
     /// [`Error::OutOfRange`] if `snr` is not above 0 or the gradients do not increase, [`Error::Empty`] without
     /// gradients, [`Error::Band`] for an impossible band, [`Error::Linalg`] if the covariance cannot be diagonalised.
-    pub fn new(model: &GradientModel, snr: f64, gradient_per_s: &[f64], padded_samples: usize) -> Result<Self, Error> {
+    pub fn new(
+        model: &GradientModel,
+        snr: f64,
+        gradient_per_s: &[f64],
+        padded_samples: usize,
+    ) -> Result<Self, Error> {
         positive("snr", snr)?;
         not_empty("gradient_per_s", gradient_per_s.len())?;
-        gradient_per_s.iter().try_for_each(|&g| finite("gradient_per_s", g))?;
+        gradient_per_s
+            .iter()
+            .try_for_each(|&g| finite("gradient_per_s", g))?;
         increasing("gradient_per_s", gradient_per_s)?;
         let (sampling, n) = (&model.sampling, model.window_samples);
         sampling.validate_for(S::KIND)?;
         let share = (sampling.band_hz.1 - sampling.band_hz.0) / sampling.sample_rate_hz;
-        let tapers =
-            gradient_per_s.iter().map(|&g| tapers(model, g, snr * share, S::KIND)).collect::<Result<Vec<_>, _>>()?;
+        let tapers = gradient_per_s
+            .iter()
+            .map(|&g| tapers(model, g, snr * share, S::KIND))
+            .collect::<Result<Vec<_>, _>>()?;
         let size = |&k: &usize| gradient_per_s[k].abs();
-        let slowest = (0..tapers.len()).min_by(|a, b| size(a).total_cmp(&size(b))).unwrap_or(0);
+        let slowest = (0..tapers.len())
+            .min_by(|a, b| size(a).total_cmp(&size(b)))
+            .unwrap_or(0);
         // Tapers of other gradients are these with a chirp, which takes out that of the wind.
         let tone = LagWeights::new(&tapers[slowest], n).expected_lags(&Array2::ones((n, n)));
-        let weights: Vec<f64> = tone.iter().step_by(2).map(|weight| weight / tone[0]).collect();
-        let search = PeakSearch::new(sampling, SignalKind::Complex, (padded_samples, 4 * n), &weights)?;
+        let weights: Vec<f64> = tone
+            .iter()
+            .step_by(2)
+            .map(|weight| weight / tone[0])
+            .collect();
+        let search = PeakSearch::new(
+            sampling,
+            SignalKind::Complex,
+            (padded_samples, 4 * n),
+            &weights,
+        )?;
         let white = model.noise == Noise::White;
-        let sides = if S::KIND == SignalKind::Real { 0.5 } else { 1.0 };
+        let sides = if S::KIND == SignalKind::Real {
+            0.5
+        } else {
+            1.0
+        };
         let band_lags = match white {
-            true => std::iter::once(Complex::from(sides)).chain(std::iter::repeat_n(Complex::ZERO, n - 1)).collect(),
+            true => std::iter::once(Complex::from(sides))
+                .chain(std::iter::repeat_n(Complex::ZERO, n - 1))
+                .collect(),
             false => (0..n).map(|m| band_lag(sampling, m, share)).collect(),
         };
         let estimator = GradientPeak {
@@ -110,12 +136,24 @@ impl<S: Sample> GradientLikelihood<S> {
             gradient_per_s: gradient_per_s.to_vec(),
             slowest,
             spread: tapers.iter().map(|tapers| tapers.spread).collect(),
-            samples_in_band: if white { sides * n as f64 } else { share * n as f64 },
+            samples_in_band: if white {
+                sides * n as f64
+            } else {
+                share * n as f64
+            },
             search,
         };
         let transform = WindowTransform::new(SignalKind::Complex, 2 * n);
-        let statistic = GradientStatistic { tapers, band_lags, transform, sample: std::marker::PhantomData };
-        let mut planned = Self { statistic, estimator };
+        let statistic = GradientStatistic {
+            tapers,
+            band_lags,
+            transform,
+            sample: std::marker::PhantomData,
+        };
+        let mut planned = Self {
+            statistic,
+            estimator,
+        };
         if S::KIND == SignalKind::Real {
             let read = (0..gradient_per_s.len()).map(|k| planned.readings(model, snr, k));
             planned.estimator.corrections = read.collect::<Result<_, _>>()?;
@@ -133,7 +171,14 @@ impl<S: Sample> GradientLikelihood<S> {
     pub fn noise_test(&self, gates: &Gates, noise: Noise) -> Result<NoiseTest, Error> {
         let (estimator, padded) = (&self.estimator, self.estimator.search.padded);
         let tapers = &self.statistic.tapers[estimator.slowest].weights;
-        NoiseTest::of_complex(&estimator.search.sampling, gates, tapers, None, padded, noise)
+        NoiseTest::of_complex(
+            &estimator.search.sampling,
+            gates,
+            tapers,
+            None,
+            padded,
+            noise,
+        )
     }
 
     /// The mean statistic of windows whose samples have the autocovariance `lags`, of all lags of a window: that of a noise
@@ -148,16 +193,24 @@ impl<S: Sample> GradientLikelihood<S> {
             let lag = S::KIND.lag(lags, i.abs_diff(j));
             if i >= j { lag } else { lag.conj() }
         });
-        Ok(self.statistic.expected(&covariance, &self.statistic.lag_weights()))
+        Ok(self
+            .statistic
+            .expected(&covariance, &self.statistic.lag_weights()))
     }
 
     /// What the peak of the expected statistic of a gradient of the list reads for true velocities all over the band.
-    fn readings(&self, model: &GradientModel, snr: f64, k: usize) -> Result<Vec<(f64, f64)>, Error> {
+    fn readings(
+        &self,
+        model: &GradientModel,
+        snr: f64,
+        k: usize,
+    ) -> Result<Vec<(f64, f64)>, Error> {
         let search = &self.estimator.search;
         let sampling = &search.sampling;
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         // the sidelobes of a taper pass the image twice as fast as the velocity changes: a quarter of one per step
-        let step_m_s = 0.0625 * sampling.wavelength_m * sampling.sample_rate_hz / model.window_samples as f64;
+        let step_m_s =
+            0.0625 * sampling.wavelength_m * sampling.sample_rate_hz / model.window_samples as f64;
         let steps = ((high_m_s - low_m_s) / step_m_s).ceil().max(1.0);
         let weights = LagWeights::new(&self.statistic.tapers[k], model.window_samples);
         let [envelope, _] = model.envelope(self.estimator.gradient_per_s[k]);
@@ -165,7 +218,12 @@ impl<S: Sample> GradientLikelihood<S> {
         let mut readings = Vec::<(f64, f64)>::with_capacity(steps as usize + 1);
         for k in 0..=steps as usize {
             let velocity_m_s = low_m_s + (high_m_s - low_m_s) * k as f64 / steps;
-            let lags = weights.expected_lags(&model.of_samples(&envelope, velocity_m_s, snr, SignalKind::Real)?);
+            let lags = weights.expected_lags(&model.of_samples(
+                &envelope,
+                velocity_m_s,
+                snr,
+                SignalKind::Real,
+            )?);
             search.zoom.density_into(&lags, &mut scratch.band)?;
             let found = search.locate(&scratch.band, Refinement::Parabola, &[], || None);
             let read_m_s = sampling.velocity_m_s(search.band.frequency_hz(found.bin));
@@ -179,20 +237,29 @@ impl<S: Sample> GradientLikelihood<S> {
 
     /// What the estimator reads for true gradients between the first and the last, in the middle of the band.
     fn gradient_readings(&self, model: &GradientModel, snr: f64) -> Result<Vec<(f64, f64)>, Error> {
-        let Self { statistic, estimator } = self;
+        let Self {
+            statistic,
+            estimator,
+        } = self;
         let sampling = &estimator.search.sampling;
         let velocity_m_s = sampling.velocity_m_s(0.5 * (sampling.band_hz.0 + sampling.band_hz.1));
         let weights = statistic.lag_weights();
         let mut readings = Vec::<(f64, f64)>::new();
         for pair in estimator.gradient_per_s.windows(2) {
             for part in 0..=READINGS {
-                let gradient_per_s = pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
+                let gradient_per_s =
+                    pair[0] + (pair[1] - pair[0]) * f64::from(part) / f64::from(READINGS);
                 let [envelope, _] = model.envelope(gradient_per_s);
                 let covariance = model.of_samples(&envelope, velocity_m_s, snr, S::KIND)?;
-                let found =
-                    estimator.velocity_and_gradient(&statistic.expected(&covariance, &weights), &mut Scratch::new());
+                let found = estimator.velocity_and_gradient(
+                    &statistic.expected(&covariance, &weights),
+                    &mut Scratch::new(),
+                );
                 // the ends of the list read themselves however far off the wind: only increasing readings can be inverted
-                if found.gradient_per_s.is_finite() && readings.last().is_none_or(|last| last.0 < found.gradient_per_s)
+                if found.gradient_per_s.is_finite()
+                    && readings
+                        .last()
+                        .is_none_or(|last| last.0 < found.gradient_per_s)
                 {
                     readings.push((found.gradient_per_s, gradient_per_s));
                 }
@@ -213,10 +280,17 @@ impl<S: Sample> Statistic<S> for GradientStatistic<S> {
 
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]) {
         let samples = window.iter().map(|sample| sample.to_complex());
-        for (tapers, lags) in self.tapers.iter().zip(out.chunks_exact_mut(2 * window.len())) {
+        for (tapers, lags) in self
+            .tapers
+            .iter()
+            .zip(out.chunks_exact_mut(2 * window.len()))
+        {
             self.transform.reset(scratch);
             for taper in &tapers.weights {
-                let weighted = samples.clone().zip(taper).map(|(sample, weight)| sample * weight);
+                let weighted = samples
+                    .clone()
+                    .zip(taper)
+                    .map(|(sample, weight)| sample * weight);
                 self.transform.add_power(weighted, 1.0, scratch);
             }
             self.transform.lags_of_power(scratch, lags);
@@ -227,7 +301,8 @@ impl<S: Sample> Statistic<S> for GradientStatistic<S> {
         lags.resize(2 * window.len(), 0.0);
         self.transform.lags_of_power(scratch, &mut lags);
         let in_band = |(m, weight): (usize, &C64)| (SignalKind::Complex.lag(&lags, m) * weight).re;
-        out[self.tapers.len() * 2 * window.len()] = self.band_lags.iter().enumerate().map(in_band).sum();
+        out[self.tapers.len() * 2 * window.len()] =
+            self.band_lags.iter().enumerate().map(in_band).sum();
         scratch.numbers = lags;
     }
 }
@@ -235,15 +310,27 @@ impl<S: Sample> Statistic<S> for GradientStatistic<S> {
 impl<S: Sample> GradientStatistic<S> {
     /// What products of samples weigh in the lags of each gradient.
     fn lag_weights(&self) -> Vec<LagWeights> {
-        self.tapers.iter().map(|tapers| LagWeights::new(tapers, self.band_lags.len())).collect()
+        self.tapers
+            .iter()
+            .map(|tapers| LagWeights::new(tapers, self.band_lags.len()))
+            .collect()
     }
 
     /// The mean statistic of windows of that covariance.
     fn expected(&self, covariance: &Array2<C64>, weights: &[LagWeights]) -> Vec<f64> {
         let n = self.band_lags.len();
-        let mut numbers: Vec<f64> = weights.iter().flat_map(|weights| weights.expected_lags(covariance)).collect();
+        let mut numbers: Vec<f64> = weights
+            .iter()
+            .flat_map(|weights| weights.expected_lags(covariance))
+            .collect();
         let lag = |m: usize| (0..n - m).map(|k| covariance[[k + m, k]]).sum::<C64>();
-        numbers.push(self.band_lags.iter().enumerate().map(|(m, weight)| (lag(m) * weight).re).sum());
+        numbers.push(
+            self.band_lags
+                .iter()
+                .enumerate()
+                .map(|(m, weight)| (lag(m) * weight).re)
+                .sum(),
+        );
         numbers
     }
 }
@@ -251,7 +338,10 @@ impl<S: Sample> GradientStatistic<S> {
 impl GradientPeak {
     /// Velocity and gradient for the mean statistic `mean`.
     pub fn velocity_and_gradient(&self, mean: &[f64], scratch: &mut Scratch) -> GradientVelocity {
-        let none = |flag| GradientVelocity { velocity: GateVelocity::none(flag), gradient_per_s: f64::NAN };
+        let none = |flag| GradientVelocity {
+            velocity: GateVelocity::none(flag),
+            gradient_per_s: f64::NAN,
+        };
         if mean.len() != self.statistic_len() {
             return none(Quality::Invalid);
         }
@@ -262,21 +352,40 @@ impl GradientPeak {
         let mut best: Option<(usize, f64, GateVelocity)> = None;
         let mut at_rest = (f64::NAN, f64::NAN);
         let mut found = Vec::with_capacity(self.spread.len());
-        for (k, (lags, spread)) in mean.chunks_exact(self.search.statistic_len()).zip(&self.spread).enumerate() {
+        for (k, (lags, spread)) in mean
+            .chunks_exact(self.search.statistic_len())
+            .zip(&self.spread)
+            .enumerate()
+        {
             let is_real = !self.corrections.is_empty();
-            let Some(located) = self.search.find(lags, Refinement::Parabola, is_real, scratch) else {
+            let Some(located) = self
+                .search
+                .find(lags, Refinement::Parabola, is_real, scratch)
+            else {
                 return none(Quality::Invalid);
             };
-            let estimate = self.search.velocity(&located, self.search.band.frequency_hz(located.bin));
+            let estimate = self
+                .search
+                .velocity(&located, self.search.band.frequency_hz(located.bin));
             if k == self.slowest {
                 at_rest = (estimate.power, estimate.detection);
             }
             // a window of a noise-free line leaves no energy: the logarithm stays finite
-            let rest = (energy - located.peak).max(1e-12 * energy).max(f64::MIN_POSITIVE);
+            let rest = (energy - located.peak)
+                .max(1e-12 * energy)
+                .max(f64::MIN_POSITIVE);
             let likelihood = -self.samples_in_band * rest.ln() - spread;
             let read_m_s = estimate.velocity_m_s;
-            found.push((likelihood, self.corrections.get(k).map_or(read_m_s, |readings| truth(readings, read_m_s))));
-            if best.as_ref().is_none_or(|(_, highest, _)| likelihood > *highest) {
+            found.push((
+                likelihood,
+                self.corrections
+                    .get(k)
+                    .map_or(read_m_s, |readings| truth(readings, read_m_s)),
+            ));
+            if best
+                .as_ref()
+                .is_none_or(|(_, highest, _)| likelihood > *highest)
+            {
                 best = Some((k, likelihood, estimate));
             }
         }
@@ -286,7 +395,15 @@ impl GradientPeak {
         let (read_per_s, velocity_m_s) = self.between(&found, k);
         let gradient_per_s = truth(&self.gradient_readings, read_per_s);
         let (power, detection) = at_rest;
-        GradientVelocity { velocity: GateVelocity { velocity_m_s, power, detection, ..estimate }, gradient_per_s }
+        GradientVelocity {
+            velocity: GateVelocity {
+                velocity_m_s,
+                power,
+                detection,
+                ..estimate
+            },
+            gradient_per_s,
+        }
     }
 
     /// Gradient and velocity at the top of the parabola through three gradients.
@@ -295,21 +412,36 @@ impl GradientPeak {
         if k == 0 || k + 1 >= found.len() {
             return (at, found[k].1);
         }
-        let (left, right) = (self.gradient_per_s[k - 1] - at, self.gradient_per_s[k + 1] - at);
+        let (left, right) = (
+            self.gradient_per_s[k - 1] - at,
+            self.gradient_per_s[k + 1] - at,
+        );
         // Newton's divided differences about the middle
         let slopes = |value: fn(&(f64, f64)) -> f64| {
-            let (down, up) = (value(&found[k - 1]) - value(&found[k]), value(&found[k + 1]) - value(&found[k]));
+            let (down, up) = (
+                value(&found[k - 1]) - value(&found[k]),
+                value(&found[k + 1]) - value(&found[k]),
+            );
             let curvature = (up / right - down / left) / (right - left);
             (up / right - curvature * right, curvature)
         };
         let (slope, curvature) = slopes(|pair| pair.0);
-        let step = if curvature < 0.0 { (-0.5 * slope / curvature).clamp(0.5 * left, 0.5 * right) } else { 0.0 };
+        let step = if curvature < 0.0 {
+            (-0.5 * slope / curvature).clamp(0.5 * left, 0.5 * right)
+        } else {
+            0.0
+        };
         let (slope, curvature) = slopes(|pair| pair.1);
         let moved_m_s = slope * step + curvature * step * step;
         // two peaks of like height may change places from one gradient to the next
         let sampling = &self.search.sampling;
-        let resolution_m_s = 0.5 * sampling.wavelength_m * sampling.sample_rate_hz / self.search.statistic_len() as f64;
-        let moved_m_s = if moved_m_s.abs() < resolution_m_s { moved_m_s } else { 0.0 };
+        let resolution_m_s = 0.5 * sampling.wavelength_m * sampling.sample_rate_hz
+            / self.search.statistic_len() as f64;
+        let moved_m_s = if moved_m_s.abs() < resolution_m_s {
+            moved_m_s
+        } else {
+            0.0
+        };
         (at + step, found[k].1 + moved_m_s)
     }
 }

@@ -30,16 +30,35 @@ pub(crate) struct LagWeights(Vec<Vec<C64>>);
 
 impl LagWeights {
     pub(crate) fn new(tapers: &Tapers, window_samples: usize) -> Self {
-        let weight = |k: usize, m: usize| tapers.weights.iter().map(|taper| taper[k + m] * taper[k].conj()).sum();
-        Self((0..window_samples).map(|m| (0..window_samples - m).map(|k| weight(k, m)).collect()).collect())
+        let weight = |k: usize, m: usize| {
+            tapers
+                .weights
+                .iter()
+                .map(|taper| taper[k + m] * taper[k].conj())
+                .sum()
+        };
+        Self(
+            (0..window_samples)
+                .map(|m| (0..window_samples - m).map(|k| weight(k, m)).collect())
+                .collect(),
+        )
     }
 
     /// Expected lags of the tapered correlogram for windows of that covariance.
     pub(crate) fn expected_lags(&self, covariance: &Array2<C64>) -> Vec<f64> {
         let lag = |(m, weights): (usize, &Vec<C64>)| -> C64 {
-            weights.iter().enumerate().map(|(k, weight)| weight * covariance[[k + m, k]]).sum()
+            weights
+                .iter()
+                .enumerate()
+                .map(|(k, weight)| weight * covariance[[k + m, k]])
+                .sum()
         };
-        self.0.iter().enumerate().map(lag).flat_map(|value| [value.re, value.im]).collect()
+        self.0
+            .iter()
+            .enumerate()
+            .map(lag)
+            .flat_map(|value| [value.re, value.im])
+            .collect()
     }
 }
 
@@ -67,21 +86,30 @@ pub(crate) fn tapers(
         SignalKind::Complex => None,
         SignalKind::Real => Some(whitener(&model.sampling, &signal, power)?),
     };
-    let whitened = whitener.as_ref().map_or_else(|| signal.clone(), |root| root.dot(&signal).dot(root));
+    let whitened = whitener
+        .as_ref()
+        .map_or_else(|| signal.clone(), |root| root.dot(&signal).dot(root));
     let (values, vectors) = hermitian_eigen("signal covariance", whitened.view())?;
     let weight = |k: usize| {
         let gain = (power * values[k]).max(0.0);
         gain / (1.0 + gain)
     };
-    let kept = (0..n).rev().filter(|&k| weight(k) > LEAST_WEIGHT * weight(n - 1));
+    let kept = (0..n)
+        .rev()
+        .filter(|&k| weight(k) > LEAST_WEIGHT * weight(n - 1));
     let weights = kept.map(|k| {
         let vector = vectors.column(k).to_owned();
-        let taper = whitener.as_ref().map_or_else(|| vector.clone(), |root| root.dot(&vector));
+        let taper = whitener
+            .as_ref()
+            .map_or_else(|| vector.clone(), |root| root.dot(&vector));
         let root = weight(k).sqrt();
         taper.iter().map(|value| value.conj() * root).collect()
     });
     let weights = weights.collect();
-    let spread = values.iter().map(|value| (power * value).max(0.0).ln_1p()).sum();
+    let spread = values
+        .iter()
+        .map(|value| (power * value).max(0.0).ln_1p())
+        .sum();
     Ok(Tapers { weights, spread })
 }
 
@@ -93,8 +121,13 @@ fn whitener(sampling: &Sampling, signal: &Array2<C64>, power: f64) -> Result<Arr
         let lag = n as f64 - m as f64;
         // the image of a line at f lies at -f, and after the carrier is removed at -2 f
         let spread = turn * (high_hz - low_hz) * lag;
-        let sinc = if lag == 0.0 { 1.0 } else { spread.sin() / spread };
-        let image = signal[[n, m]].conj() * Complex::from_polar(power * sinc, -turn * (low_hz + high_hz) * lag);
+        let sinc = if lag == 0.0 {
+            1.0
+        } else {
+            spread.sin() / spread
+        };
+        let image = signal[[n, m]].conj()
+            * Complex::from_polar(power * sinc, -turn * (low_hz + high_hz) * lag);
         image + if n == m { 1.0 } else { 0.0 }
     });
     let (values, vectors) = hermitian_eigen("noise covariance", interference.view())?;

@@ -25,14 +25,24 @@ const LEAST_WEIGHT: f64 = 1e-3;
 /// [`Error::OutOfRange`] if `snr` is not above 0; [`Error::Linalg`] if the envelope is no covariance.
 pub fn likelihood_tapers(model: &WindowModel, snr: f64) -> Result<Vec<Taper>, Error> {
     positive("snr", snr)?;
-    let noise_to_signal = model.sampling.sample_rate_hz / (model.sampling.band_hz.1 - model.sampling.band_hz.0) / snr;
+    let noise_to_signal =
+        model.sampling.sample_rate_hz / (model.sampling.band_hz.1 - model.sampling.band_hz.0) / snr;
     let envelope = model.envelope();
     let power = envelope.diag().mean().unwrap_or(1.0);
     let (values, vectors) = hermitian_eigen("envelope", envelope.view())?;
     let weight = |value: f64| (value / (value + noise_to_signal * power)).max(0.0);
     let largest = weight(values[values.len() - 1]);
-    let kept: Vec<usize> = (0..values.len()).rev().filter(|&k| weight(values[k]) > LEAST_WEIGHT * largest).collect();
+    let kept: Vec<usize> = (0..values.len())
+        .rev()
+        .filter(|&k| weight(values[k]) > LEAST_WEIGHT * largest)
+        .collect();
     let sum: f64 = kept.iter().map(|&k| weight(values[k])).sum();
     positive("sum of the weights of the tapers", sum)?;
-    Ok(kept.iter().map(|&k| Taper { weights: vectors.column(k).to_vec(), factor: weight(values[k]) / sum }).collect())
+    Ok(kept
+        .iter()
+        .map(|&k| Taper {
+            weights: vectors.column(k).to_vec(),
+            factor: weight(values[k]) / sum,
+        })
+        .collect())
 }

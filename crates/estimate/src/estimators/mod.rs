@@ -21,7 +21,9 @@ pub use cell_test::CellTest;
 pub use correlogram_estimators::{LagWindowPeak, PulsePair};
 pub use detection::{NoiseTest, RegionNoise};
 pub use first_moment::FirstMoment;
-pub use gradient_likelihood::{GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity};
+pub use gradient_likelihood::{
+    GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity,
+};
 pub use likelihood::likelihood_tapers;
 pub use model_peaks::{ModelPeak, ModelReading, model_lag_weights};
 pub use noise_floor::noise_floor;

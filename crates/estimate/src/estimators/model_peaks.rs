@@ -44,7 +44,9 @@ pub struct ModelPeak {
 #[must_use]
 pub fn model_lag_weights(order: usize) -> Vec<f64> {
     let turn = std::f64::consts::PI / (order + 1) as f64;
-    (0..=order).map(|m| 0.5 + 0.5 * (turn * m as f64).cos()).collect()
+    (0..=order)
+        .map(|m| 0.5 + 0.5 * (turn * m as f64).cos())
+        .collect()
 }
 
 impl ModelPeak {
@@ -65,8 +67,21 @@ impl ModelPeak {
     ) -> Result<Self, Error> {
         check_order(order, lags)?;
         let lag_weights = model_lag_weights(order);
-        let search = PeakSearch::new(sampling, kind, (padded_samples, padded_samples), &lag_weights)?;
-        Ok(Self { reading, order, choice: OrderChoice::Fixed, lags, search, refinement, lag_weights })
+        let search = PeakSearch::new(
+            sampling,
+            kind,
+            (padded_samples, padded_samples),
+            &lag_weights,
+        )?;
+        Ok(Self {
+            reading,
+            order,
+            choice: OrderChoice::Fixed,
+            lags,
+            search,
+            refinement,
+            lag_weights,
+        })
     }
 
     /// The same with the order chosen for each estimate; `order` is then the largest.
@@ -84,19 +99,33 @@ impl ModelPeak {
         Ok(())
     }
 
-    fn read(&self, model: &Autoregression, numbers: &mut Vec<f64>, band: &mut Vec<f64>) -> GateVelocity {
-        model.inverse_lags(self.search.kind, self.reading == ModelReading::Capon, numbers);
+    fn read(
+        &self,
+        model: &Autoregression,
+        numbers: &mut Vec<f64>,
+        band: &mut Vec<f64>,
+    ) -> GateVelocity {
+        model.inverse_lags(
+            self.search.kind,
+            self.reading == ModelReading::Capon,
+            numbers,
+        );
         numbers.resize(self.search.statistic_len(), 0.0);
         if self.search.zoom.density_into(numbers, band).is_err() {
             return GateVelocity::none(Quality::Invalid);
         }
         // a pole on the circle to rounding must not turn the density negative or infinite
         let least = f64::MIN_POSITIVE.max(1e-300 / model.noise_power);
-        band.iter_mut().for_each(|value| *value = value.max(least).recip());
+        band.iter_mut()
+            .for_each(|value| *value = value.max(least).recip());
         let found = self.search.locate(band, self.refinement, &[], || None);
-        let estimate = self.search.velocity(&found, self.search.band.frequency_hz(found.bin));
+        let estimate = self
+            .search
+            .velocity(&found, self.search.band.frequency_hz(found.bin));
         match self.reading {
-            ModelReading::Pole if found.flag == Quality::Good => self.at_pole(model, found.peak, estimate),
+            ModelReading::Pole if found.flag == Quality::Good => {
+                self.at_pole(model, found.peak, estimate)
+            }
             _ => estimate,
         }
     }
@@ -108,10 +137,21 @@ impl ModelPeak {
         match model.nearest_pole(sampling) {
             Ok(Some((frequency_hz, _))) => {
                 let is_beside = 2.0 * model.density(frequency_hz, sampling) < peak;
-                let flag = if is_beside { Quality::Ambiguous } else { estimate.flag };
-                GateVelocity { velocity_m_s: sampling.velocity_m_s(frequency_hz), flag, ..estimate }
+                let flag = if is_beside {
+                    Quality::Ambiguous
+                } else {
+                    estimate.flag
+                };
+                GateVelocity {
+                    velocity_m_s: sampling.velocity_m_s(frequency_hz),
+                    flag,
+                    ..estimate
+                }
             }
-            Ok(None) => GateVelocity { flag: Quality::OutOfBand, ..estimate },
+            Ok(None) => GateVelocity {
+                flag: Quality::OutOfBand,
+                ..estimate
+            },
             Err(_) => GateVelocity::none(Quality::Invalid),
         }
     }
@@ -129,7 +169,9 @@ impl Estimator for ModelPeak {
         let kind = self.search.kind;
         let mut model = std::mem::take(&mut scratch.model);
         let mut numbers = std::mem::take(&mut scratch.numbers);
-        let solved = model.fit(mean, kind, self.order, &mut numbers).and_then(|()| self.choose(&mut model));
+        let solved = model
+            .fit(mean, kind, self.order, &mut numbers)
+            .and_then(|()| self.choose(&mut model));
         let mut estimate = match solved {
             Ok(()) => self.read(&model, &mut numbers, &mut scratch.band),
             Err(_) => GateVelocity::none(Quality::Invalid),
@@ -140,7 +182,9 @@ impl Estimator for ModelPeak {
         numbers.extend(kind.weighted_lags(mean, &self.lag_weights));
         if let Some(found) = self.search.find(&numbers, Refinement::None, false, scratch) {
             match (estimate.flag, found.flag) {
-                (Quality::Good | Quality::OutOfBand, flag @ Quality::NoSignal) => estimate = GateVelocity::none(flag),
+                (Quality::Good | Quality::OutOfBand, flag @ Quality::NoSignal) => {
+                    estimate = GateVelocity::none(flag)
+                }
                 (Quality::Good, flag) => estimate.flag = flag,
                 _ => {}
             }

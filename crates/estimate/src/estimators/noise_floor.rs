@@ -16,7 +16,11 @@ const SHARE: f64 = 0.9;
 /// A tenth of the gates at least must be without a signal. One weaker than `deviation` counts as noise.
 #[must_use]
 pub fn noise_floor(power: &[f64], deviation: f64) -> f64 {
-    let mut sorted: Vec<f64> = power.iter().copied().filter(|power| power.is_finite()).collect();
+    let mut sorted: Vec<f64> = power
+        .iter()
+        .copied()
+        .filter(|power| power.is_finite())
+        .collect();
     sorted.sort_by(f64::total_cmp);
     let shape = deviation.max(1e-6).powi(2).recip();
     let lowest = sorted.len().div_ceil(10);
@@ -46,7 +50,9 @@ fn below(shape: f64, level: f64) -> f64 {
 /// Level that a gamma variable of that shape and mean 1 stays below with that probability.
 fn quantile(shape: f64, probability: f64) -> f64 {
     let highest = 1.0 + 20.0 / shape.sqrt().min(shape);
-    let [low, high] = bisected(0.0, highest, 60, |level| gamma_tail(shape, shape * level) > 1.0 - probability);
+    let [low, high] = bisected(0.0, highest, 60, |level| {
+        gamma_tail(shape, shape * level) > 1.0 - probability
+    });
     0.5 * (low + high)
 }
 
@@ -63,23 +69,36 @@ mod tests {
         let noise = Gamma::new(shape, shape.recip()).unwrap();
         let found: Vec<f64> = (0..400)
             .map(|_| {
-                let power = (0..gates).map(|gate| noise.sample(&mut rng) + if gate < lit { snr } else { 0.0 });
+                let power = (0..gates)
+                    .map(|gate| noise.sample(&mut rng) + if gate < lit { snr } else { 0.0 });
                 noise_floor(&power.collect::<Vec<f64>>(), shape.sqrt().recip())
             })
             .collect();
         let mean = mean_of(&found);
-        (mean, (found.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 400.0 / 399.0).sqrt())
+        (
+            mean,
+            (found.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / 400.0 / 399.0).sqrt(),
+        )
     }
 
     #[test]
     fn gates_chosen_by_their_power_tell_the_noise_for_any_number_of_lines() {
         // 13 cells of one line, of 10, of 100
         for shape in [13.0, 130.0, 1300.0] {
-            for (gates, lit, snr) in [(40, 0, 0.0), (160, 0, 0.0), (40, 20, 10.0), (160, 144, 10.0), (10, 5, 10.0)] {
+            for (gates, lit, snr) in [
+                (40, 0, 0.0),
+                (160, 0, 0.0),
+                (40, 20, 10.0),
+                (160, 144, 10.0),
+                (10, 5, 10.0),
+            ] {
                 let (found, error) = floor(gates, shape, lit, snr);
                 // of few gates with a wide scatter some per cent are left
                 let left = 0.3 / (shape * (gates - lit) as f64).sqrt();
-                assert!((found - 1.0).abs() < left + 3.0 * error, "{shape} {gates} {lit}: {found} +- {error}");
+                assert!(
+                    (found - 1.0).abs() < left + 3.0 * error,
+                    "{shape} {gates} {lit}: {found} +- {error}"
+                );
             }
         }
     }

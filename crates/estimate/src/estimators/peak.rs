@@ -32,7 +32,12 @@ impl SpectralPeak {
         padded_samples: usize,
         refinement: Refinement,
     ) -> Result<Self, Error> {
-        let search = PeakSearch::new(sampling, kind, (padded_samples, padded_samples), lag_weights)?;
+        let search = PeakSearch::new(
+            sampling,
+            kind,
+            (padded_samples, padded_samples),
+            lag_weights,
+        )?;
         Ok(Self { search, refinement })
     }
 
@@ -45,15 +50,23 @@ impl SpectralPeak {
     /// Frequencies searched \[Hz\], in increasing order.
     #[must_use]
     pub fn band_frequencies_hz(&self) -> Vec<f64> {
-        (0..self.search.band.bins).map(|bin| self.search.band.frequency_hz(bin as f64)).collect()
+        (0..self.search.band.bins)
+            .map(|bin| self.search.band.frequency_hz(bin as f64))
+            .collect()
     }
 
     /// Densities at [`SpectralPeak::band_frequencies_hz`].
     ///
     /// # Errors
     /// [`Error::Length`] if `correlogram` has not the planned number of lags.
-    pub fn band_density<'s>(&self, correlogram: &[f64], scratch: &'s mut Scratch) -> Result<&'s [f64], Error> {
-        self.search.zoom.density_into(correlogram, &mut scratch.band)?;
+    pub fn band_density<'s>(
+        &self,
+        correlogram: &[f64],
+        scratch: &'s mut Scratch,
+    ) -> Result<&'s [f64], Error> {
+        self.search
+            .zoom
+            .density_into(correlogram, &mut scratch.band)?;
         Ok(&scratch.band[1..=self.search.band.bins])
     }
 
@@ -62,7 +75,12 @@ impl SpectralPeak {
         let padded = self.search.padded as f64;
         let at = |bin: f64| {
             let frequency_hz = self.search.band.frequency_hz(bin);
-            density_at(correlogram, self.search.kind, frequency_hz, &self.search.sampling)
+            density_at(
+                correlogram,
+                self.search.kind,
+                frequency_hz,
+                &self.search.sampling,
+            )
         };
         // d(angle)/d(bin) turns the derivatives into those per bin
         let per_bin = std::f64::consts::TAU / padded;
@@ -72,7 +90,11 @@ impl SpectralPeak {
             let [_, slope, curvature] = at(bin);
             (low, high) = if slope > 0.0 { (bin, high) } else { (low, bin) };
             let newton = bin - slope / (curvature * per_bin);
-            let next = if curvature < 0.0 && newton > low && newton < high { newton } else { 0.5 * (low + high) };
+            let next = if curvature < 0.0 && newton > low && newton < high {
+                newton
+            } else {
+                0.5 * (low + high)
+            };
             let moved = (next - bin).abs();
             bin = next;
             if moved < 1e-12 * padded {

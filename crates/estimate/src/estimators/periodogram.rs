@@ -24,7 +24,11 @@ pub struct PeriodogramOptions {
 impl Default for PeriodogramOptions {
     /// Gaussian weighting, 1024 frequencies, parabola.
     fn default() -> Self {
-        Self { weighting: Weighting::default(), padded_samples: 1024, refinement: Refinement::Parabola }
+        Self {
+            weighting: Weighting::default(),
+            padded_samples: 1024,
+            refinement: Refinement::Parabola,
+        }
     }
 }
 
@@ -32,7 +36,11 @@ impl PeriodogramOptions {
     /// (29) and (30) as printed: as many frequencies as samples, no refinement.
     #[must_use]
     pub fn literal(weighting: Weighting, window_samples: usize) -> Self {
-        Self { weighting, padded_samples: window_samples, refinement: Refinement::None }
+        Self {
+            weighting,
+            padded_samples: window_samples,
+            refinement: Refinement::None,
+        }
     }
 }
 
@@ -52,11 +60,24 @@ impl<S: Sample> PeriodogramPlan<S> {
     ///
     /// # Errors
     /// [`Error::Band`] or [`Error::OutOfRange`] if sampling, window or options make no sense.
-    pub fn new(sampling: &Sampling, window_samples: usize, options: &PeriodogramOptions) -> Result<Self, Error> {
+    pub fn new(
+        sampling: &Sampling,
+        window_samples: usize,
+        options: &PeriodogramOptions,
+    ) -> Result<Self, Error> {
         let statistic = Correlogram::new(options.weighting, window_samples)?;
         let weights = statistic.lag_weights();
-        let estimator = SpectralPeak::new(sampling, S::KIND, &weights, options.padded_samples, options.refinement)?;
-        Ok(Self { statistic, estimator })
+        let estimator = SpectralPeak::new(
+            sampling,
+            S::KIND,
+            &weights,
+            options.padded_samples,
+            options.refinement,
+        )?;
+        Ok(Self {
+            statistic,
+            estimator,
+        })
     }
 
     /// Velocity of one window.

@@ -106,12 +106,25 @@ impl PeakSearch {
         let line = LagSpectrum::new(SignalKind::Real, lags, padded.max(8 * lags))?;
         let mut scratch = Scratch::new();
         let line = line.density(lag_weights, &mut scratch)?;
-        let mut leak: Vec<f64> = line[..=line.len() / 2].iter().map(|density| (density / line[0]).abs()).collect();
+        let mut leak: Vec<f64> = line[..=line.len() / 2]
+            .iter()
+            .map(|density| (density / line[0]).abs())
+            .collect();
         for place in (1..leak.len()).rev() {
             leak[place - 1] = leak[place - 1].max(leak[place]);
         }
         let (constant, widths) = (1.0 / lags as f64, widths(lag_weights, padded, band.bins)?);
-        Ok(Self { sampling: *sampling, band, kind, padded, zoom, whole, constant, widths, leak })
+        Ok(Self {
+            sampling: *sampling,
+            band,
+            kind,
+            padded,
+            zoom,
+            whole,
+            constant,
+            widths,
+            leak,
+        })
     }
 
     /// Numbers of the correlograms.
@@ -134,7 +147,14 @@ impl PeakSearch {
             let density = self.whole.density(lags, scratch).ok()?;
             let (place, highest) = highest(density);
             let place = place as f64 / density.len() as f64;
-            Some((highest, if mirrored { place.min(1.0 - place) } else { place }))
+            Some((
+                highest,
+                if mirrored {
+                    place.min(1.0 - place)
+                } else {
+                    place
+                },
+            ))
         });
         scratch.band = band;
         Some(found)
@@ -163,19 +183,35 @@ impl PeakSearch {
         let to_edge = top.min(self.band.bins - 1 - top) as f64 / self.padded as f64;
         let is_doubtful = self.power(sum) < 0.5 * lags.first().copied().unwrap_or(0.0)
             && peak - lobe.floor < self.leaked(to_edge, density_limit(lags));
-        let flag = self.flag(peak - lobe.floor, top, lobe.floor, if is_doubtful { anywhere() } else { None });
-        Located { top: top as i64, bin, peak, sum, lobe, flag }
+        let flag = self.flag(
+            peak - lobe.floor,
+            top,
+            lobe.floor,
+            if is_doubtful { anywhere() } else { None },
+        );
+        Located {
+            top: top as i64,
+            bin,
+            peak,
+            sum,
+            lobe,
+            flag,
+        }
     }
 
     /// The estimate for a peak placed at `frequency_hz`.
     pub(crate) fn velocity(&self, found: &Located, frequency_hz: f64) -> GateVelocity {
         let power = self.power(found.sum);
         if found.flag == Quality::NoSignal {
-            return GateVelocity { power, ..GateVelocity::none(found.flag) };
+            return GateVelocity {
+                power,
+                ..GateVelocity::none(found.flag)
+            };
         }
         let bins = self.band.bins as f64;
         let lobe = &found.lobe;
-        let bin_m_s = 0.5 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / self.padded as f64;
+        let bin_m_s =
+            0.5 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / self.padded as f64;
         let square_m2_s2 = bin_m_s * bin_m_s;
         GateVelocity {
             velocity_m_s: self.sampling.velocity_m_s(frequency_hz),
@@ -183,10 +219,15 @@ impl PeakSearch {
             quality: found.peak * bins / found.sum,
             detection: found.peak,
             spread_m2_s2: self.spread(lobe.width * lobe.width) * square_m2_s2,
-            resolution_m2_s2: self.widths.first().map_or(f64::NAN, |line| line.0 * square_m2_s2),
+            resolution_m2_s2: self
+                .widths
+                .first()
+                .map_or(f64::NAN, |line| line.0 * square_m2_s2),
             snr: (found.sum / (bins * lobe.floor.max(0.0)) - 1.0).max(0.0),
             runner_up: lobe.second.map(|(bin, density)| RunnerUp {
-                velocity_m_s: self.sampling.velocity_m_s(self.band.frequency_hz(bin as f64)),
+                velocity_m_s: self
+                    .sampling
+                    .velocity_m_s(self.band.frequency_hz(bin as f64)),
                 relative_density: density / found.peak,
             }),
             flag: found.flag,
@@ -195,7 +236,11 @@ impl PeakSearch {
 
     /// Power in the band, over which the densities have that sum.
     pub(crate) fn power(&self, sum: f64) -> f64 {
-        let sides = if self.kind == SignalKind::Real { 2.0 } else { 1.0 };
+        let sides = if self.kind == SignalKind::Real {
+            2.0
+        } else {
+            1.0
+        };
         sides * sum / self.padded as f64
     }
 
@@ -225,11 +270,19 @@ impl PeakSearch {
             let image = if is_real { -place } else { place };
             if peak < self.leaked(apart(place, own).min(apart(image, own)), highest - floor) {
                 let constant = is_real && apart(place, 0.0) < self.constant;
-                return if constant { Quality::NoSignal } else { Quality::OutOfBand };
+                return if constant {
+                    Quality::NoSignal
+                } else {
+                    Quality::OutOfBand
+                };
             }
         }
         let edge = top == 0 || top + 1 == self.band.bins;
-        if edge && !self.band.cyclic { Quality::OutOfBand } else { Quality::Good }
+        if edge && !self.band.cyclic {
+            Quality::OutOfBand
+        } else {
+            Quality::Good
+        }
     }
 
     /// Whether a place in cycles per sample, or its image, lies in the band.
@@ -250,16 +303,22 @@ fn apart(a: f64, b: f64) -> f64 {
 
 /// Squares of the standard deviations \[bins^2\] of the peaks of Gaussian spectra in the middle of a band, and of the spectra.
 fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f64)>, Error> {
-    let (spectrum, mut scratch) = (LagSpectrum::new(SignalKind::Complex, lag_weights.len(), padded)?, Scratch::new());
+    let (spectrum, mut scratch) = (
+        LagSpectrum::new(SignalKind::Complex, lag_weights.len(), padded)?,
+        Scratch::new(),
+    );
     let mut seen = |width: f64, place: f64| {
         let lag = |(m, weight): (usize, &f64)| {
             let turn = std::f64::consts::TAU * m as f64 / padded as f64;
-            let lag = Complex::from_polar(weight * (-0.5 * (turn * width).powi(2)).exp(), turn * place);
+            let lag =
+                Complex::from_polar(weight * (-0.5 * (turn * width).powi(2)).exp(), turn * place);
             [lag.re, lag.im]
         };
         let lags: Vec<f64> = lag_weights.iter().enumerate().flat_map(lag).collect();
         let line = spectrum.density(&lags, &mut scratch)?;
-        let density: Vec<f64> = (0..bins).map(|bin| line[(bin + padded - bins / 2) % padded]).collect();
+        let density: Vec<f64> = (0..bins)
+            .map(|bin| line[(bin + padded - bins / 2) % padded])
+            .collect();
         Ok::<_, Error>(Lobe::new(&density, bins / 2, line[0]).width.powi(2))
     };
     let own = seen(0.0, 0.0)?.sqrt();
@@ -267,7 +326,10 @@ fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f
     for k in 0..WIDTHS {
         let width = (k * k) as f64 / 16.0 * own;
         // peaks fall anywhere between the frequencies
-        let pair = (0.5 * (seen(width, 0.125)? + seen(width, 0.375)?), width * width);
+        let pair = (
+            0.5 * (seen(width, 0.125)? + seen(width, 0.375)?),
+            width * width,
+        );
         let shows = |last: &(f64, f64)| pair.0 - last.0 > LEAST_SHARE * (pair.1 - last.1);
         if !pairs.last().is_none_or(shows) {
             break;
@@ -283,8 +345,11 @@ fn widths(lag_weights: &[f64], padded: usize, bins: usize) -> Result<Vec<(f64, f
 
 impl Lobe {
     fn new(density: &[f64], top: usize, peak: f64) -> Self {
-        let lowest =
-            LazyCell::new(|| lanes(density, f64::INFINITY, |low, value| if value < low { value } else { low }));
+        let lowest = LazyCell::new(|| {
+            lanes(density, f64::INFINITY, |low, value| {
+                if value < low { value } else { low }
+            })
+        });
         let (mut floor, mut beside) = (0.0, None);
         let mut reach = [0.0; 2];
         // the half height needs the floor and the floor the half height: one repetition settles it
@@ -295,19 +360,32 @@ impl Lobe {
         }
         let second = second_peak(density, top, reach);
         let is_bare = beside.is_some() || *lowest < BARE * peak;
-        let width = if is_bare { (reach[0] + reach[1]) / FULL_WIDTH } else { f64::NAN };
-        Self { floor, width, second }
+        let width = if is_bare {
+            (reach[0] + reach[1]) / FULL_WIDTH
+        } else {
+            f64::NAN
+        };
+        Self {
+            floor,
+            width,
+            second,
+        }
     }
 }
 
 /// Distances \[bins\] from `top` to where the density falls to `level` on either side; to the end of the band if it does not.
 fn half_widths(density: &[f64], top: usize, level: f64) -> [f64; 2] {
-    let distance = |steps: usize, above: f64, below: f64| steps as f64 + (above - level) / (above - below);
+    let distance =
+        |steps: usize, above: f64, below: f64| steps as f64 + (above - level) / (above - below);
     let down = density[..top].iter().rposition(|value| *value < level);
     let up = density[top + 1..].iter().position(|value| *value < level);
     [
-        down.map_or(top as f64, |k| distance(top - k - 1, density[k + 1], density[k])),
-        up.map_or((density.len() - 1 - top) as f64, |k| distance(k, density[top + k], density[top + 1 + k])),
+        down.map_or(top as f64, |k| {
+            distance(top - k - 1, density[k + 1], density[k])
+        }),
+        up.map_or((density.len() - 1 - top) as f64, |k| {
+            distance(k, density[top + k], density[top + 1 + k])
+        }),
     ]
 }
 
@@ -318,7 +396,8 @@ fn mean_beside(density: &[f64], top: usize, reach: [f64; 2]) -> Option<f64> {
     let low = ((top as f64 - (LOBE * reach[0]).ceil()).max(0.0) as usize).max(first);
     let high = ((top as f64 + (LOBE * reach[1]).ceil()) as usize + 1).min(last);
     let count = low - first + last - high;
-    (count > 0).then(|| (lanes_sum(&density[first..low]) + lanes_sum(&density[high..last])) / count as f64)
+    (count > 0)
+        .then(|| (lanes_sum(&density[first..low]) + lanes_sum(&density[high..last])) / count as f64)
 }
 
 /// Highest density beyond the first valley on each side of the peak.
@@ -332,7 +411,10 @@ fn second_peak(density: &[f64], top: usize, reach: [f64; 2]) -> Option<(usize, f
         let (place, value) = highest(&density[k + 1..]);
         (k + 1 + place, value)
     });
-    below.into_iter().chain(above).reduce(|a, b| if b.1 > a.1 { b } else { a })
+    below
+        .into_iter()
+        .chain(above)
+        .reduce(|a, b| if b.1 > a.1 { b } else { a })
 }
 
 /// Fractional bin of the peak next to bin `top`, by parabola; `density` begins one bin early.
@@ -340,7 +422,11 @@ fn parabola(density: &[f64], top: usize) -> f64 {
     let floor = density[top + 1] * 1e-30;
     let [left, middle, right] = [0, 1, 2].map(|k| density[top + k].max(floor).ln());
     let curvature = left - 2.0 * middle + right;
-    if curvature < 0.0 { top as f64 + (0.5 * (left - right) / curvature).clamp(-0.5, 0.5) } else { top as f64 }
+    if curvature < 0.0 {
+        top as f64 + (0.5 * (left - right) / curvature).clamp(-0.5, 0.5)
+    } else {
+        top as f64
+    }
 }
 
 /// Folds numbers in independent lanes, so that no step waits for the one before.
@@ -362,8 +448,16 @@ pub(crate) fn lanes_sum(values: &[f64]) -> f64 {
 
 /// Place and value of the first highest number; (0, -inf) if there is none.
 pub(crate) fn highest(values: &[f64]) -> (usize, f64) {
-    let highest = lanes(values, f64::NEG_INFINITY, |highest, value| if value > highest { value } else { highest });
-    (values.iter().position(|value| *value == highest).unwrap_or(0), highest)
+    let highest = lanes(values, f64::NEG_INFINITY, |highest, value| {
+        if value > highest { value } else { highest }
+    });
+    (
+        values
+            .iter()
+            .position(|value| *value == highest)
+            .unwrap_or(0),
+        highest,
+    )
 }
 
 #[cfg(test)]
@@ -375,23 +469,40 @@ mod tests {
         let own = |lags: &[f64]| widths(lags, 4096, 1024).unwrap()[0].0.sqrt() / 4096.0;
         // half the maximum of the spectrum of n equal weights is 0.443 / n from its centre
         let triangle: Vec<f64> = (0..64).map(|m| 1.0 - f64::from(m) / 64.0).collect();
-        assert!((own(&triangle) * 64.0 - 0.886 / FULL_WIDTH).abs() < 2e-3, "{}", own(&triangle));
+        assert!(
+            (own(&triangle) * 64.0 - 0.886 / FULL_WIDTH).abs() < 2e-3,
+            "{}",
+            own(&triangle)
+        );
         // exp(-m^2 / (2 s^2)) has a spectrum of standard deviation 1 / (2 pi s)
-        let gaussian: Vec<f64> = (0..64).map(|m| (-0.5 * f64::from(m * m) / 100.0).exp()).collect();
+        let gaussian: Vec<f64> = (0..64)
+            .map(|m| (-0.5 * f64::from(m * m) / 100.0).exp())
+            .collect();
         assert!((own(&gaussian) * 20.0 * std::f64::consts::PI - 1.0).abs() < 2e-3);
     }
 
     #[test]
     fn lobe_of_two_gaussians_on_a_floor() {
-        let gaussian = |k: f64, centre: f64, width: f64| (-0.5 * ((k - centre) / width).powi(2)).exp();
-        let density: Vec<f64> =
-            (0..200).map(f64::from).map(|k| 0.1 + gaussian(k, 60.3, 6.0) + 0.5 * gaussian(k, 120.0, 4.0)).collect();
+        let gaussian =
+            |k: f64, centre: f64, width: f64| (-0.5 * ((k - centre) / width).powi(2)).exp();
+        let density: Vec<f64> = (0..200)
+            .map(f64::from)
+            .map(|k| 0.1 + gaussian(k, 60.3, 6.0) + 0.5 * gaussian(k, 120.0, 4.0))
+            .collect();
         let lobe = Lobe::new(&density, 60, density[60]);
         assert!((lobe.width - 6.0).abs() < 0.3, "{}", lobe.width);
         assert_eq!(lobe.second.unwrap().0, 120);
-        let alone: Vec<f64> = (0..200).map(f64::from).map(|k| 0.1 + gaussian(k, 60.3, 6.0)).collect();
+        let alone: Vec<f64> = (0..200)
+            .map(f64::from)
+            .map(|k| 0.1 + gaussian(k, 60.3, 6.0))
+            .collect();
         let lobe = Lobe::new(&alone, 60, alone[60]);
-        assert!((lobe.floor - 0.1).abs() < 1e-3 && (lobe.width - 6.0).abs() < 0.05, "{} {}", lobe.floor, lobe.width);
+        assert!(
+            (lobe.floor - 0.1).abs() < 1e-3 && (lobe.width - 6.0).abs() < 0.05,
+            "{} {}",
+            lobe.floor,
+            lobe.width
+        );
         assert!(lobe.second.is_none());
         // a flat band: everything is the main peak, and nothing is above the floor
         let flat = Lobe::new(&[1.0; 50], 0, 1.0);

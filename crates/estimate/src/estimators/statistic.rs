@@ -35,7 +35,11 @@ pub trait Statistic<S: Sample>: Sync {
         each: &mut dyn FnMut(usize, &[f64]),
     ) {
         let mut one = vec![0.0; self.statistic_len()];
-        for (gate, window) in record.windows(self.window_samples()).step_by(step_samples).enumerate() {
+        for (gate, window) in record
+            .windows(self.window_samples())
+            .step_by(step_samples)
+            .enumerate()
+        {
             if valid(gate) {
                 self.evaluate(window, scratch, &mut one);
                 each(gate, &one);
@@ -77,14 +81,21 @@ pub fn estimate_window<S: Sample>(
     scratch: &mut Scratch,
 ) -> Result<GateVelocity, Error> {
     length("window", statistic.window_samples(), window.len())?;
-    length("statistic", estimator.statistic_len(), statistic.statistic_len())?;
+    length(
+        "statistic",
+        estimator.statistic_len(),
+        statistic.statistic_len(),
+    )?;
     let missing = MissingSamples::default();
     let rule = missing.rule(window.iter().copied());
     if !window.iter().all(|sample| rule.is_measured(*sample)) {
         return Ok(GateVelocity::none(Quality::Invalid));
     }
     let scale = rule.binary_scale(window.iter().copied()).unwrap_or(1.0);
-    let scaled: Vec<S> = window.iter().map(|sample| sample.scaled(scale.recip())).collect();
+    let scaled: Vec<S> = window
+        .iter()
+        .map(|sample| sample.scaled(scale.recip()))
+        .collect();
     let mut numbers = vec![0.0; statistic.statistic_len()];
     statistic.evaluate(&scaled, scratch, &mut numbers);
     let mut estimate = estimator.estimate(&numbers, scratch);

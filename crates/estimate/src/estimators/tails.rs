@@ -24,10 +24,19 @@ pub(crate) fn gamma_tail(a: f64, x: f64) -> f64 {
 }
 
 /// Ends of the interval about the place up to which `is_below` holds, after so many bisections.
-pub(crate) fn bisected(mut low: f64, mut high: f64, steps: usize, is_below: impl Fn(f64) -> bool) -> [f64; 2] {
+pub(crate) fn bisected(
+    mut low: f64,
+    mut high: f64,
+    steps: usize,
+    is_below: impl Fn(f64) -> bool,
+) -> [f64; 2] {
     for _ in 0..steps {
         let middle = 0.5 * (low + high);
-        if is_below(middle) { low = middle } else { high = middle }
+        if is_below(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     [low, high]
 }
@@ -43,12 +52,18 @@ mod tests {
 
     #[test]
     fn tails_of_impossible_and_extreme_numbers_are_limits_or_none() {
-        assert_eq!([gamma_tail(2.0, 0.0), gamma_tail(2.0, f64::INFINITY)], [1.0, 0.0]);
+        assert_eq!(
+            [gamma_tail(2.0, 0.0), gamma_tail(2.0, f64::INFINITY)],
+            [1.0, 0.0]
+        );
         assert!((gamma_tail(1.0, 3.0) - (-3.0_f64).exp()).abs() < 1e-15);
         assert!((beta_below(1.0, 2.0, 0.25) - (1.0 - 0.75_f64.powi(2))).abs() < 1e-14);
         // of one shape on both sides of the limit
         let at = |a: f64| gamma_tail(a, a + 2.0 * a.sqrt());
-        assert!((at(1.001 * LARGE_SHAPE) / at(0.999 * LARGE_SHAPE) - 1.0).abs() < 1e-4 && at(1e200) < 1.0);
+        assert!(
+            (at(1.001 * LARGE_SHAPE) / at(0.999 * LARGE_SHAPE) - 1.0).abs() < 1e-4
+                && at(1e200) < 1.0
+        );
         for impossible in [0.0, -1.0, f64::INFINITY, f64::NAN] {
             assert!(gamma_tail(impossible, 1.0).is_nan(), "{impossible}");
         }

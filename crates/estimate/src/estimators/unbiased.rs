@@ -26,10 +26,25 @@ impl<E: Estimator> Unbiased<E> {
     /// # Errors
     /// [`Error::Length`] unless there is one weight per lag, [`Error::OutOfRange`] for a weight that is 0 or not finite.
     pub fn new(estimator: E, kind: SignalKind, lag_weights: &[f64]) -> Result<Self, Error> {
-        length("lag_weights", estimator.statistic_len(), kind.lag_numbers(lag_weights.len()))?;
-        let usable = |&w: &f64| check("lag_weights", w, "finite and not 0", w.is_finite() && w != 0.0);
+        length(
+            "lag_weights",
+            estimator.statistic_len(),
+            kind.lag_numbers(lag_weights.len()),
+        )?;
+        let usable = |&w: &f64| {
+            check(
+                "lag_weights",
+                w,
+                "finite and not 0",
+                w.is_finite() && w != 0.0,
+            )
+        };
         lag_weights.iter().try_for_each(usable)?;
-        Ok(Self { estimator, kind, gains: lag_weights.iter().map(|weight| weight.recip()).collect() })
+        Ok(Self {
+            estimator,
+            kind,
+            gains: lag_weights.iter().map(|weight| weight.recip()).collect(),
+        })
     }
 }
 

@@ -99,7 +99,11 @@ impl GateVelocity {
     /// wider than that of a line.
     #[must_use]
     pub fn width_m_s(&self) -> f64 {
-        if self.spread_m2_s2 < 0.0 { 0.0 } else { self.spread_m2_s2.sqrt() }
+        if self.spread_m2_s2 < 0.0 {
+            0.0
+        } else {
+            self.spread_m2_s2.sqrt()
+        }
     }
 
     /// Multiplies what has the unit of a power.
@@ -127,7 +131,11 @@ impl GateVelocity {
 /// How the peak is placed between the frequencies of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Refinement {
     /// Parabola through the logarithm of the highest bin and its neighbours.
     #[default]

@@ -31,16 +31,32 @@ pub(crate) fn cholesky(mut a: Array2<f64>) -> Option<Array2<f64>> {
             let row = rest.as_slice_mut()?;
             for j in first..last.min(i + 1) {
                 let product = |other: &[f64]| dot(&row[first..j], &other[first..j]);
-                let sum = row[j] - if j < i { product(above.row(j).to_slice()?) } else { product(row) };
-                row[j] = if j < i { sum / above[[j, j]] } else { sum.sqrt() };
+                let sum = row[j]
+                    - if j < i {
+                        product(above.row(j).to_slice()?)
+                    } else {
+                        product(row)
+                    };
+                row[j] = if j < i {
+                    sum / above[[j, j]]
+                } else {
+                    sum.sqrt()
+                };
             }
         }
         // the root of a pivot that is not positive is no number, or zero
-        if !a.diag().slice(s![first..last]).iter().all(|&pivot| pivot > 0.0) {
+        if !a
+            .diag()
+            .slice(s![first..last])
+            .iter()
+            .all(|&pivot| pivot > 0.0)
+        {
             return None;
         }
     }
-    a.indexed_iter_mut().filter(|((i, j), _)| j > i).for_each(|(_, above)| *above = 0.0);
+    a.indexed_iter_mut()
+        .filter(|((i, j), _)| j > i)
+        .for_each(|(_, above)| *above = 0.0);
     Some(a)
 }
 
@@ -51,7 +67,13 @@ pub(crate) fn forward(lower: ArrayView2<'_, f64>, b: &mut Array2<f64>) {
         let last = (first + BLOCK).min(order);
         let (done, mut rest) = b.view_mut().split_at(Axis(0), first);
         let mut own = rest.slice_mut(s![..last - first, ..]);
-        general_mat_mul(-1.0, &lower.slice(s![first..last, ..first]), &done, 1.0, &mut own);
+        general_mat_mul(
+            -1.0,
+            &lower.slice(s![first..last, ..first]),
+            &done,
+            1.0,
+            &mut own,
+        );
         for i in 0..last - first {
             let (before, mut here) = own.view_mut().split_at(Axis(0), i);
             let mut row = here.row_mut(0);
@@ -86,7 +108,10 @@ mod tests {
         for order in [1, 63, 64, 65, 200] {
             let a = covariance(order);
             let lower = cholesky(a.clone()).unwrap();
-            let error = (lower.dot(&lower.t()) - &a).mapv(f64::abs).into_iter().fold(0.0, f64::max);
+            let error = (lower.dot(&lower.t()) - &a)
+                .mapv(f64::abs)
+                .into_iter()
+                .fold(0.0, f64::max);
             assert!(error < 1e-13, "{order}: {error}");
             let x = Array2::from_shape_fn((order, 3), |(i, j)| ((i * 7 + j) as f64).sin());
             let mut b = lower.dot(&x);
@@ -94,7 +119,11 @@ mod tests {
             let mut one = lower.dot(&x.column(0)).to_vec();
             forward_one(lower.as_slice().unwrap(), &mut one);
             let error = (b - &x).mapv(f64::abs).into_iter().fold(0.0, f64::max);
-            let error = one.iter().zip(x.column(0)).map(|(a, b)| (a - b).abs()).fold(error, f64::max);
+            let error = one
+                .iter()
+                .zip(x.column(0))
+                .map(|(a, b)| (a - b).abs())
+                .fold(error, f64::max);
             assert!(error < 1e-11, "{order}: {error}");
         }
     }

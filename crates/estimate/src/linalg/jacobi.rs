@@ -12,7 +12,10 @@ const SWEEPS: usize = 60;
 ///
 /// Cyclic Jacobi rotations (Golub and Van Loan, section 8.5). The vectors are the columns of the result.
 /// Returns `None` if the matrix is not finite or the rotations do not converge.
-pub(crate) fn jacobi<T: Scalar<Real = f64>>(mut a: Vec<T>, order: usize) -> Option<(Vec<f64>, Vec<T>)> {
+pub(crate) fn jacobi<T: Scalar<Real = f64>>(
+    mut a: Vec<T>,
+    order: usize,
+) -> Option<(Vec<f64>, Vec<T>)> {
     let mut v = vec![T::zero(); order * order];
     (0..order).for_each(|k| v[k * (order + 1)] = T::one());
     let (mut sweeps, mut rotated) = (0..SWEEPS, true);
@@ -31,12 +34,21 @@ pub(crate) fn jacobi<T: Scalar<Real = f64>>(mut a: Vec<T>, order: usize) -> Opti
     }
     let mut places: Vec<usize> = (0..order).collect();
     places.sort_by(|&i, &j| diagonal[i].total_cmp(&diagonal[j]));
-    let vectors = places.iter().flat_map(|&k| v[k * order..(k + 1) * order].iter().copied()).collect();
+    let vectors = places
+        .iter()
+        .flat_map(|&k| v[k * order..(k + 1) * order].iter().copied())
+        .collect();
     Some((places.iter().map(|&k| diagonal[k]).collect(), vectors))
 }
 
 /// One rotation of columns p < q that annihilates a_pq; `Some(false)` if that element is negligible, `None` if it is not finite.
-fn rotate<T: Scalar<Real = f64>>(a: &mut [T], v: &mut [T], order: usize, p: usize, q: usize) -> Option<bool> {
+fn rotate<T: Scalar<Real = f64>>(
+    a: &mut [T],
+    v: &mut [T],
+    order: usize,
+    p: usize,
+    q: usize,
+) -> Option<bool> {
     let at = |row: usize, column: usize| row + column * order;
     let off = a[at(p, q)];
     let size = off.abs();
@@ -57,7 +69,10 @@ fn rotate<T: Scalar<Real = f64>>(a: &mut [T], v: &mut [T], order: usize, p: usiz
     let (up, down) = (phase.mul_real(s), phase.conj().mul_real(s));
     for matrix in [&mut *a, &mut *v] {
         let (before, from_q) = matrix.split_at_mut(q * order);
-        for (x, y) in before[p * order..(p + 1) * order].iter_mut().zip(&mut from_q[..order]) {
+        for (x, y) in before[p * order..(p + 1) * order]
+            .iter_mut()
+            .zip(&mut from_q[..order])
+        {
             (*x, *y) = (x.mul_real(c) - *y * down, *x * up + y.mul_real(c));
         }
     }

@@ -32,7 +32,12 @@ unsafe fn heev<T: Scalar<Real = f64>>(
 ) -> c_int {
     let [jobz, uplo] = [jobz, uplo].map(|letter| (letter as u8).to_ascii_uppercase());
     let unknown = [!matches!(jobz, b'N' | b'V'), !matches!(uplo, b'L' | b'U')];
-    let wrong = [(unknown[0], 1), (unknown[1], 2), (n < 0, 3), (lda < n.max(1), 5)];
+    let wrong = [
+        (unknown[0], 1),
+        (unknown[1], 2),
+        (n < 0, 3),
+        (lda < n.max(1), 5),
+    ];
     if let Some((_, place)) = wrong.iter().find(|(is_wrong, _)| *is_wrong) {
         return -place;
     }
@@ -53,11 +58,18 @@ unsafe fn heev<T: Scalar<Real = f64>>(
         order if order.is_gt() == (uplo == b'L') => a[(row, column)],
         _ => a[(column, row)].conj(),
     };
-    let full = (0..order * order).map(|place| element((place % order, place / order))).collect();
-    let Some((found, basis)) = jacobi(full, order) else { return n };
+    let full = (0..order * order)
+        .map(|place| element((place % order, place / order)))
+        .collect();
+    let Some((found, basis)) = jacobi(full, order) else {
+        return n;
+    };
     values.copy_from_slice(&found);
     if jobz == b'V' {
-        basis.into_iter().enumerate().for_each(|(place, value)| a[(place % order, place / order)] = value);
+        basis
+            .into_iter()
+            .enumerate()
+            .for_each(|(place, value)| a[(place % order, place / order)] = value);
     }
     0
 }

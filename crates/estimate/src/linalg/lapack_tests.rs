@@ -47,7 +47,12 @@ fn normal(rng: &mut Xoshiro256PlusPlus) -> f64 {
 }
 
 case!(f64, normal, dsyev_,);
-case!(C64, |rng: &mut _| C64::new(normal(rng), normal(rng)), zheev_, std::ptr::null_mut());
+case!(
+    C64,
+    |rng: &mut _| C64::new(normal(rng), normal(rng)),
+    zheev_,
+    std::ptr::null_mut()
+);
 
 /// A random order x order matrix in memory with leading dimension lda.
 fn random<T: Case>(order: usize, lda: usize, seed: u64) -> Vec<T> {
@@ -68,9 +73,22 @@ fn diagonalises<T: Case>() {
                 }
             }
             let mut only = vec![0.0; order];
-            assert_eq!(T::heev(b'N', uplo, order as i32, &mut a.clone(), lda as i32, &mut only), 0);
+            assert_eq!(
+                T::heev(
+                    b'N',
+                    uplo,
+                    order as i32,
+                    &mut a.clone(),
+                    lda as i32,
+                    &mut only
+                ),
+                0
+            );
             let mut values = vec![0.0; order];
-            assert_eq!(T::heev(b'V', uplo, order as i32, &mut a, lda as i32, &mut values), 0);
+            assert_eq!(
+                T::heev(b'V', uplo, order as i32, &mut a, lda as i32, &mut values),
+                0
+            );
             assert_eq!(only, values);
             assert!(values.is_sorted());
             let trace: f64 = (0..order).map(|i| element(i, i).re()).sum();
@@ -78,8 +96,12 @@ fn diagonalises<T: Case>() {
             for (k, value) in values.iter().enumerate() {
                 let vector = &a[k * lda..k * lda + order];
                 for i in 0..order {
-                    let product = (0..order).fold(T::zero(), |sum, j| sum + element(i, j) * vector[j]);
-                    assert!((product - vector[i].mul_real(*value)).abs() < 1e-11, "{order}");
+                    let product =
+                        (0..order).fold(T::zero(), |sum, j| sum + element(i, j) * vector[j]);
+                    assert!(
+                        (product - vector[i].mul_real(*value)).abs() < 1e-11,
+                        "{order}"
+                    );
                 }
                 let norm: f64 = vector.iter().map(|x| x.abs().powi(2)).sum();
                 assert!((norm - 1.0).abs() < 1e-12);
@@ -99,9 +121,21 @@ fn empty_matrices_succeed_and_wrong_arguments_are_named() {
     assert_eq!(C64::heev(b'V', b'L', 0, &mut [], 1, &mut []), 0);
     assert_eq!(f64::heev(b'Q', b'L', 1, &mut [1.0], 1, &mut [0.0]), -1);
     assert_eq!(f64::heev(b'V', b'Q', 1, &mut [1.0], 1, &mut [0.0]), -2);
-    assert_eq!(f64::heev(b'V', b'L', 2, &mut [1.0; 4], 1, &mut [0.0; 2]), -5);
+    assert_eq!(
+        f64::heev(b'V', b'L', 2, &mut [1.0; 4], 1, &mut [0.0; 2]),
+        -5
+    );
     // not converged: NaN
-    assert!(C64::heev(b'V', b'L', 2, &mut [C64::new(f64::NAN, 0.0); 4], 2, &mut [0.0; 2]) > 0);
+    assert!(
+        C64::heev(
+            b'V',
+            b'L',
+            2,
+            &mut [C64::new(f64::NAN, 0.0); 4],
+            2,
+            &mut [0.0; 2]
+        ) > 0
+    );
 }
 
 #[test]
@@ -109,10 +143,22 @@ fn rank_one_and_equal_eigenvalues_converge() {
     let order = 40;
     let mut ones = vec![1.0; order * order];
     let mut values = vec![0.0; order];
-    assert_eq!(f64::heev(b'V', b'U', order as i32, &mut ones, order as i32, &mut values), 0);
+    assert_eq!(
+        f64::heev(
+            b'V',
+            b'U',
+            order as i32,
+            &mut ones,
+            order as i32,
+            &mut values
+        ),
+        0
+    );
     assert!((values[order - 1] - order as f64).abs() < 1e-12);
     assert!(values[..order - 1].iter().all(|value| value.abs() < 1e-12));
-    let mut unit: Vec<C64> = (0..9).map(|k| C64::from_real(f64::from(k % 4 == 0))).collect();
+    let mut unit: Vec<C64> = (0..9)
+        .map(|k| C64::from_real(f64::from(k % 4 == 0)))
+        .collect();
     assert_eq!(C64::heev(b'V', b'L', 3, &mut unit, 3, &mut values[..3]), 0);
     assert_eq!(values[..3], [1.0; 3]);
 }

@@ -35,13 +35,19 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     let (rows, order) = a.dim();
     not_empty(field, order)?;
     length(field, order, rows)?;
-    let failed = |reason| Error::Linalg { what: field, order, reason };
+    let failed = |reason| Error::Linalg {
+        what: field,
+        order,
+        reason,
+    };
     if a.iter().any(|value| !value.abs().is_finite()) {
         return Err(failed("holds a value that is not finite"));
     }
     let mut columns = Array2::zeros(a.raw_dim().f());
     columns.assign(&a);
-    let (values, vectors) = columns.eigh(UPLO::Lower).map_err(|_| failed("has no converged eigenvalues"))?;
+    let (values, vectors) = columns
+        .eigh(UPLO::Lower)
+        .map_err(|_| failed("has no converged eigenvalues"))?;
     let mut scaled = vectors.clone();
     for (mut column, value) in scaled.columns_mut().into_iter().zip(&values) {
         column.mapv_inplace(|element| element.mul_real(*value));
@@ -50,13 +56,17 @@ pub(crate) fn hermitian_eigen<T: Scalar<Real = f64> + Lapack>(
     if residual <= RESIDUAL * order as f64 * norm(&a) {
         Ok((values, vectors))
     } else {
-        Err(failed("is not Hermitian, or its eigenvectors are those of the conjugate"))
+        Err(failed(
+            "is not Hermitian, or its eigenvectors are those of the conjugate",
+        ))
     }
 }
 
 /// The inverse of a Hermitian matrix from its eigenvectors.
 #[cfg(test)]
-pub(crate) fn inverse(a: ArrayView2<'_, num_complex::Complex<f64>>) -> Array2<num_complex::Complex<f64>> {
+pub(crate) fn inverse(
+    a: ArrayView2<'_, num_complex::Complex<f64>>,
+) -> Array2<num_complex::Complex<f64>> {
     let (values, vectors) = hermitian_eigen("test", a).unwrap();
     let scaled = &vectors / &values.mapv(num_complex::Complex::from);
     scaled.dot(&vectors.t().mapv(|value| value.conj()))
@@ -106,7 +116,11 @@ mod tests {
         }
         let top = vectors.column(23);
         let product = row_major.dot(&top);
-        let residual = product.iter().zip(top).map(|(a, b)| (a - b * values[23]).norm()).fold(0.0, f64::max);
+        let residual = product
+            .iter()
+            .zip(top)
+            .map(|(a, b)| (a - b * values[23]).norm())
+            .fold(0.0, f64::max);
         assert!(residual < 1e-12);
         // the residual of the conjugate, which the check in `hermitian_eigen` would refuse, is large
         let wrong = row_major.dot(&top.mapv(|x| x.conj())) - top.mapv(|x| x.conj() * values[23]);
@@ -132,7 +146,8 @@ mod tests {
         let error = hermitian_eigen("skew", skew.view()).unwrap_err();
         assert!(error.to_string().contains("skew of order 2"), "{error}");
         assert!(hermitian_eigen("empty", Array2::<C64>::zeros((0, 0)).view()).is_err());
-        let (values, _) = hermitian_eigen("singular", array![[1.0, 2.0], [2.0, 4.0]].view()).unwrap();
+        let (values, _) =
+            hermitian_eigen("singular", array![[1.0, 2.0], [2.0, 4.0]].view()).unwrap();
         assert!(values[0].abs() < 1e-15 && (values[1] - 5.0).abs() < 1e-14);
     }
 }

@@ -101,7 +101,14 @@ impl Scan {
         elevation_rad: &[f64],
         records: ArrayView2<'_, S>,
     ) -> Result<Self, Error> {
-        Self::without_missing(statistic, sampling, gates, elevation_rad, records, &MissingSamples::default())
+        Self::without_missing(
+            statistic,
+            sampling,
+            gates,
+            elevation_rad,
+            records,
+            &MissingSamples::default(),
+        )
     }
 
     /// The same with a rule of one's own for missing samples.
@@ -149,7 +156,12 @@ impl Scan {
     ///
     /// # Errors
     /// [`Error::Length`] if `mean` has not [`Scan::statistic_len`] places.
-    pub fn region_mean(&self, point: PolarPoint, radius_m: f64, mean: &mut [f64]) -> Result<usize, Error> {
+    pub fn region_mean(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        mean: &mut [f64],
+    ) -> Result<usize, Error> {
         length("mean", self.numbers, mean.len())?;
         mean.fill(0.0);
         let mut level = 0;
@@ -175,11 +187,18 @@ impl Scan {
         correlation: Option<&WindowCorrelation>,
         estimator: &(impl Estimator + ?Sized),
     ) -> Result<Vec<MapPoint>, Error> {
-        let n_eff = |point, radius_m| correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma));
+        let n_eff = |point, radius_m| {
+            correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma))
+        };
         self.velocities(
             (points, radius),
             self.numbers,
-            |point, radius_m, mean| Ok((self.region_mean(point, radius_m, mean)?, n_eff(point, radius_m))),
+            |point, radius_m, mean| {
+                Ok((
+                    self.region_mean(point, radius_m, mean)?,
+                    n_eff(point, radius_m),
+                ))
+            },
             estimator,
         )
     }
@@ -205,7 +224,12 @@ impl Scan {
             }
             let of_chord = |chord: Chord| chord.gates() * self.geometry.rays.count(chord.line);
             let windows: usize = self.chords(point, radius_m).map(of_chord).sum();
-            Ok(MapPoint { estimate, level, left_out: windows - level, n_eff })
+            Ok(MapPoint {
+                estimate,
+                level,
+                left_out: windows - level,
+                n_eff,
+            })
         });
         found.into_iter().collect()
     }
@@ -239,10 +263,16 @@ impl Scan {
             self.add_chord(chord, &mut sum);
             let place = self.geometry.middle(chord);
             let shift_m_s = relative_m_s(place);
-            let shift_m_s = if shift_m_s.is_finite() { shift_m_s } else { 0.0 };
+            let shift_m_s = if shift_m_s.is_finite() {
+                shift_m_s
+            } else {
+                0.0
+            };
             // a faster wind has the lower frequency: turn it up
-            let step =
-                Complex::from_polar(1.0, 2.0 * TAU * shift_m_s / (sampling.wavelength_m * sampling.sample_rate_hz));
+            let step = Complex::from_polar(
+                1.0,
+                2.0 * TAU * shift_m_s / (sampling.wavelength_m * sampling.sample_rate_hz),
+            );
             let mut turn = Complex::new(1.0, 0.0);
             for (m, pair) in mean.as_chunks_mut::<2>().0.iter_mut().enumerate() {
                 let lag = kind.lag(&sum, m) * turn;
@@ -278,7 +308,12 @@ impl Scan {
             |point, radius_m, mean| {
                 let here_m_s = guess_m_s(point);
                 let relative = |place: PolarPoint| guess_m_s(place) - here_m_s;
-                let level = self.region_mean_following((point, radius_m), (kind, sampling), &relative, mean)?;
+                let level = self.region_mean_following(
+                    (point, radius_m),
+                    (kind, sampling),
+                    &relative,
+                    mean,
+                )?;
                 Ok((level, f64::NAN))
             },
             estimator,
@@ -295,7 +330,10 @@ impl Scan {
             for ray in self.geometry.line_rays(chord.line) {
                 pairs += match self.invalid.get(&ray) {
                     None => whole,
-                    Some(invalid) => valid_pairs(&invalid[chord.first - start..=chord.last - start], correlation),
+                    Some(invalid) => valid_pairs(
+                        &invalid[chord.first - start..=chord.last - start],
+                        correlation,
+                    ),
                 };
             }
         }
@@ -305,8 +343,15 @@ impl Scan {
     /// Chords of a region, as far as they are held, by increasing elevation.
     fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         self.geometry.chords(point, radius_m).filter_map(|chord| {
-            let (first, last) = (chord.first.max(self.held.start), chord.last.min(self.held.end - 1));
-            (first <= last).then_some(Chord { first, last, ..chord })
+            let (first, last) = (
+                chord.first.max(self.held.start),
+                chord.last.min(self.held.end - 1),
+            );
+            (first <= last).then_some(Chord {
+                first,
+                last,
+                ..chord
+            })
         })
     }
 
@@ -322,12 +367,19 @@ impl Scan {
         let (start, gates) = (self.held.start, self.held.len());
         let blocks = self.blocks.len() / (self.geometry.line_elevation_rad().len() * self.numbers);
         let of = |table: &'_ [f64], place: usize, out: &mut [f64]| {
-            add(out, &table[place * self.numbers..(place + 1) * self.numbers]);
+            add(
+                out,
+                &table[place * self.numbers..(place + 1) * self.numbers],
+            );
         };
         let mut gate = chord.first;
         while gate <= chord.last {
             if gate.is_multiple_of(BLOCK) && gate + BLOCK <= chord.last + 1 {
-                of(&self.blocks, chord.line * blocks + gate / BLOCK - start.div_ceil(BLOCK), out);
+                of(
+                    &self.blocks,
+                    chord.line * blocks + gate / BLOCK - start.div_ceil(BLOCK),
+                    out,
+                );
                 gate += BLOCK;
             } else {
                 of(&self.rows, chord.line * gates + gate - start, out);
@@ -346,5 +398,7 @@ fn add(sum: &mut [f64], term: &[f64]) {
 /// Sum of gamma^2 over the ordered pairs of valid windows of one ray.
 fn valid_pairs(invalid: &[bool], correlation: &WindowCorrelation) -> f64 {
     let valid = || invalid.iter().enumerate().filter(|(_, bad)| !**bad);
-    valid().flat_map(|(i, _)| valid().map(move |(j, _)| correlation.squared(i.abs_diff(j)))).sum()
+    valid()
+        .flat_map(|(i, _)| valid().map(move |(j, _)| correlation.squared(i.abs_diff(j))))
+        .sum()
 }

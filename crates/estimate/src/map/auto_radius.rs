@@ -67,13 +67,25 @@ impl Radius {
         let table_m: Vec<f64> = (0..=64)
             .map(|k| {
                 let range_m = first_m + f64::from(k) * step_m;
-                let point = PolarPoint { range_m, elevation_rad };
-                let radius_m = geometry.radius_for(point, target_m_s.powi(-2), &by_gates(range_m), largest_m)?;
+                let point = PolarPoint {
+                    range_m,
+                    elevation_rad,
+                };
+                let radius_m = geometry.radius_for(
+                    point,
+                    target_m_s.powi(-2),
+                    &by_gates(range_m),
+                    largest_m,
+                )?;
                 Ok(radius_m.unwrap_or(largest_m))
             })
             .collect::<Result<_, Error>>()?;
         Ok(Self::OfRange(Box::new(move |range_m| {
-            let place = if step_m > 0.0 { ((range_m - first_m) / step_m).clamp(0.0, 64.0) } else { 0.0 };
+            let place = if step_m > 0.0 {
+                ((range_m - first_m) / step_m).clamp(0.0, 64.0)
+            } else {
+                0.0
+            };
             let below = (place as usize).min(63);
             table_m[below] + (table_m[below + 1] - table_m[below]) * (place - below as f64)
         })))

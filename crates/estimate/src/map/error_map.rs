@@ -36,7 +36,8 @@ impl Moments {
         let step2 = step * step;
         let term = delta * step * before;
         self.mean += step;
-        self.m4 += term * step2 * (n * n - 3.0 * n + 3.0) + 6.0 * step2 * self.m2 - 4.0 * step * self.m3;
+        self.m4 +=
+            term * step2 * (n * n - 3.0 * n + 3.0) + 6.0 * step2 * self.m2 - 4.0 * step * self.m3;
         self.m3 += term * step * (n - 2.0) - 3.0 * step * self.m2;
         self.m2 += term;
     }
@@ -52,18 +53,29 @@ impl Moments {
         let rms_m_s = (bias_m_s * bias_m_s + c2).sqrt();
         // Fourth moments of few numbers are mostly too small: what Gaussian errors of that variance and bias have counts as so many
         // numbers more.
-        let with_gaussian =
-            |found: f64, gaussian: f64| ((n - 1.0) * found + GAUSSIAN * gaussian) / (n - 1.0 + GAUSSIAN);
+        let with_gaussian = |found: f64, gaussian: f64| {
+            ((n - 1.0) * found + GAUSSIAN * gaussian) / (n - 1.0 + GAUSSIAN)
+        };
         let fourth = variance * variance * (n - 1.0) / (n + 1.0);
         let squared_bias = (bias_m_s * bias_m_s - variance / n).max(0.0);
         let of_variance = ((c4 - c2 * c2 * (n - 3.0) / (n - 1.0)) / n).max(0.0);
         let of_variance = with_gaussian(of_variance, 2.0 * fourth / (n - 1.0));
-        let of_squares = (c4 + 4.0 * bias_m_s * c3 + 4.0 * bias_m_s * bias_m_s * c2 - c2 * c2).max(0.0) / (n - 1.0);
-        let of_squares = with_gaussian(of_squares, (2.0 * fourth + 4.0 * squared_bias * variance) / n);
+        let of_squares = (c4 + 4.0 * bias_m_s * c3 + 4.0 * bias_m_s * bias_m_s * c2 - c2 * c2)
+            .max(0.0)
+            / (n - 1.0);
+        let of_squares = with_gaussian(
+            of_squares,
+            (2.0 * fourth + 4.0 * squared_bias * variance) / n,
+        );
         // About Student's factor for one and for two standard errors.
         let few = 1.0 + 0.75 / (n - 1.0);
-        let half_ratio =
-            |variance: f64, of: f64| if variance == 0.0 { 0.0 } else { few * variance.sqrt() / (2.0 * of) };
+        let half_ratio = |variance: f64, of: f64| {
+            if variance == 0.0 {
+                0.0
+            } else {
+                few * variance.sqrt() / (2.0 * of)
+            }
+        };
         ErrorStatistics {
             count: n as usize,
             missing: self.missing,
@@ -120,7 +132,9 @@ impl<D: Dimension> ErrorMap<D> {
     /// An empty accumulator for maps of the given shape.
     #[must_use]
     pub fn new(shape: D) -> Self {
-        Self { moments: Array::default(shape) }
+        Self {
+            moments: Array::default(shape),
+        }
     }
 
     /// Adds one realisation: estimates and truth \[m/s\], of the shape of the map.
@@ -129,10 +143,18 @@ impl<D: Dimension> ErrorMap<D> {
     ///
     /// # Errors
     /// [`Error::Length`] if a shape differs.
-    pub fn add(&mut self, estimate_m_s: ArrayView<'_, f64, D>, truth_m_s: ArrayView<'_, f64, D>) -> Result<(), Error> {
+    pub fn add(
+        &mut self,
+        estimate_m_s: ArrayView<'_, f64, D>,
+        truth_m_s: ArrayView<'_, f64, D>,
+    ) -> Result<(), Error> {
         for (field, view) in [("estimate_m_s", &estimate_m_s), ("truth_m_s", &truth_m_s)] {
             if view.raw_dim() != self.moments.raw_dim() {
-                return Err(Error::Length { field, expected: self.moments.len(), found: view.len() });
+                return Err(Error::Length {
+                    field,
+                    expected: self.moments.len(),
+                    found: view.len(),
+                });
             }
         }
         Zip::from(&mut self.moments)
@@ -157,10 +179,13 @@ mod tests {
 
     #[test]
     fn one_pass_moments_agree_with_two_passes_on_skewed_data() {
-        let errors: Vec<f64> = (0..200).map(|i| 2.0 + (i as f64 * 0.37).sin().powi(3).exp()).collect();
+        let errors: Vec<f64> = (0..200)
+            .map(|i| 2.0 + (i as f64 * 0.37).sin().powi(3).exp())
+            .collect();
         let mut map = ErrorMap::new(Ix1(1));
         for error in &errors {
-            map.add(array![error + 5.0].view(), array![5.0].view()).unwrap();
+            map.add(array![error + 5.0].view(), array![5.0].view())
+                .unwrap();
         }
         let found = map.statistics()[0];
         let n = errors.len() as f64;
@@ -169,26 +194,44 @@ mod tests {
         let std = (moment(2) * n / (n - 1.0)).sqrt();
         let squares: Vec<f64> = errors.iter().map(|e| e * e).collect();
         let mean_square = squares.iter().sum::<f64>() / n;
-        let spread = (squares.iter().map(|s| (s - mean_square).powi(2)).sum::<f64>() / (n - 1.0) / n).sqrt();
+        let spread = (squares
+            .iter()
+            .map(|s| (s - mean_square).powi(2))
+            .sum::<f64>()
+            / (n - 1.0)
+            / n)
+            .sqrt();
         let fourth = ((moment(4) - moment(2).powi(2) * (n - 3.0) / (n - 1.0)) / n).sqrt();
         let few = 1.0 + 0.75 / (n - 1.0);
         // With what Gaussian errors would have, as four more realisations.
-        let with = |found: f64, gaussian: f64| (((n - 1.0) * found * found + 4.0 * gaussian) / (n + 3.0)).sqrt();
+        let with = |found: f64, gaussian: f64| {
+            (((n - 1.0) * found * found + 4.0 * gaussian) / (n + 3.0)).sqrt()
+        };
         let fourth = with(fourth, 2.0 * std.powi(4) / (n + 1.0));
         let of_bias = bias * bias - std * std / n;
-        let spread = with(spread, (2.0 * std.powi(4) * (n - 1.0) / (n + 1.0) + 4.0 * of_bias * std * std) / n);
+        let spread = with(
+            spread,
+            (2.0 * std.powi(4) * (n - 1.0) / (n + 1.0) + 4.0 * of_bias * std * std) / n,
+        );
         for (value, expected) in [
             (found.bias_m_s, bias),
             (found.bias_standard_error_m_s, few * std / n.sqrt()),
             (found.std_m_s, std),
             (found.std_standard_error_m_s, few * fourth / (2.0 * std)),
             (found.rms_m_s, mean_square.sqrt()),
-            (found.rms_standard_error_m_s, few * spread / (2.0 * mean_square.sqrt())),
+            (
+                found.rms_standard_error_m_s,
+                few * spread / (2.0 * mean_square.sqrt()),
+            ),
         ] {
             assert_relative_eq!(value, expected, max_relative = 1e-9);
         }
         // rms^2 = bias^2 + population variance
-        assert_relative_eq!(found.rms_m_s.powi(2), bias * bias + moment(2), max_relative = 1e-12);
+        assert_relative_eq!(
+            found.rms_m_s.powi(2),
+            bias * bias + moment(2),
+            max_relative = 1e-12
+        );
     }
 
     /// Share of 4000 root mean squares of `count` errors about `bias` that are within one and two of their standard errors of what
@@ -202,18 +245,26 @@ mod tests {
             state ^= state << 17;
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        let mut normal = || (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
-        let found: Vec<ErrorStatistics> =
-            (0..4000).map(|_| ErrorStatistics::of((0..count).map(|_| bias + normal()).collect::<Vec<_>>())).collect();
+        let mut normal =
+            || (-2.0 * (1.0 - uniform()).ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
+        let found: Vec<ErrorStatistics> = (0..4000)
+            .map(|_| ErrorStatistics::of((0..count).map(|_| bias + normal()).collect::<Vec<_>>()))
+            .collect();
         let share = |times: f64| {
             let truth = bias.hypot(1.0);
-            let within = |s: &&ErrorStatistics| (s.rms_m_s - truth).abs() < times * s.rms_standard_error_m_s;
+            let within =
+                |s: &&ErrorStatistics| (s.rms_m_s - truth).abs() < times * s.rms_standard_error_m_s;
             found.iter().filter(within).count() as f64 / 4000.0
         };
-        let mean = |of: &dyn Fn(&ErrorStatistics) -> f64| found.iter().map(of).sum::<f64>() / 4000.0;
+        let mean =
+            |of: &dyn Fn(&ErrorStatistics) -> f64| found.iter().map(of).sum::<f64>() / 4000.0;
         let middle = mean(&|s| s.rms_m_s);
         let scatter = mean(&|s| (s.rms_m_s - middle).powi(2)).sqrt();
-        [share(1.0), share(2.0), mean(&|s| s.rms_standard_error_m_s) / scatter]
+        [
+            share(1.0),
+            share(2.0),
+            mean(&|s| s.rms_standard_error_m_s) / scatter,
+        ]
     }
 
     #[test]
@@ -228,7 +279,10 @@ mod tests {
                     4 => 0.84,
                     _ => 0.87,
                 };
-                assert!((0.59..0.75).contains(&one) && two > least, "{count}, {bias}: {one} {two}");
+                assert!(
+                    (0.59..0.75).contains(&one) && two > least,
+                    "{count}, {bias}: {one} {two}"
+                );
                 assert!((0.85..1.5).contains(&size), "{count}, {bias}: {size}");
             }
         }
@@ -236,7 +290,9 @@ mod tests {
 
     #[test]
     fn order_of_realisations_changes_only_the_rounding() {
-        let errors: Vec<f64> = (0..500).map(|i| (i as f64 * 1.7).sin() * 3.0 + 0.2).collect();
+        let errors: Vec<f64> = (0..500)
+            .map(|i| (i as f64 * 1.7).sin() * 3.0 + 0.2)
+            .collect();
         let run = |order: &mut dyn Iterator<Item = &f64>| {
             let mut map = ErrorMap::new(Ix1(1));
             for error in order {
@@ -245,7 +301,12 @@ mod tests {
             map.statistics()[0]
         };
         let (forward, backward) = (run(&mut errors.iter()), run(&mut errors.iter().rev()));
-        assert_relative_eq!(forward.bias_m_s, backward.bias_m_s, max_relative = 1e-13, epsilon = 1e-14);
+        assert_relative_eq!(
+            forward.bias_m_s,
+            backward.bias_m_s,
+            max_relative = 1e-13,
+            epsilon = 1e-14
+        );
         assert_relative_eq!(forward.std_m_s, backward.std_m_s, max_relative = 1e-13);
         assert_relative_eq!(forward.rms_m_s, backward.rms_m_s, max_relative = 1e-13);
     }
@@ -254,8 +315,10 @@ mod tests {
     fn missing_estimates_are_counted_and_left_out() {
         let mut map = ErrorMap::new(ndarray::Ix2(1, 2));
         let truth = Array2::zeros((1, 2));
-        map.add(array![[1.0, f64::NAN]].view(), truth.view()).unwrap();
-        map.add(array![[3.0, f64::NAN]].view(), truth.view()).unwrap();
+        map.add(array![[1.0, f64::NAN]].view(), truth.view())
+            .unwrap();
+        map.add(array![[3.0, f64::NAN]].view(), truth.view())
+            .unwrap();
         let found = map.statistics();
         assert_eq!((found[[0, 0]].count, found[[0, 0]].missing), (2, 0));
         assert_relative_eq!(found[[0, 0]].bias_m_s, 2.0);

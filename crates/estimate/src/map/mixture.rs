@@ -30,16 +30,25 @@ const STEPS: usize = 300;
 /// `band_m_s` wide. Without any error all is NaN.
 #[must_use]
 pub fn good_and_bad(errors_m_s: &[f64], band_m_s: f64) -> GoodAndBad {
-    let found: Vec<f64> = errors_m_s.iter().copied().filter(|e| e.is_finite()).collect();
+    let found: Vec<f64> = errors_m_s
+        .iter()
+        .copied()
+        .filter(|e| e.is_finite())
+        .collect();
     let mut sizes: Vec<f64> = found.iter().map(|e| e.abs()).collect();
     sizes.sort_by(f64::total_cmp);
     let all = errors_m_s.len() as f64;
-    let (mut share, mut mean, mut std) = (0.95, 0.0, sizes.get(sizes.len() / 2).map_or(f64::NAN, |m| m / 0.674_5));
+    let (mut share, mut mean, mut std) = (
+        0.95,
+        0.0,
+        sizes.get(sizes.len() / 2).map_or(f64::NAN, |m| m / 0.674_5),
+    );
     let mut good = 0.0;
     for _ in 0..STEPS {
         let mut sums = [0.0; 3];
         for error in &found {
-            let bell = share * (-0.5 * ((error - mean) / std).powi(2)).exp() / (std * std::f64::consts::TAU.sqrt());
+            let bell = share * (-0.5 * ((error - mean) / std).powi(2)).exp()
+                / (std * std::f64::consts::TAU.sqrt());
             let weight = bell / (bell + (1.0 - share) / band_m_s);
             sums[0] += weight;
             sums[1] += weight * error;
@@ -60,7 +69,8 @@ pub fn good_and_bad(errors_m_s: &[f64], band_m_s: f64) -> GoodAndBad {
         std_good_error_m_s: only(std / (2.0 * good).sqrt()),
         bad_fraction: bad / all,
         // the posterior of a fraction from counts: not 0 where no estimate was bad
-        bad_fraction_error: ((bad + 1.0) * (all - bad + 1.0) / ((all + 2.0).powi(2) * (all + 3.0))).sqrt(),
+        bad_fraction_error: ((bad + 1.0) * (all - bad + 1.0) / ((all + 2.0).powi(2) * (all + 3.0)))
+            .sqrt(),
         bias_m_s: only(mean),
         bias_error_m_s: only(std / good.sqrt()),
     }
@@ -81,20 +91,30 @@ mod tests {
                     / (1.0 + t * (1.432_788 + t * (0.189_269 + t * 0.001_308)));
             0.1 + 0.3 * if p < 0.5 { -z } else { z }
         });
-        bell.chain((0..bad).map(|i| 40.0 * ((i as f64 + 0.5) / bad as f64 - 0.5))).collect()
+        bell.chain((0..bad).map(|i| 40.0 * ((i as f64 + 0.5) / bad as f64 - 0.5)))
+            .collect()
     }
 
     #[test]
     fn a_mixture_of_known_shares_comes_back() {
         let found = good_and_bad(&drawn(900, 100), 40.0);
-        assert!((found.std_good_m_s - 0.3).abs() < 3.0 * found.std_good_error_m_s, "{found:?}");
-        assert!((found.bad_fraction - 0.1).abs() < 0.01 && (found.bias_m_s - 0.1).abs() < 0.02, "{found:?}");
+        assert!(
+            (found.std_good_m_s - 0.3).abs() < 3.0 * found.std_good_error_m_s,
+            "{found:?}"
+        );
+        assert!(
+            (found.bad_fraction - 0.1).abs() < 0.01 && (found.bias_m_s - 0.1).abs() < 0.02,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn estimates_all_over_the_band_have_no_standard_deviation() {
         let found = good_and_bad(&drawn(0, 500), 40.0);
-        assert!(found.std_good_m_s.is_nan() && found.bad_fraction == 1.0, "{found:?}");
+        assert!(
+            found.std_good_m_s.is_nan() && found.bad_fraction == 1.0,
+            "{found:?}"
+        );
         assert!(good_and_bad(&[f64::NAN; 30], 40.0).bad_fraction == 1.0);
     }
 }

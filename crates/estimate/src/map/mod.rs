@@ -10,5 +10,7 @@ pub(crate) mod shrinkage;
 pub use accumulate::{MapPoint, Radius, Scan, ScanSums};
 pub use error_map::{ErrorMap, ErrorStatistics};
 pub use mixture::{GoodAndBad, good_and_bad};
-pub use region::{Chord, PolarPoint, ScanGeometry, WindowCorrelation, WindowCovariance, polar_points};
+pub use region::{
+    Chord, PolarPoint, ScanGeometry, WindowCorrelation, WindowCovariance, polar_points,
+};
 pub use shrinkage::{ShrinkageOptions, ShrunkMap, shrink_to_guess};

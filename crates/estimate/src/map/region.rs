@@ -6,7 +6,9 @@
 
 use std::ops::Range;
 
-use crate::error::{Error, at_least_one, check, finite, increasing, length, not_empty, not_negative, positive};
+use crate::error::{
+    Error, at_least_one, check, finite, increasing, length, not_empty, not_negative, positive,
+};
 use crate::window::{Gates, Sampling};
 
 /// A place in the scan plane.
@@ -23,7 +25,12 @@ pub struct PolarPoint {
 pub fn polar_points(elevation_rad: &[f64], range_m: &[f64]) -> Vec<PolarPoint> {
     elevation_rad
         .iter()
-        .flat_map(|&elevation_rad| range_m.iter().map(move |&range_m| PolarPoint { range_m, elevation_rad }))
+        .flat_map(|&elevation_rad| {
+            range_m.iter().map(move |&range_m| PolarPoint {
+                range_m,
+                elevation_rad,
+            })
+        })
         .collect()
 }
 
@@ -60,13 +67,20 @@ pub(crate) struct Rays {
 impl Rays {
     /// One line after the other: the first ray of each, and one behind the last of all.
     pub(crate) fn in_order(bounds: Vec<usize>) -> Self {
-        Self { bounds, listed: None }
+        Self {
+            bounds,
+            listed: None,
+        }
     }
 
     /// The different elevations \[rad\], increasing, and the rays of each.
     pub(crate) fn grouped(elevation_rad: &[f64]) -> (Vec<f64>, Self) {
         let mut order: Vec<usize> = (0..elevation_rad.len()).collect();
-        order.sort_by(|&a, &b| elevation_rad[a].total_cmp(&elevation_rad[b]).then(a.cmp(&b)));
+        order.sort_by(|&a, &b| {
+            elevation_rad[a]
+                .total_cmp(&elevation_rad[b])
+                .then(a.cmp(&b))
+        });
         let (mut lines, mut bounds) = (Vec::new(), Vec::new());
         for (place, &ray) in order.iter().enumerate() {
             if lines.last() != Some(&elevation_rad[ray]) {
@@ -75,11 +89,19 @@ impl Rays {
             }
         }
         bounds.push(order.len());
-        (lines, Self { bounds, listed: Some(order) })
+        (
+            lines,
+            Self {
+                bounds,
+                listed: Some(order),
+            },
+        )
     }
 
     fn places(&self, line: usize) -> Range<usize> {
-        self.bounds.get(line..line + 2).map_or(0..0, |ends| ends[0]..ends[1])
+        self.bounds
+            .get(line..line + 2)
+            .map_or(0..0, |ends| ends[0]..ends[1])
     }
 
     /// Number of rays of a line.
@@ -88,15 +110,23 @@ impl Rays {
     }
 
     /// The rays of a line that are in `range`, increasing.
-    pub(crate) fn within(&self, line: usize, range: &Range<usize>) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn within(
+        &self,
+        line: usize,
+        range: &Range<usize>,
+    ) -> impl Iterator<Item = usize> + '_ {
         let places = self.places(line);
         let (listed, regular) = match &self.listed {
             Some(rays) => {
                 let all = &rays[places];
-                let [first, end] = [range.start, range.end].map(|bound| all.partition_point(|ray| *ray < bound));
+                let [first, end] =
+                    [range.start, range.end].map(|bound| all.partition_point(|ray| *ray < bound));
                 (&all[first..end.max(first)], 0..0)
             }
-            None => (&[][..], places.start.max(range.start)..places.end.min(range.end)),
+            None => (
+                &[][..],
+                places.start.max(range.start)..places.end.min(range.end),
+            ),
         };
         listed.iter().copied().chain(regular)
     }
@@ -107,7 +137,12 @@ pub(crate) fn check_angles(elevation_rad: &[f64]) -> Result<(), Error> {
     not_empty("elevation_rad", elevation_rad.len())?;
     elevation_rad.iter().try_for_each(|&value| {
         finite("elevation_rad", value)?;
-        check("elevation_rad", value, "between -pi and pi", value.abs() <= std::f64::consts::PI)
+        check(
+            "elevation_rad",
+            value,
+            "between -pi and pi",
+            value.abs() <= std::f64::consts::PI,
+        )
     })
 }
 
@@ -154,8 +189,16 @@ impl ScanGeometry {
         check_angles(elevation_rad)?;
         increasing("elevation_rad", elevation_rad)?;
         at_least_one("rays_per_line", rays_per_line)?;
-        let bounds = (0..=elevation_rad.len()).map(|line| line * rays_per_line).collect();
-        Self::of(elevation_rad.to_vec(), Rays::in_order(bounds), sampling, gates, record_samples)
+        let bounds = (0..=elevation_rad.len())
+            .map(|line| line * rays_per_line)
+            .collect();
+        Self::of(
+            elevation_rad.to_vec(),
+            Rays::in_order(bounds),
+            sampling,
+            gates,
+            record_samples,
+        )
     }
 
     /// Geometry of lines of sight in any direction: unit vectors, one for each line. Their `elevation_rad` in points and maps is
@@ -185,7 +228,10 @@ impl ScanGeometry {
         let sphere = direction.iter().copied().zip(shared).collect();
         let numbers = (0..lines).map(|line| line as f64).collect();
         let rays = Rays::in_order(first_ray.to_vec());
-        Ok(Self { sphere: Some(sphere), ..Self::of(numbers, rays, sampling, gates, record_samples)? })
+        Ok(Self {
+            sphere: Some(sphere),
+            ..Self::of(numbers, rays, sampling, gates, record_samples)?
+        })
     }
 
     fn of(
@@ -226,7 +272,9 @@ impl ScanGeometry {
     /// Ranges of the window centres \[m\].
     #[must_use]
     pub fn gate_ranges_m(&self) -> Vec<f64> {
-        (0..self.gates).map(|gate| self.first_range_m + gate as f64 * self.spacing_m).collect()
+        (0..self.gates)
+            .map(|gate| self.first_range_m + gate as f64 * self.spacing_m)
+            .collect()
     }
 
     /// Gates whose ranges are from `low_m` to `high_m`, and one more at each end.
@@ -240,7 +288,10 @@ impl ScanGeometry {
     /// The middle of a chord.
     pub(crate) fn middle(&self, chord: Chord) -> PolarPoint {
         let gate = 0.5 * (chord.first + chord.last) as f64;
-        PolarPoint { range_m: self.first_range_m + gate * self.spacing_m, elevation_rad: self.lines[chord.line] }
+        PolarPoint {
+            range_m: self.first_range_m + gate * self.spacing_m,
+            elevation_rad: self.lines[chord.line],
+        }
     }
 
     /// Chords of the disc of radius `radius_m` \[m\] about `point`, by increasing elevation.
@@ -249,10 +300,19 @@ impl ScanGeometry {
     pub fn chords(&self, point: PolarPoint, radius_m: f64) -> impl Iterator<Item = Chord> + '_ {
         let slack_m = 1e-6 * self.spacing_m;
         let radius_m = radius_m + slack_m;
-        let own = self.sphere.as_ref().and_then(|sphere| sphere.get(point.elevation_rad as usize));
-        let near = own.map_or_else(|| self.lines_within(point, radius_m), |(_, shared)| shared.clone());
+        let own = self
+            .sphere
+            .as_ref()
+            .and_then(|sphere| sphere.get(point.elevation_rad as usize));
+        let near = own.map_or_else(
+            || self.lines_within(point, radius_m),
+            |(_, shared)| shared.clone(),
+        );
         near.filter_map(move |line| {
-            let (sin, cos) = match (own, self.sphere.as_ref().and_then(|sphere| sphere.get(line))) {
+            let (sin, cos) = match (
+                own,
+                self.sphere.as_ref().and_then(|sphere| sphere.get(line)),
+            ) {
                 (Some((own, _)), Some((other, _))) => sin_cos_between(own, other),
                 _ => (self.lines[line] - point.elevation_rad).sin_cos(),
             };
@@ -265,23 +325,46 @@ impl ScanGeometry {
             let place = |range_m: f64| (range_m - self.first_range_m) / self.spacing_m;
             let first = place(along_m - half_m).ceil().max(0.0);
             let last = place(along_m + half_m).floor().min(self.gates as f64 - 1.0);
-            (first <= last).then_some(Chord { line, first: first as usize, last: last as usize })
+            (first <= last).then_some(Chord {
+                line,
+                first: first as usize,
+                last: last as usize,
+            })
         })
     }
 
     /// Lines of a plane scan that may touch the disc.
     fn lines_within(&self, point: PolarPoint, radius_m: f64) -> Range<usize> {
-        let reach_rad = if radius_m < point.range_m { (radius_m / point.range_m).asin() } else { std::f64::consts::PI };
-        let start = self.lines.partition_point(|line| *line < point.elevation_rad - reach_rad);
-        let end = self.lines.partition_point(|line| *line <= point.elevation_rad + reach_rad);
+        let reach_rad = if radius_m < point.range_m {
+            (radius_m / point.range_m).asin()
+        } else {
+            std::f64::consts::PI
+        };
+        let start = self
+            .lines
+            .partition_point(|line| *line < point.elevation_rad - reach_rad);
+        let end = self
+            .lines
+            .partition_point(|line| *line <= point.elevation_rad + reach_rad);
         start..end.max(start)
     }
 
     /// Accumulation level and n_eff of a region when all samples are valid (figure 9), without any signal.
     #[must_use]
-    pub fn level(&self, point: PolarPoint, radius_m: f64, correlation: &WindowCorrelation) -> (usize, f64) {
+    pub fn level(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        correlation: &WindowCorrelation,
+    ) -> (usize, f64) {
         let level = self.windows(point, radius_m);
-        (level, effective(level, self.sum_over_rays(point, radius_m, |gates| correlation.pair_sum(gates))))
+        (
+            level,
+            effective(
+                level,
+                self.sum_over_rays(point, radius_m, |gates| correlation.pair_sum(gates)),
+            ),
+        )
     }
 
     /// Windows of a region, when all samples are valid.
@@ -293,12 +376,22 @@ impl ScanGeometry {
     /// Information of a region whose rays have `by_gates` in chords of 1, 2, .. gates, and the last of it in longer ones; 0 without any.
     #[must_use]
     pub fn information(&self, point: PolarPoint, radius_m: f64, by_gates: &[f64]) -> f64 {
-        let of_gates = |gates: usize| by_gates.get(gates.min(by_gates.len()).wrapping_sub(1)).copied().unwrap_or(0.0);
+        let of_gates = |gates: usize| {
+            by_gates
+                .get(gates.min(by_gates.len()).wrapping_sub(1))
+                .copied()
+                .unwrap_or(0.0)
+        };
         self.sum_over_rays(point, radius_m, of_gates)
     }
 
     /// Sum over the rays of a region of what one gives whose chord has so many gates, all samples being valid.
-    fn sum_over_rays(&self, point: PolarPoint, radius_m: f64, of_gates: impl Fn(usize) -> f64) -> f64 {
+    fn sum_over_rays(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        of_gates: impl Fn(usize) -> f64,
+    ) -> f64 {
         let of_chord = |chord: Chord| self.rays.count(chord.line) as f64 * of_gates(chord.gates());
         self.chords(point, radius_m).map(of_chord).sum()
     }
@@ -313,12 +406,19 @@ impl ScanGeometry {
 /// Sine and cosine of the angle between two directions; the sine is not negative.
 fn sin_cos_between([a, b, c]: &[f64; 3], [d, e, f]: &[f64; 3]) -> (f64, f64) {
     let cross = [b * f - c * e, c * d - a * f, a * e - b * d];
-    (cross.iter().map(|x| x * x).sum::<f64>().sqrt(), a * d + b * e + c * f)
+    (
+        cross.iter().map(|x| x * x).sum::<f64>().sqrt(),
+        a * d + b * e + c * f,
+    )
 }
 
 /// (sum n)^2 / sum over pairs of gamma^2; 0 for an empty region.
 pub(crate) fn effective(level: usize, pairs: f64) -> f64 {
-    if level == 0 { 0.0 } else { (level as f64).powi(2) / pairs }
+    if level == 0 {
+        0.0
+    } else {
+        (level as f64).powi(2) / pairs
+    }
 }
 
 /// Covariance between the windows of one pulse against their distance in gates, of the signal and of the noise: that of their
@@ -343,19 +443,26 @@ impl WindowCovariance {
         noise: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
         not_empty("weights", weights.len())?;
-        let overlap: Vec<f64> =
-            (0..weights.len()).map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum()).collect();
+        let overlap: Vec<f64> = (0..weights.len())
+            .map(|d| weights[d..].iter().zip(weights).map(|(a, b)| a * b).sum())
+            .collect();
         let at = |covariance: &dyn Fn(usize) -> f64, gate: usize| -> f64 {
             let shift = (gate * step_samples) as i64;
             let reach = overlap.len() as i64 - 1;
             (-reach..=reach)
-                .map(|d| overlap[d.unsigned_abs() as usize] * covariance((shift + d).unsigned_abs() as usize))
+                .map(|d| {
+                    overlap[d.unsigned_abs() as usize]
+                        * covariance((shift + d).unsigned_abs() as usize)
+                })
                 .sum()
         };
-        let of = |covariance: &dyn Fn(usize) -> f64, reach: &dyn Fn(usize, f64) -> bool| -> Vec<f64> {
-            let all = (0..gates.max(1)).map(|gate| (gate, at(covariance, gate)));
-            all.take_while(|(gate, value)| *gate == 0 || reach(*gate, *value)).map(|(_, value)| value).collect()
-        };
+        let of =
+            |covariance: &dyn Fn(usize) -> f64, reach: &dyn Fn(usize, f64) -> bool| -> Vec<f64> {
+                let all = (0..gates.max(1)).map(|gate| (gate, at(covariance, gate)));
+                all.take_while(|(gate, value)| *gate == 0 || reach(*gate, *value))
+                    .map(|(_, value)| value)
+                    .collect()
+            };
         let whole = at(&signal, 0);
         let signal = of(&signal, &|_, value| value.abs() > 1e-8 * whole);
         // Noise of a band is alike a little at any distance: where windows share no sample, too little to be counted.
@@ -376,8 +483,15 @@ impl WindowCovariance {
         };
         let power = at(0);
         positive("power of the window", power)?;
-        let gates = self.signal.len().max(if noise > 0.0 { self.noise.len() } else { 0 });
-        WindowCorrelation::from_gate_lags(&(0..gates).map(|gate| (at(gate) / power).abs()).collect::<Vec<f64>>())
+        let gates = self
+            .signal
+            .len()
+            .max(if noise > 0.0 { self.noise.len() } else { 0 });
+        WindowCorrelation::from_gate_lags(
+            &(0..gates)
+                .map(|gate| (at(gate) / power).abs())
+                .collect::<Vec<f64>>(),
+        )
     }
 }
 
@@ -397,9 +511,18 @@ impl WindowCorrelation {
     pub fn from_gate_lags(gamma: &[f64]) -> Result<Self, Error> {
         let first = gamma.first().copied().unwrap_or(f64::NAN);
         check("gamma[0]", first, "1", (first - 1.0).abs() <= 1e-9)?;
-        let correlation = |&value: &f64| check("gamma", value, "between 0 and 1", (0.0..=1.0 + 1e-9).contains(&value));
+        let correlation = |&value: &f64| {
+            check(
+                "gamma",
+                value,
+                "between 0 and 1",
+                (0.0..=1.0 + 1e-9).contains(&value),
+            )
+        };
         gamma.iter().try_for_each(correlation)?;
-        Ok(Self { squared: gamma.iter().map(|value| value * value).collect() })
+        Ok(Self {
+            squared: gamma.iter().map(|value| value * value).collect(),
+        })
     }
 
     /// For a Gaussian pulse, |f|^2 ~ exp(-t^2 / sigma^2), in uniform wind with white noise.
@@ -424,10 +547,15 @@ impl WindowCorrelation {
         length("weights", gates.window_samples, weights.len())?;
         let covariance = |lag_samples: usize| {
             let lag = lag_samples as f64 / (sample_rate_hz * pulse_sigma_s);
-            let noise = if lag_samples == 0 { noise_to_signal } else { 0.0 };
+            let noise = if lag_samples == 0 {
+                noise_to_signal
+            } else {
+                0.0
+            };
             (-0.25 * lag * lag).exp() + noise
         };
-        WindowCovariance::new(weights, gates.step_samples, count, covariance, |_| 0.0)?.correlation(f64::INFINITY)
+        WindowCovariance::new(weights, gates.step_samples, count, covariance, |_| 0.0)?
+            .correlation(f64::INFINITY)
     }
 
     /// gamma^2 of two windows of one pulse `gates` apart.
@@ -440,7 +568,9 @@ impl WindowCorrelation {
     #[must_use]
     pub fn pair_sum(&self, gates: usize) -> f64 {
         let diagonal = gates as f64 * self.squared(0);
-        let off: f64 = (1..gates.min(self.squared.len())).map(|k| (gates - k) as f64 * self.squared[k]).sum();
+        let off: f64 = (1..gates.min(self.squared.len()))
+            .map(|k| (gates - k) as f64 * self.squared[k])
+            .sum();
         diagonal + 2.0 * off
     }
 }
@@ -461,7 +591,10 @@ mod tests {
         let gates = Gates::new(64, 1, centre_s - 132.0 / 250e6).unwrap();
         let elevation_rad: Vec<f64> = (0..81).map(|i| (i as f64 - 40.0) * 0.5 / 400.0).collect();
         let geometry = ScanGeometry::new(&sampling(), &gates, &elevation_rad, 264).unwrap();
-        let point = PolarPoint { range_m: 400.0, elevation_rad: 0.0 };
+        let point = PolarPoint {
+            range_m: 400.0,
+            elevation_rad: 0.0,
+        };
         (geometry, point)
     }
 
@@ -498,8 +631,15 @@ mod tests {
         let sigma_s = 200e-9 / (2.0 * 2.0_f64.ln().sqrt());
         // The noise hardly shows here; that it is right, other windows tell.
         for noise_to_signal in [0.0, 2.5, 25.0] {
-            let correlation =
-                WindowCorrelation::gaussian_pulse(&weights, &gates, 100, 250e6, sigma_s, noise_to_signal).unwrap();
+            let correlation = WindowCorrelation::gaussian_pulse(
+                &weights,
+                &gates,
+                100,
+                250e6,
+                sigma_s,
+                noise_to_signal,
+            )
+            .unwrap();
             let (_, n_eff) = geometry.level(point, 2.0, &correlation);
             assert!((n_eff - 7.5).abs() < 0.15, "{n_eff}");
         }
@@ -512,9 +652,19 @@ mod tests {
     fn information_of_a_region_is_the_sum_over_its_rays_of_that_of_their_chords() {
         let (geometry, point) = around_400_m();
         let by_gates: Vec<f64> = (1..=20).map(|gates| f64::from(gates).powf(1.5)).collect();
-        let direct: f64 = geometry.chords(point, 2.0).map(|chord| by_gates[chord.gates() - 1]).sum();
-        assert_relative_eq!(geometry.information(point, 2.0, &by_gates), direct, max_relative = 1e-12);
-        assert_eq!(geometry.chords(point, 2.0).map(|chord| chord.gates()).max(), Some(geometry.most_gates(2.0)));
+        let direct: f64 = geometry
+            .chords(point, 2.0)
+            .map(|chord| by_gates[chord.gates() - 1])
+            .sum();
+        assert_relative_eq!(
+            geometry.information(point, 2.0, &by_gates),
+            direct,
+            max_relative = 1e-12
+        );
+        assert_eq!(
+            geometry.chords(point, 2.0).map(|chord| chord.gates()).max(),
+            Some(geometry.most_gates(2.0))
+        );
         // Longer chords than are known have what the longest known has.
         assert_relative_eq!(geometry.information(point, 2.0, &[2.0]), 18.0);
         assert_eq!(geometry.information(point, 2.0, &[]), 0.0);
@@ -531,7 +681,8 @@ mod tests {
         let direction: Vec<[f64; 3]> = (0..20).chain(0..20).map(cone).collect();
         let group: Vec<usize> = (0..40).map(|i| i / 20).collect();
         let bounds: Vec<usize> = (0..=40).map(|i| 3 * i).collect();
-        let geometry = ScanGeometry::on_sphere(&sampling(), &gates, &direction, &group, &bounds, 300).unwrap();
+        let geometry =
+            ScanGeometry::on_sphere(&sampling(), &gates, &direction, &group, &bounds, 300).unwrap();
         let ranges_m = geometry.gate_ranges_m();
         for (line, gate, radius_m) in [(25, 10, 6.0), (0, 40, 3.0), (39, 70, 0.0)] {
             let at = |line: usize, range_m: f64| direction[line].map(|e| e * range_m);
@@ -539,19 +690,29 @@ mod tests {
             let mut inside = vec![];
             for other in 0..40 {
                 for (k, r_m) in ranges_m.iter().enumerate() {
-                    let apart: f64 = at(other, *r_m).iter().zip(centre).map(|(a, b)| (a - b).powi(2)).sum();
+                    let apart: f64 = at(other, *r_m)
+                        .iter()
+                        .zip(centre)
+                        .map(|(a, b)| (a - b).powi(2))
+                        .sum();
                     if group[other] == group[line] && apart.sqrt() <= radius_m + 1e-6 {
                         inside.push((other, k));
                     }
                 }
             }
-            let point = PolarPoint { range_m: ranges_m[gate], elevation_rad: line as f64 };
+            let point = PolarPoint {
+                range_m: ranges_m[gate],
+                elevation_rad: line as f64,
+            };
             let found: Vec<_> = geometry
                 .chords(point, radius_m)
                 .flat_map(|chord| (chord.first..=chord.last).map(move |gate| (chord.line, gate)))
                 .collect();
             assert_eq!(found, inside, "{line} {gate} {radius_m}");
-            assert_eq!(geometry.line_rays(line).collect::<Vec<_>>(), [3 * line, 3 * line + 1, 3 * line + 2]);
+            assert_eq!(
+                geometry.line_rays(line).collect::<Vec<_>>(),
+                [3 * line, 3 * line + 1, 3 * line + 2]
+            );
         }
     }
 
@@ -563,10 +724,17 @@ mod tests {
         assert_eq!(geometry.line_elevation_rad().len(), 6);
         assert_eq!(geometry.line_rays(2).collect::<Vec<_>>(), [1, 3]);
         let ranges_m = geometry.gate_ranges_m();
-        for (range_m, elevation_rad, radius_m) in
-            [(50.0, 0.07, 6.3), (20.0, 0.2, 25.0), (90.0, 0.1, 0.0), (ranges_m[5], 0.1, 0.0), (500.0, 0.0, 2.0)]
-        {
-            let point = PolarPoint { range_m, elevation_rad };
+        for (range_m, elevation_rad, radius_m) in [
+            (50.0, 0.07, 6.3),
+            (20.0, 0.2, 25.0),
+            (90.0, 0.1, 0.0),
+            (ranges_m[5], 0.1, 0.0),
+            (500.0, 0.0, 2.0),
+        ] {
+            let point = PolarPoint {
+                range_m,
+                elevation_rad,
+            };
             let mut inside = vec![];
             for (line, angle_rad) in geometry.line_elevation_rad().iter().enumerate() {
                 for (gate, r_m) in ranges_m.iter().enumerate() {

@@ -43,10 +43,16 @@ impl ShrinkageOptions {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for spacings that are not positive.
-    pub fn for_map(line_spacing_m: f64, gate_spacing_m: f64, radius_m: f64, gate_length_m: f64) -> Result<Self, Error> {
+    pub fn for_map(
+        line_spacing_m: f64,
+        gate_spacing_m: f64,
+        radius_m: f64,
+        gate_length_m: f64,
+    ) -> Result<Self, Error> {
         positive("line_spacing_m", line_spacing_m)?;
         positive("gate_spacing_m", gate_spacing_m)?;
-        let steps = |length_m: f64, spacing_m: f64| (length_m / spacing_m).round().clamp(1.0, 1e6) as usize;
+        let steps =
+            |length_m: f64, spacing_m: f64| (length_m / spacing_m).round().clamp(1.0, 1e6) as usize;
         Ok(Self {
             line_step: steps(0.5 * radius_m, line_spacing_m),
             gate_step: steps(0.5 * gate_length_m, gate_spacing_m),
@@ -82,9 +88,11 @@ pub fn shrink_to_guess(
     wanted_m_s: ArrayView2<'_, f64>,
     options: &ShrinkageOptions,
 ) -> Result<ShrunkMap, Error> {
-    for (field, map) in
-        [("half_difference_m_s", &half_difference_m_s), ("seen_m_s", &seen_m_s), ("wanted_m_s", &wanted_m_s)]
-    {
+    for (field, map) in [
+        ("half_difference_m_s", &half_difference_m_s),
+        ("seen_m_s", &seen_m_s),
+        ("wanted_m_s", &wanted_m_s),
+    ] {
         length(field, measured_m_s.nrows(), map.nrows())?;
         length(field, measured_m_s.ncols(), map.ncols())?;
     }
@@ -111,12 +119,17 @@ pub fn shrink_to_guess(
         steps = steps.map(|step| 2 * step);
     }
     correction += &residual;
-    Ok(ShrunkMap { velocity_m_s: &wanted_m_s + &correction, correction_m_s: correction })
+    Ok(ShrunkMap {
+        velocity_m_s: &wanted_m_s + &correction,
+        correction_m_s: correction,
+    })
 }
 
 /// Mean of a map with the weights of the spline, whose taps are the steps over lines and gates apart, over the places that are not NaN.
 fn smoothed(map: &Array2<f64>, [line_step, gate_step]: [usize; 2]) -> Array2<f64> {
-    let both = |map: Array2<f64>| along_lines(along_lines(map.view(), line_step).t(), gate_step).reversed_axes();
+    let both = |map: Array2<f64>| {
+        along_lines(along_lines(map.view(), line_step).t(), gate_step).reversed_axes()
+    };
     let sums = both(map.mapv(|value| if value.is_finite() { value } else { 0.0 }));
     sums / both(map.mapv(|value| f64::from(u8::from(value.is_finite()))))
 }
@@ -126,7 +139,9 @@ fn along_lines(map: ArrayView2<'_, f64>, step: usize) -> Array2<f64> {
     let mut out = Array2::zeros(map.dim());
     for line in 0..map.nrows() {
         for (tap, weight) in SPLINE.iter().enumerate() {
-            let source = (line + tap * step).checked_sub(2 * step).filter(|&source| source < map.nrows());
+            let source = (line + tap * step)
+                .checked_sub(2 * step)
+                .filter(|&source| source < map.nrows());
             if let Some(source) = source {
                 out.row_mut(line).scaled_add(*weight, &map.row(source));
             }
@@ -141,7 +156,12 @@ mod tests {
     use rand::{RngExt, SeedableRng};
 
     const SHAPE: (usize, usize) = (60, 50);
-    const OPTIONS: ShrinkageOptions = ShrinkageOptions { line_step: 1, gate_step: 1, scales: 4, factor: 2.0 };
+    const OPTIONS: ShrinkageOptions = ShrinkageOptions {
+        line_step: 1,
+        gate_step: 1,
+        scales: 4,
+        factor: 2.0,
+    };
 
     fn noise(seed: u64) -> Array2<f64> {
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -162,9 +182,20 @@ mod tests {
 
     /// Wind with noise of 0.5 m/s, from halves with 0.7 each, shrunk to a guess.
     fn shrunk(wind: &Array2<f64>, guess: &Array2<f64>, options: &ShrinkageOptions) -> Array2<f64> {
-        let (a, b) = (wind + 0.5_f64.sqrt() * noise(1), wind + 0.5_f64.sqrt() * noise(2));
+        let (a, b) = (
+            wind + 0.5_f64.sqrt() * noise(1),
+            wind + 0.5_f64.sqrt() * noise(2),
+        );
         let (mean, half) = (0.5 * (&a + &b), 0.5 * (&a - &b));
-        shrink_to_guess(mean.view(), half.view(), guess.view(), guess.view(), options).unwrap().velocity_m_s
+        shrink_to_guess(
+            mean.view(),
+            half.view(),
+            guess.view(),
+            guess.view(),
+            options,
+        )
+        .unwrap()
+        .velocity_m_s
     }
 
     #[test]
@@ -172,7 +203,14 @@ mod tests {
         let (wind, options) = (structure(), OPTIONS);
         assert!(rms(&(shrunk(&wind, &wind, &options) - &wind)) < 0.3 * 0.5);
         // a factor of 0 leaves the data
-        let data = shrunk(&wind, &wind, &ShrinkageOptions { factor: 0.0, ..options }) - &wind;
+        let data = shrunk(
+            &wind,
+            &wind,
+            &ShrinkageOptions {
+                factor: 0.0,
+                ..options
+            },
+        ) - &wind;
         assert!((rms(&data) / 0.5 - 1.0).abs() < 0.1);
     }
 
@@ -184,7 +222,14 @@ mod tests {
         let (missing, double) = (error(&nothing), error(&(2.0 * &wind)));
         assert!(missing < 0.5 && double < 0.5, "{missing} {double}");
         let without_noise = |options: &ShrinkageOptions| {
-            shrink_to_guess(wind.view(), nothing.view(), (2.0 * &wind).view(), (2.0 * &wind).view(), options).unwrap()
+            shrink_to_guess(
+                wind.view(),
+                nothing.view(),
+                (2.0 * &wind).view(),
+                (2.0 * &wind).view(),
+                options,
+            )
+            .unwrap()
         };
         assert!(rms(&(without_noise(&OPTIONS).velocity_m_s - &wind)) < 1e-12);
     }
@@ -192,7 +237,14 @@ mod tests {
     #[test]
     fn what_is_wanted_of_the_guess_need_not_be_what_is_seen() {
         let (seen, wanted) = (structure(), 1.5 * structure());
-        let found = shrink_to_guess(seen.view(), noise(3).view(), seen.view(), wanted.view(), &OPTIONS).unwrap();
+        let found = shrink_to_guess(
+            seen.view(),
+            noise(3).view(),
+            seen.view(),
+            wanted.view(),
+            &OPTIONS,
+        )
+        .unwrap();
         assert_eq!(found.velocity_m_s, wanted);
         assert_eq!(rms(&found.correction_m_s), 0.0);
     }
@@ -201,26 +253,55 @@ mod tests {
     fn missing_velocities_are_filled_from_their_surroundings_and_an_empty_map_stays_empty() {
         let (mut measured, zero) = (Array2::from_elem(SHAPE, 2.0), Array2::zeros(SHAPE));
         measured[[20, 20]] = f64::NAN;
-        let found = shrink_to_guess(measured.view(), zero.view(), zero.view(), zero.view(), &OPTIONS).unwrap();
+        let found = shrink_to_guess(
+            measured.view(),
+            zero.view(),
+            zero.view(),
+            zero.view(),
+            &OPTIONS,
+        )
+        .unwrap();
         assert!(found.velocity_m_s.iter().all(|v| (v - 2.0).abs() < 1e-12));
         measured.fill(f64::NAN);
-        let found = shrink_to_guess(measured.view(), zero.view(), zero.view(), zero.view(), &OPTIONS).unwrap();
+        let found = shrink_to_guess(
+            measured.view(),
+            zero.view(),
+            zero.view(),
+            zero.view(),
+            &OPTIONS,
+        )
+        .unwrap();
         assert!(found.velocity_m_s.iter().all(|v| v.is_nan()));
     }
 
     #[test]
     fn maps_of_other_shapes_and_impossible_options_are_refused() {
         let (map, other) = (structure(), Array2::zeros((60, 49)));
-        assert!(shrink_to_guess(map.view(), other.view(), map.view(), map.view(), &OPTIONS).is_err());
+        assert!(
+            shrink_to_guess(map.view(), other.view(), map.view(), map.view(), &OPTIONS).is_err()
+        );
         for options in [
-            ShrinkageOptions { line_step: 0, ..OPTIONS },
-            ShrinkageOptions { gate_step: 0, ..OPTIONS },
-            ShrinkageOptions { factor: f64::NAN, ..OPTIONS },
+            ShrinkageOptions {
+                line_step: 0,
+                ..OPTIONS
+            },
+            ShrinkageOptions {
+                gate_step: 0,
+                ..OPTIONS
+            },
+            ShrinkageOptions {
+                factor: f64::NAN,
+                ..OPTIONS
+            },
         ] {
-            assert!(shrink_to_guess(map.view(), map.view(), map.view(), map.view(), &options).is_err());
+            assert!(
+                shrink_to_guess(map.view(), map.view(), map.view(), map.view(), &options).is_err()
+            );
         }
         let none = Array2::<f64>::zeros((0, 0));
-        assert!(shrink_to_guess(none.view(), none.view(), none.view(), none.view(), &OPTIONS).is_err());
+        assert!(
+            shrink_to_guess(none.view(), none.view(), none.view(), none.view(), &OPTIONS).is_err()
+        );
         assert!(ShrinkageOptions::for_map(0.0, 1.0, 2.0, 15.0).is_err());
     }
 }

@@ -105,14 +105,18 @@ impl Autoregression {
         match kind {
             SignalKind::Real => {
                 let found = reflect(correlogram, order, work).map_err(unstable)?;
-                self.coefficients.extend(found.coefficients.iter().map(|a| Complex::from(*a)));
-                self.reflection.extend(found.reflection.iter().map(|k| Complex::from(*k)));
+                self.coefficients
+                    .extend(found.coefficients.iter().map(|a| Complex::from(*a)));
+                self.reflection
+                    .extend(found.reflection.iter().map(|k| Complex::from(*k)));
                 self.noise_power = found.noise_power;
             }
             SignalKind::Complex => {
                 for m in 1..=order {
                     let past = self.coefficients.iter().enumerate();
-                    let forward: Complex<f64> = past.map(|(j, a)| a * kind.lag(correlogram, m - 1 - j)).sum();
+                    let forward: Complex<f64> = past
+                        .map(|(j, a)| a * kind.lag(correlogram, m - 1 - j))
+                        .sum();
                     let reflection = -(kind.lag(correlogram, m) + forward) / self.noise_power;
                     let size = reflection.norm();
                     if size.is_nan() || size >= 1.0 {
@@ -132,8 +136,13 @@ impl Autoregression {
     pub fn truncated(&self, order: usize) -> Result<Self, Error> {
         check_order(order, self.order() + 1)?;
         let errors = self.reflection.iter().map(|k| 1.0 - k.norm_sqr());
-        let mut model = Self { noise_power: self.noise_power / errors.product::<f64>(), ..Self::default() };
-        self.reflection[..order].iter().for_each(|k| model.update(*k));
+        let mut model = Self {
+            noise_power: self.noise_power / errors.product::<f64>(),
+            ..Self::default()
+        };
+        self.reflection[..order]
+            .iter()
+            .for_each(|k| model.update(*k));
         Ok(model)
     }
 
@@ -146,19 +155,28 @@ impl Autoregression {
     /// [`Error::OutOfRange`] if the order is 0 or not below the number of samples, or if there is no power.
     pub fn burg<S: Sample>(window: &[S], order: usize) -> Result<Self, Error> {
         check_order(order, window.len())?;
-        let scale = Rule::NOT_FINITE.binary_scale(window.iter().copied()).unwrap_or(1.0);
+        let scale = Rule::NOT_FINITE
+            .binary_scale(window.iter().copied())
+            .unwrap_or(1.0);
         let scaled = |sample: &S| sample.scaled(scale.recip()).to_complex();
         let mut forward: Vec<Complex<f64>> = window.iter().map(scaled).collect();
         let mut backward = forward.clone();
         let power = forward.iter().map(|x| x.norm_sqr()).sum::<f64>() / window.len() as f64;
         positive("power of the window", power)?;
-        let mut model = Self { noise_power: power, ..Self::default() };
+        let mut model = Self {
+            noise_power: power,
+            ..Self::default()
+        };
         for m in 1..=order {
             let pairs = || forward[m..].iter().zip(&backward[m - 1..window.len() - 1]);
             let cross: Complex<f64> = pairs().map(|(f, b)| f * b.conj()).sum();
             let energy: f64 = pairs().map(|(f, b)| f.norm_sqr() + b.norm_sqr()).sum();
             // nothing left to predict: the model is complete
-            let reflection = if energy > power * f64::EPSILON { -2.0 * cross / energy } else { Complex::ZERO };
+            let reflection = if energy > power * f64::EPSILON {
+                -2.0 * cross / energy
+            } else {
+                Complex::ZERO
+            };
             for n in (m..window.len()).rev() {
                 let (f, b) = (forward[n], backward[n - 1]);
                 forward[n] = f + reflection * b;
@@ -194,9 +212,16 @@ impl Autoregression {
     /// Density (32) at `frequency_hz`, in signal units squared; white noise has its variance.
     #[must_use]
     pub fn density(&self, frequency_hz: f64, sampling: &Sampling) -> f64 {
-        let step = Complex::from_polar(1.0, -std::f64::consts::TAU * frequency_hz / sampling.sample_rate_hz);
+        let step = Complex::from_polar(
+            1.0,
+            -std::f64::consts::TAU * frequency_hz / sampling.sample_rate_hz,
+        );
         // Horner from the highest coefficient
-        let sum = self.coefficients.iter().rev().fold(Complex::ZERO, |sum, a| (sum + a) * step);
+        let sum = self
+            .coefficients
+            .iter()
+            .rev()
+            .fold(Complex::ZERO, |sum, a| (sum + a) * step);
         self.noise_power / (sum + 1.0).norm_sqr()
     }
 
@@ -207,7 +232,11 @@ impl Autoregression {
     pub fn poles(&self) -> Result<Vec<Complex<f64>>, Error> {
         roots(&self.coefficients).ok_or(Error::OutOfRange {
             field: "coefficients",
-            value: self.coefficients.iter().map(|a| a.norm()).fold(0.0, f64::max),
+            value: self
+                .coefficients
+                .iter()
+                .map(|a| a.norm())
+                .fold(0.0, f64::max),
             allowed: "finite, with roots that can be told apart",
         })
     }
@@ -222,7 +251,10 @@ impl Autoregression {
         let (low_hz, high_hz) = sampling.band_hz;
         let places = self.poles()?.into_iter().map(|pole| {
             let (modulus, angle) = pole.to_polar();
-            (angle / std::f64::consts::TAU * sampling.sample_rate_hz, modulus)
+            (
+                angle / std::f64::consts::TAU * sampling.sample_rate_hz,
+                modulus,
+            )
         });
         let inside = places.filter(|(frequency_hz, _)| (low_hz..=high_hz).contains(frequency_hz));
         Ok(inside.max_by(|a, b| a.1.total_cmp(&b.1)))
@@ -233,13 +265,35 @@ impl Autoregression {
     /// The second is the sum of |A|^2 / noise power over the models of orders 0 .. p, collected by Musicus (1985).
     pub(crate) fn inverse_lags(&self, kind: SignalKind, capon: bool, out: &mut Vec<f64>) {
         let order = self.order();
-        let a = |k: usize| if k == 0 { Complex::ONE } else { self.coefficients[k - 1] };
+        let a = |k: usize| {
+            if k == 0 {
+                Complex::ONE
+            } else {
+                self.coefficients[k - 1]
+            }
+        };
         out.clear();
         for m in 0..=order {
-            let weight = |k: usize| if capon { (order + 1 - m) as f64 - 2.0 * k as f64 } else { 1.0 };
-            let lag: Complex<f64> = (0..=order - m).map(|k| a(k + m) * a(k).conj() * weight(k)).sum();
-            let scale = if capon { 1.0 / ((order + 1) as f64 * self.noise_power) } else { 1.0 / self.noise_power };
-            out.extend([lag.re * scale, lag.im * scale].into_iter().take(kind.lag_numbers(1)));
+            let weight = |k: usize| {
+                if capon {
+                    (order + 1 - m) as f64 - 2.0 * k as f64
+                } else {
+                    1.0
+                }
+            };
+            let lag: Complex<f64> = (0..=order - m)
+                .map(|k| a(k + m) * a(k).conj() * weight(k))
+                .sum();
+            let scale = if capon {
+                1.0 / ((order + 1) as f64 * self.noise_power)
+            } else {
+                1.0 / self.noise_power
+            };
+            out.extend(
+                [lag.re * scale, lag.im * scale]
+                    .into_iter()
+                    .take(kind.lag_numbers(1)),
+            );
         }
     }
 }

@@ -17,7 +17,11 @@ pub(crate) struct Reflected<'w> {
 /// Model of order `order` of a correlogram with more lags than that, lag 0 above 0; `work` grows to 4 p numbers.
 ///
 /// A reflection coefficient on or outside the unit circle stops the recursion; its size is the error.
-pub(crate) fn reflect<'w>(correlogram: &[f64], order: usize, work: &'w mut Vec<f64>) -> Result<Reflected<'w>, f64> {
+pub(crate) fn reflect<'w>(
+    correlogram: &[f64],
+    order: usize,
+    work: &'w mut Vec<f64>,
+) -> Result<Reflected<'w>, f64> {
     work.clear();
     work.extend_from_slice(&correlogram[1..=order]);
     work.extend_from_slice(&correlogram[..order]);
@@ -38,7 +42,11 @@ pub(crate) fn reflect<'w>(correlogram: &[f64], order: usize, work: &'w mut Vec<f
         }
         step_up(&mut coefficients[..=stage], k);
     }
-    Ok(Reflected { coefficients, reflection, noise_power: behind[0] })
+    Ok(Reflected {
+        coefficients,
+        reflection,
+        noise_power: behind[0],
+    })
 }
 
 /// Levinson's update of the coefficients by one order; the last place is new.
@@ -48,7 +56,11 @@ fn step_up(coefficients: &mut [f64], k: f64) {
     };
     *last = k;
     let (low, high) = old.split_at_mut(old.len() / 2);
-    let (middle, high) = if high.len() > low.len() { high.split_at_mut(1) } else { high.split_at_mut(0) };
+    let (middle, high) = if high.len() > low.len() {
+        high.split_at_mut(1)
+    } else {
+        high.split_at_mut(0)
+    };
     for a in middle {
         *a += k * *a;
     }

@@ -19,9 +19,17 @@ pub(crate) fn roots(a: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     let degree = a.len();
     let sizes: Vec<f64> = a.iter().map(|a| a.norm()).collect();
     let bound = 1.0 + sizes.iter().copied().fold(0.0, f64::max);
-    let radius = sizes.last().map_or(1.0, |last| last.powf(1.0 / degree as f64)).clamp(1e-3, bound);
+    let radius = sizes
+        .last()
+        .map_or(1.0, |last| last.powf(1.0 / degree as f64))
+        .clamp(1e-3, bound);
     // the offset keeps the start from the symmetry of real coefficients
-    let start = |k: usize| Complex::from_polar(radius, std::f64::consts::TAU * (k as f64 + 0.35) / degree as f64);
+    let start = |k: usize| {
+        Complex::from_polar(
+            radius,
+            std::f64::consts::TAU * (k as f64 + 0.35) / degree as f64,
+        )
+    };
     let mut roots: Vec<Complex<f64>> = (0..degree).map(start).collect();
     for _ in 0..ITERATIONS {
         let mut moved = 0.0_f64;
@@ -48,20 +56,26 @@ pub(crate) fn roots(a: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
         }
     }
     // a cluster converges only linearly and to the root of the rounding: accepted where the polynomial vanishes
-    let settled = |z: &Complex<f64>| newton_step(a, &sizes, *z).is_none_or(|step| step.norm() < 1e-5);
+    let settled =
+        |z: &Complex<f64>| newton_step(a, &sizes, *z).is_none_or(|step| step.norm() < 1e-5);
     roots.iter().all(settled).then_some(roots)
 }
 
 /// P(z) / P'(z), with the absolute values of the coefficients; `None` where P is zero to rounding.
 fn newton_step(a: &[Complex<f64>], sizes: &[f64], z: Complex<f64>) -> Option<Complex<f64>> {
     let radius = z.norm();
-    let (mut value, mut slope, mut size): (Complex<f64>, Complex<f64>, f64) = (Complex::ONE, Complex::ZERO, 1.0);
+    let (mut value, mut slope, mut size): (Complex<f64>, Complex<f64>, f64) =
+        (Complex::ONE, Complex::ZERO, 1.0);
     for (a, a_size) in a.iter().zip(sizes) {
         slope = slope * z + value;
         value = value * z + a;
         size = size * radius + a_size;
     }
-    if value.norm() <= 4.0 * f64::EPSILON * size { None } else { Some(value / slope) }
+    if value.norm() <= 4.0 * f64::EPSILON * size {
+        None
+    } else {
+        Some(value / slope)
+    }
 }
 
 #[cfg(test)]
@@ -83,8 +97,11 @@ mod tests {
     fn check(expected: &[Complex<f64>], tolerance: f64) {
         let mut found = roots(&polynomial(expected)).unwrap();
         for root in expected {
-            let nearest =
-                (0..found.len()).min_by(|&i, &j| (found[i] - root).norm().total_cmp(&(found[j] - root).norm()));
+            let nearest = (0..found.len()).min_by(|&i, &j| {
+                (found[i] - root)
+                    .norm()
+                    .total_cmp(&(found[j] - root).norm())
+            });
             let place = found.swap_remove(nearest.unwrap());
             assert!((place - root).norm() < tolerance, "{root}: {place}");
         }
@@ -92,15 +109,30 @@ mod tests {
 
     #[test]
     fn roots_of_products_are_their_factors() {
-        let ring = |n: usize, r: f64| (0..n).map(move |k| Complex::from_polar(r, 0.3 + 1.9 * k as f64));
+        let ring =
+            |n: usize, r: f64| (0..n).map(move |k| Complex::from_polar(r, 0.3 + 1.9 * k as f64));
         check(&ring(16, 0.95).collect::<Vec<_>>(), 1e-9);
         check(&ring(9, 1.0).chain(ring(7, 0.4)).collect::<Vec<_>>(), 1e-9);
         check(&[Complex::new(-0.7, 0.0)], 1e-14);
         check(&[Complex::ZERO, Complex::new(0.5, 0.2)], 1e-12);
         // conjugate pairs, as real coefficients give
-        check(&[Complex::new(0.1, 0.9), Complex::new(0.1, -0.9), Complex::new(0.8, 0.0)], 1e-12);
+        check(
+            &[
+                Complex::new(0.1, 0.9),
+                Complex::new(0.1, -0.9),
+                Complex::new(0.8, 0.0),
+            ],
+            1e-12,
+        );
         // a double root is known to the root of the rounding
-        check(&[Complex::new(0.6, 0.3), Complex::new(0.6, 0.3), Complex::new(-0.2, 0.0)], 1e-6);
+        check(
+            &[
+                Complex::new(0.6, 0.3),
+                Complex::new(0.6, 0.3),
+                Complex::new(-0.2, 0.0),
+            ],
+            1e-6,
+        );
         assert!(roots(&[]).unwrap().is_empty());
         assert!(roots(&[Complex::new(f64::NAN, 0.0)]).is_none());
     }

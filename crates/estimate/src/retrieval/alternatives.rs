@@ -26,7 +26,11 @@ const APART: f64 = 0.1;
 /// What is so much above the best chi-square, in variances, has no weight; nor has what lies beyond it.
 const NEGLIGIBLE: f64 = 30.0;
 /// A fit with a given spacing ends at such a step: its deviations are small against the distance of spacings.
-const WEIGHED: Stop = Stop { iterations: 40, sigmas: 0.1, learns: false };
+const WEIGHED: Stop = Stop {
+    iterations: 40,
+    sigmas: 0.1,
+    learns: false,
+};
 
 struct Alternative {
     end: End,
@@ -40,64 +44,114 @@ impl Alternative {
     fn new(report: &Report<'_>, end: End) -> Result<Self, Error> {
         let covariance = report.covariance(&end)?;
         let vortices = report.vortices(&end, &covariance);
-        Ok(Self { end, covariance, vortices, weight: 1.0 })
+        Ok(Self {
+            end,
+            covariance,
+            vortices,
+            weight: 1.0,
+        })
     }
 }
 
 /// The result of a report, its deviations those of all that the scan allows.
 pub(crate) fn with_alternatives(report: &Report<'_>) -> Result<ScanResult, Error> {
-    let Chosen { end, covariance, statistic, alike } = report.chosen()?;
+    let Chosen {
+        end,
+        covariance,
+        statistic,
+        alike,
+    } = report.chosen()?;
     if end.kind == Kind::Wind {
         return Ok(report.told(end, covariance, statistic));
     }
     let vortices = report.vortices(end, &covariance);
-    let mut all = vec![Alternative { end: end.clone(), covariance, vortices, weight: 1.0 }];
+    let mut all = vec![Alternative {
+        end: end.clone(),
+        covariance,
+        vortices,
+        weight: 1.0,
+    }];
     let variance = report.scale.powi(2) * alike;
     let most = end.chi2 + NEGLIGIBLE * variance;
     // where the curvature of an end tells nothing, those of the others do
-    all.extend(other_spacings(report, end, most).into_iter().filter_map(|end| Alternative::new(report, end).ok()));
+    all.extend(
+        other_spacings(report, end, most)
+            .into_iter()
+            .filter_map(|end| Alternative::new(report, end).ok()),
+    );
     let spacings = all.len();
     if report.stage.options.other_profile {
         all.extend(of_other_profile(report, end, most)?);
     }
-    let least = all.iter().fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
-    all.iter_mut().for_each(|one| one.weight = (-0.5 * (one.end.chi2 - least) / variance).exp());
+    let least = all
+        .iter()
+        .fold(f64::INFINITY, |least, one| least.min(one.end.chi2));
+    all.iter_mut()
+        .for_each(|one| one.weight = (-0.5 * (one.end.chi2 - least) / variance).exp());
     let sum: f64 = all.iter().map(|one| one.weight).sum();
     all.iter_mut().for_each(|one| one.weight /= sum);
     let competes = |one: &Alternative| one.end.chi2 - least < COMPETES * variance;
-    let apart = |one: &Alternative| (one.end.wake.spacing_m() / end.wake.spacing_m()).ln().abs() > APART;
-    let is_ambiguous = all[..spacings].iter().any(|one| competes(one) && apart(one));
-    let told = if is_ambiguous { nearest_to_the_mean_spacing(&all[..spacings]) } else { end };
+    let apart =
+        |one: &Alternative| (one.end.wake.spacing_m() / end.wake.spacing_m()).ln().abs() > APART;
+    let is_ambiguous = all[..spacings]
+        .iter()
+        .any(|one| competes(one) && apart(one));
+    let told = if is_ambiguous {
+        nearest_to_the_mean_spacing(&all[..spacings])
+    } else {
+        end
+    };
     let mut result = report.told(told, mixed(&all, &told.wake), statistic);
-    result.vortices.iter_mut().for_each(|vortex| widen(vortex, &all));
+    result
+        .vortices
+        .iter_mut()
+        .for_each(|vortex| widen(vortex, &all));
     result.set(Flag::Ambiguous, is_ambiguous || result.has(Flag::Ambiguous));
     Ok(result)
 }
 
 /// Fits of pairs with given spacings, where gates are long: away from that of the end as far as chi-squares stay below `most`.
 fn other_spacings(report: &Report<'_>, end: &End, most: f64) -> Vec<End> {
-    let lateral = [Parameter::LeftLateral as usize, Parameter::RightLateral as usize];
+    let lateral = [
+        Parameter::LeftLateral as usize,
+        Parameter::RightLateral as usize,
+    ];
     let gate_m = report.stage.gates.kernel.width_m();
     let spacing_m = end.wake.spacing_m();
     let is_free = |place: &usize| end.groups.iter().any(|group| group == &[*place]);
-    if end.kind != Kind::Both || !lateral.iter().all(is_free) || gate_m < LONG * spacing_m.min(TYPICAL_M) {
+    if end.kind != Kind::Both
+        || !lateral.iter().all(is_free)
+        || gate_m < LONG * spacing_m.min(TYPICAL_M)
+    {
         return Vec::new();
     }
     let fits = report.stage;
     // both move alike: the spacing stays; cores of which something is known are free, as what suits one spacing does not suit another
     let known = report.stage.squares.prior.is_some();
-    let mut groups = if known { fits.groups(end.kind) } else { end.groups.clone() };
+    let mut groups = if known {
+        fits.groups(end.kind)
+    } else {
+        end.groups.clone()
+    };
     groups.retain(|group| !lateral.iter().any(|place| group == &[*place]));
     groups.push(lateral.to_vec());
     let step = (SPACINGS_M.1 / SPACINGS_M.0).ln() / (SPACINGS - 1) as f64;
-    let spacings_m: Vec<f64> = (0..SPACINGS).map(|i| SPACINGS_M.0 * (step * i as f64).exp()).collect();
-    let (less, more) = spacings_m.split_at(spacings_m.partition_point(|other_m| *other_m < spacing_m));
+    let spacings_m: Vec<f64> = (0..SPACINGS)
+        .map(|i| SPACINGS_M.0 * (step * i as f64).exp())
+        .collect();
+    let (less, more) =
+        spacings_m.split_at(spacings_m.partition_point(|other_m| *other_m < spacing_m));
     let mut ends = Vec::new();
     for way in [less.iter().rev().collect::<Vec<_>>(), more.iter().collect()] {
         // each begins where its neighbour ended
         let mut near = end.wake;
         for spacing_m in way {
-            let Some(found) = fits.lowest(end.kind, &with_spacing(&near, *spacing_m), groups.clone(), WEIGHED) else {
+            let Some(found) = fits.lowest(
+                end.kind,
+                &with_spacing(&near, *spacing_m),
+                groups.clone(),
+                WEIGHED,
+            ) else {
                 continue;
             };
             if found.chi2 > most {
@@ -121,22 +175,41 @@ fn with_spacing(wake: &Wake, spacing_m: f64) -> Wake {
         lateral_position_m: middle_m + ratio * (own.lateral_position_m - middle_m),
         ..*own
     };
-    Wake { left: vortex(&wake.left), right: vortex(&wake.right), ..*wake }
+    Wake {
+        left: vortex(&wake.left),
+        right: vortex(&wake.right),
+        ..*wake
+    }
 }
 
 /// The fit with the other profile, from the end of the stated one, unless its chi-square is above `most`.
-fn of_other_profile(report: &Report<'_>, end: &End, most: f64) -> Result<Option<Alternative>, Error> {
+fn of_other_profile(
+    report: &Report<'_>,
+    end: &End,
+    most: f64,
+) -> Result<Option<Alternative>, Error> {
     let mut options = report.stage.options.clone();
     options.model.profile = options.model.profile.other();
     let moving = Gates::on_grid(report.stage.map, &options, 1)?;
-    let dense = if report.stage.gates.seconds.is_some() { moving } else { moving.frozen() };
+    let dense = if report.stage.gates.seconds.is_some() {
+        moving
+    } else {
+        moving.frozen()
+    };
     let fine = dense.clone().fine(&options.gate)?;
-    let stage = Stage { options: &options, ..report.stage.clone() }.through(&dense);
+    let stage = Stage {
+        options: &options,
+        ..report.stage.clone()
+    }
+    .through(&dense);
     let near = stage.onwards(std::slice::from_ref(end), |_| ROUGH);
     let stage = stage.through(&fine);
     let other = stage.onwards(&near, |_| AS_IT_IS).pop();
     let other = other.filter(|other| other.chi2 <= most);
-    let report = Report { stage: &stage, ..*report };
+    let report = Report {
+        stage: &stage,
+        ..*report
+    };
     Ok(other.and_then(|end| Alternative::new(&report, end).ok()))
 }
 
@@ -146,7 +219,10 @@ fn nearest_to_the_mean_spacing(all: &[Alternative]) -> &End {
     let sum: f64 = all.iter().map(|one| one.weight).sum();
     let mean = all.iter().map(|one| one.weight * of(one)).sum::<f64>() / sum;
     let away = |i: &usize| (of(&all[*i]) - mean).abs();
-    &all[(0..all.len()).min_by(|a, b| away(a).total_cmp(&away(b))).unwrap_or(0)].end
+    &all[(0..all.len())
+        .min_by(|a, b| away(a).total_cmp(&away(b)))
+        .unwrap_or(0)]
+    .end
 }
 
 /// Mean squares of the distances from a wake: covariances of all and between them.
@@ -155,7 +231,13 @@ fn mixed(all: &[Alternative], wake: &Wake) -> Array2<f64> {
     let mut mixed = Array2::zeros((own.len(), own.len()));
     for one in all {
         let other = one.end.wake.to_array();
-        let away = |i: usize| if one.covariance[[i, i]] > 0.0 { other[i] - own[i] } else { 0.0 };
+        let away = |i: usize| {
+            if one.covariance[[i, i]] > 0.0 {
+                other[i] - own[i]
+            } else {
+                0.0
+            }
+        };
         mixed.indexed_iter_mut().for_each(|((i, j), c)| {
             *c += one.weight * (one.covariance[[i, j]] + away(i) * away(j));
         });
@@ -173,9 +255,14 @@ fn widen(vortex: &mut VortexResult, all: &[Alternative]) {
         |vortex| vortex.core_radius_m.as_mut(),
     ];
     for number in NUMBERS {
-        let Some(own) = number(vortex).map(|own| own.value) else { continue };
+        let Some(own) = number(vortex).map(|own| own.value) else {
+            continue;
+        };
         let square = |one: &Alternative| -> Option<f64> {
-            let mut other = *one.vortices.iter().find(|other| other.side == vortex.side)?;
+            let mut other = *one
+                .vortices
+                .iter()
+                .find(|other| other.side == vortex.side)?;
             let Measured { value, std } = *number(&mut other)?;
             Some(one.weight * (std * std + (value - own).powi(2)))
         };

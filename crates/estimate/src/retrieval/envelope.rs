@@ -76,8 +76,9 @@ impl SpectralShape {
 
     /// Expected power over the noise at a velocity, given the velocities of the air with their weights.
     fn power(&self, air: &[(f64, f64)], snr: f64, velocity_m_s: f64) -> f64 {
-        let line =
-            |(weight, air_m_s): &(f64, f64)| weight * (-((velocity_m_s - air_m_s) / self.width_m_s).powi(2)).exp();
+        let line = |(weight, air_m_s): &(f64, f64)| {
+            weight * (-((velocity_m_s - air_m_s) / self.width_m_s).powi(2)).exp()
+        };
         1.0 + snr * self.band_m_s / (self.width_m_s * PI.sqrt()) * air.iter().map(line).sum::<f64>()
     }
 
@@ -95,19 +96,33 @@ impl SpectralShape {
             .map(|i| {
                 let away = 2.0 * REACH * f64::from(i) / f64::from(STEPS);
                 let at_m = range_m + away * self.gate_std_m;
-                ((-0.5 * away * away).exp(), sign * model.radial_velocity_m_s(wake, at_m, elevation_rad))
+                (
+                    (-0.5 * away * away).exp(),
+                    sign * model.radial_velocity_m_s(wake, at_m, elevation_rad),
+                )
             })
             .collect();
         let sum: f64 = air.iter().map(|(weight, _)| weight).sum();
-        let air: Vec<(f64, f64)> = air.into_iter().map(|(weight, v)| (weight / sum, v)).collect();
-        let fastest = air.iter().fold(f64::NEG_INFINITY, |most, (_, v)| most.max(*v));
-        let slowest = air.iter().fold(f64::INFINITY, |least, (_, v)| least.min(*v));
+        let air: Vec<(f64, f64)> = air
+            .into_iter()
+            .map(|(weight, v)| (weight / sum, v))
+            .collect();
+        let fastest = air
+            .iter()
+            .fold(f64::NEG_INFINITY, |most, (_, v)| most.max(*v));
+        let slowest = air
+            .iter()
+            .fold(f64::INFINITY, |least, (_, v)| least.min(*v));
         // inwards in small steps to the first velocity that is above, then between the two
         let step = 0.1 * self.width_m_s;
         let from = fastest + 6.0 * self.width_m_s;
         let count = ((from - slowest) / step).ceil() as i32;
-        let above = (0..=count).map(|i| from - f64::from(i) * step).find(|v| self.power(&air, snr, *v) >= threshold)?;
-        let [outermost, _] = bisected(above, above + step, HALVINGS, |v| self.power(&air, snr, v) >= threshold);
+        let above = (0..=count)
+            .map(|i| from - f64::from(i) * step)
+            .find(|v| self.power(&air, snr, *v) >= threshold)?;
+        let [outermost, _] = bisected(above, above + step, HALVINGS, |v| {
+            self.power(&air, snr, v) >= threshold
+        });
         Some(sign * outermost)
     }
 }
@@ -175,7 +190,11 @@ fn one(
     side: Side,
     threshold: f64,
 ) -> EnvelopeResult {
-    let (vortex, sense) = if side == Side::Left { (about.left, -1.0) } else { (about.right, 1.0) };
+    let (vortex, sense) = if side == Side::Left {
+        (about.left, -1.0)
+    } else {
+        (about.right, 1.0)
+    };
     let (range_m, elevation_rad) = model.range_and_elevation(vortex.place_m());
     let away = |gate: &usize| (spectra.range_m[*gate] - range_m).abs();
     let gate = (0..spectra.range_m.len()).min_by(|a, b| away(a).total_cmp(&away(b)));
@@ -184,7 +203,9 @@ fn one(
     let share = model.profile.mean_5_15(vortex.core_radius_m).0;
     for (line, elevation) in spectra.elevation_rad.iter().enumerate() {
         let off_m = range_m * (elevation - elevation_rad).sin();
-        let Some(gate) = gate.filter(|_| (OFF_M.0..=OFF_M.1).contains(&off_m.abs())) else { continue };
+        let Some(gate) = gate.filter(|_| (OFF_M.0..=OFF_M.1).contains(&off_m.abs())) else {
+            continue;
+        };
         // above a left vortex the air goes away
         let sign = -sense * off_m.signum();
         let power = spectra.power.slice(ndarray::s![line, gate, ..]);
@@ -193,13 +214,28 @@ fn one(
             continue;
         };
         let place = (spectra.range_m[gate], *elevation);
-        let wind =
-            (about.lateral_wind_m_s + about.wind_shear_per_s * model.position_m(place.0, place.1).1) * elevation.cos();
+        let wind = (about.lateral_wind_m_s
+            + about.wind_shear_per_s * model.position_m(place.0, place.1).1)
+            * elevation.cos();
         let speed = sign * (envelope - wind);
         let faster = |circulation_m2_s: f64| {
-            let own = Vortex { circulation_m2_s, ..vortex };
-            let wake = if side == Side::Left { Wake { left: own, ..*about } } else { Wake { right: own, ..*about } };
-            let expected = shape.expected_envelope_m_s((model, &wake), place, (spectra.snr, threshold), sign);
+            let own = Vortex {
+                circulation_m2_s,
+                ..vortex
+            };
+            let wake = if side == Side::Left {
+                Wake {
+                    left: own,
+                    ..*about
+                }
+            } else {
+                Wake {
+                    right: own,
+                    ..*about
+                }
+            };
+            let expected =
+                shape.expected_envelope_m_s((model, &wake), place, (spectra.snr, threshold), sign);
             expected.is_some_and(|v| sign * v > sign * envelope)
         };
         // upwards: very fast air is so spread out that nothing of it is above the threshold
@@ -208,7 +244,9 @@ fn one(
             continue;
         };
         let [low, high] = [step - 1, step].map(|step| STEP_M2_S * f64::from(step));
-        let [found, _] = bisected(low, high, HALVINGS, |circulation_m2_s| !faster(circulation_m2_s));
+        let [found, _] = bisected(low, high, HALVINGS, |circulation_m2_s| {
+            !faster(circulation_m2_s)
+        });
         raw.push(2.0 * PI * off_m.abs() * speed);
         narrowed.push(2.0 * PI * off_m.abs() * (speed - calm));
         inverted.push(share * found);
@@ -220,18 +258,30 @@ fn one(
         side,
         raw_m2_s: mean(&raw),
         narrowed_m2_s: mean(&narrowed),
-        inverted_m2_s: Measured { value, std: (squares / (count - 1.0) / count).sqrt() },
+        inverted_m2_s: Measured {
+            value,
+            std: (squares / (count - 1.0) / count).sqrt(),
+        },
         lines: inverted.len(),
         left_out,
     }
 }
 
 /// Outermost velocity where a measured spectrum falls through the threshold; nothing at the end of the band or nowhere above.
-fn measured(velocity_m_s: &[f64], power: ndarray::ArrayView1<'_, f64>, threshold: f64, sign: f64) -> Option<f64> {
+fn measured(
+    velocity_m_s: &[f64],
+    power: ndarray::ArrayView1<'_, f64>,
+    threshold: f64,
+    sign: f64,
+) -> Option<f64> {
     let last = velocity_m_s.len().checked_sub(1)?;
     let cell = |i: usize| if sign > 0.0 { last - i } else { i };
     let inner = (0..=last).map(cell).find(|i| power[*i] >= threshold)?;
-    let outer = if sign > 0.0 { inner.checked_add(1).filter(|i| *i <= last) } else { inner.checked_sub(1) }?;
+    let outer = if sign > 0.0 {
+        inner.checked_add(1).filter(|i| *i <= last)
+    } else {
+        inner.checked_sub(1)
+    }?;
     let part = (power[inner] - threshold) / (power[inner] - power[outer]);
     Some(velocity_m_s[inner] + part * (velocity_m_s[outer] - velocity_m_s[inner]))
 }

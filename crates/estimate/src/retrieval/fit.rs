@@ -30,15 +30,25 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     options.validate()?;
     map.validate()?;
     let unfolded = map.unfolded();
-    let bounded = unfolded.medians(if options.turbulence.is_some() { WHITENED } else { MOST });
+    let bounded = unfolded.medians(if options.turbulence.is_some() {
+        WHITENED
+    } else {
+        MOST
+    });
     let map = bounded.as_ref().unwrap_or(&unfolded);
     // broad blocks are enough to search in
     let few = map.medians(SEARCHED);
     let (gates, sought) = (Gates::rough(map, options)?, few.as_ref().unwrap_or(map));
     let sought_gates = Gates::rough(sought, options)?;
-    let (mut all, mut search) = (Stage::new(map, options, &gates), Stage::new(sought, options, &sought_gates));
+    let (mut all, mut search) = (
+        Stage::new(map, options, &gates),
+        Stage::new(sought, options, &sought_gates),
+    );
     let starts = search.starts()?;
-    let about = starts.first().map_or(Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]), |s| s.1);
+    let about = starts.first().map_or(
+        Wake::from_array(&[0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 0.0]),
+        |s| s.1,
+    );
     if map.sigma_m_s.is_none() {
         // what the wind leaves, until fits are known
         let winds = (search.wind(&about)?, all.wind(&about)?);
@@ -48,12 +58,20 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     let likely = least(&found, search.squares.cells.len());
     all.thinned = bounded.is_some();
     let whitening = options.turbulence.as_ref().map(|turbulence| {
-        likely.iter().for_each(|end| reject(&mut all, turbulence, end));
+        likely
+            .iter()
+            .for_each(|end| reject(&mut all, turbulence, end));
         whitening(&all, turbulence)
     });
     let whitening = whitening.transpose()?;
     all.squares.whitening = whitening.as_ref();
-    let ends = ends_in_all(&all, &search, (&starts, &found), (few.is_some(), &about), options)?;
+    let ends = ends_in_all(
+        &all,
+        &search,
+        (&starts, &found),
+        (few.is_some(), &about),
+        options,
+    )?;
     let cells = all.squares.cells.len();
     let (all, scale) = in_scale(all, least(&ends, cells));
     let dense = Gates::on_grid(map, options, 1)?;
@@ -61,12 +79,26 @@ pub fn fit_scan(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult,
     let stage = all.through(&dense);
     let mut ends = stage.onwards(&rivals(&ends, scale), |_| ROUGH);
     let may_stand = options.movement == Movement::Auto && dense.seconds.is_some();
-    let standing = if may_stand { ends_at_rest(&stage, &stage.clone().through(&frozen), &ends, scale) } else { None };
-    let fine = if standing.is_some() { frozen.clone() } else { moving }.fine(&options.gate)?;
+    let standing = if may_stand {
+        ends_at_rest(&stage, &stage.clone().through(&frozen), &ends, scale)
+    } else {
+        None
+    };
+    let fine = if standing.is_some() {
+        frozen.clone()
+    } else {
+        moving
+    }
+    .fine(&options.gate)?;
     ends = standing.unwrap_or(ends);
     let stage = stage.through(&fine);
     let (wind, ends) = (stage.wind(&about)?, stage.fine(&ends));
-    with_alternatives(&Report { stage: &stage, scale, wind: &wind, ends: &ends })
+    with_alternatives(&Report {
+        stage: &stage,
+        scale,
+        wind: &wind,
+        ends: &ends,
+    })
 }
 
 /// The ends in all velocities that come of a search, whose blocks stand for them if they are many.
@@ -85,24 +117,46 @@ fn ends_in_all(
     };
     // the scale in which they compete
     let scale = search.residual_scale(likely).max(1.0);
-    let report = Report { stage: search, scale, wind: &search.wind(about)?, ends: found };
+    let report = Report {
+        stage: search,
+        scale,
+        wind: &search.wind(about)?,
+        ends: found,
+    };
     // where blocks show next to nothing, the best is enough to tell so
     let is_empty = report.chosen()?.statistic < NOTHING * options.threshold;
-    Ok(all.again(&if is_empty { vec![likely.clone()] } else { rivals(found, scale) }))
+    Ok(all.again(&if is_empty {
+        vec![likely.clone()]
+    } else {
+        rivals(found, scale)
+    }))
 }
 
 /// The ends of vortices at rest, where they explain the velocities better than those that move by more than motion costs.
-fn ends_at_rest(moving: &Stage<'_>, still: &Stage<'_>, ends: &[End], scale: f64) -> Option<Vec<End>> {
+fn ends_at_rest(
+    moving: &Stage<'_>,
+    still: &Stage<'_>,
+    ends: &[End],
+    scale: f64,
+) -> Option<Vec<End>> {
     let likely = least(ends, moving.squares.cells.len())?;
-    let end = still.onwards(std::slice::from_ref(likely), |_| ROUGH).pop()?;
-    let sense = if moving.map.lasts_s() < RetrievalOptions::SHORT_S { -1.0 } else { 1.0 };
+    let end = still
+        .onwards(std::slice::from_ref(likely), |_| ROUGH)
+        .pop()?;
+    let sense = if moving.map.lasts_s() < RetrievalOptions::SHORT_S {
+        -1.0
+    } else {
+        1.0
+    };
     let margin = RetrievalOptions::MOVES * scale.powi(2) * sense;
     (end.chi2 + margin < likely.chi2).then(|| still.onwards(ends, |_| ROUGH))
 }
 
 /// A stage with deviations or a loss of the scale of the residuals that a likely end leaves, and that scale over the stated deviations.
 fn in_scale<'a>(mut stage: Stage<'a>, likely: Option<&End>) -> (Stage<'a>, f64) {
-    let Some(likely) = likely else { return (stage, 1.0) };
+    let Some(likely) = likely else {
+        return (stage, 1.0);
+    };
     if stage.map.sigma_m_s.is_none() && stage.squares.whitening.is_none() {
         return (stage.rescaled(likely), 1.0);
     }
@@ -116,8 +170,14 @@ fn in_scale<'a>(mut stage: Stage<'a>, likely: Option<&End>) -> (Stage<'a>, f64) 
 /// What makes the velocities of a stage white.
 fn whitening(stage: &Stage<'_>, turbulence: &Turbulence) -> Result<Whitening, Error> {
     let place = |cell: &Cell| {
-        let (range_m, elevation_rad) = (stage.map.range_m[cell.gate], stage.map.elevation_rad[cell.line]);
-        (stage.gates.model.position_m(range_m, elevation_rad), cell.sigma_m_s)
+        let (range_m, elevation_rad) = (
+            stage.map.range_m[cell.gate],
+            stage.map.elevation_rad[cell.line],
+        );
+        (
+            stage.gates.model.position_m(range_m, elevation_rad),
+            cell.sigma_m_s,
+        )
     };
     let places: Vec<_> = stage.squares.cells.iter().map(place).collect();
     Whitening::new(&places, turbulence).ok_or(Error::Linalg {
@@ -134,7 +194,9 @@ fn reject(stage: &mut Stage<'_>, turbulence: &Turbulence, end: &End) {
     let before = stage.squares.cells.len();
     stage.squares.cells.retain(|cell| {
         let deviation_m_s = cell.sigma_m_s.hypot(turbulence.deviation_m_s);
-        residuals.next().is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
+        residuals
+            .next()
+            .is_none_or(|r| r.abs() * cell.sigma_m_s <= OUTLIER * deviation_m_s)
     });
     stage.rejected = before - stage.squares.cells.len();
 }

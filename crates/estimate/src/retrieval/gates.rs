@@ -23,7 +23,11 @@ impl<'a> Gates<'a> {
 
     /// For the way to the end of a fit: the points of a weight lie on one grid with the gates, which is quick, about `coarser` times as
     /// far apart as in the end.
-    pub(crate) fn on_grid(map: &'a ScanMap, options: &'a RetrievalOptions, coarser: usize) -> Result<Self, Error> {
+    pub(crate) fn on_grid(
+        map: &'a ScanMap,
+        options: &'a RetrievalOptions,
+        coarser: usize,
+    ) -> Result<Self, Error> {
         options.gate.validate(&map.range_m)?;
         let step_m = uniform_step_m(&map.range_m);
         let longest_m = |std_m: f64| coarser as f64 * 2.0 * REACH * std_m / (POINTS - 1) as f64;
@@ -31,18 +35,33 @@ impl<'a> Gates<'a> {
             Gate::Gaussian { std_m } if *std_m > 0.0 => {
                 let longest_m = longest_m(*std_m);
                 let spacing_m = step_m.map_or(longest_m, |step| step / (step / longest_m).ceil());
-                gaussian(*std_m, spacing_m, (REACH * std_m / spacing_m).ceil() as usize)?
+                gaussian(
+                    *std_m,
+                    spacing_m,
+                    (REACH * std_m / spacing_m).ceil() as usize,
+                )?
             }
             Gate::Kernel(kernel) => {
-                let factor = kernel.points_within(longest_m(kernel.width_m())).max(coarser);
-                step_m.map_or_else(|| kernel.coarser(factor), |step_m| kernel.dividing(step_m, factor))
+                let factor = kernel
+                    .points_within(longest_m(kernel.width_m()))
+                    .max(coarser);
+                step_m.map_or_else(
+                    || kernel.coarser(factor),
+                    |step_m| kernel.dividing(step_m, factor),
+                )
             }
-            Gate::Point | Gate::Gaussian { .. } => RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?,
+            Gate::Point | Gate::Gaussian { .. } => {
+                RangeKernel::new(0.0, step_m.unwrap_or(1.0), &[1.0])?
+            }
         };
         let moves = options.movement != Movement::Frozen && map.lasts_s() > 0.0;
         let seconds = moves.then(|| map.after_middle_s());
         let places = (&map.elevation_rad[..], &map.range_m[..]);
-        Ok(Self { seconds, shared_points: step_m.is_some(), ..Self::at_rest(&options.model, kernel, places) })
+        Ok(Self {
+            seconds,
+            shared_points: step_m.is_some(),
+            ..Self::at_rest(&options.model, kernel, places)
+        })
     }
 
     /// For the end of a fit: every gate has its own points, each at its place.
@@ -50,7 +69,11 @@ impl<'a> Gates<'a> {
         match gate {
             Gate::Kernel(kernel) => self.kernel = kernel.clone(),
             Gate::Gaussian { std_m } if *std_m > 0.0 => {
-                self.kernel = gaussian(*std_m, 2.0 * REACH * std_m / (POINTS - 1) as f64, POINTS / 2)?;
+                self.kernel = gaussian(
+                    *std_m,
+                    2.0 * REACH * std_m / (POINTS - 1) as f64,
+                    POINTS / 2,
+                )?;
                 self.shared_points = false;
             }
             Gate::Point | Gate::Gaussian { .. } => {}
@@ -60,7 +83,10 @@ impl<'a> Gates<'a> {
 
     /// The same with vortices that stand still.
     pub(crate) fn frozen(self) -> Self {
-        Self { seconds: None, ..self }
+        Self {
+            seconds: None,
+            ..self
+        }
     }
 }
 
@@ -75,7 +101,10 @@ fn gaussian(std_m: f64, spacing_m: f64, points: usize) -> Result<RangeKernel, Er
 fn uniform_step_m(range_m: &[f64]) -> Option<f64> {
     let (first, last) = (range_m.first()?, range_m.last()?);
     let step = (last - first) / (range_m.len() - 1) as f64;
-    let even = range_m.iter().enumerate().all(|(i, r)| (r - first - i as f64 * step).abs() < 1e-4 * step);
+    let even = range_m
+        .iter()
+        .enumerate()
+        .all(|(i, r)| (r - first - i as f64 * step).abs() < 1e-4 * step);
     (even && step > 0.0).then_some(step)
 }
 
@@ -92,9 +121,18 @@ pub fn expected_velocities(
 ) -> Result<Array2<f64>, Error> {
     options.validate()?;
     map.validate()?;
-    let movement = if moving { Movement::Moving } else { Movement::Frozen };
-    let options = RetrievalOptions { movement, ..options.clone() };
-    Ok(Gates::rough(map, &options)?.fine(&options.gate)?.velocities(wake))
+    let movement = if moving {
+        Movement::Moving
+    } else {
+        Movement::Frozen
+    };
+    let options = RetrievalOptions {
+        movement,
+        ..options.clone()
+    };
+    Ok(Gates::rough(map, &options)?
+        .fine(&options.gate)?
+        .velocities(wake))
 }
 
 #[cfg(test)]

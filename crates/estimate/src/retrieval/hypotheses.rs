@@ -35,10 +35,26 @@ const NEARLY: f64 = 5e-3;
 /// A rough end so much above the best of its kind competes no longer.
 const HOPELESS: f64 = 50.0;
 
-const FAR: Stop = Stop { iterations: 25, sigmas: 0.3, learns: false };
-pub(crate) const ROUGH: Stop = Stop { iterations: 40, sigmas: 1e-2, learns: false };
-const FINE: Stop = Stop { iterations: 50, sigmas: 1e-4, learns: false };
-pub(crate) const AS_IT_IS: Stop = Stop { iterations: 1, sigmas: f64::INFINITY, learns: false };
+const FAR: Stop = Stop {
+    iterations: 25,
+    sigmas: 0.3,
+    learns: false,
+};
+pub(crate) const ROUGH: Stop = Stop {
+    iterations: 40,
+    sigmas: 1e-2,
+    learns: false,
+};
+const FINE: Stop = Stop {
+    iterations: 50,
+    sigmas: 1e-4,
+    learns: false,
+};
+pub(crate) const AS_IT_IS: Stop = Stop {
+    iterations: 1,
+    sigmas: f64::INFINITY,
+    learns: false,
+};
 
 /// Which vortices there are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -52,7 +68,10 @@ pub(crate) enum Kind {
 impl Kind {
     /// Whether the parameter belongs to a vortex that there is, or to the wind.
     pub(crate) fn has(self, place: usize) -> bool {
-        let is_left = Side::Left.parameters().iter().any(|parameter| *parameter as usize == place);
+        let is_left = Side::Left
+            .parameters()
+            .iter()
+            .any(|parameter| *parameter as usize == place);
         match self {
             _ if place >= Parameter::Wind as usize => true,
             Self::Wind => false,
@@ -71,9 +90,19 @@ impl Kind {
         };
         match self {
             Self::Both => *wake,
-            Self::Left => Wake { right: nowhere(&wake.left, NOWHERE_M), ..*wake },
-            Self::Right => Wake { left: nowhere(&wake.right, -NOWHERE_M), ..*wake },
-            Self::Wind => Wake { left: nowhere(&wake.left, 0.0), right: nowhere(&wake.right, 0.0), ..*wake },
+            Self::Left => Wake {
+                right: nowhere(&wake.left, NOWHERE_M),
+                ..*wake
+            },
+            Self::Right => Wake {
+                left: nowhere(&wake.right, -NOWHERE_M),
+                ..*wake
+            },
+            Self::Wind => Wake {
+                left: nowhere(&wake.left, 0.0),
+                right: nowhere(&wake.right, 0.0),
+                ..*wake
+            },
         }
     }
 
@@ -113,7 +142,11 @@ pub(crate) struct Stage<'a> {
 
 impl<'a> Stage<'a> {
     /// With all velocities of the map, as independent ones of the stated deviations.
-    pub(crate) fn new(map: &'a ScanMap, options: &'a RetrievalOptions, gates: &'a Gates<'a>) -> Self {
+    pub(crate) fn new(
+        map: &'a ScanMap,
+        options: &'a RetrievalOptions,
+        gates: &'a Gates<'a>,
+    ) -> Self {
         let squares = LeastSquares {
             prediction: gates,
             fold_m_s: map.fold_m_s,
@@ -123,18 +156,36 @@ impl<'a> Stage<'a> {
             prior: options.core_prior,
             counted: 1.0,
         };
-        Self { map, options, gates, squares, rejected: 0, thinned: false, is_noise_left: true }
+        Self {
+            map,
+            options,
+            gates,
+            squares,
+            rejected: 0,
+            thinned: false,
+            is_noise_left: true,
+        }
     }
 
     /// The same with other gates.
     pub(crate) fn through(self, gates: &'a Gates<'a>) -> Self {
-        Self { gates, squares: LeastSquares { prediction: gates, ..self.squares }, ..self }
+        Self {
+            gates,
+            squares: LeastSquares {
+                prediction: gates,
+                ..self.squares
+            },
+            ..self
+        }
     }
 
     /// Where no deviations are stated, they are those of the residuals of an end.
     pub(crate) fn rescaled(self, end: &End) -> Self {
         let scale = self.residual_scale(end);
-        Self { squares: self.squares.rescaled(scale), ..self }
+        Self {
+            squares: self.squares.rescaled(scale),
+            ..self
+        }
     }
 
     /// Scale of the residuals over their deviations.
@@ -144,9 +195,14 @@ impl<'a> Stage<'a> {
 
     pub(crate) fn groups(&self, kind: Kind) -> Vec<Vec<usize>> {
         let all = self.options.free.groups().into_iter();
-        all.map(|group| group.into_iter().filter(|place| kind.has(*place)).collect::<Vec<usize>>())
-            .filter(|group| !group.is_empty())
-            .collect()
+        all.map(|group| {
+            group
+                .into_iter()
+                .filter(|place| kind.has(*place))
+                .collect::<Vec<usize>>()
+        })
+        .filter(|group| !group.is_empty())
+        .collect()
     }
 
     /// Where fits of a scan start.
@@ -156,8 +212,16 @@ impl<'a> Stage<'a> {
         pairs.sort_by(|a, b| b.explained.total_cmp(&a.explained));
         let near = |a: &Vortex, b: &Vortex| a.away_m(b.place_m()) < APART_M;
         let same = |a: &Wake, b: &Wake| near(&a.left, &b.left) && near(&a.right, &b.right);
-        let found = distinct(pairs.iter().map(|pair| search.wake(pair)), same).into_iter().take(PAIRS);
-        let mut starts: Vec<_> = self.options.start.into_iter().chain(found).map(|wake| (Kind::Both, wake)).collect();
+        let found = distinct(pairs.iter().map(|pair| search.wake(pair)), same)
+            .into_iter()
+            .take(PAIRS);
+        let mut starts: Vec<_> = self
+            .options
+            .start
+            .into_iter()
+            .chain(found)
+            .map(|wake| (Kind::Both, wake))
+            .collect();
         for (kind, sense) in [(Kind::Left, -1.0), (Kind::Right, 1.0)] {
             let single = search.single(sense);
             starts.extend(single.map(|(place_m, circulation_m2_s)| {
@@ -173,27 +237,65 @@ impl<'a> Stage<'a> {
     /// # Errors
     /// [`Error::NotConverged`] about an impossible wake.
     pub(crate) fn wind(&self, about: &Wake) -> Result<End, Error> {
-        let nowhere = Error::NotConverged { iterations: 0, sigmas_left: f64::INFINITY };
-        self.lowest(Kind::Wind, &Kind::Wind.of(about), self.groups(Kind::Wind), ROUGH).ok_or(nowhere)
+        let nowhere = Error::NotConverged {
+            iterations: 0,
+            sigmas_left: f64::INFINITY,
+        };
+        self.lowest(
+            Kind::Wind,
+            &Kind::Wind.of(about),
+            self.groups(Kind::Wind),
+            ROUGH,
+        )
+        .ok_or(nowhere)
     }
 
     /// The end from a start on, with those free numbers.
-    pub(crate) fn lowest(&self, kind: Kind, start: &Wake, groups: Vec<Vec<usize>>, stop: Stop) -> Option<End> {
-        let Minimum { at, normal, sigmas_left, .. } = self.squares.minimum(&start.to_array(), &groups, stop)?;
-        Some(End { kind, wake: Wake::from_list(&at), chi2: 2.0 * normal.cost, sigmas_left, groups })
+    pub(crate) fn lowest(
+        &self,
+        kind: Kind,
+        start: &Wake,
+        groups: Vec<Vec<usize>>,
+        stop: Stop,
+    ) -> Option<End> {
+        let Minimum {
+            at,
+            normal,
+            sigmas_left,
+            ..
+        } = self.squares.minimum(&start.to_array(), &groups, stop)?;
+        Some(End {
+            kind,
+            wake: Wake::from_list(&at),
+            chi2: 2.0 * normal.cost,
+            sigmas_left,
+            groups,
+        })
     }
 
     /// Core radius that a fit starts with or keeps.
     fn core_m(&self, kind: Kind, wake: &Wake) -> f64 {
-        let typical = if kind == Kind::Both { CORE_OVER_SPACING * wake.spacing_m() } else { LONE_CORE_M };
+        let typical = if kind == Kind::Both {
+            CORE_OVER_SPACING * wake.spacing_m()
+        } else {
+            LONE_CORE_M
+        };
         self.options.core_radius_m.unwrap_or(typical)
     }
 
     /// From a rough start with broad cores, until the places are known.
     fn near(&self, kind: Kind, start: &Wake) -> Option<Wake> {
         let groups = self.groups(kind);
-        let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
-        let spacing_m = if kind == Kind::Both { start.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
+        let coreless: Vec<Vec<usize>> = groups
+            .iter()
+            .filter(|group| !is_core(group))
+            .cloned()
+            .collect();
+        let spacing_m = if kind == Kind::Both {
+            start.spacing_m()
+        } else {
+            LONE_CORE_M / CORE_OVER_SPACING
+        };
         let broad = self.options.free.start(start).with_cores(BROAD * spacing_m);
         self.lowest(kind, &broad, coreless, FAR).map(|end| end.wake)
     }
@@ -205,9 +307,18 @@ impl<'a> Stage<'a> {
         if !groups.iter().any(|group| is_core(group)) {
             let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), ROUGH)?;
             // the typical core is that of the spacing which the fit ends with
-            return self.lowest(kind, &end.wake.with_cores(self.core_m(kind, &end.wake)), groups, ROUGH);
+            return self.lowest(
+                kind,
+                &end.wake.with_cores(self.core_m(kind, &end.wake)),
+                groups,
+                ROUGH,
+            );
         }
-        let spacing_m = if kind == Kind::Both { near.spacing_m() } else { LONE_CORE_M / CORE_OVER_SPACING };
+        let spacing_m = if kind == Kind::Both {
+            near.spacing_m()
+        } else {
+            LONE_CORE_M / CORE_OVER_SPACING
+        };
         let end = self.lowest(kind, &near.with_cores(core_m), groups.clone(), ROUGH);
         let vague: Vec<usize> = match &end {
             Some(end) => self.vague_cores(end, LARGEST * spacing_m),
@@ -221,7 +332,9 @@ impl<'a> Stage<'a> {
         vague.iter().for_each(|place| p[*place] = core_m);
         if let Some(end) = end {
             let found = end.wake.to_array();
-            (0..PARAMETERS).filter(|place| is_core(&[*place]) && !vague.contains(place)).for_each(|i| p[i] = found[i]);
+            (0..PARAMETERS)
+                .filter(|place| is_core(&[*place]) && !vague.contains(place))
+                .for_each(|i| p[i] = found[i]);
         }
         self.lowest(kind, &Wake::from_array(&p), groups, ROUGH)
     }
@@ -234,65 +347,115 @@ impl<'a> Stage<'a> {
         let p = end.wake.to_array();
         let vague = |(i, group): (usize, &Vec<usize>)| {
             let core_m = p[group[0]];
-            let deviation_m = covariance.as_ref().map_or(f64::INFINITY, |c| c[[i, i]].sqrt());
+            let deviation_m = covariance
+                .as_ref()
+                .map_or(f64::INFINITY, |c| c[[i, i]].sqrt());
             // also true for NaN
             !(deviation_m < RESOLVED * core_m && core_m < largest_m)
         };
-        let cores = end.groups.iter().enumerate().filter(|(_, group)| is_core(group));
-        cores.filter(|core| vague(*core)).flat_map(|(_, group)| group.clone()).collect()
+        let cores = end
+            .groups
+            .iter()
+            .enumerate()
+            .filter(|(_, group)| is_core(group));
+        cores
+            .filter(|core| vague(*core))
+            .flat_map(|(_, group)| group.clone())
+            .collect()
     }
 
     /// Ends of all starts; pairs also start fits of each of their vortices alone.
     pub(crate) fn ends_of(&self, starts: &[(Kind, Wake)]) -> Vec<End> {
-        let nears = starts.iter().filter_map(|(kind, start)| Some((*kind, self.near(*kind, start)?)));
-        let nears = distinct(nears, |(other, wake), (kind, near)| other == kind && kind.same(wake, near, NEARLY));
-        let mut ends: Vec<End> = nears.iter().filter_map(|(kind, near)| self.polished(*kind, near)).collect();
+        let nears = starts
+            .iter()
+            .filter_map(|(kind, start)| Some((*kind, self.near(*kind, start)?)));
+        let nears = distinct(nears, |(other, wake), (kind, near)| {
+            other == kind && kind.same(wake, near, NEARLY)
+        });
+        let mut ends: Vec<End> = nears
+            .iter()
+            .filter_map(|(kind, near)| self.polished(*kind, near))
+            .collect();
         if let Some(pair) = best(&ends, Kind::Both).map(|end| end.wake) {
-            ends.extend([Kind::Left, Kind::Right].iter().filter_map(|kind| self.polished(*kind, &kind.of(&pair))));
+            ends.extend(
+                [Kind::Left, Kind::Right]
+                    .iter()
+                    .filter_map(|kind| self.polished(*kind, &kind.of(&pair))),
+            );
         }
         ends
     }
 
     /// The ends for another problem, such as another scale of the loss.
     pub(crate) fn onwards(&self, ends: &[End], stop: impl Fn(&End) -> Stop) -> Vec<End> {
-        ends.iter().filter_map(|end| self.lowest(end.kind, &end.wake, end.groups.clone(), stop(end))).collect()
+        ends.iter()
+            .filter_map(|end| self.lowest(end.kind, &end.wake, end.groups.clone(), stop(end)))
+            .collect()
     }
 
     /// The ends with each gate's own points: the likely one, which is told, to the last; of the others the chi-square.
     pub(crate) fn fine(&self, ends: &[End]) -> Vec<End> {
         let likely = least(ends, self.squares.cells.len()).map(|likely| likely.chi2);
-        self.onwards(ends, |end| if Some(end.chi2) == likely { FINE } else { AS_IT_IS })
+        self.onwards(ends, |end| {
+            if Some(end.chi2) == likely {
+                FINE
+            } else {
+                AS_IT_IS
+            }
+        })
     }
 
     /// Ends for a problem with more velocities, from those of one with fewer.
     pub(crate) fn again(&self, ends: &[End]) -> Vec<End> {
-        ends.iter().filter_map(|end| self.polished(end.kind, &end.wake)).collect()
+        ends.iter()
+            .filter_map(|end| self.polished(end.kind, &end.wake))
+            .collect()
     }
 }
 
 /// Rough ends without those that are the same or far worse than the best of their kind.
 pub(crate) fn rivals(ends: &[End], scale: f64) -> Vec<End> {
-    let hopeless = |end: &End| best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale);
-    let same = |other: &End, end: &End| other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY);
+    let hopeless = |end: &End| {
+        best(ends, end.kind).is_none_or(|best| end.chi2 > best.chi2 + HOPELESS * scale * scale)
+    };
+    let same = |other: &End, end: &End| {
+        other.kind == end.kind && end.kind.same(&end.wake, &other.wake, ROUGHLY)
+    };
     distinct(ends.iter().filter(|end| !hopeless(end)).cloned(), same)
 }
 
 /// The best end of a kind whose circulations have the sense of an aircraft's: a left vortex the other way round is a right one.
 pub(crate) fn best(ends: &[End], kind: Kind) -> Option<&End> {
-    let circulations = [Parameter::LeftCirculation as usize, Parameter::RightCirculation as usize];
-    let turns = |end: &&End| circulations.iter().all(|i| !kind.has(*i) || end.wake.to_array()[*i] > 0.0);
-    ends.iter().filter(|end| end.kind == kind).filter(turns).min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+    let circulations = [
+        Parameter::LeftCirculation as usize,
+        Parameter::RightCirculation as usize,
+    ];
+    let turns = |end: &&End| {
+        circulations
+            .iter()
+            .all(|i| !kind.has(*i) || end.wake.to_array()[*i] > 0.0)
+    };
+    ends.iter()
+        .filter(|end| end.kind == kind)
+        .filter(turns)
+        .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
 }
 
 /// The end with the least chi^2 + k ln N.
 pub(crate) fn least(ends: &[End], cells: usize) -> Option<&End> {
     let cost = |end: &End| end.chi2 + end.groups.len() as f64 * (cells as f64).ln();
-    let bests = [Kind::Left, Kind::Right, Kind::Both].into_iter().filter_map(|kind| best(ends, kind));
+    let bests = [Kind::Left, Kind::Right, Kind::Both]
+        .into_iter()
+        .filter_map(|kind| best(ends, kind));
     bests.min_by(|a, b| cost(a).total_cmp(&cost(b)))
 }
 
 /// All ends of the kind of the best one that are not the same, the best first, given its covariance.
-pub(crate) fn tops<'a>(ends: &'a [End], best: &End, covariance: &ndarray::Array2<f64>) -> Vec<&'a End> {
+pub(crate) fn tops<'a>(
+    ends: &'a [End],
+    best: &End,
+    covariance: &ndarray::Array2<f64>,
+) -> Vec<&'a End> {
     let mut sorted: Vec<&End> = ends.iter().filter(|end| end.kind == best.kind).collect();
     sorted.sort_by(|a, b| a.chi2.total_cmp(&b.chi2));
     distinct(sorted, |top, end| {

@@ -57,20 +57,35 @@ pub fn circulation_profile(
     options.validate()?;
     map.validate()?;
     wake.validate()?;
-    radius_m.iter().try_for_each(|radius| positive("radius_m", *radius))?;
+    radius_m
+        .iter()
+        .try_for_each(|radius| positive("radius_m", *radius))?;
     let gates = Gates::rough(map, options)?.frozen().fine(&options.gate)?;
     let (of_wake, of_wind) = (gates.velocities(wake), gates.velocities(&wake.wind_alone()));
     let measured = Field::new(map, &map.velocity_m_s - &of_wind);
     let fitted = Field::new(map, of_wake - of_wind);
-    let (vortex, sense) = if side == Side::Left { (wake.left, -1.0) } else { (wake.right, 1.0) };
+    let (vortex, sense) = if side == Side::Left {
+        (wake.left, -1.0)
+    } else {
+        (wake.right, 1.0)
+    };
     let model = &options.model;
-    let centre = (vortex.lateral_position_m - model.lidar_lateral_position_m, vortex.height_m - model.lidar_height_m);
+    let centre = (
+        vortex.lateral_position_m - model.lidar_lateral_position_m,
+        vortex.height_m - model.lidar_height_m,
+    );
     let point = |radius: &f64| {
         let (omega, _, _) = model.profile.angular(radius * radius, vortex.core_radius_m);
         let truth = vortex.circulation_m2_s * 2.0 * PI * radius * radius * omega;
         let corrected = |seen: f64, of_fit: f64| (sense * seen, truth * seen / of_fit);
-        let across = corrected(measured.across(centre, *radius), fitted.across(centre, *radius));
-        let around = corrected(measured.around(centre, *radius), fitted.around(centre, *radius));
+        let across = corrected(
+            measured.across(centre, *radius),
+            fitted.across(centre, *radius),
+        );
+        let around = corrected(
+            measured.around(centre, *radius),
+            fitted.around(centre, *radius),
+        );
         ProfilePoint {
             radius_m: *radius,
             across_m2_s: across.0,
@@ -107,8 +122,12 @@ impl<'a> Field<'a> {
     /// Both components at a place, between the four cells about it.
     fn at(&self, (y, z): (f64, f64)) -> (f64, f64) {
         let nothing = (f64::NAN, f64::NAN);
-        let Some((gate, a)) = place(&self.map.range_m, y.hypot(z)) else { return nothing };
-        let Some((line, b)) = place(&self.map.elevation_rad, z.atan2(y)) else { return nothing };
+        let Some((gate, a)) = place(&self.map.range_m, y.hypot(z)) else {
+            return nothing;
+        };
+        let Some((line, b)) = place(&self.map.elevation_rad, z.atan2(y)) else {
+            return nothing;
+        };
         let between = |of: &Array2<f64>| {
             let low = of[[line, gate]] * (1.0 - a) + of[[line, gate + 1]] * a;
             let high = of[[line + 1, gate]] * (1.0 - a) + of[[line + 1, gate + 1]] * a;
@@ -143,7 +162,9 @@ impl<'a> Field<'a> {
 
 /// The cell before a value and the part of the way to the next one.
 fn place(axis: &[f64], value: f64) -> Option<(usize, f64)> {
-    let next = axis.partition_point(|x| *x <= value).min(axis.len().checked_sub(1)?);
+    let next = axis
+        .partition_point(|x| *x <= value)
+        .min(axis.len().checked_sub(1)?);
     let before = next.checked_sub(1)?;
     let part = (value - axis[before]) / (axis[next] - axis[before]);
     (part <= 1.0).then_some((before, part))

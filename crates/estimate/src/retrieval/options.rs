@@ -1,7 +1,9 @@
 //! How a scan is retrieved.
 
 use crate::error::{Error, not_negative, positive};
-use crate::vortex_fit::{CorePrior, FreeParameters, Loss, RangeKernel, Secondary, Vortex, Wake, WakeModel, WindFit};
+use crate::vortex_fit::{
+    CorePrior, FreeParameters, Loss, RangeKernel, Secondary, Vortex, Wake, WakeModel, WindFit,
+};
 
 /// What a velocity of the map is of the air about its range.
 #[derive(Debug, Clone, PartialEq)]
@@ -21,11 +23,20 @@ pub enum Gate {
 impl Gate {
     /// Refuses a weight that is wider than the scan: it shows nothing of a wake, and has more points than any memory.
     pub(crate) fn validate(&self, range_m: &[f64]) -> Result<(), Error> {
-        let Self::Gaussian { std_m } = *self else { return Ok(()) };
+        let Self::Gaussian { std_m } = *self else {
+            return Ok(());
+        };
         not_negative("std_m of the gate", std_m)?;
-        let length_m = range_m.last().zip(range_m.first()).map_or(0.0, |(last, first)| last - first);
+        let length_m = range_m
+            .last()
+            .zip(range_m.first())
+            .map_or(0.0, |(last, first)| last - first);
         let allowed = "at most the distance from the first to the last range of the scan";
-        let error = Error::OutOfRange { field: "std_m of the gate", value: std_m, allowed };
+        let error = Error::OutOfRange {
+            field: "std_m of the gate",
+            value: std_m,
+            allowed,
+        };
         if std_m > length_m { Err(error) } else { Ok(()) }
     }
 }
@@ -114,8 +125,13 @@ impl RetrievalOptions {
         if let Loss::Cauchy { width } = self.loss {
             positive("width of the loss", width)?;
         }
-        self.core_radius_m.map_or(Ok(()), |core| positive("core_radius_m", core))?;
-        self.model.secondary.iter().flatten().try_for_each(Vortex::validate)?;
+        self.core_radius_m
+            .map_or(Ok(()), |core| positive("core_radius_m", core))?;
+        self.model
+            .secondary
+            .iter()
+            .flatten()
+            .try_for_each(Vortex::validate)?;
         self.start.map_or(Ok(()), |wake| wake.validate())?;
         not_negative("threshold", self.threshold)
     }
@@ -128,7 +144,10 @@ impl Default for RetrievalOptions {
             model: WakeModel::default(),
             other_profile: true,
             gate: Gate::Point,
-            free: FreeParameters { wind: WindFit::Linear, ..FreeParameters::default() },
+            free: FreeParameters {
+                wind: WindFit::Linear,
+                ..FreeParameters::default()
+            },
             core_radius_m: None,
             core_prior: None,
             loss: Loss::Cauchy { width: 2.385 },

@@ -24,11 +24,19 @@ const GATES: usize = 3;
 ///
 /// # Errors
 /// As [`fit_scan`](crate::retrieval::fit_scan).
-pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Result<ScanResult, Error> {
+pub fn radial_velocity_method(
+    map: &ScanMap,
+    options: &RetrievalOptions,
+) -> Result<ScanResult, Error> {
     options.validate()?;
     enough_velocities(map.validate()?, 100)?;
     let fixed = Sharing::Fixed;
-    let free = FreeParameters { lateral_position: fixed, height: fixed, core_radius: fixed, ..options.free };
+    let free = FreeParameters {
+        lateral_position: fixed,
+        height: fixed,
+        core_radius: fixed,
+        ..options.free
+    };
     let linear = RetrievalOptions {
         free,
         loss: Loss::Squares,
@@ -49,7 +57,12 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
     let calm = stage.wind(&nothing)?;
     stage.squares.loss = Loss::Squares;
     let mut rest = Array2::from_elem(map.velocity_m_s.dim(), f64::NAN);
-    for (cell, residual) in stage.squares.cells.iter().zip(stage.squares.rows(&calm.wake.to_array(), &[]).residuals) {
+    for (cell, residual) in stage
+        .squares
+        .cells
+        .iter()
+        .zip(stage.squares.rows(&calm.wake.to_array(), &[]).residuals)
+    {
         rest[[cell.line, cell.gate]] = residual * cell.sigma_m_s;
     }
     let centre = |left: bool| {
@@ -57,10 +70,18 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
         Some(options.model.position_m(range_m, elevation_rad))
     };
     let fits = |stage: &Stage<'_>| -> Vec<End> {
-        let (Some(left), Some(right)) = (centre(true), centre(false)) else { return vec![] };
-        let core_m = options.core_radius_m.unwrap_or(CORE_OVER_SPACING * (right.0 - left.0).abs());
+        let (Some(left), Some(right)) = (centre(true), centre(false)) else {
+            return vec![];
+        };
+        let core_m = options
+            .core_radius_m
+            .unwrap_or(CORE_OVER_SPACING * (right.0 - left.0).abs());
         let [left, right] = [left, right].map(|place_m| Vortex::at(place_m, 1.0, core_m));
-        let wake = Wake { left, right, ..calm.wake };
+        let wake = Wake {
+            left,
+            right,
+            ..calm.wake
+        };
         let kinds = [Kind::Left, Kind::Right, Kind::Both].map(|kind| End {
             kind,
             wake: kind.of(&wake),
@@ -71,16 +92,34 @@ pub fn radial_velocity_method(map: &ScanMap, options: &RetrievalOptions) -> Resu
         stage.fine(&kinds)
     };
     let mut ends = fits(&stage);
-    if let (None, Some(best)) = (&map.sigma_m_s, ends.iter().min_by(|a, b| a.chi2.total_cmp(&b.chi2)).cloned()) {
+    if let (None, Some(best)) = (
+        &map.sigma_m_s,
+        ends.iter()
+            .min_by(|a, b| a.chi2.total_cmp(&b.chi2))
+            .cloned(),
+    ) {
         stage = stage.rescaled(&best);
         ends = fits(&stage);
     }
-    let report = Report { stage: &stage, scale: 1.0, wind: &stage.wind(&calm.wake)?, ends: &ends };
-    let Chosen { end, covariance, statistic, .. } = report.chosen()?;
+    let report = Report {
+        stage: &stage,
+        scale: 1.0,
+        wind: &stage.wind(&calm.wake)?,
+        ends: &ends,
+    };
+    let Chosen {
+        end,
+        covariance,
+        statistic,
+        ..
+    } = report.chosen()?;
     let mut result = report.told(end, covariance, statistic);
     for vortex in &mut result.vortices {
         for place in [&mut vortex.lateral_position_m, &mut vortex.height_m] {
-            *place = Measured { std: f64::NAN, ..*place };
+            *place = Measured {
+                std: f64::NAN,
+                ..*place
+            };
         }
     }
     Ok(result)
@@ -91,7 +130,11 @@ fn spread(elevation_rad: &[f64], velocity: &[f64], left: bool) -> (f64, f64) {
     // a right vortex is a left one with the velocities turned round
     let sign = if left { 1.0 } else { -1.0 };
     let (mut lowest, mut best) = ((f64::INFINITY, 0.0), (0.0, 0.0));
-    for (elevation, velocity) in elevation_rad.iter().zip(velocity).filter(|(_, v)| v.is_finite()) {
+    for (elevation, velocity) in elevation_rad
+        .iter()
+        .zip(velocity)
+        .filter(|(_, v)| v.is_finite())
+    {
         let difference = sign * velocity - lowest.0;
         if difference > best.0 {
             best = (difference, 0.5 * (elevation + lowest.1));
@@ -108,12 +151,16 @@ fn core(map: &ScanMap, rest: &Array2<f64>, left: bool) -> Option<(f64, f64)> {
     let gates = map.range_m.len();
     let about = |gate: usize| gate.saturating_sub(GATES / 2)..(gate + GATES / 2 + 1).min(gates);
     let smooth = |line: usize, gate: usize| {
-        let known = about(gate).map(|gate| rest[[line, gate]]).filter(|v| v.is_finite());
+        let known = about(gate)
+            .map(|gate| rest[[line, gate]])
+            .filter(|v| v.is_finite());
         let (sum, count) = known.fold((0.0, 0.0), |(sum, count), v| (sum + v, count + 1.0));
         sum / count
     };
     let of = |gate: usize| {
-        let column: Vec<f64> = (0..map.elevation_rad.len()).map(|line| smooth(line, gate)).collect();
+        let column: Vec<f64> = (0..map.elevation_rad.len())
+            .map(|line| smooth(line, gate))
+            .collect();
         spread(&map.elevation_rad, &column, left)
     };
     let spreads: Vec<(f64, f64)> = (0..gates).map(of).collect();
@@ -122,10 +169,16 @@ fn core(map: &ScanMap, rest: &Array2<f64>, left: bool) -> Option<(f64, f64)> {
     if best > 0 && best + 1 < gates {
         let [before, at, after] = [best - 1, best, best + 1].map(|gate| spreads[gate].0);
         let bend = before - 2.0 * at + after;
-        let part = if bend < 0.0 { 0.5 * (before - after) / bend } else { 0.0 };
+        let part = if bend < 0.0 {
+            0.5 * (before - after) / bend
+        } else {
+            0.0
+        };
         range_m += part * 0.5 * (map.range_m[best + 1] - map.range_m[best - 1]);
     }
     let weights: f64 = about(best).map(|gate| spreads[gate].0).sum();
-    let elevation: f64 = about(best).map(|gate| spreads[gate].0 * spreads[gate].1).sum();
+    let elevation: f64 = about(best)
+        .map(|gate| spreads[gate].0 * spreads[gate].1)
+        .sum();
     (weights > 0.0).then(|| (range_m, elevation / weights))
 }

@@ -53,7 +53,8 @@ impl<'a> Report<'a> {
         let mut of_likely = likely.map(|end| self.uncertainty(end)).transpose()?;
         let alike = match (likely, &of_likely) {
             (Some(end), Some(known))
-                if self.stage.is_noise_left && self.stage.options.covariance == Covariance::Sandwich =>
+                if self.stage.is_noise_left
+                    && self.stage.options.covariance == Covariance::Sandwich =>
             {
                 known.excess(&end.wake, self.scale.powi(2))
             }
@@ -64,9 +65,15 @@ impl<'a> Report<'a> {
         };
         let statistic = likely.map_or(0.0, |end| gain(Some(self.wind), end));
         let (left, right) = (best(self.ends, Kind::Left), best(self.ends, Kind::Right));
-        let lone = [left, right].into_iter().flatten().min_by(|a, b| a.chi2.total_cmp(&b.chi2));
+        let lone = [left, right]
+            .into_iter()
+            .flatten()
+            .min_by(|a, b| a.chi2.total_cmp(&b.chi2));
         // the likely one comes first
-        for end in likely.into_iter().chain(lone.filter(|_| likely.is_some_and(|end| end.kind == Kind::Both))) {
+        for end in likely
+            .into_iter()
+            .chain(lone.filter(|_| likely.is_some_and(|end| end.kind == Kind::Both)))
+        {
             let known = of_likely.take();
             let seen = match end.kind {
                 Kind::Both => gain(left, end).min(gain(right, end)),
@@ -76,14 +83,32 @@ impl<'a> Report<'a> {
                 continue;
             }
             let uncertainty = known.map_or_else(|| self.uncertainty(end), Ok)?;
-            let circulations = self.sides(end).into_iter().map(|side| side.parameters()[0] as usize);
+            let circulations = self
+                .sides(end)
+                .into_iter()
+                .map(|side| side.parameters()[0] as usize);
             let threshold = self.stage.options.threshold;
-            let certain = circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
-            if certain.collect::<Result<Vec<bool>, _>>()?.into_iter().all(|certain| certain) {
-                return Ok(Chosen { end, covariance: uncertainty.covariance(|_| true)?, statistic, alike });
+            let certain =
+                circulations.map(|place| uncertainty.certain(&end.wake, place, threshold));
+            if certain
+                .collect::<Result<Vec<bool>, _>>()?
+                .into_iter()
+                .all(|certain| certain)
+            {
+                return Ok(Chosen {
+                    end,
+                    covariance: uncertainty.covariance(|_| true)?,
+                    statistic,
+                    alike,
+                });
             }
         }
-        Ok(Chosen { end: self.wind, covariance: self.covariance(self.wind)?, statistic, alike })
+        Ok(Chosen {
+            end: self.wind,
+            covariance: self.covariance(self.wind)?,
+            statistic,
+            alike,
+        })
     }
 
     /// Covariance \[10, 10\] of an end.
@@ -94,7 +119,9 @@ impl<'a> Report<'a> {
     /// The vortices of an end with that covariance, each at its line.
     pub(crate) fn vortices(&self, end: &End, covariance: &Array2<f64>) -> Vec<VortexResult> {
         let (model, moves) = (self.stage.gates.model, self.stage.gates.seconds.is_some());
-        let vortex = |side| VortexResult::at_its_line(self.stage.map, model, (&end.wake, covariance), side, moves);
+        let vortex = |side| {
+            VortexResult::at_its_line(self.stage.map, model, (&end.wake, covariance), side, moves)
+        };
         self.sides(end).into_iter().map(vortex).collect()
     }
 
@@ -106,9 +133,13 @@ impl<'a> Report<'a> {
     fn uncertainty<'b>(&self, end: &'b End) -> Result<Uncertainty<'b>, Error> {
         let from = match self.stage.options.covariance {
             Covariance::Model => Scores::Stated,
-            Covariance::Sandwich => Scores::Decaying { blocks: self.stage.map.view().blocks(BLOCKS) },
+            Covariance::Sandwich => Scores::Decaying {
+                blocks: self.stage.map.view().blocks(BLOCKS),
+            },
         };
-        self.stage.squares.uncertainty(&end.wake.to_array(), &end.groups, from)
+        self.stage
+            .squares
+            .uncertainty(&end.wake.to_array(), &end.groups, from)
     }
 
     pub(crate) fn told(&self, end: &End, covariance: Array2<f64>, statistic: f64) -> ScanResult {
@@ -122,26 +153,53 @@ impl<'a> Report<'a> {
         if vortices.iter().any(|vortex| self.margin_m(vortex) >= 0.0) {
             vortices.retain(|vortex| self.margin_m(vortex) >= 0.0);
         }
-        let tops: Vec<Top> =
-            tops(self.ends, end, &covariance).iter().map(|end| Top { wake: end.wake, chi2: end.chi2 }).collect();
-        let spacing_m = if end.kind == Kind::Both { end.wake.spacing_m() } else { 2.0 * SEEN_M };
+        let tops: Vec<Top> = tops(self.ends, end, &covariance)
+            .iter()
+            .map(|end| Top {
+                wake: end.wake,
+                chi2: end.chi2,
+            })
+            .collect();
+        let spacing_m = if end.kind == Kind::Both {
+            end.wake.spacing_m()
+        } else {
+            2.0 * SEEN_M
+        };
         let low = |vortex: &VortexResult| vortex.height_m.value < 0.5 * spacing_m;
         let competes = tops
             .get(1)
             .zip(tops.first())
-            .is_some_and(|(second, first)| second.chi2 - first.chi2 < COMPETES * self.scale.powi(2));
-        let instant = self.stage.map.has_times() && self.stage.map.time_s.windows(2).all(|pair| pair[0] == pair[1]);
+            .is_some_and(|(second, first)| {
+                second.chi2 - first.chi2 < COMPETES * self.scale.powi(2)
+            });
+        let instant = self.stage.map.has_times()
+            && self
+                .stage
+                .map
+                .time_s
+                .windows(2)
+                .all(|pair| pair[0] == pair[1]);
         let unmoved = !moves && !instant;
         let flags = [
             (Flag::NoWake, vortices.is_empty()),
             (Flag::OneVortex, vortices.len() == 1),
-            (Flag::CoreKept, vortices.iter().any(|vortex| vortex.core_radius_m.is_none())),
-            (Flag::AtEdge, vortices.iter().any(|vortex| self.margin_m(vortex) < SEEN_M)),
+            (
+                Flag::CoreKept,
+                vortices.iter().any(|vortex| vortex.core_radius_m.is_none()),
+            ),
+            (
+                Flag::AtEdge,
+                vortices.iter().any(|vortex| self.margin_m(vortex) < SEEN_M),
+            ),
             (Flag::NearGround, vortices.iter().any(low)),
             (Flag::MotionIgnored, unmoved),
             (Flag::Ambiguous, competes),
             (Flag::PoorFit, self.scale.powi(2) > POOR),
-            (Flag::Outliers, cells_rejected as f64 > MANY_OUTLIERS * (self.stage.rejected + residuals.len()) as f64),
+            (
+                Flag::Outliers,
+                cells_rejected as f64
+                    > MANY_OUTLIERS * (self.stage.rejected + residuals.len()) as f64,
+            ),
             (Flag::Thinned, self.stage.thinned),
             (Flag::NotConverged, end.sigmas_left > AT_END),
         ];
@@ -155,7 +213,11 @@ impl<'a> Report<'a> {
             cells_rejected,
             statistic,
             threshold: self.stage.options.threshold,
-            flags: flags.into_iter().filter(|(_, set)| *set).map(|(flag, _)| flag).collect(),
+            flags: flags
+                .into_iter()
+                .filter(|(_, set)| *set)
+                .map(|(flag, _)| flag)
+                .collect(),
             vortices,
             covariance,
             tops,
@@ -164,11 +226,18 @@ impl<'a> Report<'a> {
 
     /// How far the sector reaches beyond a centre \[m\]; negative outside.
     fn margin_m(&self, vortex: &VortexResult) -> f64 {
-        let (range_m, elevation_rad) = self.stage.options.model.range_and_elevation(vortex.place_m());
+        let (range_m, elevation_rad) = self
+            .stage
+            .options
+            .model
+            .range_and_elevation(vortex.place_m());
         let within = |axis: &[f64], value: f64| {
-            axis.first().zip(axis.last()).map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
+            axis.first()
+                .zip(axis.last())
+                .map_or(f64::NAN, |(first, last)| (value - first).min(last - value))
         };
-        within(&self.stage.map.range_m, range_m).min(range_m * within(&self.stage.map.elevation_rad, elevation_rad))
+        within(&self.stage.map.range_m, range_m)
+            .min(range_m * within(&self.stage.map.elevation_rad, elevation_rad))
     }
 }
 
@@ -180,15 +249,25 @@ impl Uncertainty<'_> {
         let (wind, vortices): (Vec<usize>, Vec<usize>) =
             (0..self.groups.len()).partition(|i| self.groups[*i][0] >= Parameter::Wind as usize);
         let size = |i: &usize| {
-            if self.groups[*i][0] <= Parameter::RightCirculation as usize { p[self.groups[*i][0]] } else { 0.0 }
+            if self.groups[*i][0] <= Parameter::RightCirculation as usize {
+                p[self.groups[*i][0]]
+            } else {
+                0.0
+            }
         };
         let mut along = vec![0.0; self.groups.len()];
         vortices.iter().for_each(|i| along[*i] = size(i));
-        let times = |matrix: &Array2<f64>, i: usize| (0..along.len()).map(|j| matrix[[i, j]] * along[j]).sum::<f64>();
+        let times = |matrix: &Array2<f64>, i: usize| {
+            (0..along.len())
+                .map(|j| matrix[[i, j]] * along[j])
+                .sum::<f64>()
+        };
         let towards: Vec<f64> = wind.iter().map(|i| -times(&self.curvature, *i)).collect();
         let own = self.curvature.select(Axis(0), &wind).select(Axis(1), &wind);
         let taken = solve(&own, &towards).unwrap_or_else(|| vec![0.0; wind.len()]);
-        wind.iter().zip(taken).for_each(|(i, taken)| along[*i] = taken);
+        wind.iter()
+            .zip(taken)
+            .for_each(|(i, taken)| along[*i] = taken);
         let along = Array1::from_vec(along);
         let ratio = along.dot(&self.scores.dot(&along)) / along.dot(&self.curvature.dot(&along));
         // also 1 for NaN, where no circulation is free
@@ -200,9 +279,15 @@ impl Uncertainty<'_> {
     /// both, as far as the fit leaves them; the places are the best of many, as those of the statistic are.
     fn certain(&self, wake: &Wake, circulation: usize, threshold: f64) -> Result<bool, Error> {
         let value = wake.to_array()[circulation];
-        let beyond = |covariance: Array2<f64>, sigmas: f64| value > sigmas * covariance[[circulation; 2]].sqrt();
-        let alone = |group: &[usize]| group.contains(&circulation) || group[0] >= Parameter::Wind as usize;
+        let beyond = |covariance: Array2<f64>, sigmas: f64| {
+            value > sigmas * covariance[[circulation; 2]].sqrt()
+        };
+        let alone =
+            |group: &[usize]| group.contains(&circulation) || group[0] >= Parameter::Wind as usize;
         Ok(beyond(self.covariance(|_| true)?, LEAST_SIGMAS)
-            || beyond(self.covariance(alone)?, (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS)))
+            || beyond(
+                self.covariance(alone)?,
+                (BY_FAR * threshold.sqrt()).max(LEAST_SIGMAS),
+            ))
     }
 }

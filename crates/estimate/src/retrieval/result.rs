@@ -21,13 +21,20 @@ impl Measured {
     #[must_use]
     pub fn of_wake(parameter: Parameter, wake: &Wake, covariance: &Array2<f64>) -> Self {
         let place = parameter as usize;
-        Self { value: wake.to_array()[place], std: covariance[[place, place]].sqrt() }
+        Self {
+            value: wake.to_array()[place],
+            std: covariance[[place, place]].sqrt(),
+        }
     }
 }
 
 /// Which of the two vortices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Side {
     /// The one at smaller y, clockwise.
     Left,
@@ -86,9 +93,15 @@ impl VortexResult {
         side: Side,
         moves: bool,
     ) -> Self {
-        let [circulation, lateral, height, core] = side.parameters().map(|parameter| parameter as usize);
+        let [circulation, lateral, height, core] =
+            side.parameters().map(|parameter| parameter as usize);
         let motion = moves.then(|| Motion::new(model, wake));
-        let after = |seconds: f64| motion.as_ref().map_or(*wake, |motion| motion.wake_after(wake, seconds)).to_array();
+        let after = |seconds: f64| {
+            motion
+                .as_ref()
+                .map_or(*wake, |motion| motion.wake_after(wake, seconds))
+                .to_array()
+        };
         let reference_s = map.middle_s();
         let mut seconds = 0.0;
         // the line is that of the place then
@@ -106,8 +119,13 @@ impl VortexResult {
             if let Some(motion) = &motion {
                 motion.carry_back(seconds, &mut slope);
             }
-            let terms = covariance.indexed_iter().map(|((i, j), c)| slope[i] * c * slope[j]);
-            Measured { value: then[place], std: terms.sum::<f64>().max(0.0).sqrt() }
+            let terms = covariance
+                .indexed_iter()
+                .map(|((i, j), c)| slope[i] * c * slope[j]);
+            Measured {
+                value: then[place],
+                std: terms.sum::<f64>().max(0.0).sqrt(),
+            }
         };
         let [left, right] = wake.mean_circulations_5_15_m2_s(model.profile, covariance.view());
         let (value, std) = if side == Side::Left { left } else { right };
@@ -125,7 +143,11 @@ impl VortexResult {
 
 /// What to think of a result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Flag {
     /// No wake was found.
     NoWake,

@@ -37,9 +37,12 @@ impl ScanMap {
         let found = self.view().validate()?;
         length("time_s", self.elevation_rad.len(), self.time_s.len())?;
         if self.has_times() {
-            self.time_s.iter().try_for_each(|time| finite("time_s", *time))?;
+            self.time_s
+                .iter()
+                .try_for_each(|time| finite("time_s", *time))?;
         }
-        self.fold_m_s.map_or(Ok(()), |fold| positive("fold_m_s", fold))?;
+        self.fold_m_s
+            .map_or(Ok(()), |fold| positive("fold_m_s", fold))?;
         Ok(found)
     }
 
@@ -47,8 +50,17 @@ impl ScanMap {
     pub(crate) fn unfolded(&self) -> Self {
         let mut unfolded = self.clone();
         if let Some(fold) = self.fold_m_s {
-            let middle = median(&mut self.velocity_m_s.iter().copied().filter(|v| v.is_finite()).collect::<Vec<f64>>());
-            unfolded.velocity_m_s.mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
+            let middle = median(
+                &mut self
+                    .velocity_m_s
+                    .iter()
+                    .copied()
+                    .filter(|v| v.is_finite())
+                    .collect::<Vec<f64>>(),
+            );
+            unfolded
+                .velocity_m_s
+                .mapv_inplace(|v| v - fold * ((v - middle) / fold).round());
         }
         unfolded
     }
@@ -59,23 +71,41 @@ impl ScanMap {
         if by_line * by_gate == 1 {
             return None;
         }
-        let (elevation_rad, range_m) = (block_means(&self.elevation_rad, by_line), block_means(&self.range_m, by_gate));
+        let (elevation_rad, range_m) = (
+            block_means(&self.elevation_rad, by_line),
+            block_means(&self.range_m, by_gate),
+        );
         let mut velocity_m_s = Array2::from_elem((elevation_rad.len(), range_m.len()), f64::NAN);
         let mut sigma_m_s = Array2::ones(velocity_m_s.raw_dim());
         for ((block, velocity), sigma) in velocity_m_s.indexed_iter_mut().zip(&mut sigma_m_s) {
             let known = self.view().known_in(block, (by_line, by_gate));
-            let Some(count) = (!known.is_empty()).then_some(known.len() as f64) else { continue };
+            let Some(count) = (!known.is_empty()).then_some(known.len() as f64) else {
+                continue;
+            };
             let mut values: Vec<f64> = known.iter().map(|cell| self.velocity_m_s[*cell]).collect();
             values.sort_by(f64::total_cmp);
             *velocity = 0.5 * (values[(values.len() - 1) / 2] + values[values.len() / 2]);
-            let stated =
-                self.sigma_m_s.as_ref().map(|sigma| known.iter().map(|cell| sigma[*cell]).sum::<f64>() / count);
-            let wider = if values.len() > 2 { MEDIAN_OVER_MEAN } else { 1.0 };
+            let stated = self
+                .sigma_m_s
+                .as_ref()
+                .map(|sigma| known.iter().map(|cell| sigma[*cell]).sum::<f64>() / count);
+            let wider = if values.len() > 2 {
+                MEDIAN_OVER_MEAN
+            } else {
+                1.0
+            };
             *sigma = stated.unwrap_or(1.0) * wider / count.sqrt();
         }
         let (time_s, fold_m_s) = (block_means(&self.time_s, by_line), self.fold_m_s);
         let sigma_m_s = self.sigma_m_s.is_some().then_some(sigma_m_s);
-        Some(Self { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s, fold_m_s })
+        Some(Self {
+            elevation_rad,
+            time_s,
+            range_m,
+            velocity_m_s,
+            sigma_m_s,
+            fold_m_s,
+        })
     }
 
     /// Whether the lines have times.
@@ -86,21 +116,33 @@ impl ScanMap {
 
     /// Times of the first and the last line \[s\]; infinite the wrong way round if they are unknown.
     pub(crate) fn ends_s(&self) -> (f64, f64) {
-        self.time_s.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| (a.min(*t), b.max(*t)))
+        self.time_s
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), t| {
+                (a.min(*t), b.max(*t))
+            })
     }
 
     /// How long the scan lasts \[s\]; 0 if times are unknown.
     #[must_use]
     pub fn lasts_s(&self) -> f64 {
         let (first_s, last_s) = self.ends_s();
-        if self.has_times() { last_s - first_s } else { 0.0 }
+        if self.has_times() {
+            last_s - first_s
+        } else {
+            0.0
+        }
     }
 
     /// Time in the middle of the scan \[s\], that of the wake of a fit; NaN if times are unknown.
     #[must_use]
     pub fn middle_s(&self) -> f64 {
         let (first_s, last_s) = self.ends_s();
-        if self.has_times() { 0.5 * (first_s + last_s) } else { f64::NAN }
+        if self.has_times() {
+            0.5 * (first_s + last_s)
+        } else {
+            f64::NAN
+        }
     }
 
     /// Time of each line after the middle of the scan \[s\].

@@ -24,7 +24,12 @@ pub fn with_secondary_vortices(
 ) -> Result<Option<(ScanResult, RetrievalOptions)>, Error> {
     let is_pair = found.vortices.len() == 2;
     // the least chi-square, where other spacings share in what is told
-    let Some(pair) = found.tops.first().map(|top| top.wake).filter(|_| is_pair && options.turbulence.is_none()) else {
+    let Some(pair) = found
+        .tops
+        .first()
+        .map(|top| top.wake)
+        .filter(|_| is_pair && options.turbulence.is_none())
+    else {
         return Ok(None);
     };
     let moves = map.has_times() && !found.has(Flag::MotionIgnored);
@@ -41,7 +46,11 @@ pub fn with_secondary_vortices(
     let bounded = unfolded.medians(MOST);
     let sought = bounded.as_ref().unwrap_or(&unfolded);
     let gates = Gates::rough(sought, options)?;
-    let gates = Gates { seconds: moves.then(|| sought.after_middle_s()), shared_points: true, ..gates };
+    let gates = Gates {
+        seconds: moves.then(|| sought.after_middle_s()),
+        shared_points: true,
+        ..gates
+    };
     let setting = Setting {
         map: &sought.view(),
         model: &options.model,
@@ -50,14 +59,19 @@ pub fn with_secondary_vortices(
         options: &map_options,
         least_core_m: 0.0,
     };
-    let Some(four) = setting.with_secondary(&pair) else { return Ok(None) };
+    let Some(four) = setting.with_secondary(&pair) else {
+        return Ok(None);
+    };
     if !four.secondary.fitted {
         let mut result = found.clone();
         result.set(Flag::SecondaryVortices, true);
         return Ok(Some((result, options.clone())));
     }
     // what another profile would do was free in the search
-    let mut options = RetrievalOptions { other_profile: false, ..options.clone() };
+    let mut options = RetrievalOptions {
+        other_profile: false,
+        ..options.clone()
+    };
     options.model.secondary = Some(four.secondary.vortices);
     options.start = Some(four.wake);
     let mut result = fit_scan(map, &options)?;
@@ -74,14 +88,27 @@ fn widen(result: &mut ScanResult, map: &ScanMap, all: &Array2<f64>, options: &Re
     let grown: Vec<f64> = (0..all.nrows())
         .map(|place| {
             let (own, all) = (result.covariance[[place, place]], all[[place, place]]);
-            if own > 0.0 { (all / own).sqrt().max(1.0) } else { 1.0 }
+            if own > 0.0 {
+                (all / own).sqrt().max(1.0)
+            } else {
+                1.0
+            }
         })
         .collect();
-    result.covariance.indexed_iter_mut().for_each(|((i, j), c)| *c *= grown[i] * grown[j]);
+    result
+        .covariance
+        .indexed_iter_mut()
+        .for_each(|((i, j), c)| *c *= grown[i] * grown[j]);
     let Some(wake) = result.wake else { return };
     let moves = map.has_times() && !result.has(Flag::MotionIgnored);
     for vortex in &mut result.vortices {
-        *vortex = VortexResult::at_its_line(map, &options.model, (&wake, &result.covariance), vortex.side, moves);
+        *vortex = VortexResult::at_its_line(
+            map,
+            &options.model,
+            (&wake, &result.covariance),
+            vortex.side,
+            moves,
+        );
     }
     result.lateral_wind_m_s.std *= grown[Parameter::Wind as usize];
     result.wind_shear_per_s.std *= grown[Parameter::Shear as usize];

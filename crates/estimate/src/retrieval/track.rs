@@ -83,7 +83,8 @@ impl Track {
             let v = last.vortices.iter().find(|vortex| vortex.side == side)?;
             Some(Vortex {
                 circulation_m2_s: v.circulation_m2_s.value * (-v.decay_per_s.value * seconds).exp(),
-                lateral_position_m: v.lateral_position_m.value + seconds * v.lateral_velocity_m_s.value,
+                lateral_position_m: v.lateral_position_m.value
+                    + seconds * v.lateral_velocity_m_s.value,
                 height_m: v.height_m.value + seconds * v.vertical_velocity_m_s.value,
                 core_radius_m,
             })
@@ -119,12 +120,23 @@ struct Step {
 /// [`Error::Linalg`] for covariances that are no covariances.
 pub fn track(results: &[&ScanResult], acceleration_density_m2_s3: f64) -> Result<Track, Error> {
     positive("acceleration_density_m2_s3", acceleration_density_m2_s3)?;
-    let times: Vec<f64> = results.iter().map(|result| result.reference_time_s).collect();
-    times.iter().try_for_each(|time| finite("reference_time_s", *time))?;
+    let times: Vec<f64> = results
+        .iter()
+        .map(|result| result.reference_time_s)
+        .collect();
+    times
+        .iter()
+        .try_for_each(|time| finite("reference_time_s", *time))?;
     increasing("reference_time_s", &times)?;
     not_empty("results", results.len())?;
     let (steps, innovations) = (vec![], vec![]);
-    let mut filter = Filter { acceleration_density_m2_s3, steps, misses: [0; 2], innovations, rejected: 0 };
+    let mut filter = Filter {
+        acceleration_density_m2_s3,
+        steps,
+        misses: [0; 2],
+        innovations,
+        rejected: 0,
+    };
     for (k, result) in results.iter().enumerate() {
         let seconds = if k > 0 { times[k] - times[k - 1] } else { 0.0 };
         let soon = &results[k + 1..results.len().min(k + BIRTH)];
@@ -134,7 +146,10 @@ pub fn track(results: &[&ScanResult], acceleration_density_m2_s3: f64) -> Result
     let points = filter.steps.iter().zip(&smoothed).zip(&times);
     let points = points.map(|((step, state), time_s)| TrackPoint {
         time_s: *time_s,
-        vortices: (0..2).filter(|i| step.alive[*i]).map(|i| tracked(state, i, step.detected[i])).collect(),
+        vortices: (0..2)
+            .filter(|i| step.alive[*i])
+            .map(|i| tracked(state, i, step.detected[i]))
+            .collect(),
     });
     let count = filter.innovations.len() as f64;
     Ok(Track {
@@ -157,7 +172,10 @@ fn tracked(state: &State, i: usize, detected: bool) -> TrackedVortex {
         lateral_velocity_m_s: number(1),
         height_m: number(2),
         vertical_velocity_m_s: number(3),
-        circulation_m2_s: Measured { value, std: value * circulation.std },
+        circulation_m2_s: Measured {
+            value,
+            std: value * circulation.std,
+        },
         decay_per_s: number(5),
         detected,
     }
@@ -199,13 +217,26 @@ impl Filter {
         (transition, State { mean, covariance })
     }
 
-    fn step(&mut self, result: &ScanResult, soon: &[&ScanResult], seconds: f64) -> Result<(), Error> {
-        let nothing = State { mean: Array1::zeros(BOTH), covariance: Array2::eye(BOTH) };
-        let (before, mut alive) = self.steps.last().map_or((&nothing, [false; 2]), |step| (&step.filtered, step.alive));
+    fn step(
+        &mut self,
+        result: &ScanResult,
+        soon: &[&ScanResult],
+        seconds: f64,
+    ) -> Result<(), Error> {
+        let nothing = State {
+            mean: Array1::zeros(BOTH),
+            covariance: Array2::eye(BOTH),
+        };
+        let (before, mut alive) = self
+            .steps
+            .last()
+            .map_or((&nothing, [false; 2]), |step| (&step.filtered, step.alive));
         let (transition, mut predicted) = self.predicted(before, alive, seconds);
         let (mut taken, mut lost) = ([None; 2], [false; 2]);
         for (i, side) in Side::BOTH.into_iter().enumerate() {
-            let seen = result.vortex(side).filter(|vortex| vortex.circulation_m2_s.value > 0.0);
+            let seen = result
+                .vortex(side)
+                .filter(|vortex| vortex.circulation_m2_s.value > 0.0);
             if let (false, Some(vortex)) = (alive[i], seen) {
                 if soon.iter().any(|next| next.vortex(side).is_some()) {
                     Self::born(&mut predicted, i, vortex);
@@ -216,7 +247,9 @@ impl Filter {
             if !alive[i] {
                 continue;
             }
-            let distance = seen.map(|v| Self::innovation(&predicted, result, &[(i, v)])).transpose()?;
+            let distance = seen
+                .map(|v| Self::innovation(&predicted, result, &[(i, v)]))
+                .transpose()?;
             match (seen, distance) {
                 (Some(vortex), Some((distance, _))) if distance < GATE => {
                     taken[i] = Some(vortex);
@@ -231,20 +264,36 @@ impl Filter {
             let height_m = predicted.mean[ONE * i + 2];
             lost[i] = self.misses[i] >= DEATH || (height_m < 0.0 && taken[i].is_none());
         }
-        let pairs: Vec<(usize, &VortexResult)> =
-            taken.iter().enumerate().filter_map(|(i, v)| Some((i, (*v)?))).collect();
-        let filtered =
-            if pairs.is_empty() { predicted.clone() } else { Self::innovation(&predicted, result, &pairs)?.1 };
+        let pairs: Vec<(usize, &VortexResult)> = taken
+            .iter()
+            .enumerate()
+            .filter_map(|(i, v)| Some((i, (*v)?)))
+            .collect();
+        let filtered = if pairs.is_empty() {
+            predicted.clone()
+        } else {
+            Self::innovation(&predicted, result, &pairs)?.1
+        };
         for i in 0..2 {
             if lost[i] {
                 alive[i] = false;
                 // it ended with its last detection
-                let undetected = self.steps.iter_mut().rev().take_while(|step| step.alive[i] && !step.detected[i]);
+                let undetected = self
+                    .steps
+                    .iter_mut()
+                    .rev()
+                    .take_while(|step| step.alive[i] && !step.detected[i]);
                 undetected.for_each(|step| step.alive[i] = false);
             }
         }
         let detected = taken.map(|vortex| vortex.is_some());
-        self.steps.push(Step { transition, predicted, filtered, alive, detected });
+        self.steps.push(Step {
+            transition,
+            predicted,
+            filtered,
+            alive,
+            detected,
+        });
         Ok(())
     }
 
@@ -253,7 +302,10 @@ impl Filter {
         let z = Self::measured(vortex);
         for (place, rate) in [(0, RATE_M_S), (2, RATE_M_S), (4, DECAY_PER_S)] {
             let (value, std) = z[place / 2];
-            for (at, mean, deviation) in [(ONE * i + place, value, 100.0 * std), (ONE * i + place + 1, 0.0, rate)] {
+            for (at, mean, deviation) in [
+                (ONE * i + place, value, 100.0 * std),
+                (ONE * i + place + 1, 0.0, rate),
+            ] {
                 state.mean[at] = mean;
                 state.covariance.row_mut(at).fill(0.0);
                 state.covariance.column_mut(at).fill(0.0);
@@ -268,7 +320,11 @@ impl Filter {
         let circulation = vortex.circulation_m2_s;
         let part = circulation.std / circulation.value;
         let log = (circulation.value.ln(), if part > 0.0 { part } else { 0.1 });
-        [place(vortex.lateral_position_m), place(vortex.height_m), log]
+        [
+            place(vortex.lateral_position_m),
+            place(vortex.height_m),
+            log,
+        ]
     }
 
     /// Normalised innovation of the vortices of a scan, and the state with them.
@@ -281,7 +337,11 @@ impl Filter {
         let (mut z, mut h) = (Array1::zeros(order), Array2::zeros((order, BOTH)));
         let (mut deviations, mut places) = (vec![], vec![]);
         for (n, (i, vortex)) in vortices.iter().enumerate() {
-            let seconds = if vortex.time_s.is_finite() { vortex.time_s - result.reference_time_s } else { 0.0 };
+            let seconds = if vortex.time_s.is_finite() {
+                vortex.time_s - result.reference_time_s
+            } else {
+                0.0
+            };
             for (row, (value, std)) in Self::measured(vortex).into_iter().enumerate() {
                 z[3 * n + row] = value;
                 h[[3 * n + row, ONE * i + 2 * row]] = 1.0;
@@ -294,8 +354,17 @@ impl Filter {
         let c = &result.covariance;
         let r = Array2::from_shape_fn((order, order), |(i, j)| {
             let (a, b) = (places[i], places[j]);
-            let correlation = if i == j { 1.0 } else { c[[a, b]] / (c[[a, a]] * c[[b, b]]).sqrt() };
-            (if correlation.is_finite() { correlation } else { 0.0 }) * deviations[i] * deviations[j]
+            let correlation = if i == j {
+                1.0
+            } else {
+                c[[a, b]] / (c[[a, a]] * c[[b, b]]).sqrt()
+            };
+            (if correlation.is_finite() {
+                correlation
+            } else {
+                0.0
+            }) * deviations[i]
+                * deviations[j]
         });
         let innovation = z - h.dot(&state.mean);
         let ph = state.covariance.dot(&h.t());
@@ -305,17 +374,27 @@ impl Filter {
         // Joseph's form keeps it positive
         let covariance = keep.dot(&state.covariance).dot(&keep.t()) + gain.dot(&r).dot(&gain.t());
         let mean = &state.mean + &gain.dot(&innovation);
-        Ok((innovation.dot(&s.dot(&innovation)), State { mean, covariance }))
+        Ok((
+            innovation.dot(&s.dot(&innovation)),
+            State { mean, covariance },
+        ))
     }
 
     /// States given all scans.
     fn smoothed(&self) -> Result<Vec<State>, Error> {
-        let mut states: Vec<State> = self.steps.iter().map(|step| step.filtered.clone()).collect();
+        let mut states: Vec<State> = self
+            .steps
+            .iter()
+            .map(|step| step.filtered.clone())
+            .collect();
         for k in (0..states.len().saturating_sub(1)).rev() {
             let next = &self.steps[k + 1];
             let filtered = &self.steps[k].filtered;
             let mut gain = filtered.covariance.dot(&next.transition.t());
-            gain = gain.dot(&inverse("predicted covariance of a track", &next.predicted.covariance)?);
+            gain = gain.dot(&inverse(
+                "predicted covariance of a track",
+                &next.predicted.covariance,
+            )?);
             let later = &states[k + 1];
             let mean = &filtered.mean + &gain.dot(&(&later.mean - &next.predicted.mean));
             let change = &later.covariance - &next.predicted.covariance;
@@ -335,22 +414,42 @@ mod tests {
     /// Scans 10 s apart of a pair that decays with 90 s and moves by its own wind.
     fn series(count: usize, rng: &mut Xoshiro256PlusPlus) -> (Vec<ScanResult>, Vec<Wake>) {
         let model = crate::vortex_fit::WakeModel::default();
-        let mut truth = vec![Wake::from_array(&[400.0, 400.0, 376.5, 80.0, 423.5, 80.0, 2.0, 2.0, 1.0, 0.0])];
+        let mut truth = vec![Wake::from_array(&[
+            400.0, 400.0, 376.5, 80.0, 423.5, 80.0, 2.0, 2.0, 1.0, 0.0,
+        ])];
         while truth.len() < count {
             let mut p = truth[truth.len() - 1].to_array();
             for _ in 0..100 {
                 let [a, b, c, d] = model.centre_velocities_m_s(&Wake::from_array(&p));
-                [p[2], p[3], p[4], p[5]] = [p[2] + 0.1 * a, p[3] + 0.1 * b, p[4] + 0.1 * c, p[5] + 0.1 * d];
-                [p[0], p[1]] = [p[0] * (-0.1_f64 / 90.0).exp(), p[1] * (-0.1_f64 / 90.0).exp()];
+                [p[2], p[3], p[4], p[5]] = [
+                    p[2] + 0.1 * a,
+                    p[3] + 0.1 * b,
+                    p[4] + 0.1 * c,
+                    p[5] + 0.1 * d,
+                ];
+                [p[0], p[1]] = [
+                    p[0] * (-0.1_f64 / 90.0).exp(),
+                    p[1] * (-0.1_f64 / 90.0).exp(),
+                ];
             }
             truth.push(Wake::from_array(&p));
         }
-        let results = truth.iter().enumerate().map(|(k, wake)| scan(k, wake, rng)).collect();
+        let results = truth
+            .iter()
+            .enumerate()
+            .map(|(k, wake)| scan(k, wake, rng))
+            .collect();
         (results, truth)
     }
 
-    fn tracked_with(results: &[ScanResult], acceleration_density_m2_s3: f64) -> Result<Track, Error> {
-        track(&results.iter().collect::<Vec<_>>(), acceleration_density_m2_s3)
+    fn tracked_with(
+        results: &[ScanResult],
+        acceleration_density_m2_s3: f64,
+    ) -> Result<Track, Error> {
+        track(
+            &results.iter().collect::<Vec<_>>(),
+            acceleration_density_m2_s3,
+        )
     }
 
     fn scan(k: usize, wake: &Wake, rng: &mut Xoshiro256PlusPlus) -> ScanResult {
@@ -359,7 +458,10 @@ mod tests {
             std,
         };
         let mut covariance = Array2::zeros((10, 10));
-        [7.5, 7.5, 0.62, 0.18, 0.62, 0.18].iter().enumerate().for_each(|(i, s)| covariance[[i, i]] = s * s);
+        [7.5, 7.5, 0.62, 0.18, 0.62, 0.18]
+            .iter()
+            .enumerate()
+            .for_each(|(i, s)| covariance[[i, i]] = s * s);
         let mut vortex = |side, v: &Vortex| VortexResult {
             side,
             time_s: 10.0 * k as f64,
@@ -369,9 +471,15 @@ mod tests {
             height_m: number(v.height_m, 0.18),
             core_radius_m: None,
         };
-        let unknown = Measured { value: 0.0, std: f64::NAN };
+        let unknown = Measured {
+            value: 0.0,
+            std: f64::NAN,
+        };
         ScanResult {
-            vortices: vec![vortex(Side::Left, &wake.left), vortex(Side::Right, &wake.right)],
+            vortices: vec![
+                vortex(Side::Left, &wake.left),
+                vortex(Side::Right, &wake.right),
+            ],
             wake: Some(*wake),
             reference_time_s: 10.0 * k as f64,
             covariance,
@@ -399,7 +507,8 @@ mod tests {
                 let vortex = &point.vortices[0];
                 let error = vortex.circulation_m2_s.value - wake.left.circulation_m2_s;
                 squares += error * error / (2.0 * f64::from(repeats));
-                normalised += (error / vortex.circulation_m2_s.std).powi(2) / (2.0 * f64::from(repeats));
+                normalised +=
+                    (error / vortex.circulation_m2_s.std).powi(2) / (2.0 * f64::from(repeats));
             }
         }
         let rms = squares.sqrt();
@@ -419,11 +528,22 @@ mod tests {
         }
         results[9].vortices[1].height_m.value += 20.0;
         let found = tracked_with(&results, Track::ACCELERATION_DENSITY_M2_S3).unwrap();
-        let alive = |k: usize| found.points[k].vortices.iter().any(|v| v.side == Side::Right);
+        let alive = |k: usize| {
+            found.points[k]
+                .vortices
+                .iter()
+                .any(|v| v.side == Side::Right)
+        };
         let living: Vec<usize> = (0..14).filter(|k| alive(*k)).collect();
         assert_eq!(living, [4, 5, 6, 7, 8, 9, 10]);
         assert_eq!(found.rejected, 1);
-        let at = |k: usize| found.points[k].vortices.iter().find(|v| v.side == Side::Right).unwrap();
+        let at = |k: usize| {
+            found.points[k]
+                .vortices
+                .iter()
+                .find(|v| v.side == Side::Right)
+                .unwrap()
+        };
         assert!(!at(6).detected && !at(9).detected && at(10).detected);
         assert!(at(6).height_m.std > at(5).height_m.std);
         assert!((0..14).all(|k| found.points[k].vortices[0].side == Side::Left));

@@ -20,13 +20,17 @@ impl Whitening {
         let covariance = Array2::from_shape_fn((cells.len(), cells.len()), |(i, k)| {
             let (((ya, za), sigma), ((yb, zb), _)) = (cells[i], cells[k]);
             match k.cmp(&i) {
-                std::cmp::Ordering::Less => variance * (-(ya - yb).hypot(za - zb) / turbulence.length_m).exp(),
+                std::cmp::Ordering::Less => {
+                    variance * (-(ya - yb).hypot(za - zb) / turbulence.length_m).exp()
+                }
                 std::cmp::Ordering::Equal => variance + sigma * sigma,
                 // the lower triangle says all
                 std::cmp::Ordering::Greater => 0.0,
             }
         });
-        Some(Self { lower: cholesky(covariance)? })
+        Some(Self {
+            lower: cholesky(covariance)?,
+        })
     }
 
     /// Replaces x by L^-1 x.
@@ -44,9 +48,17 @@ mod tests {
 
     #[test]
     fn the_factor_times_its_transpose_is_the_covariance() {
-        let turbulence = Turbulence { deviation_m_s: 1.2, length_m: 25.0 };
+        let turbulence = Turbulence {
+            deviation_m_s: 1.2,
+            length_m: 25.0,
+        };
         let cells: Vec<((f64, f64), f64)> = (0..130)
-            .map(|i| ((f64::from(i % 13) * 4.0, f64::from(i / 13) * 2.0), 0.3 + 0.01 * f64::from(i % 7)))
+            .map(|i| {
+                (
+                    (f64::from(i % 13) * 4.0, f64::from(i / 13) * 2.0),
+                    0.3 + 0.01 * f64::from(i % 7),
+                )
+            })
             .collect();
         let factor = Whitening::new(&cells, &turbulence).unwrap();
         for (i, k) in [(0, 0), (7, 3), (100, 60), (129, 129)] {
@@ -59,7 +71,12 @@ mod tests {
         // columns of L become those of the unit matrix
         let mut column = factor.lower.column(60).to_vec();
         factor.whiten(&mut column);
-        assert!(column.iter().enumerate().all(|(i, x)| (x - f64::from(u8::from(i == 60))).abs() < 1e-12));
+        assert!(
+            column
+                .iter()
+                .enumerate()
+                .all(|(i, x)| (x - f64::from(u8::from(i == 60))).abs() < 1e-12)
+        );
         // two cells at one place without noise of their own
         assert!(Whitening::new(&[((1.0, 1.0), 0.0), ((1.0, 1.0), 0.0)], &turbulence).is_none());
     }

@@ -30,14 +30,19 @@ impl Taper {
     pub fn unit(weights: Vec<f64>) -> Result<Self, Error> {
         let energy: f64 = weights.iter().map(|h| h * h).sum();
         positive("sum of weights squared", energy)?;
-        Ok(Self { weights, factor: energy.recip() })
+        Ok(Self {
+            weights,
+            factor: energy.recip(),
+        })
     }
 }
 
 /// Weights 1 - m / N of the lags of white data in windows of N samples without weighting.
 #[must_use]
 pub fn unweighted_lags(window_samples: usize) -> Vec<f64> {
-    (0..window_samples).map(|m| 1.0 - m as f64 / window_samples as f64).collect()
+    (0..window_samples)
+        .map(|m| 1.0 - m as f64 / window_samples as f64)
+        .collect()
 }
 
 /// Biased correlogram with all lags, of one or several weightings.
@@ -64,8 +69,14 @@ impl<S: Sample> Correlogram<S> {
     pub fn with_tapers(tapers: Vec<Taper>) -> Result<Self, Error> {
         let window_samples = tapers.first().map_or(0, |taper| taper.weights.len());
         not_empty("tapers", window_samples)?;
-        tapers.iter().try_for_each(|taper| length("taper", window_samples, taper.weights.len()))?;
-        Ok(Self { tapers, transform: WindowTransform::new(S::KIND, 2 * window_samples), sample: PhantomData })
+        tapers
+            .iter()
+            .try_for_each(|taper| length("taper", window_samples, taper.weights.len()))?;
+        Ok(Self {
+            tapers,
+            transform: WindowTransform::new(S::KIND, 2 * window_samples),
+            sample: PhantomData,
+        })
     }
 
     /// The tapers.
@@ -82,7 +93,10 @@ impl<S: Sample> Correlogram<S> {
     pub fn lag_weights(&self) -> Vec<f64> {
         let at = |m: usize| -> f64 {
             let of = |h: &[f64]| h[m..].iter().zip(h).map(|(a, b)| a * b).sum::<f64>();
-            self.tapers.iter().map(|taper| taper.factor * of(&taper.weights)).sum()
+            self.tapers
+                .iter()
+                .map(|taper| taper.factor * of(&taper.weights))
+                .sum()
         };
         (0..self.lags()).map(|m| at(m) / at(0)).collect()
     }
@@ -106,7 +120,10 @@ impl<S: Sample> Statistic<S> for Correlogram<S> {
     fn evaluate(&self, window: &[S], scratch: &mut Scratch, out: &mut [f64]) {
         self.transform.reset(scratch);
         for taper in &self.tapers {
-            let weighted = window.iter().zip(&taper.weights).map(|(sample, h)| sample.to_complex() * h);
+            let weighted = window
+                .iter()
+                .zip(&taper.weights)
+                .map(|(sample, h)| sample.to_complex() * h);
             self.transform.add_power(weighted, taper.factor, scratch);
         }
         self.transform.lags_of_power(scratch, out);

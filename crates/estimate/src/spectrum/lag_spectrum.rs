@@ -31,7 +31,11 @@ impl LagSpectrum {
         at_least_one("lags", lags)?;
         at_least_one("padded_samples", padded_samples)?;
         let inverse = RealFftPlanner::new().plan_fft_inverse(padded_samples);
-        Ok(Self { kind, lags, inverse })
+        Ok(Self {
+            kind,
+            lags,
+            inverse,
+        })
     }
 
     /// Numbers of a correlogram with the planned number of lags.
@@ -43,7 +47,11 @@ impl LagSpectrum {
     ///
     /// # Errors
     /// [`Error::Length`] if `correlogram` does not hold the planned number of lags.
-    pub fn density<'s>(&self, correlogram: &[f64], scratch: &'s mut Scratch) -> Result<&'s [f64], Error> {
+    pub fn density<'s>(
+        &self,
+        correlogram: &[f64],
+        scratch: &'s mut Scratch,
+    ) -> Result<&'s [f64], Error> {
         length("correlogram", self.numbers(), correlogram.len())?;
         let padded = self.inverse.len();
         let half = padded / 2 + 1;
@@ -51,7 +59,9 @@ impl LagSpectrum {
         scratch.half.resize(half, Complex::ZERO);
         scratch.density.resize(padded, 0.0);
         let inner = self.inverse.get_scratch_len();
-        scratch.transform.resize(inner.max(scratch.transform.len()), Complex::ZERO);
+        scratch
+            .transform
+            .resize(inner.max(scratch.transform.len()), Complex::ZERO);
         // The transform has the sign exp(+i), so the lags go in conjugated; lags beyond M/2 fold back.
         let mut deposit = |index: usize, value: Complex<f64>| {
             if index < half {
@@ -70,8 +80,16 @@ impl LagSpectrum {
             scratch.half[half - 1].im = 0.0;
         }
         self.inverse
-            .process_with_scratch(&mut scratch.half, &mut scratch.density, &mut scratch.transform[..inner])
-            .map_err(|_| Error::Length { field: "correlogram", expected: padded, found: correlogram.len() })?;
+            .process_with_scratch(
+                &mut scratch.half,
+                &mut scratch.density,
+                &mut scratch.transform[..inner],
+            )
+            .map_err(|_| Error::Length {
+                field: "correlogram",
+                expected: padded,
+                found: correlogram.len(),
+            })?;
         Ok(&scratch.density)
     }
 }
@@ -80,7 +98,12 @@ impl LagSpectrum {
 ///
 /// Exact sum over all lags of `correlogram` (stored as [`SignalKind::lag_numbers`] says).
 #[must_use]
-pub fn density_at(correlogram: &[f64], kind: SignalKind, frequency_hz: f64, sampling: &Sampling) -> [f64; 3] {
+pub fn density_at(
+    correlogram: &[f64],
+    kind: SignalKind,
+    frequency_hz: f64,
+    sampling: &Sampling,
+) -> [f64; 3] {
     let angle = std::f64::consts::TAU * frequency_hz / sampling.sample_rate_hz;
     let lags = correlogram.len() / kind.lag_numbers(1);
     let step = Complex::from_polar(1.0, -angle);
@@ -125,12 +148,19 @@ impl Band {
                 allowed: "wide enough to hold a frequency of the padded spectrum: pad more or widen",
             });
         }
-        Ok(Self { first, bins: bins.min(padded), cyclic: bins >= padded, spacing_hz })
+        Ok(Self {
+            first,
+            bins: bins.min(padded),
+            cyclic: bins >= padded,
+            spacing_hz,
+        })
     }
 
     /// Frequencies \[Hz\] of the bins and of one neighbour on each side.
     pub(crate) fn with_neighbours_hz(&self) -> Vec<f64> {
-        (0..self.bins + 2).map(|place| self.frequency_hz(place as f64 - 1.0)).collect()
+        (0..self.bins + 2)
+            .map(|place| self.frequency_hz(place as f64 - 1.0))
+            .collect()
     }
 
     /// Frequency \[Hz\] of a (fractional) bin of the band.
@@ -150,8 +180,12 @@ mod tests {
 
     #[test]
     fn grid_and_single_frequency_agree_for_every_length_of_the_grid() {
-        let real: Vec<f64> = (0..20).map(|m| (0.7 * m as f64).cos() / (1.0 + m as f64)).collect();
-        let mut complex: Vec<f64> = (0..40).map(|m| (1.3 * m as f64).sin() / (1.0 + m as f64)).collect();
+        let real: Vec<f64> = (0..20)
+            .map(|m| (0.7 * m as f64).cos() / (1.0 + m as f64))
+            .collect();
+        let mut complex: Vec<f64> = (0..40)
+            .map(|m| (1.3 * m as f64).sin() / (1.0 + m as f64))
+            .collect();
         complex[1] = 0.0;
         let mut scratch = Scratch::new();
         for (kind, lags) in [(SignalKind::Real, &real), (SignalKind::Complex, &complex)] {
@@ -182,7 +216,12 @@ mod tests {
     #[test]
     fn detector_band_holds_205_bins_of_1024_and_12_of_64() {
         let wide = Band::new(&sampling(), SignalKind::Real, 1024).unwrap();
-        let places = |band: &Band, padded: f64| (band.bins, (band.frequency_hz(0.0) * padded / 250e6).round() as i64);
+        let places = |band: &Band, padded: f64| {
+            (
+                band.bins,
+                (band.frequency_hz(0.0) * padded / 250e6).round() as i64,
+            )
+        };
         assert_eq!(places(&wide, 1024.0), (205, 226));
         let neighbours_hz = wide.with_neighbours_hz();
         assert_eq!(neighbours_hz.len(), 207);

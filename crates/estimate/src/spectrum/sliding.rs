@@ -28,8 +28,17 @@ impl<S: Sample> ShortCorrelogram<S> {
     /// [`Error::OutOfRange`] unless 1 <= `lags` <= `window_samples`.
     pub fn new(window_samples: usize, lags: usize) -> Result<Self, Error> {
         let allowed = "at least 1 and at most the number of samples of the window";
-        check("lags", lags as f64, allowed, (1..=window_samples).contains(&lags))?;
-        Ok(Self { window_samples, lags, sample: PhantomData })
+        check(
+            "lags",
+            lags as f64,
+            allowed,
+            (1..=window_samples).contains(&lags),
+        )?;
+        Ok(Self {
+            window_samples,
+            lags,
+            sample: PhantomData,
+        })
     }
 
     /// Weights of the lags of white data, 1 - m / N.
@@ -52,7 +61,8 @@ impl<S: Sample> ShortCorrelogram<S> {
                 form_products(&record[m..], record, part, &mut products);
                 running.form(&products, first_sample % length, length);
                 for (gate, lags) in out.chunks_mut(numbers).enumerate() {
-                    lags[per_lag * m + part] = running.of(gate * step, first_sample % length, length) * share;
+                    lags[per_lag * m + part] =
+                        running.of(gate * step, first_sample % length, length) * share;
                 }
             }
         }
@@ -71,7 +81,10 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
     fn evaluate(&self, window: &[S], _: &mut Scratch, out: &mut [f64]) {
         let share = 1.0 / self.window_samples as f64;
         for (m, parts) in out.chunks_mut(S::KIND.lag_numbers(1)).enumerate() {
-            let products = window[m..].iter().zip(window).map(|(a, b)| a.to_complex() * b.to_complex().conj());
+            let products = window[m..]
+                .iter()
+                .zip(window)
+                .map(|(a, b)| a.to_complex() * b.to_complex().conj());
             let mean = products.sum::<num_complex::Complex<f64>>() * share;
             parts.copy_from_slice(&[mean.re, mean.im][..parts.len()]);
         }
@@ -93,16 +106,23 @@ impl<S: Sample> Statistic<S> for ShortCorrelogram<S> {
         if 3 * step_samples <= n && !means.is_empty() {
             self.evaluate_all(record, first_sample, step_samples, &mut means);
         } else {
-            windows.zip(means.chunks_mut(numbers)).for_each(|(window, mean)| self.evaluate(window, scratch, mean));
+            windows
+                .zip(means.chunks_mut(numbers))
+                .for_each(|(window, mean)| self.evaluate(window, scratch, mean));
         }
         let means = means.chunks(numbers).enumerate();
-        means.filter(|(gate, _)| valid(*gate)).for_each(|(gate, mean)| each(gate, mean));
+        means
+            .filter(|(gate, _)| valid(*gate))
+            .for_each(|(gate, mean)| each(gate, mean));
     }
 }
 
 /// Real parts (`part` 0) or imaginary parts of the products `ahead[k]` conj `behind[k]`.
 fn form_products<S: Sample>(ahead: &[S], behind: &[S], part: usize, products: &mut Vec<f64>) {
-    let pairs = ahead.iter().zip(behind).map(|(a, b)| (a.to_complex(), b.to_complex()));
+    let pairs = ahead
+        .iter()
+        .zip(behind)
+        .map(|(a, b)| (a.to_complex(), b.to_complex()));
     products.clear();
     match (S::KIND, part) {
         (SignalKind::Real, _) => products.extend(pairs.map(|(a, b)| a.re * b.re)),
@@ -128,7 +148,8 @@ impl Running {
         self.from.resize(products.len(), 0.0);
         let (first, rest) = products.split_at((length - skipped).min(products.len()));
         let (first_from, rest_from) = self.from.split_at_mut(first.len());
-        let blocks = std::iter::once((first, first_from)).chain(rest.chunks(length).zip(rest_from.chunks_mut(length)));
+        let blocks = std::iter::once((first, first_from))
+            .chain(rest.chunks(length).zip(rest_from.chunks_mut(length)));
         for (block, from) in blocks {
             let mut sum = 0.0;
             self.to.extend(block.iter().map(|product| {
@@ -146,6 +167,10 @@ impl Running {
     /// Sum of the `length` products from `start` on.
     fn of(&self, start: usize, skipped: usize, length: usize) -> f64 {
         let end = self.to[start + length - 1];
-        if (start + skipped).is_multiple_of(length) { end } else { self.from[start] + end }
+        if (start + skipped).is_multiple_of(length) {
+            end
+        } else {
+            self.from[start] + end
+        }
     }
 }

@@ -20,7 +20,10 @@ enum Plans {
 /// The forward and the inverse transform of complex numbers.
 pub(crate) fn complex_transforms(length: usize) -> [Arc<dyn Fft<f64>>; 2] {
     let mut planner = FftPlanner::new();
-    [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
+    [
+        planner.plan_fft_forward(length),
+        planner.plan_fft_inverse(length),
+    ]
 }
 
 /// Zero-padded transform of length `padded`.
@@ -36,14 +39,27 @@ impl WindowTransform {
         match kind {
             SignalKind::Real => {
                 let mut planner = RealFftPlanner::new();
-                let (forward, inverse) = (planner.plan_fft_forward(padded), planner.plan_fft_inverse(padded));
+                let (forward, inverse) = (
+                    planner.plan_fft_forward(padded),
+                    planner.plan_fft_inverse(padded),
+                );
                 let inner = forward.get_scratch_len().max(inverse.get_scratch_len());
-                Self { plans: Plans::Real(forward, inverse), padded, inner }
+                Self {
+                    plans: Plans::Real(forward, inverse),
+                    padded,
+                    inner,
+                }
             }
             SignalKind::Complex => {
                 let both = complex_transforms(padded);
-                let inner = both[0].get_inplace_scratch_len().max(both[1].get_inplace_scratch_len());
-                Self { plans: Plans::Complex(both), padded, inner }
+                let inner = both[0]
+                    .get_inplace_scratch_len()
+                    .max(both[1].get_inplace_scratch_len());
+                Self {
+                    plans: Plans::Complex(both),
+                    padded,
+                    inner,
+                }
             }
         }
     }
@@ -56,11 +72,18 @@ impl WindowTransform {
         };
         scratch.power.clear();
         scratch.power.resize(bins, 0.0);
-        scratch.transform.resize(self.inner.max(scratch.transform.len()), Complex::ZERO);
+        scratch
+            .transform
+            .resize(self.inner.max(scratch.transform.len()), Complex::ZERO);
     }
 
     /// Adds `factor` times the power spectrum of `samples` to `scratch.power`; real transforms take the real parts.
-    pub(crate) fn add_power(&self, samples: impl Iterator<Item = Complex<f64>>, factor: f64, scratch: &mut Scratch) {
+    pub(crate) fn add_power(
+        &self,
+        samples: impl Iterator<Item = Complex<f64>>,
+        factor: f64,
+        scratch: &mut Scratch,
+    ) {
         let inner = &mut scratch.transform[..self.inner];
         let spectrum = match &self.plans {
             Plans::Real(forward, _) => {
@@ -88,7 +111,10 @@ impl WindowTransform {
     /// Inverse transform of `scratch.power`, its first lags written to `out` (as `SignalKind::lag_numbers` says).
     pub(crate) fn lags_of_power(&self, scratch: &mut Scratch, out: &mut [f64]) {
         let inner = &mut scratch.transform[..self.inner];
-        let scaled = scratch.power.iter().map(|power| Complex::new(power / self.padded as f64, 0.0));
+        let scaled = scratch
+            .power
+            .iter()
+            .map(|power| Complex::new(power / self.padded as f64, 0.0));
         match &self.plans {
             Plans::Real(_, inverse) => {
                 scratch.half.clear();

@@ -30,17 +30,36 @@ impl ZoomSpectrum {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] without lags or for a frequency that is not finite, [`Error::Empty`] without frequencies.
-    pub fn new(kind: SignalKind, lags: usize, sampling: &Sampling, frequency_hz: &[f64]) -> Result<Self, Error> {
+    pub fn new(
+        kind: SignalKind,
+        lags: usize,
+        sampling: &Sampling,
+        frequency_hz: &[f64],
+    ) -> Result<Self, Error> {
         sampling.validate()?;
         at_least_one("lags", lags)?;
         let Some(last_hz) = frequency_hz.last() else {
-            return Err(Error::Empty { field: "frequency_hz" });
+            return Err(Error::Empty {
+                field: "frequency_hz",
+            });
         };
-        frequency_hz.iter().try_for_each(|&f_hz| finite("frequency_hz", f_hz))?;
+        frequency_hz
+            .iter()
+            .try_for_each(|&f_hz| finite("frequency_hz", f_hz))?;
         let padding = frequency_hz.len().next_multiple_of(LANES) - frequency_hz.len();
-        let padded = frequency_hz.iter().chain(std::iter::repeat_n(last_hz, padding));
-        let (sin, cos) = padded.map(|f_hz| (std::f64::consts::TAU * f_hz / sampling.sample_rate_hz).sin_cos()).unzip();
-        Ok(Self { kind, lags, frequencies: frequency_hz.len(), cos, sin })
+        let padded = frequency_hz
+            .iter()
+            .chain(std::iter::repeat_n(last_hz, padding));
+        let (sin, cos) = padded
+            .map(|f_hz| (std::f64::consts::TAU * f_hz / sampling.sample_rate_hz).sin_cos())
+            .unzip();
+        Ok(Self {
+            kind,
+            lags,
+            frequencies: frequency_hz.len(),
+            cos,
+            sin,
+        })
     }
 
     /// Writes the densities in signal units squared, in the order of the frequencies; resizes `out`.
@@ -48,7 +67,11 @@ impl ZoomSpectrum {
     /// # Errors
     /// [`Error::Length`] if `correlogram` does not hold the planned number of lags.
     pub fn density_into(&self, correlogram: &[f64], out: &mut Vec<f64>) -> Result<(), Error> {
-        length("correlogram", self.kind.lag_numbers(self.lags), correlogram.len())?;
+        length(
+            "correlogram",
+            self.kind.lag_numbers(self.lags),
+            correlogram.len(),
+        )?;
         out.resize(self.cos.len(), 0.0);
         match self.kind {
             SignalKind::Real => clenshaw(correlogram, &self.cos, out),
@@ -115,8 +138,9 @@ mod tests {
         let frequency_hz: Vec<f64> = (-20..=70).map(|k| 1.83e6 * f64::from(k)).collect();
         for lags in [1, 2, 17, 64] {
             for kind in [SignalKind::Real, SignalKind::Complex] {
-                let mut numbers: Vec<f64> =
-                    (0..kind.lag_numbers(lags)).map(|m| (2.1 * m as f64).cos() / (1.0 + 0.1 * m as f64)).collect();
+                let mut numbers: Vec<f64> = (0..kind.lag_numbers(lags))
+                    .map(|m| (2.1 * m as f64).cos() / (1.0 + 0.1 * m as f64))
+                    .collect();
                 if kind == SignalKind::Complex {
                     numbers[1] = 0.0;
                 }
@@ -127,7 +151,10 @@ mod tests {
                 assert_eq!(density.len(), 91);
                 for (found, &f_hz) in density.iter().zip(&frequency_hz) {
                     let exact = density_at(&numbers, kind, f_hz, &sampling)[0];
-                    assert!((found - exact).abs() < 2e-13 * lags as f64, "{kind:?} {lags} {f_hz}: {found} {exact}");
+                    assert!(
+                        (found - exact).abs() < 2e-13 * lags as f64,
+                        "{kind:?} {lags} {f_hz}: {found} {exact}"
+                    );
                 }
             }
         }

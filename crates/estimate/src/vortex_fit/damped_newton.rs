@@ -28,7 +28,9 @@ pub(crate) fn solve(a: &Array2<f64>, b: &[f64]) -> Option<Vec<f64>> {
     if scale.iter().any(|s| !s.is_finite()) {
         return None;
     }
-    let lower = cholesky(Array2::from_shape_fn((n, n), |(i, j)| a[[i, j]] * scale[i] * scale[j]))?;
+    let lower = cholesky(Array2::from_shape_fn((n, n), |(i, j)| {
+        a[[i, j]] * scale[i] * scale[j]
+    }))?;
     // what is left of a diagonal of ones
     if lower.diag().iter().any(|pivot| pivot * pivot < SINGULAR) {
         return None;
@@ -46,7 +48,11 @@ pub(crate) fn solve(a: &Array2<f64>, b: &[f64]) -> Option<Vec<f64>> {
 /// The error of a matrix that is not positive definite.
 pub(crate) fn singular(what: &'static str, order: usize) -> Error {
     let reason = "is singular to working precision: a free parameter does not show in the data";
-    Error::Linalg { what, order, reason }
+    Error::Linalg {
+        what,
+        order,
+        reason,
+    }
 }
 
 /// Inverse of a symmetric positive definite matrix.
@@ -94,8 +100,12 @@ pub(crate) fn converged<P>(end: Option<Minimum<P>>, stop: Stop) -> Result<Minimu
     match end {
         Some(end) if end.sigmas_left <= stop.sigmas => Ok(end),
         end => {
-            let (iterations, sigmas_left) = end.map_or((0, f64::INFINITY), |end| (end.iterations, end.sigmas_left));
-            Err(Error::NotConverged { iterations, sigmas_left })
+            let (iterations, sigmas_left) =
+                end.map_or((0, f64::INFINITY), |end| (end.iterations, end.sigmas_left));
+            Err(Error::NotConverged {
+                iterations,
+                sigmas_left,
+            })
         }
     }
 }
@@ -112,11 +122,24 @@ pub(crate) fn lowest<P: Clone>(
     let mut at = start;
     let mut here = evaluate(&at)?;
     let (mut damping, mut left) = (1e-3, f64::INFINITY);
-    let end = |at, normal, iterations, sigmas_left| Some(Minimum { at, normal, iterations, sigmas_left });
+    let end = |at, normal, iterations, sigmas_left| {
+        Some(Minimum {
+            at,
+            normal,
+            iterations,
+            sigmas_left,
+        })
+    };
     for iteration in 1..=stop.iterations {
         let down: Vec<f64> = here.gradient.iter().map(|g| -g).collect();
         if let Some(newton) = solve(&here.curvature, &down) {
-            left = newton.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>().max(0.0).sqrt();
+            left = newton
+                .iter()
+                .zip(&down)
+                .map(|(s, d)| s * d)
+                .sum::<f64>()
+                .max(0.0)
+                .sqrt();
             if left <= stop.sigmas {
                 return end(at, here, iteration, left);
             }
@@ -130,11 +153,17 @@ pub(crate) fn lowest<P: Clone>(
         let trial = step.as_ref().map(|step| moved(&at, step));
         let there = trial.as_ref().and_then(&mut evaluate);
         // gain promised by the quadratic model
-        let promised = step.map_or(0.0, |s| 0.5 * s.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>());
+        let promised = step.map_or(0.0, |s| {
+            0.5 * s.iter().zip(&down).map(|(s, d)| s * d).sum::<f64>()
+        });
         match (trial, there) {
             (Some(trial), Some(there)) if here.cost - there.cost > 1e-4 * promised => {
                 let ratio = (here.cost - there.cost) / promised;
-                damping = if ratio > 0.75 { (damping * 0.1).max(1e-9) } else { damping };
+                damping = if ratio > 0.75 {
+                    (damping * 0.1).max(1e-9)
+                } else {
+                    damping
+                };
                 (at, here) = (trial, there);
             }
             (_, refused) => {
@@ -187,7 +216,10 @@ mod tests {
         let product = inverse("test", &a).unwrap().dot(&a);
         for ((i, j), value) in product.indexed_iter() {
             let scale = (a[[j, j]] / a[[i, i]]).sqrt();
-            assert!((value - f64::from(u8::from(i == j))).abs() < 1e-11 * scale.max(1.0), "{product}");
+            assert!(
+                (value - f64::from(u8::from(i == j))).abs() < 1e-11 * scale.max(1.0),
+                "{product}"
+            );
         }
         assert!(inverse("test", &array![[1.0, 1.0], [1.0, 1.0]]).is_err());
         assert!(inverse("test", &array![[1.0, 0.0], [0.0, 0.0]]).is_err());
@@ -205,25 +237,51 @@ mod tests {
         let jacobian = array![[-1.0, 0.0], [-20.0 * p[0], 10.0]];
         let gradient = jacobian.t().dot(&ndarray::arr1(&residual)).to_vec();
         let cost = 0.5 * residual.iter().map(|r| r * r).sum::<f64>();
-        Some(Normal { cost, gradient, curvature: jacobian.t().dot(&jacobian) })
+        Some(Normal {
+            cost,
+            gradient,
+            curvature: jacobian.t().dot(&jacobian),
+        })
     }
 
     #[test]
     fn a_curved_valley_is_followed_to_its_end() {
         let moved = |p: &[f64; 2], s: &[f64]| [p[0] + s[0], p[1] + s[1]];
-        let stop = Stop { iterations: 100, sigmas: 1e-9, learns: false };
+        let stop = Stop {
+            iterations: 100,
+            sigmas: 1e-9,
+            learns: false,
+        };
         let descend = |start, stop| converged(lowest(start, stop, valley, moved), stop);
-        let Minimum { at: end, normal, .. } = descend([-1.2, 1.0], stop).unwrap();
+        let Minimum {
+            at: end, normal, ..
+        } = descend([-1.2, 1.0], stop).unwrap();
         assert!((end[0] - 1.0).abs() < 1e-8 && (end[1] - 1.0).abs() < 1e-8 && normal.cost < 1e-16);
-        let hasty = descend([-1.2, 1.0], Stop { iterations: 3, ..stop });
-        assert!(matches!(hasty, Err(Error::NotConverged { iterations: 3, .. })));
+        let hasty = descend(
+            [-1.2, 1.0],
+            Stop {
+                iterations: 3,
+                ..stop
+            },
+        );
+        assert!(matches!(
+            hasty,
+            Err(Error::NotConverged { iterations: 3, .. })
+        ));
         assert!(descend([2.0, 1.0], stop).is_err());
     }
 
     #[test]
     fn steps_are_shortened_where_they_turn_round_and_halved_to_where_there_is_an_end() {
         let mut averaging = Averaging::default();
-        let products = [(0.0, 0.0), (2.0, 4.0), (-1.0, 4.0), (-2.0, 4.0), (1.0, 4.0), (-4.0, 4.0)];
+        let products = [
+            (0.0, 0.0),
+            (2.0, 4.0),
+            (-1.0, 4.0),
+            (-2.0, 4.0),
+            (1.0, 4.0),
+            (-4.0, 4.0),
+        ];
         let parts = products.map(|(with_last, of_last)| averaging.part(with_last, of_last));
         assert_eq!(parts, [1.0, 1.0, 1.0, 0.5, 0.5, 1.0 / 3.0]);
         assert_eq!(halved(0.8, |part| (part < 0.3).then_some(part)), Some(0.2));

@@ -8,7 +8,10 @@ use crate::vortex_fit::{PARAMETERS, Wake};
 pub(crate) const SAME_SIGMAS: f64 = 0.3;
 
 /// Those that are not the same as one before them.
-pub(crate) fn distinct<T>(all: impl IntoIterator<Item = T>, same: impl Fn(&T, &T) -> bool) -> Vec<T> {
+pub(crate) fn distinct<T>(
+    all: impl IntoIterator<Item = T>,
+    same: impl Fn(&T, &T) -> bool,
+) -> Vec<T> {
     let mut kept: Vec<T> = Vec::new();
     for one in all {
         if !kept.iter().any(|before| same(before, &one)) {
@@ -19,7 +22,10 @@ pub(crate) fn distinct<T>(all: impl IntoIterator<Item = T>, same: impl Fn(&T, &T
 }
 
 /// Covariance \[10, 10\] about a wake of tops with their weights: what is known within each of them, and the distances between them.
-pub(crate) fn mixed<'t>(tops: impl Iterator<Item = (f64, &'t Wake, &'t Array2<f64>)>, about: &Wake) -> Array2<f64> {
+pub(crate) fn mixed<'t>(
+    tops: impl Iterator<Item = (f64, &'t Wake, &'t Array2<f64>)>,
+    about: &Wake,
+) -> Array2<f64> {
     let (mut mixed, mut weights) = (Array2::zeros((PARAMETERS, PARAMETERS)), 0.0);
     for (weight, wake, within) in tops {
         let (a, b) = (wake.to_array(), about.to_array());

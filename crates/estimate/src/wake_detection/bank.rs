@@ -37,7 +37,11 @@ pub struct DetectorOptions {
 impl Default for DetectorOptions {
     /// Wakes of wings of 20 to 80 m (spacing pi/4 of the span), single vortices, and no turbulence.
     fn default() -> Self {
-        Self { spacing_m: (16.0, 63.0), single_vortices: true, turbulence: None }
+        Self {
+            spacing_m: (16.0, 63.0),
+            single_vortices: true,
+            turbulence: None,
+        }
     }
 }
 
@@ -64,11 +68,18 @@ pub(super) struct Bank {
 
 impl Bank {
     /// Pairs and, if asked for, single vortices; `gate_m` is the standard deviation of a gate.
-    pub(super) fn new(cells: &Cells, model: &WakeModel, gate_m: f64, options: &DetectorOptions) -> Self {
+    pub(super) fn new(
+        cells: &Cells,
+        model: &WakeModel,
+        gate_m: f64,
+        options: &DetectorOptions,
+    ) -> Self {
         let spacing_m = options.spacing_m;
         let between = |of: fn(&(f64, f64)) -> f64| {
             let values = cells.cells.iter().map(|cell| of(&cell.place_m));
-            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
+            values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+                (low.min(x), high.max(x))
+            })
         };
         let (across_m, mut up_m) = (between(|place| place.0), between(|place| place.1));
         if model.images {
@@ -87,7 +98,10 @@ impl Bank {
         let mut index = Array2::from_elem((rows, columns), None);
         let mut places_m = Vec::new();
         for ((row, column), at) in index.indexed_iter_mut() {
-            let place = (across_m.0 + column as f64 * lateral_m, up_m.0 + row as f64 * apart_m);
+            let place = (
+                across_m.0 + column as f64 * lateral_m,
+                up_m.0 + row as f64 * apart_m,
+            );
             if cells.hold(model, place) {
                 *at = Some(places_m.len());
                 places_m.push(place);
@@ -99,22 +113,49 @@ impl Bank {
         for ((row, column), &place) in index.indexed_iter() {
             let Some(place) = place else { continue };
             if options.single_vortices {
-                templates.push(Template { left: Some(place), right: None });
-                templates.push(Template { left: None, right: Some(place) });
+                templates.push(Template {
+                    left: Some(place),
+                    right: None,
+                });
+                templates.push(Template {
+                    left: None,
+                    right: Some(place),
+                });
             }
             let partners = (least..=most).filter_map(|away| *index.get((row, column + away))?);
-            templates.extend(partners.map(|partner| Template { left: Some(place), right: Some(partner) }));
+            templates.extend(partners.map(|partner| Template {
+                left: Some(place),
+                right: Some(partner),
+            }));
         }
-        Self { places_m, step_m, core_m: CORE_OVER_STEP * apart_m, lateral_m: across_m, up_m, templates }
+        Self {
+            places_m,
+            step_m,
+            core_m: CORE_OVER_STEP * apart_m,
+            lateral_m: across_m,
+            up_m,
+            templates,
+        }
     }
 
     /// What an anticlockwise vortex of unit circulation at each place shows: cells by places.
-    pub(super) fn shapes(&self, cells: &Cells, model: &WakeModel, kernel: &RangeKernel) -> Array2<f64> {
-        let columns = map_indexed(self.places_m.len(), LineScratch::default, |scratch, place| {
-            let wake = Wake::of_unit_vortex(self.places_m[place], self.core_m);
-            shown(&wake, cells, model, kernel, scratch)
-        });
-        Array2::from_shape_fn((cells.cells.len(), columns.len()), |(cell, place)| columns[place][cell])
+    pub(super) fn shapes(
+        &self,
+        cells: &Cells,
+        model: &WakeModel,
+        kernel: &RangeKernel,
+    ) -> Array2<f64> {
+        let columns = map_indexed(
+            self.places_m.len(),
+            LineScratch::default,
+            |scratch, place| {
+                let wake = Wake::of_unit_vortex(self.places_m[place], self.core_m);
+                shown(&wake, cells, model, kernel, scratch)
+            },
+        );
+        Array2::from_shape_fn((cells.cells.len(), columns.len()), |(cell, place)| {
+            columns[place][cell]
+        })
     }
 }
 
@@ -128,18 +169,35 @@ pub(super) fn shown(
 ) -> Vec<f64> {
     let ranges = &cells.range_m;
     let (middle, reach_m) = (kernel.middle(), FAR_OVER_GATE * kernel.width_m());
-    let [one_m, other_m] = [&wake.left, &wake.right].map(|vortex| model.range_and_elevation(vortex.place_m()).0);
+    let [one_m, other_m] =
+        [&wake.left, &wake.right].map(|vortex| model.range_and_elevation(vortex.place_m()).0);
     let from = ranges.partition_point(|range_m| *range_m < one_m.min(other_m) - reach_m);
     let to = ranges.partition_point(|range_m| *range_m <= one_m.max(other_m) + reach_m);
     let mut map = Array2::zeros((cells.elevation_rad.len(), ranges.len()));
     for (mut line, &elevation_rad) in map.rows_mut().into_iter().zip(&cells.elevation_rad) {
         let seen = (model, wake, Ray::new(elevation_rad));
-        kernel.apply(seen, &ranges[from..to], false, scratch, |gate, velocity, _| line[from + gate] = velocity);
+        kernel.apply(
+            seen,
+            &ranges[from..to],
+            false,
+            scratch,
+            |gate, velocity, _| line[from + gate] = velocity,
+        );
         for gate in (0..from).chain(to..ranges.len()) {
-            middle.apply(seen, &ranges[gate..=gate], false, scratch, |_, velocity, _| line[gate] = velocity);
+            middle.apply(
+                seen,
+                &ranges[gate..=gate],
+                false,
+                scratch,
+                |_, velocity, _| line[gate] = velocity,
+            );
         }
     }
-    cells.cells.iter().map(|cell| map[[cell.line, cell.gate]]).collect()
+    cells
+        .cells
+        .iter()
+        .map(|cell| map[[cell.line, cell.gate]])
+        .collect()
 }
 
 #[cfg(test)]
@@ -159,23 +217,39 @@ mod tests {
             standard_deviation_m_s: None,
         };
         let model = WakeModel::default();
-        let bank = Bank::new(&Cells::new(&map, &model), &model, 0.3 * step_m, &DetectorOptions::default());
-        let pairs = bank.templates.iter().filter_map(|t| Some(bank.places_m[t.right?].0 - bank.places_m[t.left?].0));
-        let (least, most) = pairs.fold((f64::INFINITY, 0.0_f64), |(least, most), b| (least.min(b), most.max(b)));
+        let bank = Bank::new(
+            &Cells::new(&map, &model),
+            &model,
+            0.3 * step_m,
+            &DetectorOptions::default(),
+        );
+        let pairs = bank
+            .templates
+            .iter()
+            .filter_map(|t| Some(bank.places_m[t.right?].0 - bank.places_m[t.left?].0));
+        let (least, most) = pairs.fold((f64::INFINITY, 0.0_f64), |(least, most), b| {
+            (least.min(b), most.max(b))
+        });
         assert!(!bank.templates.is_empty());
         (least, most, bank.places_m.len())
     }
 
     #[test]
-    fn a_bank_is_bounded_whatever_the_size_of_the_scan_and_its_pairs_have_the_spacings_that_are_asked_for() {
+    fn a_bank_is_bounded_whatever_the_size_of_the_scan_and_its_pairs_have_the_spacings_that_are_asked_for()
+     {
         // a lidar near a runway, one that sees 6 km, and a radar that sees 150 km
-        for (top_rad, gates, has_pairs) in
-            [(0.2, (300.0, 0.5), true), (0.5, (500.0, 10.0), true), (1.5, (500.0, 250.0), false)]
-        {
+        for (top_rad, gates, has_pairs) in [
+            (0.2, (300.0, 0.5), true),
+            (0.5, (500.0, 10.0), true),
+            (1.5, (500.0, 250.0), false),
+        ] {
             let (least_m, most_m, places) = bank(top_rad, gates);
             assert!(places <= 2700, "{places}");
             assert_eq!(least_m.is_finite(), has_pairs, "{gates:?}: {least_m}");
-            assert!(!has_pairs || least_m >= 15.99 && most_m <= 63.01, "{least_m} {most_m}");
+            assert!(
+                !has_pairs || least_m >= 15.99 && most_m <= 63.01,
+                "{least_m} {most_m}"
+            );
         }
     }
 }

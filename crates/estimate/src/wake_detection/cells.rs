@@ -43,7 +43,10 @@ impl Cells {
     pub(super) fn new(map: &VelocityMap<'_>, model: &WakeModel) -> Self {
         let (lines, gates) = (map.elevation_rad.len(), map.range_m.len());
         let (by_line, by_gate) = map.blocks(MOST_CELLS);
-        let (elevation_rad, range_m) = (block_means(map.elevation_rad, by_line), block_means(map.range_m, by_gate));
+        let (elevation_rad, range_m) = (
+            block_means(map.elevation_rad, by_line),
+            block_means(map.range_m, by_gate),
+        );
         let weight = |line: usize, gate: usize| {
             let known = map.velocity_m_s[[line, gate]].is_finite();
             known.then(|| map.deviation(line, gate).powi(-2))
@@ -57,13 +60,23 @@ impl Cells {
         for ((line, gate), &sum) in sums.indexed_iter().filter(|(_, sum)| **sum > 0.0) {
             index[[line, gate]] = cells.len();
             let place_m = model.position_m(range_m[gate], elevation_rad[line]);
-            cells.push(Cell { line, gate, place_m, deviation_m_s: sum.sqrt().recip() });
+            cells.push(Cell {
+                line,
+                gate,
+                place_m,
+                deviation_m_s: sum.sqrt().recip(),
+            });
         }
         let share = Array2::from_shape_fn((lines, gates), |(line, gate)| {
             let block = [line / by_line, gate / by_gate];
             weight(line, gate).map(|weight| (index[block], weight / sums[block]))
         });
-        Self { elevation_rad, range_m, cells, share }
+        Self {
+            elevation_rad,
+            range_m,
+            cells,
+            share,
+        }
     }
 
     /// Whether a place is in the sector of the map.
@@ -76,8 +89,16 @@ impl Cells {
     /// # Errors
     /// [`Error::Length`] for another shape.
     pub(super) fn means(&self, velocity_m_s: ArrayView2<'_, f64>) -> Result<Vec<f64>, Error> {
-        length("lines of velocity_m_s", self.share.nrows(), velocity_m_s.nrows())?;
-        length("gates of velocity_m_s", self.share.ncols(), velocity_m_s.ncols())?;
+        length(
+            "lines of velocity_m_s",
+            self.share.nrows(),
+            velocity_m_s.nrows(),
+        )?;
+        length(
+            "gates of velocity_m_s",
+            self.share.ncols(),
+            velocity_m_s.ncols(),
+        )?;
         let mut sums = vec![(0.0, 0.0); self.cells.len()];
         for (share, &value) in self.share.iter().zip(&velocity_m_s) {
             if let Some((cell, weight)) = share.filter(|_| value.is_finite()) {
@@ -104,22 +125,36 @@ impl Background {
     pub(super) fn new(cells: &Cells, turbulence: Option<&Turbulence>) -> Result<Self, Error> {
         let cells = &cells.cells;
         let Some(turbulence) = turbulence else {
-            return Ok(Self::Noise(cells.iter().map(|cell| cell.deviation_m_s).collect()));
+            return Ok(Self::Noise(
+                cells.iter().map(|cell| cell.deviation_m_s).collect(),
+            ));
         };
         not_negative("deviation_m_s of the turbulence", turbulence.deviation_m_s)?;
         positive("length_m of the turbulence", turbulence.length_m)?;
-        let places: Vec<_> = cells.iter().map(|cell| (cell.place_m, cell.deviation_m_s)).collect();
+        let places: Vec<_> = cells
+            .iter()
+            .map(|cell| (cell.place_m, cell.deviation_m_s))
+            .collect();
         let reason = "is not positive definite: turbulence without noise in close cells has none";
         let order = cells.len();
-        let singular = Error::Linalg { what: "covariance of the background", order, reason };
-        Whitening::new(&places, turbulence).map(Self::Turbulent).ok_or(singular)
+        let singular = Error::Linalg {
+            what: "covariance of the background",
+            order,
+            reason,
+        };
+        Whitening::new(&places, turbulence)
+            .map(Self::Turbulent)
+            .ok_or(singular)
     }
 
     /// Columns of numbers by cell, made white in place.
     pub(super) fn whiten(&self, columns: &mut Array2<f64>) {
         match self {
             Self::Noise(deviations) => {
-                columns.axis_iter_mut(Axis(0)).zip(deviations).for_each(|(mut row, deviation)| row /= *deviation);
+                columns
+                    .axis_iter_mut(Axis(0))
+                    .zip(deviations)
+                    .for_each(|(mut row, deviation)| row /= *deviation);
             }
             Self::Turbulent(whitening) => forward(whitening.lower.view(), columns),
         }
@@ -128,7 +163,10 @@ impl Background {
     /// One number by cell, made white in place.
     pub(super) fn whiten_one(&self, numbers: &mut [f64]) {
         match self {
-            Self::Noise(deviations) => numbers.iter_mut().zip(deviations).for_each(|(x, deviation)| *x /= deviation),
+            Self::Noise(deviations) => numbers
+                .iter_mut()
+                .zip(deviations)
+                .for_each(|(x, deviation)| *x /= deviation),
             Self::Turbulent(whitening) => whitening.whiten(numbers),
         }
     }
@@ -142,7 +180,8 @@ mod tests {
     fn a_large_map_becomes_means_of_blocks_with_their_deviation_and_without_holes() {
         let elevation_rad: Vec<f64> = (0..120).map(|i| 0.05 + 1e-3 * f64::from(i)).collect();
         let range_m: Vec<f64> = (0..60).map(|i| 300.0 + 3.0 * f64::from(i)).collect();
-        let mut velocity = Array2::from_shape_fn((120, 60), |(line, gate)| 0.1 * line as f64 + gate as f64);
+        let mut velocity =
+            Array2::from_shape_fn((120, 60), |(line, gate)| 0.1 * line as f64 + gate as f64);
         velocity[[0, 0]] = f64::NAN;
         velocity.slice_mut(ndarray::s![60.., 30..]).fill(f64::NAN);
         let deviation = Array2::from_elem((120, 60), 0.6);
@@ -156,10 +195,24 @@ mod tests {
         assert_eq!(map.blocks(MOST_CELLS), (3, 1));
         assert_eq!(cells.cells.len(), 40 * 60 - 20 * 30);
         let means = cells.means(velocity.view()).unwrap();
-        assert!((means[0] - 0.15).abs() < 1e-12 && (cells.cells[0].deviation_m_s - 0.6 / 2f64.sqrt()).abs() < 1e-12);
-        assert!((means[1] - 1.1).abs() < 1e-12 && (cells.cells[1].deviation_m_s - 0.6 / 3f64.sqrt()).abs() < 1e-12);
+        assert!(
+            (means[0] - 0.15).abs() < 1e-12
+                && (cells.cells[0].deviation_m_s - 0.6 / 2f64.sqrt()).abs() < 1e-12
+        );
+        assert!(
+            (means[1] - 1.1).abs() < 1e-12
+                && (cells.cells[1].deviation_m_s - 0.6 / 3f64.sqrt()).abs() < 1e-12
+        );
         velocity.slice_mut(ndarray::s![3..6, 5]).fill(f64::NAN);
-        assert_eq!(cells.means(velocity.view()).unwrap().iter().filter(|v| v.is_nan()).count(), 1);
+        assert_eq!(
+            cells
+                .means(velocity.view())
+                .unwrap()
+                .iter()
+                .filter(|v| v.is_nan())
+                .count(),
+            1
+        );
         assert!(cells.means(velocity.slice(ndarray::s![1.., ..])).is_err());
     }
 }

@@ -75,7 +75,12 @@ impl WakeDetector {
     /// [`Error::OutOfRange`] for impossible numbers or a map without standard deviations, [`Error::TooFewVelocities`] with less
     /// than forty, [`Error::Empty`] if no wake of the bank fits into the scan, [`Error::Linalg`] if the background has
     /// no covariance.
-    pub fn new(map: &ScanMap, model: &WakeModel, gate: &Gate, options: &DetectorOptions) -> Result<Self, Error> {
+    pub fn new(
+        map: &ScanMap,
+        model: &WakeModel,
+        gate: &Gate,
+        options: &DetectorOptions,
+    ) -> Result<Self, Error> {
         let found = map.validate()?;
         if map.sigma_m_s.is_none() {
             return Err(Error::Empty { field: "sigma_m_s" });
@@ -97,12 +102,20 @@ impl WakeDetector {
         remove(&wind, &mut shapes);
         let gram = shapes.t().dot(&shapes);
         let shapes = shapes.t().as_standard_layout().into_owned();
-        let reciprocal_length = bank.templates.iter().map(|template| length2(template, &gram).sqrt().recip()).collect();
+        let reciprocal_length = bank
+            .templates
+            .iter()
+            .map(|template| length2(template, &gram).sqrt().recip())
+            .collect();
         let floor = REGULAR * gram.diag().iter().fold(0.0_f64, |most, x| most.max(*x));
         let order = gram.nrows();
         let factor = cholesky(gram + Array2::from_diag(&Array1::from_elem(order, floor)));
         let reason = "is not positive definite";
-        let factor = factor.ok_or(Error::Linalg { what: "covariance of the products with the bank", order, reason })?;
+        let factor = factor.ok_or(Error::Linalg {
+            what: "covariance of the products with the bank",
+            order,
+            reason,
+        })?;
         Ok(Self {
             model: *model,
             kernel,
@@ -122,14 +135,18 @@ impl WakeDetector {
     ///
     /// # Errors
     /// [`Error::Length`] for another shape, [`Error::TooFewVelocities`] if more than half is missing.
-    pub fn statistic(&self, velocity_m_s: ndarray::ArrayView2<'_, f64>) -> Result<WakeStatistic, Error> {
+    pub fn statistic(
+        &self,
+        velocity_m_s: ndarray::ArrayView2<'_, f64>,
+    ) -> Result<WakeStatistic, Error> {
         let mut means = self.cells.means(velocity_m_s)?;
         let missing = self.fill(&mut means)?;
         let white = self.white(means);
         let products = self.shapes.dot(&white);
         let (value, best) = self.best(products.view());
         let rest = white.dot(&white);
-        let dof = |fitted: usize| (self.cells.cells.len() - missing - self.wind.ncols() - fitted) as f64;
+        let dof =
+            |fitted: usize| (self.cells.cells.len() - missing - self.wind.ncols() - fitted) as f64;
         let length = self.reciprocal_length[best];
         let template = &self.bank.templates[best];
         let mut left = white;
@@ -163,25 +180,42 @@ impl WakeDetector {
                 (0..2).for_each(|b| curvature[[a, b]] += row[a] * row[b]);
             }
         }
-        let wind = solve(&curvature, &towards).unwrap_or_else(|| vec![towards[0] / curvature[[0, 0]], 0.0]);
-        for (i, value) in means.iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
-            *value = wind_row(&self.cells, i).iter().zip(&wind).map(|(row, wind)| row * wind).sum();
+        let wind = solve(&curvature, &towards)
+            .unwrap_or_else(|| vec![towards[0] / curvature[[0, 0]], 0.0]);
+        for (i, value) in means
+            .iter_mut()
+            .enumerate()
+            .filter(|(_, value)| value.is_nan())
+        {
+            *value = wind_row(&self.cells, i)
+                .iter()
+                .zip(&wind)
+                .map(|(row, wind)| row * wind)
+                .sum();
         }
         Ok(missing)
     }
 
     /// Correlation of white numbers by cell with those of the next gate and the next line, far from a wake, each with its error.
     fn neighbour_correlation(&self, numbers: &Array1<f64>, template: &Template) -> [(f64, f64); 2] {
-        let mut grid = Array2::from_elem((self.cells.elevation_rad.len(), self.cells.range_m.len()), f64::NAN);
+        let mut grid = Array2::from_elem(
+            (self.cells.elevation_rad.len(), self.cells.range_m.len()),
+            f64::NAN,
+        );
         for (cell, number) in self.cells.cells.iter().zip(numbers) {
-            let mut centres =
-                [template.left, template.right].into_iter().flatten().map(|place| self.bank.places_m[place]);
+            let mut centres = [template.left, template.right]
+                .into_iter()
+                .flatten()
+                .map(|place| self.bank.places_m[place]);
             if centres.all(|(y, z)| (y - cell.place_m.0).hypot(z - cell.place_m.1) > WAKE_M) {
                 grid[[cell.line, cell.gate]] = *number;
             }
         }
         let mean = |products: ndarray::Array2<f64>| {
-            let (sum, count) = products.iter().filter(|x| x.is_finite()).fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
+            let (sum, count) = products
+                .iter()
+                .filter(|x| x.is_finite())
+                .fold((0.0, 0.0), |(s, n), x| (s + x, n + 1.0));
             (sum / count, count)
         };
         let (power, _) = mean(&grid * &grid);
@@ -201,7 +235,10 @@ impl WakeDetector {
     /// Statistic and index of the best wake of the bank, given the products of a scan with all places.
     pub(super) fn best(&self, products: ArrayView1<'_, f64>) -> (f64, usize) {
         let all = self.scores(products).enumerate();
-        let (most, best) = all.fold((0.0, 0), |best, (i, x)| if x > best.0 { (x, i) } else { best });
+        let (most, best) = all.fold(
+            (0.0, 0),
+            |best, (i, x)| if x > best.0 { (x, i) } else { best },
+        );
         (most * most, best)
     }
 
@@ -211,14 +248,23 @@ impl WakeDetector {
             let of = |place: Option<usize>| place.map_or(0.0, |place| products[place]);
             (of(template.right) - of(template.left)) * length
         };
-        self.bank.templates.iter().zip(&self.reciprocal_length).map(score)
+        self.bank
+            .templates
+            .iter()
+            .zip(&self.reciprocal_length)
+            .map(score)
     }
 
     /// Products of what a wake shows with all places, and its length: the reciprocal of the standard deviation of a factor on its
     /// circulations, were places and cores known.
     pub(super) fn products_of(&self, wake: &Wake) -> (Array1<f64>, f64) {
-        let shown =
-            shown(&Wake::calm(wake.left, wake.right), &self.cells, &self.model, &self.kernel, &mut Default::default());
+        let shown = shown(
+            &Wake::calm(wake.left, wake.right),
+            &self.cells,
+            &self.model,
+            &self.kernel,
+            &mut Default::default(),
+        );
         let white = self.white(shown);
         (self.shapes.dot(&white), white.dot(&white).sqrt())
     }
@@ -227,9 +273,15 @@ impl WakeDetector {
         let other = template.left.or(template.right).unwrap_or(0);
         let vortex = |place: Option<usize>, sense: f64| {
             let (lateral_m, height_m) = self.bank.places_m[place.unwrap_or(other)];
-            let (away_m, circulation_m2_s) =
-                place.map_or((sense * self.bank.step_m.0, 0.0), |_| (0.0, circulation_m2_s));
-            Vortex::at((lateral_m + away_m, height_m), circulation_m2_s, self.bank.core_m)
+            let (away_m, circulation_m2_s) = place
+                .map_or((sense * self.bank.step_m.0, 0.0), |_| {
+                    (0.0, circulation_m2_s)
+                });
+            Vortex::at(
+                (lateral_m + away_m, height_m),
+                circulation_m2_s,
+                self.bank.core_m,
+            )
         };
         Wake::calm(vortex(template.left, -1.0), vortex(template.right, 1.0))
     }
@@ -240,7 +292,10 @@ fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
     match gate {
         Gate::Gaussian { std_m } if *std_m != 0.0 => {
             positive("std_m of the gate", *std_m)?;
-            let weights: Vec<f64> = (-14..=14).map(|i| 0.25 * f64::from(i)).map(|x| (-0.5 * x * x).exp()).collect();
+            let weights: Vec<f64> = (-14..=14)
+                .map(|i| 0.25 * f64::from(i))
+                .map(|x| (-0.5 * x * x).exp())
+                .collect();
             RangeKernel::new(-3.5 * std_m, 0.25 * std_m, &weights)
         }
         Gate::Kernel(kernel) => Ok(kernel.coarser(2)),
@@ -250,7 +305,9 @@ fn kernel(gate: &Gate) -> Result<RangeKernel, Error> {
 
 /// Uniform wind and shear, white and orthonormal; one direction if the scan cannot tell them apart.
 fn wind(cells: &Cells, background: &Background) -> Array2<f64> {
-    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| wind_row(cells, i)[direction]);
+    let mut wind = Array2::from_shape_fn((cells.cells.len(), 2), |(i, direction)| {
+        wind_row(cells, i)[direction]
+    });
     background.whiten(&mut wind);
     let mut basis = Array2::zeros((cells.cells.len(), 0));
     for direction in wind.columns() {

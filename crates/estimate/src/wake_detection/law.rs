@@ -48,11 +48,21 @@ impl WakeDetector {
         scans: usize,
         stream: impl Fn(u64) -> R + Sync + Send,
     ) -> Result<EmptyScanLaw, Error> {
-        EmptyScanLaw::new(self.empty_products(scans, stream).rows().into_iter().map(|row| self.best(row).0).collect())
+        EmptyScanLaw::new(
+            self.empty_products(scans, stream)
+                .rows()
+                .into_iter()
+                .map(|row| self.best(row).0)
+                .collect(),
+        )
     }
 
     /// Products of empty scans with all places: scans by places.
-    pub(super) fn empty_products<R: Rng>(&self, scans: usize, stream: impl Fn(u64) -> R + Sync + Send) -> Array2<f64> {
+    pub(super) fn empty_products<R: Rng>(
+        &self,
+        scans: usize,
+        stream: impl Fn(u64) -> R + Sync + Send,
+    ) -> Array2<f64> {
         let places = self.factor.nrows();
         let batches = map_each(scans.div_ceil(BATCH), |batch| {
             let first = batch * BATCH;
@@ -65,7 +75,8 @@ impl WakeDetector {
             lower_product(&normal, &self.factor)
         });
         let views: Vec<_> = batches.iter().map(|batch| batch.view()).collect();
-        ndarray::concatenate(ndarray::Axis(0), &views).unwrap_or_else(|_| Array2::zeros((0, places)))
+        ndarray::concatenate(ndarray::Axis(0), &views)
+            .unwrap_or_else(|_| Array2::zeros((0, places)))
     }
 }
 
@@ -76,7 +87,9 @@ fn lower_product(rows: &Array2<f64>, lower: &Array2<f64>) -> Array2<f64> {
     for first in (0..order).step_by(BATCH) {
         let last = (first + BATCH).min(order);
         let factor = lower.slice(s![first..last, ..last]);
-        product.slice_mut(s![.., first..last]).assign(&rows.slice(s![.., ..last]).dot(&factor.t()));
+        product
+            .slice_mut(s![.., first..last])
+            .assign(&rows.slice(s![.., ..last]).dot(&factor.t()));
     }
     product
 }
@@ -88,13 +101,25 @@ impl EmptyScanLaw {
     /// [`Error::OutOfRange`] with fewer than a thousand, or one that is not finite.
     pub fn new(mut statistics: Vec<f64>) -> Result<Self, Error> {
         let count = statistics.len();
-        check("empty scans", count as f64, "at least 1000: the tail of fewer is not known", count >= FEWEST)?;
-        statistics.iter().try_for_each(|value| finite("statistic of an empty scan", *value))?;
+        check(
+            "empty scans",
+            count as f64,
+            "at least 1000: the tail of fewer is not known",
+            count >= FEWEST,
+        )?;
+        statistics
+            .iter()
+            .try_for_each(|value| finite("statistic of an empty scan", *value))?;
         statistics.sort_by(|a, b| b.total_cmp(a));
         let mean = statistics.iter().sum::<f64>() / count as f64;
-        let variance = statistics.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / (count - 1) as f64;
+        let variance =
+            statistics.iter().map(|t| (t - mean).powi(2)).sum::<f64>() / (count - 1) as f64;
         let scale = (6.0 * variance).sqrt() / PI;
-        Ok(Self { statistics, location: mean - EULER * scale, scale })
+        Ok(Self {
+            statistics,
+            location: mean - EULER * scale,
+            scale,
+        })
     }
 
     /// Number of scans.
@@ -125,7 +150,12 @@ impl EmptyScanLaw {
     /// [`Error::OutOfRange`] unless the rate lies between 0 and 1.
     pub fn threshold(&self, false_alarm: f64) -> Result<f64, Error> {
         let is_rate = false_alarm > 0.0 && false_alarm < 1.0;
-        check("false_alarm", false_alarm, "between 0 and 1, for example 0.01", is_rate)?;
+        check(
+            "false_alarm",
+            false_alarm,
+            "between 0 and 1, for example 0.01",
+            is_rate,
+        )?;
         let least = self.least_counted_rate();
         if false_alarm < least {
             let (anchor, share) = (self.statistics[COUNTED - 1], false_alarm / least);

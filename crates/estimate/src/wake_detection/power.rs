@@ -42,7 +42,10 @@ impl Share {
     #[must_use]
     pub fn of(hits: usize, trials: usize) -> Self {
         let value = hits as f64 / trials as f64;
-        Self { value, standard_error: (value * (1.0 - value) / trials as f64).sqrt() }
+        Self {
+            value,
+            standard_error: (value * (1.0 - value) / trials as f64).sqrt(),
+        }
     }
 }
 
@@ -52,14 +55,21 @@ impl WakeDetector {
     pub fn draw_wakes<R: Rng>(&self, count: usize, stream: impl Fn(u64) -> R) -> Vec<Wake> {
         let draw = |index: usize| {
             let mut generator = stream(index as u64);
-            let mut between = |(low, high): (f64, f64)| low + (high - low) * generator.random::<f64>();
+            let mut between =
+                |(low, high): (f64, f64)| low + (high - low) * generator.random::<f64>();
             (0..TRIES.0).find_map(|_| {
                 let spacing_m = between(self.spacing_m);
                 (0..TRIES.1).find_map(|_| {
-                    let (left_m, height_m) = (between(self.bank.lateral_m), between(self.bank.up_m));
-                    let places_m = [left_m, left_m + spacing_m].map(|lateral_m| (lateral_m, height_m));
-                    let [left, right] = places_m.map(|place_m| Vortex::at(place_m, 1.0, 0.05 * spacing_m));
-                    places_m.iter().all(|at_m| self.cells.hold(&self.model, *at_m)).then(|| Wake::calm(left, right))
+                    let (left_m, height_m) =
+                        (between(self.bank.lateral_m), between(self.bank.up_m));
+                    let places_m =
+                        [left_m, left_m + spacing_m].map(|lateral_m| (lateral_m, height_m));
+                    let [left, right] =
+                        places_m.map(|place_m| Vortex::at(place_m, 1.0, 0.05 * spacing_m));
+                    places_m
+                        .iter()
+                        .all(|at_m| self.cells.hold(&self.model, *at_m))
+                        .then(|| Wake::calm(left, right))
                 })
             })
         };
@@ -87,7 +97,12 @@ impl WakeDetector {
             deviations.push(mean_m2_s / length);
         }
         let empty = self.empty_products(trials, stream);
-        Ok(DetectionTrials { detector: self, empty, wakes: products, circulation_std_m2_s: deviations })
+        Ok(DetectionTrials {
+            detector: self,
+            empty,
+            wakes: products,
+            circulation_std_m2_s: deviations,
+        })
     }
 }
 
@@ -97,33 +112,55 @@ impl DetectionTrials<'_> {
     pub fn statistics(&self, circulation_m2_s: f64) -> Vec<f64> {
         let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
             let wake = &self.wakes[i % self.wakes.len()];
-            self.detector.best((&empty + circulation_m2_s * wake).view()).0
+            self.detector
+                .best((&empty + circulation_m2_s * wake).view())
+                .0
         };
-        self.empty.rows().into_iter().enumerate().map(trial).collect()
+        self.empty
+            .rows()
+            .into_iter()
+            .enumerate()
+            .map(trial)
+            .collect()
     }
 
     /// Shares of the wakes of each circulation \[m^2/s\] whose statistic exceeds a threshold, which must not be negative.
     #[must_use]
     pub fn detection(&self, circulation_m2_s: &[f64], threshold: f64) -> Vec<Share> {
         let missed = self.missed_m2_s(threshold);
-        circulation_m2_s.iter().map(|circulation| share(&missed, *circulation)).collect()
+        circulation_m2_s
+            .iter()
+            .map(|circulation| share(&missed, *circulation))
+            .collect()
     }
 
     /// The circulations between which each trial stays below a threshold \[m^2/s\]: scores are linear in the circulation, so the largest of them is
     /// convex.
     fn missed_m2_s(&self, threshold: f64) -> Vec<[f64; 2]> {
         let root = threshold.max(0.0).sqrt();
-        let slopes: Vec<Vec<f64>> = self.wakes.iter().map(|wake| self.detector.scores(wake.view()).collect()).collect();
+        let slopes: Vec<Vec<f64>> = self
+            .wakes
+            .iter()
+            .map(|wake| self.detector.scores(wake.view()).collect())
+            .collect();
         let trial = |(i, empty): (usize, ndarray::ArrayView1<'_, f64>)| {
             let lines = self.detector.scores(empty).zip(&slopes[i % slopes.len()]);
-            lines.fold([f64::NEG_INFINITY, f64::INFINITY], |[low, high], (score, slope)| match (root - score) / slope {
-                reached if *slope > 0.0 => [low, high.min(reached)],
-                reached if *slope < 0.0 => [low.max(reached), high],
-                _ if score > root => [f64::INFINITY, f64::NEG_INFINITY],
-                _ => [low, high],
-            })
+            lines.fold(
+                [f64::NEG_INFINITY, f64::INFINITY],
+                |[low, high], (score, slope)| match (root - score) / slope {
+                    reached if *slope > 0.0 => [low, high.min(reached)],
+                    reached if *slope < 0.0 => [low.max(reached), high],
+                    _ if score > root => [f64::INFINITY, f64::NEG_INFINITY],
+                    _ => [low, high],
+                },
+            )
         };
-        self.empty.rows().into_iter().enumerate().map(trial).collect()
+        self.empty
+            .rows()
+            .into_iter()
+            .enumerate()
+            .map(trial)
+            .collect()
     }
 
     /// Bound on the circulation of the wakes were their places known \[m^2/s\], root mean square.
@@ -141,13 +178,26 @@ impl DetectionTrials<'_> {
         let missed = self.missed_m2_s(threshold);
         let of_group = |group: usize| {
             let own = |i: &usize| i % self.wakes.len() % GROUPS == group;
-            found_nine_times(&(0..missed.len()).filter(own).map(|i| missed[i]).collect::<Vec<_>>(), foretold)
+            found_nine_times(
+                &(0..missed.len())
+                    .filter(own)
+                    .map(|i| missed[i])
+                    .collect::<Vec<_>>(),
+                foretold,
+            )
         };
-        let groups: Vec<f64> = (0..GROUPS).filter(|_| self.wakes.len() >= 2 * GROUPS).map(of_group).collect();
+        let groups: Vec<f64> = (0..GROUPS)
+            .filter(|_| self.wakes.len() >= 2 * GROUPS)
+            .map(of_group)
+            .collect();
         let count = groups.len() as f64;
         let mean = groups.iter().sum::<f64>() / count;
         let squares: f64 = groups.iter().map(|x| (x - mean).powi(2)).sum();
-        [found_nine_times(&missed, foretold), (squares / (count - 1.0) / count).sqrt(), foretold]
+        [
+            found_nine_times(&missed, foretold),
+            (squares / (count - 1.0) / count).sqrt(),
+            foretold,
+        ]
     }
 }
 
@@ -159,7 +209,11 @@ fn found_nine_times(missed: &[[f64; 2]], about: f64) -> f64 {
     }
     while high - low > 2e-3 * high {
         let middle = 0.5 * (low + high);
-        if share(missed, middle).value < 0.9 { low = middle } else { high = middle }
+        if share(missed, middle).value < 0.9 {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     0.5 * (low + high)
 }
@@ -167,5 +221,8 @@ fn found_nine_times(missed: &[[f64; 2]], about: f64) -> f64 {
 /// Share of trials that find a circulation, of those between which each misses it.
 fn share(missed_m2_s: &[[f64; 2]], circulation_m2_s: f64) -> Share {
     let is_missed = |[low, high]: &&[f64; 2]| (*low..=*high).contains(&circulation_m2_s);
-    Share::of(missed_m2_s.len() - missed_m2_s.iter().filter(is_missed).count(), missed_m2_s.len())
+    Share::of(
+        missed_m2_s.len() - missed_m2_s.iter().filter(is_missed).count(),
+        missed_m2_s.len(),
+    )
 }

@@ -17,12 +17,17 @@ const WITH_MEDIAN: f64 = 1.09;
 #[must_use]
 pub fn without_spikes(map: &ScanMap, turbulence: Option<&Turbulence>) -> (ScanMap, usize) {
     let mut kept = map.unfolded();
-    let off = Array2::from_shape_fn(kept.velocity_m_s.raw_dim(), |at| off_neighbours(&kept.velocity_m_s, at));
+    let off = Array2::from_shape_fn(kept.velocity_m_s.raw_dim(), |at| {
+        off_neighbours(&kept.velocity_m_s, at)
+    });
     let of_all = robust_scale(off.iter().copied().filter(|x| x.is_finite()));
     let air_m_s = turbulence.map_or(0.0, |turbulence| turbulence.deviation_m_s);
     let mut spikes = 0;
     for (at, off) in off.indexed_iter() {
-        let deviation = kept.sigma_m_s.as_ref().map_or(of_all, |sigma| WITH_MEDIAN * sigma[at].hypot(air_m_s));
+        let deviation = kept
+            .sigma_m_s
+            .as_ref()
+            .map_or(of_all, |sigma| WITH_MEDIAN * sigma[at].hypot(air_m_s));
         if off.abs() > FAR * deviation {
             kept.velocity_m_s[at] = f64::NAN;
             spikes += 1;
@@ -36,7 +41,9 @@ fn off_neighbours(velocity: &Array2<f64>, (line, gate): (usize, usize)) -> f64 {
     let mut about = Vec::with_capacity(8);
     for i in line.saturating_sub(1)..=line + 1 {
         for j in gate.saturating_sub(1)..=gate + 1 {
-            let value = velocity.get((i, j)).filter(|v| v.is_finite() && (i, j) != (line, gate));
+            let value = velocity
+                .get((i, j))
+                .filter(|v| v.is_finite() && (i, j) != (line, gate));
             about.extend(value);
         }
     }
@@ -52,9 +59,12 @@ mod tests {
     fn single_outliers_go_and_a_wake_stays_nearly_whole() {
         let elevation_rad: Vec<f64> = (0..60).map(|i| 0.02 + 3e-3 * f64::from(i)).collect();
         let range_m: Vec<f64> = (0..36).map(|i| 330.0 + 4.0 * f64::from(i)).collect();
-        let (model, wake) =
-            (WakeModel::default(), Wake::from_array(&[400.0, 400.0, 377.0, 48.0, 424.0, 48.0, 2.35, 2.35, 2.0, 0.0]));
-        let of = |(i, j): (usize, usize)| model.radial_velocity_m_s(&wake, range_m[j], elevation_rad[i]);
+        let (model, wake) = (
+            WakeModel::default(),
+            Wake::from_array(&[400.0, 400.0, 377.0, 48.0, 424.0, 48.0, 2.35, 2.35, 2.0, 0.0]),
+        );
+        let of =
+            |(i, j): (usize, usize)| model.radial_velocity_m_s(&wake, range_m[j], elevation_rad[i]);
         let mut map = ScanMap {
             velocity_m_s: Array2::from_shape_fn((60, 36), of),
             sigma_m_s: Some(Array2::from_elem((60, 36), 0.5)),
@@ -70,8 +80,18 @@ mod tests {
         }
         let (kept, spikes) = without_spikes(&map, None);
         assert!((100..135).contains(&spikes), "{spikes}");
-        assert!(kept.velocity_m_s.iter().all(|v| v.is_nan() || (-14.9..14.9).contains(v)));
-        let (_, unstated) = without_spikes(&ScanMap { sigma_m_s: None, ..map }, None);
+        assert!(
+            kept.velocity_m_s
+                .iter()
+                .all(|v| v.is_nan() || (-14.9..14.9).contains(v))
+        );
+        let (_, unstated) = without_spikes(
+            &ScanMap {
+                sigma_m_s: None,
+                ..map
+            },
+            None,
+        );
         assert!(unstated >= 100, "{unstated}");
     }
 }

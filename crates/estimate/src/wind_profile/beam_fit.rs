@@ -34,7 +34,12 @@ impl WindFit {
 /// [`Error::Length`] if there is not one velocity for each direction.
 pub fn fit_wind(direction: &[[f64; 3]], velocity_m_s: &[f64]) -> Result<Option<WindFit>, Error> {
     length("velocity_m_s", direction.len(), velocity_m_s.len())?;
-    let known = || direction.iter().zip(velocity_m_s).filter(|(_, v)| v.is_finite());
+    let known = || {
+        direction
+            .iter()
+            .zip(velocity_m_s)
+            .filter(|(_, v)| v.is_finite())
+    };
     let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
     for (e, v) in known() {
         for i in 0..3 {
@@ -44,12 +49,25 @@ pub fn fit_wind(direction: &[[f64; 3]], velocity_m_s: &[f64]) -> Result<Option<W
             }
         }
     }
-    let Some(unit_covariance) = inverse(&normal) else { return Ok(None) };
+    let Some(unit_covariance) = inverse(&normal) else {
+        return Ok(None);
+    };
     let velocity_m_s = unit_covariance.map(|row| dot(row, right));
     let beams = known().count();
-    let squares: f64 = known().map(|(e, v)| (v - dot(*e, velocity_m_s)).powi(2)).sum();
-    let residual_m_s = if beams > 3 { (squares / (beams - 3) as f64).sqrt() } else { f64::NAN };
-    Ok(Some(WindFit { velocity_m_s, unit_covariance, residual_m_s, beams }))
+    let squares: f64 = known()
+        .map(|(e, v)| (v - dot(*e, velocity_m_s)).powi(2))
+        .sum();
+    let residual_m_s = if beams > 3 {
+        (squares / (beams - 3) as f64).sqrt()
+    } else {
+        f64::NAN
+    };
+    Ok(Some(WindFit {
+        velocity_m_s,
+        unit_covariance,
+        residual_m_s,
+        beams,
+    }))
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {

@@ -21,7 +21,12 @@ pub struct SwungWind {
 pub fn swing(elevation_rad: f64, [north, east, south, west]: [f64; 4]) -> Result<SwungWind, Error> {
     let (sin, cos) = elevation_rad.sin_cos();
     let slanted = elevation_rad > 0.0 && elevation_rad < std::f64::consts::FRAC_PI_2;
-    check("elevation_rad", elevation_rad, "between 0 and pi/2", slanted)?;
+    check(
+        "elevation_rad",
+        elevation_rad,
+        "between 0 and pi/2",
+        slanted,
+    )?;
     Ok(SwungWind {
         horizontal_m_s: [0.5 * (north - south) / cos, 0.5 * (east - west) / cos],
         vertical_m_s: 0.25 * (north + east + south + west) / sin,

@@ -24,8 +24,16 @@ impl Gates {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if window or step is 0 or the time is not finite.
-    pub fn new(window_samples: usize, step_samples: usize, first_sample_time_s: f64) -> Result<Self, Error> {
-        let gates = Self { window_samples, step_samples, first_sample_time_s };
+    pub fn new(
+        window_samples: usize,
+        step_samples: usize,
+        first_sample_time_s: f64,
+    ) -> Result<Self, Error> {
+        let gates = Self {
+            window_samples,
+            step_samples,
+            first_sample_time_s,
+        };
         gates.validate()?;
         Ok(gates)
     }
@@ -47,7 +55,10 @@ impl Gates {
     pub fn count(&self, record_samples: usize) -> Result<usize, Error> {
         self.validate()?;
         if self.window_samples > record_samples {
-            return Err(Error::WindowLongerThanRecord { window_samples: self.window_samples, record_samples });
+            return Err(Error::WindowLongerThanRecord {
+                window_samples: self.window_samples,
+                record_samples,
+            });
         }
         Ok((record_samples - self.window_samples) / self.step_samples + 1)
     }
@@ -73,7 +84,9 @@ impl Gates {
     /// As [`Gates::count`].
     pub fn ranges_m(&self, record_samples: usize, sampling: &Sampling) -> Result<Vec<f64>, Error> {
         let count = self.count(record_samples)?;
-        Ok((0..count).map(|gate| self.range_m(gate, sampling)).collect())
+        Ok((0..count)
+            .map(|gate| self.range_m(gate, sampling))
+            .collect())
     }
 
     /// Distance between neighbouring window centres \[m\].
@@ -103,12 +116,28 @@ mod tests {
         let start_s = 2e-6;
         let gates = Gates::new(64, 1, start_s).unwrap();
         let start_m = 0.5 * SPEED_OF_LIGHT_M_S * start_s;
-        assert_relative_eq!(gates.range_m(0, &sampling()) - start_m, 19.186_717_3, max_relative = 1e-8);
-        assert_relative_eq!(gates.length_m(&sampling()), 38.373_434_6, max_relative = 1e-8);
+        assert_relative_eq!(
+            gates.range_m(0, &sampling()) - start_m,
+            19.186_717_3,
+            max_relative = 1e-8
+        );
+        assert_relative_eq!(
+            gates.length_m(&sampling()),
+            38.373_434_6,
+            max_relative = 1e-8
+        );
         let ranges_m = gates.ranges_m(100, &sampling()).unwrap();
         assert_eq!(ranges_m.len(), 37);
-        assert_relative_eq!(ranges_m[1] - ranges_m[0], 0.599_584_916, max_relative = 1e-8);
-        assert_relative_eq!(gates.spacing_m(&sampling()), 0.599_584_916, max_relative = 1e-8);
+        assert_relative_eq!(
+            ranges_m[1] - ranges_m[0],
+            0.599_584_916,
+            max_relative = 1e-8
+        );
+        assert_relative_eq!(
+            gates.spacing_m(&sampling()),
+            0.599_584_916,
+            max_relative = 1e-8
+        );
     }
 
     #[test]
@@ -122,7 +151,13 @@ mod tests {
     #[test]
     fn window_longer_than_the_record_names_both_lengths() {
         let error = Gates::new(64, 1, 0.0).unwrap().count(50).unwrap_err();
-        assert_eq!(error, Error::WindowLongerThanRecord { window_samples: 64, record_samples: 50 });
+        assert_eq!(
+            error,
+            Error::WindowLongerThanRecord {
+                window_samples: 64,
+                record_samples: 50
+            }
+        );
         let text = error.to_string();
         assert!(text.contains("64") && text.contains("50"));
     }

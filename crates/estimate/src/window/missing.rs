@@ -28,7 +28,10 @@ impl Default for MissingSamples {
     /// Raw counts of a converter may well be -9999: they need [`MissingSamples::not_finite`].
     fn default() -> Self {
         // the default fill of NetCDF's floats and doubles is 15 x 2^119
-        Self { fill: vec![-9999.0, 15.0 * 119f64.exp2()], outsized: true }
+        Self {
+            fill: vec![-9999.0, 15.0 * 119f64.exp2()],
+            outsized: true,
+        }
     }
 }
 
@@ -36,15 +39,23 @@ impl MissingSamples {
     /// Only samples that are not finite are missing.
     #[must_use]
     pub fn not_finite() -> Self {
-        Self { fill: Vec::new(), outsized: false }
+        Self {
+            fill: Vec::new(),
+            outsized: false,
+        }
     }
 
     /// The rule for a set of samples.
     pub(crate) fn rule<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Rule<'_> {
-        let mut rule = Rule { fill: &self.fill, limit: f64::INFINITY };
+        let mut rule = Rule {
+            fill: &self.fill,
+            limit: f64::INFINITY,
+        };
         if self.outsized {
             let mut sizes = SampleSizes::default();
-            samples.filter(|sample| rule.is_measured(*sample)).for_each(|sample| sizes.add(sample.largest_part()));
+            samples
+                .filter(|sample| rule.is_measured(*sample))
+                .for_each(|sample| sizes.add(sample.largest_part()));
             rule.limit = sizes.outsized();
         }
         rule
@@ -62,7 +73,10 @@ pub struct SampleSizes {
 
 impl Default for SampleSizes {
     fn default() -> Self {
-        Self { counts: vec![0; 2048], largest: vec![0.0; 2048] }
+        Self {
+            counts: vec![0; 2048],
+            largest: vec![0.0; 2048],
+        }
     }
 }
 
@@ -81,7 +95,13 @@ impl SampleSizes {
     pub fn outsized(&self) -> f64 {
         let all: usize = self.counts.iter().sum();
         let (mut above, mut last, mut limit) = (0, None, f64::INFINITY);
-        for (order, count) in self.counts.iter().enumerate().rev().filter(|(_, count)| **count > 0) {
+        for (order, count) in self
+            .counts
+            .iter()
+            .enumerate()
+            .rev()
+            .filter(|(_, count)| **count > 0)
+        {
             if let Some(last) = last
                 && last - order > GAP
                 && 2 * above < all
@@ -97,7 +117,11 @@ impl SampleSizes {
     /// The largest sample below `limit`; 0 if there is none.
     #[must_use]
     pub fn largest_below(&self, limit: f64) -> f64 {
-        self.largest.iter().copied().filter(|size| *size < limit).fold(0.0, f64::max)
+        self.largest
+            .iter()
+            .copied()
+            .filter(|size| *size < limit)
+            .fold(0.0, f64::max)
     }
 }
 
@@ -111,10 +135,15 @@ pub(crate) struct Rule<'a> {
 
 impl Rule<'_> {
     /// Only samples that are not finite are missing.
-    pub(crate) const NOT_FINITE: Rule<'static> = Rule { fill: &[], limit: f64::INFINITY };
+    pub(crate) const NOT_FINITE: Rule<'static> = Rule {
+        fill: &[],
+        limit: f64::INFINITY,
+    };
 
     pub(crate) fn is_measured<S: Sample>(&self, sample: S) -> bool {
-        sample.is_finite() && sample.largest_part() < self.limit && !self.fill.iter().any(|fill| sample.has_part(*fill))
+        sample.is_finite()
+            && sample.largest_part() < self.limit
+            && !self.fill.iter().any(|fill| sample.has_part(*fill))
     }
 
     /// Power of two next to the largest part of the measured samples; `None` if there is none above 0.
@@ -122,7 +151,9 @@ impl Rule<'_> {
     /// Dividing by it is exact and brings the samples to order one, so that squares neither overflow nor vanish.
     pub(crate) fn binary_scale<S: Sample>(&self, samples: impl Iterator<Item = S>) -> Option<f64> {
         let measured = samples.filter(|sample| self.is_measured(*sample));
-        let largest = measured.fold(0.0_f64, |largest, sample| largest.max(sample.largest_part()));
+        let largest = measured.fold(0.0_f64, |largest, sample| {
+            largest.max(sample.largest_part())
+        });
         // clamped so that the scale and its inverse are both normal numbers
         (largest > 0.0).then(|| largest.log2().floor().clamp(-1000.0, 1000.0).exp2())
     }
@@ -135,12 +166,15 @@ pub(crate) fn invalid_windows<S: Sample>(
     gates: &Gates,
     count: usize,
 ) -> Option<Vec<bool>> {
-    let missing = samples.enumerate().filter(|(_, sample)| !rule.is_measured(*sample));
+    let missing = samples
+        .enumerate()
+        .filter(|(_, sample)| !rule.is_measured(*sample));
     let bad: Vec<usize> = missing.map(|(index, _)| index).collect();
     let invalid = |gate: usize| {
         let start = gate * gates.step_samples;
         let next = bad.partition_point(|index| *index < start);
-        bad.get(next).is_some_and(|index| *index < start + gates.window_samples)
+        bad.get(next)
+            .is_some_and(|index| *index < start + gates.window_samples)
     };
     (!bad.is_empty()).then(|| (0..count).map(invalid).collect())
 }
@@ -153,14 +187,26 @@ mod tests {
     fn measured(samples: &[f64]) -> Vec<bool> {
         let missing = MissingSamples::default();
         let rule = missing.rule(samples.iter().copied());
-        samples.iter().map(|sample| rule.is_measured(*sample)).collect()
+        samples
+            .iter()
+            .map(|sample| rule.is_measured(*sample))
+            .collect()
     }
 
     #[test]
     fn fill_values_and_the_few_that_dwarf_the_others_are_missing() {
-        assert_eq!(measured(&[0.3, f64::NAN, -0.1, 1e308, 0.0]), [true, false, true, false, true]);
-        assert_eq!(measured(&[1.0, -9999.0, 2.0, 9.969_209_968_386_869e36]), [true, false, true, false]);
-        assert_eq!(measured(&[1e-6, -9999.0, 9999.0, 1e-6, 2e-6]), [true, false, false, true, true]);
+        assert_eq!(
+            measured(&[0.3, f64::NAN, -0.1, 1e308, 0.0]),
+            [true, false, true, false, true]
+        );
+        assert_eq!(
+            measured(&[1.0, -9999.0, 2.0, 9.969_209_968_386_869e36]),
+            [true, false, true, false]
+        );
+        assert_eq!(
+            measured(&[1e-6, -9999.0, 9999.0, 1e-6, 2e-6]),
+            [true, false, false, true, true]
+        );
         // several unlike ones, each far above the next
         assert_eq!(
             measured(&[1e-6, 1e300, 1e30, 3e-6, 1e-6, 2e-6, 1e6]),
@@ -178,7 +224,8 @@ mod tests {
         assert_eq!(measured(&[0.0, 5.0]), [true; 2]);
         let all = MissingSamples::not_finite();
         assert!(
-            all.rule([1.0, 1e308].into_iter()).is_measured(1e308) && !all.rule([1.0].into_iter()).is_measured(f64::NAN)
+            all.rule([1.0, 1e308].into_iter()).is_measured(1e308)
+                && !all.rule([1.0].into_iter()).is_measured(f64::NAN)
         );
     }
 
@@ -186,11 +233,17 @@ mod tests {
     fn scale_is_a_power_of_two_next_to_the_largest_sample() {
         fn scale<S: Sample>(samples: &[S]) -> f64 {
             let missing = MissingSamples::default();
-            missing.rule(samples.iter().copied()).binary_scale(samples.iter().copied()).unwrap_or(1.0)
+            missing
+                .rule(samples.iter().copied())
+                .binary_scale(samples.iter().copied())
+                .unwrap_or(1.0)
         }
         assert_eq!(scale(&[0.3, -5.0, f64::NAN, 1e300, 2.0]), 4.0);
         assert_eq!(scale(&[Complex::new(0.0, 0.25)]), 0.25);
-        assert_eq!(scale(&[Complex::new(0.5, -9999.0), Complex::new(1.0, 1.0)]), 1.0);
+        assert_eq!(
+            scale(&[Complex::new(0.5, -9999.0), Complex::new(1.0, 1.0)]),
+            1.0
+        );
         assert_eq!(scale(&[0.0]), 1.0);
         assert!(scale(&[1e-320]).recip().is_finite());
     }

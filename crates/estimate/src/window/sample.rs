@@ -13,7 +13,9 @@ mod sealed {
 }
 
 /// One sample of a window: `f64` or `Complex<f64>`.
-pub trait Sample: Copy + Send + Sync + Into<Complex<f64>> + Mul<f64, Output = Self> + sealed::Sealed + 'static {
+pub trait Sample:
+    Copy + Send + Sync + Into<Complex<f64>> + Mul<f64, Output = Self> + sealed::Sealed + 'static
+{
     /// Kind of signal made of such samples.
     const KIND: SignalKind;
 

@@ -37,7 +37,12 @@ impl Sampling {
         wavelength_m: f64,
         band_hz: (f64, f64),
     ) -> Result<Self, Error> {
-        let sampling = Self { sample_rate_hz, intermediate_frequency_hz, wavelength_m, band_hz };
+        let sampling = Self {
+            sample_rate_hz,
+            intermediate_frequency_hz,
+            wavelength_m,
+            band_hz,
+        };
         sampling.validate()?;
         Ok(sampling)
     }
@@ -46,7 +51,11 @@ impl Sampling {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] or [`Error::Band`], see [`Sampling::validate`].
-    pub fn baseband(sample_rate_hz: f64, wavelength_m: f64, bandwidth_hz: f64) -> Result<Self, Error> {
+    pub fn baseband(
+        sample_rate_hz: f64,
+        wavelength_m: f64,
+        bandwidth_hz: f64,
+    ) -> Result<Self, Error> {
         let half_hz = 0.5 * bandwidth_hz;
         Self::new(sample_rate_hz, 0.0, wavelength_m, (-half_hz, half_hz))
     }
@@ -64,7 +73,11 @@ impl Sampling {
         if low_hz < high_hz && low_hz >= -half_hz && high_hz <= half_hz {
             Ok(())
         } else {
-            Err(Error::Band { low_hz, high_hz, allowed: "increasing and within half the sampling rate of 0 Hz" })
+            Err(Error::Band {
+                low_hz,
+                high_hz,
+                allowed: "increasing and within half the sampling rate of 0 Hz",
+            })
         }
     }
 
@@ -73,7 +86,11 @@ impl Sampling {
         self.validate()?;
         let (low_hz, high_hz) = self.band_hz;
         if kind == SignalKind::Real && low_hz < 0.0 {
-            return Err(Error::Band { low_hz, high_hz, allowed: "at or above 0 Hz for real samples" });
+            return Err(Error::Band {
+                low_hz,
+                high_hz,
+                allowed: "at or above 0 Hz for real samples",
+            });
         }
         Ok(())
     }
@@ -104,7 +121,10 @@ impl Sampling {
     /// Lowest and highest velocity \[m/s\] inside the detector band.
     #[must_use]
     pub fn velocity_limits_m_s(&self) -> (f64, f64) {
-        (self.velocity_m_s(self.band_hz.1), self.velocity_m_s(self.band_hz.0))
+        (
+            self.velocity_m_s(self.band_hz.1),
+            self.velocity_m_s(self.band_hz.0),
+        )
     }
 
     /// Frequency \[Hz\] at which a true frequency \[Hz\] appears after sampling.
@@ -139,8 +159,16 @@ mod tests {
     #[test]
     fn motion_away_from_the_lidar_lowers_the_frequency() {
         let sampling = table_2();
-        assert_relative_eq!(sampling.frequency_hz(1.0), 80e6 - 2.0 / 1.55e-6, max_relative = 1e-15);
-        assert_relative_eq!(sampling.velocity_m_s(sampling.frequency_hz(-3.7)), -3.7, max_relative = 1e-12);
+        assert_relative_eq!(
+            sampling.frequency_hz(1.0),
+            80e6 - 2.0 / 1.55e-6,
+            max_relative = 1e-15
+        );
+        assert_relative_eq!(
+            sampling.velocity_m_s(sampling.frequency_hz(-3.7)),
+            -3.7,
+            max_relative = 1e-12
+        );
     }
 
     #[test]
@@ -153,9 +181,21 @@ mod tests {
     #[test]
     fn velocities_beyond_the_unambiguous_interval_fold() {
         let sampling = table_2();
-        assert_relative_eq!(sampling.folded_velocity_m_s(63.0, SignalKind::Real), 61.0, max_relative = 1e-12);
-        assert_relative_eq!(sampling.folded_velocity_m_s(100.0, SignalKind::Real), 24.0, max_relative = 1e-12);
-        assert_relative_eq!(sampling.folded_velocity_m_s(-12.0, SignalKind::Real), -12.0, max_relative = 1e-12);
+        assert_relative_eq!(
+            sampling.folded_velocity_m_s(63.0, SignalKind::Real),
+            61.0,
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(
+            sampling.folded_velocity_m_s(100.0, SignalKind::Real),
+            24.0,
+            max_relative = 1e-12
+        );
+        assert_relative_eq!(
+            sampling.folded_velocity_m_s(-12.0, SignalKind::Real),
+            -12.0,
+            max_relative = 1e-12
+        );
         let baseband = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
         // complex samples repeat after F_s lambda / 2 = 193.75 m/s
         assert_relative_eq!(

@@ -24,7 +24,11 @@ impl SignalKind {
     }
 
     /// The numbers of a stored correlogram times one weight for each lag, as far as there are weights.
-    pub(crate) fn weighted_lags(self, numbers: &[f64], weights: &[f64]) -> impl Iterator<Item = f64> {
+    pub(crate) fn weighted_lags(
+        self,
+        numbers: &[f64],
+        weights: &[f64],
+    ) -> impl Iterator<Item = f64> {
         let lags = numbers.chunks(self.lag_numbers(1)).zip(weights);
         lags.flat_map(|(lag, weight)| lag.iter().map(move |number| number * weight))
     }

@@ -23,7 +23,9 @@ pub enum Weighting {
 impl Default for Weighting {
     /// Gaussian with w = 1/4: h falls to 0.135 at the ends of the window.
     fn default() -> Self {
-        Self::Gaussian { relative_half_width: 0.25 }
+        Self::Gaussian {
+            relative_half_width: 0.25,
+        }
     }
 }
 
@@ -39,10 +41,16 @@ impl Weighting {
         let index = (0..window_samples).map(|n| n as f64);
         Ok(match *self {
             Self::Rectangular => vec![1.0; window_samples],
-            Self::Hann => index.map(|n| (std::f64::consts::PI * (n + 0.5) / length).sin().powi(2)).collect(),
-            Self::Gaussian { relative_half_width } => {
+            Self::Hann => index
+                .map(|n| (std::f64::consts::PI * (n + 0.5) / length).sin().powi(2))
+                .collect(),
+            Self::Gaussian {
+                relative_half_width,
+            } => {
                 positive("relative_half_width", relative_half_width)?;
-                index.map(|n| (-0.5 * ((n - centre) / (relative_half_width * length)).powi(2)).exp()).collect()
+                index
+                    .map(|n| (-0.5 * ((n - centre) / (relative_half_width * length)).powi(2)).exp())
+                    .collect()
             }
         })
     }
@@ -55,7 +63,11 @@ mod tests {
 
     #[test]
     fn weightings_are_symmetric_and_reach_their_stated_ends() {
-        for weighting in [Weighting::Rectangular, Weighting::Hann, Weighting::default()] {
+        for weighting in [
+            Weighting::Rectangular,
+            Weighting::Hann,
+            Weighting::default(),
+        ] {
             let h = weighting.weights(64).unwrap();
             for n in 0..64 {
                 assert_relative_eq!(h[n], h[63 - n], max_relative = 1e-12);
@@ -63,16 +75,26 @@ mod tests {
             assert!(h[31] > 0.999);
         }
         let gaussian = Weighting::default().weights(64).unwrap();
-        assert_relative_eq!(gaussian[0], (-0.5_f64 * (31.5 / 16.0_f64).powi(2)).exp(), max_relative = 1e-14);
+        assert_relative_eq!(
+            gaussian[0],
+            (-0.5_f64 * (31.5 / 16.0_f64).powi(2)).exp(),
+            max_relative = 1e-14
+        );
         // with 9 samples and w = 1/3, h^2 falls to 1/e exactly 3 samples from the centre
-        let narrow = Weighting::Gaussian { relative_half_width: 1.0 / 3.0 }.weights(9).unwrap();
+        let narrow = Weighting::Gaussian {
+            relative_half_width: 1.0 / 3.0,
+        }
+        .weights(9)
+        .unwrap();
         assert_relative_eq!(narrow[1].powi(2), (-1.0_f64).exp(), max_relative = 1e-12);
     }
 
     #[test]
     fn degenerate_weightings_are_refused() {
         assert!(Weighting::Hann.weights(0).is_err());
-        let flat = Weighting::Gaussian { relative_half_width: 0.0 };
+        let flat = Weighting::Gaussian {
+            relative_half_width: 0.0,
+        };
         assert!(flat.weights(8).is_err());
     }
 }

@@ -31,7 +31,14 @@ fn plan() -> PeriodogramPlan<f64> {
 }
 
 fn scan(records: &Array2<f64>, elevation_rad: &[f64]) -> Scan {
-    Scan::new(&plan().statistic, &table_2(), &gates(), elevation_rad, records.view()).unwrap()
+    Scan::new(
+        &plan().statistic,
+        &table_2(),
+        &gates(),
+        elevation_rad,
+        records.view(),
+    )
+    .unwrap()
 }
 
 /// Mean correlogram and number of the valid windows near a point, window by window.
@@ -39,9 +46,16 @@ fn plain_mean(records: &Array2<f64>, point: PolarPoint, radius_m: f64) -> (Vec<f
     let weights = Weighting::default().weights(64).unwrap();
     let (mut mean, mut level) = (vec![0.0; 64], 0);
     for (ray, angle_rad) in elevations_rad().iter().enumerate() {
-        for (gate, range_m) in gates().ranges_m(SAMPLES, &table_2()).unwrap().iter().enumerate() {
-            let (a, b) =
-                (Complex::from_polar(*range_m, *angle_rad), Complex::from_polar(point.range_m, point.elevation_rad));
+        for (gate, range_m) in gates()
+            .ranges_m(SAMPLES, &table_2())
+            .unwrap()
+            .iter()
+            .enumerate()
+        {
+            let (a, b) = (
+                Complex::from_polar(*range_m, *angle_rad),
+                Complex::from_polar(point.range_m, point.elevation_rad),
+            );
             let window = records.slice(s![ray, gate..gate + 64]).to_vec();
             if (a - b).norm() > radius_m || !window.iter().all(|x| x.is_finite()) {
                 continue;
@@ -63,10 +77,16 @@ fn region_mean_is_the_running_mean_of_table_3() {
     records[[0, 230]] = f64::INFINITY;
     let scan = scan(&records, &elevations_rad());
     let mut mean = vec![0.0; 64];
-    for (range_m, elevation_rad, radius_m) in
-        [(340.0, 0.009, 2.5), (400.0, 0.011, 4.0), (450.0, 0.0, 1.0), (430.0, 0.02, 30.0)]
-    {
-        let point = PolarPoint { range_m, elevation_rad };
+    for (range_m, elevation_rad, radius_m) in [
+        (340.0, 0.009, 2.5),
+        (400.0, 0.011, 4.0),
+        (450.0, 0.0, 1.0),
+        (430.0, 0.02, 30.0),
+    ] {
+        let point = PolarPoint {
+            range_m,
+            elevation_rad,
+        };
         let (expected, level) = plain_mean(&records, point, radius_m);
         assert!(level > 0);
         assert_eq!(scan.region_mean(point, radius_m, &mut mean).unwrap(), level);
@@ -85,9 +105,15 @@ fn order_of_rays_does_not_matter() {
     let shuffled = records.select(Axis(0), &order);
     let angles_rad: Vec<f64> = order.iter().map(|&ray| elevations_rad()[ray]).collect();
     let other = scan(&shuffled, &angles_rad);
-    let point = PolarPoint { range_m: 400.0, elevation_rad: 0.01 };
+    let point = PolarPoint {
+        range_m: 400.0,
+        elevation_rad: 0.01,
+    };
     let (mut a, mut b) = (vec![0.0; 64], vec![0.0; 64]);
-    assert_eq!(forward.region_mean(point, 5.0, &mut a).unwrap(), other.region_mean(point, 5.0, &mut b).unwrap());
+    assert_eq!(
+        forward.region_mean(point, 5.0, &mut a).unwrap(),
+        other.region_mean(point, 5.0, &mut b).unwrap()
+    );
     for (a, b) in a.iter().zip(&b) {
         assert_abs_diff_eq!(a, b, epsilon = 1e-13);
     }
@@ -100,7 +126,13 @@ fn records_that_come_in_pieces_give_the_same_bits() {
     records.row_mut(4).mapv_inplace(|x| 5.0 * x);
     records.row_mut(7).mapv_inplace(|x| 3e4 * x);
     records[[5, 200]] = f64::NAN;
-    let (statistic, point) = (plan().statistic, PolarPoint { range_m: 400.0, elevation_rad: 0.01 });
+    let (statistic, point) = (
+        plan().statistic,
+        PolarPoint {
+            range_m: 400.0,
+            elevation_rad: 0.01,
+        },
+    );
     let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.7, 0.4]).unwrap();
     let lines_rad = [0.0, 0.004, 0.01, 0.013];
     let rays_rad: Vec<f64> = lines_rad.iter().flat_map(|&el| [el, el]).collect();
@@ -128,31 +160,60 @@ fn records_that_come_in_pieces_give_the_same_bits() {
 fn sums_of_some_gates_have_the_bits_of_whole_records() {
     let mut records = noise_records(13);
     records[[5, 200]] = f64::NAN;
-    let largest = records.iter().fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
+    let largest = records
+        .iter()
+        .fold(0.0_f64, |largest, sample| largest.max(sample.abs()));
     let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.7, 0.4]).unwrap();
-    let of = |statistic: &dyn Statistic<f64>, step: usize, radius_m: f64, held: std::ops::Range<usize>| {
-        let gates = Gates { step_samples: step, ..gates() };
+    let of = |statistic: &dyn Statistic<f64>,
+              step: usize,
+              radius_m: f64,
+              held: std::ops::Range<usize>| {
+        let gates = Gates {
+            step_samples: step,
+            ..gates()
+        };
         let geometry = ScanGeometry::new(&table_2(), &gates, &elevations_rad(), SAMPLES).unwrap();
         let part = records.slice(s![.., gates.samples(&held)]).to_owned();
-        let mut sums = ScanSums::of_gates(statistic, &gates, geometry, held).unwrap().scaled_for(largest);
+        let mut sums = ScanSums::of_gates(statistic, &gates, geometry, held)
+            .unwrap()
+            .scaled_for(largest);
         sums.add(0, part.view()).unwrap();
         let scan = sums.finish();
-        let point = PolarPoint { range_m: 400.0, elevation_rad: 0.01 };
+        let point = PolarPoint {
+            range_m: 400.0,
+            elevation_rad: 0.01,
+        };
         let mut mean = vec![0.0; statistic.statistic_len()];
         let level = scan.region_mean(point, radius_m, &mut mean).unwrap();
         let bits: Vec<u64> = mean.iter().map(|m| m.to_bits()).collect();
-        (bits, level, scan.n_eff(point, radius_m, &correlation).to_bits())
+        (
+            bits,
+            level,
+            scan.n_eff(point, radius_m, &correlation).to_bits(),
+        )
     };
     let (whole, short) = (plan().statistic, ShortCorrelogram::new(64, 17).unwrap());
     for statistic in [&whole as &dyn Statistic<f64>, &short] {
         for step in [1, 3, 30] {
-            let gates = Gates { step_samples: step, ..gates() };
-            let geometry = ScanGeometry::new(&table_2(), &gates, &elevations_rad(), SAMPLES).unwrap();
+            let gates = Gates {
+                step_samples: step,
+                ..gates()
+            };
+            let geometry =
+                ScanGeometry::new(&table_2(), &gates, &elevations_rad(), SAMPLES).unwrap();
             for radius_m in [0.5, 4.0, 14.0] {
                 let whole = of(statistic, step, radius_m, 0..geometry.gates());
                 let near = geometry.gates_between(400.0 - radius_m, 400.0 + radius_m);
-                for held in [near.clone(), near.start.saturating_sub(5)..near.end, near.start..geometry.gates()] {
-                    assert_eq!(of(statistic, step, radius_m, held), whole, "{step} {radius_m}");
+                for held in [
+                    near.clone(),
+                    near.start.saturating_sub(5)..near.end,
+                    near.start..geometry.gates(),
+                ] {
+                    assert_eq!(
+                        of(statistic, step, radius_m, held),
+                        whole,
+                        "{step} {radius_m}"
+                    );
                 }
             }
         }
@@ -171,16 +232,28 @@ fn points() -> Vec<PolarPoint> {
 fn map_has_the_same_bits_with_any_number_of_threads() {
     let records = noise_records(3);
     let run = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| {
             let scan = scan(&records, &elevations_rad());
-            scan.map(&points(), &Radius::Fixed { radius_m: 2.0 }, None, &plan().estimator).unwrap()
+            scan.map(
+                &points(),
+                &Radius::Fixed { radius_m: 2.0 },
+                None,
+                &plan().estimator,
+            )
+            .unwrap()
         })
     };
     let one = run(1);
     for threads in [2, 3, 7] {
         for (a, b) in one.iter().zip(run(threads)) {
-            assert_eq!(a.estimate.velocity_m_s.to_bits(), b.estimate.velocity_m_s.to_bits());
+            assert_eq!(
+                a.estimate.velocity_m_s.to_bits(),
+                b.estimate.velocity_m_s.to_bits()
+            );
             assert_eq!(a.estimate.power.to_bits(), b.estimate.power.to_bits());
             assert_eq!(a.level, b.level);
         }
@@ -205,15 +278,23 @@ fn uniform_wind_maps_to_itself_whatever_the_radius_and_a_missing_sample() {
     let holed = scan(&records, &elevations_rad());
     let varying = Radius::OfRange(Box::new(|range_m| 0.005 * range_m));
     for radius in [Radius::Fixed { radius_m: 1.5 }, varying] {
-        let full = whole.map(&points(), &radius, None, &plan().estimator).unwrap();
-        let less = holed.map(&points(), &radius, None, &plan().estimator).unwrap();
+        let full = whole
+            .map(&points(), &radius, None, &plan().estimator)
+            .unwrap();
+        let less = holed
+            .map(&points(), &radius, None, &plan().estimator)
+            .unwrap();
         let mut missing = 0;
         for (full, less) in full.iter().zip(&less).filter(|(full, _)| full.level > 0) {
             assert!((less.estimate.velocity_m_s - 4.0).abs() < 1.0 || less.level == 0);
             assert!(less.level <= full.level);
             missing += full.level - less.level;
             if full.level == less.level {
-                assert_abs_diff_eq!(full.estimate.velocity_m_s, less.estimate.velocity_m_s, epsilon = 1e-6);
+                assert_abs_diff_eq!(
+                    full.estimate.velocity_m_s,
+                    less.estimate.velocity_m_s,
+                    epsilon = 1e-6
+                );
             }
         }
         assert!(missing > 0);
@@ -229,14 +310,39 @@ fn maps<S: Sample>(records: &Array2<S>) -> Vec<MapPoint> {
     };
     let whole = PeriodogramPlan::<S>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
     let short = ShortCorrelogram::<S>::new(64, 17).unwrap();
-    let model = ModelPeak::new(ModelReading::Spectrum, &sampling, S::KIND, 17, 16, 512, Refinement::Parabola).unwrap();
+    let model = ModelPeak::new(
+        ModelReading::Spectrum,
+        &sampling,
+        S::KIND,
+        17,
+        16,
+        512,
+        Refinement::Parabola,
+    )
+    .unwrap();
     let scans: [(Scan, &dyn Estimator); 2] = [
-        (Scan::new(&whole.statistic, &sampling, &gates(), &elevation_rad, records.view()).unwrap(), &whole.estimator),
-        (Scan::new(&short, &sampling, &gates(), &elevation_rad, records.view()).unwrap(), &model),
+        (
+            Scan::new(
+                &whole.statistic,
+                &sampling,
+                &gates(),
+                &elevation_rad,
+                records.view(),
+            )
+            .unwrap(),
+            &whole.estimator,
+        ),
+        (
+            Scan::new(&short, &sampling, &gates(), &elevation_rad, records.view()).unwrap(),
+            &model,
+        ),
     ];
     let map = |radius_m: f64| {
         let radius = Radius::Fixed { radius_m };
-        scans.iter().flat_map(|(scan, estimator)| scan.map(&points(), &radius, None, *estimator).unwrap()).collect()
+        scans
+            .iter()
+            .flat_map(|(scan, estimator)| scan.map(&points(), &radius, None, *estimator).unwrap())
+            .collect()
     };
     let (mut all, wide): (Vec<MapPoint>, Vec<MapPoint>) = (map(0.7), map(7.0));
     all.extend(wide);
@@ -259,11 +365,18 @@ fn assert_only_their_own_windows(clean: &[MapPoint], holed: &[MapPoint], what: &
             touched += 1;
             if holed.level == 0 {
                 empty += 1;
-                assert!(holed.estimate.flag == Quality::Empty && holed.estimate.velocity_m_s.is_nan(), "{what}");
+                assert!(
+                    holed.estimate.flag == Quality::Empty && holed.estimate.velocity_m_s.is_nan(),
+                    "{what}"
+                );
             }
         }
     }
-    assert!(touched > empty && empty > 0 && touched < clean.len(), "{what}: {touched} {empty} {}", clean.len());
+    assert!(
+        touched > empty && empty > 0 && touched < clean.len(),
+        "{what}: {touched} {empty} {}",
+        clean.len()
+    );
 }
 
 #[test]
@@ -273,14 +386,27 @@ fn fill_values_and_huge_samples_are_left_out_counted_and_leave_every_bit_of_the_
     let complex = real.mapv(|sample| Complex::new(sample, 0.3 * sample));
     let (clean, clean_complex) = (maps(&real), maps(&complex));
     let sections = [s![1..2, 170..171], s![1..3, 150..260]];
-    for value in [1e308, -9999.0, 9.97e36, 9.969_209_968_386_869e36, f64::NAN, f64::INFINITY] {
+    for value in [
+        1e308,
+        -9999.0,
+        9.97e36,
+        9.969_209_968_386_869e36,
+        f64::NAN,
+        f64::INFINITY,
+    ] {
         for (kind, section) in ["single", "block"].iter().zip(sections) {
             let mut holed = real.clone();
             holed.slice_mut(section).fill(value);
             assert_only_their_own_windows(&clean, &maps(&holed), &format!("{value:e}, {kind}"));
             let mut holed = complex.clone();
-            holed.slice_mut(section).mapv_inplace(|sample| Complex::new(sample.re, value));
-            assert_only_their_own_windows(&clean_complex, &maps(&holed), &format!("complex {value:e}, {kind}"));
+            holed
+                .slice_mut(section)
+                .mapv_inplace(|sample| Complex::new(sample.re, value));
+            assert_only_their_own_windows(
+                &clean_complex,
+                &maps(&holed),
+                &format!("complex {value:e}, {kind}"),
+            );
         }
     }
 }
@@ -290,10 +416,25 @@ fn raw_counts_keep_minus_9999_if_the_rule_says_so() {
     let mut counts = noise_records(5).mapv(|sample| (3000.0 * sample).round());
     counts[[1, 170]] = -9999.0;
     let of = |missing: &MissingSamples| {
-        Scan::without_missing(&plan().statistic, &table_2(), &gates(), &elevations_rad(), counts.view(), missing)
-            .unwrap()
+        Scan::without_missing(
+            &plan().statistic,
+            &table_2(),
+            &gates(),
+            &elevations_rad(),
+            counts.view(),
+            missing,
+        )
+        .unwrap()
     };
-    let map = |scan: &Scan| scan.map(&points(), &Radius::Fixed { radius_m: 2.0 }, None, &plan().estimator).unwrap();
+    let map = |scan: &Scan| {
+        scan.map(
+            &points(),
+            &Radius::Fixed { radius_m: 2.0 },
+            None,
+            &plan().estimator,
+        )
+        .unwrap()
+    };
     let left_out = |scan: &Scan| map(scan).iter().map(|point| point.left_out).sum::<usize>();
     assert!(left_out(&of(&MissingSamples::default())) > 0);
     assert_eq!(left_out(&of(&MissingSamples::not_finite())), 0);
@@ -304,13 +445,28 @@ fn regions_without_windows_are_empty_and_say_so() {
     let scan = scan(&uniform_wind(), &elevations_rad());
     let correlation = WindowCorrelation::from_gate_lags(&[1.0, 0.9, 0.5]).unwrap();
     let far = [
-        PolarPoint { range_m: 5000.0, elevation_rad: 0.01 },
-        PolarPoint { range_m: 400.0, elevation_rad: -0.5 },
-        PolarPoint { range_m: 400.0, elevation_rad: 0.0105 },
+        PolarPoint {
+            range_m: 5000.0,
+            elevation_rad: 0.01,
+        },
+        PolarPoint {
+            range_m: 400.0,
+            elevation_rad: -0.5,
+        },
+        PolarPoint {
+            range_m: 400.0,
+            elevation_rad: 0.0105,
+        },
     ];
     let radius = Radius::Fixed { radius_m: 0.1 };
-    for found in scan.map(&far, &radius, Some(&correlation), &plan().estimator).unwrap() {
-        assert_eq!((found.level, found.estimate.flag, found.n_eff), (0, Quality::Empty, 0.0));
+    for found in scan
+        .map(&far, &radius, Some(&correlation), &plan().estimator)
+        .unwrap()
+    {
+        assert_eq!(
+            (found.level, found.estimate.flag, found.n_eff),
+            (0, Quality::Empty, 0.0)
+        );
         assert!(found.estimate.velocity_m_s.is_nan());
     }
 }
@@ -320,17 +476,30 @@ fn n_eff_counts_pulses_and_leaves_out_what_is_missing() {
     let mut records = uniform_wind();
     let identical = WindowCorrelation::from_gate_lags(&[1.0; 400]).unwrap();
     let range_m = gates().range_m(150, &table_2());
-    let point = PolarPoint { range_m, elevation_rad: 0.012 };
+    let point = PolarPoint {
+        range_m,
+        elevation_rad: 0.012,
+    };
     // two pulses of the line of sight at 12 mrad, 3 windows each, fully correlated within a pulse
     let radius_m = 0.7;
     let both = scan(&records, &elevations_rad());
-    assert_abs_diff_eq!(both.n_eff(point, radius_m, &identical), 2.0, epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        both.n_eff(point, radius_m, &identical),
+        2.0,
+        epsilon = 1e-12
+    );
     // the first sample of the first of the three windows of one pulse: 2 windows of it remain
     records[[5, 149]] = f64::NAN;
     let fewer = scan(&records, &elevations_rad());
-    assert_abs_diff_eq!(fewer.n_eff(point, radius_m, &identical), 25.0 / 13.0, epsilon = 1e-12);
+    assert_abs_diff_eq!(
+        fewer.n_eff(point, radius_m, &identical),
+        25.0 / 13.0,
+        epsilon = 1e-12
+    );
     let estimator = plan().estimator;
-    let map = fewer.map(&[point], &Radius::Fixed { radius_m }, None, &estimator).unwrap();
+    let map = fewer
+        .map(&[point], &Radius::Fixed { radius_m }, None, &estimator)
+        .unwrap();
     assert_eq!(map[0].level, 5);
     assert!(map[0].n_eff.is_nan());
 }
@@ -339,12 +508,18 @@ fn n_eff_counts_pulses_and_leaves_out_what_is_missing() {
 fn extreme_amplitudes_map_like_ordinary_ones() {
     let records = uniform_wind();
     let radius = Radius::Fixed { radius_m: 2.0 };
-    let reference = scan(&records, &elevations_rad()).map(&points(), &radius, None, &plan().estimator).unwrap();
+    let reference = scan(&records, &elevations_rad())
+        .map(&points(), &radius, None, &plan().estimator)
+        .unwrap();
     for factor in [2.0_f64.powi(-660), 2.0_f64.powi(660)] {
-        let found =
-            scan(&(&records * factor), &elevations_rad()).map(&points(), &radius, None, &plan().estimator).unwrap();
+        let found = scan(&(&records * factor), &elevations_rad())
+            .map(&points(), &radius, None, &plan().estimator)
+            .unwrap();
         for (a, b) in reference.iter().zip(&found) {
-            assert_eq!(a.estimate.velocity_m_s.to_bits(), b.estimate.velocity_m_s.to_bits());
+            assert_eq!(
+                a.estimate.velocity_m_s.to_bits(),
+                b.estimate.velocity_m_s.to_bits()
+            );
             assert_eq!(a.estimate.flag, b.estimate.flag);
         }
     }
@@ -358,17 +533,32 @@ fn mismatched_inputs_are_refused() {
         Scan::new(&statistic, &table_2(), &gates, angles_rad, records.view()).map(|_| ())
     };
     assert!(matches!(new(gates(), &[0.0]), Err(Error::Length { .. })));
-    assert!(matches!(new(Gates::new(32, 1, 0.0).unwrap(), &elevations_rad()), Err(Error::Length { .. })));
+    assert!(matches!(
+        new(Gates::new(32, 1, 0.0).unwrap(), &elevations_rad()),
+        Err(Error::Length { .. })
+    ));
     let long = Correlogram::<f64>::new(Weighting::Hann, 500).unwrap();
-    let refused = Scan::new(&long, &table_2(), &Gates::new(500, 1, 0.0).unwrap(), &elevations_rad(), records.view());
+    let refused = Scan::new(
+        &long,
+        &table_2(),
+        &Gates::new(500, 1, 0.0).unwrap(),
+        &elevations_rad(),
+        records.view(),
+    );
     assert!(matches!(
         refused.map(|_| ()),
-        Err(Error::WindowLongerThanRecord { window_samples: 500, record_samples: 400 })
+        Err(Error::WindowLongerThanRecord {
+            window_samples: 500,
+            record_samples: 400
+        })
     ));
     let scan = scan(&records, &elevations_rad());
     for radius_m in [f64::NAN, -1.0] {
         let radius = Radius::Fixed { radius_m };
-        assert!(scan.map(&points(), &radius, None, &plan().estimator).is_err());
+        assert!(
+            scan.map(&points(), &radius, None, &plan().estimator)
+                .is_err()
+        );
     }
 }
 
@@ -407,10 +597,25 @@ impl Estimator for LagOnePhase {
 fn estimators_of_others_plug_in() {
     let baseband = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
     let turn = std::f64::consts::TAU * baseband.frequency_hz(-6.0) / 250e6;
-    let records =
-        Array2::from_shape_fn((8, SAMPLES), |(ray, n)| Complex::from_polar(1.0, turn * n as f64 + ray as f64));
-    let scan = Scan::new(&LagOnePhase, &baseband, &gates(), &elevations_rad(), records.view()).unwrap();
-    let map = scan.map(&points(), &Radius::Fixed { radius_m: 3.0 }, None, &LagOnePhase).unwrap();
+    let records = Array2::from_shape_fn((8, SAMPLES), |(ray, n)| {
+        Complex::from_polar(1.0, turn * n as f64 + ray as f64)
+    });
+    let scan = Scan::new(
+        &LagOnePhase,
+        &baseband,
+        &gates(),
+        &elevations_rad(),
+        records.view(),
+    )
+    .unwrap();
+    let map = scan
+        .map(
+            &points(),
+            &Radius::Fixed { radius_m: 3.0 },
+            None,
+            &LagOnePhase,
+        )
+        .unwrap();
     for point in map.iter().filter(|point| point.level > 0) {
         assert_abs_diff_eq!(point.estimate.velocity_m_s, -6.0, epsilon = 1e-9);
     }
@@ -422,16 +627,29 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
     let geometry = ScanGeometry::new(&table_2(), &gates(), &elevation_rad, 1000).unwrap();
     // one window: 0.69 m/s near the lidar, more with the range; long chords tell more than the root of their gates
     let by_gates = |range_m: f64| -> Vec<f64> {
-        (1..=100).map(|gates| (0.69 * range_m / 400.0).powi(-2) * f64::from(gates).powf(1.2)).collect()
+        (1..=100)
+            .map(|gates| (0.69 * range_m / 400.0).powi(-2) * f64::from(gates).powf(1.2))
+            .collect()
     };
     let target_m_s = 0.2;
     let radius = Radius::for_standard_deviation(&geometry, by_gates, target_m_s, 20.0).unwrap();
     let mut before_m = 0.0;
     for range_m in [380.0, 450.0, 600.0, 800.0] {
         let radius_m = radius.at_m(range_m).unwrap();
-        let point = PolarPoint { range_m, elevation_rad: elevation_rad[50] };
-        let std_m_s = |radius_m: f64| geometry.information(point, radius_m, &by_gates(range_m)).sqrt().recip();
-        assert!(std_m_s(radius_m * 1.1) < target_m_s && std_m_s(radius_m * 0.6) > target_m_s, "{range_m}: {radius_m}");
+        let point = PolarPoint {
+            range_m,
+            elevation_rad: elevation_rad[50],
+        };
+        let std_m_s = |radius_m: f64| {
+            geometry
+                .information(point, radius_m, &by_gates(range_m))
+                .sqrt()
+                .recip()
+        };
+        assert!(
+            std_m_s(radius_m * 1.1) < target_m_s && std_m_s(radius_m * 0.6) > target_m_s,
+            "{range_m}: {radius_m}"
+        );
         assert!(radius_m > before_m);
         before_m = radius_m;
     }
@@ -439,7 +657,19 @@ fn automatic_radius_is_the_smallest_that_reaches_the_target() {
     let modest = Radius::for_standard_deviation(&geometry, by_gates, 1e-3, 5.0).unwrap();
     assert_eq!(modest.at_m(600.0).unwrap(), 5.0);
     assert!(Radius::for_standard_deviation(&geometry, by_gates, 0.0, 5.0).is_err());
-    let point = PolarPoint { range_m: 400.0, elevation_rad: 0.05 };
-    assert_eq!(geometry.radius_for(point, 1e9, &by_gates(400.0), 5.0).unwrap(), None);
-    assert!(geometry.radius_for(point, 0.0, &by_gates(400.0), 5.0).is_err());
+    let point = PolarPoint {
+        range_m: 400.0,
+        elevation_rad: 0.05,
+    };
+    assert_eq!(
+        geometry
+            .radius_for(point, 1e9, &by_gates(400.0), 5.0)
+            .unwrap(),
+        None
+    );
+    assert!(
+        geometry
+            .radius_for(point, 0.0, &by_gates(400.0), 5.0)
+            .is_err()
+    );
 }

@@ -7,10 +7,16 @@ use wakescope_estimate::{estimators::*, models::*, spectrum::*, window::*};
 
 /// Columns x, r_biased, a, refl of the stored window.
 fn stored_window() -> [Vec<f64>; 4] {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/estimate/window64_vector.csv");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/reference/estimate/window64_vector.csv"
+    );
     let text = std::fs::read_to_string(path).unwrap();
     let mut columns: [Vec<f64>; 4] = Default::default();
-    for line in text.lines().filter(|line| line.starts_with(|c: char| c.is_ascii_digit())) {
+    for line in text
+        .lines()
+        .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
+    {
         for (column, field) in columns.iter_mut().zip(line.split(',').skip(1)) {
             column.extend(field.parse::<f64>());
         }
@@ -33,7 +39,11 @@ fn yule_walker_reproduces_the_stored_model_of_order_16() {
         for (found, expected) in model.reflection.iter().zip(&reflection) {
             assert_abs_diff_eq!(found.re, expected, epsilon = 1e-12);
         }
-        assert_relative_eq!(model.noise_power, 9.864_466_303_239_14e-1, max_relative = 1e-12);
+        assert_relative_eq!(
+            model.noise_power,
+            9.864_466_303_239_14e-1,
+            max_relative = 1e-12
+        );
         assert!(model.reflection.iter().all(|k| k.norm() < 1.0));
     }
 }
@@ -42,8 +52,16 @@ fn yule_walker_reproduces_the_stored_model_of_order_16() {
 fn ca_peak_reproduces_the_stored_window() {
     let [x, _, _, _] = stored_window();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
-    let ca =
-        ModelPeak::new(ModelReading::Spectrum, &table_2(), SignalKind::Real, 64, 16, 4096, Refinement::None).unwrap();
+    let ca = ModelPeak::new(
+        ModelReading::Spectrum,
+        &table_2(),
+        SignalKind::Real,
+        64,
+        16,
+        4096,
+        Refinement::None,
+    )
+    .unwrap();
     let found = estimate_window(&statistic, &ca, &x, &mut Scratch::new()).unwrap();
     assert_abs_diff_eq!(found.velocity_m_s, -4.223_144_531_2, epsilon = 1e-9);
     assert_eq!(found.flag, Quality::Good);
@@ -51,16 +69,27 @@ fn ca_peak_reproduces_the_stored_window() {
 
 #[test]
 fn coefficients_satisfy_the_yule_walker_equations_complex() {
-    let window: Vec<_> = noise(128, 1).chunks(2).map(|pair| Complex::new(pair[0], pair[1])).collect();
+    let window: Vec<_> = noise(128, 1)
+        .chunks(2)
+        .map(|pair| Complex::new(pair[0], pair[1]))
+        .collect();
     let lags = correlogram_by_sum(&window, &vec![1.0; 64]);
     let r = |m: i32| {
-        let (re, im) = (lags[2 * m.unsigned_abs() as usize], lags[2 * m.unsigned_abs() as usize + 1]);
+        let (re, im) = (
+            lags[2 * m.unsigned_abs() as usize],
+            lags[2 * m.unsigned_abs() as usize + 1],
+        );
         Complex::new(re, if m < 0 { -im } else { im })
     };
     let model = Autoregression::yule_walker(&lags, SignalKind::Complex, 12).unwrap();
     for m in 0..=12 {
-        let sum: Complex<f64> =
-            r(m) + model.coefficients.iter().zip(1..).map(|(a, k)| a * r(m - k)).sum::<Complex<f64>>();
+        let sum: Complex<f64> = r(m)
+            + model
+                .coefficients
+                .iter()
+                .zip(1..)
+                .map(|(a, k)| a * r(m - k))
+                .sum::<Complex<f64>>();
         let expected = if m == 0 { model.noise_power } else { 0.0 };
         assert!((sum - expected).norm() < 1e-13, "{m}: {sum}");
     }
@@ -81,8 +110,15 @@ fn spectrum_of_a_known_model_has_its_power_and_its_pole() {
     assert!(model.coefficients[1..].iter().all(|a| a.norm() < 1e-13));
     assert_relative_eq!(model.noise_power, 1.0, max_relative = 1e-12);
     let peak_hz = 0.7 / std::f64::consts::TAU * 250e6;
-    assert_relative_eq!(model.density(peak_hz, &baseband()), 100.0, max_relative = 1e-9);
-    let mean = (0..4096).map(|k| model.density(250e6 * f64::from(k) / 4096.0, &baseband())).sum::<f64>() / 4096.0;
+    assert_relative_eq!(
+        model.density(peak_hz, &baseband()),
+        100.0,
+        max_relative = 1e-9
+    );
+    let mean = (0..4096)
+        .map(|k| model.density(250e6 * f64::from(k) / 4096.0, &baseband()))
+        .sum::<f64>()
+        / 4096.0;
     assert_relative_eq!(mean, 1.0 / 0.19, max_relative = 1e-9);
 }
 
@@ -91,7 +127,11 @@ fn reflection_coefficients_of_biased_correlograms_stay_inside_the_unit_circle() 
     let mut inputs = vec![vec![1.0; 64], tone(-3.0, 0.1), tone(18.9, 1.0)];
     inputs.push((0..64).map(|n| f64::from(u8::from(n == 40))).collect());
     inputs.push((0..64).map(|n| n as f64).collect());
-    inputs.push((0..64).map(|n| if n % 2 == 0 { 1e-9 } else { -1e9 }).collect());
+    inputs.push(
+        (0..64)
+            .map(|n| if n % 2 == 0 { 1e-9 } else { -1e9 })
+            .collect(),
+    );
     inputs.extend((0..20).map(|seed| noise(64, seed)));
     for window in inputs {
         for weighting in [Weighting::Rectangular, Weighting::default()] {
@@ -115,14 +155,27 @@ fn constant_signal_has_the_first_coefficient_of_its_biased_correlogram() {
 
 #[test]
 fn ca_shifts_noise_free_tones_by_at_most_14_cm_s() {
-    let ca = ModelPeak::new(ModelReading::Spectrum, &table_2(), SignalKind::Real, 64, 16, 4096, Refinement::Parabola)
-        .unwrap();
+    let ca = ModelPeak::new(
+        ModelReading::Spectrum,
+        &table_2(),
+        SignalKind::Real,
+        64,
+        16,
+        4096,
+        Refinement::Parabola,
+    )
+    .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
     let mut worst_m_s = 0.0_f64;
     for step in 0..24 {
         let velocity_m_s = -15.0 + 1.27 * f64::from(step);
-        let found =
-            estimate_window(&statistic, &ca, &tone(velocity_m_s, f64::from(step)), &mut Scratch::new()).unwrap();
+        let found = estimate_window(
+            &statistic,
+            &ca,
+            &tone(velocity_m_s, f64::from(step)),
+            &mut Scratch::new(),
+        )
+        .unwrap();
         assert_eq!(found.flag, Quality::Good);
         worst_m_s = worst_m_s.max((found.velocity_m_s - velocity_m_s).abs());
     }
@@ -131,7 +184,9 @@ fn ca_shifts_noise_free_tones_by_at_most_14_cm_s() {
 
 #[test]
 fn burg_puts_the_pole_of_a_complex_tone_on_the_circle_and_stops_there() {
-    let window: Vec<_> = (0..64).map(|n| Complex::from_polar(1.7, 0.9 * n as f64 + 0.2)).collect();
+    let window: Vec<_> = (0..64)
+        .map(|n| Complex::from_polar(1.7, 0.9 * n as f64 + 0.2))
+        .collect();
     let model = Autoregression::burg(&window, 6).unwrap();
     assert!((model.coefficients[0] + Complex::from_polar(1.0, 0.9)).norm() < 1e-12);
     assert!(model.coefficients[1..].iter().all(|a| a.norm() < 1e-12));
@@ -143,7 +198,10 @@ fn burg_does_not_depend_on_the_scale_of_the_samples() {
     let model = Autoregression::burg(&window, 16).unwrap();
     for factor in [2.0_f64.powi(-660), 2.0_f64.powi(660)] {
         let scaled: Vec<f64> = window.iter().map(|x| x * factor).collect();
-        assert_eq!(Autoregression::burg(&scaled, 16).unwrap().coefficients, model.coefficients);
+        assert_eq!(
+            Autoregression::burg(&scaled, 16).unwrap().coefficients,
+            model.coefficients
+        );
     }
 }
 
@@ -167,30 +225,60 @@ fn burg_recovers_the_coefficients_of_a_known_process() {
 #[test]
 fn lag_window_spectrum_is_the_hann_weighted_sum_of_lags() {
     let [x, r, _, _] = stored_window();
-    let estimator =
-        LagWindowPeak::new(&table_2(), SignalKind::Real, &unweighted_lags(64), 16, 2048, Refinement::Parabola).unwrap();
+    let estimator = LagWindowPeak::new(
+        &table_2(),
+        SignalKind::Real,
+        &unweighted_lags(64),
+        16,
+        2048,
+        Refinement::Parabola,
+    )
+    .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap();
     let found = estimate_window(&statistic, &estimator, &x, &mut Scratch::new()).unwrap();
     let density = |f_hz: f64| {
         let sum: f64 = (1..16)
             .map(|m| {
-                let hann = (std::f64::consts::FRAC_PI_2 * f64::from(m) / 16.0).cos().powi(2);
+                let hann = (std::f64::consts::FRAC_PI_2 * f64::from(m) / 16.0)
+                    .cos()
+                    .powi(2);
                 hann * r[m as usize] * (std::f64::consts::TAU * f_hz / 250e6 * f64::from(m)).cos()
             })
             .sum();
         r[0] + 2.0 * sum
     };
-    let best_hz =
-        (0..=50_000).map(|k| 55e6 + 1e3 * f64::from(k)).max_by(|a, b| density(*a).total_cmp(&density(*b))).unwrap();
-    assert_abs_diff_eq!(found.velocity_m_s, table_2().velocity_m_s(best_hz), epsilon = 2e-3);
+    let best_hz = (0..=50_000)
+        .map(|k| 55e6 + 1e3 * f64::from(k))
+        .max_by(|a, b| density(*a).total_cmp(&density(*b)))
+        .unwrap();
+    assert_abs_diff_eq!(
+        found.velocity_m_s,
+        table_2().velocity_m_s(best_hz),
+        epsilon = 2e-3
+    );
 }
 
 fn estimators(sampling: &Sampling, kind: SignalKind) -> Vec<Box<dyn Estimator>> {
     let refinement = Refinement::Parabola;
     vec![
-        Box::new(SpectralPeak::new(sampling, kind, &unweighted_lags(64), 1024, refinement).unwrap()),
-        Box::new(ModelPeak::new(ModelReading::Spectrum, sampling, kind, 64, 16, 2048, refinement).unwrap()),
-        Box::new(LagWindowPeak::new(sampling, kind, &unweighted_lags(64), 16, 1024, refinement).unwrap()),
+        Box::new(
+            SpectralPeak::new(sampling, kind, &unweighted_lags(64), 1024, refinement).unwrap(),
+        ),
+        Box::new(
+            ModelPeak::new(
+                ModelReading::Spectrum,
+                sampling,
+                kind,
+                64,
+                16,
+                2048,
+                refinement,
+            )
+            .unwrap(),
+        ),
+        Box::new(
+            LagWindowPeak::new(sampling, kind, &unweighted_lags(64), 16, 1024, refinement).unwrap(),
+        ),
         Box::new(PulsePair::new(sampling, kind, &unweighted_lags(64)).unwrap()),
     ]
 }
@@ -203,20 +291,37 @@ fn estimates<S: Sample>(windows: &[Vec<S>], sampling: &Sampling) -> Vec<GateVelo
     let mut one = mean.clone();
     for window in windows {
         statistic.evaluate(window, &mut scratch, &mut one);
-        mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / windows.len() as f64);
+        mean.iter_mut()
+            .zip(&one)
+            .for_each(|(sum, value)| *sum += value / windows.len() as f64);
     }
-    estimators(sampling, S::KIND).iter().map(|estimator| estimator.estimate(&mean, &mut scratch)).collect()
+    estimators(sampling, S::KIND)
+        .iter()
+        .map(|estimator| estimator.estimate(&mean, &mut scratch))
+        .collect()
 }
 
 #[test]
 fn every_estimator_finds_a_tone_in_moderate_noise_real_and_complex() {
     for velocity_m_s in [-12.0, -3.7, 0.0, 9.3] {
         let real: Vec<Vec<f64>> = (0..30)
-            .map(|seed| tone(velocity_m_s, seed as f64).iter().zip(noise(64, seed)).map(|(s, n)| s + 0.1 * n).collect())
+            .map(|seed| {
+                tone(velocity_m_s, seed as f64)
+                    .iter()
+                    .zip(noise(64, seed))
+                    .map(|(s, n)| s + 0.1 * n)
+                    .collect()
+            })
             .collect();
         // the last, pulse pair, is pulled to the middle of the band by noise and sidelobes that the edges cut
-        for (found, bar_m_s) in estimates(&real, &table_2()).iter().zip([0.25, 0.25, 0.25, 0.5]) {
-            assert!((found.velocity_m_s - velocity_m_s).abs() < bar_m_s, "{velocity_m_s}: {found:?}");
+        for (found, bar_m_s) in estimates(&real, &table_2())
+            .iter()
+            .zip([0.25, 0.25, 0.25, 0.5])
+        {
+            assert!(
+                (found.velocity_m_s - velocity_m_s).abs() < bar_m_s,
+                "{velocity_m_s}: {found:?}"
+            );
             assert_eq!(found.flag, Quality::Good);
         }
         let turn = std::f64::consts::TAU * baseband().frequency_hz(velocity_m_s) / 250e6;
@@ -225,12 +330,18 @@ fn every_estimator_finds_a_tone_in_moderate_noise_real_and_complex() {
                 noise(128, seed)
                     .chunks(2)
                     .enumerate()
-                    .map(|(n, pair)| Complex::from_polar(1.0, turn * n as f64) + 0.1 * Complex::new(pair[0], pair[1]))
+                    .map(|(n, pair)| {
+                        Complex::from_polar(1.0, turn * n as f64)
+                            + 0.1 * Complex::new(pair[0], pair[1])
+                    })
                     .collect()
             })
             .collect();
         for found in estimates(&complex, &baseband()) {
-            assert!((found.velocity_m_s - velocity_m_s).abs() < 0.1, "{velocity_m_s}: {found:?}");
+            assert!(
+                (found.velocity_m_s - velocity_m_s).abs() < 0.1,
+                "{velocity_m_s}: {found:?}"
+            );
             assert_eq!(found.flag, Quality::Good);
         }
     }
@@ -245,13 +356,18 @@ fn white_noise_does_not_bias_the_complex_pulse_pair() {
             noise(128, seed)
                 .chunks(2)
                 .enumerate()
-                .map(|(n, pair)| Complex::from_polar(1.0, turn * n as f64) + Complex::new(pair[0], pair[1]))
+                .map(|(n, pair)| {
+                    Complex::from_polar(1.0, turn * n as f64) + Complex::new(pair[0], pair[1])
+                })
                 .collect()
         })
         .collect();
     let found = &estimates(&windows, &baseband())[3];
     // noise power is twice the signal: a band-filtered first moment would read about half of the velocity
-    assert!((found.velocity_m_s - velocity_m_s).abs() < 0.35, "{found:?}");
+    assert!(
+        (found.velocity_m_s - velocity_m_s).abs() < 0.35,
+        "{found:?}"
+    );
 }
 
 #[test]
@@ -272,8 +388,29 @@ fn no_estimator_gives_a_silent_number_for_empty_or_constant_signals() {
 fn impossible_orders_and_indefinite_correlograms_are_refused() {
     let kind = SignalKind::Real;
     for order in [0, 64, 100] {
-        assert!(ModelPeak::new(ModelReading::Spectrum, &table_2(), kind, 64, order, 2048, Refinement::None).is_err());
-        assert!(LagWindowPeak::new(&table_2(), kind, &unweighted_lags(64), order, 2048, Refinement::None).is_err());
+        assert!(
+            ModelPeak::new(
+                ModelReading::Spectrum,
+                &table_2(),
+                kind,
+                64,
+                order,
+                2048,
+                Refinement::None
+            )
+            .is_err()
+        );
+        assert!(
+            LagWindowPeak::new(
+                &table_2(),
+                kind,
+                &unweighted_lags(64),
+                order,
+                2048,
+                Refinement::None
+            )
+            .is_err()
+        );
         assert!(Autoregression::burg(&[1.0; 64], order).is_err());
     }
     assert!(PulsePair::new(&table_2(), kind, &unweighted_lags(1)).is_err());

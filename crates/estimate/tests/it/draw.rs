@@ -25,7 +25,11 @@ fn cholesky(covariance: &Array2<Complex<f64>>) -> Vec<Vec<Complex<f64>>> {
         for j in 0..=i {
             let sum: Complex<f64> = (0..j).map(|k| l[i][k] * l[j][k].conj()).sum();
             let rest = covariance[[i, j]] - sum;
-            l[i][j] = if i == j { Complex::new((rest.re + floor).sqrt(), 0.0) } else { rest / l[j][j] };
+            l[i][j] = if i == j {
+                Complex::new((rest.re + floor).sqrt(), 0.0)
+            } else {
+                rest / l[j][j]
+            };
         }
         assert!(l[i][i].re.is_finite());
     }
@@ -65,14 +69,27 @@ impl Draw for Complex<f64> {
 
 impl<S: Draw> Windows<S> {
     pub(crate) fn new(covariance: &Array2<Complex<f64>>) -> Self {
-        let real = covariance.mapv(|value| if S::KIND == SignalKind::Real { Complex::from(value.re) } else { value });
-        let factor = cholesky(&real).into_iter().map(|row| row.into_iter().map(S::from_complex).collect()).collect();
+        let real = covariance.mapv(|value| {
+            if S::KIND == SignalKind::Real {
+                Complex::from(value.re)
+            } else {
+                value
+            }
+        });
+        let factor = cholesky(&real)
+            .into_iter()
+            .map(|row| row.into_iter().map(S::from_complex).collect())
+            .collect();
         Self { factor }
     }
 
     pub(crate) fn draw(&self, rng: &mut Xoshiro256PlusPlus) -> Vec<S> {
         let white: Vec<S> = (0..self.factor.len()).map(|_| S::normal(rng)).collect();
-        self.factor.iter().enumerate().map(|(i, row)| S::sum_of_products(&row[..=i], &white[..=i])).collect()
+        self.factor
+            .iter()
+            .enumerate()
+            .map(|(i, row)| S::sum_of_products(&row[..=i], &white[..=i]))
+            .collect()
     }
 }
 
@@ -86,31 +103,60 @@ pub(crate) struct Wind {
 impl Wind {
     /// The 200 ns pulse in windows of 64 samples; `noise` is that of real windows, complex ones get white noise.
     pub(crate) fn new(sampling: &Sampling, gradient_per_s: f64, snr: f64, noise: Noise) -> Self {
-        let rest = Sampling { intermediate_frequency_hz: 0.0, band_hz: (-25e6, 25e6), ..*sampling };
+        let rest = Sampling {
+            intermediate_frequency_hz: 0.0,
+            band_hz: (-25e6, 25e6),
+            ..*sampling
+        };
         let model = GradientModel::new(&rest, 64, sigma_s(200e-9), Noise::White).unwrap();
-        let [signal, ..] = model.covariance(0.0, gradient_per_s, 1e12, SignalKind::Complex).unwrap();
+        let [signal, ..] = model
+            .covariance(0.0, gradient_per_s, 1e12, SignalKind::Complex)
+            .unwrap();
         let real = WindowModel::gaussian_pulse(sampling, 64, sigma_s(200e-9), noise).unwrap();
-        let kind = if sampling.band_hz.0 < 0.0 { SignalKind::Complex } else { SignalKind::Real };
+        let kind = if sampling.band_hz.0 < 0.0 {
+            SignalKind::Complex
+        } else {
+            SignalKind::Real
+        };
         let at = |snr: f64| real.covariance(0.0, snr, kind).unwrap()[0].clone();
         let noise = (at(snr) - at(1e15)).mapv(|value| Complex::from(value.re));
-        Self { signal: Windows::new(&signal), noise: Windows::new(&noise), sampling: *sampling }
+        Self {
+            signal: Windows::new(&signal),
+            noise: Windows::new(&noise),
+            sampling: *sampling,
+        }
     }
 
-    pub(crate) fn complex(&self, velocity_m_s: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<Complex<f64>> {
-        let turn = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+    pub(crate) fn complex(
+        &self,
+        velocity_m_s: f64,
+        rng: &mut Xoshiro256PlusPlus,
+    ) -> Vec<Complex<f64>> {
+        let turn = std::f64::consts::TAU
+            * self.sampling.frequency_hz(velocity_m_s)
+            * self.sampling.period_s();
         let mut window = self.signal.draw(rng);
         let (re, im) = (self.noise.draw(rng), self.noise.draw(rng));
         for (n, value) in window.iter_mut().enumerate() {
-            *value = *value * Complex::from_polar(1.0, turn * n as f64) + Complex::new(re[n], im[n]) * 0.5_f64.sqrt();
+            *value = *value * Complex::from_polar(1.0, turn * n as f64)
+                + Complex::new(re[n], im[n]) * 0.5_f64.sqrt();
         }
         window
     }
 
     pub(crate) fn real(&self, velocity_m_s: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {
-        let turn = std::f64::consts::TAU * self.sampling.frequency_hz(velocity_m_s) * self.sampling.period_s();
+        let turn = std::f64::consts::TAU
+            * self.sampling.frequency_hz(velocity_m_s)
+            * self.sampling.period_s();
         let signal = self.signal.draw(rng);
         let noise = self.noise.draw(rng);
-        let carried = signal.iter().enumerate().map(|(n, z)| (z * Complex::from_polar(1.0, turn * n as f64)).re);
-        carried.zip(noise).map(|(signal, noise)| 2.0_f64.sqrt() * signal + noise).collect()
+        let carried = signal
+            .iter()
+            .enumerate()
+            .map(|(n, z)| (z * Complex::from_polar(1.0, turn * n as f64)).re);
+        carried
+            .zip(noise)
+            .map(|(signal, noise)| 2.0_f64.sqrt() * signal + noise)
+            .collect()
     }
 }

@@ -7,7 +7,8 @@ use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::{
-    Error, Gates, Scratch, SignalKind, Weighting, bound::*, estimators::*, map::*, models::*, spectrum::*,
+    Error, Gates, Scratch, SignalKind, Weighting, bound::*, estimators::*, map::*, models::*,
+    spectrum::*,
 };
 
 type Named = (&'static str, Box<dyn Statistic<f64>>, Box<dyn Estimator>);
@@ -19,7 +20,8 @@ fn estimators() -> Vec<Named> {
     let model = WindowModel::gaussian_pulse(s, 64, sigma_s(200e-9), Noise::White).unwrap();
     let peak_of = |weights: &[f64]| SpectralPeak::new(s, kind, weights, 1024, refinement).unwrap();
     let peak = || peak_of(&unweighted_lags(64));
-    let tapered = Correlogram::<f64>::with_tapers(likelihood_tapers(&model, 10.0).unwrap()).unwrap();
+    let tapered =
+        Correlogram::<f64>::with_tapers(likelihood_tapers(&model, 10.0).unwrap()).unwrap();
     let of_tapers = peak_of(&tapered.lag_weights());
     let gradient = GradientModel::new(s, 64, sigma_s(200e-9), Noise::White).unwrap();
     let joint = GradientLikelihood::<f64>::new(&gradient, 10.0, &[0.0], 1024).unwrap();
@@ -27,28 +29,48 @@ fn estimators() -> Vec<Named> {
     vec![
         ("periodogram", rectangular(), Box::new(peak())),
         ("likelihood", Box::new(tapered), Box::new(of_tapers)),
-        ("likelihood with gradient", Box::new(joint.statistic), Box::new(joint.estimator)),
-        ("first moment", rectangular(), Box::new(FirstMoment::new(s, kind, &unweighted_lags(64), 512, 2.5).unwrap())),
+        (
+            "likelihood with gradient",
+            Box::new(joint.statistic),
+            Box::new(joint.estimator),
+        ),
+        (
+            "first moment",
+            rectangular(),
+            Box::new(FirstMoment::new(s, kind, &unweighted_lags(64), 512, 2.5).unwrap()),
+        ),
         (
             "lag window",
             rectangular(),
-            Box::new(LagWindowPeak::new(s, kind, &unweighted_lags(64), 16, 1024, refinement).unwrap()),
+            Box::new(
+                LagWindowPeak::new(s, kind, &unweighted_lags(64), 16, 1024, refinement).unwrap(),
+            ),
         ),
-        ("pulse pair", rectangular(), Box::new(PulsePair::new(s, kind, &unweighted_lags(64)).unwrap())),
+        (
+            "pulse pair",
+            rectangular(),
+            Box::new(PulsePair::new(s, kind, &unweighted_lags(64)).unwrap()),
+        ),
         (
             "AR",
             Box::new(short),
-            Box::new(ModelPeak::new(ModelReading::Spectrum, s, kind, 17, 16, 2048, refinement).unwrap()),
+            Box::new(
+                ModelPeak::new(ModelReading::Spectrum, s, kind, 17, 16, 2048, refinement).unwrap(),
+            ),
         ),
         (
             "AR pole",
             rectangular(),
-            Box::new(ModelPeak::new(ModelReading::Pole, s, kind, 64, 16, 2048, refinement).unwrap()),
+            Box::new(
+                ModelPeak::new(ModelReading::Pole, s, kind, 64, 16, 2048, refinement).unwrap(),
+            ),
         ),
         (
             "Capon",
             rectangular(),
-            Box::new(ModelPeak::new(ModelReading::Capon, s, kind, 64, 16, 2048, refinement).unwrap()),
+            Box::new(
+                ModelPeak::new(ModelReading::Capon, s, kind, 64, 16, 2048, refinement).unwrap(),
+            ),
         ),
     ]
 }
@@ -58,8 +80,12 @@ fn single(statistic: &dyn Statistic<f64>, estimator: &dyn Estimator, window: &[f
     let gates = Gates::new(window.len(), 1, 2e-6).unwrap();
     let records = Array2::from_shape_vec((1, window.len()), window.to_vec()).unwrap();
     let scan = Scan::new(statistic, &table_2(), &gates, &[0.0], records.view()).unwrap();
-    let point = PolarPoint { range_m: scan.geometry().gate_ranges_m()[0], elevation_rad: 0.0 };
-    scan.map(&[point], &Radius::Fixed { radius_m: 0.0 }, None, estimator).unwrap()[0]
+    let point = PolarPoint {
+        range_m: scan.geometry().gate_ranges_m()[0],
+        elevation_rad: 0.0,
+    };
+    scan.map(&[point], &Radius::Fixed { radius_m: 0.0 }, None, estimator)
+        .unwrap()[0]
 }
 
 #[test]
@@ -68,14 +94,26 @@ fn zero_and_broken_signals_have_no_velocity_in_any_estimator() {
     broken[10] = f64::INFINITY;
     for (name, statistic, estimator) in estimators() {
         let found = single(statistic.as_ref(), estimator.as_ref(), &[0.0; 64]);
-        assert_eq!((found.estimate.flag, found.level), (Quality::NoSignal, 1), "{name}");
+        assert_eq!(
+            (found.estimate.flag, found.level),
+            (Quality::NoSignal, 1),
+            "{name}"
+        );
         assert!(found.estimate.velocity_m_s.is_nan(), "{name}");
         let found = single(statistic.as_ref(), estimator.as_ref(), &broken);
-        assert_eq!((found.estimate.flag, found.level), (Quality::Empty, 0), "{name}");
+        assert_eq!(
+            (found.estimate.flag, found.level),
+            (Quality::Empty, 0),
+            "{name}"
+        );
         assert!(found.estimate.velocity_m_s.is_nan(), "{name}");
         for number in [f64::NAN, f64::INFINITY] {
             let mean = vec![number; estimator.statistic_len()];
-            assert_eq!(estimator.estimate(&mean, &mut Scratch::new()).flag, Quality::Invalid, "{name}");
+            assert_eq!(
+                estimator.estimate(&mean, &mut Scratch::new()).flag,
+                Quality::Invalid,
+                "{name}"
+            );
         }
     }
 }
@@ -96,8 +134,17 @@ fn velocities_beyond_the_band_are_flagged_by_every_estimator() {
     let estimators = estimators();
     for velocity_m_s in [-28.0, 21.5, 25.0, 40.0, 100.0] {
         for (name, statistic, estimator) in &estimators {
-            let found = single(statistic.as_ref(), estimator.as_ref(), &tone(velocity_m_s, 0.4)).estimate;
-            assert_eq!(found.flag, Quality::OutOfBand, "{name} {velocity_m_s}: {found:?}");
+            let found = single(
+                statistic.as_ref(),
+                estimator.as_ref(),
+                &tone(velocity_m_s, 0.4),
+            )
+            .estimate;
+            assert_eq!(
+                found.flag,
+                Quality::OutOfBand,
+                "{name} {velocity_m_s}: {found:?}"
+            );
         }
     }
 }
@@ -106,26 +153,48 @@ fn velocities_beyond_the_band_are_flagged_by_every_estimator() {
 fn noise_free_tones_read_their_velocity_within_14_cm_s() {
     for (name, statistic, estimator) in estimators() {
         for velocity_m_s in [-14.0, -3.7, 0.0, 9.3] {
-            let found = single(statistic.as_ref(), estimator.as_ref(), &tone(velocity_m_s, 0.4)).estimate;
+            let found = single(
+                statistic.as_ref(),
+                estimator.as_ref(),
+                &tone(velocity_m_s, 0.4),
+            )
+            .estimate;
             let error_m_s = (found.velocity_m_s - velocity_m_s).abs();
             // a moment takes the sidelobes along that the edges of the band cut off; see the pulse pair
-            let bar_m_s = if matches!(name, "pulse pair" | "first moment") { 0.6 } else { 0.16 };
-            assert!(error_m_s < bar_m_s && found.is_good(), "{name} {velocity_m_s}: {found:?}");
+            let bar_m_s = if matches!(name, "pulse pair" | "first moment") {
+                0.6
+            } else {
+                0.16
+            };
+            assert!(
+                error_m_s < bar_m_s && found.is_good(),
+                "{name} {velocity_m_s}: {found:?}"
+            );
         }
     }
 }
 
 #[test]
 fn amplitudes_of_1e_minus_200_and_1e200_change_nothing() {
-    let window: Vec<f64> = tone(-4.0, 0.4).iter().zip(noise(64, 5)).map(|(s, n)| s + 0.3 * n).collect();
+    let window: Vec<f64> = tone(-4.0, 0.4)
+        .iter()
+        .zip(noise(64, 5))
+        .map(|(s, n)| s + 0.3 * n)
+        .collect();
     for (name, statistic, estimator) in estimators() {
         let reference = single(statistic.as_ref(), estimator.as_ref(), &window).estimate;
         assert!(reference.is_good(), "{name}");
         for factor in [1e-200, 1e200] {
             let scaled: Vec<f64> = window.iter().map(|x| x * factor).collect();
             let found = single(statistic.as_ref(), estimator.as_ref(), &scaled).estimate;
-            assert!((found.velocity_m_s - reference.velocity_m_s).abs() < 1e-9, "{name} {factor}");
-            assert!((found.snr / reference.snr - 1.0).abs() < 1e-6 && found.flag == reference.flag, "{name}");
+            assert!(
+                (found.velocity_m_s - reference.velocity_m_s).abs() < 1e-9,
+                "{name} {factor}"
+            );
+            assert!(
+                (found.snr / reference.snr - 1.0).abs() < 1e-6 && found.flag == reference.flag,
+                "{name}"
+            );
         }
     }
 }
@@ -139,8 +208,16 @@ fn snr_of_minus_40_and_plus_60_db_give_finite_velocities_in_the_band() {
         for (name, statistic, estimator) in estimators() {
             let mut near = 0;
             for _ in 0..40 {
-                let found = single(statistic.as_ref(), estimator.as_ref(), &wind.real(5.0, &mut rng)).estimate;
-                assert!(found.velocity_m_s.abs() < 19.6, "{name} {snr_db}: {found:?}");
+                let found = single(
+                    statistic.as_ref(),
+                    estimator.as_ref(),
+                    &wind.real(5.0, &mut rng),
+                )
+                .estimate;
+                assert!(
+                    found.velocity_m_s.abs() < 19.6,
+                    "{name} {snr_db}: {found:?}"
+                );
                 near += usize::from((found.velocity_m_s - 5.0).abs() < 3.0);
             }
             // at -40 dB a velocity within 3 m/s is chance: 6 of 40
@@ -151,14 +228,18 @@ fn snr_of_minus_40_and_plus_60_db_give_finite_velocities_in_the_band() {
         let model = GradientModel::new(&table_2(), 64, sigma_s(200e-9), Noise::White).unwrap();
         let plan = GradientLikelihood::<f64>::new(&model, snr, &[0.0], 1024).unwrap();
         let found = single(&plan.statistic, &plan.estimator, &tone(5.0, 0.4)).estimate;
-        assert!((found.velocity_m_s - 5.0).abs() < 0.5, "{snr_db} dB: {found:?}");
+        assert!(
+            (found.velocity_m_s - 5.0).abs() < 0.5,
+            "{snr_db} dB: {found:?}"
+        );
     }
 }
 
 #[test]
 fn pulses_much_longer_and_much_shorter_than_the_gate_keep_their_velocity() {
     for full_width_s in [10e-9, 5e-6] {
-        let model = GradientModel::new(&table_2(), 64, sigma_s(full_width_s), Noise::White).unwrap();
+        let model =
+            GradientModel::new(&table_2(), 64, sigma_s(full_width_s), Noise::White).unwrap();
         let plan = GradientLikelihood::<f64>::new(&model, 10.0, &[0.0], 1024).unwrap();
         let covariance = model.covariance(4.0, 0.0, 10.0, SignalKind::Real).unwrap()[0].clone();
         let windows = crate::draw::Windows::<f64>::new(&covariance);
@@ -166,12 +247,21 @@ fn pulses_much_longer_and_much_shorter_than_the_gate_keep_their_velocity() {
         let (mut scratch, mut one) = (Scratch::new(), vec![0.0; plan.statistic.statistic_len()]);
         let mut mean = one.clone();
         for _ in 0..200 {
-            plan.statistic.evaluate(&windows.draw(&mut rng), &mut scratch, &mut one);
-            mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / 200.0);
+            plan.statistic
+                .evaluate(&windows.draw(&mut rng), &mut scratch, &mut one);
+            mean.iter_mut()
+                .zip(&one)
+                .for_each(|(sum, value)| *sum += value / 200.0);
         }
         let found = plan.estimator.estimate(&mean, &mut scratch);
-        let bound_m_s = model.bound(4.0, 0.0, 10.0, SignalKind::Real, 200.0).unwrap().velocity_alone_m_s;
-        assert!((found.velocity_m_s - 4.0).abs() < 4.0 * bound_m_s + 0.02, "{full_width_s}: {found:?} {bound_m_s}");
+        let bound_m_s = model
+            .bound(4.0, 0.0, 10.0, SignalKind::Real, 200.0)
+            .unwrap()
+            .velocity_alone_m_s;
+        assert!(
+            (found.velocity_m_s - 4.0).abs() < 4.0 * bound_m_s + 0.02,
+            "{full_width_s}: {found:?} {bound_m_s}"
+        );
     }
 }
 
@@ -181,18 +271,39 @@ fn regions_cut_by_the_edge_of_the_sector_count_what_they_hold() {
     let gates = Gates::new(64, 1, 2e-6).unwrap();
     let elevation_rad = [0.0, 0.002, 0.004, 0.006, 0.008];
     let statistic = ShortCorrelogram::<f64>::new(64, 17).unwrap();
-    let scan = Scan::new(&statistic, &table_2(), &gates, &elevation_rad, records.view()).unwrap();
-    let at = |elevation_rad| PolarPoint { range_m: 400.0, elevation_rad };
+    let scan = Scan::new(
+        &statistic,
+        &table_2(),
+        &gates,
+        &elevation_rad,
+        records.view(),
+    )
+    .unwrap();
+    let at = |elevation_rad| PolarPoint {
+        range_m: 400.0,
+        elevation_rad,
+    };
     let mut mean = vec![0.0; 17];
     let inside = scan.region_mean(at(0.004), 1.3, &mut mean).unwrap();
     let edge = scan.region_mean(at(0.0), 1.3, &mut mean).unwrap();
     let outside = scan.region_mean(at(-0.002), 1.3, &mut mean).unwrap();
-    assert!(outside > 0 && outside < edge && edge < inside, "{outside} {edge} {inside}");
-    let (level, n_eff) = scan.geometry().level(at(0.0), 1.3, &WindowCorrelation::from_gate_lags(&[1.0, 0.9]).unwrap());
+    assert!(
+        outside > 0 && outside < edge && edge < inside,
+        "{outside} {edge} {inside}"
+    );
+    let (level, n_eff) = scan.geometry().level(
+        at(0.0),
+        1.3,
+        &WindowCorrelation::from_gate_lags(&[1.0, 0.9]).unwrap(),
+    );
     assert!(level == edge && n_eff > 0.0 && n_eff < level as f64);
     // nothing at all: NaN and a count of 0
-    let far = scan.map(&[at(1.0)], &Radius::Fixed { radius_m: 1.3 }, None, &LagOne).unwrap()[0];
-    assert!(far.level == 0 && far.estimate.flag == Quality::Empty && far.estimate.velocity_m_s.is_nan());
+    let far = scan
+        .map(&[at(1.0)], &Radius::Fixed { radius_m: 1.3 }, None, &LagOne)
+        .unwrap()[0];
+    assert!(
+        far.level == 0 && far.estimate.flag == Quality::Empty && far.estimate.velocity_m_s.is_nan()
+    );
 }
 
 /// Takes any mean of 17 numbers.
@@ -203,18 +314,60 @@ impl Estimator for LagOne {
         17
     }
     fn estimate(&self, mean: &[f64], _: &mut Scratch) -> GateVelocity {
-        GateVelocity { velocity_m_s: mean[1], ..GateVelocity::none(Quality::Good) }
+        GateVelocity {
+            velocity_m_s: mean[1],
+            ..GateVelocity::none(Quality::Good)
+        }
     }
 }
 
 #[test]
 fn windows_longer_than_the_record_and_orders_as_long_as_the_window_are_errors() {
     let error = Gates::new(64, 1, 0.0).unwrap().count(63).unwrap_err();
-    assert_eq!(error, Error::WindowLongerThanRecord { window_samples: 64, record_samples: 63 });
+    assert_eq!(
+        error,
+        Error::WindowLongerThanRecord {
+            window_samples: 64,
+            record_samples: 63
+        }
+    );
     let (kind, refinement) = (SignalKind::Real, Refinement::None);
-    assert!(ModelPeak::new(ModelReading::Spectrum, &table_2(), kind, 64, 64, 1024, refinement).is_err());
-    assert!(ModelPeak::new(ModelReading::Pole, &table_2(), kind, 64, 65, 1024, refinement).is_err());
-    assert!(ModelPeak::new(ModelReading::Capon, &table_2(), kind, 64, 64, 1024, refinement).is_err());
+    assert!(
+        ModelPeak::new(
+            ModelReading::Spectrum,
+            &table_2(),
+            kind,
+            64,
+            64,
+            1024,
+            refinement
+        )
+        .is_err()
+    );
+    assert!(
+        ModelPeak::new(
+            ModelReading::Pole,
+            &table_2(),
+            kind,
+            64,
+            65,
+            1024,
+            refinement
+        )
+        .is_err()
+    );
+    assert!(
+        ModelPeak::new(
+            ModelReading::Capon,
+            &table_2(),
+            kind,
+            64,
+            64,
+            1024,
+            refinement
+        )
+        .is_err()
+    );
     assert!(Autoregression::yule_walker(&[1.0; 16], kind, 16).is_err());
     assert!(Autoregression::burg(&[Complex::new(1.0, 0.0); 8], 8).is_err());
     assert!(FirstMoment::new(&table_2(), kind, &unweighted_lags(64), 512, 0.0).is_err());
@@ -226,24 +379,74 @@ fn following_accumulation_undoes_the_change_from_line_to_line() {
     let wind = |elevation_rad: f64| -9.0 + 2.0 * (elevation_rad / 0.001);
     let elevation_rad: Vec<f64> = (0..10).map(|i| 0.001 * f64::from(i)).collect();
     let records = Array2::from_shape_fn((10, 300), |(line, n)| {
-        let turn = std::f64::consts::TAU * table_2().frequency_hz(wind(elevation_rad[line])) / 250e6;
+        let turn =
+            std::f64::consts::TAU * table_2().frequency_hz(wind(elevation_rad[line])) / 250e6;
         (turn * n as f64 + line as f64).cos()
     });
     let gates = Gates::new(64, 1, 2e-6).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-    let scan = Scan::new(&statistic, &table_2(), &gates, &elevation_rad, records.view()).unwrap();
-    let peak =
-        SpectralPeak::new(&table_2(), SignalKind::Complex, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
-    let point = PolarPoint { range_m: 370.0, elevation_rad: 0.0042 };
+    let scan = Scan::new(
+        &statistic,
+        &table_2(),
+        &gates,
+        &elevation_rad,
+        records.view(),
+    )
+    .unwrap();
+    let peak = SpectralPeak::new(
+        &table_2(),
+        SignalKind::Complex,
+        &unweighted_lags(64),
+        1024,
+        Refinement::Parabola,
+    )
+    .unwrap();
+    let point = PolarPoint {
+        range_m: 370.0,
+        elevation_rad: 0.0042,
+    };
     let radius = Radius::Fixed { radius_m: 1.6 };
     let guess = |place: PolarPoint| wind(place.elevation_rad);
-    let map = scan.map_following(&[point], &radius, SignalKind::Real, &table_2(), &guess, &peak).unwrap();
-    assert!((map[0].estimate.velocity_m_s - wind(0.0042)).abs() < 0.1, "{map:?}");
-    let blurred = scan.map_following(&[point], &radius, SignalKind::Real, &table_2(), &|_| 0.0, &peak).unwrap();
-    assert!(blurred[0].estimate.quality < 0.6 * map[0].estimate.quality, "{blurred:?}");
+    let map = scan
+        .map_following(
+            &[point],
+            &radius,
+            SignalKind::Real,
+            &table_2(),
+            &guess,
+            &peak,
+        )
+        .unwrap();
+    assert!(
+        (map[0].estimate.velocity_m_s - wind(0.0042)).abs() < 0.1,
+        "{map:?}"
+    );
+    let blurred = scan
+        .map_following(
+            &[point],
+            &radius,
+            SignalKind::Real,
+            &table_2(),
+            &|_| 0.0,
+            &peak,
+        )
+        .unwrap();
+    assert!(
+        blurred[0].estimate.quality < 0.6 * map[0].estimate.quality,
+        "{blurred:?}"
+    );
     assert_eq!(blurred[0].level, map[0].level);
     // without a guess (NaN) nothing is shifted
-    let none = scan.map_following(&[point], &radius, SignalKind::Real, &table_2(), &|_| f64::NAN, &peak).unwrap();
+    let none = scan
+        .map_following(
+            &[point],
+            &radius,
+            SignalKind::Real,
+            &table_2(),
+            &|_| f64::NAN,
+            &peak,
+        )
+        .unwrap();
     let seen = |e: &GateVelocity| [e.velocity_m_s, e.detection, e.snr, e.power];
     assert_eq!(seen(&none[0].estimate), seen(&blurred[0].estimate));
 }

@@ -34,17 +34,28 @@ pub(crate) fn noise(count: usize, seed: u64) -> Vec<f64> {
 /// A window of 64 real samples of a hard target.
 pub(crate) fn tone(velocity_m_s: f64, phase_rad: f64) -> Vec<f64> {
     let turn = std::f64::consts::TAU * table_2().frequency_hz(velocity_m_s) / 250e6;
-    (0..64).map(|n| (turn * n as f64 + phase_rad).cos()).collect()
+    (0..64)
+        .map(|n| (turn * n as f64 + phase_rad).cos())
+        .collect()
 }
 
 /// The biased correlogram written out as a double sum.
 pub(crate) fn correlogram_by_sum<S: Sample>(window: &[S], weights: &[f64]) -> Vec<f64> {
     let energy: f64 = weights.iter().map(|h| h * h).sum();
-    let weighted: Vec<_> = window.iter().zip(weights).map(|(sample, h)| sample.to_complex() * h).collect();
+    let weighted: Vec<_> = window
+        .iter()
+        .zip(weights)
+        .map(|(sample, h)| sample.to_complex() * h)
+        .collect();
     let lag = |m: usize| {
-        let products = weighted[m..].iter().zip(&weighted).map(|(ahead, behind)| ahead * behind.conj());
+        let products = weighted[m..]
+            .iter()
+            .zip(&weighted)
+            .map(|(ahead, behind)| ahead * behind.conj());
         let lag = products.sum::<num_complex::Complex<f64>>() / energy;
-        [lag.re, lag.im].into_iter().take(if S::KIND == SignalKind::Real { 1 } else { 2 })
+        [lag.re, lag.im]
+            .into_iter()
+            .take(if S::KIND == SignalKind::Real { 1 } else { 2 })
     };
     (0..weighted.len()).flat_map(lag).collect()
 }

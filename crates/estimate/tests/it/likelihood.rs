@@ -29,7 +29,11 @@ fn draw(
     let amplitudes: Vec<_> = values.iter().map(|value| normal(*value)).collect();
     (0..64)
         .map(|n| {
-            let signal: Complex<f64> = tapers.iter().zip(&amplitudes).map(|(taper, a)| a * taper.weights[n]).sum();
+            let signal: Complex<f64> = tapers
+                .iter()
+                .zip(&amplitudes)
+                .map(|(taper, a)| a * taper.weights[n])
+                .sum();
             signal * Complex::from_polar(1.0, turn * n as f64) + normal(noise)
         })
         .collect()
@@ -70,13 +74,26 @@ fn weighted_tapered_periodograms_are_the_quadratic_form_of_the_likelihood() {
     let window = draw(&basis_tapers, &values, 0.5, 2.0, &mut rng);
     let mut lags = vec![0.0; 128];
     correlogram.evaluate(&window, &mut Scratch::new(), &mut lags);
-    let at = |v_m_s: f64| density_at(&lags, SignalKind::Complex, baseband().frequency_hz(v_m_s), &baseband())[0];
+    let at = |v_m_s: f64| {
+        density_at(
+            &lags,
+            SignalKind::Complex,
+            baseband().frequency_hz(v_m_s),
+            &baseband(),
+        )[0]
+    };
     // independent: x^H R^-1 x by conjugate gradients on the full covariance
     let x = Array1::from(window);
     let form = |v_m_s: f64| {
-        let [r, _] = model(200e-9).covariance(v_m_s, snr, SignalKind::Complex).unwrap();
+        let [r, _] = model(200e-9)
+            .covariance(v_m_s, snr, SignalKind::Complex)
+            .unwrap();
         let dot = |a: &Array1<Complex<f64>>, b: &Array1<Complex<f64>>| {
-            a.iter().zip(b).map(|(a, b)| a.conj() * b).sum::<Complex<f64>>().re
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| a.conj() * b)
+                .sum::<Complex<f64>>()
+                .re
         };
         let (mut y, mut rest) = (Array1::zeros(64), x.clone());
         let mut direction = rest.clone();
@@ -111,8 +128,14 @@ fn likelihood_estimates_reach_the_bound_of_twenty_windows() {
         let snr = 10.0_f64.powf(snr_db / 10.0);
         let tapers = likelihood_tapers(&model(200e-9), snr).unwrap();
         let correlogram = Correlogram::<Complex<f64>>::with_tapers(tapers).unwrap();
-        let peak =
-            SpectralPeak::new(&baseband(), SignalKind::Complex, &unweighted_lags(64), 1024, Refinement::Exact).unwrap();
+        let peak = SpectralPeak::new(
+            &baseband(),
+            SignalKind::Complex,
+            &unweighted_lags(64),
+            1024,
+            Refinement::Exact,
+        )
+        .unwrap();
         let (mut scratch, mut one) = (Scratch::new(), vec![0.0; 128]);
         let trials = 800;
         let mut sum = 0.0;
@@ -122,13 +145,17 @@ fn likelihood_estimates_reach_the_bound_of_twenty_windows() {
             for _ in 0..20 {
                 let window = draw(&basis_tapers, &values, 5.0 / snr, velocity_m_s, &mut rng);
                 correlogram.evaluate(&window, &mut scratch, &mut one);
-                mean.iter_mut().zip(&one).for_each(|(sum, value)| *sum += value / 20.0);
+                mean.iter_mut()
+                    .zip(&one)
+                    .for_each(|(sum, value)| *sum += value / 20.0);
             }
             let found = peak.estimate(&mean, &mut scratch);
             sum += (found.velocity_m_s - velocity_m_s).powi(2);
         }
         let rms_m_s = (sum / f64::from(trials)).sqrt();
-        let bound_m_s = model(200e-9).bound_m_s(0.0, snr, SignalKind::Complex, 20.0).unwrap();
+        let bound_m_s = model(200e-9)
+            .bound_m_s(0.0, snr, SignalKind::Complex, 20.0)
+            .unwrap();
         let ratio = rms_m_s / bound_m_s;
         // standard error of the ratio: 1 / sqrt(2 trials) = 0.025
         assert!((0.9..1.12).contains(&ratio), "{snr_db} dB: {ratio}");

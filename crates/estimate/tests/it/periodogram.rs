@@ -6,15 +6,24 @@ use num_complex::Complex;
 use wakescope_estimate::{estimators::*, spectrum::*, window::*};
 
 fn complex_noise(count: usize, seed: u64) -> Vec<Complex<f64>> {
-    noise(2 * count, seed).chunks(2).map(|pair| Complex::new(pair[0], pair[1]) / 2.0_f64.sqrt()).collect()
+    noise(2 * count, seed)
+        .chunks(2)
+        .map(|pair| Complex::new(pair[0], pair[1]) / 2.0_f64.sqrt())
+        .collect()
 }
 
 /// Columns x, r_biased, pgram of the stored window.
 fn stored_window() -> (Vec<f64>, Vec<f64>, Vec<f64>) {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/estimate/window64_vector.csv");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/reference/estimate/window64_vector.csv"
+    );
     let text = std::fs::read_to_string(path).unwrap();
     let (mut x, mut r, mut p) = (vec![], vec![], vec![]);
-    for line in text.lines().filter(|l| l.starts_with(|c: char| c.is_ascii_digit())) {
+    for line in text
+        .lines()
+        .filter(|l| l.starts_with(|c: char| c.is_ascii_digit()))
+    {
         let fields: Vec<&str> = line.split(',').collect();
         x.push(fields[1].parse().unwrap());
         r.push(fields[2].parse().unwrap());
@@ -47,9 +56,16 @@ fn peak_velocities_reproduce_the_stored_window() {
     let (x, _, _) = stored_window();
     let mut scratch = Scratch::new();
     let literal = PeriodogramOptions::literal(Weighting::Rectangular, 64);
-    for (options, velocity_m_s) in
-        [(literal, -4.6015625), (PeriodogramOptions { padded_samples: 4096, ..literal }, -4.1758422852)]
-    {
+    for (options, velocity_m_s) in [
+        (literal, -4.6015625),
+        (
+            PeriodogramOptions {
+                padded_samples: 4096,
+                ..literal
+            },
+            -4.1758422852,
+        ),
+    ] {
         let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
         let found = plan.velocity(&x, &mut scratch).unwrap();
         assert_abs_diff_eq!(found.velocity_m_s, velocity_m_s, epsilon = 1e-9);
@@ -92,9 +108,20 @@ fn check_identity<S: Sample>(windows: &[Vec<S>], weighting: Weighting) {
         let spectrum = LagSpectrum::new(S::KIND, n, m).unwrap();
         let density = spectrum.density(&mean, &mut scratch).unwrap().to_vec();
         // those of negative frequencies follow
-        let frequencies = if S::KIND == SignalKind::Real { m / 2 + 1 } else { m };
-        let mean = |k: usize| windows.iter().map(|window| periodogram_by_sum(window, &weights, k, m)).sum::<f64>();
-        let average: Vec<f64> = (0..frequencies).map(|k| mean(k) / windows.len() as f64).collect();
+        let frequencies = if S::KIND == SignalKind::Real {
+            m / 2 + 1
+        } else {
+            m
+        };
+        let mean = |k: usize| {
+            windows
+                .iter()
+                .map(|window| periodogram_by_sum(window, &weights, k, m))
+                .sum::<f64>()
+        };
+        let average: Vec<f64> = (0..frequencies)
+            .map(|k| mean(k) / windows.len() as f64)
+            .collect();
         let largest = average.iter().copied().fold(0.0, f64::max);
         for (a, b) in density.iter().zip(&average) {
             assert_abs_diff_eq!(a, b, epsilon = 1e-12 * largest);
@@ -104,7 +131,11 @@ fn check_identity<S: Sample>(windows: &[Vec<S>], weighting: Weighting) {
 
 #[test]
 fn transform_of_the_mean_biased_correlogram_is_the_mean_padded_periodogram() {
-    for weighting in [Weighting::Rectangular, Weighting::Hann, Weighting::default()] {
+    for weighting in [
+        Weighting::Rectangular,
+        Weighting::Hann,
+        Weighting::default(),
+    ] {
         for n in [1, 2, 17, 64] {
             let real: Vec<_> = (0..5).map(|seed| noise(n, seed)).collect();
             check_identity(&real, weighting);
@@ -117,7 +148,11 @@ fn transform_of_the_mean_biased_correlogram_is_the_mean_padded_periodogram() {
 #[test]
 fn white_noise_reads_its_variance_for_every_weighting() {
     let windows = 4000;
-    for weighting in [Weighting::Rectangular, Weighting::Hann, Weighting::default()] {
+    for weighting in [
+        Weighting::Rectangular,
+        Weighting::Hann,
+        Weighting::default(),
+    ] {
         let correlogram = Correlogram::<f64>::new(weighting, 64).unwrap();
         let spectrum = LagSpectrum::new(SignalKind::Real, 64, 64).unwrap();
         let samples = noise(64 * windows, 11);
@@ -136,10 +171,16 @@ fn white_noise_reads_its_variance_for_every_weighting() {
 #[test]
 fn noise_free_tones_keep_their_velocity_within_the_leakage() {
     let mut scratch = Scratch::new();
-    let rectangular = PeriodogramOptions { weighting: Weighting::Rectangular, ..PeriodogramOptions::default() };
+    let rectangular = PeriodogramOptions {
+        weighting: Weighting::Rectangular,
+        ..PeriodogramOptions::default()
+    };
     for (options, bar_m_s) in [(rectangular, 0.09), (PeriodogramOptions::default(), 0.04)] {
         for refinement in [Refinement::Parabola, Refinement::Exact] {
-            let options = PeriodogramOptions { refinement, ..options };
+            let options = PeriodogramOptions {
+                refinement,
+                ..options
+            };
             let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
             let mut worst_m_s = 0.0_f64;
             for step in 0..60 {
@@ -157,11 +198,16 @@ fn noise_free_tones_keep_their_velocity_within_the_leakage() {
 #[test]
 fn complex_tones_have_no_image_and_come_out_exactly() {
     let sampling = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
-    let options = PeriodogramOptions { refinement: Refinement::Exact, ..PeriodogramOptions::default() };
+    let options = PeriodogramOptions {
+        refinement: Refinement::Exact,
+        ..PeriodogramOptions::default()
+    };
     let plan = PeriodogramPlan::<Complex<f64>>::new(&sampling, 64, &options).unwrap();
     for velocity_m_s in [-18.3, -3.7, 0.0, 0.001, 7.77] {
         let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) / 250e6;
-        let window: Vec<_> = (0..64).map(|n| Complex::from_polar(2.0, turn * n as f64)).collect();
+        let window: Vec<_> = (0..64)
+            .map(|n| Complex::from_polar(2.0, turn * n as f64))
+            .collect();
         let found = plan.velocity(&window, &mut Scratch::new()).unwrap();
         assert_abs_diff_eq!(found.velocity_m_s, velocity_m_s, epsilon = 1e-9);
         // the power is the square of the amplitude, all in the band unless its edge is near
@@ -184,11 +230,19 @@ fn literal_mode_stays_on_a_grid_of_three_metres_per_second() {
     let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
     let mut scratch = Scratch::new();
     // calm air lies between bins 20 and 21 and reads one of the two
-    let read_m_s = plan.velocity(&tone(0.0, 0.2), &mut scratch).unwrap().velocity_m_s;
+    let read_m_s = plan
+        .velocity(&tone(0.0, 0.2), &mut scratch)
+        .unwrap()
+        .velocity_m_s;
     assert!((read_m_s - 1.453_125).abs() < 1e-9 || (read_m_s + 1.574_218_75).abs() < 1e-9);
     let spacing_m_s = 250e6 / 64.0 * 1.55e-6 / 2.0;
     assert_relative_eq!(spacing_m_s, 3.027_343_75, max_relative = 1e-12);
-    let steps = (plan.velocity(&tone(9.0, 0.2), &mut scratch).unwrap().velocity_m_s - read_m_s) / spacing_m_s;
+    let steps = (plan
+        .velocity(&tone(9.0, 0.2), &mut scratch)
+        .unwrap()
+        .velocity_m_s
+        - read_m_s)
+        / spacing_m_s;
     assert_abs_diff_eq!(steps, steps.round(), epsilon = 1e-9);
 }
 
@@ -209,15 +263,24 @@ fn amplitudes_of_1e_minus_200_and_1e200_keep_their_velocity() {
 
 #[test]
 fn empty_constant_and_broken_signals_have_no_velocity() {
-    for weighting in [Weighting::Rectangular, Weighting::default(), Weighting::Hann] {
-        let options = PeriodogramOptions { weighting, ..PeriodogramOptions::default() };
+    for weighting in [
+        Weighting::Rectangular,
+        Weighting::default(),
+        Weighting::Hann,
+    ] {
+        let options = PeriodogramOptions {
+            weighting,
+            ..PeriodogramOptions::default()
+        };
         let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
         let mut scratch = Scratch::new();
         let mut broken = tone(1.0, 0.0);
         broken[10] = f64::NAN;
-        for (window, flag) in
-            [(vec![0.0; 64], Quality::NoSignal), (vec![5.0; 64], Quality::NoSignal), (broken, Quality::Invalid)]
-        {
+        for (window, flag) in [
+            (vec![0.0; 64], Quality::NoSignal),
+            (vec![5.0; 64], Quality::NoSignal),
+            (broken, Quality::Invalid),
+        ] {
             let found = plan.velocity(&window, &mut scratch).unwrap();
             assert_eq!(found.flag, flag, "{weighting:?}");
             assert!(found.velocity_m_s.is_nan());
@@ -230,11 +293,20 @@ fn empty_constant_and_broken_signals_have_no_velocity() {
 fn tones_outside_the_band_are_flagged() {
     let mut scratch = Scratch::new();
     for weighting in [Weighting::Rectangular, Weighting::default()] {
-        let options = PeriodogramOptions { weighting, ..PeriodogramOptions::default() };
+        let options = PeriodogramOptions {
+            weighting,
+            ..PeriodogramOptions::default()
+        };
         let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
         for velocity_m_s in [-34.0, -28.0, -24.0, -20.5, 20.5, 24.0, 30.0, 45.0, 100.0] {
-            let found = plan.velocity(&tone(velocity_m_s, 0.7), &mut scratch).unwrap();
-            assert_eq!(found.flag, Quality::OutOfBand, "{velocity_m_s} {weighting:?}");
+            let found = plan
+                .velocity(&tone(velocity_m_s, 0.7), &mut scratch)
+                .unwrap();
+            assert_eq!(
+                found.flag,
+                Quality::OutOfBand,
+                "{velocity_m_s} {weighting:?}"
+            );
         }
         // 63 m/s folds to 61.0 m/s, next to 0 Hz
         let folded = plan.velocity(&tone(63.0, 0.7), &mut scratch).unwrap();
@@ -251,11 +323,18 @@ fn noise_at_minus_40_db_gives_finite_velocities_spread_over_the_band() {
     let samples = noise(64 * windows, 5);
     let mut near = 0;
     for window in samples.chunks(64) {
-        let mixed: Vec<f64> = window.iter().zip(&signal).map(|(n, s)| n + 0.014 * s).collect();
+        let mixed: Vec<f64> = window
+            .iter()
+            .zip(&signal)
+            .map(|(n, s)| n + 0.014 * s)
+            .collect();
         let found = plan.velocity(&mixed, &mut scratch).unwrap();
         assert!(found.velocity_m_s.abs() <= 19.5 && found.quality >= 1.0);
         near += usize::from((found.velocity_m_s - 3.0).abs() < 0.5);
     }
     // 1 m/s of 38.75 m/s: 2.6 %, at most 2 % more
-    assert!((near as f64 / windows as f64 - 0.026).abs() < 0.02, "{near}");
+    assert!(
+        (near as f64 / windows as f64 - 0.026).abs() < 0.02,
+        "{near}"
+    );
 }

@@ -9,7 +9,13 @@ use wakescope_estimate::vortex_fit::*;
 
 /// A stored scan, noisy and exact.
 pub(super) fn stored(text: &str) -> (ScanMap, Array2<f64>) {
-    let number = |cell: &str| if cell.is_empty() { f64::NAN } else { cell.parse().unwrap() };
+    let number = |cell: &str| {
+        if cell.is_empty() {
+            f64::NAN
+        } else {
+            cell.parse().unwrap()
+        }
+    };
     let rows: Vec<Vec<f64>> = text
         .lines()
         .filter(|line| !line.starts_with('#'))
@@ -17,10 +23,17 @@ pub(super) fn stored(text: &str) -> (ScanMap, Array2<f64>) {
         .map(|line| line.split(',').map(number).collect())
         .collect();
     let mut elevation_rad: Vec<f64> = rows.iter().map(|row| row[1]).collect();
-    let gates = elevation_rad.iter().take_while(|e| **e == elevation_rad[0]).count();
+    let gates = elevation_rad
+        .iter()
+        .take_while(|e| **e == elevation_rad[0])
+        .count();
     elevation_rad = elevation_rad.into_iter().step_by(gates).collect();
     let column = |i: usize| {
-        Array2::from_shape_vec((elevation_rad.len(), gates), rows.iter().map(|row| row[i]).collect()).unwrap()
+        Array2::from_shape_vec(
+            (elevation_rad.len(), gates),
+            rows.iter().map(|row| row[i]).collect(),
+        )
+        .unwrap()
     };
     let map = ScanMap {
         time_s: column(2).column(0).to_vec(),
@@ -45,7 +58,11 @@ pub(crate) struct Case {
 
 macro_rules! reference {
     ($name:literal) => {
-        include_str!(concat!("../../../../tests/reference/estimate/", $name, ".csv"))
+        include_str!(concat!(
+            "../../../../tests/reference/estimate/",
+            $name,
+            ".csv"
+        ))
     };
 }
 
@@ -56,27 +73,70 @@ pub(crate) fn case(name: &str) -> Case {
             reference!("map_a"),
             0.0,
             [500.0, 500.0, 376.5, 60.0, 423.5, 60.0, 2.35, 2.35, 2.0, 0.0],
-            [3.43065, 3.74845, 0.0489695, 0.0256673, 0.0416861, 0.0288482, 0.0389447, 0.0512751, 0.0340653, 5.42644e-4],
+            [
+                3.43065, 3.74845, 0.0489695, 0.0256673, 0.0416861, 0.0288482, 0.0389447, 0.0512751,
+                0.0340653, 5.42644e-4,
+            ],
         ),
         "b" => (
             reference!("map_b"),
             15.0,
             [300.0, 300.0, 381.0, 40.0, 419.0, 40.0, 3.0, 3.0, -4.0, 0.03],
-            [8.82252, 9.44185, 0.548307, 0.107213, 0.702118, 0.140685, 0.20766, 0.267131, 0.0463667, 0.000901482],
+            [
+                8.82252,
+                9.44185,
+                0.548307,
+                0.107213,
+                0.702118,
+                0.140685,
+                0.20766,
+                0.267131,
+                0.0463667,
+                0.000901482,
+            ],
         ),
         _ => (
             reference!("map_c"),
             10.0,
             [420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02],
-            [3.64935, 3.73507, 0.146386, 0.0471245, 0.18953, 0.0591762, 0.0849975, 0.109539, 0.031468, 0.000530674],
+            [
+                3.64935,
+                3.73507,
+                0.146386,
+                0.0471245,
+                0.18953,
+                0.0591762,
+                0.0849975,
+                0.109539,
+                0.031468,
+                0.000530674,
+            ],
         ),
     };
     let (map, exact) = stored(text);
-    let gate = if std_m > 0.0 { Gate::Gaussian { std_m } } else { Gate::Point };
+    let gate = if std_m > 0.0 {
+        Gate::Gaussian { std_m }
+    } else {
+        Gate::Point
+    };
     // those of a and b stand still although their lines have times
-    let movement = if name == "c" { Movement::Moving } else { Movement::Frozen };
-    let options = RetrievalOptions { gate, movement, ..Default::default() };
-    Case { map, exact, truth: Wake::from_array(&truth), bound, options }
+    let movement = if name == "c" {
+        Movement::Moving
+    } else {
+        Movement::Frozen
+    };
+    let options = RetrievalOptions {
+        gate,
+        movement,
+        ..Default::default()
+    };
+    Case {
+        map,
+        exact,
+        truth: Wake::from_array(&truth),
+        bound,
+        options,
+    }
 }
 
 /// Errors, stated deviations and chi-squares per degree of many fits.
@@ -95,11 +155,23 @@ pub(super) fn mean(numbers: impl Iterator<Item = f64>) -> f64 {
 
 impl Scatter {
     /// Of so many scans made by `draw` from the exact one.
-    fn of(case: &Case, draws: u64, draw: impl Fn(&Case, &mut Xoshiro256PlusPlus) -> Array2<f64>) -> Self {
-        let mut scatter = Self { errors: vec![], stated: vec![], chi2: vec![], failed: vec![] };
+    fn of(
+        case: &Case,
+        draws: u64,
+        draw: impl Fn(&Case, &mut Xoshiro256PlusPlus) -> Array2<f64>,
+    ) -> Self {
+        let mut scatter = Self {
+            errors: vec![],
+            stated: vec![],
+            chi2: vec![],
+            failed: vec![],
+        };
         for seed in 0..draws {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(1000 + seed);
-            let map = ScanMap { velocity_m_s: draw(case, &mut rng), ..case.map.clone() };
+            let map = ScanMap {
+                velocity_m_s: draw(case, &mut rng),
+                ..case.map.clone()
+            };
             let found = fit_scan(&map, &case.options).unwrap();
             if found.vortices.len() < 2 {
                 scatter.failed.push((seed, found));
@@ -107,8 +179,12 @@ impl Scatter {
             }
             let wake = found.wake.unwrap().to_array();
             let truth = case.truth.to_array();
-            scatter.errors.push(std::array::from_fn(|i| wake[i] - truth[i]));
-            scatter.stated.push(std::array::from_fn(|i| found.covariance[[i, i]].sqrt()));
+            scatter
+                .errors
+                .push(std::array::from_fn(|i| wake[i] - truth[i]));
+            scatter
+                .stated
+                .push(std::array::from_fn(|i| found.covariance[[i, i]].sqrt()));
             scatter.chi2.push(found.chi2_per_dof);
         }
         scatter
@@ -118,16 +194,29 @@ impl Scatter {
     fn numbers(&self, i: usize) -> (f64, f64, f64) {
         let bias = mean(self.errors.iter().map(|e| e[i]));
         let count = self.errors.len() as f64;
-        let variance = mean(self.errors.iter().map(|e| (e[i] - bias).powi(2))) * count / (count - 1.0);
-        (bias, variance.sqrt(), mean(self.stated.iter().map(|s| s[i])))
+        let variance =
+            mean(self.errors.iter().map(|e| (e[i] - bias).powi(2))) * count / (count - 1.0);
+        (
+            bias,
+            variance.sqrt(),
+            mean(self.stated.iter().map(|s| s[i])),
+        )
     }
 
     /// Bias in standard errors, scatter over the bound, stated deviation over scatter of each parameter, in words; and whether the bias is
     /// within 3.5 errors, the scatter within `above` bounds and the stated deviation within `off` of it, but for what chance allows.
-    fn told(&self, name: &str, bound: &[f64; PARAMETERS], (above, off): (f64, f64)) -> (String, bool) {
+    fn told(
+        &self,
+        name: &str,
+        bound: &[f64; PARAMETERS],
+        (above, off): (f64, f64),
+    ) -> (String, bool) {
         let count = self.errors.len() as f64;
         let chance = 3.0 / (2.0 * count).sqrt();
-        let mut told = format!("{name}: chi2 per degree {:.3}\n", mean(self.chi2.iter().copied()));
+        let mut told = format!(
+            "{name}: chi2 per degree {:.3}\n",
+            mean(self.chi2.iter().copied())
+        );
         for (seed, found) in &self.failed {
             told += &format!("  scan {seed}: {:?} {:?}\n", found.flags, found.vortices);
         }
@@ -140,7 +229,9 @@ impl Scatter {
                 std / bound,
                 stated / std
             );
-            holds &= errors.abs() < 3.5 && std / bound < above + chance && (stated / std - 1.0).abs() < off + chance;
+            holds &= errors.abs() < 3.5
+                && std / bound < above + chance
+                && (stated / std - 1.0).abs() < off + chance;
         }
         (told, holds)
     }
@@ -149,12 +240,20 @@ impl Scatter {
 /// White noise with the deviations of the map.
 pub(super) fn white(case: &Case, rng: &mut Xoshiro256PlusPlus) -> Array2<f64> {
     let sigma = case.map.sigma_m_s.as_ref().unwrap();
-    Array2::from_shape_fn(case.exact.dim(), |at| case.exact[at] + sigma[at] * normal(rng))
+    Array2::from_shape_fn(case.exact.dim(), |at| {
+        case.exact[at] + sigma[at] * normal(rng)
+    })
 }
 
 /// The same with 5 % of the velocities anywhere in the band.
 pub(crate) fn with_outliers(case: &Case, rng: &mut Xoshiro256PlusPlus) -> Array2<f64> {
-    white(case, rng).mapv(|v| if rng.random::<f64>() < 0.05 { -19.0 + 38.0 * rng.random::<f64>() } else { v })
+    white(case, rng).mapv(|v| {
+        if rng.random::<f64>() < 0.05 {
+            -19.0 + 38.0 * rng.random::<f64>()
+        } else {
+            v
+        }
+    })
 }
 
 /// Factor of the covariance of turbulence at the cells of a map.
@@ -174,7 +273,11 @@ pub(crate) fn turbulence_factor(map: &ScanMap, deviation_m_s: f64, length_m: f64
             let c = deviation_m_s.powi(2) * (-(a.0 - b.0).hypot(a.1 - b.1) / length_m).exp();
             let above = if k < i { &rows[k] } else { &row };
             let dot: f64 = row[..k].iter().zip(&above[..k]).map(|(x, y)| x * y).sum();
-            let entry = if k < i { (c - dot) / rows[k][k] } else { (c - dot).sqrt() };
+            let entry = if k < i {
+                (c - dot) / rows[k][k]
+            } else {
+                (c - dot).sqrt()
+            };
             row.push(entry);
         }
         rows.push(row);
@@ -193,7 +296,11 @@ pub(crate) fn thinned(case: Case) -> Case {
         sigma_m_s: case.map.sigma_m_s.as_ref().map(keep),
         ..case.map
     };
-    Case { exact: keep(&case.exact), map, ..case }
+    Case {
+        exact: keep(&case.exact),
+        map,
+        ..case
+    }
 }
 
 #[test]
@@ -204,7 +311,11 @@ fn scatter_over_many_scans() {
     for (n, (name, case)) in names.into_iter().zip(&cases).enumerate() {
         // cores are hardly resolved in b: more scans tell more
         let scans = if n == 1 { 200 } else { 100 };
-        let scatter = if n == 3 { Scatter::of(case, scans, with_outliers) } else { Scatter::of(case, scans, white) };
+        let scatter = if n == 3 {
+            Scatter::of(case, scans, with_outliers)
+        } else {
+            Scatter::of(case, scans, white)
+        };
         let (told, holds) = scatter.told(name, &case.bound, (1.1, 0.15));
         println!("{told}");
         assert!(holds);
@@ -226,22 +337,37 @@ fn scatter_in_turbulence() {
         velocity
     };
     let sandwich = Scatter::of(&case, 100, draw);
-    println!("{}", sandwich.told("sandwich", &case.bound, (f64::INFINITY, 0.2)).0);
-    case.options.turbulence = Some(Turbulence { deviation_m_s: 1.2, length_m: 25.0 });
+    println!(
+        "{}",
+        sandwich
+            .told("sandwich", &case.bound, (f64::INFINITY, 0.2))
+            .0
+    );
+    case.options.turbulence = Some(Turbulence {
+        deviation_m_s: 1.2,
+        length_m: 25.0,
+    });
     let whitened = Scatter::of(&case, 100, draw);
     let (told, holds) = whitened.told("whitened", &case.bound, (f64::INFINITY, 0.2));
     println!("{told}");
     // a few scans without whitening end at another top: circulations alone are held to it
     for i in 0..2 {
         let (_, std, stated) = sandwich.numbers(i);
-        assert!((stated / std - 1.0).abs() < 0.2 + 3.0 / 200.0_f64.sqrt(), "{i}: {stated} {std}");
+        assert!(
+            (stated / std - 1.0).abs() < 0.2 + 3.0 / 200.0_f64.sqrt(),
+            "{i}: {stated} {std}"
+        );
         assert!(whitened.numbers(i).1 < 0.6 * std, "{i}: {std}");
     }
     assert!(holds);
 }
 
 /// Statistics of scans that hold a wind only.
-pub(super) fn empty_statistics(scans: u64, turbulence: Option<&[Vec<f64>]>, options: &RetrievalOptions) -> Vec<f64> {
+pub(super) fn empty_statistics(
+    scans: u64,
+    turbulence: Option<&[Vec<f64>]>,
+    options: &RetrievalOptions,
+) -> Vec<f64> {
     let mut case = thinned(case("a"));
     let (elevation_rad, range_m) = (case.map.elevation_rad.clone(), case.map.range_m.clone());
     case.exact = Array2::from_shape_fn(case.exact.dim(), |(line, gate)| {
@@ -256,8 +382,19 @@ pub(super) fn empty_statistics(scans: u64, turbulence: Option<&[Vec<f64>]>, opti
                 *v += row.iter().zip(&numbers).map(|(l, x)| l * x).sum::<f64>();
             }
         }
-        let found = fit_scan(&ScanMap { velocity_m_s, ..case.map.clone() }, options).unwrap();
-        if found.vortices.is_empty() { -found.statistic } else { found.statistic }
+        let found = fit_scan(
+            &ScanMap {
+                velocity_m_s,
+                ..case.map.clone()
+            },
+            options,
+        )
+        .unwrap();
+        if found.vortices.is_empty() {
+            -found.statistic
+        } else {
+            found.statistic
+        }
     };
     let mut statistics: Vec<f64> = (0..scans).map(statistic).collect();
     statistics.sort_by(|a, b| a.abs().total_cmp(&b.abs()));
@@ -272,18 +409,44 @@ fn statistics_of_empty_scans() {
     let factor = turbulence_factor(&thinned(case("a")).map, 0.8, 25.0);
     let correlated = empty_statistics(60, Some(&factor), &RetrievalOptions::default());
     println!("turbulent {correlated:.1?}");
-    let turbulence = Some(Turbulence { deviation_m_s: 0.8, length_m: 25.0 });
-    let whitened = empty_statistics(60, Some(&factor), &RetrievalOptions { turbulence, ..Default::default() });
+    let turbulence = Some(Turbulence {
+        deviation_m_s: 0.8,
+        length_m: 25.0,
+    });
+    let whitened = empty_statistics(
+        60,
+        Some(&factor),
+        &RetrievalOptions {
+            turbulence,
+            ..Default::default()
+        },
+    );
     println!("whitened {whitened:.1?}");
     // none that is positive is a wake: these are negative
-    assert!(white.iter().chain(&whitened).all(|statistic| *statistic <= 0.0));
-    assert!(correlated.iter().filter(|statistic| **statistic > 0.0).count() <= 3);
+    assert!(
+        white
+            .iter()
+            .chain(&whitened)
+            .all(|statistic| *statistic <= 0.0)
+    );
+    assert!(
+        correlated
+            .iter()
+            .filter(|statistic| **statistic > 0.0)
+            .count()
+            <= 3
+    );
 }
 
 /// A vortex's circulation, place and core, where they are measured.
 pub(super) fn numbers(vortex: &VortexResult) -> [Measured; 4] {
     let core = vortex.core_radius_m.unwrap();
-    [vortex.circulation_m2_s, vortex.lateral_position_m, vortex.height_m, core]
+    [
+        vortex.circulation_m2_s,
+        vortex.lateral_position_m,
+        vortex.height_m,
+        core,
+    ]
 }
 
 /// Errors in units of the bound at the lines of the cores.
@@ -292,11 +455,23 @@ pub(super) fn errors_over_bounds(case: &Case, found: &ScanResult) -> Vec<f64> {
     let velocities = WakeModel::default().centre_velocities_m_s(&case.truth);
     let mut errors = vec![];
     for (vortex, places, motion) in [
-        (found.vortex(Side::Left).unwrap(), [0, 2, 3, 6], &velocities[..2]),
-        (found.vortex(Side::Right).unwrap(), [1, 4, 5, 7], &velocities[2..]),
+        (
+            found.vortex(Side::Left).unwrap(),
+            [0, 2, 3, 6],
+            &velocities[..2],
+        ),
+        (
+            found.vortex(Side::Right).unwrap(),
+            [1, 4, 5, 7],
+            &velocities[2..],
+        ),
     ] {
         // the truth of the moving one holds at time 0
-        let seconds = if case.options.movement == Movement::Moving { vortex.time_s } else { 0.0 };
+        let seconds = if case.options.movement == Movement::Moving {
+            vortex.time_s
+        } else {
+            0.0
+        };
         let moved = [0.0, seconds * motion[0], seconds * motion[1], 0.0];
         for ((number, place), moved) in numbers(vortex).iter().zip(places).zip(moved) {
             errors.push((number.value - p[place] - moved) / bound[place]);
@@ -322,21 +497,42 @@ fn exact_scans_give_the_truth_to_a_thousandth_of_the_bound() {
 fn stored_scans_are_within_three_bounds_of_the_truth_whether_the_wake_moves_or_not() {
     for name in ["a", "b", "c"] {
         let case = case(name);
-        let options = RetrievalOptions { movement: Movement::Auto, ..case.options.clone() };
+        let options = RetrievalOptions {
+            movement: Movement::Auto,
+            ..case.options.clone()
+        };
         let found = fit_scan(&case.map, &options).unwrap();
         let errors = errors_over_bounds(&case, &found);
         assert!(errors.iter().all(|e| e.abs() < 3.0), "{name}: {errors:?}");
-        assert!((found.chi2_per_dof - 1.0).abs() < 0.1, "{name}: {}", found.chi2_per_dof);
-        assert_eq!(found.has(Flag::MotionIgnored), name != "c", "{name}: {:?}", found.flags);
+        assert!(
+            (found.chi2_per_dof - 1.0).abs() < 0.1,
+            "{name}: {}",
+            found.chi2_per_dof
+        );
+        assert_eq!(
+            found.has(Flag::MotionIgnored),
+            name != "c",
+            "{name}: {:?}",
+            found.flags
+        );
         let bound = case.bound;
         for (i, bound) in bound.iter().enumerate() {
             let stated = found.covariance[[i, i]].sqrt();
-            assert!((0.8..1.3).contains(&(stated / bound)), "{name} {i}: {stated} {bound}");
+            assert!(
+                (0.8..1.3).contains(&(stated / bound)),
+                "{name} {i}: {stated} {bound}"
+            );
         }
-        let [left, right] = [Side::Left, Side::Right].map(|side| found.vortex(side).unwrap().circulation_5_15_m2_s);
-        let truth = case.truth.mean_circulations_5_15_m2_s(CoreProfile::Algebraic, found.covariance.view());
+        let [left, right] =
+            [Side::Left, Side::Right].map(|side| found.vortex(side).unwrap().circulation_5_15_m2_s);
+        let truth = case
+            .truth
+            .mean_circulations_5_15_m2_s(CoreProfile::Algebraic, found.covariance.view());
         for (found, truth) in [(left, truth[0]), (right, truth[1])] {
-            assert!((found.value - truth.0).abs() < 3.0 * found.std, "{name}: {found:?} {truth:?}");
+            assert!(
+                (found.value - truth.0).abs() < 3.0 * found.std,
+                "{name}: {found:?} {truth:?}"
+            );
         }
     }
 }
@@ -347,21 +543,48 @@ fn a_frozen_model_of_a_moving_wake_is_metres_off_and_fits_badly() {
     case.options.movement = Movement::Frozen;
     let found = fit_scan(&case.map, &case.options).unwrap();
     let wake = found.wake.unwrap();
-    assert!((wake.right.lateral_position_m - 424.0 + 2.6).abs() < 0.8, "{wake:?}");
-    assert!(wake.left.circulation_m2_s < 400.0 && found.chi2_per_dof > 1.2 && found.has(Flag::MotionIgnored));
+    assert!(
+        (wake.right.lateral_position_m - 424.0 + 2.6).abs() < 0.8,
+        "{wake:?}"
+    );
+    assert!(
+        wake.left.circulation_m2_s < 400.0
+            && found.chi2_per_dof > 1.2
+            && found.has(Flag::MotionIgnored)
+    );
 }
 
 #[test]
 fn one_vortex_is_told_as_one_and_wind_as_no_wake() {
     let (map, _) = stored(reference!("map_one"));
     for movement in [Movement::Auto, Movement::Frozen] {
-        let found = fit_scan(&map, &RetrievalOptions { movement, ..Default::default() }).unwrap();
-        assert!(found.has(Flag::OneVortex) && found.vortices.len() == 1, "{:?}", found.flags);
+        let found = fit_scan(
+            &map,
+            &RetrievalOptions {
+                movement,
+                ..Default::default()
+            },
+        )
+        .unwrap();
+        assert!(
+            found.has(Flag::OneVortex) && found.vortices.len() == 1,
+            "{:?}",
+            found.flags
+        );
         let right = numbers(found.vortex(Side::Right).unwrap());
-        let (truth, bound) = ([350.0, 410.0, 30.0, 2.5], [3.498, 0.070_12, 0.040_568, 0.065_798]);
+        let (truth, bound) = (
+            [350.0, 410.0, 30.0, 2.5],
+            [3.498, 0.070_12, 0.040_568, 0.065_798],
+        );
         for ((found, truth), bound) in right.iter().zip(truth).zip(bound) {
-            assert!((found.value - truth).abs() < 4.0 * bound, "{found:?} {truth}");
-            assert!((0.8..1.3).contains(&(found.std / bound)), "{found:?} {bound}");
+            assert!(
+                (found.value - truth).abs() < 4.0 * bound,
+                "{found:?} {truth}"
+            );
+            assert!(
+                (0.8..1.3).contains(&(found.std / bound)),
+                "{found:?} {bound}"
+            );
         }
     }
     let (map, _) = stored(reference!("map_noise"));
@@ -380,14 +603,28 @@ fn outliers_and_unknown_deviations_leave_errors_that_the_covariance_tells() {
         let mut squares = vec![];
         for seed in 0..6 {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(300 + seed);
-            let velocity_m_s = if outliers { with_outliers(&case, &mut rng) } else { white(&case, &mut rng) };
+            let velocity_m_s = if outliers {
+                with_outliers(&case, &mut rng)
+            } else {
+                white(&case, &mut rng)
+            };
             let sigma_m_s = case.map.sigma_m_s.clone().filter(|_| known);
-            let map = ScanMap { velocity_m_s, sigma_m_s, ..case.map.clone() };
+            let map = ScanMap {
+                velocity_m_s,
+                sigma_m_s,
+                ..case.map.clone()
+            };
             let found = fit_scan(&map, &case.options).unwrap();
             let (p, truth) = (found.wake.unwrap().to_array(), case.truth.to_array());
-            squares.extend((0..PARAMETERS).map(|i| (p[i] - truth[i]).powi(2) / found.covariance[[i, i]]));
+            squares.extend(
+                (0..PARAMETERS).map(|i| (p[i] - truth[i]).powi(2) / found.covariance[[i, i]]),
+            );
             let rejected = if outliers { 30..90 } else { 0..3 };
-            assert!(rejected.contains(&found.cells_rejected), "{}", found.cells_rejected);
+            assert!(
+                rejected.contains(&found.cells_rejected),
+                "{}",
+                found.cells_rejected
+            );
         }
         // 60 squares, not all independent: their mean is known to 20 %
         let mean = mean(squares.into_iter());
@@ -407,41 +644,102 @@ pub(super) fn noisy(
         (0..count).map(|i| first + step * f64::from(i)).collect()
     };
     let (elevation_rad, range_m) = (axis(lines), axis(gates));
-    let std_m = if let Gate::Gaussian { std_m } = options.gate { std_m } else { 0.0 };
+    let std_m = if let Gate::Gaussian { std_m } = options.gate {
+        std_m
+    } else {
+        0.0
+    };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let velocity_m_s = Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
-        let (mut sum, mut weights) = (0.0, 0.0);
-        for i in -40..=40 {
-            let away = f64::from(i) / 10.0;
-            let weight = (-0.5 * away * away).exp();
-            weights += weight;
-            sum += weight * options.model.radial_velocity_m_s(wake, range_m[gate] + away * std_m, elevation_rad[line]);
-        }
-        sum / weights + 0.5 * normal(&mut rng)
-    });
+    let velocity_m_s =
+        Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for i in -40..=40 {
+                let away = f64::from(i) / 10.0;
+                let weight = (-0.5 * away * away).exp();
+                weights += weight;
+                sum += weight
+                    * options.model.radial_velocity_m_s(
+                        wake,
+                        range_m[gate] + away * std_m,
+                        elevation_rad[line],
+                    );
+            }
+            sum / weights + 0.5 * normal(&mut rng)
+        });
     let sigma_m_s = Some(Array2::from_elem(velocity_m_s.dim(), 0.5));
     let time_s = vec![f64::NAN; elevation_rad.len()];
-    ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s, fold_m_s: None }
+    ScanMap {
+        elevation_rad,
+        time_s,
+        range_m,
+        velocity_m_s,
+        sigma_m_s,
+        fold_m_s: None,
+    }
 }
 
 #[test]
 fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_errors() {
     let of = |p: [f64; 6], core_m: f64, wind: [f64; 2]| {
-        Wake::from_array(&[p[0], p[1], p[2], p[3], p[4], p[5], core_m, core_m, wind[0], wind[1]])
+        Wake::from_array(&[
+            p[0], p[1], p[2], p[3], p[4], p[5], core_m, core_m, wind[0], wind[1],
+        ])
     };
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 36));
     let points = RetrievalOptions::default();
     let gate = Gate::Gaussian { std_m: 10.0 };
-    let coarse = RetrievalOptions { gate: gate.clone(), ..Default::default() };
-    let raised = WakeModel { lidar_height_m: 12.0, lidar_lateral_position_m: -30.0, ..Default::default() };
-    let raised = RetrievalOptions { model: raised, ..Default::default() };
-    let lamb = WakeModel { profile: CoreProfile::LambOseen, images: false, ..Default::default() };
-    let lamb = RetrievalOptions { model: lamb, gate, ..Default::default() };
+    let coarse = RetrievalOptions {
+        gate: gate.clone(),
+        ..Default::default()
+    };
+    let raised = WakeModel {
+        lidar_height_m: 12.0,
+        lidar_lateral_position_m: -30.0,
+        ..Default::default()
+    };
+    let raised = RetrievalOptions {
+        model: raised,
+        ..Default::default()
+    };
+    let lamb = WakeModel {
+        profile: CoreProfile::LambOseen,
+        images: false,
+        ..Default::default()
+    };
+    let lamb = RetrievalOptions {
+        model: lamb,
+        gate,
+        ..Default::default()
+    };
     for (name, wake, options, lines, gates) in [
-        ("weak", of([50.0, 50.0, 380.0, 50.0, 420.0, 50.0], 2.5, [2.0, 0.0]), &points, lines, gates),
-        ("unequal", of([420.0, 180.0, 370.0, 70.0, 425.0, 55.0], 2.5, [-5.0, 0.05]), &points, lines, gates),
-        ("low", of([300.0, 320.0, 375.0, 14.0, 428.0, 18.0], 2.5, [1.0, 0.0]), &coarse, lines, gates),
-        ("high", of([350.0, 350.0, 380.0, 110.0, 425.0, 118.0], 3.0, [8.0, 0.02]), &coarse, (0.12, 0.005, 50), gates),
+        (
+            "weak",
+            of([50.0, 50.0, 380.0, 50.0, 420.0, 50.0], 2.5, [2.0, 0.0]),
+            &points,
+            lines,
+            gates,
+        ),
+        (
+            "unequal",
+            of([420.0, 180.0, 370.0, 70.0, 425.0, 55.0], 2.5, [-5.0, 0.05]),
+            &points,
+            lines,
+            gates,
+        ),
+        (
+            "low",
+            of([300.0, 320.0, 375.0, 14.0, 428.0, 18.0], 2.5, [1.0, 0.0]),
+            &coarse,
+            lines,
+            gates,
+        ),
+        (
+            "high",
+            of([350.0, 350.0, 380.0, 110.0, 425.0, 118.0], 3.0, [8.0, 0.02]),
+            &coarse,
+            (0.12, 0.005, 50),
+            gates,
+        ),
         (
             "coarse gates",
             of([400.0, 380.0, 380.0, 50.0, 424.0, 48.0], 3.0, [0.0, 0.0]),
@@ -456,14 +754,31 @@ fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_e
             (-0.02, 0.004, 60),
             gates,
         ),
-        ("narrow", of([400.0, 380.0, 380.0, 50.0, 424.0, 48.0], 2.5, [0.0, 0.0]), &points, (0.08, 0.003, 27), gates),
-        ("Lamb-Oseen", of([400.0, 380.0, 380.0, 50.0, 424.0, 48.0], 2.5, [0.0, 0.0]), &lamb, lines, gates),
+        (
+            "narrow",
+            of([400.0, 380.0, 380.0, 50.0, 424.0, 48.0], 2.5, [0.0, 0.0]),
+            &points,
+            (0.08, 0.003, 27),
+            gates,
+        ),
+        (
+            "Lamb-Oseen",
+            of([400.0, 380.0, 380.0, 50.0, 424.0, 48.0], 2.5, [0.0, 0.0]),
+            &lamb,
+            lines,
+            gates,
+        ),
     ] {
         let found = fit_scan(&noisy(&wake, options, lines, gates, 17), options).unwrap();
         let (p, truth) = (found.wake.unwrap().to_array(), wake.to_array());
         for i in 0..PARAMETERS {
             let sigma = found.covariance[[i, i]].sqrt();
-            assert!((p[i] - truth[i]).abs() <= 4.0 * sigma, "{name} {i}: {} {} {sigma}", p[i], truth[i]);
+            assert!(
+                (p[i] - truth[i]).abs() <= 4.0 * sigma,
+                "{name} {i}: {} {} {sigma}",
+                p[i],
+                truth[i]
+            );
         }
         assert_eq!(found.vortices.len(), 2, "{name}: {:?}", found.flags);
         assert!(
@@ -477,15 +792,28 @@ fn weak_unequal_low_and_high_wakes_on_coarse_and_narrow_scans_are_within_their_e
 #[test]
 fn vortices_beyond_or_at_the_end_of_the_sector_are_told() {
     let options = RetrievalOptions::default();
-    let wake = |right_m: f64| Wake::from_array(&[380.0, 380.0, 400.0, 50.0, right_m, 50.0, 2.5, 2.5, 1.0, 0.0]);
+    let wake = |right_m: f64| {
+        Wake::from_array(&[380.0, 380.0, 400.0, 50.0, right_m, 50.0, 2.5, 2.5, 1.0, 0.0])
+    };
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 31));
     // 450 m is the last gate
     let found = fit_scan(&noisy(&wake(475.0), &options, lines, gates, 1), &options).unwrap();
-    assert!(found.has(Flag::OneVortex) && found.vortex(Side::Right).is_none(), "{:?}", found.flags);
+    assert!(
+        found.has(Flag::OneVortex) && found.vortex(Side::Right).is_none(),
+        "{:?}",
+        found.flags
+    );
     let left = numbers(found.vortex(Side::Left).unwrap());
-    assert!((left[0].value - 380.0).abs() < 25.0 && (left[1].value - 400.0).abs() < 1.0, "{left:?}");
+    assert!(
+        (left[0].value - 380.0).abs() < 25.0 && (left[1].value - 400.0).abs() < 1.0,
+        "{left:?}"
+    );
     let found = fit_scan(&noisy(&wake(444.0), &options, lines, gates, 2), &options).unwrap();
-    assert!(found.has(Flag::AtEdge) && found.vortices.len() == 2, "{:?}", found.flags);
+    assert!(
+        found.has(Flag::AtEdge) && found.vortices.len() == 2,
+        "{:?}",
+        found.flags
+    );
 }
 
 #[test]
@@ -495,15 +823,32 @@ fn folded_velocities_holes_and_cores_that_are_kept() {
     let (lines, gates) = ((0.004, 0.004, 56), (330.0, 4.0, 36));
     let mut map = noisy(&wake, &options, lines, gates, 3);
     // a band of 20 m/s about 0: what is above 10 m/s comes out below
-    map.velocity_m_s.mapv_inplace(|v| v - 20.0 * (v / 20.0_f64).round());
+    map.velocity_m_s
+        .mapv_inplace(|v| v - 20.0 * (v / 20.0_f64).round());
     map.fold_m_s = Some(20.0);
-    map.velocity_m_s.slice_mut(ndarray::s![20..24, 3..9]).fill(f64::NAN);
+    map.velocity_m_s
+        .slice_mut(ndarray::s![20..24, 3..9])
+        .fill(f64::NAN);
     let found = fit_scan(&map, &options).unwrap();
     let (p, truth) = (found.wake.unwrap().to_array(), wake.to_array());
-    assert!((0..PARAMETERS).all(|i| (p[i] - truth[i]).powi(2) <= 16.0 * found.covariance[[i, i]]), "{p:?}");
+    assert!(
+        (0..PARAMETERS).all(|i| (p[i] - truth[i]).powi(2) <= 16.0 * found.covariance[[i, i]]),
+        "{p:?}"
+    );
     assert_eq!(found.cells_used + found.cells_rejected, 56 * 36 - 24);
-    let fixed = FreeParameters { core_radius: Sharing::Fixed, ..options.free };
-    let kept = fit_scan(&map, &RetrievalOptions { free: fixed, core_radius_m: Some(2.2), ..options }).unwrap();
+    let fixed = FreeParameters {
+        core_radius: Sharing::Fixed,
+        ..options.free
+    };
+    let kept = fit_scan(
+        &map,
+        &RetrievalOptions {
+            free: fixed,
+            core_radius_m: Some(2.2),
+            ..options
+        },
+    )
+    .unwrap();
     assert!(kept.has(Flag::CoreKept) && kept.vortices.iter().all(|v| v.core_radius_m.is_none()));
     assert_eq!(kept.wake.unwrap().left.core_radius_m, 2.2);
 }
@@ -516,15 +861,70 @@ fn impossible_scans_and_options_are_refused_with_the_field() {
         assert!(error.contains(field), "{error}");
     };
     let options = RetrievalOptions::default();
-    refused(&ScanMap { time_s: vec![0.0; 3], ..map.clone() }, &options, "time_s");
-    refused(&ScanMap { fold_m_s: Some(-1.0), ..map.clone() }, &options, "fold_m_s");
-    refused(&ScanMap { sigma_m_s: Some(Array2::zeros((75, 36))), ..map.clone() }, &options, "standard_deviation_m_s");
-    refused(&ScanMap { velocity_m_s: Array2::from_elem((75, 36), f64::NAN), ..map.clone() }, &options, "velocities");
-    refused(&map, &RetrievalOptions { threshold: f64::NAN, ..options.clone() }, "threshold");
+    refused(
+        &ScanMap {
+            time_s: vec![0.0; 3],
+            ..map.clone()
+        },
+        &options,
+        "time_s",
+    );
+    refused(
+        &ScanMap {
+            fold_m_s: Some(-1.0),
+            ..map.clone()
+        },
+        &options,
+        "fold_m_s",
+    );
+    refused(
+        &ScanMap {
+            sigma_m_s: Some(Array2::zeros((75, 36))),
+            ..map.clone()
+        },
+        &options,
+        "standard_deviation_m_s",
+    );
+    refused(
+        &ScanMap {
+            velocity_m_s: Array2::from_elem((75, 36), f64::NAN),
+            ..map.clone()
+        },
+        &options,
+        "velocities",
+    );
+    refused(
+        &map,
+        &RetrievalOptions {
+            threshold: f64::NAN,
+            ..options.clone()
+        },
+        "threshold",
+    );
     for std_m in [-3.0, 1e9] {
-        refused(&map, &RetrievalOptions { gate: Gate::Gaussian { std_m }, ..options.clone() }, "std_m of the gate");
+        refused(
+            &map,
+            &RetrievalOptions {
+                gate: Gate::Gaussian { std_m },
+                ..options.clone()
+            },
+            "std_m of the gate",
+        );
     }
-    let turbulence = Some(Turbulence { deviation_m_s: 0.0, length_m: 25.0 });
-    refused(&map, &RetrievalOptions { turbulence, ..options.clone() }, "deviation_m_s");
-    assert_eq!(fit_scan(&map, &options).unwrap(), fit_scan(&map, &options).unwrap());
+    let turbulence = Some(Turbulence {
+        deviation_m_s: 0.0,
+        length_m: 25.0,
+    });
+    refused(
+        &map,
+        &RetrievalOptions {
+            turbulence,
+            ..options.clone()
+        },
+        "deviation_m_s",
+    );
+    assert_eq!(
+        fit_scan(&map, &options).unwrap(),
+        fit_scan(&map, &options).unwrap()
+    );
 }

@@ -11,17 +11,33 @@ use wakescope_estimate::vortex_fit::*;
 /// Gates so long that circulation and spacing are known by their product alone, and a little shorter than the fit takes them for.
 #[test]
 fn long_gates_hide_circulations_but_no_wakes() {
-    let options = |std_m: f64| RetrievalOptions { gate: Gate::Gaussian { std_m }, ..Default::default() };
+    let options = |std_m: f64| RetrievalOptions {
+        gate: Gate::Gaussian { std_m },
+        ..Default::default()
+    };
     let wake = Wake::from_array(&[420.0, 420.0, 376.5, 31.0, 423.5, 31.0, 4.5, 4.5, 0.0, 0.0]);
     let (lines, gates) = ((0.01, 0.0033, 75), (280.0, 13.0, 20));
     for seed in 1..4 {
-        let found = fit_scan(&noisy(&wake, &options(33.0), lines, gates, seed), &options(37.0)).unwrap();
+        let found = fit_scan(
+            &noisy(&wake, &options(33.0), lines, gates, seed),
+            &options(37.0),
+        )
+        .unwrap();
         // the gate is taken for too long: what that leaves is alike in neighbours, and counted as such
-        assert!(found.statistic > 100.0 && found.vortices.len() == 2, "{seed}: {} {:?}", found.statistic, found.flags);
+        assert!(
+            found.statistic > 100.0 && found.vortices.len() == 2,
+            "{seed}: {} {:?}",
+            found.statistic,
+            found.flags
+        );
         for vortex in &found.vortices {
             let Measured { value, std } = vortex.circulation_m2_s;
             assert!(value < 3.0 * std, "{seed}: it is certain: {value} {std}");
-            assert!((vortex.height_m.value - 31.0).abs() < 4.0 * vortex.height_m.std, "{seed}: {:?}", vortex.height_m);
+            assert!(
+                (vortex.height_m.value - 31.0).abs() < 4.0 * vortex.height_m.std,
+                "{seed}: {:?}",
+                vortex.height_m
+            );
         }
     }
 }
@@ -29,16 +45,35 @@ fn long_gates_hide_circulations_but_no_wakes() {
 /// Whether the vortices move is told by the scan where it can be, and else by how long it lasts.
 #[test]
 fn standing_vortices_are_taken_for_such_and_moving_ones_in_scans_of_seconds() {
-    for (name, lasts_s, moves) in [("a", 0.7, false), ("a", 4.0, false), ("c", 2.5, true), ("c", 0.7, false)] {
+    for (name, lasts_s, moves) in [
+        ("a", 0.7, false),
+        ("a", 4.0, false),
+        ("c", 2.5, true),
+        ("c", 0.7, false),
+    ] {
         let mut case = thinned(case(name));
         case.options.movement = Movement::Auto;
         let count = case.map.time_s.len();
-        case.map.time_s = (0..count).map(|i| lasts_s * (i as f64 / (count - 1) as f64 - 0.5)).collect();
+        case.map.time_s = (0..count)
+            .map(|i| lasts_s * (i as f64 / (count - 1) as f64 - 0.5))
+            .collect();
         case.exact = expected_velocities(&case.map, &case.options, &case.truth, moves).unwrap();
         for seed in 0..3 {
             let velocity_m_s = white(&case, &mut Xoshiro256PlusPlus::seed_from_u64(7000 + seed));
-            let found = fit_scan(&ScanMap { velocity_m_s, ..case.map.clone() }, &case.options).unwrap();
-            assert_eq!(found.has(Flag::MotionIgnored), !moves, "{name} {lasts_s} {seed}: {:?}", found.flags);
+            let found = fit_scan(
+                &ScanMap {
+                    velocity_m_s,
+                    ..case.map.clone()
+                },
+                &case.options,
+            )
+            .unwrap();
+            assert_eq!(
+                found.has(Flag::MotionIgnored),
+                !moves,
+                "{name} {lasts_s} {seed}: {:?}",
+                found.flags
+            );
         }
     }
 }
@@ -57,7 +92,10 @@ fn velocities_that_share_windows_with_their_neighbours_are_not_counted_as_indepe
     let (shared, mut largest) = ((5, 9), 0.0_f64);
     let wake = Wake::from_array(&[150.0, 150.0, 376.5, 47.0, 423.5, 47.0, 2.5, 2.5, 2.0, 0.0]);
     let calm = Wake::from_array(&[0.0, 0.0, 376.5, 47.0, 423.5, 47.0, 2.5, 2.5, 2.0, 0.0]);
-    let options = RetrievalOptions { gate: Gate::Gaussian { std_m: 10.0 }, ..Default::default() };
+    let options = RetrievalOptions {
+        gate: Gate::Gaussian { std_m: 10.0 },
+        ..Default::default()
+    };
     for seed in 0..6 {
         let map = |wake: &Wake, std_m_s: f64| {
             let mut map = noisy(wake, &options, (0.02, 2.5e-3, 60), (310.0, 4.0, 45), 1);
@@ -70,14 +108,30 @@ fn velocities_that_share_windows_with_their_neighbours_are_not_counted_as_indepe
         };
         let begin = std::time::Instant::now();
         let empty = fit_scan(&map(&calm, 0.5), &options).unwrap();
-        println!("{seed}: {:.1} {:?} {:.2} s", empty.statistic, empty.flags, begin.elapsed().as_secs_f64());
+        println!(
+            "{seed}: {:.1} {:?} {:.2} s",
+            empty.statistic,
+            empty.flags,
+            begin.elapsed().as_secs_f64()
+        );
         assert!(empty.vortices.is_empty(), "{seed}: {:?}", empty.vortices);
         largest = largest.max(empty.statistic);
         if seed < 2 {
             let begin = std::time::Instant::now();
             let found = fit_scan(&map(&wake, 0.3), &options).unwrap();
-            println!("{:.1} {:?} {:.2} s", found.statistic, found.flags, begin.elapsed().as_secs_f64());
-            assert_eq!(found.vortices.len(), 2, "{seed}: {} {:?}", found.statistic, found.flags);
+            println!(
+                "{:.1} {:?} {:.2} s",
+                found.statistic,
+                found.flags,
+                begin.elapsed().as_secs_f64()
+            );
+            assert_eq!(
+                found.vortices.len(),
+                2,
+                "{seed}: {} {:?}",
+                found.statistic,
+                found.flags
+            );
         }
     }
     // as independent ones they would reach hundreds
@@ -107,8 +161,16 @@ fn scans_without_noise_and_scans_of_another_unit_have_an_answer() {
 /// Processor time of this process and its threads so far \[s\]; NaN where the system does not tell.
 fn processor_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
-    let fields: Vec<&str> = stat.rsplit(')').next().unwrap_or_default().split_whitespace().collect();
-    fields.get(11).and_then(|ticks| ticks.parse::<f64>().ok()).map_or(f64::NAN, |ticks| 0.01 * ticks)
+    let fields: Vec<&str> = stat
+        .rsplit(')')
+        .next()
+        .unwrap_or_default()
+        .split_whitespace()
+        .collect();
+    fields
+        .get(11)
+        .and_then(|ticks| ticks.parse::<f64>().ok())
+        .map_or(f64::NAN, |ticks| 0.01 * ticks)
 }
 
 /// Scans of the size that instruments write, empty and not, with the processor time of each.
@@ -120,13 +182,26 @@ fn times_of_fits() {
             for std_m in [0.0, 15.0] {
                 let c = circulation_m2_s;
                 let wake = Wake::from_array(&[c, c, 376.5, 47.0, 423.5, 47.0, 2.5, 2.5, 2.0, 0.01]);
-                let options = RetrievalOptions { gate: Gate::Gaussian { std_m }, ..Default::default() };
+                let options = RetrievalOptions {
+                    gate: Gate::Gaussian { std_m },
+                    ..Default::default()
+                };
                 let (line_rad, gate_m) = (0.2 / f64::from(lines), 220.0 / f64::from(gates));
-                let map = noisy(&wake, &options, (0.01, line_rad, lines), (300.0, gate_m, gates), 3);
+                let map = noisy(
+                    &wake,
+                    &options,
+                    (0.01, line_rad, lines),
+                    (300.0, gate_m, gates),
+                    3,
+                );
                 let begin_s = processor_s();
                 let found = fit_scan(&map, &options).unwrap();
                 let taken_s = processor_s() - begin_s;
-                let fitted = found.vortices.iter().map(|v| v.circulation_m2_s).collect::<Vec<_>>();
+                let fitted = found
+                    .vortices
+                    .iter()
+                    .map(|v| v.circulation_m2_s)
+                    .collect::<Vec<_>>();
                 println!(
                     "{lines} x {gates} {kind} {std_m}: {taken_s:.2} s, {:.1} {:?} {fitted:?}",
                     found.statistic, found.flags
@@ -138,7 +213,11 @@ fn times_of_fits() {
 
 /// Errors over their stated deviations of circulations and lateral places, in scans of wakes drawn as the fit takes them: spacings of 16 to
 /// 63 m, one as likely as another in its logarithm, cores of 4.5 % of it within a factor of e^0.5.
-fn errors_over_deviations(widths: &[f64], seeds: std::ops::Range<u64>, cells: (u32, u32)) -> (Vec<f64>, Vec<f64>) {
+fn errors_over_deviations(
+    widths: &[f64],
+    seeds: std::ops::Range<u64>,
+    cells: (u32, u32),
+) -> (Vec<f64>, Vec<f64>) {
     let (mut circulations, mut places) = (Vec::new(), Vec::new());
     for width in widths {
         for seed in seeds.clone() {
@@ -148,14 +227,33 @@ fn errors_over_deviations(widths: &[f64], seeds: std::ops::Range<u64>, cells: (u
             let (left_m, right_m) = (core_m(), core_m());
             let circulation = 18_000.0 / spacing_m;
             let (a, b) = (400.0 - 0.5 * spacing_m, 400.0 + 0.5 * spacing_m);
-            let wake = Wake::from_array(&[circulation, circulation, a, 47.0, b, 47.0, left_m, right_m, 1.0, 0.0]);
+            let wake = Wake::from_array(&[
+                circulation,
+                circulation,
+                a,
+                47.0,
+                b,
+                47.0,
+                left_m,
+                right_m,
+                1.0,
+                0.0,
+            ]);
             let options = RetrievalOptions {
-                gate: Gate::Gaussian { std_m: width * spacing_m },
+                gate: Gate::Gaussian {
+                    std_m: width * spacing_m,
+                },
                 core_prior: Some(CorePrior::TYPICAL),
                 ..Default::default()
             };
             let lines = (0.04, 0.16 / f64::from(cells.0), cells.0);
-            let map = noisy(&wake, &options, lines, (250.0, 300.0 / f64::from(cells.1), cells.1), seed);
+            let map = noisy(
+                &wake,
+                &options,
+                lines,
+                (250.0, 300.0 / f64::from(cells.1), cells.1),
+                seed,
+            );
             let found = fit_scan(&map, &options).unwrap();
             for (vortex, lateral_m) in found.vortices.iter().zip([a, b]) {
                 let over = |number: Measured, truth: f64| (number.value - truth) / number.std;
@@ -189,7 +287,11 @@ fn deviations_cover_all_spacings_that_long_gates_allow() {
 fn deviations_of_long_gates() {
     for width in [0.5, 0.7, 1.0, 1.5] {
         let (circulations, places) = errors_over_deviations(&[width], 1..16, (48, 20));
-        println!("{width}: circulation {:.2}, place {:.2}", root_mean_square(&circulations), root_mean_square(&places));
+        println!(
+            "{width}: circulation {:.2}, place {:.2}",
+            root_mean_square(&circulations),
+            root_mean_square(&places)
+        );
     }
 }
 
@@ -199,18 +301,29 @@ fn the_profile_of_the_cores_is_part_of_the_deviations_unless_it_is_stated() {
     let (mut open, mut stated) = (Vec::new(), Vec::new());
     for core_m in [4.0, 5.0] {
         let truth = 400.0 * CoreProfile::LambOseen.mean_5_15(core_m).0;
-        let wake = Wake::from_array(&[400.0, 400.0, 376.5, 47.0, 423.5, 47.0, core_m, core_m, 1.0, 0.0]);
+        let wake = Wake::from_array(&[
+            400.0, 400.0, 376.5, 47.0, 423.5, 47.0, core_m, core_m, 1.0, 0.0,
+        ]);
         let made = RetrievalOptions {
-            model: WakeModel { profile: CoreProfile::LambOseen, ..WakeModel::default() },
+            model: WakeModel {
+                profile: CoreProfile::LambOseen,
+                ..WakeModel::default()
+            },
             gate: Gate::Gaussian { std_m: 6.0 },
             ..Default::default()
         };
         for seed in 1..4 {
             let map = noisy(&wake, &made, (0.04, 4e-3, 40), (330.0, 5.0, 30), seed);
             for (other_profile, errors) in [(true, &mut open), (false, &mut stated)] {
-                let options = RetrievalOptions { model: WakeModel::default(), other_profile, ..made.clone() };
+                let options = RetrievalOptions {
+                    model: WakeModel::default(),
+                    other_profile,
+                    ..made.clone()
+                };
                 let found = fit_scan(&map, &options).unwrap();
-                let over = |v: &VortexResult| (v.circulation_5_15_m2_s.value - truth) / v.circulation_5_15_m2_s.std;
+                let over = |v: &VortexResult| {
+                    (v.circulation_5_15_m2_s.value - truth) / v.circulation_5_15_m2_s.std
+                };
                 errors.extend(found.vortices.iter().map(over));
             }
         }

@@ -8,7 +8,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::retrieval::*;
 use wakescope_estimate::vortex_fit::*;
 use wakescope_estimate::{
-    Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise, spectrum::unweighted_lags,
+    Correlogram, Refinement, SignalKind, SpectralPeak, Weighting, bound::Noise,
+    spectrum::unweighted_lags,
 };
 
 /// What is made of a map of peaks with noise, from that range on, of a pair with these secondary vortices, and of its estimator.
@@ -18,17 +19,36 @@ fn of_peaks<T>(
     make: impl FnOnce(&VelocityMap<'_>, &EstimatorResponse<'_>) -> T,
 ) -> T {
     let sampling = table_2();
-    let peak =
-        SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
+    let peak = SpectralPeak::new(
+        &sampling,
+        SignalKind::Real,
+        &unweighted_lags(64),
+        1024,
+        Refinement::Parabola,
+    )
+    .unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
     let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
-    let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
+    let response = EstimatorResponse::new(
+        &statistic,
+        &peak,
+        &sampling,
+        &pulse,
+        (Noise::White, 10.0),
+        2.0,
+    )
+    .unwrap();
     let (elevation_rad, range_m): (Vec<f64>, Vec<f64>) = (
         (0..90).map(|i| 0.02 + 0.002 * f64::from(i)).collect(),
         (0..34).map(|i| first_m + 6.0 * f64::from(i)).collect(),
     );
-    let truth = WakeModel { secondary: shown, ..Default::default() };
-    let mut velocity_m_s = response.map(&truth, &pair, &elevation_rad, &range_m).unwrap();
+    let truth = WakeModel {
+        secondary: shown,
+        ..Default::default()
+    };
+    let mut velocity_m_s = response
+        .map(&truth, &pair, &elevation_rad, &range_m)
+        .unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
     velocity_m_s.mapv_inplace(|v| v + 0.2 * normal(&mut rng));
     let map = VelocityMap {
@@ -46,8 +66,14 @@ fn fits_near_the_ground(
     seed: u64,
     secondary: Secondary,
 ) -> (MapFit, Option<(Option<MapFit>, SecondaryVortices)>) {
-    let (model, options) =
-        (WakeModel::default(), MapFitOptions { correlated_lines: 2, secondary, ..Default::default() });
+    let (model, options) = (
+        WakeModel::default(),
+        MapFitOptions {
+            correlated_lines: 2,
+            secondary,
+            ..Default::default()
+        },
+    );
     of_peaks((grounded(), shown), (296.0, seed), |map, response| {
         let pair = fit_map_of_estimator(map, &model, response, &options).unwrap();
         let four = fit_secondary_vortices(map, &model, response, &pair.wake, &options).unwrap();
@@ -76,7 +102,8 @@ fn secondary_vortices_are_found_beside_their_vortices() {
     let truth = grounded().to_array();
     let (mut missed, mut worst) = (0.0_f64, 0.0_f64);
     for seed in 0..2 {
-        let (pair, four) = fits_near_the_ground(Some(secondary_of_grounded()), seed, Secondary::Auto);
+        let (pair, four) =
+            fits_near_the_ground(Some(secondary_of_grounded()), seed, Secondary::Auto);
         let (fit, secondary) = four.expect("secondary vortices");
         let (fit, secondary) = (fit.expect("a fit with them"), secondary.vortices);
         // circulations and places
@@ -87,8 +114,12 @@ fn secondary_vortices_are_found_beside_their_vortices() {
             (worst, missed) = (worst.max(away(&fit, &fit)), missed.max(away(&pair, &fit)));
         }
         for (found, of) in secondary.iter().zip(secondary_of_grounded()) {
-            let away_m = (found.lateral_position_m - of.lateral_position_m).hypot(found.height_m - of.height_m);
-            assert!(away_m < 5.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.35, "{found:?}");
+            let away_m = (found.lateral_position_m - of.lateral_position_m)
+                .hypot(found.height_m - of.height_m);
+            assert!(
+                away_m < 5.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.35,
+                "{found:?}"
+            );
         }
     }
     assert!(worst < 3.5 && missed > 2.0 * worst, "{worst} {missed}");
@@ -97,7 +128,12 @@ fn secondary_vortices_are_found_beside_their_vortices() {
 #[test]
 fn a_pair_alone_has_no_secondary_vortices() {
     for seed in 0..4 {
-        assert!(fits_near_the_ground(None, seed, Secondary::Auto).1.is_none(), "{seed}");
+        assert!(
+            fits_near_the_ground(None, seed, Secondary::Auto)
+                .1
+                .is_none(),
+            "{seed}"
+        );
     }
 }
 
@@ -105,17 +141,34 @@ fn a_pair_alone_has_no_secondary_vortices() {
 #[test]
 fn secondary_vortices_are_sought_beside_pairs_in_view_alone() {
     let [_, right] = secondary_of_grounded();
-    let left = Vortex { lateral_position_m: 378.0, height_m: 24.0, ..right };
+    let left = Vortex {
+        lateral_position_m: 378.0,
+        height_m: 24.0,
+        ..right
+    };
     let found = |first_m: f64, secondary: Secondary| {
-        let (model, options) =
-            (WakeModel::default(), MapFitOptions { correlated_lines: 2, secondary, ..Default::default() });
-        of_peaks((grounded(), Some([left, right])), (first_m, 0), |map, response| {
-            fit_secondary_vortices(map, &model, response, &grounded(), &options).unwrap()
-        })
+        let (model, options) = (
+            WakeModel::default(),
+            MapFitOptions {
+                correlated_lines: 2,
+                secondary,
+                ..Default::default()
+            },
+        );
+        of_peaks(
+            (grounded(), Some([left, right])),
+            (first_m, 0),
+            |map, response| {
+                fit_secondary_vortices(map, &model, response, &grounded(), &options).unwrap()
+            },
+        )
     };
     assert!(found(296.0, Secondary::Auto).is_some_and(|(_, secondary)| secondary.shown));
     assert!(found(356.0, Secondary::Auto).is_none());
-    assert!(found(356.0, Secondary::Always).is_some_and(|(_, secondary)| secondary.shown && secondary.fitted));
+    assert!(
+        found(356.0, Secondary::Always)
+            .is_some_and(|(_, secondary)| secondary.shown && secondary.fitted)
+    );
 }
 
 /// Fitted or not, the flag says what the residuals of the pair look like.
@@ -124,15 +177,35 @@ fn secondary_vortices_are_fitted_never_or_always_and_told_where_the_map_shows_th
     let shown = Some(secondary_of_grounded());
     let (pair, never) = fits_near_the_ground(shown, 0, Secondary::Never);
     let (fit, secondary) = never.expect("secondary vortices");
-    assert!(fit.is_none() && secondary.shown && !secondary.fitted, "{secondary:?}");
-    let (fit, secondary) = fits_near_the_ground(None, 0, Secondary::Always).1.expect("secondary vortices");
-    assert!(fit.is_some_and(|fit| fit.wake != pair.wake) && !secondary.shown && secondary.fitted, "{secondary:?}");
+    assert!(
+        fit.is_none() && secondary.shown && !secondary.fitted,
+        "{secondary:?}"
+    );
+    let (fit, secondary) = fits_near_the_ground(None, 0, Secondary::Always)
+        .1
+        .expect("secondary vortices");
+    assert!(
+        fit.is_some_and(|fit| fit.wake != pair.wake) && !secondary.shown && secondary.fitted,
+        "{secondary:?}"
+    );
     let case = case("b");
-    let options = |secondary: Secondary| RetrievalOptions { secondary, ..case.options.clone() };
+    let options = |secondary: Secondary| RetrievalOptions {
+        secondary,
+        ..case.options.clone()
+    };
     let pair = fit_scan(&case.map, &case.options).unwrap();
-    assert!(with_secondary_vortices(&case.map, &options(Secondary::Never), &pair).unwrap().is_none());
-    let (four, with) = with_secondary_vortices(&case.map, &options(Secondary::Always), &pair).unwrap().unwrap();
-    assert!(with.model.secondary.is_some() && !four.has(Flag::SecondaryVortices), "{four:?}");
+    assert!(
+        with_secondary_vortices(&case.map, &options(Secondary::Never), &pair)
+            .unwrap()
+            .is_none()
+    );
+    let (four, with) = with_secondary_vortices(&case.map, &options(Secondary::Always), &pair)
+        .unwrap()
+        .unwrap();
+    assert!(
+        with.model.secondary.is_some() && !four.has(Flag::SecondaryVortices),
+        "{four:?}"
+    );
 }
 
 /// Where gates resolve them, cores of secondary vortices are what they are, and not what is known of them before.
@@ -147,9 +220,14 @@ fn cores_of_secondary_vortices_are_fitted() {
     case.map.velocity_m_s = expected_velocities(&case.map, &air, &grounded(), false).unwrap();
     case.map.sigma_m_s = Some(case.map.velocity_m_s.mapv(|_| 0.05));
     let pair = fit_scan(&case.map, &case.options).unwrap();
-    let (_, with) = with_secondary_vortices(&case.map, &case.options, &pair).unwrap().unwrap();
+    let (_, with) = with_secondary_vortices(&case.map, &case.options, &pair)
+        .unwrap()
+        .unwrap();
     for (found, truth) in with.model.secondary.unwrap().iter().zip([left, right]) {
-        assert!((found.core_radius_m / truth.core_radius_m - 1.0).abs() < 0.1, "{found:?}");
+        assert!(
+            (found.core_radius_m / truth.core_radius_m - 1.0).abs() < 0.1,
+            "{found:?}"
+        );
     }
 }
 
@@ -163,7 +241,10 @@ fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
         height_m,
         core_radius_m: 5.0,
     };
-    let near_ground = [secondary(-120.0, 356.0, 38.0), secondary(-110.0, 445.0, 46.0)];
+    let near_ground = [
+        secondary(-120.0, 356.0, 38.0),
+        secondary(-110.0, 445.0, 46.0),
+    ];
     let sigma_m_s = case.map.sigma_m_s.as_ref().unwrap();
     for (shown, seed, moves) in [
         (Some(near_ground), 1, false),
@@ -172,27 +253,46 @@ fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
         (None, 4, true),
         (None, 5, false),
     ] {
-        let movement = if moves { Movement::Moving } else { Movement::Frozen };
-        let options = RetrievalOptions { movement, ..case.options.clone() };
+        let movement = if moves {
+            Movement::Moving
+        } else {
+            Movement::Frozen
+        };
+        let options = RetrievalOptions {
+            movement,
+            ..case.options.clone()
+        };
         let mut truth = options.clone();
         truth.model.secondary = shown;
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mut velocity_m_s = expected_velocities(&case.map, &truth, &case.truth, moves).unwrap();
-        velocity_m_s.zip_mut_with(sigma_m_s, |velocity, sigma| *velocity += sigma * normal(&mut rng));
-        let map = ScanMap { velocity_m_s, ..case.map.clone() };
+        velocity_m_s.zip_mut_with(sigma_m_s, |velocity, sigma| {
+            *velocity += sigma * normal(&mut rng)
+        });
+        let map = ScanMap {
+            velocity_m_s,
+            ..case.map.clone()
+        };
         let pair = fit_scan(&map, &options).unwrap();
         let four = with_secondary_vortices(&map, &options, &pair).unwrap();
         assert_eq!(four.is_some(), shown.is_some(), "{seed}");
-        let Some((four, options)) = four else { continue };
+        let Some((four, options)) = four else {
+            continue;
+        };
         assert!(four.has(Flag::SecondaryVortices));
         for (found, of) in options.model.secondary.unwrap().iter().zip(near_ground) {
-            let away_m = (found.lateral_position_m - of.lateral_position_m).hypot(found.height_m - of.height_m);
-            assert!(away_m < 4.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.3, "{found:?}");
+            let away_m = (found.lateral_position_m - of.lateral_position_m)
+                .hypot(found.height_m - of.height_m);
+            assert!(
+                away_m < 4.0 && (found.circulation_m2_s / of.circulation_m2_s - 1.0).abs() < 0.3,
+                "{found:?}"
+            );
         }
         let wake = four.wake.unwrap().to_array();
         let away = |wake: &[f64; PARAMETERS]| {
             let of = |place: usize| {
-                (wake[place] - case.truth.to_array()[place]).abs() / four.covariance[[place, place]].sqrt()
+                (wake[place] - case.truth.to_array()[place]).abs()
+                    / four.covariance[[place, place]].sqrt()
             };
             (0..6).map(of).fold(0.0, f64::max)
         };
@@ -208,34 +308,57 @@ fn secondary_vortices_are_found_in_scans_of_any_instrument_that_show_them() {
 fn cores_of_another_profile_are_no_secondary_vortices() {
     for seed in 0..6 {
         let core_m = 2.9 + 0.3 * seed as f64;
-        let truth = Wake::from_array(&[400.0, 400.0, 380.0, 20.0, 420.0, 20.0, core_m, core_m, 1.5, 0.0]);
+        let truth = Wake::from_array(&[
+            400.0, 400.0, 380.0, 20.0, 420.0, 20.0, core_m, core_m, 1.5, 0.0,
+        ]);
         let options = of_gates(4.0);
         let mut air = options.clone();
         air.model.profile = CoreProfile::LambOseen;
         let map = map_of(&air, &truth, 0.15, 0.0, seed);
         let pair = fit_scan(&map, &options).unwrap();
-        assert!(with_secondary_vortices(&map, &options, &pair).unwrap().is_none(), "{core_m}");
+        assert!(
+            with_secondary_vortices(&map, &options, &pair)
+                .unwrap()
+                .is_none(),
+            "{core_m}"
+        );
     }
 }
 
 fn of_gates(std_m: f64) -> RetrievalOptions {
-    RetrievalOptions { gate: Gate::Gaussian { std_m }, core_prior: Some(CorePrior::TYPICAL), ..Default::default() }
+    RetrievalOptions {
+        gate: Gate::Gaussian { std_m },
+        core_prior: Some(CorePrior::TYPICAL),
+        ..Default::default()
+    }
 }
 
 /// A scan of that wake as the options see it, with white errors.
-fn map_of(air: &RetrievalOptions, truth: &Wake, noise_m_s: f64, lasts_s: f64, seed: u64) -> ScanMap {
+fn map_of(
+    air: &RetrievalOptions,
+    truth: &Wake,
+    noise_m_s: f64,
+    lasts_s: f64,
+    seed: u64,
+) -> ScanMap {
     let (lines, gates) = (50, 27);
     let mut map = ScanMap {
-        time_s: (0..lines).map(|i| lasts_s * f64::from(i) / f64::from(lines)).collect(),
+        time_s: (0..lines)
+            .map(|i| lasts_s * f64::from(i) / f64::from(lines))
+            .collect(),
         elevation_rad: (0..lines).map(|i| 0.012 + 0.003 * f64::from(i)).collect(),
         range_m: (0..gates).map(|i| 320.0 + 6.0 * f64::from(i)).collect(),
         velocity_m_s: ndarray::Array2::zeros((lines as usize, gates as usize)),
-        sigma_m_s: Some(ndarray::Array2::from_elem((lines as usize, gates as usize), noise_m_s)),
+        sigma_m_s: Some(ndarray::Array2::from_elem(
+            (lines as usize, gates as usize),
+            noise_m_s,
+        )),
         fold_m_s: None,
     };
     map.velocity_m_s = expected_velocities(&map, air, truth, lasts_s > 0.0).unwrap();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-    map.velocity_m_s.mapv_inplace(|v| v + noise_m_s * normal(&mut rng));
+    map.velocity_m_s
+        .mapv_inplace(|v| v + noise_m_s * normal(&mut rng));
     map
 }
 
@@ -244,11 +367,27 @@ fn map_of(air: &RetrievalOptions, truth: &Wake, noise_m_s: f64, lasts_s: f64, se
 fn a_pair_alone_that_moves_has_no_secondary_vortices() {
     for seed in 0..12 {
         let height_m = 42.0 + seed as f64;
-        let truth = Wake::from_array(&[420.0, 450.0, 375.0, height_m, 425.0, height_m + 1.0, 2.1, 2.1, 0.0, 0.01]);
+        let truth = Wake::from_array(&[
+            420.0,
+            450.0,
+            375.0,
+            height_m,
+            425.0,
+            height_m + 1.0,
+            2.1,
+            2.1,
+            0.0,
+            0.01,
+        ]);
         let options = of_gates(10.0);
         let map = map_of(&options, &truth, 0.5, 6.0, seed);
         let pair = fit_scan(&map, &options).unwrap();
-        assert!(with_secondary_vortices(&map, &options, &pair).unwrap().is_none(), "{seed}");
+        assert!(
+            with_secondary_vortices(&map, &options, &pair)
+                .unwrap()
+                .is_none(),
+            "{seed}"
+        );
     }
 }
 
@@ -258,7 +397,12 @@ fn stored_scans_show_no_secondary_vortices() {
     for name in ["a", "b"] {
         let case = case(name);
         let pair = fit_scan(&case.map, &case.options).unwrap();
-        assert!(with_secondary_vortices(&case.map, &case.options, &pair).unwrap().is_none(), "{name}");
+        assert!(
+            with_secondary_vortices(&case.map, &case.options, &pair)
+                .unwrap()
+                .is_none(),
+            "{name}"
+        );
     }
 }
 
@@ -273,18 +417,30 @@ fn scans_with_outliers_or_turbulence_show_no_secondary_vortices() {
         let mut found = 0;
         for seed in 0..60 {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
-            let case = if deviation_m_s > 0.0 { &thinned } else { &whole };
+            let case = if deviation_m_s > 0.0 {
+                &thinned
+            } else {
+                &whole
+            };
             let mut velocity_m_s = with_outliers(case, &mut rng);
             if deviation_m_s > 0.0 {
                 velocity_m_s = case.exact.clone();
                 let normals: Vec<f64> = velocity_m_s.iter().map(|_| normal(&mut rng)).collect();
                 for (velocity, row) in velocity_m_s.iter_mut().zip(&factor) {
-                    *velocity += row.iter().zip(&normals).map(|(l, n)| l * n).sum::<f64>() + 0.3 * normal(&mut rng);
+                    *velocity += row.iter().zip(&normals).map(|(l, n)| l * n).sum::<f64>()
+                        + 0.3 * normal(&mut rng);
                 }
             }
-            let map = ScanMap { velocity_m_s, ..case.map.clone() };
+            let map = ScanMap {
+                velocity_m_s,
+                ..case.map.clone()
+            };
             let pair = fit_scan(&map, &case.options).unwrap();
-            found += usize::from(with_secondary_vortices(&map, &case.options, &pair).unwrap().is_some());
+            found += usize::from(
+                with_secondary_vortices(&map, &case.options, &pair)
+                    .unwrap()
+                    .is_some(),
+            );
         }
         println!("turbulence {deviation_m_s} m/s: secondary vortices in {found} of 60");
         assert!(found <= 3, "{found}");

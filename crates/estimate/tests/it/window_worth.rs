@@ -11,12 +11,24 @@ use wakescope_estimate::{SignalKind, bound::*, map::WindowCovariance, window::We
 
 /// Power of the mean periodogram of windows of one pulse at the frequency of the peak, its mean squared over its variance: what the
 /// windows are worth, and its standard error.
-fn worth<S: Draw>(record: &Array2<Complex<f64>>, weights: &[f64], cycles: f64, draws: u64) -> (f64, f64) {
-    let (windows, mut rng) = (Windows::<S>::new(record), Xoshiro256PlusPlus::seed_from_u64(11));
+fn worth<S: Draw>(
+    record: &Array2<Complex<f64>>,
+    weights: &[f64],
+    cycles: f64,
+    draws: u64,
+) -> (f64, f64) {
+    let (windows, mut rng) = (
+        Windows::<S>::new(record),
+        Xoshiro256PlusPlus::seed_from_u64(11),
+    );
     let turn = |n: usize| Complex::from_polar(1.0, -TAU * cycles * n as f64);
     let power = |window: &[S]| -> f64 {
-        let sum: Complex<f64> =
-            window.iter().zip(weights).enumerate().map(|(n, (x, h))| x.to_complex() * h * turn(n)).sum();
+        let sum: Complex<f64> = window
+            .iter()
+            .zip(weights)
+            .enumerate()
+            .map(|(n, (x, h))| x.to_complex() * h * turn(n))
+            .sum();
         sum.norm_sqr()
     };
     let powers: Vec<f64> = (0..draws)
@@ -27,7 +39,13 @@ fn worth<S: Draw>(record: &Array2<Complex<f64>>, weights: &[f64], cycles: f64, d
         .collect();
     let n = draws as f64;
     let mean = powers.iter().sum::<f64>() / n;
-    let moment = |order: i32| powers.iter().map(|p| (p / mean - 1.0).powi(order)).sum::<f64>() / n;
+    let moment = |order: i32| {
+        powers
+            .iter()
+            .map(|p| (p / mean - 1.0).powi(order))
+            .sum::<f64>()
+            / n
+    };
     let error = (moment(4) - moment(2).powi(2)).sqrt() / n.sqrt() / moment(2);
     (moment(2).recip(), error / moment(2))
 }
@@ -59,18 +77,35 @@ fn windows_are_worth_what_the_variance_of_their_mean_periodogram_says_in_noise_o
         };
         let snr = 10f64.powf(0.1 * snr_db);
         let covariance = WindowCovariance::new(&weights, 1, 200, signal, noise).unwrap();
-        let foretold = (count * count) as f64 / covariance.correlation(snr).unwrap().pair_sum(count);
+        let foretold =
+            (count * count) as f64 / covariance.correlation(snr).unwrap().pair_sum(count);
 
-        let kind = if sampling.band_hz.0 < 0.0 { SignalKind::Complex } else { SignalKind::Real };
-        let noise = if band { Noise::Band { floor: 1e-6 } } else { Noise::White };
-        let model = WindowModel::gaussian_pulse(&sampling, window + count - 1, sigma_s(pulse_s), noise).unwrap();
+        let kind = if sampling.band_hz.0 < 0.0 {
+            SignalKind::Complex
+        } else {
+            SignalKind::Real
+        };
+        let noise = if band {
+            Noise::Band { floor: 1e-6 }
+        } else {
+            Noise::White
+        };
+        let model =
+            WindowModel::gaussian_pulse(&sampling, window + count - 1, sigma_s(pulse_s), noise)
+                .unwrap();
         let [record, _] = model.covariance(0.0, snr, kind).unwrap();
         let cycles = sampling.frequency_hz(0.0) * sampling.period_s();
         let (found, error) = match kind {
             SignalKind::Real => worth::<f64>(&record, &weights, cycles, 10_000),
             SignalKind::Complex => worth::<Complex<f64>>(&record, &weights, cycles, 10_000),
         };
-        assert!((found - foretold).abs() < 3.5 * error, "{window} {band} {kind:?}: {foretold}, {found} +- {error}");
-        assert!((found - wrong).abs() > 3.5 * error, "{window} {band} {kind:?}: {wrong}, {found} +- {error}");
+        assert!(
+            (found - foretold).abs() < 3.5 * error,
+            "{window} {band} {kind:?}: {foretold}, {found} +- {error}"
+        );
+        assert!(
+            (found - wrong).abs() > 3.5 * error,
+            "{window} {band} {kind:?}: {wrong}, {found} +- {error}"
+        );
     }
 }

@@ -25,14 +25,26 @@ pub fn circulation_m2_s(
 ) -> Result<f64, Error> {
     check("radius_m", radius_m, "positive", |v| v > 0.0)?;
     check("samples", samples as f64, "3 or more", |v| v >= 3.0)?;
-    let directions: Vec<(f64, f64)> = (0..samples).map(|i| (2.0 * PI * i as f64 / samples as f64).sin_cos()).collect();
+    let directions: Vec<(f64, f64)> = (0..samples)
+        .map(|i| (2.0 * PI * i as f64 / samples as f64).sin_cos())
+        .collect();
     let points_m: Vec<[f64; 3]> = directions
         .iter()
-        .map(|&(sin, cos)| [0.0, centre_m[0] + radius_m * cos, centre_m[1] + radius_m * sin])
+        .map(|&(sin, cos)| {
+            [
+                0.0,
+                centre_m[0] + radius_m * cos,
+                centre_m[1] + radius_m * sin,
+            ]
+        })
         .collect();
     let mut velocity_m_s = vec![[0.0; 3]; samples];
     wind.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let sum: f64 = directions.iter().zip(&velocity_m_s).map(|(&(sin, cos), &[_, v, w])| w * cos - v * sin).sum();
+    let sum: f64 = directions
+        .iter()
+        .zip(&velocity_m_s)
+        .map(|(&(sin, cos), &[_, v, w])| w * cos - v * sin)
+        .sum();
     Ok(sum * 2.0 * PI * radius_m / samples as f64)
 }
 

@@ -37,7 +37,14 @@ impl CrossPlane {
     fn at(x_m: f64, mesh: &Mesh, velocity_m_s: Vec<[f64; 3]>) -> Self {
         let (y_m, z_m) = (mesh.centre_m(1), mesh.centre_m(2));
         let [_, y, z] = mesh.directions();
-        Self { x_m, y_m, z_m, velocity_m_s, y_edges: edges(y), z_edges: edges(z) }
+        Self {
+            x_m,
+            y_m,
+            z_m,
+            velocity_m_s,
+            y_edges: edges(y),
+            z_edges: edges(z),
+        }
     }
 }
 
@@ -50,7 +57,11 @@ impl Flow {
         let mesh = self.mesh();
         let along = &mesh.directions()[0];
         let [nx, ny, _] = mesh.cells();
-        let refused = || Error::OutOfRange { field: "x_m", value: x_m, allowed: "finite, within the mesh" };
+        let refused = || Error::OutOfRange {
+            field: "x_m",
+            value: x_m,
+            allowed: "finite, within the mesh",
+        };
         let taps;
         if nx > 1 {
             let axis = Axis::new(AXIS_NAMES[0], &mesh.centre_m(0), edges(along))?;
@@ -88,18 +99,36 @@ impl Flow {
         for component in 0..3 {
             let centred = self.centred(component, &faces.field[component]);
             for (mean, row) in own.iter_mut().zip(centred.chunks(nx)) {
-                let sum: f64 = row.iter().zip(&length_m).map(|(value, length_m)| value * length_m).sum();
+                let sum: f64 = row
+                    .iter()
+                    .zip(&length_m)
+                    .map(|(value, length_m)| value * length_m)
+                    .sum();
                 mean[component] = sum / along.length_m();
             }
         }
-        Ok(CrossPlane::at(0.5 * (along.low_m + along.high_m), mesh, self.layout.slabs.planes(own)?))
+        Ok(CrossPlane::at(
+            0.5 * (along.low_m + along.high_m),
+            mesh,
+            self.layout.slabs.planes(own)?,
+        ))
     }
 
     /// A plane of this flow as a wind.
-    pub(super) fn plane_snapshot(&self, plane: &CrossPlane, outside: OutsidePolicy) -> Result<GridSnapshot, Error> {
+    pub(super) fn plane_snapshot(
+        &self,
+        plane: &CrossPlane,
+        outside: OutsidePolicy,
+    ) -> Result<GridSnapshot, Error> {
         let [_, y, z] = self.mesh().directions();
         let (y_m, z_m) = (nodes(y, &plane.y_m), nodes(z, &plane.z_m));
-        let mesh = PlaneMesh { y_edges: plane.y_edges, z_edges: plane.z_edges, outside, y_m, z_m };
+        let mesh = PlaneMesh {
+            y_edges: plane.y_edges,
+            z_edges: plane.z_edges,
+            outside,
+            y_m,
+            z_m,
+        };
         let pick = |thin: bool, i: usize| if thin { 0 } else { i };
         let [_, ny, nz] = self.mesh().cells();
         let velocity_m_s: Vec<[f64; 3]> = (0..mesh.z_m.len())
@@ -120,13 +149,19 @@ fn source(axis: &Axis, padded: usize) -> Ghost {
 fn edges(direction: &Direction) -> Edges {
     let side = |wall: Wall, position_m: f64| match wall {
         Wall::Slip => Side::SlipWall { position_m },
-        Wall::NoSlip { velocity_m_s } => Side::NoSlipWall { position_m, velocity_m_s },
+        Wall::NoSlip { velocity_m_s } => Side::NoSlipWall {
+            position_m,
+            velocity_m_s,
+        },
     };
     match direction.ends {
-        Ends::Periodic => Edges::Periodic { period_m: direction.length_m() },
-        Ends::Walls { low, high } => {
-            Edges::Bounded { low: side(low, direction.low_m), high: side(high, direction.high_m) }
-        }
+        Ends::Periodic => Edges::Periodic {
+            period_m: direction.length_m(),
+        },
+        Ends::Walls { low, high } => Edges::Bounded {
+            low: side(low, direction.low_m),
+            high: side(high, direction.high_m),
+        },
     }
 }
 
@@ -136,7 +171,9 @@ fn nodes(direction: &Direction, centre_m: &[f64]) -> Vec<f64> {
         return centre_m.to_vec();
     }
     let cell_m = direction.length_m() / THIN_NODES as f64;
-    (0..THIN_NODES).map(|i| direction.low_m + (i as f64 + 0.5) * cell_m).collect()
+    (0..THIN_NODES)
+        .map(|i| direction.low_m + (i as f64 + 0.5) * cell_m)
+        .collect()
 }
 
 #[cfg(test)]
@@ -149,12 +186,23 @@ mod tests {
 
     /// The flow of Arnold, Beltrami and Childress, free of divergence and different in all directions.
     fn beltrami([x, y, z]: [f64; 3]) -> [f64; 3] {
-        [0.7 * z.sin() + 0.4 * y.cos(), x.sin() + 0.7 * z.cos(), 0.4 * y.sin() + x.cos()]
+        [
+            0.7 * z.sin() + 0.4 * y.cos(),
+            x.sin() + 0.7 * z.cos(),
+            0.4 * y.sin() + x.cos(),
+        ]
     }
 
-    fn start(x: Direction, y: Direction, z: Direction, field: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Flow {
+    fn start(
+        x: Direction,
+        y: Direction,
+        z: Direction,
+        field: impl Fn([f64; 3]) -> [f64; 3] + Sync,
+    ) -> Flow {
         let settings = FlowSettings::new(0.01, TimeStep::Fixed { step_s: 0.01 });
-        Flow::new(Mesh::new(x, y, z).unwrap(), settings, field).unwrap().0
+        Flow::new(Mesh::new(x, y, z).unwrap(), settings, field)
+            .unwrap()
+            .0
     }
 
     fn probe(wind: &GridSnapshot, at_m: [f64; 3]) -> [f64; 3] {
@@ -167,11 +215,18 @@ mod tests {
     fn an_analytic_flow_on_a_stretched_mesh_is_sampled_with_the_order_of_the_kernel() {
         let error = |n: usize| {
             let sine = |a| Direction::periodic(n, 0.0, TAU).stretched(Spread::Sine.by(a));
-            let flow = start(Direction::periodic(n, 0.0, TAU), sine(0.4), sine(-0.3), beltrami);
+            let flow = start(
+                Direction::periodic(n, 0.0, TAU),
+                sine(0.4),
+                sine(-0.3),
+                beltrami,
+            );
             let mut worst = 0.0_f64;
             for i in 0..9_u8 {
                 let x_m = 0.713 * f64::from(i) - 1.0;
-                let wind = flow.plane_snapshot(&flow.cross_plane(x_m).unwrap(), OutsidePolicy::Error).unwrap();
+                let wind = flow
+                    .plane_snapshot(&flow.cross_plane(x_m).unwrap(), OutsidePolicy::Error)
+                    .unwrap();
                 for j in 0..200_u16 {
                     let at_m = [x_m, 0.311 * f64::from(j), 0.173 * f64::from(j) - 3.0];
                     for (found, expected) in probe(&wind, at_m).iter().zip(beltrami(at_m)) {
@@ -183,12 +238,17 @@ mod tests {
         };
         let (coarse, fine) = (error(16), error(32));
         let order = (coarse / fine).log2();
-        assert!(order > 2.8 && fine < 5e-3, "errors {coarse}, {fine}: order {order}");
+        assert!(
+            order > 2.8 && fine < 5e-3,
+            "errors {coarse}, {fine}: order {order}"
+        );
     }
 
     #[test]
     fn walls_of_the_mesh_are_walls_of_the_wind() {
-        let belt = Wall::NoSlip { velocity_m_s: [0.3, 0.5, 0.0] };
+        let belt = Wall::NoSlip {
+            velocity_m_s: [0.3, 0.5, 0.0],
+        };
         let mapping = Spread::TanhLow.by(1.0);
         let flow = start(
             Direction::between(8, 0.0, 1.0, Wall::Slip, Wall::Slip),
@@ -197,33 +257,71 @@ mod tests {
             |[x, y, z]| [(TAU * x).sin() * z, z + 0.1 * (TAU * y).sin(), 0.2 * z],
         );
         for x_m in [0.01, 0.5, 0.97] {
-            let wind = flow.plane_snapshot(&flow.cross_plane(x_m).unwrap(), OutsidePolicy::Error).unwrap();
+            let wind = flow
+                .plane_snapshot(&flow.cross_plane(x_m).unwrap(), OutsidePolicy::Error)
+                .unwrap();
             for y in [0.0, 0.13, 0.99] {
                 let ground = probe(&wind, [x_m, y, 0.0]);
-                assert!(ground.iter().zip([0.3, 0.5, 0.0]).all(|(a, b)| (a - b).abs() < 1e-13), "{ground:?}");
-                assert!(probe(&wind, [x_m, y, 1.0])[2].abs() < 1e-13, "through the top");
+                assert!(
+                    ground
+                        .iter()
+                        .zip([0.3, 0.5, 0.0])
+                        .all(|(a, b)| (a - b).abs() < 1e-13),
+                    "{ground:?}"
+                );
+                assert!(
+                    probe(&wind, [x_m, y, 1.0])[2].abs() < 1e-13,
+                    "through the top"
+                );
             }
             let mut out = [[0.0; 3]];
             let above = wind.velocity_into(&[[x_m, 0.5, 1.001]], 0.0, &mut out);
             assert!(matches!(above, Err(Error::OutsideMesh { .. })));
         }
         let edge = flow.cross_plane(0.0).unwrap();
-        assert!(edge.velocity_m_s.iter().all(|v| v[0].abs() < 1e-14), "nothing flows through the slip wall at x = 0");
+        assert!(
+            edge.velocity_m_s.iter().all(|v| v[0].abs() < 1e-14),
+            "nothing flows through the slip wall at x = 0"
+        );
         for x_m in [-0.001, 1.001, f64::NAN] {
-            assert!(matches!(flow.cross_plane(x_m), Err(Error::OutOfRange { field: "x_m", .. })), "{x_m}");
+            assert!(
+                matches!(
+                    flow.cross_plane(x_m),
+                    Err(Error::OutOfRange { field: "x_m", .. })
+                ),
+                "{x_m}"
+            );
         }
     }
 
     #[test]
     fn directions_of_one_cell_do_not_vary() {
-        let (thin, wide) = (|| Direction::thin(0.5), || Direction::periodic(12, 0.0, 1.0));
-        let plane = start(thin(), wide(), wide(), |[_, y, z]| [1.0, (TAU * z).sin(), (TAU * y).sin()]);
-        assert_eq!(plane.cross_plane(-7.0).unwrap().velocity_m_s, plane.cross_plane(0.1).unwrap().velocity_m_s);
-        assert!(matches!(plane.cross_plane(f64::INFINITY), Err(Error::OutOfRange { field: "x_m", .. })));
-        let shear = start(wide(), thin(), wide(), |[_, _, z]| [(TAU * z).sin(), 2.0, 0.0]);
-        let wind = shear.plane_snapshot(&shear.cross_plane(0.3).unwrap(), OutsidePolicy::Error).unwrap();
+        let (thin, wide) = (
+            || Direction::thin(0.5),
+            || Direction::periodic(12, 0.0, 1.0),
+        );
+        let plane = start(thin(), wide(), wide(), |[_, y, z]| {
+            [1.0, (TAU * z).sin(), (TAU * y).sin()]
+        });
+        assert_eq!(
+            plane.cross_plane(-7.0).unwrap().velocity_m_s,
+            plane.cross_plane(0.1).unwrap().velocity_m_s
+        );
+        assert!(matches!(
+            plane.cross_plane(f64::INFINITY),
+            Err(Error::OutOfRange { field: "x_m", .. })
+        ));
+        let shear = start(wide(), thin(), wide(), |[_, _, z]| {
+            [(TAU * z).sin(), 2.0, 0.0]
+        });
+        let wind = shear
+            .plane_snapshot(&shear.cross_plane(0.3).unwrap(), OutsidePolicy::Error)
+            .unwrap();
         let [a, b] = [0.0, 0.37].map(|y| probe(&wind, [0.3, y, 0.21]));
-        assert!(a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14) && (a[1] - 2.0).abs() < 1e-14, "{a:?} {b:?}");
+        assert!(
+            a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14) && (a[1] - 2.0).abs() < 1e-14,
+            "{a:?} {b:?}"
+        );
         let expected = (TAU * 0.21).sin();
         assert!((a[0] / expected - 1.0).abs() < 0.02, "{a:?}, {expected}");
     }

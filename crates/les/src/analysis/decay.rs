@@ -7,8 +7,12 @@
 /// fewer than two points.
 #[must_use]
 pub fn value_at(points: &[(f64, f64)], tau: f64) -> f64 {
-    let i = points.partition_point(|p| p.0 < tau).clamp(1, points.len().max(2) - 1);
-    let (Some(a), Some(b)) = (points.get(i - 1), points.get(i)) else { return f64::NAN };
+    let i = points
+        .partition_point(|p| p.0 < tau)
+        .clamp(1, points.len().max(2) - 1);
+    let (Some(a), Some(b)) = (points.get(i - 1), points.get(i)) else {
+        return f64::NAN;
+    };
     a.1 + (b.1 - a.1) * (tau - a.0) / (b.0 - a.0)
 }
 
@@ -20,7 +24,10 @@ pub fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
     let early = at(0.5) - at(1.5);
     let last = gamma.last()?.0;
     let slope = |tau: f64| (at(tau - 0.05) - at(tau + 0.05)) / 0.1;
-    (0..).map(|i| 1.5 + 0.02 * f64::from(i)).take_while(|tau| tau + 0.05 <= last).find(|tau| slope(*tau) > 3.0 * early)
+    (0..)
+        .map(|i| 1.5 + 0.02 * f64::from(i))
+        .take_while(|tau| tau + 0.05 <= last)
+        .find(|tau| slope(*tau) > 3.0 * early)
 }
 
 /// Where the line through the ratio at 0.5 and 1.5 meets the steepest line over 0.8: a beginning of the fast decay that
@@ -30,10 +37,13 @@ pub fn knee(gamma: &[(f64, f64)]) -> Option<f64> {
     let at = |tau: f64| value_at(gamma, tau);
     let last = gamma.last()?.0;
     let early = at(1.5) - at(0.5);
-    let starts = (0..).map(|i| 1.5 + 0.02 * f64::from(i)).take_while(|tau| tau + 0.8 <= last);
+    let starts = (0..)
+        .map(|i| 1.5 + 0.02 * f64::from(i))
+        .take_while(|tau| tau + 0.8 <= last);
     let from = starts.min_by(|a, b| (at(a + 0.8) - at(*a)).total_cmp(&(at(b + 0.8) - at(*b))))?;
     let steep = (at(from + 0.8) - at(from)) / 0.8;
-    (steep < 2.0 * early).then(|| (at(from) - steep * from - at(0.5) + 0.5 * early) / (early - steep))
+    (steep < 2.0 * early)
+        .then(|| (at(from) - steep * from - at(0.5) + 0.5 * early) / (early - steep))
 }
 
 /// Growth rate per tau of the amplitude of a mode whose energy is given: half the slope of the logarithm from `from` to `to`.
@@ -50,18 +60,28 @@ mod tests {
     fn a_broken_line_has_its_knee_and_its_onset_where_it_breaks() {
         let gamma: Vec<(f64, f64)> = (0..=100)
             .map(|i| 0.05 * f64::from(i))
-            .map(|tau| (tau, 1.0 - 0.01 * tau - 0.3 * (tau - 2.4).max(0.0) + 0.25 * (tau - 3.6).max(0.0)))
+            .map(|tau| {
+                (
+                    tau,
+                    1.0 - 0.01 * tau - 0.3 * (tau - 2.4).max(0.0) + 0.25 * (tau - 3.6).max(0.0),
+                )
+            })
             .collect();
         assert!((knee(&gamma).unwrap() - 2.4).abs() < 1e-9);
         assert!((onset(&gamma).unwrap() - 2.4).abs() < 0.06);
-        let straight: Vec<(f64, f64)> = gamma.iter().map(|(tau, _)| (*tau, 1.0 - 0.06 * tau)).collect();
+        let straight: Vec<(f64, f64)> = gamma
+            .iter()
+            .map(|(tau, _)| (*tau, 1.0 - 0.06 * tau))
+            .collect();
         assert!(onset(&straight).is_none() && knee(&straight).is_none());
     }
 
     #[test]
     fn an_exponential_grows_at_half_the_rate_of_its_energy_and_nothing_is_no_history() {
-        let energy: Vec<(f64, f64)> =
-            (0..=40).map(|i| 0.1 * f64::from(i)).map(|tau| (tau, (3.0 * tau).exp())).collect();
+        let energy: Vec<(f64, f64)> = (0..=40)
+            .map(|i| 0.1 * f64::from(i))
+            .map(|tau| (tau, (3.0 * tau).exp()))
+            .collect();
         assert!((amplitude_growth(&energy, 1.0, 2.0) - 1.5).abs() < 1e-9);
         assert!(value_at(&[], 1.0).is_nan() && value_at(&[(0.0, 1.0)], 0.0).is_nan());
         assert!(onset(&[]).is_none() && knee(&[(0.0, 1.0)]).is_none());

@@ -32,7 +32,13 @@ pub trait Ranks: Debug + Send + Sync {
     ///
     /// # Errors
     /// [`Error::RankLost`] if a rank has ended that was to send something.
-    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error>;
+    fn all_to_all(
+        &self,
+        send: &[f64],
+        to: &[usize],
+        receive: &mut [f64],
+        from: &[usize],
+    ) -> Result<(), Error>;
 }
 
 /// One process.
@@ -48,7 +54,13 @@ impl Ranks for Single {
         1
     }
 
-    fn all_to_all(&self, send: &[f64], _: &[usize], receive: &mut [f64], _: &[usize]) -> Result<(), Error> {
+    fn all_to_all(
+        &self,
+        send: &[f64],
+        _: &[usize],
+        receive: &mut [f64],
+        _: &[usize],
+    ) -> Result<(), Error> {
         receive.copy_from_slice(send);
         Ok(())
     }
@@ -63,7 +75,10 @@ pub(crate) struct Timed {
 
 impl Timed {
     pub(crate) fn new(ranks: Arc<dyn Ranks>) -> Self {
-        Self { ranks, spent_ns: AtomicU64::new(0) }
+        Self {
+            ranks,
+            spent_ns: AtomicU64::new(0),
+        }
     }
 
     /// Time of all exchanges so far \[s\].
@@ -81,10 +96,17 @@ impl Ranks for Timed {
         self.ranks.count()
     }
 
-    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+    fn all_to_all(
+        &self,
+        send: &[f64],
+        to: &[usize],
+        receive: &mut [f64],
+        from: &[usize],
+    ) -> Result<(), Error> {
         let begun = Instant::now();
         let sent = self.ranks.all_to_all(send, to, receive, from);
-        self.spent_ns.fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        self.spent_ns
+            .fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
         sent
     }
 }
@@ -100,7 +122,9 @@ pub fn all_gather(ranks: &dyn Ranks, own: Vec<f64>) -> Result<Vec<f64>, Error> {
     }
     let share = |own: &[f64], from: &[usize]| {
         let mut all = vec![0.0; from.iter().sum()];
-        ranks.all_to_all(&own.repeat(count), &vec![own.len(); count], &mut all, from).map(|()| all)
+        ranks
+            .all_to_all(&own.repeat(count), &vec![own.len(); count], &mut all, from)
+            .map(|()| all)
     };
     let lengths = share(&[own.len() as f64], &vec![1; count])?;
     let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
@@ -112,14 +136,23 @@ pub fn all_gather(ranks: &dyn Ranks, own: Vec<f64>) -> Result<Vec<f64>, Error> {
 ///
 /// # Errors
 /// It; those of [`Ranks::all_to_all`].
-pub fn all_agree<T, E: Display>(ranks: &dyn Ranks, result: Result<T, E>, other: impl Fn(Error) -> E) -> Result<T, E> {
+pub fn all_agree<T, E: Display>(
+    ranks: &dyn Ranks,
+    result: Result<T, E>,
+    other: impl Fn(Error) -> E,
+) -> Result<T, E> {
     if ranks.count() == 1 {
         return result;
     }
     let own = result.as_ref().err().map(ToString::to_string);
     let failed = all_gather(ranks, vec![f64::from(u8::from(own.is_some()))]).map_err(&other)?;
-    let Some(rank) = failed.iter().position(|failed| *failed > 0.0) else { return result };
-    let told = own.as_deref().filter(|_| ranks.rank() == rank).unwrap_or_default();
+    let Some(rank) = failed.iter().position(|failed| *failed > 0.0) else {
+        return result;
+    };
+    let told = own
+        .as_deref()
+        .filter(|_| ranks.rank() == rank)
+        .unwrap_or_default();
     let bytes = all_gather(ranks, told.bytes().map(f64::from).collect()).map_err(&other)?;
     let bytes: Vec<u8> = bytes.iter().map(|byte| *byte as u8).collect();
     let message = String::from_utf8_lossy(&bytes).into_owned();

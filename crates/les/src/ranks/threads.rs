@@ -29,23 +29,43 @@ impl ThreadRanks {
     /// `count` ranks, one for each thread.
     fn new(count: usize) -> Vec<Self> {
         let boxes = (0..count).map(|_| vec![VecDeque::new(); count]).collect();
-        let mail = Mutex::new(Mail { boxes, has_left: vec![false; count] });
-        let office = Arc::new(Office { mail, news: Condvar::new() });
-        (0..count).map(|rank| Self { rank, office: office.clone() }).collect()
+        let mail = Mutex::new(Mail {
+            boxes,
+            has_left: vec![false; count],
+        });
+        let office = Arc::new(Office {
+            mail,
+            news: Condvar::new(),
+        });
+        (0..count)
+            .map(|rank| Self {
+                rank,
+                office: office.clone(),
+            })
+            .collect()
     }
 
     fn mail(&self) -> MutexGuard<'_, Mail> {
-        self.office.mail.lock().unwrap_or_else(PoisonError::into_inner)
+        self.office
+            .mail
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// Runs `work` on `count` threads as ranks and returns what each of them did, or `None` for one that panicked.
-pub(crate) fn on_threads<T: Send>(count: usize, work: impl Fn(Arc<dyn Ranks>) -> T + Sync) -> Vec<Option<T>> {
+pub(crate) fn on_threads<T: Send>(
+    count: usize,
+    work: impl Fn(Arc<dyn Ranks>) -> T + Sync,
+) -> Vec<Option<T>> {
     std::thread::scope(|scope| {
         let work = &work;
         let spawn = |rank| scope.spawn(move || work(Arc::new(rank)));
         let threads: Vec<_> = ThreadRanks::new(count).into_iter().map(spawn).collect();
-        threads.into_iter().map(|thread| thread.join().ok()).collect()
+        threads
+            .into_iter()
+            .map(|thread| thread.join().ok())
+            .collect()
     })
 }
 
@@ -58,7 +78,13 @@ impl Ranks for ThreadRanks {
         self.mail().has_left.len()
     }
 
-    fn all_to_all(&self, send: &[f64], to: &[usize], receive: &mut [f64], from: &[usize]) -> Result<(), Error> {
+    fn all_to_all(
+        &self,
+        send: &[f64],
+        to: &[usize],
+        receive: &mut [f64],
+        from: &[usize],
+    ) -> Result<(), Error> {
         let (mut send, mut receive) = (send, receive);
         let mut mail = self.mail();
         for (rank, &length) in to.iter().enumerate() {
@@ -74,7 +100,13 @@ impl Ranks for ThreadRanks {
                 match mail.boxes[self.rank][rank].pop_front() {
                     Some(message) => break message,
                     None if mail.has_left[rank] => return Err(Error::RankLost { rank }),
-                    None => mail = self.office.news.wait(mail).unwrap_or_else(PoisonError::into_inner),
+                    None => {
+                        mail = self
+                            .office
+                            .news
+                            .wait(mail)
+                            .unwrap_or_else(PoisonError::into_inner)
+                    }
                 }
             };
             let (place, rest) = receive.split_at_mut(length);
@@ -111,9 +143,19 @@ mod tests {
                 ranks.all_to_all(&send, &to, &mut got, &from).unwrap();
             }
             assert!(own != 1, "this one ends early");
-            (got, ranks.all_to_all(&[1.0; 3], &[1; 3], &mut [0.0; 3], &[1; 3]))
+            (
+                got,
+                ranks.all_to_all(&[1.0; 3], &[1; 3], &mut [0.0; 3], &[1; 3]),
+            )
         });
         let lost = Err(Error::RankLost { rank: 1 });
-        assert_eq!(found, [Some((vec![], lost.clone())), None, Some((vec![20.0, 21.0, 21.0], lost))]);
+        assert_eq!(
+            found,
+            [
+                Some((vec![], lost.clone())),
+                None,
+                Some((vec![20.0, 21.0, 21.0], lost))
+            ]
+        );
     }
 }

@@ -70,11 +70,17 @@ mod tests {
         for count in [0, 1, 7, 8, 9, 1000, 100_000] {
             let mut numbers = Aligned::zeros(count);
             assert_eq!(*numbers, vec![0.0; count]);
-            numbers.iter_mut().enumerate().for_each(|(place, number)| *number = place as f64);
+            numbers
+                .iter_mut()
+                .enumerate()
+                .for_each(|(place, number)| *number = place as f64);
             let copy = numbers.clone();
             assert_eq!(copy, numbers);
             for numbers in [&numbers, &copy] {
-                assert!(count == 0 || numbers.as_ptr().addr() % LINE_BYTES == 0, "{count}");
+                assert!(
+                    count == 0 || numbers.as_ptr().addr() % LINE_BYTES == 0,
+                    "{count}"
+                );
             }
         }
     }

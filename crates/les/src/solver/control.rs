@@ -34,7 +34,10 @@ impl Flow {
     }
 
     pub(super) fn explicit_viscous_rate_per_s(&self) -> f64 {
-        (0..3).filter(|&axis| !self.state.implicit[axis]).map(|axis| self.viscous_per_s[axis]).sum()
+        (0..3)
+            .filter(|&axis| !self.state.implicit[axis])
+            .map(|axis| self.viscous_per_s[axis])
+            .sum()
     }
 
     pub(super) fn refuse_courant(&self, courant: f64, step_s: f64) -> Result<(), Error> {
@@ -43,8 +46,11 @@ impl Flow {
             return Ok(());
         }
         let stability = self.stability()?;
-        let Some(limit) = stability.refused(self.judged_step_s(&stability, step_s)) else { return Ok(()) };
-        let (_, axis, place) = self.first_largest(|axis, place| self.state.velocity[axis][place].abs())?;
+        let Some(limit) = stability.refused(self.judged_step_s(&stability, step_s)) else {
+            return Ok(());
+        };
+        let (_, axis, place) =
+            self.first_largest(|axis, place| self.state.velocity[axis][place].abs())?;
         Err(Error::CourantTooLarge {
             step: self.state.step + 1,
             step_s,
@@ -57,31 +63,60 @@ impl Flow {
 
     /// The largest positive value at the places that the ranks own, with memory axis of the component and place in the whole
     /// field of the first that has it.
-    pub(super) fn first_largest(&self, of: impl Fn(usize, usize) -> f64) -> Result<(f64, usize, usize), Error> {
+    pub(super) fn first_largest(
+        &self,
+        of: impl Fn(usize, usize) -> f64,
+    ) -> Result<(f64, usize, usize), Error> {
         let shape = self.layout.shape;
         let (own, first) = (shape.own_places(), shape.own().start * shape.plane());
         let larger = |best: [f64; 3], next: [f64; 3]| {
             let is_before = next[0] == best[0] && next[1..] < best[1..];
-            if next[0] > best[0] || is_before { next } else { best }
+            if next[0] > best[0] || is_before {
+                next
+            } else {
+                best
+            }
         };
         let none = [0.0, f64::INFINITY, 0.0];
-        let of = |axis: usize, place: usize| [of(axis, place), axis as f64, (place - own.start + first) as f64];
+        let of = |axis: usize, place: usize| {
+            [
+                of(axis, place),
+                axis as f64,
+                (place - own.start + first) as f64,
+            ]
+        };
         let all = (0..3).flat_map(|axis| own.clone().map(move |place| (axis, place)));
         let best = all.fold(none, |best, (axis, place)| larger(best, of(axis, place)));
         let ranks = self.layout.slabs.all_gather(best.to_vec())?;
-        let [value, axis, place] = ranks.as_chunks::<3>().0.iter().fold(none, |best, next| larger(best, *next));
-        Ok(if value > 0.0 { (value, axis as usize, place as usize) } else { (0.0, 0, 0) })
+        let [value, axis, place] = ranks
+            .as_chunks::<3>()
+            .0
+            .iter()
+            .fold(none, |best, next| larger(best, *next));
+        Ok(if value > 0.0 {
+            (value, axis as usize, place as usize)
+        } else {
+            (0.0, 0, 0)
+        })
     }
 
     /// Whether a velocity is not finite, and the first such place.
     pub(super) fn first_not_finite(&self) -> Result<(bool, usize, usize), Error> {
-        let not_finite = |axis: usize, place: usize| f64::from(u8::from(!self.state.velocity[axis][place].is_finite()));
-        self.first_largest(not_finite).map(|(found, axis, place)| (found > 0.0, axis, place))
+        let not_finite = |axis: usize, place: usize| {
+            f64::from(u8::from(!self.state.velocity[axis][place].is_finite()))
+        };
+        self.first_largest(not_finite)
+            .map(|(found, axis, place)| (found > 0.0, axis, place))
     }
 
     pub(super) fn diverged(&self, axis: usize, place: usize, field: &'static str) -> Error {
         let place = self.place(axis, place);
-        Error::Diverged { field, step: self.state.step, time_s: self.state.time_s, place }
+        Error::Diverged {
+            field,
+            step: self.state.step,
+            time_s: self.state.time_s,
+            place,
+        }
     }
 
     /// Component and cell of a memory axis and a place in a whole field.
@@ -90,7 +125,12 @@ impl Flow {
         for (axis, index) in self.layout.shape.index(place).into_iter().enumerate() {
             cell[self.layout.direction[axis]] = index;
         }
-        let position_m = std::array::from_fn(|d| self.mesh.directions()[d].at(cell[d] as f64 + 0.5).0);
-        Place { component: ["u", "v", "w"][self.layout.direction[axis]], cell, position_m }
+        let position_m =
+            std::array::from_fn(|d| self.mesh.directions()[d].at(cell[d] as f64 + 0.5).0);
+        Place {
+            component: ["u", "v", "w"][self.layout.direction[axis]],
+            cell,
+            position_m,
+        }
     }
 }

@@ -54,8 +54,15 @@ impl Flow {
 
     pub(super) fn measure_divergence(&self) -> Result<f64, Error> {
         let velocity = self.state.velocity.each_ref().map(|field| &field[..]);
-        let [largest] = self.layout.slabs.largest([self.divergence.largest_per_s(velocity)])?;
-        Ok(if largest == 0.0 { 0.0 } else { largest / self.state.courant_per_s })
+        let [largest] = self
+            .layout
+            .slabs
+            .largest([self.divergence.largest_per_s(velocity)])?;
+        Ok(if largest == 0.0 {
+            0.0
+        } else {
+            largest / self.state.courant_per_s
+        })
     }
 
     /// The planes across z that this rank has to show, which the readers that begin with `own` give: all of them in one process.
@@ -69,7 +76,8 @@ impl Flow {
     /// # Errors
     /// [`Error::RankLost`].
     pub fn own_face_velocity_m_s(&self, direction: usize) -> Result<Vec<f64>, Error> {
-        self.face(direction).map(|faces| without_halos(self.shown(), faces))
+        self.face(direction)
+            .map(|faces| without_halos(self.shown(), faces))
     }
 
     /// Velocity along `direction` at the centres of the cells of [`Self::own_planes`], interpolated with fourth order \[m/s\],
@@ -78,7 +86,8 @@ impl Flow {
     /// # Errors
     /// [`Error::RankLost`].
     pub fn own_centre_velocity_m_s(&self, direction: usize) -> Result<Vec<f64>, Error> {
-        self.face(direction).map(|faces| self.centred(direction, &faces))
+        self.face(direction)
+            .map(|faces| self.centred(direction, &faces))
     }
 
     /// Kinematic pressure at the centres of the cells of [`Self::own_planes`] \[m^2/s^2\], `[z][y][x]`, up to a constant.
@@ -86,7 +95,8 @@ impl Flow {
     /// # Errors
     /// [`Error::RankLost`].
     pub fn own_pressure_m2_s2(&self) -> Result<Vec<f64>, Error> {
-        self.in_planes(&self.state.pressure).map(|pressure| without_halos(self.shown(), pressure))
+        self.in_planes(&self.state.pressure)
+            .map(|pressure| without_halos(self.shown(), pressure))
     }
 
     /// From the planes of all ranks to the whole field.
@@ -105,10 +115,14 @@ impl Flow {
     pub fn largest_error_m_s(&self, exact: impl Fn([f64; 3], f64) -> [f64; 3]) -> f64 {
         let at_m = [0, 1, 2].map(|axis| self.face_position_m(axis));
         let error = |axis: usize, place: usize| {
-            let velocity_m_s = exact(at_m[axis](self.layout.shape.index_held(place)), self.state.time_s);
+            let velocity_m_s = exact(
+                at_m[axis](self.layout.shape.index_held(place)),
+                self.state.time_s,
+            );
             (self.state.velocity[axis][place] - velocity_m_s[self.layout.direction[axis]]).abs()
         };
-        self.first_largest(error).map_or(f64::NAN, |(largest, ..)| largest)
+        self.first_largest(error)
+            .map_or(f64::NAN, |(largest, ..)| largest)
     }
 
     /// From the faces of the planes that are shown to the centres of those that are owned.
@@ -117,29 +131,34 @@ impl Flow {
         let (nx, n) = (shown.n[0], shown.n[direction]);
         let is_periodic = self.mesh.directions()[direction].ends == Ends::Periodic;
         let mut centred = vec![0.0; shown.own_places().len()];
-        centred.par_chunks_mut(shown.plane()).zip(shown.own()).for_each(|(plane, k)| {
-            for (place, value) in plane.iter_mut().enumerate() {
-                let mut at = [place % nx, place / nx, k];
-                let index = at[direction];
-                // A bounded direction does not store its high wall, where the normal velocity is zero.
-                let mut face = |i: usize| {
-                    at[direction] = i;
-                    if i < n { faces[shown.place(at)] } else { 0.0 }
-                };
-                *value = if n == 1 {
-                    // One cell: nothing varies, or nothing flows through it.
-                    face(0)
-                } else if is_periodic {
-                    (0..4).map(|t| MEAN[t] * face((index + n + t - 1) % n)).sum()
-                } else if index == 0 {
-                    (0..4).map(|t| AT_WALL[t] * face(t)).sum()
-                } else if index + 1 == n {
-                    (0..4).map(|t| AT_WALL[t] * face(n - t)).sum()
-                } else {
-                    (0..4).map(|t| MEAN[t] * face(index + t - 1)).sum()
-                };
-            }
-        });
+        centred
+            .par_chunks_mut(shown.plane())
+            .zip(shown.own())
+            .for_each(|(plane, k)| {
+                for (place, value) in plane.iter_mut().enumerate() {
+                    let mut at = [place % nx, place / nx, k];
+                    let index = at[direction];
+                    // A bounded direction does not store its high wall, where the normal velocity is zero.
+                    let mut face = |i: usize| {
+                        at[direction] = i;
+                        if i < n { faces[shown.place(at)] } else { 0.0 }
+                    };
+                    *value = if n == 1 {
+                        // One cell: nothing varies, or nothing flows through it.
+                        face(0)
+                    } else if is_periodic {
+                        (0..4)
+                            .map(|t| MEAN[t] * face((index + n + t - 1) % n))
+                            .sum()
+                    } else if index == 0 {
+                        (0..4).map(|t| AT_WALL[t] * face(t)).sum()
+                    } else if index + 1 == n {
+                        (0..4).map(|t| AT_WALL[t] * face(n - t)).sum()
+                    } else {
+                        (0..4).map(|t| MEAN[t] * face(index + t - 1)).sum()
+                    };
+                }
+            });
         centred
     }
 
@@ -152,7 +171,10 @@ impl Flow {
     ///
     /// # Errors
     /// As [`Flow::new`], and for arrays of the wrong length.
-    pub(super) fn with_faces(self, velocity_m_s: &[Vec<f64>; 3]) -> Result<(Self, StartReport), Error> {
+    pub(super) fn with_faces(
+        self,
+        velocity_m_s: &[Vec<f64>; 3],
+    ) -> Result<(Self, StartReport), Error> {
         let ([nx, ny, nz], direction) = (self.mesh.cells(), self.layout.direction);
         for values in velocity_m_s {
             check_lengths(nx * ny * nz, values.len())?;
@@ -171,7 +193,9 @@ impl Flow {
     /// subgrid model.
     pub(crate) fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
         let model = self.model.as_ref()?;
-        let own = self.in_planes(&model.viscosity_m2_s).map(|planes| without_halos(self.shown(), planes));
+        let own = self
+            .in_planes(&model.viscosity_m2_s)
+            .map(|planes| without_halos(self.shown(), planes));
         Some(self.whole(own))
     }
 }
@@ -192,12 +216,20 @@ mod tests {
             )
             .unwrap();
             let tau = std::f64::consts::TAU;
-            let field =
-                move |[_, y, z]: [f64; 3]| [0.3, (tau * y).sin() * (tau * z).cos(), -(tau * y).cos() * (tau * z).sin()];
+            let field = move |[_, y, z]: [f64; 3]| {
+                [
+                    0.3,
+                    (tau * y).sin() * (tau * z).cos(),
+                    -(tau * y).cos() * (tau * z).sin(),
+                ]
+            };
             let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
             let (flow, _) = Flow::new(mesh, settings.clone(), field).unwrap();
             let faces = [0, 1, 2].map(|d| flow.face_velocity_m_s(d));
-            let (again, _) = Flow::at_rest(flow.mesh().clone(), settings).unwrap().with_faces(&faces).unwrap();
+            let (again, _) = Flow::at_rest(flow.mesh().clone(), settings)
+                .unwrap()
+                .with_faces(&faces)
+                .unwrap();
             let mut worst = 0.0_f64;
             for (direction, faces) in faces.iter().enumerate() {
                 for (a, b) in again.face_velocity_m_s(direction).iter().zip(faces) {

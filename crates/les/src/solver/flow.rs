@@ -76,8 +76,14 @@ impl Flow {
     }
 
     /// Starts from `initial`.
-    pub(super) fn filled(self, initial: impl Fn([f64; 3]) -> [f64; 3] + Sync) -> Result<(Self, StartReport), Error> {
-        let (direction, at_m) = (self.layout.direction, [0, 1, 2].map(|axis| self.face_position_m(axis)));
+    pub(super) fn filled(
+        self,
+        initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
+    ) -> Result<(Self, StartReport), Error> {
+        let (direction, at_m) = (
+            self.layout.direction,
+            [0, 1, 2].map(|axis| self.face_position_m(axis)),
+        );
         self.started(|axis, index| initial(at_m[axis](index))[direction[axis]])
     }
 
@@ -90,22 +96,35 @@ impl Flow {
         for axis in 0..3 {
             let first = self.layout.line[axis].first_face();
             let own = &mut self.state.velocity[axis][shape.own_places()];
-            own.par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
-                for (place, value) in plane.iter_mut().enumerate() {
-                    let index = [place % shape.n[0], place / shape.n[0], k];
-                    *value = if index[axis] < first { 0.0 } else { velocity_m_s(axis, index) };
-                }
-            });
+            own.par_chunks_mut(shape.plane())
+                .zip(shape.own())
+                .for_each(|(plane, k)| {
+                    for (place, value) in plane.iter_mut().enumerate() {
+                        let index = [place % shape.n[0], place / shape.n[0], k];
+                        *value = if index[axis] < first {
+                            0.0
+                        } else {
+                            velocity_m_s(axis, index)
+                        };
+                    }
+                });
         }
         let report = self.start()?;
         Ok((self, report))
     }
 
     /// Where a component lies at the indices along the memory axes, x, y, z \[m\].
-    pub(super) fn face_position_m(&self, axis: usize) -> impl Fn([usize; 3]) -> [f64; 3] + Sync + use<> {
+    pub(super) fn face_position_m(
+        &self,
+        axis: usize,
+    ) -> impl Fn([usize; 3]) -> [f64; 3] + Sync + use<> {
         let direction = self.layout.direction;
         let along: [Vec<f64>; 3] = std::array::from_fn(|b| {
-            if b == axis { self.mesh.face_m(direction[b]) } else { self.mesh.centre_m(direction[b]) }
+            if b == axis {
+                self.mesh.face_m(direction[b])
+            } else {
+                self.mesh.centre_m(direction[b])
+            }
         });
         move |index| {
             let mut at_m = [0.0; 3];
@@ -121,7 +140,11 @@ impl Flow {
     }
 
     /// The same with the memory axes of a layout.
-    pub(super) fn laid_out(mesh: Mesh, settings: FlowSettings, layout: Layout) -> Result<Self, Error> {
+    pub(super) fn laid_out(
+        mesh: Mesh,
+        settings: FlowSettings,
+        layout: Layout,
+    ) -> Result<Self, Error> {
         settings.check()?;
         refuse_sticking_without_viscosity(&mesh, settings.viscosity_m2_s)?;
         let n = layout.shape.len();
@@ -144,7 +167,9 @@ impl Flow {
             pressure_solver: PressureSolver::new(&layout, settings.pressure),
             model: Subgrid::new(&layout, settings.subgrid)?,
             line_solvers: LineSolvers::default(),
-            viscous_per_s: layout.direction.map(|d| viscous_rates_per_s(&mesh, settings.viscosity_m2_s)[d]),
+            viscous_per_s: layout
+                .direction
+                .map(|d| viscous_rates_per_s(&mesh, settings.viscosity_m2_s)[d]),
             predicted: fields(),
             phi: field(),
             mesh,
@@ -168,12 +193,30 @@ impl Flow {
         self.state.implicit = self.layout.direction.map(|d| implicit[d]);
         // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long. The terms are no history.
         self.update_model(1.0, 0.0)?;
-        self.predict(Stage { fraction: 1.0, new: 1.0, old: 0.0 }, 1.0, false, false)?;
-        self.state.previous_terms.iter_mut().for_each(|terms| terms.fill(0.0));
+        self.predict(
+            Stage {
+                fraction: 1.0,
+                new: 1.0,
+                old: 0.0,
+            },
+            1.0,
+            false,
+            false,
+        )?;
+        self.state
+            .previous_terms
+            .iter_mut()
+            .for_each(|terms| terms.fill(0.0));
         self.take_divergence(1.0)?;
-        unless_stalled(self.pressure_solver.solve(&mut self.phi, self.settings.pressure_tolerance))?;
+        unless_stalled(
+            self.pressure_solver
+                .solve(&mut self.phi, self.settings.pressure_tolerance),
+        )?;
         self.state.pressure.copy_from_slice(&self.phi);
-        Ok(StartReport { given_energy_m5_s2: given, kinetic_energy_m5_s2: self.state.energy })
+        Ok(StartReport {
+            given_energy_m5_s2: given,
+            kinetic_energy_m5_s2: self.state.energy,
+        })
     }
 
     /// Makes one time step of the length that the settings give.
@@ -218,7 +261,8 @@ impl Flow {
     fn step_by(&mut self, step_s: f64) -> Result<StepReport, Error> {
         let courant = step_s * self.state.courant_per_s;
         self.refuse_courant(courant, step_s)?;
-        let ([viscous_power_m5_s3, subgrid_power_m5_s3, force_power_m5_s3], solved) = self.advance(step_s)?;
+        let ([viscous_power_m5_s3, subgrid_power_m5_s3, force_power_m5_s3], solved) =
+            self.advance(step_s)?;
         self.state.step += 1;
         self.state.time_s += step_s;
         self.state.last_step_s = step_s;
@@ -226,7 +270,11 @@ impl Flow {
             let (_, axis, place) = self.first_not_finite()?;
             return Err(self.diverged(axis, place, "velocity"));
         }
-        let [subgrid_viscosity_m2_s, decay_per_s] = self.model.as_ref().map(|model| model.largest).unwrap_or_default();
+        let [subgrid_viscosity_m2_s, decay_per_s] = self
+            .model
+            .as_ref()
+            .map(|model| model.largest)
+            .unwrap_or_default();
         Ok(StepReport {
             step: self.state.step,
             time_s: self.state.time_s,
@@ -257,14 +305,16 @@ impl Flow {
             let stage_s = stage.fraction * step_s;
             self.update_model(stage.fraction, stage_s)?;
             let powers = self.predict(stage, stage_s, keeps, begun.is_none())?;
-            begun.get_or_insert_with(|| (powers, begins.then(|| self.state.previous_terms.clone())));
+            begun
+                .get_or_insert_with(|| (powers, begins.then(|| self.state.previous_terms.clone())));
             self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
             // (25).
             add(&mut self.state.pressure, &self.phi, self.layout.shape);
         }
         let (powers, first_terms) = begun.unwrap_or_default();
-        self.state.previous_terms = first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.previous_terms));
+        self.state.previous_terms =
+            first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.previous_terms));
         Ok((powers, solved))
     }
 
@@ -273,7 +323,14 @@ impl Flow {
     /// that are stiff along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
     /// `1/((1 + d1) (1 + d2))`.
     fn solve_viscous(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
-        let Self { state, layout, ops, predicted, phi, .. } = self;
+        let Self {
+            state,
+            layout,
+            ops,
+            predicted,
+            phi,
+            ..
+        } = self;
         if state.implicit == [false; 3] {
             return Ok(());
         }
@@ -283,7 +340,13 @@ impl Flow {
             let predicted = &mut predicted[solver.component];
             if is_damped {
                 layout.slabs.halos(&mut [predicted], WHOLE)?;
-                viscous_increment(layout, &ops[solver.component], (solver.axis, a_m2), predicted, phi);
+                viscous_increment(
+                    layout,
+                    &ops[solver.component],
+                    (solver.axis, a_m2),
+                    predicted,
+                    phi,
+                );
                 solver.solve(&layout.slabs, &mut phi[own.clone()])?;
                 add(predicted, phi, layout.shape);
             } else {
@@ -292,7 +355,11 @@ impl Flow {
         }
         if !is_damped {
             for (predicted, velocity) in predicted.iter_mut().zip(&state.velocity) {
-                add(&mut predicted[own.clone()], &velocity[own.clone()], layout.shape);
+                add(
+                    &mut predicted[own.clone()],
+                    &velocity[own.clone()],
+                    layout.shape,
+                );
             }
         }
         Ok(())
@@ -306,15 +373,27 @@ impl Flow {
             let (across, along) = self.ops[component].row_mass(j, k);
             0.5 * across * weighted_dot(row, row, along)
         };
-        let of_plane = |k| [(0..3).map(|a| (0..shape.n[1]).map(|j| of_row(a, j, k)).sum::<f64>()).sum::<f64>()];
+        let of_plane = |k| {
+            [(0..3)
+                .map(|a| (0..shape.n[1]).map(|j| of_row(a, j, k)).sum::<f64>())
+                .sum::<f64>()]
+        };
         shape.own().map(of_plane).collect()
     }
 }
 
 /// `a L field` along one axis for one component into `out`; zero on walls.
-fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64), field: &[f64], out: &mut [f64]) {
+fn viscous_increment(
+    layout: &Layout,
+    ops: &Momentum,
+    (axis, a_m2): (usize, f64),
+    field: &[f64],
+    out: &mut [f64],
+) {
     let (shape, n) = (layout.shape, layout.shape.n[0]);
-    let planes = out[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+    let planes = out[shape.own_places()]
+        .par_chunks_mut(shape.plane())
+        .zip(shape.own());
     planes.for_each_init(
         || Scratch::new(n),
         |scratch, (plane, k)| {
@@ -332,7 +411,9 @@ fn viscous_increment(layout: &Layout, ops: &Momentum, (axis, a_m2): (usize, f64)
 
 /// `to += from`, plane by plane.
 fn add(to: &mut [f64], from: &[f64], shape: Shape) {
-    let planes = to.par_chunks_mut(shape.plane()).zip(from.par_chunks(shape.plane()));
+    let planes = to
+        .par_chunks_mut(shape.plane())
+        .zip(from.par_chunks(shape.plane()));
     planes.for_each(|(to, from)| to.iter_mut().zip(from).for_each(|(to, from)| *to += from));
 }
 

@@ -39,7 +39,8 @@ fn production(flow: &Flow) -> (f64, [f64; 3]) {
                 let own = &velocity[axis][shape.row(j, k)];
                 for ((c, m), u) in scratch.convection.iter().zip(along).zip(own) {
                     let force = across * m * c;
-                    (energy, energy_moduli) = (energy + force * u, energy_moduli + (force * u).abs());
+                    (energy, energy_moduli) =
+                        (energy + force * u, energy_moduli + (force * u).abs());
                     (sum, moduli) = (sum + force, moduli + force.abs());
                 }
             }
@@ -53,9 +54,13 @@ fn production(flow: &Flow) -> (f64, [f64; 3]) {
 fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_without_walls() {
     let sine = |n, a| Direction::periodic(n, 0.0, 1.0).stretched(Spread::Sine.by(a));
     let cluster = |n, strength, place| {
-        Direction::periodic(n, 0.0, 1.0).stretched(Mapping { place, ..Spread::Cluster.by(strength) })
+        Direction::periodic(n, 0.0, 1.0).stretched(Mapping {
+            place,
+            ..Spread::Cluster.by(strength)
+        })
     };
-    let walls = |n, low, high, mapping| Direction::between(n, 0.0, 1.0, low, high).stretched(mapping);
+    let walls =
+        |n, low, high, mapping| Direction::between(n, 0.0, 1.0, low, high).stretched(mapping);
     let tanh = Spread::TanhBoth.by(1.2);
     let meshes = [
         [sine(16, 0.5), sine(14, 0.4), sine(15, 0.3)],
@@ -79,7 +84,8 @@ fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_witho
     for mesh in meshes {
         let periodic: Vec<bool> = mesh.iter().map(|d| d.ends == Ends::Periodic).collect();
         let [x, y, z] = mesh;
-        let (flow, report) = Flow::new(Mesh::new(x, y, z).unwrap(), fixed(1e-3, 1e-3), rough).unwrap();
+        let (flow, report) =
+            Flow::new(Mesh::new(x, y, z).unwrap(), fixed(1e-3, 1e-3), rough).unwrap();
         assert!(report.kinetic_energy_m5_s2 < report.given_energy_m5_s2);
         let (energy, momentum) = production(&flow);
         assert!(energy.abs() < 1e-14, "energy {energy}");

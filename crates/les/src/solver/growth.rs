@@ -76,35 +76,78 @@ struct Carrying {
 
 impl Stability {
     /// Of a flow of `settings` on `mesh`, whose velocity in the cell of the indices along x, y, z is `velocity_m_s`.
-    pub fn of(mesh: &Mesh, settings: &FlowSettings, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> Self {
+    pub fn of(
+        mesh: &Mesh,
+        settings: &FlowSettings,
+        velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync,
+    ) -> Self {
         let rates = largest_rates(mesh, velocity_m_s);
-        let implicit = implicit_axes(mesh, settings, rates.iter().flatten().copied().fold(0.0, f64::max));
+        let implicit = implicit_axes(
+            mesh,
+            settings,
+            rates.iter().flatten().copied().fold(0.0, f64::max),
+        );
         Self::at_rates(mesh, settings, implicit, &rates)
     }
 
     /// The same from [`largest_rates`].
-    fn at_rates(mesh: &Mesh, settings: &FlowSettings, implicit: [bool; 3], rates: &[Vec<f64>; 3]) -> Self {
-        let sticks = mesh.directions().iter().any(|d| d.ends.no_slip() != [false; 2]);
+    fn at_rates(
+        mesh: &Mesh,
+        settings: &FlowSettings,
+        implicit: [bool; 3],
+        rates: &[Vec<f64>; 3],
+    ) -> Self {
+        let sticks = mesh
+            .directions()
+            .iter()
+            .any(|d| d.ends.no_slip() != [false; 2]);
         let mut cells: Vec<Carrying> = Vec::new();
         for (axis, (rates, lengths_m)) in rates.iter().zip(metrics(mesh)).enumerate() {
-            for (&rate_per_s, length_m) in rates.iter().zip(lengths_m).filter(|(rate, _)| **rate > 0.0) {
-                match cells.iter_mut().find(|c| c.length_m == length_m && c.axis == axis) {
+            for (&rate_per_s, length_m) in
+                rates.iter().zip(lengths_m).filter(|(rate, _)| **rate > 0.0)
+            {
+                match cells
+                    .iter_mut()
+                    .find(|c| c.length_m == length_m && c.axis == axis)
+                {
                     Some(same) => same.rate_per_s = same.rate_per_s.max(rate_per_s),
-                    None => cells.push(Carrying { rate_per_s, length_m, axis }),
+                    None => cells.push(Carrying {
+                        rate_per_s,
+                        length_m,
+                        axis,
+                    }),
                 }
             }
         }
         let transport = TRANSPORT[usize::from(sticks)];
-        let &FlowSettings { scheme, time_step, viscosity_m2_s, .. } = settings;
+        let &FlowSettings {
+            scheme,
+            time_step,
+            viscosity_m2_s,
+            ..
+        } = settings;
         let stiffness = Stiffness::new(viscous_rates_per_s(mesh, viscosity_m2_s), implicit);
         let explicit_up_to_s = explicit_up_to_s(mesh, settings);
-        Self { scheme, time_step, transport, viscosity_m2_s, cells, implicit, explicit_up_to_s, stiffness }
+        Self {
+            scheme,
+            time_step,
+            transport,
+            viscosity_m2_s,
+            cells,
+            implicit,
+            explicit_up_to_s,
+            stiffness,
+        }
     }
 
     /// Length of the first step, or of the longest if the flow starts from rest \[s\].
     pub fn first_step_s(&self) -> f64 {
         let step_s = self.time_step.step_s(self.courant_per_s());
-        if matches!(self.time_step, TimeStep::Fixed { .. }) { step_s } else { step_s.min(self.stiffness.longest_s()) }
+        if matches!(self.time_step, TimeStep::Fixed { .. }) {
+            step_s
+        } else {
+            step_s.min(self.stiffness.longest_s())
+        }
     }
 
     /// Whether steps of `step_s` are too long for implicit viscosity, in a sentence.
@@ -114,17 +157,27 @@ impl Stability {
 
     /// Largest `sum |u_i|/h_i` \[1/s\]: a Courant number over it is a time step.
     pub fn courant_per_s(&self) -> f64 {
-        self.cells.iter().fold(0.0, |most, cell| most.max(cell.rate_per_s))
+        self.cells
+            .iter()
+            .fold(0.0, |most, cell| most.max(cell.rate_per_s))
     }
 
     /// Growth of the worst wave in a step of `step_s`, `ln |G|`, and its cell, where viscosity is `implicit` along these axes.
     fn worst(&self, step_s: f64, implicit: [bool; 3]) -> (f64, Option<Carrying>) {
         let growth = |cell: &Carrying| {
             let viscous = self.viscosity_m2_s * step_s / cell.length_m.powi(2);
-            largest_growth(self.scheme, self.transport, step_s * cell.rate_per_s, viscous, implicit[cell.axis])
+            largest_growth(
+                self.scheme,
+                self.transport,
+                step_s * cell.rate_per_s,
+                viscous,
+                implicit[cell.axis],
+            )
         };
         let all = self.cells.iter().map(|cell| (growth(cell), Some(*cell)));
-        all.fold((f64::NEG_INFINITY, None), |worst, next| if next.0 > worst.0 { next } else { worst })
+        all.fold((f64::NEG_INFINITY, None), |worst, next| {
+            if next.0 > worst.0 { next } else { worst }
+        })
     }
 
     /// Largest Courant number at which every wave decays, as it does at all smaller ones; infinite in a flow that carries none. Shorter
@@ -135,14 +188,18 @@ impl Stability {
             return f64::INFINITY;
         }
         let decays = |step_s: f64, implicit| self.worst(step_s, implicit).0 <= ROUND_OFF;
-        let mut ends_s = self.explicit_up_to_s.map(|step_s| step_s.min(longest_s)).to_vec();
+        let mut ends_s = self
+            .explicit_up_to_s
+            .map(|step_s| step_s.min(longest_s))
+            .to_vec();
         ends_s.push(longest_s);
         ends_s.sort_by(f64::total_cmp);
         let mut start_s = 0.0;
         for end_s in ends_s {
             let implicit = self.explicit_up_to_s.map(|step_s| step_s < end_s);
             if !decays(end_s, implicit) {
-                return self.courant_per_s() * halve(start_s, end_s, |step_s| decays(step_s, implicit));
+                return self.courant_per_s()
+                    * halve(start_s, end_s, |step_s| decays(step_s, implicit));
             }
             start_s = end_s;
         }
@@ -151,7 +208,9 @@ impl Stability {
 
     /// What grows in steps of `step_s`; `None` where nothing does.
     pub fn undamped(&self, step_s: f64) -> Option<UndampedGrowth> {
-        let (growth, Some(cell)) = self.worst(step_s, self.implicit) else { return None };
+        let (growth, Some(cell)) = self.worst(step_s, self.implicit) else {
+            return None;
+        };
         (growth > ROUND_OFF).then(|| UndampedGrowth {
             cell_reynolds: cell.length_m.powi(2) * cell.rate_per_s / self.viscosity_m2_s,
             courant: self.courant_per_s() * step_s,
@@ -170,25 +229,43 @@ impl Stability {
 
 /// Largest `sum |u_i|/h_i` \[1/s\] of all cells whose largest term is that of a direction, by their index along it, and of the
 /// smallest cells beside walls that move: the fluid may come to their speed.
-fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync) -> [Vec<f64>; 3] {
+fn largest_rates(
+    mesh: &Mesh,
+    velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync,
+) -> [Vec<f64>; 3] {
     let (metric_m, [nx, ny, nz]) = (metrics(mesh), mesh.cells());
     let none = || metric_m.each_ref().map(|m| vec![0.0_f64; m.len()]);
     let add = |rates: &mut [Vec<f64>; 3], cell: [usize; 3], velocity_m_s: [f64; 3]| {
-        let term = |d: usize| if metric_m[d].len() == 1 { 0.0 } else { velocity_m_s[d].abs() / metric_m[d][cell[d]] };
+        let term = |d: usize| {
+            if metric_m[d].len() == 1 {
+                0.0
+            } else {
+                velocity_m_s[d].abs() / metric_m[d][cell[d]]
+            }
+        };
         let terms = [term(0), term(1), term(2)];
         let most = (1..3).fold(0, |most, d| if terms[d] > terms[most] { d } else { most });
         let rate = &mut rates[most][cell[most]];
         *rate = rate.max(terms.iter().sum());
     };
     let with_plane = |mut rates: [Vec<f64>; 3], k: usize| {
-        (0..nx * ny).map(|at| [at % nx, at / nx, k]).for_each(|cell| add(&mut rates, cell, velocity_m_s(cell)));
+        (0..nx * ny)
+            .map(|at| [at % nx, at / nx, k])
+            .for_each(|cell| add(&mut rates, cell, velocity_m_s(cell)));
         rates
     };
-    let mut rates = (0..nz).into_par_iter().fold(none, with_plane).reduce(none, |mut a, b| {
-        larger(&mut a, &b.concat());
-        a
+    let mut rates = (0..nz)
+        .into_par_iter()
+        .fold(none, with_plane)
+        .reduce(none, |mut a, b| {
+            larger(&mut a, &b.concat());
+            a
+        });
+    let smallest = metric_m.each_ref().map(|m| {
+        (0..m.len())
+            .min_by(|&a, &b| m[a].total_cmp(&m[b]))
+            .unwrap_or(0)
     });
-    let smallest = metric_m.each_ref().map(|m| (0..m.len()).min_by(|&a, &b| m[a].total_cmp(&m[b])).unwrap_or(0));
     for wall in mesh.directions().iter().flat_map(|d| d.ends.walls()) {
         if let Wall::NoSlip { velocity_m_s } = wall {
             add(&mut rates, smallest, velocity_m_s);
@@ -199,26 +276,46 @@ fn largest_rates(mesh: &Mesh, velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sy
 
 /// Takes the larger of these rates and those of `others`, one direction after the other.
 fn larger(rates: &mut [Vec<f64>; 3], others: &[f64]) {
-    rates.iter_mut().flatten().zip(others).for_each(|(rate, other)| *rate = rate.max(*other));
+    rates
+        .iter_mut()
+        .flatten()
+        .zip(others)
+        .for_each(|(rate, other)| *rate = rate.max(*other));
 }
 
 /// The end of the low part of an interval, in which `holds`.
 fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        if holds(middle) { low = middle } else { high = middle }
+        if holds(middle) {
+            low = middle
+        } else {
+            high = middle
+        }
     }
     low
 }
 
 /// Largest growth of a wave in a step, `ln |G|`, with `viscous = nu dt/h^2`.
-fn largest_growth(scheme: TimeScheme, transport: [f64; 3], courant: f64, viscous: f64, is_implicit: bool) -> f64 {
+fn largest_growth(
+    scheme: TimeScheme,
+    transport: [f64; 3],
+    courant: f64,
+    viscous: f64,
+    is_implicit: bool,
+) -> f64 {
     let growth = |wave: usize| {
         let theta = PI * wave as f64 / WAVES as f64;
-        let symbol = (1..=3).map(|m| transport[m - 1] * (m as f64 * theta).sin()).sum::<f64>();
+        let symbol = (1..=3)
+            .map(|m| transport[m - 1] * (m as f64 * theta).sin())
+            .sum::<f64>();
         let kappa = 2.0 * (9.0 / 8.0 * (0.5 * theta).sin() - (1.5 * theta).sin() / 24.0);
         let decay = viscous * kappa * kappa;
-        let [explicit, implicit] = if is_implicit { [0.0, decay] } else { [decay, 0.0] };
+        let [explicit, implicit] = if is_implicit {
+            [0.0, decay]
+        } else {
+            [decay, 0.0]
+        };
         amplification(scheme, Complex::new(-explicit, courant * symbol), implicit).ln()
     };
     (1..=WAVES).map(growth).fold(f64::NEG_INFINITY, f64::max)
@@ -237,7 +334,8 @@ fn amplification(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
     let (mut u, mut before) = (Complex::from(1.0), Complex::from(0.0));
     for stage in scheme.stages(None) {
         let term = z * u;
-        u += stage.fraction * (stage.new * term + stage.old * before - d * u) / (1.0 + 0.5 * stage.fraction * d);
+        u += stage.fraction * (stage.new * term + stage.old * before - d * u)
+            / (1.0 + 0.5 * stage.fraction * d);
         before = term;
     }
     u.norm()
@@ -262,9 +360,18 @@ impl Flow {
             place.map_or([0.0; 3], |place| axis.map(|a| velocity[a][place]))
         });
         let (own, count) = (rates.concat(), rates.iter().map(Vec::len).sum());
-        self.layout.slabs.all_gather(own)?.chunks(count).for_each(|others| larger(&mut rates, others));
+        self.layout
+            .slabs
+            .all_gather(own)?
+            .chunks(count)
+            .for_each(|others| larger(&mut rates, others));
         let implicit = axis.map(|a| self.state.implicit[a]);
-        Ok(Stability::at_rates(&self.mesh, &self.settings, implicit, &rates))
+        Ok(Stability::at_rates(
+            &self.mesh,
+            &self.settings,
+            implicit,
+            &rates,
+        ))
     }
 
     /// Memory axis and place of the component whose waves of two cells are strongest: where numerical growth shows most.
@@ -301,7 +408,13 @@ mod tests {
     const RK3: TimeScheme = TimeScheme::RungeKutta3;
 
     /// A wave of the mesh, carried by a stream of 1 m/s on 48 cells of 1 m.
-    fn wave(cells_per_wave: f64, viscosity_m2_s: f64, courant: f64, scheme: TimeScheme, implicit: bool) -> Flow {
+    fn wave(
+        cells_per_wave: f64,
+        viscosity_m2_s: f64,
+        courant: f64,
+        scheme: TimeScheme,
+        implicit: bool,
+    ) -> Flow {
         let mesh = || {
             let y = Direction::periodic(48, 0.0, 48.0);
             Mesh::new(Direction::thin(1.0), y, Direction::periodic(4, 0.0, 4.0)).unwrap()
@@ -309,13 +422,21 @@ mod tests {
         let mut settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s: courant });
         settings.scheme = scheme;
         let wave = std::f64::consts::TAU / cells_per_wave;
-        let mut flow = Flow::new(mesh(), settings, |[_, y, _]| [1e-3 * (wave * y).cos(), 1.0, 0.0]).unwrap().0;
+        let mut flow = Flow::new(mesh(), settings, |[_, y, _]| {
+            [1e-3 * (wave * y).cos(), 1.0, 0.0]
+        })
+        .unwrap()
+        .0;
         flow.state.implicit = flow.layout.direction.map(|d| d > 0 && implicit);
         flow
     }
 
     /// Growth of the energy of such a wave per second, and what is said of it.
-    fn measured_per_s(cells_per_wave: f64, viscosity_m2_s: f64, courant: f64) -> (f64, Option<UndampedGrowth>) {
+    fn measured_per_s(
+        cells_per_wave: f64,
+        viscosity_m2_s: f64,
+        courant: f64,
+    ) -> (f64, Option<UndampedGrowth>) {
         let mut flow = wave(cells_per_wave, viscosity_m2_s, courant, AB2, true);
         let growth = flow.stability().unwrap().undamped(courant);
         let energy = |flow: &Flow| flow.face_velocity_m_s(0).iter().map(|u| u * u).sum::<f64>();
@@ -327,20 +448,32 @@ mod tests {
         for _ in 0..steps {
             flow.step().unwrap();
         }
-        ((energy(&flow) / start).ln() / (f64::from(steps) * courant), growth)
+        (
+            (energy(&flow) / start).ln() / (f64::from(steps) * courant),
+            growth,
+        )
     }
 
     /// Reynolds number of a cell up to which every wave decays under Adams-Bashforth.
     fn largest_reynolds(transport: [f64; 3], courant: f64, is_implicit: bool) -> f64 {
-        let decays =
-            |power: f64| largest_growth(AB2, transport, courant, courant / 10.0_f64.powf(power), is_implicit) < 0.0;
+        let decays = |power: f64| {
+            largest_growth(
+                AB2,
+                transport,
+                courant,
+                courant / 10.0_f64.powf(power),
+                is_implicit,
+            ) < 0.0
+        };
         10.0_f64.powf(halve(-2.0, 12.0, decays))
     }
 
     /// Largest Courant number at which every wave decays.
     fn limit(scheme: TimeScheme, sticks: bool, viscous: f64, is_implicit: bool) -> f64 {
         let transport = TRANSPORT[usize::from(sticks)];
-        halve(0.0, 2.0, |courant| largest_growth(scheme, transport, courant, viscous, is_implicit) <= ROUND_OFF)
+        halve(0.0, 2.0, |courant| {
+            largest_growth(scheme, transport, courant, viscous, is_implicit) <= ROUND_OFF
+        })
     }
 
     #[test]
@@ -349,45 +482,108 @@ mod tests {
         for (courant, factor) in [(0.2, 0.88), (0.35, 0.66)] {
             let limit = largest_reynolds(TRANSPORT[0], courant, true);
             // The leading order of the growth gives 4/(2.047 C^3).
-            assert!((limit * 2.047 * courant.powi(3) / 4.0 - factor).abs() < 0.02, "{limit}");
-            let all = |reynolds: f64| waves.map(|cells| measured_per_s(cells, 1.0 / reynolds, courant));
+            assert!(
+                (limit * 2.047 * courant.powi(3) / 4.0 - factor).abs() < 0.02,
+                "{limit}"
+            );
+            let all =
+                |reynolds: f64| waves.map(|cells| measured_per_s(cells, 1.0 / reynolds, courant));
             let above = all(1.15 * limit);
             assert!(above.iter().any(|(grown, _)| *grown > 0.0), "{above:?}");
             let found = above[0].1.unwrap();
-            assert!((found.cell_reynolds / limit - 1.15).abs() < 1e-9, "{found:?}");
+            assert!(
+                (found.cell_reynolds / limit - 1.15).abs() < 1e-9,
+                "{found:?}"
+            );
             // In a flow that starts with so little viscosity it is explicit.
             let damped = largest_reynolds(TRANSPORT[0], found.damped_courant, false);
-            assert!((damped / found.cell_reynolds - 1.0).abs() < 1e-6, "{found:?}");
+            assert!(
+                (damped / found.cell_reynolds - 1.0).abs() < 1e-6,
+                "{found:?}"
+            );
             let below = all(0.85 * limit);
-            assert!(below.iter().all(|(grown, found)| *grown < 0.0 && found.is_none()), "{below:?}");
+            assert!(
+                below
+                    .iter()
+                    .all(|(grown, found)| *grown < 0.0 && found.is_none()),
+                "{below:?}"
+            );
         }
         assert!((largest_reynolds(TRANSPORT[1], 0.35, true) / 82.0 - 1.0).abs() < 0.01);
         // Without viscosity; the rate of the amplitude is half that of the energy, and the worst wave has 3.2 cells.
         let (grown, found) = measured_per_s(3.2, 0.0, 0.35);
         let found = found.unwrap();
-        assert!(found.cell_reynolds.is_infinite() && found.damped_courant < 0.01, "{found:?}");
-        assert!((0.5 * grown / found.rate_per_s - 1.0).abs() < 0.01, "{grown}, {found:?}");
+        assert!(
+            found.cell_reynolds.is_infinite() && found.damped_courant < 0.01,
+            "{found:?}"
+        );
+        assert!(
+            (0.5 * grown / found.rate_per_s - 1.0).abs() < 0.01,
+            "{grown}, {found:?}"
+        );
     }
 
     #[test]
     fn limits_are_the_measured_ones_of_both_schemes_with_viscosity_explicit_and_implicit() {
         // Measured with fixed steps on lines of 48 and 64 cells, white noise or the worst wave.
         let of = |scheme, is_implicit, viscous| limit(scheme, false, viscous, is_implicit);
-        for (viscous, measured) in
-            [(0.0, 1.0921), (0.001, 1.099), (0.01, 1.147), (0.1, 1.364), (0.3, 1.546), (0.4, 1.589)]
-        {
-            assert!((of(RK3, true, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(RK3, true, viscous));
+        for (viscous, measured) in [
+            (0.0, 1.0921),
+            (0.001, 1.099),
+            (0.01, 1.147),
+            (0.1, 1.364),
+            (0.3, 1.546),
+            (0.4, 1.589),
+        ] {
+            assert!(
+                (of(RK3, true, viscous) / measured - 1.0).abs() < 0.01,
+                "{viscous}: {}",
+                of(RK3, true, viscous)
+            );
         }
-        for (viscous, measured) in [(0.001, 1.101), (0.01, 1.162), (0.1, 1.413), (0.3, 1.453), (0.4, 1.095)] {
-            assert!((of(RK3, false, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(RK3, false, viscous));
+        for (viscous, measured) in [
+            (0.001, 1.101),
+            (0.01, 1.162),
+            (0.1, 1.413),
+            (0.3, 1.453),
+            (0.4, 1.095),
+        ] {
+            assert!(
+                (of(RK3, false, viscous) / measured - 1.0).abs() < 0.01,
+                "{viscous}: {}",
+                of(RK3, false, viscous)
+            );
         }
-        for (viscous, measured) in [(0.001, 0.204), (0.01, 0.339), (0.03, 0.4195), (0.1, 0.516), (0.15, 0.552)] {
-            assert!((of(AB2, true, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(AB2, true, viscous));
+        for (viscous, measured) in [
+            (0.001, 0.204),
+            (0.01, 0.339),
+            (0.03, 0.4195),
+            (0.1, 0.516),
+            (0.15, 0.552),
+        ] {
+            assert!(
+                (of(AB2, true, viscous) / measured - 1.0).abs() < 0.01,
+                "{viscous}: {}",
+                of(AB2, true, viscous)
+            );
         }
-        for (viscous, measured) in [(0.001, 0.206), (0.01, 0.351), (0.03, 0.438), (0.1, 0.5075), (0.15, 0.478)] {
-            assert!((of(AB2, false, viscous) / measured - 1.0).abs() < 0.01, "{viscous}: {}", of(AB2, false, viscous));
+        for (viscous, measured) in [
+            (0.001, 0.206),
+            (0.01, 0.351),
+            (0.03, 0.438),
+            (0.1, 0.5075),
+            (0.15, 0.478),
+        ] {
+            assert!(
+                (of(AB2, false, viscous) / measured - 1.0).abs() < 0.01,
+                "{viscous}: {}",
+                of(AB2, false, viscous)
+            );
         }
-        assert!((limit(RK3, true, 0.0, true) / 1.4846 - 1.0).abs() < 0.001, "with walls");
+        assert!(
+            (limit(RK3, true, 0.0, true) / 1.4846 - 1.0).abs() < 0.001,
+            "with walls"
+        );
         // Explicit viscosity alone.
         for (scheme, most) in [(AB2, 1.0), (RK3, 2.513)] {
             let most = most / (49.0 / 9.0);
@@ -401,15 +597,18 @@ mod tests {
         for (viscosity_m2_s, implicit) in [(0.0, true), (0.05, true), (0.05, false), (0.2, false)] {
             let step = |courant: f64| wave(3.6, viscosity_m2_s, courant, RK3, implicit);
             // nu dt/h^2 changes with the step.
-            let limit =
-                halve(0.0, 2.0, |c| largest_growth(RK3, TRANSPORT[0], c, viscosity_m2_s * c, implicit) <= ROUND_OFF);
+            let limit = halve(0.0, 2.0, |c| {
+                largest_growth(RK3, TRANSPORT[0], c, viscosity_m2_s * c, implicit) <= ROUND_OFF
+            });
             let mut flow = step(0.999 * limit);
             let start = flow.kinetic_energy_m5_s2();
             for _ in 0..50 {
                 flow.step().unwrap();
             }
             assert!(flow.kinetic_energy_m5_s2() <= start * (1.0 + 1e-12));
-            let Err(Error::CourantTooLarge { limit: said, .. }) = step(1.001 * limit).step() else { panic!("{limit}") };
+            let Err(Error::CourantTooLarge { limit: said, .. }) = step(1.001 * limit).step() else {
+                panic!("{limit}")
+            };
             assert!((said / limit - 1.0).abs() < 1e-6, "{said}, {limit}");
         }
     }
@@ -417,20 +616,51 @@ mod tests {
     #[test]
     fn cells_of_their_own_length_and_directions_without_variation_are_judged_each() {
         let y = Direction::periodic(8, 0.0, 8.0);
-        let mesh = Mesh::new(Direction::thin(1.0), y.clone(), Direction::periodic(8, 0.0, 80.0)).unwrap();
+        let mesh = Mesh::new(
+            Direction::thin(1.0),
+            y.clone(),
+            Direction::periodic(8, 0.0, 80.0),
+        )
+        .unwrap();
         let settings = FlowSettings::new(0.05, TimeStep::Fixed { step_s: 0.3 });
-        let of = |settings: &FlowSettings, u: [f64; 3]| Stability::of(&mesh, settings, |_| u).undamped(0.3);
-        assert!(of(&settings, [5.0, 0.0, 0.0]).is_none(), "nothing varies along x");
+        let of = |settings: &FlowSettings, u: [f64; 3]| {
+            Stability::of(&mesh, settings, |_| u).undamped(0.3)
+        };
+        assert!(
+            of(&settings, [5.0, 0.0, 0.0]).is_none(),
+            "nothing varies along x"
+        );
         // The same Courant number, but viscosity takes a hundredth from the long cells.
         assert!(of(&settings, [0.0, 1.0, 0.0]).is_none());
         let found = of(&settings, [0.0, 0.0, 10.0]).unwrap();
-        assert!((found.cell_reynolds - 2000.0).abs() < 1e-6 && (found.courant - 0.3).abs() < 1e-12, "{found:?}");
+        assert!(
+            (found.cell_reynolds - 2000.0).abs() < 1e-6 && (found.courant - 0.3).abs() < 1e-12,
+            "{found:?}"
+        );
         // The cell that carries less may be the worse one.
         let both = of(&settings, [0.0, 1.2, 9.0]).unwrap();
         assert!(both.cell_reynolds < 100.0, "{both:?}");
-        let mixed = Stability::of(&mesh, &settings, |[_, j, _]| if j == 0 { [0.0, 0.0, 9.0] } else { [0.0, 1.2, 0.0] });
+        let mixed = Stability::of(&mesh, &settings, |[_, j, _]| {
+            if j == 0 {
+                [0.0, 0.0, 9.0]
+            } else {
+                [0.0, 1.2, 0.0]
+            }
+        });
         let mixed = mixed.undamped(0.3).unwrap();
-        assert!((mixed.cell_reynolds - 1800.0).abs() < 1e-6 && (mixed.courant - 0.36).abs() < 1e-12, "{mixed:?}");
-        assert!(of(&FlowSettings { scheme: RK3, ..settings }, [0.0, 0.0, 10.0]).is_none());
+        assert!(
+            (mixed.cell_reynolds - 1800.0).abs() < 1e-6 && (mixed.courant - 0.36).abs() < 1e-12,
+            "{mixed:?}"
+        );
+        assert!(
+            of(
+                &FlowSettings {
+                    scheme: RK3,
+                    ..settings
+                },
+                [0.0, 0.0, 10.0]
+            )
+            .is_none()
+        );
     }
 }

@@ -35,15 +35,27 @@ pub(crate) struct LineSolvers(Vec<(f64, Vec<LineSolver>)>);
 
 impl LineSolvers {
     /// Those of all components along the implicit axes, `a_m2` being viscosity times the implicit part of a stage \[m^2\].
-    pub(crate) fn of(&mut self, ops: &[Momentum; 3], implicit: [bool; 3], a_m2: f64) -> &[LineSolver] {
-        let found = self.0.iter().position(|(a, _)| *a == a_m2).unwrap_or_else(|| {
-            // A fixed step has at most three stages of different length; a variable one always needs new factors.
-            self.0.truncate(2);
-            let axes = (0..3).filter(|&axis| implicit[axis]);
-            let solvers = ops.iter().flat_map(|ops| axes.clone().map(move |axis| LineSolver::new(ops, axis, a_m2)));
-            self.0.insert(0, (a_m2, solvers.collect()));
-            0
-        });
+    pub(crate) fn of(
+        &mut self,
+        ops: &[Momentum; 3],
+        implicit: [bool; 3],
+        a_m2: f64,
+    ) -> &[LineSolver] {
+        let found = self
+            .0
+            .iter()
+            .position(|(a, _)| *a == a_m2)
+            .unwrap_or_else(|| {
+                // A fixed step has at most three stages of different length; a variable one always needs new factors.
+                self.0.truncate(2);
+                let axes = (0..3).filter(|&axis| implicit[axis]);
+                let solvers = ops.iter().flat_map(|ops| {
+                    axes.clone()
+                        .map(move |axis| LineSolver::new(ops, axis, a_m2))
+                });
+                self.0.insert(0, (a_m2, solvers.collect()));
+                0
+            });
         &self.0[found].1
     }
 }
@@ -62,7 +74,12 @@ impl LineSolver {
         let mut pivot = vec![0.0; n];
         for (i, row) in ops.laplacian[axis].rows.iter().enumerate() {
             // Row i of the factor, from its first entry to the diagonal.
-            let first = row.iter().map(|tap| tap.0).filter(|j| *j <= i).min().unwrap_or(i);
+            let first = row
+                .iter()
+                .map(|tap| tap.0)
+                .filter(|j| *j <= i)
+                .min()
+                .unwrap_or(i);
             let mut work = vec![0.0; i - first + 1];
             work[i - first] = mass[i];
             for &(j, c) in row.iter().filter(|tap| tap.0 <= i) {
@@ -70,7 +87,11 @@ impl LineSolver {
             }
             for j in first..i {
                 // work[j] holds l_ij d_j once the earlier columns are taken off.
-                let sum: f64 = lower[j].iter().filter(|t| t.0 >= first).map(|&(p, l)| l * work[p - first]).sum();
+                let sum: f64 = lower[j]
+                    .iter()
+                    .filter(|t| t.0 >= first)
+                    .map(|&(p, l)| l * work[p - first])
+                    .sum();
                 work[j - first] += sum;
             }
             let mut diagonal = work[i - first];
@@ -84,7 +105,14 @@ impl LineSolver {
             }
             pivot[i] = diagonal;
         }
-        Self { component: ops.axis, axis, mass, inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(), lower, upper }
+        Self {
+            component: ops.axis,
+            axis,
+            mass,
+            inverse_pivot: pivot.iter().map(|d| 1.0 / d).collect(),
+            lower,
+            upper,
+        }
     }
 
     /// Replaces the planes of a field that are owned by the solution.
@@ -94,9 +122,15 @@ impl LineSolver {
     pub(crate) fn solve(&self, slabs: &Slabs, own: &mut [f64]) -> Result<(), Error> {
         let shape = slabs.shape;
         match self.axis {
-            0 => own.par_chunks_mut(shape.n[0] * TILE).for_each(|rows| self.solve_tile(rows, shape.n[0])),
-            1 => own.par_chunks_mut(shape.plane()).for_each(|plane| solve_block(self, plane, shape.n[0])),
-            _ => slabs.transposed(own, 1, |field, shape, _| self.solve_across_planes(shape, field))?,
+            0 => own
+                .par_chunks_mut(shape.n[0] * TILE)
+                .for_each(|rows| self.solve_tile(rows, shape.n[0])),
+            1 => own
+                .par_chunks_mut(shape.plane())
+                .for_each(|plane| solve_block(self, plane, shape.n[0])),
+            _ => slabs.transposed(own, 1, |field, shape, _| {
+                self.solve_across_planes(shape, field)
+            })?,
         }
         Ok(())
     }
@@ -121,21 +155,26 @@ impl LineSolver {
     /// Lines along axis 2: some neighbours are gathered from all planes, for rows of the same place in all planes get in each other's
     /// way in the caches.
     fn solve_across_planes(&self, shape: Shape, field: &mut [f64]) {
-        pencils(field, shape, 2, COLUMNS).par_iter_mut().for_each_init(
-            Vec::new,
-            |block: &mut Vec<f64>, Pencil { rows, .. }| {
+        pencils(field, shape, 2, COLUMNS)
+            .par_iter_mut()
+            .for_each_init(Vec::new, |block: &mut Vec<f64>, Pencil { rows, .. }| {
                 let width = rows[0].len();
                 block.clear();
                 rows.iter().for_each(|row| block.extend_from_slice(row));
                 solve_block(self, block, width);
-                rows.iter_mut().zip(block.chunks(width)).for_each(|(row, solved)| row.copy_from_slice(solved));
-            },
-        );
+                rows.iter_mut()
+                    .zip(block.chunks(width))
+                    .for_each(|(row, solved)| row.copy_from_slice(solved));
+            });
     }
 }
 
 /// Solves lines that run across the rows of `block`, which are `width` long.
-#[multiversion::multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
+#[multiversion::multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl",
+    "x86_64+avx2",
+    "aarch64+neon"
+))]
 fn solve_block(solver: &LineSolver, block: &mut [f64], width: usize) {
     for i in 0..solver.mass.len() {
         let (before, rest) = block.split_at_mut(i * width);
@@ -161,7 +200,10 @@ fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize)
     let n = row.len();
     for taps in taps.chunks(4) {
         if let [a, b, c] = *taps {
-            let (x, y) = (&other[(a.0 - first) * n..][..n], &other[(b.0 - first) * n..][..n]);
+            let (x, y) = (
+                &other[(a.0 - first) * n..][..n],
+                &other[(b.0 - first) * n..][..n],
+            );
             let z = &other[(c.0 - first) * n..][..n];
             for i in 0..n {
                 row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
@@ -183,7 +225,8 @@ mod tests {
         let a_m2 = 0.02;
         let kinds = [
             Direction::periodic(20, 0.0, 1.0).stretched(Spread::Sine.by(0.5)),
-            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5)),
+            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip)
+                .stretched(Spread::TanhLow.by(1.5)),
             Direction::between(18, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST),
         ];
         for shift in 0..3 {
@@ -194,17 +237,25 @@ mod tests {
             for component in 0..3 {
                 let ops = Momentum::new(&layout, component);
                 for axis in 0..3 {
-                    let right: Vec<f64> = (0..shape.len()).map(|i| ((i * i) as f64).sin()).collect();
+                    let right: Vec<f64> =
+                        (0..shape.len()).map(|i| ((i * i) as f64).sin()).collect();
                     let mut x = right.clone();
-                    LineSolver::new(&ops, axis, a_m2).solve(&layout.slabs, &mut x).unwrap();
+                    LineSolver::new(&ops, axis, a_m2)
+                        .solve(&layout.slabs, &mut x)
+                        .unwrap();
                     let stride = [1, nx, nx * ny][axis];
                     for place in 0..shape.len() {
                         let index = place / stride % shape.n[axis];
                         let origin = place - index * stride;
-                        let applied: f64 =
-                            ops.laplacian[axis].rows[index].iter().map(|&(i, c)| c * x[origin + i * stride]).sum();
+                        let applied: f64 = ops.laplacian[axis].rows[index]
+                            .iter()
+                            .map(|&(i, c)| c * x[origin + i * stride])
+                            .sum();
                         let residual = x[place] - a_m2 * applied - right[place];
-                        assert!(residual.abs() < 1e-11, "component {component}, axis {axis}, {index}: {residual}");
+                        assert!(
+                            residual.abs() < 1e-11,
+                            "component {component}, axis {axis}, {index}: {residual}"
+                        );
                     }
                 }
             }

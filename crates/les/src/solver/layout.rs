@@ -39,7 +39,15 @@ impl Layout {
     pub(crate) fn in_order(mesh: &Mesh, direction: [usize; 3]) -> Self {
         let line = direction.map(|d| Operators1d::new(&mesh.directions()[d]));
         let shape = Shape::whole(direction.map(|d| mesh.cells()[d]));
-        Self { line, direction, shape, slabs: Slabs { ranks: Arc::new(Timed::new(Arc::new(Single))), shape } }
+        Self {
+            line,
+            direction,
+            shape,
+            slabs: Slabs {
+                ranks: Arc::new(Timed::new(Arc::new(Single))),
+                shape,
+            },
+        }
     }
 
     /// The same for one of several ranks.
@@ -48,12 +56,19 @@ impl Layout {
     /// [`Error::TooManyRanks`].
     pub(crate) fn shared(self, ranks: Arc<dyn Ranks>) -> Result<Self, Error> {
         let slabs = Slabs::new(ranks, self.shape.n)?;
-        Ok(Self { shape: slabs.shape, slabs, ..self })
+        Ok(Self {
+            shape: slabs.shape,
+            slabs,
+            ..self
+        })
     }
 
     /// The memory axis of direction `d` (0, 1, 2 for x, y, z).
     pub(crate) fn axis_of(&self, d: usize) -> usize {
-        self.direction.iter().position(|&other| other == d).unwrap_or(d)
+        self.direction
+            .iter()
+            .position(|&other| other == d)
+            .unwrap_or(d)
     }
 
     /// Velocity along memory axis `component` of the walls at the low and the high end of memory axis `axis` \[m/s\]; zero
@@ -70,9 +85,17 @@ impl Layout {
 
     /// What the velocity of the walls of memory axis `axis` adds to an operator along it on a component, from the operator's coefficients of
     /// the two walls.
-    pub(crate) fn wall_source(&self, axis: usize, component: usize, walls: &[[f64; 2]]) -> Vec<f64> {
+    pub(crate) fn wall_source(
+        &self,
+        axis: usize,
+        component: usize,
+        walls: &[[f64; 2]],
+    ) -> Vec<f64> {
         let [low, high] = self.wall_velocity_m_s(axis, component);
-        walls.iter().map(|wall| wall[0] * low + wall[1] * high).collect()
+        walls
+            .iter()
+            .map(|wall| wall[0] * low + wall[1] * high)
+            .collect()
     }
 }
 
@@ -98,8 +121,14 @@ mod tests {
         assert_eq!(order(8, 16, 32), [1, 0, 2]);
         assert_eq!(order(16, 16, 32), [0, 1, 2]);
         let sine = d(16).stretched(Spread::Sine.by(0.3));
-        for y in [Direction::between(16, 0.0, 1.0, Wall::Slip, Wall::Slip), sine] {
-            assert_eq!(Layout::new(&Mesh::new(d(8), y, d(32)).unwrap()).direction, [0, 1, 2]);
+        for y in [
+            Direction::between(16, 0.0, 1.0, Wall::Slip, Wall::Slip),
+            sine,
+        ] {
+            assert_eq!(
+                Layout::new(&Mesh::new(d(8), y, d(32)).unwrap()).direction,
+                [0, 1, 2]
+            );
         }
         assert_eq!(order(1, 64, 32), [1, 0, 2]);
         assert_eq!(order(1, 32, 64), [2, 0, 1]);

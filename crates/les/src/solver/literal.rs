@@ -19,7 +19,11 @@ pub(crate) fn literal_convection(layout: &Layout, velocity: [&[f64]; 3], a: usiz
     let mean = layout.line[a].flux_mean();
     let tables: [_; 3] = std::array::from_fn(|b| {
         let line = &layout.line[b];
-        if b == a { line.transport_of_faces(stencil).rows } else { line.transport_of_cells(stencil).rows }
+        if b == a {
+            line.transport_of_faces(stencil).rows
+        } else {
+            line.transport_of_cells(stencil).rows
+        }
     });
     let convection = |at: [usize; 3]| -> f64 {
         let mut sum = 0.0;
@@ -29,17 +33,28 @@ pub(crate) fn literal_convection(layout: &Layout, velocity: [&[f64]; 3], a: usiz
                 let flux: f64 = if b == a {
                     velocity[a][shape.place(through)]
                 } else {
-                    let weighted =
-                        |&(cell, weight): &(usize, f64)| weight * velocity[b][shape.place(moved(through, a, cell))];
+                    let weighted = |&(cell, weight): &(usize, f64)| {
+                        weight * velocity[b][shape.place(moved(through, a, cell))]
+                    };
                     mean[at[a]].iter().map(weighted).sum()
                 };
-                let mass_m = if b == a { 1.0 } else { layout.line[b].cell_mass_m[at[b]] };
+                let mass_m = if b == a {
+                    1.0
+                } else {
+                    layout.line[b].cell_mass_m[at[b]]
+                };
                 sum += coefficient * flux * velocity[a][shape.place(moved(at, b, value))] / mass_m;
             }
         }
-        if at[a] < layout.line[a].first_face() { 0.0 } else { sum / layout.line[a].face_mass_m[at[a]] }
+        if at[a] < layout.line[a].first_face() {
+            0.0
+        } else {
+            sum / layout.line[a].face_mass_m[at[a]]
+        }
     };
-    (0..shape.len()).map(|place| convection(shape.index(place))).collect()
+    (0..shape.len())
+        .map(|place| convection(shape.index(place)))
+        .collect()
 }
 
 #[cfg(test)]
@@ -54,7 +69,8 @@ mod tests {
         let sine = |n| waves(n).stretched(Spread::Sine.by(0.25));
         let slip = |n| Direction::between(n, 0.0, 0.9, Wall::Slip, Wall::Slip);
         let tanh = |strength| Spread::TanhLow.by(strength);
-        let ground = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(tanh(1.5));
+        let ground =
+            |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(tanh(1.5));
         let closed = |n| Direction::between(n, 0.0, 2.0, Wall::AT_REST, Wall::AT_REST);
         let meshes = [
             [waves(8), waves(7), waves(9)],
@@ -79,19 +95,30 @@ mod tests {
                 let first = layout.line[a].first_face();
                 let index = |p: usize| layout.shape.index(p)[a];
                 let rough = |p: usize| ((p * p + 17 * a) as f64 * 0.37).sin() + 0.3;
-                (0..layout.shape.len()).map(|p| if index(p) < first { 0.0 } else { rough(p) }).collect()
+                (0..layout.shape.len())
+                    .map(|p| if index(p) < first { 0.0 } else { rough(p) })
+                    .collect()
             });
             let velocity = velocity.each_ref().map(Vec::as_slice);
             for a in 0..3 {
                 let literal = literal_convection(&layout, velocity, a);
-                let largest = literal.iter().fold(0.0_f64, |most, value| most.max(value.abs()));
+                let largest = literal
+                    .iter()
+                    .fold(0.0_f64, |most, value| most.max(value.abs()));
                 let (ops, mut scratch) = (Momentum::new(&layout, a), Scratch::new(n0));
                 for (j, k) in (0..n2).flat_map(|k| (0..n1).map(move |j| (j, k))) {
                     scratch.convection(&ops, velocity, j, k);
                     let mut fresh = Scratch::new(n0);
                     fresh.convection(&ops, velocity, j, k);
-                    assert_eq!(fresh.convection, scratch.convection, "fluxes that were kept are those of row {j} {k}");
-                    for (found, expected) in scratch.convection.iter().zip(&literal[layout.shape.row(j, k)]) {
+                    assert_eq!(
+                        fresh.convection, scratch.convection,
+                        "fluxes that were kept are those of row {j} {k}"
+                    );
+                    for (found, expected) in scratch
+                        .convection
+                        .iter()
+                        .zip(&literal[layout.shape.row(j, k)])
+                    {
                         let apart = (found - expected).abs();
                         assert!(
                             apart <= 1e-13 * largest,

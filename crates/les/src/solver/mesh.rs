@@ -27,7 +27,9 @@ pub enum Wall {
 
 impl Wall {
     /// A wall at rest.
-    pub const AT_REST: Self = Self::NoSlip { velocity_m_s: [0.0; 3] };
+    pub const AT_REST: Self = Self::NoSlip {
+        velocity_m_s: [0.0; 3],
+    };
 }
 
 /// The two ends of one direction of the flow.
@@ -57,7 +59,9 @@ impl Ends {
     pub(crate) fn no_slip(self) -> [bool; 2] {
         match self {
             Self::Periodic => [false; 2],
-            Self::Walls { low, high } => [low, high].map(|wall| matches!(wall, Wall::NoSlip { .. })),
+            Self::Walls { low, high } => {
+                [low, high].map(|wall| matches!(wall, Wall::NoSlip { .. }))
+            }
         }
     }
 }
@@ -80,12 +84,24 @@ pub struct Direction {
 impl Direction {
     /// Equal cells from `low_m` to `high_m` \[m\], periodic.
     pub fn periodic(cells: usize, low_m: f64, high_m: f64) -> Self {
-        Self { cells, low_m, high_m, mapping: Mapping::default(), ends: Ends::Periodic }
+        Self {
+            cells,
+            low_m,
+            high_m,
+            mapping: Mapping::default(),
+            ends: Ends::Periodic,
+        }
     }
 
     /// Equal cells from `low_m` to `high_m` \[m\] between two planes.
     pub fn between(cells: usize, low_m: f64, high_m: f64, low: Wall, high: Wall) -> Self {
-        Self { cells, low_m, high_m, mapping: Mapping::default(), ends: Ends::Walls { low, high } }
+        Self {
+            cells,
+            low_m,
+            high_m,
+            mapping: Mapping::default(),
+            ends: Ends::Walls { low, high },
+        }
     }
 
     /// One cell of the given length \[m\] in which nothing varies: the third direction of a plane flow.
@@ -106,7 +122,10 @@ impl Direction {
     /// Position \[m\] and metric `dx/dxi` \[m\] at the index coordinate `xi`.
     pub(crate) fn at(&self, xi: f64) -> (f64, f64) {
         let (x, slope) = self.mapping.at(xi / self.cells as f64);
-        (self.low_m + self.length_m() * x, self.length_m() * slope / self.cells as f64)
+        (
+            self.low_m + self.length_m() * x,
+            self.length_m() * slope / self.cells as f64,
+        )
     }
 
     /// Refuses what the schemes cannot take: too few cells, folds, jumps, walls that blow.
@@ -115,12 +134,19 @@ impl Direction {
         if !(self.low_m.is_finite() && self.high_m.is_finite() && self.length_m() > 0.0) {
             return bad("high_m - low_m", self.length_m(), "finite and positive");
         }
-        let Mapping { spread, strength, place, .. } = self.mapping;
+        let Mapping {
+            spread,
+            strength,
+            place,
+            ..
+        } = self.mapping;
         match spread {
             Spread::Uniform => {}
             Spread::Sine if strength.abs() < 1.0 => {}
             Spread::Sine => return bad("amplitude", strength, "between -1 and 1"),
-            _ if !(strength > 0.0 && strength <= 20.0) => return bad("strength", strength, "above 0 and at most 20"),
+            _ if !(strength > 0.0 && strength <= 20.0) => {
+                return bad("strength", strength, "above 0 and at most 20");
+            }
             Spread::Cluster if !(0.0..=1.0).contains(&place) => {
                 return bad("place", place, "a fraction of the length, 0 to 1");
             }
@@ -130,22 +156,40 @@ impl Direction {
         self.check_spacing(axis)?;
         if self.ends == Ends::Periodic && !self.mapping.is_periodic() {
             let ratio = self.at(self.cells as f64).1 / self.at(0.0).1;
-            let allowed =
-                "1, with the same growth on both sides: a periodic direction takes equal cells, a sine or a cluster";
-            return bad("metric dx/dxi at its high end over that at its low end", ratio, allowed);
+            let allowed = "1, with the same growth on both sides: a periodic direction takes equal cells, a sine or a cluster";
+            return bad(
+                "metric dx/dxi at its high end over that at its low end",
+                ratio,
+                allowed,
+            );
         }
         Ok(())
     }
 
     fn check_cells(&self, axis: usize) -> Result<(), Error> {
         for wall in self.ends.walls() {
-            let Wall::NoSlip { velocity_m_s: velocity } = wall else { continue };
+            let Wall::NoSlip {
+                velocity_m_s: velocity,
+            } = wall
+            else {
+                continue;
+            };
             if !velocity.iter().all(|v| v.is_finite()) || velocity[axis] != 0.0 {
                 let allowed = "finite, and zero across the wall: the fluid cannot flow through it";
-                return Err(refused(axis, "velocity of the wall across itself", velocity[axis], allowed));
+                return Err(refused(
+                    axis,
+                    "velocity of the wall across itself",
+                    velocity[axis],
+                    allowed,
+                ));
             }
         }
-        let sticking = self.ends.no_slip().into_iter().filter(|sticks| *sticks).count();
+        let sticking = self
+            .ends
+            .no_slip()
+            .into_iter()
+            .filter(|sticks| *sticks)
+            .count();
         let (least, allowed) = match sticking {
             0 => (4, "1, or at least 4"),
             1 => (12, "at least 12 with a no-slip wall"),
@@ -158,21 +202,36 @@ impl Direction {
     }
 
     fn check_spacing(&self, axis: usize) -> Result<(), Error> {
-        let metric: Vec<f64> = (0..=2 * self.cells).map(|i| self.at(0.5 * i as f64).1).collect();
+        let metric: Vec<f64> = (0..=2 * self.cells)
+            .map(|i| self.at(0.5 * i as f64).1)
+            .collect();
         if let Some(folded) = metric.iter().find(|h| !(h.is_finite() && **h > 0.0)) {
             let allowed = "finite and positive in every cell: the mapping must not fold";
             return Err(refused(axis, "metric dx/dxi", *folded, allowed));
         }
         let centres: Vec<f64> = metric.iter().skip(1).step_by(2).copied().collect();
         let ratio = |i: usize| (centres[i + 1] / centres[i]).max(centres[i] / centres[i + 1]);
-        let worst = (0..centres.len().saturating_sub(1)).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
-        let Some(index) = worst.filter(|&index| ratio(index) > MAX_NEIGHBOUR_RATIO.0) else { return Ok(()) };
-        Err(refused(axis, jump_at(index), ratio(index), MAX_NEIGHBOUR_RATIO.1))
+        let worst =
+            (0..centres.len().saturating_sub(1)).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
+        let Some(index) = worst.filter(|&index| ratio(index) > MAX_NEIGHBOUR_RATIO.0) else {
+            return Ok(());
+        };
+        Err(refused(
+            axis,
+            jump_at(index),
+            ratio(index),
+            MAX_NEIGHBOUR_RATIO.1,
+        ))
     }
 }
 
 /// What is wrong with direction `axis` (0, 1, 2 for x, y, z).
-pub(crate) fn refused(axis: usize, what: impl Into<String>, value: f64, allowed: &'static str) -> Error {
+pub(crate) fn refused(
+    axis: usize,
+    what: impl Into<String>,
+    value: f64,
+    allowed: &'static str,
+) -> Error {
     axis::refused(AXIS_NAMES[axis], what, value, allowed)
 }
 
@@ -209,13 +268,17 @@ impl Mesh {
     /// Positions of the cell centres of direction `axis` (0, 1, 2 for x, y, z) \[m\].
     pub fn centre_m(&self, axis: usize) -> Vec<f64> {
         let direction = &self.directions[axis];
-        (0..direction.cells).map(|i| direction.at(i as f64 + 0.5).0).collect()
+        (0..direction.cells)
+            .map(|i| direction.at(i as f64 + 0.5).0)
+            .collect()
     }
 
     /// Positions of the `n + 1` faces of direction `axis` \[m\].
     pub fn face_m(&self, axis: usize) -> Vec<f64> {
         let direction = &self.directions[axis];
-        (0..=direction.cells).map(|i| direction.at(i as f64).0).collect()
+        (0..=direction.cells)
+            .map(|i| direction.at(i as f64).0)
+            .collect()
     }
 }
 
@@ -224,7 +287,11 @@ pub type MappingFn = Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>;
 
 /// A formula that spreads the cells of a direction: it maps `s` in `[0, 1]` to the fraction of the length, with a strength `a`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Spread {
     /// Equal cells.
     #[default]
@@ -248,7 +315,12 @@ pub enum Spread {
 impl Spread {
     /// The mapping of this strength.
     pub fn by(self, strength: f64) -> Mapping {
-        Mapping { spread: self, strength, place: 0.5, custom: None }
+        Mapping {
+            spread: self,
+            strength,
+            place: 0.5,
+            custom: None,
+        }
     }
 }
 
@@ -267,7 +339,12 @@ pub struct Mapping {
 
 impl fmt::Debug for Mapping {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { spread, strength, place, custom } = self;
+        let Self {
+            spread,
+            strength,
+            place,
+            custom,
+        } = self;
         match spread {
             _ if custom.is_some() => write!(f, "Custom"),
             Spread::Uniform => write!(f, "Uniform"),
@@ -313,7 +390,10 @@ impl Mapping {
     pub(super) fn is_periodic(&self) -> bool {
         match &self.custom {
             Some(map) => (map(1.0).1 / map(0.0).1 - 1.0).abs() < 1e-9,
-            None => matches!(self.spread, Spread::Uniform | Spread::Sine | Spread::Cluster),
+            None => matches!(
+                self.spread,
+                Spread::Uniform | Spread::Sine | Spread::Cluster
+            ),
         }
     }
 }
@@ -343,9 +423,18 @@ mod tests {
             Spread::TanhHigh.by(2.5),
             Spread::TanhBoth.by(2.0),
             Spread::SinhMiddle.by(3.0),
-            Mapping { place: 0.5, ..Spread::Cluster.by(0.8) },
-            Mapping { place: 0.15, ..Spread::Cluster.by(1.2) },
-            Mapping { custom: Some(custom), ..Mapping::default() },
+            Mapping {
+                place: 0.5,
+                ..Spread::Cluster.by(0.8)
+            },
+            Mapping {
+                place: 0.15,
+                ..Spread::Cluster.by(1.2)
+            },
+            Mapping {
+                custom: Some(custom),
+                ..Mapping::default()
+            },
         ]
     }
 
@@ -353,12 +442,18 @@ mod tests {
     fn every_mapping_spans_its_direction_and_its_metric_is_its_derivative() {
         for mapping in all() {
             let direction = Direction::periodic(40, -2.0, 3.0).stretched(mapping);
-            assert!((direction.at(0.0).0 + 2.0).abs() < 1e-14 && (direction.at(40.0).0 - 3.0).abs() < 1e-14);
+            assert!(
+                (direction.at(0.0).0 + 2.0).abs() < 1e-14
+                    && (direction.at(40.0).0 - 3.0).abs() < 1e-14
+            );
             for i in 1..40 {
                 let xi = f64::from(i);
                 let slope = (direction.at(xi + 1e-5).0 - direction.at(xi - 1e-5).0) / 2e-5;
                 let metric = direction.at(xi).1;
-                assert!((slope / metric - 1.0).abs() < 1e-8, "{direction:?} at {xi}: {slope} against {metric}");
+                assert!(
+                    (slope / metric - 1.0).abs() < 1e-8,
+                    "{direction:?} at {xi}: {slope} against {metric}"
+                );
             }
         }
     }
@@ -366,8 +461,10 @@ mod tests {
     #[test]
     fn a_cluster_is_finest_at_its_place_and_repeats_itself() {
         for (strength, place) in [(0.5, 0.5), (1.0, 0.2), (1.5, 0.0), (0.7, 0.93)] {
-            let direction =
-                Direction::periodic(200, 0.0, 1.0).stretched(Mapping { place, ..Spread::Cluster.by(strength) });
+            let direction = Direction::periodic(200, 0.0, 1.0).stretched(Mapping {
+                place,
+                ..Spread::Cluster.by(strength)
+            });
             direction.check(1).unwrap();
             let finest = (0..200).min_by(|&i, &j| {
                 let h = |i: usize| direction.at(i as f64 + 0.5).1;
@@ -376,10 +473,16 @@ mod tests {
             let (x, h) = direction.at(finest.unwrap() as f64 + 0.5);
             let apart = (x - place - (x - place).round()).abs();
             assert!(apart <= h, "{strength} at {place}: finest at {x}");
-            assert!((h * 200.0 / (-strength).exp() - 1.0).abs() < 0.01, "{strength} at {place}: {h}");
+            assert!(
+                (h * 200.0 / (-strength).exp() - 1.0).abs() < 0.01,
+                "{strength} at {place}: {h}"
+            );
             for xi in [0.0, 0.5, 3.0, 77.5] {
                 let (a, b) = (direction.at(xi), direction.at(xi + 200.0));
-                assert!((a.0 + 1.0 - b.0).abs() < 1e-13 && (a.1 / b.1 - 1.0).abs() < 1e-12, "{a:?} {b:?}");
+                assert!(
+                    (a.0 + 1.0 - b.0).abs() < 1e-13 && (a.1 / b.1 - 1.0).abs() < 1e-12,
+                    "{a:?} {b:?}"
+                );
             }
         }
     }
@@ -387,24 +490,47 @@ mod tests {
     #[test]
     fn folds_jumps_and_too_few_cells_are_refused() {
         let fold: MappingFn = Arc::new(|s| (2.0 * s * s - s, 4.0 * s - 1.0));
-        let refused = |d: Direction| Mesh::new(Direction::thin(1.0), d, Direction::thin(1.0)).unwrap_err().to_string();
-        let message =
-            refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping { custom: Some(fold), ..Mapping::default() }));
+        let refused = |d: Direction| {
+            Mesh::new(Direction::thin(1.0), d, Direction::thin(1.0))
+                .unwrap_err()
+                .to_string()
+        };
+        let message = refused(Direction::periodic(8, 0.0, 1.0).stretched(Mapping {
+            custom: Some(fold),
+            ..Mapping::default()
+        }));
         assert!(message.contains("metric"), "{message}");
         let message = refused(Direction::periodic(8, 0.0, 1.0).stretched(Spread::TanhLow.by(4.0)));
         assert!(message.contains("differ by a factor"), "{message}");
         let message = refused(Direction::periodic(64, 0.0, 1.0).stretched(Spread::TanhLow.by(1.0)));
         assert!(message.contains("periodic direction takes"), "{message}");
         let cluster = |strength, place| {
-            Direction::periodic(64, 0.0, 1.0).stretched(Mapping { place, ..Spread::Cluster.by(strength) })
+            Direction::periodic(64, 0.0, 1.0).stretched(Mapping {
+                place,
+                ..Spread::Cluster.by(strength)
+            })
         };
         assert!(refused(cluster(1.0, 1.5)).contains("place = 1.5"));
         assert!(refused(cluster(0.0, 0.5)).contains("above 0"));
         assert!(refused(Direction::periodic(3, 0.0, 1.0)).contains("at least 4"));
-        assert!(refused(Direction::between(15, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST)).contains("at least 16"));
+        assert!(
+            refused(Direction::between(
+                15,
+                0.0,
+                1.0,
+                Wall::AT_REST,
+                Wall::AT_REST
+            ))
+            .contains("at least 16")
+        );
         assert!(refused(Direction::periodic(8, 1.0, 1.0)).contains("positive"));
-        assert!(refused(Direction::periodic(8, 0.0, 1.0).stretched(Spread::Sine.by(1.0))).contains("-1"));
-        let blowing = Wall::NoSlip { velocity_m_s: [0.0, 0.1, 0.0] };
+        assert!(
+            refused(Direction::periodic(8, 0.0, 1.0).stretched(Spread::Sine.by(1.0)))
+                .contains("-1")
+        );
+        let blowing = Wall::NoSlip {
+            velocity_m_s: [0.0, 0.1, 0.0],
+        };
         assert!(refused(Direction::between(32, 0.0, 1.0, blowing, Wall::Slip)).contains("across"));
     }
 }

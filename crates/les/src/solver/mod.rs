@@ -42,8 +42,8 @@ pub use mesh::{Direction, Ends, Mapping, MappingFn, Mesh, Spread, Wall};
 pub use pressure::PressureMethod;
 pub use report::{StartReport, StepReport};
 pub use run::{
-    CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunWarning, Silent, StepEnergy,
-    StepRecord, Stepping,
+    CheckpointPlan, EnergyBudget, Interval, NOTICED_GROWTH, Run, RunObserver, RunPlan, RunWarning,
+    Silent, StepEnergy, StepRecord, Stepping,
 };
 pub use settings::{FlowSettings, TimeScheme, TimeStep};
 pub use subgrid::SubgridModel;

@@ -83,13 +83,26 @@ impl Momentum {
         let n = layout.shape.n;
         let own = &line[axis];
         let inverse = |x: &f64| 1.0 / x;
-        let inverse_face_mass =
-            (0..n[axis]).map(|face| if face < own.first_face() { 0.0 } else { 1.0 / own.face_mass_m[face] }).collect();
+        let inverse_face_mass = (0..n[axis])
+            .map(|face| {
+                if face < own.first_face() {
+                    0.0
+                } else {
+                    1.0 / own.face_mass_m[face]
+                }
+            })
+            .collect();
         let laplacian = std::array::from_fn(|b| {
             let per_h2 = line[b].cell_mass_m[0].powi(-2);
-            let rows = if b == axis { line[b].laplacian_at_faces() } else { line[b].laplacian_at_cells().0 };
+            let rows = if b == axis {
+                line[b].laplacian_at_faces()
+            } else {
+                line[b].laplacian_at_cells().0
+            };
             let mut along = RowOperator::new(layout, b, rows);
-            along.even = line[b].is_fourier().then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
+            along.even = line[b]
+                .is_fourier()
+                .then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
             along
         });
         let wall_source = std::array::from_fn(|b| {
@@ -110,9 +123,15 @@ impl Momentum {
             flux_mean: RowOperator::new(layout, axis, own.flux_mean()),
             equal_mass: own.is_fourier().then(|| own.cell_mass_m[0]),
             transport: std::array::from_fn(|b| {
-                if b == axis { line[b].transport_of_faces(stencil) } else { line[b].transport_of_cells(stencil) }
+                if b == axis {
+                    line[b].transport_of_faces(stencil)
+                } else {
+                    line[b].transport_of_cells(stencil)
+                }
             }),
-            inverse_cell_mass: std::array::from_fn(|b| line[b].cell_mass_m.iter().map(inverse).collect()),
+            inverse_cell_mass: std::array::from_fn(|b| {
+                line[b].cell_mass_m.iter().map(inverse).collect()
+            }),
             inverse_face_mass,
             inverse_metric: if own.is_thin() {
                 vec![0.0]
@@ -120,7 +139,11 @@ impl Momentum {
                 own.face_metric_m[..n[axis]].iter().map(inverse).collect()
             },
             mass: std::array::from_fn(|b| {
-                if b == axis { own.face_mass_m[..n[b]].to_vec() } else { line[b].cell_mass_m.clone() }
+                if b == axis {
+                    own.face_mass_m[..n[b]].to_vec()
+                } else {
+                    line[b].cell_mass_m.clone()
+                }
             }),
             laplacian,
             wall_source,
@@ -175,19 +198,37 @@ pub(crate) fn add_laplacian_row(
 
 /// Gradient of a field at the centres for row `(j, k)` of the component.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn gradient_row(ops: &Momentum, field: &[f64], j: usize, k: usize, out: &mut [f64], padded: &mut [f64]) {
+fn gradient_row(
+    ops: &Momentum,
+    field: &[f64],
+    j: usize,
+    k: usize,
+    out: &mut [f64],
+    padded: &mut [f64],
+) {
     out.fill(0.0);
     ops.gradient.add(out, field, [j, k], padded);
 }
 
 impl Scratch {
     /// Laplacians of one row: those along the implicit axes into `self.implicit`, the others into `self.explicit`.
-    pub(crate) fn laplacians(&mut self, ops: &Momentum, field: &[f64], implicit: [bool; 3], j: usize, k: usize) {
+    pub(crate) fn laplacians(
+        &mut self,
+        ops: &Momentum,
+        field: &[f64],
+        implicit: [bool; 3],
+        j: usize,
+        k: usize,
+    ) {
         self.implicit.fill(0.0);
         self.explicit.fill(0.0);
         for axis in 0..3 {
             if !ops.thin[axis] {
-                let out = if implicit[axis] { &mut self.implicit } else { &mut self.explicit };
+                let out = if implicit[axis] {
+                    &mut self.implicit
+                } else {
+                    &mut self.explicit
+                };
                 add_laplacian_row(ops, field, axis, [j, k], out, &mut self.padded[0]);
             }
         }

@@ -70,8 +70,18 @@ impl Operators1d {
                 face_mass_m[inward(0, n)] *= 0.5;
             }
         }
-        let divergence = (0..n).map(|k| divergence_row(n, direction.ends, sticks, k)).collect();
-        Self { cells: n, ends: direction.ends, cell_metric_m, face_metric_m, cell_mass_m, face_mass_m, divergence }
+        let divergence = (0..n)
+            .map(|k| divergence_row(n, direction.ends, sticks, k))
+            .collect();
+        Self {
+            cells: n,
+            ends: direction.ends,
+            cell_metric_m,
+            face_metric_m,
+            cell_mass_m,
+            face_mass_m,
+            divergence,
+        }
     }
 
     /// Whether the flow cannot vary in this direction.
@@ -85,7 +95,11 @@ impl Operators1d {
 
     /// Whether all cells are equal and the direction periodic: what a Fourier transform needs.
     pub(crate) fn is_fourier(&self) -> bool {
-        self.is_periodic() && self.cell_metric_m.iter().all(|h| *h == self.cell_metric_m[0])
+        self.is_periodic()
+            && self
+                .cell_metric_m
+                .iter()
+                .all(|h| *h == self.cell_metric_m[0])
     }
 
     /// First stored face that carries a velocity: face 0 of a bounded direction is a wall.
@@ -96,7 +110,10 @@ impl Operators1d {
     /// The weighted divergence over the stored faces that carry a velocity.
     pub(crate) fn stored_divergence(&self) -> Vec<Taps> {
         let carries = |face: usize| self.is_periodic() || (face > 0 && face < self.cells);
-        self.divergence.iter().map(|row| row.iter().copied().filter(|tap| carries(tap.0)).collect()).collect()
+        self.divergence
+            .iter()
+            .map(|row| row.iter().copied().filter(|tap| carries(tap.0)).collect())
+            .collect()
     }
 
     /// Transposed rows of the weighted divergence: for each face 0 to `n` the cells and their coefficients.
@@ -129,7 +146,9 @@ impl Operators1d {
     /// coefficients of the velocities of the low and of the high wall.
     pub(crate) fn laplacian_at_cells(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
         let scaled = |(row, mass): (&Taps, &f64)| {
-            row.iter().map(|&(face, c)| (face, c / (mass * self.face_mass_m[face]))).collect::<Taps>()
+            row.iter()
+                .map(|&(face, c)| (face, c / (mass * self.face_mass_m[face])))
+                .collect::<Taps>()
         };
         self.sums_of_gradients(self.divergence.iter().zip(&self.cell_mass_m).map(scaled))
     }
@@ -137,8 +156,19 @@ impl Operators1d {
     /// Half the mean of the gradients at the two faces of each cell of such a field, in the same form. At a slip wall the gradient of
     /// what flows along it is zero.
     pub(crate) fn half_mean_gradient(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
-        let face = |face: usize| if self.is_periodic() { face % self.cells } else { face };
-        let both = |cell: usize| [cell, cell + 1].map(face).map(|face| (face, 0.25 / self.face_mass_m[face])).to_vec();
+        let face = |face: usize| {
+            if self.is_periodic() {
+                face % self.cells
+            } else {
+                face
+            }
+        };
+        let both = |cell: usize| {
+            [cell, cell + 1]
+                .map(face)
+                .map(|face| (face, 0.25 / self.face_mass_m[face]))
+                .to_vec()
+        };
         self.sums_of_gradients((0..self.cells).map(both))
     }
 
@@ -187,7 +217,11 @@ impl Operators1d {
 
 /// The entries of a dense row that are not zero.
 fn nonzero(sums: &[f64]) -> Taps {
-    sums.iter().enumerate().filter(|(_, c)| **c != 0.0).map(|(i, c)| (i, *c)).collect()
+    sums.iter()
+        .enumerate()
+        .filter(|(_, c)| **c != 0.0)
+        .map(|(i, c)| (i, *c))
+        .collect()
 }
 
 /// One row of the weighted divergence.
@@ -196,11 +230,17 @@ fn divergence_row(n: usize, ends: Ends, sticks: [bool; 2], k: usize) -> Taps {
         return Taps::new();
     }
     if sticks[0] && k < 3 {
-        return (0..5).map(|f| (f, WALL_DIVERGENCE[k][f])).filter(|tap| tap.1 != 0.0).collect();
+        return (0..5)
+            .map(|f| (f, WALL_DIVERGENCE[k][f]))
+            .filter(|tap| tap.1 != 0.0)
+            .collect();
     }
     if sticks[1] && k + 3 >= n {
         let row = WALL_DIVERGENCE[n - 1 - k];
-        return (0..5).map(|f| (n - f, -row[f])).filter(|tap| tap.1 != 0.0).collect();
+        return (0..5)
+            .map(|f| (n - f, -row[f]))
+            .filter(|tap| tap.1 != 0.0)
+            .collect();
     }
     let mut row = vec![0.0; n + 1];
     for (offset, coefficient) in DIFFERENCE.iter().enumerate() {
@@ -245,7 +285,9 @@ mod tests {
     use super::*;
 
     fn apply(rows: &[Taps], x: &[f64]) -> Vec<f64> {
-        rows.iter().map(|row| row.iter().map(|&(i, c)| c * x[i]).sum()).collect()
+        rows.iter()
+            .map(|row| row.iter().map(|&(i, c)| c * x[i]).sum())
+            .collect()
     }
 
     fn walls(n: usize) -> Direction {
@@ -259,7 +301,8 @@ mod tests {
             walls(24),
             walls(25).stretched(tanh.clone()),
             Direction::between(24, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(tanh),
-            Direction::between(24, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5)),
+            Direction::between(24, 0.0, 2.0, Wall::AT_REST, Wall::Slip)
+                .stretched(Spread::TanhLow.by(1.5)),
         ]
     }
 
@@ -268,10 +311,17 @@ mod tests {
         for direction in every_kind() {
             let line = Operators1d::new(&direction);
             let columns = line.adjoint();
-            let inner = if line.is_periodic() { 0..line.cells } else { 1..line.cells };
+            let inner = if line.is_periodic() {
+                0..line.cells
+            } else {
+                1..line.cells
+            };
             for face in inner {
                 let sum: f64 = columns[face].iter().map(|tap| tap.1).sum();
-                assert!(sum.abs() < 2e-16, "{direction:?}: column {face} sums to {sum}");
+                assert!(
+                    sum.abs() < 2e-16,
+                    "{direction:?}: column {face} sums to {sum}"
+                );
             }
         }
     }
@@ -284,9 +334,14 @@ mod tests {
         let square: Vec<f64> = face.iter().map(|z| z * z).collect();
         for (k, value) in apply(&line.divergence, &square).iter().enumerate() {
             let expected = 2.0 * h * (k as f64 + 0.5);
-            assert!((value / line.cell_mass_m[k] - expected).abs() < 1e-13, "cell {k}");
+            assert!(
+                (value / line.cell_mass_m[k] - expected).abs() < 1e-13,
+                "cell {k}"
+            );
         }
-        let centre: Vec<f64> = (0..24).map(|k| (h * (f64::from(k) + 0.5)).powi(2)).collect();
+        let centre: Vec<f64> = (0..24)
+            .map(|k| (h * (f64::from(k) + 0.5)).powi(2))
+            .collect();
         for (n, value) in apply(&line.gradient(), &centre).iter().enumerate().skip(1) {
             assert!((value - 2.0 * face[n]).abs() < 1e-12, "face {n}: {value}");
         }
@@ -302,9 +357,10 @@ mod tests {
         for direction in every_kind() {
             let line = Operators1d::new(&direction);
             let n = line.cells;
-            for (rows, mass) in
-                [(line.laplacian_at_cells().0, &line.cell_mass_m), (line.laplacian_at_faces(), &line.face_mass_m)]
-            {
+            for (rows, mass) in [
+                (line.laplacian_at_cells().0, &line.cell_mass_m),
+                (line.laplacian_at_faces(), &line.face_mass_m),
+            ] {
                 let mut dense = vec![vec![0.0; n]; n];
                 for (i, row) in rows.iter().enumerate() {
                     for &(j, c) in row {
@@ -314,11 +370,16 @@ mod tests {
                 let scale = dense[n / 2][n / 2].abs();
                 for i in 0..n {
                     for j in 0..n {
-                        assert!((dense[i][j] - dense[j][i]).abs() < 1e-14 * scale, "{direction:?} ({i}, {j})");
+                        assert!(
+                            (dense[i][j] - dense[j][i]).abs() < 1e-14 * scale,
+                            "{direction:?} ({i}, {j})"
+                        );
                     }
                 }
                 let x: Vec<f64> = (0..n).map(|i| ((i * i) as f64 * 0.7).sin()).collect();
-                let work: f64 = (0..n).map(|i| (0..n).map(|j| x[i] * dense[i][j] * x[j]).sum::<f64>()).sum();
+                let work: f64 = (0..n)
+                    .map(|i| (0..n).map(|j| x[i] * dense[i][j] * x[j]).sum::<f64>())
+                    .sum();
                 assert!(work < 0.0, "{direction:?}");
             }
         }
@@ -328,21 +389,32 @@ mod tests {
     fn errors(direction: &Direction) -> [f64; 2] {
         let line = Operators1d::new(direction);
         let wave = std::f64::consts::PI;
-        let centre: Vec<f64> = (0..line.cells).map(|k| direction.at(k as f64 + 0.5).0).collect();
+        let centre: Vec<f64> = (0..line.cells)
+            .map(|k| direction.at(k as f64 + 0.5).0)
+            .collect();
         let face: Vec<f64> = (0..line.cells).map(|k| direction.at(k as f64).0).collect();
         let worst = |rows: Vec<Taps>, x: &[f64], f: fn(f64) -> f64| {
             let values = apply(&rows, &x.iter().map(|x| f(wave * x)).collect::<Vec<_>>());
-            let errors = values.iter().zip(x).map(|(value, x)| (value + wave * wave * f(wave * x)).abs());
+            let errors = values
+                .iter()
+                .zip(x)
+                .map(|(value, x)| (value + wave * wave * f(wave * x)).abs());
             errors.skip(8).take(line.cells - 16).fold(0.0, f64::max)
         };
-        [worst(line.laplacian_at_cells().0, &centre, f64::cos), worst(line.laplacian_at_faces(), &face, f64::sin)]
+        [
+            worst(line.laplacian_at_cells().0, &centre, f64::cos),
+            worst(line.laplacian_at_faces(), &face, f64::sin),
+        ]
     }
 
     #[test]
     fn laplacians_are_of_fourth_order_on_stretched_meshes() {
         let sine = Spread::Sine.by(0.5);
         let tanh = Spread::TanhBoth.by(1.5);
-        let cluster = Mapping { place: 0.3, ..Spread::Cluster.by(0.7) };
+        let cluster = Mapping {
+            place: 0.3,
+            ..Spread::Cluster.by(0.7)
+        };
         for make in [
             |n, m| Direction::periodic(n, 0.0, 2.0).stretched(m),
             |n, m| Direction::between(n, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(m),

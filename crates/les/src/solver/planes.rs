@@ -35,7 +35,11 @@ impl Flow {
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn faces(&self) -> Result<Faces, Error> {
         let field = [self.face(0)?, self.face(1)?, self.face(2)?];
-        Ok(Faces { shape: self.shown(), field, slabs: self.layout.slabs.clone() })
+        Ok(Faces {
+            shape: self.shown(),
+            field,
+            slabs: self.layout.slabs.clone(),
+        })
     }
 
     /// One component of it.
@@ -57,17 +61,23 @@ impl Flow {
         let (shape, field) = if layout.direction[2] == 2 || layout.slabs.is_alone() {
             (layout.shape, field)
         } else {
-            gathered = layout.slabs.all_gather(field[layout.shape.own_places()].to_vec())?;
+            gathered = layout
+                .slabs
+                .all_gather(field[layout.shape.own_places()].to_vec())?;
             (Shape::whole(layout.shape.n), &gathered[..])
         };
         let place = |at: [usize; 3]| shape.place(layout.direction.map(|d| at[d]));
         let mut out = vec![0.0; shown.len()];
         let held: Vec<usize> = shown.held().collect();
-        out.par_chunks_mut(nx * ny).zip(held).for_each(|(plane, k)| {
-            for (j, row) in plane.chunks_mut(nx).enumerate() {
-                row.iter_mut().enumerate().for_each(|(i, value)| *value = field[place([i, j, k])]);
-            }
-        });
+        out.par_chunks_mut(nx * ny)
+            .zip(held)
+            .for_each(|(plane, k)| {
+                for (j, row) in plane.chunks_mut(nx).enumerate() {
+                    row.iter_mut()
+                        .enumerate()
+                        .for_each(|(i, value)| *value = field[place([i, j, k])]);
+                }
+            });
         Ok(out)
     }
 }
@@ -90,20 +100,34 @@ mod tests {
     #[test]
     fn planes_and_their_halos_are_those_of_one_process_in_every_order_in_memory() {
         let case = taylor_green_3d(16, 100.0).unwrap();
-        let flat =
-            Mesh::new(Direction::periodic(24, 0.0, 1.0), Direction::periodic(28, 0.0, 1.0), Direction::thin(0.1))
-                .unwrap();
+        let flat = Mesh::new(
+            Direction::periodic(24, 0.0, 1.0),
+            Direction::periodic(28, 0.0, 1.0),
+            Direction::thin(0.1),
+        )
+        .unwrap();
         let orders = [[0, 1, 2], [1, 0, 2], [0, 2, 1], [2, 0, 1], [1, 2, 0]];
         for (mesh, orders) in [(case.mesh, &orders[..]), (flat, &orders[2..])] {
-            let field = |[x, y, z]: [f64; 3]| [(7.0 * x + z).sin(), (5.0 * y - x).cos(), (3.0 * z + 2.0 * y).sin()];
+            let field = |[x, y, z]: [f64; 3]| {
+                [
+                    (7.0 * x + z).sin(),
+                    (5.0 * y - x).cos(),
+                    (3.0 * z + 2.0 * y).sin(),
+                ]
+            };
             let start = |ranks, order| {
                 let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
                 let settings = FlowSettings { ranks, ..settings };
-                Initial::Field(Box::new(field)).start_in_order(order, mesh.clone(), settings).unwrap()
+                Initial::Field(Box::new(field))
+                    .start_in_order(order, mesh.clone(), settings)
+                    .unwrap()
             };
             for &order in orders {
                 let alone = start(std::sync::Arc::new(crate::ranks::Single), order);
-                let (whole, centred) = (alone.faces().unwrap(), alone.own_centre_velocity_m_s(2).unwrap());
+                let (whole, centred) = (
+                    alone.faces().unwrap(),
+                    alone.own_centre_velocity_m_s(2).unwrap(),
+                );
                 assert!(whole.field.iter().flatten().any(|value| *value != 0.0));
                 for count in [2, 3, 4] {
                     let found = on_threads(count, |ranks| {
@@ -120,12 +144,20 @@ mod tests {
                             }
                         }
                         assert_eq!(flow.whole(flow.own_centre_velocity_m_s(2)), centred);
-                        (flow.own_planes(), flow.own_centre_velocity_m_s(2).unwrap().len())
+                        (
+                            flow.own_planes(),
+                            flow.own_centre_velocity_m_s(2).unwrap().len(),
+                        )
                     });
                     let [nx, ny, nz] = mesh.cells();
-                    let planes: usize = found.iter().flatten().map(|(planes, _)| planes.len()).sum();
+                    let planes: usize =
+                        found.iter().flatten().map(|(planes, _)| planes.len()).sum();
                     let values: usize = found.iter().flatten().map(|(_, values)| values).sum();
-                    assert_eq!((planes, values), (nz, nx * ny * nz), "{order:?}, {count} ranks");
+                    assert_eq!(
+                        (planes, values),
+                        (nz, nx * ny * nz),
+                        "{order:?}, {count} ranks"
+                    );
                 }
             }
         }

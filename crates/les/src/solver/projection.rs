@@ -22,7 +22,9 @@ pub(crate) struct Divergence {
 
 impl Divergence {
     pub(crate) fn new(layout: &Layout) -> Self {
-        let along = std::array::from_fn(|b| RowOperator::new(layout, b, layout.line[b].stored_divergence()));
+        let along = std::array::from_fn(|b| {
+            RowOperator::new(layout, b, layout.line[b].stored_divergence())
+        });
         Self {
             shape: layout.shape,
             reach: layout.slabs.reach(&along[2].rows),
@@ -34,7 +36,9 @@ impl Divergence {
     /// Writes `scale` times the weighted divergence of `velocity` to `out`.
     pub(crate) fn apply(&self, velocity: [&[f64]; 3], scale: f64, out: &mut [f64]) {
         let n = self.shape.n[0];
-        let planes = out[self.shape.own_places()].par_chunks_mut(self.shape.plane()).zip(self.shape.own());
+        let planes = out[self.shape.own_places()]
+            .par_chunks_mut(self.shape.plane())
+            .zip(self.shape.own());
         planes.for_each_init(
             || vec![0.0; n + 2 * HALO],
             |padded, (plane, k)| {
@@ -79,14 +83,29 @@ fn divergence_row(
     let n = out.len();
     let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
     out.fill(0.0);
-    add_across(out, velocity[1], mass_2, &ops.along[1].rows[j], ops.shape.row_offsets(1, [j, k]));
-    add_across(out, velocity[2], mass_1, &ops.along[2].rows[k], ops.shape.row_offsets(2, [j, k]));
+    add_across(
+        out,
+        velocity[1],
+        mass_2,
+        &ops.along[1].rows[j],
+        ops.shape.row_offsets(1, [j, k]),
+    );
+    add_across(
+        out,
+        velocity[2],
+        mass_1,
+        &ops.along[2].rows[k],
+        ops.shape.row_offsets(2, [j, k]),
+    );
     for (out, mass) in out.iter_mut().zip(&ops.cell_mass[0]) {
         *out *= mass;
     }
     let across = mass_1 * ops.cell_mass[2][k];
     let start = ops.shape.place([0, j, k]);
-    for (to, from) in padded[HALO..].iter_mut().zip(&velocity[0][start..start + n]) {
+    for (to, from) in padded[HALO..]
+        .iter_mut()
+        .zip(&velocity[0][start..start + n])
+    {
         *to = across * from;
     }
     wrap(padded, n, ops.along[0].periodic);
@@ -104,7 +123,9 @@ pub(crate) fn correct(
 ) -> Vec<[f64; 2]> {
     let shape = ops[0].shape;
     let n = shape.n[0];
-    let [u, v, w] = velocity.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
+    let [u, v, w] = velocity
+        .each_mut()
+        .map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
     (u, v, w, shape.own())
         .into_par_iter()
         .map_init(
@@ -123,8 +144,15 @@ pub(crate) fn correct(
                             across_metric.fill(ops.inverse_metric[[j, k][a - 1]]);
                             &*across_metric
                         };
-                        let read = [&predicted[a][shape.row(j, k)], &scratch.pressure, mass, metric];
-                        energy += 0.5 * across * correct_row(&mut plane[j * n..(j + 1) * n], read, scale, rate);
+                        let read = [
+                            &predicted[a][shape.row(j, k)],
+                            &scratch.pressure,
+                            mass,
+                            metric,
+                        ];
+                        energy += 0.5
+                            * across
+                            * correct_row(&mut plane[j * n..(j + 1) * n], read, scale, rate);
                     }
                     for &value in rate.iter() {
                         if value > courant_per_s {
@@ -142,7 +170,8 @@ pub(crate) fn correct(
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn correct_row(row: &mut [f64], read: [&[f64]; 4], scale: f64, rate: &mut [f64]) -> f64 {
     let n = row.len();
-    let ([predicted, gradient, mass, inverse_metric], rate) = (cut_rows!(read, n, 0 1 2 3), &mut rate[..n]);
+    let ([predicted, gradient, mass, inverse_metric], rate) =
+        (cut_rows!(read, n, 0 1 2 3), &mut rate[..n]);
     for i in 0..n {
         row[i] = predicted[i] - scale * gradient[i];
         rate[i] += row[i].abs() * inverse_metric[i];
@@ -155,13 +184,21 @@ fn correct_row(row: &mut [f64], read: [&[f64]; 4], scale: f64, rate: &mut [f64])
 pub(crate) fn weighted_dot(x: &[f64], y: &[f64], mass: &[f64]) -> f64 {
     const LANES: usize = 8;
     let mut sums = [0.0; LANES];
-    let ((x, x_rest), (y, y_rest), (m, m_rest)) =
-        (x.as_chunks::<LANES>(), y.as_chunks::<LANES>(), mass.as_chunks::<LANES>());
+    let ((x, x_rest), (y, y_rest), (m, m_rest)) = (
+        x.as_chunks::<LANES>(),
+        y.as_chunks::<LANES>(),
+        mass.as_chunks::<LANES>(),
+    );
     for ((x, y), m) in x.iter().zip(y).zip(m) {
         for i in 0..LANES {
             sums[i] += m[i] * (x[i] * y[i]);
         }
     }
-    let rest: f64 = x_rest.iter().zip(y_rest).zip(m_rest).map(|((x, y), m)| m * (x * y)).sum();
+    let rest: f64 = x_rest
+        .iter()
+        .zip(y_rest)
+        .zip(m_rest)
+        .map(|((x, y), m)| m * (x * y))
+        .sum();
     sums.iter().sum::<f64>() + rest
 }

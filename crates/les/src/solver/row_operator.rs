@@ -22,8 +22,19 @@ impl RowOperator {
     /// The operator with the rows `rows` along memory axis `axis`.
     pub(crate) fn new(layout: &Layout, axis: usize, rows: Vec<Taps>) -> Self {
         let periodic = layout.line[axis].is_periodic();
-        let columns = if axis == 0 { Columns::new(&rows, periodic) } else { Columns::default() };
-        Self { axis, shape: layout.shape, periodic, rows, columns, even: None }
+        let columns = if axis == 0 {
+            Columns::new(&rows, periodic)
+        } else {
+            Columns::default()
+        };
+        Self {
+            axis,
+            shape: layout.shape,
+            periodic,
+            rows,
+            columns,
+            even: None,
+        }
     }
 
     /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes 1 and 2).
@@ -42,7 +53,11 @@ impl RowOperator {
         let (index, starts) = (at[self.axis - 1], self.shape.row_offsets(self.axis, at));
         if let Some(pairs) = self.even {
             let count = self.shape.n[self.axis];
-            add_even(out, pairs, &rows_from(field, out.len(), starts, index + 3 * count - 3, count));
+            add_even(
+                out,
+                pairs,
+                &rows_from(field, out.len(), starts, index + 3 * count - 3, count),
+            );
         } else {
             add_across(out, field, 1.0, &self.rows[index], starts);
         }
@@ -51,7 +66,13 @@ impl RowOperator {
     /// `out +=` an operator of axis 1 at row `j` of a plane that stands alone.
     #[inline(always)]
     pub(crate) fn add_in_plane(&self, out: &mut [f64], plane: &[f64], j: usize) {
-        add_across(out, plane, 1.0, &self.rows[j], RowOffsets::every(self.shape.n[0], 0));
+        add_across(
+            out,
+            plane,
+            1.0,
+            &self.rows[j],
+            RowOffsets::every(self.shape.n[0], 0),
+        );
     }
 
     /// `out =` an operator of axis 0 on one row.
@@ -67,7 +88,16 @@ impl RowOperator {
         pad(padded, row, self.periodic);
         if let Some(pairs) = self.even {
             const FIRST: usize = HALO - 3;
-            let places = from_places!(padded, FIRST, FIRST + 1, FIRST + 2, FIRST + 3, FIRST + 4, FIRST + 5, FIRST + 6);
+            let places = from_places!(
+                padded,
+                FIRST,
+                FIRST + 1,
+                FIRST + 2,
+                FIRST + 3,
+                FIRST + 4,
+                FIRST + 5,
+                FIRST + 6
+            );
             add_even(out, pairs, &places);
         } else {
             self.columns.add(out, padded);

@@ -36,14 +36,23 @@ impl Columns {
         for (i, row) in rows.iter().enumerate() {
             for &(index, c) in row {
                 // A wrapped tap belongs to the offset that the padded row shows it at.
-                let band = if periodic { (index + HALO + n - i) % n } else { (index + HALO).wrapping_sub(i) };
+                let band = if periodic {
+                    (index + HALO + n - i) % n
+                } else {
+                    (index + HALO).wrapping_sub(i)
+                };
                 if let Some(coefficients) = bands.get_mut(band) {
                     coefficients[i] += c;
                 }
             }
         }
-        let used = bands.into_iter().enumerate().filter(|(_, band)| band.iter().any(|c| *c != 0.0));
-        Self { bands: used.collect() }
+        let used = bands
+            .into_iter()
+            .enumerate()
+            .filter(|(_, band)| band.iter().any(|c| *c != 0.0));
+        Self {
+            bands: used.collect(),
+        }
     }
 
     /// `out += self padded`.
@@ -51,7 +60,11 @@ impl Columns {
     pub(crate) fn add(&self, out: &mut [f64], padded: &[f64]) {
         let mut bands = self.bands.as_slice();
         while let [a, b, c, d, rest @ ..] = bands {
-            add_products(out, [&a.1, &b.1, &c.1, &d.1], from_places!(padded, a.0, b.0, c.0, d.0));
+            add_products(
+                out,
+                [&a.1, &b.1, &c.1, &d.1],
+                from_places!(padded, a.0, b.0, c.0, d.0),
+            );
             bands = rest;
         }
         for (offset, coefficient) in bands {
@@ -64,13 +77,21 @@ impl Columns {
 
     /// Sums of squares of the `n` rows.
     pub(crate) fn squares(&self, n: usize) -> Vec<f64> {
-        (0..n).map(|i| self.bands.iter().map(|band| band.1[i] * band.1[i]).sum()).collect()
+        (0..n)
+            .map(|i| self.bands.iter().map(|band| band.1[i] * band.1[i]).sum())
+            .collect()
     }
 
     /// `out -= mass self (padded - own)`, `own` being the middle of `padded`: nothing at all for a constant if the rows sum to
     /// zero. The operations are fused, on every machine.
     #[inline(always)]
-    pub(crate) fn subtract_differences(&self, out: &mut [f64], mass: f64, own: &[f64], padded: &[f64]) {
+    pub(crate) fn subtract_differences(
+        &self,
+        out: &mut [f64],
+        mass: f64,
+        own: &[f64],
+        padded: &[f64],
+    ) {
         let n = out.len();
         let own = &own[..n];
         for (offset, coefficient) in self.bands.iter().filter(|band| band.0 != HALO) {
@@ -120,7 +141,13 @@ pub(crate) fn wrap(padded: &mut [f64], n: usize, periodic: bool) {
 
 /// `out += scale sum c row` over the taps of an operator across rows.
 #[inline(always)]
-pub(crate) fn add_across(out: &mut [f64], field: &[f64], scale: f64, mut taps: &[(usize, f64)], starts: RowOffsets) {
+pub(crate) fn add_across(
+    out: &mut [f64],
+    field: &[f64],
+    scale: f64,
+    mut taps: &[(usize, f64)],
+    starts: RowOffsets,
+) {
     let n = out.len();
     while let [a, b, c, d, rest @ ..] = taps {
         let (x0, x1) = (&field[starts.of(a.0)..][..n], &field[starts.of(b.0)..][..n]);
@@ -166,12 +193,25 @@ pub(crate) fn round(mut index: usize, count: usize) -> usize {
 
 /// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3 to 3.
 #[inline(always)]
-pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: &[&[f64]; 4], q: &[&[f64]; 7]) {
+pub(crate) fn add_transport(
+    out: &mut [f64],
+    scale: f64,
+    stencil: Stencil,
+    g: &[&[f64]; 4],
+    q: &[&[f64]; 7],
+) {
     let n = out.len();
     let [g0, g1, g2, g3] = cut_rows!(g, n, 0 1 2 3);
     let [q0, q1, q2, q4, q5, q6] = cut_rows!(q, n, 0 1 2 4 5 6);
     let ([a, b, c], [d, e, f]) = (stencil.near, stencil.far);
-    let [a, b, c, d, e, f] = [scale * a, scale * b, scale * c, scale * d, scale * e, scale * f];
+    let [a, b, c, d, e, f] = [
+        scale * a,
+        scale * b,
+        scale * c,
+        scale * d,
+        scale * e,
+        scale * f,
+    ];
     if stencil.is_plain() {
         for i in 0..n {
             out[i] += b * (g2[i] * q4[i] - g1[i] * q2[i]) + f * (g3[i] * q6[i] - g0[i] * q0[i]);
@@ -179,8 +219,14 @@ pub(crate) fn add_transport(out: &mut [f64], scale: f64, stencil: Stencil, g: &[
         return;
     }
     for i in 0..n {
-        let after = [a * q2[i] + (b * q4[i] + c * q5[i]), d * q4[i] + (e * q5[i] + f * q6[i])];
-        let before = [a * q4[i] + (b * q2[i] + c * q1[i]), d * q2[i] + (e * q1[i] + f * q0[i])];
+        let after = [
+            a * q2[i] + (b * q4[i] + c * q5[i]),
+            d * q4[i] + (e * q5[i] + f * q6[i]),
+        ];
+        let before = [
+            a * q4[i] + (b * q2[i] + c * q1[i]),
+            d * q2[i] + (e * q1[i] + f * q0[i]),
+        ];
         out[i] += (g2[i] * after[0] - g1[i] * before[0]) + (g3[i] * after[1] - g0[i] * before[1]);
     }
 }
@@ -193,7 +239,8 @@ pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: &[&[f64]; 7]) {
     for i in 0..n {
         let own = q3[i];
         let pair = |low: f64, high: f64| (low - own) + (high - own);
-        out[i] += c[0] * pair(q2[i], q4[i]) + (c[1] * pair(q1[i], q5[i]) + c[2] * pair(q0[i], q6[i]));
+        out[i] +=
+            c[0] * pair(q2[i], q4[i]) + (c[1] * pair(q1[i], q5[i]) + c[2] * pair(q0[i], q6[i]));
     }
 }
 
@@ -233,14 +280,23 @@ impl RowOffsets {
     /// Rows of `step` values, of which that of index `lowest` is the first.
     #[inline(always)]
     pub(crate) fn every(step: usize, lowest: usize) -> Self {
-        Self { first: 0_usize.wrapping_sub(lowest * step), step, lowest: 0, round: 0 }
+        Self {
+            first: 0_usize.wrapping_sub(lowest * step),
+            step,
+            lowest: 0,
+            round: 0,
+        }
     }
 
     /// That of index `i`.
     #[inline(always)]
     pub(crate) fn of(self, i: usize) -> usize {
         let start = self.first.wrapping_add(i * self.step);
-        if i < self.lowest { start.wrapping_add(self.round) } else { start }
+        if i < self.lowest {
+            start.wrapping_add(self.round)
+        } else {
+            start
+        }
     }
 }
 
@@ -253,8 +309,18 @@ mod tests {
         for (n, periodic) in [(9, true), (5, true), (4, true), (9, false)] {
             let index = |i: usize, o: isize| (i as isize + o).rem_euclid(n as isize) as usize;
             let rows: Vec<Taps> = (0..n)
-                .map(|i| (-2..=2).map(|o| (index(i, o), (i as f64) + 0.1 * o as f64)).collect::<Taps>())
-                .map(|row| if periodic { row } else { row.into_iter().take(1).filter(|t| t.0 + 2 < n).collect() })
+                .map(|i| {
+                    (-2..=2)
+                        .map(|o| (index(i, o), (i as f64) + 0.1 * o as f64))
+                        .collect::<Taps>()
+                })
+                .map(|row| {
+                    if periodic {
+                        row
+                    } else {
+                        row.into_iter().take(1).filter(|t| t.0 + 2 < n).collect()
+                    }
+                })
                 .collect();
             let x: Vec<f64> = (0..n).map(|i| ((3 * i) as f64).cos()).collect();
             let mut padded = vec![0.0; n + 2 * HALO];
@@ -263,7 +329,11 @@ mod tests {
             Columns::new(&rows, periodic).add(&mut out, &padded);
             for (i, row) in rows.iter().enumerate() {
                 let reachable = |j: usize| periodic || j.abs_diff(i) <= HALO;
-                let expected: f64 = row.iter().filter(|t| reachable(t.0)).map(|&(j, c)| c * x[j]).sum();
+                let expected: f64 = row
+                    .iter()
+                    .filter(|t| reachable(t.0))
+                    .map(|&(j, c)| c * x[j])
+                    .sum();
                 assert!((out[i] - expected).abs() < 1e-14, "n = {n}, row {i}");
             }
         }

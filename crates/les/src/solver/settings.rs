@@ -14,7 +14,11 @@ pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum TimeScheme {
     /// Second-order Adams-Bashforth, (22): one pressure solve per step; the first step, which has no history, is one of
     /// Runge-Kutta.
@@ -30,13 +34,21 @@ impl TimeScheme {
     /// the one before, `None` where no old terms exist: then a step of Runge-Kutta needs none.
     pub(crate) fn stages(self, ratio: Option<f64>) -> Vec<Stage> {
         match (self, ratio) {
-            (Self::AdamsBashforth2, Some(r)) => vec![Stage { fraction: 1.0, new: 1.0 + 0.5 * r, old: -0.5 * r }],
+            (Self::AdamsBashforth2, Some(r)) => vec![Stage {
+                fraction: 1.0,
+                new: 1.0 + 0.5 * r,
+                old: -0.5 * r,
+            }],
             (Self::AdamsBashforth2, None) | (Self::RungeKutta3, _) => {
                 let gamma = [8.0 / 15.0, 5.0 / 12.0, 3.0 / 4.0];
                 let zeta = [0.0, -17.0 / 60.0, -5.0 / 12.0];
                 let stage = |i: usize| {
                     let fraction = gamma[i] + zeta[i];
-                    Stage { fraction, new: gamma[i] / fraction, old: zeta[i] / fraction }
+                    Stage {
+                        fraction,
+                        new: gamma[i] / fraction,
+                        old: zeta[i] / fraction,
+                    }
                 };
                 vec![stage(0), stage(1), stage(2)]
             }
@@ -161,13 +173,25 @@ impl FlowSettings {
     }
 
     pub(crate) fn check(&self) -> Result<(), Error> {
-        check("viscosity_m2_s", self.viscosity_m2_s, "finite and not negative", |nu| nu >= 0.0)?;
+        check(
+            "viscosity_m2_s",
+            self.viscosity_m2_s,
+            "finite and not negative",
+            |nu| nu >= 0.0,
+        )?;
         for force in self.force_m_s2 {
             check("force_m_s2", force, "finite", |_| true)?;
         }
-        check("pressure_tolerance", self.pressure_tolerance, "between 1e-15 and 0.1", |t| (1e-15..=0.1).contains(&t))?;
+        check(
+            "pressure_tolerance",
+            self.pressure_tolerance,
+            "between 1e-15 and 0.1",
+            |t| (1e-15..=0.1).contains(&t),
+        )?;
         match self.time_step {
-            TimeStep::Fixed { step_s } => check("step_s", step_s, "finite and positive", |dt| dt > 0.0)?,
+            TimeStep::Fixed { step_s } => {
+                check("step_s", step_s, "finite and positive", |dt| dt > 0.0)?
+            }
             TimeStep::Courant { courant, longest_s } => {
                 check("courant", courant, "finite and positive", |c| c > 0.0)?;
                 check("longest_s", longest_s, "finite and positive", |dt| dt > 0.0)?;
@@ -178,9 +202,19 @@ impl FlowSettings {
 }
 
 /// Without viscosity nothing can stick to a wall.
-pub(super) fn refuse_sticking_without_viscosity(mesh: &Mesh, viscosity_m2_s: f64) -> Result<(), Error> {
+pub(super) fn refuse_sticking_without_viscosity(
+    mesh: &Mesh,
+    viscosity_m2_s: f64,
+) -> Result<(), Error> {
     let found = (0..3).find(|&axis| mesh.directions()[axis].ends.no_slip() != [false; 2]);
-    let Some(axis) = found.filter(|_| viscosity_m2_s == 0.0) else { return Ok(()) };
+    let Some(axis) = found.filter(|_| viscosity_m2_s == 0.0) else {
+        return Ok(());
+    };
     let allowed = "positive: an inviscid flow cannot stick to a wall, so make it a slip wall";
-    Err(refused(axis, "no-slip wall with viscosity_m2_s", 0.0, allowed))
+    Err(refused(
+        axis,
+        "no-slip wall with viscosity_m2_s",
+        0.0,
+        allowed,
+    ))
 }

@@ -26,7 +26,12 @@ pub(crate) struct Shape {
 impl Shape {
     /// All planes.
     pub(crate) fn whole(n: [usize; 3]) -> Self {
-        Self { n, own: [0, n[2]], lowest: 0, held: n[2] }
+        Self {
+            n,
+            own: [0, n[2]],
+            lowest: 0,
+            held: n[2],
+        }
     }
 
     /// The slab of one of `count` ranks.
@@ -37,7 +42,12 @@ impl Shape {
             return whole;
         }
         let lowest = (own.start + n[2] - HALO.min(n[2])) % n[2];
-        Self { n, own: [own.start, own.end], lowest, held: (own.len() + 2 * HALO).min(n[2]) }
+        Self {
+            n,
+            own: [own.start, own.end],
+            lowest,
+            held: (own.len() + 2 * HALO).min(n[2]),
+        }
     }
 
     /// Planes that one of `count` ranks owns.
@@ -73,7 +83,11 @@ impl Shape {
 
     /// Indices along the axes of a place in a whole field.
     pub(crate) fn index(self, place: usize) -> [usize; 3] {
-        [place % self.n[0], place / self.n[0] % self.n[1], place / self.plane()]
+        [
+            place % self.n[0],
+            place / self.n[0] % self.n[1],
+            place / self.plane(),
+        ]
     }
 
     /// Indices along the axes of a place in memory.
@@ -85,7 +99,11 @@ impl Shape {
     /// Place in memory of indices along the axes. That of a plane that is not held lies beyond the end.
     #[inline(always)]
     pub(crate) fn place(self, [i, j, k]: [usize; 3]) -> usize {
-        let k = if k >= self.lowest { k - self.lowest } else { k + self.n[2] - self.lowest };
+        let k = if k >= self.lowest {
+            k - self.lowest
+        } else {
+            k + self.n[2] - self.lowest
+        };
         (k * self.n[1] + j) * self.n[0] + i
     }
 
@@ -93,10 +111,20 @@ impl Shape {
     #[inline(always)]
     pub(crate) fn row_offsets(self, axis: usize, [j, k]: [usize; 2]) -> RowOffsets {
         if axis == 1 {
-            return RowOffsets { first: self.place([0, 0, k]), step: self.n[0], lowest: 0, round: 0 };
+            return RowOffsets {
+                first: self.place([0, 0, k]),
+                step: self.n[0],
+                lowest: 0,
+                round: 0,
+            };
         }
         let (step, first) = (self.plane(), j * self.n[0]);
-        RowOffsets { first: first.wrapping_sub(self.lowest * step), step, lowest: self.lowest, round: self.n[2] * step }
+        RowOffsets {
+            first: first.wrapping_sub(self.lowest * step),
+            step,
+            lowest: self.lowest,
+            round: self.n[2] * step,
+        }
     }
 
     /// Places in memory of the row at indices `j` of axis 1 and `k` of axis 2.
@@ -122,15 +150,26 @@ mod tests {
                 shape.own().for_each(|k| owners[k] += 1);
                 for (at, k) in shape.own().enumerate() {
                     assert_eq!(
-                        [shape.row_offsets(1, [0, k]).of(1), shape.row_offsets(2, [1, 0]).of(k)],
+                        [
+                            shape.row_offsets(1, [0, k]).of(1),
+                            shape.row_offsets(2, [1, 0]).of(k)
+                        ],
                         [shape.place([0, 1, k]); 2]
                     );
-                    assert_eq!(shape.place([1, 1, k]), shape.own_places().start + 6 * at + 4);
+                    assert_eq!(
+                        shape.place([1, 1, k]),
+                        shape.own_places().start + 6 * at + 4
+                    );
                 }
-                let held = (0..planes).filter(|&k| shape.row(1, k).end <= shape.len()).count();
+                let held = (0..planes)
+                    .filter(|&k| shape.row(1, k).end <= shape.len())
+                    .count();
                 assert_eq!(held * 6, shape.len());
                 for step in 0..if count > 1 { HALO } else { 0 } {
-                    let beside = [(shape.own().start + planes - step - 1) % planes, (shape.own().end + step) % planes];
+                    let beside = [
+                        (shape.own().start + planes - step - 1) % planes,
+                        (shape.own().end + step) % planes,
+                    ];
                     assert!(beside.iter().all(|&k| shape.row(1, k).end <= shape.len()));
                 }
             }

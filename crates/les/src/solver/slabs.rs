@@ -33,10 +33,17 @@ impl Slabs {
     pub(crate) fn new(ranks: Arc<dyn Ranks>, n: [usize; 3]) -> Result<Self, Error> {
         let (ranks_found, most) = (ranks.count(), (n[2] / HALO).max(1));
         if ranks_found > most {
-            return Err(Error::TooManyRanks { ranks: ranks_found, planes: n[2], most });
+            return Err(Error::TooManyRanks {
+                ranks: ranks_found,
+                planes: n[2],
+                most,
+            });
         }
         let shape = Shape::slab(n, ranks.rank(), ranks.count());
-        Ok(Self { ranks: Arc::new(Timed::new(ranks)), shape })
+        Ok(Self {
+            ranks: Arc::new(Timed::new(ranks)),
+            shape,
+        })
     }
 
     /// Whether there is but one rank.
@@ -55,10 +62,19 @@ impl Slabs {
         let (n2, count) = (self.shape.n[2], self.ranks.count());
         let mut reach = [0; 2];
         for own in (0..count).map(|rank| self.shape.planes_of(rank, count)) {
-            for place in rows[own.clone()].iter().flatten().map(|tap| tap.0).filter(|place| !own.contains(place)) {
+            for place in rows[own.clone()]
+                .iter()
+                .flatten()
+                .map(|tap| tap.0)
+                .filter(|place| !own.contains(place))
+            {
                 let below = (own.start + n2 - place) % n2;
                 let above = (place + n2 - own.end) % n2 + 1;
-                let (side, planes) = if below <= above { (0, below) } else { (1, above) };
+                let (side, planes) = if below <= above {
+                    (0, below)
+                } else {
+                    (1, above)
+                };
                 reach[side] = reach[side].max(planes);
             }
         }
@@ -69,7 +85,11 @@ impl Slabs {
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
-    pub(crate) fn halos(&self, fields: &mut [&mut [f64]], [below, above]: [usize; 2]) -> Result<(), Error> {
+    pub(crate) fn halos(
+        &self,
+        fields: &mut [&mut [f64]],
+        [below, above]: [usize; 2],
+    ) -> Result<(), Error> {
         if self.is_alone() {
             return Ok(());
         }
@@ -77,8 +97,11 @@ impl Slabs {
         let (plane, n2) = (shape.plane(), shape.n[2]);
         // Planes of the halos of one rank that another owns, in the order in which they are sent.
         let sent = |from: usize, to: usize| {
-            let (owned, Range { start, end }) = (shape.planes_of(from, count), shape.planes_of(to, count));
-            let halos = (start + n2 - below..start + n2).chain(end..end + above).map(move |k| k % n2);
+            let (owned, Range { start, end }) =
+                (shape.planes_of(from, count), shape.planes_of(to, count));
+            let halos = (start + n2 - below..start + n2)
+                .chain(end..end + above)
+                .map(move |k| k % n2);
             halos.filter(move |k| owned.contains(k))
         };
         let values = |from: usize, to: usize| sent(from, to).count() * plane * fields.len();
@@ -86,7 +109,10 @@ impl Slabs {
         let from: Vec<usize> = (0..count).map(|rank| values(rank, own_rank)).collect();
         let mut send = Vec::with_capacity(to.iter().sum());
         for rank in 0..count {
-            for (field, k) in fields.iter().flat_map(|field| sent(own_rank, rank).map(move |k| (field, k))) {
+            for (field, k) in fields
+                .iter()
+                .flat_map(|field| sent(own_rank, rank).map(move |k| (field, k)))
+            {
                 send.extend_from_slice(&field[shape.place([0, 0, k])..][..plane]);
             }
         }
@@ -116,8 +142,15 @@ impl Slabs {
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
-    pub(crate) fn planes<const M: usize>(&self, own: Vec<[f64; M]>) -> Result<Vec<[f64; M]>, Error> {
-        Ok(self.all_gather(own.into_flattened())?.as_chunks::<M>().0.to_vec())
+    pub(crate) fn planes<const M: usize>(
+        &self,
+        own: Vec<[f64; M]>,
+    ) -> Result<Vec<[f64; M]>, Error> {
+        Ok(self
+            .all_gather(own.into_flattened())?
+            .as_chunks::<M>()
+            .0
+            .to_vec())
     }
 
     /// Sums over the planes that are owned to sums over all, one after the other.
@@ -126,7 +159,9 @@ impl Slabs {
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn sums<const M: usize>(&self, own: Vec<[f64; M]>) -> Result<[f64; M], Error> {
         let planes = self.planes(own)?;
-        Ok(planes.iter().fold([0.0; M], |sum, plane| std::array::from_fn(|i| sum[i] + plane[i])))
+        Ok(planes.iter().fold([0.0; M], |sum, plane| {
+            std::array::from_fn(|i| sum[i] + plane[i])
+        }))
     }
 
     /// The largest of each of some numbers.
@@ -135,7 +170,11 @@ impl Slabs {
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn largest<const M: usize>(&self, own: [f64; M]) -> Result<[f64; M], Error> {
         let all = self.all_gather(own.to_vec())?;
-        Ok(all.as_chunks::<M>().0.iter().fold(own, |a, b| std::array::from_fn(|i| a[i].max(b[i]))))
+        Ok(all
+            .as_chunks::<M>()
+            .0
+            .iter()
+            .fold(own, |a, b| std::array::from_fn(|i| a[i].max(b[i]))))
     }
 
     /// Lets `work` act on the planes that are owned while they lie so that lines along the axes 1 and 2 are whole: each rank
@@ -156,12 +195,24 @@ impl Slabs {
         let (shape, count) = (self.shape, self.ranks.count());
         let [n0, n1, n2] = shape.n;
         let groups = n0.div_ceil(step);
-        let columns = |r: usize| (groups * r / count * step).min(n0)..(groups * (r + 1) / count * step).min(n0);
+        let columns = |r: usize| {
+            (groups * r / count * step).min(n0)..(groups * (r + 1) / count * step).min(n0)
+        };
         let mine = columns(self.ranks.rank());
-        let to: Vec<usize> = (0..count).map(|r| shape.own().len() * n1 * columns(r).len()).collect();
-        let from: Vec<usize> = (0..count).map(|r| shape.planes_of(r, count).len() * n1 * mine.len()).collect();
+        let to: Vec<usize> = (0..count)
+            .map(|r| shape.own().len() * n1 * columns(r).len())
+            .collect();
+        let from: Vec<usize> = (0..count)
+            .map(|r| shape.planes_of(r, count).len() * n1 * mine.len())
+            .collect();
         let mut pieces = vec![0.0; own.len()];
-        pack(own, &mut pieces, shape, (0..count).map(columns), |row, piece| piece.copy_from_slice(row));
+        pack(
+            own,
+            &mut pieces,
+            shape,
+            (0..count).map(columns),
+            |row, piece| piece.copy_from_slice(row),
+        );
         // In the order of the ranks the planes follow one another.
         let mut turned = vec![0.0; mine.len() * n1 * n2];
         self.ranks.all_to_all(&pieces, &to, &mut turned, &from)?;
@@ -171,7 +222,13 @@ impl Slabs {
             work(&mut turned, Shape::whole([mine.len(), n1, n2]), mine.start)
         };
         self.ranks.all_to_all(&turned, &from, &mut pieces, &to)?;
-        pack(own, &mut pieces, shape, (0..count).map(columns), |row, piece| row.copy_from_slice(piece));
+        pack(
+            own,
+            &mut pieces,
+            shape,
+            (0..count).map(columns),
+            |row, piece| row.copy_from_slice(piece),
+        );
         Ok(found)
     }
 
@@ -181,7 +238,11 @@ impl Slabs {
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn broadcast(&self, numbers: impl FnOnce() -> Vec<f64>) -> Result<Vec<f64>, Error> {
-        self.all_gather(if self.is_first() { numbers() } else { Vec::new() })
+        self.all_gather(if self.is_first() {
+            numbers()
+        } else {
+            Vec::new()
+        })
     }
 
     /// As [`ranks::all_agree`].
@@ -205,7 +266,9 @@ fn pack(
     let mut rest = pieces;
     for columns in columns.filter(|columns| !columns.is_empty()) {
         let (part, after) = rest.split_at_mut(shape.own().len() * n1 * columns.len());
-        let planes = own.par_chunks_mut(shape.plane()).zip(part.par_chunks_mut(n1 * columns.len()));
+        let planes = own
+            .par_chunks_mut(shape.plane())
+            .zip(part.par_chunks_mut(n1 * columns.len()));
         planes.for_each(|(plane, part)| {
             for (row, piece) in plane.chunks_mut(n0).zip(part.chunks_mut(columns.len())) {
                 each(&mut row[columns.clone()], piece);

@@ -18,11 +18,21 @@ fn bits(values: Vec<f64>) -> Vec<u64> {
 }
 
 /// `implicit` says along which memory axes viscosity is implicit, if not the flow.
-fn seen(case: &Case, implicit: Option<[bool; 3]>, ranks: Arc<dyn Ranks>, steps: usize) -> Result<Seen, Error> {
-    let settings = FlowSettings { ranks, ..case.settings.clone() };
+fn seen(
+    case: &Case,
+    implicit: Option<[bool; 3]>,
+    ranks: Arc<dyn Ranks>,
+    steps: usize,
+) -> Result<Seen, Error> {
+    let settings = FlowSettings {
+        ranks,
+        ..case.settings.clone()
+    };
     let (mut flow, start) = case.initial.start(case.mesh.clone(), settings)?;
     flow.state.implicit = implicit.unwrap_or(flow.state.implicit);
-    let reports = (0..steps).map(|_| flow.step()).collect::<Result<_, Error>>()?;
+    let reports = (0..steps)
+        .map(|_| flow.step())
+        .collect::<Result<_, Error>>()?;
     let mut fields: Vec<_> = [0, 1, 2].map(|d| bits(flow.face_velocity_m_s(d))).into();
     fields.push(bits(flow.whole(flow.own_centre_velocity_m_s(2))));
     fields.push(bits(flow.pressure_m2_s2()));
@@ -32,7 +42,11 @@ fn seen(case: &Case, implicit: Option<[bool; 3]>, ranks: Arc<dyn Ranks>, steps: 
 
 /// `work` on as many threads as a pool of its own has.
 fn with_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(work)
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap()
+        .install(work)
 }
 
 fn assert_same(name: &str, case: &Case, steps: usize) {
@@ -41,22 +55,43 @@ fn assert_same(name: &str, case: &Case, steps: usize) {
 
 fn assert_same_with(name: &str, case: &Case, implicit: Option<[bool; 3]>, steps: usize) {
     let alone = seen(case, implicit, Arc::new(Single), steps).unwrap();
-    assert!(alone.2.iter().flatten().any(|value| *value != 0), "{name}: nothing moves");
-    for (count, threads) in [2, 3, 5, 7].into_iter().flat_map(|count| [(count, 1), (count, 2)]) {
-        for (rank, found) in on_threads(count, |ranks| with_threads(threads, || seen(case, implicit, ranks, steps)))
-            .into_iter()
-            .enumerate()
+    assert!(
+        alone.2.iter().flatten().any(|value| *value != 0),
+        "{name}: nothing moves"
+    );
+    for (count, threads) in [2, 3, 5, 7]
+        .into_iter()
+        .flat_map(|count| [(count, 1), (count, 2)])
+    {
+        for (rank, found) in on_threads(count, |ranks| {
+            with_threads(threads, || seen(case, implicit, ranks, steps))
+        })
+        .into_iter()
+        .enumerate()
         {
-            assert!(found == Some(Ok(alone.clone())), "{name}: rank {rank} of {count}, {threads} threads each");
+            assert!(
+                found == Some(Ok(alone.clone())),
+                "{name}: rank {rank} of {count}, {threads} threads each"
+            );
         }
     }
 }
 
 /// Both schemes; 17 and 29 planes leave the ranks uneven parts.
 fn wake(cells: [usize; 3], subgrid: SubgridModel, slip_sides: bool) -> Case {
-    let case =
-        VortexPairCase { cells, perturbation: 0.05, subgrid, slip_sides, reynolds: 1000.0, ..VortexPairCase::coarse() };
-    case.case(TimeStep::Courant { courant: 0.65, longest_s: 0.1 }).unwrap()
+    let case = VortexPairCase {
+        cells,
+        perturbation: 0.05,
+        subgrid,
+        slip_sides,
+        reynolds: 1000.0,
+        ..VortexPairCase::coarse()
+    };
+    case.case(TimeStep::Courant {
+        courant: 0.65,
+        longest_s: 0.1,
+    })
+    .unwrap()
 }
 
 #[test]
@@ -65,22 +100,43 @@ fn vortices_of_taylor_and_green_are_the_same_on_any_number_of_ranks() {
     assert_same("Adams-Bashforth, all axes transformed", &case, 4);
     case.settings.scheme = TimeScheme::RungeKutta3;
     case.settings.subgrid = SubgridModel::WALE;
-    assert_same_with("Runge-Kutta, all axes implicit, WALE", &case, Some([true; 3]), 2);
+    assert_same_with(
+        "Runge-Kutta, all axes implicit, WALE",
+        &case,
+        Some([true; 3]),
+        2,
+    );
 }
 
 #[test]
 fn wakes_with_filters_of_order_1_and_4_are_the_same_on_any_number_of_ranks() {
     for order in [1, 4] {
-        let model = SubgridModel::MultiscaleWale { constant: 0.9, order };
-        assert_same(&format!("order {order}"), &wake([8, 24, 29], model, false), 2);
+        let model = SubgridModel::MultiscaleWale {
+            constant: 0.9,
+            order,
+        };
+        assert_same(
+            &format!("order {order}"),
+            &wake([8, 24, 29], model, false),
+            2,
+        );
     }
-    assert_same("planes of two blocks", &wake([72, 60, 28], SubgridModel::None, false), 1);
+    assert_same(
+        "planes of two blocks",
+        &wake([72, 60, 28], SubgridModel::None, false),
+        1,
+    );
 }
 
 #[test]
 fn walls_implicit_lines_and_every_form_of_the_pressure_are_the_same_on_any_number_of_ranks() {
     let between_walls = channel([12, 10, 28], 1.5, 100.0).unwrap();
-    assert_same_with("channel, axis 2 implicit", &between_walls, Some([false, false, true]), 3);
+    assert_same_with(
+        "channel, axis 2 implicit",
+        &between_walls,
+        Some([false, false, true]),
+        3,
+    );
     let sides = wake([8, 28, 32], SubgridModel::None, true);
     assert_same_with("axis 1 implicit", &sides, Some([false, true, false]), 2);
     let mut long = wake([8, 40, 28], SubgridModel::None, true);

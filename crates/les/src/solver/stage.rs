@@ -31,20 +31,36 @@ struct Block<'a> {
 
 /// Cuts the planes that are owned into blocks of the same rows of one plane after the other, so that rows of the planes about a
 /// block have just been read.
-fn blocks<'a>(shape: Shape, predicted: &'a mut [Aligned; 3], previous: &'a mut [Aligned; 3]) -> Vec<Block<'a>> {
+fn blocks<'a>(
+    shape: Shape,
+    predicted: &'a mut [Aligned; 3],
+    previous: &'a mut [Aligned; 3],
+) -> Vec<Block<'a>> {
     let [n0, n1, _] = shape.n;
     let rows = n1.div_ceil((n0 * n1).div_ceil(BLOCK));
     let pieces = |field: &'a mut Aligned| {
         let planes = field[shape.own_places()].chunks_mut(shape.plane());
         planes.flat_map(move |plane| plane.chunks_mut(rows * n0))
     };
-    let (mut predicted, mut previous) = (predicted.each_mut().map(pieces), previous.each_mut().map(pieces));
+    let (mut predicted, mut previous) = (
+        predicted.each_mut().map(pieces),
+        previous.each_mut().map(pieces),
+    );
     let mut blocks: Vec<Vec<Block<'_>>> = (0..n1.div_ceil(rows)).map(|_| Vec::new()).collect();
     for plane in shape.own() {
         for (at, blocks) in blocks.iter_mut().enumerate() {
-            let predicted = predicted.each_mut().map(|pieces| pieces.next().unwrap_or_default());
-            let previous = previous.each_mut().map(|pieces| pieces.next().unwrap_or_default());
-            blocks.push(Block { plane, row: at * rows, predicted, previous });
+            let predicted = predicted
+                .each_mut()
+                .map(|pieces| pieces.next().unwrap_or_default());
+            let previous = previous
+                .each_mut()
+                .map(|pieces| pieces.next().unwrap_or_default());
+            blocks.push(Block {
+                plane,
+                row: at * rows,
+                predicted,
+                previous,
+            });
         }
     }
     blocks.into_iter().flatten().collect()
@@ -53,7 +69,13 @@ fn blocks<'a>(shape: Shape, predicted: &'a mut [Aligned; 3], previous: &'a mut [
 impl Flow {
     /// The right side of (22) into `predicted`, or the velocity with all but implicit viscosity if `keeps` says that no line solve of the
     /// increments follows; its terms into the previous ones. The work of the terms if `measured`.
-    pub(super) fn predict(&mut self, stage: Stage, stage_s: f64, keeps: bool, measured: bool) -> Result<Powers, Error> {
+    pub(super) fn predict(
+        &mut self,
+        stage: Stage,
+        stage_s: f64,
+        keeps: bool,
+        measured: bool,
+    ) -> Result<Powers, Error> {
         let shape = self.layout.shape;
         let keep = if keeps { 1.0 } else { 0.0 };
         // What is written leaves the flow, which the blocks read.
@@ -75,18 +97,38 @@ impl Flow {
             let blocks = || powers.iter().skip(k).step_by(shape.own().len());
             std::array::from_fn(|i| blocks().map(|powers| powers[i / 3][i % 3]).sum())
         };
-        let planes = self.layout.slabs.planes((0..shape.own().len()).map(of_plane).collect())?;
-        let terms = (0..3).flat_map(|component| planes.iter().map(move |plane| &plane[3 * component..]));
-        Ok(terms.fold(Powers::default(), |total, plane| std::array::from_fn(|i| total[i] + plane[i])))
+        let planes = self
+            .layout
+            .slabs
+            .planes((0..shape.own().len()).map(of_plane).collect())?;
+        let terms =
+            (0..3).flat_map(|component| planes.iter().map(move |plane| &plane[3 * component..]));
+        Ok(terms.fold(Powers::default(), |total, plane| {
+            std::array::from_fn(|i| total[i] + plane[i])
+        }))
     }
 
     /// The viscosity of the model for the present field, at most such that `stage_s`, this fraction of a step, is stable; its
     /// acceleration by stresses in planes into `predicted`, where the terms of the momentum equation are summed.
     pub(super) fn update_model(&mut self, fraction: f64, stage_s: f64) -> Result<(), Error> {
         let explicit_per_s = self.settings.scheme.largest_decay() * fraction / stage_s;
-        let limit_per_s = (SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0);
-        let Self { model: Some(model), predicted, phi, .. } = self else { return Ok(()) };
-        model.update(self.state.velocity.each_ref().map(|field| &field[..]), limit_per_s, predicted, phi)
+        let limit_per_s =
+            (SUBGRID_SHARE * explicit_per_s - self.explicit_viscous_rate_per_s()).max(0.0);
+        let Self {
+            model: Some(model),
+            predicted,
+            phi,
+            ..
+        } = self
+        else {
+            return Ok(());
+        };
+        model.update(
+            self.state.velocity.each_ref().map(|field| &field[..]),
+            limit_per_s,
+            predicted,
+            phi,
+        )
     }
 
     /// `predicted = dt (c N + c' N' - grad p + nu L u) + keep u`, without `nu L u` if `keep` is 1, in the rows of a block, with the previous terms; returns the work of each
@@ -99,7 +141,13 @@ impl Flow {
     ) -> [Powers; 3] {
         let (n, k) = (self.layout.shape.n[0], block.plane);
         let mut powers = [Powers::default(); 3];
-        let components = block.predicted.into_iter().zip(block.previous).zip(scratch).zip(&mut powers).enumerate();
+        let components = block
+            .predicted
+            .into_iter()
+            .zip(block.previous)
+            .zip(scratch)
+            .zip(&mut powers)
+            .enumerate();
         for (axis, (((predicted, previous), scratch), powers)) in components {
             let rows = predicted.chunks_mut(n).zip(previous.chunks_mut(n));
             for ((predicted, previous), j) in rows.zip(block.row..) {
@@ -107,10 +155,19 @@ impl Flow {
                     predicted.fill(0.0);
                     continue;
                 }
-                self.terms([axis, j, k], predicted, scratch, measured.then_some(&mut *powers));
+                self.terms(
+                    [axis, j, k],
+                    predicted,
+                    scratch,
+                    measured.then_some(&mut *powers),
+                );
                 scratch.gradient(&self.ops[axis], &self.state.pressure, j, k);
                 let own = &self.state.velocity[axis][self.layout.shape.row(j, k)];
-                let nu = if keep == 1.0 { 0.0 } else { self.settings.viscosity_m2_s };
+                let nu = if keep == 1.0 {
+                    0.0
+                } else {
+                    self.settings.viscosity_m2_s
+                };
                 advance_row(
                     [stage.new, stage.old, nu, stage_s, keep],
                     predicted,
@@ -125,12 +182,23 @@ impl Flow {
 
     /// `N`, the terms that are integrated explicitly, of one row into `out`, which has the model's acceleration by stresses in planes; the Laplacian along
     /// the implicit axes into the scratch.
-    fn terms(&self, [axis, j, k]: [usize; 3], out: &mut [f64], scratch: &mut Scratch, powers: Option<&mut Powers>) {
+    fn terms(
+        &self,
+        [axis, j, k]: [usize; 3],
+        out: &mut [f64],
+        scratch: &mut Scratch,
+        powers: Option<&mut Powers>,
+    ) {
         let ops = &self.ops[axis];
         if self.model.is_some() {
             scratch.model.copy_from_slice(out);
         }
-        scratch.convection(ops, self.state.velocity.each_ref().map(|field| &field[..]), j, k);
+        scratch.convection(
+            ops,
+            self.state.velocity.each_ref().map(|field| &field[..]),
+            j,
+            k,
+        );
         let nu = self.settings.viscosity_m2_s;
         let force = self.settings.force_m_s2[self.layout.direction[axis]];
         if nu == 0.0 {
@@ -150,7 +218,8 @@ impl Flow {
         let own = &self.state.velocity[axis][self.layout.shape.row(j, k)];
         let (across, along) = ops.row_mass(j, k);
         if nu > 0.0 {
-            let work = weighted_dot(own, &scratch.implicit, along) + weighted_dot(own, &scratch.explicit, along);
+            let work = weighted_dot(own, &scratch.implicit, along)
+                + weighted_dot(own, &scratch.explicit, along);
             powers[0] += across * nu * work;
         }
         if force != 0.0 {
@@ -182,7 +251,12 @@ fn advance_row(
     [implicit, pressure, own]: [&[f64]; 3],
 ) {
     let n = predicted.len();
-    let (previous, implicit, pressure, own) = (&mut previous[..n], &implicit[..n], &pressure[..n], &own[..n]);
+    let (previous, implicit, pressure, own) = (
+        &mut previous[..n],
+        &implicit[..n],
+        &pressure[..n],
+        &own[..n],
+    );
     for i in 0..n {
         let term = predicted[i];
         let total = new * term + old * previous[i] - pressure[i] + nu * implicit[i];
@@ -197,17 +271,34 @@ mod tests {
 
     #[test]
     fn blocks_hold_every_value_that_is_owned_once_and_in_its_place() {
-        for shape in [Shape::whole([100, 130, 5]), Shape::slab([100, 41, 16], 1, 3), Shape::whole([5000, 2, 9])] {
+        for shape in [
+            Shape::whole([100, 130, 5]),
+            Shape::slab([100, 41, 16], 1, 3),
+            Shape::whole([5000, 2, 9]),
+        ] {
             let mut predicted = [0, 1, 2].map(|_| Aligned::zeros(shape.len()));
             for (axis, field) in predicted.iter_mut().enumerate() {
-                field.iter_mut().enumerate().for_each(|(place, value)| *value = (3 * place + axis) as f64);
+                field
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(place, value)| *value = (3 * place + axis) as f64);
             }
             let mut previous = predicted.clone();
             let mut seen = 0;
-            for Block { plane, row, predicted, previous } in blocks(shape, &mut predicted, &mut previous) {
+            for Block {
+                plane,
+                row,
+                predicted,
+                previous,
+            } in blocks(shape, &mut predicted, &mut previous)
+            {
                 assert!(predicted[0].len() <= BLOCK.max(shape.n[0]));
-                for (axis, (predicted, previous)) in predicted.into_iter().zip(previous).enumerate() {
-                    assert_eq!(predicted[0], (3 * shape.place([0, row, plane]) + axis) as f64);
+                for (axis, (predicted, previous)) in predicted.into_iter().zip(previous).enumerate()
+                {
+                    assert_eq!(
+                        predicted[0],
+                        (3 * shape.place([0, row, plane]) + axis) as f64
+                    );
                     assert_eq!(predicted, previous);
                     seen += predicted.len();
                 }

@@ -16,14 +16,20 @@ const RESOLVED_DECAY: f64 = 4.0;
 
 /// Lengths of the cells along each direction \[m\].
 pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
-    mesh.directions().each_ref().map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
+    mesh.directions()
+        .each_ref()
+        .map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
 }
 
 /// Largest decay rate of the viscous term along x, y, z \[1/s\]; zero along a direction of one cell.
 pub(super) fn viscous_rates_per_s(mesh: &Mesh, viscosity_m2_s: f64) -> [f64; 3] {
     metrics(mesh).map(|metric_m| {
         let least_m = metric_m.iter().copied().fold(f64::INFINITY, f64::min);
-        if metric_m.len() > 1 { LAPLACIAN_SYMBOL * viscosity_m2_s / least_m.powi(2) } else { 0.0 }
+        if metric_m.len() > 1 {
+            LAPLACIAN_SYMBOL * viscosity_m2_s / least_m.powi(2)
+        } else {
+            0.0
+        }
     })
 }
 
@@ -46,7 +52,8 @@ pub(super) struct Stiffness([f64; 2]);
 impl Stiffness {
     /// From the rates along all axes and whether viscosity is implicit there.
     pub(super) fn new(rates_per_s: [f64; 3], implicit: [bool; 3]) -> Self {
-        let mut rates_per_s: [f64; 3] = std::array::from_fn(|a| if implicit[a] { rates_per_s[a] } else { 0.0 });
+        let mut rates_per_s: [f64; 3] =
+            std::array::from_fn(|a| if implicit[a] { rates_per_s[a] } else { 0.0 });
         rates_per_s.sort_by(|a, b| b.total_cmp(a));
         Self([rates_per_s[0], rates_per_s[1]])
     }
@@ -92,12 +99,22 @@ mod tests {
         let mesh = Mesh::new(Direction::thin(1.0), direction(8), direction(32)).unwrap();
         let step_s = 0.01;
         let per_viscosity = viscous_rates_per_s(&mesh, 1.0)[2] * step_s;
-        for (scheme, limit) in [(TimeScheme::AdamsBashforth2, 1.0), (TimeScheme::RungeKutta3, 2.5)] {
+        for (scheme, limit) in [
+            (TimeScheme::AdamsBashforth2, 1.0),
+            (TimeScheme::RungeKutta3, 2.5),
+        ] {
             for share in [0.09, 0.11] {
                 let viscosity_m2_s = share * limit / per_viscosity;
-                let settings = FlowSettings { scheme, ..FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s }) };
+                let settings = FlowSettings {
+                    scheme,
+                    ..FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s })
+                };
                 let implicit = implicit_axes(&mesh, &settings, 0.0);
-                assert_eq!(implicit, [false, false, share > 0.1], "{scheme:?} at {share} of its limit");
+                assert_eq!(
+                    implicit,
+                    [false, false, share > 0.1],
+                    "{scheme:?} at {share} of its limit"
+                );
             }
         }
     }

@@ -62,11 +62,18 @@ impl Stencil {
 
     /// That of a mesh with these directions.
     pub(crate) fn of(lines: &[Operators1d]) -> Self {
-        if lines.iter().all(|line| line.ends.no_slip() == [false; 2]) { Self::WIDE } else { Self::PLAIN }
+        if lines.iter().all(|line| line.ends.no_slip() == [false; 2]) {
+            Self::WIDE
+        } else {
+            Self::PLAIN
+        }
     }
 
     const fn with(share: f64) -> Self {
-        Self { near: [-share, PAIR[0] + 3.0 * share, -2.0 * share], far: [share, -2.0 * share, PAIR[1] + share] }
+        Self {
+            near: [-share, PAIR[0] + 3.0 * share, -2.0 * share],
+            far: [share, -2.0 * share, PAIR[1] + share],
+        }
     }
 
     /// Whether only the pairs are there.
@@ -78,9 +85,17 @@ impl Stencil {
     /// Places of flux and value, and the coefficient.
     fn products(self) -> impl Iterator<Item = (isize, isize, f64)> {
         let [near, far] = [self.near, self.far];
-        let near = [-1, 1, 2].into_iter().zip(near).map(|(value, c)| (1, value, c));
-        let far = [1, 2, 3].into_iter().zip(far).map(|(value, c)| (2, value, c));
-        near.chain(far).filter(|p| p.2 != 0.0).flat_map(|(flux, value, c)| [(flux, value, c), (1 - flux, -value, -c)])
+        let near = [-1, 1, 2]
+            .into_iter()
+            .zip(near)
+            .map(|(value, c)| (1, value, c));
+        let far = [1, 2, 3]
+            .into_iter()
+            .zip(far)
+            .map(|(value, c)| (2, value, c));
+        near.chain(far)
+            .filter(|p| p.2 != 0.0)
+            .flat_map(|(flux, value, c)| [(flux, value, c), (1 - flux, -value, -c)])
     }
 }
 
@@ -143,7 +158,10 @@ impl Operators1d {
                     }
                 }
                 let weighted = sums.iter().zip(&self.cell_mass_m).enumerate();
-                weighted.filter(|(_, (c, _))| **c != 0.0).map(|(i, (c, mass))| (i, c * mass)).collect()
+                weighted
+                    .filter(|(_, (c, _))| **c != 0.0)
+                    .map(|(i, (c, mass))| (i, c * mass))
+                    .collect()
             })
             .collect()
     }
@@ -153,7 +171,11 @@ impl Operators1d {
         let n = self.cells;
         let mut rows = vec![Vec::new(); n];
         if self.is_thin() {
-            return Transport { rows, regular: 0..0, stencil };
+            return Transport {
+                rows,
+                regular: 0..0,
+                stencil,
+            };
         }
         let sticks = self.ends.no_slip();
         for (k, row) in rows.iter_mut().enumerate() {
@@ -172,7 +194,11 @@ impl Operators1d {
         for entry in WALL_PAIRS {
             add_closure(&mut rows, sticks, [n, n - 1], 3, entry);
         }
-        Transport { rows, regular: 3..n.saturating_sub(3), stencil }
+        Transport {
+            rows,
+            regular: 3..n.saturating_sub(3),
+            stencil,
+        }
     }
 
     /// Transport of the normal velocity at the faces by itself; pairs alone at a no-slip wall.
@@ -180,7 +206,11 @@ impl Operators1d {
         let n = self.cells;
         let mut rows = vec![Vec::new(); n];
         if self.is_thin() {
-            return Transport { rows, regular: 0..0, stencil };
+            return Transport {
+                rows,
+                regular: 0..0,
+                stencil,
+            };
         }
         let sticks = self.ends.no_slip();
         let from_table = |face: usize| (sticks[0] && face <= 4) || (sticks[1] && face + 4 >= n);
@@ -188,7 +218,8 @@ impl Operators1d {
             for (face, value, c) in interior_products(stencil, m as isize) {
                 let (face, face_sign) = resolve_face(n, self.ends, face);
                 let (value, value_sign) = resolve_face(n, self.ends, value);
-                let walls = !self.is_periodic() && (face == 0 || face == n || value == 0 || value == n);
+                let walls =
+                    !self.is_periodic() && (face == 0 || face == n || value == 0 || value == n);
                 if !walls && !from_table(face) {
                     row.push((face, value, face_sign * value_sign * c));
                 }
@@ -200,13 +231,23 @@ impl Operators1d {
             }
         }
         let margin = |sticks: bool| if sticks { WALL_ROWS + 1 } else { 3 };
-        Transport { rows, regular: margin(sticks[0])..n.saturating_sub(margin(sticks[1])), stencil }
+        Transport {
+            rows,
+            regular: margin(sticks[0])..n.saturating_sub(margin(sticks[1])),
+            stencil,
+        }
     }
 }
 
 /// Adds the skew entry `(a, b, c)` of the flux through `face` at each end that sticks, places counted from there; the last face and the
 /// last place of a value are `last`.
-fn add_closure(rows: &mut [Vec<Product>], sticks: [bool; 2], last: [usize; 2], face: usize, (a, b, c): SkewEntry) {
+fn add_closure(
+    rows: &mut [Vec<Product>],
+    sticks: [bool; 2],
+    last: [usize; 2],
+    face: usize,
+    (a, b, c): SkewEntry,
+) {
     if sticks[0] {
         rows[a].push((face, b, c));
         rows[b].push((face, a, -c));
@@ -223,7 +264,9 @@ fn interior_products(stencil: Stencil, m: isize) -> impl Iterator<Item = (isize,
     stencil.products().flat_map(move |(flux, value, c)| {
         // The flux at 1 is that of the cell between the faces m and m + 1.
         let cell = m + flux - 1;
-        MEAN.iter().enumerate().map(move |(i, mean)| (cell + i as isize - 1, m + value, c * mean))
+        MEAN.iter()
+            .enumerate()
+            .map(move |(i, mean)| (cell + i as isize - 1, m + value, c * mean))
     })
 }
 
@@ -238,15 +281,21 @@ mod tests {
     fn kinds() -> Vec<Direction> {
         vec![
             Direction::periodic(20, 0.0, 1.0).stretched(Spread::Sine.by(0.4)),
-            Direction::between(20, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST).stretched(Spread::TanhBoth.by(1.5)),
-            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.5)),
+            Direction::between(20, 0.0, 1.0, Wall::AT_REST, Wall::AT_REST)
+                .stretched(Spread::TanhBoth.by(1.5)),
+            Direction::between(21, 0.0, 1.0, Wall::AT_REST, Wall::Slip)
+                .stretched(Spread::TanhLow.by(1.5)),
             Direction::between(19, 0.0, 1.0, Wall::Slip, Wall::Slip),
         ]
     }
 
     /// What may be used along a direction.
     fn stencils(line: &Operators1d) -> Vec<Stencil> {
-        if line.ends.no_slip() == [false; 2] { vec![Stencil::PLAIN, Stencil::WIDE] } else { vec![Stencil::PLAIN] }
+        if line.ends.no_slip() == [false; 2] {
+            vec![Stencil::PLAIN, Stencil::WIDE]
+        } else {
+            vec![Stencil::PLAIN]
+        }
     }
 
     /// `S^n` of a transport as dense matrices.
@@ -269,7 +318,10 @@ mod tests {
                 for matrix in dense(&transport.rows, line.cells) {
                     for i in 0..line.cells {
                         for j in 0..line.cells {
-                            assert!((matrix[i][j] + matrix[j][i]).abs() < 1e-17, "{direction:?} ({i}, {j})");
+                            assert!(
+                                (matrix[i][j] + matrix[j][i]).abs() < 1e-17,
+                                "{direction:?} ({i}, {j})"
+                            );
                         }
                     }
                 }
@@ -288,8 +340,15 @@ mod tests {
                 for face in first..n {
                     for cell in 0..n {
                         let sum: f64 = matrices[face][cell].iter().sum();
-                        let made: f64 = line.divergence[cell].iter().filter(|t| t.0 == face).map(|t| t.1).sum();
-                        assert!((sum - 0.5 * made).abs() < 4e-16, "{direction:?}: flux {face}, cell {cell}");
+                        let made: f64 = line.divergence[cell]
+                            .iter()
+                            .filter(|t| t.0 == face)
+                            .map(|t| t.1)
+                            .sum();
+                        assert!(
+                            (sum - 0.5 * made).abs() < 4e-16,
+                            "{direction:?}: flux {face}, cell {cell}"
+                        );
                     }
                 }
             }
@@ -299,7 +358,13 @@ mod tests {
     #[test]
     fn tables_of_the_normal_velocity_meet_their_row_sums() {
         let n = 24;
-        let line = Operators1d::new(&Direction::between(n, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
+        let line = Operators1d::new(&Direction::between(
+            n,
+            0.0,
+            24.0,
+            Wall::AT_REST,
+            Wall::AT_REST,
+        ));
         let mean = line.flux_mean();
         for face in 1..=4 {
             for row in 1..10 {
@@ -311,21 +376,38 @@ mod tests {
                 let made: f64 = mean[row]
                     .iter()
                     .map(|&(cell, c)| {
-                        let divergence: f64 = line.divergence[cell].iter().filter(|t| t.0 == face).map(|t| t.1).sum();
+                        let divergence: f64 = line.divergence[cell]
+                            .iter()
+                            .filter(|t| t.0 == face)
+                            .map(|t| t.1)
+                            .sum();
                         c / line.cell_mass_m[cell] * divergence
                     })
                     .sum();
-                assert!((sum - 0.5 * made).abs() < 2e-16, "flux {face}, row {row}: {sum} against {}", 0.5 * made);
+                assert!(
+                    (sum - 0.5 * made).abs() < 2e-16,
+                    "flux {face}, row {row}: {sum} against {}",
+                    0.5 * made
+                );
             }
         }
     }
 
     #[test]
     fn the_flux_mean_keeps_constants_and_slopes_at_a_wall() {
-        let line = Operators1d::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::Slip));
+        let line = Operators1d::new(&Direction::between(
+            24,
+            0.0,
+            24.0,
+            Wall::AT_REST,
+            Wall::Slip,
+        ));
         for (face, row) in line.flux_mean().iter().enumerate().skip(1) {
             let sum: f64 = row.iter().map(|t| t.1).sum();
-            assert!((sum - line.face_mass_m[face]).abs() < 1e-15, "face {face}: {sum}");
+            assert!(
+                (sum - line.face_mass_m[face]).abs() < 1e-15,
+                "face {face}: {sum}"
+            );
             let slope: f64 = row.iter().map(|t| t.1 * (t.0 as f64 + 0.5)).sum();
             let at_slip_wall = face + 2 > 24;
             assert!(
@@ -337,29 +419,51 @@ mod tests {
 
     #[test]
     fn transport_along_a_wall_is_exact_for_a_parabolic_flux() {
-        let line = Operators1d::new(&Direction::between(24, 0.0, 24.0, Wall::AT_REST, Wall::AT_REST));
+        let line = Operators1d::new(&Direction::between(
+            24,
+            0.0,
+            24.0,
+            Wall::AT_REST,
+            Wall::AT_REST,
+        ));
         let transport = line.transport_of_cells(Stencil::PLAIN);
         // q = 1, F = z^2: the skew form gives half the derivative of F, and the same for F = z, q = z is exact to z^2.
         for (k, row) in transport.rows.iter().take(6).enumerate() {
             let z = k as f64 + 0.5;
             let sum: f64 = row.iter().map(|&(f, _, c)| c * (f as f64).powi(2)).sum();
-            assert!((sum / line.cell_mass_m[k] - z).abs() < 1e-14, "cell {k}: {sum}");
-            let sum: f64 = row.iter().map(|&(f, l, c)| c * f as f64 * (l as f64 + 0.5)).sum();
+            assert!(
+                (sum / line.cell_mass_m[k] - z).abs() < 1e-14,
+                "cell {k}: {sum}"
+            );
+            let sum: f64 = row
+                .iter()
+                .map(|&(f, l, c)| c * f as f64 * (l as f64 + 0.5))
+                .sum();
             // z dq/dz + q/2 with q = z.
-            assert!((sum / line.cell_mass_m[k] - 1.5 * z).abs() < 1e-13, "cell {k}: {sum}");
+            assert!(
+                (sum / line.cell_mass_m[k] - 1.5 * z).abs() < 1e-13,
+                "cell {k}: {sum}"
+            );
         }
     }
 
     #[test]
     fn a_uniform_flux_carries_waves_with_sixth_order_away_from_no_slip_walls() {
         let speed = |stencil: Stencil, theta: f64| {
-            let sum: f64 = stencil.products().map(|(_, value, c)| c * (theta * value as f64).sin()).sum();
+            let sum: f64 = stencil
+                .products()
+                .map(|(_, value, c)| c * (theta * value as f64).sin())
+                .sum();
             sum / theta
         };
-        let central =
-            |theta: f64| (45.0 * theta.sin() - 9.0 * (2.0 * theta).sin() + (3.0 * theta).sin()) / (30.0 * theta);
+        let central = |theta: f64| {
+            (45.0 * theta.sin() - 9.0 * (2.0 * theta).sin() + (3.0 * theta).sin()) / (30.0 * theta)
+        };
         for theta in [0.1, 0.7, 1.5, 3.0] {
-            assert!((speed(Stencil::WIDE, theta) - central(theta)).abs() < 1e-15, "{theta}");
+            assert!(
+                (speed(Stencil::WIDE, theta) - central(theta)).abs() < 1e-15,
+                "{theta}"
+            );
         }
         let loss = 1.0 - speed(Stencil::PLAIN, 0.1);
         assert!((loss / (0.075 * 1e-4) - 1.0).abs() < 1e-2, "{loss}");
@@ -369,8 +473,14 @@ mod tests {
     fn one_no_slip_wall_takes_the_wide_stencil_from_all_directions() {
         let around = || Operators1d::new(&Direction::periodic(20, 0.0, 1.0));
         let between = |wall| Operators1d::new(&Direction::between(20, 0.0, 1.0, wall, Wall::Slip));
-        assert_eq!(Stencil::of(&[around(), around(), between(Wall::Slip)]), Stencil::WIDE);
-        assert_eq!(Stencil::of(&[around(), around(), between(Wall::AT_REST)]), Stencil::PLAIN);
+        assert_eq!(
+            Stencil::of(&[around(), around(), between(Wall::Slip)]),
+            Stencil::WIDE
+        );
+        assert_eq!(
+            Stencil::of(&[around(), around(), between(Wall::AT_REST)]),
+            Stencil::PLAIN
+        );
     }
 
     #[test]

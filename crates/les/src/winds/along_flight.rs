@@ -22,7 +22,11 @@ impl AlongFlight {
     pub fn new(pair: VortexPair, speed_m_s: f64, aircraft_x_m: f64) -> Result<Self, Error> {
         check("speed_m_s", speed_m_s, "positive", |v| v > 0.0)?;
         check("aircraft_x_m", aircraft_x_m, "finite", |_| true)?;
-        Ok(Self { pair: pair.wind()?, speed_m_s, aircraft_x_m })
+        Ok(Self {
+            pair: pair.wind()?,
+            speed_m_s,
+            aircraft_x_m,
+        })
     }
 
     /// Time since the aircraft passed `x_m`, s; negative where it has not yet.
@@ -32,7 +36,12 @@ impl AlongFlight {
 }
 
 impl Wind for AlongFlight {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         // Places that follow each other with one x are of one age.
         let mut outs = out_m_s;
@@ -51,6 +60,9 @@ impl Wind for AlongFlight {
 
     /// That of the pair when it is released and at the time that is asked for: the older one is nearer to the ground.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        self.pair.max_gradient_per_s(0.0).max(self.pair.max_gradient_per_s(self.age_s(-1e4, time_s).max(0.0)))
+        self.pair.max_gradient_per_s(0.0).max(
+            self.pair
+                .max_gradient_per_s(self.age_s(-1e4, time_s).max(0.0)),
+        )
     }
 }

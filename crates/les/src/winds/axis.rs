@@ -98,16 +98,35 @@ impl Axis {
         for (index, &value_m) in node_m.iter().enumerate() {
             if !value_m.is_finite() || (index > 0 && value_m <= node_m[index - 1]) {
                 let what = format!("position of node {index}");
-                return Err(refused(name, what, value_m, "finite and above that of the node before"));
+                return Err(refused(
+                    name,
+                    what,
+                    value_m,
+                    "finite and above that of the node before",
+                ));
             }
         }
-        let high_is_open = matches!(edges, Edges::Bounded { high: Side::Open, .. });
+        let high_is_open = matches!(
+            edges,
+            Edges::Bounded {
+                high: Side::Open,
+                ..
+            }
+        );
         let (ghosts, below, above, span_m, period_m) = match edges {
             Edges::Periodic { period_m } => {
                 if !(period_m.is_finite() && period_m > node_m[nodes - 1] - node_m[0]) {
-                    return Err(refused(name, "period", period_m, "longer than the mesh from first to last node"));
+                    return Err(refused(
+                        name,
+                        "period",
+                        period_m,
+                        "longer than the mesh from first to last node",
+                    ));
                 }
-                let ghosts = [[Ghost::Copy(nodes - 1), Ghost::Copy(nodes - 2)], [Ghost::Copy(0), Ghost::Copy(1)]];
+                let ghosts = [
+                    [Ghost::Copy(nodes - 1), Ghost::Copy(nodes - 2)],
+                    [Ghost::Copy(0), Ghost::Copy(1)],
+                ];
                 let below = [node_m[nodes - 1] - period_m, node_m[nodes - 2] - period_m];
                 let above = [node_m[0] + period_m, node_m[1] + period_m];
                 (ghosts, below, above, None, Some(period_m))
@@ -122,7 +141,14 @@ impl Axis {
         position_m.extend_from_slice(node_m);
         position_m.extend_from_slice(&above);
         let last_cell = nodes + usize::from(!high_is_open);
-        let axis = Self { name, position_m, span_m, period_m, last_cell, ghosts };
+        let axis = Self {
+            name,
+            position_m,
+            span_m,
+            period_m,
+            last_cell,
+            ghosts,
+        };
         axis.check_stretch(edges)?;
         Ok(axis)
     }
@@ -145,7 +171,10 @@ impl Axis {
                 return refuse(i + 1, ratio, MAX_CELL_RATIO.1);
             }
         }
-        let ends = [(low_is_open, GHOSTS, GHOSTS + 1), (high_is_open, self.last_cell, self.last_cell - 1)];
+        let ends = [
+            (low_is_open, GHOSTS, GHOSTS + 1),
+            (high_is_open, self.last_cell, self.last_cell - 1),
+        ];
         for (_, end, inner) in ends.into_iter().filter(|end| end.0) {
             let ratio = cell_m(inner) / cell_m(end);
             if ratio > MAX_OPEN_RATIO.0 {
@@ -171,7 +200,9 @@ impl Axis {
         let node_m = &self.position_m[GHOSTS..GHOSTS + self.nodes()];
         let x_m = match (self.span_m, self.period_m) {
             (Some((low_m, high_m)), _) if low_m <= x_m && x_m <= high_m => x_m,
-            (None, Some(period_m)) if x_m.is_finite() => node_m[0] + (x_m - node_m[0]).rem_euclid(period_m),
+            (None, Some(period_m)) if x_m.is_finite() => {
+                node_m[0] + (x_m - node_m[0]).rem_euclid(period_m)
+            }
             _ => return None,
         };
         let cell = (node_m.partition_point(|&p| p <= x_m) + 1).min(self.last_cell);
@@ -200,7 +231,11 @@ fn fraction(nodes_m: [f64; 4], x_m: f64) -> f64 {
         }
         let slope = m0 + s * (2.0 * c2 + 3.0 * s * c3);
         let newton = s - excess / slope;
-        let next = if newton >= low && newton <= high { newton } else { 0.5 * (low + high) };
+        let next = if newton >= low && newton <= high {
+            newton
+        } else {
+            0.5 * (low + high)
+        };
         if (next - s).abs() <= 2.0 * f64::EPSILON {
             return next;
         }
@@ -215,8 +250,18 @@ pub(crate) fn jump_at(index: usize) -> String {
 }
 
 /// A direction that cannot be taken.
-pub(crate) fn refused(axis: &'static str, what: impl Into<String>, value: f64, allowed: &'static str) -> Error {
-    Error::BadDirection { axis, what: what.into(), value, allowed }
+pub(crate) fn refused(
+    axis: &'static str,
+    what: impl Into<String>,
+    value: f64,
+    allowed: &'static str,
+) -> Error {
+    Error::BadDirection {
+        axis,
+        what: what.into(),
+        value,
+        allowed,
+    }
 }
 
 /// The ghosts of one bounded end and their positions, nearest first, and where the mesh ends.
@@ -238,15 +283,28 @@ fn end(
         }
         Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
     };
-    let gap_m = if is_high { wall_m - at(0) } else { at(0) - wall_m };
+    let gap_m = if is_high {
+        wall_m - at(0)
+    } else {
+        at(0) - wall_m
+    };
     let cell_m = (at(1) - at(0)).abs();
     if !(0.0..cell_m).contains(&gap_m) {
         let wall = if is_high { "high wall" } else { "low wall" };
-        return Err(refused(axis, wall, wall_m, "at the last node or less than a cell beyond it"));
+        return Err(refused(
+            axis,
+            wall,
+            wall_m,
+            "at the last node or less than a cell beyond it",
+        ));
     }
     // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
     let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
-    Ok((mirrored.map(|i| Ghost::Image(inner(i), side)), mirrored.map(|i| 2.0 * wall_m - at(i)), wall_m))
+    Ok((
+        mirrored.map(|i| Ghost::Image(inner(i), side)),
+        mirrored.map(|i| 2.0 * wall_m - at(i)),
+        wall_m,
+    ))
 }
 
 /// The kernel `W` of (27) at `x` cells from its node; zero beyond two cells.
@@ -269,7 +327,12 @@ pub fn m4_prime(x: f64) -> f64 {
 /// Weights of the nodes -1, 0, 1, 2 for a point at the fraction `s` (0 to 1) between nodes 0 and 1, from (27).
 pub fn m4_prime_weights(s: f64) -> [f64; 4] {
     let t = 1.0 - s;
-    [-0.5 * s * t * t, 1.0 + s * s * (1.5 * s - 2.5), 1.0 + t * t * (1.5 * t - 2.5), -0.5 * t * s * s]
+    [
+        -0.5 * s * t * t,
+        1.0 + s * s * (1.5 * s - 2.5),
+        1.0 + t * t * (1.5 * t - 2.5),
+        -0.5 * t * s * s,
+    ]
 }
 
 #[cfg(test)]
@@ -279,10 +342,16 @@ mod tests {
 
     #[test]
     fn kernel_and_weights_are_those_of_the_reference() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/signal/m4prime_kernel.csv");
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/reference/signal/m4prime_kernel.csv"
+        );
         let text = std::fs::read_to_string(path).unwrap();
         let mut rows = (0, 0);
-        for line in text.lines().filter(|l| !l.starts_with('#') && !l.starts_with('x')) {
+        for line in text
+            .lines()
+            .filter(|l| !l.starts_with('#') && !l.starts_with('x'))
+        {
             let row: Vec<Option<f64>> = line.split(',').map(|v| v.trim().parse().ok()).collect();
             let (x, w) = (row[0].unwrap(), row[1].unwrap());
             assert_abs_diff_eq!(m4_prime(x), w, epsilon = 1e-15);
@@ -320,14 +389,20 @@ mod tests {
     #[test]
     fn weights_are_the_kernel_at_the_four_distances() {
         let s = 0.37;
-        for (w, distance) in m4_prime_weights(s).iter().zip([1.0 + s, s, 1.0 - s, 2.0 - s]) {
+        for (w, distance) in m4_prime_weights(s)
+            .iter()
+            .zip([1.0 + s, s, 1.0 - s, 2.0 - s])
+        {
             assert_relative_eq!(*w, m4_prime(distance), max_relative = 1e-13);
         }
     }
 
     #[test]
     fn kernel_ends_at_two_cells_and_dips_to_minus_two_27ths() {
-        assert_eq!((m4_prime(1.0), m4_prime(2.0), m4_prime(2.5)), (0.0, 0.0, 0.0));
+        assert_eq!(
+            (m4_prime(1.0), m4_prime(2.0), m4_prime(2.5)),
+            (0.0, 0.0, 0.0)
+        );
         assert_relative_eq!(m4_prime(4.0 / 3.0), -2.0 / 27.0, max_relative = 1e-14);
     }
 }

@@ -59,13 +59,24 @@ impl GridSnapshot {
         let y = Axis::new("y", &mesh.y_m, mesh.y_edges)?;
         let z = Axis::new("z", &mesh.z_m, mesh.z_edges)?;
         let nodes = (y.nodes() * z.nodes()) as f64;
-        check("number of velocities", velocity_m_s.len() as f64, "one for each node", |n| n == nodes)?;
+        check(
+            "number of velocities",
+            velocity_m_s.len() as f64,
+            "one for each node",
+            |n| n == nodes,
+        )?;
         for &component in velocity_m_s.iter().flatten() {
             check("velocity_m_s", component, "finite", |_| true)?;
         }
         let velocity_m_s = with_ghosts(&y, &z, velocity_m_s);
         let max_gradient_per_s = largest_strain_per_s(&y, &z, &velocity_m_s);
-        Ok(Self { y, z, outside: mesh.outside, velocity_m_s, max_gradient_per_s })
+        Ok(Self {
+            y,
+            z,
+            outside: mesh.outside,
+            velocity_m_s,
+            max_gradient_per_s,
+        })
     }
 
     /// Velocity at `(y, z)`, or `None` outside, (26).
@@ -89,7 +100,12 @@ impl GridSnapshot {
 
 impl Wind for GridSnapshot {
     /// As the trait says; outside the mesh as [`OutsidePolicy`] says. A coordinate that is NaN is outside; x is not read.
-    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        _time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         for (&[_, y_m, z_m], out) in points_m.iter().zip(out_m_s) {
             *out = match (self.interpolate(y_m, z_m), self.outside) {
@@ -117,13 +133,15 @@ fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let start = (i_z + GHOSTS) * width;
         padded[start + GHOSTS..start + GHOSTS + nodes_y].copy_from_slice(row);
         for (i, ghost) in ghost_places(y) {
-            padded[start + i] = std::array::from_fn(|c| ghost_value(ghost, 1, c, |node| row[node][c]));
+            padded[start + i] =
+                std::array::from_fn(|c| ghost_value(ghost, 1, c, |node| row[node][c]));
         }
     }
     for (i, ghost) in ghost_places(z) {
         for column in 0..width {
             let at = |node: usize| padded[(node + GHOSTS) * width + column];
-            padded[i * width + column] = std::array::from_fn(|c| ghost_value(ghost, 2, c, |node| at(node)[c]));
+            padded[i * width + column] =
+                std::array::from_fn(|c| ghost_value(ghost, 2, c, |node| at(node)[c]));
         }
     }
     padded
@@ -133,15 +151,31 @@ fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
 pub(crate) fn ghost_places(axis: &Axis) -> impl Iterator<Item = (usize, Ghost)> {
     let above = GHOSTS + axis.nodes();
     let [low, high] = axis.ghosts;
-    [(GHOSTS - 1, low[0]), (GHOSTS - 2, low[1]), (above, high[0]), (above + 1, high[1])].into_iter()
+    [
+        (GHOSTS - 1, low[0]),
+        (GHOSTS - 2, low[1]),
+        (above, high[0]),
+        (above + 1, high[1]),
+    ]
+    .into_iter()
 }
 
 /// Component `component` of the velocity of a ghost beyond an end across direction `across`, from those at the nodes.
-pub(crate) fn ghost_value(ghost: Ghost, across: usize, component: usize, at: impl Fn(usize) -> f64) -> f64 {
+pub(crate) fn ghost_value(
+    ghost: Ghost,
+    across: usize,
+    component: usize,
+    at: impl Fn(usize) -> f64,
+) -> f64 {
     match ghost {
         Ghost::Copy(node) => at(node),
         Ghost::Parabola([a, b, c]) => 3.0 * at(a) - 3.0 * at(b) + at(c),
-        Ghost::Image(node, Side::NoSlipWall { velocity_m_s: wall, .. }) => 2.0 * wall[component] - at(node),
+        Ghost::Image(
+            node,
+            Side::NoSlipWall {
+                velocity_m_s: wall, ..
+            },
+        ) => 2.0 * wall[component] - at(node),
         Ghost::Image(node, Side::Open | Side::SlipWall { .. }) => {
             if across == component {
                 -at(node)
@@ -168,7 +202,8 @@ fn largest_strain_per_s(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> f64 {
             let along_z = |k: usize| (c[k] - a[k] + d[k] - b[k]) * per_z;
             let (stretch_y, stretch_z) = (along_y(1), along_z(2));
             let shear = 0.5 * (along_z(1) + along_y(2));
-            let in_plane = 0.5 * (stretch_y + stretch_z).abs() + (0.5 * (stretch_y - stretch_z)).hypot(shear);
+            let in_plane =
+                0.5 * (stretch_y + stretch_z).abs() + (0.5 * (stretch_y - stretch_z)).hypot(shear);
             largest = largest.max(in_plane + 0.5 * along_y(0).hypot(along_z(0)));
         }
     }

@@ -23,7 +23,12 @@ impl Linear {
     /// # Errors
     /// As [`Self::validated`].
     pub fn uniform(velocity_m_s: [f64; 3]) -> Result<Self, Error> {
-        Self { velocity_m_s, gradient_per_s: [[0.0; 3]; 3], acceleration_m_s2: [0.0; 3] }.validated()
+        Self {
+            velocity_m_s,
+            gradient_per_s: [[0.0; 3]; 3],
+            acceleration_m_s2: [0.0; 3],
+        }
+        .validated()
     }
 
     /// Says what is wrong with the wind, if anything.
@@ -31,7 +36,12 @@ impl Linear {
     /// # Errors
     /// [`Error::OutOfRange`] for a number that is not finite.
     pub fn validated(self) -> Result<Self, Error> {
-        let numbers = self.gradient_per_s.iter().flatten().chain(&self.velocity_m_s).chain(&self.acceleration_m_s2);
+        let numbers = self
+            .gradient_per_s
+            .iter()
+            .flatten()
+            .chain(&self.velocity_m_s)
+            .chain(&self.acceleration_m_s2);
         for &value in numbers {
             check("linear wind", value, "finite", |_| true)?;
         }
@@ -40,11 +50,20 @@ impl Linear {
 }
 
 impl Wind for Linear {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         for (point_m, out) in points_m.iter().zip(out_m_s) {
             for (d, component) in out.iter_mut().enumerate() {
-                let along: f64 = self.gradient_per_s[d].iter().zip(point_m).map(|(g, x)| g * x).sum();
+                let along: f64 = self.gradient_per_s[d]
+                    .iter()
+                    .zip(point_m)
+                    .map(|(g, x)| g * x)
+                    .sum();
                 *component = self.velocity_m_s[d] + along + self.acceleration_m_s2[d] * time_s;
             }
         }

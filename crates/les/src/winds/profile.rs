@@ -43,7 +43,12 @@ impl CirculationProfile {
     }
 
     /// Tangential velocity \[m/s\] at `radius_m` from an isolated vortex, equation (4).
-    pub fn tangential_velocity_m_s(self, circulation_m2_s: f64, core_radius_m: f64, radius_m: f64) -> f64 {
+    pub fn tangential_velocity_m_s(
+        self,
+        circulation_m2_s: f64,
+        core_radius_m: f64,
+        radius_m: f64,
+    ) -> f64 {
         radius_m * self.angular_velocity_rad_s(circulation_m2_s, core_radius_m, radius_m * radius_m)
     }
 
@@ -62,7 +67,9 @@ impl CirculationProfile {
             }
             Self::TwoScale(_) => {
                 // The strain has one maximum, beyond the core radius.
-                let strain = |s: f64| self.strain_rate_per_s(circulation_m2_s, core_radius_m, s * core_radius_m);
+                let strain = |s: f64| {
+                    self.strain_rate_per_s(circulation_m2_s, core_radius_m, s * core_radius_m)
+                };
                 let (mut low, mut high) = (0.0, 4.0);
                 for _ in 0..100 {
                     let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
@@ -91,7 +98,11 @@ impl CirculationProfile {
             Self::LambOseen => {
                 let s = LAMB_OSEEN_BETA * radius_squared_m2 / core2;
                 // (1 - exp(-s))/s tends to 1 - s/2 at the centre.
-                let ratio = if s < 1e-8 { 1.0 - 0.5 * s } else { -(-s).exp_m1() / s };
+                let ratio = if s < 1e-8 {
+                    1.0 - 0.5 * s
+                } else {
+                    -(-s).exp_m1() / s
+                };
                 circulation_m2_s * LAMB_OSEEN_BETA / (2.0 * PI * core2) * ratio
             }
             Self::TwoScale(shape) => {
@@ -102,7 +113,12 @@ impl CirculationProfile {
     }
 
     /// Strain rate \[1/s\] of an isolated vortex at `radius_m`, an upper bound of the line gradient there.
-    pub(crate) fn strain_rate_per_s(self, circulation_m2_s: f64, core_radius_m: f64, radius_m: f64) -> f64 {
+    pub(crate) fn strain_rate_per_s(
+        self,
+        circulation_m2_s: f64,
+        core_radius_m: f64,
+        radius_m: f64,
+    ) -> f64 {
         let core2 = core_radius_m * core_radius_m;
         let r2 = radius_m * radius_m;
         match self {
@@ -110,7 +126,11 @@ impl CirculationProfile {
             Self::LambOseen => {
                 let s = LAMB_OSEEN_BETA * r2 / core2;
                 let core = LAMB_OSEEN_BETA * circulation_m2_s / (2.0 * PI * core2);
-                if s < 1e-4 { core * 0.5 * s } else { core * (-(-s).exp_m1() / s - (-s).exp()) }
+                if s < 1e-4 {
+                    core * 0.5 * s
+                } else {
+                    core * (-(-s).exp_m1() / s - (-s).exp())
+                }
             }
             Self::TwoScale(shape) => {
                 let s2 = r2 / core2;
@@ -145,9 +165,13 @@ impl TwoScale {
     /// # Errors
     /// [`Error::OutOfRange`] unless the ratio is from 5 to 1000.
     pub fn new(span_over_core: f64) -> Result<Self, Error> {
-        check("span_over_core", span_over_core, "from 5 to 1000", |r| (5.0..=1000.0).contains(&r))?;
-        let of =
-            |inner: f64| Self { inner, joint: inner * span_over_core.powi(2) / OUTER * span_over_core.powf(-1.25) };
+        check("span_over_core", span_over_core, "from 5 to 1000", |r| {
+            (5.0..=1000.0).contains(&r)
+        })?;
+        let of = |inner: f64| Self {
+            inner,
+            joint: inner * span_over_core.powi(2) / OUTER * span_over_core.powf(-1.25),
+        };
         // The velocity grows with r at the core radius while r q' > exp(q) - 1; the stronger the core, the less.
         let (mut low, mut high) = (1e-6_f64, 1e3_f64);
         for _ in 0..200 {
@@ -175,11 +199,16 @@ mod tests {
     use super::*;
     use approx::assert_relative_eq;
 
-    const COMPACT: [CirculationProfile; 2] = [CirculationProfile::Algebraic, CirculationProfile::LambOseen];
+    const COMPACT: [CirculationProfile; 2] =
+        [CirculationProfile::Algebraic, CirculationProfile::LambOseen];
 
     fn profiles() -> [CirculationProfile; 3] {
         let broad = CirculationProfile::TwoScale(TwoScale::new(25.0).unwrap());
-        [CirculationProfile::Algebraic, CirculationProfile::LambOseen, broad]
+        [
+            CirculationProfile::Algebraic,
+            CirculationProfile::LambOseen,
+            broad,
+        ]
     }
 
     #[test]
@@ -205,7 +234,10 @@ mod tests {
                 let r = 2.35 * (5.0 + 0.5 * f64::from(step));
                 let point = 500.0 / (2.0 * PI * r);
                 let u = profile.tangential_velocity_m_s(500.0, 2.35, r);
-                assert!(u < point * (1.0 + 1e-14) && u > 0.96 * point, "{profile:?} at {r} m");
+                assert!(
+                    u < point * (1.0 + 1e-14) && u > 0.96 * point,
+                    "{profile:?} at {r} m"
+                );
             }
         }
     }
@@ -235,7 +267,10 @@ mod tests {
                     let h = 1e-4;
                     let ahead = velocity(r + h * e_y, h * e_z);
                     let behind = velocity(r - h * e_y, -h * e_z);
-                    let gradient = (0..2).map(|k| (ahead[k] - behind[k]) * [e_y, e_z][k]).sum::<f64>() / (2.0 * h);
+                    let gradient = (0..2)
+                        .map(|k| (ahead[k] - behind[k]) * [e_y, e_z][k])
+                        .sum::<f64>()
+                        / (2.0 * h);
                     largest = largest.max(gradient.abs());
                 }
             }
@@ -249,8 +284,9 @@ mod tests {
     #[test]
     fn strain_rate_peaks_at_the_largest_line_gradient_and_vanishes_at_the_centre() {
         for profile in profiles() {
-            let peak =
-                (0..100_000).map(|i| profile.strain_rate_per_s(500.0, 2.0, 1e-4 * f64::from(i))).fold(0.0, f64::max);
+            let peak = (0..100_000)
+                .map(|i| profile.strain_rate_per_s(500.0, 2.0, 1e-4 * f64::from(i)))
+                .fold(0.0, f64::max);
             let stated = profile.max_line_gradient_per_s(500.0, 2.0);
             assert_relative_eq!(peak, stated, max_relative = 1e-7);
             assert_eq!(profile.strain_rate_per_s(500.0, 2.0, 0.0), 0.0);
@@ -267,22 +303,42 @@ mod two_scale_tests {
         for span in [15.0, 40.0] {
             let profile = TwoScale::new(span).unwrap();
             let (near, slope) = profile.exponent(1e-6);
-            assert!((near / (profile.inner * 1e-6) - 1.0).abs() < 1e-6 && (slope / near - 2.0).abs() < 1e-6);
+            assert!(
+                (near / (profile.inner * 1e-6) - 1.0).abs() < 1e-6
+                    && (slope / near - 2.0).abs() < 1e-6
+            );
             let far = 30.0 * span;
             let (q, slope) = profile.exponent(far * far);
-            assert!((q / (10.0 * (far / span).powf(0.75)) - 1.0).abs() < 1e-3, "{q}");
+            assert!(
+                (q / (10.0 * (far / span).powf(0.75)) - 1.0).abs() < 1e-3,
+                "{q}"
+            );
             assert!((slope / q - 0.75).abs() < 1e-3);
             let velocity = |s: f64| -(-profile.exponent(s * s).0).exp_m1() / s;
             assert!(velocity(1.0) > velocity(0.998) && velocity(1.0) > velocity(1.002));
         }
         // With the constants of the literature, beta_i = 500, the core is 4.1 % of the span.
-        let usual = |core_over_span: f64| TwoScale::new(core_over_span.recip()).unwrap().inner / core_over_span.powi(2);
-        assert!(usual(0.0405) > 500.0 && usual(0.0415) < 500.0, "{} {}", usual(0.0405), usual(0.0415));
+        let usual = |core_over_span: f64| {
+            TwoScale::new(core_over_span.recip()).unwrap().inner / core_over_span.powi(2)
+        };
+        assert!(
+            usual(0.0405) > 500.0 && usual(0.0415) < 500.0,
+            "{} {}",
+            usual(0.0405),
+            usual(0.0415)
+        );
         // What lies beyond a part of the span.
-        let beyond = |span: f64, part: f64| (-TwoScale::new(span).unwrap().exponent((part * span).powi(2)).0).exp();
+        let beyond = |span: f64, part: f64| {
+            (-TwoScale::new(span)
+                .unwrap()
+                .exponent((part * span).powi(2))
+                .0)
+                .exp()
+        };
         for span in [25.0, 33.0, 40.0] {
             assert!(
-                (beyond(span, 1.0 / 12.0) - 0.215).abs() < 0.01 && (beyond(span, 1.0 / 18.0) - 0.333).abs() < 0.025
+                (beyond(span, 1.0 / 12.0) - 0.215).abs() < 0.01
+                    && (beyond(span, 1.0 / 18.0) - 0.333).abs() < 0.025
             );
         }
         assert!(TwoScale::new(1.0).is_err() && TwoScale::new(f64::NAN).is_err());

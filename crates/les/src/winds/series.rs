@@ -34,9 +34,19 @@ impl Series {
     /// [`Error::OutOfRange`] for an empty series, and for times that are not finite or do not increase.
     pub fn new(snapshots: impl IntoIterator<Item = (f64, GridSnapshot)>) -> Result<Self, Error> {
         let (time_s, fields): (Vec<f64>, Vec<GridSnapshot>) = snapshots.into_iter().unzip();
-        let gradients_per_s = fields.iter().map(|field| field.max_gradient_per_s(0.0)).collect();
-        let fields: Vec<Arc<dyn Wind>> = fields.into_iter().map(|field| Arc::new(field) as Arc<dyn Wind>).collect();
-        Self::of(time_s, gradients_per_s, Box::new(move |i| Ok(fields[i].clone())))
+        let gradients_per_s = fields
+            .iter()
+            .map(|field| field.max_gradient_per_s(0.0))
+            .collect();
+        let fields: Vec<Arc<dyn Wind>> = fields
+            .into_iter()
+            .map(|field| Arc::new(field) as Arc<dyn Wind>)
+            .collect();
+        Self::of(
+            time_s,
+            gradients_per_s,
+            Box::new(move |i| Ok(fields[i].clone())),
+        )
     }
 
     /// A series with the times \[s\] of its fields, the largest gradient of all \[1/s\], and what reads field number `i`.
@@ -49,28 +59,52 @@ impl Series {
         read: impl Fn(usize) -> Result<VolumeSnapshot, Error> + Send + Sync + 'static,
     ) -> Result<Self, Error> {
         let gradients_per_s = vec![max_gradient_per_s; time_s.len()];
-        Self::of(time_s, gradients_per_s, Box::new(move |i| Ok(Arc::new(read(i)?))))
+        Self::of(
+            time_s,
+            gradients_per_s,
+            Box::new(move |i| Ok(Arc::new(read(i)?))),
+        )
     }
 
-    fn of(time_s: Vec<f64>, max_gradient_per_s: Vec<f64>, read: Box<Reader>) -> Result<Self, Error> {
-        check("number of times", time_s.len() as f64, "at least 1", |n| n >= 1.0)?;
+    fn of(
+        time_s: Vec<f64>,
+        max_gradient_per_s: Vec<f64>,
+        read: Box<Reader>,
+    ) -> Result<Self, Error> {
+        check("number of times", time_s.len() as f64, "at least 1", |n| {
+            n >= 1.0
+        })?;
         let mut last_s = f64::NEG_INFINITY;
         for &time_s in &time_s {
-            check("time_s", time_s, "finite and greater than the one before", |t| t > last_s)?;
+            check(
+                "time_s",
+                time_s,
+                "finite and greater than the one before",
+                |t| t > last_s,
+            )?;
             last_s = time_s;
         }
-        Ok(Self { time_s, max_gradient_per_s, read, kept: Mutex::new(Vec::new()) })
+        Ok(Self {
+            time_s,
+            max_gradient_per_s,
+            read,
+            kept: Mutex::new(Vec::new()),
+        })
     }
 
     /// The last field that is not after `time_s`, and the weight of the next one if it counts.
     fn about(&self, time_s: f64) -> Result<(usize, Option<f64>), Error> {
         let (times_s, last) = (&self.time_s, self.time_s.len() - 1);
-        check("time_s", time_s, "between the first and the last time of the series", |t| {
-            times_s[0] <= t && t <= times_s[last]
-        })?;
+        check(
+            "time_s",
+            time_s,
+            "between the first and the last time of the series",
+            |t| times_s[0] <= t && t <= times_s[last],
+        )?;
         let at = times_s.partition_point(|&t| t <= time_s) - 1;
         let from_s = times_s[at];
-        let weight = (time_s != from_s && at != last).then(|| (time_s - from_s) / (times_s[at + 1] - from_s));
+        let weight = (time_s != from_s && at != last)
+            .then(|| (time_s - from_s) / (times_s[at + 1] - from_s));
         Ok((at, weight))
     }
 
@@ -89,28 +123,49 @@ impl Series {
 }
 
 impl Wind for Series {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         let (at, weight) = self.about(time_s)?;
         self.field(at)?.velocity_into(points_m, time_s, out_m_s)?;
         let Some(weight) = weight else { return Ok(()) };
-        combine(&*self.field(at + 1)?, points_m, time_s, out_m_s, |out, later| *out += weight * (later - *out))
+        combine(
+            &*self.field(at + 1)?,
+            points_m,
+            time_s,
+            out_m_s,
+            |out, later| *out += weight * (later - *out),
+        )
     }
 
     /// As the velocity: linear between two times, unknown where one of them does not know it.
-    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), Error> {
+    fn scalar_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
         let (at, weight) = self.about(time_s)?;
         self.field(at)?.scalar_into(points_m, time_s, out)?;
         let Some(weight) = weight else { return Ok(()) };
         let mut later = vec![0.0; out.len()];
-        self.field(at + 1)?.scalar_into(points_m, time_s, &mut later)?;
-        out.iter_mut().zip(&later).for_each(|(out, later)| *out += weight * (later - *out));
+        self.field(at + 1)?
+            .scalar_into(points_m, time_s, &mut later)?;
+        out.iter_mut()
+            .zip(&later)
+            .for_each(|(out, later)| *out += weight * (later - *out));
         Ok(())
     }
 
     /// The larger of those of the two fields about the time; of a time outside the series, the largest of all.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        let about = self.about(time_s).map(|(at, weight)| at..=at + usize::from(weight.is_some()));
+        let about = self
+            .about(time_s)
+            .map(|(at, weight)| at..=at + usize::from(weight.is_some()));
         let gradients = &self.max_gradient_per_s[about.unwrap_or(0..=self.time_s.len() - 1)];
         gradients.iter().copied().fold(0.0, f64::max)
     }
@@ -124,9 +179,17 @@ mod tests {
     /// A uniform velocity on a small mesh.
     fn uniform(velocity_m_s: [f64; 3]) -> GridSnapshot {
         let axis: Vec<f64> = (0..4).map(f64::from).collect();
-        let open = Edges::Bounded { low: Side::Open, high: Side::Open };
-        let mesh =
-            PlaneMesh { y_m: axis.clone(), z_m: axis, y_edges: open, z_edges: open, outside: OutsidePolicy::Error };
+        let open = Edges::Bounded {
+            low: Side::Open,
+            high: Side::Open,
+        };
+        let mesh = PlaneMesh {
+            y_m: axis.clone(),
+            z_m: axis,
+            y_edges: open,
+            z_edges: open,
+            outside: OutsidePolicy::Error,
+        };
         GridSnapshot::new(&mesh, &[velocity_m_s; 16]).unwrap()
     }
 
@@ -168,7 +231,16 @@ mod tests {
     fn times_outside_the_series_and_disorder_are_refused() {
         let wind = series(&[0.0, 1.0], |_| [1.0; 3]);
         for t in [-1e-9, 1.0 + 1e-9, f64::NAN] {
-            assert!(matches!(at(&wind, t), Err(Error::OutOfRange { field: "time_s", .. })), "{t}");
+            assert!(
+                matches!(
+                    at(&wind, t),
+                    Err(Error::OutOfRange {
+                        field: "time_s",
+                        ..
+                    })
+                ),
+                "{t}"
+            );
         }
         assert!(Series::new([]).is_err());
         assert!(Series::new([(1.0, uniform([0.0; 3])), (1.0, uniform([0.0; 3]))]).is_err());

@@ -46,8 +46,17 @@ impl VolumeSnapshot {
         let [u, v, w] = std::array::from_fn(|c| Padded::new(&components[c], edges, |_| c));
         let components = [u?, v?, w?];
         let largest = |p: &Padded| p.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        let max_speed_m_s = components.iter().map(|p| largest(p).powi(2)).sum::<f64>().sqrt();
-        let mut field = Self { components, scalar: None, max_gradient_per_s: 0.0, max_speed_m_s };
+        let max_speed_m_s = components
+            .iter()
+            .map(|p| largest(p).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        let mut field = Self {
+            components,
+            scalar: None,
+            max_gradient_per_s: 0.0,
+            max_speed_m_s,
+        };
         field.max_gradient_per_s = field.steepest_per_s()?;
         Ok(field)
     }
@@ -62,11 +71,17 @@ impl VolumeSnapshot {
             other => other,
         };
         let edges = edges.map(|edges| match edges {
-            Edges::Bounded { low, high } => Edges::Bounded { low: even(low), high: even(high) },
+            Edges::Bounded { low, high } => Edges::Bounded {
+                low: even(low),
+                high: even(high),
+            },
             periodic @ Edges::Periodic { .. } => periodic,
         });
         // At a wall without friction the velocity along it is mirrored as it is.
-        Ok(Self { scalar: Some(Padded::new(scalar, edges, |direction| (direction + 1) % 3)?), ..self })
+        Ok(Self {
+            scalar: Some(Padded::new(scalar, edges, |direction| (direction + 1) % 3)?),
+            ..self
+        })
     }
 
     /// The largest strain rate in the middle of the cells of u, from differences of their corners.
@@ -78,7 +93,10 @@ impl VolumeSnapshot {
         let [xs, ys, zs] = nodes_m;
         let nx = xs.len();
         let plane = |z_m: f64| -> Result<Vec<[f64; 3]>, Error> {
-            let points: Vec<[f64; 3]> = ys.iter().flat_map(|&y_m| xs.iter().map(move |&x_m| [x_m, y_m, z_m])).collect();
+            let points: Vec<[f64; 3]> = ys
+                .iter()
+                .flat_map(|&y_m| xs.iter().map(move |&x_m| [x_m, y_m, z_m]))
+                .collect();
             let mut velocity = vec![[0.0; 3]; points.len()];
             self.velocity_into(&points, 0.0, &mut velocity)?;
             Ok(velocity)
@@ -123,7 +141,12 @@ impl VolumeSnapshot {
 
 impl Wind for VolumeSnapshot {
     /// As the trait says; NaN outside the mesh.
-    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        _time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         for (point_m, out) in points_m.iter().zip(out_m_s) {
             for (component, out) in self.components.iter().zip(out) {
@@ -139,23 +162,42 @@ impl Wind for VolumeSnapshot {
         self.max_gradient_per_s
     }
 
-    fn scalar_into(&self, points_m: &[[f64; 3]], _time_s: f64, out: &mut [f64]) -> Result<(), Error> {
+    fn scalar_into(
+        &self,
+        points_m: &[[f64; 3]],
+        _time_s: f64,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out.len())?;
-        let at = |point_m: &[f64; 3]| self.scalar.as_ref().and_then(|scalar| scalar.at(point_m)).unwrap_or(f64::NAN);
-        out.iter_mut().zip(points_m).for_each(|(out, point_m)| *out = at(point_m));
+        let at = |point_m: &[f64; 3]| {
+            self.scalar
+                .as_ref()
+                .and_then(|scalar| scalar.at(point_m))
+                .unwrap_or(f64::NAN)
+        };
+        out.iter_mut()
+            .zip(points_m)
+            .for_each(|(out, point_m)| *out = at(point_m));
         Ok(())
     }
 }
 
 impl Padded {
     /// `number` says for each direction which component of a velocity the values are to its walls.
-    fn new(component: &VolumeComponent, edges: [Edges; 3], number: impl Fn(usize) -> usize) -> Result<Self, Error> {
-        let [x, y, z] = std::array::from_fn(|d| Axis::new(AXIS_NAMES[d], &component.nodes_m[d], edges[d]));
+    fn new(
+        component: &VolumeComponent,
+        edges: [Edges; 3],
+        number: impl Fn(usize) -> usize,
+    ) -> Result<Self, Error> {
+        let [x, y, z] =
+            std::array::from_fn(|d| Axis::new(AXIS_NAMES[d], &component.nodes_m[d], edges[d]));
         let axes = [x?, y?, z?];
         let [nx, ny, nz] = axes.each_ref().map(Axis::nodes);
         let values = &component.values;
         let allowed = "as many as nodes along x, y and z give";
-        check("number of values", values.len() as f64, allowed, |n| n == (nx * ny * nz) as f64)?;
+        check("number of values", values.len() as f64, allowed, |n| {
+            n == (nx * ny * nz) as f64
+        })?;
         for &value in values {
             check("velocity_m_s", value, "finite", |_| true)?;
         }
@@ -168,7 +210,8 @@ impl Padded {
         // Ghosts direction by direction; what is made of places that are not there yet, a later direction replaces.
         let strides = [1, px, px * py];
         for d in 0..3 {
-            let count: [usize; 3] = std::array::from_fn(|along| if along == d { 1 } else { [px, py, pz][along] });
+            let count: [usize; 3] =
+                std::array::from_fn(|along| if along == d { 1 } else { [px, py, pz][along] });
             for (ghost_at, ghost) in ghost_places(&axes[d]) {
                 for (k, j) in (0..count[2]).flat_map(|k| (0..count[1]).map(move |j| (k, j))) {
                     for i in 0..count[0] {
@@ -179,7 +222,10 @@ impl Padded {
                 }
             }
         }
-        Ok(Self { axes, values: padded })
+        Ok(Self {
+            axes,
+            values: padded,
+        })
     }
 
     /// The value at a place, (26); none outside.
@@ -192,7 +238,11 @@ impl Padded {
         for (dk, weight_z) in across_z.iter().enumerate() {
             for (dj, weight_y) in across_y.iter().enumerate() {
                 let start = ((k + dk) * py + j + dj) * px + i;
-                let row: f64 = self.values[start..start + 4].iter().zip(&across_x).map(|(v, w)| v * w).sum();
+                let row: f64 = self.values[start..start + 4]
+                    .iter()
+                    .zip(&across_x)
+                    .map(|(v, w)| v * w)
+                    .sum();
                 sum += weight_z * weight_y * row;
             }
         }

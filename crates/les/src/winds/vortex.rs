@@ -77,12 +77,27 @@ impl VortexPair {
     /// # Errors
     /// [`Error::OutOfRange`] with the first field that is not allowed.
     pub fn validate(&self) -> Result<(), Error> {
-        check("circulation_m2_s", self.circulation_m2_s, "zero or positive", |v| v >= 0.0)?;
+        check(
+            "circulation_m2_s",
+            self.circulation_m2_s,
+            "zero or positive",
+            |v| v >= 0.0,
+        )?;
         check("spacing_m", self.spacing_m, "positive", |v| v > 0.0)?;
         check("core_radius_m", self.core_radius_m, "positive", |v| v > 0.0)?;
-        check("lateral_position_m", self.lateral_position_m, "finite", |_| true)?;
+        check(
+            "lateral_position_m",
+            self.lateral_position_m,
+            "finite",
+            |_| true,
+        )?;
         match self.ground {
-            Ground::Image => check("height_m", self.height_m, "positive, above the ground", |v| v > 0.0),
+            Ground::Image => check(
+                "height_m",
+                self.height_m,
+                "positive, above the ground",
+                |v| v > 0.0,
+            ),
             Ground::None => check("height_m", self.height_m, "finite", |_| true),
         }
     }
@@ -124,8 +139,15 @@ impl VortexPair {
                     .map(|i| {
                         let radius_m = 5.0 + f64::from(i) * step;
                         let is_end = i == 0 || i == SIMPSON_PANELS;
-                        let weight = if is_end { 1.0 } else { f64::from(2 + 2 * (i % 2)) };
-                        weight * self.profile.circulation_m2_s(self.circulation_m2_s, core, radius_m)
+                        let weight = if is_end {
+                            1.0
+                        } else {
+                            f64::from(2 + 2 * (i % 2))
+                        };
+                        weight
+                            * self
+                                .profile
+                                .circulation_m2_s(self.circulation_m2_s, core, radius_m)
                     })
                     .sum();
                 sum * step / 30.0
@@ -142,17 +164,28 @@ impl VortexPair {
         let half_m = 0.5 * self.spacing_m;
         let (half_m, height_m) = match (self.motion, self.ground) {
             (Motion::Frozen, _) => (half_m, self.height_m),
-            (Motion::Inviscid, Ground::None) => (half_m, self.height_m - self.descent_speed_m_s() * time_s),
+            (Motion::Inviscid, Ground::None) => {
+                (half_m, self.height_m - self.descent_speed_m_s() * time_s)
+            }
             (Motion::Inviscid, Ground::Image) => self.path_over_ground(half_m, time_s),
         };
-        Centres { left_y_m: self.lateral_position_m - half_m, right_y_m: self.lateral_position_m + half_m, height_m }
+        Centres {
+            left_y_m: self.lateral_position_m - half_m,
+            right_y_m: self.lateral_position_m + half_m,
+            height_m,
+        }
     }
 
     /// Velocity `(v, w)` of one vortex of circulation `sign * Gamma0`, anticlockwise if positive, seen at `(dy, dz)`
     /// from its centre.
     fn vortex_velocity(&self, sign: f64, dy_m: f64, dz_m: f64) -> [f64; 2] {
         let square_m2 = dy_m * dy_m + dz_m * dz_m;
-        let omega = sign * self.profile.angular_velocity_rad_s(self.circulation_m2_s, self.core_radius_m, square_m2);
+        let omega = sign
+            * self.profile.angular_velocity_rad_s(
+                self.circulation_m2_s,
+                self.core_radius_m,
+                square_m2,
+            );
         [-omega * dz_m, omega * dy_m]
     }
 
@@ -164,7 +197,11 @@ impl VortexPair {
         let cot = cot_start - invariant * self.circulation_m2_s * time_s / (8.0 * PI);
         // The root of tan^2 + 2 cot tan - 1 that is positive, without cancellation for either sign.
         let root = cot.hypot(1.0);
-        let tangent = if cot > 0.0 { 1.0 / (cot + root) } else { root - cot };
+        let tangent = if cot > 0.0 {
+            1.0 / (cot + root)
+        } else {
+            root - cot
+        };
         let half_m = tangent.hypot(1.0) / invariant.sqrt();
         (half_m, half_m / tangent)
     }
@@ -174,7 +211,12 @@ impl VortexPair {
 const SIMPSON_PANELS: i32 = 400;
 
 impl Wind for VortexPair {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         check("time_s", time_s, "finite", |_| true)?;
         let centres = self.centres(time_s);
@@ -210,14 +252,20 @@ impl Wind for VortexPair {
                 vec![spacing_m, image_m, spacing_m.hypot(image_m)]
             }
         };
-        let own = self.profile.max_line_gradient_per_s(self.circulation_m2_s, self.core_radius_m);
+        let own = self
+            .profile
+            .max_line_gradient_per_s(self.circulation_m2_s, self.core_radius_m);
         // A point is nearest to one vortex, so each other one is at least half their distance away; beyond the peak of
         // the strain, which lies within 1.2 core radii, the strain only falls.
         let added: f64 = others_m
             .iter()
             .map(|&distance_m| {
                 if distance_m > 2.4 * self.core_radius_m {
-                    self.profile.strain_rate_per_s(self.circulation_m2_s, self.core_radius_m, 0.5 * distance_m)
+                    self.profile.strain_rate_per_s(
+                        self.circulation_m2_s,
+                        self.core_radius_m,
+                        0.5 * distance_m,
+                    )
                 } else {
                     own
                 }
@@ -254,7 +302,12 @@ impl Aircraft {
 
     /// At 70 m/s, the approach speed of the chapter, in standard air at sea level.
     const fn landing(mass_kg: f64, span_m: f64) -> Self {
-        Self { mass_kg, speed_m_s: 70.0, span_m, air_density_kg_m3: 1.225 }
+        Self {
+            mass_kg,
+            speed_m_s: 70.0,
+            span_m,
+            air_density_kg_m3: 1.225,
+        }
     }
 
     /// Distance between the vortices, `b0 = pi b/4` \[m\].
@@ -273,7 +326,12 @@ impl Aircraft {
     pub fn circulation_m2_s(&self) -> Result<f64, Error> {
         check("mass_kg", self.mass_kg, "positive", |v| v > 0.0)?;
         check("speed_m_s", self.speed_m_s, "positive", |v| v > 0.0)?;
-        check("air_density_kg_m3", self.air_density_kg_m3, "positive", |v| v > 0.0)?;
+        check(
+            "air_density_kg_m3",
+            self.air_density_kg_m3,
+            "positive",
+            |v| v > 0.0,
+        )?;
         let lift_n = self.mass_kg * GRAVITY_M_S2;
         Ok(lift_n / (self.air_density_kg_m3 * self.speed_m_s * self.spacing_m()?))
     }

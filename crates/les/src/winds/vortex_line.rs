@@ -47,11 +47,23 @@ impl VortexLines {
             let allowed = "2 of an endless vortex, 2 or more of another";
             check("number of nodes", nodes as f64, allowed, |_| fits)?;
             for pair in line.nodes_m.windows(2) {
-                check("distance of nodes_m", norm(minus(pair[1], pair[0])), "finite and positive", |d| d > 0.0)?;
+                check(
+                    "distance of nodes_m",
+                    norm(minus(pair[1], pair[0])),
+                    "finite and positive",
+                    |d| d > 0.0,
+                )?;
             }
-            check("circulation_m2_s", line.circulation_m2_s, "finite", |_| true)?;
+            check("circulation_m2_s", line.circulation_m2_s, "finite", |_| {
+                true
+            })?;
             check("core_radius_m", line.core_radius_m, "positive", |r| r > 0.0)?;
-            check("axial_deficit_m_s", line.axial_deficit_m_s, "finite", |_| true)?;
+            check(
+                "axial_deficit_m_s",
+                line.axial_deficit_m_s,
+                "finite",
+                |_| true,
+            )?;
         }
         let image = |line: &VortexLine| VortexLine {
             nodes_m: line.nodes_m.iter().map(|[x, y, z]| [*x, *y, -z]).collect(),
@@ -66,12 +78,20 @@ impl VortexLines {
         };
         let lines: Vec<VortexLine> = lines.into_iter().chain(images).collect();
         let max_gradient_per_s = largest_gradient_per_s(&lines);
-        Ok(Self { lines, max_gradient_per_s })
+        Ok(Self {
+            lines,
+            max_gradient_per_s,
+        })
     }
 }
 
 impl Wind for VortexLines {
-    fn velocity_into(&self, points_m: &[[f64; 3]], _time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        _time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         for (point_m, out) in points_m.iter().zip(out_m_s) {
             *out = [0.0; 3];
@@ -99,7 +119,11 @@ impl VortexLine {
             let (s1, s2) = (dot(t, a), dot(t, b));
             let d: [f64; 3] = std::array::from_fn(|i| s1 * t[i] - a[i]);
             let q = dot(d, d) + self.core_radius_m * self.core_radius_m;
-            let reach = if self.endless { 2.0 } else { s2 / (s2 * s2 + q).sqrt() - s1 / (s1 * s1 + q).sqrt() };
+            let reach = if self.endless {
+                2.0
+            } else {
+                s2 / (s2 * s2 + q).sqrt() - s1 / (s1 * s1 + q).sqrt()
+            };
             let strength = self.circulation_m2_s / (4.0 * PI) / q * reach;
             // The axes are left-handed, so the product is taken by components: along +x it turns y towards z.
             let turn = cross(t, d);
@@ -107,18 +131,24 @@ impl VortexLine {
                 out_m_s[i] += strength * turn[i];
             }
             if self.axial_deficit_m_s != 0.0 && self.endless {
-                let along = -self.axial_deficit_m_s * (-dot(d, d) / (self.core_radius_m * self.core_radius_m)).exp();
-                out_m_s.iter_mut().zip(t).for_each(|(out, t)| *out += along * t);
+                let along = -self.axial_deficit_m_s
+                    * (-dot(d, d) / (self.core_radius_m * self.core_radius_m)).exp();
+                out_m_s
+                    .iter_mut()
+                    .zip(t)
+                    .for_each(|(out, t)| *out += along * t);
             }
         }
     }
 
     fn own_gradient_per_s(&self) -> f64 {
-        let axial = self.axial_deficit_m_s.abs() * (2.0 / std::f64::consts::E).sqrt() / self.core_radius_m;
+        let axial =
+            self.axial_deficit_m_s.abs() * (2.0 / std::f64::consts::E).sqrt() / self.core_radius_m;
         let turning = CirculationProfile::Algebraic;
         // A corner of a polyline adds up to as much as the segment itself.
         let corners = if self.nodes_m.len() > 2 { 2.0 } else { 1.0 };
-        corners * turning.max_line_gradient_per_s(self.circulation_m2_s.abs(), self.core_radius_m) + 0.5 * axial
+        corners * turning.max_line_gradient_per_s(self.circulation_m2_s.abs(), self.core_radius_m)
+            + 0.5 * axial
     }
 }
 
@@ -127,23 +157,38 @@ fn largest_gradient_per_s(lines: &[VortexLine]) -> f64 {
         let nearest_m = if other.endless && line.endless {
             distance_m(line, other)
         } else {
-            let pairs = line.nodes_m.windows(2).flat_map(|a| other.nodes_m.windows(2).map(move |b| (a, b)));
-            pairs.map(|(a, b)| segment_distance_m([a[0], a[1]], [b[0], b[1]])).fold(f64::INFINITY, f64::min)
+            let pairs = line
+                .nodes_m
+                .windows(2)
+                .flat_map(|a| other.nodes_m.windows(2).map(move |b| (a, b)));
+            pairs
+                .map(|(a, b)| segment_distance_m([a[0], a[1]], [b[0], b[1]]))
+                .fold(f64::INFINITY, f64::min)
         };
         let (profile, core_m) = (CirculationProfile::Algebraic, other.core_radius_m);
         // Beyond the core radius the strain only falls.
-        profile.strain_rate_per_s(other.circulation_m2_s.abs(), core_m, (0.5 * nearest_m).max(core_m))
+        profile.strain_rate_per_s(
+            other.circulation_m2_s.abs(),
+            core_m,
+            (0.5 * nearest_m).max(core_m),
+        )
     };
     let of = |i: usize| {
         let others = lines.iter().enumerate().filter(|(j, _)| *j != i);
-        lines[i].own_gradient_per_s() + others.map(|(_, other)| added(other, &lines[i])).sum::<f64>()
+        lines[i].own_gradient_per_s()
+            + others
+                .map(|(_, other)| added(other, &lines[i]))
+                .sum::<f64>()
     };
     (0..lines.len()).map(of).fold(0.0, f64::max)
 }
 
 /// Distance of two straight lines without end.
 fn distance_m(a: &VortexLine, b: &VortexLine) -> f64 {
-    let (along_a, along_b) = (minus(a.nodes_m[1], a.nodes_m[0]), minus(b.nodes_m[1], b.nodes_m[0]));
+    let (along_a, along_b) = (
+        minus(a.nodes_m[1], a.nodes_m[0]),
+        minus(b.nodes_m[1], b.nodes_m[0]),
+    );
     let between = minus(b.nodes_m[0], a.nodes_m[0]);
     let normal = cross(along_a, along_b);
     if norm(normal) > 1e-12 * norm(along_a) * norm(along_b) {

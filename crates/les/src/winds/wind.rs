@@ -19,7 +19,12 @@ pub trait Wind: Send + Sync {
     /// # Errors
     /// [`Error::LengthMismatch`] if the slices differ in length; what else depends on the wind, such as
     /// [`Error::OutsideMesh`].
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error>;
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error>;
 
     /// Upper bound of the gradient of the radial velocity along any straight line, `|e . grad(u) . e|` for unit
     /// `e` \[1/s\]: the largest eigenvalue of the strain rate. It sets how thin the layers of a lidar signal must
@@ -31,7 +36,12 @@ pub trait Wind: Send + Sync {
     ///
     /// # Errors
     /// As [`Wind::velocity_into`].
-    fn scalar_into(&self, points_m: &[[f64; 3]], _time_s: f64, out: &mut [f64]) -> Result<(), Error> {
+    fn scalar_into(
+        &self,
+        points_m: &[[f64; 3]],
+        _time_s: f64,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out.len())?;
         out.fill(f64::NAN);
         Ok(())
@@ -55,30 +65,54 @@ pub(super) fn combine(
 ) -> Result<(), Error> {
     let mut others = vec![[0.0; 3]; points_m.len()];
     wind.velocity_into(points_m, time_s, &mut others)?;
-    out_m_s.as_flattened_mut().iter_mut().zip(others.as_flattened()).for_each(|(out, other)| act(out, *other));
+    out_m_s
+        .as_flattened_mut()
+        .iter_mut()
+        .zip(others.as_flattened())
+        .for_each(|(out, other)| act(out, *other));
     Ok(())
 }
 
 impl Wind for Sum {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), Error> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         out_m_s.fill([0.0; 3]);
-        self.winds.iter().try_for_each(|wind| combine(&**wind, points_m, time_s, out_m_s, |sum, other| *sum += other))
+        self.winds.iter().try_for_each(|wind| {
+            combine(&**wind, points_m, time_s, out_m_s, |sum, other| {
+                *sum += other
+            })
+        })
     }
 
     /// The sum of the bounds: sharp when one wind dominates.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
-        self.winds.iter().map(|wind| wind.max_gradient_per_s(time_s)).sum()
+        self.winds
+            .iter()
+            .map(|wind| wind.max_gradient_per_s(time_s))
+            .sum()
     }
 
     /// At each point that of the first wind that knows it.
-    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), Error> {
+    fn scalar_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out: &mut [f64],
+    ) -> Result<(), Error> {
         check_lengths(points_m.len(), out.len())?;
         out.fill(f64::NAN);
         let mut part = vec![0.0; points_m.len()];
         for wind in &self.winds {
             wind.scalar_into(points_m, time_s, &mut part)?;
-            out.iter_mut().zip(&part).filter(|(out, _)| out.is_nan()).for_each(|(out, known)| *out = *known);
+            out.iter_mut()
+                .zip(&part)
+                .filter(|(out, _)| out.is_nan())
+                .for_each(|(out, known)| *out = *known);
         }
         Ok(())
     }
@@ -92,7 +126,13 @@ mod tests {
     #[test]
     fn sum_adds_velocities_and_gradients() {
         let uniform = |v| Box::new(Linear::uniform(v).unwrap()) as Box<dyn Wind>;
-        let sum = Sum { winds: vec![uniform([1.0, 2.0, 3.0]), Box::<Sum>::default(), uniform([0.5, -4.0, 0.25])] };
+        let sum = Sum {
+            winds: vec![
+                uniform([1.0, 2.0, 3.0]),
+                Box::<Sum>::default(),
+                uniform([0.5, -4.0, 0.25]),
+            ],
+        };
         let points = vec![[0.0; 3]; 519];
         let mut out = vec![[9.0; 3]; points.len()];
         sum.velocity_into(&points, 0.0, &mut out).unwrap();
@@ -103,13 +143,18 @@ mod tests {
     #[test]
     fn an_empty_sum_is_calm() {
         let mut out = [[9.0; 3]; 2];
-        Sum::default().velocity_into(&[[1.0; 3]; 2], 0.0, &mut out).unwrap();
+        Sum::default()
+            .velocity_into(&[[1.0; 3]; 2], 0.0, &mut out)
+            .unwrap();
         assert_eq!(out, [[0.0; 3]; 2]);
     }
 
     #[test]
     fn every_wind_refuses_slices_of_different_length() {
-        let winds: [Box<dyn Wind>; 2] = [Box::new(Linear::uniform([1.0; 3]).unwrap()), Box::<Sum>::default()];
+        let winds: [Box<dyn Wind>; 2] = [
+            Box::new(Linear::uniform([1.0; 3]).unwrap()),
+            Box::<Sum>::default(),
+        ];
         for wind in &winds {
             let result = wind.velocity_into(&[[0.0; 3]; 3], 0.0, &mut [[0.0; 3]; 2]);
             assert_eq!(result, Err(Error::LengthMismatch { points: 3, out: 2 }));
@@ -118,6 +163,12 @@ mod tests {
 
     #[test]
     fn a_wind_that_is_not_finite_is_refused() {
-        assert!(matches!(Linear::uniform([0.0, f64::NAN, 0.0]), Err(Error::OutOfRange { field: "linear wind", .. })));
+        assert!(matches!(
+            Linear::uniform([0.0, f64::NAN, 0.0]),
+            Err(Error::OutOfRange {
+                field: "linear wind",
+                ..
+            })
+        ));
     }
 }

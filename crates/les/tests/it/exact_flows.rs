@@ -18,19 +18,38 @@ fn profile_error(flow: &Flow, exact: impl Fn(f64) -> f64) -> f64 {
     let [nx, ny, _] = flow.mesh().cells();
     let z_m = flow.mesh().centre_m(2);
     let u = flow.face_velocity_m_s(0);
-    u.iter().enumerate().map(|(i, u)| (u - exact(z_m[i / (nx * ny)])).abs()).fold(0.0, f64::max)
+    u.iter()
+        .enumerate()
+        .map(|(i, u)| (u - exact(z_m[i / (nx * ny)])).abs())
+        .fold(0.0, f64::max)
 }
 
 #[test]
 fn poiseuilles_parabola_and_couettes_line_are_steady_to_round_off_on_equal_cells() {
     let poiseuille = run(
-        &cases::Plates { cells: 24, strength: 0.0, viscosity_m2_s: 0.1, step_s: 0.05 }.poiseuille(1.0).unwrap(),
+        &cases::Plates {
+            cells: 24,
+            strength: 0.0,
+            viscosity_m2_s: 0.1,
+            step_s: 0.05,
+        }
+        .poiseuille(1.0)
+        .unwrap(),
         200,
     );
     let error = profile_error(&poiseuille, |z| 1.0 - z * z);
     assert!(error < 1e-12, "Poiseuille {error}");
-    let couette =
-        run(&cases::Plates { cells: 24, strength: 0.0, viscosity_m2_s: 0.1, step_s: 0.05 }.couette(1.0).unwrap(), 200);
+    let couette = run(
+        &cases::Plates {
+            cells: 24,
+            strength: 0.0,
+            viscosity_m2_s: 0.1,
+            step_s: 0.05,
+        }
+        .couette(1.0)
+        .unwrap(),
+        200,
+    );
     let error = profile_error(&couette, |z| z);
     assert!(error < 1e-12, "Couette {error}");
 }
@@ -38,11 +57,31 @@ fn poiseuilles_parabola_and_couettes_line_are_steady_to_round_off_on_equal_cells
 #[test]
 fn plates_drag_a_fluid_at_rest_to_the_steady_profile() {
     let error = |flow: &Flow, exact: fn(f64) -> f64| profile_error(flow, exact);
-    let couette =
-        run(&cases::Plates { cells: 32, strength: 1.5, viscosity_m2_s: 0.1, step_s: 0.2 }.couette(0.0).unwrap(), 1000);
-    assert!(error(&couette, |z| z) < 5e-5, "Couette {}", error(&couette, |z| z));
+    let couette = run(
+        &cases::Plates {
+            cells: 32,
+            strength: 1.5,
+            viscosity_m2_s: 0.1,
+            step_s: 0.2,
+        }
+        .couette(0.0)
+        .unwrap(),
+        1000,
+    );
+    assert!(
+        error(&couette, |z| z) < 5e-5,
+        "Couette {}",
+        error(&couette, |z| z)
+    );
     let poiseuille = run(
-        &cases::Plates { cells: 32, strength: 1.5, viscosity_m2_s: 0.1, step_s: 0.2 }.poiseuille(0.0).unwrap(),
+        &cases::Plates {
+            cells: 32,
+            strength: 1.5,
+            viscosity_m2_s: 0.1,
+            step_s: 0.2,
+        }
+        .poiseuille(0.0)
+        .unwrap(),
         1000,
     );
     let found = error(&poiseuille, |z| 1.0 - z * z);
@@ -53,10 +92,19 @@ fn plates_drag_a_fluid_at_rest_to_the_steady_profile() {
 fn a_layer_between_plates_decays_with_third_order_in_space_and_second_in_time() {
     let nu = 0.1;
     let error = |cells: usize, step_s: f64| {
-        let case = cases::Plates { cells, strength: 1.5, viscosity_m2_s: nu, step_s }.decaying_layer().unwrap();
+        let case = cases::Plates {
+            cells,
+            strength: 1.5,
+            viscosity_m2_s: nu,
+            step_s,
+        }
+        .decaying_layer()
+        .unwrap();
         let steps = (2.0 / step_s).round() as usize;
         let flow = run(&case, steps);
-        profile_error(&flow, |z| (0.5 * PI * z).cos() * (-nu * PI * PI / 4.0 * 2.0).exp())
+        profile_error(&flow, |z| {
+            (0.5 * PI * z).cos() * (-nu * PI * PI / 4.0 * 2.0).exp()
+        })
     };
     let order = (error(16, 1e-3) / error(32, 1e-3)).log2();
     assert!(order > 2.8, "in space: {order}");
@@ -68,19 +116,36 @@ fn a_layer_between_plates_decays_with_third_order_in_space_and_second_in_time() 
 #[test]
 fn an_impulsively_started_plate_is_followed_at_any_viscous_number() {
     // nu dt/h^2 reaches 1e4 at the wall; the ringing of Crank and Nicolson's scheme must decay, nothing may blow up.
-    let plain = cases::Plates { cells: 64, strength: 2.5, viscosity_m2_s: 1.0, step_s: 0.01 }.rayleigh_plate().unwrap();
+    let plain = cases::Plates {
+        cells: 64,
+        strength: 2.5,
+        viscosity_m2_s: 1.0,
+        step_s: 0.01,
+    }
+    .rayleigh_plate()
+    .unwrap();
     // After four viscous times the profile is Couette's: 1 at z = -1, 0 at z = 1.
     let off = |case: &Case, steps: usize| profile_error(&run(case, steps), |z| 0.5 * (1.0 - z));
     // Crank and Nicolson's scheme turns the sign of the stiffest wave in every step and takes off 4/(nu dt k^2) of it: by 3600
     // steps at the 1.2e4 of the cell at the wall to about a third.
     let (early, late) = (off(&plain, 400), off(&plain, 4000));
-    assert!(early < 1.0 && (0.1..0.7).contains(&(late / early)), "{early} {late}");
+    assert!(
+        early < 1.0 && (0.1..0.7).contains(&(late / early)),
+        "{early} {late}"
+    );
     let mut damped = plain;
     damped.settings.damped_steps = 4;
     assert!(off(&damped, 400) < 1e-4, "{}", off(&damped, 400));
     let nu = 0.01;
     let flow = run(
-        &cases::Plates { cells: 96, strength: 2.0, viscosity_m2_s: nu, step_s: 0.002 }.rayleigh_plate().unwrap(),
+        &cases::Plates {
+            cells: 96,
+            strength: 2.0,
+            viscosity_m2_s: nu,
+            step_s: 0.002,
+        }
+        .rayleigh_plate()
+        .unwrap(),
         1000,
     );
     let error = profile_error(&flow, |z| erfc((z + 1.0) / (2.0 * (nu * 2.0).sqrt())));
@@ -98,7 +163,9 @@ fn erfc(x: f64) -> f64 {
         }
         1.0 - 2.0 / PI.sqrt() * sum
     } else {
-        let fraction = (1..200).rev().fold(0.0, |tail, n| 0.5 * f64::from(n) / (x + tail));
+        let fraction = (1..200)
+            .rev()
+            .fold(0.0, |tail, n| 0.5 * f64::from(n) / (x + tail));
         (-x * x).exp() / PI.sqrt() / (x + fraction)
     }
 }
@@ -106,9 +173,15 @@ fn erfc(x: f64) -> f64 {
 fn plane_error(flow: &Flow, nu: f64) -> f64 {
     let (y_m, z_m) = (flow.mesh().face_m(1), flow.mesh().centre_m(2));
     let ny = y_m.len() - 1;
-    let exact =
-        |place: usize| cases::taylor_green_plane_exact([0.0, y_m[place % ny], z_m[place / ny]], flow.time_s(), nu)[1];
-    flow.face_velocity_m_s(1).iter().enumerate().map(|(i, v)| (v - exact(i)).abs()).fold(0.0, f64::max)
+    let exact = |place: usize| {
+        cases::taylor_green_plane_exact([0.0, y_m[place % ny], z_m[place / ny]], flow.time_s(), nu)
+            [1]
+    };
+    flow.face_velocity_m_s(1)
+        .iter()
+        .enumerate()
+        .map(|(i, v)| (v - exact(i)).abs())
+        .fold(0.0, f64::max)
 }
 
 #[test]
@@ -128,9 +201,17 @@ fn plane_vortices_converge_with_fourth_order_on_periodic_directions_refined_abou
     let nu = 0.01;
     let error = |n: usize, step_s: f64, steps: usize| {
         let mut case = cases::taylor_green_plane(n, [0.0; 2], nu, step_s).unwrap();
-        let cluster = |strength, place| Mapping { place, ..Spread::Cluster.by(strength) };
+        let cluster = |strength, place| Mapping {
+            place,
+            ..Spread::Cluster.by(strength)
+        };
         let [x, y, z] = case.mesh.directions().clone();
-        case.mesh = Mesh::new(x, y.stretched(cluster(0.5, 0.5)), z.stretched(cluster(0.4, 0.15))).unwrap();
+        case.mesh = Mesh::new(
+            x,
+            y.stretched(cluster(0.5, 0.5)),
+            z.stretched(cluster(0.4, 0.15)),
+        )
+        .unwrap();
         case.settings.scheme = TimeScheme::RungeKutta3;
         plane_error(&run(&case, steps), nu)
     };
@@ -142,10 +223,20 @@ fn plane_vortices_converge_with_fourth_order_on_periodic_directions_refined_abou
 fn both_schemes_are_of_second_order_in_time() {
     // Vortices that a mean flow carries along: the convection then has to follow in time.
     let mesh = || {
-        Mesh::new(Direction::thin(1.0), Direction::periodic(32, 0.0, 1.0), Direction::periodic(32, 0.0, 1.0)).unwrap()
+        Mesh::new(
+            Direction::thin(1.0),
+            Direction::periodic(32, 0.0, 1.0),
+            Direction::periodic(32, 0.0, 1.0),
+        )
+        .unwrap()
     };
     let velocity = |scheme: TimeScheme, steps: usize, nu: f64| {
-        let mut settings = FlowSettings::new(nu, TimeStep::Fixed { step_s: 0.2 / steps as f64 });
+        let mut settings = FlowSettings::new(
+            nu,
+            TimeStep::Fixed {
+                step_s: 0.2 / steps as f64,
+            },
+        );
         settings.scheme = scheme;
         let initial = |at_m: [f64; 3]| {
             let [_, v, w] = cases::taylor_green_plane_exact(at_m, 0.0, nu);
@@ -157,7 +248,12 @@ fn both_schemes_are_of_second_order_in_time() {
         }
         flow.face_velocity_m_s(2)
     };
-    let distance = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    let distance = |a: &[f64], b: &[f64]| {
+        a.iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max)
+    };
     // Explicit and implicit at all these steps.
     for nu in [0.003, 0.1] {
         for scheme in [TimeScheme::AdamsBashforth2, TimeScheme::RungeKutta3] {
@@ -175,7 +271,12 @@ fn without_viscosity_the_energy_error_falls_with_the_cube_of_the_step() {
     let drift = |steps: usize| {
         let direction = |a: f64| Direction::periodic(32, 0.0, 1.0).stretched(Spread::Sine.by(a));
         let mesh = Mesh::new(Direction::thin(1.0), direction(0.3), direction(-0.2)).unwrap();
-        let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 2.0 / steps as f64 });
+        let settings = FlowSettings::new(
+            0.0,
+            TimeStep::Fixed {
+                step_s: 2.0 / steps as f64,
+            },
+        );
         let initial = |at_m: [f64; 3]| {
             let [_, v, w] = cases::taylor_green_plane_exact(at_m, 0.0, 0.0);
             [0.0, v + 1.0, w + 0.5]
@@ -224,7 +325,10 @@ fn tollmien_schlichting_waves_grow_at_the_rate_of_linear_theory() {
         }
     }
     let rate = 0.5 * (energies[1] / energies[0]).ln() / 20.0;
-    assert!((rate / expected - 1.0).abs() < 0.01, "rate {rate}, linear theory {expected}");
+    assert!(
+        (rate / expected - 1.0).abs() < 0.01,
+        "rate {rate}, linear theory {expected}"
+    );
 }
 
 #[test]
@@ -236,5 +340,8 @@ fn an_eighth_of_the_taylor_green_vortices_between_planes_of_symmetry_is_the_whol
     };
     let whole = energy(cases::taylor_green_3d(24, 1600.0).unwrap(), 1.0);
     let eighth = energy(cases::taylor_green_eighth(12, 1600.0).unwrap(), 8.0);
-    assert!((whole / eighth - 1.0).abs() < 1e-12, "{whole} against {eighth}");
+    assert!(
+        (whole / eighth - 1.0).abs() < 1e-12,
+        "{whole} against {eighth}"
+    );
 }

@@ -4,28 +4,40 @@ use approx::{assert_abs_diff_eq, assert_relative_eq};
 use wakescope_les::winds::{Edges, Linear, OutsidePolicy, PlaneMesh, Side};
 use wakescope_les::{CirculationProfile, Error, GridSnapshot, Ground, Motion, VortexPair, Wind};
 
-const OPEN: Edges = Edges::Bounded { low: Side::Open, high: Side::Open };
+const OPEN: Edges = Edges::Bounded {
+    low: Side::Open,
+    high: Side::Open,
+};
 
 /// Nodes from 0 to `length_m`, dense at 0: the usual hyperbolic stretching.
 fn stretched(nodes: usize, length_m: f64, strength: f64) -> Vec<f64> {
     let xi = |i: usize| i as f64 / (nodes - 1) as f64;
-    (0..nodes).map(|i| length_m * (strength * xi(i)).sinh() / strength.sinh()).collect()
+    (0..nodes)
+        .map(|i| length_m * (strength * xi(i)).sinh() / strength.sinh())
+        .collect()
 }
 
 fn even(nodes: usize, first_m: f64, last_m: f64) -> Vec<f64> {
-    (0..nodes).map(|i| first_m + (last_m - first_m) * i as f64 / (nodes - 1) as f64).collect()
+    (0..nodes)
+        .map(|i| first_m + (last_m - first_m) * i as f64 / (nodes - 1) as f64)
+        .collect()
 }
 
 fn at(wind: &dyn Wind, y_m: f64, z_m: f64) -> [f64; 3] {
     let mut out = [[0.0; 3]];
-    wind.velocity_into(&[[0.0, y_m, z_m]], 0.0, &mut out).unwrap();
+    wind.velocity_into(&[[0.0, y_m, z_m]], 0.0, &mut out)
+        .unwrap();
     out[0]
 }
 
 /// A field given by a function, at the nodes of a mesh.
 fn snapshot(mesh: &PlaneMesh, field: impl Fn(f64, f64) -> [f64; 3]) -> GridSnapshot {
-    let values: Vec<[f64; 3]> =
-        mesh.z_m.iter().flat_map(|&z| mesh.y_m.iter().map(move |&y| (y, z))).map(|(y, z)| field(y, z)).collect();
+    let values: Vec<[f64; 3]> = mesh
+        .z_m
+        .iter()
+        .flat_map(|&z| mesh.y_m.iter().map(move |&y| (y, z)))
+        .map(|(y, z)| field(y, z))
+        .collect();
     GridSnapshot::new(mesh, &values).unwrap()
 }
 
@@ -46,16 +58,23 @@ fn pair() -> VortexPair {
 fn scattered() -> impl Iterator<Item = (f64, f64)> {
     (0..3000).map(|i| {
         let i = f64::from(i);
-        (120.0 * (0.618_033_988_75 * i).fract(), 80.0 * (0.754_877_666_2 * i).fract())
+        (
+            120.0 * (0.618_033_988_75 * i).fract(),
+            80.0 * (0.754_877_666_2 * i).fract(),
+        )
     })
 }
 
 /// The wind at the nodes of a mesh, in the plane x = 0 at time 0.
 fn at_nodes(wind: &dyn Wind, mesh: &PlaneMesh) -> GridSnapshot {
-    let points_m: Vec<[f64; 3]> =
-        mesh.z_m.iter().flat_map(|&z_m| mesh.y_m.iter().map(move |&y_m| [0.0, y_m, z_m])).collect();
+    let points_m: Vec<[f64; 3]> = mesh
+        .z_m
+        .iter()
+        .flat_map(|&z_m| mesh.y_m.iter().map(move |&y_m| [0.0, y_m, z_m]))
+        .collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    wind.velocity_into(&points_m, 0.0, &mut velocity_m_s).unwrap();
+    wind.velocity_into(&points_m, 0.0, &mut velocity_m_s)
+        .unwrap();
     GridSnapshot::new(mesh, &velocity_m_s).unwrap()
 }
 
@@ -68,7 +87,13 @@ fn linear_fields_are_exact_on_a_strongly_stretched_mesh() {
         z_edges: OPEN,
         outside: OutsidePolicy::Error,
     };
-    let field = |y: f64, z: f64| [1.0 + 0.3 * y - 0.2 * z, -2.0 + 0.1 * y + 0.05 * y * z, 0.7 * z];
+    let field = |y: f64, z: f64| {
+        [
+            1.0 + 0.3 * y - 0.2 * z,
+            -2.0 + 0.1 * y + 0.05 * y * z,
+            0.7 * z,
+        ]
+    };
     let wind = snapshot(&mesh, field);
     for (y, z) in scattered().chain([(0.0, 0.0), (120.0, 80.0), (mesh.y_m[7], mesh.z_m[9])]) {
         for (found, expected) in at(&wind, y, z).iter().zip(field(y, z)) {
@@ -117,7 +142,10 @@ fn rms_error(nodes: usize, strength: f64) -> f64 {
         y_m: stretched(nodes, 120.0, strength),
         z_m: stretched(nodes, 80.0, strength),
         y_edges: OPEN,
-        z_edges: Edges::Bounded { low: Side::SlipWall { position_m: 0.0 }, high: Side::Open },
+        z_edges: Edges::Bounded {
+            low: Side::SlipWall { position_m: 0.0 },
+            high: Side::Open,
+        },
         outside: OutsidePolicy::Error,
     };
     let exact = pair().wind().unwrap();
@@ -135,7 +163,10 @@ fn a_sampled_vortex_converges_with_third_order_on_even_and_stretched_meshes() {
         let errors = [161, 321, 641].map(|nodes| rms_error(nodes, strength));
         for pair in errors.windows(2) {
             let order = (pair[0] / pair[1]).log2();
-            assert!((2.9..3.4).contains(&order), "strength {strength}: {errors:?}");
+            assert!(
+                (2.9..3.4).contains(&order),
+                "strength {strength}: {errors:?}"
+            );
         }
         assert!(errors[2] < 1e-4, "{errors:?}");
     }
@@ -148,7 +179,10 @@ fn no_air_crosses_a_slip_wall_on_a_node_or_beside_one() {
             y_m: even(60, 0.0, 120.0),
             z_m: even(40, first_m, 80.0),
             y_edges: OPEN,
-            z_edges: Edges::Bounded { low: Side::SlipWall { position_m: 0.0 }, high: Side::Open },
+            z_edges: Edges::Bounded {
+                low: Side::SlipWall { position_m: 0.0 },
+                high: Side::Open,
+            },
             outside: OutsidePolicy::Mask,
         };
         let exact = pair().wind().unwrap();
@@ -169,7 +203,10 @@ fn air_sticks_to_a_no_slip_wall_and_moves_with_it() {
         z_m: even(8, 0.5, 7.5),
         y_edges: OPEN,
         z_edges: Edges::Bounded {
-            low: Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0, 2.0, 0.0] },
+            low: Side::NoSlipWall {
+                position_m: 0.0,
+                velocity_m_s: [0.0, 2.0, 0.0],
+            },
             high: Side::Open,
         },
         outside: OutsidePolicy::Error,
@@ -212,7 +249,10 @@ fn a_periodic_mesh_holds_every_point_and_repeats() {
     let period_m = 10.0;
     let mesh = PlaneMesh {
         y_m: (0..nodes)
-            .map(|i| -3.0 + period_m * (f64::from(i) + 0.3 * (0.4 * f64::from(i)).sin()) / f64::from(nodes))
+            .map(|i| {
+                -3.0 + period_m * (f64::from(i) + 0.3 * (0.4 * f64::from(i)).sin())
+                    / f64::from(nodes)
+            })
             .collect(),
         z_m: even(6, 0.0, 5.0),
         y_edges: Edges::Periodic { period_m },
@@ -237,17 +277,39 @@ fn points_outside_follow_the_policy() {
         y_m: even(5, 0.0, 4.0),
         z_m: even(5, 1.0, 5.0),
         y_edges: OPEN,
-        z_edges: Edges::Bounded { low: Side::SlipWall { position_m: 0.4 }, high: Side::Open },
+        z_edges: Edges::Bounded {
+            low: Side::SlipWall { position_m: 0.4 },
+            high: Side::Open,
+        },
         outside,
     };
     let make = |outside| snapshot(&mesh(outside), |_, _| [1.0, 2.0, 0.0]);
-    for (y, z) in [(-0.01, 2.0), (4.01, 2.0), (2.0, 0.39), (2.0, 5.01), (f64::NAN, 2.0), (2.0, f64::INFINITY)] {
-        let refused = make(OutsidePolicy::Error).velocity_into(&[[0.0, y, z]], 0.0, &mut [[0.0; 3]]);
+    for (y, z) in [
+        (-0.01, 2.0),
+        (4.01, 2.0),
+        (2.0, 0.39),
+        (2.0, 5.01),
+        (f64::NAN, 2.0),
+        (2.0, f64::INFINITY),
+    ] {
+        let refused =
+            make(OutsidePolicy::Error).velocity_into(&[[0.0, y, z]], 0.0, &mut [[0.0; 3]]);
         assert!(matches!(refused, Err(Error::OutsideMesh { .. })), "{y} {z}");
-        assert_eq!(at(&make(OutsidePolicy::Constant([7.0, 8.0, 9.0])), y, z), [7.0, 8.0, 9.0]);
-        assert!(at(&make(OutsidePolicy::Mask), y, z).iter().all(|v| v.is_nan()));
+        assert_eq!(
+            at(&make(OutsidePolicy::Constant([7.0, 8.0, 9.0])), y, z),
+            [7.0, 8.0, 9.0]
+        );
+        assert!(
+            at(&make(OutsidePolicy::Mask), y, z)
+                .iter()
+                .all(|v| v.is_nan())
+        );
     }
-    assert_abs_diff_eq!(at(&make(OutsidePolicy::Error), 2.0, 0.4)[1], 2.0, epsilon = 1e-14);
+    assert_abs_diff_eq!(
+        at(&make(OutsidePolicy::Error), 2.0, 0.4)[1],
+        2.0,
+        epsilon = 1e-14
+    );
 }
 
 #[test]
@@ -256,14 +318,23 @@ fn gradient_of_a_resolved_vortex_is_that_of_its_profile() {
         y_m: even(401, 0.0, 120.0),
         z_m: even(301, 0.0, 80.0),
         y_edges: OPEN,
-        z_edges: Edges::Bounded { low: Side::SlipWall { position_m: 0.0 }, high: Side::Open },
+        z_edges: Edges::Bounded {
+            low: Side::SlipWall { position_m: 0.0 },
+            high: Side::Open,
+        },
         outside: OutsidePolicy::Error,
     };
     let exact = pair().wind().unwrap();
     let sampled = at_nodes(&exact, &mesh);
-    let (found, bound) = (sampled.max_gradient_per_s(0.0), exact.max_gradient_per_s(0.0));
+    let (found, bound) = (
+        sampled.max_gradient_per_s(0.0),
+        exact.max_gradient_per_s(0.0),
+    );
     let alone = pair().profile.max_line_gradient_per_s(500.0, 6.0);
-    assert!(found < bound && found > 0.97 * alone, "{found}: one vortex {alone}, bound {bound}");
+    assert!(
+        found < bound && found > 0.97 * alone,
+        "{found}: one vortex {alone}, bound {bound}"
+    );
     let calm = at_nodes(&Linear::uniform([3.0, 1.0, 0.0]).unwrap(), &mesh);
     assert_eq!(calm.max_gradient_per_s(0.0), 0.0);
 }
@@ -281,26 +352,71 @@ fn meshes_that_cannot_be_interpolated_are_refused() {
         let count = mesh.y_m.len() * mesh.z_m.len();
         GridSnapshot::new(&mesh, &vec![[0.0; 3]; count]).unwrap_err()
     };
-    let with_y = |y_m: Vec<f64>| refused(PlaneMesh { y_m, ..good.clone() });
+    let with_y = |y_m: Vec<f64>| {
+        refused(PlaneMesh {
+            y_m,
+            ..good.clone()
+        })
+    };
     let bad = |error: Error, on: &str, named: &str| {
-        assert!(matches!(&error, Error::BadDirection { axis, what, .. } if *axis == on && what == named), "{error}");
+        assert!(
+            matches!(&error, Error::BadDirection { axis, what, .. } if *axis == on && what == named),
+            "{error}"
+        );
     };
     bad(with_y(vec![0.0, 1.0, 2.0]), "y", "number of nodes");
     bad(with_y(vec![0.0, 1.0, 1.0, 2.0]), "y", "position of node 2");
-    bad(with_y(vec![0.0, f64::NAN, 1.0, 2.0]), "y", "position of node 1");
-    bad(with_y(vec![0.0, 1.0, 2.0, 2.1, 2.2]), "y", "cells beside node 2 differ by a factor");
-    bad(with_y(vec![0.0, 1.0, 4.0, 7.0, 10.0]), "y", "cells beside node 1 differ by a factor");
-    bad(with_y(vec![0.0, 3.0, 6.0, 9.0, 10.0]), "y", "cells beside node 3 differ by a factor");
-    let with_edges = |z_edges| refused(PlaneMesh { z_edges, ..good.clone() });
+    bad(
+        with_y(vec![0.0, f64::NAN, 1.0, 2.0]),
+        "y",
+        "position of node 1",
+    );
+    bad(
+        with_y(vec![0.0, 1.0, 2.0, 2.1, 2.2]),
+        "y",
+        "cells beside node 2 differ by a factor",
+    );
+    bad(
+        with_y(vec![0.0, 1.0, 4.0, 7.0, 10.0]),
+        "y",
+        "cells beside node 1 differ by a factor",
+    );
+    bad(
+        with_y(vec![0.0, 3.0, 6.0, 9.0, 10.0]),
+        "y",
+        "cells beside node 3 differ by a factor",
+    );
+    let with_edges = |z_edges| {
+        refused(PlaneMesh {
+            z_edges,
+            ..good.clone()
+        })
+    };
     for position_m in [0.1, -1.0, f64::NAN] {
         let low = Side::SlipWall { position_m };
-        let error = with_edges(Edges::Bounded { low, high: Side::Open });
+        let error = with_edges(Edges::Bounded {
+            low,
+            high: Side::Open,
+        });
         bad(error, "z", "low wall");
     }
     let short = with_edges(Edges::Periodic { period_m: 5.0 });
     bad(short, "z", "period");
     let counted = GridSnapshot::new(&good, &[[0.0; 3]; 35]);
-    assert!(matches!(counted, Err(Error::OutOfRange { field: "number of velocities", value: 35.0, .. })));
+    assert!(matches!(
+        counted,
+        Err(Error::OutOfRange {
+            field: "number of velocities",
+            value: 35.0,
+            ..
+        })
+    ));
     let infinite = GridSnapshot::new(&good, &[[f64::INFINITY; 3]; 36]);
-    assert!(matches!(infinite, Err(Error::OutOfRange { field: "velocity_m_s", .. })));
+    assert!(matches!(
+        infinite,
+        Err(Error::OutOfRange {
+            field: "velocity_m_s",
+            ..
+        })
+    ));
 }

@@ -23,7 +23,8 @@ fn heavy() -> VortexPair {
 fn velocity(pair: VortexPair, y_m: f64, z_m: f64, time_s: f64) -> [f64; 3] {
     let mut out = [[0.0; 3]];
     let wind = pair.wind().unwrap();
-    wind.velocity_into(&[[0.0, y_m, z_m]], time_s, &mut out).unwrap();
+    wind.velocity_into(&[[0.0, y_m, z_m]], time_s, &mut out)
+        .unwrap();
     out[0]
 }
 
@@ -31,19 +32,29 @@ fn velocity(pair: VortexPair, y_m: f64, z_m: f64, time_s: f64) -> [f64; 3] {
 fn scattered() -> impl Iterator<Item = (f64, f64)> {
     (0..2000).map(|i| {
         let i = f64::from(i);
-        (340.0 + 120.0 * (0.618_033_988_75 * i).fract(), 100.0 * (0.754_877_666_2 * i).fract())
+        (
+            340.0 + 120.0 * (0.618_033_988_75 * i).fract(),
+            100.0 * (0.754_877_666_2 * i).fract(),
+        )
     })
 }
 
 #[test]
 fn no_air_crosses_the_ground() {
     for profile in [CirculationProfile::Algebraic, CirculationProfile::LambOseen] {
-        let pair = VortexPair { profile, height_m: 12.3, ..heavy() };
+        let pair = VortexPair {
+            profile,
+            height_m: 12.3,
+            ..heavy()
+        };
         for (y_m, _) in scattered() {
             assert_eq!(velocity(pair, y_m, 0.0, 0.0)[2], 0.0);
         }
     }
-    let free = VortexPair { ground: Ground::None, ..heavy() };
+    let free = VortexPair {
+        ground: Ground::None,
+        ..heavy()
+    };
     assert!(velocity(free, 400.0, 0.0, 0.0)[2] < -0.5);
 }
 
@@ -69,7 +80,11 @@ fn the_pair_moves_the_air_between_its_vortices_down_and_the_air_beside_it_up() {
 
 #[test]
 fn a_vortex_is_carried_down_by_the_other_at_v0() {
-    let pair = VortexPair { ground: Ground::None, core_radius_m: 1e-3, ..heavy() };
+    let pair = VortexPair {
+        ground: Ground::None,
+        core_radius_m: 1e-3,
+        ..heavy()
+    };
     let descent = velocity(pair, 400.0 - 23.5, 47.0, 0.0);
     assert_relative_eq!(descent[2], -500.0 / (2.0 * PI * 47.0), max_relative = 1e-8);
     assert_relative_eq!(pair.descent_speed_m_s(), -descent[2], max_relative = 1e-8);
@@ -79,7 +94,12 @@ fn a_vortex_is_carried_down_by_the_other_at_v0() {
 #[test]
 fn circulation_on_circles_about_one_vortex_is_its_profile() {
     // The other vortex is so far that it adds nothing to a circle that does not enclose it beyond its vorticity tail.
-    let pair = VortexPair { spacing_m: 1e7, lateral_position_m: 5e6, ground: Ground::None, ..heavy() };
+    let pair = VortexPair {
+        spacing_m: 1e7,
+        lateral_position_m: 5e6,
+        ground: Ground::None,
+        ..heavy()
+    };
     let wind = pair.wind().unwrap();
     for radius_m in [0.5, 2.35, 5.0, 15.0] {
         let found = circulation_m2_s(&wind, [0.0, 47.0], radius_m, 0.0, 64).unwrap();
@@ -93,21 +113,37 @@ fn circulation_on_circles_about_one_vortex_is_its_profile() {
 #[test]
 fn gamma_5_15_agrees_between_closed_form_quadrature_and_circles() {
     for profile in [CirculationProfile::Algebraic, CirculationProfile::LambOseen] {
-        let pair = VortexPair { profile, spacing_m: 1e7, lateral_position_m: 5e6, ground: Ground::None, ..heavy() };
+        let pair = VortexPair {
+            profile,
+            spacing_m: 1e7,
+            lateral_position_m: 5e6,
+            ground: Ground::None,
+            ..heavy()
+        };
         let wind = pair.wind().unwrap();
         let circles = mean_circulation_5_15_m2_s(&wind, [0.0, 47.0], 0.0, 64).unwrap();
         assert_relative_eq!(-circles, pair.circulation_5_15_m2_s(), max_relative = 1e-9);
     }
     // 1 - 0.235 (atan(15/2.35) - atan(5/2.35)), evaluated apart.
     let expected = 500.0 * (1.0 - 0.235 * (1.415_392_874_166 - 1.131_435_439_510));
-    assert_relative_eq!(heavy().circulation_5_15_m2_s(), expected, max_relative = 1e-6);
+    assert_relative_eq!(
+        heavy().circulation_5_15_m2_s(),
+        expected,
+        max_relative = 1e-6
+    );
 }
 
 #[test]
 fn path_over_the_ground_follows_the_independent_integration() {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/les/vortex_pair_inviscid_ground_h1.csv");
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/reference/les/vortex_pair_inviscid_ground_h1.csv"
+    );
     let text = std::fs::read_to_string(path).unwrap();
-    let pair = VortexPair { motion: Motion::Inviscid, ..heavy() };
+    let pair = VortexPair {
+        motion: Motion::Inviscid,
+        ..heavy()
+    };
     let mut rows = 0;
     for line in text.lines().filter(|l| !l.starts_with('#')) {
         let row: Vec<f64> = line.split(',').map(|x| x.trim().parse().unwrap()).collect();
@@ -115,7 +151,11 @@ fn path_over_the_ground_follows_the_independent_integration() {
         let half = 0.5 * (centres.right_y_m - centres.left_y_m) / pair.spacing_m;
         assert_abs_diff_eq!(half, row[1], epsilon = 2e-9);
         assert_abs_diff_eq!(centres.height_m / pair.spacing_m, row[2], epsilon = 2e-9);
-        assert_abs_diff_eq!(0.5 * (centres.left_y_m + centres.right_y_m), 400.0, epsilon = 1e-10);
+        assert_abs_diff_eq!(
+            0.5 * (centres.left_y_m + centres.right_y_m),
+            400.0,
+            epsilon = 1e-10
+        );
         rows += 1;
     }
     assert_eq!(rows, 61);
@@ -123,7 +163,12 @@ fn path_over_the_ground_follows_the_independent_integration() {
 
 #[test]
 fn path_keeps_its_invariant_and_obeys_the_velocity_of_the_other_vortices() {
-    let pair = VortexPair { motion: Motion::Inviscid, core_radius_m: 1e-3, height_m: 80.0, ..heavy() };
+    let pair = VortexPair {
+        motion: Motion::Inviscid,
+        core_radius_m: 1e-3,
+        height_m: 80.0,
+        ..heavy()
+    };
     let invariant = 4.0 / (47.0 * 47.0) + 1.0 / (80.0 * 80.0);
     for step in -20..400 {
         let time_s = 2.0 * f64::from(step);
@@ -143,11 +188,19 @@ fn path_keeps_its_invariant_and_obeys_the_velocity_of_the_other_vortices() {
 
 #[test]
 fn without_a_ground_the_pair_descends_straight_at_v0() {
-    let pair = VortexPair { motion: Motion::Inviscid, ground: Ground::None, ..heavy() };
+    let pair = VortexPair {
+        motion: Motion::Inviscid,
+        ground: Ground::None,
+        ..heavy()
+    };
     let later = pair.centres(pair.time_s(3.0));
     assert_relative_eq!(later.height_m, 47.0 - 3.0 * 47.0, max_relative = 1e-12);
     assert_eq!(later.left_y_m, 376.5);
-    assert_relative_eq!(pair.time_s(3.0) * pair.descent_speed_m_s() / pair.spacing_m, 3.0, max_relative = 1e-15);
+    assert_relative_eq!(
+        pair.time_s(3.0) * pair.descent_speed_m_s() / pair.spacing_m,
+        3.0,
+        max_relative = 1e-15
+    );
 }
 
 /// The bound of the gradient of a pair over the largest that a search about a core and towards the other one finds.
@@ -158,7 +211,10 @@ fn bound_over_largest(pair: VortexPair) -> f64 {
     let h = 1e-4;
     for i in 0..120 {
         for j in 0..120 {
-            let (y, z) = (core_y_m - 6.5 + 0.1 * f64::from(i), pair.height_m - 6.0 + 0.1 * f64::from(j));
+            let (y, z) = (
+                core_y_m - 6.5 + 0.1 * f64::from(i),
+                pair.height_m - 6.0 + 0.1 * f64::from(j),
+            );
             let (up, down) = (velocity(pair, y, z + h, 0.0), velocity(pair, y, z - h, 0.0));
             let (east, west) = (velocity(pair, y + h, z, 0.0), velocity(pair, y - h, z, 0.0));
             let stretch = (east[1] - west[1]) / (2.0 * h);
@@ -170,7 +226,8 @@ fn bound_over_largest(pair: VortexPair) -> f64 {
 }
 
 #[test]
-fn gradient_bound_holds_everywhere_and_is_at_most_six_percent_too_large_where_cores_are_far_apart() {
+fn gradient_bound_holds_everywhere_and_is_at_most_six_percent_too_large_where_cores_are_far_apart()
+{
     for profile in [CirculationProfile::Algebraic, CirculationProfile::LambOseen] {
         let ratio = bound_over_largest(VortexPair { profile, ..heavy() });
         assert!((1.0..1.06).contains(&ratio), "{profile:?}: {ratio}");
@@ -182,15 +239,26 @@ fn gradient_bound_of_a_close_pair_holds_and_is_the_looser_the_closer_it_is() {
     // Spacings of 12, 9 and 6 core radii.
     for (spacing_m, least, most) in [(28.0, 1.05, 1.1), (21.0, 1.1, 1.16), (14.0, 1.2, 1.26)] {
         for profile in [CirculationProfile::Algebraic, CirculationProfile::LambOseen] {
-            let ratio = bound_over_largest(VortexPair { profile, spacing_m, ..heavy() });
-            assert!((least..most).contains(&ratio), "{spacing_m} m, {profile:?}: {ratio}");
+            let ratio = bound_over_largest(VortexPair {
+                profile,
+                spacing_m,
+                ..heavy()
+            });
+            assert!(
+                (least..most).contains(&ratio),
+                "{spacing_m} m, {profile:?}: {ratio}"
+            );
         }
     }
 }
 
 #[test]
 fn a_pair_without_circulation_is_calm_and_stays_where_it_is() {
-    let pair = VortexPair { circulation_m2_s: 0.0, motion: Motion::Inviscid, ..heavy() };
+    let pair = VortexPair {
+        circulation_m2_s: 0.0,
+        motion: Motion::Inviscid,
+        ..heavy()
+    };
     assert_eq!(velocity(pair, 380.0, 40.0, 100.0), [0.0, 0.0, 0.0]);
     assert_relative_eq!(pair.centres(100.0).height_m, 47.0, max_relative = 1e-14);
     assert_eq!(pair.wind().unwrap().max_gradient_per_s(0.0), 0.0);
@@ -198,10 +266,22 @@ fn a_pair_without_circulation_is_calm_and_stays_where_it_is() {
 
 #[test]
 fn lift_equals_weight_for_a_heavy_aircraft() {
-    let aircraft = Aircraft { mass_kg: 250_000.0, speed_m_s: 75.0, span_m: 60.0, air_density_kg_m3: 1.225 };
-    let (gamma, b0) = (aircraft.circulation_m2_s().unwrap(), aircraft.spacing_m().unwrap());
+    let aircraft = Aircraft {
+        mass_kg: 250_000.0,
+        speed_m_s: 75.0,
+        span_m: 60.0,
+        air_density_kg_m3: 1.225,
+    };
+    let (gamma, b0) = (
+        aircraft.circulation_m2_s().unwrap(),
+        aircraft.spacing_m().unwrap(),
+    );
     assert_relative_eq!(b0, 47.123_889_803_8, max_relative = 1e-11);
-    assert_relative_eq!(1.225 * 75.0 * b0 * gamma, 250_000.0 * 9.806_65, max_relative = 1e-14);
+    assert_relative_eq!(
+        1.225 * 75.0 * b0 * gamma,
+        250_000.0 * 9.806_65,
+        max_relative = 1e-14
+    );
     assert!((400.0..600.0).contains(&gamma));
 }
 
@@ -211,15 +291,58 @@ fn values_that_make_no_vortex_are_refused_by_name() {
         Err(Error::OutOfRange { field, .. }) => field,
         other => panic!("{other:?}"),
     };
-    assert_eq!(refused(VortexPair { circulation_m2_s: -1.0, ..heavy() }), "circulation_m2_s");
-    assert_eq!(refused(VortexPair { spacing_m: 0.0, ..heavy() }), "spacing_m");
-    assert_eq!(refused(VortexPair { core_radius_m: f64::NAN, ..heavy() }), "core_radius_m");
-    assert_eq!(refused(VortexPair { height_m: -5.0, ..heavy() }), "height_m");
-    assert_eq!(refused(VortexPair { lateral_position_m: f64::INFINITY, ..heavy() }), "lateral_position_m");
+    assert_eq!(
+        refused(VortexPair {
+            circulation_m2_s: -1.0,
+            ..heavy()
+        }),
+        "circulation_m2_s"
+    );
+    assert_eq!(
+        refused(VortexPair {
+            spacing_m: 0.0,
+            ..heavy()
+        }),
+        "spacing_m"
+    );
+    assert_eq!(
+        refused(VortexPair {
+            core_radius_m: f64::NAN,
+            ..heavy()
+        }),
+        "core_radius_m"
+    );
+    assert_eq!(
+        refused(VortexPair {
+            height_m: -5.0,
+            ..heavy()
+        }),
+        "height_m"
+    );
+    assert_eq!(
+        refused(VortexPair {
+            lateral_position_m: f64::INFINITY,
+            ..heavy()
+        }),
+        "lateral_position_m"
+    );
     let wind = heavy().wind().unwrap();
     let wrong = wind.velocity_into(&[[0.0; 3]; 2], 0.0, &mut [[0.0; 3]; 1]);
     assert_eq!(wrong, Err(Error::LengthMismatch { points: 2, out: 1 }));
-    let circulation = |radius_m, samples| circulation_m2_s(&wind, [0.0, 0.0], radius_m, 0.0, samples);
-    assert!(matches!(circulation(-1.0, 64), Err(Error::OutOfRange { field: "radius_m", .. })));
-    assert!(matches!(circulation(1.0, 2), Err(Error::OutOfRange { field: "samples", .. })));
+    let circulation =
+        |radius_m, samples| circulation_m2_s(&wind, [0.0, 0.0], radius_m, 0.0, samples);
+    assert!(matches!(
+        circulation(-1.0, 64),
+        Err(Error::OutOfRange {
+            field: "radius_m",
+            ..
+        })
+    ));
+    assert!(matches!(
+        circulation(1.0, 2),
+        Err(Error::OutOfRange {
+            field: "samples",
+            ..
+        })
+    ));
 }

@@ -38,13 +38,23 @@ impl Cn2Path {
         match self {
             Self::None => Ok(0.0),
             Self::Uniform { cn2_m_m23 } => Ok(*cn2_m_m23),
-            Self::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad } => {
+            Self::Heights {
+                height_m,
+                cn2_m_m23,
+                telescope_height_m,
+                elevation_rad,
+            } => {
                 let h = telescope_height_m + range_m * elevation_rad.sin();
                 let last = height_m.len() - 1;
                 // A horizontal path along the lowest or highest point must not fail by a rounding error.
                 let slack = 1e-9 * (height_m[last] - height_m[0]);
                 let inside = h >= height_m[0] - slack && h <= height_m[last] + slack;
-                within("height_m", h, inside, "within the heights of the Cn2 profile along the whole path")?;
+                within(
+                    "height_m",
+                    h,
+                    inside,
+                    "within the heights of the Cn2 profile along the whole path",
+                )?;
                 let i = height_m.partition_point(|&v| v <= h).clamp(1, last) - 1;
                 let t = ((h - height_m[i]) / (height_m[i + 1] - height_m[i])).clamp(0.0, 1.0);
                 Ok(cn2_m_m23[i] * (1.0 - t) + cn2_m_m23[i + 1] * t)
@@ -61,16 +71,27 @@ impl Cn2Path {
             return self.at(start_m);
         }
         let edges = self.edges_m(start_m, end_m);
-        let values = edges.iter().map(|&z| self.at(z)).collect::<Result<Vec<_>, _>>()?;
+        let values = edges
+            .iter()
+            .map(|&z| self.at(z))
+            .collect::<Result<Vec<_>, _>>()?;
         let pieces = edges.windows(2).zip(values.windows(2));
-        let integral: f64 = pieces.map(|(z, cn2)| 0.5 * (cn2[0] + cn2[1]) * (z[1] - z[0])).sum();
+        let integral: f64 = pieces
+            .map(|(z, cn2)| 0.5 * (cn2[0] + cn2[1]) * (z[1] - z[0]))
+            .sum();
         Ok(integral / (end_m - start_m))
     }
 
     /// `start_m`, the ranges between at which the profile has a knot, `end_m`.
     fn edges_m(&self, start_m: f64, end_m: f64) -> Vec<f64> {
         let mut edges = vec![start_m];
-        if let Self::Heights { height_m, telescope_height_m, elevation_rad, .. } = self {
+        if let Self::Heights {
+            height_m,
+            telescope_height_m,
+            elevation_rad,
+            ..
+        } = self
+        {
             let climb = elevation_rad.sin();
             let ranges = height_m.iter().map(|h| (h - telescope_height_m) / climb);
             // A horizontal path gives infinity or NaN, which is between nothing.
@@ -96,7 +117,9 @@ impl Cn2Path {
         let mut out = Vec::new();
         match self {
             Self::None => {}
-            Self::Uniform { cn2_m_m23 } => out.extend(places.mapped(0.0, range_m).map(|(z, w)| (z, cn2_m_m23 * w))),
+            Self::Uniform { cn2_m_m23 } => {
+                out.extend(places.mapped(0.0, range_m).map(|(z, w)| (z, cn2_m_m23 * w)))
+            }
             Self::Heights { .. } => {
                 for panel in HALVED.windows(2) {
                     let (start, end) = (panel[0] * range_m, panel[1] * range_m);
@@ -105,7 +128,10 @@ impl Cn2Path {
                     for piece in self.edges_m(start, end).windows(2) {
                         for (z, dz) in exact.mapped(piece[0], piece[1]) {
                             let cn2_dz = self.at(z)? * dz;
-                            weight.iter_mut().enumerate().for_each(|(j, w)| *w += cn2_dz * lagrange(&at, j, z));
+                            weight
+                                .iter_mut()
+                                .enumerate()
+                                .for_each(|(j, w)| *w += cn2_dz * lagrange(&at, j, z));
                         }
                     }
                     out.extend(at.into_iter().zip(weight));
@@ -134,15 +160,28 @@ impl Cn2Path {
             Self::Uniform { cn2_m_m23 } => {
                 not_negative("cn2_m_m23", *cn2_m_m23)?;
             }
-            Self::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad } => {
+            Self::Heights {
+                height_m,
+                cn2_m_m23,
+                telescope_height_m,
+                elevation_rad,
+            } => {
                 let (found, expected) = (cn2_m_m23.len(), height_m.len().max(2));
                 if found != expected || height_m.len() < 2 {
-                    return Err(Error::Length { field: "cn2_m_m23", found, expected });
+                    return Err(Error::Length {
+                        field: "cn2_m_m23",
+                        found,
+                        expected,
+                    });
                 }
                 finite("height_m", height_m[0])?;
                 for index in 1..height_m.len() {
                     if finite("height_m", height_m[index])? <= height_m[index - 1] {
-                        return Err(Error::NotIncreasing { field: "height_m", index, value: height_m[index] });
+                        return Err(Error::NotIncreasing {
+                            field: "height_m",
+                            index,
+                            value: height_m[index],
+                        });
                     }
                 }
                 for &value in cn2_m_m23 {
@@ -159,14 +198,21 @@ impl Cn2Path {
 /// Hufnagel-Valley 5/7 up to `top_m`, with knots dense near the ground.
 #[cfg(test)]
 pub(crate) fn hufnagel_valley(top_m: f64, telescope_height_m: f64, elevation_rad: f64) -> Cn2Path {
-    let height_m: Vec<f64> = (0..=2000).map(|i| top_m * (f64::from(i) / 2000.0).powi(2)).collect();
+    let height_m: Vec<f64> = (0..=2000)
+        .map(|i| top_m * (f64::from(i) / 2000.0).powi(2))
+        .collect();
     let at = |h: f64| {
         0.00594 * (21f64 / 27.0).powi(2) * (1e-5 * h).powi(10) * (-h / 1000.0).exp()
             + 2.7e-16 * (-h / 1500.0).exp()
             + 1.7e-14 * (-h / 100.0).exp()
     };
     let cn2_m_m23 = height_m.iter().map(|&h| at(h)).collect();
-    Cn2Path::Heights { height_m, cn2_m_m23, telescope_height_m, elevation_rad }
+    Cn2Path::Heights {
+        height_m,
+        cn2_m_m23,
+        telescope_height_m,
+        elevation_rad,
+    }
 }
 
 #[cfg(test)]
@@ -213,12 +259,20 @@ mod tests {
         let slices = 200_000;
         let sum = |f: &dyn Fn(f64) -> f64| {
             let dz = range_m / f64::from(slices);
-            (0..slices).map(|i| (f64::from(i) + 0.5) * dz).map(|z| path.at(z).unwrap() * f(z) * dz).sum::<f64>()
+            (0..slices)
+                .map(|i| (f64::from(i) + 0.5) * dz)
+                .map(|z| path.at(z).unwrap() * f(z) * dz)
+                .sum::<f64>()
         };
         assert!((path.mean(0.0, range_m).unwrap() * range_m / sum(&|_| 1.0) - 1.0).abs() < 1e-6);
         for power in [5.0 / 6.0, 5.0 / 3.0] {
             let f = |z: f64| (1.0 - z / range_m).powf(power);
-            let found: f64 = path.quadrature(range_m).unwrap().iter().map(|&(z, w)| w * f(z)).sum();
+            let found: f64 = path
+                .quadrature(range_m)
+                .unwrap()
+                .iter()
+                .map(|&(z, w)| w * f(z))
+                .sum();
             assert!((found / sum(&f) - 1.0).abs() < 1e-6, "{power}");
         }
     }

@@ -26,7 +26,11 @@ pub trait Spectrum: Debug + Send + Sync {
 
 /// How the outer scale L0 gives the wave number kappa_0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum OuterScaleConvention {
     /// kappa_0 = 1/L0, as (17) has it.
     Inverse,
@@ -48,8 +52,17 @@ pub struct Scales {
 impl Scales {
     /// kappa_0, and kappa_m = `cut`/l0, after the checks that every spectrum needs \[rad/m\].
     fn wavenumbers_rad_m(self, cut: f64) -> Result<(f64, f64), Error> {
-        let Self { outer_scale_m, inner_scale_m, convention } = self;
-        within("outer_scale_m", outer_scale_m, outer_scale_m > 0.0, "a number above 0, infinity for none")?;
+        let Self {
+            outer_scale_m,
+            inner_scale_m,
+            convention,
+        } = self;
+        within(
+            "outer_scale_m",
+            outer_scale_m,
+            outer_scale_m > 0.0,
+            "a number above 0, infinity for none",
+        )?;
         not_negative("inner_scale_m", inner_scale_m)?;
         let outer_rad_m = match convention {
             OuterScaleConvention::Inverse => 1.0 / outer_scale_m,
@@ -57,7 +70,12 @@ impl Scales {
         };
         let inner_rad_m = cut / inner_scale_m;
         let apart = outer_rad_m < inner_rad_m && outer_scale_m > inner_scale_m;
-        within("inner_scale_m", inner_scale_m, apart, "below outer_scale_m, with kappa_m above kappa_0")?;
+        within(
+            "inner_scale_m",
+            inner_scale_m,
+            apart,
+            "below outer_scale_m, with kappa_m above kappa_0",
+        )?;
         Ok((outer_rad_m, inner_rad_m))
     }
 }
@@ -80,17 +98,29 @@ impl VonKarman {
     pub fn new(scales: Scales, constant: f64) -> Result<Self, Error> {
         let (outer_rad_m, inner_rad_m) = scales.wavenumbers_rad_m(5.92)?;
         positive("constant", constant)?;
-        Ok(Self { constant, outer_rad_m, inner_rad_m })
+        Ok(Self {
+            constant,
+            outer_rad_m,
+            inner_rad_m,
+        })
     }
 
     /// The chapter's spectrum: L0 = 1 m with kappa_0 = 1/L0, l0 = 1 cm, constant 0.033.
     pub fn table2() -> Self {
-        Self { constant: CHAPTER_CONSTANT, outer_rad_m: 1.0, inner_rad_m: 592.0 }
+        Self {
+            constant: CHAPTER_CONSTANT,
+            outer_rad_m: 1.0,
+            inner_rad_m: 592.0,
+        }
     }
 
     /// Kolmogorov's spectrum: no scales, exact constant.
     pub fn kolmogorov() -> Self {
-        Self { constant: EXACT_CONSTANT, outer_rad_m: 0.0, inner_rad_m: f64::INFINITY }
+        Self {
+            constant: EXACT_CONSTANT,
+            outer_rad_m: 0.0,
+            inner_rad_m: f64::INFINITY,
+        }
     }
 
     /// Tatarskii's spectrum: inner scale only, exact constant.
@@ -99,7 +129,14 @@ impl VonKarman {
     /// As [`VonKarman::new`].
     pub fn tatarskii(inner_scale_m: f64) -> Result<Self, Error> {
         let convention = OuterScaleConvention::Inverse;
-        Self::new(Scales { outer_scale_m: f64::INFINITY, inner_scale_m, convention }, EXACT_CONSTANT)
+        Self::new(
+            Scales {
+                outer_scale_m: f64::INFINITY,
+                inner_scale_m,
+                convention,
+            },
+            EXACT_CONSTANT,
+        )
     }
 }
 
@@ -133,7 +170,10 @@ impl HillAndrews {
     pub fn new(scales: Scales) -> Result<Self, Error> {
         positive("inner_scale_m", scales.inner_scale_m)?;
         let (outer_rad_m, inner_rad_m) = scales.wavenumbers_rad_m(3.3)?;
-        Ok(Self { outer_rad_m, inner_rad_m })
+        Ok(Self {
+            outer_rad_m,
+            inner_rad_m,
+        })
     }
 }
 
@@ -157,12 +197,17 @@ mod tests {
     use super::*;
 
     fn scales(outer_scale_m: f64, inner_scale_m: f64) -> Scales {
-        Scales { outer_scale_m, inner_scale_m, convention: OuterScaleConvention::Inverse }
+        Scales {
+            outer_scale_m,
+            inner_scale_m,
+            convention: OuterScaleConvention::Inverse,
+        }
     }
 
     #[test]
     fn exact_constant_is_the_gamma_function_expression() {
-        let exact = libm::tgamma(8.0 / 3.0) * (std::f64::consts::PI / 3.0).sin() / (4.0 * std::f64::consts::PI.powi(2));
+        let exact = libm::tgamma(8.0 / 3.0) * (std::f64::consts::PI / 3.0).sin()
+            / (4.0 * std::f64::consts::PI.powi(2));
         assert!((EXACT_CONSTANT / exact - 1.0).abs() < 1e-12, "{exact}");
     }
 
@@ -180,9 +225,11 @@ mod tests {
     #[test]
     fn scales_that_cross_or_are_no_numbers_are_refused() {
         let new = |outer, inner| VonKarman::new(scales(outer, inner), 0.033);
-        assert_eq!(new(f64::INFINITY, 0.0).unwrap().outer_wavenumber_rad_m(), 0.0);
-        let named =
-            |result: Result<_, Error>, name| matches!(result, Err(Error::OutOfRange { field, .. }) if field == name);
+        assert_eq!(
+            new(f64::INFINITY, 0.0).unwrap().outer_wavenumber_rad_m(),
+            0.0
+        );
+        let named = |result: Result<_, Error>, name| matches!(result, Err(Error::OutOfRange { field, .. }) if field == name);
         for outer in [0.0, -1.0, f64::NAN] {
             assert!(named(new(outer, 0.01), "outer_scale_m"), "{outer}");
         }
@@ -190,6 +237,12 @@ mod tests {
             assert!(named(new(outer, inner), "inner_scale_m"), "{outer} {inner}");
         }
         let hill = HillAndrews::new(scales(1.0, 0.0));
-        assert!(matches!(hill, Err(Error::OutOfRange { field: "inner_scale_m", .. })));
+        assert!(matches!(
+            hill,
+            Err(Error::OutOfRange {
+                field: "inner_scale_m",
+                ..
+            })
+        ));
     }
 }

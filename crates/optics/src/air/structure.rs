@@ -22,10 +22,21 @@ pub fn structure_function_m53(spectrum: &dyn Spectrum, separation_m: f64) -> Res
         return Ok(0.0);
     }
     let rule = GaussLegendre::new(16);
-    let (outer, inner) = (spectrum.outer_wavenumber_rad_m(), spectrum.inner_wavenumber_rad_m());
-    let end = if inner.is_finite() { 7.0 * inner } else { 1e12 / r };
+    let (outer, inner) = (
+        spectrum.outer_wavenumber_rad_m(),
+        spectrum.inner_wavenumber_rad_m(),
+    );
+    let end = if inner.is_finite() {
+        7.0 * inner
+    } else {
+        1e12 / r
+    };
     // Without an outer scale the integrand falls as kappa^(-2/3) dkappa towards 0: 1e-39 of the scale is 1e-13 of it.
-    let start = if outer > 0.0 { 1e-8 * outer.min(1.0 / r).min(end) } else { 1e-39 / r };
+    let start = if outer > 0.0 {
+        1e-8 * outer.min(1.0 / r).min(end)
+    } else {
+        1e-39 / r
+    };
     let smooth_end = (4.0 / r).min(end);
     let density = |kappa: f64| kappa * spectrum.density_per_cn2(kappa);
     let integrand = |kappa: f64| density(kappa) * one_minus_j0(kappa * r);
@@ -83,7 +94,13 @@ impl StructureTable {
         let first_ln = Self::SMALLEST_M.ln();
         let n = ((Self::LARGEST_M / Self::SMALLEST_M).ln() / step_ln).round() as usize + 1;
         let ln_value = |r: f64| structure_function_m53(spectrum, r).unwrap_or(f64::NAN).ln();
-        Self { first_ln, step_ln, ln_value: (0..n).map(|i| ln_value((first_ln + step_ln * i as f64).exp())).collect() }
+        Self {
+            first_ln,
+            step_ln,
+            ln_value: (0..n)
+                .map(|i| ln_value((first_ln + step_ln * i as f64).exp()))
+                .collect(),
+        }
     }
 
     /// G(r) \[m^(5/3)\] at `separation_m` >= 0.
@@ -102,7 +119,9 @@ impl StructureTable {
         }
         let start = (t as usize).saturating_sub(2).min(n - 6);
         let near = self.ln_value[start..start + 6].iter().enumerate();
-        near.map(|(i, value)| lagrange(&Self::NODES, i, t - start as f64) * value).sum::<f64>().exp()
+        near.map(|(i, value)| lagrange(&Self::NODES, i, t - start as f64) * value)
+            .sum::<f64>()
+            .exp()
     }
 
     /// Structure function D(rho) \[rad^2\] of two spherical waves from `range_m` that are rho apart at the telescope: k^2 times the sum of
@@ -114,7 +133,10 @@ impl StructureTable {
         places: impl IntoIterator<Item = (f64, f64)>,
     ) -> impl Fn(f64) -> f64 {
         let k2 = wavenumber_rad_m.powi(2);
-        let weights: Vec<_> = places.into_iter().map(|(z, w)| (1.0 - z / range_m, k2 * w)).collect();
+        let weights: Vec<_> = places
+            .into_iter()
+            .map(|(z, w)| (1.0 - z / range_m, k2 * w))
+            .collect();
         move |rho| weights.iter().map(|(g, w)| w * self.at(rho * g)).sum()
     }
 }
@@ -139,8 +161,16 @@ mod tests {
 
     #[test]
     fn table_follows_the_quadrature() {
-        let scales = Scales { outer_scale_m: 0.3, inner_scale_m: 0.004, convention: OuterScaleConvention::TwoPiOver };
-        for spectrum in [VonKarman::table2(), VonKarman::kolmogorov(), VonKarman::new(scales, 0.033).unwrap()] {
+        let scales = Scales {
+            outer_scale_m: 0.3,
+            inner_scale_m: 0.004,
+            convention: OuterScaleConvention::TwoPiOver,
+        };
+        for spectrum in [
+            VonKarman::table2(),
+            VonKarman::kolmogorov(),
+            VonKarman::new(scales, 0.033).unwrap(),
+        ] {
             let table = StructureTable::new(&spectrum);
             for i in 0..60 {
                 let r = 2.3e-5 * 10f64.powf(f64::from(i) * 0.09);

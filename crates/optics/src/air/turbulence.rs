@@ -24,12 +24,18 @@ impl Turbulence {
     /// # Errors
     /// [`Error::OutOfRange`] for a negative Cn2 or one that is not a number.
     pub fn table2(cn2_m_m23: f64) -> Result<Self, Error> {
-        Ok(Self { spectrum: Arc::new(VonKarman::table2()), cn2: Cn2Path::Uniform { cn2_m_m23 }.validated()? })
+        Ok(Self {
+            spectrum: Arc::new(VonKarman::table2()),
+            cn2: Cn2Path::Uniform { cn2_m_m23 }.validated()?,
+        })
     }
 
     /// No turbulence at all.
     pub fn none() -> Self {
-        Self { spectrum: Arc::new(VonKarman::table2()), cn2: Cn2Path::None }
+        Self {
+            spectrum: Arc::new(VonKarman::table2()),
+            cn2: Cn2Path::None,
+        }
     }
 }
 
@@ -54,7 +60,12 @@ pub fn path_rytov_variance(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Re
     let k = 2.0 * std::f64::consts::PI / positive("wavelength_m", wavelength_m)?;
     let rest = positive("range_m", range_m)?;
     let places = cn2.clone().validated()?.quadrature(range_m)?;
-    Ok(CONSTANT * k.powf(7.0 / 6.0) * places.iter().map(|(z, w)| w * (rest - z).powf(5.0 / 6.0)).sum::<f64>())
+    Ok(CONSTANT
+        * k.powf(7.0 / 6.0)
+        * places
+            .iter()
+            .map(|(z, w)| w * (rest - z).powf(5.0 / 6.0))
+            .sum::<f64>())
 }
 
 /// Coherence radius rho_0 \[m\] at the telescope of a spherical wave from `range_m`: exp(-(rho/rho_0)^(5/3)) is its mutual
@@ -67,7 +78,10 @@ pub fn coherence_radius_m(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Res
     let k = 2.0 * std::f64::consts::PI / positive("wavelength_m", wavelength_m)?;
     let whole = positive("range_m", range_m)?;
     let places = cn2.clone().validated()?.quadrature(range_m)?;
-    let weighted: f64 = places.iter().map(|(z, w)| w * (1.0 - z / whole).powf(5.0 / 3.0)).sum();
+    let weighted: f64 = places
+        .iter()
+        .map(|(z, w)| w * (1.0 - z / whole).powf(5.0 / 3.0))
+        .sum();
     Ok((1.4572 * k * k * weighted).powf(-0.6))
 }
 
@@ -80,7 +94,10 @@ mod tests {
     fn medium_turbulence_is_strong_beyond_690_m() {
         let rytov = rytov_variance(1e-13, 1.55e-6, 690.0).unwrap();
         assert!((rytov - 1.0).abs() < 0.02, "{rytov}");
-        assert_eq!(refused(rytov_variance(f64::NAN, 1.55e-6, 690.0)), "cn2_m_m23");
+        assert_eq!(
+            refused(rytov_variance(f64::NAN, 1.55e-6, 690.0)),
+            "cn2_m_m23"
+        );
     }
 
     #[test]
@@ -101,7 +118,10 @@ mod tests {
         };
         for path in [uniform, level] {
             let rytov = path_rytov_variance(&path, 1.55e-6, 900.0).unwrap();
-            assert!((rytov / rytov_variance(3e-14, 1.55e-6, 900.0).unwrap() - 1.0).abs() < 1e-4, "{rytov}");
+            assert!(
+                (rytov / rytov_variance(3e-14, 1.55e-6, 900.0).unwrap() - 1.0).abs() < 1e-4,
+                "{rytov}"
+            );
             let radius = coherence_radius_m(&path, 1.55e-6, 900.0).unwrap();
             let k = 2.0 * std::f64::consts::PI / 1.55e-6;
             let printed = (1.4572 * k * k * 3e-14 * 900.0 * 0.375f64).powf(-0.6);

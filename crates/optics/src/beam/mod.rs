@@ -12,7 +12,11 @@ use std::f64::consts::{PI, SQRT_2};
 
 /// What `beam_radius_m` means: the radius at which one quantity has fallen to 1/e of its value on the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum RadiusDefinition {
     /// Irradiance: |E|^2 ~ exp(-r^2/s^2). The chapter's Table 2 is read this way.
     Intensity,
@@ -81,11 +85,26 @@ impl Telescope {
         positive("aperture_radius_m", self.aperture_radius_m)?;
         not_negative("obscuration_radius_m", self.obscuration_radius_m)?;
         let (hidden, lit) = (self.obscuration_radius_m, self.beam_radius_m);
-        within("obscuration_radius_m", hidden, hidden < self.aperture_radius_m, "below aperture_radius_m")?;
-        within("beam_radius_m", lit, lit > 0.0, "a number above 0, infinity for a uniformly lit aperture")?;
+        within(
+            "obscuration_radius_m",
+            hidden,
+            hidden < self.aperture_radius_m,
+            "below aperture_radius_m",
+        )?;
+        within(
+            "beam_radius_m",
+            lit,
+            lit > 0.0,
+            "a number above 0, infinity for a uniformly lit aperture",
+        )?;
         if let Focus::At(focus_m) = self.focus {
             finite("focus_m", focus_m)?;
-            within("focus_m", focus_m, focus_m != 0.0, "a finite number other than 0")?;
+            within(
+                "focus_m",
+                focus_m,
+                focus_m != 0.0,
+                "a finite number other than 0",
+            )?;
         }
         Ok(self)
     }
@@ -115,7 +134,10 @@ impl Telescope {
         if s.is_infinite() {
             return 1.0;
         }
-        let (inner, outer) = ((self.obscuration_radius_m / s).powi(2), (self.aperture_radius_m / s).powi(2));
+        let (inner, outer) = (
+            (self.obscuration_radius_m / s).powi(2),
+            (self.aperture_radius_m / s).powi(2),
+        );
         // exp(-i) - exp(-o) without cancellation for wide beams.
         (-inner).exp() * -(inner - outer).exp_m1()
     }
@@ -147,7 +169,10 @@ pub struct Misalignment {
 
 impl Misalignment {
     /// Perfectly aligned beams.
-    pub const NONE: Self = Self { offset_m: [0.0; 2], tilt_rad: [0.0; 2] };
+    pub const NONE: Self = Self {
+        offset_m: [0.0; 2],
+        tilt_rad: [0.0; 2],
+    };
 
     /// The misalignment itself when all four numbers are finite.
     ///
@@ -176,7 +201,10 @@ mod tests {
     fn chapter_beam_transmits_what_the_reference_states() {
         let t = Telescope::table2();
         assert!((t.transmitted_fraction() - 0.937_823_475_240_2).abs() < 1e-9);
-        let field = Telescope { radius_definition: RadiusDefinition::Field, ..t };
+        let field = Telescope {
+            radius_definition: RadiusDefinition::Field,
+            ..t
+        };
         assert!((field.transmitted_fraction() - 0.996_134_080_0).abs() < 1e-6);
     }
 
@@ -185,9 +213,15 @@ mod tests {
         let rule = crate::quadrature::GaussLegendre::new(20);
         for beam_radius_m in [0.01, 0.03, 1e6, f64::INFINITY] {
             for obscuration_radius_m in [0.0, 0.02] {
-                let t = Telescope { beam_radius_m, obscuration_radius_m, ..Telescope::table2() };
+                let t = Telescope {
+                    beam_radius_m,
+                    obscuration_radius_m,
+                    ..Telescope::table2()
+                };
                 let irradiance = |r: f64| t.peak_irradiance_per_m2() * t.relative_irradiance(r);
-                let power = rule.composite(obscuration_radius_m, 0.05, 20, |r| 2.0 * PI * r * irradiance(r));
+                let power = rule.composite(obscuration_radius_m, 0.05, 20, |r| {
+                    2.0 * PI * r * irradiance(r)
+                });
                 assert!((power / t.transmitted_fraction() - 1.0).abs() < 1e-9);
             }
         }
@@ -197,12 +231,48 @@ mod tests {
     fn bad_fields_are_named() {
         let good = Telescope::table2();
         let cases = [
-            (Telescope { wavelength_m: -1.0, ..good }, "wavelength_m"),
-            (Telescope { aperture_radius_m: 0.0, ..good }, "aperture_radius_m"),
-            (Telescope { beam_radius_m: f64::NAN, ..good }, "beam_radius_m"),
-            (Telescope { obscuration_radius_m: 0.05, ..good }, "obscuration_radius_m"),
-            (Telescope { focus: Focus::At(0.0), ..good }, "focus_m"),
-            (Telescope { focus: Focus::At(f64::NAN), ..good }, "focus_m"),
+            (
+                Telescope {
+                    wavelength_m: -1.0,
+                    ..good
+                },
+                "wavelength_m",
+            ),
+            (
+                Telescope {
+                    aperture_radius_m: 0.0,
+                    ..good
+                },
+                "aperture_radius_m",
+            ),
+            (
+                Telescope {
+                    beam_radius_m: f64::NAN,
+                    ..good
+                },
+                "beam_radius_m",
+            ),
+            (
+                Telescope {
+                    obscuration_radius_m: 0.05,
+                    ..good
+                },
+                "obscuration_radius_m",
+            ),
+            (
+                Telescope {
+                    focus: Focus::At(0.0),
+                    ..good
+                },
+                "focus_m",
+            ),
+            (
+                Telescope {
+                    focus: Focus::At(f64::NAN),
+                    ..good
+                },
+                "focus_m",
+            ),
         ];
         for (bad, name) in cases {
             assert_eq!(crate::error::refused(bad.validated()), name);

@@ -27,7 +27,10 @@ fn transform(telescope: &Telescope, largest_rad_m: f64) -> impl Fn(f64) -> f64 {
     let panels = 2 + (largest_rad_m * (a - b) / 8.0) as usize;
     let peak = telescope.peak_irradiance_per_m2().sqrt();
     let weight = |r: f64, w: f64| 2.0 * PI * w * r * peak * telescope.relative_irradiance(r).sqrt();
-    let nodes: Vec<_> = GaussLegendre::new(16).on_panels(b, a, panels).map(|(r, w)| (r, weight(r, w))).collect();
+    let nodes: Vec<_> = GaussLegendre::new(16)
+        .on_panels(b, a, panels)
+        .map(|(r, w)| (r, weight(r, w)))
+        .collect();
     let value = |kappa: f64| nodes.iter().map(|(r, w)| w * libm::j0(kappa * r)).sum();
     let count = (largest_rad_m / step_rad_m) as usize + 4;
     let table: Vec<f64> = (0..count).map(|i| value(step_rad_m * i as f64)).collect();
@@ -40,7 +43,10 @@ pub(crate) fn aperture_field<T: Real>(
     misalignment: &Misalignment,
     grid: &Grid,
 ) -> Vec<Complex<T>> {
-    let [dkx, dky] = [2.0 * PI / (grid.nx as f64 * grid.dx_m), 2.0 * PI / (grid.ny as f64 * grid.dy_m)];
+    let [dkx, dky] = [
+        2.0 * PI / (grid.nx as f64 * grid.dx_m),
+        2.0 * PI / (grid.ny as f64 * grid.dy_m),
+    ];
     let nyquist = [PI / grid.dx_m, PI / grid.dy_m];
     let transform = transform(telescope, nyquist[0].hypot(nyquist[1]) * 1.001);
     // Power in the band, and how it grows with the weight given to its upper half.
@@ -70,13 +76,20 @@ pub(crate) fn aperture_field<T: Real>(
     }
     let missing = RESTORED * (telescope.transmitted_fraction() - p0).max(0.0);
     // p0 + 2 w p1 + w^2 p2 = p0 + missing.
-    let weight = if p1 > 0.0 { missing / (p1 + (p1 * p1 + p2 * missing).sqrt()) } else { 0.0 };
+    let weight = if p1 > 0.0 {
+        missing / (p1 + (p1 * p1 + p2 * missing).sqrt())
+    } else {
+        0.0
+    };
     let scale = 1.0 / (grid.points() as f64 * grid.dx_m * grid.dy_m);
     for (value, e) in spectrum.iter_mut().zip(&edge) {
         *value *= (1.0 + weight * e) * scale;
     }
     let fft = Fft2::<f64>::new(grid);
-    let Work { whole: mut field, mut scratch } = fft.work();
+    let Work {
+        whole: mut field,
+        mut scratch,
+    } = fft.work();
     Fft2::transposing(&fft.inverse_y, &mut field, &mut scratch, |ix, block| {
         let start = ix * grid.ny;
         block.copy_from_slice(&spectrum[start..start + block.len()]);
@@ -88,7 +101,8 @@ pub(crate) fn aperture_field<T: Real>(
         let x = Grid::offset_m(grid.nx, grid.dx_m, i % grid.nx);
         let y = Grid::offset_m(grid.ny, grid.dy_m, i / grid.nx);
         let (u, v) = (x - misalignment.offset_m[0], y - misalignment.offset_m[1]);
-        let phase = k * (x * misalignment.tilt_rad[0] + y * misalignment.tilt_rad[1]) - bend * (u * u + v * v);
+        let phase = k * (x * misalignment.tilt_rad[0] + y * misalignment.tilt_rad[1])
+            - bend * (u * u + v * v);
         let value = e * Complex::cis(phase);
         Complex::new(T::of(value.re), T::of(value.im))
     };
@@ -100,7 +114,9 @@ pub(crate) fn aperture_field<T: Real>(
 /// The field has waves up to k a/|F|, its irradiance up to twice and the square of that up to four times as much. The sum over
 /// the points is the integral (19) while no wave of the square comes round to 0, at 2 pi/dx: dx <= lambda |F|/(4 a).
 pub(crate) fn slope_rad(telescope: &Telescope, misalignment: &Misalignment) -> f64 {
-    let reach = telescope.aperture_radius_m.min(3.0 * telescope.intensity_radius_m());
+    let reach = telescope
+        .aperture_radius_m
+        .min(3.0 * telescope.intensity_radius_m());
     let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
     tilt + 2.0 * reach * telescope.focus.curvature_per_m().abs()
 }
@@ -120,13 +136,26 @@ pub(crate) fn check_grid(
     let grid = grid.validated()?;
     let violated = |row| Violation::of(row, grid.largest_spacing_m(), grid.smallest_width_m());
     let violations: Vec<_> = limits.into_iter().filter_map(violated).collect();
-    if violations.is_empty() { Ok(()) } else { Err(Error::Sampling { violations, would_do: None }) }
+    if violations.is_empty() {
+        Ok(())
+    } else {
+        Err(Error::Sampling {
+            violations,
+            would_do: None,
+        })
+    }
 }
 
 /// What telescope and beam out to `range_m` demand of any grid: largest spacings and least widths \[m\].
-pub(crate) fn beam_limits_m(t: &Telescope, misalignment: &Misalignment, range_m: f64) -> [(Limit, f64); 4] {
+pub(crate) fn beam_limits_m(
+    t: &Telescope,
+    misalignment: &Misalignment,
+    range_m: f64,
+) -> [(Limit, f64); 4] {
     let (a, lambda) = (t.aperture_radius_m, t.wavelength_m);
-    let resolved = (0.5 * (a - t.obscuration_radius_m)).min(a / 3.0).min(t.intensity_radius_m());
+    let resolved = (0.5 * (a - t.obscuration_radius_m))
+        .min(a / 3.0)
+        .min(t.intensity_radius_m());
     let offset = misalignment.offset_m[0].hypot(misalignment.offset_m[1]);
     let tilt = misalignment.tilt_rad[0].hypot(misalignment.tilt_rad[1]);
     let reach = a.min(3.0 * t.intensity_radius_m());
@@ -146,9 +175,20 @@ mod tests {
 
     #[test]
     fn power_on_the_grid_is_nearly_the_transmitted_fraction() {
-        let grid = Grid { nx: 256, ny: 243, dx_m: 2e-3, dy_m: 2e-3 };
-        for (beam_radius_m, obscuration_radius_m) in [(0.03, 0.0), (0.02, 0.015), (f64::INFINITY, 0.02)] {
-            let t = Telescope { beam_radius_m, obscuration_radius_m, ..Telescope::table2() };
+        let grid = Grid {
+            nx: 256,
+            ny: 243,
+            dx_m: 2e-3,
+            dy_m: 2e-3,
+        };
+        for (beam_radius_m, obscuration_radius_m) in
+            [(0.03, 0.0), (0.02, 0.015), (f64::INFINITY, 0.02)]
+        {
+            let t = Telescope {
+                beam_radius_m,
+                obscuration_radius_m,
+                ..Telescope::table2()
+            };
             let field = aperture_field::<f64>(&t, &Misalignment::NONE, &grid);
             let power: f64 = field.iter().map(|e| e.norm_sqr()).sum::<f64>() * 4e-6;
             let missing = 1.0 - power / t.transmitted_fraction();
@@ -166,19 +206,37 @@ mod tests {
             Err(Error::Sampling { violations, .. }) => (violations[0].limit, violations[0].needed),
             other => panic!("{other:?}"),
         };
-        let tiny = Telescope { aperture_radius_m: 5e-3, beam_radius_m: 3e-3, ..t };
+        let tiny = Telescope {
+            aperture_radius_m: 5e-3,
+            beam_radius_m: 3e-3,
+            ..t
+        };
         assert_eq!(first(tiny, 100.0), (Limit::Aperture, 1.666e-3));
-        let huge = Telescope { aperture_radius_m: 0.6, ..t };
+        let huge = Telescope {
+            aperture_radius_m: 0.6,
+            ..t
+        };
         assert_eq!(first(huge, 100.0), (Limit::Border, 1.5));
         // Focus far in front of the target: the beam outgrows the grid.
-        let short = Telescope { focus: crate::Focus::At(300.0), ..t };
+        let short = Telescope {
+            focus: crate::Focus::At(300.0),
+            ..t
+        };
         assert_eq!(first(short, 3000.0).0, Limit::Beam);
-        let steep = Telescope { focus: crate::Focus::At(50.0), ..t };
+        let steep = Telescope {
+            focus: crate::Focus::At(50.0),
+            ..t
+        };
         assert_eq!(first(steep, 60.0).0, Limit::WaveFront);
         // All of them at once.
-        let both = Telescope { focus: crate::Focus::At(50.0), ..t };
+        let both = Telescope {
+            focus: crate::Focus::At(50.0),
+            ..t
+        };
         match check_grid(&both, &none, &grid, 3000.0) {
-            Err(Error::Sampling { violations, .. }) => assert_eq!(violations.len(), 2, "{violations:?}"),
+            Err(Error::Sampling { violations, .. }) => {
+                assert_eq!(violations.len(), 2, "{violations:?}")
+            }
             other => panic!("{other:?}"),
         }
     }

@@ -26,25 +26,45 @@ pub(super) fn check<T: Real>(
     screens: &ScreenGenerator<T>,
     found: &EfficiencyEstimate,
 ) -> Result<(), Error> {
-    let Some(bistatic) = &found.bistatic else { return Ok(()) };
+    let Some(bistatic) = &found.bistatic else {
+        return Ok(());
+    };
     let table = StructureTable::new(&*run.turbulence.spectrum);
     // Of a spectrum that is cut at Nyquist less than this is missing at any separation.
-    let missing = if screens.folds() { 0.0 } else { screens.missing_at_one_spacing()?.max(0.0) };
+    let missing = if screens.folds() {
+        0.0
+    } else {
+        screens.missing_at_one_spacing()?.max(0.0)
+    };
     for (i, &range_m) in run.range_m.iter().enumerate() {
         let layers = run.layers.screens_to(range_m, &run.turbulence.cn2)?;
         let with = |share: f64| {
-            let weaker = |s: &ScreenStrength| ScreenStrength { cn2_thickness_m13: share * s.cn2_thickness_m13, ..*s };
+            let weaker = |s: &ScreenStrength| ScreenStrength {
+                cn2_thickness_m13: share * s.cn2_thickness_m13,
+                ..*s
+            };
             let layers: Vec<ScreenStrength> = layers.iter().map(weaker).collect();
             bistatic_efficiency_screens(&run.telescope, &run.misalignment, &layers, &table, range_m)
         };
         let exact = with(1.0)?;
-        let most = if missing > 0.0 { with(1.0 - missing)? } else { exact };
+        let most = if missing > 0.0 {
+            with(1.0 - missing)?
+        } else {
+            exact
+        };
         let (mean, standard_error) = (bistatic.mean[i], bistatic.standard_error[i]);
         let correction = found.exact_free_space[i] / found.grid_free_space[i];
         let of_grid = OF_SCREENS + OF_CORRECTION * (correction - 1.0).abs();
         let allowed = errors_of(found.independent_samples) * standard_error + of_grid * exact;
-        if mean < exact - allowed - 2.0 * found.lost_power_fraction[i] * exact || mean > most + allowed {
-            return Err(Error::AgainstTheory { range_m, mean, standard_error, exact });
+        if mean < exact - allowed - 2.0 * found.lost_power_fraction[i] * exact
+            || mean > most + allowed
+        {
+            return Err(Error::AgainstTheory {
+                range_m,
+                mean,
+                standard_error,
+                exact,
+            });
         }
     }
     Ok(())
@@ -72,10 +92,15 @@ mod tests {
         };
         let layers = run.layers.screens_to(600.0, &run.turbulence.cn2).unwrap();
         let table = StructureTable::new(&*run.turbulence.spectrum);
-        let exact = bistatic_efficiency_screens(&run.telescope, &run.misalignment, &layers, &table, 600.0).unwrap();
+        let exact =
+            bistatic_efficiency_screens(&run.telescope, &run.misalignment, &layers, &table, 600.0)
+                .unwrap();
         let grid = |spacing_m| {
-            ScreenGenerator::<f64>::new(crate::Grid::square(64, spacing_m).unwrap(), run.turbulence.spectrum.clone())
-                .unwrap()
+            ScreenGenerator::<f64>::new(
+                crate::Grid::square(64, spacing_m).unwrap(),
+                run.turbulence.spectrum.clone(),
+            )
+            .unwrap()
         };
         let tried = |spacing_m: f64, off: f64, error: f64, samples: usize, lost: f64| {
             let mut bistatic = EfficiencyProfile::default();
@@ -94,12 +119,20 @@ mod tests {
             check(&run, &grid(spacing_m), &found).is_ok()
         };
         for sign in [-1.0, 1.0] {
-            assert!(tried(4e-3, sign * 0.048, 0.01, 10_000, 0.0) && !tried(4e-3, sign * 0.056, 0.01, 10_000, 0.0));
+            assert!(
+                tried(4e-3, sign * 0.048, 0.01, 10_000, 0.0)
+                    && !tried(4e-3, sign * 0.056, 0.01, 10_000, 0.0)
+            );
             // What the error of few samples is worth; that of one pair is not known.
-            assert!(tried(4e-3, sign * 0.08, 0.01, 11, 0.0) && !tried(4e-3, sign * 0.13, 0.01, 11, 0.0));
+            assert!(
+                tried(4e-3, sign * 0.08, 0.01, 11, 0.0) && !tried(4e-3, sign * 0.13, 0.01, 11, 0.0)
+            );
             assert!(tried(4e-3, sign * 0.9, f64::NAN, 2, 0.0));
             // Without random error the screens themselves are allowed for.
-            assert!(tried(4e-3, sign * 1e-3, 0.0, 10_000, 0.0) && !tried(4e-3, sign * 4e-3, 0.0, 10_000, 0.0));
+            assert!(
+                tried(4e-3, sign * 1e-3, 0.0, 10_000, 0.0)
+                    && !tried(4e-3, sign * 4e-3, 0.0, 10_000, 0.0)
+            );
         }
         // Light that the border took lowers the mean, and screens that miss small eddies raise it.
         assert!(tried(4e-3, -0.03, 0.0, 10_000, 0.02) && !tried(4e-3, 0.03, 0.0, 10_000, 0.02));
@@ -110,7 +143,11 @@ mod tests {
     fn errors_are_students() {
         // The quantiles of five normal deviations, 1 - 2.87e-7, by a quadrature of the density.
         for (samples, quantile) in [(11, 11.166), (31, 6.319), (101, 5.344), (100_001, 5.0)] {
-            assert!((errors_of(samples) / quantile - 1.0).abs() < 0.02, "{samples}: {}", errors_of(samples));
+            assert!(
+                (errors_of(samples) / quantile - 1.0).abs() < 0.02,
+                "{samples}: {}",
+                errors_of(samples)
+            );
         }
     }
 }

@@ -51,7 +51,10 @@ pub struct Stop {
 impl Stop {
     /// A fixed number of realisations.
     pub fn after(realisations: usize) -> Self {
-        Self { realisations, relative_standard_error: None }
+        Self {
+            realisations,
+            relative_standard_error: None,
+        }
     }
 }
 
@@ -163,7 +166,10 @@ impl MonteCarlo {
     /// # Errors
     /// As [`MonteCarlo::run_in`].
     pub fn grid_free_space<T: Real>(&self) -> Result<Vec<f64>, Error> {
-        let calm = Self { turbulence: Turbulence::none(), ..self.in_order() };
+        let calm = Self {
+            turbulence: Turbulence::none(),
+            ..self.in_order()
+        };
         let prepared = calm.prepare::<T>()?;
         let ranges = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1, &|_| Ok(()))?;
         Ok(ranges.iter().map(|at| at.samples[0].same_path).collect())
@@ -174,7 +180,11 @@ impl MonteCarlo {
         let mut range_m = self.range_m.clone();
         range_m.sort_by(f64::total_cmp);
         range_m.dedup();
-        Self { layers: self.layers.split_at(&range_m), range_m, ..self.clone() }
+        Self {
+            layers: self.layers.split_at(&range_m),
+            range_m,
+            ..self.clone()
+        }
     }
 
     pub(crate) fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
@@ -182,21 +192,40 @@ impl MonteCarlo {
         let misalignment = self.misalignment.validated()?;
         let cn2 = self.turbulence.cn2.clone().validated()?;
         crate::efficiency::check_increasing("range_m", &self.range_m)?;
-        let furthest = *self.range_m.last().ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })?;
+        let furthest = *self.range_m.last().ok_or(Error::Length {
+            field: "range_m",
+            found: 0,
+            expected: 1,
+        })?;
         check_grid(&telescope, &misalignment, &self.grid, furthest)?;
         let lambda = telescope.wavelength_m;
         let path = Path::new(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
         let propagator = Propagator::new(self.grid, lambda)?;
         let generator = || ScreenGenerator::new(self.grid, self.turbulence.spectrum.clone());
         let displaced = misalignment != Misalignment::NONE;
-        let beams = if displaced { vec![Misalignment::NONE, misalignment] } else { vec![Misalignment::NONE] };
-        let start: Vec<Vec<Complex<T>>> = beams.iter().map(|m| aperture_field(&telescope, m, &self.grid)).collect();
+        let beams = if displaced {
+            vec![Misalignment::NONE, misalignment]
+        } else {
+            vec![Misalignment::NONE]
+        };
+        let start: Vec<Vec<Complex<T>>> = beams
+            .iter()
+            .map(|m| aperture_field(&telescope, m, &self.grid))
+            .collect();
         let pixel = self.grid.dx_m * self.grid.dy_m;
         Ok(Prepared {
-            transfers: path.distance_m.iter().map(|&d| propagator.transfer(d)).collect::<Result<_, _>>()?,
+            transfers: path
+                .distance_m
+                .iter()
+                .map(|&d| propagator.transfer(d))
+                .collect::<Result<_, _>>()?,
             screens: (!path.strength.is_empty()).then(generator).transpose()?,
             folding: Folding::new(&self.grid, !displaced),
-            scale: self.range_m.iter().map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel).collect(),
+            scale: self
+                .range_m
+                .iter()
+                .map(|r| (lambda * r).powi(2) / telescope.aperture_area_m2() * pixel)
+                .collect(),
             power: start[0].iter().map(|e| e.norm_sqr().wide()).sum::<f64>() * pixel,
             path,
             propagator,
@@ -210,10 +239,21 @@ impl MonteCarlo {
         stop: Stop,
         progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
     ) -> Result<EfficiencyEstimate, Error> {
-        within("realisations", stop.realisations as f64, stop.realisations > 0, "at least 1")?;
-        stop.relative_standard_error.map_or(Ok(0.0), |target| positive("relative_standard_error", target))?;
+        within(
+            "realisations",
+            stop.realisations as f64,
+            stop.realisations > 0,
+            "at least 1",
+        )?;
+        stop.relative_standard_error.map_or(Ok(0.0), |target| {
+            positive("relative_standard_error", target)
+        })?;
         // Without turbulence every realisation is the same.
-        let total = if prepared.screens.is_some() { stop.realisations } else { 1 };
+        let total = if prepared.screens.is_some() {
+            stop.realisations
+        } else {
+            1
+        };
         let mut ranges: Vec<AtRange<T>> = Vec::new();
         let (mut done, mut relative_standard_error) = (0, f64::INFINITY);
         let carried = Mutex::new((0, progress));
@@ -222,25 +262,41 @@ impl MonteCarlo {
             let watch = |more| {
                 let (done, progress) = &mut *carried.lock().unwrap_or_else(PoisonError::into_inner);
                 *done += more;
-                match progress(Progress { done: *done, total, relative_standard_error }) {
+                match progress(Progress {
+                    done: *done,
+                    total,
+                    relative_standard_error,
+                }) {
                     ControlFlow::Continue(()) => Ok(()),
-                    ControlFlow::Break(()) => Err(Error::Cancelled { realisations: *done }),
+                    ControlFlow::Break(()) => Err(Error::Cancelled {
+                        realisations: *done,
+                    }),
                 }
             };
             let group = |&first: &usize| {
-                Walker::new(prepared, self.seed, self.sampling).group(first, GROUP.min(total - first), &watch)
+                Walker::new(prepared, self.seed, self.sampling).group(
+                    first,
+                    GROUP.min(total - first),
+                    &watch,
+                )
             };
             for group in in_parallel(&firsts, group) {
                 let group = group?;
                 if ranges.is_empty() {
                     ranges = group;
                 } else {
-                    ranges.iter_mut().zip(group).for_each(|(all, more)| all.add(more));
+                    ranges
+                        .iter_mut()
+                        .zip(group)
+                        .for_each(|(all, more)| all.add(more));
                 }
             }
             done = (done + GROUPS_PER_WAVE * GROUP).min(total);
             relative_standard_error = ranges.iter().map(relative_error).fold(0.0, f64::max);
-            if stop.relative_standard_error.is_some_and(|target| relative_standard_error <= target) {
+            if stop
+                .relative_standard_error
+                .is_some_and(|target| relative_standard_error <= target)
+            {
                 break;
             }
         }
@@ -259,7 +315,8 @@ impl MonteCarlo {
             true => ranges.iter().map(|at| at.samples[0].same_path).collect(),
             false => self.grid_free_space::<T>()?,
         };
-        let exact = |&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r);
+        let exact =
+            |&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r);
         let mut out = EfficiencyEstimate {
             monostatic: EfficiencyProfile::default(),
             bistatic: None,
@@ -280,18 +337,25 @@ impl MonteCarlo {
             out.lost_power_fraction.push(fraction);
             let factor = out.exact_free_space[i] / out.grid_free_space[i];
             let single = at.samples.iter().flat_map(|s| &s.single);
-            out.monostatic_realisations.push(single.map(|eta| factor * eta).collect());
-            out.bistatic_realisations.push(at.products.iter().map(|eta| factor * eta).collect());
+            out.monostatic_realisations
+                .push(single.map(|eta| factor * eta).collect());
+            out.bistatic_realisations
+                .push(at.products.iter().map(|eta| factor * eta).collect());
             if is_calm {
-                out.monostatic.push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
+                out.monostatic
+                    .push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
                 pairs.push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
                 continue;
             }
-            out.monostatic.push(range_m, monostatic(at).map(|v| factor * v));
+            out.monostatic
+                .push(range_m, monostatic(at).map(|v| factor * v));
             if at.samples.len() > 1 {
-                let total =
-                    prepared.folding.overlap(&at.planes[0], &at.planes[at.planes.len() - 1]) * prepared.scale[i];
-                let (mean, error) = bistatic(&at.samples, total, &prepared.folding, prepared.scale[i]);
+                let total = prepared
+                    .folding
+                    .overlap(&at.planes[0], &at.planes[at.planes.len() - 1])
+                    * prepared.scale[i];
+                let (mean, error) =
+                    bistatic(&at.samples, total, &prepared.folding, prepared.scale[i]);
                 let spread = mean_and_variance(at.products.iter().copied()).1.sqrt();
                 pairs.push(range_m, [mean, spread, error].map(|v| factor * v));
             }
@@ -307,14 +371,20 @@ impl MonteCarlo {
 /// Mean, standard deviation of one realisation and standard error of the mean, both beams through the same path.
 fn monostatic<T>(at: &AtRange<T>) -> [f64; 3] {
     let (mean, variance) = mean_and_variance(at.samples.iter().map(|s| s.same_path));
-    let spread = mean_and_variance(at.samples.iter().flat_map(|s| s.single.iter().copied())).1.sqrt();
+    let spread = mean_and_variance(at.samples.iter().flat_map(|s| s.single.iter().copied()))
+        .1
+        .sqrt();
     [mean, spread, (variance / at.samples.len() as f64).sqrt()]
 }
 
 /// Relative standard error of the monostatic mean; infinite while it is not known.
 fn relative_error<T>(at: &AtRange<T>) -> f64 {
     let [mean, _, error] = monostatic(at);
-    if at.samples.len() > 1 { error / mean } else { f64::INFINITY }
+    if at.samples.len() > 1 {
+        error / mean
+    } else {
+        f64::INFINITY
+    }
 }
 
 /// The results of `work` in the order of `items`.

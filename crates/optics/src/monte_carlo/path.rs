@@ -25,7 +25,11 @@ impl Layers {
     /// [`Error`] for an empty list, or ends that are not positive and increasing.
     pub fn new(end_m: Vec<f64>) -> Result<Self, Error> {
         if end_m.is_empty() {
-            return Err(Error::Length { field: "end_m", found: 0, expected: 1 });
+            return Err(Error::Length {
+                field: "end_m",
+                found: 0,
+                expected: 1,
+            });
         }
         check_increasing("end_m", &end_m)?;
         Ok(Self { end_m })
@@ -37,7 +41,11 @@ impl Layers {
     /// [`Error::OutOfRange`] for a range that is not positive or no layers.
     pub fn equal(count: usize, range_m: f64) -> Result<Self, Error> {
         positive("range_m", range_m)?;
-        Self::new((1..=count).map(|i| range_m * i as f64 / count as f64).collect())
+        Self::new(
+            (1..=count)
+                .map(|i| range_m * i as f64 / count as f64)
+                .collect(),
+        )
     }
 
     /// Ends of the layers \[m\].
@@ -49,8 +57,14 @@ impl Layers {
     #[must_use]
     pub fn split_at(&self, range_m: &[f64]) -> Self {
         let last = self.end_m[self.end_m.len() - 1];
-        let inside = |r: &&f64| **r > 0.0 && **r < last && !self.end_m.iter().any(|end| same(*end, **r));
-        let mut end_m: Vec<f64> = self.end_m.iter().chain(range_m.iter().filter(inside)).copied().collect();
+        let inside =
+            |r: &&f64| **r > 0.0 && **r < last && !self.end_m.iter().any(|end| same(*end, **r));
+        let mut end_m: Vec<f64> = self
+            .end_m
+            .iter()
+            .chain(range_m.iter().filter(inside))
+            .copied()
+            .collect();
         end_m.sort_by(f64::total_cmp);
         end_m.dedup_by(|b, a| same(*a, *b));
         Self { end_m }
@@ -58,7 +72,9 @@ impl Layers {
 
     /// Start and end of each layer \[m\].
     pub(crate) fn bounds_m(&self) -> impl Iterator<Item = (f64, f64)> {
-        std::iter::once(0.0).chain(self.end_m.iter().copied()).zip(self.end_m.iter().copied())
+        std::iter::once(0.0)
+            .chain(self.end_m.iter().copied())
+            .zip(self.end_m.iter().copied())
     }
 
     /// The screens that a field arriving at `range_m` has crossed, for the exact bistatic theory of a simulated path.
@@ -71,7 +87,11 @@ impl Layers {
             if start >= range_m || cn2.is_none() {
                 break;
             }
-            let end = if same(end, range_m) { end } else { end.min(range_m) };
+            let end = if same(end, range_m) {
+                end
+            } else {
+                end.min(range_m)
+            };
             screens.push(ScreenStrength {
                 position_m: 0.5 * (start + end),
                 cn2_thickness_m13: cn2.mean(start, end)? * (end - start),
@@ -103,7 +123,10 @@ impl Leg {
     /// Ranges that the leg reaches: index, and whether it is one on the way.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (usize, bool)> {
         let at_the_end = self.outputs.clone().map(|output| (output, false));
-        self.tap.iter().map(|&(output, _)| (output, true)).chain(at_the_end)
+        self.tap
+            .iter()
+            .map(|&(output, _)| (output, true))
+            .chain(at_the_end)
     }
 }
 
@@ -131,20 +154,36 @@ impl Path {
         let last = layers.end_m[layers.end_m.len() - 1];
         for &r in range_m {
             positive("range_m", r)?;
-            within("range_m", r, r <= last || same(r, last), "within the layers of the path")?;
+            within(
+                "range_m",
+                r,
+                r <= last || same(r, last),
+                "within the layers of the path",
+            )?;
         }
         let (mut path, largest_step_m) = (Self::default(), grid.largest_step_m(wavelength_m));
         let furthest = range_m.last().copied().unwrap_or_default();
         // Places with the screen that stands there, or the ranges.
         let mut stops: Vec<(f64, Option<usize>, Range<usize>)> = Vec::new();
         let mut reached = 0;
-        for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < furthest && !same(*start, furthest)) {
+        for (start, end) in layers
+            .bounds_m()
+            .take_while(|(start, _)| *start < furthest && !same(*start, furthest))
+        {
             if !cn2.is_none() {
                 let cn2_thickness = cn2.mean(start, end)? * (end - start);
-                stops.push((0.5 * (start + end), Some(path.strength.len()), reached..reached));
-                path.strength.push(2.0 * std::f64::consts::PI / wavelength_m * cn2_thickness.sqrt());
+                stops.push((
+                    0.5 * (start + end),
+                    Some(path.strength.len()),
+                    reached..reached,
+                ));
+                path.strength
+                    .push(2.0 * std::f64::consts::PI / wavelength_m * cn2_thickness.sqrt());
             }
-            let here = range_m[reached..].iter().take_while(|r| **r < end || same(**r, end)).count();
+            let here = range_m[reached..]
+                .iter()
+                .take_while(|r| **r < end || same(**r, end))
+                .count();
             if here > 0 {
                 let at_m = if cn2.is_none() { range_m[reached] } else { end };
                 stops.push((at_m, None, reached..reached + here));
@@ -155,7 +194,13 @@ impl Path {
         for (at_m, next_screen, outputs) in stops {
             let times = ((at_m - from_m) / largest_step_m - 1e-9).ceil().max(1.0);
             let distance = path.step((at_m - from_m) / times);
-            legs.push(Leg { screen, tap: None, distance, times: times as usize, outputs });
+            legs.push(Leg {
+                screen,
+                tap: None,
+                distance,
+                times: times as usize,
+                outputs,
+            });
             (from_m, screen) = (at_m, next_screen);
         }
         path.join(legs, largest_step_m);
@@ -165,7 +210,8 @@ impl Path {
     /// Takes the legs over; two become one with a tap where one step reaches past a range.
     fn join(&mut self, legs: Vec<Leg>, largest_step_m: f64) {
         for leg in legs {
-            let whole_m = |before: &Leg| self.distance_m[before.distance] + self.distance_m[leg.distance];
+            let whole_m =
+                |before: &Leg| self.distance_m[before.distance] + self.distance_m[leg.distance];
             let passes = |before: &mut Leg| {
                 (before.tap, before.outputs.len(), before.times) == (None, 1, 1)
                     && (leg.screen, leg.times) == (None, 1)
@@ -176,7 +222,12 @@ impl Path {
                 (whole_m(&before), before.screen, tap)
             });
             let leg = match joined {
-                Some((whole_m, screen, tap)) => Leg { screen, tap, distance: self.step(whole_m), ..leg },
+                Some((whole_m, screen, tap)) => Leg {
+                    screen,
+                    tap,
+                    distance: self.step(whole_m),
+                    ..leg
+                },
                 None => leg,
             };
             self.legs.push(leg);
@@ -186,7 +237,10 @@ impl Path {
     /// Index of the distance of a step, new if need be.
     fn step(&mut self, distance_m: f64) -> usize {
         let key = (distance_m.ln() * 1e9).round() as i64;
-        let near = self.known.range(key - 1..=key + 1).find(|(_, i)| same(self.distance_m[**i], distance_m));
+        let near = self
+            .known
+            .range(key - 1..=key + 1)
+            .find(|(_, i)| same(self.distance_m[**i], distance_m));
         if let Some((_, index)) = near {
             return *index;
         }
@@ -197,7 +251,16 @@ impl Path {
 
     /// Fourier transform pairs of one realisation.
     pub(crate) fn transform_pairs(&self) -> f64 {
-        self.legs.iter().map(|leg| if leg.tap.is_some() { 1.5 } else { leg.times as f64 }).sum()
+        self.legs
+            .iter()
+            .map(|leg| {
+                if leg.tap.is_some() {
+                    1.5
+                } else {
+                    leg.times as f64
+                }
+            })
+            .sum()
     }
 }
 
@@ -209,7 +272,14 @@ mod tests {
     const UNIFORM: Cn2Path = Cn2Path::Uniform { cn2_m_m23: 1e-14 };
 
     fn path(layers: &Layers, range_m: &[f64], cn2: &Cn2Path) -> Path {
-        Path::new(&layers.split_at(range_m), range_m, cn2, &Grid::table2(), 1.55e-6).unwrap()
+        Path::new(
+            &layers.split_at(range_m),
+            range_m,
+            cn2,
+            &Grid::table2(),
+            1.55e-6,
+        )
+        .unwrap()
     }
 
     #[test]
@@ -279,7 +349,16 @@ mod tests {
     #[test]
     fn ranges_beyond_the_path_are_refused() {
         let layers = Layers::equal(4, 1000.0).unwrap();
-        assert_eq!(refused(Path::new(&layers, &[1000.5], &UNIFORM, &Grid::table2(), 1.55e-6)), "range_m");
+        assert_eq!(
+            refused(Path::new(
+                &layers,
+                &[1000.5],
+                &UNIFORM,
+                &Grid::table2(),
+                1.55e-6
+            )),
+            "range_m"
+        );
         assert_eq!(refused(Layers::equal(0, 1000.0)), "end_m");
         assert_eq!(refused(Layers::new(vec![10.0, 5.0])), "end_m");
     }

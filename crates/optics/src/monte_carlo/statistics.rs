@@ -29,11 +29,27 @@ impl Folding {
     /// Onto the quadrant, for beams symmetric about both axes, or the grid as it is, for displaced beams.
     pub(crate) fn new(grid: &Grid, folded: bool) -> Self {
         let Grid { nx, ny, dx_m, dy_m } = *grid;
-        let size = if folded { [nx / 2 + 1, ny / 2 + 1] } else { [nx, ny] };
+        let size = if folded {
+            [nx / 2 + 1, ny / 2 + 1]
+        } else {
+            [nx, ny]
+        };
         let unit = RING * dx_m.min(dy_m);
         let rings = (0.5 * grid.smallest_width_m() / unit).ceil() as usize + 1;
-        let mut this = Self { grid: *grid, folded, size, ring: Vec::new(), ring_points: vec![0.0; rings] };
-        let place_m = |n, spacing_m, i| if folded { i as f64 * spacing_m } else { Grid::offset_m(n, spacing_m, i) };
+        let mut this = Self {
+            grid: *grid,
+            folded,
+            size,
+            ring: Vec::new(),
+            ring_points: vec![0.0; rings],
+        };
+        let place_m = |n, spacing_m, i| {
+            if folded {
+                i as f64 * spacing_m
+            } else {
+                Grid::offset_m(n, spacing_m, i)
+            }
+        };
         for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
             let radius_m = place_m(nx, dx_m, x).hypot(place_m(ny, dy_m, y));
             let ring = ((radius_m / unit) as usize).min(rings - 1);
@@ -130,13 +146,25 @@ pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
     let squares: f64 = values.map(|v| (v - mean) * (v - mean)).sum();
-    (mean, if n > 1.0 { squares / (n - 1.0) } else { f64::NAN })
+    (
+        mean,
+        if n > 1.0 {
+            squares / (n - 1.0)
+        } else {
+            f64::NAN
+        },
+    )
 }
 
 /// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer than three samples.
 ///
 /// `total` is the overlap of the two summed planes, `scale` turns a product of ring sums (per point) into an efficiency.
-pub(crate) fn bistatic(samples: &[Sample], total: f64, folding: &Folding, scale: f64) -> (f64, f64) {
+pub(crate) fn bistatic(
+    samples: &[Sample],
+    total: f64,
+    folding: &Folding,
+    scale: f64,
+) -> (f64, f64) {
     let n = samples.len() as f64;
     let own: f64 = samples.iter().map(|s| s.folded).sum();
     let mean = (total - own) / (n * (n - 1.0));
@@ -164,7 +192,10 @@ pub(crate) fn bistatic(samples: &[Sample], total: f64, folding: &Folding, scale:
         sum * scale
     };
     // Its overlap with itself, which rings would smooth, is in neither.
-    let left_out: Vec<f64> = samples.iter().map(|s| (total - own - with_others(s)) / ((n - 1.0) * (n - 2.0))).collect();
+    let left_out: Vec<f64> = samples
+        .iter()
+        .map(|s| (total - own - with_others(s)) / ((n - 1.0) * (n - 2.0)))
+        .collect();
     let (_, variance) = mean_and_variance(left_out.iter().copied());
     // Jackknife: (n - 1)/n sum (theta_i - mean)^2 = (n - 1)^2/n variance.
     (mean, (variance / n).sqrt() * (n - 1.0))
@@ -189,7 +220,12 @@ mod tests {
     #[test]
     fn folded_overlap_is_the_overlap_for_symmetric_planes() {
         for (nx, ny) in [(32, 24), (31, 25)] {
-            let grid = Grid { nx, ny, dx_m: 1.0, dy_m: 1.0 };
+            let grid = Grid {
+                nx,
+                ny,
+                dx_m: 1.0,
+                dy_m: 1.0,
+            };
             let (a, b) = (plane(&grid, 6.0, 1.0), plane(&grid, 9.0, 2.0));
             let exact: f64 = a.iter().zip(&b).map(|(a, b)| a * b).sum();
             for folding in [Folding::new(&grid, true), Folding::new(&grid, false)] {
@@ -200,7 +236,11 @@ mod tests {
                     }
                 }
                 let found = folding.overlap(&planes[0], &planes[1]);
-                assert!((found / exact - 1.0).abs() < 1e-12, "{nx} {:?}: {found} {exact}", folding.size);
+                assert!(
+                    (found / exact - 1.0).abs() < 1e-12,
+                    "{nx} {:?}: {found} {exact}",
+                    folding.size
+                );
                 assert_eq!(folding.ring_points.iter().sum::<f64>(), (nx * ny) as f64);
             }
         }
@@ -208,10 +248,22 @@ mod tests {
 
     #[test]
     fn pairs_and_jackknife_agree_with_the_double_sums() {
-        let grid = Grid { nx: 48, ny: 48, dx_m: 1.0, dy_m: 1.0 };
+        let grid = Grid {
+            nx: 48,
+            ny: 48,
+            dx_m: 1.0,
+            dy_m: 1.0,
+        };
         let folding = Folding::new(&grid, true);
-        let planes: Vec<Vec<f64>> =
-            (0..7).map(|i| plane(&grid, 9.0 + 0.7 * f64::from(i), 1.0 + 0.2 * f64::from(i % 3))).collect();
+        let planes: Vec<Vec<f64>> = (0..7)
+            .map(|i| {
+                plane(
+                    &grid,
+                    9.0 + 0.7 * f64::from(i),
+                    1.0 + 0.2 * f64::from(i % 3),
+                )
+            })
+            .collect();
         let mut total = vec![0.0; folding.points()];
         let mut samples = Vec::new();
         for p in &planes {
@@ -235,7 +287,11 @@ mod tests {
             let (mut sum, mut count) = (0.0, 0.0);
             for i in (0..7).filter(|i| Some(*i) != left_out) {
                 for j in (0..7).filter(|j| Some(*j) != left_out && *j != i) {
-                    sum += planes[i].iter().zip(&planes[j]).map(|(a, b)| a * b).sum::<f64>();
+                    sum += planes[i]
+                        .iter()
+                        .zip(&planes[j])
+                        .map(|(a, b)| a * b)
+                        .sum::<f64>();
                     count += 1.0;
                 }
             }
@@ -252,7 +308,12 @@ mod tests {
     /// cancels the scatter.
     #[test]
     fn few_realisations_with_bright_speckles_state_their_error() {
-        let grid = Grid { nx: 48, ny: 48, dx_m: 1.0, dy_m: 1.0 };
+        let grid = Grid {
+            nx: 48,
+            ny: 48,
+            dx_m: 1.0,
+            dy_m: 1.0,
+        };
         let folding = Folding::new(&grid, false);
         let speckled = |i: usize| {
             let (height, angle) = (3 * i % 7, 2.4 * i as f64);
@@ -268,17 +329,30 @@ mod tests {
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
         let planes: Vec<Vec<f64>> = (0..5).map(speckled).collect();
         let mut total = vec![0.0; folding.points()];
-        planes.iter().for_each(|p| total.iter_mut().zip(p).for_each(|(t, v)| *t += v));
+        planes
+            .iter()
+            .for_each(|p| total.iter_mut().zip(p).for_each(|(t, v)| *t += v));
         let sample = |p: &Vec<f64>| {
             let rings = folding.ring_sums(p).iter().map(|&v| v as f32).collect();
             let own = dot(p, p);
-            Sample { same_path: own, single: vec![own], folded: own, rings: [rings, Vec::new()], lost: 0.0 }
+            Sample {
+                same_path: own,
+                single: vec![own],
+                folded: own,
+                rings: [rings, Vec::new()],
+                lost: 0.0,
+            }
         };
         let samples: Vec<Sample> = planes.iter().map(sample).collect();
         let (_, error) = bistatic(&samples, dot(&total, &total), &folding, 1.0);
         let pairs = |left_out: usize| {
             let others = || (0..5).filter(move |i| *i != left_out);
-            let of = |i: usize| others().filter(move |j| *j != i).map(|j| dot(&planes[i], &planes[j])).sum::<f64>();
+            let of = |i: usize| {
+                others()
+                    .filter(move |j| *j != i)
+                    .map(|j| dot(&planes[i], &planes[j]))
+                    .sum::<f64>()
+            };
             others().map(of).sum::<f64>() / 12.0
         };
         let (_, variance) = mean_and_variance((0..5).map(pairs).collect::<Vec<_>>().into_iter());

@@ -86,7 +86,12 @@ pub(crate) struct Walker<'a, T: Real> {
 impl<T: Real> AtRange<T> {
     /// Adds what the next group left.
     pub(crate) fn add(&mut self, other: Self) {
-        for (mine, theirs) in self.planes.iter_mut().flatten().zip(other.planes.into_iter().flatten()) {
+        for (mine, theirs) in self
+            .planes
+            .iter_mut()
+            .flatten()
+            .zip(other.planes.into_iter().flatten())
+        {
             *mine = *mine + theirs;
         }
         self.samples.extend(other.samples);
@@ -99,21 +104,41 @@ impl<T: Real> AtRange<T> {
             let count = marks.len() as f64;
             let single: Vec<f64> = marks.iter().map(|m| m.same_path).collect();
             let lost = marks.iter().map(|m| m.lost).sum::<f64>() / count;
-            let Some(Mark { mut planes, .. }) = marks.pop() else { continue };
+            let Some(Mark { mut planes, .. }) = marks.pop() else {
+                continue;
+            };
             for other in marks.drain(..) {
-                for (a, b) in planes.iter_mut().flatten().zip(other.planes.into_iter().flatten()) {
+                for (a, b) in planes
+                    .iter_mut()
+                    .flatten()
+                    .zip(other.planes.into_iter().flatten())
+                {
                     *a = (*a + b) * T::of(0.5);
                 }
             }
-            let rings = |plane: &Vec<T>| folding.ring_sums(plane).iter().map(|&v| v as f32).collect::<Vec<f32>>();
+            let rings = |plane: &Vec<T>| {
+                folding
+                    .ring_sums(plane)
+                    .iter()
+                    .map(|&v| v as f32)
+                    .collect::<Vec<f32>>()
+            };
             self.samples.push(Sample {
                 same_path: single.iter().sum::<f64>() / count,
                 single,
                 folded: folding.overlap(&planes[0], &planes[planes.len() - 1]) * scale,
-                rings: [rings(&planes[0]), planes.get(1).map_or_else(Vec::new, rings)],
+                rings: [
+                    rings(&planes[0]),
+                    planes.get(1).map_or_else(Vec::new, rings),
+                ],
                 lost,
             });
-            for (t, p) in self.planes.iter_mut().flatten().zip(planes.iter().flatten()) {
+            for (t, p) in self
+                .planes
+                .iter_mut()
+                .flatten()
+                .zip(planes.iter().flatten())
+            {
                 *t = *t + *p;
             }
         }
@@ -123,8 +148,15 @@ impl<T: Real> AtRange<T> {
 impl<'a, T: Real> Walker<'a, T> {
     pub(crate) fn new(prepared: &'a Prepared<T>, seed: u64, sampling: Sampling) -> Self {
         let grid = prepared.propagator.grid();
-        let (count, points) = if prepared.screens.is_some() { (2, grid.points()) } else { (1, 0) };
-        let beams = || Beams { fields: prepared.start.clone(), power: prepared.power };
+        let (count, points) = if prepared.screens.is_some() {
+            (2, grid.points())
+        } else {
+            (1, 0)
+        };
+        let beams = || Beams {
+            fields: prepared.start.clone(),
+            power: prepared.power,
+        };
         let realisation = |_| Realisation {
             here: beams(),
             passed: beams(),
@@ -152,7 +184,13 @@ impl<'a, T: Real> Walker<'a, T> {
         count: usize,
         watch: &(dyn Fn(usize) -> Result<(), Error> + Sync),
     ) -> Result<Vec<AtRange<T>>, Error> {
-        let Prepared { path, scale, folding, start, .. } = self.prepared;
+        let Prepared {
+            path,
+            scale,
+            folding,
+            start,
+            ..
+        } = self.prepared;
         let nothing = |_| AtRange {
             planes: vec![vec![T::zero(); folding.points()]; start.len()],
             samples: Vec::new(),
@@ -165,7 +203,9 @@ impl<'a, T: Real> Walker<'a, T> {
             for which in 0..active {
                 self.begin(which, (pair + which) as u64);
             }
-            let waits = self.sampling == Sampling::Antithetic && (pair / 2) % 2 == 0 && pair + 2 < first + count;
+            let waits = self.sampling == Sampling::Antithetic
+                && (pair / 2) % 2 == 0
+                && pair + 2 < first + count;
             for leg in &path.legs {
                 for which in 0..active {
                     self.propagate(which, leg)?;
@@ -192,29 +232,59 @@ impl<'a, T: Real> Walker<'a, T> {
         (state.stream, state.sign) = match self.sampling {
             Sampling::Independent => (index, 1.0),
             // Order +A +B -A -B: neighbours are independent.
-            Sampling::Antithetic => (index / 4 * 4 + index % 2, if index % 4 < 2 { 1.0 } else { -1.0 }),
+            Sampling::Antithetic => (
+                index / 4 * 4 + index % 2,
+                if index % 4 < 2 { 1.0 } else { -1.0 },
+            ),
         };
     }
 
     /// One leg of a realisation, (16): the screen, then free space, past a range or in equal steps.
     fn propagate(&mut self, which: usize, leg: &Leg) -> Result<(), Error> {
-        let Prepared { path, propagator, transfers, screens: generator, .. } = self.prepared;
-        let Realisation { here, passed, screens, synthesis, stream: key, sign } = &mut self.pair[which];
-        if let (Some(layer), Some(generator), Some(work)) = (leg.screen, generator, &mut self.screen_work) {
+        let Prepared {
+            path,
+            propagator,
+            transfers,
+            screens: generator,
+            ..
+        } = self.prepared;
+        let Realisation {
+            here,
+            passed,
+            screens,
+            synthesis,
+            stream: key,
+            sign,
+        } = &mut self.pair[which];
+        if let (Some(layer), Some(generator), Some(work)) =
+            (leg.screen, generator, &mut self.screen_work)
+        {
             // Two layers share one synthesis.
             if synthesis.replace(layer / 2) != Some(layer / 2) {
                 let [first, second] = &mut *screens;
-                generator.fill_pair(&mut stream(self.seed, *key, (layer / 2) as u64), work, first, second)?;
+                generator.fill_pair(
+                    &mut stream(self.seed, *key, (layer / 2) as u64),
+                    work,
+                    first,
+                    second,
+                )?;
             }
         }
-        let screen = leg.screen.map(|layer| (&screens[layer % 2][..], T::of(*sign * path.strength[layer])));
+        let screen = leg
+            .screen
+            .map(|layer| (&screens[layer % 2][..], T::of(*sign * path.strength[layer])));
         let step = &transfers[leg.distance];
         for beam in (0..here.fields.len()).rev() {
             let (field, mut screen) = (&mut here.fields[beam], screen);
             if let Some((_, distance)) = leg.tap {
                 let steps = [&transfers[distance], step];
-                [passed.power, here.power] =
-                    propagator.step_with_tap(field, &mut passed.fields[beam], screen, steps, &mut self.work)?;
+                [passed.power, here.power] = propagator.step_with_tap(
+                    field,
+                    &mut passed.fields[beam],
+                    screen,
+                    steps,
+                    &mut self.work,
+                )?;
                 continue;
             }
             for _ in 0..leg.times {
@@ -226,11 +296,24 @@ impl<'a, T: Real> Walker<'a, T> {
 
     /// Overlaps and folded planes of the realisations at a range, and the product of the two.
     fn measure(&mut self, range: usize, active: usize, is_passed: bool, at: &mut AtRange<T>) {
-        let Self { prepared, pair, rows, .. } = self;
-        let Prepared { folding, start, scale, .. } = prepared;
+        let Self {
+            prepared,
+            pair,
+            rows,
+            ..
+        } = self;
+        let Prepared {
+            folding,
+            start,
+            scale,
+            ..
+        } = prepared;
         let (nx, ny) = (prepared.propagator.grid().nx, prepared.propagator.grid().ny);
         let last = start.len() - 1;
-        let beams: Vec<_> = pair[..active].iter().map(|one| if is_passed { &one.passed } else { &one.here }).collect();
+        let beams: Vec<_> = pair[..active]
+            .iter()
+            .map(|one| if is_passed { &one.passed } else { &one.here })
+            .collect();
         let mark = |beams: &&Beams<T>| Mark {
             same_path: 0.0,
             lost: 1.0 - beams.power / prepared.power,
@@ -256,6 +339,7 @@ impl<'a, T: Real> Walker<'a, T> {
             mark.same_path *= scale[range];
             waiting.push(mark);
         }
-        at.products.extend((active == 2).then_some(product * scale[range]));
+        at.products
+            .extend((active == 2).then_some(product * scale[range]));
     }
 }

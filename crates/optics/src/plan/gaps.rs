@@ -48,17 +48,33 @@ impl LayerGap {
 }
 
 /// Largest Rytov variance of a layer before `furthest_m`.
-pub(super) fn worst_rytov(cn2: &Cn2Path, wavelength_m: f64, layers: &Layers, furthest_m: f64) -> Result<f64, Error> {
+pub(super) fn worst_rytov(
+    cn2: &Cn2Path,
+    wavelength_m: f64,
+    layers: &Layers,
+    furthest_m: f64,
+) -> Result<f64, Error> {
     let mut worst = 0f64;
-    for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < furthest_m) {
+    for (start, end) in layers
+        .bounds_m()
+        .take_while(|(start, _)| *start < furthest_m)
+    {
         let end = end.min(furthest_m);
-        worst = worst.max(rytov_variance(cn2.mean(start, end)?, wavelength_m, end - start)?);
+        worst = worst.max(rytov_variance(
+            cn2.mean(start, end)?,
+            wavelength_m,
+            end - start,
+        )?);
     }
     Ok(worst)
 }
 
 /// Equal layers to `furthest_m`, as many as keep each below [`LARGEST_LAYER_RYTOV`].
-pub(super) fn thin_layers(cn2: &Cn2Path, wavelength_m: f64, furthest_m: f64) -> Result<Layers, Error> {
+pub(super) fn thin_layers(
+    cn2: &Cn2Path,
+    wavelength_m: f64,
+    furthest_m: f64,
+) -> Result<Layers, Error> {
     let mut count = 1;
     while count <= MOST {
         let layers = Layers::equal(count, furthest_m)?;
@@ -98,7 +114,12 @@ impl<'a> Gaps<'a> {
     ) -> Result<Self, Error> {
         let wavenumber_rad_m = telescope.wavenumber_rad_m();
         let rule = GaussLegendre::new(10);
-        let mut gaps = Self { cn2, table, wavenumber_rad_m, ranges: Vec::new() };
+        let mut gaps = Self {
+            cn2,
+            table,
+            wavenumber_rad_m,
+            ranges: Vec::new(),
+        };
         if cn2.is_none() {
             return Ok(gaps);
         }
@@ -110,26 +131,46 @@ impl<'a> Gaps<'a> {
                 let middle = pair[0] + 0.25 * (pair[1] - pair[0]);
                 for (low, high) in [(pair[0], middle), (middle, pair[1])] {
                     node.extend(
-                        rule.mapped(low, high).map(|(rho, w)| (rho, w * 2.0 * PI * rho * overlap.at(rho).powi(2))),
+                        rule.mapped(low, high)
+                            .map(|(rho, w)| (rho, w * 2.0 * PI * rho * overlap.at(rho).powi(2))),
                     );
                 }
             }
             let rytov = path_rytov_variance(cn2, telescope.wavelength_m, range_m)?;
             let path = gaps.integral(&node, range_m, cn2.quadrature(range_m)?);
-            gaps.ranges.push(AtRange { range_m, node, path, standard_error: forecast_error(rytov, realisations) });
+            gaps.ranges.push(AtRange {
+                range_m,
+                node,
+                path,
+                standard_error: forecast_error(rytov, realisations),
+            });
         }
         Ok(gaps)
     }
 
     /// Integral of M^2 exp(-D) for a path that is a sum over places z with weights Cn2 dz.
-    fn integral(&self, node: &[(f64, f64)], range_m: f64, places: impl IntoIterator<Item = (f64, f64)>) -> f64 {
-        let structure_rad2 = self.table.of_spherical_waves(self.wavenumber_rad_m, range_m, places);
-        node.iter().map(|&(rho, weight)| weight * (-structure_rad2(rho)).exp()).sum()
+    fn integral(
+        &self,
+        node: &[(f64, f64)],
+        range_m: f64,
+        places: impl IntoIterator<Item = (f64, f64)>,
+    ) -> f64 {
+        let structure_rad2 = self
+            .table
+            .of_spherical_waves(self.wavenumber_rad_m, range_m, places);
+        node.iter()
+            .map(|&(rho, weight)| weight * (-structure_rad2(rho)).exp())
+            .sum()
     }
 
     /// The gap of a set of layers at each range; of very many layers, at some of the ranges.
     pub(super) fn of(&self, layers: &Layers) -> Result<Vec<LayerGap>, Error> {
-        let nodes = self.ranges.iter().map(|r| r.node.len()).sum::<usize>().max(1);
+        let nodes = self
+            .ranges
+            .iter()
+            .map(|r| r.node.len())
+            .sum::<usize>()
+            .max(1);
         let fraction = (MOST_TERMS as f64 / (nodes * layers.end_m().len()) as f64).min(1.0);
         let some = (self.ranges.len() as f64 * fraction).ceil().max(2.0) as usize;
         let mut out = Vec::new();
@@ -137,7 +178,11 @@ impl<'a> Gaps<'a> {
             let screens = layers.screens_to(at.range_m, self.cn2)?;
             let places = screens.iter().map(|s| (s.position_m, s.cn2_thickness_m13));
             let relative = self.integral(&at.node, at.range_m, places) / at.path - 1.0;
-            out.push(LayerGap { range_m: at.range_m, relative, standard_error: at.standard_error });
+            out.push(LayerGap {
+                range_m: at.range_m,
+                relative,
+                standard_error: at.standard_error,
+            });
         }
         Ok(out)
     }
@@ -145,7 +190,11 @@ impl<'a> Gaps<'a> {
     /// `layers`, each cut in halves until no range has a large gap; those whose screens err most are cut first.
     pub(super) fn refined(&self, mut layers: Layers) -> Result<Layers, Error> {
         loop {
-            let large: Vec<LayerGap> = self.of(&layers)?.into_iter().filter(LayerGap::is_large).collect();
+            let large: Vec<LayerGap> = self
+                .of(&layers)?
+                .into_iter()
+                .filter(LayerGap::is_large)
+                .collect();
             if large.is_empty() || layers.end_m().len() >= MOST {
                 return Ok(layers);
             }
@@ -156,8 +205,9 @@ impl<'a> Gaps<'a> {
                 worst.into_iter().for_each(|(layer, _)| cut[layer] = true);
             }
             let parts = layers.bounds_m().zip(cut);
-            let ends =
-                parts.flat_map(|((start, end), cut)| cut.then_some(0.5 * (start + end)).into_iter().chain([end]));
+            let ends = parts.flat_map(|((start, end), cut)| {
+                cut.then_some(0.5 * (start + end)).into_iter().chain([end])
+            });
             layers = Layers::new(ends.collect())?;
         }
     }
@@ -180,10 +230,18 @@ impl<'a> Gaps<'a> {
     }
 
     /// Number of equal layers to `furthest_m`, `least` or more, without a large gap; none if 1000 have one.
-    pub(super) fn equal_layers(&self, least: usize, furthest_m: f64) -> Result<Option<usize>, Error> {
+    pub(super) fn equal_layers(
+        &self,
+        least: usize,
+        furthest_m: f64,
+    ) -> Result<Option<usize>, Error> {
         let mut count = least;
         while count <= MOST {
-            if !self.of(&Layers::equal(count, furthest_m)?)?.iter().any(LayerGap::is_large) {
+            if !self
+                .of(&Layers::equal(count, furthest_m)?)?
+                .iter()
+                .any(LayerGap::is_large)
+            {
                 return Ok(Some(count));
             }
             count += 1 + count / 4;
@@ -203,7 +261,9 @@ fn spread_over<T: Copy>(items: &[T], count: usize) -> Vec<T> {
     if items.len() <= count || count < 2 {
         return items.iter().copied().take(count.max(1)).collect();
     }
-    (0..count).map(|i| items[i * (items.len() - 1) / (count - 1)]).collect()
+    (0..count)
+        .map(|i| items[i * (items.len() - 1) / (count - 1)])
+        .collect()
 }
 
 #[cfg(test)]
@@ -223,16 +283,30 @@ mod tests {
         let telescope = Telescope::table2();
         let table = StructureTable::new(&*Turbulence::table2(1e-15).unwrap().spectrum);
         let strong = Cn2Path::Uniform { cn2_m_m23: 1e-13 };
-        for (cn2, furthest_m) in [(strong, 600.0), (slanted(30f64.to_radians()), 3000.0), (slanted(FRAC_PI_2), 3000.0)]
-        {
+        for (cn2, furthest_m) in [
+            (strong, 600.0),
+            (slanted(30f64.to_radians()), 3000.0),
+            (slanted(FRAC_PI_2), 3000.0),
+        ] {
             let range_m: Vec<f64> = (1..=6).map(|i| furthest_m * f64::from(i) / 6.0).collect();
             let gaps = Gaps::new(&telescope, &cn2, &table, &range_m, 400).unwrap();
             let thin = thin_layers(&cn2, telescope.wavelength_m, furthest_m).unwrap();
-            let worst = |layers: &Layers| gaps.of(layers).unwrap().iter().fold(0f64, |w, g| w.max(g.excess()));
+            let worst = |layers: &Layers| {
+                gaps.of(layers)
+                    .unwrap()
+                    .iter()
+                    .fold(0f64, |w, g| w.max(g.excess()))
+            };
             assert!(worst(&thin) > 1.0, "{}", worst(&thin));
             let refined = gaps.refined(thin.clone()).unwrap();
-            assert!(worst(&refined) <= 1.0 && refined.end_m().len() < 60, "{refined:?}");
-            let equal = gaps.equal_layers(thin.end_m().len(), furthest_m).unwrap().unwrap();
+            assert!(
+                worst(&refined) <= 1.0 && refined.end_m().len() < 60,
+                "{refined:?}"
+            );
+            let equal = gaps
+                .equal_layers(thin.end_m().len(), furthest_m)
+                .unwrap()
+                .unwrap();
             assert!(worst(&Layers::equal(equal, furthest_m).unwrap()) <= 1.0);
         }
     }
@@ -242,16 +316,29 @@ mod tests {
         let (telescope, none) = (Telescope::table2(), crate::Misalignment::NONE);
         let turbulence = Turbulence::table2(1e-13).unwrap();
         let table = StructureTable::new(&*turbulence.spectrum);
-        let gaps = Gaps::new(&telescope, &turbulence.cn2, &table, &[80.0, 200.0, 600.0], 400).unwrap();
+        let gaps = Gaps::new(
+            &telescope,
+            &turbulence.cn2,
+            &table,
+            &[80.0, 200.0, 600.0],
+            400,
+        )
+        .unwrap();
         let layers = Layers::equal(3, 600.0).unwrap();
         for gap in gaps.of(&layers).unwrap() {
             let r = gap.range_m;
             let screens = layers.screens_to(r, &turbulence.cn2).unwrap();
             let of_screens =
-                crate::theory::bistatic_efficiency_screens(&telescope, &none, &screens, &table, r).unwrap();
-            let of_path = crate::theory::bistatic_efficiency(&telescope, &none, &turbulence, r).unwrap();
+                crate::theory::bistatic_efficiency_screens(&telescope, &none, &screens, &table, r)
+                    .unwrap();
+            let of_path =
+                crate::theory::bistatic_efficiency(&telescope, &none, &turbulence, r).unwrap();
             let exact = of_screens / of_path - 1.0;
-            assert!((gap.relative - exact).abs() < 1e-3 * exact.abs() + 1e-9, "{r}: {} {exact}", gap.relative);
+            assert!(
+                (gap.relative - exact).abs() < 1e-3 * exact.abs() + 1e-9,
+                "{r}: {} {exact}",
+                gap.relative
+            );
         }
     }
 }

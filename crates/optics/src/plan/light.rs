@@ -37,7 +37,9 @@ impl Light {
         table: &StructureTable,
         furthest_m: f64,
     ) -> Result<Self, Error> {
-        let lit_m = telescope.aperture_radius_m.min(3.0 * telescope.intensity_radius_m());
+        let lit_m = telescope
+            .aperture_radius_m
+            .min(3.0 * telescope.intensity_radius_m());
         let mut planes = Vec::new();
         for i in 1..=PLANES {
             let range_m = furthest_m * f64::from(i) / f64::from(PLANES);
@@ -45,9 +47,14 @@ impl Light {
             let spread_m = 2.0 * scatter_rad(telescope, cn2, range_m)? * range_m;
             let lobe_m = range_m / (telescope.wavenumber_rad_m() * lit_m);
             // From well inside the beam to where only the 1/r of the edge is left.
-            let (first_m, last_m) = (0.3 * (shadow_m + lobe_m), shadow_m + 4.0 * spread_m + 150.0 * lobe_m);
+            let (first_m, last_m) = (
+                0.3 * (shadow_m + lobe_m),
+                shadow_m + 4.0 * spread_m + 150.0 * lobe_m,
+            );
             let step_ln = (last_m / first_m).ln() / f64::from(RADII - 1);
-            let radius_m: Vec<f64> = (0..RADII).map(|j| first_m * (step_ln * f64::from(j)).exp()).collect();
+            let radius_m: Vec<f64> = (0..RADII)
+                .map(|j| first_m * (step_ln * f64::from(j)).exp())
+                .collect();
             planes.push(Plane {
                 range_m,
                 displaced_m: misalignment.separation_m(range_m),
@@ -56,7 +63,10 @@ impl Light {
                 beyond: mean_power_beyond(telescope, cn2, table, range_m, &radius_m)?,
             });
         }
-        Ok(Self { wavelength_m: telescope.wavelength_m, planes })
+        Ok(Self {
+            wavelength_m: telescope.wavelength_m,
+            planes,
+        })
     }
 
     /// Largest mean fraction of the light on a grid of this width and spacing that its border takes.
@@ -64,7 +74,8 @@ impl Light {
         self.planes.iter().fold(0.0, |worst, plane| {
             let border_m = (0.5 * BORDER * width_m - plane.displaced_m).max(0.0);
             // Light at angles beyond the band of the grid, a square of the area of this circle, is not on it and cannot be lost.
-            let nyquist_m = self.wavelength_m * plane.range_m / (spacing_m * std::f64::consts::PI.sqrt());
+            let nyquist_m =
+                self.wavelength_m * plane.range_m / (spacing_m * std::f64::consts::PI.sqrt());
             worst.max(plane.beyond(border_m) - plane.beyond(nyquist_m))
         })
     }
@@ -77,7 +88,11 @@ impl Light {
         }
         for _ in 0..40 {
             let middle = 0.5 * (low + high);
-            if self.lost(middle, spacing_m) > fraction { low = middle } else { high = middle }
+            if self.lost(middle, spacing_m) > fraction {
+                low = middle
+            } else {
+                high = middle
+            }
         }
         high
     }
@@ -101,7 +116,11 @@ impl Plane {
 }
 
 /// Angle into which turbulence scatters the beam \[rad\], lambda/(pi rho_0).
-pub(super) fn scatter_rad(telescope: &Telescope, cn2: &Cn2Path, range_m: f64) -> Result<f64, Error> {
+pub(super) fn scatter_rad(
+    telescope: &Telescope,
+    cn2: &Cn2Path,
+    range_m: f64,
+) -> Result<f64, Error> {
     let rho_0 = coherence_radius_m(cn2, telescope.wavelength_m, range_m)?;
     Ok(telescope.wavelength_m / (std::f64::consts::PI * rho_0))
 }

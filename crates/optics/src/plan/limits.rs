@@ -31,29 +31,61 @@ impl<'a> Limits<'a> {
         case.telescope.validated()?;
         case.misalignment.validated()?;
         case.turbulence.cn2.clone().validated()?;
-        Ok(Self { case, table: StructureTable::new(&*case.turbulence.spectrum) })
+        Ok(Self {
+            case,
+            table: StructureTable::new(&*case.turbulence.spectrum),
+        })
     }
 
     /// What layers do to the mean at these ranges.
     pub(super) fn gaps(&self, range_m: &[f64]) -> Result<Gaps<'_>, Error> {
-        let Case { telescope, turbulence, realisations, .. } = self.case;
-        Gaps::new(telescope, &turbulence.cn2, &self.table, range_m, *realisations)
+        let Case {
+            telescope,
+            turbulence,
+            realisations,
+            ..
+        } = self.case;
+        Gaps::new(
+            telescope,
+            &turbulence.cn2,
+            &self.table,
+            range_m,
+            *realisations,
+        )
     }
 
     /// Equal layers to the last of these ranges, each thin against diffraction.
     pub(super) fn thin_layers(&self, range_m: &[f64]) -> Result<Layers, Error> {
-        thin_layers(&self.case.turbulence.cn2, self.case.telescope.wavelength_m, last(range_m)?)
+        thin_layers(
+            &self.case.turbulence.cn2,
+            self.case.telescope.wavelength_m,
+            last(range_m)?,
+        )
     }
 
     /// Tails of the beam out to the furthest range.
     fn light(&self, range_m: &[f64]) -> Result<Light, Error> {
-        let Case { telescope, misalignment, turbulence, .. } = self.case;
-        Light::new(telescope, misalignment, &turbulence.cn2, &self.table, last(range_m)?)
+        let Case {
+            telescope,
+            misalignment,
+            turbulence,
+            ..
+        } = self.case;
+        Light::new(
+            telescope,
+            misalignment,
+            &turbulence.cn2,
+            &self.table,
+            last(range_m)?,
+        )
     }
 
     /// Width \[m\] at which the border takes three quarters of what is doubtful, at the spacing of a grid.
     pub(super) fn width_for_light_m(&self, grid: &Grid, range_m: &[f64]) -> Result<f64, Error> {
-        Ok(not_below(self.light(range_m)?.width_m(DERIVED_LOSS, grid.largest_spacing_m())))
+        Ok(not_below(
+            self.light(range_m)?
+                .width_m(DERIVED_LOSS, grid.largest_spacing_m()),
+        ))
     }
 
     /// The table: what turbulence and the aperture demand of the spacing, beside what the beam demands of any grid
@@ -63,31 +95,64 @@ impl<'a> Limits<'a> {
     /// of the points give the efficiency as well (within 1e-4 in free space). For the angles into which focus, tilt and
     /// turbulence send the beam the plan keeps a margin of two: what lies within it is left to the monitored border.
     fn spacings_m(&self, range_m: &[f64]) -> Result<([(Limit, f64); 2], f64), Error> {
-        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        let Case {
+            telescope,
+            misalignment,
+            turbulence,
+            ..
+        } = self.case;
         let (a, lambda) = (telescope.aperture_radius_m, telescope.wavelength_m);
-        let fresnel = range_m.iter().fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
-        let [planned, accepted] = if fresnel < FAR_FIELD { [4.0, 3.0] } else { [25.0, 12.5] };
+        let fresnel = range_m
+            .iter()
+            .fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
+        let [planned, accepted] = if fresnel < FAR_FIELD {
+            [4.0, 3.0]
+        } else {
+            [25.0, 12.5]
+        };
         let scatter = scatter_rad(telescope, &turbulence.cn2, last(range_m)?)?;
         let slope = (slope_rad(telescope, misalignment) + 2.0 * scatter).max(1e-30);
         let planned_m = (a / planned).min(0.5 * lambda / slope);
-        Ok(([(Limit::Aperture, a / accepted), (Limit::Scatter, lambda / slope)], planned_m))
+        Ok((
+            [
+                (Limit::Aperture, a / accepted),
+                (Limit::Scatter, lambda / slope),
+            ],
+            planned_m,
+        ))
     }
 
     /// What a grid violates for these ranges, and the share of the light that its border takes.
-    pub(super) fn verdict(&self, grid: &Grid, range_m: &[f64]) -> Result<(Vec<Violation>, f64), Error> {
+    pub(super) fn verdict(
+        &self,
+        grid: &Grid,
+        range_m: &[f64],
+    ) -> Result<(Vec<Violation>, f64), Error> {
         let grid = grid.validated()?;
-        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        let Case {
+            telescope,
+            misalignment,
+            turbulence,
+            ..
+        } = self.case;
         let mut limits_m = beam_limits_m(telescope, misalignment, last(range_m)?).to_vec();
         if !turbulence.cn2.is_none() {
             limits_m.extend(self.spacings_m(range_m)?.0);
         }
-        let (light, spacing_m, width_m) = (self.light(range_m)?, grid.largest_spacing_m(), grid.smallest_width_m());
+        let (light, spacing_m, width_m) = (
+            self.light(range_m)?,
+            grid.largest_spacing_m(),
+            grid.smallest_width_m(),
+        );
         let light_lost = light.lost(width_m, spacing_m);
         if light_lost > LARGEST_LOSS {
             limits_m.push((Limit::Light, light.width_m(LARGEST_LOSS, spacing_m)));
         }
         let violated = |row| Violation::of(row, spacing_m, width_m);
-        Ok((limits_m.into_iter().filter_map(violated).collect(), light_lost))
+        Ok((
+            limits_m.into_iter().filter_map(violated).collect(),
+            light_lost,
+        ))
     }
 
     /// A grid for these ranges: with the spacing to plan with, or else with the largest that is accepted; with the border that takes next
@@ -101,7 +166,9 @@ impl<'a> Limits<'a> {
         if !cn2.is_none() && fine_m < planned_m && fine_m >= 0.5 * planned_m {
             planned_m = fine_m;
         }
-        let grid = |spacing_m, loss| self.grid_of(spacing_m, light.width_m(loss, spacing_m), last(range_m)?);
+        let grid = |spacing_m, loss| {
+            self.grid_of(spacing_m, light.width_m(loss, spacing_m), last(range_m)?)
+        };
         match grid(planned_m, DERIVED_LOSS) {
             Ok(grid) if grid.nx <= COMFORTABLE_POINTS => Ok(grid),
             _ => grid(accepted_m, DERIVED_LOSS).or_else(|_| grid(accepted_m, LARGEST_LOSS)),
@@ -109,8 +176,15 @@ impl<'a> Limits<'a> {
     }
 
     /// A grid of at most this spacing and at least this width that holds the beam to `furthest_m`.
-    fn grid_of(&self, mut spacing_m: f64, mut width_m: f64, furthest_m: f64) -> Result<Grid, Error> {
-        for (limit, limit_m) in beam_limits_m(&self.case.telescope, &self.case.misalignment, furthest_m) {
+    fn grid_of(
+        &self,
+        mut spacing_m: f64,
+        mut width_m: f64,
+        furthest_m: f64,
+    ) -> Result<Grid, Error> {
+        for (limit, limit_m) in
+            beam_limits_m(&self.case.telescope, &self.case.misalignment, furthest_m)
+        {
             match limit.is_spacing() {
                 true => spacing_m = spacing_m.min(limit_m),
                 false => width_m = width_m.max(not_below(limit_m)),
@@ -120,8 +194,15 @@ impl<'a> Limits<'a> {
         let points = good_size((width_m / spacing_m).ceil() as usize).max(128);
         if points > LARGEST_POINTS {
             let (needed, found) = (points as f64, LARGEST_POINTS as f64);
-            let violations = vec![Violation { limit: Limit::Points, needed, found }];
-            return Err(Error::Sampling { violations, would_do: None });
+            let violations = vec![Violation {
+                limit: Limit::Points,
+                needed,
+                found,
+            }];
+            return Err(Error::Sampling {
+                violations,
+                would_do: None,
+            });
         }
         Grid::square(points, spacing_m)
     }
@@ -133,8 +214,15 @@ impl<'a> Limits<'a> {
         all.dedup();
         let grid = self.grid(&all).ok()?;
         let layers = self.equal_layers(runs).ok()??;
-        let good = |range_m: &&[f64]| self.verdict(&grid, range_m).is_ok_and(|(violations, _)| violations.is_empty());
-        runs.iter().all(good).then_some(SetUp { points: grid.nx, spacing_m: grid.dx_m, layers })
+        let good = |range_m: &&[f64]| {
+            self.verdict(&grid, range_m)
+                .is_ok_and(|(violations, _)| violations.is_empty())
+        };
+        runs.iter().all(good).then_some(SetUp {
+            points: grid.nx,
+            spacing_m: grid.dx_m,
+            layers,
+        })
     }
 
     /// How many equal layers to its last range are enough for every one of these lists of ranges; none if 1000 are not.
@@ -161,7 +249,11 @@ impl<'a> Limits<'a> {
 
 /// The last of a list of ranges.
 pub(super) fn last(range_m: &[f64]) -> Result<f64, Error> {
-    range_m.last().copied().ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })
+    range_m.last().copied().ok_or(Error::Length {
+        field: "range_m",
+        found: 0,
+        expected: 1,
+    })
 }
 
 /// The next size with only the factors 2, 3 and 5, even.
@@ -174,5 +266,7 @@ fn good_size(at_least: usize) -> usize {
             rest
         })
     };
-    (at_least.max(2)..).find(|&n| n % 2 == 0 && rest(n) == 1).unwrap_or(at_least)
+    (at_least.max(2)..)
+        .find(|&n| n % 2 == 0 && rest(n) == 1)
+        .unwrap_or(at_least)
 }

@@ -44,7 +44,11 @@ pub enum Model {
 
 /// Which paths the two beams take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Receiver {
     /// Both beams through the same turbulence.
     Monostatic,
@@ -88,7 +92,10 @@ impl Plan {
     /// Memory of so many realisations with so many threads in f32 \[bytes\]: as many groups run at a time as there are threads.
     #[must_use]
     pub fn memory_bytes_of(&self, realisations: usize, threads: usize) -> usize {
-        let at_once = realisations.div_ceil(GROUP).clamp(1, GROUPS_PER_WAVE).min(threads.max(1));
+        let at_once = realisations
+            .div_ceil(GROUP)
+            .clamp(1, GROUPS_PER_WAVE)
+            .min(threads.max(1));
         self.memory_bytes - (GROUPS_PER_WAVE - at_once) * self.group_bytes
     }
 }
@@ -152,7 +159,9 @@ impl Case {
         crate::efficiency::check_increasing("range_m", range_m)?;
         let limits = Limits::new(self)?;
         let grid = limits.grid(range_m)?;
-        let layers = limits.gaps(range_m)?.refined(limits.thin_layers(range_m)?)?;
+        let layers = limits
+            .gaps(range_m)?
+            .refined(limits.thin_layers(range_m)?)?;
         self.examine(&grid, &layers, range_m)
     }
 
@@ -161,8 +170,14 @@ impl Case {
     /// # Errors
     /// As [`Case::examine_runs`].
     pub fn examine(&self, grid: &Grid, layers: &Layers, range_m: &[f64]) -> Result<Plan, Error> {
-        let plan = Limits::new(self)?.plans(grid, &[(layers.clone(), range_m)])?.pop();
-        plan.ok_or(Error::Length { field: "range_m", found: 0, expected: 1 })
+        let plan = Limits::new(self)?
+            .plans(grid, &[(layers.clone(), range_m)])?
+            .pop();
+        plan.ok_or(Error::Length {
+            field: "range_m",
+            found: 0,
+            expected: 1,
+        })
     }
 
     /// As [`Case::examine`] for several runs on one grid, each with `layers` equal layers to its last range: what one
@@ -171,7 +186,12 @@ impl Case {
     /// # Errors
     /// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing: largest) value that works,
     /// and a whole set-up that was tried and works.
-    pub fn examine_runs(&self, grid: &Grid, layers: usize, runs: &[&[f64]]) -> Result<Vec<Plan>, Error> {
+    pub fn examine_runs(
+        &self,
+        grid: &Grid,
+        layers: usize,
+        runs: &[&[f64]],
+    ) -> Result<Vec<Plan>, Error> {
         let mut set_ups = Vec::new();
         for range_m in runs {
             set_ups.push((Layers::equal(layers, last(range_m)?)?, *range_m));
@@ -192,10 +212,14 @@ impl Limits<'_> {
             light_lost.push(lost);
         }
         if !violations.is_empty() {
-            return Err(Error::Sampling { violations, would_do: self.set_up(&all) });
+            return Err(Error::Sampling {
+                violations,
+                would_do: self.set_up(&all),
+            });
         }
         let each = runs.iter().zip(light_lost);
-        each.map(|((layers, range_m), lost)| self.costs(grid, layers, range_m, lost, &all)).collect()
+        each.map(|((layers, range_m), lost)| self.costs(grid, layers, range_m, lost, &all))
+            .collect()
     }
 
     /// Cost and warnings of a set-up whose grid is accepted; layers that would do, do for all `runs`.
@@ -207,21 +231,33 @@ impl Limits<'_> {
         light_lost: f64,
         runs: &[&[f64]],
     ) -> Result<Plan, Error> {
-        let Case { telescope, misalignment, turbulence, .. } = self.case;
+        let Case {
+            telescope,
+            misalignment,
+            turbulence,
+            ..
+        } = self.case;
         let lambda = telescope.wavelength_m;
         let split = layers.split_at(range_m);
         let path = Path::new(&split, range_m, &turbulence.cn2, grid, lambda)?;
-        let beams = if *misalignment == Misalignment::NONE { 1 } else { 2 };
+        let beams = if *misalignment == Misalignment::NONE {
+            1
+        } else {
+            2
+        };
         let transfers = path.distance_m.len() * (grid.nx + grid.ny) * 8;
         let group_bytes = group_bytes(grid, range_m.len(), beams);
-        let steps_s = LAYER_S * path.transform_pairs() * beams as f64 + SCREEN_S * path.strength.len() as f64;
+        let steps_s =
+            LAYER_S * path.transform_pairs() * beams as f64 + SCREEN_S * path.strength.len() as f64;
         let mut plan = Plan {
             grid: *grid,
             layers: layers.clone(),
             layer_rytov_variance: worst_rytov(&turbulence.cn2, lambda, &split, last(range_m)?)?,
             light_lost,
             gaps: self.gaps(range_m)?.of(&split)?,
-            memory_bytes: GROUPS_PER_WAVE * group_bytes + shared_bytes(grid, range_m.len(), beams) + transfers,
+            memory_bytes: GROUPS_PER_WAVE * group_bytes
+                + shared_bytes(grid, range_m.len(), beams)
+                + transfers,
             group_bytes,
             realisation_cpu_s: grid.points() as f64 * steps_s,
             warnings: Vec::new(),
@@ -231,29 +267,54 @@ impl Limits<'_> {
     }
 
     /// What is allowed in a plan but deserves a word.
-    fn warnings(&self, plan: &Plan, range_m: &[f64], runs: &[&[f64]]) -> Result<Vec<Warning>, Error> {
+    fn warnings(
+        &self,
+        plan: &Plan,
+        range_m: &[f64],
+        runs: &[&[f64]],
+    ) -> Result<Vec<Warning>, Error> {
         let mut warnings = Vec::new();
         let rytov_variance = plan.layer_rytov_variance;
         let is_thick = rytov_variance > LARGEST_LAYER_RYTOV;
-        let worst = plan.gaps.iter().filter(|g| g.is_large()).max_by(|a, b| a.excess().total_cmp(&b.excess()));
+        let worst = plan
+            .gaps
+            .iter()
+            .filter(|g| g.is_large())
+            .max_by(|a, b| a.excess().total_cmp(&b.excess()));
         if is_thick || worst.is_some() {
             // One number clears both warnings, of every run.
             let layers_needed = self.equal_layers(runs)?;
-            warnings.extend(is_thick.then_some(Warning::ThickLayers { rytov_variance, layers_needed }));
-            warnings.extend(worst.map(|&worst| Warning::LayerGap { worst, layers_needed }));
+            warnings.extend(is_thick.then_some(Warning::ThickLayers {
+                rytov_variance,
+                layers_needed,
+            }));
+            warnings.extend(worst.map(|&worst| Warning::LayerGap {
+                worst,
+                layers_needed,
+            }));
         }
         if plan.light_lost > DOUBTFUL_LOSS {
             let width_m = self.width_for_light_m(&plan.grid, range_m)?;
-            warnings.push(Warning::LightLost { fraction: plan.light_lost, width_m });
+            warnings.push(Warning::LightLost {
+                fraction: plan.light_lost,
+                width_m,
+            });
         }
-        let Case { telescope, turbulence, .. } = self.case;
+        let Case {
+            telescope,
+            turbulence,
+            ..
+        } = self.case;
         if !turbulence.cn2.is_none() {
-            let rytov_variance = path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, last(range_m)?)?;
+            let rytov_variance =
+                path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, last(range_m)?)?;
             if rytov_variance < 1e-3 {
                 warnings.push(Warning::WeakTurbulence { rytov_variance });
             }
             if turbulence.spectrum.inner_wavenumber_rad_m() * plan.grid.largest_spacing_m() > 2.97 {
-                warnings.push(Warning::InnerScale { missing: missing_at_one_spacing(turbulence, &plan.grid)? });
+                warnings.push(Warning::InnerScale {
+                    missing: missing_at_one_spacing(turbulence, &plan.grid)?,
+                });
             }
         }
         Ok(warnings)
@@ -262,27 +323,39 @@ impl Limits<'_> {
 
 /// What screens miss at one grid spacing: a part of a large grid shows it.
 fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, Error> {
-    let part = Grid { nx: grid.nx.min(256), ny: grid.ny.min(256), ..*grid };
+    let part = Grid {
+        nx: grid.nx.min(256),
+        ny: grid.ny.min(256),
+        ..*grid
+    };
     ScreenGenerator::<f64>::new(part, turbulence.spectrum.clone())?.missing_at_one_spacing()
 }
 
 /// Points of the plane onto which a field folds.
 fn folded_points(grid: &Grid, beams: usize) -> usize {
-    if beams == 1 { (grid.nx / 2 + 1) * (grid.ny / 2 + 1) } else { grid.points() }
+    if beams == 1 {
+        (grid.nx / 2 + 1) * (grid.ny / 2 + 1)
+    } else {
+        grid.points()
+    }
 }
 
 /// Buffers of a group under way in f32: fields and taps of two realisations, what steps and screens work with, four screens;
 /// planes that wait for their antithetic partners at each range.
 fn group_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let complex = 8 * grid.points();
-    complex * (4 * beams + 2) + 4 * 4 * grid.points() + 4 * folded_points(grid, beams) * beams * (2 * ranges + 4)
+    complex * (4 * beams + 2)
+        + 4 * 4 * grid.points()
+        + 4 * folded_points(grid, beams) * beams * (2 * ranges + 4)
 }
 
 /// What all groups share, in f32: the sums of a wave of groups and of all before them, the spectrum of the screens, the
 /// field at the telescope, places of the folded points.
 fn shared_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let folded = folded_points(grid, beams);
-    (GROUPS_PER_WAVE + 1) * 4 * folded * beams * ranges + (4 + 8 * beams) * grid.points() + 2 * folded
+    (GROUPS_PER_WAVE + 1) * 4 * folded * beams * ranges
+        + (4 + 8 * beams) * grid.points()
+        + 2 * folded
 }
 
 #[cfg(test)]
@@ -300,18 +373,34 @@ mod tests {
     }
 
     fn chapter(cn2: f64, range_m: f64) -> Result<Plan, Error> {
-        case(cn2).examine(&Grid::table2(), &Layers::equal(10, range_m).unwrap(), &[range_m])
+        case(cn2).examine(
+            &Grid::table2(),
+            &Layers::equal(10, range_m).unwrap(),
+            &[range_m],
+        )
     }
 
     #[test]
     fn chapters_set_up_is_accepted_with_the_warning_it_deserves() {
         assert!(chapter(1e-15, 3000.0).unwrap().warnings.is_empty());
         let plan = chapter(1e-13, 3000.0).unwrap();
-        assert!(matches!(plan.warnings[..], [Warning::ThickLayers { layers_needed: Some(15..=17), .. }]), "{plan:?}");
+        assert!(
+            matches!(
+                plan.warnings[..],
+                [Warning::ThickLayers {
+                    layers_needed: Some(15..=17),
+                    ..
+                }]
+            ),
+            "{plan:?}"
+        );
         assert!((plan.layer_rytov_variance - 0.22).abs() < 0.01);
         assert!(plan.memory_bytes < 200 << 20, "{}", plan.memory_bytes);
         let weak = chapter(1e-18, 1000.0).unwrap();
-        assert!(matches!(weak.warnings[..], [Warning::WeakTurbulence { .. }]), "{weak:?}");
+        assert!(
+            matches!(weak.warnings[..], [Warning::WeakTurbulence { .. }]),
+            "{weak:?}"
+        );
     }
 
     #[test]
@@ -323,10 +412,19 @@ mod tests {
 
     #[test]
     fn what_a_plan_proposes_passes_its_own_test() {
-        for (cn2, range_m) in [(0.0, 2000.0), (1e-15, 3000.0), (1e-13, 1000.0), (1e-12, 1500.0)] {
+        for (cn2, range_m) in [
+            (0.0, 2000.0),
+            (1e-15, 3000.0),
+            (1e-13, 1000.0),
+            (1e-12, 1500.0),
+        ] {
             let p = case(cn2).plan(&[0.5 * range_m, range_m]).unwrap();
             assert!(p.layer_rytov_variance <= LARGEST_LAYER_RYTOV);
-            assert!(!p.warnings.iter().any(|w| matches!(w, Warning::ThickLayers { .. })));
+            assert!(
+                !p.warnings
+                    .iter()
+                    .any(|w| matches!(w, Warning::ThickLayers { .. }))
+            );
             assert!(p.realisation_cpu_s > 0.0);
         }
     }
@@ -334,9 +432,18 @@ mod tests {
     #[test]
     fn cheapest_model_needs_no_monte_carlo_for_bistatic_or_calm_air() {
         let uniform = Cn2Path::Uniform { cn2_m_m23: 1e-13 };
-        assert_eq!(cheapest_model(Receiver::Bistatic, &uniform), Model::ExactBistatic);
-        assert_eq!(cheapest_model(Receiver::Monostatic, &uniform), Model::MonteCarlo);
-        assert_eq!(cheapest_model(Receiver::Monostatic, &Cn2Path::Uniform { cn2_m_m23: 0.0 }), Model::FreeSpace);
+        assert_eq!(
+            cheapest_model(Receiver::Bistatic, &uniform),
+            Model::ExactBistatic
+        );
+        assert_eq!(
+            cheapest_model(Receiver::Monostatic, &uniform),
+            Model::MonteCarlo
+        );
+        assert_eq!(
+            cheapest_model(Receiver::Monostatic, &Cn2Path::Uniform { cn2_m_m23: 0.0 }),
+            Model::FreeSpace
+        );
     }
 
     #[test]
@@ -347,7 +454,12 @@ mod tests {
         };
         let grid = Grid::square(128, 4e-3).unwrap();
         let layers = Layers::equal(6, 800.0).unwrap();
-        let p = Case { turbulence, ..case(0.0) }.examine(&grid, &layers, &[800.0]).unwrap();
+        let p = Case {
+            turbulence,
+            ..case(0.0)
+        }
+        .examine(&grid, &layers, &[800.0])
+        .unwrap();
         assert!(
             matches!(p.warnings[..], [Warning::InnerScale { missing }] if missing > 0.02 && missing < 0.3),
             "{p:?}"

@@ -57,19 +57,36 @@ impl Violation {
     /// What a grid of this spacing and width violates of a limit: a largest spacing, or a least width \[m\].
     pub(crate) fn of((limit, limit_m): (Limit, f64), spacing_m: f64, width_m: f64) -> Option<Self> {
         if limit.is_spacing() {
-            return (spacing_m > limit_m).then(|| Self { limit, needed: not_above(limit_m), found: spacing_m });
+            return (spacing_m > limit_m).then(|| Self {
+                limit,
+                needed: not_above(limit_m),
+                found: spacing_m,
+            });
         }
-        (width_m < limit_m).then(|| Self { limit, needed: not_below(limit_m), found: width_m })
+        (width_m < limit_m).then(|| Self {
+            limit,
+            needed: not_below(limit_m),
+            found: width_m,
+        })
     }
 }
 
 impl fmt::Display for Violation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { limit, needed, found } = self;
+        let Self {
+            limit,
+            needed,
+            found,
+        } = self;
         let purpose = limit.purpose();
         match limit {
-            Limit::Points => write!(f, "{needed} points along an axis are needed {purpose}, {found} at most"),
-            spacing if spacing.is_spacing() => write!(f, "grid spacing [m] {found:.6}, at most {needed} {purpose}"),
+            Limit::Points => write!(
+                f,
+                "{needed} points along an axis are needed {purpose}, {found} at most"
+            ),
+            spacing if spacing.is_spacing() => {
+                write!(f, "grid spacing [m] {found:.6}, at most {needed} {purpose}")
+            }
             _ => write!(f, "grid width [m] {found:.6}, at least {needed} {purpose}"),
         }
     }
@@ -89,8 +106,15 @@ pub struct SetUp {
 /// All violations, and what would do.
 pub(crate) fn listed(violations: &[Violation], would_do: Option<&SetUp>) -> String {
     let mut items: Vec<String> = violations.iter().map(Violation::to_string).collect();
-    if let Some(SetUp { points, spacing_m, layers }) = would_do {
-        items.push(format!("{points} x {points} points of {spacing_m} m with {layers} layers would do"));
+    if let Some(SetUp {
+        points,
+        spacing_m,
+        layers,
+    }) = would_do
+    {
+        items.push(format!(
+            "{points} x {points} points of {spacing_m} m with {layers} layers would do"
+        ));
     }
     items.join("; ")
 }
@@ -108,9 +132,14 @@ pub(crate) fn not_above(value: f64) -> f64 {
 /// `value` to four digits, one unit of the last further in `direction` if that is on the wrong side.
 fn four_digits(value: f64, direction: i32) -> f64 {
     let text = format!("{value:.3e}");
-    let Some((digits, exponent)) = text.split_once('e') else { return value };
-    let (Ok(rounded), Ok(digits), Ok(exponent)) = (text.parse::<f64>(), digits.parse::<f64>(), exponent.parse::<i32>())
-    else {
+    let Some((digits, exponent)) = text.split_once('e') else {
+        return value;
+    };
+    let (Ok(rounded), Ok(digits), Ok(exponent)) = (
+        text.parse::<f64>(),
+        digits.parse::<f64>(),
+        exponent.parse::<i32>(),
+    ) else {
         return value;
     };
     if f64::from(direction) * (rounded - value) >= 0.0 {
@@ -119,7 +148,9 @@ fn four_digits(value: f64, direction: i32) -> f64 {
     // Below a power of ten the digits are ten times finer.
     let fine = if direction < 0 && digits == 1.0 { 4 } else { 3 };
     let units = (digits * 10f64.powi(fine)).round() + f64::from(direction);
-    format!("{units}e{}", exponent - fine).parse().unwrap_or(value)
+    format!("{units}e{}", exponent - fine)
+        .parse()
+        .unwrap_or(value)
 }
 
 #[cfg(test)]

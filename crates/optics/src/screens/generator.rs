@@ -49,7 +49,9 @@ pub fn stream(seed: u64, realisation: u64, screen: u64) -> Xoshiro256PlusPlus {
     let mut state = seed;
     for word in [realisation, screen] {
         // One round of splitmix64 for each word.
-        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_add(word.wrapping_mul(0xd1b5_4a32_d192_ed03));
+        state = state
+            .wrapping_add(0x9e37_79b9_7f4a_7c15)
+            .wrapping_add(word.wrapping_mul(0xd1b5_4a32_d192_ed03));
         state = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         state = (state ^ (state >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         state ^= state >> 31;
@@ -64,7 +66,10 @@ impl<T: Real> ScreenGenerator<T> {
     /// As [`Grid::validated`].
     pub fn new(grid: Grid, spectrum: Arc<dyn Spectrum>) -> Result<Self, Error> {
         let grid = grid.validated()?;
-        let delta_rad_m = [2.0 * PI / (grid.nx as f64 * grid.dx_m), 2.0 * PI / (grid.ny as f64 * grid.dy_m)];
+        let delta_rad_m = [
+            2.0 * PI / (grid.nx as f64 * grid.dx_m),
+            2.0 * PI / (grid.ny as f64 * grid.dy_m),
+        ];
         let exact = [grid.nx, grid.ny].map(|n| EXACT.min((n - 1) / 2));
         let low = LowFrequencies::new([grid.nx, grid.ny], [grid.dx_m, grid.dy_m], &*spectrum);
         let mut generator = Self {
@@ -162,7 +167,8 @@ impl<T: Real> ScreenGenerator<T> {
         for iy in (0..=last).chain(ny - last..ny) {
             let my = Grid::frequency_index(ny, iy);
             if mx.abs() > 1.0 || my.abs() > 1.0 {
-                let density = self.phase_density(kx, (my + shift[1]) * dy) + self.folded[ix * ny + iy];
+                let density =
+                    self.phase_density(kx, (my + shift[1]) * dy) + self.folded[ix * ny + iy];
                 row[iy] = T::of((density * dx * dy).sqrt());
             }
         }
@@ -186,7 +192,10 @@ impl<T: Real> ScreenGenerator<T> {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
         let low = self.low.draw(&*self.spectrum, self.shift_sign, rng);
-        let Work { whole: field, scratch } = work;
+        let Work {
+            whole: field,
+            scratch,
+        } = work;
         let (mut radius, mut angle, mut row) = (vec![0; ny], vec![0; ny], vec![T::zero(); ny]);
         Fft2::transposing(&self.fft.inverse_y, field, scratch, |ix, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
@@ -221,7 +230,10 @@ impl<T: Real> ScreenGenerator<T> {
     pub fn expected_structure_m53(&self, steps_x: usize, steps_y: usize) -> f64 {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let [dx, dy] = self.delta_rad_m;
-        let r = [steps_x as f64 * self.grid.dx_m, steps_y as f64 * self.grid.dy_m];
+        let r = [
+            steps_x as f64 * self.grid.dx_m,
+            steps_y as f64 * self.grid.dy_m,
+        ];
         // Mean of a cosine over a shift spread evenly over one cell.
         let blur = sinc(0.5 * dx * r[0]) * sinc(0.5 * dy * r[1]);
         let rule = GaussLegendre::new(5);
@@ -237,7 +249,8 @@ impl<T: Real> ScreenGenerator<T> {
                 }
                 if mx.abs() <= self.exact[0] as f64 && my.abs() <= self.exact[1] as f64 {
                     let corner = [(mx - 0.5) * dx, (my - 0.5) * dy];
-                    sum += self.cell_integral(&rule, corner, [dx, dy], r) + self.folded[at] * dx * dy * flat;
+                    sum += self.cell_integral(&rule, corner, [dx, dy], r)
+                        + self.folded[at] * dx * dy * flat;
                 } else {
                     sum += self.amplitude[at].wide().powi(2) * flat;
                 }
@@ -260,7 +273,13 @@ impl<T: Real> ScreenGenerator<T> {
     }
 
     /// Integral of Phi_psi (1 - cos(kappa.r)) over a cell, without cancellation.
-    fn cell_integral(&self, rule: &GaussLegendre, corner: [f64; 2], size: [f64; 2], r: [f64; 2]) -> f64 {
+    fn cell_integral(
+        &self,
+        rule: &GaussLegendre,
+        corner: [f64; 2],
+        size: [f64; 2],
+        r: [f64; 2],
+    ) -> f64 {
         let mut sum = 0.0;
         for (kx, wx) in rule.mapped(corner[0], corner[0] + size[0]) {
             for (ky, wy) in rule.mapped(corner[1], corner[1] + size[1]) {
@@ -271,8 +290,15 @@ impl<T: Real> ScreenGenerator<T> {
         sum
     }
 
-    fn graded_integral(&self, rule: &GaussLegendre, corner: [f64; 2], size: [f64; 2], r: [f64; 2]) -> f64 {
-        let touches = [0, 1].map(|a| corner[a] * (corner[a] + size[a]) <= 1e-12 * size[a] * size[a]);
+    fn graded_integral(
+        &self,
+        rule: &GaussLegendre,
+        corner: [f64; 2],
+        size: [f64; 2],
+        r: [f64; 2],
+    ) -> f64 {
+        let touches =
+            [0, 1].map(|a| corner[a] * (corner[a] + size[a]) <= 1e-12 * size[a] * size[a]);
         if touches != [true, true] {
             return self.cell_integral(rule, corner, size, r);
         }
@@ -282,8 +308,12 @@ impl<T: Real> ScreenGenerator<T> {
             let half = size.map(|s| 0.5 * s);
             let mut next = corner;
             for i in 0..4 {
-                let sub = [corner[0] + half[0] * f64::from(i & 1), corner[1] + half[1] * f64::from(i >> 1)];
-                let at_origin = [0, 1].map(|a| sub[a].abs().min((sub[a] + half[a]).abs()) < 1e-9 * half[a]);
+                let sub = [
+                    corner[0] + half[0] * f64::from(i & 1),
+                    corner[1] + half[1] * f64::from(i >> 1),
+                ];
+                let at_origin =
+                    [0, 1].map(|a| sub[a].abs().min((sub[a] + half[a]).abs()) < 1e-9 * half[a]);
                 if at_origin == [true, true] {
                     next = sub;
                 } else {

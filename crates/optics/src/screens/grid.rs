@@ -33,12 +33,23 @@ impl Grid {
     /// # Errors
     /// As [`Grid::validated`].
     pub fn square(n: usize, spacing_m: f64) -> Result<Self, Error> {
-        Self { nx: n, ny: n, dx_m: spacing_m, dy_m: spacing_m }.validated()
+        Self {
+            nx: n,
+            ny: n,
+            dx_m: spacing_m,
+            dy_m: spacing_m,
+        }
+        .validated()
     }
 
     /// The chapter's grid, 512 x 512 points of 2 mm.
     pub fn table2() -> Self {
-        Self { nx: 512, ny: 512, dx_m: 2e-3, dy_m: 2e-3 }
+        Self {
+            nx: 512,
+            ny: 512,
+            dx_m: 2e-3,
+            dy_m: 2e-3,
+        }
     }
 
     /// The grid itself when every field is allowed.
@@ -47,7 +58,12 @@ impl Grid {
     /// [`Error::OutOfRange`] for fewer than 16 points along an axis, or a spacing that is not positive.
     pub fn validated(self) -> Result<Self, Error> {
         for (field, n) in [("nx", self.nx), ("ny", self.ny)] {
-            within(field, n as f64, (16..=1 << 15).contains(&n), "16 to 32768 points")?;
+            within(
+                field,
+                n as f64,
+                (16..=1 << 15).contains(&n),
+                "16 to 32768 points",
+            )?;
         }
         positive("dx_m", self.dx_m)?;
         positive("dy_m", self.dy_m)?;
@@ -83,7 +99,11 @@ impl Grid {
 
     /// Signed index of frequency i of n.
     pub(crate) fn frequency_index(n: usize, i: usize) -> f64 {
-        if i < n.div_ceil(2) { i as f64 } else { i as f64 - n as f64 }
+        if i < n.div_ceil(2) {
+            i as f64
+        } else {
+            i as f64 - n as f64
+        }
     }
 }
 
@@ -111,17 +131,43 @@ pub(crate) struct Fft2<T: Real> {
 
 impl<T: Real> Fft2<T> {
     pub(crate) fn new(grid: &Grid) -> Self {
-        let [[forward_x, inverse_x], [forward_y, inverse_y]] = [grid.nx, grid.ny].map(T::transforms);
-        Self { forward_x, forward_y, inverse_x, inverse_y }
+        let [[forward_x, inverse_x], [forward_y, inverse_y]] =
+            [grid.nx, grid.ny].map(T::transforms);
+        Self {
+            forward_x,
+            forward_y,
+            inverse_x,
+            inverse_y,
+        }
     }
 
     pub(crate) fn work(&self) -> Work<T> {
-        let plans = [&self.forward_x, &self.forward_y, &self.inverse_x, &self.inverse_y];
-        let block = plans.iter().map(|plan| ROWS * plan.len()).max().unwrap_or(0);
-        let inner = plans.iter().map(|plan| plan.get_inplace_scratch_len()).max().unwrap_or(0);
+        let plans = [
+            &self.forward_x,
+            &self.forward_y,
+            &self.inverse_x,
+            &self.inverse_y,
+        ];
+        let block = plans
+            .iter()
+            .map(|plan| ROWS * plan.len())
+            .max()
+            .unwrap_or(0);
+        let inner = plans
+            .iter()
+            .map(|plan| plan.get_inplace_scratch_len())
+            .max()
+            .unwrap_or(0);
         let zeros = |length| vec![Complex::default(); length];
-        let scratch = FftScratch { block: zeros(block), spectrum: zeros(block), inner: zeros(inner) };
-        Work { whole: zeros(self.forward_x.len() * self.forward_y.len()), scratch }
+        let scratch = FftScratch {
+            block: zeros(block),
+            spectrum: zeros(block),
+            inner: zeros(inner),
+        };
+        Work {
+            whole: zeros(self.forward_x.len() * self.forward_y.len()),
+            scratch,
+        }
     }
 
     /// Rows of the length of `plan`: `fill` makes each block, told the index of its first row; transform, transposed into `out`.
@@ -150,7 +196,11 @@ impl<T: Real> Fft2<T> {
         scratch: &mut FftScratch<T>,
         mut middle: impl FnMut(usize, usize, &mut [Complex<T>]),
     ) {
-        let FftScratch { block, spectrum, inner } = scratch;
+        let FftScratch {
+            block,
+            spectrum,
+            inner,
+        } = scratch;
         let length = self.forward_y.len();
         for (index, rows) in field.chunks(ROWS * length).enumerate() {
             let (first, points) = (index * ROWS, ..rows.len());
@@ -186,7 +236,12 @@ impl<T: Real> Fft2<T> {
 }
 
 /// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
-fn store_transposed<T: Real>(out: &mut [Complex<T>], length: usize, first: usize, block: &[Complex<T>]) {
+fn store_transposed<T: Real>(
+    out: &mut [Complex<T>],
+    length: usize,
+    first: usize,
+    block: &[Complex<T>],
+) {
     let (count, height) = (out.len() / length, block.len() / length);
     for (i, column) in out.chunks_exact_mut(count).enumerate() {
         for (b, value) in column[first..first + height].iter_mut().enumerate() {
@@ -206,11 +261,17 @@ mod tests {
 
     #[test]
     fn two_dimensional_transform_is_the_direct_sum_for_odd_sizes() {
-        let grid = Grid { nx: 17, ny: 23, dx_m: 1.0, dy_m: 1.0 };
+        let grid = Grid {
+            nx: 17,
+            ny: 23,
+            dx_m: 1.0,
+            dy_m: 1.0,
+        };
         let fft = Fft2::<f64>::new(&grid);
         let mut scratch = fft.work().scratch;
-        let field: Vec<Complex<f64>> =
-            (0..grid.points()).map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos())).collect();
+        let field: Vec<Complex<f64>> = (0..grid.points())
+            .map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos()))
+            .collect();
         let mut b = field.clone();
         Fft2::transposing(&fft.forward_x, &mut b, &mut scratch, |first, block| {
             block.copy_from_slice(&field[first * 17..first * 17 + block.len()]);
@@ -226,7 +287,9 @@ mod tests {
         let mut exact = Complex::default();
         for y in 0..23 {
             for x in 0..17 {
-                let phase = -2.0 * std::f64::consts::PI * (kx as f64 * x as f64 / 17.0 + ky as f64 * y as f64 / 23.0);
+                let phase = -2.0
+                    * std::f64::consts::PI
+                    * (kx as f64 * x as f64 / 17.0 + ky as f64 * y as f64 / 23.0);
                 exact += field[y * 17 + x] * Complex::from_polar(1.0, phase);
             }
         }
@@ -239,9 +302,11 @@ mod tests {
 
     #[test]
     fn grids_too_small_or_without_spacing_are_refused() {
-        for (bad, field) in
-            [(Grid::square(1, 1e-3), "nx"), (Grid::square(512, 0.0), "dx_m"), (Grid::square(512, f64::NAN), "dx_m")]
-        {
+        for (bad, field) in [
+            (Grid::square(1, 1e-3), "nx"),
+            (Grid::square(512, 0.0), "dx_m"),
+            (Grid::square(512, f64::NAN), "dx_m"),
+        ] {
             assert_eq!(crate::error::refused(bad), field);
         }
     }

@@ -67,16 +67,25 @@ pub(crate) fn multiply_cis<T: Real>(field: &mut [Complex<T>], phase: &[T], scale
 
 /// out = amplitude (a + j b) with a, b standard normal, from two random 32-bit words each (Box and Muller 1958).
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn normals<T: Real>(radius: &[u32], angle: &[u32], amplitude: &[T], out: &mut [Complex<T>]) {
+pub(crate) fn normals<T: Real>(
+    radius: &[u32],
+    angle: &[u32],
+    amplitude: &[T],
+    out: &mut [Complex<T>],
+) {
     let mut a = [T::zero(); BLOCK];
     let mut b = [T::zero(); BLOCK];
-    let chunks = radius.chunks(BLOCK).zip(angle.chunks(BLOCK)).zip(amplitude.chunks(BLOCK));
+    let chunks = radius
+        .chunks(BLOCK)
+        .zip(angle.chunks(BLOCK))
+        .zip(amplitude.chunks(BLOCK));
     for (((radius, angle), amplitude), out) in chunks.zip(out.chunks_mut(BLOCK)) {
         let words = radius.iter().zip(angle).zip(amplitude);
         for (((&u, &v), &amplitude), (a, b)) in words.zip(a.iter_mut().zip(&mut b)) {
             let unit = (T::of_i32((u >> 1) as i32) + T::of(0.5)) * T::of(1.0 / 2_147_483_648.0);
             let r = unit.minus_two_ln().root() * amplitude;
-            let part = T::of_i32((v & 0x3fff_ffff) as i32) * T::of(1.0 / 1_073_741_824.0) - T::of(0.5);
+            let part =
+                T::of_i32((v & 0x3fff_ffff) as i32) * T::of(1.0 / 1_073_741_824.0) - T::of(0.5);
             let (s, c) = (part * T::of(FRAC_PI_2)).sin_cos_of_quadrant(v >> 30);
             (*a, *b) = (r * c, r * s);
         }
@@ -88,9 +97,16 @@ pub(crate) fn normals<T: Real>(radius: &[u32], angle: &[u32], amplitude: &[T], o
 
 /// row *= factor * other.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(crate) fn multiply_scaled<T: Real>(row: &mut [Complex<T>], factor: Complex<T>, other: &[Complex<T>]) {
+pub(crate) fn multiply_scaled<T: Real>(
+    row: &mut [Complex<T>],
+    factor: Complex<T>,
+    other: &[Complex<T>],
+) {
     for (e, h) in row.iter_mut().zip(other) {
-        let w = Complex::new(factor.re * h.re - factor.im * h.im, factor.re * h.im + factor.im * h.re);
+        let w = Complex::new(
+            factor.re * h.re - factor.im * h.im,
+            factor.re * h.im + factor.im * h.re,
+        );
         *e = Complex::new(e.re * w.re - e.im * w.im, e.re * w.im + e.im * w.re);
     }
 }
@@ -153,7 +169,10 @@ pub(crate) fn finish_screen<T: Real>(
         let sums = re.iter().zip(&im);
         let outs = first[start..end].iter_mut().zip(&mut second[start..end]);
         for (((e, p), (&re, &im)), (a, b)) in values.zip(sums).zip(outs) {
-            let w = Complex::new(p.re * factor.re - p.im * factor.im, p.re * factor.im + p.im * factor.re);
+            let w = Complex::new(
+                p.re * factor.re - p.im * factor.im,
+                p.re * factor.im + p.im * factor.re,
+            );
             *a = e.re * w.re - e.im * w.im + re;
             *b = e.re * w.im + e.im * w.re + im;
         }
@@ -165,7 +184,10 @@ macro_rules! scalar {
         impl sealed::Scalar for $real {
             fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2] {
                 let mut planner = FftPlanner::new();
-                [planner.plan_fft_forward(length), planner.plan_fft_inverse(length)]
+                [
+                    planner.plan_fft_forward(length),
+                    planner.plan_fft_inverse(length),
+                ]
             }
 
             #[inline(always)]
@@ -211,9 +233,11 @@ macro_rules! scalar {
                 // self = m 2^e with m from sqrt(1/2) to sqrt(2); integers below 2^mantissa turn into numbers by their bits.
                 let bits = self.to_bits();
                 let exponent = (bits.wrapping_sub($sqrt_half).wrapping_add(BIAS)) >> $mantissa;
-                let m = $real::from_bits(bits.wrapping_sub(exponent << $mantissa).wrapping_add(BIAS));
+                let m =
+                    $real::from_bits(bits.wrapping_sub(exponent << $mantissa).wrapping_add(BIAS));
                 let integer = (1u64 << $mantissa) as $real;
-                let exponent = $real::from_bits(integer.to_bits() | exponent) - integer - $one_exp as $real;
+                let exponent =
+                    $real::from_bits(integer.to_bits() | exponent) - integer - $one_exp as $real;
                 let t = (m - 1.0) / (m + 1.0);
                 let ln_m = 2.0 * t * polynomial(&$log, t * t);
                 -2.0 * (ln_m + exponent * std::$real::consts::LN_2)
@@ -262,7 +286,11 @@ scalar!(
     52,
     0x3fe6_a09e_667f_3bcd_u64,
     1023,
-    [1.570796326734125614166, 6.077100503593460545382e-11, 2.912732056093356158e-20],
+    [
+        1.570796326734125614166,
+        6.077100503593460545382e-11,
+        2.912732056093356158e-20
+    ],
     [
         -0.16666666666666664,
         0.0083333333333307006,
@@ -279,7 +307,18 @@ scalar!(
         2.0876121658871156e-9,
         -1.1380876948169574e-11
     ],
-    [1.0, 1.0 / 3.0, 1.0 / 5.0, 1.0 / 7.0, 1.0 / 9.0, 1.0 / 11.0, 1.0 / 13.0, 1.0 / 15.0, 1.0 / 17.0, 1.0 / 19.0]
+    [
+        1.0,
+        1.0 / 3.0,
+        1.0 / 5.0,
+        1.0 / 7.0,
+        1.0 / 9.0,
+        1.0 / 11.0,
+        1.0 / 13.0,
+        1.0 / 15.0,
+        1.0 / 17.0,
+        1.0 / 19.0
+    ]
 );
 
 #[cfg(test)]
@@ -292,11 +331,18 @@ mod tests {
         for i in 0..200_000 {
             let x = (f64::from(i) - 1e5) * 0.003_171_3;
             let (s, c) = Scalar::sin_cos(x);
-            assert!((s - x.sin()).abs() < 3e-16 && (c - x.cos()).abs() < 3e-16, "{x}");
+            assert!(
+                (s - x.sin()).abs() < 3e-16 && (c - x.cos()).abs() < 3e-16,
+                "{x}"
+            );
             let y = x as f32;
             let (s, c) = Scalar::sin_cos(y);
             let wide = f64::from(y);
-            assert!((f64::from(s) - wide.sin()).abs() < 1.5e-7 && (f64::from(c) - wide.cos()).abs() < 1.5e-7, "{y}");
+            assert!(
+                (f64::from(s) - wide.sin()).abs() < 1.5e-7
+                    && (f64::from(c) - wide.cos()).abs() < 1.5e-7,
+                "{y}"
+            );
         }
     }
 
@@ -327,10 +373,15 @@ mod tests {
         for (a, b) in out.iter().zip(&single) {
             assert!((a.re - f64::from(b.re)).abs() < 1e-5 && (a.im - f64::from(b.im)).abs() < 1e-5);
         }
-        let mean = |f: &dyn Fn(f64, f64) -> f64| out.iter().map(|c| f(c.re, c.im)).sum::<f64>() / N as f64;
+        let mean =
+            |f: &dyn Fn(f64, f64) -> f64| out.iter().map(|c| f(c.re, c.im)).sum::<f64>() / N as f64;
         // Standard errors: 1, sqrt 2, sqrt 96 over sqrt N; z below 4.
         let scale = 4.0 / (N as f64).sqrt();
-        assert!(mean(&|a, _| a).abs() < scale && mean(&|_, b| b).abs() < scale && mean(&|a, b| a * b).abs() < scale);
+        assert!(
+            mean(&|a, _| a).abs() < scale
+                && mean(&|_, b| b).abs() < scale
+                && mean(&|a, b| a * b).abs() < scale
+        );
         assert!((mean(&|a, _| a * a) - 1.0).abs() < scale * 2f64.sqrt());
         assert!((mean(&|_, b| b * b) - 1.0).abs() < scale * 2f64.sqrt());
         assert!((mean(&|a, _| a.powi(4)) - 3.0).abs() < scale * 96f64.sqrt());

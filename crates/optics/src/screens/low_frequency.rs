@@ -43,22 +43,37 @@ impl<T: Real> LowFrequencies<T> {
         let basis = [0, 1].map(|a| sampled_basis(&point[a], size[a]));
         let centre_m = [0, 1].map(|a| 0.5 * size[a] as f64 * spacing_m[a]);
         let width = (size[0] as f64 * spacing_m[0]).max(size[1] as f64 * spacing_m[1]);
-        Self { cells: cells(delta, levels(spectrum, delta, width)), point, basis, spacing_m, centre_m }
+        Self {
+            cells: cells(delta, levels(spectrum, delta, width)),
+            point,
+            basis,
+            spacing_m,
+            centre_m,
+        }
     }
 
     /// Draws the waves and sums them at the Chebyshev points, which are the polynomial's coefficients. `[y]\[x\]`.
-    pub(crate) fn draw(&self, spectrum: &dyn Spectrum, shift_sign: f64, rng: &mut impl Rng) -> LowCoefficients {
+    pub(crate) fn draw(
+        &self,
+        spectrum: &dyn Spectrum,
+        shift_sign: f64,
+        rng: &mut impl Rng,
+    ) -> LowCoefficients {
         let mut sum = [[Complex::default(); LOW_ORDER]; LOW_ORDER];
         for cell in &self.cells {
             let centre = [0, 1].map(|a| cell.corner_rad_m[a] + 0.5 * cell.size_rad_m[a]);
             let shift = [0, 1].map(|a| cell.size_rad_m[a] * (unit(rng) - 0.5));
             let area = cell.size_rad_m[0] * cell.size_rad_m[1];
-            let density = 2.0 * PI * spectrum.density_per_cn2((centre[0] + shift[0]).hypot(centre[1] + shift[1]));
+            let density = 2.0
+                * PI
+                * spectrum.density_per_cn2((centre[0] + shift[0]).hypot(centre[1] + shift[1]));
             let amplitude = (density * area).sqrt() * normal_pair(rng);
             let kappa = [0, 1].map(|a| centre[a] + shift_sign * shift[a]);
-            let wave = [0, 1].map(|a| self.point[a].map(|p| Complex::cis(kappa[a] * (p * self.spacing_m[a]))));
+            let wave = [0, 1]
+                .map(|a| self.point[a].map(|p| Complex::cis(kappa[a] * (p * self.spacing_m[a]))));
             // Without an outer scale the slowest waves are huge: what they have in common over the grid is taken off.
-            let piston = amplitude * Complex::cis(kappa[0] * self.centre_m[0] + kappa[1] * self.centre_m[1]);
+            let piston =
+                amplitude * Complex::cis(kappa[0] * self.centre_m[0] + kappa[1] * self.centre_m[1]);
             for (row, y) in sum.iter_mut().zip(wave[1]) {
                 let factor = amplitude * y;
                 for (value, x) in row.iter_mut().zip(wave[0]) {
@@ -133,7 +148,13 @@ fn chebyshev(size: usize) -> [f64; LOW_ORDER] {
 
 /// Lagrange polynomials of the points, sampled at `size` grid points.
 fn sampled_basis<T: Real>(point: &[f64; LOW_ORDER], size: usize) -> Vec<Vec<T>> {
-    (0..LOW_ORDER).map(|i| (0..size).map(|x| T::of(quadrature::lagrange(point, i, x as f64))).collect()).collect()
+    (0..LOW_ORDER)
+        .map(|i| {
+            (0..size)
+                .map(|x| T::of(quadrature::lagrange(point, i, x as f64)))
+                .collect()
+        })
+        .collect()
 }
 
 #[cfg(test)]
@@ -168,7 +189,11 @@ mod tests {
                     sum += Complex::new(c[0], c[1]) * basis[x];
                 }
                 let exact = Complex::cis(kappa[0] * x as f64 + kappa[1] * y as f64);
-                assert!((sum - exact).norm() < 2e-7, "{x} {y} {}", (sum - exact).norm());
+                assert!(
+                    (sum - exact).norm() < 2e-7,
+                    "{x} {y} {}",
+                    (sum - exact).norm()
+                );
             }
         }
     }

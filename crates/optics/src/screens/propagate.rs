@@ -33,7 +33,12 @@ impl<T: Real> Propagator<T> {
     pub fn new(grid: Grid, wavelength_m: f64) -> Result<Self, Error> {
         let grid = grid.validated()?;
         positive("wavelength_m", wavelength_m)?;
-        Ok(Self { fft: Fft2::new(&grid), window: [grid.nx, grid.ny].map(window), grid, wavelength_m })
+        Ok(Self {
+            fft: Fft2::new(&grid),
+            window: [grid.nx, grid.ny].map(window),
+            grid,
+            wavelength_m,
+        })
     }
 
     /// The grid.
@@ -48,7 +53,9 @@ impl<T: Real> Propagator<T> {
 
     /// Number of equal steps into which `distance_m` must be cut so that each is sampled: N dx^2/lambda at most.
     pub fn pieces(&self, distance_m: f64) -> usize {
-        (distance_m.abs() / self.grid.largest_step_m(self.wavelength_m) - 1e-9).ceil().max(1.0) as usize
+        (distance_m.abs() / self.grid.largest_step_m(self.wavelength_m) - 1e-9)
+            .ceil()
+            .max(1.0) as usize
     }
 
     /// Transfer function of `distance_m` (negative: backwards).
@@ -58,7 +65,12 @@ impl<T: Real> Propagator<T> {
     pub fn transfer(&self, distance_m: f64) -> Result<Transfer<T>, Error> {
         finite("distance_m", distance_m)?;
         let one_step = self.pieces(distance_m) == 1;
-        within("distance_m", distance_m, one_step, "at most N dx^2 / lambda in one step: cut the step")?;
+        within(
+            "distance_m",
+            distance_m,
+            one_step,
+            "at most N dx^2 / lambda in one step: cut the step",
+        )?;
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
         // The inverse transform of rustfft is not normalised.
         let scale = 1.0 / (nx * ny) as f64;
@@ -67,8 +79,12 @@ impl<T: Real> Propagator<T> {
         let lambda = self.wavelength_m;
         let paraxial = |f: f64| Complex::cis(-PI * lambda * distance_m * f * f);
         Ok(Transfer {
-            x: (0..nx).map(|i| narrow(paraxial(frequency(nx, dx_m, i)) * scale)).collect(),
-            y: (0..ny).map(|i| narrow(paraxial(frequency(ny, dy_m, i)))).collect(),
+            x: (0..nx)
+                .map(|i| narrow(paraxial(frequency(nx, dx_m, i)) * scale))
+                .collect(),
+            y: (0..ny)
+                .map(|i| narrow(paraxial(frequency(ny, dy_m, i))))
+                .collect(),
         })
     }
 
@@ -108,12 +124,20 @@ impl<T: Real> Propagator<T> {
     }
 
     /// Screen and transform along x into the transposed buffer.
-    fn forward(&self, field: &[Complex<T>], screen: Option<(&[T], T)>, work: &mut Work<T>) -> Result<(), Error> {
+    fn forward(
+        &self,
+        field: &[Complex<T>],
+        screen: Option<(&[T], T)>,
+        work: &mut Work<T>,
+    ) -> Result<(), Error> {
         check_length("field", field.len(), self.grid.points())?;
         if let Some((phase, _)) = screen {
             check_length("screen", phase.len(), self.grid.points())?;
         }
-        let Work { whole: transposed, scratch } = work;
+        let Work {
+            whole: transposed,
+            scratch,
+        } = work;
         Fft2::transposing(&self.fft.forward_x, transposed, scratch, |row, block| {
             let points = row * self.grid.nx..row * self.grid.nx + block.len();
             block.copy_from_slice(&field[points.clone()]);
@@ -131,13 +155,21 @@ impl<T: Real> Propagator<T> {
         transfers: [&Transfer<T>; N],
         work: &mut Work<T>,
     ) -> [f64; N] {
-        let Work { whole: transposed, scratch } = work;
+        let Work {
+            whole: transposed,
+            scratch,
+        } = work;
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
-        self.fft.filter_y(transposed, fields.each_mut().map(|field| &mut **field), scratch, |which, kx, block| {
-            for (i, line) in block.chunks_exact_mut(ny).enumerate() {
-                kernel::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
-            }
-        });
+        self.fft.filter_y(
+            transposed,
+            fields.each_mut().map(|field| &mut **field),
+            scratch,
+            |which, kx, block| {
+                for (i, line) in block.chunks_exact_mut(ny).enumerate() {
+                    kernel::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
+                }
+            },
+        );
         fields.map(|field| {
             let mut power = 0.0;
             self.fft.inverse_x(field, scratch, |y, block| {
@@ -153,7 +185,9 @@ impl<T: Real> Propagator<T> {
 /// Super-Gaussian edge: 1 inside, 0.9 at 0.9 of the half width, nil at the border.
 fn window<T: Real>(n: usize) -> Vec<T> {
     let half = 0.5 * n as f64;
-    (0..n).map(|i| T::of((-((i as f64 + 0.5 - half).abs() / (0.95 * half)).powi(40)).exp())).collect()
+    (0..n)
+        .map(|i| T::of((-((i as f64 + 0.5 - half).abs() / (0.95 * half)).powi(40)).exp()))
+        .collect()
 }
 
 #[cfg(test)]
@@ -181,7 +215,9 @@ mod tests {
         let pieces = propagator.pieces(z);
         let transfer = propagator.transfer(z / pieces as f64).unwrap();
         for _ in 0..pieces {
-            propagator.step(&mut field, None, &transfer, &mut work).unwrap();
+            propagator
+                .step(&mut field, None, &transfer, &mut work)
+                .unwrap();
         }
         let q = Complex::new(1.0, z / (2.0 * PI / lambda * s * s));
         let mut worst = 0f64;
@@ -198,7 +234,11 @@ mod tests {
 
     #[test]
     fn gaussian_beam_keeps_width_and_phase_on_any_grid() {
-        for (nx, ny, dx_m, dy_m) in [(256, 256, 2e-3, 2e-3), (192, 256, 2e-3, 1.5e-3), (251, 243, 2e-3, 2e-3)] {
+        for (nx, ny, dx_m, dy_m) in [
+            (256, 256, 2e-3, 2e-3),
+            (192, 256, 2e-3, 1.5e-3),
+            (251, 243, 2e-3, 2e-3),
+        ] {
             let error = gaussian_error(Grid { nx, ny, dx_m, dy_m });
             assert!(error < 1e-9, "{nx} {ny}: {error}");
         }
@@ -213,7 +253,9 @@ mod tests {
         let power: f64 = start.iter().map(|e| e.norm_sqr()).sum::<f64>() * 4e-6;
         let mut field = start.clone();
         let there = propagator.transfer(150.0).unwrap();
-        let left = propagator.step(&mut field, None, &there, &mut work).unwrap();
+        let left = propagator
+            .step(&mut field, None, &there, &mut work)
+            .unwrap();
         assert!((left / power - 1.0).abs() < 1e-12);
         let back = propagator.transfer(-150.0).unwrap();
         propagator.step(&mut field, None, &back, &mut work).unwrap();
@@ -227,7 +269,10 @@ mod tests {
         let grid = Grid::table2();
         let propagator = Propagator::<f32>::new(grid, 1.55e-6).unwrap();
         assert!((grid.largest_step_m(1.55e-6) - 1321.3).abs() < 0.1);
-        assert_eq!(crate::error::refused(propagator.transfer(3000.0)), "distance_m");
+        assert_eq!(
+            crate::error::refused(propagator.transfer(3000.0)),
+            "distance_m"
+        );
         assert_eq!(propagator.pieces(3000.0), 3);
         assert_eq!(propagator.pieces(1321.2), 1);
     }

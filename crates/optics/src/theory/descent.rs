@@ -32,7 +32,10 @@ pub(crate) struct Descent {
 
 impl Descent {
     pub(crate) fn new() -> Self {
-        Self { regular: laguerre(NODES, 0.0), branch: laguerre(NODES, 0.5) }
+        Self {
+            regular: laguerre(NODES, 0.0),
+            branch: laguerre(NODES, 0.5),
+        }
     }
 
     /// Integral of f(x) cos(kappa x) from `low` to `high` under the arc; none where kappa is too small for the rules.
@@ -53,13 +56,26 @@ impl Descent {
             return None;
         }
         let mut sum = C::new(0.0, 0.0);
-        for &(node, weight) in if is_branch { &self.branch } else { &self.regular } {
+        for &(node, weight) in if is_branch {
+            &self.branch
+        } else {
+            &self.regular
+        } {
             let t = node / kappa;
             // h^2 = p^2 - (offset + j t)^2; at a branch p^2 - offset^2 is 0 and h is sqrt(t) times a smooth function.
-            let on_axis = if is_branch { 0.0 } else { (arc.radius_m - offset) * (arc.radius_m + offset) };
+            let on_axis = if is_branch {
+                0.0
+            } else {
+                (arc.radius_m - offset) * (arc.radius_m + offset)
+            };
             let half = C::new(on_axis + t * t, -2.0 * offset * t).sqrt();
             let value = arc.chord(C::new(at, t), half);
-            sum += value * if is_branch { weight / node.sqrt() } else { weight };
+            sum += value
+                * if is_branch {
+                    weight / node.sqrt()
+                } else {
+                    weight
+                };
         }
         Some(C::new(0.0, 1.0 / kappa) * C::cis(kappa * at) * sum)
     }
@@ -108,7 +124,10 @@ fn laguerre(n: usize, alpha: f64) -> Vec<(f64, f64)> {
         let (mut before, mut now) = (0.0, 1.0);
         for k in 0..n {
             let k = k as f64;
-            (before, now) = (now, ((2.0 * k + 1.0 + alpha - x) * now - (k + alpha) * before) / (k + 1.0));
+            (before, now) = (
+                now,
+                ((2.0 * k + 1.0 + alpha - x) * now - (k + alpha) * before) / (k + 1.0),
+            );
         }
         (now, before)
     };
@@ -150,9 +169,15 @@ mod tests {
     fn rules_are_exact_for_polynomials() {
         for alpha in [0.0, 0.5] {
             for power in [0, 1, 7, 20, 31] {
-                let found: f64 = laguerre(NODES, alpha).iter().map(|(x, w)| w * x.powi(power)).sum();
+                let found: f64 = laguerre(NODES, alpha)
+                    .iter()
+                    .map(|(x, w)| w * x.powi(power))
+                    .sum();
                 let exact = libm::tgamma(f64::from(power) + alpha + 1.0);
-                assert!((found / exact - 1.0).abs() < 1e-11, "{alpha} {power}: {found:e} {exact:e}");
+                assert!(
+                    (found / exact - 1.0).abs() < 1e-11,
+                    "{alpha} {power}: {found:e} {exact:e}"
+                );
             }
         }
     }
@@ -161,7 +186,10 @@ mod tests {
     fn error_function_is_the_real_one_on_the_axis_and_continuous_between_its_forms() {
         for x in [1e-3, 0.4, 1.7, 3.4, 3.5, 6.0] {
             let found = erf(C::new(x, 0.0));
-            assert!((found.re - libm::erf(x)).abs() < 1e-14 && found.im == 0.0, "{x}: {found}");
+            assert!(
+                (found.re - libm::erf(x)).abs() < 1e-14 && found.im == 0.0,
+                "{x}: {found}"
+            );
         }
         // The derivative 2/sqrt(pi) exp(-z^2) across the circle where the form changes.
         for angle in [0.2, 0.5] {
@@ -169,7 +197,10 @@ mod tests {
             let d = z * 1e-4;
             let slope = (erf(z + d) - erf(z - d)) / (d * 2.0);
             let exact = (-z * z).exp() * (2.0 / PI.sqrt());
-            assert!((slope / exact - 1.0).norm() < 1e-5, "{angle}: {slope} {exact}");
+            assert!(
+                (slope / exact - 1.0).norm() < 1e-5,
+                "{angle}: {slope} {exact}"
+            );
         }
     }
 
@@ -178,7 +209,11 @@ mod tests {
         let rule = GaussLegendre::new(20);
         let descent = Descent::new();
         for s in [0.012, 0.03, f64::INFINITY] {
-            let arc = Arc { centre_m: -0.007, radius_m: 0.05, intensity_radius_m: s };
+            let arc = Arc {
+                centre_m: -0.007,
+                radius_m: 0.05,
+                intensity_radius_m: s,
+            };
             // From inside to the end of the arc, and the whole disc.
             for (low, high) in [(0.004, 0.043), (-0.057, 0.043), (-0.057, 0.01)] {
                 for kappa in [8e3, 3e4] {
@@ -186,11 +221,16 @@ mod tests {
                     let panels = rule.composite(-0.5 * PI, 0.5 * PI, 800, |theta: f64| {
                         let x = middle + half * theta.sin();
                         let y = (0.05f64.powi(2) - (x + 0.007).powi(2)).max(0.0).sqrt();
-                        half * theta.cos() * arc.chord(C::new(x, 0.0), C::new(y, 0.0)).re * (kappa * x).cos()
+                        half * theta.cos()
+                            * arc.chord(C::new(x, 0.0), C::new(y, 0.0)).re
+                            * (kappa * x).cos()
                     });
                     let found = descent.integral(arc, low, high, kappa).unwrap();
                     // Against the size of the integrand: what an efficiency needs.
-                    assert!((found - panels).abs() < 1e-13 * (high - low), "{s} {low} {kappa}: {found} {panels}");
+                    assert!(
+                        (found - panels).abs() < 1e-13 * (high - low),
+                        "{s} {low} {kappa}: {found} {panels}"
+                    );
                 }
             }
             assert!(descent.integral(arc, 0.004, 0.043, 1e3).is_none());

@@ -35,7 +35,8 @@ pub fn mean_power_beyond(
     for &r in radius_m {
         largest_m = largest_m.max(not_negative("radius_m", r)?);
     }
-    let structure_rad2 = table.of_spherical_waves(k, range_m, cn2.clone().validated()?.quadrature(range_m)?);
+    let structure_rad2 =
+        table.of_spherical_waves(k, range_m, cn2.clone().validated()?.quadrature(range_m)?);
     let overlap = Overlap::new(&telescope, range_m);
     let rule = GaussLegendre::new(12);
     let mut nodes = Vec::new();
@@ -52,7 +53,10 @@ pub fn mean_power_beyond(
     let whole = telescope.transmitted_fraction();
     let beyond = |&r: &f64| {
         let scale = k * r / range_m;
-        let inside: f64 = nodes.iter().map(|(rho, w)| w * scale * libm::j1(scale * rho)).sum();
+        let inside: f64 = nodes
+            .iter()
+            .map(|(rho, w)| w * scale * libm::j1(scale * rho))
+            .sum();
         (1.0 - inside / whole).clamp(0.0, 1.0)
     };
     Ok(radius_m.iter().map(beyond).collect())
@@ -72,16 +76,30 @@ mod tests {
     #[test]
     fn gaussian_beam_and_airy_pattern_have_the_known_power_beyond_a_circle() {
         let s = 0.02;
-        let gauss =
-            Telescope { aperture_radius_m: 0.2, beam_radius_m: s, focus: Focus::At(-900.0), ..Telescope::table2() };
+        let gauss = Telescope {
+            aperture_radius_m: 0.2,
+            beam_radius_m: s,
+            focus: Focus::At(-900.0),
+            ..Telescope::table2()
+        };
         let range_m: f64 = 1200.0;
         let k = gauss.wavenumber_rad_m();
         let width2 = (s * (1.0 + range_m / 900.0)).powi(2) + (range_m / (k * s)).powi(2);
         let radius_m = [0.0, 0.02, 0.06, 0.12];
-        for (r, found) in radius_m.iter().zip(beyond(&gauss, &Cn2Path::None, range_m, &radius_m)) {
-            assert!((found - (-r * r / width2).exp()).abs() < 1e-9, "{r}: {found}");
+        for (r, found) in radius_m
+            .iter()
+            .zip(beyond(&gauss, &Cn2Path::None, range_m, &radius_m))
+        {
+            assert!(
+                (found - (-r * r / width2).exp()).abs() < 1e-9,
+                "{r}: {found}"
+            );
         }
-        let airy = Telescope { beam_radius_m: f64::INFINITY, focus: Focus::At(800.0), ..Telescope::table2() };
+        let airy = Telescope {
+            beam_radius_m: f64::INFINITY,
+            focus: Focus::At(800.0),
+            ..Telescope::table2()
+        };
         for v in [1.0f64, 3.8317, 30.0, 150.0] {
             let found = beyond(&airy, &Cn2Path::None, 800.0, &[v * 800.0 / (k * 0.05)])[0];
             let exact = libm::j0(v).powi(2) + libm::j1(v).powi(2);
@@ -92,10 +110,17 @@ mod tests {
     #[test]
     fn square_root_of_the_coherence_spreads_the_mean_beam() {
         // Square law in place of 5/3 within a few per cent: exp(-r^2/w^2) with w^2 + (R/(k s))^2 ... + 2 (2R/(k rho_0'))^2/2.
-        let t = Telescope { aperture_radius_m: 0.2, beam_radius_m: 0.03, ..Telescope::table2() };
+        let t = Telescope {
+            aperture_radius_m: 0.2,
+            beam_radius_m: 0.03,
+            ..Telescope::table2()
+        };
         let strong = Cn2Path::Uniform { cn2_m_m23: 3e-13 };
         let calm = beyond(&t, &Cn2Path::None, 2000.0, &[0.1])[0];
         let spread = beyond(&t, &strong, 2000.0, &[0.1, 30.0]);
-        assert!(spread[0] > 100.0 * calm && spread[0] > 0.3 && spread[1] < 1e-3, "{calm} {spread:?}");
+        assert!(
+            spread[0] > 100.0 * calm && spread[0] > 0.3 && spread[1] < 1e-3,
+            "{calm} {spread:?}"
+        );
     }
 }

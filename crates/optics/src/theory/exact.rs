@@ -135,7 +135,12 @@ pub fn bistatic_efficiency_screens(
             places.push((screen.position_m, strength));
         }
     }
-    efficiency_with(telescope, misalignment, range_m, &table.of_spherical_waves(k, range_m, places))
+    efficiency_with(
+        telescope,
+        misalignment,
+        range_m,
+        &table.of_spherical_waves(k, range_m, places),
+    )
 }
 
 #[cfg(test)]
@@ -155,12 +160,19 @@ mod tests {
     #[test]
     fn square_law_quadrature_gives_the_closed_form() {
         // An aperture of ten radii and a quadratic structure function 2 (rho/rho_0)^2 are what the closed form assumes.
-        let t =
-            Telescope { aperture_radius_m: 0.2, beam_radius_m: 0.02, focus: Focus::At(700.0), ..Telescope::table2() };
+        let t = Telescope {
+            aperture_radius_m: 0.2,
+            beam_radius_m: 0.02,
+            focus: Focus::At(700.0),
+            ..Telescope::table2()
+        };
         let (cn2, range_m) = (Cn2Path::Uniform { cn2_m_m23: 3e-14 }, 1200.0);
         let rho_0 = coherence_radius_m(&cn2, 1.55e-6, range_m).unwrap();
         let closed = square_law_efficiency(&t, rho_0, range_m);
-        let exact = efficiency_with(&t, &Misalignment::NONE, range_m, &|rho| 2.0 * (rho / rho_0).powi(2)).unwrap();
+        let exact = efficiency_with(&t, &Misalignment::NONE, range_m, &|rho| {
+            2.0 * (rho / rho_0).powi(2)
+        })
+        .unwrap();
         assert!((closed / exact - 1.0).abs() < 1e-9);
         assert!(closed < untruncated_efficiency(&t, range_m).unwrap());
     }
@@ -175,7 +187,10 @@ mod tests {
         };
         let path = bistatic_efficiency(&t, &Misalignment::NONE, &turbulence, 1500.0).unwrap();
         let rho_0 = coherence_radius_m(&turbulence.cn2, 1.55e-6, 1500.0).unwrap();
-        let law = efficiency_with(&t, &Misalignment::NONE, 1500.0, &|rho| 2.0 * (rho / rho_0).powf(5.0 / 3.0)).unwrap();
+        let law = efficiency_with(&t, &Misalignment::NONE, 1500.0, &|rho| {
+            2.0 * (rho / rho_0).powf(5.0 / 3.0)
+        })
+        .unwrap();
         assert!((path / law - 1.0).abs() < 2e-4, "{path} {law}");
     }
 
@@ -188,14 +203,23 @@ mod tests {
         let screens = |n: usize, shift: f64| -> f64 {
             let dz = 1000.0 / n as f64;
             let list: Vec<_> = (0..n)
-                .map(|i| ScreenStrength { position_m: (i as f64 + shift) * dz, cn2_thickness_m13: 1e-13 * dz })
+                .map(|i| ScreenStrength {
+                    position_m: (i as f64 + shift) * dz,
+                    cn2_thickness_m13: 1e-13 * dz,
+                })
                 .collect();
-            bistatic_efficiency_screens(&t, &Misalignment::NONE, &list, &table, 1000.0).unwrap() / exact - 1.0
+            bistatic_efficiency_screens(&t, &Misalignment::NONE, &list, &table, 1000.0).unwrap()
+                / exact
+                - 1.0
         };
         // Mid-layer screens are second order; screens at the start of the layer overweight the turbulence near the lidar.
         assert!(screens(10, 0.5).abs() < 2e-3, "{}", screens(10, 0.5));
         assert!(screens(40, 0.5).abs() < 2e-4);
-        assert!((screens(10, 0.0) + 0.067).abs() < 0.005, "{}", screens(10, 0.0));
+        assert!(
+            (screens(10, 0.0) + 0.067).abs() < 0.005,
+            "{}",
+            screens(10, 0.0)
+        );
     }
 
     #[test]
@@ -208,15 +232,22 @@ mod tests {
             elevation_rad: 10f64.to_radians(),
         };
         let range_m = 3000.0;
-        let turbulence = Turbulence { cn2: cn2.clone(), ..Turbulence::table2(1e-13).unwrap() };
+        let turbulence = Turbulence {
+            cn2: cn2.clone(),
+            ..Turbulence::table2(1e-13).unwrap()
+        };
         let found = bistatic_efficiency(&t, &Misalignment::NONE, &turbulence, range_m).unwrap();
         let dz = range_m / 6000.0;
         let slices: Vec<_> = (0..6000)
             .map(|i| (f64::from(i) + 0.5) * dz)
-            .map(|z| ScreenStrength { position_m: z, cn2_thickness_m13: cn2.at(z).unwrap() * dz })
+            .map(|z| ScreenStrength {
+                position_m: z,
+                cn2_thickness_m13: cn2.at(z).unwrap() * dz,
+            })
             .collect();
         let table = StructureTable::new(&*turbulence.spectrum);
-        let sum = bistatic_efficiency_screens(&t, &Misalignment::NONE, &slices, &table, range_m).unwrap();
+        let sum =
+            bistatic_efficiency_screens(&t, &Misalignment::NONE, &slices, &table, range_m).unwrap();
         assert!((found / sum - 1.0).abs() < 1e-5, "{found} {sum}");
         assert!((found / 0.13243 - 1.0).abs() < 1e-4, "{found}");
     }

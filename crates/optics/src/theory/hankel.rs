@@ -13,7 +13,11 @@ use num_complex::Complex;
 use std::f64::consts::PI;
 
 /// Field U(r) \[1/m\] at a distance \[m\] from the axis; `largest_radius_m` is the largest at which it will be asked for.
-pub(crate) fn field_per_m(telescope: &Telescope, range_m: f64, largest_radius_m: f64) -> impl Fn(f64) -> Complex<f64> {
+pub(crate) fn field_per_m(
+    telescope: &Telescope,
+    range_m: f64,
+    largest_radius_m: f64,
+) -> impl Fn(f64) -> Complex<f64> {
     let k = telescope.wavenumber_rad_m();
     let chirp = 0.5 * k * (1.0 / range_m - telescope.focus.curvature_per_m());
     let (b, a) = (telescope.obscuration_radius_m, telescope.aperture_radius_m);
@@ -28,8 +32,16 @@ pub(crate) fn field_per_m(telescope: &Telescope, range_m: f64, largest_radius_m:
         let (sin, cos) = (chirp * r * r).sin_cos();
         (r, Complex::new(weight * cos, weight * sin))
     };
-    let nodes: Vec<_> = GaussLegendre::new(16).on_panels(b, a.max(b), panels).map(weighted).collect();
-    move |radius_m| nodes.iter().map(|(r, weight)| weight * libm::j0(k / range_m * radius_m * r)).sum()
+    let nodes: Vec<_> = GaussLegendre::new(16)
+        .on_panels(b, a.max(b), panels)
+        .map(weighted)
+        .collect();
+    move |radius_m| {
+        nodes
+            .iter()
+            .map(|(r, weight)| weight * libm::j0(k / range_m * radius_m * r))
+            .sum()
+    }
 }
 
 /// Free-space efficiency eta_s (19) by the Fresnel-Hankel integral: the independent check of
@@ -41,7 +53,12 @@ pub fn free_space_efficiency_hankel(telescope: &Telescope, range_m: f64) -> Resu
     let telescope = telescope.validated()?;
     let range_m = positive("range_m", range_m)?;
     check_fresnel_number(&telescope, range_m)?;
-    let (k, a) = (telescope.wavenumber_rad_m(), telescope.aperture_radius_m.min(9.0 * telescope.intensity_radius_m()));
+    let (k, a) = (
+        telescope.wavenumber_rad_m(),
+        telescope
+            .aperture_radius_m
+            .min(9.0 * telescope.intensity_radius_m()),
+    );
     let geometric = a * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
     let lobe = range_m / (k * a);
     // Beyond the geometric shadow irradiance falls as r^-3, its square times r as r^-5.
@@ -49,7 +66,9 @@ pub fn free_space_efficiency_hankel(telescope: &Telescope, range_m: f64) -> Resu
     let field_per_m = field_per_m(&telescope, range_m, end);
     let panels = 8 + (end / (3.0 * lobe)) as usize;
     let rule = GaussLegendre::new(10);
-    let integral = rule.composite(0.0, end, panels, |r| 2.0 * PI * r * field_per_m(r).norm_sqr().powi(2));
+    let integral = rule.composite(0.0, end, panels, |r| {
+        2.0 * PI * r * field_per_m(r).norm_sqr().powi(2)
+    });
     let scale = (telescope.wavelength_m * range_m).powi(2) / telescope.aperture_area_m2();
     Ok(scale * integral)
 }
@@ -62,9 +81,15 @@ mod tests {
     #[test]
     fn wide_aperture_gives_the_gaussian_beam_of_the_closed_form() {
         let s = 0.02;
-        let t = Telescope { aperture_radius_m: 0.3, beam_radius_m: s, focus: Focus::At(400.0), ..Telescope::table2() };
+        let t = Telescope {
+            aperture_radius_m: 0.3,
+            beam_radius_m: s,
+            focus: Focus::At(400.0),
+            ..Telescope::table2()
+        };
         let range_m = 900.0;
-        let width2 = (s * (1.0 - range_m / 400.0)).powi(2) + (range_m / (t.wavenumber_rad_m() * s)).powi(2);
+        let width2 =
+            (s * (1.0 - range_m / 400.0)).powi(2) + (range_m / (t.wavenumber_rad_m() * s)).powi(2);
         let radius = [0.0, 0.01, 0.03, 0.06];
         let field_per_m = field_per_m(&t, range_m, 0.06);
         for r in radius {
@@ -76,10 +101,18 @@ mod tests {
 
     #[test]
     fn power_at_the_target_is_the_transmitted_fraction() {
-        let t = Telescope { obscuration_radius_m: 0.01, ..Telescope::table2() };
+        let t = Telescope {
+            obscuration_radius_m: 0.01,
+            ..Telescope::table2()
+        };
         let field_per_m = field_per_m(&t, 1500.0, 2.0);
         let radius = (0..4000).map(|i| (f64::from(i) + 0.5) * 5e-4);
-        let power: f64 = radius.map(|r| 2.0 * PI * r * 5e-4 * field_per_m(r).norm_sqr()).sum();
-        assert!((power / t.transmitted_fraction() - 1.0).abs() < 5e-3, "{power}");
+        let power: f64 = radius
+            .map(|r| 2.0 * PI * r * 5e-4 * field_per_m(r).norm_sqr())
+            .sum();
+        assert!(
+            (power / t.transmitted_fraction() - 1.0).abs() < 5e-3,
+            "{power}"
+        );
     }
 }

@@ -24,8 +24,11 @@ pub const LARGEST_FRESNEL_NUMBER: f64 = 3000.0;
 /// Fresnel number a^2 |1/R - 1/F| / lambda of the lit aperture at `range_m`: the number of half waves by which its edge and its
 /// centre differ. Large values are the geometric near field, far from any focus.
 pub fn fresnel_number(telescope: &Telescope, range_m: f64) -> f64 {
-    let lit_m = telescope.aperture_radius_m.min(GAUSSIAN_REACH * telescope.intensity_radius_m());
-    lit_m * lit_m * (1.0 / range_m - telescope.focus.curvature_per_m()).abs() / telescope.wavelength_m
+    let lit_m = telescope
+        .aperture_radius_m
+        .min(GAUSSIAN_REACH * telescope.intensity_radius_m());
+    lit_m * lit_m * (1.0 / range_m - telescope.focus.curvature_per_m()).abs()
+        / telescope.wavelength_m
 }
 
 /// Forecast of the time of one quadrature of the efficiency at `range_m` on one core of 2023 \[s\]; `screens` is the number of
@@ -48,7 +51,11 @@ pub(crate) fn check_fresnel_number(telescope: &Telescope, range_m: f64) -> Resul
     if found <= LARGEST_FRESNEL_NUMBER {
         return Ok(());
     }
-    Err(Error::FresnelNumber { range_m, found, largest: LARGEST_FRESNEL_NUMBER })
+    Err(Error::FresnelNumber {
+        range_m,
+        found,
+        largest: LARGEST_FRESNEL_NUMBER,
+    })
 }
 
 /// Evaluates M(rho) of one telescope for one wave-front curvature.
@@ -73,7 +80,10 @@ impl Overlap {
 
     /// M(rho), real because the aperture is centro-symmetric.
     pub(crate) fn at(&self, separation_m: f64) -> f64 {
-        let (a, b) = (self.telescope.aperture_radius_m, self.telescope.obscuration_radius_m);
+        let (a, b) = (
+            self.telescope.aperture_radius_m,
+            self.telescope.obscuration_radius_m,
+        );
         let mut sum = self.lens(a, a, separation_m);
         if b > 0.0 {
             // Annulus = disc minus disc; the two mixed terms are mirror images with equal real parts.
@@ -102,7 +112,11 @@ impl Overlap {
         };
         let right = self.strip(crossing, high, rho, -0.5 * rho, p);
         // Equal discs: the left strip is the mirror image of the right one.
-        if p == q { 2.0 * right } else { self.strip(low, crossing, rho, 0.5 * rho, q) + right }
+        if p == q {
+            2.0 * right
+        } else {
+            self.strip(low, crossing, rho, 0.5 * rho, q) + right
+        }
     }
 
     /// One strip of the lens, under the arc of radius `radius` about `centre`.
@@ -114,7 +128,11 @@ impl Overlap {
         let middle = 0.5 * (high + low);
         let s = self.telescope.intensity_radius_m();
         let kappa = self.phase_rad_m2 * rho;
-        let arc = Arc { centre_m: centre, radius_m: radius, intensity_radius_m: s };
+        let arc = Arc {
+            centre_m: centre,
+            radius_m: radius,
+            intensity_radius_m: s,
+        };
         if let Some(integral) = self.descent.integral(arc, low, high, kappa) {
             return integral;
         }
@@ -131,13 +149,21 @@ impl Overlap {
 
     /// exp(-x^2/s^2) times the integral of exp(-y^2/s^2) from -y to y.
     fn chord(&self, x: f64, y: f64, s: f64) -> f64 {
-        if s.is_infinite() { 2.0 * y } else { (-(x / s).powi(2)).exp() * s * PI.sqrt() * libm::erf(y / s) }
+        if s.is_infinite() {
+            2.0 * y
+        } else {
+            (-(x / s).powi(2)).exp() * s * PI.sqrt() * libm::erf(y / s)
+        }
     }
 
     /// End points of smooth pieces of |M|^2, fine enough for its oscillation.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let t = &self.telescope;
-        let (a, b, s) = (t.aperture_radius_m, t.obscuration_radius_m, t.intensity_radius_m());
+        let (a, b, s) = (
+            t.aperture_radius_m,
+            t.obscuration_radius_m,
+            t.intensity_radius_m(),
+        );
         let end = (2.0 * a).min(2.0 * GAUSSIAN_REACH * s);
         let mut kinks = vec![0.0, 2.0 * b, a - b, a + b, end];
         kinks.retain(|&x| x <= end);
@@ -171,14 +197,24 @@ pub(crate) fn efficiency_with(
     check_fresnel_number(&telescope, range_m)?;
     let overlap = Overlap::new(&telescope, range_m);
     let shift = telescope.wavenumber_rad_m() * misalignment.separation_m(range_m) / range_m;
-    let integral = adaptive(&overlap.rule, &overlap.breaks(), 2e-13, "efficiency", &mut |rho| {
-        let damping = (-structure_rad2(rho)).exp();
-        if damping == 0.0 {
-            return 0.0;
-        }
-        let j0 = if shift == 0.0 { 1.0 } else { libm::j0(shift * rho) };
-        2.0 * PI * rho * overlap.at(rho).powi(2) * damping * j0
-    })?;
+    let integral = adaptive(
+        &overlap.rule,
+        &overlap.breaks(),
+        2e-13,
+        "efficiency",
+        &mut |rho| {
+            let damping = (-structure_rad2(rho)).exp();
+            if damping == 0.0 {
+                return 0.0;
+            }
+            let j0 = if shift == 0.0 {
+                1.0
+            } else {
+                libm::j0(shift * rho)
+            };
+            2.0 * PI * rho * overlap.at(rho).powi(2) * damping * j0
+        },
+    )?;
     Ok(integral / telescope.aperture_area_m2())
 }
 
@@ -190,7 +226,11 @@ mod tests {
     fn overlap_at_zero_separation_is_the_transmitted_fraction() {
         for beam_radius_m in [0.004, 0.03, 0.3, f64::INFINITY] {
             for obscuration_radius_m in [0.0, 0.01, 0.03] {
-                let t = Telescope { beam_radius_m, obscuration_radius_m, ..Telescope::table2() };
+                let t = Telescope {
+                    beam_radius_m,
+                    obscuration_radius_m,
+                    ..Telescope::table2()
+                };
                 let m0 = Overlap::new(&t, 700.0).at(0.0);
                 let exact = t.transmitted_fraction();
                 assert!((m0 - exact).abs() < 1e-13, "{beam_radius_m} {m0} {exact}");
@@ -200,7 +240,11 @@ mod tests {
 
     #[test]
     fn uniform_disc_in_focus_has_the_optical_transfer_function_of_a_circular_pupil() {
-        let t = Telescope { beam_radius_m: f64::INFINITY, focus: crate::Focus::At(800.0), ..Telescope::table2() };
+        let t = Telescope {
+            beam_radius_m: f64::INFINITY,
+            focus: crate::Focus::At(800.0),
+            ..Telescope::table2()
+        };
         let overlap = Overlap::new(&t, 800.0);
         for v in [0.0f64, 0.1, 0.5, 0.9, 0.999] {
             let exact = 2.0 / PI * (v.acos() - v * (1.0 - v * v).sqrt());
@@ -211,9 +255,16 @@ mod tests {
     #[test]
     fn fresnel_number_without_bound_is_an_error_that_names_it() {
         let focus = crate::Focus::At(1.777e-4);
-        let t = Telescope { focus, ..Telescope::table2() };
+        let t = Telescope {
+            focus,
+            ..Telescope::table2()
+        };
         match efficiency_with(&t, &Misalignment::NONE, 1000.0, &|_| 0.0) {
-            Err(Error::FresnelNumber { range_m, found, largest }) => {
+            Err(Error::FresnelNumber {
+                range_m,
+                found,
+                largest,
+            }) => {
                 assert_eq!((range_m, largest), (1000.0, LARGEST_FRESNEL_NUMBER));
                 assert!((found / 9.07e6 - 1.0).abs() < 1e-2, "{found}");
             }
@@ -225,7 +276,10 @@ mod tests {
     fn shadow_of_geometry_is_the_limit_of_a_large_fresnel_number() {
         // M(rho) is then the transform of the irradiance: eta = (lambda R)^2/A_R integral of j^2 with j the shadow of the
         // aperture. What the edge diffracts is of the order of the reciprocal of the Fresnel number.
-        let t = Telescope { wavelength_m: 1.62e-7, ..Telescope::table2() };
+        let t = Telescope {
+            wavelength_m: 1.62e-7,
+            ..Telescope::table2()
+        };
         let range_m = 50.0;
         assert!(fresnel_number(&t, range_m) > 300.0);
         let eta = efficiency_with(&t, &Misalignment::NONE, range_m, &|_| 0.0).unwrap();

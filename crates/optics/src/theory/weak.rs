@@ -55,7 +55,11 @@ pub fn weak_turbulence_efficiency(
     let bistatic = bistatic_efficiency(&telescope, &Misalignment::NONE, turbulence, range_m)?;
     let found = fresnel_number(&telescope, range_m);
     if found > LARGEST_FRESNEL {
-        return Err(Error::FresnelNumber { range_m, found, largest: LARGEST_FRESNEL });
+        return Err(Error::FresnelNumber {
+            range_m,
+            found,
+            largest: LARGEST_FRESNEL,
+        });
     }
     let rytov_variance = path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, range_m)?;
     let overlaps = DisplacedOverlaps::new(&telescope, range_m);
@@ -85,14 +89,22 @@ struct DisplacedOverlaps {
 impl DisplacedOverlaps {
     fn new(telescope: &Telescope, range_m: f64) -> Self {
         let wavenumber_rad_m = telescope.wavenumber_rad_m();
-        let lit_m = telescope.aperture_radius_m.min(6.0 * telescope.intensity_radius_m());
+        let lit_m = telescope
+            .aperture_radius_m
+            .min(6.0 * telescope.intensity_radius_m());
         // U has no wave number above 1/lobe: sums over a lattice of less than 2 pi/(4 lobe) integrate products of four exactly.
         let lobe_m = range_m / (wavenumber_rad_m * lit_m);
         let step_m = 0.5 * lobe_m;
         let shadow_m = lit_m * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
         let reach = ((1.2 * shadow_m + 20.0 * lobe_m) / step_m).ceil() as usize;
         let field = lattice(telescope, range_m, step_m, reach);
-        let at = |i: usize, j: usize| if i.max(j) <= reach { field[i * (reach + 1) + j] } else { Complex::default() };
+        let at = |i: usize, j: usize| {
+            if i.max(j) <= reach {
+                field[i * (reach + 1) + j]
+            } else {
+                Complex::default()
+            }
+        };
         let irradiance = |i: usize, j: usize| at(i, j).norm_sqr();
         let mut values = Vec::with_capacity(2 * reach + 1);
         for s in 0..=2 * reach {
@@ -100,10 +112,14 @@ impl DisplacedOverlaps {
             for i in 0..=reach {
                 for j in 0..=reach {
                     // Four quadrants; points on an axis belong to two, the origin to one.
-                    let copies = f64::from(if i > 0 { 2u8 } else { 1 }) * f64::from(if j > 0 { 2u8 } else { 1 });
+                    let copies = f64::from(if i > 0 { 2u8 } else { 1 })
+                        * f64::from(if j > 0 { 2u8 } else { 1 });
                     let (near, far) = (i.abs_diff(s), i + s);
                     // The point and its mirror image across the y axis.
-                    sum[0] += copies * 0.5 * irradiance(i, j) * (irradiance(near, j) + irradiance(far, j));
+                    sum[0] += copies
+                        * 0.5
+                        * irradiance(i, j)
+                        * (irradiance(near, j) + irradiance(far, j));
                     let x = (at(i, j) * at(i, j)).conj() * (at(near, j) * at(far, j));
                     sum[1] += copies * x.re;
                     sum[2] += copies * x.im;
@@ -113,7 +129,12 @@ impl DisplacedOverlaps {
         }
         let whole = values[0][0];
         values.iter_mut().flatten().for_each(|v| *v /= whole);
-        Self { wavenumber_rad_m, range_m, step_m, values }
+        Self {
+            wavenumber_rad_m,
+            range_m,
+            step_m,
+            values,
+        }
     }
 
     /// Q, Re X, Im X at displacement `s_m`: even functions, so polynomials in its square.
@@ -127,7 +148,9 @@ impl DisplacedOverlaps {
         let mut out = [0.0; 3];
         for (i, values) in self.values[start..start + 6].iter().enumerate() {
             let weight = lagrange(&squares, i, t * t);
-            out.iter_mut().zip(values).for_each(|(o, v)| *o += weight * v);
+            out.iter_mut()
+                .zip(values)
+                .for_each(|(o, v)| *o += weight * v);
         }
         out
     }
@@ -136,7 +159,8 @@ impl DisplacedOverlaps {
     fn bracket(&self, kappa: f64, z: f64) -> f64 {
         let rest = self.range_m - z;
         let [q, re, im] = self.at(kappa * rest / self.wavenumber_rad_m);
-        let (sin, cos) = (kappa * kappa * rest * z / (self.wavenumber_rad_m * self.range_m)).sin_cos();
+        let (sin, cos) =
+            (kappa * kappa * rest * z / (self.wavenumber_rad_m * self.range_m)).sin_cos();
         q - (re * cos + im * sin)
     }
 
@@ -145,18 +169,22 @@ impl DisplacedOverlaps {
         let k = self.wavenumber_rad_m;
         let rest = self.range_m - z;
         // Wave numbers beyond which displaced copies do not meet, or the spectrum ends.
-        let end =
-            (k / rest * self.step_m * (self.values.len() - 1) as f64).min(7.0 * spectrum.inner_wavenumber_rad_m());
+        let end = (k / rest * self.step_m * (self.values.len() - 1) as f64)
+            .min(7.0 * spectrum.inner_wavenumber_rad_m());
         let late = rest * z / (k * self.range_m);
         // Below this the bracket is quadratic in kappa.
-        let quadratic = (0.05 * k / rest * self.step_m).min(0.1 / late.sqrt()).min(end);
+        let quadratic = (0.05 * k / rest * self.step_m)
+            .min(0.1 / late.sqrt())
+            .min(end);
         let curvature = self.bracket(quadratic, z) / (quadratic * quadratic);
         let rule = GaussLegendre::new(8);
         let density = |kappa: f64| kappa * spectrum.density_per_cn2(kappa);
         let mut sum = 0.0;
         let mut high = quadratic;
         for _ in 0..60 {
-            sum += rule.integrate(0.5 * high, high, |kappa| density(kappa) * curvature * kappa * kappa);
+            sum += rule.integrate(0.5 * high, high, |kappa| {
+                density(kappa) * curvature * kappa * kappa
+            });
             high *= 0.5;
         }
         let mut low = quadratic;
@@ -165,7 +193,9 @@ impl DisplacedOverlaps {
             let next = (1.26 * low).min((low * low + 4.0 / late).sqrt()).min(end);
             // So late that the delay has averaged X away.
             sum += if low * low * late > 1000.0 {
-                rule.integrate(low, end, |kappa| density(kappa) * self.at(kappa * rest / k)[0])
+                rule.integrate(low, end, |kappa| {
+                    density(kappa) * self.at(kappa * rest / k)[0]
+                })
             } else {
                 rule.integrate(low, next, |kappa| density(kappa) * self.bracket(kappa, z))
             };
@@ -181,7 +211,9 @@ fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Ve
     let end_m = step_m * (reach + 1) as f64 * std::f64::consts::SQRT_2;
     let field_per_m = field_per_m(telescope, range_m, end_m);
     let count = (end_m / step_m * FINER) as usize + 4;
-    let radial: Vec<Complex<f64>> = (0..count).map(|i| field_per_m(step_m / FINER * i as f64)).collect();
+    let radial: Vec<Complex<f64>> = (0..count)
+        .map(|i| field_per_m(step_m / FINER * i as f64))
+        .collect();
     let steps = (0..=reach).flat_map(|i| (0..=reach).map(move |j| (i as f64).hypot(j as f64)));
     steps.map(|steps| cubic(FINER * steps, &radial)).collect()
 }
@@ -198,7 +230,12 @@ mod tests {
         // U = exp(-g w^2): Q = exp(-2 Re g ... ) in closed form. |U|^2 = exp(-2 a w^2), g = a + jb:
         // Q(s)/Q(0) = exp(-a s^2); X(s) = exp(-2 g s^2) integral of exp(-(2 g* + 2 g) w^2) = exp(-2 g s^2) Q(0).
         let s = 0.02;
-        let t = Telescope { aperture_radius_m: 0.2, beam_radius_m: s, focus: Focus::At(900.0), ..Telescope::table2() };
+        let t = Telescope {
+            aperture_radius_m: 0.2,
+            beam_radius_m: s,
+            focus: Focus::At(900.0),
+            ..Telescope::table2()
+        };
         let range_m = 1500.0;
         let k = t.wavenumber_rad_m();
         let overlaps = DisplacedOverlaps::new(&t, range_m);
@@ -210,8 +247,14 @@ mod tests {
             let [q, x_re, x_im] = overlaps.at(d);
             assert!((q - (-a * d * d).exp()).abs() < 1e-6, "{d}: {q}");
             let size = (-2.0 * a * d * d).exp();
-            assert!((x_re - size * (2.0 * b * d * d).cos()).abs() < 1e-6, "{d}: {x_re}");
-            assert!((x_im + size * (2.0 * b * d * d).sin()).abs() < 1e-6, "{d}: {x_im}");
+            assert!(
+                (x_re - size * (2.0 * b * d * d).cos()).abs() < 1e-6,
+                "{d}: {x_re}"
+            );
+            assert!(
+                (x_im + size * (2.0 * b * d * d).sin()).abs() < 1e-6,
+                "{d}: {x_im}"
+            );
         }
     }
 
@@ -221,24 +264,50 @@ mod tests {
             spectrum: std::sync::Arc::new(spectrum),
             cn2: Cn2Path::Uniform { cn2_m_m23: 1e-16 },
         };
-        let t = Telescope { aperture_radius_m: 0.25, beam_radius_m: 0.08, ..Telescope::table2() };
-        let weak = weak_turbulence_efficiency(&t, &turbulence(VonKarman::kolmogorov()), 1500.0).unwrap();
-        assert!((weak.enhancement / weak.rytov_variance - 1.0).abs() < 0.03, "{weak:?}");
+        let t = Telescope {
+            aperture_radius_m: 0.25,
+            beam_radius_m: 0.08,
+            ..Telescope::table2()
+        };
+        let weak =
+            weak_turbulence_efficiency(&t, &turbulence(VonKarman::kolmogorov()), 1500.0).unwrap();
+        assert!(
+            (weak.enhancement / weak.rytov_variance - 1.0).abs() < 0.03,
+            "{weak:?}"
+        );
         // In its focus the spot wanders and breaks up: far more.
-        let focused = Telescope { focus: Focus::At(1500.0), ..t };
-        let weak = weak_turbulence_efficiency(&focused, &turbulence(VonKarman::table2()), 1500.0).unwrap();
+        let focused = Telescope {
+            focus: Focus::At(1500.0),
+            ..t
+        };
+        let weak =
+            weak_turbulence_efficiency(&focused, &turbulence(VonKarman::table2()), 1500.0).unwrap();
         assert!(weak.enhancement > 3.0 * weak.rytov_variance, "{weak:?}");
     }
 
     #[test]
     fn validity_ends_where_the_first_order_does() {
-        let weak = |cn2| weak_turbulence_efficiency(&Telescope::table2(), &Turbulence::table2(cn2).unwrap(), 1000.0);
-        let (calm, weaker, strong) = (weak(0.0).unwrap(), weak(1e-16).unwrap(), weak(1e-13).unwrap());
+        let weak = |cn2| {
+            weak_turbulence_efficiency(
+                &Telescope::table2(),
+                &Turbulence::table2(cn2).unwrap(),
+                1000.0,
+            )
+        };
+        let (calm, weaker, strong) = (
+            weak(0.0).unwrap(),
+            weak(1e-16).unwrap(),
+            weak(1e-13).unwrap(),
+        );
         assert_eq!((calm.enhancement, calm.valid), (0.0, true));
         assert!(weaker.valid && !strong.valid);
         assert!((strong.enhancement / weaker.enhancement / 1000.0 - 1.0).abs() < 1e-9);
         assert!(matches!(
-            weak_turbulence_efficiency(&Telescope::table2(), &Turbulence::table2(1e-14).unwrap(), 20.0),
+            weak_turbulence_efficiency(
+                &Telescope::table2(),
+                &Turbulence::table2(1e-14).unwrap(),
+                20.0
+            ),
             Err(Error::FresnelNumber { .. })
         ));
     }

@@ -11,7 +11,11 @@ fn worst_error(grid: Grid, spectrum: Arc<dyn Spectrum>) -> f64 {
     let mut worst = 0f64;
     let mut steps = 2;
     while steps <= grid.nx / 2 {
-        for (x, y) in [(steps, 0), (0, steps.min(grid.ny / 2)), (steps, steps.min(grid.ny / 2))] {
+        for (x, y) in [
+            (steps, 0),
+            (0, steps.min(grid.ny / 2)),
+            (steps, steps.min(grid.ny / 2)),
+        ] {
             let r = (x as f64 * grid.dx_m).hypot(y as f64 * grid.dy_m);
             let exact = structure_function_m53(&*spectrum, r).expect("quadrature");
             worst = worst.max((generator.expected_structure_m53(x, y) / exact - 1.0).abs());
@@ -28,18 +32,30 @@ fn expected_structure_function_is_within_0_1_percent_of_theory() {
     for outer_scale_m in [0.1 * width, 1.0, 10.0, f64::INFINITY] {
         for inner_scale_m in [8e-3, 0.02] {
             let spectrum = VonKarman::new(
-                Scales { outer_scale_m, inner_scale_m, convention: OuterScaleConvention::Inverse },
+                Scales {
+                    outer_scale_m,
+                    inner_scale_m,
+                    convention: OuterScaleConvention::Inverse,
+                },
                 0.033,
             );
             let worst = worst_error(grid, Arc::new(spectrum.expect("spectrum")));
-            assert!(worst < 1e-3, "L0 {outer_scale_m} l0 {inner_scale_m}: {worst}");
+            assert!(
+                worst < 1e-3,
+                "L0 {outer_scale_m} l0 {inner_scale_m}: {worst}"
+            );
         }
     }
 }
 
 #[test]
 fn expected_structure_function_holds_on_rectangular_and_prime_grids_and_for_other_spectra() {
-    let rectangular = Grid { nx: 192, ny: 251, dx_m: 3e-3, dy_m: 4e-3 };
+    let rectangular = Grid {
+        nx: 192,
+        ny: 251,
+        dx_m: 3e-3,
+        dy_m: 4e-3,
+    };
     let worst = worst_error(rectangular, Arc::new(VonKarman::table2()));
     assert!(worst < 1e-3, "{worst}");
     let hill = HillAndrews::new(Scales {
@@ -55,10 +71,12 @@ fn expected_structure_function_holds_on_rectangular_and_prime_grids_and_for_othe
 #[test]
 fn unresolved_inner_scale_is_cut_at_nyquist_and_reported() {
     let grid = Grid::square(128, 4e-3).expect("grid");
-    let generator = ScreenGenerator::<f64>::new(grid, Arc::new(VonKarman::kolmogorov())).expect("generator");
+    let generator =
+        ScreenGenerator::<f64>::new(grid, Arc::new(VonKarman::kolmogorov())).expect("generator");
     assert!(!generator.folds());
     let error = |steps: usize| {
-        let exact = structure_function_m53(&VonKarman::kolmogorov(), steps as f64 * 4e-3).expect("quadrature");
+        let exact = structure_function_m53(&VonKarman::kolmogorov(), steps as f64 * 4e-3)
+            .expect("quadrature");
         generator.expected_structure_m53(steps, 0) / exact - 1.0
     };
     // What lies beyond Nyquist is missing: much at small separations, little at large ones.
@@ -68,8 +86,14 @@ fn unresolved_inner_scale_is_cut_at_nyquist_and_reported() {
 
 #[test]
 fn measured_structure_function_agrees_with_the_expected_one() {
-    let grid = Grid { nx: 96, ny: 128, dx_m: 6e-3, dy_m: 5e-3 };
-    let generator = ScreenGenerator::<f32>::new(grid, Arc::new(VonKarman::table2())).expect("generator");
+    let grid = Grid {
+        nx: 96,
+        ny: 128,
+        dx_m: 6e-3,
+        dy_m: 5e-3,
+    };
+    let generator =
+        ScreenGenerator::<f32>::new(grid, Arc::new(VonKarman::table2())).expect("generator");
     let mut work = generator.work();
     let mut screens = [vec![0f32; grid.points()], vec![0f32; grid.points()]];
     let separations = [(1usize, 0usize), (0, 3), (10, 0), (8, 8), (0, 40)];
@@ -78,7 +102,9 @@ fn measured_structure_function_agrees_with_the_expected_one() {
     for realisation in 0..600 {
         let [first, second] = &mut screens;
         let mut rng = stream(42, realisation, 0);
-        generator.fill_pair(&mut rng, &mut work, first, second).expect("sizes");
+        generator
+            .fill_pair(&mut rng, &mut work, first, second)
+            .expect("sizes");
         for (list, &(sx, sy)) in samples.iter_mut().zip(&separations) {
             let mut sum = 0.0;
             for screen in [&*first, &*second] {

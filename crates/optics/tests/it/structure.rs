@@ -9,13 +9,28 @@ fn quadrature_reproduces_the_stored_structure_function() {
     let rows = reference("structure_function_vonkarman.csv");
     assert!(rows.len() > 100);
     for v in rows {
-        for (column, convention) in [(1, OuterScaleConvention::Inverse), (2, OuterScaleConvention::TwoPiOver)] {
-            let spectrum = VonKarman::new(Scales { outer_scale_m: 1.0, inner_scale_m: 0.01, convention }, 0.033)
-                .expect("spectrum");
+        for (column, convention) in [
+            (1, OuterScaleConvention::Inverse),
+            (2, OuterScaleConvention::TwoPiOver),
+        ] {
+            let spectrum = VonKarman::new(
+                Scales {
+                    outer_scale_m: 1.0,
+                    inner_scale_m: 0.01,
+                    convention,
+                },
+                0.033,
+            )
+            .expect("spectrum");
             let g = structure_function_m53(&spectrum, v[0]).expect("value");
             // Beyond 1 m the stored separations are rounded to six digits, and D varies with them.
             let tolerance = if v[0] > 1.0 { 5e-6 } else { 1e-9 };
-            assert!((g / v[column] - 1.0).abs() < tolerance, "{} m: {g} {}", v[0], v[column]);
+            assert!(
+                (g / v[column] - 1.0).abs() < tolerance,
+                "{} m: {g} {}",
+                v[0],
+                v[column]
+            );
         }
     }
 }

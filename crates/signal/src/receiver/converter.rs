@@ -24,7 +24,8 @@ impl Converter {
     /// Density of the rounding over that of the noise, `(k^2/(3 4^bits)) 2 B/F_s`.
     pub fn rounding(&self) -> f64 {
         let steps = f64::from(self.bits).exp2();
-        (self.full_scale_over_noise / steps).powi(2) / 3.0 * (2.0 * self.bandwidth_hz / self.sample_rate_hz)
+        (self.full_scale_over_noise / steps).powi(2) / 3.0
+            * (2.0 * self.bandwidth_hz / self.sample_rate_hz)
     }
 
     /// What clipping does to the samples.
@@ -36,7 +37,9 @@ impl Converter {
     /// sampling rate, which is exact for white noise.
     pub fn clipping_noise(&self) -> f64 {
         let spread = self.input_over_noise.powi(2) * 2.0 * self.bandwidth_hz / self.sample_rate_hz;
-        let Clipping { gain, distortion, .. } = self.clipping();
+        let Clipping {
+            gain, distortion, ..
+        } = self.clipping();
         let rounding = self.rounding();
         (rounding * (1.0 - gain * gain) + distortion * spread) / (gain * gain)
     }
@@ -65,7 +68,13 @@ impl Clipping {
         let density = (-0.5 * k * k).exp() / (2.0 * PI).sqrt();
         // Without the rounding of differences between numbers near 1, which would leave a negative distortion.
         let missing = (k * k - 1.0) * clipped_fraction - 2.0 * k * density;
-        let distortion = (missing + 2.0 * clipped_fraction - clipped_fraction * clipped_fraction).max(0.0);
-        Self { clipped_fraction, gain, variance: 1.0 + missing, distortion }
+        let distortion =
+            (missing + 2.0 * clipped_fraction - clipped_fraction * clipped_fraction).max(0.0);
+        Self {
+            clipped_fraction,
+            gain,
+            variance: 1.0 + missing,
+            distortion,
+        }
     }
 }

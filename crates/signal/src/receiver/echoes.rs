@@ -9,7 +9,10 @@ impl Receiver {
     /// Signal-to-noise ratio of the pulse that the telescope reflects, at `time_s` after its middle has left:
     /// `eta_Q rho E |f(t)|^2/(h nu B)` at the shot-noise limit.
     pub fn reflex_snr(&self, pulse: &Pulse, time_s: f64) -> f64 {
-        self.heterodyne_gain_a2_w() * pulse.energy_j() * self.front_end.reflection * pulse.intensity_per_s(time_s)
+        self.heterodyne_gain_a2_w()
+            * pulse.energy_j()
+            * self.front_end.reflection
+            * pulse.intensity_per_s(time_s)
             / self.snr_noise_a2()
     }
 
@@ -23,7 +26,11 @@ impl Receiver {
         }
         let (first_s, last_s) = pulse.support_s();
         let time_s = |i: u32| last_s - (last_s - first_s) * f64::from(i) / f64::from(STEPS);
-        (0..=STEPS).map(time_s).find(|&t| self.reflex_snr(pulse, t) >= limit_snr).unwrap_or(0.0).max(0.0)
+        (0..=STEPS)
+            .map(time_s)
+            .find(|&t| self.reflex_snr(pulse, t) >= limit_snr)
+            .unwrap_or(0.0)
+            .max(0.0)
     }
 }
 

@@ -48,7 +48,10 @@ pub struct Butterworth {
 impl Butterworth {
     /// `|H(f)|^2`.
     pub fn power_at(&self, frequency_hz: f64) -> f64 {
-        1.0 / (1.0 + (frequency_hz / self.half_power_hz).powi(2).powi(self.order as i32))
+        1.0 / (1.0
+            + (frequency_hz / self.half_power_hz)
+                .powi(2)
+                .powi(self.order as i32))
     }
 }
 
@@ -62,7 +65,10 @@ impl FrontEnd {
         intensity_noise_db_hz: f64::NEG_INFINITY,
         rejection_db: 0.0,
         saturation_w: f64::INFINITY,
-        response: Butterworth { order: 1, half_power_hz: f64::INFINITY },
+        response: Butterworth {
+            order: 1,
+            half_power_hz: f64::INFINITY,
+        },
         rounding_noise: 0.0,
         clipping_noise: 0.0,
         linewidth_hz: 0.0,
@@ -91,12 +97,20 @@ impl FrontEnd {
         ];
         for (field, value) in above {
             if value.is_nan() || value <= 0.0 {
-                return Err(Error::OutOfRange { field, value, allowed: "above 0" });
+                return Err(Error::OutOfRange {
+                    field,
+                    value,
+                    allowed: "above 0",
+                });
             }
         }
         let value = self.intensity_noise_db_hz;
         if value.is_nan() || value > 0.0 {
-            return Err(Error::OutOfRange { field: "intensity_noise_db_hz", value, allowed: "0 or less, or -inf" });
+            return Err(Error::OutOfRange {
+                field: "intensity_noise_db_hz",
+                value,
+                allowed: "0 or less, or -inf",
+            });
         }
         Ok(())
     }

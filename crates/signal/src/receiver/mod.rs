@@ -38,7 +38,11 @@ pub enum PlanckConvention {
 
 /// Which noise is added to the signal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum NoiseModel {
     /// Flat in the detector band, nothing outside; variance (13).
     #[default]
@@ -92,8 +96,16 @@ impl Receiver {
 
     /// What bounds the layers of air for this receiver in a wind of that largest gradient along any line \[1/s\].
     pub fn layer_limits(&self, max_gradient_per_s: f64) -> LayerLimits {
-        let Self { sample_rate_hz, wavelength_m, .. } = *self;
-        LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s }
+        let Self {
+            sample_rate_hz,
+            wavelength_m,
+            ..
+        } = *self;
+        LayerLimits {
+            sample_rate_hz,
+            wavelength_m,
+            max_gradient_per_s,
+        }
     }
 
     /// Says what is wrong with the receiver, if anything.
@@ -116,7 +128,11 @@ impl Receiver {
         let half_hz = 0.5 * self.bandwidth_hz;
         let nyquist_hz = 0.5 * self.sample_rate_hz;
         if half_hz >= nyquist_hz || half_hz > self.intermediate_frequency_hz {
-            return Err(Error::BandBeyondNyquist { low_hz: -half_hz, high_hz: half_hz, nyquist_hz });
+            return Err(Error::BandBeyondNyquist {
+                low_hz: -half_hz,
+                high_hz: half_hz,
+                nyquist_hz,
+            });
         }
         Ok(())
     }
@@ -126,7 +142,12 @@ impl Receiver {
         check_positive("sample_rate_hz", self.sample_rate_hz)?;
         check_positive("intermediate_frequency_hz", self.intermediate_frequency_hz)?;
         check_positive("bandwidth_hz", self.bandwidth_hz)?;
-        check("quantum_efficiency", self.quantum_efficiency, "above 0 and at most 1", |q| q > 0.0 && q <= 1.0)?;
+        check(
+            "quantum_efficiency",
+            self.quantum_efficiency,
+            "above 0 and at most 1",
+            |q| q > 0.0 && q <= 1.0,
+        )?;
         check_positive("local_oscillator_w", self.local_oscillator_w)?;
         self.front_end.validate()
     }
@@ -137,7 +158,11 @@ impl Receiver {
         let high_hz = self.intermediate_frequency_hz + 0.5 * self.bandwidth_hz;
         let nyquist_hz = 0.5 * self.sample_rate_hz;
         if low_hz < 0.0 || high_hz >= nyquist_hz {
-            return Err(Error::BandBeyondNyquist { low_hz, high_hz, nyquist_hz });
+            return Err(Error::BandBeyondNyquist {
+                low_hz,
+                high_hz,
+                nyquist_hz,
+            });
         }
         Ok(())
     }
@@ -165,7 +190,8 @@ impl Receiver {
 
     /// Variance of the noise that the signal-to-noise ratio counts: with that of the converter.
     pub(crate) fn snr_noise_a2(&self) -> f64 {
-        self.noise_variance_a2() * (1.0 + self.front_end.rounding_noise + self.front_end.clipping_noise)
+        self.noise_variance_a2()
+            * (1.0 + self.front_end.rounding_noise + self.front_end.clipping_noise)
     }
 
     /// Power of the complex envelope per joule sent and per unit of returned fraction and `|f|^2`,
@@ -183,7 +209,8 @@ impl Receiver {
     /// Signal-to-noise ratio of a pulse of `energy_j` where the return `weight_per_m` changes slowly over the pulse:
     /// `(eta_Q E_t/(h nu B)) (c/2) weight`, (14), corrected (with `hbar` if the convention says so).
     pub fn slowly_varying_snr(&self, energy_j: f64, weight_per_m: f64) -> f64 {
-        self.heterodyne_gain_a2_w() * energy_j * 0.5 * SPEED_OF_LIGHT_M_S * weight_per_m / self.snr_noise_a2()
+        self.heterodyne_gain_a2_w() * energy_j * 0.5 * SPEED_OF_LIGHT_M_S * weight_per_m
+            / self.snr_noise_a2()
     }
 }
 
@@ -193,19 +220,33 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn receiver() -> Receiver {
-        Receiver { quantum_efficiency: 0.8, ..Receiver::table2() }
+        Receiver {
+            quantum_efficiency: 0.8,
+            ..Receiver::table2()
+        }
     }
 
     #[test]
     fn responsivity_of_a_perfect_detector_is_1_25_ampere_per_watt_at_1550_nm() {
-        let perfect = Receiver { quantum_efficiency: 1.0, ..receiver() };
-        assert_relative_eq!(perfect.responsivity_a_w(), 1.55 / 1.239_841_984, max_relative = 1e-6);
+        let perfect = Receiver {
+            quantum_efficiency: 1.0,
+            ..receiver()
+        };
+        assert_relative_eq!(
+            perfect.responsivity_a_w(),
+            1.55 / 1.239_841_984,
+            max_relative = 1e-6
+        );
     }
 
     #[test]
     fn noise_is_2_e_s_p_b() {
         let expected = 2.0 * 1.602_176_634e-19 * receiver().responsivity_a_w() * 1e-3 * 50e6;
-        assert_relative_eq!(receiver().noise_variance_a2(), expected, max_relative = 1e-14);
+        assert_relative_eq!(
+            receiver().noise_variance_a2(),
+            expected,
+            max_relative = 1e-14
+        );
     }
 
     #[test]
@@ -214,7 +255,11 @@ mod tests {
         let solid_angle = PI * 0.05 * 0.05 / (400.0 * 400.0);
         let weight_per_m = (-2.0 * 7e-5 * 400.0_f64).exp() * 1e-7 * solid_angle * 0.0088;
         for local_oscillator_w in [1e-6, 1.0] {
-            let perfect = Receiver { quantum_efficiency: 1.0, local_oscillator_w, ..receiver() };
+            let perfect = Receiver {
+                quantum_efficiency: 1.0,
+                local_oscillator_w,
+                ..receiver()
+            };
             let snr = perfect.slowly_varying_snr(150e-6, weight_per_m);
             let received_w = 150e-6 * 0.5 * SPEED_OF_LIGHT_M_S * weight_per_m;
             let limit = received_w / (perfect.photon_energy_j() * 50e6);
@@ -225,7 +270,10 @@ mod tests {
 
     #[test]
     fn printed_hbar_gives_two_pi_times_the_power() {
-        let printed = Receiver { planck: PlanckConvention::Hbar, ..receiver() };
+        let printed = Receiver {
+            planck: PlanckConvention::Hbar,
+            ..receiver()
+        };
         let ratio = printed.slowly_varying_snr(1.0, 1.0) / receiver().slowly_varying_snr(1.0, 1.0);
         assert_relative_eq!(ratio, 2.0 * PI, max_relative = 1e-14);
         assert_eq!(printed.noise_variance_a2(), receiver().noise_variance_a2());
@@ -234,13 +282,40 @@ mod tests {
     #[test]
     fn bands_beyond_nyquist_or_below_zero_and_bad_numbers_are_refused() {
         assert_eq!(receiver().validate(), Ok(()));
-        for (intermediate_frequency_hz, bandwidth_hz) in [(101e6, 50e6), (20e6, 50e6), (80e6, 90.1e6)] {
-            let bad = Receiver { intermediate_frequency_hz, bandwidth_hz, ..receiver() };
-            assert!(matches!(bad.validate(), Err(Error::BandBeyondNyquist { .. })));
+        for (intermediate_frequency_hz, bandwidth_hz) in
+            [(101e6, 50e6), (20e6, 50e6), (80e6, 90.1e6)]
+        {
+            let bad = Receiver {
+                intermediate_frequency_hz,
+                bandwidth_hz,
+                ..receiver()
+            };
+            assert!(matches!(
+                bad.validate(),
+                Err(Error::BandBeyondNyquist { .. })
+            ));
         }
-        let bad = Receiver { quantum_efficiency: 1.1, ..receiver() };
-        assert!(matches!(bad.validate(), Err(Error::OutOfRange { field: "quantum_efficiency", .. })));
-        let bad = Receiver { wavelength_m: f64::NAN, ..receiver() };
-        assert!(matches!(bad.validate(), Err(Error::OutOfRange { field: "wavelength_m", .. })));
+        let bad = Receiver {
+            quantum_efficiency: 1.1,
+            ..receiver()
+        };
+        assert!(matches!(
+            bad.validate(),
+            Err(Error::OutOfRange {
+                field: "quantum_efficiency",
+                ..
+            })
+        ));
+        let bad = Receiver {
+            wavelength_m: f64::NAN,
+            ..receiver()
+        };
+        assert!(matches!(
+            bad.validate(),
+            Err(Error::OutOfRange {
+                field: "wavelength_m",
+                ..
+            })
+        ));
     }
 }

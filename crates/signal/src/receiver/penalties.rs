@@ -24,7 +24,8 @@ pub struct NoiseDensities {
 impl NoiseDensities {
     /// All of them behind the detector \[A^2/Hz\].
     pub fn total_a2_hz(&self) -> f64 {
-        self.response * (self.shot_a2_hz + self.dark_a2_hz + self.intensity_a2_hz) + self.amplifier_a2_hz
+        self.response * (self.shot_a2_hz + self.dark_a2_hz + self.intensity_a2_hz)
+            + self.amplifier_a2_hz
     }
 }
 
@@ -50,7 +51,11 @@ pub struct Penalties {
 impl Penalties {
     /// Their sum \[dB\].
     pub fn total_db(&self) -> f64 {
-        let before = self.saturation_db + self.amplifier_db + self.dark_db + self.intensity_db + self.response_db;
+        let before = self.saturation_db
+            + self.amplifier_db
+            + self.dark_db
+            + self.intensity_db
+            + self.response_db;
         before + self.rounding_db + self.clipping_db
     }
 }
@@ -67,7 +72,10 @@ impl Receiver {
 
     /// Power gain of the beat against an unsaturated and fast detector: `|H(f_c)|^2 (dI/dP / S)^2`.
     pub(super) fn beat_gain(&self) -> f64 {
-        self.front_end.response.power_at(self.intermediate_frequency_hz) / self.drive().powi(4)
+        self.front_end
+            .response
+            .power_at(self.intermediate_frequency_hz)
+            / self.drive().powi(4)
     }
 
     /// The densities of its noises.
@@ -88,9 +96,18 @@ impl Receiver {
 
     /// What it loses against the shot-noise limit.
     pub fn penalties(&self) -> Penalties {
-        let NoiseDensities { shot_a2_hz, amplifier_a2_hz, dark_a2_hz, intensity_a2_hz, response } =
-            self.noise_densities();
-        let FrontEnd { rounding_noise, clipping_noise, .. } = self.front_end;
+        let NoiseDensities {
+            shot_a2_hz,
+            amplifier_a2_hz,
+            dark_a2_hz,
+            intensity_a2_hz,
+            response,
+        } = self.noise_densities();
+        let FrontEnd {
+            rounding_noise,
+            clipping_noise,
+            ..
+        } = self.front_end;
         let amplified = shot_a2_hz + amplifier_a2_hz;
         let dark = amplified + dark_a2_hz;
         let all = dark + intensity_a2_hz;
@@ -113,11 +130,19 @@ impl Receiver {
     pub fn best_local_oscillator_w(&self) -> f64 {
         let of = Self {
             local_oscillator_w: 1.0,
-            front_end: FrontEnd { saturation_w: f64::INFINITY, ..self.front_end },
+            front_end: FrontEnd {
+                saturation_w: f64::INFINITY,
+                ..self.front_end
+            },
             ..*self
         };
-        let NoiseDensities { shot_a2_hz, amplifier_a2_hz, dark_a2_hz, intensity_a2_hz, response } =
-            of.noise_densities();
+        let NoiseDensities {
+            shot_a2_hz,
+            amplifier_a2_hz,
+            dark_a2_hz,
+            intensity_a2_hz,
+            response,
+        } = of.noise_densities();
         let constant = amplifier_a2_hz / response + dark_a2_hz;
         if constant == 0.0 {
             return 0.0;
@@ -130,14 +155,21 @@ impl Receiver {
                 + (3.0 * x - 1.0) * (1.0 + x).powi(3) * constant / power_w
                 + intensity_a2_hz * power_w
         };
-        let (mut low_w, mut high_w) = (0.0, (saturation_w / 3.0).min((constant / intensity_a2_hz).sqrt()));
+        let (mut low_w, mut high_w) = (
+            0.0,
+            (saturation_w / 3.0).min((constant / intensity_a2_hz).sqrt()),
+        );
         if high_w.is_infinite() {
             return f64::INFINITY;
         }
         // Each step halves the interval; after these it is one number wide.
         for _ in 0..200 {
             let middle_w = 0.5 * (low_w + high_w);
-            if slope(middle_w) < 0.0 { low_w = middle_w } else { high_w = middle_w }
+            if slope(middle_w) < 0.0 {
+                low_w = middle_w
+            } else {
+                high_w = middle_w
+            }
         }
         high_w
     }

@@ -11,7 +11,12 @@ use rand_distr::StandardNormal;
 
 /// Standard deviation \[m/s\] of the mean frequency of a still point target over `window_s`, when its light comes back after
 /// `delay_s`: `(lambda/2) sqrt(dnu min(delay, T)/(pi T^2))`.
-pub fn mean_frequency_sd_m_s(wavelength_m: f64, linewidth_hz: f64, delay_s: f64, window_s: f64) -> f64 {
+pub fn mean_frequency_sd_m_s(
+    wavelength_m: f64,
+    linewidth_hz: f64,
+    delay_s: f64,
+    window_s: f64,
+) -> f64 {
     0.5 * wavelength_m * (linewidth_hz * delay_s.min(window_s) / PI).sqrt() / window_s
 }
 
@@ -37,7 +42,12 @@ pub fn peak_variance_factor(weight: impl Fn(f64) -> f64) -> f64 {
 }
 
 /// Writes `exp(j phase)` of a random walk, one value every `step_s`, the first at phase 0.
-pub(crate) fn walk<R: Rng + ?Sized>(linewidth_hz: f64, step_s: f64, rng: &mut R, out: &mut [Complex<f64>]) {
+pub(crate) fn walk<R: Rng + ?Sized>(
+    linewidth_hz: f64,
+    step_s: f64,
+    rng: &mut R,
+    out: &mut [Complex<f64>],
+) {
     let step_rad = (2.0 * PI * linewidth_hz * step_s).sqrt();
     let mut phase_rad = 0.0;
     for turn in out {

@@ -27,7 +27,9 @@ fn records(noise: NoiseModel, samples: usize) -> Vec<Vec<f64>> {
     (0..RECORDS)
         .map(|_| {
             let mut current = vec![0.0; samples];
-            simulator.record_into(&silent, &mut rng, &mut scratch, &mut current).unwrap();
+            simulator
+                .record_into(&silent, &mut rng, &mut scratch, &mut current)
+                .unwrap();
             current.iter().map(|i| i / sd_a).collect()
         })
         .collect()
@@ -37,10 +39,18 @@ fn records(noise: NoiseModel, samples: usize) -> Vec<Vec<f64>> {
 fn density(records: &[Vec<f64>], frequency_hz: f64) -> f64 {
     let samples = records[0].len();
     let window = |k: usize| (PI * (k as f64 + 0.5) / samples as f64).sin().powi(2);
-    let kernel: Vec<Complex<f64>> =
-        (0..samples).map(|k| window(k) * Complex::cis(-2.0 * PI * frequency_hz * k as f64 / 250e6)).collect();
+    let kernel: Vec<Complex<f64>> = (0..samples)
+        .map(|k| window(k) * Complex::cis(-2.0 * PI * frequency_hz * k as f64 / 250e6))
+        .collect();
     let squares: f64 = (0..samples).map(|k| window(k).powi(2)).sum();
-    let power = |record: &Vec<f64>| record.iter().zip(&kernel).map(|(i, w)| i * w).sum::<Complex<f64>>().norm_sqr();
+    let power = |record: &Vec<f64>| {
+        record
+            .iter()
+            .zip(&kernel)
+            .map(|(i, w)| i * w)
+            .sum::<Complex<f64>>()
+            .norm_sqr()
+    };
     records.iter().map(power).sum::<f64>() / (records.len() as f64 * squares * 250e6)
 }
 
@@ -89,15 +99,20 @@ fn white_noise_has_the_same_density_up_to_nyquist() {
 #[test]
 fn the_end_of_a_record_does_not_know_its_beginning() {
     let records = records(NoiseModel::BandLimited, 1000);
-    let mean_product = |a: usize, b: usize| records.iter().map(|r| r[a] * r[b]).sum::<f64>() / RECORDS as f64;
+    let mean_product =
+        |a: usize, b: usize| records.iter().map(|r| r[a] * r[b]).sum::<f64>() / RECORDS as f64;
     let error = 1.0 / (RECORDS as f64).sqrt();
     for (a, b) in [(0, 999), (0, 998), (1, 999)] {
         // The covariance of a flat band is sinc(B tau) cos(2 pi f_c tau), about -0.4 for neighbours and next neighbours,
         // which these pairs would be on a circle of 1000 samples.
         let tau = (a + 1000 - b) as f64 / 250e6;
-        let covariance = (PI * 50e6 * tau).sin() / (PI * 50e6 * tau) * (2.0 * PI * 80e6 * tau).cos();
+        let covariance =
+            (PI * 50e6 * tau).sin() / (PI * 50e6 * tau) * (2.0 * PI * 80e6 * tau).cos();
         let inside = mean_product(500, 500 + a + 1000 - b);
-        assert!((inside - covariance).abs() < 4.0 * error, "{inside} {covariance}");
+        assert!(
+            (inside - covariance).abs() < 4.0 * error,
+            "{inside} {covariance}"
+        );
         assert!(mean_product(a, b).abs() < 3.0 * error && covariance.abs() > 7.0 * error);
     }
 }

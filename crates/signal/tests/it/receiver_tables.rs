@@ -11,12 +11,21 @@ use wakescope_signal::{Error, GaussianPulse, Pulse, PulseDuration, Receiver, SPE
 
 /// The rows of a stored table.
 fn rows<const N: usize>(name: &str) -> Vec<[f64; N]> {
-    let path = format!("{}/../../tests/reference/receiver/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/../../tests/reference/receiver/{name}.csv",
+        env!("CARGO_MANIFEST_DIR")
+    );
     let text = std::fs::read_to_string(path).unwrap();
     let rows: Vec<[f64; N]> = text
         .lines()
         .filter(|line| line.starts_with(|c: char| c.is_ascii_digit()))
-        .map(|line| line.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>().try_into().unwrap())
+        .map(|line| {
+            line.split(',')
+                .map(|x| x.parse().unwrap())
+                .collect::<Vec<f64>>()
+                .try_into()
+                .unwrap()
+        })
         .collect();
     assert!(rows.len() >= 4, "{name}: {} rows", rows.len());
     rows
@@ -32,13 +41,24 @@ fn excess_db(ratio: f64) -> f64 {
 }
 
 fn with(front_end: FrontEnd) -> Receiver {
-    Receiver { front_end, ..Receiver::table2() }
+    Receiver {
+        front_end,
+        ..Receiver::table2()
+    }
 }
 
 #[test]
 fn noise_densities_and_what_they_cost_are_the_stored_ones() {
-    for [wavelength_m, quantum_efficiency, local_oscillator_w, rin, rejection_db, amplifier, dark, expected @ ..] in
-        rows::<16>("noise_density")
+    for [
+        wavelength_m,
+        quantum_efficiency,
+        local_oscillator_w,
+        rin,
+        rejection_db,
+        amplifier,
+        dark,
+        expected @ ..,
+    ] in rows::<16>("noise_density")
     {
         let front_end = FrontEnd {
             intensity_noise_db_hz: rin,
@@ -47,8 +67,13 @@ fn noise_densities_and_what_they_cost_are_the_stored_ones() {
             dark_current_a: dark,
             ..FrontEnd::IDEAL
         };
-        let receiver =
-            Receiver { wavelength_m, quantum_efficiency, local_oscillator_w, front_end, ..Receiver::table2() };
+        let receiver = Receiver {
+            wavelength_m,
+            quantum_efficiency,
+            local_oscillator_w,
+            front_end,
+            ..Receiver::table2()
+        };
         let n = receiver.noise_densities();
         let found = [
             receiver.responsivity_a_w(),
@@ -61,7 +86,10 @@ fn noise_densities_and_what_they_cost_are_the_stored_ones() {
             excess_db(n.intensity_a2_hz / n.shot_a2_hz),
             receiver.penalties().total_db(),
         ];
-        found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
+        found
+            .iter()
+            .zip(expected)
+            .for_each(|(found, expected)| close(*found, expected));
         assert_relative_eq!(
             receiver.noise_density_a2_hz(),
             n.shot_a2_hz * 10f64.powf(0.1 * expected[8]),
@@ -69,48 +97,110 @@ fn noise_densities_and_what_they_cost_are_the_stored_ones() {
         );
     }
     // 50 ohm at 290 K, 2.55 dB beside the shot noise of 1 mW.
-    let thermal = with(FrontEnd { load_ohm: 50.0, ..FrontEnd::IDEAL });
-    assert_relative_eq!(thermal.noise_densities().amplifier_a2_hz, 3.203e-22, max_relative = 1e-4);
+    let thermal = with(FrontEnd {
+        load_ohm: 50.0,
+        ..FrontEnd::IDEAL
+    });
+    assert_relative_eq!(
+        thermal.noise_densities().amplifier_a2_hz,
+        3.203e-22,
+        max_relative = 1e-4
+    );
     assert!((thermal.penalties().total_db() - 2.55).abs() < 0.005);
 }
 
 #[test]
 fn saturation_costs_what_is_stored_and_its_best_local_oscillator_is_the_best() {
-    for [local_oscillator_w, saturation_w, amplifier, loss, shot_limited, best_w, best_loss] in
-        rows::<7>("lo_saturation")
+    for [
+        local_oscillator_w,
+        saturation_w,
+        amplifier,
+        loss,
+        shot_limited,
+        best_w,
+        best_loss,
+    ] in rows::<7>("lo_saturation")
     {
-        let front_end = FrontEnd { saturation_w, amplifier_noise_a_rthz: amplifier, ..FrontEnd::IDEAL };
-        let receiver = Receiver { local_oscillator_w, ..with(front_end) };
+        let front_end = FrontEnd {
+            saturation_w,
+            amplifier_noise_a_rthz: amplifier,
+            ..FrontEnd::IDEAL
+        };
+        let receiver = Receiver {
+            local_oscillator_w,
+            ..with(front_end)
+        };
         close(receiver.penalties().total_db(), loss);
         close(receiver.penalties().saturation_db, shot_limited);
         close(receiver.best_local_oscillator_w(), best_w);
         if best_w > 0.0 {
-            let at = |local_oscillator_w| Receiver { local_oscillator_w, ..receiver }.penalties().total_db();
+            let at = |local_oscillator_w| {
+                Receiver {
+                    local_oscillator_w,
+                    ..receiver
+                }
+                .penalties()
+                .total_db()
+            };
             close(at(best_w), best_loss);
-            let noisy =
-                with(FrontEnd { intensity_noise_db_hz: -150.0, rejection_db: 10.0, dark_current_a: 1e-6, ..front_end });
+            let noisy = with(FrontEnd {
+                intensity_noise_db_hz: -150.0,
+                rejection_db: 10.0,
+                dark_current_a: 1e-6,
+                ..front_end
+            });
             let best_w = noisy.best_local_oscillator_w();
-            let at = |local_oscillator_w| Receiver { local_oscillator_w, ..noisy }.penalties().total_db();
+            let at = |local_oscillator_w| {
+                Receiver {
+                    local_oscillator_w,
+                    ..noisy
+                }
+                .penalties()
+                .total_db()
+            };
             assert!(at(best_w) < at(0.99 * best_w) && at(best_w) < at(1.01 * best_w));
         }
     }
-    let free = with(FrontEnd { amplifier_noise_a_rthz: 1e-11, ..FrontEnd::IDEAL });
+    let free = with(FrontEnd {
+        amplifier_noise_a_rthz: 1e-11,
+        ..FrontEnd::IDEAL
+    });
     assert_eq!(free.best_local_oscillator_w(), f64::INFINITY);
 }
 
 #[test]
 fn the_poles_of_the_detector_cost_what_is_stored() {
-    for [order, half_power_hz, frequency_hz, over_shot, signal_db, against_dc, against_shot] in
-        rows::<7>("band_response")
+    for [
+        order,
+        half_power_hz,
+        frequency_hz,
+        over_shot,
+        signal_db,
+        against_dc,
+        against_shot,
+    ] in rows::<7>("band_response")
     {
-        let response = Butterworth { order: order as u32, half_power_hz };
+        let response = Butterworth {
+            order: order as u32,
+            half_power_hz,
+        };
         close(10.0 * response.power_at(frequency_hz).log10(), signal_db);
         let shot = with(FrontEnd::IDEAL).noise_density_a2_hz();
-        let front_end = FrontEnd { response, amplifier_noise_a_rthz: (over_shot * shot).sqrt(), ..FrontEnd::IDEAL };
-        let found = Receiver { intermediate_frequency_hz: frequency_hz, ..with(front_end) };
+        let front_end = FrontEnd {
+            response,
+            amplifier_noise_a_rthz: (over_shot * shot).sqrt(),
+            ..FrontEnd::IDEAL
+        };
+        let found = Receiver {
+            intermediate_frequency_hz: frequency_hz,
+            ..with(front_end)
+        };
         close(found.penalties().response_db, against_dc);
         close(found.penalties().total_db(), against_shot);
-        let ideal = Receiver { intermediate_frequency_hz: frequency_hz, ..with(FrontEnd::IDEAL) };
+        let ideal = Receiver {
+            intermediate_frequency_hz: frequency_hz,
+            ..with(FrontEnd::IDEAL)
+        };
         let lost = ideal.slowly_varying_snr(1.0, 1.0) / found.slowly_varying_snr(1.0, 1.0);
         close(10.0 * lost.log10(), against_shot);
     }
@@ -118,25 +208,63 @@ fn the_poles_of_the_detector_cost_what_is_stored() {
 
 #[test]
 fn rounding_and_clipping_cost_what_is_stored() {
-    for [bits, full_scale_over_noise, bandwidth_hz, sample_rate_hz, expected @ ..] in rows::<7>("converter_noise") {
+    for [
+        bits,
+        full_scale_over_noise,
+        bandwidth_hz,
+        sample_rate_hz,
+        expected @ ..,
+    ] in rows::<7>("converter_noise")
+    {
         let bits = bits as u32;
-        let converter = Converter { bits, full_scale_over_noise, bandwidth_hz, sample_rate_hz, input_over_noise: 1.0 };
-        let loss_db =
-            with(FrontEnd { rounding_noise: converter.rounding(), ..FrontEnd::IDEAL }).penalties().rounding_db;
+        let converter = Converter {
+            bits,
+            full_scale_over_noise,
+            bandwidth_hz,
+            sample_rate_hz,
+            input_over_noise: 1.0,
+        };
+        let loss_db = with(FrontEnd {
+            rounding_noise: converter.rounding(),
+            ..FrontEnd::IDEAL
+        })
+        .penalties()
+        .rounding_db;
         let found = [converter.rounding(), loss_db];
-        found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
+        found
+            .iter()
+            .zip(expected)
+            .for_each(|(found, expected)| close(*found, expected));
     }
     for [k, expected @ ..] in rows::<6>("clipping") {
         let c = Clipping::at(k);
-        let found = [c.clipped_fraction, c.gain, c.variance, c.distortion, excess_db(c.distortion / (c.gain * c.gain))];
-        found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
+        let found = [
+            c.clipped_fraction,
+            c.gain,
+            c.variance,
+            c.distortion,
+            excess_db(c.distortion / (c.gain * c.gain)),
+        ];
+        found
+            .iter()
+            .zip(expected)
+            .for_each(|(found, expected)| close(*found, expected));
     }
 }
 
 #[test]
 fn phase_noise_moves_velocities_as_is_stored() {
     let hann = |s: f64| (std::f64::consts::PI * s).cos().powi(2);
-    for [samples, rate_hz, linewidth_hz, delay_s, mean, rectangular, of_hann] in rows::<7>("phase_noise") {
+    for [
+        samples,
+        rate_hz,
+        linewidth_hz,
+        delay_s,
+        mean,
+        rectangular,
+        of_hann,
+    ] in rows::<7>("phase_noise")
+    {
         let found = mean_frequency_sd_m_s(1.55e-6, linewidth_hz, delay_s, samples / rate_hz);
         close(found, mean);
         if rectangular.is_finite() {
@@ -148,15 +276,36 @@ fn phase_noise_moves_velocities_as_is_stored() {
 
 #[test]
 fn the_reflex_and_the_pulse_before_are_the_stored_ones() {
-    for [energy_j, fwhm_s, bandwidth_hz, reflection_db, peak_db, limit_db, time_s, range_m] in rows::<8>("reflex") {
-        let pulse = Pulse::from(GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(fwhm_s), energy_j).unwrap());
+    for [
+        energy_j,
+        fwhm_s,
+        bandwidth_hz,
+        reflection_db,
+        peak_db,
+        limit_db,
+        time_s,
+        range_m,
+    ] in rows::<8>("reflex")
+    {
+        let pulse = Pulse::from(
+            GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(fwhm_s), energy_j).unwrap(),
+        );
         let reflection = 10f64.powf(0.1 * reflection_db);
-        let receiver = Receiver { bandwidth_hz, ..with(FrontEnd { reflection, ..FrontEnd::IDEAL }) };
+        let receiver = Receiver {
+            bandwidth_hz,
+            ..with(FrontEnd {
+                reflection,
+                ..FrontEnd::IDEAL
+            })
+        };
         close(10.0 * receiver.reflex_snr(&pulse, 0.0).log10(), peak_db);
         let found_s = receiver.blind_time_s(&pulse, 10f64.powf(0.1 * limit_db));
         close(found_s, time_s);
         close(0.5 * SPEED_OF_LIGHT_M_S * found_s, range_m);
-        close(10.0 * receiver.reflex_snr(&pulse, found_s).log10(), limit_db);
+        close(
+            10.0 * receiver.reflex_snr(&pulse, found_s).log10(),
+            limit_db,
+        );
     }
     for [rate_hz, ambiguous_m, range_m, _, _, second_m, _] in rows::<7>("second_trip") {
         close(ambiguous_range_m(rate_hz), ambiguous_m);
@@ -166,16 +315,40 @@ fn the_reflex_and_the_pulse_before_are_the_stored_ones() {
 
 #[test]
 fn amplifiers_give_the_stored_energy_and_fibres_bear_it() {
-    for [mean_power_w, storage_time_s, largest_energy_j, rate_hz, energy_j, power_w] in rows::<6>("amplifier_energy") {
-        let found_j = Amplifier { mean_power_w, storage_time_s, largest_energy_j }.energy_j(rate_hz);
+    for [
+        mean_power_w,
+        storage_time_s,
+        largest_energy_j,
+        rate_hz,
+        energy_j,
+        power_w,
+    ] in rows::<6>("amplifier_energy")
+    {
+        let found_j = Amplifier {
+            mean_power_w,
+            storage_time_s,
+            largest_energy_j,
+        }
+        .energy_j(rate_hz);
         close(found_j, energy_j);
         close(found_j * rate_hz, power_w);
     }
-    for [effective_area_m2, brillouin_gain_m_w, length_m, gain_db, fwhm_s, brillouin_width_hz, expected @ ..] in
-        rows::<10>("brillouin")
+    for [
+        effective_area_m2,
+        brillouin_gain_m_w,
+        length_m,
+        gain_db,
+        fwhm_s,
+        brillouin_width_hz,
+        expected @ ..,
+    ] in rows::<10>("brillouin")
     {
         let of_glass = Fibre::silica(effective_area_m2, length_m, gain_db);
-        let fibre = Fibre { brillouin_gain_m_w, brillouin_width_hz, ..of_glass };
+        let fibre = Fibre {
+            brillouin_gain_m_w,
+            brillouin_width_hz,
+            ..of_glass
+        };
         let found = [
             fibre.effective_length_m(fwhm_s),
             pulse_spectrum_hz(fwhm_s),
@@ -183,7 +356,10 @@ fn amplifiers_give_the_stored_energy_and_fibres_bear_it() {
             // Peak power times the width over the energy of a Gaussian pulse is 2 sqrt(ln 2/pi).
             fibre.brillouin_threshold_w(fwhm_s) * fwhm_s / (2.0 * (LN_2 / PI).sqrt()),
         ];
-        found.iter().zip(expected).for_each(|(found, expected)| close(*found, expected));
+        found
+            .iter()
+            .zip(expected)
+            .for_each(|(found, expected)| close(*found, expected));
     }
     // A short pulse meets only the part of a long fibre that it is in at once.
     let long = Fibre::silica(3e-10, 100.0, 0.0).effective_length_m(20e-9);
@@ -193,17 +369,48 @@ fn amplifiers_give_the_stored_energy_and_fibres_bear_it() {
 #[test]
 fn an_ideal_front_end_changes_no_bit_and_impossible_ones_are_refused() {
     let ideal = with(FrontEnd::IDEAL);
-    let shot = 2.0 * wakescope_signal::constants::ELEMENTARY_CHARGE_C * ideal.responsivity_a_w() * 1e-3;
+    let shot =
+        2.0 * wakescope_signal::constants::ELEMENTARY_CHARGE_C * ideal.responsivity_a_w() * 1e-3;
     assert_eq!(ideal.noise_density_a2_hz().to_bits(), shot.to_bits());
     let responsivity = ideal.responsivity_a_w();
-    assert_eq!(ideal.heterodyne_gain_a2_w().to_bits(), (2.0 * responsivity * responsivity * 1e-3).to_bits());
+    assert_eq!(
+        ideal.heterodyne_gain_a2_w().to_bits(),
+        (2.0 * responsivity * responsivity * 1e-3).to_bits()
+    );
     assert_eq!(ideal.penalties().total_db(), 0.0);
     let refused = |front_end, name| {
         let found = with(front_end).validate();
-        assert!(matches!(found, Err(Error::OutOfRange { field, .. }) if field == name), "{name}: {found:?}");
+        assert!(
+            matches!(found, Err(Error::OutOfRange { field, .. }) if field == name),
+            "{name}: {found:?}"
+        );
     };
-    refused(FrontEnd { dark_current_a: -1.0, ..FrontEnd::IDEAL }, "dark_current_a");
-    refused(FrontEnd { load_ohm: 0.0, ..FrontEnd::IDEAL }, "load_ohm");
-    refused(FrontEnd { saturation_w: f64::NAN, ..FrontEnd::IDEAL }, "saturation_w");
-    refused(FrontEnd { intensity_noise_db_hz: 3.0, ..FrontEnd::IDEAL }, "intensity_noise_db_hz");
+    refused(
+        FrontEnd {
+            dark_current_a: -1.0,
+            ..FrontEnd::IDEAL
+        },
+        "dark_current_a",
+    );
+    refused(
+        FrontEnd {
+            load_ohm: 0.0,
+            ..FrontEnd::IDEAL
+        },
+        "load_ohm",
+    );
+    refused(
+        FrontEnd {
+            saturation_w: f64::NAN,
+            ..FrontEnd::IDEAL
+        },
+        "saturation_w",
+    );
+    refused(
+        FrontEnd {
+            intensity_noise_db_hz: 3.0,
+            ..FrontEnd::IDEAL
+        },
+        "intensity_noise_db_hz",
+    );
 }

@@ -13,7 +13,9 @@ use crate::setup::{STEP_M, gaussian, line, mean_power, receiver, simulator};
 const SAMPLES: usize = 48;
 
 fn lines() -> Vec<LineOfSight> {
-    [-4.0, 2.0, 9.0].map(|v| line(330.0, 500.0, STEP_M, |_| v)).to_vec()
+    [-4.0, 2.0, 9.0]
+        .map(|v| line(330.0, 500.0, STEP_M, |_| v))
+        .to_vec()
 }
 
 fn noisy() -> Simulator {
@@ -22,7 +24,11 @@ fn noisy() -> Simulator {
 
 /// A current of about twice the root mean square of the noise.
 fn digitiser() -> Digitiser {
-    Digitiser::new(8, 2.0 * receiver(NoiseModel::BandLimited).noise_variance_a2().sqrt()).unwrap()
+    Digitiser::new(
+        8,
+        2.0 * receiver(NoiseModel::BandLimited).noise_variance_a2().sqrt(),
+    )
+    .unwrap()
 }
 
 /// Everything that a scan of 3 lines and 150 pulses each delivers: all records, their ordered and their folded sum.
@@ -58,10 +64,20 @@ fn records_of_a_scan_are_those_made_one_by_one() {
     let (all, clipped) = deliver(None);
     assert_eq!(clipped, [Clipped::default(); 2]);
     for (index, record) in all.chunks(SAMPLES).enumerate() {
-        let key = PulseKey { line: index / 150, pulse: index % 150 };
+        let key = PulseKey {
+            line: index / 150,
+            pulse: index % 150,
+        };
         let mut alone = [0.0; SAMPLES];
         let mut rng = pulse_generator(9, key);
-        simulator.record_into(&lines[key.line], &mut rng, &mut Scratch::default(), &mut alone).unwrap();
+        simulator
+            .record_into(
+                &lines[key.line],
+                &mut rng,
+                &mut Scratch::default(),
+                &mut alone,
+            )
+            .unwrap();
         assert_eq!(record, alone);
     }
 }
@@ -70,7 +86,10 @@ fn records_of_a_scan_are_those_made_one_by_one() {
 #[test]
 fn a_scan_has_the_same_bits_with_any_number_of_threads() {
     let with = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
         pool.install(|| deliver(Some(digitiser())))
     };
     let one = with(1);
@@ -88,7 +107,10 @@ fn clipped_samples_are_counted_alike_by_all_ways_through_a_scan() {
         let code = i / step_a;
         assert!((code - code.round()).abs() < 1e-9 && (-128.0..=127.0).contains(&code.round()));
     }
-    let at_the_ends = all.iter().filter(|i| [-128.0, 127.0].contains(&(*i / step_a).round())).count() as u64;
+    let at_the_ends = all
+        .iter()
+        .filter(|i| [-128.0, 127.0].contains(&(*i / step_a).round()))
+        .count() as u64;
     // Codes at the ends hold the clipped samples and those within half a step.
     assert!(at_the_ends >= clipped[0].total() && at_the_ends < 2 * clipped[0].total() + 50);
 }
@@ -129,13 +151,39 @@ fn the_first_error_of_a_scan_comes_out_after_the_records_before_it() {
         delivered += 1;
         Ok(())
     });
-    assert!(matches!(result, Err(Error::ElementOutOfRange { field: "radial_velocity_m_s", index: 7, .. })));
+    assert!(matches!(
+        result,
+        Err(Error::ElementOutOfRange {
+            field: "radial_velocity_m_s",
+            index: 7,
+            ..
+        })
+    ));
     assert_eq!(delivered, 40);
-    assert!(matches!(scan.collect::<f64>(), Err(Error::ElementOutOfRange { index: 7, .. })));
-    let stop = scan.for_each::<f64, Error>(|_, _| Err(Error::Empty { field: "the caller's own reason" }));
-    assert_eq!(stop, Err(Error::Empty { field: "the caller's own reason" }));
-    let nothing = Scan { lines: 0, pulses_per_line: 0, ..scan };
-    assert_eq!(nothing.for_each::<f64, Error>(|_, _| Ok(())), Ok(Clipped::default()));
+    assert!(matches!(
+        scan.collect::<f64>(),
+        Err(Error::ElementOutOfRange { index: 7, .. })
+    ));
+    let stop = scan.for_each::<f64, Error>(|_, _| {
+        Err(Error::Empty {
+            field: "the caller's own reason",
+        })
+    });
+    assert_eq!(
+        stop,
+        Err(Error::Empty {
+            field: "the caller's own reason"
+        })
+    );
+    let nothing = Scan {
+        lines: 0,
+        pulses_per_line: 0,
+        ..scan
+    };
+    assert_eq!(
+        nothing.for_each::<f64, Error>(|_, _| Ok(())),
+        Ok(Clipped::default())
+    );
 }
 
 #[test]
@@ -150,7 +198,9 @@ fn streams_of_neighbouring_keys_and_seeds_differ() {
     }
     // Bits of the first draws of neighbours are independent: 64 bits differ in 32 on average.
     let first = |line, pulse| pulse_generator(1, PulseKey { line, pulse }).next_u64();
-    let differing: u32 = (0..1000).map(|i| (first(0, i) ^ first(0, i + 1)).count_ones()).sum();
+    let differing: u32 = (0..1000)
+        .map(|i| (first(0, i) ^ first(0, i + 1)).count_ones())
+        .sum();
     assert!((f64::from(differing) - 32_000.0).abs() < 4.0 * 16_000.0_f64.sqrt());
 }
 
@@ -165,7 +215,10 @@ fn an_efficiency_of_its_own_for_each_pulse_adds_its_variance_to_that_of_the_spec
             simulator: &simulator,
             lines: 1,
             pulses_per_line: 12_000,
-            shot: |key: PulseKey| Shot { efficiency: own.then(|| layers.of_pulse(key.pulse)), ..Shot::from(&air) },
+            shot: |key: PulseKey| Shot {
+                efficiency: own.then(|| layers.of_pulse(key.pulse)),
+                ..Shot::from(&air)
+            },
             generator: |key| pulse_generator(4, key),
             digitiser: None,
         };
@@ -182,11 +235,20 @@ fn an_efficiency_of_its_own_for_each_pulse_adds_its_variance_to_that_of_the_spec
     // Exponential power: E P^2 = 2 (E P)^2, with sd sqrt(20); times E eta^2 = 1 + 2/3 0.64 for efficiencies about 1.
     let (mean, square) = moments(false);
     assert!((mean - 1.0).abs() < 4.0 / 12e3_f64.sqrt(), "{mean}");
-    assert!((square - 2.0).abs() < 4.0 * 20_f64.sqrt() / 12e3_f64.sqrt(), "{square}");
+    assert!(
+        (square - 2.0).abs() < 4.0 * 20_f64.sqrt() / 12e3_f64.sqrt(),
+        "{square}"
+    );
     let (mean, square) = moments(true);
     let expected: f64 = 2.0 * (1.0 + 2.0 / 3.0 * 0.64);
-    assert!((mean - 1.0).abs() < 4.0 * (expected - 1.0).sqrt() / 12e3_f64.sqrt(), "{mean}");
+    assert!(
+        (mean - 1.0).abs() < 4.0 * (expected - 1.0).sqrt() / 12e3_f64.sqrt(),
+        "{mean}"
+    );
     // E P^4 = 24 E eta^4, E eta^4 = (0.2^4 + 1 + 1.8^4)/3.
     let sd = (24.0 * (0.2_f64.powi(4) + 1.0 + 1.8_f64.powi(4)) / 3.0 - expected * expected).sqrt();
-    assert!((square - expected).abs() < 4.0 * sd / 12e3_f64.sqrt(), "{square}");
+    assert!(
+        (square - expected).abs() < 4.0 * sd / 12e3_f64.sqrt(),
+        "{square}"
+    );
 }

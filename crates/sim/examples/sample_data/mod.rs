@@ -2,7 +2,9 @@
 #![allow(dead_code, reason = "each example uses a part")]
 
 use ndarray::{Array2, Array3};
-use wakescope_sim::io::{CrossPlanes, Field, OPEN_EDGES, Provenance, PulseInfo, Ray, Sweep, Unit, VelocityMap};
+use wakescope_sim::io::{
+    CrossPlanes, Field, OPEN_EDGES, Provenance, PulseInfo, Ray, Sweep, Unit, VelocityMap,
+};
 use wakescope_sim::scene::Site;
 
 /// Origin written into the sample files.
@@ -21,7 +23,8 @@ pub(crate) fn wind(y_m: f64, z_m: f64, tau: f64) -> (f64, f64) {
     let vortices = [(-24.0, 28.0, 1.0), (26.0, 31.0, -1.0)];
     vortices.iter().fold((0.0, 0.0), |sum, &(y0, z0, sign)| {
         let (dy, dz) = (y_m - y0, z_m - z0);
-        let turn = sign * gamma_m2_s / std::f64::consts::TAU / (dy * dy + dz * dz + core_m * core_m);
+        let turn =
+            sign * gamma_m2_s / std::f64::consts::TAU / (dy * dy + dz * dz + core_m * core_m);
         (sum.0 + turn * dz, sum.1 - turn * dy)
     })
 }
@@ -44,7 +47,10 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         title: "made-up vortex pair".into(),
         rays,
         range_m: (0..gates).map(|g| 300.0 + 5.0 * (g as f64 + 0.5)).collect(),
-        sweeps: taus.iter().map(|&tau| Sweep::rhi(tau, azimuth_rad)).collect(),
+        sweeps: taus
+            .iter()
+            .map(|&tau| Sweep::rhi(tau, azimuth_rad))
+            .collect(),
         pulse: PulseInfo {
             prt_s: 5e-5,
             pulse_width_s: 2e-7,
@@ -61,7 +67,11 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
         is_simulated: true,
     };
     let exact = Array2::from_shape_fn((map.rays.len(), gates), |(r, g)| {
-        let (v, w) = wind(map.place_m(r, g)[1], map.place_m(r, g)[2], map.sweeps[map.rays[r].sweep].tau);
+        let (v, w) = wind(
+            map.place_m(r, g)[1],
+            map.place_m(r, g)[2],
+            map.sweeps[map.rays[r].sweep].tau,
+        );
         let angle = map.rays[r].elevation_rad;
         v * angle.cos() + w * angle.sin()
     });
@@ -75,12 +85,42 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
     let away = "positive away from the lidar";
     let speed = Unit::METRE_PER_SECOND;
     map.fields = vec![
-        Field::float("v_exact", speed, &format!("exact radial velocity, {away}"), exact.clone()),
-        Field::float("v_gate", speed, &format!("gate-weighted radial velocity, {away}"), exact.mapv(|v| 0.97 * v)),
-        Field::float("radial_velocity", speed, &format!("estimated radial velocity, {away}"), mean),
-        Field::float("velocity_standard_deviation", speed, "standard deviation of the estimate", spread),
-        Field::float("signal_to_noise_ratio", Unit::DECIBEL, "signal-to-noise ratio", snr),
-        Field::float("quality_flag", Unit::ONE, "1 where the estimate is missing", flag),
+        Field::float(
+            "v_exact",
+            speed,
+            &format!("exact radial velocity, {away}"),
+            exact.clone(),
+        ),
+        Field::float(
+            "v_gate",
+            speed,
+            &format!("gate-weighted radial velocity, {away}"),
+            exact.mapv(|v| 0.97 * v),
+        ),
+        Field::float(
+            "radial_velocity",
+            speed,
+            &format!("estimated radial velocity, {away}"),
+            mean,
+        ),
+        Field::float(
+            "velocity_standard_deviation",
+            speed,
+            "standard deviation of the estimate",
+            spread,
+        ),
+        Field::float(
+            "signal_to_noise_ratio",
+            Unit::DECIBEL,
+            "signal-to-noise ratio",
+            snr,
+        ),
+        Field::float(
+            "quality_flag",
+            Unit::ONE,
+            "1 where the estimate is missing",
+            flag,
+        ),
     ];
     map
 }
@@ -88,10 +128,14 @@ pub(crate) fn map(taus: &[f64], gaps: bool) -> VelocityMap {
 /// The wind in planes at three ages.
 pub(crate) fn planes() -> CrossPlanes {
     let tau = vec![0.0, 2.5, 5.0];
-    let y_m: Vec<f64> = (-20..=20).map(|i| f64::from(i) * 3.0 + 0.02 * f64::from(i * i * i)).collect();
+    let y_m: Vec<f64> = (-20..=20)
+        .map(|i| f64::from(i) * 3.0 + 0.02 * f64::from(i * i * i))
+        .collect();
     let z_m: Vec<f64> = (0..24).map(|i| 0.5 * 1.15_f64.powi(i)).collect();
     let shape = (tau.len(), z_m.len(), y_m.len());
-    let part = |get: fn((f64, f64)) -> f64| Array3::from_shape_fn(shape, |(t, z, y)| get(wind(y_m[y], z_m[z], tau[t])));
+    let part = |get: fn((f64, f64)) -> f64| {
+        Array3::from_shape_fn(shape, |(t, z, y)| get(wind(y_m[y], z_m[z], tau[t])))
+    };
     CrossPlanes {
         title: "made-up vortex pair".into(),
         time_s: tau.iter().map(|t| 16.4 * t).collect(),

@@ -44,7 +44,19 @@ impl Figure {
     /// All of them, in the order of tables.
     pub const ALL: [Self; 11] = {
         use Figure::*;
-        [Efficiency, Bias, Std, Rms, U, V, W, Circulation, Height, Energy, Dissipation]
+        [
+            Efficiency,
+            Bias,
+            Std,
+            Rms,
+            U,
+            V,
+            W,
+            Circulation,
+            Height,
+            Energy,
+            Dissipation,
+        ]
     };
 }
 
@@ -74,7 +86,12 @@ impl Values {
     pub(super) fn mean(numbers: &[f64]) -> Self {
         let finite = || numbers.iter().filter(|x| x.is_finite());
         let (sum, n) = (finite().sum::<f64>(), finite().count() as f64);
-        Self([sum / n].into_iter().chain(finite().map(|x| (sum - x) / (n - 1.0))).collect())
+        Self(
+            [sum / n]
+                .into_iter()
+                .chain(finite().map(|x| (sum - x) / (n - 1.0)))
+                .collect(),
+        )
     }
 
     fn whole(&self) -> f64 {
@@ -94,13 +111,24 @@ impl Values {
     }
 
     fn with(&self, other: &Self, of: impl Fn(f64, f64) -> f64) -> Self {
-        Self(self.0.iter().zip(&other.0).map(|(a, b)| of(*a, *b)).collect())
+        Self(
+            self.0
+                .iter()
+                .zip(&other.0)
+                .map(|(a, b)| of(*a, *b))
+                .collect(),
+        )
     }
 
     /// How far this is from `fine`, over a scale.
     pub(super) fn shift(&self, fine: &Self, scale: &Self) -> Shift {
-        let over = self.with(fine, |a, b| a - b).with(scale, |apart, scale| apart / scale);
-        Shift { shift: over.whole(), error: over.error() }
+        let over = self
+            .with(fine, |a, b| a - b)
+            .with(scale, |apart, scale| apart / scale);
+        Shift {
+            shift: over.whole(),
+            error: over.error(),
+        }
     }
 }
 
@@ -126,14 +154,30 @@ impl Shown {
         map: VelocityEstimates,
         circulation: bool,
     ) -> Result<Self, Error> {
-        let off_m_s = (&map.v_pulse_m_s - &map.v_gate_m_s).iter().copied().collect();
-        let mut shown = Self { off_m_s, ..Self::default() };
-        let retrieval = if circulation { Retrieval::new(plan, scanner) } else { None };
+        let off_m_s = (&map.v_pulse_m_s - &map.v_gate_m_s)
+            .iter()
+            .copied()
+            .collect();
+        let mut shown = Self {
+            off_m_s,
+            ..Self::default()
+        };
+        let retrieval = if circulation {
+            Retrieval::new(plan, scanner)
+        } else {
+            None
+        };
         for scan in &map.scans {
             let velocity_m_s = &scan.error_m_s + &map.v_pulse_m_s;
             shown.wind_m_s.extend(mean_wind_m_s(plan, &velocity_m_s)?);
-            shown.circulation_m2_s.extend(retrieval.as_ref().and_then(|own| own.circulation_m2_s(&velocity_m_s)));
-            shown.error_m_s.push(scan.error_m_s.iter().copied().collect());
+            shown.circulation_m2_s.extend(
+                retrieval
+                    .as_ref()
+                    .and_then(|own| own.circulation_m2_s(&velocity_m_s)),
+            );
+            shown
+                .error_m_s
+                .push(scan.error_m_s.iter().copied().collect());
         }
         Ok(shown)
     }
@@ -152,13 +196,16 @@ impl Shown {
     /// Cells with an estimate in every realisation.
     fn known(&self) -> Vec<bool> {
         let finite = |cell: usize| self.error_m_s.iter().all(|scan| scan[cell].is_finite());
-        (0..self.off_m_s.len()).map(|cell| self.off_m_s[cell].is_finite() && finite(cell)).collect()
+        (0..self.off_m_s.len())
+            .map(|cell| self.off_m_s[cell].is_finite() && finite(cell))
+            .collect()
     }
 
     /// Part of the cells of `fine` that this setting has no estimate of.
     pub(super) fn lost(&self, fine: &Self) -> f64 {
         let (own, all) = (self.known(), fine.known());
-        let count = |of: &dyn Fn(usize) -> bool| (0..all.len()).filter(|cell| of(*cell)).count() as f64;
+        let count =
+            |of: &dyn Fn(usize) -> bool| (0..all.len()).filter(|cell| of(*cell)).count() as f64;
         count(&|cell| all[cell] && !own[cell]) / count(&|cell| all[cell]).max(1.0)
     }
 
@@ -171,8 +218,14 @@ impl Shown {
             let fine = Values::mean(&fine);
             return Values::mean(&own).shift(&fine, &fine);
         }
-        let both: Vec<bool> = self.known().iter().zip(fine.known()).map(|(a, b)| *a && b).collect();
-        self.values(figure, &both).shift(&fine.values(figure, &both), &fine.scale(figure, &both))
+        let both: Vec<bool> = self
+            .known()
+            .iter()
+            .zip(fine.known())
+            .map(|(a, b)| *a && b)
+            .collect();
+        self.values(figure, &both)
+            .shift(&fine.values(figure, &both), &fine.scale(figure, &both))
     }
 
     /// Relative standard error of a figure with these realisations.
@@ -190,7 +243,9 @@ impl Shown {
             Figure::Bias if own.whole() <= 4.0 * own.error() => rms(),
             Figure::U | Figure::V | Figure::W => {
                 let part = |of| self.values(of, cells);
-                let speed = part(Figure::U).with(&part(Figure::V), f64::hypot).with(&part(Figure::W), f64::hypot);
+                let speed = part(Figure::U)
+                    .with(&part(Figure::V), f64::hypot)
+                    .with(&part(Figure::W), f64::hypot);
                 speed.with(&rms(), f64::max)
             }
             _ => own,
@@ -198,7 +253,15 @@ impl Shown {
     }
 
     fn values(&self, figure: Figure, cells: &[bool]) -> Values {
-        let wind = |part: usize| Values::mean(&self.wind_m_s.iter().map(|wind| wind[part]).collect::<Vec<_>>());
+        let wind = |part: usize| {
+            Values::mean(
+                &self
+                    .wind_m_s
+                    .iter()
+                    .map(|wind| wind[part])
+                    .collect::<Vec<_>>(),
+            )
+        };
         match figure {
             Figure::U => wind(0),
             Figure::V => wind(1),
@@ -222,14 +285,19 @@ impl Shown {
         };
         for cell in (0..cells.len()).filter(|cell| cells[*cell]) {
             let errors = || self.error_m_s.iter().map(|scan| scan[cell]);
-            let (sum, squares) = errors().fold((0.0, 0.0), |(sum, squares), e| (sum + e, squares + e * e));
+            let (sum, squares) =
+                errors().fold((0.0, 0.0), |(sum, squares), e| (sum + e, squares + e * e));
             count += 1.0;
             sums[0] += square(all, sum, squares, self.off_m_s[cell]);
             for (out, e) in sums[1..].iter_mut().zip(errors()) {
                 *out += square(all - 1.0, sum - e, squares - e * e, self.off_m_s[cell]);
             }
         }
-        Values(sums.into_iter().map(|sum| (sum / count).max(0.0).sqrt()).collect())
+        Values(
+            sums.into_iter()
+                .map(|sum| (sum / count).max(0.0).sqrt())
+                .collect(),
+        )
     }
 }
 
@@ -241,12 +309,20 @@ mod tests {
     fn shown(realisations: usize, cells: usize, change: impl Fn(f64) -> f64) -> Shown {
         let mut state = 1u64;
         let mut uniform = || {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            state = state
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (state >> 11) as f64 / (1u64 << 53) as f64
         };
         let mut normal = || (0..12).map(|_| uniform()).sum::<f64>() - 6.0;
-        let error_m_s = (0..realisations).map(|_| (0..cells).map(|_| change(normal())).collect()).collect();
-        Shown { error_m_s, off_m_s: vec![0.5; cells], ..Shown::default() }
+        let error_m_s = (0..realisations)
+            .map(|_| (0..cells).map(|_| change(normal())).collect())
+            .collect();
+        Shown {
+            error_m_s,
+            off_m_s: vec![0.5; cells],
+            ..Shown::default()
+        }
     }
 
     #[test]
@@ -257,8 +333,16 @@ mod tests {
         let of = |figure| own.values(figure, &all);
         // sqrt(2/(M - 1)/cells)/2 of a standard deviation
         let expected = (0.5 / ((m - 1) as f64 * n as f64)).sqrt();
-        assert!((of(Figure::Std).whole() - 1.0).abs() < 4.0 * expected, "{:?}", of(Figure::Std).whole());
-        assert!((own.noise(Figure::Std) / expected - 1.0).abs() < 0.6, "{} {expected}", own.noise(Figure::Std));
+        assert!(
+            (of(Figure::Std).whole() - 1.0).abs() < 4.0 * expected,
+            "{:?}",
+            of(Figure::Std).whole()
+        );
+        assert!(
+            (own.noise(Figure::Std) / expected - 1.0).abs() < 0.6,
+            "{} {expected}",
+            own.noise(Figure::Std)
+        );
         // The mean error is 1 against the pulse's velocity and 1.5 against the gate's.
         assert!(
             (of(Figure::Bias).whole() - 1.5).abs() < 4.0 * of(Figure::Bias).error(),
@@ -273,30 +357,55 @@ mod tests {
         let (fine, coarse) = (shown(8, 500, |e| e), shown(8, 500, |e| 1.02 * e));
         assert_eq!(fine.shift(&fine, Figure::Std), Shift::default());
         let found = coarse.shift(&fine, Figure::Std);
-        assert!((found.shift - 0.02).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
+        assert!(
+            (found.shift - 0.02).abs() < 1e-12 && found.error < 1e-12,
+            "{found:?}"
+        );
         assert!(fine.noise(Figure::Std) > 1e-3);
     }
 
     #[test]
     fn a_bias_within_its_error_is_compared_with_the_root_mean_square_error() {
-        let still = Shown { off_m_s: vec![0.0; 500], ..shown(8, 500, |e| e) };
+        let still = Shown {
+            off_m_s: vec![0.0; 500],
+            ..shown(8, 500, |e| e)
+        };
         let (noise, rms) = (still.noise(Figure::Bias), still.noise(Figure::Rms));
-        assert!(noise.is_finite() && noise < 0.2 && rms < 0.05, "{noise} {rms}");
+        assert!(
+            noise.is_finite() && noise < 0.2 && rms < 0.05,
+            "{noise} {rms}"
+        );
         // Where noise alone is left, whichever realisation is left out, the bias is zero and so is its error.
-        let of = |size: f64| (0..8).map(|scan| vec![if scan % 2 == 0 { size } else { -size }; 50]).collect();
-        let [fine, coarse] =
-            [1.0, 1.1].map(|size| Shown { error_m_s: of(size), off_m_s: vec![0.0; 50], ..still.clone() });
+        let of = |size: f64| {
+            (0..8)
+                .map(|scan| vec![if scan % 2 == 0 { size } else { -size }; 50])
+                .collect()
+        };
+        let [fine, coarse] = [1.0, 1.1].map(|size| Shown {
+            error_m_s: of(size),
+            off_m_s: vec![0.0; 50],
+            ..still.clone()
+        });
         assert_eq!(coarse.shift(&fine, Figure::Bias), Shift::default());
     }
 
     #[test]
     fn a_fit_that_came_to_no_end_leaves_the_others_in_their_pairs() {
-        let fine = Shown { circulation_m2_s: vec![480.0, 530.0, 470.0, 515.0, 490.0], ..Shown::default() };
+        let fine = Shown {
+            circulation_m2_s: vec![480.0, 530.0, 470.0, 515.0, 490.0],
+            ..Shown::default()
+        };
         let mut coarse = fine.clone();
-        coarse.circulation_m2_s.iter_mut().for_each(|circulation| *circulation *= 1.02);
+        coarse
+            .circulation_m2_s
+            .iter_mut()
+            .for_each(|circulation| *circulation *= 1.02);
         coarse.circulation_m2_s[1] = f64::NAN;
         let found = coarse.shift(&fine, Figure::Circulation);
-        assert!((found.shift - 0.02).abs() < 1e-12 && found.error < 1e-12, "{found:?}");
+        assert!(
+            (found.shift - 0.02).abs() < 1e-12 && found.error < 1e-12,
+            "{found:?}"
+        );
     }
 
     #[test]

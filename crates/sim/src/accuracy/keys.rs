@@ -48,8 +48,19 @@ pub fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFil
             let width_m = value(&scene, GRID_POINTS) * value(&scene, GRID_SPACING);
             set(&mut table, GRID_POINTS, whole(width_m / number));
         }
-        set(&mut table, key, if key == GRID_SPACING { Value::Float(number) } else { whole(number) });
-        let refused = |e: toml::de::Error| Error::Key { key, reason: e.message().into() };
+        set(
+            &mut table,
+            key,
+            if key == GRID_SPACING {
+                Value::Float(number)
+            } else {
+                whole(number)
+            },
+        );
+        let refused = |e: toml::de::Error| Error::Key {
+            key,
+            reason: e.message().into(),
+        };
         scene = Value::Table(table).try_into().map_err(refused)?;
     }
     Ok(file.with(scene)?)

@@ -29,7 +29,11 @@ impl Verdict {
             return Self::Kept;
         }
         let is_far = |own: &Shift| own.shift.abs() - 2.0 * own.error > limit;
-        if shifts.iter().any(|(_, own)| is_far(own)) { Self::TooFar } else { Self::NotDecided }
+        if shifts.iter().any(|(_, own)| is_far(own)) {
+            Self::TooFar
+        } else {
+            Self::NotDecided
+        }
     }
 
     /// In words.
@@ -43,9 +47,17 @@ impl Verdict {
             Self::Lost(part) => format!("loses {:.1} % of the gates", 100.0 * part),
             // What would do for this key, without the place of a value that the user did not write.
             Self::Refused(why) => {
-                let allowed =
-                    why.lines().next().unwrap_or_default().split("is not allowed: ").last().unwrap_or_default();
-                format!("refused: {}", allowed.split("; together").next().unwrap_or_default())
+                let allowed = why
+                    .lines()
+                    .next()
+                    .unwrap_or_default()
+                    .split("is not allowed: ")
+                    .last()
+                    .unwrap_or_default();
+                format!(
+                    "refused: {}",
+                    allowed.split("; together").next().unwrap_or_default()
+                )
             }
         }
     }
@@ -70,14 +82,24 @@ impl Step {
     /// A value with its forecast, or why it is refused.
     pub(super) fn new(value: f64, forecast_s: Result<f64, Error>) -> Self {
         let refused = |error: Error| (f64::NAN, Verdict::Refused(error.to_string()));
-        let (forecast_s, verdict) = forecast_s.map_or_else(refused, |forecast_s| (forecast_s, Verdict::Finest));
-        Self { value, cells: None, forecast_s, shifts: Vec::new(), verdict }
+        let (forecast_s, verdict) =
+            forecast_s.map_or_else(refused, |forecast_s| (forecast_s, Verdict::Finest));
+        Self {
+            value,
+            cells: None,
+            forecast_s,
+            shifts: Vec::new(),
+            verdict,
+        }
     }
 
     /// What it shifts a figure, where that is known.
     #[must_use]
     pub fn shift(&self, figure: Figure) -> Option<Shift> {
-        self.shifts.iter().find(|(of, _)| *of == figure).map(|(_, own)| *own)
+        self.shifts
+            .iter()
+            .find(|(of, _)| *of == figure)
+            .map(|(_, own)| *own)
     }
 
     /// What it shifts a figure at most; nothing where that is not known.
@@ -106,25 +128,39 @@ pub struct Ladder {
 impl Ladder {
     /// Values of a key from the finest on, which is chosen.
     pub(super) fn new(key: &'static str, now: f64, steps: Vec<Step>) -> Self {
-        Self { key, now, steps, chosen: 0, note: None, orders: Vec::new() }
+        Self {
+            key,
+            now,
+            steps,
+            chosen: 0,
+            note: None,
+            orders: Vec::new(),
+        }
     }
 
     /// The value that is chosen.
     #[must_use]
     pub fn value(&self) -> f64 {
-        self.steps.get(self.chosen).map_or(self.now, |step| step.value)
+        self.steps
+            .get(self.chosen)
+            .map_or(self.now, |step| step.value)
     }
 
     /// The first value that is not known to be good or bad.
     pub(super) fn is_open(&self) -> bool {
-        let first = self.steps.iter().find(|step| !matches!(step.verdict, Verdict::Finest | Verdict::Kept));
+        let first = self
+            .steps
+            .iter()
+            .find(|step| !matches!(step.verdict, Verdict::Finest | Verdict::Kept));
         first.is_some_and(|step| step.verdict == Verdict::NotDecided)
     }
 }
 
 /// The values that are chosen.
 pub(super) fn chosen(ladders: &[Ladder]) -> impl Iterator<Item = &Step> {
-    ladders.iter().filter_map(|ladder| ladder.steps.get(ladder.chosen))
+    ladders
+        .iter()
+        .filter_map(|ladder| ladder.steps.get(ladder.chosen))
 }
 
 /// Bound on a figure by the values that are chosen.
@@ -134,25 +170,37 @@ pub(super) fn bound(ladders: &[Ladder], figure: Figure) -> f64 {
 
 /// Moves keys to coarser values, the one that saves most time for the share of the limit that it takes first, while the sum of the bounds
 /// stays within the limit. Returns the moves: which key, from which place.
-pub(super) fn choose(ladders: &mut [Ladder], figures: &[Figure], limit: f64) -> Vec<(usize, usize)> {
+pub(super) fn choose(
+    ladders: &mut [Ladder],
+    figures: &[Figure],
+    limit: f64,
+) -> Vec<(usize, usize)> {
     let mut moves = Vec::new();
     loop {
         let mut best: Option<(f64, usize, usize)> = None;
         for (which, ladder) in ladders.iter().enumerate() {
-            let Some(here) = ladder.steps.get(ladder.chosen) else { continue };
+            let Some(here) = ladder.steps.get(ladder.chosen) else {
+                continue;
+            };
             let coarser = ladder.steps.iter().enumerate().skip(ladder.chosen + 1);
             for (place, step) in coarser.take_while(|(_, step)| step.verdict == Verdict::Kept) {
                 let more = |figure: &Figure| step.bound(*figure) - here.bound(*figure);
-                let fits = figures.iter().all(|figure| bound(ladders, *figure) + more(figure) <= limit);
-                let (saved_s, share) =
-                    (here.forecast_s - step.forecast_s, figures.iter().map(more).fold(0.0, f64::max) / limit);
+                let fits = figures
+                    .iter()
+                    .all(|figure| bound(ladders, *figure) + more(figure) <= limit);
+                let (saved_s, share) = (
+                    here.forecast_s - step.forecast_s,
+                    figures.iter().map(more).fold(0.0, f64::max) / limit,
+                );
                 let gain = saved_s / share.max(1e-6);
                 if fits && saved_s > 0.0 && best.is_none_or(|(most, ..)| gain > most) {
                     best = Some((gain, which, place));
                 }
             }
         }
-        let Some((_, which, place)) = best else { return moves };
+        let Some((_, which, place)) = best else {
+            return moves;
+        };
         moves.push((which, ladders[which].chosen));
         ladders[which].chosen = place;
     }
@@ -166,11 +214,28 @@ mod tests {
     fn ladder(key: &'static str, steps: &[(f64, f64, f64, f64)]) -> Ladder {
         let step = |(i, &(value, forecast_s, shift, error)): (usize, &(f64, f64, f64, f64))| {
             let shifts = vec![(Figure::Rms, Shift { shift, error })];
-            let verdict = if i == 0 { Verdict::Finest } else { Verdict::of(&shifts, 0.015) };
-            Step { value, cells: None, forecast_s, shifts, verdict }
+            let verdict = if i == 0 {
+                Verdict::Finest
+            } else {
+                Verdict::of(&shifts, 0.015)
+            };
+            Step {
+                value,
+                cells: None,
+                forecast_s,
+                shifts,
+                verdict,
+            }
         };
         let steps = steps.iter().enumerate().map(step).collect();
-        Ladder { key, now: 1.0, steps, chosen: 0, note: None, orders: Vec::new() }
+        Ladder {
+            key,
+            now: 1.0,
+            steps,
+            chosen: 0,
+            note: None,
+            orders: Vec::new(),
+        }
     }
 
     #[test]
@@ -184,21 +249,48 @@ mod tests {
 
     #[test]
     fn the_cheapest_for_its_share_goes_first_and_the_sum_stays_inside_the_limit() {
-        let step = ladder(WINDOW_STEP, &[(1.0, 10.0, 0.0, 0.0), (2.0, 9.0, 0.004, 0.001), (4.0, 8.5, 0.01, 0.001)]);
-        let layers = ladder(LAYERS, &[(8.0, 10.0, 0.0, 0.0), (4.0, 6.0, 0.005, 0.0), (2.0, 4.0, 0.012, 0.0)]);
+        let step = ladder(
+            WINDOW_STEP,
+            &[
+                (1.0, 10.0, 0.0, 0.0),
+                (2.0, 9.0, 0.004, 0.001),
+                (4.0, 8.5, 0.01, 0.001),
+            ],
+        );
+        let layers = ladder(
+            LAYERS,
+            &[
+                (8.0, 10.0, 0.0, 0.0),
+                (4.0, 6.0, 0.005, 0.0),
+                (2.0, 4.0, 0.012, 0.0),
+            ],
+        );
         let mut all = [step, layers];
         let moves = choose(&mut all, &[Figure::Rms], 0.015);
         // 4 layers save 4 s for 0.005, and 2 another 2 s for 0.007; then a step of 2, which takes 0.006, no longer fits.
-        assert_eq!((all[0].value(), all[1].value(), moves), (1.0, 2.0, vec![(1, 0), (1, 1)]));
+        assert_eq!(
+            (all[0].value(), all[1].value(), moves),
+            (1.0, 2.0, vec![(1, 0), (1, 1)])
+        );
         assert!((bound(&all, Figure::Rms) - 0.012).abs() < 1e-12);
     }
 
     #[test]
     fn what_loses_gates_or_is_not_decided_is_never_passed() {
-        let mut own = ladder(WINDOW_STEP, &[(1.0, 9.0, 0.0, 0.0), (2.0, 8.0, 0.02, 0.003), (4.0, 7.0, 0.0, 0.0)]);
+        let mut own = ladder(
+            WINDOW_STEP,
+            &[
+                (1.0, 9.0, 0.0, 0.0),
+                (2.0, 8.0, 0.02, 0.003),
+                (4.0, 7.0, 0.0, 0.0),
+            ],
+        );
         assert!(own.is_open());
         assert!(choose(std::slice::from_mut(&mut own), &[Figure::Rms], 0.015).is_empty());
         own.steps[1].verdict = Verdict::Lost(0.13);
-        assert!(choose(std::slice::from_mut(&mut own), &[Figure::Rms], 0.015).is_empty() && !own.is_open());
+        assert!(
+            choose(std::slice::from_mut(&mut own), &[Figure::Rms], 0.015).is_empty()
+                && !own.is_open()
+        );
     }
 }

@@ -40,7 +40,10 @@ pub struct Request {
     #[cfg_attr(feature = "cli", arg(long, value_name = "PART", value_parser = part))]
     pub within: f64,
     /// Figures to be judged; all that a run of the scene writes without it, circulation where the scene has a retrieval.
-    #[cfg_attr(feature = "cli", arg(long, value_name = "FIGURE,...", value_delimiter = ',', value_enum))]
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, value_name = "FIGURE,...", value_delimiter = ',', value_enum)
+    )]
     pub of: Vec<Figure>,
     /// What the search may take, and a run that it proposes: so many times the scene's own run.
     #[cfg_attr(feature = "cli", arg(long, value_name = "RUNS", default_value = "10", value_parser = budget))]
@@ -51,7 +54,11 @@ impl Request {
     /// Of these figures, all where there are none, within a budget of ten runs.
     #[must_use]
     pub fn new(within: f64, of: &[Figure]) -> Self {
-        Self { within, of: of.to_vec(), budget: 10.0 }
+        Self {
+            within,
+            of: of.to_vec(),
+            budget: 10.0,
+        }
     }
 
     /// The figures that are judged, in the order of tables.
@@ -73,8 +80,15 @@ impl Request {
             ),
             _ => None,
         };
-        if let Some((figure, why)) = self.of.iter().find_map(|figure| Some((figure, lacking(*figure)?))) {
-            return Err(Error::Input { path: "--of".into(), reason: format!("{} {why}", figure.name()) });
+        if let Some((figure, why)) = self
+            .of
+            .iter()
+            .find_map(|figure| Some((figure, lacking(*figure)?)))
+        {
+            return Err(Error::Input {
+                path: "--of".into(),
+                reason: format!("{} {why}", figure.name()),
+            });
         }
         let has = |figure: &Figure| match figure {
             Figure::Efficiency => model(scene) == Model::MonteCarlo,
@@ -82,7 +96,8 @@ impl Request {
             _ => true,
         };
         let is_asked = |figure: &Figure| self.of.is_empty() || self.of.contains(figure);
-        let is_judged = |figure: &Figure| lacking(*figure).is_none() && has(figure) && is_asked(figure);
+        let is_judged =
+            |figure: &Figure| lacking(*figure).is_none() && has(figure) && is_asked(figure);
         Ok(Figure::ALL.into_iter().filter(is_judged).collect())
     }
 }
@@ -95,12 +110,19 @@ fn part(text: &str) -> Result<f64, String> {
         None => text.trim().parse(),
     };
     let allowed = "from 0.001% to 50%, such as 3% or 0.03";
-    number.ok().filter(|part| (1e-5..=0.5).contains(part)).ok_or_else(|| allowed.into())
+    number
+        .ok()
+        .filter(|part| (1e-5..=0.5).contains(part))
+        .ok_or_else(|| allowed.into())
 }
 
 #[cfg(feature = "cli")]
 fn budget(text: &str) -> Result<f64, String> {
-    let number = text.trim().parse::<f64>().ok().filter(|runs| (1.0..=1e6).contains(runs));
+    let number = text
+        .trim()
+        .parse::<f64>()
+        .ok()
+        .filter(|runs| (1.0..=1e6).contains(runs));
     number.ok_or_else(|| "from 1 to 1000000 runs of the scene".into())
 }
 
@@ -194,7 +216,12 @@ pub struct Accuracy<S = SceneFile> {
 
 impl<S: Subject> Accuracy<S> {
     /// That of a scene or case, and its hash, before anything is looked at; forecasts of its own run and of what was done, s of one core.
-    fn begun((scene, hash): (S, &str), request: &Request, [own_s, spent_s]: [f64; 2], figures: Vec<Figure>) -> Self {
+    fn begun(
+        (scene, hash): (S, &str),
+        request: &Request,
+        [own_s, spent_s]: [f64; 2],
+        figures: Vec<Figure>,
+    ) -> Self {
         Self {
             of_scene: hash.into(),
             within: request.within,
@@ -217,7 +244,11 @@ impl<S: Subject> Accuracy<S> {
     /// Whether a run within the budget has every figure within the target.
     #[must_use]
     pub fn is_reached(&self) -> bool {
-        let reached = |figure: &Figure| self.noises.iter().any(|noise| noise.figure == *figure && noise.is_reached);
+        let reached = |figure: &Figure| {
+            self.noises
+                .iter()
+                .any(|noise| noise.figure == *figure && noise.is_reached)
+        };
         self.verified.is_confirmed && (!S::IS_NOISY || self.figures.iter().all(reached))
     }
 }

@@ -13,12 +13,20 @@ impl<S: Subject> Accuracy<S> {
     /// The picture.
     pub fn picture(&self) -> Picture {
         let panels = self.figures.iter().map(|figure| self.panel(*figure));
-        Picture { columns: 2.min(self.figures.len().max(1)), width: 1240.0, ..Picture::stacked(panels) }
+        Picture {
+            columns: 2.min(self.figures.len().max(1)),
+            width: 1240.0,
+            ..Picture::stacked(panels)
+        }
     }
 
     fn panel(&self, figure: Figure) -> CurvePlot {
         let axis = Axis::log("forecast of a run, one core [s]");
-        let error = if S::IS_NOISY { "error, two standard errors [%]" } else { "error [%]" };
+        let error = if S::IS_NOISY {
+            "error, two standard errors [%]"
+        } else {
+            "error [%]"
+        };
         let mut plot = CurvePlot::new(figure.name(), axis, Axis::log(error));
         plot.shape = 0.7;
         let mut all = Vec::new();
@@ -26,7 +34,9 @@ impl<S: Subject> Accuracy<S> {
         for (colour, ladder) in self.ladders.iter().enumerate() {
             let mut points = Vec::new();
             for (place, step) in ladder.steps.iter().enumerate() {
-                let point = step.shift(figure).map(|own| (step.forecast_s, (100.0 * own.bound()).max(FLOOR)));
+                let point = step
+                    .shift(figure)
+                    .map(|own| (step.forecast_s, (100.0 * own.bound()).max(FLOOR)));
                 points.extend(point);
                 chosen.extend(point.filter(|_| place == ladder.chosen));
             }
@@ -37,14 +47,23 @@ impl<S: Subject> Accuracy<S> {
             }
         }
         if let Some(noise) = self.noises.iter().find(|noise| noise.figure == figure) {
-            let points = [(self.own_s, 100.0 * noise.now), (noise.forecast_s, 100.0 * self.within)];
+            let points = [
+                (self.own_s, 100.0 * noise.now),
+                (noise.forecast_s, 100.0 * self.within),
+            ];
             all.extend(points);
-            plot = plot.with(Series::new("noise: now, needed", Style::LineMarkers, points).in_colour(5));
+            plot = plot
+                .with(Series::new("noise: now, needed", Style::LineMarkers, points).in_colour(5));
         }
         plot = plot.with(Series::new("chosen", Style::Markers, chosen).in_colour(6));
         let ends = all.iter().map(|(x, _)| *x).filter(|x| x.is_finite());
-        let (low, high) = ends.fold((self.own_s, self.own_s), |(low, high), x| (low.min(x), high.max(x)));
-        let target = [(low / 1.5, 100.0 * self.within), (1.5 * high, 100.0 * self.within)];
+        let (low, high) = ends.fold((self.own_s, self.own_s), |(low, high), x| {
+            (low.min(x), high.max(x))
+        });
+        let target = [
+            (low / 1.5, 100.0 * self.within),
+            (1.5 * high, 100.0 * self.within),
+        ];
         plot.with(Series::new("target", Style::Dash, target).in_colour(7))
     }
 }

@@ -62,13 +62,30 @@ impl Accuracy {
         own.fits()?;
         let own_s = run_s(&own);
         let spent_s = PLANNING_S * own.screens.len() as f64;
-        let mut out = Self::begun((file.clone(), &file.hash), request, [own_s, spent_s], request.figures(&own)?);
+        let mut out = Self::begun(
+            (file.clone(), &file.hash),
+            request,
+            [own_s, spent_s],
+            request.figures(&own)?,
+        );
         // TOML has signed whole numbers.
         out.verified.seed = stream(file.content.seed, "accuracy", 0).next_u64() >> 1;
-        let mut search = Search { request, observer, common, own, fine, crossed: Vec::new(), scatter: None, out };
+        let mut search = Search {
+            request,
+            observer,
+            common,
+            own,
+            fine,
+            crossed: Vec::new(),
+            scatter: None,
+            out,
+        };
         observer.begin(Stage::Cases, 3);
         if model(&file.content) != Model::MonteCarlo {
-            search.out.notes.push("efficiency: exact, by quadrature".into());
+            search
+                .out
+                .notes
+                .push("efficiency: exact, by quadrature".into());
         }
         let pilot = search.pilot()?;
         observer.advance(1);
@@ -92,7 +109,12 @@ impl Search<'_> {
 
     /// The figures of the map.
     pub(super) fn of_map(&self) -> Vec<Figure> {
-        self.out.figures.iter().copied().filter(|figure| *figure != Figure::Efficiency).collect()
+        self.out
+            .figures
+            .iter()
+            .copied()
+            .filter(|figure| *figure != Figure::Efficiency)
+            .collect()
     }
 
     /// Spends a time, s, where it leaves as much as is kept for what follows.
@@ -126,16 +148,25 @@ impl Search<'_> {
         let mut ladder = Ladder::new(key, now, Vec::new());
         for value in values {
             if !ladder.steps.is_empty() && !self.affords(0.0, 0.0) {
-                self.out.notes.push(format!("{key}: not all values are looked at, the budget is spent"));
+                self.out.notes.push(format!(
+                    "{key}: not all values are looked at, the budget is spent"
+                ));
                 break;
             }
-            let planned = with(&self.fine, &[(key, value)]).and_then(|scene| self.plan(&scene, Target::Run));
-            let shifts = planned.as_ref().map_or(Vec::new(), |plan| shifts(self, plan));
+            let planned =
+                with(&self.fine, &[(key, value)]).and_then(|scene| self.plan(&scene, Target::Run));
+            let shifts = planned
+                .as_ref()
+                .map_or(Vec::new(), |plan| shifts(self, plan));
             let mut step = Step::new(value, planned.map(|plan| run_s(&plan)));
             let is_refused = step.forecast_s.is_nan();
             if !is_refused && !ladder.steps.is_empty() {
                 let undecided = shifts.is_empty();
-                step.verdict = if undecided { Verdict::NotDecided } else { Verdict::of(&shifts, self.limit()) };
+                step.verdict = if undecided {
+                    Verdict::NotDecided
+                } else {
+                    Verdict::of(&shifts, self.limit())
+                };
             }
             ladder.steps.push(Step { shifts, ..step });
             if is_refused {
@@ -143,13 +174,16 @@ impl Search<'_> {
             }
         }
         let forecasts_s = || ladder.steps.iter().map(|step| step.forecast_s);
-        let saved_s = forecasts_s().next().unwrap_or(f64::NAN) - forecasts_s().fold(f64::INFINITY, f64::min);
+        let saved_s =
+            forecasts_s().next().unwrap_or(f64::NAN) - forecasts_s().fold(f64::INFINITY, f64::min);
         let saved = saved_s / self.out.own_s;
         // What is refused says itself why there is no other.
         if saved < NOTHING && forecasts_s().all(f64::is_finite) {
             ladder.steps.truncate(1);
             let saved = 100.0 * saved.max(0.0);
-            ladder.note = Some(format!("takes its finest value: any other saves {saved:.0} % of a run at most"));
+            ladder.note = Some(format!(
+                "takes its finest value: any other saves {saved:.0} % of a run at most"
+            ));
         }
         self.out.ladders.push(ladder);
     }
@@ -159,14 +193,22 @@ impl Search<'_> {
         let (mut sum_s, mut crossed, mut before) = (0.0, self.crossed.clone(), None);
         for file in scenes {
             let plan = self.plan(file, Target::Map)?;
-            let (scene, share) = (&file.content, count as f64 / file.content.scan.realisations as f64);
+            let (scene, share) = (
+                &file.content,
+                count as f64 / file.content.scan.realisations as f64,
+            );
             let air = (scene.atmosphere.clone(), scene.seed);
             if !crossed.contains(&air) {
                 sum_s += plan.times.optics_s + PLANNING_S * plan.screens.len() as f64;
                 crossed.push(air.clone());
             }
             let signals = Some((air, scene.pulse_energy_j()));
-            sum_s += share * plan.times.maps_s + if before == signals { 0.0 } else { share * plan.times.signals_s };
+            sum_s += share * plan.times.maps_s
+                + if before == signals {
+                    0.0
+                } else {
+                    share * plan.times.signals_s
+                };
             if self.out.figures.contains(&Figure::Circulation) {
                 sum_s += count as f64 * plan.times.fit_s;
             }
@@ -187,13 +229,23 @@ impl Search<'_> {
         if !self.affords(cost_s, kept_s) {
             return Ok(None);
         }
-        self.crossed.extend(scenes.iter().map(|file| (file.content.atmosphere.clone(), file.content.seed)));
-        let scenes = scenes.iter().map(|scene| with(scene, &[(REALISATIONS, count as f64)]));
+        self.crossed.extend(
+            scenes
+                .iter()
+                .map(|file| (file.content.atmosphere.clone(), file.content.seed)),
+        );
+        let scenes = scenes
+            .iter()
+            .map(|scene| with(scene, &[(REALISATIONS, count as f64)]));
         let circulation = self.out.figures.contains(&Figure::Circulation);
         let scenes: Vec<SceneFile> = scenes.collect::<Result<_, _>>()?;
-        let found = measured(&scenes, first, &self.common, self.observer, |plan, scanner, map| {
-            Shown::new(plan, scanner, map, circulation)
-        })?;
+        let found = measured(
+            &scenes,
+            first,
+            &self.common,
+            self.observer,
+            |plan, scanner, map| Shown::new(plan, scanner, map, circulation),
+        )?;
         Ok(Some(found.into_iter().map(|(_, shown)| shown).collect()))
     }
 }
@@ -221,27 +273,54 @@ impl Search<'_> {
         let mut found = self.measure(&scenes, 0, LEAST, kept_s)?;
         // The coarsest values are the likeliest to be too far.
         while found.is_none() && !places.is_empty() {
-            let longest = self.out.ladders.iter().map(|ladder| ladder.steps.len()).max().unwrap_or(1);
-            self.out.ladders.iter_mut().for_each(|ladder| ladder.steps.truncate(longest - 1));
+            let longest = self
+                .out
+                .ladders
+                .iter()
+                .map(|ladder| ladder.steps.len())
+                .max()
+                .unwrap_or(1);
+            self.out
+                .ladders
+                .iter_mut()
+                .for_each(|ladder| ladder.steps.truncate(longest - 1));
             places = self.undecided();
             scenes = self.beside_the_finest(&places)?;
-            found = self.measure(&scenes, 0, LEAST, if places.is_empty() { 0.0 } else { kept_s })?;
+            found = self.measure(
+                &scenes,
+                0,
+                LEAST,
+                if places.is_empty() { 0.0 } else { kept_s },
+            )?;
         }
         if places.len() < all {
             let needed = (needed_s / self.out.own_s).ceil();
-            let seen = if places.is_empty() { "are not varied" } else { "are varied but for the coarsest values" };
-            self.out.notes.push(format!("keys of the estimator {seen}: --budget {needed} would do for all"));
+            let seen = if places.is_empty() {
+                "are not varied"
+            } else {
+                "are varied but for the coarsest values"
+            };
+            self.out.notes.push(format!(
+                "keys of the estimator {seen}: --budget {needed} would do for all"
+            ));
         }
         let Some(mut shown) = found else {
-            self.out.notes.push(format!("the map is not measured: its pilot takes {LEAST} realisations"));
+            self.out.notes.push(format!(
+                "the map is not measured: its pilot takes {LEAST} realisations"
+            ));
             return Ok(None);
         };
         self.refuse_lacking(&shown[0])?;
         self.judge(&shown, &places);
         while self.out.ladders.iter().any(Ladder::is_open) {
             let (count, more) = (shown[0].realisations(), shown[0].realisations() / 2);
-            let Some(more) = self.measure(&scenes, count, more, kept_s)? else { break };
-            shown.iter_mut().zip(more).for_each(|(shown, more)| shown.extend(more));
+            let Some(more) = self.measure(&scenes, count, more, kept_s)? else {
+                break;
+            };
+            shown
+                .iter_mut()
+                .zip(more)
+                .for_each(|(shown, more)| shown.extend(more));
             self.judge(&shown, &places);
         }
         self.out.pilot = shown[0].realisations();
@@ -252,7 +331,9 @@ impl Search<'_> {
     fn undecided(&self) -> Vec<(usize, usize)> {
         let steps = |which: usize| self.out.ladders[which].steps.iter().enumerate();
         let of_key = |which| steps(which).filter(|(_, step)| step.verdict == Verdict::NotDecided);
-        (0..self.out.ladders.len()).flat_map(|which| of_key(which).map(move |(place, _)| (which, place))).collect()
+        (0..self.out.ladders.len())
+            .flat_map(|which| of_key(which).map(move |(place, _)| (which, place)))
+            .collect()
     }
 
     /// The finest setting, and after it the same with each of the values at those places.
@@ -261,24 +342,38 @@ impl Search<'_> {
             let ladder = &self.out.ladders[which];
             with(&self.fine, &[(ladder.key, ladder.steps[place].value)])
         });
-        std::iter::once(Ok(self.fine.clone())).chain(varied).collect()
+        std::iter::once(Ok(self.fine.clone()))
+            .chain(varied)
+            .collect()
     }
 
     /// The keys of the estimator, from the finest values on.
     fn estimator_keys(&mut self) -> Result<(), Error> {
         let scene = self.fine.content.clone();
         let window = scene.estimator.window_samples;
-        let most = (FINE_PADDING * window).next_power_of_two().min(1 << 20).max(scene.estimator.padded_samples) as f64;
-        let has_spectrum = !matches!(scene.estimator.method, Method::PulsePair {} | Method::AutoregressivePole(_));
+        let most = (FINE_PADDING * window)
+            .next_power_of_two()
+            .min(1 << 20)
+            .max(scene.estimator.padded_samples) as f64;
+        let has_spectrum = !matches!(
+            scene.estimator.method,
+            Method::PulsePair {} | Method::AutoregressivePole(_)
+        );
         self.fine = with(&self.fine, &[(WINDOW_STEP, 1.0)])?;
         if has_spectrum {
             self.fine = with(&self.fine, &[(PADDED, most)])?;
         }
         let window = window as f64;
-        let steps = (0..).map(|i| 2f64.powi(i)).take_while(|step| *step <= window);
-        self.vary(WINDOW_STEP, value(&scene, WINDOW_STEP), steps, |_, _| Vec::new());
+        let steps = (0..)
+            .map(|i| 2f64.powi(i))
+            .take_while(|step| *step <= window);
+        self.vary(WINDOW_STEP, value(&scene, WINDOW_STEP), steps, |_, _| {
+            Vec::new()
+        });
         if has_spectrum {
-            let points = (0..).map(|i| most / 2f64.powi(i)).take_while(|points| *points >= window);
+            let points = (0..)
+                .map(|i| most / 2f64.powi(i))
+                .take_while(|points| *points >= window);
             self.vary(PADDED, value(&scene, PADDED), points, |_, _| Vec::new());
         }
         Ok(())
@@ -286,11 +381,14 @@ impl Search<'_> {
 
     /// The circulation where no map has one: an error if it was asked for.
     fn refuse_lacking(&mut self, shown: &Shown) -> Result<(), Error> {
-        let lacking = |figure: &Figure| *figure == Figure::Circulation && !shown.noise(*figure).is_finite();
+        let lacking =
+            |figure: &Figure| *figure == Figure::Circulation && !shown.noise(*figure).is_finite();
         if self.request.of.iter().any(lacking) {
-            let reason =
-                "circulation is fitted to scans across a pair alone, with noise, real signals and a Gaussian pulse";
-            return Err(Error::Input { path: "--of".into(), reason: reason.into() });
+            let reason = "circulation is fitted to scans across a pair alone, with noise, real signals and a Gaussian pulse";
+            return Err(Error::Input {
+                path: "--of".into(),
+                reason: reason.into(),
+            });
         }
         self.out.figures.retain(|figure| !lacking(figure));
         Ok(())
@@ -300,10 +398,17 @@ impl Search<'_> {
     fn judge(&mut self, shown: &[Shown], places: &[(usize, usize)]) {
         let (figures, limit) = (self.of_map(), self.limit());
         for (&(which, place), own) in places.iter().zip(&shown[1..]) {
-            let shifts: Vec<_> = figures.iter().map(|figure| (*figure, own.shift(&shown[0], *figure))).collect();
+            let shifts: Vec<_> = figures
+                .iter()
+                .map(|figure| (*figure, own.shift(&shown[0], *figure)))
+                .collect();
             let lost = own.lost(&shown[0]);
             let step = &mut self.out.ladders[which].steps[place];
-            step.verdict = if lost > 0.0 { Verdict::Lost(lost) } else { Verdict::of(&shifts, limit) };
+            step.verdict = if lost > 0.0 {
+                Verdict::Lost(lost)
+            } else {
+                Verdict::of(&shifts, limit)
+            };
             step.shifts = shifts;
         }
     }
@@ -323,7 +428,9 @@ impl Search<'_> {
         }
         let found = self.measure(&[self.fine.clone(), self.fine.with(scene)?], 0, LEAST, 0.0)?;
         if found.is_none() {
-            self.out.notes.push("response of the map to the efficiency: not measured, taken to be 1".into());
+            self.out
+                .notes
+                .push("response of the map to the efficiency: not measured, taken to be 1".into());
         }
         let response = |figure| match &found {
             Some(found) => (figure, found[1].shift(&found[0], figure).bound() / RAISED),

@@ -27,20 +27,36 @@ impl Search<'_> {
         if pilot.is_none() && !self.of_map().is_empty() {
             return Ok(());
         }
-        let (count, limit) = (pilot.as_ref().map_or(PILOT, Shown::realisations), self.limit());
+        let (count, limit) = (
+            pilot.as_ref().map_or(PILOT, Shown::realisations),
+            self.limit(),
+        );
         let mut moves = choose(&mut self.out.ladders, &self.out.figures, limit);
         for _ in 0..=BACK {
             // Keys that are good alone may be refused together.
-            while self.chosen().and_then(|scene| self.plan(&scene, Target::Run)).is_err() {
-                let Some((which, place)) = moves.pop() else { break };
+            while self
+                .chosen()
+                .and_then(|scene| self.plan(&scene, Target::Run))
+                .is_err()
+            {
+                let Some((which, place)) = moves.pop() else {
+                    break;
+                };
                 self.out.ladders[which].chosen = place;
             }
             self.out.verified.rows.clear();
             if !moves.is_empty() {
-                let Some(rows) = self.tried(count)? else { break };
+                let Some(rows) = self.tried(count)? else {
+                    break;
+                };
                 self.out.verified.rows = rows;
             }
-            let mut found = self.out.verified.rows.iter().map(|(_, _, found)| found.bound());
+            let mut found = self
+                .out
+                .verified
+                .rows
+                .iter()
+                .map(|(_, _, found)| found.bound());
             self.out.verified.is_confirmed = found.all(|bound| bound <= self.out.within);
             if self.out.verified.is_confirmed {
                 break;
@@ -60,32 +76,70 @@ impl Search<'_> {
             let plan = self.plan(&chosen, Target::Run)?;
             let coarse = turbulence(&chosen.content).unwrap_or_default();
             let fine = turbulence(&self.own.scene.content).unwrap_or_default();
-            let mut shift = Shift { shift: self.of_layers(&plan)[0], error: 0.0 };
-            if (fine.grid_points, fine.grid_spacing_m) != (coarse.grid_points, coarse.grid_spacing_m) {
+            let mut shift = Shift {
+                shift: self.of_layers(&plan)[0],
+                error: 0.0,
+            };
+            if (fine.grid_points, fine.grid_spacing_m)
+                != (coarse.grid_points, coarse.grid_spacing_m)
+            {
                 let mut on = |t| self.efficiency(&t, self.out.verified.seed, beyond_s);
-                let fine = on(RefractiveTurbulence { layers: coarse.layers, ..fine })?;
-                let (Some(fine), Some(coarse)) = (fine, on(coarse)?) else { return Ok(None) };
+                let fine = on(RefractiveTurbulence {
+                    layers: coarse.layers,
+                    ..fine
+                })?;
+                let (Some(fine), Some(coarse)) = (fine, on(coarse)?) else {
+                    return Ok(None);
+                };
                 let of_grid = coarse.shift(&fine, &fine);
-                shift = Shift { shift: shift.shift + of_grid.shift, ..of_grid };
+                shift = Shift {
+                    shift: shift.shift + of_grid.shift,
+                    ..of_grid
+                };
             }
             found.push((Figure::Efficiency, shift));
         }
         let figures = self.of_map();
         if !figures.is_empty() {
             let seed = self.out.verified.seed;
-            let seeded = |file: &SceneFile| file.with(Scene { seed, ..file.content.clone() });
+            let seeded = |file: &SceneFile| {
+                file.with(Scene {
+                    seed,
+                    ..file.content.clone()
+                })
+            };
             let scenes = [seeded(&self.fine)?, seeded(&chosen)?];
-            let Some(shown) = self.measure(&scenes, 0, count, beyond_s)? else { return Ok(None) };
-            found.extend(figures.into_iter().map(|figure| (figure, shown[1].shift(&shown[0], figure))));
+            let Some(shown) = self.measure(&scenes, 0, count, beyond_s)? else {
+                return Ok(None);
+            };
+            found.extend(
+                figures
+                    .into_iter()
+                    .map(|figure| (figure, shown[1].shift(&shown[0], figure))),
+            );
         }
-        let shift = |figure| chosen_steps(&self.out.ladders).filter_map(move |step| step.shift(figure));
+        let shift =
+            |figure| chosen_steps(&self.out.ladders).filter_map(move |step| step.shift(figure));
         let predicted = |figure| shift(figure).map(|own| own.shift).sum();
-        Ok(Some(found.into_iter().map(|(figure, found)| (figure, predicted(figure), found)).collect()))
+        Ok(Some(
+            found
+                .into_iter()
+                .map(|(figure, found)| (figure, predicted(figure), found))
+                .collect(),
+        ))
     }
 
     /// The scene with the chosen keys.
     fn chosen(&self) -> Result<SceneFile, Error> {
-        with(&self.fine, &self.out.ladders.iter().map(|ladder| (ladder.key, ladder.value())).collect::<Vec<_>>())
+        with(
+            &self.fine,
+            &self
+                .out
+                .ladders
+                .iter()
+                .map(|ladder| (ladder.key, ladder.value()))
+                .collect::<Vec<_>>(),
+        )
     }
 
     fn bound(&self, figure: Figure) -> f64 {
@@ -93,13 +147,22 @@ impl Search<'_> {
     }
 
     fn response(&self, figure: Figure) -> f64 {
-        self.out.response.iter().find(|(of, _)| *of == figure).map_or(0.0, |(_, of)| *of)
+        self.out
+            .response
+            .iter()
+            .find(|(of, _)| *of == figure)
+            .map_or(0.0, |(_, of)| *of)
     }
 
     /// What the noise asks for: realisations of the path, and of the scan with the rest of the target.
     pub(super) fn finish(&mut self, pilot: &Option<Shown>) -> Result<(), Error> {
         let (within, allowed_s) = (self.out.within, self.out.allowed_s);
-        let mut values: Vec<_> = self.out.ladders.iter().map(|ladder| (ladder.key, ladder.value())).collect();
+        let mut values: Vec<_> = self
+            .out
+            .ladders
+            .iter()
+            .map(|ladder| (ladder.key, ladder.value()))
+            .collect();
         let chosen = self.chosen()?;
         let plan = self.plan(&chosen, Target::Run)?;
         let (mut whole_s, times) = (run_s(&plan), plan.times);
@@ -107,17 +170,39 @@ impl Search<'_> {
         if let Some(scatter) = self.scatter {
             let (one, now) = (2.0 * scatter, value(&chosen.content, PATHS));
             let (each_s, fixed_s) = (times.optics_s / now, whole_s - times.optics_s);
-            let of = OfNoise { key: PATHS, now, each_s, fixed_s, least: LEAST_PATHS };
+            let of = OfNoise {
+                key: PATHS,
+                now,
+                each_s,
+                fixed_s,
+                least: LEAST_PATHS,
+            };
             let judged = self.out.figures.contains(&Figure::Efficiency);
-            let own =
-                judged.then(|| of.noise(Figure::Efficiency, one, self.bound(Figure::Efficiency), within, allowed_s));
+            let own = judged.then(|| {
+                of.noise(
+                    Figure::Efficiency,
+                    one,
+                    self.bound(Figure::Efficiency),
+                    within,
+                    allowed_s,
+                )
+            });
             // A quarter of the target of a map is for the efficiency that its signals have.
             let rest = |figure| 0.25 * within / self.response(figure);
-            let of_maps = self.of_map().into_iter().map(|figure| (one / rest(figure)).powi(2));
+            let of_maps = self
+                .of_map()
+                .into_iter()
+                .map(|figure| (one / rest(figure)).powi(2));
             // Whole pairs of antithetic pairs.
-            let needed = of_maps.chain(own.map(|own| own.needed)).fold(LEAST_PATHS, f64::max);
+            let needed = of_maps
+                .chain(own.map(|own| own.needed))
+                .fold(LEAST_PATHS, f64::max);
             let needed = (0.25 * needed).ceil() * 4.0;
-            let paths = if of.run_s(needed) <= allowed_s { needed } else { now };
+            let paths = if of.run_s(needed) <= allowed_s {
+                needed
+            } else {
+                now
+            };
             whole_s = of.run_s(paths);
             of_paths = one / paths.sqrt();
             values.push((PATHS, paths));
@@ -125,11 +210,27 @@ impl Search<'_> {
         }
         let now = value(&chosen.content, REALISATIONS);
         let scans_s = times.signals_s + times.maps_s + times.retrieval_s;
-        let of = OfNoise { key: REALISATIONS, now, each_s: scans_s / now, fixed_s: whole_s - scans_s, least: LEAST };
+        let of = OfNoise {
+            key: REALISATIONS,
+            now,
+            each_s: scans_s / now,
+            fixed_s: whole_s - scans_s,
+            least: LEAST,
+        };
         let mut realisations = None;
-        for (figure, pilot) in self.of_map().into_iter().filter_map(|figure| Some((figure, pilot.as_ref()?))) {
+        for (figure, pilot) in self
+            .of_map()
+            .into_iter()
+            .filter_map(|figure| Some((figure, pilot.as_ref()?)))
+        {
             let one = 2.0 * pilot.noise(figure) * (pilot.realisations() as f64).sqrt();
-            let noise = of.noise(figure, one, self.bound(figure) + of_paths * self.response(figure), within, allowed_s);
+            let noise = of.noise(
+                figure,
+                one,
+                self.bound(figure) + of_paths * self.response(figure),
+                within,
+                allowed_s,
+            );
             realisations = realisations.max(noise.is_reached.then_some(noise.needed as usize));
             self.out.noises.push(noise);
         }
@@ -157,8 +258,13 @@ impl OfNoise {
 
     /// Of a figure with twice the standard error `one` of one realisation, beside what the keys shift.
     fn noise(&self, figure: Figure, one: f64, keys: f64, within: f64, allowed_s: f64) -> Noise {
-        let needed = (one / (within - keys).max(0.0)).powi(2).ceil().max(self.least);
-        let most = ((allowed_s - self.fixed_s) / self.each_s).floor().max(self.least);
+        let needed = (one / (within - keys).max(0.0))
+            .powi(2)
+            .ceil()
+            .max(self.least);
+        let most = ((allowed_s - self.fixed_s) / self.each_s)
+            .floor()
+            .max(self.least);
         let forecast_s = self.run_s(needed);
         Noise {
             figure,

@@ -30,11 +30,17 @@ pub(super) fn accuracy(words: &AccuracyWords, cli: &Cli) -> Result<u8, Error> {
     let (path, request) = (words.scene.as_deref(), &words.request);
     if let Some(path) = path.filter(|path| words.preset.is_none() && !cli.is_case(path)) {
         let file = cli.scene(path)?;
-        return answer(words, cli, || Accuracy::of(&file, request, &*cli.observer()));
+        return answer(words, cli, || {
+            Accuracy::of(&file, request, &*cli.observer())
+        });
     }
     let file = case_file(path, words.preset, cli)?;
-    let file = cli.seed.map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
-    answer(words, cli, || Accuracy::of_case(&file, request, &*cli.observer()))
+    let file = cli
+        .seed
+        .map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
+    answer(words, cli, || {
+        Accuracy::of_case(&file, request, &*cli.observer())
+    })
 }
 
 fn answer<S: Subject>(
@@ -42,7 +48,9 @@ fn answer<S: Subject>(
     cli: &Cli,
     find: impl FnOnce() -> Result<Accuracy<S>, Error>,
 ) -> Result<u8, Error> {
-    words.folder.prepare(cli, |files| Accuracy::<S>::list(None, files))?;
+    words
+        .folder
+        .prepare(cli, |files| Accuracy::<S>::list(None, files))?;
     let found = find()?;
     let text = format!("{}search took {:.1} s\n", found.text(), found.took_s);
     let mut object = json!({
@@ -52,6 +60,11 @@ fn answer<S: Subject>(
     });
     object[format!("{}_hash", S::NAME)] = json!(found.of_scene);
     let of = (Default::default(), found.scene.provenance());
-    words.folder.finish(cli, of, |files| Accuracy::list(Some(&found), files), (object, text))?;
+    words.folder.finish(
+        cli,
+        of,
+        |files| Accuracy::list(Some(&found), files),
+        (object, text),
+    )?;
     Ok(u8::from(!found.is_reached()))
 }

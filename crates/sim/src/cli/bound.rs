@@ -34,7 +34,9 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     words.table.prepare(cli)?;
     let found = of_plan(&plan, &Silent)?;
     let mut text = found.text();
-    let file = words.table.write(cli, &found.table(), &plan.scene.provenance(), &mut text)?;
+    let file = words
+        .table
+        .write(cli, &found.table(), &plan.scene.provenance(), &mut text)?;
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr).objects(),
         "by_range": points(&found.by_range).objects(),
@@ -65,13 +67,18 @@ pub(super) fn budget(words: &BudgetWords, cli: &Cli) -> Result<(), Error> {
     if let Some(folder) = &words.out {
         cli.prepare(folder, &["budget.csv".into()], existing)?;
     }
-    let ranges_m = if words.range.is_empty() { scan_ranges_m(&plan.scene.content) } else { words.range.clone() };
+    let ranges_m = if words.range.is_empty() {
+        scan_ranges_m(&plan.scene.content)
+    } else {
+        words.range.clone()
+    };
     let found = Budget::new(&plan, &ranges_m, &*cli.observer())?;
     let mut text = found.text();
     let mut files = Vec::new();
     if let Some(folder) = &words.out {
         let of = (scene::Outputs::default(), plan.scene.provenance());
-        let list = |files: &mut Outputs| files.table("budget", Some(&found), |found| Ok(found.table()));
+        let list =
+            |files: &mut Outputs| files.table("budget", Some(&found), |found| Ok(found.table()));
         files = cli.write(folder, existing, of, list)?;
         text += &format!("wrote {}\n", folder.join("budget.csv").display());
     }

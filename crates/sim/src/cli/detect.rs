@@ -4,8 +4,8 @@ use super::Cli;
 use super::words::{AirWords, FolderWords, ScanWords, finite, rate, spacing, stride};
 use crate::Error;
 use crate::detection::{
-    Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test, gate_table,
-    scan_table, share_table, strided,
+    Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
+    gate_table, scan_table, share_table, strided,
 };
 use crate::io::Provenance;
 use crate::io::csv::digits;
@@ -58,7 +58,11 @@ pub(super) struct DetectWords {
 
 pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let observer = cli.observer();
-    let stated = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
+    let stated = words
+        .scene
+        .as_deref()
+        .map(|path| cli.scene(path))
+        .transpose()?;
     let (mut scans, mut notes) = (Vec::new(), Vec::new());
     for path in &words.data {
         let read = words.scans.read(path, stated.as_ref(), false)?;
@@ -70,10 +74,16 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         (stated, _) => stated,
     };
     let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;
-    let plan = still.map(|scene| Plan::new(scene, Target::Map)).transpose()?;
+    let plan = still
+        .map(|scene| Plan::new(scene, Target::Map))
+        .transpose()?;
     // The closed forms of single gates are those of noise.
-    let noisy = plan.as_ref().filter(|plan| plan.scene.content.detector.noise != NoiseModel::None);
-    words.folder.prepare(cli, |files| list(words, noisy, None, files))?;
+    let noisy = plan
+        .as_ref()
+        .filter(|plan| plan.scene.content.detector.noise != NoiseModel::None);
+    words
+        .folder
+        .prepare(cli, |files| list(words, noisy, None, files))?;
     let of_plan = plan.as_ref().map(|plan| &plan.scene.content);
     let (gate, note) = gate_of(scans.first(), words.air.gate_std, of_plan)?;
     notes.extend(note.map(str::to_owned));
@@ -83,21 +93,36 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     if let Some(plan) = &plan {
         let noise = SceneNoise::new(plan, &*observer)?;
         settings.stride = words.stride.unwrap_or(noise.stride);
-        scans.iter_mut().for_each(|scan| noise.give(&mut scan.map, scan.scans));
+        scans
+            .iter_mut()
+            .for_each(|scan| noise.give(&mut scan.map, scan.scans));
         empty = scans.is_empty().then(|| noise.empty_scan(plan));
     }
     let maps: Vec<ScanMap> = scans.iter().map(|scan| scan.map.clone()).collect();
-    let (found, mut calibration) = test(&maps, &settings, &*observer).map_err(|error| match &scans[..] {
-        [only] => Error::Input { path: only.path.clone(), reason: error.to_string() },
-        _ => error,
-    })?;
+    let (found, mut calibration) =
+        test(&maps, &settings, &*observer).map_err(|error| match &scans[..] {
+            [only] => Error::Input {
+                path: only.path.clone(),
+                reason: error.to_string(),
+            },
+            _ => error,
+        })?;
     if let Some(empty) = empty {
-        calibration = Some(Calibration::new(&strided(&empty, settings.stride), &settings, &*observer)?);
+        calibration = Some(Calibration::new(
+            &strided(&empty, settings.stride),
+            &settings,
+            &*observer,
+        )?);
     }
-    let power = calibration.map(|known| known.power(&settings, &*observer)).transpose()?;
+    let power = calibration
+        .map(|known| known.power(&settings, &*observer))
+        .transpose()?;
     let none = || Provenance::new("", "", settings.seed);
     let origin = scene.as_ref().map_or_else(none, SceneFile::provenance);
-    let holds = background(&settings, found.iter().all(|scan| scan.assumed_sigma_m_s.is_none()));
+    let holds = background(
+        &settings,
+        found.iter().all(|scan| scan.assumed_sigma_m_s.is_none()),
+    );
     let mut text = notes.clone();
     told(&scans, &found, power.as_ref(), &mut text);
     text.push(format!("the rate of false alarms holds for {holds}\n"));
@@ -112,9 +137,19 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
         "notes": notes,
     });
-    let tested = Some((&scans[..], &found[..], power.as_ref(), &*observer as &dyn Observer));
+    let tested = Some((
+        &scans[..],
+        &found[..],
+        power.as_ref(),
+        &*observer as &dyn Observer,
+    ));
     let list = |files: &mut Outputs| list(words, noisy, tested, files);
-    words.folder.finish(cli, (Default::default(), origin), list, (object, text.join("\n")))
+    words.folder.finish(
+        cli,
+        (Default::default(), origin),
+        list,
+        (object, text.join("\n")),
+    )
 }
 
 impl DetectWords {
@@ -124,7 +159,11 @@ impl DetectWords {
         let lidar_height_m = self.lidar_height.unwrap_or(height_m);
         DetectionSettings {
             false_alarm: self.false_alarm,
-            model: WakeModel { lidar_height_m, images: self.air.images, ..WakeModel::default() },
+            model: WakeModel {
+                lidar_height_m,
+                images: self.air.images,
+                ..WakeModel::default()
+            },
             gate,
             options: DetectorOptions {
                 spacing_m: self.spacing,
@@ -139,16 +178,35 @@ impl DetectWords {
 }
 
 /// Adds what people read of the scans and of the wakes that are found in scans like them.
-fn told(scans: &[ReadScan], found: &[ScanDetection], power: Option<&Power>, text: &mut Vec<String>) {
+fn told(
+    scans: &[ReadScan],
+    found: &[ScanDetection],
+    power: Option<&Power>,
+    text: &mut Vec<String>,
+) {
     for (scan, found) in scans.iter().zip(found) {
         let verdict = if found.is_wake() { "wake" } else { "no wake" };
-        let (statistic, threshold, rate) = (found.statistic.value, found.threshold, found.false_alarm);
-        let reached = if rate < 1e-12 { "less than 1e-12".into() } else { digits(rate) };
-        let mut line = format!("{} sweep {}: {verdict}; statistic {statistic:.1}, ", scan.path.display(), scan.sweep);
-        line += &format!("threshold {threshold:.1}; an empty scan reaches it with probability {reached}");
+        let (statistic, threshold, rate) =
+            (found.statistic.value, found.threshold, found.false_alarm);
+        let reached = if rate < 1e-12 {
+            "less than 1e-12".into()
+        } else {
+            digits(rate)
+        };
+        let mut line = format!(
+            "{} sweep {}: {verdict}; statistic {statistic:.1}, ",
+            scan.path.display(),
+            scan.sweep
+        );
+        line += &format!(
+            "threshold {threshold:.1}; an empty scan reaches it with probability {reached}"
+        );
         text.push(line);
         if let Some(sigma_m_s) = found.assumed_sigma_m_s {
-            text.push(format!("  no deviations are stated: {} m/s is taken for all", digits(sigma_m_s)));
+            text.push(format!(
+                "  no deviations are stated: {} m/s is taken for all",
+                digits(sigma_m_s)
+            ));
         }
         if found.is_correlated() {
             let (along, across) = found.statistic.neighbour_correlation;
@@ -161,30 +219,58 @@ fn told(scans: &[ReadScan], found: &[ScanDetection], power: Option<&Power>, text
     if let Some(power) = power {
         let ((mu, beta), (measured, foretold)) = (power.gumbel, power.smallest_m2_s);
         let (threshold, rate) = (power.threshold, power.false_alarm);
-        let doubt = if (1.5..2.6).contains(&beta) { "" } else { " (should be near 2: is the noise what was stated?)" };
+        let doubt = if (1.5..2.6).contains(&beta) {
+            ""
+        } else {
+            " (should be near 2: is the noise what was stated?)"
+        };
         let law = format!("Gumbel's mu {mu:.2}, beta {beta:.2}{doubt}");
-        text.push(format!("threshold {threshold:.2} for {rate} false alarms a scan; {law}"));
+        text.push(format!(
+            "threshold {threshold:.2} for {rate} false alarms a scan; {law}"
+        ));
         let (error, bound) = (power.smallest_error_m2_s, power.circulation_std_m2_s);
         let by_bound = format!("the bound of {bound:.2} m^2/s foretells {foretold:.1}");
-        text.push(format!("circulation found nine times in ten: {measured:.1} +- {error:.1} m^2/s ({by_bound})"));
+        text.push(format!(
+            "circulation found nine times in ten: {measured:.1} +- {error:.1} m^2/s ({by_bound})"
+        ));
     }
 }
 
 /// Scans, what was found in them, how often wakes are found, and who is told of what is computed for the files alone.
-type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>, &'t dyn Observer);
+type Tested<'t> = (
+    &'t [ReadScan],
+    &'t [ScanDetection],
+    Option<&'t Power>,
+    &'t dyn Observer,
+);
 
 /// The files, whose content is not there before the tests; those of single gates for a plan with noise.
-fn list(words: &DetectWords, noisy: Option<&Plan>, of: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
+fn list(
+    words: &DetectWords,
+    noisy: Option<&Plan>,
+    of: Option<Tested<'_>>,
+    files: &mut Outputs,
+) -> Result<(), Error> {
     if !words.data.is_empty() {
-        files.table("detection", of.as_ref(), |(scans, found, ..)| Ok(scan_table(scans, found)))?;
+        files.table("detection", of.as_ref(), |(scans, found, ..)| {
+            Ok(scan_table(scans, found))
+        })?;
     }
     let power = of.and_then(|(_, _, power, _)| power);
-    files.table("detection_power", power, |power| Ok(share_table(power, &power.found, true)))?;
-    files.table("detection_roc", power, |power| Ok(share_table(power, &power.roc, false)))?;
+    files.table("detection_power", power, |power| {
+        Ok(share_table(power, &power.found, true))
+    })?;
+    files.table("detection_roc", power, |power| {
+        Ok(share_table(power, &power.roc, false))
+    })?;
     #[cfg(feature = "plots")]
-    files.figure("detection", power, |power| Ok(crate::detection::picture(power)))?;
+    files.figure("detection", power, |power| {
+        Ok(crate::detection::picture(power))
+    })?;
     if let Some(plan) = noisy {
-        files.table("detection_gates", of.as_ref(), |(.., observer)| gate_table(plan, words.false_alarm, *observer))?;
+        files.table("detection_gates", of.as_ref(), |(.., observer)| {
+            gate_table(plan, words.false_alarm, *observer)
+        })?;
     }
     Ok(())
 }

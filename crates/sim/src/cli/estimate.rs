@@ -4,7 +4,9 @@ use super::Cli;
 use super::words::{FolderWords, noise, positive};
 use crate::Error;
 use crate::io::raw::{RawFormat, RawRecords};
-use crate::measure::recorded::{self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape};
+use crate::measure::recorded::{
+    self, NoiseLevel, RayTable, Recorded, RecordedOptions, record_shape,
+};
 use crate::plan::Plan;
 use crate::write;
 use clap::Args;
@@ -46,13 +48,25 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     records.scale = words.scale;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
     let (plan, is_own) = recorded::plan(scene, &records)?;
-    words.folder.prepare_names(cli, &write::recorded_names(&plan)?)?;
-    let options = RecordedOptions { rays, noise: words.noise, spectra: words.spectra, block_bytes: None };
+    words
+        .folder
+        .prepare_names(cli, &write::recorded_names(&plan)?)?;
+    let options = RecordedOptions {
+        rays,
+        noise: words.noise,
+        spectra: words.spectra,
+        block_bytes: None,
+    };
     let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
     let (text, results) = told(&plan, &found, records.records);
     let of = (plan.scene.content.outputs, plan.scene.provenance());
     let object = json!({ "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results });
-    words.folder.finish(cli, of, |files| write::list_recorded(&plan, found, files), (object, text))
+    words.folder.finish(
+        cli,
+        of,
+        |files| write::list_recorded(&plan, found, files),
+        (object, text),
+    )
 }
 
 /// The result in a few numbers.
@@ -64,12 +78,18 @@ fn told(plan: &Plan, found: &Recorded, records: usize) -> (String, serde_json::V
                 "{records} records of {scans} scans of this scene: the map has the truth of its flow beside it\n"
             );
             let cells = map.v_mean_m_s.len();
-            (text, json!({ "records": records, "scans": scans, "gates": cells, "truth": true }))
+            (
+                text,
+                json!({ "records": records, "scans": scans, "gates": cells, "truth": true }),
+            )
         }
         Recorded::Measured { scans, .. } => {
             let gates: usize = scans.iter().map(|scan| scan.velocity_m_s.len()).sum();
             let flagged: f64 = scans.iter().map(|scan| scan.flagged.sum()).sum();
-            let lines: usize = scans.iter().map(|scan| scan.lines.elevation_rad.len()).sum();
+            let lines: usize = scans
+                .iter()
+                .map(|scan| scan.lines.elevation_rad.len())
+                .sum();
             let fraction = flagged / gates.max(1) as f64;
             let text = format!(
                 "{records} records: {} scans of {lines} lines together\nfraction of flagged estimates {fraction:.4}\n",

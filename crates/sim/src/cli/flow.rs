@@ -6,7 +6,8 @@ use crate::Error;
 #[cfg(feature = "plots")]
 use crate::flow::FinishedWake;
 use crate::flow::{
-    Begin, CaseFile, CaseKind, EXAMPLES, FlowOutcome, RunOptions, WakePreset, check_on, example, run_on,
+    Begin, CaseFile, CaseKind, EXAMPLES, FlowOutcome, RunOptions, WakePreset, check_on, example,
+    run_on,
 };
 use crate::setup::progress::{Observer, Silent};
 use clap::Args;
@@ -68,10 +69,16 @@ pub(super) struct RunWords {
 
 pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
     if let Some(text) = words.example.as_deref().and_then(example) {
-        return if ranks.rank() == 0 { cli.print(text) } else { Ok(()) };
+        return if ranks.rank() == 0 {
+            cli.print(text)
+        } else {
+            Ok(())
+        };
     }
     // The words were checked: without an example there is a case.
-    let Some(case) = &words.case else { return Ok(()) };
+    let Some(case) = &words.case else {
+        return Ok(());
+    };
     simulate(cli.case(case, None)?, &words.run, cli, ranks)
 }
 
@@ -79,25 +86,47 @@ pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
     let file = case_file(words.case.as_deref(), words.preset, cli)?;
     if !matches!(file.content.case, CaseKind::Wake(_)) {
         let path = words.case.clone().unwrap_or_default();
-        return Err(Error::Input { path, reason: "case.kind is not \"wake\": wakescope flow runs it".into() });
+        return Err(Error::Input {
+            path,
+            reason: "case.kind is not \"wake\": wakescope flow runs it".into(),
+        });
     }
     if words.print {
-        let file = cli.seed.map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
-        return if ranks.rank() == 0 { cli.print(&file.toml) } else { Ok(()) };
+        let file = cli
+            .seed
+            .map_or(Ok(file.clone()), |seed| file.with_seed(seed))?;
+        return if ranks.rank() == 0 {
+            cli.print(&file.toml)
+        } else {
+            Ok(())
+        };
     }
     simulate(file, &words.run, cli, ranks)
 }
 
 /// A case file, a preset, or the one over the other; the coarse preset without either.
-pub(super) fn case_file(path: Option<&Path>, preset: Option<WakePreset>, cli: &Cli) -> Result<CaseFile, Error> {
+pub(super) fn case_file(
+    path: Option<&Path>,
+    preset: Option<WakePreset>,
+    cli: &Cli,
+) -> Result<CaseFile, Error> {
     match path {
         Some(path) => cli.case(path, preset),
-        None => Ok(CaseFile::parse_over(preset.or(Some(WakePreset::Coarse)), "", Path::new("preset"))?),
+        None => Ok(CaseFile::parse_over(
+            preset.or(Some(WakePreset::Coarse)),
+            "",
+            Path::new("preset"),
+        )?),
     }
 }
 
 /// Runs a case and says what came of it, on rank 0.
-fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {
+fn simulate(
+    mut file: CaseFile,
+    words: &RunWords,
+    cli: &Cli,
+    ranks: &Arc<dyn Ranks>,
+) -> Result<(), Error> {
     let is_first = ranks.rank() == 0;
     if let Some(end) = words.end {
         file = file.with_end(end)?;
@@ -110,22 +139,38 @@ fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ran
         (_, true) => Begin::Overwrite,
         _ => Begin::New,
     };
-    let options = RunOptions { begin, allow_large: words.allow_large };
+    let options = RunOptions {
+        begin,
+        allow_large: words.allow_large,
+    };
     if words.check {
         if !is_first {
             return Ok(());
         }
         let forecast = check_on(ranks, &file, words.out.as_deref(), options)?;
-        forecast.notes.iter().for_each(|text| cli.observer().warn(text));
+        forecast
+            .notes
+            .iter()
+            .for_each(|text| cli.observer().warn(text));
         let mut object = json!(forecast);
         object["version"] = crate::VERSION.into();
         return cli.say(&object, &format!("good\n{forecast}"));
     }
     let Some(out) = &words.out else {
-        return Err(Error::Input { path: "--out DIR".into(), reason: "a run needs a folder to write to".into() });
+        return Err(Error::Input {
+            path: "--out DIR".into(),
+            reason: "a run needs a folder to write to".into(),
+        });
     };
-    let observer: Arc<dyn Observer> = if is_first { cli.observer() } else { Arc::new(Silent) };
-    #[cfg_attr(not(feature = "plots"), expect(unused_mut, reason = "there is nothing to draw with"))]
+    let observer: Arc<dyn Observer> = if is_first {
+        cli.observer()
+    } else {
+        Arc::new(Silent)
+    };
+    #[cfg_attr(
+        not(feature = "plots"),
+        expect(unused_mut, reason = "there is nothing to draw with")
+    )]
     let mut outcome = run_on(ranks, &file, out, options, &*observer)?;
     if !is_first {
         return Ok(());
@@ -142,28 +187,57 @@ fn simulate(mut file: CaseFile, words: &RunWords, cli: &Cli, ranks: &Arc<dyn Ran
             }
         }
     }
-    let FlowOutcome { steps, time_s, is_complete, kinetic_energy_m5_s2, relative_divergence, stepping, .. } = outcome;
+    let FlowOutcome {
+        steps,
+        time_s,
+        is_complete,
+        kinetic_energy_m5_s2,
+        relative_divergence,
+        stepping,
+        ..
+    } = outcome;
     let object = json!({
         "version": crate::VERSION, "case_hash": file.hash, "steps": steps, "time_s": time_s, "is_complete": is_complete,
         "kinetic_energy_m5_s2": kinetic_energy_m5_s2, "relative_divergence": relative_divergence, "steps_wall_s": stepping.wall_s,
         "exchange_wall_s": stepping.exchange_s, "files": paths(&outcome.files), "warnings": outcome.warnings,
     });
-    let state = if is_complete { "done" } else { "paused, --restart continues it" };
-    let mut text = format!("{state}: step {steps}, t = {time_s:?} s, energy {kinetic_energy_m5_s2:.6e} m^5/s^2, ");
+    let state = if is_complete {
+        "done"
+    } else {
+        "paused, --restart continues it"
+    };
+    let mut text = format!(
+        "{state}: step {steps}, t = {time_s:?} s, energy {kinetic_energy_m5_s2:.6e} m^5/s^2, "
+    );
     text += &format!("relative divergence {relative_divergence:.1e}\n");
     if ranks.count() > 1 {
         let share = 100.0 * stepping.exchange_s / stepping.wall_s;
-        text += &format!("steps took {:.1} s, {share:.1} % of it in turns and halos\n", stepping.wall_s);
+        text += &format!(
+            "steps took {:.1} s, {share:.1} % of it in turns and halos\n",
+            stepping.wall_s
+        );
     }
-    cli.say(&object, &format!("{text}wrote {} files to {}", outcome.files.len(), out.display()))
+    cli.say(
+        &object,
+        &format!(
+            "{text}wrote {} files to {}",
+            outcome.files.len(),
+            out.display()
+        ),
+    )
 }
 
 /// What Open MPI and MPICH (with its relatives) tell each process of their number.
 const COUNTS: [&str; 2] = ["OMPI_COMM_WORLD_SIZE", "PMI_SIZE"];
 
 /// Runs `work` on the processes that share it. Where it fails, rank 0 alone says so, and all end.
-pub(super) fn ranked(cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
-    let started = COUNTS.iter().find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());
+pub(super) fn ranked(
+    cli: &Cli,
+    work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>,
+) -> Result<(), Error> {
+    let started = COUNTS
+        .iter()
+        .find_map(|name| std::env::var(name).ok()?.parse::<usize>().ok());
     match started.filter(|count| *count > 1) {
         None => work(&(Arc::new(Single) as Arc<dyn Ranks>)),
         Some(count) => on_processes(count, cli, work),
@@ -171,21 +245,35 @@ pub(super) fn ranked(cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(),
 }
 
 #[cfg(feature = "mpi")]
-fn on_processes(_: usize, cli: &Cli, work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
+fn on_processes(
+    _: usize,
+    cli: &Cli,
+    work: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>,
+) -> Result<(), Error> {
     let world = crate::processes::World::join()?;
     let ranks = world.ranks();
     if ranks.rank() == 0 && !cli.quiet {
         use std::io::Write as _;
         let (count, threads) = (ranks.count(), rayon::current_num_threads());
-        let _ = writeln!(std::io::stderr(), "{count} ranks; threads of the first: {threads}");
+        let _ = writeln!(
+            std::io::stderr(),
+            "{count} ranks; threads of the first: {threads}"
+        );
     }
     work(&ranks).or_else(|error| world.fail(|| super::output::complain(&error, cli.json)))
 }
 
 #[cfg(not(feature = "mpi"))]
-fn on_processes(count: usize, _: &Cli, _: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>) -> Result<(), Error> {
+fn on_processes(
+    count: usize,
+    _: &Cli,
+    _: impl FnOnce(&Arc<dyn Ranks>) -> Result<(), Error>,
+) -> Result<(), Error> {
     let reason = format!(
         "{count} processes were started, but this build shares no flow among them: build with `--features mpi`, or start one"
     );
-    Err(Error::Input { path: "mpirun".into(), reason })
+    Err(Error::Input {
+        path: "mpirun".into(),
+        reason,
+    })
 }

@@ -57,8 +57,17 @@ pub struct Refusal(pub Value);
 impl Refusal {
     /// For a value that is not allowed.
     pub fn of(problem: Problem) -> Self {
-        let problems = vec![Located { problem, line: None }];
-        Self(as_object(&SceneError::Invalid { path: "scene".into(), problems }.into()))
+        let problems = vec![Located {
+            problem,
+            line: None,
+        }];
+        Self(as_object(
+            &SceneError::Invalid {
+                path: "scene".into(),
+                problems,
+            }
+            .into(),
+        ))
     }
 }
 
@@ -81,13 +90,21 @@ pub(super) struct Call {
 /// # Errors
 /// Words that the command line does not know, and whatever the command refuses; [`Error::Stopped`] where the observer stopped it.
 pub fn call(words: &[OsString], host: Host) -> Result<Answer, Refusal> {
-    let words = [OsString::from("wakescope")].into_iter().chain(words.iter().cloned());
+    let words = [OsString::from("wakescope")]
+        .into_iter()
+        .chain(words.iter().cloned());
     let mut cli = Cli::try_parse_from(words).map_err(|error| Refusal(explained(&error)))?;
-    let call = Arc::new(Call { host, answer: Mutex::default() });
+    let call = Arc::new(Call {
+        host,
+        answer: Mutex::default(),
+    });
     (cli.quiet, cli.json, cli.call) = (true, true, Some(call.clone()));
     let done = stoppable(|| with_threads(&cli, || dispatch(&cli)).flatten());
     let code = done.map_err(|error| refusal(error, call.host.texts.is_empty()))?;
-    Ok(Answer { code, ..std::mem::take(&mut *call.answer()) })
+    Ok(Answer {
+        code,
+        ..std::mem::take(&mut *call.answer())
+    })
 }
 
 impl Call {
@@ -122,15 +139,24 @@ impl Cli {
 
     /// Gives a text as it is.
     pub(super) fn print(&self, text: &str) -> Result<(), Error> {
-        let Some(call) = &self.call else { return print(text) };
+        let Some(call) = &self.call else {
+            return print(text);
+        };
         text.clone_into(&mut call.answer().text);
         Ok(())
     }
 
     /// The text of a scene or a case: what the program that called has for its path, else that of the file.
     fn text(&self, path: &Path) -> Result<Cow<'_, str>, SceneError> {
-        let unreadable = |source| SceneError::Unreadable { path: path.to_owned(), source };
-        match self.call.as_ref().and_then(|call| call.host.texts.get(path)) {
+        let unreadable = |source| SceneError::Unreadable {
+            path: path.to_owned(),
+            source,
+        };
+        match self
+            .call
+            .as_ref()
+            .and_then(|call| call.host.texts.get(path))
+        {
             Some(text) => Ok(text.into()),
             None => text_file::read(path).map(Cow::Owned).map_err(unreadable),
         }
@@ -140,7 +166,10 @@ impl Cli {
     pub(super) fn scene(&self, path: &Path) -> Result<SceneFile, Error> {
         let file = SceneFile::parse(&self.text(path)?, path)?;
         match self.seed {
-            Some(seed) => Ok(file.with(crate::scene::Scene { seed, ..file.content.clone() })?),
+            Some(seed) => Ok(file.with(crate::scene::Scene {
+                seed,
+                ..file.content.clone()
+            })?),
             None => Ok(file),
         }
     }
@@ -163,7 +192,13 @@ impl Cli {
 
     /// The signals that a path stands for, where the program that called gave them.
     pub(super) fn signals(&self, path: &Path) -> Option<RawRecords> {
-        let mut held = self.call.as_ref()?.host.signals.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut held = self
+            .call
+            .as_ref()?
+            .host
+            .signals
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
         held.take_if(|records| records.path == path)
     }
 
@@ -172,8 +207,17 @@ impl Cli {
     }
 
     /// Finds out whether files of these names can be written to a folder.
-    pub(super) fn prepare(&self, folder: &Path, names: &[String], existing: Existing) -> Result<(), Error> {
-        if self.keeper().is_some() { Ok(()) } else { outputs::prepare(folder, names, existing, true) }
+    pub(super) fn prepare(
+        &self,
+        folder: &Path,
+        names: &[String],
+        existing: Existing,
+    ) -> Result<(), Error> {
+        if self.keeper().is_some() {
+            Ok(())
+        } else {
+            outputs::prepare(folder, names, existing, true)
+        }
     }
 
     /// Writes the files of a list to a folder, or keeps them; returns their paths.
@@ -184,7 +228,9 @@ impl Cli {
         of: (Formats, Provenance),
         list: impl List,
     ) -> Result<Vec<PathBuf>, Error> {
-        let Some(call) = self.keeper() else { return Outputs::write(folder, existing, of, list) };
+        let Some(call) = self.keeper() else {
+            return Outputs::write(folder, existing, of, list);
+        };
         let files = Outputs::contents(of.0, Some(of.1), list)?;
         let names = files.iter().map(|(name, _)| name.into()).collect();
         call.answer().files.extend(files);
@@ -193,14 +239,25 @@ impl Cli {
 
     /// Finds out whether a file can be written.
     pub(super) fn prepare_one(&self, path: &Path, existing: Existing) -> Result<(), Error> {
-        let name = path.file_name().and_then(|name| name.to_str()).filter(|_| self.keeper().is_none());
-        Ok(refuse_foreign(path.parent().unwrap_or(Path::new("")), name, existing)?)
+        let name = path
+            .file_name()
+            .and_then(|name| name.to_str())
+            .filter(|_| self.keeper().is_none());
+        Ok(refuse_foreign(
+            path.parent().unwrap_or(Path::new("")),
+            name,
+            existing,
+        )?)
     }
 
     /// Writes a file, or keeps it.
     pub(super) fn write_one(&self, path: &Path, content: String) -> Result<(), Error> {
-        let Some(call) = self.keeper() else { return Ok(write_atomic(path, content)?) };
-        call.answer().files.push((path.display().to_string(), content.into()));
+        let Some(call) = self.keeper() else {
+            return Ok(write_atomic(path, content)?);
+        };
+        call.answer()
+            .files
+            .push((path.display().to_string(), content.into()));
         Ok(())
     }
 }

@@ -152,7 +152,11 @@ pub fn main(words: impl IntoIterator<Item = OsString>) -> u8 {
 fn dispatch(cli: &Cli) -> Result<u8, Error> {
     match &cli.command {
         Command::Accuracy(words) => return accuracy::accuracy(words, cli),
-        Command::Init { scene, force, preset } => init(scene, *force, preset.as_deref(), cli),
+        Command::Init {
+            scene,
+            force,
+            preset,
+        } => init(scene, *force, preset.as_deref(), cli),
         Command::Check(words) => check(words, cli),
         Command::Run(io) => execute(io, Target::Run, cli),
         Command::Efficiency(io) => execute(io, Target::Efficiency, cli),
@@ -172,14 +176,23 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
 }
 
 fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(), Error> {
-    let mut text = preset.and_then(preset_toml).unwrap_or_else(|| TABLE2_TOML.to_owned());
+    let mut text = preset
+        .and_then(preset_toml)
+        .unwrap_or_else(|| TABLE2_TOML.to_owned());
     if let Some(seed) = cli.seed {
         text = text.replacen("seed = 1 ", &format!("seed = {seed} "), 1);
     }
     SceneFile::parse(&text, path)?;
     if !force && path.exists() {
-        let source = std::io::Error::new(std::io::ErrorKind::AlreadyExists, "it exists; --force replaces it");
-        return Err(Error::Io { action: "write", path: path.to_owned(), source });
+        let source = std::io::Error::new(
+            std::io::ErrorKind::AlreadyExists,
+            "it exists; --force replaces it",
+        );
+        return Err(Error::Io {
+            action: "write",
+            path: path.to_owned(),
+            source,
+        });
     }
     crate::io::write_atomic(path, text.as_bytes())?;
     let text = format!("wrote {}\nnext: wakescope check {0}", path.display());
@@ -187,8 +200,7 @@ fn init(path: &Path, force: bool, preset: Option<&str>, cli: &Cli) -> Result<(),
 }
 
 /// What the ratio of a check lacks where phase screens make the efficiency.
-const AS_ON_INDEPENDENT_PATHS: &str =
-    "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says";
+const AS_ON_INDEPENDENT_PATHS: &str = "; turbulence as on independent paths: one path out and back returns more, by as much as wakescope budget says";
 
 fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let plan = planned(&words.scene, Target::Run, words.allow_large, cli)?;
@@ -208,12 +220,24 @@ fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     // What only phase screens could tell is not told.
     let is_less = plan.runs(Stage::PhaseScreens) && model(&plan.scene.content) == Model::MonteCarlo;
     let mut object = plan_json(&plan);
-    object["budget"] = json!({ "range_m": ranges_m, "snr_db": snr_db, "independent_paths": is_less });
+    object["budget"] =
+        json!({ "range_m": ranges_m, "snr_db": snr_db, "independent_paths": is_less });
     let screens = if is_less { AS_ON_INDEPENDENT_PATHS } else { "" };
-    let ranges = ranges_m.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-    let ratios = snr_db.iter().map(|db| format!("{db:.2}")).collect::<Vec<_>>().join(", ");
+    let ranges = ranges_m
+        .iter()
+        .map(f64::to_string)
+        .collect::<Vec<_>>()
+        .join(", ");
+    let ratios = snr_db
+        .iter()
+        .map(|db| format!("{db:.2}"))
+        .collect::<Vec<_>>()
+        .join(", ");
     let short = format!("SNR in the band, one pulse, at {ranges} m: {ratios} dB{screens}");
-    cli.say(&object, &format!("{}: good\n{plan}  {short}\n", words.scene.display()))
+    cli.say(
+        &object,
+        &format!("{}: good\n{plan}  {short}\n", words.scene.display()),
+    )
 }
 
 /// The plan of a scene, with all that can be known before the computing: limits, memory.
@@ -233,8 +257,14 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
     }
     let outcome = run::run(&plan, &*cli.observer())?;
     let summary = outcome.summary();
-    let mut text: String = summary.iter().map(|(_, text, value)| format!("{text:<44} {}\n", digits(*value))).collect();
-    let values: serde_json::Map<_, _> = summary.iter().map(|(key, _, value)| ((*key).into(), json!(value))).collect();
+    let mut text: String = summary
+        .iter()
+        .map(|(_, text, value)| format!("{text:<44} {}\n", digits(*value)))
+        .collect();
+    let values: serde_json::Map<_, _> = summary
+        .iter()
+        .map(|(key, _, value)| ((*key).into(), json!(value)))
+        .collect();
     let mut object = plan_json(&plan);
     object["results"] = Value::Object(values);
     if let Some(retrieval) = &outcome.retrieval {
@@ -245,13 +275,21 @@ fn execute(io: &Io, target: Target, cli: &Cli) -> Result<(), Error> {
         object["retrieval"] = json!({ "errors": errors.objects(), "detected": detected });
     }
     let of = (plan.scene.content.outputs, plan.scene.provenance());
-    io.folder.finish(cli, of, |files| write::list(&plan, &outcome, files), (object, text))
+    io.folder.finish(
+        cli,
+        of,
+        |files| write::list(&plan, &outcome, files),
+        (object, text),
+    )
 }
 
 fn with_threads<T: Send>(cli: &Cli, work: impl FnOnce() -> T + Send) -> Result<T, Error> {
     let threads = usize::from(cli.threads.unwrap_or(0));
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let pool = pool.map_err(|e| Error::Threads { threads, reason: e.to_string() })?;
+    let pool = pool.map_err(|e| Error::Threads {
+        threads,
+        reason: e.to_string(),
+    })?;
     Ok(pool.install(work))
 }
 

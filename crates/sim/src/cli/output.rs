@@ -19,7 +19,11 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
             // Results are printed last.
             let told = format!("{source}; the files of this command are in place");
             let source = std::io::Error::new(source.kind(), told);
-            Err(Error::Io { action: "write to", path: "standard output".into(), source })
+            Err(Error::Io {
+                action: "write to",
+                path: "standard output".into(),
+                source,
+            })
         }
         _ => Ok(()),
     }
@@ -27,12 +31,19 @@ pub(super) fn print(text: &str) -> Result<(), Error> {
 
 /// Paths for an object, whatever bytes their names are of.
 pub(super) fn paths<P: AsRef<Path>>(paths: &[P]) -> Vec<String> {
-    paths.iter().map(|path| path.as_ref().display().to_string()).collect()
+    paths
+        .iter()
+        .map(|path| path.as_ref().display().to_string())
+        .collect()
 }
 
 /// Prints an error to standard error; nothing can be done where that fails.
 pub(super) fn complain(error: &Error, as_json: bool) {
-    let text = if as_json { format!("{:#}", as_object(error)) } else { format!("error: {error}") };
+    let text = if as_json {
+        format!("{:#}", as_object(error))
+    } else {
+        format!("error: {error}")
+    };
     let _ = writeln!(std::io::stderr(), "{text}");
 }
 
@@ -70,15 +81,25 @@ pub(super) fn as_object(error: &Error) -> Value {
 
 fn problems(error: &Error) -> Vec<Value> {
     let object = |file: &Path, line: Option<usize>, [key, value]: [Value; 2], allowed: &str| json!({ "file": file.to_string_lossy(), "line": line, "key": key, "value": value, "allowed": allowed });
-    let problem = |file: &Path, line, allowed: &str| object(file, line, [Value::Null, Value::Null], allowed);
+    let problem =
+        |file: &Path, line, allowed: &str| object(file, line, [Value::Null, Value::Null], allowed);
     match error {
         Error::Scene(SceneError::Invalid { path, problems }) => {
             let of = |Located { problem, line }: &Located| {
-                object(path, *line, [json!(problem.key), json!(problem.value)], &problem.allowed)
+                object(
+                    path,
+                    *line,
+                    [json!(problem.key), json!(problem.value)],
+                    &problem.allowed,
+                )
             };
             problems.iter().map(of).collect()
         }
-        Error::Scene(SceneError::Malformed { path, line, message }) => vec![problem(path, Some(*line), message)],
+        Error::Scene(SceneError::Malformed {
+            path,
+            line,
+            message,
+        }) => vec![problem(path, Some(*line), message)],
         Error::Input { path, reason } => vec![problem(path, None, reason)],
         Error::Scene(SceneError::Unreadable { path, source }) | Error::Io { path, source, .. } => {
             vec![problem(path, None, &source.to_string())]
@@ -86,7 +107,9 @@ fn problems(error: &Error) -> Vec<Value> {
         Error::Case { source, .. } => problems(source),
         Error::OfKey { key, source } => {
             let mut found = problems(source);
-            found.iter_mut().for_each(|problem| problem["key"] = json!(key));
+            found
+                .iter_mut()
+                .for_each(|problem| problem["key"] = json!(key));
             found
         }
         _ => Vec::new(),

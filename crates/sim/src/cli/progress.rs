@@ -14,14 +14,22 @@ pub(super) struct Bars {
 
 impl Bars {
     pub(super) fn new() -> Self {
-        let template = "  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}";
-        let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
-        Self { style: style.progress_chars("=> "), stages: Mutex::default() }
+        let template =
+            "  {prefix:<16} [{bar:32}] {percent:>3} %  {elapsed} gone, {eta} left  {msg}";
+        let style =
+            ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+        Self {
+            style: style.progress_chars("=> "),
+            stages: Mutex::default(),
+        }
     }
 
     fn with(&self, act: impl FnOnce(&mut Vec<ProgressBar>)) {
         // A panic elsewhere cannot leave a bar in a bad state.
-        act(&mut self.stages.lock().unwrap_or_else(std::sync::PoisonError::into_inner));
+        act(&mut self
+            .stages
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner));
     }
 }
 
@@ -32,7 +40,11 @@ impl Observer for Bars {
 
     fn begin(&self, stage: Stage, steps: u64) {
         self.with(|stages| {
-            let bar = if stages.is_empty() { ProgressBar::new(steps) } else { ProgressBar::hidden() };
+            let bar = if stages.is_empty() {
+                ProgressBar::new(steps)
+            } else {
+                ProgressBar::hidden()
+            };
             let bar = bar.with_style(self.style.clone()).with_prefix(stage.name());
             // A stage that does not come to its end stays where it is.
             stages.push(bar.with_finish(ProgressFinish::Abandon));
@@ -40,11 +52,23 @@ impl Observer for Bars {
     }
 
     fn advance(&self, steps: u64) {
-        self.with(|stages| stages.iter().last().into_iter().for_each(|bar| bar.inc(steps)));
+        self.with(|stages| {
+            stages
+                .iter()
+                .last()
+                .into_iter()
+                .for_each(|bar| bar.inc(steps))
+        });
     }
 
     fn reach(&self, text: &str) {
-        self.with(|stages| stages.iter().last().into_iter().for_each(|bar| bar.set_message(text.to_owned())));
+        self.with(|stages| {
+            stages
+                .iter()
+                .last()
+                .into_iter()
+                .for_each(|bar| bar.set_message(text.to_owned()))
+        });
     }
 
     fn end(&self) {

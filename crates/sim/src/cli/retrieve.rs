@@ -1,7 +1,9 @@
 //! `wakescope retrieve`: vortices from scans, maps of any instrument or signals of a scene.
 
 use super::Cli;
-use super::words::{AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch};
+use super::words::{
+    AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch,
+};
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
@@ -15,7 +17,9 @@ use crate::{Error, SPEED_OF_LIGHT_M_S};
 use clap::{ArgAction, Args};
 use serde_json::json;
 use std::path::{Path, PathBuf};
-use wakescope_estimate::retrieval::{Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track};
+use wakescope_estimate::retrieval::{
+    Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track,
+};
 use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Secondary, Wake};
 
 /// Words of `wakescope retrieve`.
@@ -93,32 +97,57 @@ impl RetrieveWords {
         options.model.lidar_height_m = self.lidar_height.unwrap_or(options.model.lidar_height_m);
         options.secondary = self.secondary.unwrap_or(options.secondary);
         let (covariance, movement, threshold) = (self.covariance, self.motion, self.threshold);
-        RetrievalOptions { turbulence: self.air.turbulence, covariance, movement, threshold, ..options }
+        RetrievalOptions {
+            turbulence: self.air.turbulence,
+            covariance,
+            movement,
+            threshold,
+            ..options
+        }
     }
 
     /// A scene with what is stated, else with what the file says, else with the defaults, at a high signal-to-noise ratio.
     fn stated_scene(&self, scan: &ReadScan) -> Result<SceneFile, Error> {
-        let mut text = String::from("detector.snr.reference = \"fixed\"\ndetector.snr.snr_db = 10.0\n");
+        let mut text =
+            String::from("detector.snr.reference = \"fixed\"\ndetector.snr.snr_db = 10.0\n");
         let mut state = |key: &str, value: Option<String>| {
             text.extend(value.map(|value| format!("{key} = {value}\n")));
         };
         let word = |word: &str| Some(format!("{word:?}"));
         let number = |value: f64| Some(format!("{value:?}"));
-        state("pulse.shape.duration_s", self.pulse.or(scan.pulse_width_s).and_then(number));
+        state(
+            "pulse.shape.duration_s",
+            self.pulse.or(scan.pulse_width_s).and_then(number),
+        );
         if let Some(method) = &self.estimator {
-            let gate_s = scan.gate_length_m.map(|length_m| 2.0 * length_m / SPEED_OF_LIGHT_M_S);
-            let samples = |seconds: f64| Some(((seconds * WIDE_HZ).round().max(1.0) as u64).to_string());
+            let gate_s = scan
+                .gate_length_m
+                .map(|length_m| 2.0 * length_m / SPEED_OF_LIGHT_M_S);
+            let samples =
+                |seconds: f64| Some(((seconds * WIDE_HZ).round().max(1.0) as u64).to_string());
             state("estimator.method.kind", word(method));
-            state("estimator.window_samples", self.window.or(gate_s).and_then(samples));
-            state("estimator.weighting", word(self.weighting.as_deref().unwrap_or("rectangular")));
+            state(
+                "estimator.window_samples",
+                self.window.or(gate_s).and_then(samples),
+            );
+            state(
+                "estimator.weighting",
+                word(self.weighting.as_deref().unwrap_or("rectangular")),
+            );
             // Gates of one line each, and a band that is wide enough for all instruments.
-            state(Estimator::RADIUS, number(0.0).filter(|_| method != "periodogram"));
+            state(
+                Estimator::RADIUS,
+                number(0.0).filter(|_| method != "periodogram"),
+            );
             state("estimator.padded_samples", Some("4096".into()));
             state("detector.sampling_hz", number(WIDE_HZ));
             state("detector.intermediate_frequency_hz", number(0.25 * WIDE_HZ));
             state("detector.bandwidth_hz", number(0.4 * WIDE_HZ));
         }
-        Ok(SceneFile::parse(&text, Path::new("what --estimator, --pulse, --window and --weighting state"))?)
+        Ok(SceneFile::parse(
+            &text,
+            Path::new("what --estimator, --pulse, --window and --weighting state"),
+        )?)
     }
 }
 
@@ -132,30 +161,59 @@ struct Found {
 }
 
 pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
-    let stated = words.scene.as_deref().map(|path| cli.scene(path)).transpose()?;
+    let stated = words
+        .scene
+        .as_deref()
+        .map(|path| cli.scene(path))
+        .transpose()?;
     let observer = cli.observer();
     // The files, and the scene of each scan, where one is known.
     let (mut inputs, mut scenes) = (Vec::new(), Vec::<Option<SceneFile>>::new());
     for path in &words.data {
         if matches!(words.method, Method::Signals | Method::Envelope) && !is_signals(path) {
-            let reason = "it is no file of raw signals, which this method needs: --method fit takes maps".into();
-            return Err(Error::Input { path: path.clone(), reason });
+            let reason =
+                "it is no file of raw signals, which this method needs: --method fit takes maps"
+                    .into();
+            return Err(Error::Input {
+                path: path.clone(),
+                reason,
+            });
         }
-        let read = words.scans.read(path, stated.as_ref(), words.method == Method::Envelope)?;
-        let known = read.signals.as_ref().map(|signals| &signals.plan.scene).or(stated.as_ref());
+        let read = words
+            .scans
+            .read(path, stated.as_ref(), words.method == Method::Envelope)?;
+        let known = read
+            .signals
+            .as_ref()
+            .map(|signals| &signals.plan.scene)
+            .or(stated.as_ref());
         for scan in &read.maps {
-            scenes.push(known.cloned().map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene)))?);
+            scenes.push(
+                known
+                    .cloned()
+                    .map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene)))?,
+            );
         }
-        read.left_out.iter().for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
+        read.left_out
+            .iter()
+            .for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));
         inputs.push(read);
     }
     let count = scenes.len();
-    words.folder.prepare(cli, |files| list(words.method, count, None, files))?;
+    words
+        .folder
+        .prepare(cli, |files| list(words.method, count, None, files))?;
     let mut found = Found::default();
     observer.begin(Stage::Retrieval, count as u64);
     if matches!(words.method, Method::Fit | Method::Signals) {
-        let due_s = inputs.iter().map(|input| forecast_s(words, input, stated.is_some())).sum();
-        observer.reach(&format!("forecast: {} of one core, to a factor of three", seconds(due_s)));
+        let due_s = inputs
+            .iter()
+            .map(|input| forecast_s(words, input, stated.is_some()))
+            .sum();
+        observer.reach(&format!(
+            "forecast: {} of one core, to a factor of three",
+            seconds(due_s)
+        ));
     }
     for Scans { maps, signals, .. } in inputs {
         if let Some(signals) = signals {
@@ -165,18 +223,31 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         for scan in maps {
             let start = prediction(&found.scans, &scan);
             let scene = scenes[found.scans.len()].as_ref();
-            found.scans.push(of_map(words, scene, scan, start, &*observer)?);
+            found
+                .scans
+                .push(of_map(words, scene, scan, start, &*observer)?);
             observer.advance(1);
         }
     }
     observer.end();
     same_origin(&mut found.scans);
     found.track = retrieve::track_of(&found.scans)?;
-    let is_of_signals =
-        words.method == Method::Signals && found.scans.iter().any(|scan| !scan.result.vortices.is_empty());
+    let is_of_signals = words.method == Method::Signals
+        && found
+            .scans
+            .iter()
+            .any(|scan| !scan.result.vortices.is_empty());
     let text = text(&found.scans) + if is_of_signals { HEIGHTS } else { "" };
-    let (of, object) = ((Default::default(), provenance(&scenes)), json!({ "scans": retrieve::json(&found.scans) }));
-    words.folder.finish(cli, of, |files| list(words.method, count, Some(&found), files), (object, text))
+    let (of, object) = (
+        (Default::default(), provenance(&scenes)),
+        json!({ "scans": retrieve::json(&found.scans) }),
+    );
+    words.folder.finish(
+        cli,
+        of,
+        |files| list(words.method, count, Some(&found), files),
+        (object, text),
+    )
 }
 
 /// Velocities of means that a fit looks at: of more, some.
@@ -184,12 +255,21 @@ const MOST: f64 = 8000.0;
 
 /// Time of the fits to the scans of a file on one core, s. Good to a factor of three: scans without a wake take less.
 fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
-    let is_shown = is_stated || words.estimator.as_deref().is_some_and(|method| method != MEANS);
-    let fitted = input.signals.as_ref().filter(|_| words.method == Method::Signals);
+    let is_shown = is_stated
+        || words
+            .estimator
+            .as_deref()
+            .is_some_and(|method| method != MEANS);
+    let fitted = input
+        .signals
+        .as_ref()
+        .filter(|_| words.method == Method::Signals);
     let one = |scan: &ReadScan| {
         let velocities = scan.map.velocity_m_s.len() as f64;
         let are_means = !(is_shown || scan.is_own && words.estimator.is_none());
-        let samples = fitted.map_or(0, |signals| scan.map.elevation_rad.len() * signals.records.samples) as f64;
+        let samples = fitted.map_or(0, |signals| {
+            scan.map.elevation_rad.len() * signals.records.samples
+        }) as f64;
         let of_means_s = 0.25 + 0.5 * (velocities / MOST).min(1.0) + 4e-6 * velocities;
         of_means_s + if are_means { 0.0 } else { FIT_S * velocities } + SIGNAL_FIT_S * samples
     };
@@ -200,9 +280,13 @@ fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
 fn prediction(before: &[RetrievedScan], scan: &ReadScan) -> Option<Wake> {
     let last = before.last()?;
     let reference = scan.reference.zip(last.scan.reference);
-    let time_s = scan.map.middle_s() + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
+    let time_s =
+        scan.map.middle_s() + reference.map_or(0.0, |(own, of_last)| own.seconds_since(of_last));
     let core_m = last.result.wake.map_or(2.0, |wake| wake.left.core_radius_m);
-    retrieve::track_of(before).ok().flatten()?.prediction(time_s, core_m)
+    retrieve::track_of(before)
+        .ok()
+        .flatten()?
+        .prediction(time_s, core_m)
 }
 
 /// The word for velocities that are means over the gates.
@@ -229,19 +313,32 @@ fn of_map(
     };
     let of_gate = instrument.as_ref().or(scene).map(|file| &file.content);
     let (gate, remark) = gate_of(Some(&scan), words.air.gate_std, of_gate)?;
-    let own = instrument.as_ref().map(|scene| SceneResponse::of_scene(scene, &Silent)).transpose()?.flatten();
+    let own = instrument
+        .as_ref()
+        .map(|scene| SceneResponse::of_scene(scene, &Silent))
+        .transpose()?
+        .flatten();
     let velocities = match &own {
         Some(own) if is_likely => Velocities::LikelyShown(own),
         Some(own) => Velocities::Shown(own),
         None if are_means => Velocities::Means,
         None => Velocities::Unknown,
     };
-    let options = RetrievalOptions { start, ..words.options(scene, gate) };
+    let options = RetrievalOptions {
+        start,
+        ..words.options(scene, gate)
+    };
     let found = retrieve::retrieve_map(scan, words.method, options, velocities)?;
     let lost = "it is a map of this program that has lost its scene, as some programs drop it: the estimator is taken for the default one, and \
                 the deviations hold what means would differ by; --scene gives the circulations of the original";
     let taken = found.result.has(Flag::TakenForMeans);
-    for remark in [remark, taken.then_some(if is_likely { lost } else { UNKNOWN })].into_iter().flatten() {
+    for remark in [
+        remark,
+        taken.then_some(if is_likely { lost } else { UNKNOWN }),
+    ]
+    .into_iter()
+    .flatten()
+    {
         observer.warn(&format!("{}: {remark}", found.scan.path.display()));
     }
     Ok(found)
@@ -254,13 +351,23 @@ fn of_signals(
     found: &mut Found,
     observer: &dyn Observer,
 ) -> Result<(), Error> {
-    let Signals { mut records, plan, scans, spectra } = signals;
+    let Signals {
+        mut records,
+        plan,
+        scans,
+        spectra,
+    } = signals;
     let own = SceneResponse::of_scene(&plan.scene, &Silent)?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
     let mut first_line = 0;
     for (scan, measured) in maps.into_iter().zip(&scans) {
         let (gate, _) = gate_of(Some(&scan), words.air.gate_std, Some(&plan.scene.content))?;
-        let mut one = retrieve::retrieve_map(scan, words.method, words.options(Some(&plan.scene), gate), velocities)?;
+        let mut one = retrieve::retrieve_map(
+            scan,
+            words.method,
+            words.options(Some(&plan.scene), gate),
+            velocities,
+        )?;
         let lines = first_line..first_line + measured.lines.elevation_rad.len();
         first_line = lines.end;
         match (&own, words.method) {
@@ -271,11 +378,17 @@ fn of_signals(
                 if let (Some(spectra), Some(wake)) = (&spectra, one.result.wake) {
                     let snr = own.snr_of(&wake);
                     let results = retrieve::envelopes(&plan, spectra, lines, snr, &mut one)?;
-                    found.envelopes.extend(results.into_iter().map(|result| (found.scans.len() + 1, result)));
+                    found.envelopes.extend(
+                        results
+                            .into_iter()
+                            .map(|result| (found.scans.len() + 1, result)),
+                    );
                 }
             }
             (None, Method::Signals | Method::Envelope) => {
-                let reason = "this method needs noise and a Gaussian pulse without chirp in the scene".into();
+                let reason =
+                    "this method needs noise and a Gaussian pulse without chirp in the scene"
+                        .into();
                 return Err(records.refuse(reason));
             }
             _ => {}
@@ -292,42 +405,67 @@ fn same_origin(scans: &mut [RetrievedScan]) {
     let dates = dates.unwrap_or_default();
     for (scan, date) in scans.iter_mut().zip(&dates) {
         let later_s = date.seconds_since(dates[0]);
-        scan.scan.map.time_s.iter_mut().for_each(|time_s| *time_s += later_s);
+        scan.scan
+            .map
+            .time_s
+            .iter_mut()
+            .for_each(|time_s| *time_s += later_s);
         scan.result.reference_time_s += later_s;
-        scan.result.vortices.iter_mut().for_each(|vortex| vortex.time_s += later_s);
+        scan.result
+            .vortices
+            .iter_mut()
+            .for_each(|vortex| vortex.time_s += later_s);
     }
 }
 
 /// Of the one scene of all scans; those of several scenes have none in common.
 fn provenance(scenes: &[Option<SceneFile>]) -> Provenance {
-    let one =
-        scenes.iter().map(Option::as_ref).reduce(|a, b| a.filter(|a| b.is_some_and(|b| a.hash == b.hash))).flatten();
+    let one = scenes
+        .iter()
+        .map(Option::as_ref)
+        .reduce(|a, b| a.filter(|a| b.is_some_and(|b| a.hash == b.hash)))
+        .flatten();
     one.map_or_else(|| Provenance::new("", "", 0), SceneFile::provenance)
 }
 
 /// The files of so many scans, whose content is not there before the fits.
-fn list(method: Method, count: usize, found: Option<&Found>, files: &mut Outputs) -> Result<(), Error> {
+fn list(
+    method: Method,
+    count: usize,
+    found: Option<&Found>,
+    files: &mut Outputs,
+) -> Result<(), Error> {
     let scans = found.map(|found| found.scans.as_slice());
     files.table("retrieval", scans, |scans| Ok(retrieve::rows(scans)))?;
     files.add("retrieval.json", scans, |scans, origin| {
         let (program, hash, scans) = (&origin.program, &origin.scene_hash, retrieve::json(scans));
-        Ok(format!("{{\"source\": \"{program}\", \"scene_hash\": \"{hash}\", \"scans\": {scans}}}\n"))
+        Ok(format!(
+            "{{\"source\": \"{program}\", \"scene_hash\": \"{hash}\", \"scans\": {scans}}}\n"
+        ))
     })?;
     if method == Method::Envelope {
-        files.table("envelopes", found, |found| Ok(retrieve::envelope_table(&found.envelopes)))?;
+        files.table("envelopes", found, |found| {
+            Ok(retrieve::envelope_table(&found.envelopes))
+        })?;
     }
     if method == Method::Integral {
         files.table("profiles", scans, retrieve::profile_table)?;
     }
     let tracked = found.and_then(|found| Some((found.track.as_ref()?, &found.scans)));
-    files.table("track", tracked.as_ref(), |(track, _)| Ok(retrieve::track_table(track)))?;
+    files.table("track", tracked.as_ref(), |(track, _)| {
+        Ok(retrieve::track_table(track))
+    })?;
     #[cfg(feature = "plots")]
     {
         for number in 1..=count {
             let scan = scans.and_then(|scans| scans.get(number - 1));
-            files.figure(&format!("scan_{number:03}"), scan, |scan| retrieve::figure(scan, number))?;
+            files.figure(&format!("scan_{number:03}"), scan, |scan| {
+                retrieve::figure(scan, number)
+            })?;
         }
-        files.figure("track", tracked.as_ref(), |(track, scans)| Ok(retrieve::track_figure(track, scans)))?;
+        files.figure("track", tracked.as_ref(), |(track, scans)| {
+            Ok(retrieve::track_figure(track, scans))
+        })?;
     }
     #[cfg(not(feature = "plots"))]
     let _ = count;
@@ -339,7 +477,11 @@ fn text(found: &[RetrievedScan]) -> String {
     let mut out = String::new();
     for (number, scan) in found.iter().enumerate() {
         let flags = retrieve::flags(&scan.result);
-        let flags = if flags.is_empty() { String::new() } else { format!("  [{flags}]") };
+        let flags = if flags.is_empty() {
+            String::new()
+        } else {
+            format!("  [{flags}]")
+        };
         let name = format!("scan {}", number + 1);
         if scan.result.has(Flag::NoWake) || scan.result.vortices.is_empty() {
             let (statistic, threshold) = (scan.result.statistic, scan.result.threshold);
@@ -347,7 +489,9 @@ fn text(found: &[RetrievedScan]) -> String {
                 true => ("below", ""),
                 false => ("above", ", but no circulation is certain"),
             };
-            out += &format!("{name}: no wake, statistic {statistic:.1} {why} {threshold:.1}{certain}{flags}\n");
+            out += &format!(
+                "{name}: no wake, statistic {statistic:.1} {why} {threshold:.1}{certain}{flags}\n"
+            );
         }
         for vortex in &scan.result.vortices {
             let mean = vortex.circulation_5_15_m2_s;
@@ -356,10 +500,11 @@ fn text(found: &[RetrievedScan]) -> String {
                 (true, false) => format!("{:.1} m^2/s, its error unknown,", mean.value),
                 (true, true) => format!("{:.1} +- {:.1} m^2/s", mean.value, mean.std),
             };
-            let [y, z] =
-                [vortex.lateral_position_m, vortex.height_m].map(|m| format!("{:.2} +- {:.2} m", m.value, m.std));
+            let [y, z] = [vortex.lateral_position_m, vortex.height_m]
+                .map(|m| format!("{:.2} +- {:.2} m", m.value, m.std));
             let side = retrieve::name(vortex.side);
-            out += &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");
+            out +=
+                &format!("{name}: {side:<5} Gamma(5-15 m) {circulation} at y {y}, z {z}{flags}\n");
         }
     }
     out

@@ -30,16 +30,33 @@ pub(super) struct SweepWords {
 }
 
 pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
-    let request = Request { seed: cli.seed, ..words.request.clone() };
-    let sweep = words.scene.as_deref().map(|scene| cli.sweep(scene, &request)).transpose()?;
+    let request = Request {
+        seed: cli.seed,
+        ..words.request.clone()
+    };
+    let sweep = words
+        .scene
+        .as_deref()
+        .map(|scene| cli.sweep(scene, &request))
+        .transpose()?;
     let Some(sweep) = sweep.as_ref().filter(|_| words.merge.is_empty()) else {
         let existing = Existing::with_overwrite(words.settings.overwrite);
         let files = merge(&words.merge, sweep.as_ref(), &words.out, existing)?;
         let text = format!("wrote {} files to {}", files.len(), words.out.display());
-        return cli.say(&json!({ "version": crate::VERSION, "files": paths(&files) }), &text);
+        return cli.say(
+            &json!({ "version": crate::VERSION, "files": paths(&files) }),
+            &text,
+        );
     };
     let summary = run(sweep, &words.out, words.settings, &*cli.observer())?;
-    let sweep::Summary { run: ran, kept, flows, efficiencies, signals, files } = summary;
+    let sweep::Summary {
+        run: ran,
+        kept,
+        flows,
+        efficiencies,
+        signals,
+        files,
+    } = summary;
     let text = format!(
         "{ran} cases run, {kept} kept; computed once for all that share them: flows {flows}, efficiency curves {efficiencies}, signals \
          {signals}\nwrote {} files and the folders of the cases to {}",
@@ -66,9 +83,14 @@ pub(super) struct ParetoWords {
 
 pub(super) fn pareto(words: &ParetoWords, cli: &Cli) -> Result<(), Error> {
     words.front.prepare(cli)?;
-    let refuse = |reason| Error::Input { path: words.table.clone(), reason };
+    let refuse = |reason| Error::Input {
+        path: words.table.clone(),
+        reason,
+    };
     let found = FrontTable::new(TextTable::read(&words.table)?, &words.wanted).map_err(refuse)?;
     let mut text = found.text();
-    words.front.write(cli, &found.rows(), &found.origin(), &mut text)?;
+    words
+        .front
+        .write(cli, &found.rows(), &found.origin(), &mut text)?;
     cli.say(&found.json(), &text)
 }

@@ -6,7 +6,9 @@ use crate::io::netcdf_input;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
 use crate::io::{Existing, Provenance, Table};
-use crate::measure::recorded::{self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape};
+use crate::measure::recorded::{
+    self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape,
+};
 use crate::outputs::{List, Outputs};
 use crate::plan::Plan;
 use crate::scene::SceneFile;
@@ -55,7 +57,14 @@ impl FolderWords {
     ) -> Result<(), Error> {
         let files = cli.write(&self.out, self.existing(), of, list)?;
         (object["version"], object["files"]) = (crate::VERSION.into(), paths(&files).into());
-        cli.say(&object, &format!("{text}wrote {} files to {}", files.len(), self.out.display()))
+        cli.say(
+            &object,
+            &format!(
+                "{text}wrote {} files to {}",
+                files.len(),
+                self.out.display()
+            ),
+        )
     }
 }
 
@@ -74,7 +83,9 @@ impl TableWords {
     /// Finds out whether the file can be written.
     pub(super) fn prepare(&self, cli: &Cli) -> Result<(), Error> {
         let existing = Existing::with_overwrite(self.overwrite);
-        self.out.as_ref().map_or(Ok(()), |path| cli.prepare_one(path, existing))
+        self.out
+            .as_ref()
+            .map_or(Ok(()), |path| cli.prepare_one(path, existing))
     }
 
     /// Writes the file, if there is to be one, and says so in the text; returns its path for an object.
@@ -85,7 +96,9 @@ impl TableWords {
         origin: &Provenance,
         text: &mut String,
     ) -> Result<Value, Error> {
-        let Some(path) = &self.out else { return Ok(Value::Null) };
+        let Some(path) = &self.out else {
+            return Ok(Value::Null);
+        };
         cli.write_one(path, table.to_csv(origin)?)?;
         *text += &format!("wrote {}\n", path.display());
         Ok(json!(paths(&[path])[0]))
@@ -142,50 +155,108 @@ pub(super) struct Signals {
 
 impl ScanWords {
     /// The scans of a file; raw signals go through the estimator of the scene, whose spectra are kept if asked for.
-    pub(super) fn read(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Scans, Error> {
+    pub(super) fn read(
+        &self,
+        path: &Path,
+        scene: Option<&SceneFile>,
+        spectra: bool,
+    ) -> Result<Scans, Error> {
         if is_signals(path) {
             return self.signals(path, scene, spectra);
         }
-        let format = ScanFormat { field: self.field.clone(), towards: self.towards, min_snr_db: self.min_snr };
+        let format = ScanFormat {
+            field: self.field.clone(),
+            towards: self.towards,
+            min_snr_db: self.min_snr,
+        };
         let (maps, left_out) = scans::read(path, &format)?;
-        Ok(Scans { maps, left_out, signals: None })
+        Ok(Scans {
+            maps,
+            left_out,
+            signals: None,
+        })
     }
 
-    fn signals(&self, path: &Path, scene: Option<&SceneFile>, spectra: bool) -> Result<Scans, Error> {
+    fn signals(
+        &self,
+        path: &Path,
+        scene: Option<&SceneFile>,
+        spectra: bool,
+    ) -> Result<Scans, Error> {
         let Some(scene) = scene else {
             let reason = "it holds raw signals: --scene says which instrument recorded them".into();
-            return Err(Error::Input { path: path.to_owned(), reason });
+            return Err(Error::Input {
+                path: path.to_owned(),
+                reason,
+            });
         };
-        let mut records = RawRecords::open(path, &RawFormat::default(), record_shape(&scene.content))?;
+        let mut records =
+            RawRecords::open(path, &RawFormat::default(), record_shape(&scene.content))?;
         records.scale = self.scale.unwrap_or(1.0);
         let (plan, is_own) = recorded::plan(scene.clone(), &records)?;
-        let noise = if is_own || self.scale.is_some() { NoiseLevel::OfScene } else { NoiseLevel::Quietest };
-        // What is known of the air is not looked at: this is a retrieval.
-        let options = RecordedOptions { noise: Some(noise), spectra, ..RecordedOptions::default() };
-        let (scans, spectra) = match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
-            Recorded::Measured { scans, spectra } => (scans, spectra),
-            Recorded::OfRun { .. } => (Vec::new(), None),
+        let noise = if is_own || self.scale.is_some() {
+            NoiseLevel::OfScene
+        } else {
+            NoiseLevel::Quietest
         };
+        // What is known of the air is not looked at: this is a retrieval.
+        let options = RecordedOptions {
+            noise: Some(noise),
+            spectra,
+            ..RecordedOptions::default()
+        };
+        let (scans, spectra) =
+            match recorded::estimate((&plan, false), &mut records, &options, &Silent)? {
+                Recorded::Measured { scans, spectra } => (scans, spectra),
+                Recorded::OfRun { .. } => (Vec::new(), None),
+            };
         let map = |(sweep, scan)| retrieve::scan_of_signals(path, sweep, &plan, scan);
         let maps = scans.iter().enumerate().map(map).collect();
-        Ok(Scans { maps, left_out: Vec::new(), signals: Some(Signals { records, plan, scans, spectra }) })
+        Ok(Scans {
+            maps,
+            left_out: Vec::new(),
+            signals: Some(Signals {
+                records,
+                plan,
+                scans,
+                spectra,
+            }),
+        })
     }
 }
 
 /// Whether a file holds raw signals and no map.
 pub(super) fn is_signals(path: &Path) -> bool {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    ["npy", "npz"].contains(&extension) || netcdf_input::open(path).is_ok_and(|file| file.has("current_a"))
+    let extension = path
+        .extension()
+        .and_then(|e| e.to_str())
+        .unwrap_or_default();
+    ["npy", "npz"].contains(&extension)
+        || netcdf_input::open(path).is_ok_and(|file| file.has("current_a"))
 }
 
 /// A number of which `is_allowed` holds, or what is allowed.
-fn read<T: FromStr>(word: &str, is_allowed: impl Fn(&T) -> bool, allowed: &str) -> Result<T, String> {
-    word.trim().parse().ok().filter(is_allowed).ok_or_else(|| allowed.to_owned())
+fn read<T: FromStr>(
+    word: &str,
+    is_allowed: impl Fn(&T) -> bool,
+    allowed: &str,
+) -> Result<T, String> {
+    word.trim()
+        .parse()
+        .ok()
+        .filter(is_allowed)
+        .ok_or_else(|| allowed.to_owned())
 }
 
 /// Two numbers with a comma between.
-fn two<T: FromStr>(word: &str, are_allowed: impl Fn(&(T, T)) -> bool, allowed: &str) -> Result<(T, T), String> {
-    let both = word.split_once(',').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+fn two<T: FromStr>(
+    word: &str,
+    are_allowed: impl Fn(&(T, T)) -> bool,
+    allowed: &str,
+) -> Result<(T, T), String> {
+    let both = word
+        .split_once(',')
+        .and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
     both.filter(are_allowed).ok_or_else(|| allowed.to_owned())
 }
 
@@ -194,15 +265,27 @@ pub(super) fn finite(word: &str) -> Result<f64, String> {
 }
 
 pub(super) fn not_negative(word: &str) -> Result<f64, String> {
-    read(word, |value| (0.0..f64::INFINITY).contains(value), "a number from 0 on, e.g. 14.4")
+    read(
+        word,
+        |value| (0.0..f64::INFINITY).contains(value),
+        "a number from 0 on, e.g. 14.4",
+    )
 }
 
 pub(super) fn positive(word: &str) -> Result<f64, String> {
-    read(word, |value: &f64| *value > 0.0 && value.is_finite(), "a number above 0, e.g. 2.35 or 1e-6")
+    read(
+        word,
+        |value: &f64| *value > 0.0 && value.is_finite(),
+        "a number above 0, e.g. 2.35 or 1e-6",
+    )
 }
 
 pub(super) fn rate(word: &str) -> Result<f64, String> {
-    read(word, |rate| (1e-9..=0.5).contains(rate), "a rate from 1e-9 to 0.5, e.g. 0.01")
+    read(
+        word,
+        |rate| (1e-9..=0.5).contains(rate),
+        "a rate from 1e-9 to 0.5, e.g. 0.01",
+    )
 }
 
 pub(super) fn range(word: &str) -> Result<f64, String> {
@@ -214,17 +297,28 @@ pub(super) fn turbulence(word: &str) -> Result<Turbulence, String> {
     let is_good = |value: &f64| *value > 0.0 && value.is_finite();
     let allowed = "two numbers above 0, m/s and m, with a comma between, e.g. 1.2,25";
     let (deviation_m_s, length_m) = two(word, |(a, b)| is_good(a) && is_good(b), allowed)?;
-    Ok(Turbulence { deviation_m_s, length_m })
+    Ok(Turbulence {
+        deviation_m_s,
+        length_m,
+    })
 }
 
 pub(super) fn spacing(word: &str) -> Result<(f64, f64), String> {
     let allowed = "two distances from 1 to 1e4 m, the smaller one first, e.g. 16,63";
-    two(word, |(least, most)| *least >= 1.0 && least <= most && *most <= 1e4, allowed)
+    two(
+        word,
+        |(least, most)| *least >= 1.0 && least <= most && *most <= 1e4,
+        allowed,
+    )
 }
 
 pub(super) fn stride(word: &str) -> Result<(usize, usize), String> {
     let is_good = |n: &usize| (1..=1000).contains(n);
-    two(word, |(lines, gates)| is_good(lines) && is_good(gates), "two whole numbers from 1 to 1000, e.g. 4,8")
+    two(
+        word,
+        |(lines, gates)| is_good(lines) && is_good(gates),
+        "two whole numbers from 1 to 1000, e.g. 4,8",
+    )
 }
 
 pub(super) fn noise(word: &str) -> Result<NoiseLevel, String> {
@@ -248,9 +342,15 @@ mod tests {
 
     #[test]
     fn words_are_read_or_refused_with_an_example() {
-        assert_eq!((spacing("47,47"), stride("4,8"), rate("1e-3")), (Ok((47.0, 47.0)), Ok((4, 8)), Ok(1e-3)));
+        assert_eq!(
+            (spacing("47,47"), stride("4,8"), rate("1e-3")),
+            (Ok((47.0, 47.0)), Ok((4, 8)), Ok(1e-3))
+        );
         assert!(
-            spacing("60,20").is_err() && spacing("0,20").is_err() && stride("0,1").is_err() && stride("a").is_err()
+            spacing("60,20").is_err()
+                && spacing("0,20").is_err()
+                && stride("0,1").is_err()
+                && stride("a").is_err()
         );
         assert!(rate("0").is_err() && rate("0.7").is_err() && rate("inf").is_err());
     }

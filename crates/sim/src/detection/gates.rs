@@ -22,8 +22,13 @@ use wakescope_estimate::estimators::CellTest;
 /// a pulse of `sigma` intervals.
 fn peak_gain(window: &[f64], sigma: f64, band: f64) -> f64 {
     let lag = |n: usize, m: usize| (n as f64 - m as f64) / sigma;
-    let row =
-        |n: usize| window.iter().enumerate().map(move |(m, h)| h * (-0.25 * lag(n, m).powi(2)).exp()).sum::<f64>();
+    let row = |n: usize| {
+        window
+            .iter()
+            .enumerate()
+            .map(move |(m, h)| h * (-0.25 * lag(n, m).powi(2)).exp())
+            .sum::<f64>()
+    };
     let power: f64 = window.iter().enumerate().map(|(n, h)| h * row(n)).sum();
     band * power / window.iter().map(|h| h * h).sum::<f64>()
 }
@@ -38,16 +43,29 @@ pub fn gate_table(plan: &Plan, false_alarm: f64, observer: &dyn Observer) -> Res
     let scene = &plan.scene.content;
     let d = &scene.detector;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    let gain = peak_gain(&window, plan.instrument.pulse.sigma_s() * d.sampling_hz, d.bandwidth_hz / d.sampling_hz);
-    let cells = (3.0 * d.bandwidth_hz * scene.estimator.window_samples as f64 / d.sampling_hz).max(1.0);
+    let gain = peak_gain(
+        &window,
+        plan.instrument.pulse.sigma_s() * d.sampling_hz,
+        d.bandwidth_hz / d.sampling_hz,
+    );
+    let cells =
+        (3.0 * d.bandwidth_hz * scene.estimator.window_samples as f64 / d.sampling_hz).max(1.0);
     let best = CellTest::best_of(cells, false_alarm)?;
     let points = bound(plan, observer)?.by_range;
     let of = |point: &BoundPoint| -> Result<[f64; 3], Error> {
         let test = CellTest::known_noise(point.n_eff)?;
         let threshold = test.threshold(false_alarm)?;
         let snr = 10f64.powf(0.1 * point.snr_db);
-        let found = if snr.is_finite() { test.probability(threshold, gain * snr)? } else { false_alarm };
-        Ok([threshold, found, 10.0 * (test.needed_snr(false_alarm, 0.9)? / gain).log10()])
+        let found = if snr.is_finite() {
+            test.probability(threshold, gain * snr)?
+        } else {
+            false_alarm
+        };
+        Ok([
+            threshold,
+            found,
+            10.0 * (test.needed_snr(false_alarm, 0.9)? / gain).log10(),
+        ])
     };
     let rows = points.iter().map(of).collect::<Result<Vec<_>, Error>>()?;
     let column = |i: usize| rows.iter().map(move |row| row[i]).collect::<Vec<_>>();
@@ -70,9 +88,14 @@ mod tests {
     #[test]
     fn the_peak_of_a_gaussian_window_is_that_of_the_closed_form_and_a_cut_one_is_lower() {
         let sigma = 30.03;
-        let closed = 2.0 * std::f64::consts::PI.sqrt() * 0.2 * sigma * 16.0 / f64::hypot(sigma, 16.0);
+        let closed =
+            2.0 * std::f64::consts::PI.sqrt() * 0.2 * sigma * 16.0 / f64::hypot(sigma, 16.0);
         assert!((closed - 10.0).abs() < 0.02, "{closed}");
-        let whole = Weighting::Gaussian { relative_half_width: 16.0 / 256.0 }.weights(256).unwrap();
+        let whole = Weighting::Gaussian {
+            relative_half_width: 16.0 / 256.0,
+        }
+        .weights(256)
+        .unwrap();
         let gain = peak_gain(&whole, sigma, 0.2);
         assert!((gain / closed - 1.0).abs() < 1e-9, "{gain} {closed}");
         let cut = peak_gain(&Weighting::default().weights(64).unwrap(), sigma, 0.2);

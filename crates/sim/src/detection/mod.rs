@@ -103,7 +103,10 @@ impl ScanDetection {
     /// Whether what is left of the scan is so correlated that the stated background cannot be the true one.
     #[must_use]
     pub fn is_correlated(&self) -> bool {
-        let ((along, across), errors) = (self.statistic.neighbour_correlation, self.statistic.correlation_error);
+        let ((along, across), errors) = (
+            self.statistic.neighbour_correlation,
+            self.statistic.correlation_error,
+        );
         along > CORRELATED * errors.0 || across > CORRELATED * errors.1
     }
 }
@@ -147,18 +150,36 @@ impl Calibration {
     ///
     /// # Errors
     /// What the test refuses.
-    pub fn new(map: &ScanMap, settings: &DetectionSettings, observer: &dyn Observer) -> Result<Self, Error> {
-        let with = |map: &ScanMap, options| WakeDetector::new(map, &settings.model, &settings.gate, &options);
+    pub fn new(
+        map: &ScanMap,
+        settings: &DetectionSettings,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
+        let with = |map: &ScanMap, options| {
+            WakeDetector::new(map, &settings.model, &settings.gate, &options)
+        };
         let mut map = map.clone();
         let mut assumed_sigma_m_s = None;
         if map.sigma_m_s.is_none() {
             map.sigma_m_s = Some(ndarray::Array2::ones(map.velocity_m_s.raw_dim()));
-            let unit = with(&map, DetectorOptions { turbulence: None, ..settings.options })?;
+            let unit = with(
+                &map,
+                DetectorOptions {
+                    turbulence: None,
+                    ..settings.options
+                },
+            )?;
             let all = unit.statistic(map.velocity_m_s.view())?.wake_chi2_per_dof;
-            let air = settings.options.turbulence.map_or(0.0, |turbulence| turbulence.deviation_m_s.powi(2));
+            let air = settings
+                .options
+                .turbulence
+                .map_or(0.0, |turbulence| turbulence.deviation_m_s.powi(2));
             // turbulence has its part of what is left; some noise there must be
             let sigma_m_s = (all - air).max(0.01 * all).sqrt();
-            map.sigma_m_s = Some(ndarray::Array2::from_elem(map.velocity_m_s.raw_dim(), sigma_m_s));
+            map.sigma_m_s = Some(ndarray::Array2::from_elem(
+                map.velocity_m_s.raw_dim(),
+                sigma_m_s,
+            ));
             assumed_sigma_m_s = Some(sigma_m_s);
         }
         let detector = with(&map, settings.options)?;
@@ -169,21 +190,35 @@ impl Calibration {
         })?;
         observer.end();
         let threshold = law.threshold(settings.false_alarm)?;
-        Ok(Self { map, detector, law, threshold, assumed_sigma_m_s })
+        Ok(Self {
+            map,
+            detector,
+            law,
+            threshold,
+            assumed_sigma_m_s,
+        })
     }
 
     /// Whether the calibration holds for another scan: the same axes, nearly the same velocities missing, deviations within a tenth.
     fn is_for(&self, map: &ScanMap) -> bool {
-        let same_axes = map.elevation_rad == self.map.elevation_rad && map.range_m == self.map.range_m;
+        let same_axes =
+            map.elevation_rad == self.map.elevation_rad && map.range_m == self.map.range_m;
         if !same_axes || map.sigma_m_s.is_none() != self.assumed_sigma_m_s.is_some() {
             return false;
         }
-        let sigma = |of: &ScanMap, at: (usize, usize)| of.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at]);
-        let is_other = |at: &(usize, usize)| (sigma(map, *at) / sigma(&self.map, *at) - 1.0).abs() > 0.1;
+        let sigma = |of: &ScanMap, at: (usize, usize)| {
+            of.sigma_m_s.as_ref().map_or(f64::NAN, |sigma| sigma[at])
+        };
+        let is_other =
+            |at: &(usize, usize)| (sigma(map, *at) / sigma(&self.map, *at) - 1.0).abs() > 0.1;
         let known = |of: &ScanMap, at: (usize, usize)| of.velocity_m_s[at].is_finite();
         let cells = map.velocity_m_s.indexed_iter().map(|(at, _)| at);
-        let (both, rest): (Vec<_>, Vec<_>) = cells.partition(|at| known(map, *at) && known(&self.map, *at));
-        let one = rest.into_iter().filter(|at| known(map, *at) || known(&self.map, *at)).count();
+        let (both, rest): (Vec<_>, Vec<_>) =
+            cells.partition(|at| known(map, *at) && known(&self.map, *at));
+        let one = rest
+            .into_iter()
+            .filter(|at| known(map, *at) || known(&self.map, *at))
+            .count();
         10 * one < both.len() && !both.iter().any(is_other)
     }
 
@@ -191,11 +226,18 @@ impl Calibration {
     ///
     /// # Errors
     /// What the test refuses.
-    pub(crate) fn of_scan(&self, scan: &ScanMap, settings: &DetectionSettings) -> Result<ScanDetection, Error> {
+    pub(crate) fn of_scan(
+        &self,
+        scan: &ScanMap,
+        settings: &DetectionSettings,
+    ) -> Result<ScanDetection, Error> {
         self.test(&cleaned(scan, settings))
     }
 
-    fn test(&self, (map, outliers, velocities): &(ScanMap, usize, usize)) -> Result<ScanDetection, Error> {
+    fn test(
+        &self,
+        (map, outliers, velocities): &(ScanMap, usize, usize),
+    ) -> Result<ScanDetection, Error> {
         let statistic = self.detector.statistic(map.velocity_m_s.view())?;
         Ok(ScanDetection {
             statistic,
@@ -212,8 +254,14 @@ impl Calibration {
     ///
     /// # Errors
     /// What the trials refuse, such as a scan too small for a pair.
-    pub fn power(&self, settings: &DetectionSettings, observer: &dyn Observer) -> Result<Power, Error> {
-        let wakes = self.detector.draw_wakes(PLACES, |wake| stream(settings.seed, "wakes to find", wake));
+    pub fn power(
+        &self,
+        settings: &DetectionSettings,
+        observer: &dyn Observer,
+    ) -> Result<Power, Error> {
+        let wakes = self
+            .detector
+            .draw_wakes(PLACES, |wake| stream(settings.seed, "wakes to find", wake));
         observer.begin(Stage::Detection, TRIALS as u64);
         let trials = self.detector.trials(&wakes, TRIALS, |trial| {
             observer.advance(1);
@@ -223,7 +271,8 @@ impl Calibration {
         let std_m2_s = trials.circulation_std_m2_s();
         let circulations: Vec<f64> = (0..=20).map(|i| 0.5 * f64::from(i) * std_m2_s).collect();
         let shares = trials.detection(&circulations, self.threshold);
-        let at_rate = |(circulation, share)| (circulation, settings.false_alarm, self.threshold, share);
+        let at_rate =
+            |(circulation, share)| (circulation, settings.false_alarm, self.threshold, share);
         let found = circulations.into_iter().zip(shares).map(at_rate).collect();
         // four rates in a decade
         let rates: Vec<f64> = (-16..0).map(|i| 10f64.powf(0.25 * f64::from(i))).collect();
@@ -232,11 +281,15 @@ impl Calibration {
             let statistics = trials.statistics(circulation_m2_s);
             for &rate in &rates {
                 let threshold = self.law.threshold(rate)?;
-                let hits = statistics.iter().filter(|value| **value > threshold).count();
+                let hits = statistics
+                    .iter()
+                    .filter(|value| **value > threshold)
+                    .count();
                 roc.push((circulation_m2_s, rate, threshold, Share::of(hits, TRIALS)));
             }
         }
-        let [measured, smallest_error_m2_s, foretold] = trials.smallest_detectable_m2_s(self.threshold);
+        let [measured, smallest_error_m2_s, foretold] =
+            trials.smallest_detectable_m2_s(self.threshold);
         Ok(Power {
             false_alarm: settings.false_alarm,
             threshold: self.threshold,
@@ -259,15 +312,24 @@ pub fn detect(
     settings: &DetectionSettings,
     observer: &dyn Observer,
 ) -> Result<(Vec<ScanDetection>, Option<Calibration>), Error> {
-    let (mut found, mut calibrations) = (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
+    let (mut found, mut calibrations) =
+        (Vec::with_capacity(scans.len()), Vec::<Calibration>::new());
     for scan in scans {
         let cleaned = cleaned(scan, settings);
-        if !calibrations.last().is_some_and(|known| known.is_for(&cleaned.0)) {
+        if !calibrations
+            .last()
+            .is_some_and(|known| known.is_for(&cleaned.0))
+        {
             // the first is kept for its curves, the last for the next scan
             calibrations.truncate(1);
             calibrations.push(Calibration::new(&cleaned.0, settings, observer)?);
         }
-        found.extend(calibrations.last().map(|known| known.test(&cleaned)).transpose()?);
+        found.extend(
+            calibrations
+                .last()
+                .map(|known| known.test(&cleaned))
+                .transpose()?,
+        );
     }
     calibrations.truncate(1);
     Ok((found, calibrations.pop()))
@@ -305,10 +367,16 @@ pub fn background(settings: &DetectionSettings, has_sigma: bool) -> String {
         true => "independent noise with the stated deviation of each velocity",
         false => "independent noise of one deviation, that of what is left of the scan",
     };
-    let air = settings.options.turbulence.map_or(String::new(), |turbulence| {
-        let Turbulence { deviation_m_s, length_m } = turbulence;
-        format!(", and turbulence of {deviation_m_s} m/s correlated over {length_m} m")
-    });
+    let air = settings
+        .options
+        .turbulence
+        .map_or(String::new(), |turbulence| {
+            let Turbulence {
+                deviation_m_s,
+                length_m,
+            } = turbulence;
+            format!(", and turbulence of {deviation_m_s} m/s correlated over {length_m} m")
+        });
     format!("a wind that is linear in height, {noise}{air}")
 }
 
@@ -328,47 +396,94 @@ mod tests {
         let mut rng = stream(seed, "test", 0);
         let velocity_m_s = Array2::from_shape_fn((44, 26), |(i, j)| {
             // twelve uniform numbers are nearly normal
-            let noise: f64 = (0..12).map(|_| rng.next_u64() as f64 / u64::MAX as f64).sum::<f64>() - 6.0;
-            WakeModel::default().radial_velocity_m_s(&wake, range_m[j], elevation_rad[i]) + 0.5 * noise
+            let noise: f64 = (0..12)
+                .map(|_| rng.next_u64() as f64 / u64::MAX as f64)
+                .sum::<f64>()
+                - 6.0;
+            WakeModel::default().radial_velocity_m_s(&wake, range_m[j], elevation_rad[i])
+                + 0.5 * noise
         });
         let sigma_m_s = Some(Array2::from_elem((44, 26), 0.5));
-        ScanMap { time_s: vec![f64::NAN; 44], elevation_rad, range_m, velocity_m_s, sigma_m_s, fold_m_s: None }
+        ScanMap {
+            time_s: vec![f64::NAN; 44],
+            elevation_rad,
+            range_m,
+            velocity_m_s,
+            sigma_m_s,
+            fold_m_s: None,
+        }
     }
 
     fn settings() -> DetectionSettings {
-        DetectionSettings { empty_scans: 2000, ..DetectionSettings::default() }
+        DetectionSettings {
+            empty_scans: 2000,
+            ..DetectionSettings::default()
+        }
     }
 
     #[test]
     fn wakes_are_found_and_empty_scans_are_not_whatever_the_threads() {
         let scans = [map(1, 0.0), map(2, 60.0), map(3, 0.0)];
         let run = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
             pool.install(|| detect(&scans, &settings(), &Silent).unwrap().0)
         };
         let found = run(1);
         assert_eq!(found, run(3));
-        assert_eq!(found.iter().map(ScanDetection::is_wake).collect::<Vec<_>>(), [false, true, false]);
-        assert!(found[1].false_alarm < 1e-6 && found[0].false_alarm > 1e-2, "{found:?}");
+        assert_eq!(
+            found.iter().map(ScanDetection::is_wake).collect::<Vec<_>>(),
+            [false, true, false]
+        );
+        assert!(
+            found[1].false_alarm < 1e-6 && found[0].false_alarm > 1e-2,
+            "{found:?}"
+        );
         assert!(!found.iter().any(ScanDetection::is_correlated), "{found:?}");
         let wake = found[1].statistic.wake;
-        assert!((wake.left.lateral_position_m - 379.0).abs() < 8.0 && (wake.right.height_m - 46.0).abs() < 5.0);
+        assert!(
+            (wake.left.lateral_position_m - 379.0).abs() < 8.0
+                && (wake.right.height_m - 46.0).abs() < 5.0
+        );
         // a scan that states no deviations is told by its residuals
-        let unstated = ScanMap { sigma_m_s: None, ..scans[1].clone() };
+        let unstated = ScanMap {
+            sigma_m_s: None,
+            ..scans[1].clone()
+        };
         let (found, _) = detect(&[unstated], &settings(), &Silent).unwrap();
-        assert!(found[0].is_wake() && (found[0].assumed_sigma_m_s.unwrap() / 0.5 - 1.0).abs() < 0.1, "{found:?}");
+        assert!(
+            found[0].is_wake() && (found[0].assumed_sigma_m_s.unwrap() / 0.5 - 1.0).abs() < 0.1,
+            "{found:?}"
+        );
     }
 
     #[test]
     fn shares_grow_with_circulation_and_rate_and_reach_the_smallest_that_is_found() {
         let (_, calibration) = detect(&[map(1, 0.0)], &settings(), &Silent).unwrap();
         let power = calibration.unwrap().power(&settings(), &Silent).unwrap();
-        assert!(power.found.windows(2).all(|pair| pair[1].3.value >= pair[0].3.value - 0.01));
-        assert!(power.found[0].3.value < 0.03 && power.found[20].3.value > 0.99, "{power:?}");
+        assert!(
+            power
+                .found
+                .windows(2)
+                .all(|pair| pair[1].3.value >= pair[0].3.value - 0.01)
+        );
+        assert!(
+            power.found[0].3.value < 0.03 && power.found[20].3.value > 0.99,
+            "{power:?}"
+        );
         let (measured, foretold) = power.smallest_m2_s;
-        assert!((measured / foretold - 1.0).abs() < 0.15, "{measured} {foretold}");
+        assert!(
+            (measured / foretold - 1.0).abs() < 0.15,
+            "{measured} {foretold}"
+        );
         for curve in power.roc.chunks(16) {
-            assert!(curve.windows(2).all(|pair| pair[1].3.value >= pair[0].3.value));
+            assert!(
+                curve
+                    .windows(2)
+                    .all(|pair| pair[1].3.value >= pair[0].3.value)
+            );
         }
     }
 
@@ -382,16 +497,36 @@ mod tests {
         }
         let (found, _) = detect(std::slice::from_ref(&smooth), &settings(), &Silent).unwrap();
         assert!(found[0].is_correlated(), "{found:?}");
-        let parted = DetectionSettings { stride: (3, 1), ..settings() };
+        let parted = DetectionSettings {
+            stride: (3, 1),
+            ..settings()
+        };
         assert!(!detect(&[smooth], &parted, &Silent).unwrap().0[0].is_correlated());
     }
 
     #[test]
     fn correlation_of_a_few_neighbours_is_held_against_its_own_error() {
         let scans: Vec<ScanMap> = (100..250).map(|seed| map(seed, 0.0)).collect();
-        let (found, _) = detect(&scans, &DetectionSettings { stride: (6, 4), ..settings() }, &Silent).unwrap();
-        let beyond = |limit: f64| found.iter().filter(|f| f.statistic.neighbour_correlation.0 > limit).count();
+        let (found, _) = detect(
+            &scans,
+            &DetectionSettings {
+                stride: (6, 4),
+                ..settings()
+            },
+            &Silent,
+        )
+        .unwrap();
+        let beyond = |limit: f64| {
+            found
+                .iter()
+                .filter(|f| f.statistic.neighbour_correlation.0 > limit)
+                .count()
+        };
         // a fifth is chance among so few
-        assert!(beyond(0.2) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1, "{}", beyond(0.2));
+        assert!(
+            beyond(0.2) > 5 && found.iter().filter(|f| f.is_correlated()).count() <= 1,
+            "{}",
+            beyond(0.2)
+        );
     }
 }

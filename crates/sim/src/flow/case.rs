@@ -142,7 +142,12 @@ impl FlowCase {
     /// Everything in this case that is out of its limits; what depends on the mesh is found when the flow starts.
     pub fn problems(&self) -> Vec<Problem> {
         let mut p = Checker::new(&|_| true);
-        p.require(self.format == FORMAT, "format", self.format, "1, the format of this program");
+        p.require(
+            self.format == FORMAT,
+            "format",
+            self.format,
+            "1, the format of this program",
+        );
         self.check_limits("", &mut p);
         self.case.check(&mut p);
         let (t, o, c) = (self.time, &self.output, self.checkpoint);
@@ -151,28 +156,63 @@ impl FlowCase {
         };
         if let Some(step_s) = t.step_s {
             let is_controlled = t.courant.is_some() || t.longest_step_s.is_some();
-            absent(is_controlled, "time.step_s", &step_s, " where a Courant number or a longest step is given");
+            absent(
+                is_controlled,
+                "time.step_s",
+                &step_s,
+                " where a Courant number or a longest step is given",
+            );
         }
         if let Some(every_s) = o.every_s {
-            absent(!o.times_s.is_empty(), "output.every_s", &every_s, " beside output.times_s");
+            absent(
+                !o.times_s.is_empty(),
+                "output.every_s",
+                &every_s,
+                " beside output.times_s",
+            );
         }
         if let Some(every_s) = c.every_s {
-            absent(c.every_steps.is_some(), "checkpoint.every_s", &every_s, " beside checkpoint.every_steps");
+            absent(
+                c.every_steps.is_some(),
+                "checkpoint.every_s",
+                &every_s,
+                " beside checkpoint.every_steps",
+            );
         }
         let is_wake = matches!(self.case, CaseKind::Wake(_));
         let has_times = !o.times_s.is_empty() || o.every_s.is_some();
         let by_age = ", like output.every_s: the section wake has the ages";
         absent(is_wake && has_times, "output.times_s", &o.times_s, by_age);
-        absent(is_wake && !o.planes_x_m.is_empty(), "output.planes_x_m", &o.planes_x_m, ": see wake.planes_x");
+        absent(
+            is_wake && !o.planes_x_m.is_empty(),
+            "output.planes_x_m",
+            &o.planes_x_m,
+            ": see wake.planes_x",
+        );
         if let Some(wake) = &self.wake {
-            absent(!is_wake, "wake.end_tau", &wake.end_tau, ": the section is for case.kind = \"wake\"");
+            absent(
+                !is_wake,
+                "wake.end_tau",
+                &wake.end_tau,
+                ": the section is for case.kind = \"wake\"",
+            );
             wake.check(&mut p);
         }
         let initial = o.planes.contains(&FileFormat::InitialNetcdf);
-        p.require(!initial, "output.planes", &o.planes, "csv, netcdf, vtr: an initial field is a whole field");
+        p.require(
+            !initial,
+            "output.planes",
+            &o.planes,
+            "csv, netcdf, vtr: an initial field is a whole field",
+        );
         for (key, formats) in [("output.fields", &o.fields), ("output.planes", &o.planes)] {
             let is_built = cfg!(feature = "vtk") || !formats.contains(&FileFormat::Vtr);
-            p.require(is_built, key, formats, "formats of this build, which lacks the feature `vtk`");
+            p.require(
+                is_built,
+                key,
+                formats,
+                "formats of this build, which lacks the feature `vtk`",
+            );
         }
         p.into_problems()
     }
@@ -183,15 +223,28 @@ impl FlowCase {
     /// A problem if there are too many.
     pub(super) fn output_times_s(&self, end_s: f64) -> Result<Vec<f64>, Problem> {
         let Some(every_s) = self.output.every_s else {
-            return Ok(if self.output.times_s.is_empty() { vec![end_s] } else { self.output.times_s.clone() });
+            return Ok(if self.output.times_s.is_empty() {
+                vec![end_s]
+            } else {
+                self.output.times_s.clone()
+            });
         };
         let count = end_s / every_s;
         if count > MAX_OUTPUTS as f64 {
-            let allowed = format!("at least {:?}, for at most {MAX_OUTPUTS} outputs", end_s / MAX_OUTPUTS as f64);
-            return Err(Problem { key: "output.every_s".into(), value: format!("{every_s:?}"), allowed });
+            let allowed = format!(
+                "at least {:?}, for at most {MAX_OUTPUTS} outputs",
+                end_s / MAX_OUTPUTS as f64
+            );
+            return Err(Problem {
+                key: "output.every_s".into(),
+                value: format!("{every_s:?}"),
+                allowed,
+            });
         }
         // The last multiple may be the end but for rounding.
-        let mut times_s: Vec<f64> = (0..=(count + 1e-6).floor() as usize).map(|i| i as f64 * every_s).collect();
+        let mut times_s: Vec<f64> = (0..=(count + 1e-6).floor() as usize)
+            .map(|i| i as f64 * every_s)
+            .collect();
         if let Some(last_s) = times_s.last_mut()
             && (*last_s - end_s).abs() < 1e-6 * every_s
         {

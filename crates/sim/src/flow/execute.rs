@@ -16,7 +16,9 @@ use crate::{Error, machine};
 use std::path::Path;
 use std::sync::Arc;
 use wakescope_les::ranks::{Ranks, Single, all_gather};
-use wakescope_les::solver::{CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan, check_checkpoint};
+use wakescope_les::solver::{
+    CheckpointPlan, Ends, Interval, NOTICED_GROWTH, Run, RunPlan, check_checkpoint,
+};
 use wakescope_les::{SubgridModel, TimeStep};
 
 /// Steps between checkpoints where a case states nothing.
@@ -47,7 +49,8 @@ pub fn check_on(
     if let Some(folder) = folder {
         refuse_folder(folder, options.begin)?;
     }
-    let (setup, _, _, mut forecast) = prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
+    let (setup, _, _, mut forecast) =
+        prepare(file, folder.unwrap_or(Path::new("")), options, ranks)?;
     // A run tells of these itself, as it goes.
     let growth = setup.stability().undamped(forecast.step_s);
     let is_modelled = setup.settings.subgrid != SubgridModel::None;
@@ -60,9 +63,23 @@ pub fn check_on(
 ///
 /// # Errors
 /// As there.
-pub fn run(file: &CaseFile, folder: &Path, begin: Begin, observer: &dyn Observer) -> Result<FlowOutcome, Error> {
+pub fn run(
+    file: &CaseFile,
+    folder: &Path,
+    begin: Begin,
+    observer: &dyn Observer,
+) -> Result<FlowOutcome, Error> {
     let alone = Arc::new(Single) as Arc<dyn Ranks>;
-    run_on(&alone, file, folder, RunOptions { begin, allow_large: false }, observer)
+    run_on(
+        &alone,
+        file,
+        folder,
+        RunOptions {
+            begin,
+            allow_large: false,
+        },
+        observer,
+    )
 }
 
 /// Runs a case on ranks, all of which call this, and writes its files to `folder`, in which no other run may be writing. The
@@ -80,7 +97,11 @@ pub fn run_on(
     observer: &dyn Observer,
 ) -> Result<FlowOutcome, Error> {
     let is_first = ranks.rank() == 0;
-    let prepared = if is_first { refuse_folder(folder, options.begin) } else { Ok(()) };
+    let prepared = if is_first {
+        refuse_folder(folder, options.begin)
+    } else {
+        Ok(())
+    };
     let prepared = prepared.and_then(|()| prepare(file, folder, options, ranks));
     let (mut setup, plan, files, forecast) = agree(ranks, prepared)?;
     let mut warnings = forecast.notes.clone();
@@ -93,7 +114,9 @@ pub fn run_on(
     // From where the run goes on, rank 0 says: the number of the checkpoint, from 1, or 0.
     let number = vec![opened.as_ref().map_or(0.0, |(_, number)| *number as f64)];
     let number = all_gather(&**ranks, number).map_err(Error::Flow)?[0] as usize;
-    let checkpoint = number.checked_sub(1).and_then(|place| checkpoint_paths(folder).into_iter().nth(place));
+    let checkpoint = number
+        .checked_sub(1)
+        .and_then(|place| checkpoint_paths(folder).into_iter().nth(place));
     let tau_per_s = setup.tau_per_s;
     let wake = setup.wake.take();
     let (mut run, kept) = match &checkpoint {
@@ -106,7 +129,10 @@ pub fn run_on(
         let reason = format!(
             "the end, {end_s:?} s, lies before {reached_s:?} s (tau = {reached_tau:?}), which the checkpoint has reached"
         );
-        return Err(Error::Input { path: file.path().to_owned(), reason });
+        return Err(Error::Input {
+            path: file.path().to_owned(),
+            reason,
+        });
     }
     if is_first {
         warnings.iter().for_each(|text| observer.warn(text));
@@ -165,7 +191,11 @@ fn start(setup: Setup, plan: RunPlan, warnings: &mut Vec<String>) -> Result<Run,
 
 /// Takes the folder, and finds from which checkpoint the run goes on: the newer one, 1, or the one before it where that is gone or
 /// damaged, 2; 0 for none.
-fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(FolderLock, usize), Error> {
+fn open(
+    folder: &Path,
+    begin: Begin,
+    warnings: &mut Vec<String>,
+) -> Result<(FolderLock, usize), Error> {
     std::fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
     let lock = FolderLock::take(folder)?;
     let [checkpoint, previous] = checkpoint_paths(folder);
@@ -173,12 +203,18 @@ fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(Fold
         Begin::New | Begin::Overwrite => 0,
         // Killed before there was anything to continue from.
         Begin::Restart if !checkpoint.exists() && !previous.exists() => {
-            warnings.push(format!("there is no checkpoint in {}: the run begins anew", folder.display()));
+            warnings.push(format!(
+                "there is no checkpoint in {}: the run begins anew",
+                folder.display()
+            ));
             0
         }
         Begin::Restart => match check_checkpoint(&checkpoint) {
             Err(error) if check_checkpoint(&previous).is_ok() => {
-                warnings.push(format!("{error}: the one before it is used, {}", previous.display()));
+                warnings.push(format!(
+                    "{error}: the one before it is used, {}",
+                    previous.display()
+                ));
                 2
             }
             _ => 1,
@@ -190,7 +226,9 @@ fn open(folder: &Path, begin: Begin, warnings: &mut Vec<String>) -> Result<(Fold
 /// Refuses a folder that holds a run that is not to be overwritten, that cannot be written to, or that is in use.
 fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
     if begin == Begin::New
-        && let Some(path) = checkpoint_paths(folder).into_iter().find(|path| path.exists())
+        && let Some(path) = checkpoint_paths(folder)
+            .into_iter()
+            .find(|path| path.exists())
     {
         return Err(Error::CheckpointInTheWay { path });
     }
@@ -206,26 +244,44 @@ pub(super) fn prepare(
 ) -> Result<Prepared, Error> {
     // Of several ranks each is taken to have a machine of its own.
     let machines = ranks.count() as f64;
-    let available = machine::available_memory_bytes().filter(|_| !options.allow_large).map(|bytes| bytes * machines);
+    let available = machine::available_memory_bytes()
+        .filter(|_| !options.allow_large)
+        .map(|bytes| bytes * machines);
     // Before the setup, which holds the initial field.
     refuse_too_large(&file.content, file.content.case.cells(), &[], available)?;
     // What the solver refuses of a case is a matter of its file.
-    let of_file =
-        |error: wakescope_les::Error| Error::Input { path: file.path().to_owned(), reason: format!("[case]: {error}") };
+    let of_file = |error: wakescope_les::Error| Error::Input {
+        path: file.path().to_owned(),
+        reason: format!("[case]: {error}"),
+    };
     let setup = Setup::new(&file.content, file.folder());
-    let mut setup = setup.map_err(|error| if let Error::Flow(error) = error { of_file(error) } else { error })?;
+    let mut setup = setup.map_err(|error| {
+        if let Error::Flow(error) = error {
+            of_file(error)
+        } else {
+            error
+        }
+    })?;
     setup.settings.ranks = ranks.clone();
     let dense = setup.settings.pressure.dense_directions(&setup.mesh);
     refuse_too_large(&file.content, setup.mesh.cells(), &dense, available)?;
-    setup.settings.validate(&setup.mesh).map_err(|error| match error {
-        wakescope_les::Error::TooManyRanks { .. } => Error::Flow(error),
-        error => of_file(error),
-    })?;
+    setup
+        .settings
+        .validate(&setup.mesh)
+        .map_err(|error| match error {
+            wakescope_les::Error::TooManyRanks { .. } => Error::Flow(error),
+            error => of_file(error),
+        })?;
     if options.begin != Begin::Restart {
         refuse_unstable(file, &setup)?;
     }
     let (plan, files) = plan(file, &setup, folder)?;
-    plan.check(if options.begin == Begin::Restart { f64::NEG_INFINITY } else { 0.0 }).map_err(Error::Flow)?;
+    plan.check(if options.begin == Begin::Restart {
+        f64::NEG_INFINITY
+    } else {
+        0.0
+    })
+    .map_err(Error::Flow)?;
     let forecast = FlowForecast::new(file, &setup, &plan, &files);
     Ok((setup, plan, files, forecast))
 }
@@ -234,7 +290,9 @@ pub(super) fn prepare(
 fn refuse_unstable(file: &CaseFile, setup: &Setup) -> Result<(), Error> {
     let stability = setup.stability();
     let step_s = stability.first_step_s();
-    let Some(limit) = stability.refused(step_s) else { return Ok(()) };
+    let Some(limit) = stability.refused(step_s) else {
+        return Ok(());
+    };
     let allowed = |most: f64| {
         format!(
             "at most {most:.4} with this scheme, mesh and viscosity: beyond a Courant number of {limit:.3} waves of the mesh grow"
@@ -242,15 +300,29 @@ fn refuse_unstable(file: &CaseFile, setup: &Setup) -> Result<(), Error> {
     };
     let courant_per_s = stability.courant_per_s();
     Err(match setup.settings.time_step {
-        TimeStep::Fixed { .. } => file.refuse("time.step_s", step_s, allowed(limit / courant_per_s)),
+        TimeStep::Fixed { .. } => {
+            file.refuse("time.step_s", step_s, allowed(limit / courant_per_s))
+        }
         TimeStep::Courant { courant, .. } => file.refuse("time.courant", courant, allowed(limit)),
     })
 }
 
 /// The run of a checkpoint. Which scheme suits a flow depends on the step, which may be changed: where the case does not name
 /// one, that of the checkpoint goes on.
-fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(Run, Vec<u8>), Error> {
-    let try_with = |setup: &Setup| Run::resume(path, setup.mesh.clone(), setup.settings.clone(), plan.clone());
+fn resume(
+    path: &Path,
+    setup: Setup,
+    plan: RunPlan,
+    case: &FlowCase,
+) -> Result<(Run, Vec<u8>), Error> {
+    let try_with = |setup: &Setup| {
+        Run::resume(
+            path,
+            setup.mesh.clone(),
+            setup.settings.clone(),
+            plan.clone(),
+        )
+    };
     let resumed = match try_with(&setup) {
         Err(wakescope_les::Error::CheckpointMismatch { what, .. })
             if what == "the time scheme" && case.time.scheme.is_none() =>
@@ -265,10 +337,17 @@ fn resume(path: &Path, setup: Setup, plan: RunPlan, case: &FlowCase) -> Result<(
 /// The plan of the run and of its files, with all that can be refused before the computing.
 fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files), Error> {
     let case = &file.content;
-    let wake_end_s = case.wake.as_ref().map(|wake| wake.end_tau / setup.tau_per_s);
+    let wake_end_s = case
+        .wake
+        .as_ref()
+        .map(|wake| wake.end_tau / setup.tau_per_s);
     let Some(end_s) = case.time.end_s.or(wake_end_s).or(setup.end_s) else {
         let allowed = "a number in s, e.g. 30.0, is needed for a flow of one's own".into();
-        let problem = Problem { key: "time.end_s".into(), value: Problem::ABSENT.into(), allowed };
+        let problem = Problem {
+            key: "time.end_s".into(),
+            value: Problem::ABSENT.into(),
+            allowed,
+        };
         return Err(Error::Scene(file.located(vec![problem])));
     };
     let mut output = case.output.clone();
@@ -277,10 +356,17 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
             output.planes_x_m = wake.planes_x.iter().map(|x| x * scales.spacing_m).collect();
             Schedule::of_wake(wake, setup.tau_per_s, end_s)
         }
-        _ => Schedule::plain(case.output_times_s(end_s).map_err(|problem| Error::Scene(file.located(vec![problem])))?),
+        _ => Schedule::plain(
+            case.output_times_s(end_s)
+                .map_err(|problem| Error::Scene(file.located(vec![problem])))?,
+        ),
     };
     if let Some(late) = schedule.times_s.iter().find(|t| **t > end_s) {
-        return Err(file.refuse("output.times_s", late, format!("at most the end, {end_s:?} s")));
+        return Err(file.refuse(
+            "output.times_s",
+            late,
+            format!("at most the end, {end_s:?} s"),
+        ));
     }
     let along = &setup.mesh.directions()[0];
     let inside = |x: &f64| along.ends == Ends::Periodic || (along.low_m..=along.high_m).contains(x);
@@ -297,7 +383,10 @@ fn plan(file: &CaseFile, setup: &Setup, folder: &Path) -> Result<(RunPlan, Files
     let run = RunPlan {
         end_s,
         output_times_s: schedule.times_s.clone(),
-        checkpoint: case.checkpoint.write.then_some(CheckpointPlan { path, every }),
+        checkpoint: case
+            .checkpoint
+            .write
+            .then_some(CheckpointPlan { path, every }),
         pause_after_steps: case.time.pause_after_steps,
     };
     let files = Files {

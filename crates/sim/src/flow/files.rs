@@ -12,7 +12,10 @@ use crate::Error;
 use crate::io::own::refuse_foreign;
 #[cfg(feature = "vtk")]
 use crate::io::vtr;
-use crate::io::{CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, cf_fields, tables};
+use crate::io::{
+    CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, cf_fields,
+    tables,
+};
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -101,8 +104,17 @@ impl Files {
             let mut formats = self.output.fields.clone();
             formats.sort_by_key(|format| *format == FileFormat::InitialNetcdf);
             out.extend(formats.into_iter().map(|format| {
-                let stem = if format == FileFormat::InitialNetcdf { "initial" } else { "fields" };
-                OutputFile { stem: stem.into(), index, format, plane: None }
+                let stem = if format == FileFormat::InitialNetcdf {
+                    "initial"
+                } else {
+                    "fields"
+                };
+                OutputFile {
+                    stem: stem.into(),
+                    index,
+                    format,
+                    plane: None,
+                }
             }));
         }
         if let Some(index) = due.planes {
@@ -120,7 +132,10 @@ impl Files {
     }
 
     fn of_outputs(&self) -> impl Iterator<Item = OutputFile> {
-        self.schedule.due.iter().flat_map(|due| self.of_output(*due))
+        self.schedule
+            .due
+            .iter()
+            .flat_map(|due| self.of_output(*due))
     }
 
     /// Names of all files of a run, but for its checkpoints.
@@ -132,45 +147,94 @@ impl Files {
             #[cfg(feature = "plots")]
             out.extend(wake::PICTURES.map(str::to_owned));
         }
-        out.extend(self.of_outputs().flat_map(|file| std::iter::once(file.name()).chain(file.collection())));
+        out.extend(
+            self.of_outputs()
+                .flat_map(|file| std::iter::once(file.name()).chain(file.collection())),
+        );
         out
     }
 
     /// Number and size of the files of a run of so many steps, those of all outputs together.
-    pub(super) fn forecast(&self, cells: [usize; 3], steps: f64, writes_checkpoints: bool) -> Vec<FileForecast> {
+    pub(super) fn forecast(
+        &self,
+        cells: [usize; 3],
+        steps: f64,
+        writes_checkpoints: bool,
+    ) -> Vec<FileForecast> {
         let [nx, ny, nz] = cells.map(|n| n as f64);
         let variables = if self.is_wake { 5.0 } else { 4.0 };
         let mut out: Vec<FileForecast> = Vec::new();
-        let mut add = |name: &str, count: usize, bytes: f64| match out.iter_mut().find(|kind| kind.name == name) {
+        let mut add = |name: &str, count: usize, bytes: f64| match out
+            .iter_mut()
+            .find(|kind| kind.name == name)
+        {
             Some(kind) => (kind.count, kind.bytes) = (kind.count + count, kind.bytes + bytes),
-            None if count > 0 => out.push(FileForecast { name: name.into(), count, bytes }),
+            None if count > 0 => out.push(FileForecast {
+                name: name.into(),
+                count,
+                bytes,
+            }),
             None => {}
         };
-        let (planes, fields): (Vec<_>, Vec<_>) = self.of_outputs().partition(|file| file.plane.is_some());
+        let (planes, fields): (Vec<_>, Vec<_>) =
+            self.of_outputs().partition(|file| file.plane.is_some());
         for file in fields.into_iter().chain(planes) {
-            let stem = if file.plane.is_some() { "plane*" } else { &file.stem };
-            add(&format!("{stem}_*.{}", file.format.ending()), 1, file.bytes(nx * ny * nz, ny * nz, variables));
+            let stem = if file.plane.is_some() {
+                "plane*"
+            } else {
+                &file.stem
+            };
+            add(
+                &format!("{stem}_*.{}", file.format.ending()),
+                1,
+                file.bytes(nx * ny * nz, ny * nz, variables),
+            );
         }
-        add(STEPS, usize::from(self.output.steps), steps * STEP_ROW_BYTES);
+        add(
+            STEPS,
+            usize::from(self.output.steps),
+            steps * STEP_ROW_BYTES,
+        );
         let histories = 2;
         let records = self.schedule.due.iter().filter(|due| due.record).count() as f64;
-        add("wake.*", if self.is_wake { histories } else { 0 }, records * (RECORD_BYTES + 40.0 * nx));
-        add("flow.checkpoint*", if writes_checkpoints { 2 } else { 0 }, 2.0 * 7.0 * 8.0 * nx * ny * nz);
+        add(
+            "wake.*",
+            if self.is_wake { histories } else { 0 },
+            records * (RECORD_BYTES + 40.0 * nx),
+        );
+        add(
+            "flow.checkpoint*",
+            if writes_checkpoints { 2 } else { 0 },
+            2.0 * 7.0 * 8.0 * nx * ny * nz,
+        );
         out
     }
 
     /// Refuses a folder with files in the way that this program did not write. On a restart the case may have been edited: its
     /// end and its outputs may change.
     pub(super) fn refuse_foreign(&self, begin: Begin) -> Result<(), Error> {
-        let existing = if begin == Begin::Overwrite { Existing::Any } else { Existing::Own };
+        let existing = if begin == Begin::Overwrite {
+            Existing::Any
+        } else {
+            Existing::Own
+        };
         let mut names = self.names();
         names.retain(|name| begin != Begin::Restart || name != CASE);
-        Ok(refuse_foreign(&self.folder, names.iter().map(String::as_str), existing)?)
+        Ok(refuse_foreign(
+            &self.folder,
+            names.iter().map(String::as_str),
+            existing,
+        )?)
     }
 
     /// Writes all files that are due, or none of them; returns their paths, on rank 0 alone. Of fields each rank writes what it
     /// has; planes, which all have, rank 0 writes.
-    pub(super) fn write(&self, flow: &Flow, due: Due, ranks: &Arc<dyn Ranks>) -> Result<Vec<PathBuf>, Error> {
+    pub(super) fn write(
+        &self,
+        flow: &Flow,
+        due: Due,
+        ranks: &Arc<dyn Ranks>,
+    ) -> Result<Vec<PathBuf>, Error> {
         let is_first = ranks.rank() == 0;
         let shown = agree(ranks, self.shown(flow, due, ranks))?;
         let (mut group, mut rows) = (FileGroup::new(&self.folder), Vec::new());
@@ -194,68 +258,131 @@ impl Files {
             let lengths = all_gather(&**ranks, vec![text.len() as f64]).map_err(Error::Flow)?;
             let before = lengths[..ranks.rank()].iter().sum::<f64>() as u64;
             let length = lengths.iter().sum::<f64>() as u64;
-            group.add_parts(&name, FileParts { length, parts: vec![(before, text.into_bytes())] })?;
+            group.add_parts(
+                &name,
+                FileParts {
+                    length,
+                    parts: vec![(before, text.into_bytes())],
+                },
+            )?;
         }
         commit(&group, ranks)
     }
 
     /// What is due of the flow, for which all ranks must ask together.
     fn shown(&self, flow: &Flow, due: Due, ranks: &Arc<dyn Ranks>) -> Result<Shown, Error> {
-        let share = Share { planes: flow.own_planes(), is_first: ranks.rank() == 0 };
-        let wants = |of: &dyn Fn(&FileFormat) -> bool| due.fields.is_some() && self.output.fields.iter().any(of);
+        let share = Share {
+            planes: flow.own_planes(),
+            is_first: ranks.rank() == 0,
+        };
+        let wants = |of: &dyn Fn(&FileFormat) -> bool| {
+            due.fields.is_some() && self.output.fields.iter().any(of)
+        };
         let initial = |format: &FileFormat| *format == FileFormat::InitialNetcdf;
-        let field = if wants(&|format| !initial(format)) { Some(self.field(flow, share.clone())?) } else { None };
+        let field = if wants(&|format| !initial(format)) {
+            Some(self.field(flow, share.clone())?)
+        } else {
+            None
+        };
         #[cfg(feature = "vtk")]
-        let behind = field.as_ref().map_or(Ok(None), |field| behind(field, ranks))?;
-        let xs_m: &[f64] = if due.planes.is_some() { &self.output.planes_x_m } else { &[] };
-        let planes = xs_m.iter().map(|x_m| self.plane(flow, *x_m)).collect::<Result<_, _>>()?;
+        let behind = field
+            .as_ref()
+            .map_or(Ok(None), |field| behind(field, ranks))?;
+        let xs_m: &[f64] = if due.planes.is_some() {
+            &self.output.planes_x_m
+        } else {
+            &[]
+        };
+        let planes = xs_m
+            .iter()
+            .map(|x_m| self.plane(flow, *x_m))
+            .collect::<Result<_, _>>()?;
         Ok(Shown {
             field,
             #[cfg(feature = "vtk")]
             behind,
-            faces: if wants(&initial) { Some(self.faces(flow, share)?) } else { None },
+            faces: if wants(&initial) {
+                Some(self.faces(flow, share)?)
+            } else {
+                None
+            },
             planes,
         })
     }
 
     /// What this rank has of a file; none of the table of a field, in which the place of its text is not known yet.
-    fn parts(&self, file: &OutputFile, shown: &Shown, is_first: bool) -> Result<Option<FileParts>, Error> {
+    fn parts(
+        &self,
+        file: &OutputFile,
+        shown: &Shown,
+        is_first: bool,
+    ) -> Result<Option<FileParts>, Error> {
         let whole = |bytes: Vec<u8>| Some(of_first(bytes, is_first));
         let origin = &self.origin;
         Ok(match (file.plane, file.format, &shown.field) {
-            (None, FileFormat::Netcdf, Some(field)) => Some(cf_fields::cf_field_parts(field, origin)?),
-            #[cfg(feature = "vtk")]
-            (None, FileFormat::Vtr, Some(field)) => Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?),
-            (None, FileFormat::InitialNetcdf, _) => {
-                shown.faces.as_ref().map(|faces| cf_fields::cf_faces_parts(faces, origin)).transpose()?
-            }
-            (Some(at), FileFormat::Csv, _) => {
-                whole(tables::planes_table(&shown.planes[at])?.to_csv(origin)?.into_bytes())
-            }
-            (Some(at), FileFormat::Netcdf, _) => {
-                whole(crate::io::cf_planes::cf_planes_bytes(&shown.planes[at], origin)?)
+            (None, FileFormat::Netcdf, Some(field)) => {
+                Some(cf_fields::cf_field_parts(field, origin)?)
             }
             #[cfg(feature = "vtk")]
-            (Some(at), FileFormat::Vtr, _) => whole(vtr::plane_bytes(&shown.planes[at], 0, origin)?),
+            (None, FileFormat::Vtr, Some(field)) => {
+                Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?)
+            }
+            (None, FileFormat::InitialNetcdf, _) => shown
+                .faces
+                .as_ref()
+                .map(|faces| cf_fields::cf_faces_parts(faces, origin))
+                .transpose()?,
+            (Some(at), FileFormat::Csv, _) => whole(
+                tables::planes_table(&shown.planes[at])?
+                    .to_csv(origin)?
+                    .into_bytes(),
+            ),
+            (Some(at), FileFormat::Netcdf, _) => whole(crate::io::cf_planes::cf_planes_bytes(
+                &shown.planes[at],
+                origin,
+            )?),
+            #[cfg(feature = "vtk")]
+            (Some(at), FileFormat::Vtr, _) => {
+                whole(vtr::plane_bytes(&shown.planes[at], 0, origin)?)
+            }
             _ => None,
         })
     }
 
     /// The rows of the field that this rank has, on the first one below their names.
     fn rows(&self, shown: &Shown) -> Result<String, Error> {
-        let Some(field) = &shown.field else { return Ok(String::new()) };
+        let Some(field) = &shown.field else {
+            return Ok(String::new());
+        };
         let table = field.table()?;
-        Ok(if field.share.is_first { table.to_csv(&self.origin)? } else { table.rows()? })
+        Ok(if field.share.is_first {
+            table.to_csv(&self.origin)?
+        } else {
+            table.rows()?
+        })
     }
 
     /// The collection of all outputs up to this one.
     #[cfg(feature = "vtk")]
     fn collection(&self, file: &OutputFile) -> Vec<u8> {
         let of_planes = file.plane.is_some();
-        let names: Vec<String> = (0..=file.index).map(|i| numbered(&file.stem, i, "vtr")).collect();
+        let names: Vec<String> = (0..=file.index)
+            .map(|i| numbered(&file.stem, i, "vtr"))
+            .collect();
         let per_s = if of_planes { self.tau_per_s } else { 1.0 };
-        let due = |due: &Due| if of_planes { due.planes.is_some() } else { due.fields.is_some() };
-        let outputs = self.schedule.times_s.iter().zip(&self.schedule.due).filter(|(_, own)| due(own));
+        let due = |due: &Due| {
+            if of_planes {
+                due.planes.is_some()
+            } else {
+                due.fields.is_some()
+            }
+        };
+        let outputs = self
+            .schedule
+            .times_s
+            .iter()
+            .zip(&self.schedule.due)
+            .filter(|(_, own)| due(own));
         let members = outputs.map(|(time_s, _)| time_s * per_s);
         vtr::pvd_bytes(members.zip(names.iter().map(String::as_str)), &self.origin)
     }
@@ -263,8 +390,11 @@ impl Files {
     fn field(&self, flow: &Flow, share: Share) -> Result<VelocityField, Error> {
         let mesh = flow.mesh();
         let velocity = |axis| flow.own_centre_velocity_m_s(axis).map_err(Error::Flow);
-        let vorticity_per_s =
-            if self.is_wake { Some(flow.own_vorticity_magnitude_per_s().map_err(Error::Flow)?) } else { None };
+        let vorticity_per_s = if self.is_wake {
+            Some(flow.own_vorticity_magnitude_per_s().map_err(Error::Flow)?)
+        } else {
+            None
+        };
         Ok(VelocityField {
             title: self.title.clone(),
             time_s: flow.time_s(),
@@ -323,7 +453,14 @@ impl Files {
 /// A file that all ranks have whole: the first one writes it.
 fn of_first(bytes: Vec<u8>, is_first: bool) -> FileParts {
     let all = FileParts::from(bytes);
-    if is_first { all } else { FileParts { parts: Vec::new(), ..all } }
+    if is_first {
+        all
+    } else {
+        FileParts {
+            parts: Vec::new(),
+            ..all
+        }
+    }
 }
 
 /// What is due of a flow: of fields what this rank has, planes whole.
@@ -339,12 +476,17 @@ struct Shown {
 /// Values of a field in the first cell of the next rank that has any.
 #[cfg(feature = "vtk")]
 fn behind(field: &VelocityField, ranks: &Arc<dyn Ranks>) -> Result<Option<Vec<f64>>, Error> {
-    let first: Vec<f64> = field.named().filter_map(|(_, values)| values.first().copied()).collect();
+    let first: Vec<f64> = field
+        .named()
+        .filter_map(|(_, values)| values.first().copied())
+        .collect();
     let count = field.named().count();
     let place = (!first.is_empty()).then_some(field.share.planes.start as f64);
     let own = place.into_iter().chain(first).collect();
     let all = all_gather(&**ranks, own).map_err(Error::Flow)?;
-    let next = all.chunks(count + 1).find(|values| values[0] == field.share.planes.end as f64);
+    let next = all
+        .chunks(count + 1)
+        .find(|values| values[0] == field.share.planes.end as f64);
     Ok(next.map(|values| values[1..].to_vec()))
 }
 
@@ -359,17 +501,40 @@ pub(super) fn agree<T>(ranks: &Arc<dyn Ranks>, result: Result<T, Error>) -> Resu
 /// The first refusal of the system on any rank; the folder is then as it was before.
 fn commit(group: &FileGroup, ranks: &Arc<dyn Ranks>) -> Result<Vec<PathBuf>, Error> {
     let is_first = ranks.rank() == 0;
-    let begun = if is_first { group.begin().map(Some) } else { Ok(None) };
+    let begun = if is_first {
+        group.begin().map(Some)
+    } else {
+        Ok(None)
+    };
     let stage = agree(ranks, begun.map_err(Error::from))?;
-    let name = stage.as_ref().map_or_else(Vec::new, |stage| stage.name().bytes().map(f64::from).collect());
-    let name: Vec<u8> = all_gather(&**ranks, name).map_err(Error::Flow)?.iter().map(|byte| *byte as u8).collect();
-    agree(ranks, group.write(&String::from_utf8_lossy(&name)).map_err(Error::from))?;
-    agree(ranks, stage.map_or(Ok(Vec::new()), |stage| group.put(&stage).map_err(Error::from)))
+    let name = stage.as_ref().map_or_else(Vec::new, |stage| {
+        stage.name().bytes().map(f64::from).collect()
+    });
+    let name: Vec<u8> = all_gather(&**ranks, name)
+        .map_err(Error::Flow)?
+        .iter()
+        .map(|byte| *byte as u8)
+        .collect();
+    agree(
+        ranks,
+        group
+            .write(&String::from_utf8_lossy(&name))
+            .map_err(Error::from),
+    )?;
+    agree(
+        ranks,
+        stage.map_or(Ok(Vec::new()), |stage| {
+            group.put(&stage).map_err(Error::from)
+        }),
+    )
 }
 
 /// The checkpoint of a run in `folder`, and the one before it.
 pub(super) fn checkpoint_paths(folder: &Path) -> [PathBuf; 2] {
-    [folder.join("flow.checkpoint"), folder.join("flow.checkpoint.previous")]
+    [
+        folder.join("flow.checkpoint"),
+        folder.join("flow.checkpoint.previous"),
+    ]
 }
 
 #[cfg(test)]
@@ -389,21 +554,42 @@ mod tests {
                 let mut group = FileGroup::new(folder.path());
                 let part = (rank as u64, vec![text.as_bytes()[rank]]);
                 // No file reaches so far.
-                let part = if fails && rank == 1 { (u64::MAX, part.1) } else { part };
-                group.add_parts("a", FileParts { length: 3, parts: vec![part] }).unwrap();
+                let part = if fails && rank == 1 {
+                    (u64::MAX, part.1)
+                } else {
+                    part
+                };
+                group
+                    .add_parts(
+                        "a",
+                        FileParts {
+                            length: 3,
+                            parts: vec![part],
+                        },
+                    )
+                    .unwrap();
                 commit(&group, &ranks).map_err(|error| error.to_string())
             })
         };
         let names = || fs::read_dir(folder.path()).unwrap().count();
         let written = write("abc", false);
         assert_eq!(written[0], Some(Ok(vec![path.clone()])));
-        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names()), ("abc", 1));
+        assert_eq!(
+            (fs::read_to_string(&path).unwrap().as_str(), names()),
+            ("abc", 1)
+        );
         let failed = write("xyz", true);
         assert!(
-            failed.iter().all(|one| matches!(one, Some(Err(words)) if words.contains("cannot write"))),
+            failed
+                .iter()
+                .all(|one| matches!(one, Some(Err(words)) if words.contains("cannot write"))),
             "{failed:?}"
         );
-        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names()), ("abc", 1), "nothing is left behind");
+        assert_eq!(
+            (fs::read_to_string(&path).unwrap().as_str(), names()),
+            ("abc", 1),
+            "nothing is left behind"
+        );
     }
 
     #[test]

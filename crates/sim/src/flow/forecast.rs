@@ -62,7 +62,9 @@ impl FlowForecast {
         let stability = setup.stability();
         let step_s = stability.first_step_s().min(plan.end_s);
         let to_end = steps_to(plan.end_s, step_s, setup).ceil();
-        let steps = plan.pause_after_steps.map_or(to_end, |pause| to_end.min(pause as f64));
+        let steps = plan
+            .pause_after_steps
+            .map_or(to_end, |pause| to_end.min(pause as f64));
         let (cells, ranks) = (setup.mesh.cells(), setup.settings.ranks.count());
         // Of a rank with its halos.
         let mut held = cells;
@@ -70,9 +72,17 @@ impl FlowForecast {
             held[2] = (cells[2].div_ceil(ranks) + 2 * HALO_PLANES).min(cells[2]);
         }
         let scheme = setup.settings.scheme;
-        let passes = if scheme == TimeScheme::RungeKutta3 { 3.0 } else { 1.0 };
+        let passes = if scheme == TimeScheme::RungeKutta3 {
+            3.0
+        } else {
+            1.0
+        };
         let matrices: f64 = dense.iter().map(|n| *n as f64).sum();
-        let pictures_s = if case.wake.is_some() && cfg!(feature = "plots") { PICTURES_S } else { 0.0 };
+        let pictures_s = if case.wake.is_some() && cfg!(feature = "plots") {
+            PICTURES_S
+        } else {
+            0.0
+        };
         let eigen_s: f64 = dense.iter().map(|n| (*n as f64).powi(3) * EIGEN_S).sum();
         let cell_s = CELL_S[usize::from(setup.settings.pressure.is_multigrid(&setup.mesh))];
         let pass_s = count(cells) * (cell_s + matrices * MATRIX_S);
@@ -113,25 +123,62 @@ impl fmt::Display for FlowForecast {
         let [nx, ny, nz] = self.cells;
         writeln!(f, "case {}", self.case_hash)?;
         writeln!(f, "  cells    {nx} x {ny} x {nz} = {}", count(self.cells))?;
-        let age =
-            if self.end_tau == self.end_s { String::new() } else { format!(", tau = {:?}", rounded(self.end_tau, 5)) };
+        let age = if self.end_tau == self.end_s {
+            String::new()
+        } else {
+            format!(", tau = {:?}", rounded(self.end_tau, 5))
+        };
         writeln!(f, "  end      t = {:?} s{age}", rounded(self.end_s, 5))?;
-        let scheme = if self.scheme == TimeScheme::RungeKutta3 { "runge_kutta3" } else { "adams_bashforth2" };
-        let reason = self.scheme_reason.as_ref().map_or(String::new(), |reason| format!(", {reason}"));
-        writeln!(f, "  steps    about {:.0} of {:.3e} s, {scheme}{reason}", self.steps, self.step_s)?;
+        let scheme = if self.scheme == TimeScheme::RungeKutta3 {
+            "runge_kutta3"
+        } else {
+            "adams_bashforth2"
+        };
+        let reason = self
+            .scheme_reason
+            .as_ref()
+            .map_or(String::new(), |reason| format!(", {reason}"));
+        writeln!(
+            f,
+            "  steps    about {:.0} of {:.3e} s, {scheme}{reason}",
+            self.steps, self.step_s
+        )?;
         if self.damped_courant.is_finite() {
             let (courant, damped) = (self.courant, self.damped_courant);
-            writeln!(f, "  courant  {courant:.3}, all waves of the mesh decay up to {damped:.3}")?;
+            writeln!(
+                f,
+                "  courant  {courant:.3}, all waves of the mesh decay up to {damped:.3}"
+            )?;
         }
-        writeln!(f, "  time     about {} on one core", seconds(self.core_s + self.program_s))?;
-        let available = machine::available_memory_bytes().map_or(String::new(), |b| format!(" of {}", bytes(b)));
-        writeln!(f, "  memory   about {}{available}", bytes(self.memory_bytes))?;
+        writeln!(
+            f,
+            "  time     about {} on one core",
+            seconds(self.core_s + self.program_s)
+        )?;
+        let available = machine::available_memory_bytes()
+            .map_or(String::new(), |b| format!(" of {}", bytes(b)));
+        writeln!(
+            f,
+            "  memory   about {}{available}",
+            bytes(self.memory_bytes)
+        )?;
         if self.ranks > 1 {
-            writeln!(f, "  ranks    {}, each about {}", self.ranks, bytes(self.rank_bytes))?;
+            writeln!(
+                f,
+                "  ranks    {}, each about {}",
+                self.ranks,
+                bytes(self.rank_bytes)
+            )?;
         }
         writeln!(f, "  files    about {}", bytes(self.file_bytes()))?;
         for kind in &self.files {
-            writeln!(f, "           {:<28} {:>6} {:>10}", kind.name, kind.count, bytes(kind.bytes))?;
+            writeln!(
+                f,
+                "           {:<28} {:>6} {:>10}",
+                kind.name,
+                kind.count,
+                bytes(kind.bytes)
+            )?;
         }
         Ok(())
     }
@@ -156,15 +203,18 @@ fn notes(case: &FlowCase, setup: &Setup, stability: &Stability, step_s: f64) -> 
 /// fastest: their radius squared grows by `4 nu t`, and their largest speed, `b0/(2 r) V0`, falls beside the `V0` that each vortex
 /// gets from the other.
 fn steps_to(end_s: f64, first_s: f64, setup: &Setup) -> f64 {
-    let (Some(wake), TimeStep::Courant { longest_s, .. }) = (&setup.wake, setup.settings.time_step) else {
+    let (Some(wake), TimeStep::Courant { longest_s, .. }) = (&setup.wake, setup.settings.time_step)
+    else {
         return end_s / first_s;
     };
     let speed = |time_s: f64| {
-        let radius_m = (wake.core_radius_m.powi(2) + 4.0 * setup.settings.viscosity_m2_s * time_s).sqrt();
+        let radius_m =
+            (wake.core_radius_m.powi(2) + 4.0 * setup.settings.viscosity_m2_s * time_s).sqrt();
         1.0 + 0.5 * wake.scales.spacing_m / radius_m
     };
     let part_s = end_s / SPREADING_PARTS as f64;
-    let step_s = |part: usize| (first_s * speed(0.0) / speed((part as f64 + 0.5) * part_s)).min(longest_s);
+    let step_s =
+        |part: usize| (first_s * speed(0.0) / speed((part as f64 + 0.5) * part_s)).min(longest_s);
     (0..SPREADING_PARTS).map(|part| part_s / step_s(part)).sum()
 }
 
@@ -179,7 +229,9 @@ pub(super) fn refuse_too_large(
     available_bytes: Option<f64>,
 ) -> Result<(), Error> {
     let needed = memory_bytes(case, [cells; 2], dense);
-    let Some(available) = available_bytes.filter(|available| needed > *available) else { return Ok(()) };
+    let Some(available) = available_bytes.filter(|available| needed > *available) else {
+        return Ok(());
+    };
     let matrices = dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>();
     let (stage, remedy) = if matrices > 0.5 * needed {
         let longest = dense.iter().max().copied().unwrap_or_default();
@@ -190,17 +242,35 @@ pub(super) fn refuse_too_large(
         ("the pressure solver", remedy)
     } else {
         let [nx, ny, nz] = fitting(case, cells, dense, available);
-        ("the fields of the flow", format!("case.cells of about {nx} x {ny} x {nz} would fit"))
+        (
+            "the fields of the flow",
+            format!("case.cells of about {nx} x {ny} x {nz} would fit"),
+        )
     };
-    Err(Error::TooLarge { needed: bytes(needed), available: bytes(available), stage, remedy })
+    Err(Error::TooLarge {
+        needed: bytes(needed),
+        available: bytes(available),
+        stage,
+        remedy,
+    })
 }
 
 /// Cells in the same proportions that fit, two digits of each, rounded down. Nothing grows faster than the cube of a direction.
-fn fitting(case: &FlowCase, cells: [usize; 3], dense: &[usize], available_bytes: f64) -> [usize; 3] {
+fn fitting(
+    case: &FlowCase,
+    cells: [usize; 3],
+    dense: &[usize],
+    available_bytes: f64,
+) -> [usize; 3] {
     let varying = cells.iter().filter(|n| **n > 1).count().max(1) as f64;
-    let share = (available_bytes - PROGRAM_BYTES).max(0.0) / (memory_bytes(case, [cells; 2], dense) - PROGRAM_BYTES);
+    let share = (available_bytes - PROGRAM_BYTES).max(0.0)
+        / (memory_bytes(case, [cells; 2], dense) - PROGRAM_BYTES);
     cells.map(|n| {
-        let most = if n == 1 { 1 } else { ((n as f64 * share.powf(1.0 / varying)) as usize).max(4) };
+        let most = if n == 1 {
+            1
+        } else {
+            ((n as f64 * share.powf(1.0 / varying)) as usize).max(4)
+        };
         let unit = 10_usize.pow(most.ilog10().saturating_sub(1));
         most / unit * unit
     })
@@ -218,11 +288,24 @@ fn memory_bytes(case: &FlowCase, [cells, whole]: [[usize; 3]; 2], dense: &[usize
         CaseKind::Free(free) if matches!(free.initial, InitialName::Netcdf { .. }) => 3.0,
         _ => 0.0,
     };
-    let of_output = |format: &FileFormat| if *format == FileFormat::Csv { CSV_ARRAYS } else { OUTPUT_ARRAYS };
+    let of_output = |format: &FileFormat| {
+        if *format == FileFormat::Csv {
+            CSV_ARRAYS
+        } else {
+            OUTPUT_ARRAYS
+        }
+    };
     let outputs = case.output.fields.iter().map(of_output).fold(0.0, f64::max);
-    let meter = if matches!(case.case, CaseKind::Wake(_)) { METER_ARRAYS } else { 0.0 };
+    let meter = if matches!(case.case, CaseKind::Wake(_)) {
+        METER_ARRAYS
+    } else {
+        0.0
+    };
     // At the start the given field, which every rank has whole; in the first step of Adams-Bashforth its terms; later what is written.
-    let later = count(cells) * [FIRST_STEP_ARRAYS, outputs, meter].into_iter().fold(0.0, f64::max);
+    let later = count(cells)
+        * [FIRST_STEP_ARRAYS, outputs, meter]
+            .into_iter()
+            .fold(0.0, f64::max);
     let values = count(cells) * (FLOW_ARRAYS + model) + f64::max(count(whole) * given, later);
     8.0 * values + dense.iter().map(|n| matrix_bytes(*n)).sum::<f64>() + PROGRAM_BYTES
 }
@@ -263,7 +346,9 @@ mod tests {
     use std::path::Path;
 
     fn case(text: &str) -> FlowCase {
-        CaseFile::parse(text, Path::new("case.toml")).unwrap().content
+        CaseFile::parse(text, Path::new("case.toml"))
+            .unwrap()
+            .content
     }
 
     #[test]
@@ -277,13 +362,25 @@ mod tests {
             let error = refuse_too_large(&case, cells, &[], Some(8e9)).unwrap_err();
             assert!(matches!(error, Error::TooLarge { .. }), "{error}");
             let fits = fitting(&case, cells, &[], 8e9);
-            assert!(error.to_string().contains(&format!("{} x {} x {}", fits[0], fits[1], fits[2])), "{error}");
+            assert!(
+                error
+                    .to_string()
+                    .contains(&format!("{} x {} x {}", fits[0], fits[1], fits[2])),
+                "{error}"
+            );
             refuse_too_large(&case, fits, &[], Some(8e9)).unwrap();
             assert!(refuse_too_large(&case, fits.map(|n| n * 5 / 4), &[], Some(8e9)).is_err());
             refuse_too_large(&case, cells, &[], None).unwrap();
         }
-        let direct = case("[case]\nkind = \"lid_driven_cavity\"\ncells = 30000\n[solver]\npressure = \"direct\"\n");
-        let error = refuse_too_large(&direct, [1, 30, 30_000], &[30_000], Some(8e9)).unwrap_err().to_string();
-        assert!(error.contains("30000 cells") && error.contains("pressure solver"), "{error}");
+        let direct = case(
+            "[case]\nkind = \"lid_driven_cavity\"\ncells = 30000\n[solver]\npressure = \"direct\"\n",
+        );
+        let error = refuse_too_large(&direct, [1, 30, 30_000], &[30_000], Some(8e9))
+            .unwrap_err()
+            .to_string();
+        assert!(
+            error.contains("30000 cells") && error.contains("pressure solver"),
+            "{error}"
+        );
     }
 }

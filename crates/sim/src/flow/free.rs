@@ -7,7 +7,8 @@ use crate::scene::CoreProfile;
 use std::path::Path;
 use wakescope_les::solver::Ends;
 use wakescope_les::{
-    Direction, FlowSettings, Ground, Mapping, Mesh, Motion, Spread, TimeScheme, TimeStep, VortexPair, Wall, Wind,
+    Direction, FlowSettings, Ground, Mapping, Mesh, Motion, Spread, TimeScheme, TimeStep,
+    VortexPair, Wall, Wind,
 };
 
 crate::keys::foreign_choices! {
@@ -111,17 +112,34 @@ impl Axis {
         p.require(ordered, &key("high_m"), self.high_m, "finite, above low_m");
         match self.mapping {
             Spread::Uniform => {
-                p.require(self.stretch == 0.0, &key("stretch"), self.stretch, "0 for equal cells; name a mapping");
+                p.require(
+                    self.stretch == 0.0,
+                    &key("stretch"),
+                    self.stretch,
+                    "0 for equal cells; name a mapping",
+                );
             }
             Spread::Sine => {
-                p.require(self.stretch.abs() < 1.0, &key("stretch"), self.stretch, "between -1 and 1 for a sine");
+                p.require(
+                    self.stretch.abs() < 1.0,
+                    &key("stretch"),
+                    self.stretch,
+                    "between -1 and 1 for a sine",
+                );
             }
             _ => {
                 let ok = self.stretch > 0.0 && self.stretch <= 20.0;
-                p.require(ok, &key("stretch"), self.stretch, "above 0 and at most 20 for this mapping");
+                p.require(
+                    ok,
+                    &key("stretch"),
+                    self.stretch,
+                    "above 0 and at most 20 for this mapping",
+                );
             }
         }
-        let place = self.place.is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == Spread::Cluster);
+        let place = self
+            .place
+            .is_none_or(|place| (0.0..=1.0).contains(&place) && self.mapping == Spread::Cluster);
         p.require(
             place,
             &key("place"),
@@ -129,17 +147,36 @@ impl Axis {
             "a fraction of the length, 0 to 1, and only with mapping = \"cluster\"",
         );
         let periodic = [self.low_end, self.high_end].map(|end| end == EndName::Periodic);
-        let repeats = matches!(self.mapping, Spread::Uniform | Spread::Sine | Spread::Cluster);
-        let allowed = "uniform, sine or cluster in a periodic direction, and no cluster between planes";
-        let fits = if periodic[0] { repeats } else { self.mapping != Spread::Cluster };
+        let repeats = matches!(
+            self.mapping,
+            Spread::Uniform | Spread::Sine | Spread::Cluster
+        );
+        let allowed =
+            "uniform, sine or cluster in a periodic direction, and no cluster between planes";
+        let fits = if periodic[0] {
+            repeats
+        } else {
+            self.mapping != Spread::Cluster
+        };
         p.require(fits, &key("mapping"), self.mapping, allowed);
-        p.require(periodic[0] == periodic[1], &key("high_end"), self.high_end, "periodic at both ends or at none");
+        p.require(
+            periodic[0] == periodic[1],
+            &key("high_end"),
+            self.high_end,
+            "periodic at both ends or at none",
+        );
         for (field, end, velocity) in [
             ("low_velocity_m_s", self.low_end, self.low_velocity_m_s),
             ("high_velocity_m_s", self.high_end, self.high_velocity_m_s),
         ] {
-            let ok = velocity.iter().all(|v| v.is_finite()) && (end == EndName::NoSlip || velocity == [0.0; 3]);
-            p.require(ok, &key(field), velocity, "finite, and 0 where there is no no-slip wall");
+            let ok = velocity.iter().all(|v| v.is_finite())
+                && (end == EndName::NoSlip || velocity == [0.0; 3]);
+            p.require(
+                ok,
+                &key(field),
+                velocity,
+                "finite, and 0 where there is no no-slip wall",
+            );
         }
     }
 
@@ -152,7 +189,10 @@ impl Axis {
             cells: self.cells,
             low_m: self.low_m,
             high_m: self.high_m,
-            mapping: Mapping { place: self.place.unwrap_or(0.5), ..self.mapping.by(self.stretch) },
+            mapping: Mapping {
+                place: self.place.unwrap_or(0.5),
+                ..self.mapping.by(self.stretch)
+            },
             ends: match self.low_end {
                 EndName::Periodic => Ends::Periodic,
                 _ => Ends::Walls {
@@ -172,26 +212,43 @@ impl Free {
     }
 
     pub(super) fn setup(&self, folder: &Path) -> Result<Setup, Error> {
-        let mesh = Mesh::new(self.x.direction(), self.y.direction(), self.z.direction()).map_err(Error::Flow)?;
+        let mesh = Mesh::new(self.x.direction(), self.y.direction(), self.z.direction())
+            .map_err(Error::Flow)?;
         let (initial, tau_per_s) = self.initial(&mesh, folder)?;
         // Without an end of its own a case needs one from its file, and so has no longest step of its own.
         let courant = TimeScheme::AdamsBashforth2.default_courant();
         let longest_s = f64::MAX;
-        let mut settings = FlowSettings::new(self.viscosity_m2_s, TimeStep::Courant { courant, longest_s });
+        let mut settings = FlowSettings::new(
+            self.viscosity_m2_s,
+            TimeStep::Courant { courant, longest_s },
+        );
         settings.force_m_s2 = self.force_m_s2;
-        Ok(Setup { mesh, settings, initial, end_s: None, tau_per_s, wake: None, undamped: None })
+        Ok(Setup {
+            mesh,
+            settings,
+            initial,
+            end_s: None,
+            tau_per_s,
+            wake: None,
+            undamped: None,
+        })
     }
 
     fn initial(&self, mesh: &Mesh, folder: &Path) -> Result<(Initial, f64), Error> {
         match &self.initial {
-            &InitialName::Uniform { velocity_m_s } => Ok((Initial::Field(Box::new(move |_| velocity_m_s)), 1.0)),
+            &InitialName::Uniform { velocity_m_s } => {
+                Ok((Initial::Field(Box::new(move |_| velocity_m_s)), 1.0))
+            }
             InitialName::VortexPair(pair) => {
                 let speed_m_s = pair.circulation_m2_s / (std::f64::consts::TAU * pair.spacing_m);
                 Ok((pair.field()?, speed_m_s / pair.spacing_m))
             }
             InitialName::Netcdf { path } => {
                 let faces = super::initial_file::read(&folder.join(path), mesh);
-                Ok((Initial::Faces(faces.map_err(Error::of_key("case.initial.path"))?), 1.0))
+                Ok((
+                    Initial::Faces(faces.map_err(Error::of_key("case.initial.path"))?),
+                    1.0,
+                ))
             }
         }
     }

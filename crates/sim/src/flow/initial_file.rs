@@ -36,11 +36,15 @@ fn velocity(file: &NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, Str
     // x is the fastest: direction 0 is the last dimension.
     for (direction, dim) in dims.iter().rev().enumerate() {
         let coordinate_m = file.coordinate_m(dim)?;
-        let target_m = if direction == axis { mesh.face_m(direction) } else { mesh.centre_m(direction) };
+        let target_m = if direction == axis {
+            mesh.face_m(direction)
+        } else {
+            mesh.centre_m(direction)
+        };
         let along = &mesh.directions()[direction];
         let letter = ["x", "y", "z"][direction];
-        let taps =
-            taps(&coordinate_m, &target_m[..along.cells], along).map_err(|e| format!("{letter} of {name}: {e}"))?;
+        let taps = taps(&coordinate_m, &target_m[..along.cells], along)
+            .map_err(|e| format!("{letter} of {name}: {e}"))?;
         let count: usize = values.len() / coordinate_m.len().max(1);
         if count * coordinate_m.len() != values.len() {
             return Err(format!("{name} is not of the size of its dimensions"));
@@ -49,7 +53,9 @@ fn velocity(file: &NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, Str
         inner *= along.cells;
     }
     match values.iter().position(|v| !v.is_finite()) {
-        Some(place) => Err(format!("{name} is missing or not finite at the mesh's face {place}")),
+        Some(place) => Err(format!(
+            "{name} is missing or not finite at the mesh's face {place}"
+        )),
         None => Ok(values),
     }
 }
@@ -57,10 +63,23 @@ fn velocity(file: &NetcdfFile, mesh: &Mesh, axis: usize) -> Result<Vec<f64>, Str
 /// The dimensions of a component along z, y, x: by what they are for, or three of any name in this order.
 fn axes(file: &NetcdfFile, name: &str) -> Result<[String; 3], String> {
     file.roles(name, [Z, Y, X]).or_else(|reason| {
-        let dims: Vec<String> = file.dims(name).unwrap_or_default().into_iter().map(str::to_owned).collect();
-        let letters = |dim: &String| ["x", "y", "z", "X", "Y", "Z"].iter().any(|letter| dim.starts_with(letter));
+        let dims: Vec<String> = file
+            .dims(name)
+            .unwrap_or_default()
+            .into_iter()
+            .map(str::to_owned)
+            .collect();
+        let letters = |dim: &String| {
+            ["x", "y", "z", "X", "Y", "Z"]
+                .iter()
+                .any(|letter| dim.starts_with(letter))
+        };
         // Names that say something else must not be taken for what they are not.
-        if dims.iter().any(letters) { Err(reason) } else { dims.try_into().map_err(|_| reason) }
+        if dims.iter().any(letters) {
+            Err(reason)
+        } else {
+            dims.try_into().map_err(|_| reason)
+        }
     })
 }
 
@@ -72,7 +91,10 @@ fn apply(taps: &[Taps], values: &[f64], inner: usize, n: usize) -> Vec<f64> {
             let start = out.len();
             out.resize(start + inner, 0.0);
             for &(node, weight) in row {
-                for (out, value) in out[start..].iter_mut().zip(&block[node * inner..(node + 1) * inner]) {
+                for (out, value) in out[start..]
+                    .iter_mut()
+                    .zip(&block[node * inner..(node + 1) * inner])
+                {
                     *out += weight * value;
                 }
             }
@@ -95,7 +117,10 @@ fn taps(source_m: &[f64], target_m: &[f64], along: &Direction) -> Result<Vec<Tap
     let slack_m = source_m[1] - source_m[0];
     let last_m = source_m[n - 1];
     if periodic && last_m - source_m[0] > period_m * (1.0 - 1e-9) {
-        return Err(format!("{n} nodes span {} m: a period of {period_m} m has no node twice", last_m - source_m[0]));
+        return Err(format!(
+            "{n} nodes span {} m: a period of {period_m} m has no node twice",
+            last_m - source_m[0]
+        ));
     }
     let count = n.min(4);
     let position_m = |i: isize| {
@@ -105,19 +130,32 @@ fn taps(source_m: &[f64], target_m: &[f64], along: &Direction) -> Result<Vec<Tap
     target_m
         .iter()
         .map(|&x_m| {
-            let x_m = if periodic { source_m[0] + (x_m - source_m[0]).rem_euclid(period_m) } else { x_m };
+            let x_m = if periodic {
+                source_m[0] + (x_m - source_m[0]).rem_euclid(period_m)
+            } else {
+                x_m
+            };
             let outside = x_m < source_m[0] - slack_m || x_m > last_m + (last_m - source_m[n - 2]);
             if !periodic && outside {
-                return Err(format!("{x_m} m of the mesh is not covered by {} to {last_m} m", source_m[0]));
+                return Err(format!(
+                    "{x_m} m of the mesh is not covered by {} to {last_m} m",
+                    source_m[0]
+                ));
             }
             let below = source_m.partition_point(|&s| s <= x_m) as isize - 1;
-            let first = if periodic { below - 1 } else { (below - 1).clamp(0, (n - count) as isize) };
+            let first = if periodic {
+                below - 1
+            } else {
+                (below - 1).clamp(0, (n - count) as isize)
+            };
             let nodes: Vec<isize> = (first..first + count as isize).collect();
             Ok(nodes
                 .iter()
                 .map(|&i| {
                     let others = nodes.iter().filter(|&&j| j != i);
-                    let weight = others.map(|&j| (x_m - position_m(j)) / (position_m(i) - position_m(j))).product();
+                    let weight = others
+                        .map(|&j| (x_m - position_m(j)) / (position_m(i) - position_m(j)))
+                        .product();
                     (i.rem_euclid(n as isize) as usize, weight)
                 })
                 .filter(|&(_, weight): &(usize, f64)| weight != 0.0)
@@ -134,9 +172,19 @@ mod tests {
     fn cubics_come_back_exactly_and_nodes_keep_their_values() {
         let cubic = |x: f64| 1.0 - x + 2.0 * x * x - 0.7 * x.powi(3);
         let source_m = [0.0, 0.1, 0.25, 0.5, 0.8, 1.0];
-        let bounded = Direction::between(8, 0.0, 1.0, wakescope_les::Wall::Slip, wakescope_les::Wall::Slip);
+        let bounded = Direction::between(
+            8,
+            0.0,
+            1.0,
+            wakescope_les::Wall::Slip,
+            wakescope_les::Wall::Slip,
+        );
         let target_m = [0.0, 0.05, 0.3, 0.5, 0.99, 1.0];
-        for (row, x) in taps(&source_m, &target_m, &bounded).unwrap().iter().zip(target_m) {
+        for (row, x) in taps(&source_m, &target_m, &bounded)
+            .unwrap()
+            .iter()
+            .zip(target_m)
+        {
             let found: f64 = row.iter().map(|&(i, w)| w * cubic(source_m[i])).sum();
             assert!((found - cubic(x)).abs() < 1e-14, "{x}");
             if source_m.contains(&x) {
@@ -153,17 +201,40 @@ mod tests {
             let target_m: Vec<f64> = (0..100).map(|i| 0.01 * f64::from(i)).collect();
             let wave = |x: f64| (std::f64::consts::TAU * x).sin();
             let taps = taps(&source_m, &target_m, &along).unwrap();
-            let found = taps.iter().map(|row| row.iter().map(|&(i, w)| w * wave(source_m[i])).sum::<f64>());
-            found.zip(&target_m).map(|(f, x)| (f - wave(*x)).abs()).fold(0.0, f64::max)
+            let found = taps
+                .iter()
+                .map(|row| row.iter().map(|&(i, w)| w * wave(source_m[i])).sum::<f64>());
+            found
+                .zip(&target_m)
+                .map(|(f, x)| (f - wave(*x)).abs())
+                .fold(0.0, f64::max)
         };
         assert!((error(16) / error(32)).log2() > 3.7);
     }
 
     #[test]
     fn a_source_that_does_not_cover_the_mesh_is_refused() {
-        let bounded = Direction::between(8, 0.0, 1.0, wakescope_les::Wall::Slip, wakescope_les::Wall::Slip);
-        assert!(taps(&[0.0, 0.2, 0.4], &[0.7], &bounded).unwrap_err().contains("0.7"));
-        assert!(taps(&[0.0, 0.2, 0.1], &[0.1], &bounded).unwrap_err().contains("increase"));
-        assert!(taps(&[0.0, 0.5, 1.0], &[0.1], &Direction::periodic(8, 0.0, 1.0)).unwrap_err().contains("twice"));
+        let bounded = Direction::between(
+            8,
+            0.0,
+            1.0,
+            wakescope_les::Wall::Slip,
+            wakescope_les::Wall::Slip,
+        );
+        assert!(
+            taps(&[0.0, 0.2, 0.4], &[0.7], &bounded)
+                .unwrap_err()
+                .contains("0.7")
+        );
+        assert!(
+            taps(&[0.0, 0.2, 0.1], &[0.1], &bounded)
+                .unwrap_err()
+                .contains("increase")
+        );
+        assert!(
+            taps(&[0.0, 0.5, 1.0], &[0.1], &Direction::periodic(8, 0.0, 1.0))
+                .unwrap_err()
+                .contains("twice")
+        );
     }
 }

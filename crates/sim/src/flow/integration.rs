@@ -68,14 +68,22 @@ fn subgrid(choice: Subgrid) -> SubgridModel {
     match choice {
         Subgrid::None {} => SubgridModel::None,
         Subgrid::Smagorinsky { constant: None } => SubgridModel::SMAGORINSKY,
-        Subgrid::Smagorinsky { constant: Some(constant) } => SubgridModel::Smagorinsky { constant },
+        Subgrid::Smagorinsky {
+            constant: Some(constant),
+        } => SubgridModel::Smagorinsky { constant },
         Subgrid::Wale { constant: None } => SubgridModel::WALE,
-        Subgrid::Wale { constant: Some(constant) } => SubgridModel::Wale { constant },
-        Subgrid::MultiscaleWale { constant: None, order: None } => SubgridModel::MULTISCALE_WALE,
+        Subgrid::Wale {
+            constant: Some(constant),
+        } => SubgridModel::Wale { constant },
+        Subgrid::MultiscaleWale {
+            constant: None,
+            order: None,
+        } => SubgridModel::MULTISCALE_WALE,
         Subgrid::MultiscaleWale { constant, order } => {
             // The constant of the order that gives WALE's dissipation with the constant of its authors.
             let order = order.unwrap_or(3);
-            let constant = constant.unwrap_or_else(|| SubgridModel::multiscale_constant(0.5, order));
+            let constant =
+                constant.unwrap_or_else(|| SubgridModel::multiscale_constant(0.5, order));
             SubgridModel::MultiscaleWale { constant, order }
         }
     }

@@ -2,8 +2,8 @@
 
 use super::free::Free;
 use super::named::{
-    Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane, VortexPairFlow,
-    check_pair,
+    Channel, Dipole, LidDrivenCavity, OrrSommerfeld, PlateDriven, TaylorGreen, TaylorGreenPlane,
+    VortexPairFlow, check_pair,
 };
 use super::setup::Setup;
 use super::wake::WakeFlow;
@@ -56,9 +56,19 @@ impl CaseKind {
         match self {
             Self::StokesLayer(c) | Self::RayleighPlate(c) => {
                 let allowed = "this key is for case.kind = \"poiseuille\" or \"couette\"";
-                p.require(c.initial_share == 0.0, "case.initial_share", c.initial_share, allowed);
+                p.require(
+                    c.initial_share == 0.0,
+                    "case.initial_share",
+                    c.initial_share,
+                    allowed,
+                );
             }
-            Self::VortexPair(c) => check_pair(p, (c.height, c.size), ("case.cross_wind", c.cross_wind), c.slip_sides),
+            Self::VortexPair(c) => check_pair(
+                p,
+                (c.height, c.size),
+                ("case.cross_wind", c.cross_wind),
+                c.slip_sides,
+            ),
             Self::Wake(c) => c.check(p),
             Self::Free(c) => c.check(p),
             _ => {}
@@ -69,14 +79,23 @@ impl CaseKind {
     pub(super) fn unresolved(&self, mesh: &Mesh) -> Vec<String> {
         let lengths = match self {
             Self::Dipole(c) => Some(VortexLengths::dipole(c.reynolds)),
-            Self::VortexPair(c) => Some(VortexLengths::pair(c.core_radius, c.height, c.reynolds, 1.0)),
+            Self::VortexPair(c) => Some(VortexLengths::pair(
+                c.core_radius,
+                c.height,
+                c.reynolds,
+                1.0,
+            )),
             Self::Wake(c) => {
                 let scales = c.pair.scales().ok();
-                scales.map(|scales| VortexLengths::pair(c.core_radius, c.height, c.reynolds, scales.spacing_m))
+                scales.map(|scales| {
+                    VortexLengths::pair(c.core_radius, c.height, c.reynolds, scales.spacing_m)
+                })
             }
             _ => None,
         };
-        lengths.map_or_else(Vec::new, |lengths| Resolution::new(mesh, &lengths).warnings())
+        lengths.map_or_else(Vec::new, |lengths| {
+            Resolution::new(mesh, &lengths).warnings()
+        })
     }
 
     /// Cells along x, y, z.
@@ -84,9 +103,10 @@ impl CaseKind {
         match *self {
             Self::TaylorGreenPlane(ref c) => [1, c.cells, c.cells],
             Self::TaylorGreen(ref c) => [c.cells; 3],
-            Self::Poiseuille(ref c) | Self::Couette(ref c) | Self::StokesLayer(ref c) | Self::RayleighPlate(ref c) => {
-                [1, 1, c.cells]
-            }
+            Self::Poiseuille(ref c)
+            | Self::Couette(ref c)
+            | Self::StokesLayer(ref c)
+            | Self::RayleighPlate(ref c) => [1, 1, c.cells],
             Self::OrrSommerfeld(ref c) => [c.cells[0], 1, c.cells[1]],
             Self::Dipole(ref c) => [1, c.cells[0], c.cells[1]],
             Self::LidDrivenCavity(ref c) => [1, c.cells, c.cells],
@@ -102,7 +122,10 @@ impl CaseKind {
         match self {
             Self::TaylorGreenPlane(c) => vec![&mut c.cells],
             Self::TaylorGreen(c) => vec![&mut c.cells],
-            Self::Poiseuille(c) | Self::Couette(c) | Self::StokesLayer(c) | Self::RayleighPlate(c) => {
+            Self::Poiseuille(c)
+            | Self::Couette(c)
+            | Self::StokesLayer(c)
+            | Self::RayleighPlate(c) => {
                 vec![&mut c.cells]
             }
             Self::OrrSommerfeld(c) => c.cells.iter_mut().collect(),
@@ -120,7 +143,10 @@ impl CaseKind {
         let steady = |case: Result<Case, wakescope_les::Error>| {
             let mut case = case?;
             let courant = TimeScheme::AdamsBashforth2.default_courant();
-            case.settings.time_step = TimeStep::Courant { courant, longest_s: case.end_s / LEAST_STEPS };
+            case.settings.time_step = TimeStep::Courant {
+                courant,
+                longest_s: case.end_s / LEAST_STEPS,
+            };
             Ok(case)
         };
         let plates = |c: &PlateDriven| cases::Plates {
@@ -130,9 +156,12 @@ impl CaseKind {
             step_s: ANY_STEP_S,
         };
         let case = match *self {
-            Self::TaylorGreenPlane(ref c) => {
-                steady(cases::taylor_green_plane(c.cells, c.stretch, c.viscosity_m2_s, ANY_STEP_S))
-            }
+            Self::TaylorGreenPlane(ref c) => steady(cases::taylor_green_plane(
+                c.cells,
+                c.stretch,
+                c.viscosity_m2_s,
+                ANY_STEP_S,
+            )),
             Self::TaylorGreen(ref c) => cases::taylor_green_3d(c.cells, c.reynolds),
             Self::Poiseuille(ref c) => steady(plates(c).poiseuille(c.initial_share)),
             Self::Couette(ref c) => steady(plates(c).couette(c.initial_share)),
@@ -143,16 +172,35 @@ impl CaseKind {
                     .and_then(|wave| wave.case(c.cells, c.stretch, c.amplitude, ANY_STEP_S)),
             ),
             Self::Dipole(ref c) => {
-                let dipole = if c.closed_sides { cases::dipole_in_a_box } else { cases::dipole_between_walls };
+                let dipole = if c.closed_sides {
+                    cases::dipole_in_a_box
+                } else {
+                    cases::dipole_between_walls
+                };
                 dipole(c.cells, [c.lateral_stretch(), c.stretch], c.reynolds)
             }
-            Self::LidDrivenCavity(ref c) => cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds),
+            Self::LidDrivenCavity(ref c) => {
+                cases::lid_driven_cavity(c.cells, c.stretch, c.reynolds)
+            }
             Self::Channel(ref c) => cases::channel(c.cells, c.stretch, c.reynolds_tau),
             Self::VortexPair(ref c) => c.case(),
             Self::Wake(ref c) => return c.setup(),
             Self::Free(ref c) => return c.setup(folder),
         };
-        let Case { mesh, settings, initial, end_s } = case.map_err(Error::Flow)?;
-        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0, wake: None, undamped: None })
+        let Case {
+            mesh,
+            settings,
+            initial,
+            end_s,
+        } = case.map_err(Error::Flow)?;
+        Ok(Setup {
+            mesh,
+            settings,
+            initial,
+            end_s: Some(end_s),
+            tau_per_s: 1.0,
+            wake: None,
+            undamped: None,
+        })
     }
 }

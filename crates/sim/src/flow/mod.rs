@@ -58,21 +58,30 @@ impl Content for FlowCase {
 
     fn seed(&self) -> u64 {
         // 0 stands for noise by a closed formula, and for none.
-        if let CaseKind::Wake(wake) = &self.case { wake.seed.unwrap_or(0) } else { 0 }
+        if let CaseKind::Wake(wake) = &self.case {
+            wake.seed.unwrap_or(0)
+        } else {
+            0
+        }
     }
 }
 
 impl CaseFile {
     /// Whether a text is a case, by its keys, and no scene.
     pub fn is_of(text: &str) -> bool {
-        text.parse::<toml::Table>().is_ok_and(|table| table.contains_key("case"))
+        text.parse::<toml::Table>()
+            .is_ok_and(|table| table.contains_key("case"))
     }
 
     /// The text of a case file over the preset of a wake, if there is one: keys that it does not have are those of the preset.
     ///
     /// # Errors
     /// As [`CaseFile::parse`].
-    pub fn parse_over(preset: Option<WakePreset>, text: &str, path: &Path) -> Result<Self, SceneError> {
+    pub fn parse_over(
+        preset: Option<WakePreset>,
+        text: &str,
+        path: &Path,
+    ) -> Result<Self, SceneError> {
         let base = preset.map(WakePreset::case);
         Ok(Self::of(text::read(text, path, base.as_ref())?, path, text))
     }
@@ -85,7 +94,10 @@ impl CaseFile {
         let mut case = self.content.clone();
         case.time.end_s = None;
         match &mut case.wake {
-            Some(wake) => wake.end_at(end, ["wake.fields_tau", "wake.planes_tau"].map(|key| self.states(key))),
+            Some(wake) => wake.end_at(
+                end,
+                ["wake.fields_tau", "wake.planes_tau"].map(|key| self.states(key)),
+            ),
             None => {
                 case.time.end_s = Some(end);
                 case.output.times_s.retain(|time_s| *time_s <= end);
@@ -93,11 +105,18 @@ impl CaseFile {
         }
         // The end is of the command line, whatever the file says of it.
         let of_command = |problem: Problem| match problem.key.as_str() {
-            "time.end_s" | "wake.end_tau" => Problem { key: "--end".into(), ..problem },
+            "time.end_s" | "wake.end_tau" => Problem {
+                key: "--end".into(),
+                ..problem
+            },
             _ => problem,
         };
         let problems: Vec<Problem> = case.problems().into_iter().map(of_command).collect();
-        if problems.is_empty() { Ok(self.changed(case)) } else { Err(self.refused(problems)) }
+        if problems.is_empty() {
+            Ok(self.changed(case))
+        } else {
+            Err(self.refused(problems))
+        }
     }
 
     /// The same case with another seed of its noise.
@@ -115,7 +134,11 @@ impl CaseFile {
     }
 
     fn refuse(&self, key: &str, value: impl std::fmt::Debug, allowed: String) -> Error {
-        Error::Scene(self.located(vec![Problem { key: key.into(), value: format!("{value:?}"), allowed }]))
+        Error::Scene(self.located(vec![Problem {
+            key: key.into(),
+            value: format!("{value:?}"),
+            allowed,
+        }]))
     }
 }
 

@@ -6,7 +6,10 @@ use crate::scene::CoreProfile;
 use wakescope_les::cases::{Case, VortexPairCase};
 
 /// Strength of the stretching of a mesh.
-pub(super) const STRETCH: Number = Number(|a| (0.0..=20.0).contains(&a), "a number from 0 (equal cells) to 20");
+pub(super) const STRETCH: Number = Number(
+    |a| (0.0..=20.0).contains(&a),
+    "a number from 0 (equal cells) to 20",
+);
 
 keys! {
     /// `v = sin(2 pi y) cos(2 pi z) exp(-8 pi^2 nu t)` on the unit square.
@@ -128,13 +131,22 @@ keys! {
 
 impl Dipole {
     pub(super) fn lateral_stretch(&self) -> f64 {
-        self.lateral_stretch.unwrap_or(if self.closed_sides { self.stretch } else { 0.0 })
+        self.lateral_stretch
+            .unwrap_or(if self.closed_sides { self.stretch } else { 0.0 })
     }
 }
 
 impl VortexPairFlow {
     pub(super) fn case(&self) -> Result<Case, wakescope_les::Error> {
-        let Self { cells, size, ground_stretch, height, core_radius, reynolds, .. } = *self;
+        let Self {
+            cells,
+            size,
+            ground_stretch,
+            height,
+            core_radius,
+            reynolds,
+            ..
+        } = *self;
         let profile = crate::setup::wind::circulation_profile(self.profile);
         VortexPairCase {
             cells,
@@ -161,7 +173,12 @@ pub(super) fn check_pair(
     (key, wind): (&str, f64),
     slip_sides: bool,
 ) {
-    p.require(height > 0.0 && height < size[2], "case.height", height, "above 0 and below the top");
+    p.require(
+        height > 0.0 && height < size[2],
+        "case.height",
+        height,
+        "above 0 and below the top",
+    );
     let fits = wind.is_finite() && (wind == 0.0 || !slip_sides);
     p.require(fits, key, wind, "finite, and 0 between frictionless sides");
 }

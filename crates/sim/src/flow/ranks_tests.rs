@@ -26,17 +26,34 @@ fn wake(more: &str) -> String {
 /// Runs the case; the words of each rank's error, if any.
 fn run(text: &str, folder: &Path, begin: Begin, count: usize) -> Vec<Option<String>> {
     let file = CaseFile::parse(text, Path::new("case.toml")).unwrap();
-    let options = RunOptions { begin, allow_large: false };
-    let run = |ranks| run_on(&ranks, &file, folder, options, &Silent).err().map(|e| e.to_string());
-    on_threads(count, run).into_iter().map(|error| error.unwrap()).collect()
+    let options = RunOptions {
+        begin,
+        allow_large: false,
+    };
+    let run = |ranks| {
+        run_on(&ranks, &file, folder, options, &Silent)
+            .err()
+            .map(|e| e.to_string())
+    };
+    on_threads(count, run)
+        .into_iter()
+        .map(|error| error.unwrap())
+        .collect()
 }
 
 fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     let entry = |entry: std::io::Result<fs::DirEntry>| {
         let path = entry.unwrap().path();
-        (path.file_name().unwrap().to_string_lossy().into_owned(), fs::read(path).unwrap())
+        (
+            path.file_name().unwrap().to_string_lossy().into_owned(),
+            fs::read(path).unwrap(),
+        )
     };
-    fs::read_dir(folder).unwrap().filter(|entry| entry.as_ref().unwrap().path().is_file()).map(entry).collect()
+    fs::read_dir(folder)
+        .unwrap()
+        .filter(|entry| entry.as_ref().unwrap().path().is_file())
+        .map(entry)
+        .collect()
 }
 
 #[test]
@@ -45,13 +62,24 @@ fn every_file_has_the_bytes_of_one_process_also_after_a_restart_on_other_ranks()
     let (paused, whole) = (wake("[time]\npause_after_steps = 3\n"), wake(""));
     let (alone, ranks) = (new(), new());
     assert_eq!(run(&paused, alone.path(), Begin::New, 1), [None]);
-    assert_eq!(run(&paused, ranks.path(), Begin::New, 3), [None, None, None]);
-    assert!(files(alone.path()).len() > 3 && files(ranks.path()) == files(alone.path()), "paused");
+    assert_eq!(
+        run(&paused, ranks.path(), Begin::New, 3),
+        [None, None, None]
+    );
+    assert!(
+        files(alone.path()).len() > 3 && files(ranks.path()) == files(alone.path()),
+        "paused"
+    );
     assert_eq!(run(&whole, alone.path(), Begin::Restart, 1), [None]);
     assert_eq!(run(&whole, ranks.path(), Begin::Restart, 2), [None, None]);
     let (expected, found) = (files(alone.path()), files(ranks.path()));
     assert!(expected.len() > 8, "{:?}", expected.keys());
-    assert!(found.keys().eq(expected.keys()), "{:?} against {:?}", found.keys(), expected.keys());
+    assert!(
+        found.keys().eq(expected.keys()),
+        "{:?} against {:?}",
+        found.keys(),
+        expected.keys()
+    );
     for (name, bytes) in &expected {
         assert!(found[name] == *bytes, "{name}");
     }
@@ -59,9 +87,18 @@ fn every_file_has_the_bytes_of_one_process_also_after_a_restart_on_other_ranks()
     assert_eq!(run(&whole, ranks.path(), Begin::New, 2), [None, None]);
     // What rank 0 finds in its folder stops all.
     let refused = run(&whole, ranks.path(), Begin::New, 2);
-    assert!(refused.iter().all(|error| error.as_ref().is_some_and(|e| e.contains("--restart"))), "{refused:?}");
+    assert!(
+        refused
+            .iter()
+            .all(|error| error.as_ref().is_some_and(|e| e.contains("--restart"))),
+        "{refused:?}"
+    );
     let many = run(&whole, new().path(), Begin::New, 7);
-    assert!(many.iter().all(|error| error.as_ref().is_some_and(|e| e.contains("at most 6"))), "{many:?}");
+    assert!(
+        many.iter()
+            .all(|error| error.as_ref().is_some_and(|e| e.contains("at most 6"))),
+        "{many:?}"
+    );
 }
 
 #[test]
@@ -74,12 +111,27 @@ fn an_output_that_one_rank_cannot_write_stops_all_and_leaves_no_part_of_it() {
     let blocked = folder.path().join(name);
     let found = on_threads(3, |ranks| {
         let blocks = Blocks(&blocked);
-        let options = RunOptions { begin: Begin::New, allow_large: false };
-        run_on(&ranks, &file, folder.path(), options, &blocks).err().map(|e| e.to_string())
+        let options = RunOptions {
+            begin: Begin::New,
+            allow_large: false,
+        };
+        run_on(&ranks, &file, folder.path(), options, &blocks)
+            .err()
+            .map(|e| e.to_string())
     });
-    assert!(found.iter().all(|one| matches!(one, Some(Some(words)) if words.contains(name))), "{found:?}");
+    assert!(
+        found
+            .iter()
+            .all(|one| matches!(one, Some(Some(words)) if words.contains(name))),
+        "{found:?}"
+    );
     let left = files(folder.path());
-    assert!(left.keys().all(|name| !name.starts_with("fields") && !name.starts_with('.')), "{:?}", left.keys());
+    assert!(
+        left.keys()
+            .all(|name| !name.starts_with("fields") && !name.starts_with('.')),
+        "{:?}",
+        left.keys()
+    );
     assert!(left.contains_key("flow.checkpoint"), "{:?}", left.keys());
 }
 

@@ -3,8 +3,8 @@
 use crate::Error;
 pub(super) use wakescope_les::cases::Initial;
 use wakescope_les::{
-    Flow, FlowSettings, Mesh, analysis::WakeMeter, analysis::WakeScales, solver::Stability, solver::StartReport,
-    solver::UndampedGrowth,
+    Flow, FlowSettings, Mesh, analysis::WakeMeter, analysis::WakeScales, solver::Stability,
+    solver::StartReport, solver::UndampedGrowth,
 };
 
 /// All that a simulation is made of.
@@ -44,12 +44,19 @@ impl Setup {
         let [nx, ny, _] = self.mesh.cells();
         move |cell| match &self.initial {
             Initial::Field(field) => field([0, 1, 2].map(|axis| centre_m[axis][cell[axis]])),
-            Initial::Faces(faces) => faces.each_ref().map(|face| face[(cell[2] * ny + cell[1]) * nx + cell[0]]),
+            Initial::Faces(faces) => faces
+                .each_ref()
+                .map(|face| face[(cell[2] * ny + cell[1]) * nx + cell[0]]),
         }
     }
 
     pub(super) fn start(self) -> Result<(Flow, StartReport), Error> {
-        let Self { mesh, settings, initial, .. } = self;
+        let Self {
+            mesh,
+            settings,
+            initial,
+            ..
+        } = self;
         initial.start(mesh, settings).map_err(Error::Flow)
     }
 }

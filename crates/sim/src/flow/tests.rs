@@ -41,13 +41,19 @@ fn tiny(name: &str, text: &str) -> String {
         // Its outputs are by age; one of each kind comes within three steps.
         let wake = table["wake"].as_table_mut().unwrap();
         for key in ["fields_tau", "planes_tau"] {
-            wake.insert(key.into(), toml::Value::Array(vec![toml::Value::Float(0.0)]));
+            wake.insert(
+                key.into(),
+                toml::Value::Array(vec![toml::Value::Float(0.0)]),
+            );
         }
         return toml::to_string(&table).unwrap();
     }
     let output = table["output"].as_table_mut().unwrap();
     output.remove("every_s");
-    output.insert("times_s".into(), toml::Value::Array(vec![toml::Value::Float(0.0)]));
+    output.insert(
+        "times_s".into(),
+        toml::Value::Array(vec![toml::Value::Float(0.0)]),
+    );
     toml::to_string(&table).unwrap()
 }
 
@@ -56,12 +62,22 @@ fn parse(text: &str) -> CaseFile {
 }
 
 fn refused(text: &str) -> String {
-    CaseFile::parse(text, Path::new("case.toml")).unwrap_err().to_string()
+    CaseFile::parse(text, Path::new("case.toml"))
+        .unwrap_err()
+        .to_string()
 }
 
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let file = |e: fs::DirEntry| (e.file_name().into_string().unwrap(), fs::read(e.path()).unwrap());
-    fs::read_dir(folder).unwrap().map(|e| file(e.unwrap())).collect()
+    let file = |e: fs::DirEntry| {
+        (
+            e.file_name().into_string().unwrap(),
+            fs::read(e.path()).unwrap(),
+        )
+    };
+    fs::read_dir(folder)
+        .unwrap()
+        .map(|e| file(e.unwrap()))
+        .collect()
 }
 
 #[test]
@@ -69,23 +85,37 @@ fn every_example_is_a_good_case_that_keeps_its_meaning_and_runs() {
     let folder = tempfile::tempdir().unwrap();
     for (name, text) in EXAMPLES {
         let file = parse(text);
-        assert_eq!(parse(&file.toml).content, file.content, "{name} written out and read again");
+        assert_eq!(
+            parse(&file.toml).content,
+            file.content,
+            "{name} written out and read again"
+        );
         assert!(text.contains(&format!("kind = \"{name}\"")), "{name}");
         let out = folder.path().join(name);
-        let outcome =
-            run(&parse(&tiny(name, text)), &out, Begin::New, &Silent).unwrap_or_else(|e| panic!("{name}: {e}"));
+        let outcome = run(&parse(&tiny(name, text)), &out, Begin::New, &Silent)
+            .unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!((outcome.steps, outcome.is_complete), (3, false), "{name}");
-        assert!(outcome.relative_divergence < 1e-8, "{name}: {}", outcome.relative_divergence);
+        assert!(
+            outcome.relative_divergence < 1e-8,
+            "{name}: {}",
+            outcome.relative_divergence
+        );
         assert!(outcome.files.iter().all(|path| path.exists()));
         let steps = fs::read_to_string(out.join("steps.csv")).unwrap();
-        assert_eq!(steps.lines().filter(|l| !l.starts_with('#')).count(), 4, "{name}: a header and three rows");
+        assert_eq!(
+            steps.lines().filter(|l| !l.starts_with('#')).count(),
+            4,
+            "{name}: a header and three rows"
+        );
     }
     assert!(example("dipole").is_some() && example("none").is_none());
 }
 
 /// Decaying vortices with all outputs.
 fn vortices(pause: Option<u64>) -> CaseFile {
-    let pause = pause.map_or(String::new(), |steps| format!("pause_after_steps = {steps}\n"));
+    let pause = pause.map_or(String::new(), |steps| {
+        format!("pause_after_steps = {steps}\n")
+    });
     let formats = "\"csv\", \"netcdf\", \"initial_netcdf\"";
     let planes = "\"csv\", \"netcdf\"";
     parse(&format!(
@@ -110,12 +140,19 @@ fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() 
     let last = run(&vortices(None), &parts, Begin::Restart, &Silent).unwrap();
     assert_eq!((last.steps, last.time_s), (outcome.steps, outcome.time_s));
     let (whole, parts) = (contents(&whole), contents(&parts));
-    assert!(whole.keys().any(|name| name == "plane1_0003.csv"), "{:?}", whole.keys());
+    assert!(
+        whole.keys().any(|name| name == "plane1_0003.csv"),
+        "{:?}",
+        whole.keys()
+    );
     for (name, bytes) in &whole {
         // Files of the start say that the run would pause; checkpoints of other steps went before.
         let body = |bytes: &[u8]| {
             let text = String::from_utf8_lossy(bytes).into_owned();
-            text.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect::<String>()
+            text.lines()
+                .filter(|line| !line.starts_with('#'))
+                .map(|line| format!("{line}\n"))
+                .collect::<String>()
         };
         if name.ends_with(".csv") {
             assert_eq!(body(bytes), body(&parts[name]), "{name}");
@@ -123,12 +160,17 @@ fn an_interrupted_run_leaves_the_same_files_byte_for_byte_as_one_that_was_not() 
             assert!(bytes == &parts[name], "the state at the end");
         }
     }
-    assert!(whole["steps.csv"] == parts["steps.csv"], "the table with its head");
+    assert!(
+        whole["steps.csv"] == parts["steps.csv"],
+        "the table with its head"
+    );
 }
 
 /// A small wake with records, fields, planes and checkpoints.
 fn small_wake(pause: Option<u64>) -> CaseFile {
-    let pause = pause.map_or(String::new(), |steps| format!("pause_after_steps = {steps}\n"));
+    let pause = pause.map_or(String::new(), |steps| {
+        format!("pause_after_steps = {steps}\n")
+    });
     let format = "netcdf";
     parse(&format!(
         "[case]\nkind = \"wake\"\npair = {{ from = \"a340\" }}\ncells = [6, 32, 24]\ncross_wind_m_s = 0.5\n\
@@ -149,28 +191,45 @@ fn an_interrupted_wake_leaves_the_same_histories_fields_and_planes() {
     assert_eq!(last.steps, outcome.steps);
     let (whole, parts) = (contents(&whole), contents(&parts));
     let end = "nc";
-    assert!(whole["wake.csv"] == parts["wake.csv"] && whole["flow.checkpoint"] == parts["flow.checkpoint"]);
+    assert!(
+        whole["wake.csv"] == parts["wake.csv"]
+            && whole["flow.checkpoint"] == parts["flow.checkpoint"]
+    );
     for name in ["plane1_0004", "fields_0001"].map(|stem| format!("{stem}.{end}")) {
         assert!(whole[&name] == parts[&name], "{name}");
     }
     assert!(whole["wake.nc"] == parts["wake.nc"]);
     let text = |file: &str| {
         let text = String::from_utf8(whole[file].clone()).unwrap();
-        let rows: Vec<String> = text.lines().filter(|line| !line.starts_with('#')).map(str::to_owned).collect();
+        let rows: Vec<String> = text
+            .lines()
+            .filter(|line| !line.starts_with('#'))
+            .map(str::to_owned)
+            .collect();
         assert_eq!(rows.len(), 7, "a header and the ages 0, 0.04, ..., 0.2");
         rows
     };
     let (si, scaled) = (text("wake.csv"), text("wake_scaled.csv"));
     let of = |row: usize, name: &str| -> f64 {
-        let find = |rows: &[String]| rows[0].split(',').position(|n| n == name).map(|at| (rows[row].clone(), at));
-        let (row, at) = find(&si).or_else(|| find(&scaled)).unwrap_or_else(|| panic!("{name}"));
+        let find = |rows: &[String]| {
+            rows[0]
+                .split(',')
+                .position(|n| n == name)
+                .map(|at| (rows[row].clone(), at))
+        };
+        let (row, at) = find(&si)
+            .or_else(|| find(&scaled))
+            .unwrap_or_else(|| panic!("{name}"));
         row.split(',').nth(at).unwrap().parse().unwrap()
     };
     // The A340's pair: b0 = pi b/4.
     let spacing_m = std::f64::consts::PI * 60.3 / 4.0;
     assert!((of(1, "y_right_m") / of(1, "y_right") - spacing_m).abs() < 1e-9);
     assert!((of(1, "y_left") + 0.5).abs() < 0.02 && (of(1, "z_right") - 1.0).abs() < 0.02);
-    assert!((of(6, "tau") - 0.2).abs() < 1e-12 && of(4, "z_left") < of(1, "z_left") - 0.03, "it sinks at first");
+    assert!(
+        (of(6, "tau") - 0.2).abs() < 1e-12 && of(4, "z_left") < of(1, "z_left") - 0.03,
+        "it sinks at first"
+    );
     assert!(of(6, "gamma_5_15_left_m2_s") < 0.0 && of(6, "gamma_ratio_left") < 1.0);
 }
 
@@ -179,7 +238,8 @@ fn the_history_of_a_wake_opens_with_its_axes() {
     let folder = tempfile::tempdir().unwrap();
     run(&small_wake(None), folder.path(), Begin::New, &Silent).unwrap();
     let mut file = netcdf3::FileReader::open(folder.path().join("wake.nc")).unwrap();
-    let [tau, radius, mode] = ["tau", "radius", "mode"].map(|name| file.read_var_f64(name).unwrap());
+    let [tau, radius, mode] =
+        ["tau", "radius", "mode"].map(|name| file.read_var_f64(name).unwrap());
     assert_eq!((tau.len(), radius.len(), mode.len()), (6, 24, 4));
     let gamma = file.read_var_f64("gamma").unwrap();
     assert_eq!(gamma.len(), 6 * 2 * 24);
@@ -190,21 +250,36 @@ fn the_history_of_a_wake_opens_with_its_axes() {
     assert_eq!(file.read_var_f64("y_centre").unwrap().len(), 6 * 2 * 6);
     // Each column of the table is a variable: its name less the tag of its unit.
     let table = std::fs::read_to_string(folder.path().join("wake.csv")).unwrap();
-    let mut rows = table.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').collect::<Vec<_>>());
+    let mut rows = table
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split(',').collect::<Vec<_>>());
     let (names, last) = (rows.next().unwrap(), rows.next_back().unwrap());
     assert!(names.contains(&"gamma_ratio_left") && names.contains(&"gamma_ratio_right"));
     for (name, cell) in names.iter().zip(last) {
         let tags = ["_m2_s", "_m", "_s", "_hz"];
-        let bare = tags.iter().find_map(|tag| name.strip_suffix(tag)).unwrap_or(name);
-        let values =
-            file.read_var_f64(bare).or_else(|_| file.read_var_f64(name)).unwrap_or_else(|e| panic!("{name}: {e:?}"));
+        let bare = tags
+            .iter()
+            .find_map(|tag| name.strip_suffix(tag))
+            .unwrap_or(name);
+        let values = file
+            .read_var_f64(bare)
+            .or_else(|_| file.read_var_f64(name))
+            .unwrap_or_else(|e| panic!("{name}: {e:?}"));
         let value = cell.parse::<f64>().unwrap_or(f64::NAN);
-        assert!(values[5] == value || values[5].is_nan() && value.is_nan(), "{name}: {} and {cell}", values[5]);
+        assert!(
+            values[5] == value || values[5].is_nan() && value.is_nan(),
+            "{name}: {} and {cell}",
+            values[5]
+        );
     }
     let mut field = netcdf3::FileReader::open(folder.path().join("fields_0001.nc")).unwrap();
     let vorticity = field.read_var_f32("vorticity_magnitude").unwrap();
     let largest = vorticity.iter().fold(0.0_f32, |a, b| a.max(*b));
-    assert!(f64::from(largest) > 10.0 / scales.time_unit_s(), "{largest}");
+    assert!(
+        f64::from(largest) > 10.0 / scales.time_unit_s(),
+        "{largest}"
+    );
 }
 
 #[test]
@@ -214,10 +289,18 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
     let mut commented = parse(text).content;
     (commented.time.scheme, commented.time.courant) = (None, None);
     commented.checkpoint.every_steps = None;
-    assert_eq!(commented, coarse.content, "the commented example is the preset");
-    let [coarse, wide] =
-        [[24, 128, 80], [48, 240, 128]].map(|cells| VortexPairCase { cells, ..VortexPairCase::coarse() });
-    let medium = VortexPairCase { size: [1.0, 5.0, 2.5], ..wide };
+    assert_eq!(
+        commented, coarse.content,
+        "the commented example is the preset"
+    );
+    let [coarse, wide] = [[24, 128, 80], [48, 240, 128]].map(|cells| VortexPairCase {
+        cells,
+        ..VortexPairCase::coarse()
+    });
+    let medium = VortexPairCase {
+        size: [1.0, 5.0, 2.5],
+        ..wide
+    };
     let multiscale = SubgridModel::MULTISCALE_WALE;
     let fine = VortexPairCase {
         cells: [64, 256, 144],
@@ -228,7 +311,12 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
         subgrid: multiscale,
         ..medium.clone()
     };
-    let chapter = VortexPairCase { cells: [128, 432, 224], size: [2.0, 6.0, 3.0], ground_stretch: 2.2, ..fine.clone() };
+    let chapter = VortexPairCase {
+        cells: [128, 432, 224],
+        size: [2.0, 6.0, 3.0],
+        ground_stretch: 2.2,
+        ..fine.clone()
+    };
     for (preset, expected) in [
         (WakePreset::Coarse, coarse),
         (WakePreset::Medium, medium),
@@ -236,24 +324,44 @@ fn presets_are_cases_of_the_solver_and_give_way_to_keys_of_a_file() {
         (WakePreset::Chapter, chapter),
     ] {
         let file = CaseFile::parse_over(Some(preset), "", Path::new("preset")).unwrap();
-        let CaseKind::Wake(flow) = &file.content.case else { panic!("{preset:?}") };
+        let CaseKind::Wake(flow) = &file.content.case else {
+            panic!("{preset:?}")
+        };
         let mut pair = flow.pair_case().unwrap();
         pair.subgrid = expected.subgrid;
         assert_eq!(pair, expected);
-        let is_multiscale = file.content.solver.subgrid == Subgrid::MultiscaleWale { constant: None, order: None };
+        let is_multiscale = file.content.solver.subgrid
+            == Subgrid::MultiscaleWale {
+                constant: None,
+                order: None,
+            };
         assert_eq!(is_multiscale, expected.subgrid == multiscale, "{preset:?}");
     }
     let own = "[case]\nkind = \"wake\"\nreynolds = 1e4\npair = { from = \"a320\" }\n[wake]\nend_tau = 1.0\n\
                fields_tau = []\nplanes_tau = []\n";
     let file = CaseFile::parse_over(Some(WakePreset::Medium), own, Path::new("case.toml")).unwrap();
-    let CaseKind::Wake(flow) = &file.content.case else { panic!() };
-    assert_eq!((flow.cells, flow.reynolds, flow.pair), ([48, 240, 128], 1e4, PairScale::A320 {}));
-    let over =
-        |text: &str| CaseFile::parse_over(Some(WakePreset::Coarse), text, Path::new("c.toml")).unwrap_err().to_string();
+    let CaseKind::Wake(flow) = &file.content.case else {
+        panic!()
+    };
+    assert_eq!(
+        (flow.cells, flow.reynolds, flow.pair),
+        ([48, 240, 128], 1e4, PairScale::A320 {})
+    );
+    let over = |text: &str| {
+        CaseFile::parse_over(Some(WakePreset::Coarse), text, Path::new("c.toml"))
+            .unwrap_err()
+            .to_string()
+    };
     let message = over("[case]\nkind = \"wake\"\ncore_radius = -0.1\n");
-    assert!(message.contains("c.toml:3") && message.contains("case.core_radius = -0.1"), "{message}");
+    assert!(
+        message.contains("c.toml:3") && message.contains("case.core_radius = -0.1"),
+        "{message}"
+    );
     let message = over("[case]\nkind = \"wake\"\n[wake]\nfields_tau = [9.0]\n");
-    assert!(message.contains("wake.fields_tau") && message.contains("wake.end_tau"), "{message}");
+    assert!(
+        message.contains("wake.fields_tau") && message.contains("wake.end_tau"),
+        "{message}"
+    );
     let message = refused("[case]\nkind = \"dipole\"\n[wake]\nevery_tau = 0.1\n");
     assert!(message.contains("case.kind = \"wake\""), "{message}");
     let message = refused("[case]\nkind = \"wake\"\n[output]\ntimes_s = [1.0]\n");
@@ -270,7 +378,10 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
     let outcome = run(&vortices(None), folder.path(), Begin::Restart, &Silent).unwrap();
-    assert!(outcome.is_complete && outcome.warnings[0].contains("damaged"), "{outcome:?}");
+    assert!(
+        outcome.is_complete && outcome.warnings[0].contains("damaged"),
+        "{outcome:?}"
+    );
     let fresh = tempfile::tempdir().unwrap();
     run(&vortices(None), fresh.path(), Begin::New, &Silent).unwrap();
     let steps = |folder: &Path| fs::read(folder.join("steps.csv")).unwrap();
@@ -278,8 +389,13 @@ fn a_checkpoint_is_not_lost_by_mistake_and_a_damaged_one_gives_way_to_the_one_be
     run(&vortices(Some(1)), folder.path(), Begin::Overwrite, &Silent).unwrap();
     // Another flow does not continue this one.
     let other = parse(&vortices(None).toml.replace("cells = 12", "cells = 14"));
-    let error = run(&other, folder.path(), Begin::Restart, &Silent).unwrap_err().to_string();
-    assert!(error.contains("cells along y") && error.contains("12") && error.contains("14"), "{error}");
+    let error = run(&other, folder.path(), Begin::Restart, &Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("cells along y") && error.contains("12") && error.contains("14"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -295,8 +411,13 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
     let in_the_way = folder.path().join("fields_0002.csv");
     // Before the run it is found before any computing.
     fs::create_dir_all(&in_the_way).unwrap();
-    let error = run(&vortices(None), folder.path(), Begin::New, &Silent).unwrap_err().to_string();
-    assert!(error.contains("fields_0002.csv") && error.contains("folder"), "{error}");
+    let error = run(&vortices(None), folder.path(), Begin::New, &Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("fields_0002.csv") && error.contains("folder"),
+        "{error}"
+    );
     fs::remove_dir(&in_the_way).unwrap();
     assert!(contents(folder.path()).is_empty(), "nothing was written");
     let mischief = Mischief(in_the_way);
@@ -304,16 +425,26 @@ fn outputs_that_cannot_be_written_stop_the_run_and_leave_the_checkpoint() {
     assert!(matches!(error, Error::Export(_)), "{error}");
     assert!(wakescope_les::solver::check_checkpoint(folder.path().join("flow.checkpoint")).is_ok());
     fs::remove_dir(folder.path().join("fields_0002.csv")).unwrap();
-    assert!(run(&vortices(None), folder.path(), Begin::Restart, &Silent).unwrap().is_complete);
+    assert!(
+        run(&vortices(None), folder.path(), Begin::Restart, &Silent)
+            .unwrap()
+            .is_complete
+    );
     assert!(folder.path().join("fields_0002.csv").is_file());
 }
 
 #[test]
 fn a_flow_that_blows_up_names_step_and_place() {
     let folder = tempfile::tempdir().unwrap();
-    let text = "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
-    let error = run(&parse(text), folder.path(), Begin::New, &Silent).unwrap_err().to_string();
-    assert!(error.contains("time.step_s = 0.2") && error.contains("Courant number"), "{error}");
+    let text =
+        "[case]\nkind = \"taylor_green_plane\"\ncells = 12\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
+    let error = run(&parse(text), folder.path(), Begin::New, &Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.contains("time.step_s = 0.2") && error.contains("Courant number"),
+        "{error}"
+    );
     // A force that brings the air to a speed that the step does not allow.
     let z = "[case.z]\ncells = 8\nlow_m = 0.0\nhigh_m = 8.0\n";
     let text = format!(
@@ -321,8 +452,13 @@ fn a_flow_that_blows_up_names_step_and_place() {
          [case.initial]\nkind = \"uniform\"\nvelocity_m_s = [0.0, 0.1, 0.0]\n[time]\nend_s = 10.0\nstep_s = 0.2\nscheme = \"runge_kutta3\"\n"
     );
     let folder = tempfile::tempdir().unwrap();
-    let error = run(&parse(&text), folder.path(), Begin::New, &Silent).unwrap_err().to_string();
-    assert!(error.starts_with("flow: step ") && error.contains("fastest is v"), "{error}");
+    let error = run(&parse(&text), folder.path(), Begin::New, &Silent)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        error.starts_with("flow: step ") && error.contains("fastest is v"),
+        "{error}"
+    );
 }
 
 #[test]
@@ -332,44 +468,105 @@ fn a_mesh_that_does_not_resolve_core_and_boundary_layer_is_said_to() {
         let text = format!(
             "[case]\nkind = \"dipole\"\n{keys}\n[time]\nend_s = 1e-3\nstep_s = 5e-4\n[checkpoint]\nwrite = false\n"
         );
-        run(&parse(&text), folder.path(), Begin::New, &Silent).unwrap().warnings
+        run(&parse(&text), folder.path(), Begin::New, &Silent)
+            .unwrap()
+            .warnings
     };
     let found = warnings("cells = [48, 48]\nreynolds = 2500.0");
-    assert!(found.iter().any(|text| text.contains("core radius along y has 2.40 cells, at least 2.5")), "{found:?}");
-    assert!(found.iter().any(|text| text.contains("along the wall, where it rolls up")), "{found:?}");
-    assert_eq!(warnings("cells = [96, 96]\nlateral_stretch = 0.7\nreynolds = 200.0"), Vec::<String>::new());
+    assert!(
+        found
+            .iter()
+            .any(|text| text.contains("core radius along y has 2.40 cells, at least 2.5")),
+        "{found:?}"
+    );
+    assert!(
+        found
+            .iter()
+            .any(|text| text.contains("along the wall, where it rolls up")),
+        "{found:?}"
+    );
+    assert_eq!(
+        warnings("cells = [96, 96]\nlateral_stretch = 0.7\nreynolds = 200.0"),
+        Vec::<String>::new()
+    );
 }
 
 #[test]
 fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
     let dipole = |rest: &str| refused(&format!("[case]\nkind = \"dipole\"\n{rest}"));
     for (message, wanted) in [
-        (refused("[case]\nkind = \"tornado\"\n"), ["tornado", "vortex_pair"]),
-        (refused("[time]\nend_s = 1.0\n"), ["case.kind is missing", "one of"]),
-        (dipole("reynolds = -5.0\n"), ["case.toml:3: case.reynolds = -5.0", "above 0"]),
+        (
+            refused("[case]\nkind = \"tornado\"\n"),
+            ["tornado", "vortex_pair"],
+        ),
+        (
+            refused("[time]\nend_s = 1.0\n"),
+            ["case.kind is missing", "one of"],
+        ),
+        (
+            dipole("reynolds = -5.0\n"),
+            ["case.toml:3: case.reynolds = -5.0", "above 0"],
+        ),
         (
             dipole("viscosity = 1.0\n"),
-            ["case.toml:3: case.viscosity = 1.0 is not allowed: there is no such key", "reynolds"],
+            [
+                "case.toml:3: case.viscosity = 1.0 is not allowed: there is no such key",
+                "reynolds",
+            ],
         ),
-        (dipole("cells = [0, 4]\n"), ["case.cells = [0, 4]", "1 to 100000"]),
-        (dipole("[time]\nstep_s = 0.1\ncourant = 0.3\n"), ["time.step_s = 0.1", "absent"]),
-        (dipole("[time]\nscheme = \"euler\"\n"), ["euler", "adams_bashforth2"]),
-        (dipole("[solver]\npressure_tolerance = 2.0\n"), ["case.toml:4: solver.pressure_tolerance", "1e-15 to 0.1"]),
-        (dipole("[solver]\nrotational = true\n"), ["case.toml:4: solver.rotational", "no such key"]),
-        (dipole("[solver]\nsubgrid = { model = \"magic\" }\n"), ["magic", "multiscale_wale"]),
-        (dipole("[output]\ntimes_s = [0.2, 0.1]\n"), ["output.times_s", "increasing"]),
-        (dipole("[output]\nplanes = [\"initial_netcdf\"]\n"), ["output.planes", "whole field"]),
-        (dipole("[checkpoint]\nevery_steps = 0\n"), ["checkpoint.every_steps", "above 0"]),
+        (
+            dipole("cells = [0, 4]\n"),
+            ["case.cells = [0, 4]", "1 to 100000"],
+        ),
+        (
+            dipole("[time]\nstep_s = 0.1\ncourant = 0.3\n"),
+            ["time.step_s = 0.1", "absent"],
+        ),
+        (
+            dipole("[time]\nscheme = \"euler\"\n"),
+            ["euler", "adams_bashforth2"],
+        ),
+        (
+            dipole("[solver]\npressure_tolerance = 2.0\n"),
+            ["case.toml:4: solver.pressure_tolerance", "1e-15 to 0.1"],
+        ),
+        (
+            dipole("[solver]\nrotational = true\n"),
+            ["case.toml:4: solver.rotational", "no such key"],
+        ),
+        (
+            dipole("[solver]\nsubgrid = { model = \"magic\" }\n"),
+            ["magic", "multiscale_wale"],
+        ),
+        (
+            dipole("[output]\ntimes_s = [0.2, 0.1]\n"),
+            ["output.times_s", "increasing"],
+        ),
+        (
+            dipole("[output]\nplanes = [\"initial_netcdf\"]\n"),
+            ["output.planes", "whole field"],
+        ),
+        (
+            dipole("[checkpoint]\nevery_steps = 0\n"),
+            ["checkpoint.every_steps", "above 0"],
+        ),
         (
             refused("[case]\nkind = \"free\"\n[case.z]\ncells = 16\nlow_end = \"slip\"\n"),
             ["case.z.high_end", "periodic at both ends"],
         ),
         (
-            refused("[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"tanh_low\"\nstretch = 1.0\n"),
-            ["case.y.mapping = \"tanh_low\"", "sine or cluster in a periodic direction"],
+            refused(
+                "[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"tanh_low\"\nstretch = 1.0\n",
+            ),
+            [
+                "case.y.mapping = \"tanh_low\"",
+                "sine or cluster in a periodic direction",
+            ],
         ),
         (
-            refused("[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"sine\"\nplace = 0.5\n"),
+            refused(
+                "[case]\nkind = \"free\"\n[case.y]\ncells = 16\nmapping = \"sine\"\nplace = 0.5\n",
+            ),
             ["case.y.place", "only with mapping = \"cluster\""],
         ),
     ] {
@@ -383,19 +580,35 @@ fn wrong_cases_are_refused_with_key_value_and_what_is_allowed() {
 fn what_only_the_mesh_tells_is_refused_before_anything_is_written() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
-    let start = |text: &str| run(&parse(text), &out, Begin::New, &Silent).unwrap_err().to_string();
+    let start = |text: &str| {
+        run(&parse(text), &out, Begin::New, &Silent)
+            .unwrap_err()
+            .to_string()
+    };
     let message = start("[case]\nkind = \"free\"\n");
     assert!(message.contains("time.end_s is missing"), "{message}");
     let walls = "[case]\nkind = \"free\"\n[case.x]\ncells = 8\nlow_end = \"slip\"\nhigh_end = \"slip\"\n\
                  [time]\nend_s = 1.0\n[output]\nplanes_x_m = [2.0]\n";
     let message = start(walls);
-    assert!(message.contains("output.planes_x_m = 2.0") && message.contains("0.0 to 1.0 m"), "{message}");
+    assert!(
+        message.contains("output.planes_x_m = 2.0") && message.contains("0.0 to 1.0 m"),
+        "{message}"
+    );
     let message = start("[case]\nkind = \"dipole\"\ncells = [16, 9]\nstretch = 0.0\n");
-    assert!(message.contains("z direction: cells = 9") && message.contains("at least 16"), "{message}");
+    assert!(
+        message.contains("z direction: cells = 9") && message.contains("at least 16"),
+        "{message}"
+    );
     let message = start("[case]\nkind = \"dipole\"\ncells = [16, 16]\n[output]\nevery_s = 1e-6\n");
-    assert!(message.contains("output.every_s = 1e-6") && message.contains("9999"), "{message}");
+    assert!(
+        message.contains("output.every_s = 1e-6") && message.contains("9999"),
+        "{message}"
+    );
     let message = start("[case]\nkind = \"dipole\"\ncells = [16, 16]\n[output]\ntimes_s = [2.0]\n");
-    assert!(message.contains("output.times_s = 2.0") && message.contains("0.75"), "{message}");
+    assert!(
+        message.contains("output.times_s = 2.0") && message.contains("0.75"),
+        "{message}"
+    );
     assert!(!out.exists());
 }
 
@@ -416,25 +629,64 @@ fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
         )
     };
     let pair = "kind = \"vortex_pair\"\ncirculation_m2_s = 6.28\nspacing_m = 2.0\ncore_radius_m = 0.8\nheight_m = 2.0";
-    run(&case(pair, &mesh(24)), &folder.path().join("a"), Begin::New, &Silent).unwrap();
+    run(
+        &case(pair, &mesh(24)),
+        &folder.path().join("a"),
+        Begin::New,
+        &Silent,
+    )
+    .unwrap();
     let again = "kind = \"netcdf\"\npath = \"a/initial_0001.nc\"";
-    run(&case(again, &mesh(24)), &folder.path().join("b"), Begin::New, &Silent).unwrap();
+    run(
+        &case(again, &mesh(24)),
+        &folder.path().join("b"),
+        Begin::New,
+        &Silent,
+    )
+    .unwrap();
     let speeds = |name: &str| -> Vec<f64> {
         let text = fs::read_to_string(folder.path().join(name)).unwrap();
         let rows = text.lines().filter(|l| !l.starts_with('#')).skip(1);
-        rows.flat_map(|l| l.split(',').skip(4).take(3).map(|c| c.parse().unwrap()).collect::<Vec<f64>>()).collect()
+        rows.flat_map(|l| {
+            l.split(',')
+                .skip(4)
+                .take(3)
+                .map(|c| c.parse().unwrap())
+                .collect::<Vec<f64>>()
+        })
+        .collect()
     };
     for output in ["fields_0001.csv", "fields_0002.csv"] {
-        let (a, b) = (speeds(&format!("a/{output}")), speeds(&format!("b/{output}")));
+        let (a, b) = (
+            speeds(&format!("a/{output}")),
+            speeds(&format!("b/{output}")),
+        );
         assert_eq!(a.len(), 3 * 24 * 24);
-        let worst = a.iter().zip(&b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let worst = a
+            .iter()
+            .zip(&b)
+            .map(|(a, b)| (a - b).abs())
+            .fold(0.0, f64::max);
         assert!(worst < 1e-12, "{output}: {worst}");
     }
     // Also on a mesh of its own: both runs then differ by the error of the coarser one.
-    let outcome = run(&case(again, &mesh(20)), &folder.path().join("c"), Begin::New, &Silent).unwrap();
+    let outcome = run(
+        &case(again, &mesh(20)),
+        &folder.path().join("c"),
+        Begin::New,
+        &Silent,
+    )
+    .unwrap();
     let energy = |folder_name: &str| {
         let text = fs::read_to_string(folder.path().join(folder_name).join("steps.csv")).unwrap();
-        text.lines().last().unwrap().split(',').nth(4).unwrap().parse::<f64>().unwrap()
+        text.lines()
+            .last()
+            .unwrap()
+            .split(',')
+            .nth(4)
+            .unwrap()
+            .parse::<f64>()
+            .unwrap()
     };
     assert!((outcome.kinetic_energy_m5_s2 / energy("a") - 1.0).abs() < 0.02);
     // What is no NetCDF, not there, or too small is refused by name.
@@ -442,10 +694,16 @@ fn a_field_written_by_a_run_starts_another_with_the_same_velocities() {
     for (path, mesh, wanted) in [
         ("text.nc", mesh(24), "NETCDF3_64BIT"),
         ("none.nc", mesh(24), "none.nc"),
-        ("a/initial_0001.nc", mesh(24).replace("high_m = 4.0\nlow_end", "high_m = 9.0\nlow_end"), "not covered"),
+        (
+            "a/initial_0001.nc",
+            mesh(24).replace("high_m = 4.0\nlow_end", "high_m = 9.0\nlow_end"),
+            "not covered",
+        ),
     ] {
         let file = case(&format!("kind = \"netcdf\"\npath = \"{path}\""), &mesh);
-        let message = run(&file, &folder.path().join("d"), Begin::New, &Silent).unwrap_err().to_string();
+        let message = run(&file, &folder.path().join("d"), Begin::New, &Silent)
+            .unwrap_err()
+            .to_string();
         assert!(message.contains(wanted), "{wanted} is not in: {message}");
     }
 }

@@ -20,7 +20,10 @@ pub const EXAMPLES: [(&str, &str); 13] = examples![
 
 /// The example of this name.
 pub fn example(name: &str) -> Option<&'static str> {
-    EXAMPLES.iter().find(|(n, _)| *n == name).map(|(_, text)| *text)
+    EXAMPLES
+        .iter()
+        .find(|(n, _)| *n == name)
+        .map(|(_, text)| *text)
 }
 
 /// Values of keys that no example has.
@@ -33,11 +36,16 @@ const TAGS: [&str; 3] = ["kind", "from", "model"];
 ///
 /// # Errors
 /// The file, the line, the key, the value and what is allowed.
-pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<FlowCase, SceneError> {
+pub(super) fn read(
+    text: &str,
+    path: &Path,
+    base: Option<&FlowCase>,
+) -> Result<FlowCase, SceneError> {
     static KEYS: LazyLock<Vec<Key>> = LazyLock::new(|| {
         let mut keys = keys_of::<FlowCase>();
         // Which flow is no matter of defaults.
-        keys.iter_mut().for_each(|key| key.is_required = key.name == "case");
+        keys.iter_mut()
+            .for_each(|key| key.is_required = key.name == "case");
         keys
     });
     let document = Text::parse(text, path)?;
@@ -47,7 +55,11 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
         (None, Some(kind)) => defaults_of(kind),
         (None, None) => Table::new(),
     };
-    let table = document.vet(&Format { keys: &KEYS, defaults: &defaults, examples: &examples_of(kind) })?;
+    let table = document.vet(&Format {
+        keys: &KEYS,
+        defaults: &defaults,
+        examples: &examples_of(kind),
+    })?;
     let whole = match base {
         Some(_) => over(defaults, table),
         None => table,
@@ -57,21 +69,30 @@ pub(super) fn read(text: &str, path: &Path, base: Option<&FlowCase>) -> Result<F
         case.wake.get_or_insert_default().complete();
     }
     let problems = case.problems();
-    if problems.is_empty() { Ok(case) } else { Err(document.located(problems)) }
+    if problems.is_empty() {
+        Ok(case)
+    } else {
+        Err(document.located(problems))
+    }
 }
 
 /// Texts with values of keys, that of the same kind first.
 fn examples_of(kind: Option<&str>) -> Vec<&'static str> {
     let own = EXAMPLES.iter().filter(|(name, _)| Some(*name) == kind);
     let others = EXAMPLES.iter().filter(|(name, _)| Some(*name) != kind);
-    own.chain(others).map(|(_, text)| *text).chain([MORE_EXAMPLES]).collect()
+    own.chain(others)
+        .map(|(_, text)| *text)
+        .chain([MORE_EXAMPLES])
+        .collect()
 }
 
 /// A case of this kind as a table; empty if there is no such kind.
 fn defaults_of(kind: &str) -> Table {
     let case = Table::from_iter([("kind".to_owned(), toml::Value::from(kind))]);
     let whole = Table::from_iter([("case".to_owned(), toml::Value::Table(case))]);
-    FlowCase::deserialize(whole).map(|case| table_of(&case)).unwrap_or_default()
+    FlowCase::deserialize(whole)
+        .map(|case| table_of(&case))
+        .unwrap_or_default()
 }
 
 fn table_of(case: &FlowCase) -> Table {
@@ -80,7 +101,9 @@ fn table_of(case: &FlowCase) -> Table {
 
 /// The keys of `over` in place of those of `base`; a table of another kind replaces the whole table.
 fn over(mut base: Table, over: Table) -> Table {
-    let other = TAGS.iter().any(|tag| over.contains_key(*tag) && over.get(*tag) != base.get(*tag));
+    let other = TAGS
+        .iter()
+        .any(|tag| over.contains_key(*tag) && over.get(*tag) != base.get(*tag));
     if other {
         return over;
     }
@@ -103,14 +126,19 @@ mod tests {
     use crate::keys::Kind;
 
     fn message(text: &str) -> String {
-        CaseFile::parse(text, Path::new("c.toml")).unwrap_err().to_string()
+        CaseFile::parse(text, Path::new("c.toml"))
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
     fn each_key_of_a_case_names_itself_and_what_it_takes() {
         let first = |text: &str| message(text).lines().next().unwrap_or_default().to_owned();
         let missing = first("[time]\nend_s = 1.0\n");
-        assert!(missing.starts_with("c.toml:1: case.kind is missing: one of \"taylor_green_plane\", "), "{missing}");
+        assert!(
+            missing.starts_with("c.toml:1: case.kind is missing: one of \"taylor_green_plane\", "),
+            "{missing}"
+        );
         for (text, wanted) in [
             (
                 "[case]\nkind = \"dipol\"\n",
@@ -150,32 +178,68 @@ mod tests {
     fn tables_without_their_kind_and_needed_values_are_the_defaults() {
         let parse = |text: &str| CaseFile::parse(text, Path::new("c.toml")).unwrap().toml;
         let pair = parse("[case]\nkind = \"wake\"\npair = { spacing_m = 30.0 }\n");
-        assert!(pair.contains("from = \"circulation\"\nspacing_m = 30.0\ncirculation_m2_s = 500.0"), "{pair}");
-        let free = parse("[case]\nkind = \"free\"\ninitial = { spacing_m = 30.0 }\n[time]\nend_s = 1.0\n");
-        assert!(free.contains("kind = \"vortex_pair\"") && free.contains("spacing_m = 30.0"), "{free}");
+        assert!(
+            pair.contains("from = \"circulation\"\nspacing_m = 30.0\ncirculation_m2_s = 500.0"),
+            "{pair}"
+        );
+        let free =
+            parse("[case]\nkind = \"free\"\ninitial = { spacing_m = 30.0 }\n[time]\nend_s = 1.0\n");
+        assert!(
+            free.contains("kind = \"vortex_pair\"") && free.contains("spacing_m = 30.0"),
+            "{free}"
+        );
     }
 
     #[test]
     fn a_file_over_a_preset_needs_only_what_differs_and_is_blamed_on_its_own_lines() {
-        let over = |text: &str| CaseFile::parse_over(Some(WakePreset::Fine), text, Path::new("c.toml"));
+        let over =
+            |text: &str| CaseFile::parse_over(Some(WakePreset::Fine), text, Path::new("c.toml"));
         let fine = over("").unwrap();
         assert_eq!(over("").unwrap().toml, fine.toml);
-        let changed = over("[case.pair]\nfrom = \"a340\"\n[solver.subgrid]\norder = 2\n").unwrap().toml;
-        assert!(changed.contains("from = \"a340\"\n") && !changed.contains("spacing_m"), "{changed}");
-        assert!(changed.contains("model = \"multiscale_wale\"\norder = 2\n"), "{changed}");
+        let changed = over("[case.pair]\nfrom = \"a340\"\n[solver.subgrid]\norder = 2\n")
+            .unwrap()
+            .toml;
+        assert!(
+            changed.contains("from = \"a340\"\n") && !changed.contains("spacing_m"),
+            "{changed}"
+        );
+        assert!(
+            changed.contains("model = \"multiscale_wale\"\norder = 2\n"),
+            "{changed}"
+        );
         let message = over("\n[case]\nheight = 9.0\n").unwrap_err().to_string();
-        assert!(message.starts_with("c.toml:3: case.height = 9.0 is not allowed"), "{message}");
+        assert!(
+            message.starts_with("c.toml:3: case.height = 9.0 is not allowed"),
+            "{message}"
+        );
     }
 
-    fn wrong<'k>(keys: &'k [Key], path: &str, before: &str, out: &mut Vec<(String, &'k Kind, String)>) {
-        for key in keys.iter().filter(|key| !(path.is_empty() && key.name == "case")) {
+    fn wrong<'k>(
+        keys: &'k [Key],
+        path: &str,
+        before: &str,
+        out: &mut Vec<(String, &'k Kind, String)>,
+    ) {
+        for key in keys
+            .iter()
+            .filter(|key| !(path.is_empty() && key.name == "case"))
+        {
             let here = crate::keys::join(path, key.name);
-            out.push((here.clone(), &key.kind, format!("{before}{here} = 1979-05-27\n")));
+            out.push((
+                here.clone(),
+                &key.kind,
+                format!("{before}{here} = 1979-05-27\n"),
+            ));
             match &key.kind {
                 Kind::Table(inner) => wrong(inner, &here, before, out),
                 Kind::Tagged { tag, kinds } => {
                     for (name, inner) in kinds {
-                        wrong(inner, &here, &format!("{before}{here}.{tag} = \"{name}\"\n"), out);
+                        wrong(
+                            inner,
+                            &here,
+                            &format!("{before}{here}.{tag} = \"{name}\"\n"),
+                            out,
+                        );
                     }
                 }
                 _ => {}
@@ -189,22 +253,45 @@ mod tests {
         let keys = keys_of::<FlowCase>();
         wrong(&keys, "", "case.kind = \"dipole\"\n", &mut cases);
         let case = keys.iter().find(|key| key.name == "case").unwrap();
-        let Kind::Tagged { kinds, .. } = &case.kind else { panic!("tagged") };
-        assert_eq!(kinds.iter().map(|(name, _)| *name).collect::<Vec<_>>().len(), EXAMPLES.len());
+        let Kind::Tagged { kinds, .. } = &case.kind else {
+            panic!("tagged")
+        };
+        assert_eq!(
+            kinds
+                .iter()
+                .map(|(name, _)| *name)
+                .collect::<Vec<_>>()
+                .len(),
+            EXAMPLES.len()
+        );
         for (name, inner) in kinds {
-            wrong(inner, "case", &format!("case.kind = \"{name}\"\n"), &mut cases);
+            wrong(
+                inner,
+                "case",
+                &format!("case.kind = \"{name}\"\n"),
+                &mut cases,
+            );
         }
         assert!(cases.len() > 130, "{}", cases.len());
         for (key, kind, text) in cases {
             let line = text.lines().count();
             let m = message(&text);
-            let own = m.lines().any(|l| l.starts_with(&format!("c.toml:{line}: {key} ")));
+            let own = m
+                .lines()
+                .any(|l| l.starts_with(&format!("c.toml:{line}: {key} ")));
             assert!(own, "{text}{m}");
             let plain = matches!(kind, Kind::Number | Kind::Whole { .. } | Kind::Text);
             let case = text.split('"').nth(1).unwrap();
             let examples = examples_of(Some(case));
-            let format = Format { keys: &[], defaults: &defaults_of(case), examples: &examples };
-            assert!(!plain || format.example(&key, kind).is_some(), "{key} needs a value in flow/more_examples.toml");
+            let format = Format {
+                keys: &[],
+                defaults: &defaults_of(case),
+                examples: &examples,
+            };
+            assert!(
+                !plain || format.example(&key, kind).is_some(),
+                "{key} needs a value in flow/more_examples.toml"
+            );
         }
     }
 }

@@ -35,9 +35,19 @@ impl CaseFile {
     /// nothing varies.
     pub(crate) fn coarser(&self, ratio: f64) -> Self {
         let mut case = self.content.clone();
-        for cells in case.case.cells_mut().into_iter().filter(|cells| **cells > 1) {
+        for cells in case
+            .case
+            .cells_mut()
+            .into_iter()
+            .filter(|cells| **cells > 1)
+        {
             let pairs = 0.5 * *cells as f64 / ratio;
-            *cells = 2 * (if ratio < 1.0 { pairs.ceil() } else { pairs.round() }) as usize;
+            *cells = 2
+                * (if ratio < 1.0 {
+                    pairs.ceil()
+                } else {
+                    pairs.round()
+                }) as usize;
         }
         self.changed(case)
     }
@@ -47,7 +57,9 @@ impl CaseFile {
     /// # Errors
     /// As [`CaseFile::forecast`].
     pub(crate) fn with_longer_steps(&self, times: f64) -> Result<(Self, &'static str, f64), Error> {
-        let settings = prepare(self, Path::new(""), RunOptions::default(), &alone())?.0.settings;
+        let settings = prepare(self, Path::new(""), RunOptions::default(), &alone())?
+            .0
+            .settings;
         let mut case = self.content.clone();
         let time = &mut case.time;
         time.scheme = Some(settings.scheme);
@@ -67,10 +79,13 @@ impl CaseFile {
         (case.output.fields, case.output.planes) = Default::default();
         (case.checkpoint.write, case.time.pause_after_steps) = (false, None);
         if let Some(wake) = &mut case.wake {
-            (wake.fields_tau, wake.planes_tau, wake.series_tau) = (Some(Vec::new()), Some(Vec::new()), None);
+            (wake.fields_tau, wake.planes_tau, wake.series_tau) =
+                (Some(Vec::new()), Some(Vec::new()), None);
             wake.every_tau = wake.every_tau.min(wake.end_tau / TIMES);
         } else if case.output.every_s.is_none() && case.output.times_s.len() < 4 {
-            case.output.times_s = (0..=TIMES as usize).map(|i| end_s * i as f64 / TIMES).collect();
+            case.output.times_s = (0..=TIMES as usize)
+                .map(|i| end_s * i as f64 / TIMES)
+                .collect();
         }
         self.changed(case)
     }
@@ -85,7 +100,10 @@ impl CaseFile {
             && let InitialName::Netcdf { path } = &mut free.initial
         {
             let whole = self.folder().join(&*path);
-            *path = std::path::absolute(&whole).map_err(Error::io("find", &whole))?.to_string_lossy().into_owned();
+            *path = std::path::absolute(&whole)
+                .map_err(Error::io("find", &whole))?
+                .to_string_lossy()
+                .into_owned();
         }
         Ok(self.changed(case))
     }
@@ -93,12 +111,20 @@ impl CaseFile {
     /// A refusal of its cells.
     pub(crate) fn refuse_cells(&self, allowed: String) -> Error {
         let is_free = matches!(self.content.case, CaseKind::Free(_));
-        self.refuse(if is_free { "case" } else { "case.cells" }, self.content.case.cells(), allowed)
+        self.refuse(
+            if is_free { "case" } else { "case.cells" },
+            self.content.case.cells(),
+            allowed,
+        )
     }
 
     /// A refusal of a word of the command line.
     pub(crate) fn refuse_word(&self, key: &str, value: &str, allowed: String) -> SceneError {
-        self.refused(vec![crate::keys::Problem { key: key.into(), value: value.into(), allowed }])
+        self.refused(vec![crate::keys::Problem {
+            key: key.into(),
+            value: value.into(),
+            allowed,
+        }])
     }
 }
 
@@ -112,11 +138,21 @@ fn alone() -> Arc<dyn Ranks> {
 /// What the case refuses; a flow that blows up.
 pub(crate) fn of_history(file: &CaseFile, observer: &dyn Observer) -> Result<History, Error> {
     let end_s = file.forecast()?.end_s;
-    let (mut setup, mut plan, ..) = prepare(&file.for_history(end_s), Path::new(""), RunOptions::default(), &alone())?;
+    let (mut setup, mut plan, ..) = prepare(
+        &file.for_history(end_s),
+        Path::new(""),
+        RunOptions::default(),
+        &alone(),
+    )?;
     plan.checkpoint = None;
     let meter = setup.wake.take().map(|wake| wake.meter);
     let cells = setup.mesh.cells();
-    let mut recorder = Recorder { meter, history: History::default(), observer, cells };
+    let mut recorder = Recorder {
+        meter,
+        history: History::default(),
+        observer,
+        cells,
+    };
     let (flow, _) = setup.start()?;
     let mut run = Run::new(flow, plan).map_err(Error::Flow)?;
     run.to_end(&mut recorder).map_err(Error::Flow)?;
@@ -138,17 +174,26 @@ impl RunObserver for Recorder<'_> {
     fn step(&mut self, _: &Flow, record: &StepRecord) -> Result<(), String> {
         let report = &record.report;
         let [nx, ny, nz] = self.cells;
-        self.observer.reach(&format!("{nx} x {ny} x {nz} cells, step {}", report.step));
+        self.observer
+            .reach(&format!("{nx} x {ny} x {nz} cells, step {}", report.step));
         // Powers are those of the start of a step.
         let [energy, dissipation, ..] = &mut self.history;
-        dissipation.resize(energy.len(), -report.viscous_power_m5_s3 - report.subgrid_power_m5_s3);
+        dissipation.resize(
+            energy.len(),
+            -report.viscous_power_m5_s3 - report.subgrid_power_m5_s3,
+        );
         Ok(())
     }
 
     fn output(&mut self, flow: &Flow, _: usize) -> Result<(), String> {
         let [energy, _, circulation, height] = &mut self.history;
         // The meter follows the vortices from the start, which is the same on all meshes but for the jump at a wall.
-        let record = self.meter.as_mut().map(|meter| meter.measure(flow)).transpose().map_err(|e| e.to_string())?;
+        let record = self
+            .meter
+            .as_mut()
+            .map(|meter| meter.measure(flow))
+            .transpose()
+            .map_err(|e| e.to_string())?;
         if flow.steps() == 0 {
             return Ok(());
         }

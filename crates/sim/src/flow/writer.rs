@@ -26,7 +26,9 @@ fn parted(bytes: &[u8], is_wake: bool) -> (&[u8], &[u8]) {
     if !is_wake {
         return (bytes, &[]);
     }
-    let Some((length, rest)) = bytes.split_first_chunk::<8>() else { return Default::default() };
+    let Some((length, rest)) = bytes.split_first_chunk::<8>() else {
+        return Default::default();
+    };
     let length = usize::try_from(u64::from_le_bytes(*length)).unwrap_or(usize::MAX);
     rest.split_at_checked(length).unwrap_or_default()
 }
@@ -61,32 +63,53 @@ impl Writer<'_> {
     }
 
     /// Begins the files of a run, or continues them from what a checkpoint kept; ranks other than the first have none.
-    pub(super) fn begin(&mut self, file: &CaseFile, checkpoint: Option<PathBuf>, kept: &[u8]) -> Result<(), Error> {
+    pub(super) fn begin(
+        &mut self,
+        file: &CaseFile,
+        checkpoint: Option<PathBuf>,
+        kept: &[u8],
+    ) -> Result<(), Error> {
         let (row, history) = parted(kept, self.wake.is_some());
         if let (Some(wake), Some(path)) = (&mut self.wake, checkpoint) {
             let what = "its history of the wake is not that of this case";
-            wake.restore(history).ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged { path, what }))?;
+            wake.restore(history)
+                .ok_or(Error::Flow(wakescope_les::Error::CheckpointDamaged {
+                    path,
+                    what,
+                }))?;
         }
         if self.ranks.rank() > 0 {
             return Ok(());
         }
         let folder = &self.files.folder;
         self.written.push(folder.join(CASE));
-        write_atomic(&folder.join(CASE), format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml))?;
+        write_atomic(
+            &folder.join(CASE),
+            format!("# {}, case {}\n{}", crate::PROGRAM, file.hash, file.toml),
+        )?;
         if self.files.output.steps {
             let path = folder.join(STEPS);
             self.steps = Some(StepTable::open(&path, &self.files.origin, row)?);
             self.written.push(path);
         }
-        self.written.extend(self.wake.iter().flat_map(|_| HISTORIES.map(|name| folder.join(name))));
+        self.written.extend(
+            self.wake
+                .iter()
+                .flat_map(|_| HISTORIES.map(|name| folder.join(name))),
+        );
         Ok(())
     }
 
     /// Completes the tables.
     pub(super) fn finish(&mut self) -> Result<(), Error> {
-        let steps = self.steps.as_mut().map_or(Ok(()), |steps| steps.write_waiting(None));
+        let steps = self
+            .steps
+            .as_mut()
+            .map_or(Ok(()), |steps| steps.write_waiting(None));
         match &self.wake {
-            Some(wake) if self.ranks.rank() == 0 => steps.and(wake.finish(&self.files.folder, &self.files.origin)),
+            Some(wake) if self.ranks.rank() == 0 => {
+                steps.and(wake.finish(&self.files.folder, &self.files.origin))
+            }
             _ => steps,
         }
     }
@@ -108,20 +131,37 @@ impl RunObserver for Writer<'_> {
         self.done = done.max(self.done);
         // Four decimals, or the exponent form of what these would not show.
         let is_plain = (1e-2..1e9).contains(&r.time_s);
-        let time = if is_plain { format!("{:.4}", r.time_s) } else { format!("{:.3e}", r.time_s) };
-        self.observer.reach(&format!("step {}, t = {time} s, Courant {:.2}", r.step, r.courant));
-        let pushed = self.steps.as_mut().map_or(Ok(()), |steps| steps.push(record));
+        let time = if is_plain {
+            format!("{:.4}", r.time_s)
+        } else {
+            format!("{:.3e}", r.time_s)
+        };
+        self.observer.reach(&format!(
+            "step {}, t = {time} s, Courant {:.2}",
+            r.step, r.courant
+        ));
+        let pushed = self
+            .steps
+            .as_mut()
+            .map_or(Ok(()), |steps| steps.push(record));
         self.keep(pushed)
     }
 
     fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        let due = self.files.schedule.due.get(index).copied().unwrap_or_default();
+        let due = self
+            .files
+            .schedule
+            .due
+            .get(index)
+            .copied()
+            .unwrap_or_default();
         if due.record
             && let Some(wake) = &mut self.wake
         {
             let mut recorded = wake.record(flow);
             if self.ranks.rank() == 0 {
-                recorded = recorded.and_then(|()| wake.write_tables(&self.files.folder, &self.files.origin));
+                recorded = recorded
+                    .and_then(|()| wake.write_tables(&self.files.folder, &self.files.origin));
             }
             let recorded = agree(&self.ranks, recorded);
             self.keep(recorded)?;
@@ -147,7 +187,12 @@ impl RunObserver for Writer<'_> {
         let steps = self.steps.as_ref().map_or_else(Vec::new, StepTable::kept);
         match &self.wake {
             None => steps,
-            Some(wake) => [&(steps.len() as u64).to_le_bytes()[..], &steps, &wake.kept()].concat(),
+            Some(wake) => [
+                &(steps.len() as u64).to_le_bytes()[..],
+                &steps,
+                &wake.kept(),
+            ]
+            .concat(),
         }
     }
 }
@@ -169,15 +214,28 @@ impl StepTable {
     /// kept.
     fn open(path: &Path, origin: &Provenance, kept: &[u8]) -> Result<Self, Error> {
         let waiting = (!kept.is_empty()).then(|| String::from_utf8_lossy(kept).into_owned());
-        let step_of = |row: &str| row.split(',').next().and_then(|cell| cell.parse::<u64>().ok());
+        let step_of = |row: &str| {
+            row.split(',')
+                .next()
+                .and_then(|cell| cell.parse::<u64>().ok())
+        };
         let next = waiting.as_deref().and_then(step_of).unwrap_or(0);
         // A table that was removed begins again with the rows to come.
         let old = std::fs::read_to_string(path).unwrap_or_default();
-        let rows = old.lines().filter(|line| step_of(line).is_some_and(|step| step < next));
+        let rows = old
+            .lines()
+            .filter(|line| step_of(line).is_some_and(|step| step < next));
         let rows: String = rows.map(|line| format!("{line}\n")).collect();
         write_atomic(path, format!("{}{HEADER}\n{rows}", origin.comment_lines()))?;
-        let file = OpenOptions::new().append(true).open(path).map_err(Error::io("write", path))?;
-        Ok(Self { path: path.to_owned(), file, waiting })
+        let file = OpenOptions::new()
+            .append(true)
+            .open(path)
+            .map_err(Error::io("write", path))?;
+        Ok(Self {
+            path: path.to_owned(),
+            file,
+            waiting,
+        })
     }
 
     /// Takes the record of a step; the row before it is written.
@@ -212,9 +270,13 @@ impl StepTable {
 
     /// Writes the row that waits with its budget, which stays open of the last one.
     fn write_waiting(&mut self, budget: Option<EnergyBudget>) -> Result<(), Error> {
-        let Some(row) = self.waiting.take() else { return Ok(()) };
+        let Some(row) = self.waiting.take() else {
+            return Ok(());
+        };
         let [rate, residual] = budget.map_or([f64::NAN; 2], |b| [b.rate_m5_s3, b.residual_m5_s3()]);
         let line = format!("{row},{},{}\n", float_text(rate), float_text(residual));
-        self.file.write_all(line.as_bytes()).map_err(Error::io("write", &self.path))
+        self.file
+            .write_all(line.as_bytes())
+            .map_err(Error::io("write", &self.path))
     }
 }

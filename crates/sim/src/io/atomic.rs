@@ -30,7 +30,10 @@ pub struct FileGroup {
 impl FileGroup {
     /// A group for this folder, which is made by [`Self::commit`] where it does not exist.
     pub fn new(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), files: Vec::new() }
+        Self {
+            folder: folder.to_owned(),
+            files: Vec::new(),
+        }
     }
 
     /// Adds a file.
@@ -47,10 +50,17 @@ impl FileGroup {
     /// As [`Self::add`].
     pub fn add_parts(&mut self, name: &str, content: FileParts) -> OutputResult<()> {
         if Path::new(name).file_name() != Some(name.as_ref()) {
-            return Err(OutputError::value("file name", name, "must be a plain name without folders"));
+            return Err(OutputError::value(
+                "file name",
+                name,
+                "must be a plain name without folders",
+            ));
         }
         if self.files.iter().any(|(n, _)| n == name) {
-            return Err(OutputError::Duplicate { what: "file", name: name.into() });
+            return Err(OutputError::Duplicate {
+                what: "file",
+                name: name.into(),
+            });
         }
         self.files.push((name.into(), content));
         Ok(())
@@ -97,7 +107,11 @@ impl FileGroup {
             }
             file.sync_all()
         };
-        for (name, content) in self.files.iter().filter(|(_, content)| !content.parts.is_empty()) {
+        for (name, content) in self
+            .files
+            .iter()
+            .filter(|(_, content)| !content.parts.is_empty())
+        {
             let path = self.folder.join(stage).join(NEW).join(name);
             write(&path, content).map_err(|e| io_error("write", &path, e))?;
         }
@@ -115,21 +129,32 @@ impl FileGroup {
                 for (name, _) in self.files[..place].iter().rev() {
                     let (target, kept) = (self.folder.join(name), stage.old.join(name));
                     let was_there = kept.symlink_metadata().is_ok();
-                    drop(if was_there { fs::rename(kept, target) } else { fs::remove_file(target) });
+                    drop(if was_there {
+                        fs::rename(kept, target)
+                    } else {
+                        fs::remove_file(target)
+                    });
                 }
                 return Err(error);
             }
         }
         // So that the renames reach the disk. Not every system can sync a folder; the files themselves are complete either way.
         drop(fs::File::open(&self.folder).and_then(|folder| folder.sync_all()));
-        Ok(self.files.iter().map(|(name, _)| self.folder.join(name)).collect())
+        Ok(self
+            .files
+            .iter()
+            .map(|(name, _)| self.folder.join(name))
+            .collect())
     }
 
     /// Puts one file into place; an older one waits in the stage, but for the last file.
     fn put_one(&self, stage: &Stage, name: &str, is_last: bool) -> OutputResult<()> {
         let (target, kept) = (self.folder.join(name), stage.old.join(name));
         if target.is_dir() {
-            let source = std::io::Error::new(ErrorKind::IsADirectory, "a folder of that name is in the way");
+            let source = std::io::Error::new(
+                ErrorKind::IsADirectory,
+                "a folder of that name is in the way",
+            );
             return Err(io_error("write", &target, source));
         }
         let keeps = !is_last && target.symlink_metadata().is_ok();
@@ -150,10 +175,13 @@ impl FileGroup {
 /// # Errors
 /// The refusal of the system; nothing is left behind and an older file is untouched.
 pub fn write_atomic(path: &Path, content: impl Into<Vec<u8>>) -> OutputResult<()> {
-    let name = path
-        .file_name()
-        .and_then(|n| n.to_str())
-        .ok_or_else(|| OutputError::value("file name", path.display(), "must end with a UTF-8 file name"))?;
+    let name = path.file_name().and_then(|n| n.to_str()).ok_or_else(|| {
+        OutputError::value(
+            "file name",
+            path.display(),
+            "must end with a UTF-8 file name",
+        )
+    })?;
     let parent = path.parent().filter(|p| !p.as_os_str().is_empty());
     let folder = parent.unwrap_or(Path::new("."));
     let mut group = FileGroup::new(folder);
@@ -183,7 +211,8 @@ const LOCK: &str = "lock";
 pub(super) fn sweep_stages(folder: &Path) {
     let entries = |path: &Path| fs::read_dir(path).into_iter().flatten().flatten();
     let is_stage = |entry: &fs::DirEntry| {
-        entry.file_name().to_string_lossy().starts_with(STAGE) && entry.file_type().is_ok_and(|kind| kind.is_dir())
+        entry.file_name().to_string_lossy().starts_with(STAGE)
+            && entry.file_type().is_ok_and(|kind| kind.is_dir())
     };
     let path = |entry: fs::DirEntry| entry.path();
     for root in entries(folder).filter(is_stage).map(path) {
@@ -212,11 +241,20 @@ pub(super) fn sweep_stages(folder: &Path) {
 impl Stage {
     /// The name of the folder.
     pub(crate) fn name(&self) -> String {
-        self.root.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        self.root
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
     }
 
     fn of(root: PathBuf, lock: fs::File) -> Self {
-        Self { new: root.join(NEW), old: root.join("old"), root, _lock: lock }
+        Self {
+            new: root.join(NEW),
+            old: root.join("old"),
+            root,
+            _lock: lock,
+        }
     }
 
     /// Makes the stage of a folder.
@@ -238,7 +276,11 @@ impl Stage {
                 Err(e) => return Err(io_error("create folder", &root, e)),
             }
         }
-        Err(io_error("write into", folder, ErrorKind::AlreadyExists.into()))
+        Err(io_error(
+            "write into",
+            folder,
+            ErrorKind::AlreadyExists.into(),
+        ))
     }
 
     fn begin(root: &Path) -> std::io::Result<Self> {
@@ -258,7 +300,8 @@ impl Stage {
 impl Drop for Stage {
     fn drop(&mut self) {
         // The lock goes last: without it a stage that is not empty is nobody's to sweep.
-        let goes = |part: &Path| fs::remove_dir_all(part).is_ok() || part.symlink_metadata().is_err();
+        let goes =
+            |part: &Path| fs::remove_dir_all(part).is_ok() || part.symlink_metadata().is_err();
         if goes(&self.new) && goes(&self.old) {
             drop(fs::remove_dir_all(&self.root));
         }
@@ -287,7 +330,11 @@ pub(crate) fn in_folder<T, E: From<OutputError>>(
 }
 
 fn io_error(action: &'static str, path: &Path, source: std::io::Error) -> OutputError {
-    OutputError::Io { action, path: path.to_owned(), source }
+    OutputError::Io {
+        action,
+        path: path.to_owned(),
+        source,
+    }
 }
 
 #[cfg(test)]
@@ -295,8 +342,10 @@ mod tests {
     use super::*;
 
     fn listing(folder: &Path) -> Vec<String> {
-        let mut names: Vec<String> =
-            fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        let mut names: Vec<String> = fs::read_dir(folder)
+            .unwrap()
+            .map(|e| e.unwrap().file_name().into_string().unwrap())
+            .collect();
         names.sort();
         names
     }
@@ -331,7 +380,11 @@ mod tests {
         let error = group(temp.path(), &["a", "b", "c"]).commit().unwrap_err();
         assert!(error.to_string().contains('c'), "{error}");
         assert_eq!(listing(temp.path()), ["a", "c"]);
-        assert_eq!(fs::read_to_string(temp.path().join("a")).unwrap(), "old a", "the replaced file must come back");
+        assert_eq!(
+            fs::read_to_string(temp.path().join("a")).unwrap(),
+            "old a",
+            "the replaced file must come back"
+        );
     }
 
     #[test]
@@ -340,7 +393,10 @@ mod tests {
         let file = temp.path().join("file");
         fs::write(&file, "x").unwrap();
         for folder in [file.clone(), file.join("sub/folder")] {
-            assert!(matches!(group(&folder, &["a"]).commit(), Err(OutputError::Io { .. })));
+            assert!(matches!(
+                group(&folder, &["a"]).commit(),
+                Err(OutputError::Io { .. })
+            ));
         }
         assert_eq!(listing(temp.path()), ["file"]);
         assert_eq!(fs::read_to_string(file).unwrap(), "x");
@@ -406,6 +462,9 @@ mod tests {
             assert!(group.add(name, "").is_err(), "{name:?}");
         }
         group.add("a", "").unwrap();
-        assert!(matches!(group.add("a", ""), Err(OutputError::Duplicate { .. })));
+        assert!(matches!(
+            group.add("a", ""),
+            Err(OutputError::Duplicate { .. })
+        ));
     }
 }

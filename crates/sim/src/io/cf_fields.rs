@@ -28,14 +28,28 @@ pub fn cf_field_parts(field: &VelocityField, provenance: &Provenance) -> OutputR
         ("w", Data::filled(w)),
         ("pressure_m2_s2", Data::filled(&field.pressure_m2_s2)),
     ];
-    values.extend(field.vorticity_per_s.as_ref().map(|vorticity| ("vorticity_magnitude", Data::filled(vorticity))));
+    values.extend(
+        field
+            .vorticity_per_s
+            .as_ref()
+            .map(|vorticity| ("vorticity_magnitude", Data::filled(vorticity))),
+    );
     // By which readers close a period of cells that are not equal.
     let edges = |period_m: f64| Data::text(edges::to_text(Edges::Periodic { period_m }));
     let periods = ["x:edges", "y:edges"].into_iter().zip(field.period_m);
     values.extend(periods.filter_map(|(name, period_m)| Some((name, edges(period_m?)))));
-    let dims = vec![("time", 1), ("z", field.z_m.len()), ("y", field.y_m.len()), ("x", field.x_m.len())];
-    let variables = shared(described(include_str!("cf_fields.cdl"), values), field.first());
-    Layout::cf(&field.title, dims, variables, provenance).into_parts(provenance, field.share.is_first)
+    let dims = vec![
+        ("time", 1),
+        ("z", field.z_m.len()),
+        ("y", field.y_m.len()),
+        ("x", field.x_m.len()),
+    ];
+    let variables = shared(
+        described(include_str!("cf_fields.cdl"), values),
+        field.first(),
+    );
+    Layout::cf(&field.title, dims, variables, provenance)
+        .into_parts(provenance, field.share.is_first)
 }
 
 /// Velocity components at the low faces of the cells.
@@ -62,7 +76,10 @@ pub struct FaceVelocities {
 pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> OutputResult<FileParts> {
     let mut dims = Vec::new();
     let mut values = vec![("time", Data::f64([faces.time_s]))];
-    for (d, (name, face)) in [("x", "x_face"), ("y", "y_face"), ("z", "z_face")].into_iter().enumerate() {
+    for (d, (name, face)) in [("x", "x_face"), ("y", "y_face"), ("z", "z_face")]
+        .into_iter()
+        .enumerate()
+    {
         same_length(face, faces.face_m[d].len(), name, faces.centre_m[d].len())?;
         for (name, places_m) in [(name, &faces.centre_m[d]), (face, &faces.face_m[d])] {
             dims.push((name, places_m.len()));
@@ -71,16 +88,28 @@ pub fn cf_faces_parts(faces: &FaceVelocities, provenance: &Provenance) -> Output
     }
     let plane = faces.centre_m[0].len() * faces.centre_m[1].len();
     for (name, velocity_m_s) in ["u", "v", "w"].into_iter().zip(&faces.velocity_m_s) {
-        same_length(name, velocity_m_s.len(), "z x y x x", faces.share.planes.len() * plane)?;
+        same_length(
+            name,
+            velocity_m_s.len(),
+            "z x y x x",
+            faces.share.planes.len() * plane,
+        )?;
         values.push((name, Data::f64(velocity_m_s.iter().copied())));
     }
-    let variables = shared(described(include_str!("cf_faces.cdl"), values), faces.share.planes.start * plane);
-    Layout::cf(&faces.title, dims, variables, provenance).into_parts(provenance, faces.share.is_first)
+    let variables = shared(
+        described(include_str!("cf_faces.cdl"), values),
+        faces.share.planes.start * plane,
+    );
+    Layout::cf(&faces.title, dims, variables, provenance)
+        .into_parts(provenance, faces.share.is_first)
 }
 
 /// The variables of which ranks have the values from number `first` on: those over the planes across z.
 fn shared(mut variables: Vec<Variable>, first: usize) -> Vec<Variable> {
-    variables.iter_mut().filter(|variable| variable.dims.len() > 2).for_each(|variable| variable.first = Some(first));
+    variables
+        .iter_mut()
+        .filter(|variable| variable.dims.len() > 2)
+        .for_each(|variable| variable.first = Some(first));
     variables
 }
 
@@ -106,33 +135,62 @@ mod tests {
         assert_eq!(file.read_var_f64("x").unwrap(), field.x_m);
         assert_eq!(file.read_var_f64("z").unwrap(), field.z_m);
         assert_eq!(file.read_var_f64("time").unwrap(), [2.5]);
-        assert_eq!(file.data_set().get_var_attr_as_string("y", "edges").unwrap(), "periodic 3.25");
+        assert_eq!(
+            file.data_set()
+                .get_var_attr_as_string("y", "edges")
+                .unwrap(),
+            "periodic 3.25"
+        );
         assert_eq!(file.data_set().get_var_attr_as_string("x", "edges"), None);
-        assert_eq!(file.data_set().get_var("w").unwrap().dim_names(), ["time", "z", "y", "x"]);
+        assert_eq!(
+            file.data_set().get_var("w").unwrap().dim_names(),
+            ["time", "z", "y", "x"]
+        );
         let expected: Vec<f32> = field.velocity_m_s[2].iter().map(|v| *v as f32).collect();
         assert_eq!(file.read_var_f32("w").unwrap(), expected);
-        assert_eq!(file.data_set().get_global_attr_as_string("scene").unwrap(), example().scene_toml);
+        assert_eq!(
+            file.data_set().get_global_attr_as_string("scene").unwrap(),
+            example().scene_toml
+        );
     }
 
     #[test]
     fn what_ranks_have_of_a_field_is_the_file_of_one() {
-        let mut parts = fields::example_on_ranks().into_iter().map(|field| cf_field_parts(&field, &example()).unwrap());
+        let mut parts = fields::example_on_ranks()
+            .into_iter()
+            .map(|field| cf_field_parts(&field, &example()).unwrap());
         let mut file = parts.next().unwrap();
         parts.for_each(|other| file.parts.extend(other.parts));
-        assert_eq!(file.into_bytes(), cf_field_parts(&fields::example(), &example()).unwrap().into_bytes());
+        assert_eq!(
+            file.into_bytes(),
+            cf_field_parts(&fields::example(), &example())
+                .unwrap()
+                .into_bytes()
+        );
     }
 
     #[test]
     fn components_on_their_faces_read_back_in_full_precision() {
         let field = fields::example();
         let centre_m = [field.x_m.clone(), field.y_m.clone(), field.z_m.clone()];
-        let face_m = centre_m.clone().map(|axis| axis.iter().map(|a| a - 0.05).collect::<Vec<f64>>());
+        let face_m = centre_m
+            .clone()
+            .map(|axis| axis.iter().map(|a| a - 0.05).collect::<Vec<f64>>());
         let mut velocity_m_s = field.velocity_m_s.clone();
         velocity_m_s[0][5] = 1.0 / 3.0;
-        let faces =
-            FaceVelocities { title: "A".into(), time_s: 2.5, centre_m, face_m, velocity_m_s, share: Share::whole(4) };
+        let faces = FaceVelocities {
+            title: "A".into(),
+            time_s: 2.5,
+            centre_m,
+            face_m,
+            velocity_m_s,
+            share: Share::whole(4),
+        };
         let (_temp, mut file) = open(cf_faces_parts(&faces, &example()).unwrap());
-        assert_eq!(file.data_set().get_var("v").unwrap().dim_names(), ["z", "y_face", "x"]);
+        assert_eq!(
+            file.data_set().get_var("v").unwrap().dim_names(),
+            ["z", "y_face", "x"]
+        );
         assert_eq!(file.read_var_f64("u").unwrap(), faces.velocity_m_s[0]);
         assert_eq!(file.read_var_f64("y_face").unwrap(), faces.face_m[1]);
         let mut short = faces;

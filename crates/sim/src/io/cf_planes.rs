@@ -26,7 +26,11 @@ pub fn cf_planes_bytes(planes: &CrossPlanes, provenance: &Provenance) -> OutputR
         ("w", Data::filled(&planes.w_m_s)),
     ];
     let variables = described(include_str!("cf_planes.cdl"), values);
-    let dims = vec![("tau", planes.tau.len()), ("z", planes.z_m.len()), ("y", planes.y_m.len())];
+    let dims = vec![
+        ("tau", planes.tau.len()),
+        ("z", planes.z_m.len()),
+        ("y", planes.y_m.len()),
+    ];
     Layout::cf(&planes.title, dims, variables, provenance).into_bytes(provenance)
 }
 
@@ -54,10 +58,20 @@ mod tests {
         let w = file.read_var_f32("w").unwrap();
         let expected: Vec<f32> = planes.w_m_s.iter().map(|v| *v as f32).collect();
         assert_eq!(w, expected);
-        assert_eq!(file.read_var_f32("v").unwrap()[0], FILL, "NaN is stored as the fill value");
+        assert_eq!(
+            file.read_var_f32("v").unwrap()[0],
+            FILL,
+            "NaN is stored as the fill value"
+        );
         let set = file.data_set();
-        assert_eq!(set.get_global_attr_as_string("seed").unwrap(), u64::MAX.to_string());
-        assert_eq!(set.get_global_attr_as_string("scene").unwrap(), example().scene_toml);
+        assert_eq!(
+            set.get_global_attr_as_string("seed").unwrap(),
+            u64::MAX.to_string()
+        );
+        assert_eq!(
+            set.get_global_attr_as_string("scene").unwrap(),
+            example().scene_toml
+        );
         assert_eq!(set.get_var_attr_f32("v", "_FillValue").unwrap(), [FILL]);
     }
 

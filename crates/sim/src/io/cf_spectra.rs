@@ -24,6 +24,11 @@ pub fn cf_spectra_bytes(spectra: &Spectra, provenance: &Provenance) -> OutputRes
         ("range", spectra.range_m.len()),
         ("velocity", spectra.velocity_m_s.len()),
     ];
-    Layout::cf("Spectra of recorded signals", dims, described(include_str!("cf_spectra.cdl"), values), provenance)
-        .into_bytes(provenance)
+    Layout::cf(
+        "Spectra of recorded signals",
+        dims,
+        described(include_str!("cf_spectra.cdl"), values),
+        provenance,
+    )
+    .into_bytes(provenance)
 }

@@ -35,7 +35,11 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     let times: Vec<f64> = map.rays.iter().map(|r| r.time_s).collect();
     if let Some(bad) = times.iter().find(outside) {
         let allowed = format!("within {MAX_TIME_S:?} s of the start of the flow");
-        return Err(OutputError::value("ray time_s", format!("{bad:?}"), allowed));
+        return Err(OutputError::value(
+            "ray time_s",
+            format!("{bad:?}"),
+            allowed,
+        ));
     }
     let mut values = axes(map, times);
     values.extend(site(map));
@@ -45,8 +49,13 @@ fn layout(map: &VelocityMap, provenance: &Provenance) -> OutputResult<Layout> {
     let mut variables = described(include_str!("cfradial.cdl"), values);
     if !map.is_carried() {
         // A lidar that stands has one place for all rays.
-        let is_place = |variable: &&mut Variable| ["latitude", "longitude", "altitude"].contains(&&*variable.name);
-        variables.iter_mut().filter(is_place).for_each(|variable| variable.dims.clear());
+        let is_place = |variable: &&mut Variable| {
+            ["latitude", "longitude", "altitude"].contains(&&*variable.name)
+        };
+        variables
+            .iter_mut()
+            .filter(is_place)
+            .for_each(|variable| variable.dims.clear());
     }
     variables.extend(fields(map, &provenance.scene_toml)?);
     Ok(Layout {
@@ -76,11 +85,20 @@ fn globals(map: &VelocityMap, provenance: &Provenance) -> Vec<(&'static str, Str
         ("Conventions", "CF-1.7 CF/Radial instrument_parameters"),
         ("version", "1.4"),
         ("institution", institution),
-        ("references", "CfRadial data file format, version 1.4, NCAR (2016)"),
+        (
+            "references",
+            "CfRadial data file format, version 1.4, NCAR (2016)",
+        ),
         ("comment", comment),
         ("instrument_name", "wakescope lidar"),
-        ("scan_name", map.sweeps.first().map_or("rhi", |sweep| sweep.mode.name())),
-        ("platform_is_mobile", if map.is_carried() { "true" } else { "false" }),
+        (
+            "scan_name",
+            map.sweeps.first().map_or("rhi", |sweep| sweep.mode.name()),
+        ),
+        (
+            "platform_is_mobile",
+            if map.is_carried() { "true" } else { "false" },
+        ),
         ("n_gates_vary", "false"),
         ("ray_times_increase", "true"),
         ("simulated", simulated),
@@ -96,16 +114,33 @@ type Values = Vec<(&'static str, Data)>;
 
 fn axes(map: &VelocityMap, times: Vec<f64>) -> Values {
     let gates = &map.range_m;
-    let spacing = if gates.len() > 1 { gates[1] - gates[0] } else { 0.0 };
+    let spacing = if gates.len() > 1 {
+        gates[1] - gates[0]
+    } else {
+        0.0
+    };
     // Gate centres come from sums and products of a few terms: equal to a part in 1e6 is constant.
-    let constant = gates.windows(2).all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
-    let degrees = |angle: fn(&super::map::Ray) -> f64| Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32));
+    let constant = gates
+        .windows(2)
+        .all(|w| (w[1] - w[0] - spacing).abs() <= 1e-6 * spacing);
+    let degrees = |angle: fn(&super::map::Ray) -> f64| {
+        Data::f32(map.rays.iter().map(|r| angle(r).to_degrees() as f32))
+    };
     vec![
         ("time", Data::f64(times)),
-        ("time:units", Data::text(format!("seconds since {}", map.start()))),
+        (
+            "time:units",
+            Data::text(format!("seconds since {}", map.start())),
+        ),
         ("range", single(gates)),
-        ("range:spacing_is_constant", Data::text(if constant { "true" } else { "false" })),
-        ("range:meters_to_center_of_first_gate", Data::f32([gates[0] as f32])),
+        (
+            "range:spacing_is_constant",
+            Data::text(if constant { "true" } else { "false" }),
+        ),
+        (
+            "range:meters_to_center_of_first_gate",
+            Data::f32([gates[0] as f32]),
+        ),
         ("range:meters_between_gates", Data::f32([spacing as f32])),
         ("azimuth", degrees(|r| turn(r.azimuth_rad))),
         ("elevation", degrees(|r| r.elevation_rad)),
@@ -120,8 +155,13 @@ const DEGREE_M: f64 = 6_371_008.8 * std::f64::consts::PI / 180.0;
 
 fn site(map: &VelocityMap) -> Values {
     // A scan in one plane without a flight of its own looks across it.
-    let across_rad = map.rays.first().map_or(0.0, |ray| ray.azimuth_rad - FRAC_PI_2);
-    let heading_rad = map.flight.map_or(across_rad, |(_, azimuth_rad)| azimuth_rad);
+    let across_rad = map
+        .rays
+        .first()
+        .map_or(0.0, |ray| ray.azimuth_rad - FRAC_PI_2);
+    let heading_rad = map
+        .flight
+        .map_or(across_rad, |(_, azimuth_rad)| azimuth_rad);
     // Along the flight and to the right of it, as north and east.
     let north_east = |x: f64, y: f64| {
         let (sin, cos) = heading_rad.sin_cos();
@@ -131,28 +171,49 @@ fn site(map: &VelocityMap) -> Values {
         let (north_m, east_m) = north_east(x_m, y_m);
         let width = map.site.latitude_deg.to_radians().cos();
         let (latitude, longitude) = (map.site.latitude_deg, map.site.longitude_deg);
-        [latitude + north_m / DEGREE_M, longitude + east_m / (DEGREE_M * width), map.site.altitude_m + z_m]
+        [
+            latitude + north_m / DEGREE_M,
+            longitude + east_m / (DEGREE_M * width),
+            map.site.altitude_m + z_m,
+        ]
     };
-    let here_m = [map.flight.map_or(0.0, |(x_m, _)| x_m), map.lidar_y_m, map.lidar_height_m];
-    let carrier: Vec<([f64; 3], [f64; 3])> = map.rays.iter().filter_map(|ray| ray.carrier).collect();
+    let here_m = [
+        map.flight.map_or(0.0, |(x_m, _)| x_m),
+        map.lidar_y_m,
+        map.lidar_height_m,
+    ];
+    let carrier: Vec<([f64; 3], [f64; 3])> =
+        map.rays.iter().filter_map(|ray| ray.carrier).collect();
     let places: Vec<[f64; 3]> = match carrier.is_empty() {
         true => vec![place(here_m)],
         false => carrier.iter().map(|(place_m, _)| place(*place_m)).collect(),
     };
     let values = |d: usize| Data::f64(places.iter().map(|p| p[d]));
-    let mut out = vec![("latitude", values(0)), ("longitude", values(1)), ("altitude", values(2))];
+    let mut out = vec![
+        ("latitude", values(0)),
+        ("longitude", values(1)),
+        ("altitude", values(2)),
+    ];
     if !carrier.is_empty() {
         // A level carrier that heads along the flight, and drifts where its track does not.
         let heading_deg = turn(heading_rad).to_degrees();
         let over_ground = |i: usize| north_east(carrier[i].1[0], carrier[i].1[1]);
         let drift = |i: usize| {
             let (north, east) = over_ground(i);
-            let aside_rad = if north == 0.0 && east == 0.0 { 0.0 } else { east.atan2(north) - heading_rad };
+            let aside_rad = if north == 0.0 && east == 0.0 {
+                0.0
+            } else {
+                east.atan2(north) - heading_rad
+            };
             aside_rad.sin().atan2(aside_rad.cos()).to_degrees() as f32
         };
         let each = |of: &dyn Fn(usize) -> f32| (0..carrier.len()).map(of).collect::<Vec<f32>>();
-        let angles = map.rays.iter().map(|ray| [ray.azimuth_rad, ray.elevation_rad].map(|rad| rad.to_degrees() as f32));
-        let (rotation, tilt): (Vec<f32>, Vec<f32>) = angles.map(|[az, el]| (az - heading_deg as f32, el)).unzip();
+        let angles = map
+            .rays
+            .iter()
+            .map(|ray| [ray.azimuth_rad, ray.elevation_rad].map(|rad| rad.to_degrees() as f32));
+        let (rotation, tilt): (Vec<f32>, Vec<f32>) =
+            angles.map(|[az, el]| (az - heading_deg as f32, el)).unzip();
         let still = || vec![0.0; map.rays.len()];
         let motion = [
             ("heading", each(&|_| heading_deg as f32)),
@@ -173,19 +234,31 @@ fn site(map: &VelocityMap) -> Values {
 fn sweeps(map: &VelocityMap) -> Values {
     let bounds = map.sweep_bounds();
     let ints = |values: &mut dyn Iterator<Item = usize>| Data::i32(values.map(|v| v as i32));
-    let floats = |get: fn(&super::map::Sweep) -> f64| Data::f32(map.sweeps.iter().map(|s| get(s) as f32));
+    let floats =
+        |get: fn(&super::map::Sweep) -> f64| Data::f32(map.sweeps.iter().map(|s| get(s) as f32));
     let is_rhi = map.sweeps.iter().all(|sweep| sweep.mode == SweepMode::Rhi);
     let fixed = floats(|s| {
-        let angle_rad = if s.mode == SweepMode::Rhi { turn(s.fixed_angle_rad) } else { s.fixed_angle_rad };
+        let angle_rad = if s.mode == SweepMode::Rhi {
+            turn(s.fixed_angle_rad)
+        } else {
+            s.fixed_angle_rad
+        };
         angle_rad.to_degrees()
     });
-    let fixed_name = if is_rhi { "azimuth of the scan plane" } else { "angle that stays during the sweep" };
+    let fixed_name = if is_rhi {
+        "azimuth of the scan plane"
+    } else {
+        "angle that stays during the sweep"
+    };
     let mut out = vec![
         ("volume_number", Data::i32([0])),
         ("sweep_number", ints(&mut (0..bounds.len()))),
         ("fixed_angle", fixed),
         ("fixed_angle:long_name", Data::text(fixed_name)),
-        ("sweep_start_ray_index", ints(&mut bounds.iter().map(|b| b.0))),
+        (
+            "sweep_start_ray_index",
+            ints(&mut bounds.iter().map(|b| b.0)),
+        ),
         ("sweep_end_ray_index", ints(&mut bounds.iter().map(|b| b.1))),
     ];
     // Nobody knows the age of a measured wake.
@@ -197,14 +270,32 @@ fn sweeps(map: &VelocityMap) -> Values {
 
 fn texts(map: &VelocityMap) -> Values {
     let start = map.start();
-    let time = |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
+    let time =
+        |ray: Option<&super::map::Ray>| start.after_s(ray.map_or(0.0, |r| r.time_s)).to_string();
     let each = |text: &str| Data::text(padded(text).repeat(map.sweeps.len()));
-    let modes: Vec<u8> = map.sweeps.iter().flat_map(|sweep| padded(sweep.mode.name())).collect();
+    let modes: Vec<u8> = map
+        .sweeps
+        .iter()
+        .flat_map(|sweep| padded(sweep.mode.name()))
+        .collect();
     vec![
-        ("time_coverage_start", Data::text(padded(&time(map.rays.first())))),
-        ("time_coverage_end", Data::text(padded(&time(map.rays.last())))),
+        (
+            "time_coverage_start",
+            Data::text(padded(&time(map.rays.first()))),
+        ),
+        (
+            "time_coverage_end",
+            Data::text(padded(&time(map.rays.last()))),
+        ),
         ("time_reference", Data::text(padded(&start.to_string()))),
-        ("platform_type", Data::text(padded(if map.is_carried() { "aircraft" } else { "fixed" }))),
+        (
+            "platform_type",
+            Data::text(padded(if map.is_carried() {
+                "aircraft"
+            } else {
+                "fixed"
+            })),
+        ),
         ("instrument_type", Data::text(padded("lidar"))),
         ("primary_axis", Data::text(padded("axis_z"))),
         ("sweep_mode", Data::text(modes)),
@@ -221,8 +312,22 @@ fn instrument(map: &VelocityMap) -> Values {
         ("prt", each(pulse.prt_s)),
         ("pulse_width", each(pulse.pulse_width_s)),
         ("nyquist_velocity", each(pulse.nyquist_velocity_m_s)),
-        ("nyquist_velocity:folding", Data::text(if pulse.is_mirrored() { MIRRORED } else { "modulo" })),
-        ("n_samples", Data::i32(map.rays.iter().map(|ray| i32::try_from(ray.pulses).unwrap_or(i32::MAX)))),
+        (
+            "nyquist_velocity:folding",
+            Data::text(if pulse.is_mirrored() {
+                MIRRORED
+            } else {
+                "modulo"
+            }),
+        ),
+        (
+            "n_samples",
+            Data::i32(
+                map.rays
+                    .iter()
+                    .map(|ray| i32::try_from(ray.pulses).unwrap_or(i32::MAX)),
+            ),
+        ),
         ("antenna_transition", Data::i8(vec![0; rays])),
     ]
 }
@@ -233,19 +338,32 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
     let variable = |field: &Field| {
         let out = field_variable(field);
         match field.name.as_str() {
-            "radial_velocity" => out.text("scene", scene_toml).text("instrument", &instrument_of(scene_toml)),
+            "radial_velocity" => out
+                .text("scene", scene_toml)
+                .text("instrument", &instrument_of(scene_toml)),
             _ => out,
         }
     };
     let mut out: Vec<Variable> = map.fields.iter().map(variable).collect();
     if map.field("radial_velocity").is_none() {
-        let source = ["v_gate", "v_pulse", "v_exact"].iter().find_map(|name| map.field(name));
+        let source = ["v_gate", "v_pulse", "v_exact"]
+            .iter()
+            .find_map(|name| map.field(name));
         let source = source.ok_or_else(|| OutputError::Missing {
             what: "field radial_velocity".into(),
-            needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact to stand for it".into(),
+            needed: "a CfRadial file needs it, or one of v_gate, v_pulse, v_exact to stand for it"
+                .into(),
         })?;
-        let copy = Field::float("radial_velocity", Unit::METRE_PER_SECOND, &source.long_name, source.values.clone());
-        out.push(field_variable(&copy).text("comment", &format!("no estimate was made: copy of {}", source.name)));
+        let copy = Field::float(
+            "radial_velocity",
+            Unit::METRE_PER_SECOND,
+            &source.long_name,
+            source.values.clone(),
+        );
+        out.push(field_variable(&copy).text(
+            "comment",
+            &format!("no estimate was made: copy of {}", source.name),
+        ));
     }
     Ok(out)
 }
@@ -254,7 +372,17 @@ fn fields(map: &VelocityMap, scene_toml: &str) -> OutputResult<Vec<Variable>> {
 fn instrument_of(scene_toml: &str) -> String {
     let mut scene: toml::Table = scene_toml.parse().unwrap_or_default();
     scene.retain(|key, _| {
-        ["format", "laser", "pulse", "detector", "telescope", "atmosphere", "scan", "estimator"].contains(&key)
+        [
+            "format",
+            "laser",
+            "pulse",
+            "detector",
+            "telescope",
+            "atmosphere",
+            "scan",
+            "estimator",
+        ]
+        .contains(&key)
     });
     scene.to_string()
 }
@@ -268,9 +396,15 @@ fn field_variable(field: &Field) -> Variable {
     let further = [
         ("standard_name", field.standard_name()),
         ("cell_methods", field.cell_methods.as_deref()),
-        ("ancillary_variables", Some(field.ancillary.as_str()).filter(|names| !names.is_empty())),
+        (
+            "ancillary_variables",
+            Some(field.ancillary.as_str()).filter(|names| !names.is_empty()),
+        ),
     ];
-    for (name, text) in further.into_iter().filter_map(|(name, text)| Some((name, text?))) {
+    for (name, text) in further
+        .into_iter()
+        .filter_map(|(name, text)| Some((name, text?)))
+    {
         out = out.text(name, text);
     }
     out.attr("_FillValue", Data::f32([FILL]))

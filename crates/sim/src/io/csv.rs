@@ -76,7 +76,10 @@ impl Table {
     /// Adds a column of text.
     #[must_use]
     pub fn text<S: Into<String>>(self, name: &str, values: impl IntoIterator<Item = S>) -> Self {
-        self.column(name, Column::Text(values.into_iter().map(Into::into).collect()))
+        self.column(
+            name,
+            Column::Text(values.into_iter().map(Into::into).collect()),
+        )
     }
 
     /// Adds a column of any kind.
@@ -98,8 +101,13 @@ impl Table {
     /// # Errors
     /// Tables whose columns differ in number, name or kind.
     pub fn stack(tables: impl IntoIterator<Item = Self>) -> OutputResult<Self> {
-        let refuse =
-            |name: &str, other| OutputError::value("column of a table", other, format!("{name}, of the same kind"));
+        let refuse = |name: &str, other| {
+            OutputError::value(
+                "column of a table",
+                other,
+                format!("{name}, of the same kind"),
+            )
+        };
         let mut tables = tables.into_iter();
         let mut all = tables.next().unwrap_or_default();
         for table in tables {
@@ -131,7 +139,12 @@ impl Table {
             Column::Int(v) => json!(v[row]),
             Column::Text(v) => json!(v[row]),
         };
-        let object = |row| self.columns.iter().map(|(name, column)| (name.clone(), value(column, row))).collect();
+        let object = |row| {
+            self.columns
+                .iter()
+                .map(|(name, column)| (name.clone(), value(column, row)))
+                .collect()
+        };
         (0..self.len()).map(object).collect()
     }
 
@@ -146,11 +159,19 @@ impl Table {
             Some(row) => column.cell(row, digits),
         };
         let lines = || 0..=self.len();
-        let width = |column| lines().map(|line| cell(column, line).chars().count()).max().unwrap_or(0);
+        let width = |column| {
+            lines()
+                .map(|line| cell(column, line).chars().count())
+                .max()
+                .unwrap_or(0)
+        };
         let widths: Vec<usize> = self.columns.iter().map(width).collect();
         let padded = |line: usize| {
-            let cells =
-                self.columns.iter().zip(&widths).map(|(column, width)| format!("{:>width$}", cell(column, line)));
+            let cells = self
+                .columns
+                .iter()
+                .zip(&widths)
+                .map(|(column, width)| format!("{:>width$}", cell(column, line)));
             cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
         };
         lines().map(padded).collect()
@@ -161,7 +182,11 @@ impl Table {
     /// # Errors
     /// No column, columns of different lengths, a repeated or empty name, a name that would look like a comment.
     pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
-        let header: Vec<String> = self.columns.iter().map(|(name, _)| quoted(name.clone())).collect();
+        let header: Vec<String> = self
+            .columns
+            .iter()
+            .map(|(name, _)| quoted(name.clone()))
+            .collect();
         self.with_rows(provenance.comment_lines() + &header.join(",") + "\n")
     }
 
@@ -194,15 +219,25 @@ impl Table {
 
     fn check(&self) -> OutputResult<()> {
         let Some((first, values)) = self.columns.first() else {
-            return Err(OutputError::Missing { what: "column".into(), needed: "a table has at least one".into() });
+            return Err(OutputError::Missing {
+                what: "column".into(),
+                needed: "a table has at least one".into(),
+            });
         };
         for (i, (name, column)) in self.columns.iter().enumerate() {
             same_length(name, column.len(), first, values.len())?;
             if name.is_empty() || name.starts_with('#') {
-                return Err(OutputError::value("column name", name, "must not be empty or start with '#'"));
+                return Err(OutputError::value(
+                    "column name",
+                    name,
+                    "must not be empty or start with '#'",
+                ));
             }
             if self.columns[..i].iter().any(|(n, _)| n == name) {
-                return Err(OutputError::Duplicate { what: "column", name: name.clone() });
+                return Err(OutputError::Duplicate {
+                    what: "column",
+                    name: name.clone(),
+                });
             }
         }
         Ok(())
@@ -231,7 +266,11 @@ pub(crate) fn digits(value: f64) -> String {
 fn quoted(text: String) -> String {
     // A leading '#' is quoted too: readers drop lines that begin with it.
     let plain = !text.contains([',', '"', '\n', '\r']) && !text.starts_with('#');
-    if plain { text } else { format!("\"{}\"", text.replace('"', "\"\"")) }
+    if plain {
+        text
+    } else {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    }
 }
 
 #[cfg(test)]
@@ -241,7 +280,10 @@ mod tests {
 
     /// Minimal independent reader: records of cells, comments dropped, quotes undone.
     fn parse(text: &str) -> Vec<Vec<String>> {
-        let body: String = text.split_inclusive('\n').filter(|l| !l.starts_with('#')).collect();
+        let body: String = text
+            .split_inclusive('\n')
+            .filter(|l| !l.starts_with('#'))
+            .collect();
         let (mut rows, mut row, mut cell, mut inside) = (vec![], vec![], String::new(), false);
         let mut chars = body.chars().peekable();
         while let Some(c) = chars.next() {
@@ -261,20 +303,44 @@ mod tests {
 
     #[test]
     fn numbers_read_back_to_the_same_bits() {
-        let values = [0.1, 1.0 / 3.0, -2.5e-17, 6.02e23, f64::MAX, f64::MIN_POSITIVE, 5e-324, 123456789.0];
-        let text = Table::new().float("a_m", values).int("n", 0..8).to_csv(&example()).unwrap();
+        let values = [
+            0.1,
+            1.0 / 3.0,
+            -2.5e-17,
+            6.02e23,
+            f64::MAX,
+            f64::MIN_POSITIVE,
+            5e-324,
+            123456789.0,
+        ];
+        let text = Table::new()
+            .float("a_m", values)
+            .int("n", 0..8)
+            .to_csv(&example())
+            .unwrap();
         let rows = parse(&text);
         assert_eq!(rows[0], ["a_m", "n"]);
         for (row, value) in rows[1..].iter().zip(values) {
-            assert_eq!(row[0].parse::<f64>().unwrap().to_bits(), value.to_bits(), "{}", row[0]);
+            assert_eq!(
+                row[0].parse::<f64>().unwrap().to_bits(),
+                value.to_bits(),
+                "{}",
+                row[0]
+            );
         }
-        assert!(text.lines().all(|l| l.len() < 60), "tiny and huge numbers must not be spelled out");
+        assert!(
+            text.lines().all(|l| l.len() < 60),
+            "tiny and huge numbers must not be spelled out"
+        );
     }
 
     #[test]
     fn missing_is_empty_and_zero_has_no_sign() {
-        let text =
-            Table::new().float("a", [f64::NAN, -0.0]).float("b", [f64::INFINITY, 1.0]).to_csv(&example()).unwrap();
+        let text = Table::new()
+            .float("a", [f64::NAN, -0.0])
+            .float("b", [f64::INFINITY, 1.0])
+            .to_csv(&example())
+            .unwrap();
         assert!(text.ends_with("a,b\n,inf\n0.0,1.0\n"), "{text}");
     }
 
@@ -289,11 +355,23 @@ mod tests {
     #[test]
     fn bad_tables_are_refused() {
         let uneven = Table::new().float("a", [1.0]).float("b", [1.0, 2.0]);
-        assert!(matches!(uneven.to_csv(&example()), Err(OutputError::Length { .. })));
+        assert!(matches!(
+            uneven.to_csv(&example()),
+            Err(OutputError::Length { .. })
+        ));
         let twice = Table::new().float("a", [1.0]).float("a", [1.0]);
-        assert!(matches!(twice.to_csv(&example()), Err(OutputError::Duplicate { .. })));
-        assert!(matches!(Table::new().to_csv(&example()), Err(OutputError::Missing { .. })));
+        assert!(matches!(
+            twice.to_csv(&example()),
+            Err(OutputError::Duplicate { .. })
+        ));
+        assert!(matches!(
+            Table::new().to_csv(&example()),
+            Err(OutputError::Missing { .. })
+        ));
         let comment = Table::new().float("#a", [1.0]);
-        assert!(matches!(comment.to_csv(&example()), Err(OutputError::Value { .. })));
+        assert!(matches!(
+            comment.to_csv(&example()),
+            Err(OutputError::Value { .. })
+        ));
     }
 }

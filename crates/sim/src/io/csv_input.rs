@@ -24,7 +24,10 @@ impl TextTable {
     /// A file that cannot be read; no header; rows with more or fewer cells than it.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let text = text_file::read(path).map_err(Error::io("read", path))?;
-        Self::parse(&text).map_err(|reason| Error::Input { path: path.to_owned(), reason })
+        Self::parse(&text).map_err(|reason| Error::Input {
+            path: path.to_owned(),
+            reason,
+        })
     }
 
     /// Reads a text.
@@ -33,29 +36,49 @@ impl TextTable {
     /// As [`TextTable::read`], without the file.
     pub fn parse(text: &str) -> Result<Self, String> {
         let mut records = records(text.strip_prefix('\u{feff}').unwrap_or(text));
-        let header = records.next().ok_or("no header: the first line that is no comment names the columns")?;
+        let header = records
+            .next()
+            .ok_or("no header: the first line that is no comment names the columns")?;
         let mut rows = Vec::new();
         for row in records {
             if row.len() != header.len() {
                 let (found, wanted) = (row.len(), header.len());
-                return Err(format!("row {} has {found} cells, the header {wanted}", rows.len() + 1));
+                return Err(format!(
+                    "row {} has {found} cells, the header {wanted}",
+                    rows.len() + 1
+                ));
             }
             rows.push(row);
         }
-        let comment =
-            text.lines().map_while(|line| line.strip_prefix('#')).map(|line| format!("{}\n", line.trim_end()));
-        Ok(Self { header, rows, comment: comment.collect() })
+        let comment = text
+            .lines()
+            .map_while(|line| line.strip_prefix('#'))
+            .map(|line| format!("{}\n", line.trim_end()));
+        Ok(Self {
+            header,
+            rows,
+            comment: comment.collect(),
+        })
     }
 
     /// Where the table comes from, as far as its comments say it.
     pub fn origin(&self) -> Provenance {
-        let entry = |name: &str| self.comment.lines().find_map(|line| line.trim_start().strip_prefix(name));
+        let entry = |name: &str| {
+            self.comment
+                .lines()
+                .find_map(|line| line.trim_start().strip_prefix(name))
+        };
         let (_, scene) = self.comment.split_once(" scene:\n").unwrap_or_default();
         Provenance {
             program: crate::PROGRAM.into(),
-            scene_toml: scene.lines().map(|line| format!("{}\n", line.strip_prefix("   ").unwrap_or(line))).collect(),
+            scene_toml: scene
+                .lines()
+                .map(|line| format!("{}\n", line.strip_prefix("   ").unwrap_or(line)))
+                .collect(),
             scene_hash: entry("scene_hash: ").unwrap_or_default().into(),
-            seed: entry("seed: ").and_then(|seed| seed.parse().ok()).unwrap_or(0),
+            seed: entry("seed: ")
+                .and_then(|seed| seed.parse().ok())
+                .unwrap_or(0),
         }
     }
 
@@ -67,13 +90,16 @@ impl TextTable {
     /// Place of the column of an angle, and its unit, rad: that in radians, or else that in degrees.
     pub(crate) fn angle(&self, name: &str) -> Option<(usize, f64)> {
         let in_degrees = || Some((self.column(&format!("{name}_deg"))?, 1f64.to_radians()));
-        self.column(&format!("{name}_rad")).map(|column| (column, 1.0)).or_else(in_degrees)
+        self.column(&format!("{name}_rad"))
+            .map(|column| (column, 1.0))
+            .or_else(in_degrees)
     }
 
     /// A cell as a number; NaN where it is empty or none.
     pub fn number(&self, row: usize, column: usize) -> f64 {
         let cell = self.rows.get(row).and_then(|cells| cells.get(column));
-        cell.and_then(|cell| cell.trim().parse().ok()).unwrap_or(f64::NAN)
+        cell.and_then(|cell| cell.trim().parse().ok())
+            .unwrap_or(f64::NAN)
     }
 }
 
@@ -111,12 +137,29 @@ mod tests {
 
     #[test]
     fn what_the_writer_makes_comes_back() {
-        let wild = ["plain", "a,b", "say \"x\"", "two\nlines", "# no comment", ""];
+        let wild = [
+            "plain",
+            "a,b",
+            "say \"x\"",
+            "two\nlines",
+            "# no comment",
+            "",
+        ];
         let numbers = [0.1, 1.0 / 3.0, f64::NAN, f64::INFINITY, -2.5e-17, 5e-324];
-        let text = Table::new().text("a label", wild).float("x_m", numbers).to_csv(&example()).unwrap();
+        let text = Table::new()
+            .text("a label", wild)
+            .float("x_m", numbers)
+            .to_csv(&example())
+            .unwrap();
         let table = TextTable::parse(&text).unwrap();
         assert_eq!(table.header, ["a label", "x_m"]);
-        assert_eq!(table.origin(), Provenance { program: crate::PROGRAM.into(), ..example() });
+        assert_eq!(
+            table.origin(),
+            Provenance {
+                program: crate::PROGRAM.into(),
+                ..example()
+            }
+        );
         for (row, (label, number)) in wild.iter().zip(numbers).enumerate() {
             assert_eq!(table.rows[row][0], *label);
             let read = table.number(row, table.column("x_m").unwrap());
@@ -127,8 +170,19 @@ mod tests {
     #[test]
     fn tables_of_others_are_read_or_refused() {
         let table = TextTable::parse("# note\r\n\r\na,b\r\n1,2\r\n\n3,4").unwrap();
-        assert_eq!((table.rows.len(), table.number(1, 1), table.column("c")), (2, 4.0, None));
-        assert!(TextTable::parse("a,b\n1\n").unwrap_err().contains("row 1 has 1 cells, the header 2"));
-        assert!(TextTable::parse("# nothing\n").unwrap_err().contains("no header"));
+        assert_eq!(
+            (table.rows.len(), table.number(1, 1), table.column("c")),
+            (2, 4.0, None)
+        );
+        assert!(
+            TextTable::parse("a,b\n1\n")
+                .unwrap_err()
+                .contains("row 1 has 1 cells, the header 2")
+        );
+        assert!(
+            TextTable::parse("# nothing\n")
+                .unwrap_err()
+                .contains("no header")
+        );
     }
 }

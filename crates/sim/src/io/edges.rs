@@ -10,7 +10,10 @@ pub(crate) fn to_text(edges: Edges) -> String {
     let side = |side: Side| match side {
         Side::Open => "open".to_owned(),
         Side::SlipWall { position_m } => format!("slip_wall {position_m:?}"),
-        Side::NoSlipWall { position_m, velocity_m_s: [u, v, w] } => {
+        Side::NoSlipWall {
+            position_m,
+            velocity_m_s: [u, v, w],
+        } => {
             format!("no_slip_wall {position_m:?} {u:?} {v:?} {w:?}")
         }
     };
@@ -23,10 +26,15 @@ pub(crate) fn to_text(edges: Edges) -> String {
 /// The ends that a text stands for; `None` if it is no such text.
 pub(crate) fn from_text(text: &str) -> Option<Edges> {
     if let Some(period) = text.strip_prefix("periodic ") {
-        return Some(Edges::Periodic { period_m: period.trim().parse().ok()? });
+        return Some(Edges::Periodic {
+            period_m: period.trim().parse().ok()?,
+        });
     }
     let (low, high) = text.split_once(',')?;
-    Some(Edges::Bounded { low: side(low)?, high: side(high)? })
+    Some(Edges::Bounded {
+        low: side(low)?,
+        high: side(high)?,
+    })
 }
 
 fn side(text: &str) -> Option<Side> {
@@ -36,7 +44,10 @@ fn side(text: &str) -> Option<Side> {
     match (kind, &numbers[..]) {
         ("open", []) => Some(Side::Open),
         ("slip_wall", &[position_m]) => Some(Side::SlipWall { position_m }),
-        ("no_slip_wall", &[position_m, u, v, w]) => Some(Side::NoSlipWall { position_m, velocity_m_s: [u, v, w] }),
+        ("no_slip_wall", &[position_m, u, v, w]) => Some(Side::NoSlipWall {
+            position_m,
+            velocity_m_s: [u, v, w],
+        }),
         _ => None,
     }
 }
@@ -47,15 +58,33 @@ mod tests {
 
     #[test]
     fn every_form_comes_back_and_others_are_none() {
-        let ground = Side::NoSlipWall { position_m: -0.0, velocity_m_s: [0.1 + 0.2, 1e-300, -3.0] };
+        let ground = Side::NoSlipWall {
+            position_m: -0.0,
+            velocity_m_s: [0.1 + 0.2, 1e-300, -3.0],
+        };
         for edges in [
             Edges::Periodic { period_m: 250.1 },
-            Edges::Bounded { low: Side::Open, high: Side::SlipWall { position_m: 1.0 / 3.0 } },
-            Edges::Bounded { low: ground, high: Side::Open },
+            Edges::Bounded {
+                low: Side::Open,
+                high: Side::SlipWall {
+                    position_m: 1.0 / 3.0,
+                },
+            },
+            Edges::Bounded {
+                low: ground,
+                high: Side::Open,
+            },
         ] {
             assert_eq!(from_text(&to_text(edges)), Some(edges));
         }
-        for text in ["", "periodic", "open", "open, wall 3.0", "open, slip_wall", "slip_wall 1.0 2.0, open"] {
+        for text in [
+            "",
+            "periodic",
+            "open",
+            "open, wall 3.0",
+            "open, slip_wall",
+            "slip_wall 1.0 2.0, open",
+        ] {
             assert_eq!(from_text(text), None, "{text}");
         }
     }

@@ -85,32 +85,60 @@ pub type OutputResult<T> = Result<T, OutputError>;
 
 impl OutputError {
     pub(crate) fn unsupported(format: &'static str, reason: impl ToString) -> Self {
-        Self::Unsupported { format, reason: reason.to_string() }
+        Self::Unsupported {
+            format,
+            reason: reason.to_string(),
+        }
     }
 
-    pub(crate) fn value(field: impl Into<String>, value: impl ToString, allowed: impl Into<String>) -> Self {
-        Self::Value { field: field.into(), value: value.to_string(), allowed: allowed.into() }
+    pub(crate) fn value(
+        field: impl Into<String>,
+        value: impl ToString,
+        allowed: impl Into<String>,
+    ) -> Self {
+        Self::Value {
+            field: field.into(),
+            value: value.to_string(),
+            allowed: allowed.into(),
+        }
     }
 }
 
 /// Refuses a length that does not match its axis.
-pub(crate) fn same_length(field: &str, actual: usize, axis: &str, expected: usize) -> OutputResult<()> {
+pub(crate) fn same_length(
+    field: &str,
+    actual: usize,
+    axis: &str,
+    expected: usize,
+) -> OutputResult<()> {
     if actual == expected {
         return Ok(());
     }
-    Err(OutputError::Length { field: field.into(), axis: axis.into(), expected, actual })
+    Err(OutputError::Length {
+        field: field.into(),
+        axis: axis.into(),
+        expected,
+        actual,
+    })
 }
 
 /// Refuses an axis that is empty, not finite or not strictly increasing.
 pub(crate) fn increasing(field: &str, values: &[f64]) -> OutputResult<()> {
     if values.is_empty() {
-        return Err(OutputError::Missing { what: field.into(), needed: "at least one value".into() });
+        return Err(OutputError::Missing {
+            what: field.into(),
+            needed: "at least one value".into(),
+        });
     }
     if let Some(bad) = values.iter().find(|v| !v.is_finite()) {
         return Err(OutputError::value(field, bad, "must be finite"));
     }
     if let Some(pair) = values.windows(2).find(|w| w[1] <= w[0]) {
-        return Err(OutputError::value(field, format!("{:?}, {:?}", pair[0], pair[1]), "must increase strictly"));
+        return Err(OutputError::value(
+            field,
+            format!("{:?}, {:?}", pair[0], pair[1]),
+            "must increase strictly",
+        ));
     }
     Ok(())
 }

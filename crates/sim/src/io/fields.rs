@@ -57,9 +57,17 @@ impl VelocityField {
     /// The fields with their names.
     pub(crate) fn named(&self) -> impl Iterator<Item = (&'static str, &[f64])> {
         let [u, v, w] = &self.velocity_m_s;
-        let always: [(&'static str, &[f64]); 4] =
-            [("u_m_s", u), ("v_m_s", v), ("w_m_s", w), ("pressure_m2_s2", &self.pressure_m2_s2)];
-        always.into_iter().chain(self.vorticity_per_s.as_deref().map(|values| ("vorticity_magnitude_hz", values)))
+        let always: [(&'static str, &[f64]); 4] = [
+            ("u_m_s", u),
+            ("v_m_s", v),
+            ("w_m_s", w),
+            ("pressure_m2_s2", &self.pressure_m2_s2),
+        ];
+        always.into_iter().chain(
+            self.vorticity_per_s
+                .as_deref()
+                .map(|values| ("vorticity_magnitude_hz", values)),
+        )
     }
 
     /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, and `vorticity_magnitude_hz` (1/s) where
@@ -76,13 +84,19 @@ impl VelocityField {
             .float("z_m", cells().map(|i| self.z_m[i / (nx * ny)]))
             .float("y_m", cells().map(|i| self.y_m[i / nx % ny]))
             .float("x_m", cells().map(|i| self.x_m[i % nx]));
-        Ok(self.named().fold(table, |table, (name, values)| table.float(name, values.iter().copied())))
+        Ok(self.named().fold(table, |table, (name, values)| {
+            table.float(name, values.iter().copied())
+        }))
     }
 }
 
 #[cfg(test)]
 pub(crate) fn example() -> VelocityField {
-    let (x_m, y_m, z_m) = (vec![0.5, 1.5, 3.0], vec![-1.0, 0.5], vec![0.1, 0.3, 0.7, 1.5]);
+    let (x_m, y_m, z_m) = (
+        vec![0.5, 1.5, 3.0],
+        vec![-1.0, 0.5],
+        vec![0.1, 0.3, 0.7, 1.5],
+    );
     let field = |a: f64| (0..24).map(|i| a + f64::from(i)).collect::<Vec<f64>>();
     VelocityField {
         title: "A flow".into(),
@@ -108,7 +122,10 @@ pub(crate) fn example_on_ranks() -> Vec<VelocityField> {
             velocity_m_s: whole.velocity_m_s.each_ref().map(part),
             pressure_m2_s2: part(&whole.pressure_m2_s2),
             vorticity_per_s: whole.vorticity_per_s.as_ref().map(part),
-            share: Share { planes, is_first: std::mem::take(&mut is_first) },
+            share: Share {
+                planes,
+                is_first: std::mem::take(&mut is_first),
+            },
             ..whole.clone()
         }
     };

@@ -33,23 +33,44 @@ pub(crate) struct FieldPlace {
 pub(crate) fn places(path: &Path, name: &str) -> Result<Vec<FieldPlace>, Error> {
     let file = open(path)?;
     let times = times(&file, name).map_err(|reason| file.refuse(reason))?;
-    Ok(times.into_iter().map(|(place, time_s)| FieldPlace { path: path.to_owned(), place, time_s }).collect())
+    Ok(times
+        .into_iter()
+        .map(|(place, time_s)| FieldPlace {
+            path: path.to_owned(),
+            place,
+            time_s,
+        })
+        .collect())
 }
 
 fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, String> {
     let Some(dim) = file.dim_of(name, TIME) else {
         // A field on its own: its time is a number beside it.
-        let time = if file.has("time") { file.seconds("time")?.first().copied() } else { None };
+        let time = if file.has("time") {
+            file.seconds("time")?.first().copied()
+        } else {
+            None
+        };
         return Ok(vec![(None, time.unwrap_or(0.0))]);
     };
     if file.dims(name).and_then(|dims| dims.first().copied()) != Some(dim.as_str()) {
         return Err(format!("{name}: time must be its first dimension"));
     }
-    let source = [dim.as_str(), "XTIME", "time"].into_iter().find(|n| file.has(n)).map(str::to_owned);
+    let source = [dim.as_str(), "XTIME", "time"]
+        .into_iter()
+        .find(|n| file.has(n))
+        .map(str::to_owned);
     let Some(source) = source else {
-        return Err("it has no times: a variable of the name of its time dimension is needed".into());
+        return Err(
+            "it has no times: a variable of the name of its time dimension is needed".into(),
+        );
     };
-    Ok(file.seconds(&source)?.into_iter().enumerate().map(|(i, t)| (Some(i), t)).collect())
+    Ok(file
+        .seconds(&source)?
+        .into_iter()
+        .enumerate()
+        .map(|(i, t)| (Some(i), t))
+        .collect())
 }
 
 /// The components of one field, in m and m/s or the units that the file leaves unnamed, on the axes of the file.
@@ -58,12 +79,23 @@ fn times(file: &NetcdfFile, name: &str) -> Result<Vec<(Option<usize>, f64)>, Str
 /// A variable or a coordinate that is missing, a value that is missing, levels that are not level.
 pub(crate) fn read(field: &FieldPlace, names: &[String; 3]) -> Result<Components, Error> {
     let file = open(&field.path)?;
-    let component = |name: &str| component(&file, name, field, true).map_err(|reason| file.refuse(reason));
-    let period_m = |role| match file.text(&file.dim_of(&names[0], role)?, "edges").and_then(edges::from_text) {
+    let component =
+        |name: &str| component(&file, name, field, true).map_err(|reason| file.refuse(reason));
+    let period_m = |role| match file
+        .text(&file.dim_of(&names[0], role)?, "edges")
+        .and_then(edges::from_text)
+    {
         Some(Edges::Periodic { period_m }) => Some(period_m),
         _ => None,
     };
-    Ok(([component(&names[0])?, component(&names[1])?, component(&names[2])?], [X, Y].map(period_m)))
+    Ok((
+        [
+            component(&names[0])?,
+            component(&names[1])?,
+            component(&names[2])?,
+        ],
+        [X, Y].map(period_m),
+    ))
 }
 
 /// The components of a field, and the lengths of the periods along x and y that its file states for the first of them \[m\].
@@ -76,26 +108,46 @@ type Components = ([VolumeComponent; 3], [Option<f64>; 2]);
 pub(crate) fn read_scalar(field: &FieldPlace, name: &str) -> Result<VolumeComponent, Error> {
     let file = open(&field.path)?;
     let scalar = component(&file, name, field, false).map_err(|reason| file.refuse(reason))?;
-    if let Some((at, value)) = scalar.values.iter().enumerate().find(|(_, value)| **value < 0.0) {
-        return Err(file.refuse(format!("{name} is {value:?} at place {at}: it must not be negative")));
+    if let Some((at, value)) = scalar
+        .values
+        .iter()
+        .enumerate()
+        .find(|(_, value)| **value < 0.0)
+    {
+        return Err(file.refuse(format!(
+            "{name} is {value:?} at place {at}: it must not be negative"
+        )));
     }
     Ok(scalar)
 }
 
-fn component(file: &NetcdfFile, name: &str, field: &FieldPlace, is_velocity: bool) -> Result<VolumeComponent, String> {
+fn component(
+    file: &NetcdfFile,
+    name: &str,
+    field: &FieldPlace,
+    is_velocity: bool,
+) -> Result<VolumeComponent, String> {
     let place = field.place;
     let dims = match place {
-        Some(_) => file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x])?,
+        Some(_) => file
+            .roles(name, [TIME, Z, Y, X])
+            .map(|[_, z, y, x]| [z, y, x])?,
         None => file.roles(name, [Z, Y, X])?,
     };
     let [z, y, x] = dims.each_ref().map(String::as_str);
-    let nodes_m = [nodes(file, x, place)?, nodes(file, y, place)?, nodes(file, z, place)?];
+    let nodes_m = [
+        nodes(file, x, place)?,
+        nodes(file, y, place)?,
+        nodes(file, z, place)?,
+    ];
     let values = match is_velocity {
         true => file.velocities(name, &dims, place)?,
         false => file.ordered(name, &dims, place)?,
     };
     if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-        return Err(format!("{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"));
+        return Err(format!(
+            "{name} is missing or not finite at place {at}: cut what the terrain hides, or fill it"
+        ));
     }
     Ok(VolumeComponent { nodes_m, values })
 }
@@ -113,7 +165,9 @@ fn nodes(file: &NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>,
         _ => return file.coordinate(dim),
     };
     let Some(step_m) = file.global_number(step).filter(|step_m| *step_m > 0.0) else {
-        return Err(format!("it has neither the coordinate of {dim} nor the attribute {step}"));
+        return Err(format!(
+            "it has neither the coordinate of {dim} nor the attribute {step}"
+        ));
     };
     let count = file.length(dim).unwrap_or(0);
     let first = if staggered { 0.0 } else { 0.5 };
@@ -123,21 +177,37 @@ fn nodes(file: &NetcdfFile, dim: &str, place: Option<usize>) -> Result<Vec<f64>,
 /// Heights of WRF's levels above the ground, from the geopotential, if they are level.
 fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Vec<f64>, String> {
     let both = ["PH", "PHB"].map(|name| {
-        let dims = file.roles(name, [TIME, Z, Y, X]).map(|[_, z, y, x]| [z, y, x]);
-        dims.or_else(|_| file.roles(name, [Z, Y, X])).and_then(|dims| {
-            let count = file.length(&dims[0]).unwrap_or(0) as usize;
-            Ok((count, file.ordered(name, &dims, place)?))
-        })
+        let dims = file
+            .roles(name, [TIME, Z, Y, X])
+            .map(|[_, z, y, x]| [z, y, x]);
+        dims.or_else(|_| file.roles(name, [Z, Y, X]))
+            .and_then(|dims| {
+                let count = file.length(&dims[0]).unwrap_or(0) as usize;
+                Ok((count, file.ordered(name, &dims, place)?))
+            })
     });
-    let [(count, disturbed), (_, base)] = match both {
-        [Ok(ph), Ok(phb)] if ph.1.len() == phb.1.len() && ph.0 > 1 => [ph, phb],
-        _ => return Err("its levels have no heights: a coordinate of bottom_top, or PH and PHB are needed".into()),
-    };
-    let height_m: Vec<f64> = disturbed.iter().zip(&base).map(|(a, b)| (a + b) / WRF_GRAVITY_M_S2).collect();
+    let [(count, disturbed), (_, base)] =
+        match both {
+            [Ok(ph), Ok(phb)] if ph.1.len() == phb.1.len() && ph.0 > 1 => [ph, phb],
+            _ => return Err(
+                "its levels have no heights: a coordinate of bottom_top, or PH and PHB are needed"
+                    .into(),
+            ),
+        };
+    let height_m: Vec<f64> = disturbed
+        .iter()
+        .zip(&base)
+        .map(|(a, b)| (a + b) / WRF_GRAVITY_M_S2)
+        .collect();
     let columns = height_m.len() / count;
-    let mean_m: Vec<f64> = height_m.chunks_exact(columns).map(|l| l.iter().sum::<f64>() / columns as f64).collect();
-    let uneven_m =
-        height_m.chunks_exact(columns).zip(&mean_m).flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
+    let mean_m: Vec<f64> = height_m
+        .chunks_exact(columns)
+        .map(|l| l.iter().sum::<f64>() / columns as f64)
+        .collect();
+    let uneven_m = height_m
+        .chunks_exact(columns)
+        .zip(&mean_m)
+        .flat_map(|(l, mean)| l.iter().map(move |h| (h - mean).abs()));
     let uneven_m = uneven_m.fold(0.0, f64::max);
     let (ground_m, top_m) = (mean_m[0], mean_m[count - 1]);
     if uneven_m > LEVEL * (top_m - ground_m) {
@@ -146,7 +216,14 @@ fn levels(file: &NetcdfFile, staggered: bool, place: Option<usize>) -> Result<Ve
         ));
     }
     let faces_m: Vec<f64> = mean_m.iter().map(|h| h - ground_m).collect();
-    Ok(if staggered { faces_m } else { faces_m.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])).collect() })
+    Ok(if staggered {
+        faces_m
+    } else {
+        faces_m
+            .windows(2)
+            .map(|pair| 0.5 * (pair[0] + pair[1]))
+            .collect()
+    })
 }
 
 #[cfg(test)]
@@ -163,11 +240,13 @@ mod tests {
             Variable::new(name, &["time", "z", "y", "x"], Data::f64(values)).text("units", "cm s-1")
         };
         let axis = |name: &str, dims: &'static [&'static str]| {
-            Variable::new(name, dims, Data::f64((0..4).map(|i| 0.01 * f64::from(i)))).text("units", "km")
+            Variable::new(name, dims, Data::f64((0..4).map(|i| 0.01 * f64::from(i))))
+                .text("units", "km")
         };
-        let time = Variable::new("time", &["time"], Data::f64([0.5])).text("units", "days since 2024-01-01");
-        let scalar =
-            Variable::new("beta", &["time", "z", "y", "x"], Data::f64(vec![2.0; 64])).text("units", "km-1 sr-1");
+        let time = Variable::new("time", &["time"], Data::f64([0.5]))
+            .text("units", "days since 2024-01-01");
+        let scalar = Variable::new("beta", &["time", "z", "y", "x"], Data::f64(vec![2.0; 64]))
+            .text("units", "km-1 sr-1");
         let variables = vec![
             time,
             axis("z", &["z"]),
@@ -178,12 +257,28 @@ mod tests {
             wind("w"),
             scalar,
         ];
-        let layout = Layout { dims: vec![("time", 1), ("z", 4), ("y", 4), ("x", 4)], globals: Vec::new(), variables };
-        std::fs::write(&path, layout.into_bytes(&crate::io::provenance::example()).unwrap()).unwrap();
+        let layout = Layout {
+            dims: vec![("time", 1), ("z", 4), ("y", 4), ("x", 4)],
+            globals: Vec::new(),
+            variables,
+        };
+        std::fs::write(
+            &path,
+            layout
+                .into_bytes(&crate::io::provenance::example())
+                .unwrap(),
+        )
+        .unwrap();
         let place = places(&path, "u").unwrap().remove(0);
         assert_eq!(place.time_s, 43_200.0);
         for component in read(&place, &["u", "v", "w"].map(str::to_owned)).unwrap().0 {
-            assert!(component.values.iter().enumerate().all(|(i, v)| (v - i as f64).abs() < 1e-12));
+            assert!(
+                component
+                    .values
+                    .iter()
+                    .enumerate()
+                    .all(|(i, v)| (v - i as f64).abs() < 1e-12)
+            );
             assert!(
                 component
                     .nodes_m

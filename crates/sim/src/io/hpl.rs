@@ -27,12 +27,24 @@ pub fn hpl_bytes(map: &VelocityMap, sweep: usize, file_name: &str) -> OutputResu
     let ((first, last), [velocity, snr_db]) = swept(map, sweep)?;
     let (gate_m, before) = gate_grid(&map.range_m)?;
     within_a_day(map.rays[first].time_s, map.rays[last].time_s, map.start())?;
-    let mut out = header(map, file_name, gate_m, before + map.range_m.len(), (first, last));
+    let mut out = header(
+        map,
+        file_name,
+        gate_m,
+        before + map.range_m.len(),
+        (first, last),
+    );
     for ray in first..=last {
         let hours = second_of_day(map, ray) / 3600.0;
-        let azimuth_deg = map.rays[ray].azimuth_rad.rem_euclid(std::f64::consts::TAU).to_degrees();
+        let azimuth_deg = map.rays[ray]
+            .azimuth_rad
+            .rem_euclid(std::f64::consts::TAU)
+            .to_degrees();
         let elevation_deg = map.rays[ray].elevation_rad.to_degrees();
-        out += &format!("{hours:11.8} {azimuth_deg:6.2} {elevation_deg:6.2} {:.2} {:.2}\r\n", 0.0, 0.0);
+        out += &format!(
+            "{hours:11.8} {azimuth_deg:6.2} {elevation_deg:6.2} {:.2} {:.2}\r\n",
+            0.0, 0.0
+        );
         for gate in 0..before {
             push_gate(gate, f64::NAN, f64::NAN, &mut out);
         }
@@ -54,7 +66,13 @@ pub fn hpl_table(map: &VelocityMap, sweep: usize) -> OutputResult<Table> {
     let all = (first..=last).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate)));
     let cells: Vec<(usize, usize)> = all.filter(|cell| velocity[*cell].is_finite()).collect();
     let of_ray = |get: &dyn Fn(usize) -> f64| cells.iter().map(|c| get(c.0)).collect::<Vec<_>>();
-    let ratio = |cell: &(usize, usize)| if snr_db[*cell].is_nan() { f64::NEG_INFINITY } else { snr_db[*cell] };
+    let ratio = |cell: &(usize, usize)| {
+        if snr_db[*cell].is_nan() {
+            f64::NEG_INFINITY
+        } else {
+            snr_db[*cell]
+        }
+    };
     Ok(Table::new()
         .float("time_s", of_ray(&|ray| map.rays[ray].time_s))
         .float("elevation_rad", of_ray(&|ray| map.rays[ray].elevation_rad))
@@ -71,14 +89,20 @@ fn swept(map: &VelocityMap, sweep: usize) -> OutputResult<Swept<'_>> {
     map.check()?;
     let bounds = map.sweep_bounds();
     let rays = bounds.get(sweep).copied();
-    let rays = rays.ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))?;
+    let rays =
+        rays.ok_or_else(|| OutputError::value("sweep", sweep, format!("below {}", bounds.len())))?;
     let need = |name: &str| {
-        map.field(name).map(|field| &field.values).ok_or_else(|| OutputError::Missing {
-            what: format!("field {name}"),
-            needed: "an .hpl file holds velocity and intensity".into(),
-        })
+        map.field(name)
+            .map(|field| &field.values)
+            .ok_or_else(|| OutputError::Missing {
+                what: format!("field {name}"),
+                needed: "an .hpl file holds velocity and intensity".into(),
+            })
     };
-    Ok((rays, [need("radial_velocity")?, need("signal_to_noise_ratio")?]))
+    Ok((
+        rays,
+        [need("radial_velocity")?, need("signal_to_noise_ratio")?],
+    ))
 }
 
 /// The format counts hours of one day.
@@ -91,7 +115,11 @@ pub fn within_a_day(first_s: f64, last_s: f64, start: super::UtcTime) -> OutputR
         return Ok(());
     }
     let both = format!("{first} to {last}");
-    Err(OutputError::value("time of the rays", both, "an .hpl file holds a sweep within one day"))
+    Err(OutputError::value(
+        "time of the rays",
+        both,
+        "an .hpl file holds a sweep within one day",
+    ))
 }
 
 /// Gate length in metres, and number of gates between the lidar and the first one.
@@ -115,9 +143,17 @@ fn gate_grid(range_m: &[f64]) -> OutputResult<(f64, usize)> {
 }
 
 /// The head of the file; its focus range 65535 stands for a collimated beam, where readers ask for an integer.
-fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize, usize)) -> String {
+fn header(
+    map: &VelocityMap,
+    name: &str,
+    gate_m: f64,
+    gates: usize,
+    rays: (usize, usize),
+) -> String {
     let pulse = &map.pulse;
-    let points = (2.0 * gate_m / SPEED_OF_LIGHT_M_S * pulse.sampling_hz).round().max(1.0);
+    let points = (2.0 * gate_m / SPEED_OF_LIGHT_M_S * pulse.sampling_hz)
+        .round()
+        .max(1.0);
     let resolution_m_s = 0.5 * pulse.wavelength_m() * pulse.sampling_hz / points;
     let header = format!(
         include_str!("hpl_header.txt"),
@@ -138,9 +174,9 @@ fn header(map: &VelocityMap, name: &str, gate_m: f64, gates: usize, rays: (usize
 
 /// The word of the instrument for a sweep, by its rays.
 fn scan_type(map: &VelocityMap, (first, last): (usize, usize)) -> &'static str {
-    let still = map.rays[first..=last]
-        .windows(2)
-        .all(|pair| pair[0].azimuth_rad == pair[1].azimuth_rad && pair[0].elevation_rad == pair[1].elevation_rad);
+    let still = map.rays[first..=last].windows(2).all(|pair| {
+        pair[0].azimuth_rad == pair[1].azimuth_rad && pair[0].elevation_rad == pair[1].elevation_rad
+    });
     match map.sweeps[map.rays[first].sweep].mode {
         SweepMode::Rhi => "RHI",
         SweepMode::AzimuthSurveillance | SweepMode::Sector => "VAD - stepped",
@@ -160,13 +196,26 @@ fn start_time(map: &VelocityMap, ray: usize) -> String {
     let (h, m) = ((s / 3600.0) as u32, (s / 60.0) as u32 % 60);
     // Hundredths are cut, not rounded: 59.999 s must not become 60.00.
     let rest = ((s % 60.0) * 100.0).floor() / 100.0;
-    format!("{:04}{:02}{:02} {h:02}:{m:02}:{rest:05.2}", date.year(), date.month(), date.day())
+    format!(
+        "{:04}{:02}{:02} {h:02}:{m:02}:{rest:05.2}",
+        date.year(),
+        date.month(),
+        date.day()
+    )
 }
 
 fn push_gate(gate: usize, velocity_m_s: f64, snr_db: f64, out: &mut String) {
-    let velocity = if velocity_m_s.is_nan() { 0.0 } else { velocity_m_s };
+    let velocity = if velocity_m_s.is_nan() {
+        0.0
+    } else {
+        velocity_m_s
+    };
     let has_ratio = velocity_m_s.is_finite() && snr_db.is_finite();
-    let intensity = if has_ratio { 1.0 + 10_f64.powf(snr_db / 10.0) } else { 1.0 };
+    let intensity = if has_ratio {
+        1.0 + 10_f64.powf(snr_db / 10.0)
+    } else {
+        1.0
+    };
     let backscatter = format!("{:.6E}", 0.0);
     *out += &format!("{gate:3} {velocity:.4} {intensity:.6} {backscatter:>13}\r\n");
 }
@@ -187,16 +236,32 @@ mod tests {
         let map = samples::map();
         let lines = lines(&map, 1);
         assert_eq!(lines[0], "Filename:\tx_1.hpl");
-        assert_eq!(lines[2], "Number of gates:\t6", "one empty gate before the first at 45 m");
+        assert_eq!(
+            lines[2], "Number of gates:\t6",
+            "one empty gate before the first at 45 m"
+        );
         assert_eq!(lines[9], "Start time:\t20240101 00:01:20.00");
         assert_eq!(lines[16], "****");
         assert_eq!(lines.len(), 17 + 6 * 7 + 1);
-        let ray: Vec<f64> = lines[17].split_whitespace().map(|c| c.parse().unwrap()).collect();
+        let ray: Vec<f64> = lines[17]
+            .split_whitespace()
+            .map(|c| c.parse().unwrap())
+            .collect();
         assert_eq!(ray.len(), 5);
         approx::assert_abs_diff_eq!(ray[0], 80.0 / 3600.0, epsilon = 1e-8);
-        approx::assert_abs_diff_eq!(ray[2], map.rays[6].elevation_rad.to_degrees(), epsilon = 5e-3);
-        assert_eq!(lines[18].split_whitespace().collect::<Vec<_>>()[..3], ["0", "0.0000", "1.000000"]);
-        let gate: Vec<f64> = lines[19].split_whitespace().map(|c| c.parse().unwrap()).collect();
+        approx::assert_abs_diff_eq!(
+            ray[2],
+            map.rays[6].elevation_rad.to_degrees(),
+            epsilon = 5e-3
+        );
+        assert_eq!(
+            lines[18].split_whitespace().collect::<Vec<_>>()[..3],
+            ["0", "0.0000", "1.000000"]
+        );
+        let gate: Vec<f64> = lines[19]
+            .split_whitespace()
+            .map(|c| c.parse().unwrap())
+            .collect();
         let value = |name: &str| map.field(name).unwrap().values[[6, 0]];
         approx::assert_abs_diff_eq!(gate[1], value("radial_velocity"), epsilon = 5e-5);
         let snr = 10.0 * (gate[2] - 1.0).log10();
@@ -235,8 +300,14 @@ mod tests {
     fn gates_that_the_format_cannot_place_are_refused() {
         let mut map = samples::map();
         map.range_m.iter_mut().for_each(|r| *r += 7.0);
-        assert!(matches!(hpl_bytes(&map, 0, "x.hpl"), Err(OutputError::Unsupported { .. })));
-        assert!(matches!(hpl_bytes(&samples::map(), 2, "x.hpl"), Err(OutputError::Value { .. })));
+        assert!(matches!(
+            hpl_bytes(&map, 0, "x.hpl"),
+            Err(OutputError::Unsupported { .. })
+        ));
+        assert!(matches!(
+            hpl_bytes(&samples::map(), 2, "x.hpl"),
+            Err(OutputError::Value { .. })
+        ));
     }
 
     #[test]
@@ -244,12 +315,23 @@ mod tests {
         let mut map = samples::map();
         map.site.start_utc = "2023-12-31T23:58:00Z".into();
         let lines = lines(&map, 0);
-        assert_eq!(lines[9], "Start time:\t20231231 23:58:40.00", "the sweep begins 40 s after the flow");
-        let hours: f64 = lines[17].split_whitespace().next().unwrap().parse().unwrap();
+        assert_eq!(
+            lines[9], "Start time:\t20231231 23:58:40.00",
+            "the sweep begins 40 s after the flow"
+        );
+        let hours: f64 = lines[17]
+            .split_whitespace()
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap();
         approx::assert_abs_diff_eq!(hours, 23.0 + 58.0 / 60.0 + 40.0 / 3600.0, epsilon = 1e-8);
         map.site.start_utc = "2023-12-31T23:59:19Z".into();
         let error = hpl_bytes(&map, 0, "x.hpl").unwrap_err().to_string();
-        assert!(error.contains("2023-12-31T23:59:59Z to 2024-01-01T00:00:01Z"), "{error}");
+        assert!(
+            error.contains("2023-12-31T23:59:59Z to 2024-01-01T00:00:01Z"),
+            "{error}"
+        );
     }
 
     #[test]
@@ -257,7 +339,8 @@ mod tests {
         let map = samples::map();
         let table = hpl_table(&map, 1).unwrap();
         assert_eq!(table.columns()[0].1, {
-            let times = (6..12).flat_map(|ray| vec![map.rays[ray].time_s; if ray == 11 { 4 } else { 5 }]);
+            let times =
+                (6..12).flat_map(|ray| vec![map.rays[ray].time_s; if ray == 11 { 4 } else { 5 }]);
             super::super::csv::Column::Float(times.collect())
         });
     }

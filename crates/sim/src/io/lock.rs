@@ -27,14 +27,31 @@ impl FolderLock {
     /// [`OutputError::InUse`] while another run has it; what the system says.
     pub(crate) fn take(folder: &Path) -> OutputResult<Self> {
         let path = folder.join(NAME);
-        let io = |source| OutputError::Io { action: "lock", path: path.clone(), source };
+        let io = |source| OutputError::Io {
+            action: "lock",
+            path: path.clone(),
+            source,
+        };
         let file = loop {
-            let file = OpenOptions::new().create(true).truncate(false).write(true).open(&path).map_err(io)?;
+            let file = OpenOptions::new()
+                .create(true)
+                .truncate(false)
+                .write(true)
+                .open(&path)
+                .map_err(io)?;
             match file.try_lock() {
                 Ok(()) => {}
-                Err(TryLockError::WouldBlock) => return Err(OutputError::InUse { folder: folder.to_owned() }),
+                Err(TryLockError::WouldBlock) => {
+                    return Err(OutputError::InUse {
+                        folder: folder.to_owned(),
+                    });
+                }
                 // A file system without locks: nothing can be held there.
-                Err(TryLockError::Error(error)) if error.kind() == std::io::ErrorKind::Unsupported => break file,
+                Err(TryLockError::Error(error))
+                    if error.kind() == std::io::ErrorKind::Unsupported =>
+                {
+                    break file;
+                }
                 Err(TryLockError::Error(error)) => return Err(io(error)),
             }
             if is_at(&file, &path) {
@@ -82,7 +99,10 @@ mod tests {
         let first = FolderLock::take(temp.path()).unwrap();
         let second = FolderLock::take(temp.path()).unwrap_err();
         assert!(matches!(second, OutputError::InUse { .. }), "{second}");
-        assert!(second.to_string().contains(temp.path().to_str().unwrap()), "{second}");
+        assert!(
+            second.to_string().contains(temp.path().to_str().unwrap()),
+            "{second}"
+        );
         drop(first);
         drop(FolderLock::take(temp.path()).unwrap());
         if cfg!(unix) {
@@ -108,12 +128,17 @@ mod tests {
         let stage = temp.path().join(".wakescope-stage-1-1");
         fs::create_dir(&stage).unwrap();
         fs::write(stage.join("lock"), "").unwrap();
-        ["old", "new"].iter().for_each(|part| symlink(others.path().join(part), stage.join(part)).unwrap());
+        ["old", "new"]
+            .iter()
+            .for_each(|part| symlink(others.path().join(part), stage.join(part)).unwrap());
         fs::write(temp.path().join("map.csv"), "mine").unwrap();
         drop(FolderLock::take(temp.path()).unwrap());
         let read = |folder: &Path, name: &str| fs::read_to_string(folder.join(name)).unwrap();
         assert_eq!(read(temp.path(), "map.csv"), "mine");
-        assert_eq!(["old/map.csv", "new/map.csv"].map(|name| read(others.path(), name)), ["old", "new"]);
+        assert_eq!(
+            ["old/map.csv", "new/map.csv"].map(|name| read(others.path(), name)),
+            ["old", "new"]
+        );
         assert!(!stage.exists());
     }
 
@@ -157,6 +182,9 @@ mod tests {
         group.write(&begun.name()).unwrap();
         group.put(&begun).unwrap();
         assert_eq!(fs::read_to_string(folder.join("map.csv")).unwrap(), "new");
-        assert_eq!(fs::read_to_string(elsewhere.join("new/mine")).unwrap(), "mine");
+        assert_eq!(
+            fs::read_to_string(elsewhere.join("new/mine")).unwrap(),
+            "mine"
+        );
     }
 }

@@ -23,11 +23,23 @@ pub struct Unit {
 
 impl Unit {
     /// Dimensionless.
-    pub const ONE: Self = Self { tag: "", udunits: "1", label: "" };
+    pub const ONE: Self = Self {
+        tag: "",
+        udunits: "1",
+        label: "",
+    };
     /// Metre per second.
-    pub const METRE_PER_SECOND: Self = Self { tag: "m_s", udunits: "m s-1", label: "m/s" };
+    pub const METRE_PER_SECOND: Self = Self {
+        tag: "m_s",
+        udunits: "m s-1",
+        label: "m/s",
+    };
     /// Decibel.
-    pub const DECIBEL: Self = Self { tag: "db", udunits: "dB", label: "dB" };
+    pub const DECIBEL: Self = Self {
+        tag: "db",
+        udunits: "dB",
+        label: "dB",
+    };
 }
 
 /// One quantity over all rays and gates.
@@ -70,15 +82,21 @@ impl Field {
     /// The same field with the names of those that say how good it is.
     #[must_use]
     pub fn with_ancillary(self, names: &str) -> Self {
-        Self { ancillary: names.into(), ..self }
+        Self {
+            ancillary: names.into(),
+            ..self
+        }
     }
 
     /// CF or CfRadial standard name, where one exists.
     pub fn standard_name(&self) -> Option<&'static str> {
         match self.name.as_str() {
-            "radial_velocity" | "velocity_standard_deviation" | "v_scan" | "v_exact" | "v_pulse" | "v_gate" => {
-                Some("radial_velocity_of_scatterers_away_from_instrument")
-            }
+            "radial_velocity"
+            | "velocity_standard_deviation"
+            | "v_scan"
+            | "v_exact"
+            | "v_pulse"
+            | "v_gate" => Some("radial_velocity_of_scatterers_away_from_instrument"),
             "width" => Some("doppler_spectrum_width"),
             "count" => Some("number_of_observations"),
             "signal_to_noise_ratio" => Some("signal_to_noise_ratio"),
@@ -129,7 +147,11 @@ pub struct Sweep {
 impl Sweep {
     /// A sweep of elevation at one azimuth.
     pub fn rhi(tau: f64, azimuth_rad: f64) -> Self {
-        Self { tau, fixed_angle_rad: azimuth_rad, mode: SweepMode::Rhi }
+        Self {
+            tau,
+            fixed_angle_rad: azimuth_rad,
+            mode: SweepMode::Rhi,
+        }
     }
 }
 
@@ -193,10 +215,21 @@ pub struct VelocityMap {
 impl VelocityMap {
     /// Position of a gate along the flight, across it and above the ground, m.
     pub fn place_m(&self, ray: usize, gate: usize) -> [f64; 3] {
-        let here = [self.flight.map_or(0.0, |(x_m, _)| x_m), self.lidar_y_m, self.lidar_height_m];
-        let Ray { azimuth_rad, elevation_rad, carrier, .. } = self.rays[ray];
+        let here = [
+            self.flight.map_or(0.0, |(x_m, _)| x_m),
+            self.lidar_y_m,
+            self.lidar_height_m,
+        ];
+        let Ray {
+            azimuth_rad,
+            elevation_rad,
+            carrier,
+            ..
+        } = self.rays[ray];
         let from_m = carrier.map_or(here, |(place_m, _)| place_m);
-        let from_x_rad = self.flight.map_or(FRAC_PI_2, |(_, x_rad)| azimuth_rad - x_rad);
+        let from_x_rad = self
+            .flight
+            .map_or(FRAC_PI_2, |(_, x_rad)| azimuth_rad - x_rad);
         Direction::new(from_x_rad, elevation_rad).at_range_m(from_m, self.range_m[gate])
     }
 
@@ -208,13 +241,36 @@ impl VelocityMap {
     /// The sweeps of one kind alone.
     #[must_use]
     pub fn of_mode(&self, mode: SweepMode) -> Self {
-        let is_of = |ray: &usize| self.sweeps.get(self.rays[*ray].sweep).is_some_and(|sweep| sweep.mode == mode);
+        let is_of = |ray: &usize| {
+            self.sweeps
+                .get(self.rays[*ray].sweep)
+                .is_some_and(|sweep| sweep.mode == mode)
+        };
         let rays: Vec<usize> = (0..self.rays.len()).filter(is_of).collect();
-        let before = |sweep: usize| self.sweeps[..sweep].iter().filter(|s| s.mode == mode).count();
-        let field = |field: &Field| Field { values: field.values.select(Axis(0), &rays), ..field.clone() };
+        let before = |sweep: usize| {
+            self.sweeps[..sweep]
+                .iter()
+                .filter(|s| s.mode == mode)
+                .count()
+        };
+        let field = |field: &Field| Field {
+            values: field.values.select(Axis(0), &rays),
+            ..field.clone()
+        };
         Self {
-            rays: rays.iter().map(|&ray| Ray { sweep: before(self.rays[ray].sweep), ..self.rays[ray] }).collect(),
-            sweeps: self.sweeps.iter().copied().filter(|sweep| sweep.mode == mode).collect(),
+            rays: rays
+                .iter()
+                .map(|&ray| Ray {
+                    sweep: before(self.rays[ray].sweep),
+                    ..self.rays[ray]
+                })
+                .collect(),
+            sweeps: self
+                .sweeps
+                .iter()
+                .copied()
+                .filter(|sweep| sweep.mode == mode)
+                .collect(),
             fields: self.fields.iter().map(field).collect(),
             ..self.clone()
         }
@@ -237,7 +293,10 @@ impl VelocityMap {
             next += rays.len();
             (next - rays.len(), next - 1)
         };
-        self.rays.chunk_by(|a, b| a.sweep == b.sweep).map(bounds).collect()
+        self.rays
+            .chunk_by(|a, b| a.sweep == b.sweep)
+            .map(bounds)
+            .collect()
     }
 
     /// Checks shapes, order and values.
@@ -250,12 +309,19 @@ impl VelocityMap {
         let times: Vec<f64> = self.rays.iter().map(|r| r.time_s).collect();
         increasing("ray time_s", &times)?;
         if self.range_m[0] <= 0.0 {
-            return Err(OutputError::value("range_m", format!("{:?}", self.range_m[0]), "must be positive"));
+            return Err(OutputError::value(
+                "range_m",
+                format!("{:?}", self.range_m[0]),
+                "must be positive",
+            ));
         }
         self.check_rays()?;
         for (i, field) in self.fields.iter().enumerate() {
             if self.fields[..i].iter().any(|f| f.name == field.name) {
-                return Err(OutputError::Duplicate { what: "field", name: field.name.clone() });
+                return Err(OutputError::Duplicate {
+                    what: "field",
+                    name: field.name.clone(),
+                });
             }
             self.check_field(field)?;
         }
@@ -265,15 +331,26 @@ impl VelocityMap {
     fn check_rays(&self) -> OutputResult<()> {
         let is_known = |ray: &Ray| ray.elevation_rad.is_finite() && ray.azimuth_rad.is_finite();
         if let Some(i) = self.rays.iter().position(|ray| !is_known(ray)) {
-            let pair = format!("{}, {}", self.rays[i].elevation_rad, self.rays[i].azimuth_rad);
-            return Err(OutputError::value(format!("ray {i} angles"), pair, "must be finite"));
+            let pair = format!(
+                "{}, {}",
+                self.rays[i].elevation_rad, self.rays[i].azimuth_rad
+            );
+            return Err(OutputError::value(
+                format!("ray {i} angles"),
+                pair,
+                "must be finite",
+            ));
         }
         let bounds = self.sweep_bounds();
         for (expected, (first, _)) in bounds.iter().enumerate() {
             let sweep = self.rays[*first].sweep;
             if sweep != expected {
                 let allowed = format!("sweeps tile the rays in order: {expected} is next");
-                return Err(OutputError::value(format!("ray {first} sweep"), sweep, allowed));
+                return Err(OutputError::value(
+                    format!("ray {first} sweep"),
+                    sweep,
+                    allowed,
+                ));
             }
         }
         same_length("sweeps", self.sweeps.len(), "the rays", bounds.len())
@@ -284,7 +361,11 @@ impl VelocityMap {
         same_length(&field.name, rays, "rays", self.rays.len())?;
         same_length(&field.name, gates, "range_m", self.range_m.len())?;
         if let Some(bad) = field.values.iter().find(|v| v.is_infinite()) {
-            return Err(OutputError::value(&field.name, bad, "must be finite, or NaN where missing"));
+            return Err(OutputError::value(
+                &field.name,
+                bad,
+                "must be finite, or NaN where missing",
+            ));
         }
         Ok(())
     }
@@ -314,7 +395,10 @@ pub struct CrossPlanes {
 }
 
 /// Ends of an axis of which nothing is known beyond its last values.
-pub const OPEN_EDGES: Edges = Edges::Bounded { low: Side::Open, high: Side::Open };
+pub const OPEN_EDGES: Edges = Edges::Bounded {
+    low: Side::Open,
+    high: Side::Open,
+};
 
 impl CrossPlanes {
     /// Checks axes and shapes.
@@ -333,7 +417,11 @@ impl CrossPlanes {
             same_length(name, z, "z_m", self.z_m.len())?;
             same_length(name, y, "y_m", self.y_m.len())?;
             if let Some(bad) = array.iter().find(|v| v.is_infinite()) {
-                return Err(OutputError::value(name, bad, "must be finite, or NaN where missing"));
+                return Err(OutputError::value(
+                    name,
+                    bad,
+                    "must be finite, or NaN where missing",
+                ));
             }
         }
         Ok(())

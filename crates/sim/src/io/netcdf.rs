@@ -30,7 +30,11 @@ impl Data {
     fn new<const N: usize>(code: usize, values: impl Iterator<Item = [u8; N]>) -> Self {
         let mut bytes = Vec::with_capacity(N * values.size_hint().0);
         values.for_each(|value| bytes.extend(value));
-        Self { code, width: N, bytes }
+        Self {
+            code,
+            width: N,
+            bytes,
+        }
     }
 
     pub(crate) fn i8(values: impl IntoIterator<Item = i8>) -> Self {
@@ -38,7 +42,11 @@ impl Data {
     }
 
     pub(crate) fn text(text: impl Into<Vec<u8>>) -> Self {
-        Self { code: 2, width: 1, bytes: text.into() }
+        Self {
+            code: 2,
+            width: 1,
+            bytes: text.into(),
+        }
     }
 
     pub(crate) fn i32(values: impl IntoIterator<Item = i32>) -> Self {
@@ -55,7 +63,11 @@ impl Data {
 
     /// 32-bit floats with [`FILL`] for NaN.
     pub(crate) fn filled<'a>(values: impl IntoIterator<Item = &'a f64>) -> Self {
-        Self::f32(values.into_iter().map(|v| if v.is_nan() { FILL } else { *v as f32 }))
+        Self::f32(
+            values
+                .into_iter()
+                .map(|v| if v.is_nan() { FILL } else { *v as f32 }),
+        )
     }
 
     fn len(&self) -> usize {
@@ -75,7 +87,13 @@ pub(crate) struct Variable {
 
 impl Variable {
     pub(crate) fn new(name: &str, dims: &[&'static str], data: Data) -> Self {
-        Self { name: name.into(), dims: dims.to_vec(), data, attrs: Vec::new(), first: None }
+        Self {
+            name: name.into(),
+            dims: dims.to_vec(),
+            data,
+            attrs: Vec::new(),
+            first: None,
+        }
     }
 
     /// Adds a text attribute.
@@ -92,32 +110,49 @@ impl Variable {
 
 /// Variables as `cdl` describes them in the notation of `ncdump`, in its order: their dimensions and attributes. Values stand by the name
 /// of their variable; variables without are left out. An attribute `?` has the value of the name `variable:attribute`, or is left out, too.
-pub(crate) fn described(cdl: &'static str, values: impl IntoIterator<Item = (&'static str, Data)>) -> Vec<Variable> {
+pub(crate) fn described(
+    cdl: &'static str,
+    values: impl IntoIterator<Item = (&'static str, Data)>,
+) -> Vec<Variable> {
     // Types in the order of their codes.
     let types = ["byte", "char", "short", "int", "float", "double"];
     let mut values: BTreeMap<&str, Data> = values.into_iter().collect();
     let mut out: Vec<Variable> = Vec::new();
-    for line in cdl.lines().filter_map(|line| line.trim().strip_suffix(" ;")) {
+    for line in cdl
+        .lines()
+        .filter_map(|line| line.trim().strip_suffix(" ;"))
+    {
         match line.split_once(" = ") {
             // Such as `float azimuth(time)`.
             None => {
                 let (kind, line) = line.split_once(' ').unwrap_or_default();
-                let (name, dims) = line.trim_end_matches(')').split_once('(').unwrap_or((line, ""));
+                let (name, dims) = line
+                    .trim_end_matches(')')
+                    .split_once('(')
+                    .unwrap_or((line, ""));
                 let dims: Vec<&str> = dims.split(", ").filter(|dim| !dim.is_empty()).collect();
                 let data = values.remove(name);
-                debug_assert!(data.iter().all(|data| types[data.code - 1] == kind), "{name} is no {kind}");
+                debug_assert!(
+                    data.iter().all(|data| types[data.code - 1] == kind),
+                    "{name} is no {kind}"
+                );
                 out.extend(data.map(|data| Variable::new(name, &dims, data)));
             }
             Some((key, value)) => {
                 let (name, attribute) = key.split_once(':').unwrap_or_default();
-                let number = value.strip_suffix('f').and_then(|number| number.parse::<f32>().ok());
+                let number = value
+                    .strip_suffix('f')
+                    .and_then(|number| number.parse::<f32>().ok());
                 let value = match number {
                     _ if value == "?" => values.remove(key),
                     Some(number) => Some(Data::f32([number])),
                     None => Some(Data::text(value.trim_matches('"'))),
                 };
                 let variable = out.last_mut().filter(|variable| variable.name == name);
-                variable.into_iter().zip(value).for_each(|(variable, value)| variable.attrs.push((attribute, value)));
+                variable
+                    .into_iter()
+                    .zip(value)
+                    .for_each(|(variable, value)| variable.attrs.push((attribute, value)));
             }
         }
     }
@@ -137,10 +172,23 @@ pub(crate) struct Layout {
 
 impl Layout {
     /// A file of the CF conventions.
-    pub(crate) fn cf(title: &str, dims: Dims, variables: Vec<Variable>, provenance: &Provenance) -> Self {
+    pub(crate) fn cf(
+        title: &str,
+        dims: Dims,
+        variables: Vec<Variable>,
+        provenance: &Provenance,
+    ) -> Self {
         let history = format!("written by {}", provenance.program);
-        let globals = vec![("Conventions", "CF-1.10".into()), ("title", title.into()), ("history", history)];
-        Self { dims, globals, variables }
+        let globals = vec![
+            ("Conventions", "CF-1.10".into()),
+            ("title", title.into()),
+            ("history", history),
+        ];
+        Self {
+            dims,
+            globals,
+            variables,
+        }
     }
 
     /// The bytes of the file. The provenance follows the global attributes, each entry as text.
@@ -149,12 +197,21 @@ impl Layout {
     }
 
     /// The parts of the file that are here: of the variables that ranks share, and, for the first rank, all else.
-    pub(crate) fn into_parts(mut self, provenance: &Provenance, is_first: bool) -> OutputResult<FileParts> {
+    pub(crate) fn into_parts(
+        mut self,
+        provenance: &Provenance,
+        is_first: bool,
+    ) -> OutputResult<FileParts> {
         self.check()?;
         self.globals.extend(provenance.entries());
-        let sizes: Vec<u64> = self.variables.iter().map(|v| (self.count(v) * v.data.width) as u64).collect();
+        let sizes: Vec<u64> = self
+            .variables
+            .iter()
+            .map(|v| (self.count(v) * v.data.width) as u64)
+            .collect();
         if let Some(size) = sizes.iter().find(|size| **size > LARGEST_VARIABLE) {
-            let reason = format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
+            let reason =
+                format!("a variable of {size} bytes, at most {LARGEST_VARIABLE}: take fewer cells");
             return Err(OutputError::unsupported("NetCDF", reason));
         }
         // The places of the data do not change the length of the head.
@@ -171,7 +228,11 @@ impl Layout {
         for (variable, begin) in self.variables.into_iter().zip(begins) {
             let (each, mut bytes) = (variable.data.width, variable.data.bytes);
             // Behind bytes the value that the library of NetCDF stores where nothing was written.
-            let padding = if variable.data.code == 1 { (-127_i8) as u8 } else { 0 };
+            let padding = if variable.data.code == 1 {
+                (-127_i8) as u8
+            } else {
+                0
+            };
             match variable.first {
                 Some(first) => parts.push((begin + (first * each) as u64, bytes)),
                 None if is_first => {
@@ -186,7 +247,12 @@ impl Layout {
 
     /// Values of a whole variable.
     fn count(&self, variable: &Variable) -> usize {
-        let size = |dim: &&str| self.dims.iter().find(|(name, _)| name == dim).map_or(0, |(_, size)| *size);
+        let size = |dim: &&str| {
+            self.dims
+                .iter()
+                .find(|(name, _)| name == dim)
+                .map_or(0, |(_, size)| *size)
+        };
         variable.dims.iter().map(size).product()
     }
 
@@ -195,10 +261,19 @@ impl Layout {
         for (place, variable) in self.variables.iter().enumerate() {
             let name = &variable.name;
             if name.is_empty() || name.contains(['/', '\0']) {
-                return Err(OutputError::unsupported("NetCDF", format!("'{name}' is no name")));
+                return Err(OutputError::unsupported(
+                    "NetCDF",
+                    format!("'{name}' is no name"),
+                ));
             }
-            if self.variables[..place].iter().any(|other| other.name == *name) {
-                return Err(OutputError::Duplicate { what: "name in NetCDF", name: name.clone() });
+            if self.variables[..place]
+                .iter()
+                .any(|other| other.name == *name)
+            {
+                return Err(OutputError::Duplicate {
+                    what: "name in NetCDF",
+                    name: name.clone(),
+                });
             }
             let (found, expected) = (variable.data.len(), self.count(variable));
             let axes = variable.dims.join(" x ");
@@ -207,10 +282,15 @@ impl Layout {
                 first => same_length(name, first.unwrap_or(0) + found, &axes, expected)?,
             }
         }
-        let own = self.variables.iter().filter(|variable| variable.first.is_none());
+        let own = self
+            .variables
+            .iter()
+            .filter(|variable| variable.first.is_none());
         let total: usize = own.map(|v| v.data.bytes.len()).sum();
         if total > MAX_BYTES {
-            let reason = format!("{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep");
+            let reason = format!(
+                "{total} bytes in one file, at most {MAX_BYTES}: write one file per time or sweep"
+            );
             return Err(OutputError::unsupported("NetCDF", reason));
         }
         Ok(())
@@ -234,7 +314,12 @@ impl Layout {
             head.number(variable.dims.len());
             for dim in &variable.dims {
                 // Every axis is among the dimensions, or the variable had no values and was refused.
-                head.number(self.dims.iter().position(|(name, _)| name == dim).unwrap_or_default());
+                head.number(
+                    self.dims
+                        .iter()
+                        .position(|(name, _)| name == dim)
+                        .unwrap_or_default(),
+                );
             }
             head.list(0x0C, variable.attrs.len());
             for (name, value) in &variable.attrs {
@@ -291,11 +376,16 @@ mod tests {
             dims: vec![("time", 3), ("range", 2), ("letters", 5)],
             globals: vec![("title", "A, b".into()), ("empty", String::new())],
             variables: vec![
-                Variable::new("v", &["time", "range"], Data::f32((0..6).map(|i| i as f32 - 2.5)))
-                    .text("units", "m s-1")
-                    .attr("_FillValue", Data::f32([FILL])),
+                Variable::new(
+                    "v",
+                    &["time", "range"],
+                    Data::f32((0..6).map(|i| i as f32 - 2.5)),
+                )
+                .text("units", "m s-1")
+                .attr("_FillValue", Data::f32([FILL])),
                 Variable::new("once", &[], Data::f64([1.0 / 3.0])),
-                Variable::new("flag", &["letters"], Data::i8([1, -2, 3, 4, 5])).attr("values", Data::i8([1, 2])),
+                Variable::new("flag", &["letters"], Data::i8([1, -2, 3, 4, 5]))
+                    .attr("values", Data::i8([1, 2])),
                 Variable::new("word", &["letters"], Data::text("lidar")),
                 Variable::new("count", &["time"], Data::i32([7, -8, 9])).text("long_name", ""),
             ],
@@ -305,29 +395,35 @@ mod tests {
     #[test]
     fn the_bytes_are_those_of_another_encoder() {
         let mut file = NcFileBuilder::new();
-        let ids =
-            [("time", 3), ("range", 2), ("letters", 5)].map(|(name, size)| file.add_dimension(name, size).unwrap());
+        let ids = [("time", 3), ("range", 2), ("letters", 5)]
+            .map(|(name, size)| file.add_dimension(name, size).unwrap());
         let chars = |text: &str| NcAttrValue::Chars(text.into());
         let own = [("title", "A, b".to_owned()), ("empty", String::new())];
         for (name, text) in own.into_iter().chain(example().entries()) {
             file.add_attribute(name, chars(&text)).unwrap();
         }
         let v = file.add_variable::<f32>("v", &ids[..2]).unwrap();
-        file.add_variable_attribute(v, "units", chars("m s-1")).unwrap();
-        file.add_variable_attribute(v, "_FillValue", NcAttrValue::Floats(vec![FILL])).unwrap();
-        file.write_variable(v, &[-2.5_f32, -1.5, -0.5, 0.5, 1.5, 2.5]).unwrap();
+        file.add_variable_attribute(v, "units", chars("m s-1"))
+            .unwrap();
+        file.add_variable_attribute(v, "_FillValue", NcAttrValue::Floats(vec![FILL]))
+            .unwrap();
+        file.write_variable(v, &[-2.5_f32, -1.5, -0.5, 0.5, 1.5, 2.5])
+            .unwrap();
         let once = file.add_variable::<f64>("once", &[]).unwrap();
         file.write_variable(once, &[1.0 / 3.0]).unwrap();
         let flag = file.add_variable::<i8>("flag", &ids[2..]).unwrap();
-        file.add_variable_attribute(flag, "values", NcAttrValue::Bytes(vec![1, 2])).unwrap();
+        file.add_variable_attribute(flag, "values", NcAttrValue::Bytes(vec![1, 2]))
+            .unwrap();
         file.write_variable(flag, &[1_i8, -2, 3, 4, 5]).unwrap();
         let word = file.add_char_variable("word", &ids[2..]).unwrap();
         file.write_char_variable(word, b"lidar").unwrap();
         let count = file.add_variable::<i32>("count", &ids[..1]).unwrap();
-        file.add_variable_attribute(count, "long_name", chars("")).unwrap();
+        file.add_variable_attribute(count, "long_name", chars(""))
+            .unwrap();
         file.write_variable(count, &[7, -8, 9]).unwrap();
         let mut expected = Vec::new();
-        file.write(&mut expected, NcWriteOptions::offset64()).unwrap();
+        file.write(&mut expected, NcWriteOptions::offset64())
+            .unwrap();
         assert_eq!(layout().into_bytes(&example()).unwrap(), expected);
     }
 
@@ -347,7 +443,10 @@ mod tests {
         assert_eq!(parts.into_bytes(), layout().into_bytes(&example()).unwrap());
         let mut beyond = layout();
         beyond.variables[0].first = Some(1);
-        assert!(matches!(beyond.into_parts(&example(), true), Err(OutputError::Length { .. })));
+        assert!(matches!(
+            beyond.into_parts(&example(), true),
+            Err(OutputError::Length { .. })
+        ));
         let mut large = layout();
         (large.dims[0].1, large.variables[0].first) = (1 << 30, Some(0));
         large.variables.truncate(1);
@@ -372,6 +471,16 @@ mod tests {
             variables: vec![Variable::new("v", &["time", "range"], Data::f32([0.0; 5]))],
         };
         let error = layout.into_bytes(&example()).unwrap_err();
-        assert!(matches!(error, OutputError::Length { expected: 6, actual: 5, .. }), "{error}");
+        assert!(
+            matches!(
+                error,
+                OutputError::Length {
+                    expected: 6,
+                    actual: 5,
+                    ..
+                }
+            ),
+            "{error}"
+        );
     }
 }

@@ -17,7 +17,11 @@ const MOST_GROUPS: usize = 10_000;
 /// What is wrong with it; a damaged file.
 pub(super) fn check_groups(path: &Path, unsound: &'static str) -> Result<(), &'static str> {
     let damaged = |_: hdf5_reader::error::Error| unsound;
-    let mut groups = vec![Hdf5File::open(path).and_then(|file| file.root_group()).map_err(damaged)?];
+    let mut groups = vec![
+        Hdf5File::open(path)
+            .and_then(|file| file.root_group())
+            .map_err(damaged)?,
+    ];
     for _ in 0..=DEEPEST {
         let below: Result<Vec<_>, _> = groups.iter().map(|group| group.groups()).collect();
         groups = below.map_err(damaged)?.into_iter().flatten().collect();
@@ -37,9 +41,21 @@ pub(crate) mod made {
     /// An object of HDF5 with hard links to these places, and further messages.
     pub(crate) fn object(links: &[(&str, u64)], messages: &[(u16, Vec<u8>)]) -> Vec<u8> {
         let link = |(name, at): &(&str, u64)| {
-            (6, [&[1, 0, name.len() as u8][..], name.as_bytes(), &at.to_le_bytes()].concat())
+            (
+                6,
+                [
+                    &[1, 0, name.len() as u8][..],
+                    name.as_bytes(),
+                    &at.to_le_bytes(),
+                ]
+                .concat(),
+            )
         };
-        let all: Vec<(u16, Vec<u8>)> = links.iter().map(link).chain(messages.iter().cloned()).collect();
+        let all: Vec<(u16, Vec<u8>)> = links
+            .iter()
+            .map(link)
+            .chain(messages.iter().cloned())
+            .collect();
         let mut body = Vec::new();
         for (kind, data) in &all {
             let padded = data.len().div_ceil(8) * 8;
@@ -77,27 +93,56 @@ pub(crate) mod made {
 
     /// An array of doubles whose numbers are at a place of the file.
     pub(crate) fn array(shape: &[u64], at: u64) -> Vec<u8> {
-        let lengths: Vec<u8> = shape.iter().flat_map(|length| length.to_le_bytes()).collect();
+        let lengths: Vec<u8> = shape
+            .iter()
+            .flat_map(|length| length.to_le_bytes())
+            .collect();
         let space = [&[1, shape.len() as u8, 0, 0, 0, 0, 0, 0][..], &lengths].concat();
-        let double = vec![0x11, 0x20, 0x3F, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52, 0xFF, 3, 0, 0];
+        let double = vec![
+            0x11, 0x20, 0x3F, 0, 8, 0, 0, 0, 0, 0, 64, 0, 52, 11, 0, 52, 0xFF, 3, 0, 0,
+        ];
         let bytes = 8 * shape.iter().product::<u64>();
         let place = [&[3, 1][..], &at.to_le_bytes(), &bytes.to_le_bytes()].concat();
-        object(&[], &[(1, space), (3, double), (5, vec![2, 2, 1, 0]), (8, place)])
+        object(
+            &[],
+            &[(1, space), (3, double), (5, vec![2, 2, 1, 0]), (8, place)],
+        )
     }
 
     /// A file with these arrays in its root.
     pub(crate) fn of_arrays(arrays: &[(&str, &[u64], Vec<f64>)]) -> Vec<u8> {
         let names = |at: &dyn Fn(usize) -> u64| -> Vec<u8> {
-            let links: Vec<(&str, u64)> = arrays.iter().enumerate().map(|(i, (name, ..))| (*name, at(i))).collect();
+            let links: Vec<(&str, u64)> = arrays
+                .iter()
+                .enumerate()
+                .map(|(i, (name, ..))| (*name, at(i)))
+                .collect();
             object(&links, &[])
         };
         let root = names(&|_| 0).len() as u64;
-        let sizes: Vec<u64> = arrays.iter().map(|(_, shape, _)| array(shape, 0).len() as u64).collect();
+        let sizes: Vec<u64> = arrays
+            .iter()
+            .map(|(_, shape, _)| array(shape, 0).len() as u64)
+            .collect();
         let ends: u64 = 96 + root + sizes.iter().sum::<u64>();
-        let before = |i: usize| arrays[..i].iter().map(|(.., values)| 8 * values.len() as u64).sum::<u64>();
+        let before = |i: usize| {
+            arrays[..i]
+                .iter()
+                .map(|(.., values)| 8 * values.len() as u64)
+                .sum::<u64>()
+        };
         let mut objects = vec![names(&|i| 96 + root + sizes[..i].iter().sum::<u64>())];
-        objects.extend(arrays.iter().enumerate().map(|(i, (_, shape, _))| array(shape, ends + before(i))));
-        objects.extend(arrays.iter().map(|(.., values)| values.iter().flat_map(|v| v.to_le_bytes()).collect()));
+        objects.extend(
+            arrays
+                .iter()
+                .enumerate()
+                .map(|(i, (_, shape, _))| array(shape, ends + before(i))),
+        );
+        objects.extend(
+            arrays
+                .iter()
+                .map(|(.., values)| values.iter().flat_map(|v| v.to_le_bytes()).collect()),
+        );
         file(&objects)
     }
 }
@@ -117,11 +162,19 @@ mod tests {
     fn groups_in_circles_and_without_end_are_refused() {
         let size = object(&[("g", 0)], &[]).len() as u64;
         let first = object(&[("g", 96 + size)], &[]);
-        assert_eq!(opened(&file(&[first, empty_group()])).map(|_| ()), Ok(()), "a group in a group is nothing strange");
+        assert_eq!(
+            opened(&file(&[first, empty_group()])).map(|_| ()),
+            Ok(()),
+            "a group in a group is nothing strange"
+        );
         let refused = |bytes: &[u8]| opened(bytes).err().unwrap_or_default();
         assert!(refused(&file(&[object(&[("g", 96)], &[])])).contains("hold each other"));
-        assert!(refused(&file(&[object(&[("g", 96), ("h", 96)], &[])])).contains("hold each other"));
-        let mut deep: Vec<Vec<u8>> = (1..3000).map(|i| object(&[("g", 96 + i * size)], &[])).collect();
+        assert!(
+            refused(&file(&[object(&[("g", 96), ("h", 96)], &[])])).contains("hold each other")
+        );
+        let mut deep: Vec<Vec<u8>> = (1..3000)
+            .map(|i| object(&[("g", 96 + i * size)], &[]))
+            .collect();
         deep.push(empty_group());
         assert!(refused(&file(&deep)).contains("more than 32 deep"));
     }

@@ -18,7 +18,11 @@ struct Sketch<'a> {
 impl Sketch<'_> {
     fn count(&self, value: u64, out: &mut Vec<u8>) {
         let bytes = value.to_be_bytes();
-        out.extend(if self.version == 5 { &bytes[..] } else { &bytes[4..] });
+        out.extend(if self.version == 5 {
+            &bytes[..]
+        } else {
+            &bytes[4..]
+        });
     }
 
     fn name(&self, name: &str, out: &mut Vec<u8>) {
@@ -46,7 +50,8 @@ impl Sketch<'_> {
         for ((name, dims, attributes, values), begin) in self.variables.iter().zip(begin) {
             self.name(name, &mut out);
             self.count(dims.len() as u64, &mut out);
-            dims.iter().for_each(|dim| self.count((*dim).into(), &mut out));
+            dims.iter()
+                .for_each(|dim| self.count((*dim).into(), &mut out));
             self.list(0x0C, attributes.len(), &mut out);
             for (name, text) in *attributes {
                 self.name(name, &mut out);
@@ -56,19 +61,35 @@ impl Sketch<'_> {
             out.extend(6_u32.to_be_bytes());
             self.count(8 * values.len() as u64, &mut out);
             let bytes = begin.to_be_bytes();
-            out.extend(if self.version == 1 { &bytes[4..] } else { &bytes[..] });
+            out.extend(if self.version == 1 {
+                &bytes[4..]
+            } else {
+                &bytes[..]
+            });
         }
         out
     }
 
     fn bytes(&self) -> Vec<u8> {
         let mut at = self.header(&vec![0; self.variables.len()]).len() as u64;
-        let grows = |dims: &[u32]| dims.first().is_some_and(|dim| self.dims[*dim as usize].1 == 0);
+        let grows = |dims: &[u32]| {
+            dims.first()
+                .is_some_and(|dim| self.dims[*dim as usize].1 == 0)
+        };
         let mut begin = Vec::new();
         // Variables that grow come last; a record has one part of each of them.
         for last in [false, true] {
-            for (i, (_, dims, _, values)) in self.variables.iter().enumerate().filter(|(_, v)| grows(v.1) == last) {
-                let parts = if grows(dims) { self.records.max(1) as usize } else { 1 };
+            for (i, (_, dims, _, values)) in self
+                .variables
+                .iter()
+                .enumerate()
+                .filter(|(_, v)| grows(v.1) == last)
+            {
+                let parts = if grows(dims) {
+                    self.records.max(1) as usize
+                } else {
+                    1
+                };
                 begin.push((i, at));
                 at += (8 * values.len() / parts) as u64;
             }
@@ -76,8 +97,13 @@ impl Sketch<'_> {
         begin.sort_unstable();
         let begin: Vec<u64> = begin.into_iter().map(|(_, at)| at).collect();
         let mut out = self.header(&begin);
-        let put = |values: &[f64], out: &mut Vec<u8>| values.iter().for_each(|v| out.extend(v.to_be_bytes()));
-        self.variables.iter().filter(|v| !grows(v.1)).for_each(|v| put(&v.3, &mut out));
+        let put = |values: &[f64], out: &mut Vec<u8>| {
+            values.iter().for_each(|v| out.extend(v.to_be_bytes()))
+        };
+        self.variables
+            .iter()
+            .filter(|v| !grows(v.1))
+            .for_each(|v| put(&v.3, &mut out));
         for record in 0..self.records as usize {
             for (.., values) in self.variables.iter().filter(|v| grows(v.1)) {
                 let part = values.len() / self.records as usize;
@@ -97,10 +123,15 @@ fn planes_of(bytes: &[u8]) -> Result<crate::io::CrossPlanes, String> {
 
 /// Two planes of 3 x 4 points whose v is 100 t + 10 z + y, in a given order of dimensions.
 fn sketch(version: u8, names: [&'static str; 3], records: u32) -> Sketch<'static> {
-    let dims: &'static [(&str, u32)] =
-        Box::leak(Box::new([(names[0], if records > 0 { 0 } else { 2 }), (names[1], 3), (names[2], 4)]));
+    let dims: &'static [(&str, u32)] = Box::leak(Box::new([
+        (names[0], if records > 0 { 0 } else { 2 }),
+        (names[1], 3),
+        (names[2], 4),
+    ]));
     let value = |t: usize, z: usize, y: usize| 100.0 * t as f64 + 10.0 * z as f64 + y as f64;
-    let all = (0..24).map(|i| value(i / 12, i / 4 % 3, i % 4)).collect::<Vec<_>>();
+    let all = (0..24)
+        .map(|i| value(i / 12, i / 4 % 3, i % 4))
+        .collect::<Vec<_>>();
     let line = |n: usize| (0..n).map(|i| i as f64).collect::<Vec<_>>();
     Sketch {
         version,
@@ -122,8 +153,15 @@ fn all_versions_of_the_format_and_growing_files_are_read() {
         for records in [0, 2] {
             let planes = planes_of(&sketch(version, ["time", "z", "y"], records).bytes()).unwrap();
             assert_eq!(planes.v_m_s.dim(), (2, 3, 4));
-            assert_eq!(planes.v_m_s[[1, 2, 3]], 123.0, "version {version}, {records} records");
-            assert_eq!((planes.time_s, planes.tau), (vec![0.0, 1.0], vec![0.0, 1.0]));
+            assert_eq!(
+                planes.v_m_s[[1, 2, 3]],
+                123.0,
+                "version {version}, {records} records"
+            );
+            assert_eq!(
+                (planes.time_s, planes.tau),
+                (vec![0.0, 1.0], vec![0.0, 1.0])
+            );
         }
     }
 }
@@ -139,13 +177,19 @@ fn dimensions_are_found_by_name_and_role_in_any_order() {
         }
     }
     let planes = planes_of(&turned.bytes()).unwrap();
-    assert_eq!((planes.v_m_s.dim(), planes.v_m_s[[1, 2, 3]]), ((2, 3, 4), 123.0));
+    assert_eq!(
+        (planes.v_m_s.dim(), planes.v_m_s[[1, 2, 3]]),
+        ((2, 3, 4), 123.0)
+    );
     let mut of_axis = sketch(2, ["time", "level", "across"], 0);
     of_axis.variables[1].2 = &[("axis", "Z")];
     of_axis.variables[2].2 = &[("axis", "Y")];
     assert_eq!(planes_of(&of_axis.bytes()).unwrap().v_m_s[[1, 2, 3]], 123.0);
     let unknown = planes_of(&sketch(2, ["time", "level", "y"], 0).bytes()).unwrap_err();
-    assert!(unknown.contains("rename level, in xarray with ds.rename(level=\"z\")"), "{unknown}");
+    assert!(
+        unknown.contains("rename level, in xarray with ds.rename(level=\"z\")"),
+        "{unknown}"
+    );
     let age = planes_of(&sketch(2, ["tau", "z", "y"], 0).bytes()).unwrap_err();
     assert!(age.contains("no variable time"), "{age}");
     let mut hours = sketch(2, ["time", "z", "y"], 0);
@@ -153,7 +197,10 @@ fn dimensions_are_found_by_name_and_role_in_any_order() {
     assert_eq!(planes_of(&hours.bytes()).unwrap().time_s, vec![0.0, 3600.0]);
     hours.variables[0].2 = &[("units", "months since 2000-01-01")];
     let months = planes_of(&hours.bytes()).unwrap_err();
-    assert!(months.contains("a unit of time is needed") && !months.contains("2000"), "{months}");
+    assert!(
+        months.contains("a unit of time is needed") && !months.contains("2000"),
+        "{months}"
+    );
 }
 
 #[test]
@@ -170,7 +217,10 @@ fn a_header_that_lies_is_refused_without_memory_and_without_a_word_of_the_file()
                 bytes[at..at + 4].copy_from_slice(&lie.to_be_bytes());
                 if let Err(message) = planes_of(&bytes) {
                     refused += 1;
-                    assert!(!message.contains(&secret[..8]) && message.len() < 400, "{message}");
+                    assert!(
+                        !message.contains(&secret[..8]) && message.len() < 400,
+                        "{message}"
+                    );
                 }
             }
         }
@@ -185,11 +235,17 @@ fn a_header_that_lies_is_refused_without_memory_and_without_a_word_of_the_file()
 fn files_of_other_kinds_name_the_remedy_and_nothing_of_their_content() {
     let hdf = b"\x89HDF\r\n\x1a\nsecret";
     let broken = planes_of(hdf).unwrap_err();
-    assert!(broken.contains("NetCDF-4") && !broken.contains("secret"), "{broken}");
+    assert!(
+        broken.contains("NetCDF-4") && !broken.contains("secret"),
+        "{broken}"
+    );
     assert!(broken.contains("nccopy -k cdf2"), "{broken}");
     assert!(CONVERT.contains("nccopy -k cdf2") && CONVERT.contains("NETCDF3_64BIT"));
     let text = planes_of("root:x:0:0:secret\n".repeat(300).as_bytes()).unwrap_err();
-    assert!(text.contains("no NetCDF file") && !text.contains("root"), "{text}");
+    assert!(
+        text.contains("no NetCDF file") && !text.contains("root"),
+        "{text}"
+    );
     #[cfg(unix)]
     assert!(open(Path::new("/dev/zero")).is_err());
 }
@@ -198,15 +254,34 @@ fn files_of_other_kinds_name_the_remedy_and_nothing_of_their_content() {
 fn packed_and_missing_values_are_understood() {
     let mut packed = sketch(2, ["time", "z", "y"], 0);
     packed.variables[3].3[0] = DEFAULT_FILL;
-    assert!(planes_of(&packed.bytes()).unwrap_err().contains("v is missing or not finite at place 0"));
-    let y = [("scale_factor", 0.5), ("add_offset", 3.0), ("_FillValue", 2.0)]
-        .into_iter()
-        .fold(Variable::new("y", &["y"], Data::f64([0.0, 1.0, 2.0, 3.0])), |y, (name, value)| {
-            y.attr(name, Data::f64([value]))
-        });
-    let layout = Layout { dims: vec![("y", 4)], globals: Vec::new(), variables: vec![y] };
+    assert!(
+        planes_of(&packed.bytes())
+            .unwrap_err()
+            .contains("v is missing or not finite at place 0")
+    );
+    let y = [
+        ("scale_factor", 0.5),
+        ("add_offset", 3.0),
+        ("_FillValue", 2.0),
+    ]
+    .into_iter()
+    .fold(
+        Variable::new("y", &["y"], Data::f64([0.0, 1.0, 2.0, 3.0])),
+        |y, (name, value)| y.attr(name, Data::f64([value])),
+    );
+    let layout = Layout {
+        dims: vec![("y", 4)],
+        globals: Vec::new(),
+        variables: vec![y],
+    };
     let file = tempfile::NamedTempFile::new().unwrap();
-    std::fs::write(file.path(), layout.into_bytes(&crate::io::provenance::example()).unwrap()).unwrap();
+    std::fs::write(
+        file.path(),
+        layout
+            .into_bytes(&crate::io::provenance::example())
+            .unwrap(),
+    )
+    .unwrap();
     let y = open(file.path()).unwrap().floats("y").unwrap();
     assert_eq!((y[0], y[1], y[3]), (3.0, 3.5, 4.5));
     assert!(y[2].is_nan());

@@ -12,21 +12,36 @@ pub(crate) struct NumberType {
 }
 
 impl NumberType {
-    pub(crate) const F32: Self = Self { kind: 'f', bytes: 4 };
-    pub(crate) const F64: Self = Self { kind: 'f', bytes: 8 };
+    pub(crate) const F32: Self = Self {
+        kind: 'f',
+        bytes: 4,
+    };
+    pub(crate) const F64: Self = Self {
+        kind: 'f',
+        bytes: 8,
+    };
 
     /// By its name with the number of bits, such as `i16`.
     pub(crate) fn named(name: &str) -> Option<Self> {
         let kind = name.chars().next()?;
         let bits = name.strip_prefix(kind)?;
-        let is_known = matches!((kind, bits), ('i' | 'u', "8" | "16" | "32" | "64") | ('f', "32" | "64"));
-        is_known.then_some(Self { kind, bytes: bits.parse::<u64>().ok()? / 8 })
+        let is_known = matches!(
+            (kind, bits),
+            ('i' | 'u', "8" | "16" | "32" | "64") | ('f', "32" | "64")
+        );
+        is_known.then_some(Self {
+            kind,
+            bytes: bits.parse::<u64>().ok()? / 8,
+        })
     }
 
     /// By its name in numpy, which counts bytes: `i2`.
     pub(crate) fn of_numpy(name: &str) -> Option<Self> {
         let (kind, bytes) = name.split_at_checked(1)?;
-        Self::named(&format!("{kind}{}", bytes.parse::<u8>().ok()?.checked_mul(8)?))
+        Self::named(&format!(
+            "{kind}{}",
+            bytes.parse::<u8>().ok()?.checked_mul(8)?
+        ))
     }
 
     pub(crate) fn is_float(self) -> bool {
@@ -84,7 +99,13 @@ mod tests {
             assert_eq!(big.len() as u64, number.bytes);
         }
         assert_eq!(NumberType::of_numpy("i2"), NumberType::named("i16"));
-        assert_eq!((NumberType::of_numpy("i8"), named("i8").bytes), (NumberType::named("i64"), 1));
-        assert_eq!(["f2", "f99", "\u{e9}4", ""].map(NumberType::of_numpy), [None; 4]);
+        assert_eq!(
+            (NumberType::of_numpy("i8"), named("i8").bytes),
+            (NumberType::named("i64"), 1)
+        );
+        assert_eq!(
+            ["f2", "f99", "\u{e9}4", ""].map(NumberType::of_numpy),
+            [None; 4]
+        );
     }
 }

@@ -25,7 +25,10 @@ impl FileParts {
 
 impl From<Vec<u8>> for FileParts {
     fn from(bytes: Vec<u8>) -> Self {
-        Self { length: bytes.len() as u64, parts: vec![(0, bytes)] }
+        Self {
+            length: bytes.len() as u64,
+            parts: vec![(0, bytes)],
+        }
     }
 }
 
@@ -41,6 +44,9 @@ pub struct Share {
 impl Share {
     /// All of `planes` planes.
     pub fn whole(planes: usize) -> Self {
-        Self { planes: 0..planes, is_first: true }
+        Self {
+            planes: 0..planes,
+            is_first: true,
+        }
     }
 }

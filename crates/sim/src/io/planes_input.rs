@@ -20,20 +20,40 @@ pub(crate) fn files(planes: &Path) -> Result<Vec<PathBuf>, Error> {
     if planes.is_file() {
         return Ok(vec![planes.to_owned()]);
     }
-    let folder = planes.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let stem = planes.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let folder = planes
+        .parent()
+        .filter(|f| !f.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let stem = planes
+        .file_name()
+        .map(|n| n.to_string_lossy().into_owned())
+        .unwrap_or_default();
     let numbered = |path: &PathBuf| {
-        let name = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let number = name.strip_prefix(&format!("{stem}_")).and_then(|rest| rest.strip_suffix(".nc"));
+        let name = path
+            .file_name()
+            .map(|n| n.to_string_lossy().into_owned())
+            .unwrap_or_default();
+        let number = name
+            .strip_prefix(&format!("{stem}_"))
+            .and_then(|rest| rest.strip_suffix(".nc"));
         number.is_some_and(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
     };
-    let listed = std::fs::read_dir(folder).map(|entries| entries.filter_map(|e| Some(e.ok()?.path())));
-    let mut found: Vec<PathBuf> = listed.map(|paths| paths.filter(numbered).collect()).unwrap_or_default();
+    let listed =
+        std::fs::read_dir(folder).map(|entries| entries.filter_map(|e| Some(e.ok()?.path())));
+    let mut found: Vec<PathBuf> = listed
+        .map(|paths| paths.filter(numbered).collect())
+        .unwrap_or_default();
     // Longer numbers behind shorter ones.
     found.sort_by_key(|path| (path.as_os_str().len(), path.clone()));
     if found.is_empty() {
-        let reason = format!("neither a file nor the beginning of files {stem}_0001.nc, ... in {}", folder.display());
-        return Err(Error::Input { path: planes.to_owned(), reason });
+        let reason = format!(
+            "neither a file nor the beginning of files {stem}_0001.nc, ... in {}",
+            folder.display()
+        );
+        return Err(Error::Input {
+            path: planes.to_owned(),
+            reason,
+        });
     }
     Ok(found)
 }
@@ -62,11 +82,22 @@ fn planes(file: &NetcdfFile) -> Result<CrossPlanes, String> {
         if let Some(place) = values.iter().position(|v| !v.is_finite()) {
             return Err(format!("{name} is missing or not finite at place {place}"));
         }
-        Array3::from_shape_vec(shape, values).map_err(|_| format!("{name} has not the lengths of its coordinates"))
+        Array3::from_shape_vec(shape, values)
+            .map_err(|_| format!("{name} has not the lengths of its coordinates"))
     };
     let (v_m_s, w_m_s) = (component("v")?, component("w")?);
     let (y_edges, z_edges) = (ends(file, y)?, ends(file, z)?);
-    let planes = CrossPlanes { title: String::new(), tau, time_s, y_m, z_m, v_m_s, w_m_s, y_edges, z_edges };
+    let planes = CrossPlanes {
+        title: String::new(),
+        tau,
+        time_s,
+        y_m,
+        z_m,
+        v_m_s,
+        w_m_s,
+        y_edges,
+        z_edges,
+    };
     planes.check().map_err(|e| e.to_string())?;
     Ok(planes)
 }
@@ -80,8 +111,16 @@ fn times(file: &NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
             return Err("it has no variable time, the times of the planes in s".into());
         }
         let source = if file.has(name) { name } else { dim };
-        let values = if name == "time" || !is_age { file.seconds(source)? } else { file.floats(source)? };
-        if values.len() == count { Ok(values) } else { Err(format!("{name} has not one value for each plane")) }
+        let values = if name == "time" || !is_age {
+            file.seconds(source)?
+        } else {
+            file.floats(source)?
+        };
+        if values.len() == count {
+            Ok(values)
+        } else {
+            Err(format!("{name} has not one value for each plane"))
+        }
     };
     Ok([values("tau")?, values("time")?])
 }
@@ -89,8 +128,9 @@ fn times(file: &NetcdfFile, dim: &str) -> Result<[Vec<f64>; 2], String> {
 /// The ends of an axis; open if the file does not say.
 fn ends(file: &NetcdfFile, axis: &str) -> Result<Edges, String> {
     match file.text(axis, "edges") {
-        Some(text) => edges::from_text(text)
-            .ok_or_else(|| "an attribute edges must be as `wakescope flow` writes it, or be taken out".to_owned()),
+        Some(text) => edges::from_text(text).ok_or_else(|| {
+            "an attribute edges must be as `wakescope flow` writes it, or be taken out".to_owned()
+        }),
         None => Ok(OPEN_EDGES),
     }
 }
@@ -114,8 +154,14 @@ mod tests {
         let mut planes = samples::planes();
         planes.v_m_s[[0, 0, 0]] = 0.25;
         planes.y_edges = Edges::Periodic { period_m: 100.0 };
-        let ground = Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] };
-        planes.z_edges = Edges::Bounded { low: ground, high: Side::Open };
+        let ground = Side::NoSlipWall {
+            position_m: 0.0,
+            velocity_m_s: [0.0; 3],
+        };
+        planes.z_edges = Edges::Bounded {
+            low: ground,
+            high: Side::Open,
+        };
         planes
     }
 
@@ -125,33 +171,67 @@ mod tests {
         let (_folder, path) = written(&planes);
         let found = read(&path).unwrap();
         let single = |field: &Array3<f64>| field.mapv(|v| f64::from(v as f32));
-        assert_eq!((found.v_m_s, found.w_m_s), (single(&planes.v_m_s), single(&planes.w_m_s)));
-        assert_eq!((found.y_m, found.z_m, found.time_s), (planes.y_m, planes.z_m, planes.time_s));
-        assert_eq!((found.tau, found.y_edges, found.z_edges), (planes.tau, planes.y_edges, planes.z_edges));
+        assert_eq!(
+            (found.v_m_s, found.w_m_s),
+            (single(&planes.v_m_s), single(&planes.w_m_s))
+        );
+        assert_eq!(
+            (found.y_m, found.z_m, found.time_s),
+            (planes.y_m, planes.z_m, planes.time_s)
+        );
+        assert_eq!(
+            (found.tau, found.y_edges, found.z_edges),
+            (planes.tau, planes.y_edges, planes.z_edges)
+        );
     }
 
     /// The same planes with other units, made with nothing but what a client has.
     fn with_units(units: [&str; 3], scale: [f64; 3]) -> Result<CrossPlanes, Error> {
         use crate::io::netcdf::{Data, Layout, Variable};
         let [velocity, length, time] = scale;
-        let axis = |name: &str, dims: &'static [&'static str], values: &[f64], scale: f64, units: &str| {
-            let values = values.iter().map(|v| v / scale);
-            Variable::new(name, dims, Data::f64(values)).text("units", units)
-        };
+        let axis =
+            |name: &str, dims: &'static [&'static str], values: &[f64], scale: f64, units: &str| {
+                let values = values.iter().map(|v| v / scale);
+                Variable::new(name, dims, Data::f64(values)).text("units", units)
+            };
         let planes = whole();
         let flat = |field: &Array3<f64>| field.iter().copied().collect::<Vec<f64>>();
         let variables = vec![
             axis("time", &["time"], &planes.time_s, time, units[2]),
             axis("z", &["z"], &planes.z_m, length, units[1]),
             axis("y", &["y"], &planes.y_m, length, units[1]),
-            axis("v", &["time", "z", "y"], &flat(&planes.v_m_s), velocity, units[0]),
-            axis("w", &["time", "z", "y"], &flat(&planes.w_m_s), velocity, units[0]),
+            axis(
+                "v",
+                &["time", "z", "y"],
+                &flat(&planes.v_m_s),
+                velocity,
+                units[0],
+            ),
+            axis(
+                "w",
+                &["time", "z", "y"],
+                &flat(&planes.w_m_s),
+                velocity,
+                units[0],
+            ),
         ];
-        let dims = vec![("time", planes.time_s.len()), ("z", planes.z_m.len()), ("y", planes.y_m.len())];
-        let file = Layout { dims, globals: Vec::new(), variables };
+        let dims = vec![
+            ("time", planes.time_s.len()),
+            ("z", planes.z_m.len()),
+            ("y", planes.y_m.len()),
+        ];
+        let file = Layout {
+            dims,
+            globals: Vec::new(),
+            variables,
+        };
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("plane1_0001.nc");
-        std::fs::write(&path, file.into_bytes(&crate::io::provenance::example()).unwrap()).unwrap();
+        std::fs::write(
+            &path,
+            file.into_bytes(&crate::io::provenance::example()).unwrap(),
+        )
+        .unwrap();
         read(&path)
     }
 
@@ -160,18 +240,44 @@ mod tests {
         let planes = whole();
         for (units, scale) in [
             (["m s-1", "m", "s"], [1.0; 3]),
-            (["cm s-1", "km", "days since 2024-02-29 23:59:58"], [0.01, 1e3, 86_400.0]),
-            (["km/h", "cm", "nanoseconds since 2000-01-01"], [1.0 / 3.6, 0.01, 1e-9]),
-            (["knots", "metre", "milliseconds"], [1852.0 / 3600.0, 1.0, 1e-3]),
+            (
+                ["cm s-1", "km", "days since 2024-02-29 23:59:58"],
+                [0.01, 1e3, 86_400.0],
+            ),
+            (
+                ["km/h", "cm", "nanoseconds since 2000-01-01"],
+                [1.0 / 3.6, 0.01, 1e-9],
+            ),
+            (
+                ["knots", "metre", "milliseconds"],
+                [1852.0 / 3600.0, 1.0, 1e-3],
+            ),
             (["", "", ""], [1.0; 3]),
         ] {
             let found = with_units(units, scale).unwrap();
-            let close = |a: &[f64], b: &[f64]| a.iter().zip(b).all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs());
-            assert!(close(&found.y_m, &planes.y_m) && close(&found.z_m, &planes.z_m), "{units:?}: {:?}", found.z_m);
-            assert!(close(&found.time_s, &planes.time_s) && close(&found.tau, &planes.time_s), "{units:?}");
+            let close = |a: &[f64], b: &[f64]| {
+                a.iter()
+                    .zip(b)
+                    .all(|(a, b)| (a - b).abs() <= 1e-12 * b.abs())
+            };
+            assert!(
+                close(&found.y_m, &planes.y_m) && close(&found.z_m, &planes.z_m),
+                "{units:?}: {:?}",
+                found.z_m
+            );
+            assert!(
+                close(&found.time_s, &planes.time_s) && close(&found.tau, &planes.time_s),
+                "{units:?}"
+            );
             let flat = |field: &Array3<f64>| field.iter().copied().collect::<Vec<f64>>();
-            assert!(close(&flat(&found.v_m_s), &flat(&planes.v_m_s)), "{units:?}");
-            assert!(close(&flat(&found.w_m_s), &flat(&planes.w_m_s)), "{units:?}");
+            assert!(
+                close(&flat(&found.v_m_s), &flat(&planes.v_m_s)),
+                "{units:?}"
+            );
+            assert!(
+                close(&flat(&found.w_m_s), &flat(&planes.w_m_s)),
+                "{units:?}"
+            );
         }
         for (units, name) in [
             (["furlongs", "m", "s"], "units of v"),
@@ -187,23 +293,42 @@ mod tests {
     fn missing_values_and_missing_files_are_refused_by_name() {
         let (_folder, path) = written(&samples::planes());
         let message = read(&path).unwrap_err().to_string();
-        assert!(message.contains("plane1_0001.nc: v is missing"), "{message}");
+        assert!(
+            message.contains("plane1_0001.nc: v is missing"),
+            "{message}"
+        );
         let folder = tempfile::tempdir().unwrap();
-        let message = files(&folder.path().join("plane1")).unwrap_err().to_string();
+        let message = files(&folder.path().join("plane1"))
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("plane1_0001.nc"), "{message}");
         std::fs::write(folder.path().join("other.nc"), b"no such file").unwrap();
-        let message = read(&folder.path().join("other.nc")).unwrap_err().to_string();
+        let message = read(&folder.path().join("other.nc"))
+            .unwrap_err()
+            .to_string();
         assert!(message.contains("no NetCDF file"), "{message}");
     }
 
     #[test]
     fn numbered_files_come_in_the_order_of_their_numbers() {
         let folder = tempfile::tempdir().unwrap();
-        for name in ["plane1_0002.nc", "plane1_10000.nc", "plane1_0001.nc", "plane1_x.nc", "plane10_0001.nc"] {
+        for name in [
+            "plane1_0002.nc",
+            "plane1_10000.nc",
+            "plane1_0001.nc",
+            "plane1_x.nc",
+            "plane10_0001.nc",
+        ] {
             std::fs::write(folder.path().join(name), b"").unwrap();
         }
         let found = files(&folder.path().join("plane1")).unwrap();
-        let names: Vec<_> = found.iter().map(|p| p.file_name().unwrap().to_string_lossy().into_owned()).collect();
-        assert_eq!(names, ["plane1_0001.nc", "plane1_0002.nc", "plane1_10000.nc"]);
+        let names: Vec<_> = found
+            .iter()
+            .map(|p| p.file_name().unwrap().to_string_lossy().into_owned())
+            .collect();
+        assert_eq!(
+            names,
+            ["plane1_0001.nc", "plane1_0002.nc", "plane1_10000.nc"]
+        );
     }
 }

@@ -20,12 +20,20 @@ pub struct Provenance {
 impl Provenance {
     /// Of this program.
     pub fn new(scene_toml: &str, scene_hash: &str, seed: u64) -> Self {
-        Self { program: crate::PROGRAM.into(), scene_toml: scene_toml.into(), scene_hash: scene_hash.into(), seed }
+        Self {
+            program: crate::PROGRAM.into(),
+            scene_toml: scene_toml.into(),
+            scene_hash: scene_hash.into(),
+            seed,
+        }
     }
 
     /// The scene with every default written out, as a file that this program knows for its own: running it again gives the same files.
     pub fn scene_file(&self) -> String {
-        format!("# {}, scene {}\n{}", self.program, self.scene_hash, self.scene_toml)
+        format!(
+            "# {}, scene {}\n{}",
+            self.program, self.scene_hash, self.scene_toml
+        )
     }
 
     /// The entries as (key, text), in the order in which every writer puts them.
@@ -41,9 +49,15 @@ impl Provenance {
     /// The entries as comment lines `# key: value` that end with a line feed; the scene follows its key line by line, indented.
     pub fn comment_lines(&self) -> String {
         let [source, seed, hash, (_, scene)] = self.entries();
-        let entry = |(key, text): (&str, String)| format!("# {key}: {}\n", text.replace(['\n', '\r'], " "));
+        let entry =
+            |(key, text): (&str, String)| format!("# {key}: {}\n", text.replace(['\n', '\r'], " "));
         // A comment must stay one line for every reader of the table.
-        let line = |line: &str| format!("#   {}", line.replace('\r', " ")).trim_end().to_owned() + "\n";
+        let line = |line: &str| {
+            format!("#   {}", line.replace('\r', " "))
+                .trim_end()
+                .to_owned()
+                + "\n"
+        };
         let entries: String = [source, seed, hash].map(entry).concat();
         entries + "# scene:\n" + &scene.lines().map(line).collect::<String>()
     }
@@ -51,7 +65,11 @@ impl Provenance {
 
 /// The short name of a text: the first 16 hexadecimal digits of its SHA-256.
 pub fn hash_of(text: &str) -> String {
-    Sha256::digest(text.as_bytes()).iter().take(8).map(|b| format!("{b:02x}")).collect()
+    Sha256::digest(text.as_bytes())
+        .iter()
+        .take(8)
+        .map(|b| format!("{b:02x}"))
+        .collect()
 }
 
 #[cfg(test)]
@@ -71,7 +89,11 @@ mod tests {
     #[test]
     fn every_line_of_the_scene_is_a_comment() {
         let text = example().comment_lines();
-        assert!(text.lines().all(|l| l.starts_with('#') && l == l.trim_end()), "{text}");
+        assert!(
+            text.lines()
+                .all(|l| l.starts_with('#') && l == l.trim_end()),
+            "{text}"
+        );
         assert!(text.contains("# seed: 18446744073709551615\n"));
         assert!(text.contains("#   [laser]\n"));
         assert!(text.ends_with('\n'));

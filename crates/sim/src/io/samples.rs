@@ -21,8 +21,11 @@ pub(crate) fn map() -> VelocityMap {
         }
     }
     let shape = (rays.len(), gates);
-    let wave =
-        |phase: f64| Array2::from_shape_fn(shape, |(r, g)| (r as f64 * 0.7 + g as f64 * 1.3 + phase).sin() * 8.0);
+    let wave = |phase: f64| {
+        Array2::from_shape_fn(shape, |(r, g)| {
+            (r as f64 * 0.7 + g as f64 * 1.3 + phase).sin() * 8.0
+        })
+    };
     let mut mean = wave(0.1);
     mean[[11, 4]] = f64::NAN;
     let positive = |scale: f64| wave(0.0).mapv(|v| scale * (v.abs() + 0.5));
@@ -30,7 +33,9 @@ pub(crate) fn map() -> VelocityMap {
         title: "two sweeps".into(),
         rays,
         range_m: (0..gates).map(|g| 45.0 + 30.0 * g as f64).collect(),
-        sweeps: [2.5, 5.0].map(|tau| Sweep::rhi(tau, std::f64::consts::FRAC_PI_2)).to_vec(),
+        sweeps: [2.5, 5.0]
+            .map(|tau| Sweep::rhi(tau, std::f64::consts::FRAC_PI_2))
+            .to_vec(),
         pulse: PulseInfo {
             prt_s: 5e-5,
             pulse_width_s: 2e-7,
@@ -70,10 +75,25 @@ pub(crate) fn map() -> VelocityMap {
                 "standard deviation of the estimate",
                 positive(0.05),
             ),
-            Field::float("rms", Unit::METRE_PER_SECOND, "root mean square error", positive(0.06)),
+            Field::float(
+                "rms",
+                Unit::METRE_PER_SECOND,
+                "root mean square error",
+                positive(0.06),
+            ),
             Field::float("level", Unit::ONE, "accumulation level", positive(3.0)),
-            Field::float("n_eff", Unit::ONE, "effective number of independent spectra", positive(2.0)),
-            Field::float("signal_to_noise_ratio", Unit::DECIBEL, "signal-to-noise ratio", wave(1.0)),
+            Field::float(
+                "n_eff",
+                Unit::ONE,
+                "effective number of independent spectra",
+                positive(2.0),
+            ),
+            Field::float(
+                "signal_to_noise_ratio",
+                Unit::DECIBEL,
+                "signal-to-noise ratio",
+                wave(1.0),
+            ),
         ],
         lidar_y_m: -150.0,
         lidar_height_m: 2.0,
@@ -86,7 +106,9 @@ pub(crate) fn map() -> VelocityMap {
 /// Two planes on a stretched mesh of 5 x 4 cells, one value missing.
 pub(crate) fn planes() -> CrossPlanes {
     let shape = (2, 4, 5);
-    let mut v_m_s = Array3::from_shape_fn(shape, |(t, z, y)| t as f64 + 0.1 * z as f64 - 0.01 * y as f64);
+    let mut v_m_s = Array3::from_shape_fn(shape, |(t, z, y)| {
+        t as f64 + 0.1 * z as f64 - 0.01 * y as f64
+    });
     v_m_s[[0, 0, 0]] = f64::NAN;
     CrossPlanes {
         title: "planes".into(),

@@ -56,22 +56,62 @@ impl RawSignals<'_> {
     /// Lengths that do not match, times that do not increase, values that are not finite.
     pub fn check(&self) -> OutputResult<()> {
         increasing("time_s", &self.time_s)?;
-        same_length("current_a", self.current_a.ncols(), "time_s", self.time_s.len())?;
+        same_length(
+            "current_a",
+            self.current_a.ncols(),
+            "time_s",
+            self.time_s.len(),
+        )?;
         let pulses = self.elevation_rad.len();
-        same_length("current_a", self.current_a.nrows(), "elevation_rad", pulses * self.realisations())?;
-        same_length("pulse_time_s", self.pulse_time_s.len(), "elevation_rad", pulses)?;
+        same_length(
+            "current_a",
+            self.current_a.nrows(),
+            "elevation_rad",
+            pulses * self.realisations(),
+        )?;
+        same_length(
+            "pulse_time_s",
+            self.pulse_time_s.len(),
+            "elevation_rad",
+            pulses,
+        )?;
         if !self.azimuth_rad.is_empty() {
-            same_length("azimuth_rad", self.azimuth_rad.len(), "elevation_rad", pulses)?;
+            same_length(
+                "azimuth_rad",
+                self.azimuth_rad.len(),
+                "elevation_rad",
+                pulses,
+            )?;
         }
         if let Some(quadrature) = &self.quadrature_a {
-            same_length("quadrature_a", quadrature.nrows(), "current_a", self.current_a.nrows())?;
-            same_length("quadrature_a", quadrature.ncols(), "time_s", self.time_s.len())?;
+            same_length(
+                "quadrature_a",
+                quadrature.nrows(),
+                "current_a",
+                self.current_a.nrows(),
+            )?;
+            same_length(
+                "quadrature_a",
+                quadrature.ncols(),
+                "time_s",
+                self.time_s.len(),
+            )?;
         }
         increasing("range_m", &self.range_m)?;
         let (lines, ranges) = self.radial_velocity_m_s.dim();
         same_length("radial_velocity_m_s", ranges, "range_m", self.range_m.len())?;
-        same_length("radial_velocity_m_s", lines, "the lines", self.first_pulse.len())?;
-        match self.current_a.iter().chain(self.quadrature_a.iter().flatten()).find(|a| !a.is_finite()) {
+        same_length(
+            "radial_velocity_m_s",
+            lines,
+            "the lines",
+            self.first_pulse.len(),
+        )?;
+        match self
+            .current_a
+            .iter()
+            .chain(self.quadrature_a.iter().flatten())
+            .find(|a| !a.is_finite())
+        {
             Some(bad) => Err(OutputError::value("current_a", bad, "must be finite")),
             None => Ok(()),
         }
@@ -94,9 +134,14 @@ impl RawSignals<'_> {
         let table = Table::new()
             .int("ray", cells().map(|(ray, _)| ray as i64))
             .float("time_s", cells().map(|(_, k)| self.time_s[k]))
-            .float("current_a", cells().map(|(ray, k)| self.current_a[[ray, k]]));
+            .float(
+                "current_a",
+                cells().map(|(ray, k)| self.current_a[[ray, k]]),
+            );
         Ok(match &self.quadrature_a {
-            Some(quadrature) => table.float("quadrature_a", cells().map(|(ray, k)| quadrature[[ray, k]])),
+            Some(quadrature) => {
+                table.float("quadrature_a", cells().map(|(ray, k)| quadrature[[ray, k]]))
+            }
             None => table,
         })
     }
@@ -146,11 +191,36 @@ mod tests {
         let signals = example();
         let table = signals.table().unwrap();
         let current = &table.columns()[2].1;
-        assert_eq!(*current, crate::io::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0]));
+        assert_eq!(
+            *current,
+            crate::io::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0])
+        );
         assert_eq!(signals.realisations(), 2);
-        assert!(RawSignals { time_s: vec![1.0], ..signals.clone() }.check().is_err());
-        assert!(RawSignals { pulse_time_s: vec![1.0], ..signals.clone() }.check().is_err());
+        assert!(
+            RawSignals {
+                time_s: vec![1.0],
+                ..signals.clone()
+            }
+            .check()
+            .is_err()
+        );
+        assert!(
+            RawSignals {
+                pulse_time_s: vec![1.0],
+                ..signals.clone()
+            }
+            .check()
+            .is_err()
+        );
         let odd = signals.current_a.slice_move(ndarray::s![..7, ..]);
-        assert!(RawSignals { current_a: odd, ..signals }.check().is_err(), "half a realisation");
+        assert!(
+            RawSignals {
+                current_a: odd,
+                ..signals
+            }
+            .check()
+            .is_err(),
+            "half a realisation"
+        );
     }
 }

@@ -14,7 +14,8 @@ pub fn map_table(map: &VelocityMap) -> OutputResult<Table> {
     map.check()?;
     let gates = map.range_m.len();
     let cells = || (0..map.rays.len() * gates).map(|cell| (cell / gates, cell % gates));
-    let per_ray = |get: &dyn Fn(usize) -> f64| -> Vec<f64> { cells().map(|(r, _)| get(r)).collect() };
+    let per_ray =
+        |get: &dyn Fn(usize) -> f64| -> Vec<f64> { cells().map(|(r, _)| get(r)).collect() };
     let mut table = Table::new()
         .float("tau", per_ray(&|r| map.sweeps[map.rays[r].sweep].tau))
         .float("range_m", cells().map(|(_, g)| map.range_m[g]))
@@ -70,7 +71,10 @@ mod tests {
         let table = map_table(&map).unwrap();
         let (ray, gate) = (7, 3);
         let row = ray * map.range_m.len() + gate;
-        assert_eq!(floats(&table, "v_mean_m_s")[row], map.field("radial_velocity").unwrap().values[[ray, gate]]);
+        assert_eq!(
+            floats(&table, "v_mean_m_s")[row],
+            map.field("radial_velocity").unwrap().values[[ray, gate]]
+        );
         let (y, z) = (floats(&table, "y_m")[row], floats(&table, "z_m")[row]);
         let range = (y - map.lidar_y_m).hypot(z - map.lidar_height_m);
         approx::assert_relative_eq!(range, map.range_m[gate], max_relative = 1e-14);
@@ -80,8 +84,25 @@ mod tests {
             max_relative = 1e-12
         );
         let names: Vec<&str> = table.columns().iter().map(|(n, _)| n.as_str()).collect();
-        assert_eq!(names[..6], ["tau", "range_m", "elevation_rad", "y_m", "z_m", "v_exact_m_s"]);
-        for name in ["v_mean_m_s", "std_m_s", "rms_m_s", "level", "n_eff", "snr_db"] {
+        assert_eq!(
+            names[..6],
+            [
+                "tau",
+                "range_m",
+                "elevation_rad",
+                "y_m",
+                "z_m",
+                "v_exact_m_s"
+            ]
+        );
+        for name in [
+            "v_mean_m_s",
+            "std_m_s",
+            "rms_m_s",
+            "level",
+            "n_eff",
+            "snr_db",
+        ] {
             assert!(names.contains(&name), "{name} missing in {names:?}");
         }
     }
@@ -105,17 +126,32 @@ mod tests {
             spoil(&mut map);
             map_table(&map).unwrap_err()
         };
-        assert!(matches!(refused(&|m| m.range_m[1] = m.range_m[0]), OutputError::Value { .. }));
-        assert!(matches!(refused(&|m| m.rays[1].time_s = m.rays[0].time_s), OutputError::Value { .. }));
-        assert!(matches!(refused(&|m| m.rays[2].sweep = 1), OutputError::Value { .. }));
+        assert!(matches!(
+            refused(&|m| m.range_m[1] = m.range_m[0]),
+            OutputError::Value { .. }
+        ));
+        assert!(matches!(
+            refused(&|m| m.rays[1].time_s = m.rays[0].time_s),
+            OutputError::Value { .. }
+        ));
+        assert!(matches!(
+            refused(&|m| m.rays[2].sweep = 1),
+            OutputError::Value { .. }
+        ));
         assert!(matches!(
             refused(&|m| {
                 m.sweeps.pop();
             }),
             OutputError::Length { .. }
         ));
-        assert!(matches!(refused(&|m| m.fields[0].values[[0, 0]] = f64::INFINITY), OutputError::Value { .. }));
-        assert!(matches!(refused(&|m| m.fields[1].name = m.fields[0].name.clone()), OutputError::Duplicate { .. }));
+        assert!(matches!(
+            refused(&|m| m.fields[0].values[[0, 0]] = f64::INFINITY),
+            OutputError::Value { .. }
+        ));
+        assert!(matches!(
+            refused(&|m| m.fields[1].name = m.fields[0].name.clone()),
+            OutputError::Duplicate { .. }
+        ));
         assert!(matches!(
             refused(&|m| {
                 m.range_m.pop();

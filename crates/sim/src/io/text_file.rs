@@ -14,10 +14,14 @@ const LARGEST_BYTES: u64 = 16 << 20;
 pub(crate) fn open(path: &Path) -> Result<(File, u64)> {
     let about = std::fs::metadata(path)?;
     if about.is_dir() {
-        return Err(Error::new(ErrorKind::IsADirectory, "it is a folder, a file is needed"));
+        return Err(Error::new(
+            ErrorKind::IsADirectory,
+            "it is a folder, a file is needed",
+        ));
     }
     if !about.is_file() {
-        let reason = "it is no regular file but a device or a pipe: write its content to a file first";
+        let reason =
+            "it is no regular file but a device or a pipe: write its content to a file first";
         return Err(Error::new(ErrorKind::InvalidInput, reason));
     }
     Ok((File::open(path)?, about.len()))
@@ -46,12 +50,18 @@ pub(crate) fn read(path: &Path) -> Result<String> {
     // Files of the system may say that they are empty and still have no end.
     file.take(LARGEST_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > LARGEST_BYTES {
-        let reason = format!("it is larger than {} MiB: no scene and no case is", LARGEST_BYTES >> 20);
+        let reason = format!(
+            "it is larger than {} MiB: no scene and no case is",
+            LARGEST_BYTES >> 20
+        );
         return Err(Error::new(ErrorKind::FileTooLarge, reason));
     }
     String::from_utf8(bytes).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
-        Error::new(ErrorKind::InvalidData, format!("it is no text in UTF-8: byte {} is not", at + 1))
+        Error::new(
+            ErrorKind::InvalidData,
+            format!("it is no text in UTF-8: byte {} is not", at + 1),
+        )
     })
 }
 
@@ -67,10 +77,23 @@ mod tests {
         assert_eq!(read(&path).unwrap(), "seed = 1\n");
         std::fs::write(&path, b"seed = \xff\n").unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("byte 8"));
-        File::create(&path).unwrap().set_len(LARGEST_BYTES + 1).unwrap();
+        File::create(&path)
+            .unwrap()
+            .set_len(LARGEST_BYTES + 1)
+            .unwrap();
         assert!(read(&path).unwrap_err().to_string().contains("16 MiB"));
-        assert!(read(folder.path()).unwrap_err().to_string().contains("folder"));
+        assert!(
+            read(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("folder")
+        );
         #[cfg(unix)]
-        assert!(read(Path::new("/dev/zero")).unwrap_err().to_string().contains("device"));
+        assert!(
+            read(Path::new("/dev/zero"))
+                .unwrap_err()
+                .to_string()
+                .contains("device")
+        );
     }
 }

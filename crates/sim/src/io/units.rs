@@ -28,13 +28,17 @@ impl Quantity {
             "" => Some(1.0),
             // Not "per millisecond".
             "ms-1" | "ms^-1" if self == Self::Velocity => Some(1.0),
-            text => product(text).filter(|(_, powers)| *powers == self.powers()).map(|(factor, _)| factor),
+            text => product(text)
+                .filter(|(_, powers)| *powers == self.powers())
+                .map(|(factor, _)| factor),
         };
         factor.ok_or_else(|| {
             match self {
                 Self::Length => "a unit of length is needed, such as m, km or cm",
                 Self::Time => "a unit of time is needed: s, ms, us, ns, minutes, hours or days",
-                Self::Velocity => "a unit of velocity is needed, such as m s-1, cm s-1, km/h or knots",
+                Self::Velocity => {
+                    "a unit of velocity is needed, such as m s-1, cm s-1, km/h or knots"
+                }
             }
             .to_owned()
         })
@@ -43,14 +47,19 @@ impl Quantity {
 
 /// The factor of a product of units in SI, and its powers of length and time.
 fn product(text: &str) -> Option<(f64, [i32; 2])> {
-    let spaced = text.replace("**", "^").replace('/', " / ").replace(['.', '*', '_'], " ");
+    let spaced = text
+        .replace("**", "^")
+        .replace('/', " / ")
+        .replace(['.', '*', '_'], " ");
     let (mut factor, mut powers, mut sign) = (1.0_f64, [0; 2], 1);
     for word in spaced.split_whitespace() {
         if word == "/" || word == "per" {
             sign = -1;
             continue;
         }
-        let end = word.find(|c: char| !c.is_alphabetic()).unwrap_or(word.len());
+        let end = word
+            .find(|c: char| !c.is_alphabetic())
+            .unwrap_or(word.len());
         let power = match word[end..].trim_start_matches('^') {
             "" => 1,
             power => power.parse::<i32>().ok().filter(|power| power.abs() < 10)?,
@@ -71,10 +80,17 @@ const UNITS: &str = include_str!("units.csv");
 /// One unit in SI, and its powers.
 fn base(word: &str) -> Option<(f64, [i32; 2])> {
     let lower = word.to_lowercase();
-    let row = UNITS.lines().find_map(|row| row.split_once(',').filter(|(unit, _)| *unit == lower))?.1;
-    let (factor, (length, time)) =
-        row.split_once(',').and_then(|(factor, powers)| Some((factor, powers.split_once(',')?)))?;
-    Some((factor.parse().ok()?, [length.parse().ok()?, time.parse().ok()?]))
+    let row = UNITS
+        .lines()
+        .find_map(|row| row.split_once(',').filter(|(unit, _)| *unit == lower))?
+        .1;
+    let (factor, (length, time)) = row
+        .split_once(',')
+        .and_then(|(factor, powers)| Some((factor, powers.split_once(',')?)))?;
+    Some((
+        factor.parse().ok()?,
+        [length.parse().ok()?, time.parse().ok()?],
+    ))
 }
 
 #[cfg(test)]
@@ -87,9 +103,18 @@ mod tests {
             let found = quantity.si(text).unwrap_or_else(|e| panic!("{text}: {e}"));
             assert!((found / expected - 1.0).abs() < 1e-14, "{text}: {found}");
         };
-        for text in
-            ["m s-1", "m/s", "m s^-1", "m.s-1", "meters per second", "metre second-1", "m s**-1", "", "m_s-1", "ms-1"]
-        {
+        for text in [
+            "m s-1",
+            "m/s",
+            "m s^-1",
+            "m.s-1",
+            "meters per second",
+            "metre second-1",
+            "m s**-1",
+            "",
+            "m_s-1",
+            "ms-1",
+        ] {
             close(Quantity::Velocity, text, 1.0);
         }
         for (text, expected) in [
@@ -101,9 +126,14 @@ mod tests {
         ] {
             close(Quantity::Velocity, text, expected);
         }
-        for (text, expected) in
-            [("m", 1.0), ("km", 1e3), ("Kilometers", 1e3), ("cm", 0.01), ("mm", 1e-3), ("metre", 1.0)]
-        {
+        for (text, expected) in [
+            ("m", 1.0),
+            ("km", 1e3),
+            ("Kilometers", 1e3),
+            ("cm", 0.01),
+            ("mm", 1e-3),
+            ("metre", 1.0),
+        ] {
             close(Quantity::Length, text, expected);
         }
         for (text, expected) in [

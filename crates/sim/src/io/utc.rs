@@ -42,7 +42,11 @@ impl UtcTime {
     /// The second in which the time `seconds` later lies.
     #[must_use]
     pub fn after_s(self, seconds: f64) -> Self {
-        Self(self.0.saturating_add(SignedDuration::from_secs(seconds.floor() as i64)).unwrap_or(self.0))
+        Self(
+            self.0
+                .saturating_add(SignedDuration::from_secs(seconds.floor() as i64))
+                .unwrap_or(self.0),
+        )
     }
 
     /// Year, month and day.
@@ -73,15 +77,28 @@ mod tests {
         assert_eq!(at("2024-01-01T00:00:00Z"), UtcTime::SYNTHETIC);
         // From a table of Unix times.
         assert_eq!(at("2001-09-09T01:46:40Z").0.as_second(), 1_000_000_000);
-        assert_eq!(at("2000-02-29T23:59:59Z").after_s(1.0).to_string(), "2000-03-01T00:00:00Z");
-        assert_eq!(at("1900-02-28T00:00:00Z").after_s(DAY_S).to_string(), "1900-03-01T00:00:00Z", "no leap year");
-        assert_eq!(at("2024-01-01T00:00:00Z").after_s(-0.5).to_string(), "2023-12-31T23:59:59Z");
+        assert_eq!(
+            at("2000-02-29T23:59:59Z").after_s(1.0).to_string(),
+            "2000-03-01T00:00:00Z"
+        );
+        assert_eq!(
+            at("1900-02-28T00:00:00Z").after_s(DAY_S).to_string(),
+            "1900-03-01T00:00:00Z",
+            "no leap year"
+        );
+        assert_eq!(
+            at("2024-01-01T00:00:00Z").after_s(-0.5).to_string(),
+            "2023-12-31T23:59:59Z"
+        );
         // Every day of three centuries is the one after the day before, and comes back.
         let (mut day, last) = (at("1900-01-01T00:00:00Z"), at("2199-12-31T00:00:00Z"));
         let mut count = 1;
         while day < last {
             let next = day.after_s(DAY_S);
-            assert!(next.date() > day.date() && UtcTime::parse(&next.to_string()) == Some(next), "{next}");
+            assert!(
+                next.date() > day.date() && UtcTime::parse(&next.to_string()) == Some(next),
+                "{next}"
+            );
             (day, count) = (next, count + 1);
         }
         assert_eq!(count, 300 * 365 + 73, "73 leap years from 1900 to 2199");

@@ -12,9 +12,13 @@ use base64::prelude::{BASE64_STANDARD, Engine as _};
 use ndarray::{Array3, Axis};
 
 /// The collection of a series of files: members with their times, in this order.
-pub fn pvd_bytes<'a>(members: impl IntoIterator<Item = (f64, &'a str)>, provenance: &Provenance) -> Vec<u8> {
-    let entry =
-        |(time, name): (f64, &str)| format!("    <DataSet timestep=\"{time:?}\" part=\"0\" file=\"{name}\"/>\n");
+pub fn pvd_bytes<'a>(
+    members: impl IntoIterator<Item = (f64, &'a str)>,
+    provenance: &Provenance,
+) -> Vec<u8> {
+    let entry = |(time, name): (f64, &str)| {
+        format!("    <DataSet timestep=\"{time:?}\" part=\"0\" file=\"{name}\"/>\n")
+    };
     let entries: String = members.into_iter().map(entry).collect();
     format!(
         "<?xml version=\"1.0\"?>\n{}<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n{entries}  </Collection>\n</VTKFile>\n",
@@ -29,7 +33,11 @@ pub fn pvd_bytes<'a>(members: impl IntoIterator<Item = (f64, &'a str)>, provenan
 ///
 /// # Errors
 /// What [`VelocityField::check`] finds.
-pub fn field_parts(field: &VelocityField, behind: Option<&[f64]>, provenance: &Provenance) -> OutputResult<FileParts> {
+pub fn field_parts(
+    field: &VelocityField,
+    behind: Option<&[f64]>,
+    provenance: &Provenance,
+) -> OutputResult<FileParts> {
     field.check()?;
     let cells = field.x_m.len() * field.y_m.len() * field.z_m.len();
     let named: Vec<&[f64]> = field.named().map(|(_, values)| values).collect();
@@ -41,25 +49,62 @@ pub fn field_parts(field: &VelocityField, behind: Option<&[f64]>, provenance: &P
         first: field.first(),
     };
     let mut arrays = vec![array("velocity", 0..3), array("pressure_m2_s2", 3..4)];
-    arrays.extend(field.vorticity_per_s.is_some().then(|| array("vorticity_magnitude", 4..5)));
-    Ok(grid([&field.x_m, &field.y_m, &field.z_m], &arrays, field.share.is_first, provenance))
+    arrays.extend(
+        field
+            .vorticity_per_s
+            .is_some()
+            .then(|| array("vorticity_magnitude", 4..5)),
+    );
+    Ok(grid(
+        [&field.x_m, &field.y_m, &field.z_m],
+        &arrays,
+        field.share.is_first,
+        provenance,
+    ))
 }
 
 /// The plane of one age, at one point of x.
 ///
 /// # Errors
 /// What [`CrossPlanes::check`] finds.
-pub fn plane_bytes(planes: &CrossPlanes, age: usize, provenance: &Provenance) -> OutputResult<Vec<u8>> {
+pub fn plane_bytes(
+    planes: &CrossPlanes,
+    age: usize,
+    provenance: &Provenance,
+) -> OutputResult<Vec<u8>> {
     planes.check()?;
-    let of = |field: &Array3<f64>| field.index_axis(Axis(0), age).iter().copied().collect::<Vec<f64>>();
+    let of = |field: &Array3<f64>| {
+        field
+            .index_axis(Axis(0), age)
+            .iter()
+            .copied()
+            .collect::<Vec<f64>>()
+    };
     let [v, w] = [of(&planes.v_m_s), of(&planes.w_m_s)];
     let u = vec![0.0; v.len()];
-    let velocity = Array { name: "velocity", values: vec![&u, &v, &w], behind: &[], cells: v.len(), first: 0 };
-    Ok(grid([&[0.0], &planes.y_m, &planes.z_m], &[velocity], true, provenance).into_bytes())
+    let velocity = Array {
+        name: "velocity",
+        values: vec![&u, &v, &w],
+        behind: &[],
+        cells: v.len(),
+        first: 0,
+    };
+    Ok(grid(
+        [&[0.0], &planes.y_m, &planes.z_m],
+        &[velocity],
+        true,
+        provenance,
+    )
+    .into_bytes())
 }
 
 /// A grid with its arrays at the points of these axes, the first one fastest: all of it, or what a rank has that has `is_first` or not.
-fn grid(axes: [&[f64]; 3], arrays: &[Array<'_>], is_first: bool, provenance: &Provenance) -> FileParts {
+fn grid(
+    axes: [&[f64]; 3],
+    arrays: &[Array<'_>],
+    is_first: bool,
+    provenance: &Provenance,
+) -> FileParts {
     let extent = axes.map(|axis| format!("0 {}", axis.len() - 1)).join(" ");
     let scalars = arrays.iter().find(|array| array.values.len() == 1);
     let scalars = scalars.map_or_else(String::new, |array| format!("Scalars=\"{}\" ", array.name));
@@ -92,11 +137,19 @@ fn grid(axes: [&[f64]; 3], arrays: &[Array<'_>], is_first: bool, provenance: &Pr
     text += "</PointData><CellData/><Coordinates>";
     for axis in axes {
         let length = (8 * axis.len() as u64).to_le_bytes();
-        let bytes: Vec<u8> = length.into_iter().chain(axis.iter().flat_map(|value| value.to_le_bytes())).collect();
+        let bytes: Vec<u8> = length
+            .into_iter()
+            .chain(axis.iter().flat_map(|value| value.to_le_bytes()))
+            .collect();
         let digits = BASE64_STANDARD.encode(bytes);
-        text += &format!("<DataArray type=\"Float64\" format=\"binary\" NumberOfComponents=\"1\">{digits}</DataArray>");
+        text += &format!(
+            "<DataArray type=\"Float64\" format=\"binary\" NumberOfComponents=\"1\">{digits}</DataArray>"
+        );
     }
-    add(&mut file, text + "</Coordinates></Piece></RectilinearGrid></VTKFile>");
+    add(
+        &mut file,
+        text + "</Coordinates></Piece></RectilinearGrid></VTKFile>",
+    );
     file
 }
 
@@ -133,15 +186,41 @@ impl Array<'_> {
             bytes.extend((self.before(self.cells) as u64 - 8).to_le_bytes());
         }
         for cell in 0..cells {
-            bytes.extend(self.values.iter().flat_map(|values| (values[cell] as f32).to_le_bytes()));
+            bytes.extend(
+                self.values
+                    .iter()
+                    .flat_map(|values| (values[cell] as f32).to_le_bytes()),
+            );
         }
-        bytes.extend(self.behind.iter().flat_map(|value| (*value as f32).to_le_bytes()));
+        bytes.extend(
+            self.behind
+                .iter()
+                .flat_map(|value| (*value as f32).to_le_bytes()),
+        );
         // Three bytes make four digits, which belong to who has the first of these.
-        let from = if self.first == 0 { 0 } else { self.before(self.first).next_multiple_of(3) };
-        let to = if end == self.cells { self.before(end) } else { self.before(end).next_multiple_of(3) };
-        let here = if self.first == 0 { 0 } else { self.before(self.first) };
-        let own = bytes.get(from - here..to - here).filter(|_| cells > 0).unwrap_or_default();
-        ((from / 3 * 4) as u64, BASE64_STANDARD.encode(own).into_bytes())
+        let from = if self.first == 0 {
+            0
+        } else {
+            self.before(self.first).next_multiple_of(3)
+        };
+        let to = if end == self.cells {
+            self.before(end)
+        } else {
+            self.before(end).next_multiple_of(3)
+        };
+        let here = if self.first == 0 {
+            0
+        } else {
+            self.before(self.first)
+        };
+        let own = bytes
+            .get(from - here..to - here)
+            .filter(|_| cells > 0)
+            .unwrap_or_default();
+        (
+            (from / 3 * 4) as u64,
+            BASE64_STANDARD.encode(own).into_bytes(),
+        )
     }
 }
 
@@ -157,7 +236,8 @@ mod tests {
     use super::super::samples;
     use super::*;
     use vtkio::model::{
-        Attribute, Attributes, ByteOrder, Coordinates, DataSet, Extent, Piece, RectilinearGridPiece, Version, Vtk,
+        Attribute, Attributes, ByteOrder, Coordinates, DataSet, Extent, Piece,
+        RectilinearGridPiece, Version, Vtk,
     };
 
     /// What another encoder makes of a grid.
@@ -166,8 +246,15 @@ mod tests {
         let range = |axis: &[f64]| 0..=(axis.len() as i32 - 1);
         let grid = RectilinearGridPiece {
             extent: Extent::Ranges([range(&x), range(&y), range(&z)]),
-            coords: Coordinates { x: x.into(), y: y.into(), z: z.into() },
-            data: Attributes { point, cell: vec![] },
+            coords: Coordinates {
+                x: x.into(),
+                y: y.into(),
+                z: z.into(),
+            },
+            data: Attributes {
+                point,
+                cell: vec![],
+            },
         };
         let file = Vtk {
             version: Version::new((1, 0)),
@@ -186,15 +273,34 @@ mod tests {
         let planes = samples::planes();
         let file = plane_bytes(&planes, 1, &example()).unwrap();
         let vtk = Vtk::parse_xml(file.as_slice()).unwrap();
-        let DataSet::RectilinearGrid { pieces, .. } = vtk.data else { panic!("no rectilinear grid") };
-        let Piece::Inline(grid) = &pieces[0] else { panic!("no inline piece") };
-        assert_eq!(grid.coords.y.clone().cast_into::<f64>().unwrap(), planes.y_m);
-        assert_eq!(grid.coords.z.clone().cast_into::<f64>().unwrap(), planes.z_m);
-        let Attribute::DataArray(array) = &grid.data.point[0] else { panic!("no point data") };
+        let DataSet::RectilinearGrid { pieces, .. } = vtk.data else {
+            panic!("no rectilinear grid")
+        };
+        let Piece::Inline(grid) = &pieces[0] else {
+            panic!("no inline piece")
+        };
+        assert_eq!(
+            grid.coords.y.clone().cast_into::<f64>().unwrap(),
+            planes.y_m
+        );
+        assert_eq!(
+            grid.coords.z.clone().cast_into::<f64>().unwrap(),
+            planes.z_m
+        );
+        let Attribute::DataArray(array) = &grid.data.point[0] else {
+            panic!("no point data")
+        };
         let velocity = array.data.clone().cast_into::<f32>().unwrap();
         let (ny, z, y) = (planes.y_m.len(), 2, 3);
         let vector = &velocity[3 * (z * ny + y)..][..3];
-        assert_eq!(vector, [0.0, planes.v_m_s[[1, z, y]] as f32, planes.w_m_s[[1, z, y]] as f32]);
+        assert_eq!(
+            vector,
+            [
+                0.0,
+                planes.v_m_s[[1, z, y]] as f32,
+                planes.w_m_s[[1, z, y]] as f32
+            ]
+        );
         let point = vec![Attribute::vectors("velocity").with_data(velocity.clone())];
         assert!(file == encoded([&[0.0], &planes.y_m, &planes.z_m], point));
     }
@@ -220,7 +326,12 @@ mod tests {
                 field
             };
             let field = keep(super::super::fields::example());
-            let floats = |values: &[f64]| values.iter().map(|value| *value as f32).collect::<Vec<f32>>();
+            let floats = |values: &[f64]| {
+                values
+                    .iter()
+                    .map(|value| *value as f32)
+                    .collect::<Vec<f32>>()
+            };
             let [u, v, w] = field.velocity_m_s.each_ref().map(|values| floats(values));
             let velocity: Vec<f32> = (0..u.len()).flat_map(|i| [u[i], v[i], w[i]]).collect();
             let mut point = vec![
@@ -235,33 +346,57 @@ mod tests {
             );
             let expected = encoded([&field.x_m, &field.y_m, &field.z_m], point);
             assert!(field_parts(&field, None, &example()).unwrap().into_bytes() == expected);
-            let ranks: Vec<VelocityField> = super::super::fields::example_on_ranks().into_iter().map(keep).collect();
+            let ranks: Vec<VelocityField> = super::super::fields::example_on_ranks()
+                .into_iter()
+                .map(keep)
+                .collect();
             let mut file = FileParts::default();
             for rank in &ranks {
-                let next = ranks
-                    .iter()
-                    .find(|next| next.share.planes.start == rank.share.planes.end && !next.share.planes.is_empty());
-                let behind: Option<Vec<f64>> = next.map(|next| next.named().map(|(_, values)| values[0]).collect());
+                let next = ranks.iter().find(|next| {
+                    next.share.planes.start == rank.share.planes.end
+                        && !next.share.planes.is_empty()
+                });
+                let behind: Option<Vec<f64>> =
+                    next.map(|next| next.named().map(|(_, values)| values[0]).collect());
                 let parts = field_parts(rank, behind.as_deref(), &example()).unwrap();
                 file.length = parts.length;
                 file.parts.extend(parts.parts);
             }
-            assert!(file.into_bytes() == expected, "ranks, vorticity: {with_vorticity}");
+            assert!(
+                file.into_bytes() == expected,
+                "ranks, vorticity: {with_vorticity}"
+            );
         }
     }
 
     #[test]
     fn a_whole_field_reads_back_with_x_fastest() {
         let field = super::super::fields::example();
-        let vtk = Vtk::parse_xml(field_parts(&field, None, &example()).unwrap().into_bytes().as_slice()).unwrap();
-        let DataSet::RectilinearGrid { pieces, .. } = vtk.data else { panic!("no rectilinear grid") };
-        let Piece::Inline(grid) = &pieces[0] else { panic!("no inline piece") };
+        let vtk = Vtk::parse_xml(
+            field_parts(&field, None, &example())
+                .unwrap()
+                .into_bytes()
+                .as_slice(),
+        )
+        .unwrap();
+        let DataSet::RectilinearGrid { pieces, .. } = vtk.data else {
+            panic!("no rectilinear grid")
+        };
+        let Piece::Inline(grid) = &pieces[0] else {
+            panic!("no inline piece")
+        };
         assert_eq!(grid.coords.x.clone().cast_into::<f64>().unwrap(), field.x_m);
-        let Attribute::DataArray(array) = &grid.data.point[0] else { panic!("no point data") };
+        let Attribute::DataArray(array) = &grid.data.point[0] else {
+            panic!("no point data")
+        };
         let velocity = array.data.clone().cast_into::<f32>().unwrap();
         let place = (3 * field.y_m.len() + 1) * field.x_m.len() + 2;
-        assert_eq!(velocity[3 * place..][..3], field.velocity_m_s.each_ref().map(|u| u[place] as f32));
-        let pvd = String::from_utf8(pvd_bytes([(0.5, "a.vtr"), (1.0, "b.vtr")], &example())).unwrap();
+        assert_eq!(
+            velocity[3 * place..][..3],
+            field.velocity_m_s.each_ref().map(|u| u[place] as f32)
+        );
+        let pvd =
+            String::from_utf8(pvd_bytes([(0.5, "a.vtr"), (1.0, "b.vtr")], &example())).unwrap();
         assert!(pvd.contains("timestep=\"0.5\" part=\"0\" file=\"a.vtr\""));
     }
 }

@@ -21,7 +21,11 @@ pub(crate) trait Declared {
 impl Key {
     /// A key of a table, which may have a default for it.
     pub(crate) fn of<T: Declared>(name: &'static str, has_default: bool) -> Self {
-        Self { name, kind: T::kind(), is_required: !has_default && !T::IS_OPTIONAL }
+        Self {
+            name,
+            kind: T::kind(),
+            is_required: !has_default && !T::IS_OPTIONAL,
+        }
     }
 }
 
@@ -193,17 +197,25 @@ impl<T: Declared> Declared for Box<T> {
 
 impl<T: Declared> Declared for Vec<T> {
     fn kind() -> Kind {
-        Kind::List { of: Box::new(T::kind()), len: None }
+        Kind::List {
+            of: Box::new(T::kind()),
+            len: None,
+        }
     }
 
     fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
-        self.iter().enumerate().for_each(|(i, value)| value.check_limits(&format!("{at}[{i}]"), c));
+        self.iter()
+            .enumerate()
+            .for_each(|(i, value)| value.check_limits(&format!("{at}[{i}]"), c));
     }
 }
 
 impl<T: Declared, const N: usize> Declared for [T; N] {
     fn kind() -> Kind {
-        Kind::List { of: Box::new(T::kind()), len: Some(N) }
+        Kind::List {
+            of: Box::new(T::kind()),
+            len: Some(N),
+        }
     }
 }
 
@@ -219,21 +231,62 @@ mod tests {
     #[test]
     fn a_scene_says_what_it_reads() {
         let scene = keys_of::<Scene>();
-        let Kind::Table(pulse) = &find(&scene, "pulse").kind else { panic!("a table") };
+        let Kind::Table(pulse) = &find(&scene, "pulse").kind else {
+            panic!("a table")
+        };
         assert_eq!(find(pulse, "energy_j").kind, Kind::Number);
-        let Kind::Tagged { kinds, .. } = &find(pulse, "shape").kind else { panic!("tagged") };
-        assert_eq!(find(&kinds[0].1, "definition").kind, Kind::Choice(vec!["fwhm", "one_over_e_half_width"]));
-        let Kind::Tagged { tag: "kind", kinds } = &find(&scene, "flow").kind else { panic!("tagged") };
-        let names = ["calm", "uniform", "linear", "vortex_lines", "vortex_pair", "simulated", "fields"];
+        let Kind::Tagged { kinds, .. } = &find(pulse, "shape").kind else {
+            panic!("tagged")
+        };
+        assert_eq!(
+            find(&kinds[0].1, "definition").kind,
+            Kind::Choice(vec!["fwhm", "one_over_e_half_width"])
+        );
+        let Kind::Tagged { tag: "kind", kinds } = &find(&scene, "flow").kind else {
+            panic!("tagged")
+        };
+        let names = [
+            "calm",
+            "uniform",
+            "linear",
+            "vortex_lines",
+            "vortex_pair",
+            "simulated",
+            "fields",
+        ];
         assert_eq!(kinds.iter().map(|k| k.0).collect::<Vec<_>>(), names);
-        assert!(kinds[1].1.iter().all(|key| key.is_required && key.kind == Kind::Number) && kinds[1].1.len() == 2);
+        assert!(
+            kinds[1]
+                .1
+                .iter()
+                .all(|key| key.is_required && key.kind == Kind::Number)
+                && kinds[1].1.len() == 2
+        );
         assert!(kinds[4].1.iter().all(|key| !key.is_required));
-        let Kind::Table(estimator) = &find(&scene, "estimator").kind else { panic!("a table") };
-        assert_eq!(find(estimator, "false_alarm").kind, Kind::Number, "what may be absent");
-        let Kind::Tagged { kinds, .. } = &find(estimator, "method").kind else { panic!("tagged") };
-        assert_eq!(find(&kinds[2].1, "order").kind, Kind::Whole { largest: i64::MAX as u64 });
-        let Kind::Tagged { kinds, .. } = &find(estimator, "radius").kind else { panic!("tagged") };
-        let list = Kind::List { of: Box::new(Kind::Number), len: None };
+        let Kind::Table(estimator) = &find(&scene, "estimator").kind else {
+            panic!("a table")
+        };
+        assert_eq!(
+            find(estimator, "false_alarm").kind,
+            Kind::Number,
+            "what may be absent"
+        );
+        let Kind::Tagged { kinds, .. } = &find(estimator, "method").kind else {
+            panic!("tagged")
+        };
+        assert_eq!(
+            find(&kinds[2].1, "order").kind,
+            Kind::Whole {
+                largest: i64::MAX as u64
+            }
+        );
+        let Kind::Tagged { kinds, .. } = &find(estimator, "radius").kind else {
+            panic!("tagged")
+        };
+        let list = Kind::List {
+            of: Box::new(Kind::Number),
+            len: None,
+        };
         assert_eq!(find(&kinds[1].1, "range_m").kind, list);
     }
 
@@ -243,14 +296,26 @@ mod tests {
         let scene = toml::Table::try_from(Scene::default()).unwrap();
         fn look(keys: &[Key], table: &toml::Table) {
             for (name, value) in table {
-                let Some(key) = keys.iter().find(|key| key.name == name) else { panic!("{name} is not declared") };
+                let Some(key) = keys.iter().find(|key| key.name == name) else {
+                    panic!("{name} is not declared")
+                };
                 match (&key.kind, value) {
-                    (Kind::Choice(names), toml::Value::String(word)) => assert!(names.contains(&word.as_str())),
+                    (Kind::Choice(names), toml::Value::String(word)) => {
+                        assert!(names.contains(&word.as_str()))
+                    }
                     (Kind::Table(inner), toml::Value::Table(table)) => look(inner, table),
                     (Kind::Tagged { tag, kinds }, toml::Value::Table(table)) => {
-                        let kind = kinds.iter().find(|(name, _)| table[*tag].as_str() == Some(name)).unwrap();
+                        let kind = kinds
+                            .iter()
+                            .find(|(name, _)| table[*tag].as_str() == Some(name))
+                            .unwrap();
                         let rest = table.iter().filter(|(name, _)| name != tag);
-                        look(&kind.1, &rest.map(|(name, value)| (name.clone(), value.clone())).collect());
+                        look(
+                            &kind.1,
+                            &rest
+                                .map(|(name, value)| (name.clone(), value.clone()))
+                                .collect(),
+                        );
                     }
                     _ => {}
                 }

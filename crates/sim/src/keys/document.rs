@@ -42,7 +42,10 @@ impl<T: Content> Document<T> {
     /// # Errors
     /// [`SceneError`] names the file, the line, the key, the value and what is allowed.
     pub fn read(path: &Path) -> Result<Self, SceneError> {
-        let text = text_file::read(path).map_err(|source| SceneError::Unreadable { path: path.to_owned(), source })?;
+        let text = text_file::read(path).map_err(|source| SceneError::Unreadable {
+            path: path.to_owned(),
+            source,
+        })?;
         Self::parse(&text, path)
     }
 
@@ -58,7 +61,13 @@ impl<T: Content> Document<T> {
     /// What was checked of a text.
     pub(crate) fn of(content: T, path: &Path, text: &str) -> Self {
         let toml = content.to_toml();
-        Self { hash: hash_of(&toml), toml, content, path: path.to_owned(), text: text.to_owned() }
+        Self {
+            hash: hash_of(&toml),
+            toml,
+            content,
+            path: path.to_owned(),
+            text: text.to_owned(),
+        }
     }
 
     /// What comes of this and needs no check, with the folder and the lines of its file.
@@ -98,7 +107,16 @@ impl<T: Content> Document<T> {
     /// Problems of what was asked for beside the file.
     #[cfg(feature = "flow")]
     pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
-        let problems = problems.into_iter().map(|problem| Located { problem, line: None }).collect();
-        SceneError::Invalid { path: self.path.clone(), problems }
+        let problems = problems
+            .into_iter()
+            .map(|problem| Located {
+                problem,
+                line: None,
+            })
+            .collect();
+        SceneError::Invalid {
+            path: self.path.clone(),
+            problems,
+        }
     }
 }

@@ -27,12 +27,19 @@ pub(crate) struct Named(pub(crate) &'static str);
 pub(crate) struct NothingOr(pub(crate) RangeInclusive<f64>);
 
 /// Above 0; `inf` stands for none.
-pub(crate) const ABOVE_ZERO_OR_INF: Number = Number(|value| value > 0.0, "above 0 {}, or inf for none");
+pub(crate) const ABOVE_ZERO_OR_INF: Number =
+    Number(|value| value > 0.0, "above 0 {}, or inf for none");
 /// Above 0.
 #[cfg(feature = "flow")]
-pub(crate) const ABOVE_ZERO: Number = Number(|value| value.is_finite() && value > 0.0, "a finite number above 0");
+pub(crate) const ABOVE_ZERO: Number = Number(
+    |value| value.is_finite() && value > 0.0,
+    "a finite number above 0",
+);
 /// 0 or more.
-pub(crate) const ZERO_OR_MORE: Number = Number(|value| value.is_finite() && value >= 0.0, "a finite number, 0 or more");
+pub(crate) const ZERO_OR_MORE: Number = Number(
+    |value| value.is_finite() && value >= 0.0,
+    "a finite number, 0 or more",
+);
 /// Neither infinite nor no number.
 #[cfg(feature = "flow")]
 pub(crate) const FINITE: Number = Number(f64::is_finite, "finite");
@@ -47,7 +54,12 @@ impl Limit<String> for Named {
 
 impl Limit<f64> for Number {
     fn hold(&self, key: &str, value: &f64, c: &mut Checker<'_>) {
-        c.require((self.0)(*value), key, value, self.1.replace("{}", unit_of(key).unwrap_or_default()));
+        c.require(
+            (self.0)(*value),
+            key,
+            value,
+            self.1.replace("{}", unit_of(key).unwrap_or_default()),
+        );
     }
 }
 
@@ -60,15 +72,29 @@ impl<T: Debug, W: ToString> Is<T, W> {
 impl Limit<f64> for RangeInclusive<f64> {
     fn hold(&self, key: &str, value: &f64, c: &mut Checker<'_>) {
         let (low, high, unit) = (self.start(), self.end(), unit_of(key).unwrap_or_default());
-        c.require(self.contains(value), key, value, format!("a number from {low:?} to {high:?} {unit}").trim_end());
+        c.require(
+            self.contains(value),
+            key,
+            value,
+            format!("a number from {low:?} to {high:?} {unit}").trim_end(),
+        );
     }
 }
 
 impl Limit<f64> for NothingOr {
     fn hold(&self, key: &str, value: &f64, c: &mut Checker<'_>) {
-        let (low, high, unit) = (self.0.start(), self.0.end(), unit_of(key).unwrap_or_default());
+        let (low, high, unit) = (
+            self.0.start(),
+            self.0.end(),
+            unit_of(key).unwrap_or_default(),
+        );
         let allowed = format!("a number from {low:?} to {high:?} {unit}, or -inf for none");
-        c.require(*value == f64::NEG_INFINITY || self.0.contains(value), key, value, allowed);
+        c.require(
+            *value == f64::NEG_INFINITY || self.0.contains(value),
+            key,
+            value,
+            allowed,
+        );
     }
 }
 
@@ -96,7 +122,10 @@ impl<T, L: Limit<T>> Limit<Option<T>> for L {
 /// Each value of a list, which is named itself.
 impl<T, L: Limit<T>> Limit<Vec<T>> for L {
     fn hold(&self, key: &str, values: &Vec<T>, c: &mut Checker<'_>) {
-        values.iter().enumerate().for_each(|(i, value)| self.hold(&format!("{key}[{i}]"), value, c));
+        values
+            .iter()
+            .enumerate()
+            .for_each(|(i, value)| self.hold(&format!("{key}[{i}]"), value, c));
     }
 }
 
@@ -104,7 +133,9 @@ impl<T, L: Limit<T>> Limit<Vec<T>> for L {
 impl<T: Debug, L: Limit<T>, const N: usize> Limit<[T; N]> for L {
     fn hold(&self, key: &str, values: &[T; N], c: &mut Checker<'_>) {
         let mut parts = Checker::new(&|_| true);
-        values.iter().for_each(|value| self.hold(key, value, &mut parts));
+        values
+            .iter()
+            .for_each(|value| self.hold(key, value, &mut parts));
         if let Some(problem) = parts.into_problems().into_iter().next() {
             c.refuse(key, &format!("{values:?}"), problem.allowed);
         }
@@ -128,7 +159,10 @@ pub(crate) struct Checker<'s> {
 impl<'s> Checker<'s> {
     /// Nothing is wrong yet.
     pub(crate) fn new(is_stated: &'s dyn Fn(&str) -> bool) -> Self {
-        Self { found: Vec::new(), is_stated }
+        Self {
+            found: Vec::new(),
+            is_stated,
+        }
     }
 
     /// What was found, in the order in which it was asked for.
@@ -143,11 +177,21 @@ impl<'s> Checker<'s> {
 
     /// A problem whose value is shown as `value` says it.
     pub(crate) fn refuse(&mut self, key: &str, value: &str, allowed: impl Into<String>) {
-        self.found.push(Problem { key: key.into(), value: value.into(), allowed: allowed.into() });
+        self.found.push(Problem {
+            key: key.into(),
+            value: value.into(),
+            allowed: allowed.into(),
+        });
     }
 
     /// A condition on a value.
-    pub(crate) fn require(&mut self, ok: bool, key: &str, value: impl Debug, allowed: impl Into<String>) -> bool {
+    pub(crate) fn require(
+        &mut self,
+        ok: bool,
+        key: &str,
+        value: impl Debug,
+        allowed: impl Into<String>,
+    ) -> bool {
         if !ok {
             // `{:?}` writes 1e-9 where `{}` would write all the zeros, and quotation marks about texts.
             self.refuse(key, &format!("{value:?}"), allowed);
@@ -170,15 +214,27 @@ impl<'s> Checker<'s> {
             _ => (a <= b, "at least"),
         };
         let side = |i: usize, word: &str| {
-            let other = format!("{word} {}, {} {}", keys[1 - i], values[1 - i], unit_of(keys[0]).unwrap_or_default());
-            (keys[i], format!("{:?}", values[i]), other.trim_end().to_owned())
+            let other = format!(
+                "{word} {}, {} {}",
+                keys[1 - i],
+                values[1 - i],
+                unit_of(keys[0]).unwrap_or_default()
+            );
+            (
+                keys[i],
+                format!("{:?}", values[i]),
+                other.trim_end().to_owned(),
+            )
         };
         self.between(ok, &[side(0, word), side(1, reverse)])
     }
 
     /// A limit between keys: the first that the file states has to give way, or else the first.
     pub(crate) fn between(&mut self, ok: bool, sides: &[Side<'_>]) -> bool {
-        let blamed = sides.iter().find(|(key, ..)| (self.is_stated)(key)).or(sides.first());
+        let blamed = sides
+            .iter()
+            .find(|(key, ..)| (self.is_stated)(key))
+            .or(sides.first());
         if let Some((key, value, allowed)) = blamed.filter(|_| !ok) {
             self.refuse(key, value, allowed.clone());
         }

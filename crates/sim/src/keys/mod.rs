@@ -15,12 +15,16 @@ mod problem;
 mod vet;
 mod words;
 
-pub(crate) use declare::{Declared, choice, foreign_choices, held, keys, keys_of, kinds, second, table};
+pub(crate) use declare::{
+    Declared, choice, foreign_choices, held, keys, keys_of, kinds, second, table,
+};
 pub use document::{Content, Document};
 pub(crate) use key::{Key, Kind, join};
 #[cfg(feature = "flow")]
 pub(crate) use limit::{ABOVE_ZERO, FINITE};
-pub(crate) use limit::{ABOVE_ZERO_OR_INF, Checker, Is, Limit, Named, NothingOr, Number, ZERO_OR_MORE, side};
+pub(crate) use limit::{
+    ABOVE_ZERO_OR_INF, Checker, Is, Limit, Named, NothingOr, Number, ZERO_OR_MORE, side,
+};
 pub use problem::{Located, Problem, SceneError};
 pub(crate) use vet::{Format, Text, lines_with_keys, value_at};
 pub(crate) use words::{near, one_of, unit_of};

@@ -36,18 +36,46 @@ impl<'a> Text<'a> {
     /// # Errors
     /// The line and what is wrong, without the text that is there.
     pub(crate) fn parse(text: &'a str, path: &'a Path) -> Result<Self, SceneError> {
-        let breaks: Vec<usize> = text.bytes().enumerate().filter(|(_, b)| *b == b'\n').map(|(at, _)| at).collect();
+        let breaks: Vec<usize> = text
+            .bytes()
+            .enumerate()
+            .filter(|(_, b)| *b == b'\n')
+            .map(|(at, _)| at)
+            .collect();
         match DeTable::parse(text) {
-            Ok(table) => Ok(Self { text, path, table: table.into_inner(), breaks }),
+            Ok(table) => Ok(Self {
+                text,
+                path,
+                table: table.into_inner(),
+                breaks,
+            }),
             Err(e) => {
                 let at = e.span().map_or(0, |span| span.start);
-                let before = text.get(..at).unwrap_or_default().lines().next_back().unwrap_or_default();
+                let before = text
+                    .get(..at)
+                    .unwrap_or_default()
+                    .lines()
+                    .next_back()
+                    .unwrap_or_default();
                 let key = before.split_once('=').map(|(key, _)| key.trim());
-                let is_bare = |key: &&str| key.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
-                let place = key.filter(is_bare).map(|key| format!("{}: ", quote(key))).unwrap_or_default();
-                let message = format!("{place}this is no valid TOML: {}", e.message().replace('\n', " "));
+                let is_bare = |key: &&str| {
+                    key.bytes()
+                        .all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b))
+                };
+                let place = key
+                    .filter(is_bare)
+                    .map(|key| format!("{}: ", quote(key)))
+                    .unwrap_or_default();
+                let message = format!(
+                    "{place}this is no valid TOML: {}",
+                    e.message().replace('\n', " ")
+                );
                 let line = breaks.partition_point(|end| *end < at) + 1;
-                Err(SceneError::Malformed { path: path.to_owned(), line, message })
+                Err(SceneError::Malformed {
+                    path: path.to_owned(),
+                    line,
+                    message,
+                })
             }
         }
     }
@@ -55,7 +83,11 @@ impl<'a> Text<'a> {
     /// The line of a key, from 1; none if the text does not state it.
     pub(crate) fn line(&self, path: &str) -> Option<usize> {
         // The values of a list stand where it does.
-        let path = if path.ends_with(']') { path.split_once('[')?.0 } else { path };
+        let path = if path.ends_with(']') {
+            path.split_once('[')?.0
+        } else {
+            path
+        };
         find(&self.table, path).map(|(span, _)| self.line_of(&span))
     }
 
@@ -66,7 +98,8 @@ impl<'a> Text<'a> {
 
     /// The line of a key, or of the table that would have it.
     fn line_near(&self, path: &str) -> Option<usize> {
-        self.line(path).or_else(|| self.line_near(path.rsplit_once('.')?.0))
+        self.line(path)
+            .or_else(|| self.line_near(path.rsplit_once('.')?.0))
     }
 
     /// The value of a key.
@@ -86,9 +119,21 @@ impl<'a> Text<'a> {
     /// # Errors
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
     pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, SceneError> {
-        let mut walk = Walk { document: self, format, found: Vec::new() };
-        let table =
-            walk.table(format.keys, &self.table, Place { path: "", line: 1, defaults: Some(format.defaults) }, None);
+        let mut walk = Walk {
+            document: self,
+            format,
+            found: Vec::new(),
+        };
+        let table = walk.table(
+            format.keys,
+            &self.table,
+            Place {
+                path: "",
+                line: 1,
+                defaults: Some(format.defaults),
+            },
+            None,
+        );
         if walk.found.is_empty() {
             return Ok(table);
         }
@@ -112,17 +157,25 @@ impl<'a> Text<'a> {
         let locate = |mut problem: Problem| {
             if let Some(written) = self.written(&problem.key) {
                 problem.value = written;
-            } else if self.line(&problem.key).is_none() && !["", Problem::ABSENT].contains(&problem.value.as_str()) {
+            } else if self.line(&problem.key).is_none()
+                && !["", Problem::ABSENT].contains(&problem.value.as_str())
+            {
                 problem.value += " (the default)";
             }
-            Located { line: self.line_near(&problem.key), problem }
+            Located {
+                line: self.line_near(&problem.key),
+                problem,
+            }
         };
         self.invalid(problems.into_iter().map(locate).collect())
     }
 
     fn invalid(&self, mut problems: Vec<Located>) -> SceneError {
         problems.sort_by_key(|located| located.line);
-        SceneError::Invalid { path: self.path.to_owned(), problems }
+        SceneError::Invalid {
+            path: self.path.to_owned(),
+            problems,
+        }
     }
 
     fn quote(&self, span: Range<usize>) -> String {
@@ -131,8 +184,13 @@ impl<'a> Text<'a> {
 }
 
 /// Where the key with this path stands, and its value; the path may lead through a table of a list.
-fn find<'t, 'a>(table: &'t DeTable<'a>, path: &str) -> Option<(Range<usize>, &'t Spanned<DeValue<'a>>)> {
-    let (head, rest) = path.split_once('.').map_or((path, None), |(h, r)| (h, Some(r)));
+fn find<'t, 'a>(
+    table: &'t DeTable<'a>,
+    path: &str,
+) -> Option<(Range<usize>, &'t Spanned<DeValue<'a>>)> {
+    let (head, rest) = path
+        .split_once('.')
+        .map_or((path, None), |(h, r)| (h, Some(r)));
     let (name, place) = match head.strip_suffix(']').and_then(|head| head.split_once('[')) {
         Some((name, place)) => (name, Some(place.parse::<usize>().ok()?)),
         None => (head, None),
@@ -153,7 +211,8 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
     match value {
         DeValue::Float(value) => {
             let number: f64 = value.as_str().parse().ok()?;
-            (number.is_finite() || !value.as_str().contains(|c: char| c.is_ascii_digit())).then_some(number)
+            (number.is_finite() || !value.as_str().contains(|c: char| c.is_ascii_digit()))
+                .then_some(number)
         }
         DeValue::Integer(value) if value.radix() == 10 => value.as_str().parse().ok(),
         DeValue::Integer(_) => whole(value).map(|whole| whole as f64),
@@ -162,7 +221,9 @@ fn number(value: &DeValue<'_>) -> Option<f64> {
 }
 
 fn whole(value: &DeValue<'_>) -> Option<i64> {
-    let DeValue::Integer(value) = value else { return None };
+    let DeValue::Integer(value) = value else {
+        return None;
+    };
     i64::from_str_radix(value.as_str(), value.radix()).ok()
 }
 
@@ -187,21 +248,44 @@ struct Walk<'w> {
 
 impl Walk<'_> {
     fn refuse(&mut self, key: String, value: String, allowed: String, line: usize) {
-        self.found.push(Located { problem: Problem { key, value, allowed }, line: Some(line) });
+        self.found.push(Located {
+            problem: Problem {
+                key,
+                value,
+                allowed,
+            },
+            line: Some(line),
+        });
     }
 
     /// A value as the text writes it; nothing for tables, which no line can show.
     fn shown(&self, value: &Spanned<DeValue<'_>>) -> String {
         let is_table = match value.get_ref() {
-            DeValue::Array(values) => values.first().is_some_and(|first| first.get_ref().is_table()),
+            DeValue::Array(values) => values
+                .first()
+                .is_some_and(|first| first.get_ref().is_table()),
             other => other.is_table(),
         };
-        if is_table { String::new() } else { self.document.quote(value.span()) }
+        if is_table {
+            String::new()
+        } else {
+            self.document.quote(value.span())
+        }
     }
 
     /// A table with these keys; `kinds` are those of a table with a tag.
-    fn table(&mut self, keys: &[Key], table: &DeTable<'_>, at: Place<'_>, kinds: Option<Kinds<'_>>) -> toml::Table {
-        let Place { path, line, defaults } = at;
+    fn table(
+        &mut self,
+        keys: &[Key],
+        table: &DeTable<'_>,
+        at: Place<'_>,
+        kinds: Option<Kinds<'_>>,
+    ) -> toml::Table {
+        let Place {
+            path,
+            line,
+            defaults,
+        } = at;
         let default = |name: &str| defaults.and_then(|d| d.get(name));
         let mut out = toml::Table::new();
         for (name, value) in table {
@@ -209,7 +293,15 @@ impl Walk<'_> {
             match keys.iter().find(|key| key.name == here) {
                 Some(key) => {
                     let defaults = default(here).and_then(Value::as_table);
-                    let read = self.value(&key.kind, value, Place { path: &join(path, here), line, defaults });
+                    let read = self.value(
+                        &key.kind,
+                        value,
+                        Place {
+                            path: &join(path, here),
+                            line,
+                            defaults,
+                        },
+                    );
                     out.extend(read.map(|value| (here.to_owned(), value)));
                 }
                 None if kinds.is_some_and(|(tag, ..)| tag == here) => {}
@@ -219,14 +311,19 @@ impl Walk<'_> {
                 }
             }
         }
-        for key in keys.iter().filter(|key| key.is_required && !table.contains_key(key.name)) {
+        for key in keys
+            .iter()
+            .filter(|key| key.is_required && !table.contains_key(key.name))
+        {
             match default(key.name) {
                 Some(default) => out.extend([(key.name.to_owned(), default.clone())]),
                 None => {
                     let path = join(path, key.name);
                     // Of a table with a tag, the tag is what must be said.
                     let (path, allowed) = match &key.kind {
-                        Kind::Tagged { tag, kinds } => (join(&path, tag), one_of(&names(kinds), "")),
+                        Kind::Tagged { tag, kinds } => {
+                            (join(&path, tag), one_of(&names(kinds), ""))
+                        }
                         kind => (path.clone(), self.wanted(&path, kind, "")),
                     };
                     self.refuse(path, Problem::ABSENT.into(), allowed, line);
@@ -240,20 +337,35 @@ impl Walk<'_> {
         let inner = value.get_ref();
         let read = match (kind, inner) {
             (Kind::Number, _) => number(inner).map(Value::Float),
-            (Kind::Whole { largest }, _) => {
-                whole(inner).filter(|w| u64::try_from(*w).is_ok_and(|w| w <= *largest)).map(Value::Integer)
-            }
+            (Kind::Whole { largest }, _) => whole(inner)
+                .filter(|w| u64::try_from(*w).is_ok_and(|w| w <= *largest))
+                .map(Value::Integer),
             (Kind::Switch, DeValue::Boolean(value)) => Some(Value::Boolean(*value)),
             (Kind::Text, DeValue::String(text)) => Some(Value::String(text.to_string())),
-            (Kind::Choice(names), DeValue::String(text)) if names.iter().any(|name| name == text) => {
+            (Kind::Choice(names), DeValue::String(text))
+                if names.iter().any(|name| name == text) =>
+            {
                 Some(Value::String(text.to_string()))
             }
-            (Kind::List { of, len }, DeValue::Array(values)) if len.is_none_or(|len| len == values.len()) => {
+            (Kind::List { of, len }, DeValue::Array(values))
+                if len.is_none_or(|len| len == values.len()) =>
+            {
                 // Each value that does not fit is named itself.
                 let mut list = Vec::with_capacity(values.len());
                 for (i, value) in values.iter().enumerate() {
-                    let (path, line) = (&format!("{}[{i}]", at.path), self.document.line_of(&value.span()));
-                    list.extend(self.value(of, value, Place { path, line, defaults: None }));
+                    let (path, line) = (
+                        &format!("{}[{i}]", at.path),
+                        self.document.line_of(&value.span()),
+                    );
+                    list.extend(self.value(
+                        of,
+                        value,
+                        Place {
+                            path,
+                            line,
+                            defaults: None,
+                        },
+                    ));
                 }
                 return Some(Value::Array(list));
             }
@@ -272,24 +384,54 @@ impl Walk<'_> {
         read
     }
 
-    fn tagged(&mut self, tag: &str, kinds: &AllKinds, table: &DeTable<'_>, at: Place<'_>) -> Option<toml::Table> {
+    fn tagged(
+        &mut self,
+        tag: &str,
+        kinds: &AllKinds,
+        table: &DeTable<'_>,
+        at: Place<'_>,
+    ) -> Option<toml::Table> {
         let of_default = at.defaults.and_then(|d| d.get(tag)).and_then(Value::as_str);
         let path = &join(at.path, tag);
-        let name = match (table.iter().find(|(key, _)| key.get_ref() == tag), of_default) {
+        let name = match (
+            table.iter().find(|(key, _)| key.get_ref() == tag),
+            of_default,
+        ) {
             (Some((key, value)), _) => {
                 let line = self.document.line_of(&key.span());
-                self.value(&Kind::Choice(names(kinds)), value, Place { path, line, defaults: None })?;
+                self.value(
+                    &Kind::Choice(names(kinds)),
+                    value,
+                    Place {
+                        path,
+                        line,
+                        defaults: None,
+                    },
+                )?;
                 value.get_ref().as_str()?
             }
             (None, Some(name)) => name,
             (None, None) => {
-                self.refuse(path.clone(), Problem::ABSENT.into(), one_of(&names(kinds), ""), at.line);
+                self.refuse(
+                    path.clone(),
+                    Problem::ABSENT.into(),
+                    one_of(&names(kinds), ""),
+                    at.line,
+                );
                 return None;
             }
         };
-        let keys = kinds.iter().find(|(n, _)| *n == name).map_or(&[][..], |(_, keys)| keys);
+        let keys = kinds
+            .iter()
+            .find(|(n, _)| *n == name)
+            .map_or(&[][..], |(_, keys)| keys);
         let defaults = at.defaults.filter(|_| of_default == Some(name));
-        let mut out = self.table(keys, table, Place { defaults, ..at }, Some((tag, name, kinds)));
+        let mut out = self.table(
+            keys,
+            table,
+            Place { defaults, ..at },
+            Some((tag, name, kinds)),
+        );
         out.insert(tag.to_owned(), Value::String(name.to_owned()));
         Some(out)
     }
@@ -298,38 +440,70 @@ impl Walk<'_> {
     fn unknown(&self, keys: &[Key], here: &str, path: &str, kinds: Option<Kinds<'_>>) -> String {
         if let Some((tag, chosen, all)) = kinds {
             let has = |(_, keys): &&(&str, Vec<Key>)| keys.iter().any(|key| key.name == here);
-            let others: Vec<String> = all.iter().filter(has).map(|(name, _)| format!("\"{name}\"")).collect();
+            let others: Vec<String> = all
+                .iter()
+                .filter(has)
+                .map(|(name, _)| format!("\"{name}\""))
+                .collect();
             if !others.is_empty() {
                 let (tag, needed) = (join(path, tag), others.join(" or "));
-                let stated = if self.document.value(&tag).is_some() { "" } else { ", the default" };
-                return format!("this key is for {tag} = {needed}, and {tag} is \"{chosen}\"{stated}");
+                let stated = if self.document.value(&tag).is_some() {
+                    ""
+                } else {
+                    ", the default"
+                };
+                return format!(
+                    "this key is for {tag} = {needed}, and {tag} is \"{chosen}\"{stated}"
+                );
             }
         }
         let meant = near(here, keys.iter().map(|key| key.name));
         let hint = match (meant, table_with(self.format.keys, here, "")) {
             (Some(meant), _) => format!("; did you mean {meant}?"),
-            (None, Some(table)) if table.is_empty() => "; it stands before the first [section].".into(),
+            (None, Some(table)) if table.is_empty() => {
+                "; it stands before the first [section].".into()
+            }
             (None, Some(table)) => format!("; it is a key of [{table}]."),
             (None, None) => ".".into(),
         };
-        let known: Vec<&str> = kinds.iter().map(|(tag, ..)| *tag).chain(keys.iter().map(|key| key.name)).collect();
-        format!("there is no such key{hint} Known here: {}", known.join(", "))
+        let known: Vec<&str> = kinds
+            .iter()
+            .map(|(tag, ..)| *tag)
+            .chain(keys.iter().map(|key| key.name))
+            .collect();
+        format!(
+            "there is no such key{hint} Known here: {}",
+            known.join(", ")
+        )
     }
 
     /// What a key takes in place of what is written, with an example.
     fn wanted(&self, path: &str, kind: &Kind, written: &str) -> String {
-        let name = path.rsplit('.').next().and_then(|name| name.split('[').next());
+        let name = path
+            .rsplit('.')
+            .next()
+            .and_then(|name| name.split('[').next());
         let what = wanted(name.unwrap_or(path), kind, written);
         match kind {
             Kind::Switch | Kind::Choice(_) => what,
             Kind::Table(keys) => {
-                let inner =
-                    keys.first().map(|k| format!("{} = {}", k.name, self.example(&join(path, k.name), &k.kind)));
+                let inner = keys.first().map(|k| {
+                    format!(
+                        "{} = {}",
+                        k.name,
+                        self.example(&join(path, k.name), &k.kind)
+                    )
+                });
                 format!("{what}, e.g. {{ {} }}", inner.unwrap_or_default())
             }
             Kind::Tagged { tag, kinds } => {
-                let plainest = kinds.iter().min_by_key(|(_, keys)| keys.iter().filter(|k| k.is_required).count());
-                format!("{what}, e.g. {{ {tag} = \"{}\" }}", plainest.map_or("", |(name, _)| name))
+                let plainest = kinds
+                    .iter()
+                    .min_by_key(|(_, keys)| keys.iter().filter(|k| k.is_required).count());
+                format!(
+                    "{what}, e.g. {{ {tag} = \"{}\" }}",
+                    plainest.map_or("", |(name, _)| name)
+                )
             }
             _ => format!("{what}, e.g. {}", self.example(path, kind)),
         }
@@ -337,22 +511,33 @@ impl Walk<'_> {
 
     /// An example of the value of a key: its own, else one of the kind.
     fn example(&self, path: &str, kind: &Kind) -> String {
-        self.format.example(path, kind).unwrap_or_else(|| match kind {
-            Kind::Number => "1.0".into(),
-            Kind::Whole { .. } => "1".into(),
-            Kind::Switch => "true".into(),
-            Kind::Choice(names) => format!("\"{}\"", names.first().unwrap_or(&"")),
-            Kind::List { of, len } => format!("[{}]", vec![self.example("", of); len.unwrap_or(2)].join(", ")),
-            Kind::Text | Kind::Table(_) | Kind::Tagged { .. } => "\"name\"".into(),
-        })
+        self.format
+            .example(path, kind)
+            .unwrap_or_else(|| match kind {
+                Kind::Number => "1.0".into(),
+                Kind::Whole { .. } => "1".into(),
+                Kind::Switch => "true".into(),
+                Kind::Choice(names) => format!("\"{}\"", names.first().unwrap_or(&"")),
+                Kind::List { of, len } => format!(
+                    "[{}]",
+                    vec![self.example("", of); len.unwrap_or(2)].join(", ")
+                ),
+                Kind::Text | Kind::Table(_) | Kind::Tagged { .. } => "\"name\"".into(),
+            })
     }
 }
 
 impl Format<'_> {
     /// The value of a key in the texts with examples, or its default; of a list also one of its values, `key[0]`.
     pub(crate) fn example(&self, path: &str, kind: &Kind) -> Option<String> {
-        let (whole, element) = path.split_once('[').map_or((path, false), |(whole, _)| (whole, true));
-        let at = if element { format!("{whole}[0]") } else { whole.to_owned() };
+        let (whole, element) = path
+            .split_once('[')
+            .map_or((path, false), |(whole, _)| (whole, true));
+        let at = if element {
+            format!("{whole}[0]")
+        } else {
+            whole.to_owned()
+        };
         let of_text = |text: &&str| {
             let document = Text::parse(text, Path::new("")).ok()?;
             let (_, value) = find(&document.table, &at)?;
@@ -375,8 +560,15 @@ impl Format<'_> {
 pub(crate) fn lines_with_keys(toml: &str) -> impl Iterator<Item = (String, &str)> {
     let mut section = "";
     toml.lines().map(move |line| {
-        section = line.strip_prefix('[').map_or(section, |name| name.trim_end_matches(']'));
-        (line.split_once(" = ").map(|(key, _)| join(section, key)).unwrap_or_default(), line)
+        section = line
+            .strip_prefix('[')
+            .map_or(section, |name| name.trim_end_matches(']'));
+        (
+            line.split_once(" = ")
+                .map(|(key, _)| join(section, key))
+                .unwrap_or_default(),
+            line,
+        )
     })
 }
 

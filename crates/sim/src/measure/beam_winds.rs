@@ -49,17 +49,28 @@ pub fn beam_winds(plan: &Plan, map: &VelocityEstimates) -> Result<Option<Vec<Bea
     for sweep in 0..plan.geometry.schedule.sweeps.len() {
         let (lines, beams) = beams_of(plan, sweep);
         let direction: Vec<[f64; 3]> = beams.iter().map(|beam| beam.direction.0).collect();
-        let time_s = plan.wind.start_s + beams.iter().map(|beam| beam.time_s).sum::<f64>() / beams.len().max(1) as f64;
+        let time_s = plan.wind.start_s
+            + beams.iter().map(|beam| beam.time_s).sum::<f64>() / beams.len().max(1) as f64;
         for (gate, &range_m) in map.range_m.iter().enumerate() {
-            let of = |values: &Array2<f64>| -> Vec<f64> { lines.iter().map(|line| values[[*line, gate]]).collect() };
+            let of = |values: &Array2<f64>| -> Vec<f64> {
+                lines.iter().map(|line| values[[*line, gate]]).collect()
+            };
             let from = |values: &Array2<f64>| wind_of(pattern, &direction, &of(values));
             let (wind_m_s, error_bar_m_s) = from(&map.v_scan_m_s)?;
-            let slanted = beams.iter().filter(|beam| beam.direction.0[2] < 1.0).map(|beam| beam.at_range_m(range_m)[2]);
-            let (sum_m, slanted) = slanted.fold((0.0, 0.0), |(sum, n), height_m| (sum + height_m, n + 1.0));
+            let slanted = beams
+                .iter()
+                .filter(|beam| beam.direction.0[2] < 1.0)
+                .map(|beam| beam.at_range_m(range_m)[2]);
+            let (sum_m, slanted) =
+                slanted.fold((0.0, 0.0), |(sum, n), height_m| (sum + height_m, n + 1.0));
             let height_m = sum_m / slanted;
             let mut truth = [[f64::NAN; 3]];
-            let above_m = beams.first().map_or([0.0; 3], |beam| [beam.position_m[0], beam.position_m[1], height_m]);
-            plan.wind.wind().velocity_into(&[above_m], time_s, &mut truth)?;
+            let above_m = beams.first().map_or([0.0; 3], |beam| {
+                [beam.position_m[0], beam.position_m[1], height_m]
+            });
+            plan.wind
+                .wind()
+                .velocity_into(&[above_m], time_s, &mut truth)?;
             out.push(BeamWind {
                 sweep,
                 time_s,
@@ -88,7 +99,10 @@ fn beams_of(plan: &Plan, sweep: usize) -> (Vec<usize>, Vec<Beam>) {
 ///
 /// # Errors
 /// As [`beam_winds`].
-pub(crate) fn mean_wind_m_s(plan: &Plan, velocity_m_s: &Array2<f64>) -> Result<Option<[f64; 3]>, Error> {
+pub(crate) fn mean_wind_m_s(
+    plan: &Plan,
+    velocity_m_s: &Array2<f64>,
+) -> Result<Option<[f64; 3]>, Error> {
     let pattern = &plan.scene.content.scan.pattern;
     if !matches!(pattern, Pattern::Vad(_) | Pattern::Dbs(_)) {
         return Ok(None);
@@ -101,7 +115,9 @@ pub(crate) fn mean_wind_m_s(plan: &Plan, velocity_m_s: &Array2<f64>) -> Result<O
             let seen: Vec<f64> = lines.iter().map(|line| gate[*line]).collect();
             let (wind, _) = wind_of(pattern, &direction, &seen)?;
             if wind.iter().all(|part| part.is_finite()) {
-                sum.iter_mut().zip(wind).for_each(|(sum, part)| *sum += part);
+                sum.iter_mut()
+                    .zip(wind)
+                    .for_each(|(sum, part)| *sum += part);
                 count += 1.0;
             }
         }
@@ -110,7 +126,11 @@ pub(crate) fn mean_wind_m_s(plan: &Plan, velocity_m_s: &Array2<f64>) -> Result<O
 }
 
 /// Wind of radial velocities, m/s, and what they tell of its standard deviations.
-fn wind_of(pattern: &Pattern, direction: &[[f64; 3]], seen_m_s: &[f64]) -> Result<([f64; 3], [f64; 3]), Error> {
+fn wind_of(
+    pattern: &Pattern,
+    direction: &[[f64; 3]],
+    seen_m_s: &[f64],
+) -> Result<([f64; 3], [f64; 3]), Error> {
     let unknown = [f64::NAN; 3];
     match (pattern, seen_m_s) {
         (Pattern::Dbs(dbs), &[north, east, south, west, up]) => {
@@ -124,18 +144,30 @@ fn wind_of(pattern: &Pattern, direction: &[[f64; 3]], seen_m_s: &[f64]) -> Resul
             Ok(([horizontal(0), horizontal(1), up], unknown))
         }
         (Pattern::Dbs(_), _) => Ok((unknown, unknown)),
-        _ => Ok(fit_wind(direction, seen_m_s)?
-            .map_or((unknown, unknown), |fit| (fit.velocity_m_s, fit.standard_deviation_m_s()))),
+        _ => Ok(
+            fit_wind(direction, seen_m_s)?.map_or((unknown, unknown), |fit| {
+                (fit.velocity_m_s, fit.standard_deviation_m_s())
+            }),
+        ),
     }
 }
 
 /// Standard deviations of the wind for independent beams with these standard deviations: the wind is linear in what they see.
-fn spread_of(pattern: &Pattern, direction: &[[f64; 3]], std_m_s: &[f64]) -> Result<[f64; 3], Error> {
+fn spread_of(
+    pattern: &Pattern,
+    direction: &[[f64; 3]],
+    std_m_s: &[f64],
+) -> Result<[f64; 3], Error> {
     let mut variance = [0.0; 3];
     for (beam, std) in std_m_s.iter().enumerate() {
-        let one: Vec<f64> = (0..std_m_s.len()).map(|i| if i == beam { *std } else { 0.0 }).collect();
+        let one: Vec<f64> = (0..std_m_s.len())
+            .map(|i| if i == beam { *std } else { 0.0 })
+            .collect();
         let (part, _) = wind_of(pattern, direction, &one)?;
-        variance.iter_mut().zip(part).for_each(|(sum, v)| *sum += v * v);
+        variance
+            .iter_mut()
+            .zip(part)
+            .for_each(|(sum, v)| *sum += v * v);
     }
     let known = std_m_s.iter().all(|std| std.is_finite());
     Ok(variance.map(|v| if known { v.sqrt() } else { f64::NAN }))

@@ -70,13 +70,22 @@ impl<'p> Setting<'p> {
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let lines = places.line_elevation_rad();
         let elevation_rad = lines[lines.len() / 2];
-        Ok(Self { of_rays, places, covariance, radius, elevation_rad })
+        Ok(Self {
+            of_rays,
+            places,
+            covariance,
+            radius,
+            elevation_rad,
+        })
     }
 
     /// At a range, with the scene's own signal-to-noise ratios about it.
     fn at(&self, range_m: f64) -> Result<BoundPoint, Error> {
         let (rays, radius_m) = (&self.of_rays, self.radius.at_m(range_m)?);
-        let (gates_m, most) = (self.places.gate_ranges_m(), self.places.most_gates(radius_m));
+        let (gates_m, most) = (
+            self.places.gate_ranges_m(),
+            self.places.most_gates(radius_m),
+        );
         // Each record is about its innermost window, with which rows of windows begin: ends of the scan cut chords. Most chords share one.
         let (mut about, mut of_region) = (BTreeMap::new(), 0.0);
         for chord in self.places.chords(self.point(range_m), radius_m) {
@@ -88,7 +97,10 @@ impl<'p> Setting<'p> {
             let pulses = self.places.line_rays(chord.line).count();
             of_region += pulses as f64 * by_gates[chord.gates().min(most) - 1];
         }
-        let ratios = [of_table(&rays.layer_m, &rays.layer_snr, range_m), rays.of_windows(&[range_m])?[0]];
+        let ratios = [
+            of_table(&rays.layer_m, &rays.layer_snr, range_m),
+            rays.of_windows(&[range_m])?[0],
+        ];
         self.told(range_m, ratios, [rays.at(range_m, 1)?[0], of_region])
     }
 
@@ -96,23 +108,47 @@ impl<'p> Setting<'p> {
     fn of_snr(&self, range_m: f64, snr: f64) -> Result<BoundPoint, Error> {
         let radius_m = self.radius.at_m(range_m)?;
         let by_gates = self.of_rays.of_snr(snr, self.places.most_gates(radius_m))?;
-        let of_region = self.places.information(self.point(range_m), radius_m, &by_gates);
+        let of_region = self
+            .places
+            .information(self.point(range_m), radius_m, &by_gates);
         self.told(range_m, [snr; 2], [by_gates[0], of_region])
     }
 
     fn point(&self, range_m: f64) -> PolarPoint {
-        PolarPoint { range_m, elevation_rad: self.elevation_rad }
+        PolarPoint {
+            range_m,
+            elevation_rad: self.elevation_rad,
+        }
     }
 
     /// From the ratio of the air at the range and that of a window there, and the information of a window and of the region.
-    fn told(&self, range_m: f64, snr: [f64; 2], information: [f64; 2]) -> Result<BoundPoint, Error> {
+    fn told(
+        &self,
+        range_m: f64,
+        snr: [f64; 2],
+        information: [f64; 2],
+    ) -> Result<BoundPoint, Error> {
         let correlation = self.covariance.correlation(snr[1])?;
-        let (level, n_eff) = self.places.level(self.point(range_m), self.radius.at_m(range_m)?, &correlation);
+        let (level, n_eff) = self.places.level(
+            self.point(range_m),
+            self.radius.at_m(range_m)?,
+            &correlation,
+        );
         // Without any return there is no information.
-        let bound_m_s = |information: f64| if information > 0.0 { information.sqrt().recip() } else { f64::NAN };
+        let bound_m_s = |information: f64| {
+            if information > 0.0 {
+                information.sqrt().recip()
+            } else {
+                f64::NAN
+            }
+        };
         Ok(BoundPoint {
             range_m,
-            snr_db: if snr[0] > 0.0 { 10.0 * snr[0].log10() } else { f64::NAN },
+            snr_db: if snr[0] > 0.0 {
+                10.0 * snr[0].log10()
+            } else {
+                f64::NAN
+            },
             window_m_s: bound_m_s(information[0]),
             level,
             n_eff,
@@ -131,7 +167,13 @@ pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> 
     let middle_m = gates_m[gates_m.len() / 2];
     let of_snr = |db: i32| setting.of_snr(middle_m, 10f64.powf(0.1 * f64::from(db)));
     let by_snr = SNR_DB.map(of_snr).collect::<Result<_, _>>()?;
-    Ok(SceneBound { by_snr, by_range: gates_m.iter().map(|&range_m| setting.at(range_m)).collect::<Result<_, _>>()? })
+    Ok(SceneBound {
+        by_snr,
+        by_range: gates_m
+            .iter()
+            .map(|&range_m| setting.at(range_m))
+            .collect::<Result<_, _>>()?,
+    })
 }
 
 /// The bound in the middle of the range of the gates of a scan.
@@ -139,7 +181,8 @@ pub fn bound(plan: &Plan, observer: &dyn Observer) -> Result<SceneBound, Error> 
 /// # Errors
 /// As [`bound`].
 pub(crate) fn bound_in_the_middle(plan: &Plan, scanner: &Scanner<'_>) -> Result<BoundPoint, Error> {
-    Setting::new(plan, scanner)?.at(plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2])
+    Setting::new(plan, scanner)?
+        .at(plan.geometry.gate_range_m[plan.geometry.gate_range_m.len() / 2])
 }
 
 /// The table `range_m,snr_db,bound_window_m_s,level,n_eff,bound_region_m_s`.
@@ -157,17 +200,32 @@ pub fn points(points: &[BoundPoint]) -> Table {
 impl SceneBound {
     /// All points in one table, behind a column `curve` that is `snr` or `range`.
     pub fn table(&self) -> Table {
-        let curve = |name: &'static str, points: &[BoundPoint]| std::iter::repeat_n(name, points.len());
+        let curve =
+            |name: &'static str, points: &[BoundPoint]| std::iter::repeat_n(name, points.len());
         Table::new()
-            .text("curve", curve("snr", &self.by_snr).chain(curve("range", &self.by_range)))
+            .text(
+                "curve",
+                curve("snr", &self.by_snr).chain(curve("range", &self.by_range)),
+            )
             .beside(points(&[self.by_snr.as_slice(), &self.by_range].concat()))
     }
 
     /// A few lines for people: every tenth decibel, and five ranges.
     pub fn text(&self) -> String {
         let spread = (self.by_range.len().max(2) - 1) as f64 / 4.0;
-        let ranges = (0..5).map(|i| (f64::from(i) * spread) as usize).filter_map(|i| self.by_range.get(i));
-        points(&self.by_snr.iter().step_by(10).chain(ranges).copied().collect::<Vec<_>>()).aligned()
+        let ranges = (0..5)
+            .map(|i| (f64::from(i) * spread) as usize)
+            .filter_map(|i| self.by_range.get(i));
+        points(
+            &self
+                .by_snr
+                .iter()
+                .step_by(10)
+                .chain(ranges)
+                .copied()
+                .collect::<Vec<_>>(),
+        )
+        .aligned()
     }
 }
 
@@ -184,27 +242,47 @@ mod tests {
         (scene.scan.elevation_max_rad, scene.scan.elevation_step_rad) = (0.02, 1e-3);
         scene.detector.snr = SnrReference::Fixed { snr_db: 3.0 };
         change(&mut scene);
-        bound(&Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap(), &Silent)
+        bound(
+            &Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap(),
+            &Silent,
+        )
     }
 
     /// The stored column at the ratios of the file.
     fn stored(column: usize) -> Vec<(f64, f64)> {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/signal/crlb_200ns.csv");
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/reference/signal/crlb_200ns.csv"
+        );
         let text = std::fs::read_to_string(path).unwrap();
-        let rows = text.lines().filter(|l| l.starts_with(|c: char| c == '-' || c.is_ascii_digit()));
-        rows.map(|l| l.split(',').map(|x| x.parse().unwrap()).collect::<Vec<f64>>())
-            .map(|r| (r[0], r[column]))
-            .collect()
+        let rows = text
+            .lines()
+            .filter(|l| l.starts_with(|c: char| c == '-' || c.is_ascii_digit()));
+        rows.map(|l| {
+            l.split(',')
+                .map(|x| x.parse().unwrap())
+                .collect::<Vec<f64>>()
+        })
+        .map(|r| (r[0], r[column]))
+        .collect()
     }
 
     #[test]
     fn the_bound_of_one_window_of_table_2_is_the_stored_curve() {
-        for (signal, column) in [(DetectorSignal::Baseband, 1), (DetectorSignal::IntermediateFrequency, 2)] {
-            let found = of(|s| (s.detector.noise, s.detector.signal) = (NoiseModel::White, signal)).unwrap().by_snr;
+        for (signal, column) in [
+            (DetectorSignal::Baseband, 1),
+            (DetectorSignal::IntermediateFrequency, 2),
+        ] {
+            let found = of(|s| (s.detector.noise, s.detector.signal) = (NoiseModel::White, signal))
+                .unwrap()
+                .by_snr;
             let mut compared = 0;
             for (snr_db, expected_m_s) in stored(column) {
                 if let Some(p) = found.iter().find(|p| (p.snr_db - snr_db).abs() < 1e-9) {
-                    assert!((p.window_m_s / expected_m_s - 1.0).abs() < 1e-7, "{snr_db}: {p:?}, {expected_m_s}");
+                    assert!(
+                        (p.window_m_s / expected_m_s - 1.0).abs() < 1e-7,
+                        "{snr_db}: {p:?}, {expected_m_s}"
+                    );
                     compared += 1;
                 }
             }
@@ -223,14 +301,27 @@ mod tests {
             s.estimator.radius_m = 0.0;
             s.scan.pulses_per_line = 9;
         });
-        assert!((one.n_eff - 1.0).abs() < 1e-9 && (one.snr_db - 3.0).abs() < 1e-9, "{one:?}");
-        assert!((one.region_m_s / many.region_m_s - 3.0).abs() < 1e-9, "{one:?} {many:?}");
+        assert!(
+            (one.n_eff - 1.0).abs() < 1e-9 && (one.snr_db - 3.0).abs() < 1e-9,
+            "{one:?}"
+        );
+        assert!(
+            (one.region_m_s / many.region_m_s - 3.0).abs() < 1e-9,
+            "{one:?} {many:?}"
+        );
         let region = middle(|s| s.scan.pulses_per_line = 1);
-        assert!(region.level > 20 && region.region_m_s < 0.5 * one.region_m_s, "{region:?}");
+        assert!(
+            region.level > 20 && region.region_m_s < 0.5 * one.region_m_s,
+            "{region:?}"
+        );
     }
 
     fn plan(text: &str) -> Plan {
-        Plan::new(SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(), Target::Map).unwrap()
+        Plan::new(
+            SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(),
+            Target::Map,
+        )
+        .unwrap()
     }
 
     /// Lines so far from each other that they share nothing, in a wind of 3 m/s at rest along them.
@@ -256,20 +347,36 @@ mod tests {
             (lines(&fixed(10.0), 200e-9, 4, &of_radius(30.0)), true),
             (lines(&fixed(10.0), 200e-9, 8, "radius_m = 2.0\n"), false),
             (
-                lines(&fixed(3.0), 200e-9, 20, "method.kind = \"likelihood\"\nradius_m = 10.0\nwindow_samples = 32\n"),
+                lines(
+                    &fixed(3.0),
+                    200e-9,
+                    20,
+                    "method.kind = \"likelihood\"\nradius_m = 10.0\nwindow_samples = 32\n",
+                ),
                 false,
             ),
         ] {
             let map = crate::run::run(&plan, &Silent).unwrap().map.unwrap();
             let gate = map.range_m.len() / 2;
             let column = map.std_m_s.column(gate);
-            let std_m_s = column.iter().map(|std| std * std / column.len() as f64).sum::<f64>().sqrt();
+            let std_m_s = column
+                .iter()
+                .map(|std| std * std / column.len() as f64)
+                .sum::<f64>()
+                .sqrt();
             let error_m_s = std_m_s / (2.0 * column.len() as f64 * 79.0).sqrt();
             let found = bound(&plan, &Silent).unwrap().by_range[gate];
-            assert!(found.region_m_s < std_m_s + 3.0 * error_m_s, "{found:?}: {std_m_s} +- {error_m_s}");
+            assert!(
+                found.region_m_s < std_m_s + 3.0 * error_m_s,
+                "{found:?}: {std_m_s} +- {error_m_s}"
+            );
             assert!(found.region_m_s > 0.2 * std_m_s, "{found:?}: {std_m_s}");
             let by_n_eff_m_s = found.window_m_s / found.n_eff.sqrt();
-            assert_eq!(by_n_eff_m_s > std_m_s + 3.0 * error_m_s, beaten, "{by_n_eff_m_s} {std_m_s} {found:?}");
+            assert_eq!(
+                by_n_eff_m_s > std_m_s + 3.0 * error_m_s,
+                beaten,
+                "{by_n_eff_m_s} {std_m_s} {found:?}"
+            );
         }
     }
 
@@ -277,17 +384,32 @@ mod tests {
     fn each_row_has_what_its_own_ratio_is_worth() {
         let at = |db: f64| {
             let detector = format!("snr = {{ reference = \"fixed\", snr_db = {db:?} }}");
-            bound(&lines(&detector, 200e-9, 1, "window_samples = 16\nradius_m = 10.0\n"), &Silent).unwrap()
+            bound(
+                &lines(
+                    &detector,
+                    200e-9,
+                    1,
+                    "window_samples = 16\nradius_m = 10.0\n",
+                ),
+                &Silent,
+            )
+            .unwrap()
         };
         let (strong, weak) = (at(0.0), at(-20.0));
         let (row, gate) = (strong.by_snr[10], weak.by_range[weak.by_range.len() / 2]);
         assert!((row.snr_db + 20.0).abs() < 1e-9 && (gate.snr_db + 20.0).abs() < 1e-9);
-        for (row, gate) in
-            [(row.n_eff, gate.n_eff), (row.region_m_s, gate.region_m_s), (row.window_m_s, gate.window_m_s)]
-        {
+        for (row, gate) in [
+            (row.n_eff, gate.n_eff),
+            (row.region_m_s, gate.region_m_s),
+            (row.window_m_s, gate.window_m_s),
+        ] {
             assert!((row / gate - 1.0).abs() < 1e-6, "{row} {gate}");
         }
-        assert!(row.n_eff > 1.3 * strong.by_snr[30].n_eff, "{row:?} {:?}", strong.by_snr[30]);
+        assert!(
+            row.n_eff > 1.3 * strong.by_snr[30].n_eff,
+            "{row:?} {:?}",
+            strong.by_snr[30]
+        );
     }
 
     #[test]
@@ -304,12 +426,31 @@ mod tests {
             (points, map.n_eff.row(0).to_vec())
         };
         let (clear, cloudy) = (of("1e-7"), of("1e-4"));
-        let at = |range_m: f64| clear.0.iter().position(|point| point.range_m > range_m).unwrap();
+        let at = |range_m: f64| {
+            clear
+                .0
+                .iter()
+                .position(|point| point.range_m > range_m)
+                .unwrap()
+        };
         let (far, near) = (at(350.0), at(464.0));
         let ratio = |gate: usize| cloudy.0[gate].region_m_s / clear.0[gate].region_m_s;
-        assert!((ratio(far) - 1.0).abs() < 1e-9 && ratio(near) < 0.7, "{} {}", ratio(far), ratio(near));
-        assert!((cloudy.1[far] / clear.1[far] - 1.0).abs() < 1e-9, "{} {}", cloudy.1[far], clear.1[far]);
-        assert!((cloudy.1[far] / cloudy.0[far].n_eff - 1.0).abs() < 1e-9, "map and bound differ");
+        assert!(
+            (ratio(far) - 1.0).abs() < 1e-9 && ratio(near) < 0.7,
+            "{} {}",
+            ratio(far),
+            ratio(near)
+        );
+        assert!(
+            (cloudy.1[far] / clear.1[far] - 1.0).abs() < 1e-9,
+            "{} {}",
+            cloudy.1[far],
+            clear.1[far]
+        );
+        assert!(
+            (cloudy.1[far] / cloudy.0[far].n_eff - 1.0).abs() < 1e-9,
+            "map and bound differ"
+        );
     }
 
     #[test]
@@ -323,9 +464,15 @@ mod tests {
         let points = bound(&scene, &Silent).unwrap().by_range;
         for of in [|p: &BoundPoint| p.window_m_s, |p: &BoundPoint| p.region_m_s] {
             // Apart from the ends, which cut regions.
-            let rise: Vec<f64> = points[1..points.len() - 1].windows(2).map(|p| of(&p[1]) / of(&p[0])).collect();
+            let rise: Vec<f64> = points[1..points.len() - 1]
+                .windows(2)
+                .map(|p| of(&p[1]) / of(&p[0]))
+                .collect();
             assert!(rise.iter().all(|rise| *rise > 1.05), "{rise:?}");
-            assert!(rise.windows(2).all(|rise| rise[1] < 1.01 * rise[0]), "{rise:?}");
+            assert!(
+                rise.windows(2).all(|rise| rise[1] < 1.01 * rise[0]),
+                "{rise:?}"
+            );
         }
     }
 
@@ -337,17 +484,31 @@ mod tests {
                  [pulse.shape]\nduration_s = 300e-9\n[atmosphere]\nbackscatter_per_m_sr = 1e-6\n[scan]\nelevation_min_rad = 0.1\n\
                  elevation_max_rad = 0.1\nrange_min_m = 300.0\nrange_max_m = 460.0\n[estimator]\n{estimator}\nradius_m = {radius_m:?}\n"
             ));
-            Setting::new(&scene, &Scanner::new(&scene, &Silent).unwrap()).unwrap().at(range_m).unwrap()
+            Setting::new(&scene, &Scanner::new(&scene, &Silent).unwrap())
+                .unwrap()
+                .at(range_m)
+                .unwrap()
         };
         // Two windows of 24 samples, 8 samples apart, and one of 32 between them.
         let step_m = 4.0 * SPEED_OF_LIGHT_M_S / 250e6;
-        let gates = plan("[estimator]\nwindow_samples = 24\nwindow_step_samples = 8\n[scan]\nrange_min_m = 300.0\n");
-        let gate_m = places(&gates.scene.content, &gates.geometry).unwrap().gate_ranges_m()[10];
+        let gates = plan(
+            "[estimator]\nwindow_samples = 24\nwindow_step_samples = 8\n[scan]\nrange_min_m = 300.0\n",
+        );
+        let gate_m = places(&gates.scene.content, &gates.geometry)
+            .unwrap()
+            .gate_ranges_m()[10];
         let middle_m = gate_m + 0.5 * step_m;
-        let two = at("window_samples = 24\nwindow_step_samples = 8", 0.6 * step_m, middle_m);
+        let two = at(
+            "window_samples = 24\nwindow_step_samples = 8",
+            0.6 * step_m,
+            middle_m,
+        );
         let one = at("window_samples = 32", 0.0, middle_m);
         assert_eq!(two.level, 32);
-        assert!((two.region_m_s / (one.window_m_s / 4.0) - 1.0).abs() < 1e-9, "{two:?} {one:?}");
+        assert!(
+            (two.region_m_s / (one.window_m_s / 4.0) - 1.0).abs() < 1e-9,
+            "{two:?} {one:?}"
+        );
     }
 
     #[test]

@@ -37,15 +37,22 @@ impl CellAverage {
     pub fn over(map: &VelocityEstimates, cells: &[(usize, usize)]) -> Self {
         let [known, scattered] = with_estimates(map, cells);
         let means = Self::without_errors(map, cells);
-        let Some(law) = map.law.as_ref().filter(|_| !known.is_empty()) else { return means };
+        let Some(law) = map.law.as_ref().filter(|_| !known.is_empty()) else {
+            return means;
+        };
         let error = |scan: &ScanErrors, cell| scan.error_m_s[cell];
         let squared = |scan: &ScanErrors, cell| scan.error_m_s[cell].powi(2);
         let (unseen, of_bias) = law.unseen(&known);
-        let [variance, square] = [mean(&scattered, &map.std_m_s, 2), mean(&known, &map.rms_m_s, 2)];
+        let [variance, square] = [
+            mean(&scattered, &map.std_m_s, 2),
+            mean(&known, &map.rms_m_s, 2),
+        ];
         let of_variance = variance_of_mean(map, law, &scattered, error, of_variance);
         let of_square = variance_of_mean(map, law, &known, squared, about_mean);
         Self {
-            bias_standard_error_m_s: (variance_of_mean(map, law, &known, error, about_mean) + of_bias).sqrt(),
+            bias_standard_error_m_s: (variance_of_mean(map, law, &known, error, about_mean)
+                + of_bias)
+                .sqrt(),
             std_standard_error_m_s: error_of_root(variance, of_variance, unseen),
             standard_error_m_s: error_of_root(square, of_square, unseen),
             ..means
@@ -70,7 +77,11 @@ impl CellAverage {
 /// The cells that have an estimate, and those of them that have several: a cell with one has an error, but no scatter.
 fn with_estimates(map: &VelocityEstimates, cells: &[(usize, usize)]) -> [Vec<(usize, usize)>; 2] {
     let are_finite = |field: &Array2<f64>, cells: &[(usize, usize)]| {
-        cells.iter().copied().filter(|cell| field.get(*cell).is_some_and(|value| value.is_finite())).collect::<Vec<_>>()
+        cells
+            .iter()
+            .copied()
+            .filter(|cell| field.get(*cell).is_some_and(|value| value.is_finite()))
+            .collect::<Vec<_>>()
     };
     let known = are_finite(&map.rms_m_s, cells);
     let scattered = are_finite(&map.std_m_s, &known);
@@ -88,12 +99,22 @@ pub fn flagged_fraction(map: &VelocityEstimates) -> [f64; 2] {
     let cells: Vec<(usize, usize)> = map.flagged.indexed_iter().map(|(cell, _)| cell).collect();
     let fraction = map.flagged.sum() / cells.len() as f64;
     let flag = |scan: &ScanErrors, cell| f64::from(u8::from(scan.flagged[cell]));
-    let scattered = map.law.as_ref().map(|law| variance_of_mean(map, law, &cells, flag, about_mean).sqrt());
+    let scattered = map
+        .law
+        .as_ref()
+        .map(|law| variance_of_mean(map, law, &cells, flag, about_mean).sqrt());
     // Cells that share windows may be flagged together; where none is, nothing tells how many: between one and all of them.
-    let shared = map.law.as_ref().filter(|_| fraction == 0.0).map_or(1.0, |law| law.shared.iter().product());
+    let shared = map
+        .law
+        .as_ref()
+        .filter(|_| fraction == 0.0)
+        .map_or(1.0, |law| law.shared.iter().product());
     let together = f64::sqrt(shared).max(1.0);
     let least = error_of_fraction(fraction, (cells.len() * map.scans.len()) as f64 / together);
-    [fraction, scattered.map_or(f64::NAN, |error| error.max(least))]
+    [
+        fraction,
+        scattered.map_or(f64::NAN, |error| error.max(least)),
+    ]
 }
 
 /// Standard error of a fraction of so many: not 0 where none was found.
@@ -114,9 +135,17 @@ fn about_mean(values: &[f64]) -> Vec<f64> {
 fn of_variance(errors: &[f64]) -> Vec<f64> {
     let (n, apart) = (errors.len() as f64, about_mean(errors));
     if errors.len() == 2 {
-        return apart.iter().map(|x| 2.0 * (5.0_f64 / 6.0).sqrt() * x * x.abs()).collect();
+        return apart
+            .iter()
+            .map(|x| 2.0 * (5.0_f64 / 6.0).sqrt() * x * x.abs())
+            .collect();
     }
-    about_mean(&apart.iter().map(|x| n / (n - 2.0) * x * x).collect::<Vec<_>>())
+    about_mean(
+        &apart
+            .iter()
+            .map(|x| n / (n - 2.0) * x * x)
+            .collect::<Vec<_>>(),
+    )
 }
 
 /// Variance of the mean over cells and realisations of a value, by deviations over the realisations of a cell; where a cell has one
@@ -130,14 +159,27 @@ fn variance_of_mean(
 ) -> f64 {
     let mut of_scans = vec![Array2::<f64>::zeros(map.flagged.dim()); map.scans.len()];
     let value = &value;
-    let values_of =
-        |cell| map.scans.iter().map(move |scan| value(scan, cell)).enumerate().filter(|(_, v)| v.is_finite());
-    let all: Vec<f64> = cells.iter().flat_map(|cell| values_of(*cell)).map(|(_, value)| value).collect();
+    let values_of = |cell| {
+        map.scans
+            .iter()
+            .map(move |scan| value(scan, cell))
+            .enumerate()
+            .filter(|(_, v)| v.is_finite())
+    };
+    let all: Vec<f64> = cells
+        .iter()
+        .flat_map(|cell| values_of(*cell))
+        .map(|(_, value)| value)
+        .collect();
     let middle = all.iter().sum::<f64>() / all.len() as f64;
     for &cell in cells {
         let (scans, values): (Vec<usize>, Vec<f64>) = values_of(cell).unzip();
         let share = 1.0 / (values.len() * cells.len()) as f64;
-        let apart = if values.len() == 1 { vec![values[0] - middle] } else { deviations(&values) };
+        let apart = if values.len() == 1 {
+            vec![values[0] - middle]
+        } else {
+            deviations(&values)
+        };
         for (scan, deviation) in scans.into_iter().zip(apart) {
             of_scans[scan][cell] = share * deviation;
         }
@@ -149,7 +191,8 @@ fn variance_of_mean(
         for &(line, gate) in cells {
             let value = scan[(line, gate)];
             own += value * value;
-            *blocks.entry((block(line, 0), block(gate, 1))).or_default() += value * near[(line, gate)];
+            *blocks.entry((block(line, 0), block(gate, 1))).or_default() +=
+                value * near[(line, gate)];
         }
     }
     let n = map.scans.len() as f64;
@@ -166,10 +209,17 @@ fn weighted_sums(values: &Array2<f64>, shared: [f64; 2]) -> Array2<f64> {
         let reach = REACH * shared[axis];
         let weight = |away: usize| (1.0 - (away as f64 / reach).powi(4)).max(0.0);
         let weights: Vec<f64> = (0..values.len_of(Axis(axis))).map(weight).collect();
-        for (mut to, from) in sums.lanes_mut(Axis(axis)).into_iter().zip(values.lanes(Axis(axis))) {
+        for (mut to, from) in sums
+            .lanes_mut(Axis(axis))
+            .into_iter()
+            .zip(values.lanes(Axis(axis)))
+        {
             for (at, sum) in to.indexed_iter_mut() {
-                let near = at.saturating_sub(reach as usize)..(at + reach as usize + 1).min(from.len());
-                *sum = near.map(|other| weights[at.abs_diff(other)] * from[other]).sum::<f64>();
+                let near =
+                    at.saturating_sub(reach as usize)..(at + reach as usize + 1).min(from.len());
+                *sum = near
+                    .map(|other| weights[at.abs_diff(other)] * from[other])
+                    .sum::<f64>();
             }
         }
         sums

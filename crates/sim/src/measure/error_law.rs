@@ -27,10 +27,19 @@ const OUTLIER: f64 = 6.0;
 /// What the crates refuse; a checked scene gives none.
 pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
     let (scene, g) = (&plan.scene.content, &plan.geometry);
-    let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
+    let middle_m = g
+        .gate_range_m
+        .get(g.gate_range_m.len() / 2)
+        .copied()
+        .unwrap_or(1.0);
     // From one line to the next of the same sweep; lines of which each is alone share nothing.
     let schedule = &g.schedule;
-    let next = |i: &usize| schedule.lines.get(i + 1).is_some_and(|next| next.group == schedule.lines[*i].group);
+    let next = |i: &usize| {
+        schedule
+            .lines
+            .get(i + 1)
+            .is_some_and(|next| next.group == schedule.lines[*i].group)
+    };
     let apart = |i: usize| {
         let [a, b] = [i, i + 1].map(|line| schedule.middle(line).direction.0);
         (0..3).map(|k| (a[k] - b[k]).powi(2)).sum::<f64>().sqrt()
@@ -41,8 +50,15 @@ pub(crate) fn shared_cells(plan: &Plan) -> Result<[f64; 2], Error> {
     let gate_m = scene.estimator.gate_step_samples as f64 * g.sample_spacing_m;
     let across_m = 2.0 * scene.estimator.largest_radius_m(middle_m);
     let lines = (across_m / line_m).floor() + 1.0;
-    let gates = (range_filter(plan)?.full_width_half_maximum_m().hypot(across_m) / gate_m).max(1.0);
-    Ok([lines.min(g.elevation_rad.len() as f64), gates.min(g.gate_range_m.len() as f64)])
+    let gates = (range_filter(plan)?
+        .full_width_half_maximum_m()
+        .hypot(across_m)
+        / gate_m)
+        .max(1.0);
+    Ok([
+        lines.min(g.elevation_rad.len() as f64),
+        gates.min(g.gate_range_m.len() as f64),
+    ])
 }
 
 /// What one realisation shows, each \[line, gate\].
@@ -86,24 +102,42 @@ impl ErrorLaw {
         let freedom = n - 1.0;
         let near = reach(shared, 2.0 * FREEDOM / freedom);
         let median_m_s = medians(scans, near);
-        let finite = |cell| scans.iter().map(move |scan| scan.error_m_s[cell]).filter(|error| error.is_finite());
+        let finite = |cell| {
+            scans
+                .iter()
+                .map(move |scan| scan.error_m_s[cell])
+                .filter(|error| error.is_finite())
+        };
         let is_far = |cell, error: &f64| error.abs() > OUTLIER * median_m_s[cell];
         let count = Array2::from_shape_fn(shape, |cell| finite(cell).count() as f64);
-        let outliers = Array2::from_shape_fn(shape, |cell| finite(cell).filter(|e| is_far(cell, e)).count() as f64);
+        let outliers = Array2::from_shape_fn(shape, |cell| {
+            finite(cell).filter(|e| is_far(cell, e)).count() as f64
+        });
         // Guesses over the band are alike in all cells, long tails go with what is usual about them: the lesser.
         let powers = [2, 4].map(|power| {
             let far = median_m_s.indexed_iter().flat_map(|(cell, m)| {
-                finite(cell).filter(move |e| is_far(cell, e)).map(move |e| [e.powi(power), (e / m).powi(power)])
+                finite(cell)
+                    .filter(move |e| is_far(cell, e))
+                    .map(move |e| [e.powi(power), (e / m).powi(power)])
             });
             let sum = far.fold([0.0; 2], |sum, far| [sum[0] + far[0], sum[1] + far[1]]);
             let mean = sum.map(|sum| sum / outliers.sum().max(1.0));
-            median_m_s.mapv(|m| mean[0].min(if m > 0.0 { mean[1] * m.powi(power) } else { f64::INFINITY }))
+            median_m_s.mapv(|m| {
+                mean[0].min(if m > 0.0 {
+                    mean[1] * m.powi(power)
+                } else {
+                    f64::INFINITY
+                })
+            })
         });
         let near_count = &count - &outliers;
         let central = |power: i32, about: Option<&Array2<f64>>| {
             Array2::from_shape_fn(shape, |cell| {
                 let middle = about.map_or(0.0, |about| about[cell]);
-                finite(cell).filter(|e| !is_far(cell, e)).map(|e| (e - middle).powi(power)).sum::<f64>()
+                finite(cell)
+                    .filter(|e| !is_far(cell, e))
+                    .map(|e| (e - middle).powi(power))
+                    .sum::<f64>()
             })
         };
         let bias_m_s = central(1, None) / near_count.mapv(|n| n.max(1.0));
@@ -112,25 +146,52 @@ impl ErrorLaw {
         let pooled = |reach| sums_about(&squares, reach) / sums_about(&freedoms, reach);
         // The excess of deviations from a mean of few is a part of that of the errors.
         let variance = pooled(near);
-        let fourth = sums_about(&fourths, near) / sums_about(&near_count, near) * (n / freedom).powi(2);
-        let ratios: Vec<f64> =
-            fourth.iter().zip(&variance).map(|(f, v)| f / (v * v)).filter(|ratio| ratio.is_finite()).collect();
-        let cells = near.iter().map(|reach| (2 * reach + 1) as f64).product::<f64>() / (ALIKE * shared[0] * shared[1]);
+        let fourth =
+            sums_about(&fourths, near) / sums_about(&near_count, near) * (n / freedom).powi(2);
+        let ratios: Vec<f64> = fourth
+            .iter()
+            .zip(&variance)
+            .map(|(f, v)| f / (v * v))
+            .filter(|ratio| ratio.is_finite())
+            .collect();
+        let cells = near
+            .iter()
+            .map(|reach| (2 * reach + 1) as f64)
+            .product::<f64>()
+            / (ALIKE * shared[0] * shared[1]);
         let seen = freedom * cells.max(1.0);
-        let fourth = ratios.iter().sum::<f64>() / (ratios.len() as f64).max(1.0) * (seen + 2.0) / seen;
+        let fourth =
+            ratios.iter().sum::<f64>() / (ratios.len() as f64).max(1.0) * (seen + 2.0) / seen;
         let of_squares = 2.0 + (fourth - 3.0).max(0.0) * n * n * freedom / (freedom.powi(3) + 1.0);
-        let variance = pooled(reach(shared, FREEDOM * of_squares.min(MOST_UNITS) / freedom));
+        let variance = pooled(reach(
+            shared,
+            FREEDOM * of_squares.min(MOST_UNITS) / freedom,
+        ));
         let scatter = Array2::from_shape_fn(shape, |cell| {
             let mean = finite(cell).map(|e| e * e).sum::<f64>() / count[cell].max(1.0);
             finite(cell).map(|e| (e * e - mean).powi(2)).sum::<f64>() / (count[cell] - 1.0).max(1.0)
         });
         let outlier_part = outliers.sum() / count.sum().max(1.0);
-        Some(Self { shared, count, bias_m_s, variance, of_squares, scatter, outliers, outlier_part, powers })
+        Some(Self {
+            shared,
+            count,
+            bias_m_s,
+            variance,
+            of_squares,
+            scatter,
+            outliers,
+            outlier_part,
+            powers,
+        })
     }
 
     /// Expected part of outliers among `count` estimates that have `found`: those of the map count as one more.
     fn expected(&self, found: f64, count: f64) -> f64 {
-        if self.outlier_part > 0.0 { (found + 1.0) / (count + 1.0 / self.outlier_part) } else { 0.0 }
+        if self.outlier_part > 0.0 {
+            (found + 1.0) / (count + 1.0 / self.outlier_part)
+        } else {
+            0.0
+        }
     }
 
     /// Standard error of the root mean square of each cell, m/s; NaN for fewer than two estimates.
@@ -144,15 +205,27 @@ impl ErrorLaw {
             self.powers.each_ref().map(|power| part * power[cell])
         };
         // What the scatter adds to it is taken off: it may be below zero.
-        let squared_bias = |cell| self.bias_m_s[cell].powi(2) - self.variance[cell] / self.count[cell];
+        let squared_bias =
+            |cell| self.bias_m_s[cell].powi(2) - self.variance[cell] / self.count[cell];
         let of_squares = |cell, squared_bias: f64| {
             let (variance, [far, _]) = (self.variance[cell], outliers(cell));
-            4.0 * squared_bias * (variance + far) + self.of_squares * variance.powi(2) + 2.0 * variance * far
+            4.0 * squared_bias * (variance + far)
+                + self.of_squares * variance.powi(2)
+                + 2.0 * variance * far
         };
         let freedom = self.count.mapv(|n| (n - 1.0).max(0.0));
-        let wide = reach(self.shared, FREEDOM_OF_SCATTER / freedom.mean().unwrap_or(1.0).max(1.0));
+        let wide = reach(
+            self.shared,
+            FREEDOM_OF_SCATTER / freedom.mean().unwrap_or(1.0).max(1.0),
+        );
         let about = |of: &dyn Fn((usize, usize)) -> f64| {
-            let one = |cell| if self.variance[cell] > 0.0 { freedom[cell] * of(cell) } else { 0.0 };
+            let one = |cell| {
+                if self.variance[cell] > 0.0 {
+                    freedom[cell] * of(cell)
+                } else {
+                    0.0
+                }
+            };
             sums_about(&Array2::from_shape_fn(freedom.dim(), one), wide)
         };
         let seen = about(&|cell| self.scatter[cell] / self.variance[cell].powi(2));
@@ -169,7 +242,11 @@ impl ErrorLaw {
             let [far, of_far] = outliers(cell);
             let squared_bias = squared_bias(cell).max(0.0);
             let of_mean = less * of_squares(cell, squared_bias) / n;
-            error_of_root(squared_bias + self.variance[cell], of_mean, [far, of_far / n])
+            error_of_root(
+                squared_bias + self.variance[cell],
+                of_mean,
+                [far, of_far / n],
+            )
         })
     }
 
@@ -179,7 +256,10 @@ impl ErrorLaw {
         let sum = |of: &Array2<f64>| cells.iter().map(|cell| of[*cell]).sum::<f64>();
         let (count, found) = (sum(&self.count), sum(&self.outliers));
         let part = (self.expected(found, count) - found / count).max(0.0);
-        let [square, fourth] = self.powers.each_ref().map(|power| part * sum(power) / cells.len() as f64);
+        let [square, fourth] = self
+            .powers
+            .each_ref()
+            .map(|power| part * sum(power) / cells.len() as f64);
         ([square, fourth / count], square / count)
     }
 }
@@ -214,7 +294,8 @@ fn sums_about(values: &Array2<f64>, reach: [usize; 2]) -> Array2<f64> {
     Array2::from_shape_fn((lines, gates), |(i, j)| {
         let (first, end) = (i.saturating_sub(reach[0]), (i + reach[0] + 1).min(lines));
         let (left, right) = (j.saturating_sub(reach[1]), (j + reach[1] + 1).min(gates));
-        let sum = table[(end, right)] - table[(first, right)] - table[(end, left)] + table[(first, left)];
+        let sum =
+            table[(end, right)] - table[(first, right)] - table[(end, left)] + table[(first, left)];
         sum.max(0.0)
     })
 }
@@ -226,7 +307,11 @@ fn medians(scans: &[ScanErrors], reach: [usize; 2]) -> Array2<f64> {
     let part = |(i, j)| (place(i, lines, reach[0]), place(j, gates, reach[1]));
     let mut parts: BTreeMap<(usize, usize), Vec<f64>> = BTreeMap::new();
     for scan in scans {
-        for (cell, error) in scan.error_m_s.indexed_iter().filter(|(_, error)| error.is_finite()) {
+        for (cell, error) in scan
+            .error_m_s
+            .indexed_iter()
+            .filter(|(_, error)| error.is_finite())
+        {
             parts.entry(part(cell)).or_default().push(error.abs());
         }
     }
@@ -234,6 +319,11 @@ fn medians(scans: &[ScanErrors], reach: [usize; 2]) -> Array2<f64> {
         let middle = sizes.len() / 2;
         *sizes.select_nth_unstable_by(middle, f64::total_cmp).1
     };
-    let medians: BTreeMap<_, f64> = parts.into_iter().map(|(part, sizes)| (part, median(sizes))).collect();
-    Array2::from_shape_fn((lines, gates), |cell| medians.get(&part(cell)).copied().unwrap_or(0.0))
+    let medians: BTreeMap<_, f64> = parts
+        .into_iter()
+        .map(|(part, sizes)| (part, median(sizes)))
+        .collect();
+    Array2::from_shape_fn((lines, gates), |cell| {
+        medians.get(&part(cell)).copied().unwrap_or(0.0)
+    })
 }

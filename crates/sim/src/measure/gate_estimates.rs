@@ -49,17 +49,26 @@ impl GateSums {
     /// Adds the estimate of a map, held against so many times the scene's noise; returns whether it is flagged.
     pub(crate) fn add(&mut self, gate: &GateEstimate, noise_factor: f64) -> bool {
         let (is_flagged, e) = (gate.is_flagged(noise_factor), &gate.found.estimate);
-        (self.level, self.n_eff, self.deviation) = (gate.found.level as f64, gate.found.n_eff, gate.deviation);
+        (self.level, self.n_eff, self.deviation) =
+            (gate.found.level as f64, gate.found.n_eff, gate.deviation);
         self.maps += 1.0;
         self.flagged += f64::from(u8::from(is_flagged));
         self.count += f64::from(u8::from(e.velocity_m_s.is_finite()));
         let values = [gate.power_a2, gate.gain, e.quality, e.resolution_m2_s2];
-        for (sums, value) in self.sums.iter_mut().zip(values).filter(|(_, value)| value.is_finite()) {
+        for (sums, value) in self
+            .sums
+            .iter_mut()
+            .zip(values)
+            .filter(|(_, value)| value.is_finite())
+        {
             *sums = [sums[0] + value, sums[1] + 1.0];
         }
         let spread = e.spread_m2_s2;
         if spread.is_finite() && !is_flagged {
-            self.spreads.iter_mut().zip([1.0, spread, spread * spread]).for_each(|(sum, term)| *sum += term);
+            self.spreads
+                .iter_mut()
+                .zip([1.0, spread, spread * spread])
+                .for_each(|(sum, term)| *sum += term);
         }
         is_flagged
     }
@@ -71,7 +80,8 @@ impl GateSums {
 
     /// Means of power in the band, A^2, gain, quality and resolution, m^2/s^2; NaN where no value is finite.
     fn means(&self) -> [f64; 4] {
-        self.sums.map(|[sum, n]| if n > 0.0 { sum / n } else { f64::NAN })
+        self.sums
+            .map(|[sum, n]| if n > 0.0 { sum / n } else { f64::NAN })
     }
 
     /// Mean quality.
@@ -85,7 +95,11 @@ impl GateSums {
         let [power_a2, gain, ..] = self.means();
         let excess = power_a2 / noise_a2 / noise_factor - 1.0;
         let is_seen = excess > 2.0 * self.deviation / self.count.sqrt();
-        if is_seen { 10.0 * (excess * gain).log10() } else { f64::NAN }
+        if is_seen {
+            10.0 * (excess * gain).log10()
+        } else {
+            f64::NAN
+        }
     }
 
     /// Spectral width, m/s; NaN where it does not stand out of its standard error or of what the shape of the floor beneath it may add, a part
@@ -98,10 +112,18 @@ impl GateSums {
         }
         let spread = sum / count;
         let variance = (squares / count - spread * spread).max(0.0) / (count - 1.0).max(1.0);
-        let snr_db = if noise_a2.is_nan() { f64::INFINITY } else { self.snr_db(noise_a2, noise_factor) };
+        let snr_db = if noise_a2.is_nan() {
+            f64::INFINITY
+        } else {
+            self.snr_db(noise_a2, noise_factor)
+        };
         let least = self.means()[3] * (0.05 + 0.12 / 10f64.powf(0.1 * snr_db));
         // A comparison that an unknown ratio fails: `max` would leave it out.
-        if spread > least && spread > 2.0 * variance.sqrt() { spread.sqrt() } else { f64::NAN }
+        if spread > least && spread > 2.0 * variance.sqrt() {
+            spread.sqrt()
+        } else {
+            f64::NAN
+        }
     }
 }
 
@@ -114,9 +136,25 @@ mod tests {
     /// Sums of three maps with so much power over that of noise, a spread of 4 m^2/s^2 and a line of 1 m^2/s^2.
     fn sums(power: f64) -> GateSums {
         let none = GateVelocity::none(Quality::Good);
-        let estimate = GateVelocity { velocity_m_s: 1.0, spread_m2_s2: 4.0, resolution_m2_s2: 1.0, ..none };
-        let found = MapPoint { estimate, level: 9, left_out: 0, n_eff: 3.0 };
-        let gate = GateEstimate { found, power_a2: power, gain: 1.0, detection_ratio: f64::NAN, deviation: 0.1 };
+        let estimate = GateVelocity {
+            velocity_m_s: 1.0,
+            spread_m2_s2: 4.0,
+            resolution_m2_s2: 1.0,
+            ..none
+        };
+        let found = MapPoint {
+            estimate,
+            level: 9,
+            left_out: 0,
+            n_eff: 3.0,
+        };
+        let gate = GateEstimate {
+            found,
+            power_a2: power,
+            gain: 1.0,
+            detection_ratio: f64::NAN,
+            deviation: 0.1,
+        };
         let mut sums = GateSums::default();
         for _ in 0..3 {
             assert!(!sums.add(&gate, 1.0));
@@ -127,7 +165,10 @@ mod tests {
     #[test]
     fn a_width_is_told_where_the_ratio_is_known_that_says_what_the_floor_adds() {
         let (strong, weak) = (sums(2.0), sums(1.05));
-        assert!(strong.snr_db(1.0, 1.0).abs() < 1e-12 && (strong.width_m_s(1.0, 1.0) - 2.0).abs() < 1e-12);
+        assert!(
+            strong.snr_db(1.0, 1.0).abs() < 1e-12
+                && (strong.width_m_s(1.0, 1.0) - 2.0).abs() < 1e-12
+        );
         assert!(weak.snr_db(1.0, 1.0).is_nan() && weak.width_m_s(1.0, 1.0).is_nan());
         // without noise there is no floor
         assert!((weak.width_m_s(f64::NAN, 1.0) - 2.0).abs() < 1e-12);

@@ -95,7 +95,10 @@ impl<'p, S: Sample> Mapper<'p, S> {
         let places = places(scene, g)?;
         let estimator = MapEstimator::new(plan, &scanner.layer_snr(), &places)?;
         let points = polar_points(places.line_elevation_rad(), &g.gate_range_m);
-        let radius_m = g.gate_range_m.iter().map(|range_m| estimator.radius.at_m(*range_m));
+        let radius_m = g
+            .gate_range_m
+            .iter()
+            .map(|range_m| estimator.radius.at_m(*range_m));
         let map = VelocityEstimates {
             elevation_rad: g.elevation_rad.clone(),
             range_m: g.gate_range_m.clone(),
@@ -117,24 +120,35 @@ impl<'p, S: Sample> Mapper<'p, S> {
     fn add(&mut self, scan: &Scan) -> Result<Array2<f64>, Error> {
         let found = self.estimator.gates(scan, &self.points, &self.noise)?;
         let (map, shape) = (&mut self.map, self.gates.dim());
-        let velocity = Array2::from_shape_fn(shape, |(i, j)| found[i * shape.1 + j].found.estimate.velocity_m_s);
+        let velocity = Array2::from_shape_fn(shape, |(i, j)| {
+            found[i * shape.1 + j].found.estimate.velocity_m_s
+        });
         self.errors.add(velocity.view(), map.v_pulse_m_s.view())?;
         if map.scans.is_empty() {
-            let known = |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
-            map.v_scan_m_s = ndarray::Zip::from(&velocity).and(&map.v_pulse_m_s).map_collect(known);
+            let known =
+                |estimate: &f64, truth: &f64| if truth.is_nan() { f64::NAN } else { *estimate };
+            map.v_scan_m_s = ndarray::Zip::from(&velocity)
+                .and(&map.v_pulse_m_s)
+                .map_collect(known);
         }
         let mut flagged = Array2::from_elem(shape, false);
         for ((sums, flagged), found) in self.gates.iter_mut().zip(&mut flagged).zip(&found) {
             *flagged = sums.add(found, 1.0);
         }
-        map.scans.push(ScanErrors { error_m_s: &velocity - &map.v_pulse_m_s, flagged });
+        map.scans.push(ScanErrors {
+            error_m_s: &velocity - &map.v_pulse_m_s,
+            flagged,
+        });
         Ok(velocity)
     }
 
     /// `clipped_fraction` is that of the samples that the converter clipped.
     fn finish(self, plan: &Plan, clipped_fraction: f64) -> Result<VelocityEstimates, Error> {
         let Self { mut map, gates, .. } = self;
-        let (statistics, noise_a2) = (self.errors.statistics(), self.estimator.tools.noise.power_a2);
+        let (statistics, noise_a2) = (
+            self.errors.statistics(),
+            self.estimator.tools.noise.power_a2,
+        );
         map.level = gates.map(|gate| gate.level);
         map.n_eff = gates.map(|gate| gate.n_eff);
         map.count = gates.map(|gate| gate.count);
@@ -148,23 +162,44 @@ impl<'p, S: Sample> Mapper<'p, S> {
         map.rms_m_s = statistics.mapv(|s| s.rms_m_s);
         map.law = ErrorLaw::new(&map.scans, shared_cells(plan)?);
         let unknown = || Array2::from_elem(map.count.dim(), f64::NAN);
-        map.standard_error_m_s = map.law.as_ref().map_or_else(unknown, ErrorLaw::rms_standard_errors);
+        map.standard_error_m_s = map
+            .law
+            .as_ref()
+            .map_or_else(unknown, ErrorLaw::rms_standard_errors);
         map.clipped_fraction = clipped_fraction;
         Ok(map)
     }
 }
 
 /// The air at the gates, \[line, gate\], and nothing else yet.
-fn truth(plan: &Plan, scanner: &Scanner<'_>, shape: (usize, usize)) -> Result<VelocityEstimates, Error> {
+fn truth(
+    plan: &Plan,
+    scanner: &Scanner<'_>,
+    shape: (usize, usize),
+) -> Result<VelocityEstimates, Error> {
     let g = &plan.geometry;
     let [mut exact_m_s, mut pulse_m_s, mut gate_m_s] = [(); 3].map(|()| Array2::zeros(shape));
     let by_pulse = RangeFilter::pulse(&plan.instrument.pulse, g.layer_thickness_m)?;
     let by_gate = range_filter(plan)?;
     for i in 0..scanner.lines.len() {
-        exact_m_s.row_mut(i).assign(&Array1::from(radial_velocity_m_s(plan, i, &g.gate_range_m)?));
-        let (line, backscatter) = (&scanner.lines[i], scanner.backscatter_per_m_sr.get(i).map(Vec::as_slice));
+        exact_m_s
+            .row_mut(i)
+            .assign(&Array1::from(radial_velocity_m_s(
+                plan,
+                i,
+                &g.gate_range_m,
+            )?));
+        let (line, backscatter) = (
+            &scanner.lines[i],
+            scanner.backscatter_per_m_sr.get(i).map(Vec::as_slice),
+        );
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
-            cells.row_mut(i).assign(&Array1::from(seen_m_s(filter, g, &line.radial_velocity_m_s, backscatter)?));
+            cells.row_mut(i).assign(&Array1::from(seen_m_s(
+                filter,
+                g,
+                &line.radial_velocity_m_s,
+                backscatter,
+            )?));
         }
     }
     Ok(VelocityEstimates {
@@ -200,7 +235,8 @@ pub(crate) fn estimates<S: Sample + wakescope_signal::Sample>(
 }
 
 /// What takes the records of pulses from a number on.
-pub(crate) type AddRecords<'a, S> = &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
+pub(crate) type AddRecords<'a, S> =
+    &'a mut dyn FnMut(usize, ArrayView2<'_, S>) -> Result<(), Error>;
 
 /// The same of records that `read` hands over for each realisation, piece after piece; it says how many samples were clipped.
 pub(crate) fn of_records<S: Sample>(
@@ -210,16 +246,27 @@ pub(crate) fn of_records<S: Sample>(
     mut read: impl FnMut(usize, AddRecords<'_, S>) -> Result<Clipped, Error>,
     mut seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
-    let Some(plan) = plans.first() else { return Ok(Vec::new()) };
-    let mut mappers: Vec<Mapper<'_, S>> =
-        plans.iter().map(|plan| Mapper::new(plan, scanner)).collect::<Result<_, _>>()?;
+    let Some(plan) = plans.first() else {
+        return Ok(Vec::new());
+    };
+    let mut mappers: Vec<Mapper<'_, S>> = plans
+        .iter()
+        .map(|plan| Mapper::new(plan, scanner))
+        .collect::<Result<_, _>>()?;
     let mut clipped = Clipped::default();
-    observer.begin(Stage::Estimates, (plan.realisations() * plan.geometry.elevation_rad.len()) as u64);
+    observer.begin(
+        Stage::Estimates,
+        (plan.realisations() * plan.geometry.elevation_rad.len()) as u64,
+    );
     for realisation in 0..plan.realisations() {
-        let sums = mappers.iter().map(|mapper| mapper.estimator.sums(mapper.places.clone(), None));
+        let sums = mappers
+            .iter()
+            .map(|mapper| mapper.estimator.sums(mapper.places.clone(), None));
         let mut sums = sums.collect::<Result<Vec<_>, _>>()?;
         clipped += read(realisation, &mut |first, records| {
-            Ok(sums.iter_mut().try_for_each(|sums| sums.add(first, records))?)
+            Ok(sums
+                .iter_mut()
+                .try_for_each(|sums| sums.add(first, records))?)
         })?;
         let scans: Vec<Scan> = sums.into_iter().map(ScanSums::finish).collect();
         for (i, (mapper, scan)) in mappers.iter_mut().zip(&scans).enumerate() {
@@ -228,9 +275,14 @@ pub(crate) fn of_records<S: Sample>(
     }
     observer.end();
     // The real numbers that the converter sees.
-    let samples = plan.realisations() * scanner.pulses() * plan.geometry.samples * S::KIND.lag_numbers(1);
+    let samples =
+        plan.realisations() * scanner.pulses() * plan.geometry.samples * S::KIND.lag_numbers(1);
     let clipped_fraction = clipped.total() as f64 / (samples as f64).max(1.0);
-    mappers.into_iter().zip(plans).map(|(mapper, plan)| mapper.finish(plan, clipped_fraction)).collect()
+    mappers
+        .into_iter()
+        .zip(plans)
+        .map(|(mapper, plan)| mapper.finish(plan, clipped_fraction))
+        .collect()
 }
 
 /// The radial velocities \[line, gate\], m/s, of each realisation of a plan: what whole scans show, one after the other. Efficiency and
@@ -241,7 +293,9 @@ pub(crate) fn of_records<S: Sample>(
 pub fn velocities(plan: &Plan, observer: &dyn Observer) -> Result<Vec<Array2<f64>>, Error> {
     let scanner = Scanner::new(plan, observer)?;
     let mut maps = Vec::with_capacity(plan.realisations());
-    of_plans(&[plan], &scanner, observer, |_, velocity_m_s| maps.push(velocity_m_s.clone()))?;
+    of_plans(&[plan], &scanner, observer, |_, velocity_m_s| {
+        maps.push(velocity_m_s.clone())
+    })?;
     Ok(maps)
 }
 
@@ -255,9 +309,15 @@ pub(crate) fn of_plans(
     observer: &dyn Observer,
     seen: impl FnMut(usize, &Array2<f64>),
 ) -> Result<Vec<VelocityEstimates>, Error> {
-    let Some(first) = plans.first() else { return Ok(Vec::new()) };
+    let Some(first) = plans.first() else {
+        return Ok(Vec::new());
+    };
     match first.scene.content.detector.signal {
-        DetectorSignal::IntermediateFrequency => estimates::<f64>(plans, scanner, observer, |_| (), seen),
-        DetectorSignal::Baseband => estimates::<Complex<f64>>(plans, scanner, observer, |_| (), seen),
+        DetectorSignal::IntermediateFrequency => {
+            estimates::<f64>(plans, scanner, observer, |_| (), seen)
+        }
+        DetectorSignal::Baseband => {
+            estimates::<Complex<f64>>(plans, scanner, observer, |_| (), seen)
+        }
     }
 }

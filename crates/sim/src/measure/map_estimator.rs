@@ -41,7 +41,12 @@ pub(crate) type WindowSums<'a, S> = ScanSums<'a, S, dyn Statistic<S>>;
 pub(crate) fn places_of(plan: &Plan, record_elevation_rad: &[f64]) -> Result<ScanGeometry, Error> {
     let (scene, samples) = (&plan.scene.content, plan.geometry.samples);
     let (sampling, gates) = (estimators::sampling(scene)?, estimators::gates(scene)?);
-    Ok(ScanGeometry::new(&sampling, &gates, record_elevation_rad, samples)?)
+    Ok(ScanGeometry::new(
+        &sampling,
+        &gates,
+        record_elevation_rad,
+        samples,
+    )?)
 }
 
 impl<'p, S: Sample> MapEstimator<'p, S> {
@@ -49,24 +54,48 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
     ///
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
-    pub(crate) fn new(plan: &'p Plan, layer_snr: &[(f64, f64)], places: &ScanGeometry) -> Result<Self, Error> {
+    pub(crate) fn new(
+        plan: &'p Plan,
+        layer_snr: &[(f64, f64)],
+        places: &ScanGeometry,
+    ) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.content, &plan.geometry);
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let of_rays = RayInformation::new(plan, layer_snr)?;
         let radius = region_radius(&of_rays, places)?;
         let lines = places.line_elevation_rad();
-        let middle =
-            PolarPoint { range_m: g.gate_range_m[g.gate_range_m.len() / 2], elevation_rad: lines[lines.len() / 2] };
+        let middle = PolarPoint {
+            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
+            elevation_rad: lines[lines.len() / 2],
+        };
         let correlation = covariance.correlation(of_rays.of_windows(&[middle.range_m])?[0])?;
-        let n_eff = places.level(middle, radius.at_m(middle.range_m)?, &correlation).1;
-        let known = WindowStatistics { snr: median_snr(layer_snr), n_eff };
+        let n_eff = places
+            .level(middle, radius.at_m(middle.range_m)?, &correlation)
+            .1;
+        let known = WindowStatistics {
+            snr: median_snr(layer_snr),
+            n_eff,
+        };
         let tools = Toolkit::new(scene, &plan.instrument, &known)?;
-        Ok(Self { plan, tools, covariance, of_rays, radius })
+        Ok(Self {
+            plan,
+            tools,
+            covariance,
+            of_rays,
+            radius,
+        })
     }
 
     /// Sums over the windows of some lines, still without any record; over those of some gates if these are given.
-    pub(crate) fn sums(&self, places: ScanGeometry, held: Option<Range<usize>>) -> Result<WindowSums<'_, S>, Error> {
-        let (statistic, gates) = (&*self.tools.statistic, estimators::gates(&self.plan.scene.content)?);
+    pub(crate) fn sums(
+        &self,
+        places: ScanGeometry,
+        held: Option<Range<usize>>,
+    ) -> Result<WindowSums<'_, S>, Error> {
+        let (statistic, gates) = (
+            &*self.tools.statistic,
+            estimators::gates(&self.plan.scene.content)?,
+        );
         Ok(match held {
             None => ScanSums::new(statistic, &gates, places, self.plan.geometry.samples)?,
             Some(held) => ScanSums::of_gates(statistic, &gates, places, held)?,
@@ -80,50 +109,115 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         points: &[PolarPoint],
         noise: &NoiseAtPoints,
     ) -> Result<Vec<GateEstimate>, Error> {
-        let Toolkit { estimator, following, .. } = &self.tools;
+        let Toolkit {
+            estimator,
+            following,
+            ..
+        } = &self.tools;
         let mut found = scan.map(points, &self.radius, None, &**estimator)?;
-        let gates = points.iter().take_while(|p| p.elevation_rad == points[0].elevation_rad).count().max(1);
+        let gates = points
+            .iter()
+            .take_while(|p| p.elevation_rad == points[0].elevation_rad)
+            .count()
+            .max(1);
         if let Some(following) = following {
             let shape = (points.len() / gates, gates);
-            let velocity_m_s = Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
+            let velocity_m_s =
+                Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
             let guess = interpolated(points, velocity_m_s);
             let sampling = estimators::sampling(&self.plan.scene.content)?;
-            found = scan.map_following(points, &self.radius, S::KIND, &sampling, &guess, &**following)?;
+            found = scan.map_following(
+                points,
+                &self.radius,
+                S::KIND,
+                &sampling,
+                &guess,
+                &**following,
+            )?;
         }
         // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.
-        let range_m: Vec<f64> = points.iter().take(gates).map(|point| point.range_m).collect();
-        let of_gate =
-            |(range_m, snr): (&f64, f64)| Ok((self.radius.at_m(*range_m)?, self.covariance.correlation(snr)?));
+        let range_m: Vec<f64> = points
+            .iter()
+            .take(gates)
+            .map(|point| point.range_m)
+            .collect();
+        let of_gate = |(range_m, snr): (&f64, f64)| {
+            Ok((
+                self.radius.at_m(*range_m)?,
+                self.covariance.correlation(snr)?,
+            ))
+        };
         let ratios = self.of_rays.of_windows(&range_m)?;
-        let of_gates = range_m.iter().zip(ratios).map(of_gate).collect::<Result<Vec<_>, Error>>()?;
+        let of_gates = range_m
+            .iter()
+            .zip(ratios)
+            .map(of_gate)
+            .collect::<Result<Vec<_>, Error>>()?;
         let held = |(index, (found, point)): (usize, (MapPoint, &PolarPoint))| {
             let ((radius_m, correlation), e) = (&of_gates[index % gates], &found.estimate);
             GateEstimate {
-                found: MapPoint { n_eff: scan.n_eff(*point, *radius_m, correlation), ..found },
-                power_a2: if e.velocity_m_s.is_finite() { e.power } else { f64::NAN },
+                found: MapPoint {
+                    n_eff: scan.n_eff(*point, *radius_m, correlation),
+                    ..found
+                },
+                power_a2: if e.velocity_m_s.is_finite() {
+                    e.power
+                } else {
+                    f64::NAN
+                },
                 gain: self.tools.noise.gain(e.velocity_m_s),
                 detection_ratio: e.detection / noise.threshold[index],
                 deviation: noise.deviation[index],
             }
         };
-        Ok(found.into_par_iter().zip(points).enumerate().map(held).collect())
+        Ok(found
+            .into_par_iter()
+            .zip(points)
+            .enumerate()
+            .map(held)
+            .collect())
     }
 
     /// What noise gives at points of a scan.
-    pub(crate) fn noise(&self, places: &ScanGeometry, points: &[PolarPoint]) -> Result<NoiseAtPoints, Error> {
+    pub(crate) fn noise(
+        &self,
+        places: &ScanGeometry,
+        points: &[PolarPoint],
+    ) -> Result<NoiseAtPoints, Error> {
         let Some(test) = &self.tools.test else {
-            return Ok(NoiseAtPoints { threshold: vec![f64::NAN; points.len()], deviation: vec![0.0; points.len()] });
+            return Ok(NoiseAtPoints {
+                threshold: vec![f64::NAN; points.len()],
+                deviation: vec![0.0; points.len()],
+            });
         };
-        let region = |point: &PolarPoint| Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?));
-        let regions = points.iter().map(region).collect::<Result<Vec<RegionNoise>, Error>>()?;
+        let region = |point: &PolarPoint| {
+            Ok(test.region_at(places, *point, self.radius.at_m(point.range_m)?))
+        };
+        let regions = points
+            .iter()
+            .map(region)
+            .collect::<Result<Vec<RegionNoise>, Error>>()?;
         let rate = self.plan.scene.content.estimator.false_alarm;
-        let threshold = if rate > 0.0 { self.thresholds(test, &regions)? } else { vec![f64::NAN; points.len()] };
-        Ok(NoiseAtPoints { threshold, deviation: regions.iter().map(|at| test.band_deviation(at.n_eff)).collect() })
+        let threshold = if rate > 0.0 {
+            self.thresholds(test, &regions)?
+        } else {
+            vec![f64::NAN; points.len()]
+        };
+        Ok(NoiseAtPoints {
+            threshold,
+            deviation: regions
+                .iter()
+                .map(|at| test.band_deviation(at.n_eff))
+                .collect(),
+        })
     }
 
     /// Densities, A^2, that noise exceeds with the rate of false alarms; NaN where there is no window.
     fn thresholds(&self, test: &NoiseTest, regions: &[RegionNoise]) -> Result<Vec<f64>, Error> {
-        let (density_a2, rate) = (self.tools.noise.density_a2, self.plan.scene.content.estimator.false_alarm);
+        let (density_a2, rate) = (
+            self.tools.noise.density_a2,
+            self.plan.scene.content.estimator.false_alarm,
+        );
         // Many points share their windows.
         let mut known = HashMap::new();
         let of = |region: &RegionNoise| {

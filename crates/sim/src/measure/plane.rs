@@ -20,12 +20,19 @@ pub(crate) fn cross_plane(plan: &Plan) -> Result<CrossPlanes, Error> {
     let top_m = (scene.scan.lidar_height_m + far_m * top_rad.sin()).max(0.1 * far_m);
     let y_m = spaced(low_y_m, high_y_m, PLANE_POINTS.0);
     let z_m = spaced(0.0, top_m, PLANE_POINTS.1);
-    let points_m: Vec<[f64; 3]> = z_m.iter().flat_map(|&z| y_m.iter().map(move |&y| [0.0, y, z])).collect();
+    let points_m: Vec<[f64; 3]> = z_m
+        .iter()
+        .flat_map(|&z| y_m.iter().map(move |&y| [0.0, y, z]))
+        .collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
     let time_s = plan.wind.start_s;
-    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    plan.wind
+        .wind()
+        .velocity_into(&points_m, time_s, &mut velocity_m_s)?;
     let at = |component: usize| {
-        Array3::from_shape_fn((1, z_m.len(), y_m.len()), |(_, k, j)| velocity_m_s[k * y_m.len() + j][component])
+        Array3::from_shape_fn((1, z_m.len(), y_m.len()), |(_, k, j)| {
+            velocity_m_s[k * y_m.len() + j][component]
+        })
     };
     Ok(CrossPlanes {
         title: "Wind across the runway at the start of the scan".into(),

@@ -7,7 +7,9 @@ use crate::Error;
 use crate::plan::{Plan, Stage};
 use crate::scene::{ReceiverPath, Scene, SnrReference, hash_of};
 use crate::setup::Setup;
-use crate::setup::efficiency_model::{MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence};
+use crate::setup::efficiency_model::{
+    MOST_QUADRATURES, OF_QUADRATURES, OF_SCREENS, model, stretches, turbulence,
+};
 use crate::setup::instrument::Instrument;
 use crate::setup::known::Known;
 use crate::setup::progress::Observer;
@@ -80,8 +82,16 @@ impl LineOptics<'_> {
         }
         // No light comes back from the blind range or from air without aerosol.
         let known = |db: f64| if db.is_finite() { db } else { f64::NAN };
-        let snr_db = snr_db(self.plan, &efficiency)?.into_iter().map(known).collect();
-        Ok(RangeProfile { efficiency, snr_db, others, lost_power_fraction })
+        let snr_db = snr_db(self.plan, &efficiency)?
+            .into_iter()
+            .map(known)
+            .collect();
+        Ok(RangeProfile {
+            efficiency,
+            snr_db,
+            others,
+            lost_power_fraction,
+        })
     }
 
     /// The efficiency at given ranges, m, increasing, by the cheapest model that is valid: the one that signals, budget, bound, map and
@@ -100,25 +110,38 @@ impl LineOptics<'_> {
     /// The efficiency at the layers of the lines, as [`Self::efficiency_at`].
     pub(crate) fn of_layers(&self) -> Result<Arc<EfficiencyProfile>, Error> {
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        self.known.layers.of(cause(&self.plan.scene.content, &ranges_m), || {
-            self.observer.begin(Stage::Efficiency, 1);
-            let profile = self.efficiency_at(&ranges_m)?;
-            self.observer.end();
-            Ok(profile)
-        })
+        self.known
+            .layers
+            .of(cause(&self.plan.scene.content, &ranges_m), || {
+                self.observer.begin(Stage::Efficiency, 1);
+                let profile = self.efficiency_at(&ranges_m)?;
+                self.observer.end();
+                Ok(profile)
+            })
     }
 
     /// The phase screens of a stretch of range, m.
     pub(crate) fn screens(&self, [from_m, to_m]: [f64; 2]) -> Result<Arc<Screens>, Error> {
         let range_m = curved_ranges_m(&self.plan.instrument.telescope, from_m, to_m, OF_SCREENS);
-        self.known.screens.of(cause(&self.plan.scene.content, &range_m), || self.run_screens(range_m))
+        self.known
+            .screens
+            .of(cause(&self.plan.scene.content, &range_m), || {
+                self.run_screens(range_m)
+            })
     }
 
     /// The monostatic and the bistatic efficiency across phase screens at the ranges of `theory`, and the light lost at the border: the
     /// ratio to theory, which is smooth, on straight lines between the ranges of the screens, times theory.
-    fn across_screens(&self, theory: &EfficiencyProfile) -> Result<([EfficiencyProfile; 2], f64), Error> {
+    fn across_screens(
+        &self,
+        theory: &EfficiencyProfile,
+    ) -> Result<([EfficiencyProfile; 2], f64), Error> {
         let (mut found, mut done, mut lost) = ([const { Vec::new() }; 6], 0, 0f64);
-        for (ends_m, inside) in stretches(&self.plan.scene.content, &self.plan.geometry, &theory.range_m) {
+        for (ends_m, inside) in stretches(
+            &self.plan.scene.content,
+            &self.plan.geometry,
+            &theory.range_m,
+        ) {
             let screens = self.screens(ends_m)?;
             lost = lost.max(screens.lost_power_fraction);
             if theory.range_m.get(done) != inside.first() {
@@ -134,14 +157,20 @@ impl LineOptics<'_> {
         if let Some(&range_m) = theory.range_m.get(done) {
             let o = &self.plan.scene.content.outputs;
             let (first_m, last_m) = (o.profile_range_min_m, o.profile_range_max_m);
-            return Err(wakescope_optics::Error::Extrapolation { range_m, first_m, last_m }.into());
+            return Err(wakescope_optics::Error::Extrapolation {
+                range_m,
+                first_m,
+                last_m,
+            }
+            .into());
         }
-        let profile = |[mean, standard_deviation, standard_error]: [Vec<f64>; 3]| EfficiencyProfile {
-            range_m: theory.range_m.clone(),
-            mean,
-            standard_deviation,
-            standard_error,
-        };
+        let profile =
+            |[mean, standard_deviation, standard_error]: [Vec<f64>; 3]| EfficiencyProfile {
+                range_m: theory.range_m.clone(),
+                mean,
+                standard_deviation,
+                standard_error,
+            };
         let [a, b, c, d, e, f] = found;
         Ok(([profile([a, b, c]), profile([d, e, f])], lost))
     }
@@ -151,21 +180,29 @@ impl LineOptics<'_> {
     /// # Errors
     /// What the optics refuse, such as a grid too small for the beam.
     fn run_screens(&self, range_m: Vec<f64>) -> Result<Screens, Error> {
-        let (scene, instrument, observer) = (&self.plan.scene.content, &self.plan.instrument, self.observer);
+        let (scene, instrument, observer) = (
+            &self.plan.scene.content,
+            &self.plan.instrument,
+            self.observer,
+        );
         let t = turbulence(scene).unwrap_or_default();
         observer.begin(Stage::PhaseScreens, t.realisations as u64);
         let mut seen = 0;
         // Single precision: its rounding is far below the error of any number of realisations.
-        let estimate = instrument.monte_carlo(&t, &range_m, scene.seed)?.0.run_in::<f32>(
-            Stop::after(t.realisations),
-            |progress| {
+        let estimate = instrument
+            .monte_carlo(&t, &range_m, scene.seed)?
+            .0
+            .run_in::<f32>(Stop::after(t.realisations), |progress| {
                 observer.advance((progress.done - seen) as u64);
                 seen = progress.done;
                 ControlFlow::Continue(())
-            },
-        )?;
+            })?;
         observer.end();
-        let lost_power_fraction = estimate.lost_power_fraction.iter().copied().fold(0.0, f64::max);
+        let lost_power_fraction = estimate
+            .lost_power_fraction
+            .iter()
+            .copied()
+            .fold(0.0, f64::max);
         if lost_power_fraction > DOUBTFUL_LOSS {
             observer.warn(&format!(
                 "the border of the phase screens took {lost_power_fraction:.3} of the light, 0.01 at most is good: a wider grid is \
@@ -173,10 +210,20 @@ impl LineOptics<'_> {
             ));
         }
         // A checked scene has at least two realisations, and so pairs of them.
-        let pairs = wakescope_optics::Error::Length { field: "realisations", found: 1, expected: 2 };
+        let pairs = wakescope_optics::Error::Length {
+            field: "realisations",
+            found: 1,
+            expected: 2,
+        };
         let theory = efficiency_by_theory(instrument, &range_m)?.mean;
         let over_theory = [estimate.monostatic, estimate.bistatic.ok_or(pairs)?].map(|found| {
-            let over = |values: Vec<f64>| values.iter().zip(&theory).map(|(value, eta)| value / eta).collect();
+            let over = |values: Vec<f64>| {
+                values
+                    .iter()
+                    .zip(&theory)
+                    .map(|(value, eta)| value / eta)
+                    .collect()
+            };
             [found.mean, found.standard_deviation, found.standard_error].map(over)
         });
         let by_range = match scene.telescope.receiver {
@@ -184,10 +231,24 @@ impl LineOptics<'_> {
             ReceiverPath::Bistatic => estimate.bistatic_realisations,
         };
         let count = by_range.iter().map(Vec::len).min().unwrap_or(0);
-        let mean: Vec<f64> = by_range.iter().map(|all| all[..count].iter().sum::<f64>() / count as f64).collect();
-        let over_mean = |i: usize| by_range.iter().zip(&mean).map(|(all, mean)| all[i] / mean).collect();
+        let mean: Vec<f64> = by_range
+            .iter()
+            .map(|all| all[..count].iter().sum::<f64>() / count as f64)
+            .collect();
+        let over_mean = |i: usize| {
+            by_range
+                .iter()
+                .zip(&mean)
+                .map(|(all, mean)| all[i] / mean)
+                .collect()
+        };
         let realisations = (0..count).map(over_mean).collect();
-        Ok(Screens { range_m, over_theory, realisations, lost_power_fraction })
+        Ok(Screens {
+            range_m,
+            over_theory,
+            realisations,
+            lost_power_fraction,
+        })
     }
 }
 
@@ -198,14 +259,28 @@ pub(crate) fn snr_db(setup: &Setup, efficiency: &EfficiencyProfile) -> Result<Ve
         SnrReference::Fixed { snr_db } => Ok(snr_db),
         _ => {
             let returned = instrument.return_per_m(range_m)? * mean;
-            Ok(10.0 * instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), returned).log10())
+            Ok(10.0
+                * instrument
+                    .receiver
+                    .slowly_varying_snr(scene.pulse_energy_j(), returned)
+                    .log10())
         }
     };
-    efficiency.range_m.iter().zip(&efficiency.mean).map(snr_db).collect()
+    efficiency
+        .range_m
+        .iter()
+        .zip(&efficiency.mean)
+        .map(snr_db)
+        .collect()
 }
 
-pub(crate) fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-    of_theory(instrument, range_m, |range_m| free_space_efficiency(&instrument.telescope, range_m))
+pub(crate) fn free_space(
+    instrument: &Instrument,
+    range_m: &[f64],
+) -> Result<EfficiencyProfile, Error> {
+    of_theory(instrument, range_m, |range_m| {
+        free_space_efficiency(&instrument.telescope, range_m)
+    })
 }
 
 /// The efficiency without phase screens: of free space, and in turbulence the exact mean of independent paths, which leaves out
@@ -213,11 +288,22 @@ pub(crate) fn free_space(instrument: &Instrument, range_m: &[f64]) -> Result<Eff
 ///
 /// # Errors
 /// What the optics refuse, such as a range of 0.
-pub(crate) fn efficiency_by_theory(instrument: &Instrument, range_m: &[f64]) -> Result<EfficiencyProfile, Error> {
-    let Some(turbulence) = &instrument.turbulence else { return free_space(instrument, range_m) };
+pub(crate) fn efficiency_by_theory(
+    instrument: &Instrument,
+    range_m: &[f64],
+) -> Result<EfficiencyProfile, Error> {
+    let Some(turbulence) = &instrument.turbulence else {
+        return free_space(instrument, range_m);
+    };
     let table = StructureTable::new(&*turbulence.spectrum);
     of_theory(instrument, range_m, |range_m| {
-        bistatic_efficiency_with(&instrument.telescope, &Misalignment::NONE, &turbulence.cn2, &table, range_m)
+        bistatic_efficiency_with(
+            &instrument.telescope,
+            &Misalignment::NONE,
+            &turbulence.cn2,
+            &table,
+            range_m,
+        )
     })
 }
 
@@ -231,7 +317,9 @@ fn of_theory(
         [first_m, .., last_m] if range_m.len() > MOST_QUADRATURES => {
             let curved_m = curved_ranges_m(&instrument.telescope, first_m, last_m, OF_QUADRATURES);
             let curve = EfficiencyProfile::from_theory(&curved_m, quadrature)?;
-            Ok(EfficiencyProfile::from_theory(range_m, |range_m| curve.interpolated(range_m))?)
+            Ok(EfficiencyProfile::from_theory(range_m, |range_m| {
+                curve.interpolated(range_m)
+            })?)
         }
         _ => Ok(EfficiencyProfile::from_theory(range_m, quadrature)?),
     }
@@ -253,7 +341,10 @@ pub(crate) struct Screens {
 fn cause(scene: &Scene, range_m: &[f64]) -> String {
     let (air, laser) = (&scene.atmosphere.turbulence, scene.laser.wavelength_m);
     let seed = turbulence(scene).map(|_| scene.seed);
-    hash_of(&format!("{:?}", (laser, &scene.telescope, air, seed, range_m)))
+    hash_of(&format!(
+        "{:?}",
+        (laser, &scene.telescope, air, seed, range_m)
+    ))
 }
 
 #[cfg(test)]
@@ -272,12 +363,17 @@ mod tests {
             "[telescope]\n{telescope}\n[scan]\nelevation_min_rad = 0.1\nelevation_max_rad = 0.1\nrange_min_m = {from_m:?}\n\
              range_max_m = {to_m:?}\npulses_per_line = 1\nrealisations = 2\n[estimator]\ngate_step_samples = 150\n{more}"
         );
-        let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap_or_else(|e| panic!("{e}\n{text}"));
+        let file =
+            SceneFile::parse(&text, Path::new("s.toml")).unwrap_or_else(|e| panic!("{e}\n{text}"));
         Plan::new(file, target).unwrap()
     }
 
     fn optics<'a>(plan: &'a Plan, known: &'a Efficiencies) -> LineOptics<'a> {
-        LineOptics { plan, known, observer: &Silent }
+        LineOptics {
+            plan,
+            known,
+            observer: &Silent,
+        }
     }
 
     /// (14) as it is written, for a return that changes slowly over the pulse, in even air.
@@ -287,8 +383,13 @@ mod tests {
         let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
         let photons = scene.detector.quantum_efficiency * scene.pulse_energy_j() / photon_j;
         let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
-        let seen = (-2.0 * air.extinction_per_m * range_m).exp() * area_m2 / (range_m * range_m) * efficiency;
-        photons / scene.detector.bandwidth_hz * 0.5 * SPEED_OF_LIGHT_M_S * air.backscatter_per_m_sr * seen
+        let seen = (-2.0 * air.extinction_per_m * range_m).exp() * area_m2 / (range_m * range_m)
+            * efficiency;
+        photons / scene.detector.bandwidth_hz
+            * 0.5
+            * SPEED_OF_LIGHT_M_S
+            * air.backscatter_per_m_sr
+            * seen
     }
 
     /// Signal-to-noise ratios of `bound`, `budget` and the profile at the ranges of the bound, dB.
@@ -296,9 +397,12 @@ mod tests {
         let of_bound = bound(plan, &Silent).unwrap().by_range;
         let ranges_m: Vec<f64> = of_bound.iter().map(|p| p.range_m).collect();
         let budget = Budget::new(plan, &ranges_m, &Silent).unwrap();
-        let profile = optics(plan, &Efficiencies::default()).profile_at(&ranges_m).unwrap();
+        let profile = optics(plan, &Efficiencies::default())
+            .profile_at(&ranges_m)
+            .unwrap();
         let all = of_bound.iter().zip(budget.snr_db()).zip(&profile.snr_db);
-        all.map(|((bound, budget), profile)| (bound.range_m, [bound.snr_db, *budget, *profile])).collect()
+        all.map(|((bound, budget), profile)| (bound.range_m, [bound.snr_db, *budget, *profile]))
+            .collect()
     }
 
     #[test]
@@ -307,16 +411,23 @@ mod tests {
         for (telescope, ends_m) in [
             ("focus_m = 300.0", [150.0, 1500.0]),
             (WIDE, [200.0, 2000.0]),
-            ("focus_m = -700.0\nobscuration_radius_m = 0.02", [150.0, 900.0]),
+            (
+                "focus_m = -700.0\nobscuration_radius_m = 0.02",
+                [150.0, 900.0],
+            ),
         ] {
             let plan = plan(telescope, ends_m, "", Target::Map);
             let found = three_outputs(&plan);
             assert!(found.len() > 1);
             for (range_m, outputs_db) in found {
-                let efficiency = free_space_efficiency(&plan.instrument.telescope, range_m).unwrap();
+                let efficiency =
+                    free_space_efficiency(&plan.instrument.telescope, range_m).unwrap();
                 let exact_db = 10.0 * of_14(&plan, range_m, efficiency).log10();
                 for (snr_db, error_db) in outputs_db.into_iter().zip([0.01, 1e-9, 1e-9]) {
-                    assert!((snr_db - exact_db).abs() < error_db, "{telescope} {range_m}: {outputs_db:?} {exact_db}");
+                    assert!(
+                        (snr_db - exact_db).abs() < error_db,
+                        "{telescope} {range_m}: {outputs_db:?} {exact_db}"
+                    );
                 }
             }
         }
@@ -346,7 +457,9 @@ mod tests {
                 assert!((a - b).abs() < 1e-9, "{a} {b}");
             }
             let middle = result.middle.unwrap();
-            let there = optics(&plan, &Efficiencies::default()).efficiency_at(&[middle.range_m]).unwrap();
+            let there = optics(&plan, &Efficiencies::default())
+                .efficiency_at(&[middle.range_m])
+                .unwrap();
             assert!((middle.efficiency / there.mean[0] - 1.0).abs() < 1e-12);
             assert!((middle.snr_db - snr_db(&plan, &there).unwrap()[0]).abs() < 0.02);
         }
@@ -360,10 +473,16 @@ mod tests {
                  layers = 5\nrealisations = 5\n[outputs]\nprofile_range_min_m = {first_m:?}\nprofile_range_max_m = {last_m:?}\n"
             );
             let plan = plan("focus_m = 300.0", [200.0, 540.0], &more, Target::Run);
-            let mut ranges_m: Vec<f64> = plan.geometry.layer_range_m().chain([first_m, last_m]).collect();
+            let mut ranges_m: Vec<f64> = plan
+                .geometry
+                .layer_range_m()
+                .chain([first_m, last_m])
+                .collect();
             ranges_m.sort_by(f64::total_cmp);
-            let found: usize =
-                stretches(&plan.scene.content, &plan.geometry, &ranges_m).iter().map(|s| s.1.len()).sum();
+            let found: usize = stretches(&plan.scene.content, &plan.geometry, &ranges_m)
+                .iter()
+                .map(|s| s.1.len())
+                .sum();
             assert_eq!(found, ranges_m.len(), "{first_m} {last_m}");
         }
     }
@@ -380,8 +499,12 @@ mod tests {
         let mut all_m: Vec<f64> = nodes_m.iter().chain(&between_m).copied().collect();
         all_m.sort_by(f64::total_cmp);
         // One run at all of them has the same layers and random numbers: what differs is the interpolation.
-        let screens = optics(&plan, &Efficiencies::default()).run_screens(all_m.clone()).unwrap();
-        let ratio = |range_m: &f64| screens.over_theory[0][0][all_m.iter().position(|m| m == range_m).unwrap()];
+        let screens = optics(&plan, &Efficiencies::default())
+            .run_screens(all_m.clone())
+            .unwrap();
+        let ratio = |range_m: &f64| {
+            screens.over_theory[0][0][all_m.iter().position(|m| m == range_m).unwrap()]
+        };
         let at_nodes: Vec<f64> = nodes_m.iter().map(ratio).collect();
         for range_m in &between_m {
             let off_db = 10.0 * (of_table(&nodes_m, &at_nodes, *range_m) / ratio(range_m)).log10();
@@ -392,12 +515,25 @@ mod tests {
     #[test]
     fn the_summary_has_the_efficiency_of_the_middle_however_few_points_the_profile_has() {
         for (telescope, target) in [("", Target::Run), ("focus_m = 420.0", Target::Efficiency)] {
-            let plan = plan(telescope, [280.0, 520.0], "[outputs]\nprofile_points = 2\n", target);
+            let plan = plan(
+                telescope,
+                [280.0, 520.0],
+                "[outputs]\nprofile_points = 2\n",
+                target,
+            );
             let middle = run(&plan, &Silent).unwrap().middle.unwrap();
             let exact = free_space_efficiency(&plan.instrument.telescope, 400.0).unwrap();
-            assert!((middle.efficiency / exact - 1.0).abs() < 1e-12, "{} {exact}", middle.efficiency);
+            assert!(
+                (middle.efficiency / exact - 1.0).abs() < 1e-12,
+                "{} {exact}",
+                middle.efficiency
+            );
             let snr_db = 10.0 * of_14(&plan, 400.0, exact).log10();
-            assert!((middle.snr_db - snr_db).abs() < 1e-3, "{} {snr_db}", middle.snr_db);
+            assert!(
+                (middle.snr_db - snr_db).abs() < 1e-3,
+                "{} {snr_db}",
+                middle.snr_db
+            );
         }
     }
 }

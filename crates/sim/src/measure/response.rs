@@ -43,18 +43,33 @@ impl SceneResponse {
     /// What the regions refuse; a checked scene gives none.
     pub(crate) fn new(plan: &Plan, layer_snr: Vec<(f64, f64)>) -> Result<Option<Self>, Error> {
         let (scene, pulse) = (&plan.scene.content, &plan.instrument.pulse);
-        let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else { return Ok(None) };
+        let Some(noise) = noise_kind(scene).filter(|_| scene.pulse.is_gaussian()) else {
+            return Ok(None);
+        };
         let of_rays = RayInformation::new(plan, &layer_snr)?;
         let radius = region_radius(&of_rays, &places(scene, &plan.geometry)?)?;
-        let response = response(scene, pulse, median_snr(&layer_snr)).ok().flatten();
+        let response = response(scene, pulse, median_snr(&layer_snr))
+            .ok()
+            .flatten();
         let pulse = PulseShape::gaussian(pulse.sigma_s())?;
         let noise_power_a2 = plan.instrument.receiver.noise_variance_a2();
-        Ok(Some(Self { scene: scene.clone(), response, pulse, noise, noise_power_a2, layer_snr, radius }))
+        Ok(Some(Self {
+            scene: scene.clone(),
+            response,
+            pulse,
+            noise,
+            noise_power_a2,
+            layer_snr,
+            radius,
+        }))
     }
 
     /// Expected signal-to-noise ratio of the layer nearest to a range, a power ratio.
     pub(crate) fn snr_at(&self, range_m: f64) -> f64 {
-        let nearest = self.layer_snr.iter().min_by(|a, b| (a.0 - range_m).abs().total_cmp(&(b.0 - range_m).abs()));
+        let nearest = self
+            .layer_snr
+            .iter()
+            .min_by(|a, b| (a.0 - range_m).abs().total_cmp(&(b.0 - range_m).abs()));
         nearest.map_or(0.0, |(_, snr)| *snr)
     }
 
@@ -64,7 +79,15 @@ impl SceneResponse {
         let (correlogram, estimator) = self.response.as_ref()?;
         let noise = (self.noise, self.snr_at(range_m));
         let sampling = sampling(&self.scene).ok()?;
-        let of_lines = EstimatorResponse::new(correlogram, &**estimator, &sampling, &self.pulse, noise, 0.0).ok()?;
+        let of_lines = EstimatorResponse::new(
+            correlogram,
+            &**estimator,
+            &sampling,
+            &self.pulse,
+            noise,
+            0.0,
+        )
+        .ok()?;
         Some(of_lines.with_radius(|range_m| self.radius_m(range_m)))
     }
 
@@ -81,13 +104,21 @@ impl SceneResponse {
     /// Every so-manyth gate of a map says something of its own: neighbours that share most of their window say the same.
     pub(crate) fn gate_step(&self, range_m: &[f64]) -> usize {
         let period_s = 1.0 / self.scene.detector.sampling_hz;
-        let apart_m = 0.25 * self.scene.estimator.window_samples as f64 * 0.5 * crate::SPEED_OF_LIGHT_M_S * period_s;
+        let apart_m = 0.25
+            * self.scene.estimator.window_samples as f64
+            * 0.5
+            * crate::SPEED_OF_LIGHT_M_S
+            * period_s;
         // files round their ranges
         ((apart_m / spacing_m(range_m) - 1e-3).ceil() as usize).max(1)
     }
 
     /// How the records of lines at elevations, rad, were taken.
-    pub(crate) fn setup(&self, wake: WakeModel, elevation_rad: Vec<f64>) -> Result<ScanSetup, Error> {
+    pub(crate) fn setup(
+        &self,
+        wake: WakeModel,
+        elevation_rad: Vec<f64>,
+    ) -> Result<ScanSetup, Error> {
         let scene = &self.scene;
         Ok(ScanSetup {
             sampling: sampling(scene)?,
@@ -120,21 +151,34 @@ mod tests {
             let mut scene = Scene::default();
             (scene.estimator.radius_m, scene.estimator.radius) = (radius_m, radius);
             let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap();
-            let snr: Vec<(f64, f64)> = plan.geometry.layer_range_m().map(|range_m| (range_m, 1.0)).collect();
+            let snr: Vec<(f64, f64)> = plan
+                .geometry
+                .layer_range_m()
+                .map(|range_m| (range_m, 1.0))
+                .collect();
             let response = SceneResponse::new(&plan, snr).unwrap().unwrap();
-            let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
+            let wake =
+                Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.5, 2.5, 1.3, 0.0]);
             let lines: Vec<f64> = (0..20).map(|line| 0.1 + 2.5e-3 * f64::from(line)).collect();
             let shown = response.shown(400.0).unwrap();
-            let map = shown.map(&WakeModel::default(), &wake, &lines, &[376.5, 423.5]).unwrap();
+            let map = shown
+                .map(&WakeModel::default(), &wake, &lines, &[376.5, 423.5])
+                .unwrap();
             (map, response.correlated_lines(2.5e-3, 400.0))
         };
-        let table = |radius_m| RegionRadius::OfRange { range_m: vec![300.0, 500.0], radius_m };
+        let table = |radius_m| RegionRadius::OfRange {
+            range_m: vec![300.0, 500.0],
+            radius_m,
+        };
         let six = shown(6.0, RegionRadius::Fixed {});
         assert_eq!(shown(2.0, table(vec![6.0, 6.0])), six);
         assert_ne!(shown(2.0, RegionRadius::Fixed {}).0, six.0);
         assert_eq!(six.1, 12);
         // Regions that are as large as may be in order to reach a deviation that none has.
-        let target = RegionRadius::Target { standard_deviation_m_s: 1e-3, largest_m: 6.0 };
+        let target = RegionRadius::Target {
+            standard_deviation_m_s: 1e-3,
+            largest_m: 6.0,
+        };
         assert_eq!(shown(2.0, target), six);
     }
 }

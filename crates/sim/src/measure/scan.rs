@@ -56,9 +56,17 @@ impl<'a> Scanner<'a> {
     ///
     /// # Errors
     /// As [`Scanner::new`].
-    pub(crate) fn with(plan: &'a Plan, known: &Efficiencies, observer: &dyn Observer) -> Result<Self, Error> {
+    pub(crate) fn with(
+        plan: &'a Plan,
+        known: &Efficiencies,
+        observer: &dyn Observer,
+    ) -> Result<Self, Error> {
         let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
-        let optics = LineOptics { plan, known, observer };
+        let optics = LineOptics {
+            plan,
+            known,
+            observer,
+        };
         let returns = layer_returns(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let by_pulse = RangeFilter::pulse(&instrument.pulse, geometry.layer_thickness_m)?;
@@ -71,10 +79,15 @@ impl<'a> Scanner<'a> {
         };
         let airs = in_time_order(plan, &all, |line| geometry.line_time_s[*line], of_line)?;
         let lines: Vec<LineOfSight> = airs.iter().map(|air| returns.line(air, geometry)).collect();
-        let spreads: Option<Vec<&[f64]>> = airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
+        let spreads: Option<Vec<&[f64]>> =
+            airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
         let shape = (lines.len(), geometry.gate_range_m.len());
-        let spread_m_s = spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
-        let backscatter_per_m_sr = airs.into_iter().filter_map(|air| air.backscatter_per_m_sr).collect();
+        let spread_m_s =
+            spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
+        let backscatter_per_m_sr = airs
+            .into_iter()
+            .filter_map(|air| air.backscatter_per_m_sr)
+            .collect();
         observer.end();
         let efficiency = drawn_efficiency(&optics, &lines)?;
         let record = Record {
@@ -82,20 +95,42 @@ impl<'a> Scanner<'a> {
             samples: geometry.samples,
         };
         let simulator = match scene.detector.signal {
-            DetectorSignal::IntermediateFrequency => Simulator::new(&instrument.pulse, instrument.receiver, record)?,
-            DetectorSignal::Baseband => Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?,
+            DetectorSignal::IntermediateFrequency => {
+                Simulator::new(&instrument.pulse, instrument.receiver, record)?
+            }
+            DetectorSignal::Baseband => {
+                Simulator::for_baseband(&instrument.pulse, instrument.receiver, record)?
+            }
         };
         let previous = previous_air(plan, &lines)?;
-        Ok(Self { plan, simulator, returns, lines, backscatter_per_m_sr, spread_m_s, efficiency, previous, first: 0 })
+        Ok(Self {
+            plan,
+            simulator,
+            returns,
+            lines,
+            backscatter_per_m_sr,
+            spread_m_s,
+            efficiency,
+            previous,
+            first: 0,
+        })
     }
 
     /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
     /// carries is its mean over the lines.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
-        let Some(mut line) = self.lines.first().cloned() else { return Vec::new() };
+        let Some(mut line) = self.lines.first().cloned() else {
+            return Vec::new();
+        };
         if !self.backscatter_per_m_sr.is_empty() {
             let count = self.lines.len() as f64;
-            let mean = |layer: usize| self.lines.iter().map(|line| line.weight_per_m[layer]).sum::<f64>() / count;
+            let mean = |layer: usize| {
+                self.lines
+                    .iter()
+                    .map(|line| line.weight_per_m[layer])
+                    .sum::<f64>()
+                    / count
+            };
             line.weight_per_m = (0..line.layers()).map(mean).collect();
         }
         layer_snr(&self.plan.scene.content, &self.plan.instrument, &line)
@@ -105,10 +140,21 @@ impl<'a> Scanner<'a> {
     ///
     /// # Errors
     /// As [`Scanner::new`].
-    pub(crate) fn expected_layer_snr(plan: &Plan, observer: &dyn Observer) -> Result<Vec<(f64, f64)>, Error> {
-        let optics = LineOptics { plan, known: &Efficiencies::default(), observer };
+    pub(crate) fn expected_layer_snr(
+        plan: &Plan,
+        observer: &dyn Observer,
+    ) -> Result<Vec<(f64, f64)>, Error> {
+        let optics = LineOptics {
+            plan,
+            known: &Efficiencies::default(),
+            observer,
+        };
         let radial_velocity_m_s = vec![0.0; plan.geometry.layers];
-        let still = Air { radial_velocity_m_s, backscatter_per_m_sr: None, spread_m_s: None };
+        let still = Air {
+            radial_velocity_m_s,
+            backscatter_per_m_sr: None,
+            spread_m_s: None,
+        };
         let line = layer_returns(&optics)?.line(&still, &plan.geometry);
         Ok(layer_snr(&plan.scene.content, &plan.instrument, &line))
     }
@@ -137,7 +183,8 @@ impl<'a> Scanner<'a> {
         if self.spread_m_s.is_some() {
             // Each pulse brings its air: velocity and weight of each layer.
             let layers = self.plan.geometry.layers.max(1);
-            size = size.min((AIRS_BYTES as usize / (16 * layers)).max(rayon::current_num_threads()));
+            size =
+                size.min((AIRS_BYTES as usize / (16 * layers)).max(rayon::current_num_threads()));
         }
         let mut clipped = Clipped::default();
         for first in (0..self.pulses()).step_by(size) {
@@ -157,7 +204,8 @@ impl<'a> Scanner<'a> {
         observer: &dyn Observer,
     ) -> Result<(Array2<T>, Clipped), Error> {
         let schedule = &self.plan.geometry.schedule;
-        let index = |key: PulseKey| (self.first + realisation) * self.pulses() + pulses.start + key.pulse;
+        let index =
+            |key: PulseKey| (self.first + realisation) * self.pulses() + pulses.start + key.pulse;
         let (airs, air_of) = self.airs_of_pulses(&pulses)?;
         let scan = Scan {
             simulator: &self.simulator,
@@ -172,9 +220,15 @@ impl<'a> Scanner<'a> {
                 }
                 let efficiency = self.efficiency.as_ref().map(|e| e.of_pulse(index(key)));
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
-                let impairment_seed = stream(self.plan.scene.content.seed, "asides", index(key) as u64).next_u64();
+                let impairment_seed =
+                    stream(self.plan.scene.content.seed, "asides", index(key) as u64).next_u64();
                 let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
-                Shot { line: air.unwrap_or(&self.lines[line]), efficiency, previous, impairment_seed }
+                Shot {
+                    line: air.unwrap_or(&self.lines[line]),
+                    efficiency,
+                    previous,
+                    impairment_seed,
+                }
             },
             generator: |key| stream(self.plan.scene.content.seed, "signal", index(key) as u64),
             digitiser: self.plan.instrument.digitiser,
@@ -183,11 +237,17 @@ impl<'a> Scanner<'a> {
     }
 
     /// The airs of some pulses, and which one each of them meets; none where lines have one air.
-    fn airs_of_pulses(&self, pulses: &Range<usize>) -> Result<(Vec<LineOfSight>, Vec<usize>), Error> {
+    fn airs_of_pulses(
+        &self,
+        pulses: &Range<usize>,
+    ) -> Result<(Vec<LineOfSight>, Vec<usize>), Error> {
         if self.spread_m_s.is_none() {
             return Ok((Vec::new(), Vec::new()));
         }
-        let (schedule, of) = (&self.plan.geometry.schedule, self.plan.scene.content.scan.wind_of_pulses);
+        let (schedule, of) = (
+            &self.plan.geometry.schedule,
+            self.plan.scene.content.scan.wind_of_pulses,
+        );
         let mut wanted: Vec<(usize, usize)> = Vec::new();
         let air_of = pulses
             .clone()
@@ -202,9 +262,19 @@ impl<'a> Scanner<'a> {
             })
             .collect();
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        let beams: Vec<Beam> = wanted.iter().map(|&(line, air)| beam_of_air(self.plan, line, air)).collect();
-        let along = |beam: &Beam| Ok(self.returns.line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry));
-        Ok((in_time_order(self.plan, &beams, |beam| beam.time_s, along)?, air_of))
+        let beams: Vec<Beam> = wanted
+            .iter()
+            .map(|&(line, air)| beam_of_air(self.plan, line, air))
+            .collect();
+        let along = |beam: &Beam| {
+            Ok(self
+                .returns
+                .line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry))
+        };
+        Ok((
+            in_time_order(self.plan, &beams, |beam| beam.time_s, along)?,
+            air_of,
+        ))
     }
 }
 
@@ -220,20 +290,36 @@ fn in_time_order<T: Sync, R: Send>(
     let stretch = |item: &T| wind.stretch_of(wind.start_s + time_s(item));
     let mut out = Vec::with_capacity(items.len());
     for part in items.chunk_by(|a, b| stretch(a) == stretch(b)) {
-        out.extend(part.par_iter().map(&work).collect::<Result<Vec<_>, Error>>()?);
+        out.extend(
+            part.par_iter()
+                .map(&work)
+                .collect::<Result<Vec<_>, Error>>()?,
+        );
     }
     Ok(out)
 }
 
 fn layer_snr(scene: &Scene, instrument: &Instrument, line: &LineOfSight) -> Vec<(f64, f64)> {
-    let snr = |&weight_per_m: &f64| instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), weight_per_m);
-    line.weight_per_m.iter().enumerate().map(|(l, weight_per_m)| (line.range_m(l), snr(weight_per_m))).collect()
+    let snr = |&weight_per_m: &f64| {
+        instrument
+            .receiver
+            .slowly_varying_snr(scene.pulse_energy_j(), weight_per_m)
+    };
+    line.weight_per_m
+        .iter()
+        .enumerate()
+        .map(|(l, weight_per_m)| (line.range_m(l), snr(weight_per_m)))
+        .collect()
 }
 
 /// Signal-to-noise ratio of most layers that return light, given with their ranges: the median, which a cloud does not move; 0 where none
 /// does.
 pub(crate) fn median_snr(layer_snr: &[(f64, f64)]) -> f64 {
-    let mut all: Vec<f64> = layer_snr.iter().map(|(_, snr)| *snr).filter(|snr| *snr > 0.0).collect();
+    let mut all: Vec<f64> = layer_snr
+        .iter()
+        .map(|(_, snr)| *snr)
+        .filter(|snr| *snr > 0.0)
+        .collect();
     all.sort_by(f64::total_cmp);
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
@@ -251,7 +337,11 @@ impl Returns {
     fn line(&self, air: &Air, geometry: &Geometry) -> LineOfSight {
         let weight_per_m = match &air.backscatter_per_m_sr {
             None => self.weight_per_m.clone(),
-            Some(carried) => carried.iter().zip(&self.of_backscatter_sr).map(|(beta, of)| beta * of).collect(),
+            Some(carried) => carried
+                .iter()
+                .zip(&self.of_backscatter_sr)
+                .map(|(beta, of)| beta * of)
+                .collect(),
         };
         LineOfSight {
             first_range_m: geometry.first_layer_range_m,
@@ -267,13 +357,23 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
     let plan = optics.plan;
     let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
-        let unit = instrument.receiver.slowly_varying_snr(scene.pulse_energy_j(), 1.0);
+        let unit = instrument
+            .receiver
+            .slowly_varying_snr(scene.pulse_energy_j(), 1.0);
         let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
-        return Ok(Returns { weight_per_m, of_backscatter_sr: Vec::new() });
+        return Ok(Returns {
+            weight_per_m,
+            of_backscatter_sr: Vec::new(),
+        });
     }
     let efficiency = optics.of_layers()?;
     let with_efficiency = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
-        efficiency.range_m.iter().zip(&efficiency.mean).map(|(&range_m, eta)| Ok(of(range_m)? * eta)).collect()
+        efficiency
+            .range_m
+            .iter()
+            .zip(&efficiency.mean)
+            .map(|(&range_m, eta)| Ok(of(range_m)? * eta))
+            .collect()
     };
     Ok(Returns {
         weight_per_m: with_efficiency(&|range_m| instrument.return_per_m(range_m))?,
@@ -288,26 +388,62 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
 /// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.
 fn previous_air(plan: &Plan, lines: &[LineOfSight]) -> Result<Option<Vec<LineOfSight>>, Error> {
     let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
-    let Some(SecondTrip { radial_velocity_m_s: elsewhere_m_s }) = scene.scan.second_trip else { return Ok(None) };
+    let Some(SecondTrip {
+        radial_velocity_m_s: elsewhere_m_s,
+    }) = scene.scan.second_trip
+    else {
+        return Ok(None);
+    };
     let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
-    let ranges_m: Vec<f64> = geometry.layer_range_m().map(|range_m| range_m + apart_m).collect();
+    let ranges_m: Vec<f64> = geometry
+        .layer_range_m()
+        .map(|range_m| range_m + apart_m)
+        .collect();
     let efficiency = efficiency_by_theory(instrument, &ranges_m)?;
     let weight = |(&range_m, eta): (&f64, &f64)| Ok(instrument.return_per_m(range_m)? * eta);
-    let weight_per_m = ranges_m.iter().zip(&efficiency.mean).map(weight).collect::<Result<Vec<_>, Error>>()?;
+    let weight_per_m = ranges_m
+        .iter()
+        .zip(&efficiency.mean)
+        .map(weight)
+        .collect::<Result<Vec<_>, Error>>()?;
     let far = |(i, line): (usize, &LineOfSight)| {
         let mut velocity_m_s = known_velocity_m_s(plan, &geometry.schedule.middle(i), &ranges_m)?.1;
-        velocity_m_s.iter_mut().filter(|v| v.is_nan()).for_each(|v| *v = elsewhere_m_s);
-        Ok(LineOfSight { radial_velocity_m_s: velocity_m_s, weight_per_m: weight_per_m.clone(), ..line.clone() })
+        velocity_m_s
+            .iter_mut()
+            .filter(|v| v.is_nan())
+            .for_each(|v| *v = elsewhere_m_s);
+        Ok(LineOfSight {
+            radial_velocity_m_s: velocity_m_s,
+            weight_per_m: weight_per_m.clone(),
+            ..line.clone()
+        })
     };
-    Ok(Some(lines.iter().enumerate().map(far).collect::<Result<_, Error>>()?))
+    Ok(Some(
+        lines
+            .iter()
+            .enumerate()
+            .map(far)
+            .collect::<Result<_, Error>>()?,
+    ))
 }
 
 /// Efficiencies of the layers over their mean, one set for each realisation of the turbulence, if the pulses have their own.
-fn drawn_efficiency(optics: &LineOptics<'_>, lines: &[LineOfSight]) -> Result<Option<LayerEfficiency>, Error> {
+fn drawn_efficiency(
+    optics: &LineOptics<'_>,
+    lines: &[LineOfSight],
+) -> Result<Option<LayerEfficiency>, Error> {
     let (scene, geometry) = (&optics.plan.scene.content, &optics.plan.geometry);
-    let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else { return Ok(None) };
+    let (Some(_), Some(line)) = (drawn_turbulence(scene), lines.first()) else {
+        return Ok(None);
+    };
     let first_m = [geometry.first_layer_range_m];
-    let Some(&(ends_m, _)) = stretches(scene, geometry, &first_m).first() else { return Ok(None) };
+    let Some(&(ends_m, _)) = stretches(scene, geometry, &first_m).first() else {
+        return Ok(None);
+    };
     let screens = optics.screens(ends_m)?;
-    Ok(Some(LayerEfficiency::new(&screens.range_m, &screens.realisations, line)?))
+    Ok(Some(LayerEfficiency::new(
+        &screens.range_m,
+        &screens.realisations,
+        line,
+    )?))
 }

@@ -41,7 +41,10 @@ fn is_inside((line, gate): (usize, usize)) -> bool {
 }
 
 fn cells(wanted: impl Fn((usize, usize)) -> bool) -> Vec<(usize, usize)> {
-    (0..SHAPE.0).flat_map(|i| (0..SHAPE.1).map(move |j| (i, j))).filter(|cell| wanted(*cell)).collect()
+    (0..SHAPE.0)
+        .flat_map(|i| (0..SHAPE.1).map(move |j| (i, j)))
+        .filter(|cell| wanted(*cell))
+        .collect()
 }
 
 impl Law {
@@ -49,7 +52,10 @@ impl Law {
     fn of(&self, (line, gate): (usize, usize)) -> [f64; 2] {
         let away = (line as f64 - 12.0).hypot(0.7 * (gate as f64 - 16.0)) / 4.0;
         let swell = (-away * away).exp();
-        [self.bias_m_s * swell * if line < 12 { -1.0 } else { 1.0 }, 0.5 + swell]
+        [
+            self.bias_m_s * swell * if line < 12 { -1.0 } else { 1.0 },
+            0.5 + swell,
+        ]
     }
 
     /// True bias, mean variance and mean square over cells. Outliers have no bias.
@@ -57,10 +63,13 @@ impl Law {
         let mut sums = [0.0; 3];
         for cell in cells {
             let [bias, std] = self.of(*cell);
-            let square = (1.0 - self.bad) * (bias * bias + std * std) + self.bad * BAND_M_S * BAND_M_S / 3.0;
+            let square =
+                (1.0 - self.bad) * (bias * bias + std * std) + self.bad * BAND_M_S * BAND_M_S / 3.0;
             let bias = (1.0 - self.bad) * bias;
             let of_cell = [bias, square - bias * bias, square];
-            sums.iter_mut().zip(of_cell).for_each(|(sum, value)| *sum += value / cells.len() as f64);
+            sums.iter_mut()
+                .zip(of_cell)
+                .for_each(|(sum, value)| *sum += value / cells.len() as f64);
         }
         sums
     }
@@ -90,7 +99,8 @@ impl Law {
 fn map_of(scans: Vec<ScanErrors>) -> VelocityEstimates {
     let errors = |cell| scans.iter().map(move |scan| scan.error_m_s[cell]);
     let statistics = Array2::from_shape_fn(SHAPE, |cell| ErrorStatistics::of(errors(cell)));
-    let flags = |cell| scans.iter().filter(|scan| scan.flagged[cell]).count() as f64 / scans.len() as f64;
+    let flags =
+        |cell| scans.iter().filter(|scan| scan.flagged[cell]).count() as f64 / scans.len() as f64;
     let law = ErrorLaw::new(&scans, SHARED);
     VelocityEstimates {
         bias_m_s: statistics.mapv(|s| s.bias_m_s),
@@ -112,7 +122,11 @@ impl Found {
     /// Shares within one and two stated errors, and the root mean square of these over that of the deviations.
     fn covered(&self) -> [f64; 3] {
         let share = |times: f64| {
-            self.0.iter().filter(|[apart, error]| apart.abs() < times * error).count() as f64 / self.0.len() as f64
+            self.0
+                .iter()
+                .filter(|[apart, error]| apart.abs() < times * error)
+                .count() as f64
+                / self.0.len() as f64
         };
         let square = |which: usize| self.0.iter().map(|found| found[which].powi(2)).sum::<f64>();
         [share(1.0), share(2.0), (square(1) / square(0)).sqrt()]
@@ -121,9 +135,17 @@ impl Found {
 
 /// Realisations, bias and part of outliers: away from all that is usual.
 fn laws(most: usize) -> impl Iterator<Item = Law> {
-    let of =
-        |scans| [(0.0, 0.0), (3.0, 0.0), (1.0, 0.003), (1.0, 0.3)].map(|(bias_m_s, bad)| Law { scans, bias_m_s, bad });
-    [2, 3, 4, 8, 40].into_iter().filter(move |scans| *scans <= most).flat_map(of)
+    let of = |scans| {
+        [(0.0, 0.0), (3.0, 0.0), (1.0, 0.003), (1.0, 0.3)].map(|(bias_m_s, bad)| Law {
+            scans,
+            bias_m_s,
+            bad,
+        })
+    };
+    [2, 3, 4, 8, 40]
+        .into_iter()
+        .filter(move |scans| *scans <= most)
+        .flat_map(of)
 }
 
 #[test]
@@ -133,9 +155,13 @@ fn standard_errors_of_cells_cover_however_few_realisations_there_are() {
         let mut found = [const { Found(Vec::new()) }; 2];
         for _ in 0..if law.scans < 40 { 30 } else { 12 } {
             let map = law.map(&mut rng);
-            for cell in cells(|(line, gate)| line % 2 == 0 && gate % 3 == 0 || is_inside((line, gate))) {
+            for cell in
+                cells(|(line, gate)| line % 2 == 0 && gate % 3 == 0 || is_inside((line, gate)))
+            {
                 let apart = map.rms_m_s[cell] - law.truth(&[cell])[2].sqrt();
-                found[usize::from(is_inside(cell))].0.push([apart, map.standard_error_m_s[cell]]);
+                found[usize::from(is_inside(cell))]
+                    .0
+                    .push([apart, map.standard_error_m_s[cell]]);
             }
         }
         for (place, found) in ["outside", "inside"].iter().zip(&found) {
@@ -159,21 +185,37 @@ fn guesses_at_either_edge_of_the_band_have_squares_that_hardly_scatter() {
         let edges = [BAND_M_S - 2.0, -BAND_M_S - 2.0];
         for _ in 0..20 {
             let mut scan = || {
-                let white = Array2::from_shape_simple_fn((SHAPE.0 + 2, SHAPE.1 + 3), || normal(&mut rng));
+                let white =
+                    Array2::from_shape_simple_fn((SHAPE.0 + 2, SHAPE.1 + 3), || normal(&mut rng));
                 let is_low = |(i, j)| white.slice(ndarray::s![i..i + 3, j..j + 4]).sum() < 0.0;
-                let error_m_s = Array2::from_shape_fn(SHAPE, |cell| edges[usize::from(is_low(cell))]);
-                ScanErrors { error_m_s, flagged: Array2::from_elem(SHAPE, true) }
+                let error_m_s =
+                    Array2::from_shape_fn(SHAPE, |cell| edges[usize::from(is_low(cell))]);
+                ScanErrors {
+                    error_m_s,
+                    flagged: Array2::from_elem(SHAPE, true),
+                }
             };
             let scans: Vec<ScanErrors> = (0..scans).map(|_| scan()).collect();
             let stated = ErrorLaw::new(&scans, SHARED).unwrap().rms_standard_errors();
             let truth = (0.5 * (edges[0].powi(2) + edges[1].powi(2))).sqrt();
-            found.0.extend(cells(|(i, j)| i % 3 == 1 && j % 4 == 1).into_iter().map(|cell| {
-                let square = scans.iter().map(|scan| scan.error_m_s[cell].powi(2)).sum::<f64>() / scans.len() as f64;
-                [square.sqrt() - truth, stated[cell]]
-            }));
+            found.0.extend(
+                cells(|(i, j)| i % 3 == 1 && j % 4 == 1)
+                    .into_iter()
+                    .map(|cell| {
+                        let square = scans
+                            .iter()
+                            .map(|scan| scan.error_m_s[cell].powi(2))
+                            .sum::<f64>()
+                            / scans.len() as f64;
+                        [square.sqrt() - truth, stated[cell]]
+                    }),
+            );
         }
         let [one, two, size] = found.covered();
-        assert!(two > 0.9 && (0.9..1.5).contains(&size), "{scans} scans: {one} {two} {size}");
+        assert!(
+            two > 0.9 && (0.9..1.5).contains(&size),
+            "{scans} scans: {one} {two} {size}"
+        );
     }
 }
 
@@ -190,16 +232,28 @@ fn standard_errors_of_averages_cover_however_few_realisations_and_cells_there_ar
             for ((_, cells), found) in parts.iter().zip(&mut found) {
                 let a = CellAverage::over(&map, cells);
                 let [bias, variance, square] = law.truth(cells);
-                found[0].0.push([a.bias_m_s - bias, a.bias_standard_error_m_s]);
-                found[1].0.push([a.std_m_s - variance.sqrt(), a.std_standard_error_m_s]);
-                found[2].0.push([a.rms_m_s - square.sqrt(), a.standard_error_m_s]);
+                found[0]
+                    .0
+                    .push([a.bias_m_s - bias, a.bias_standard_error_m_s]);
+                found[1]
+                    .0
+                    .push([a.std_m_s - variance.sqrt(), a.std_standard_error_m_s]);
+                found[2]
+                    .0
+                    .push([a.rms_m_s - square.sqrt(), a.standard_error_m_s]);
             }
             let [fraction, error] = flagged_fraction(&map);
-            assert!(error > 0.0 && (fraction > 0.0 || law.bad < 0.1), "{law:?}: {fraction} {error}");
+            assert!(
+                error > 0.0 && (fraction > 0.0 || law.bad < 0.1),
+                "{law:?}: {fraction} {error}"
+            );
             flagged.0.push([fraction - law.bad, error]);
         }
         let of_parts = parts.iter().zip(&found).flat_map(|((part, _), found)| {
-            ["bias", "std", "rms"].iter().zip(found).map(move |(name, found)| (format!("{name} {part}"), found))
+            ["bias", "std", "rms"]
+                .iter()
+                .zip(found)
+                .map(move |(name, found)| (format!("{name} {part}"), found))
         });
         let of_flags = (law.bad > 0.0).then(|| ("flagged".to_owned(), &flagged));
         for (name, found) in of_parts.chain(of_flags) {
@@ -207,7 +261,10 @@ fn standard_errors_of_averages_cover_however_few_realisations_and_cells_there_ar
             // 150 maps: shares are known to 0.04 and 0.02, a scatter to 0.06, with outliers to 0.1. Of three values the jackknife
             // of a variance is 1.4 times too large.
             let case = format!("{name}, {law:?}: {one} {two} {size}");
-            assert!((0.55..0.9).contains(&one) && two > 0.84 && (0.8..1.6).contains(&size), "{case}");
+            assert!(
+                (0.55..0.9).contains(&one) && two > 0.84 && (0.8..1.6).contains(&size),
+                "{case}"
+            );
         }
     }
 }
@@ -215,13 +272,19 @@ fn standard_errors_of_averages_cover_however_few_realisations_and_cells_there_ar
 #[test]
 fn standard_errors_of_simulated_maps_cover_with_two_realisations() {
     let scene = |seed| {
-        let mut scene = Scene { seed, ..Scene::default() };
+        let mut scene = Scene {
+            seed,
+            ..Scene::default()
+        };
         scene.detector.snr = SnrReference::Fixed { snr_db: -3.0 };
         (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.08, 0.16);
         scene.scan.elevation_step_rad = 4e-3;
         (scene.scan.range_min_m, scene.scan.range_max_m) = (350.0, 450.0);
         (scene.scan.pulses_per_line, scene.scan.realisations) = (8, 2);
-        (scene.estimator.window_samples, scene.estimator.gate_step_samples) = (32, 12);
+        (
+            scene.estimator.window_samples,
+            scene.estimator.gate_step_samples,
+        ) = (32, 12);
         scene
     };
     let map = |seed| {
@@ -231,12 +294,27 @@ fn standard_errors_of_simulated_maps_cover_with_two_realisations() {
     let maps: Vec<VelocityEstimates> = (1..=40).map(map).collect();
     let mut found = Found::default();
     for cell in maps[0].rms_m_s.indexed_iter().map(|(cell, _)| cell) {
-        let square = maps.iter().map(|map| map.rms_m_s[cell].powi(2)).sum::<f64>() / maps.len() as f64;
-        found.0.extend(maps.iter().map(|map| [map.rms_m_s[cell] - square.sqrt(), map.standard_error_m_s[cell]]));
+        let square = maps
+            .iter()
+            .map(|map| map.rms_m_s[cell].powi(2))
+            .sum::<f64>()
+            / maps.len() as f64;
+        found.0.extend(maps.iter().map(|map| {
+            [
+                map.rms_m_s[cell] - square.sqrt(),
+                map.standard_error_m_s[cell],
+            ]
+        }));
     }
     let [one, two, size] = found.covered();
-    assert!(one > 0.6 && two > 0.93 && (0.9..1.5).contains(&size), "{one} {two} {size}");
-    assert!(maps.iter().all(|map| map.law.is_some() && map.scans.len() == 2));
+    assert!(
+        one > 0.6 && two > 0.93 && (0.9..1.5).contains(&size),
+        "{one} {two} {size}"
+    );
+    assert!(
+        maps.iter()
+            .all(|map| map.law.is_some() && map.scans.len() == 2)
+    );
 }
 
 #[test]
@@ -254,37 +332,73 @@ fn lines_share_windows_by_the_distance_between_them_whatever_the_pattern() {
     };
     assert_eq!((ppi(2e-3), ppi(2e-2)), (6.0, 1.0));
     // Beams 60 degrees apart share nothing.
-    assert_eq!(lines("pattern = { kind = \"vad\", elevation_rad = 1.2, beams = 6 }"), 1.0);
+    assert_eq!(
+        lines("pattern = { kind = \"vad\", elevation_rad = 1.2, beams = 6 }"),
+        1.0
+    );
 }
 
 #[test]
 fn one_realisation_and_no_cells_have_no_standard_error() {
-    let law = Law { scans: 2, bias_m_s: 0.0, bad: 0.0 };
+    let law = Law {
+        scans: 2,
+        bias_m_s: 0.0,
+        bad: 0.0,
+    };
     let two = law.map(&mut Xoshiro256PlusPlus::seed_from_u64(1));
     assert!(CellAverage::over(&two, &[]).standard_error_m_s.is_nan());
     assert!(ErrorLaw::new(&two.scans[..1], SHARED).is_none());
     let mut one = VelocityEstimates { law: None, ..two };
     one.scans.truncate(1);
-    assert!(CellAverage::over(&one, &[(3, 4)]).standard_error_m_s.is_nan() && flagged_fraction(&one)[1].is_nan());
+    assert!(
+        CellAverage::over(&one, &[(3, 4)])
+            .standard_error_m_s
+            .is_nan()
+            && flagged_fraction(&one)[1].is_nan()
+    );
 }
 
 #[test]
 fn cells_without_estimates_leave_their_neighbours_theirs() {
-    let law = Law { scans: 3, bias_m_s: 0.0, bad: 0.0 };
+    let law = Law {
+        scans: 3,
+        bias_m_s: 0.0,
+        bad: 0.0,
+    };
     let mut scans = law.map(&mut Xoshiro256PlusPlus::seed_from_u64(2)).scans;
-    scans.iter_mut().for_each(|scan| scan.error_m_s[(5, 5)] = f64::NAN);
+    scans
+        .iter_mut()
+        .for_each(|scan| scan.error_m_s[(5, 5)] = f64::NAN);
     (scans[0].error_m_s[(9, 9)], scans[1].error_m_s[(9, 9)]) = (f64::NAN, f64::NAN);
     let errors = ErrorLaw::new(&scans, SHARED).unwrap().rms_standard_errors();
     let is_empty = |cell| cell == (5, 5) || cell == (9, 9);
-    assert!(errors.indexed_iter().all(|(cell, error)| if is_empty(cell) { error.is_nan() } else { *error > 0.05 }));
+    assert!(
+        errors
+            .indexed_iter()
+            .all(|(cell, error)| if is_empty(cell) {
+                error.is_nan()
+            } else {
+                *error > 0.05
+            })
+    );
     // Without noise errors are those of the bias alone, which all realisations have.
     scans.iter_mut().for_each(|scan| scan.error_m_s.fill(0.3));
-    assert!(ErrorLaw::new(&scans, SHARED).unwrap().rms_standard_errors().iter().all(|error| *error == 0.0));
+    assert!(
+        ErrorLaw::new(&scans, SHARED)
+            .unwrap()
+            .rms_standard_errors()
+            .iter()
+            .all(|error| *error == 0.0)
+    );
 }
 
 #[test]
 fn cells_with_one_estimate_have_no_scatter_and_widen_that_of_the_bias() {
-    let law = Law { scans: 3, bias_m_s: 0.0, bad: 0.0 };
+    let law = Law {
+        scans: 3,
+        bias_m_s: 0.0,
+        bad: 0.0,
+    };
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(3);
     let all = cells(|_| true);
     let truth = law.truth(&all)[1].sqrt();
@@ -293,16 +407,27 @@ fn cells_with_one_estimate_have_no_scatter_and_widen_that_of_the_bias() {
         let mut scans = law.map(&mut rng).scans;
         // Two of three estimates are missing: most cells have one, some none, few two.
         scans.iter_mut().for_each(|scan| {
-            scan.error_m_s.mapv_inplace(|error| if uniform(&mut rng) < 0.67 { f64::NAN } else { error });
+            scan.error_m_s.mapv_inplace(|error| {
+                if uniform(&mut rng) < 0.67 {
+                    f64::NAN
+                } else {
+                    error
+                }
+            });
         });
         let a = CellAverage::over(&map_of(scans), &all);
         found[0].0.push([a.bias_m_s, a.bias_standard_error_m_s]);
-        found[1].0.push([a.std_m_s - truth, a.std_standard_error_m_s]);
+        found[1]
+            .0
+            .push([a.std_m_s - truth, a.std_standard_error_m_s]);
         found[2].0.push([a.rms_m_s - truth, a.standard_error_m_s]);
     }
     for (name, found) in ["bias", "std", "rms"].iter().zip(&found) {
         let [one, two, size] = found.covered();
-        assert!((0.55..0.95).contains(&one) && two > 0.9 && (0.8..1.7).contains(&size), "{name}: {one} {two} {size}");
+        assert!(
+            (0.55..0.95).contains(&one) && two > 0.9 && (0.8..1.7).contains(&size),
+            "{name}: {one} {two} {size}"
+        );
     }
 }
 
@@ -314,12 +439,20 @@ fn two_exact_deviations_hold_fewer_than_95_in_a_hundred_of_rare_outliers() {
         let mut sum = 0.0;
         for number in 0..50 {
             let apart = (f64::from(number) - expected).abs();
-            sum += if apart <= 2.0 * expected.sqrt() { part } else { 0.0 };
+            sum += if apart <= 2.0 * expected.sqrt() {
+                part
+            } else {
+                0.0
+            };
             part *= expected / f64::from(number + 1);
         }
         sum
     };
     for (expected, right) in [(0.1, 0.905), (0.17, 0.844), (0.5, 0.910), (3.0, 0.966)] {
-        assert!((share(expected) - right).abs() < 1e-3, "{expected}: {}", share(expected));
+        assert!(
+            (share(expected) - right).abs() < 1e-3,
+            "{expected}: {}",
+            share(expected)
+        );
     }
 }

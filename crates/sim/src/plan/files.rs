@@ -30,13 +30,19 @@ impl Written {
     /// A file, and what is held beside it until it is there.
     fn add(&mut self, wanted: bool, file_bytes: f64, beside_bytes: f64) {
         if wanted {
-            self.most_bytes = self.most_bytes.max(self.done_bytes + file_bytes + beside_bytes);
+            self.most_bytes = self
+                .most_bytes
+                .max(self.done_bytes + file_bytes + beside_bytes);
             self.done_bytes += file_bytes;
         }
     }
 
     fn table(&mut self, wanted: bool, rows: f64, columns: f64) {
-        self.add(wanted, rows * columns * TEXT_BYTES, rows * columns * NUMBER_BYTES);
+        self.add(
+            wanted,
+            rows * columns * TEXT_BYTES,
+            rows * columns * NUMBER_BYTES,
+        );
     }
 
     fn netcdf(&mut self, wanted: bool, file_bytes: f64) {
@@ -49,7 +55,10 @@ impl Written {
         // one where its panels are cut out.
         let mask = if raster_pixels > 0.0 { 1.0 } else { 0.0 };
         let held_bytes = raster_pixels * 4.0 * 1.5 + DRAWING_BYTES;
-        for (wanted, file_bytes, painted) in [(svg, raster_pixels * 0.5, 0.0), (png, pixels * 0.2, 4.0 + mask)] {
+        for (wanted, file_bytes, painted) in [
+            (svg, raster_pixels * 0.5, 0.0),
+            (png, pixels * 0.2, 4.0 + mask),
+        ] {
             self.add(wanted, file_bytes, held_bytes + pixels * painted);
         }
     }
@@ -73,7 +82,10 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
     if n.kept > 0.0 {
         written.table(o.csv, n.lines * n.samples, 2.0 + n.parts);
         let others = n.kept * n.records * 28.0 + n.lines * n.layers * 4.0;
-        written.netcdf(netcdf, n.kept * n.records * n.samples * n.parts * 8.0 + others);
+        written.netcdf(
+            netcdf,
+            n.kept * n.records * n.samples * n.parts * 8.0 + others,
+        );
     }
     if matches!(target, Target::Run | Target::Map) {
         written.done_bytes += n.cells * MAP_FIELDS * 8.0;
@@ -85,7 +97,12 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
         written.done_bytes += panels * n.cells * 8.0;
         written.picture(pictures, whole_pixels, pixels);
     }
-    let kinds = [(o.csv, "CSV"), (o.netcdf, "NetCDF"), (o.svg, "SVG"), (o.png, "PNG")];
+    let kinds = [
+        (o.csv, "CSV"),
+        (o.netcdf, "NetCDF"),
+        (o.svg, "SVG"),
+        (o.png, "PNG"),
+    ];
     let kinds: Vec<&str> = kinds.into_iter().filter(|k| k.0).map(|k| k.1).collect();
     run(Stage::Files, kinds.join(", "), [written.most_bytes, 0.0])
 }
@@ -103,9 +120,21 @@ fn map_pixels(scene: &Scene, g: &Geometry) -> (f64, f64, f64) {
     let top_m = (scene.scan.lidar_height_m + far_m * high.sin()).max(0.0);
     let bottom_m = (scene.scan.lidar_height_m + far_m * low.sin()).min(0.0);
     // The lidar is shown where that takes less than half as much again.
-    let across_m = if near_m < 0.5 * (far_m - near_m) { far_m } else { far_m - near_m };
+    let across_m = if near_m < 0.5 * (far_m - near_m) {
+        far_m
+    } else {
+        far_m - near_m
+    };
     // A single gate has no width.
     let height = (BOX * (top_m - bottom_m) / across_m.max(1e-9)).clamp(90.0, 780.0);
-    let panels = if scene.scan.realisations == 1 { 3.0 } else { 6.0 };
-    (panels, panels * 4.0 * BOX * height, 1872.0 * (72.0 + 1.2 * panels / 3.0 * (height + 92.0)))
+    let panels = if scene.scan.realisations == 1 {
+        3.0
+    } else {
+        6.0
+    };
+    (
+        panels,
+        panels * 4.0 * BOX * height,
+        1872.0 * (72.0 + 1.2 * panels / 3.0 * (height + 92.0)),
+    )
 }

@@ -39,12 +39,15 @@ impl Plan {
             Pattern::Ppi(_) | Pattern::Axial(_) => "a larger scan.pattern.azimuth_step_rad",
             _ => "fewer lines of sight",
         };
-        let is_derived =
-            matches!(scene.atmosphere.turbulence, Turbulence::Refractive(t) if t.sampling == ScreenSampling::Derived);
+        let is_derived = matches!(scene.atmosphere.turbulence, Turbulence::Refractive(t) if t.sampling == ScreenSampling::Derived);
         match stage {
-            Stage::PhaseScreens if is_derived => "a smaller scan.range_max_m and outputs.profile_range_max_m".into(),
+            Stage::PhaseScreens if is_derived => {
+                "a smaller scan.range_max_m and outputs.profile_range_max_m".into()
+            }
             Stage::PhaseScreens => "fewer atmosphere.turbulence.grid_points".into(),
-            Stage::CrossPlane | Stage::Efficiency => "fewer outputs.profile_points, or outputs.flow = false".into(),
+            Stage::CrossPlane | Stage::Efficiency => {
+                "fewer outputs.profile_points, or outputs.flow = false".into()
+            }
             _ if self.kept_realisations() > 0 && self.target == Target::Run => {
                 format!("outputs.signals = false, {lines} or fewer scan.pulses_per_line")
             }
@@ -69,14 +72,26 @@ impl Plan {
     /// # Errors
     /// As [`Plan::fits`].
     pub fn bound_fits_in(&self, available_bytes: f64) -> Result<(), Error> {
-        let stages = of_bound(&self.stages, &Sizes::new(&self.scene.content, self.target, &self.geometry));
-        hold(&stages, available_bytes, |_| "fewer estimator.window_samples".into())
+        let stages = of_bound(
+            &self.stages,
+            &Sizes::new(&self.scene.content, self.target, &self.geometry),
+        );
+        hold(&stages, available_bytes, |_| {
+            "fewer estimator.window_samples".into()
+        })
     }
 }
 
 /// Holds the memory of some stages against what is available; `smaller` says what makes a stage smaller.
-fn hold(stages: &[PlannedStage], available_bytes: f64, smaller: impl Fn(Stage) -> String) -> Result<(), Error> {
-    let Forecast { memory_bytes, largest } = total(stages);
+fn hold(
+    stages: &[PlannedStage],
+    available_bytes: f64,
+    smaller: impl Fn(Stage) -> String,
+) -> Result<(), Error> {
+    let Forecast {
+        memory_bytes,
+        largest,
+    } = total(stages);
     if memory_bytes <= SHARE * available_bytes {
         return Ok(());
     }
@@ -95,7 +110,11 @@ mod tests {
     use crate::scene::SceneFile;
 
     fn plan(text: &str) -> Plan {
-        Plan::new(SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(), Target::Run).unwrap()
+        Plan::new(
+            SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(),
+            Target::Run,
+        )
+        .unwrap()
     }
 
     #[test]
@@ -104,23 +123,40 @@ mod tests {
         let refused = plan(text).fits_in(2e10).unwrap_err().to_string();
         assert!(refused.contains("and 20.0 GB are available"), "{refused}");
         assert!(refused.contains("--allow-large"), "{refused}");
-        assert!(refused.contains("a larger scan.elevation_step_rad"), "{refused}");
-        plan(&text.replace("1.1e-5", "1.1e-3")).fits_in(2e10).unwrap();
+        assert!(
+            refused.contains("a larger scan.elevation_step_rad"),
+            "{refused}"
+        );
+        plan(&text.replace("1.1e-5", "1.1e-3"))
+            .fits_in(2e10)
+            .unwrap();
         // The keys are those of the pattern and of the sampling.
         let of = |text: &str| plan(text).fits_in(1e6).unwrap_err().to_string();
         let around = of("[scan.pattern]\nkind = \"ppi\"\n");
-        assert!(around.contains("scan.pattern.azimuth_step_rad") && !around.contains("elevation_step"), "{around}");
+        assert!(
+            around.contains("scan.pattern.azimuth_step_rad") && !around.contains("elevation_step"),
+            "{around}"
+        );
         let screens = "[scan]\nelevation_max_rad = 0.01\n[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-14\nsampling = ";
         let derived = of(&format!("{screens}\"derived\"\n"));
-        assert!(derived.contains("phase screens") && derived.contains("profile_range_max_m"), "{derived}");
-        let explicit = of(&format!("{screens}\"explicit\"\ngrid_points = 1024\nlayers = 12\n"));
+        assert!(
+            derived.contains("phase screens") && derived.contains("profile_range_max_m"),
+            "{derived}"
+        );
+        let explicit = of(&format!(
+            "{screens}\"explicit\"\ngrid_points = 1024\nlayers = 12\n"
+        ));
         assert!(explicit.contains("grid_points"), "{explicit}");
     }
 
     #[test]
     fn pulses_along_a_line_cost_no_memory_unless_their_signals_are_kept() {
         let memory = |pulses: usize, more: &str| {
-            plan(&format!("[scan]\npulses_per_line = {pulses}\n[outputs]\nnetcdf = false\n{more}")).total().memory_bytes
+            plan(&format!(
+                "[scan]\npulses_per_line = {pulses}\n[outputs]\nnetcdf = false\n{more}"
+            ))
+            .total()
+            .memory_bytes
         };
         let (few, many) = (memory(100, ""), memory(1_000_000, ""));
         assert!(many < 1.01 * few && many < 2e8, "{few} {many}");
@@ -128,13 +164,21 @@ mod tests {
         let geometry = &plan("").geometry;
         let kept = 1e4 * (geometry.elevation_rad.len() * geometry.samples) as f64 * 8.0;
         let with_signals = memory(10_000, "signals = true\n");
-        assert!((kept..1.1 * kept).contains(&with_signals), "{with_signals} {kept}");
+        assert!(
+            (kept..1.1 * kept).contains(&with_signals),
+            "{with_signals} {kept}"
+        );
     }
 
     #[test]
     fn a_single_gate_has_a_finite_forecast() {
         let plan = plan("[scan]\nelevation_max_rad = 0.0\nrange_max_m = 320.0\n");
-        assert!(plan.core_s.is_finite() && plan.total().memory_bytes.is_finite(), "{} {:?}", plan.core_s, plan.total());
+        assert!(
+            plan.core_s.is_finite() && plan.total().memory_bytes.is_finite(),
+            "{} {:?}",
+            plan.core_s,
+            plan.total()
+        );
     }
 
     #[test]
@@ -148,8 +192,14 @@ mod tests {
         long.fits_in(8e9).unwrap();
         let refused = long.bound_fits_in(8e9).unwrap_err().to_string();
         // Some six matrices of 13 000 x 13 000 numbers.
-        assert!(refused.contains("needs 8.") && refused.contains("--allow-large"), "{refused}");
-        assert!(refused.contains("fewer estimator.window_samples"), "{refused}");
+        assert!(
+            refused.contains("needs 8.") && refused.contains("--allow-large"),
+            "{refused}"
+        );
+        assert!(
+            refused.contains("fewer estimator.window_samples"),
+            "{refused}"
+        );
         plan(&text("6500")).bound_fits_in(8e9).unwrap();
     }
 }

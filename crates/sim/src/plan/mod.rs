@@ -78,12 +78,21 @@ impl Plan {
             let scene = &setup.scene.content;
             let fastest_m_s = fastest::fastest_m_s(&setup)?;
             let mut warnings = warnings::of_scene(&setup, fastest_m_s)?;
-            let (optics, optics_s, screens) = optics::stages(&setup, target, planned, &mut warnings)?;
+            let (optics, optics_s, screens) =
+                optics::stages(&setup, target, planned, &mut warnings)?;
             let sizes = sizes::Sizes::new(scene, target, &setup.geometry);
             let stages = stages::stages(&setup, target, &sizes, optics);
             let times = time::times(scene, target, &sizes, optics_s);
-            let mut plan =
-                Self { setup, target, stages, core_s: times.total_s(), times, screens, fastest_m_s, warnings };
+            let mut plan = Self {
+                setup,
+                target,
+                stages,
+                core_s: times.total_s(),
+                times,
+                screens,
+                fastest_m_s,
+                warnings,
+            };
             if plan.runs(Stage::Estimates) {
                 plan.warnings.extend(warnings::of_empty_gates(&plan)?);
             }
@@ -110,7 +119,11 @@ impl Plan {
 
     /// Realisations to run: the raw signals alone need those that are kept.
     pub fn realisations(&self) -> usize {
-        if self.runs(Stage::Estimates) { self.scene.content.scan.realisations } else { self.kept_realisations() }
+        if self.runs(Stage::Estimates) {
+            self.scene.content.scan.realisations
+        } else {
+            self.kept_realisations()
+        }
     }
 }
 
@@ -124,13 +137,33 @@ impl Deref for Plan {
 
 impl fmt::Display for Plan {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "scene {}, seed {}", self.scene.hash, self.scene.content.seed)?;
+        writeln!(
+            f,
+            "scene {}, seed {}",
+            self.scene.hash, self.scene.content.seed
+        )?;
         for s in &self.stages {
-            let (word, memory) = if s.runs { ("run", units::bytes(s.memory_bytes)) } else { ("skip", String::new()) };
-            writeln!(f, "  {word:<5} {:<16} {memory:>10}   {}", s.stage.name(), s.reason)?;
+            let (word, memory) = if s.runs {
+                ("run", units::bytes(s.memory_bytes))
+            } else {
+                ("skip", String::new())
+            };
+            writeln!(
+                f,
+                "  {word:<5} {:<16} {memory:>10}   {}",
+                s.stage.name(),
+                s.reason
+            )?;
         }
-        let (time, memory) = (units::seconds(self.core_s), units::bytes(self.total().memory_bytes));
-        writeln!(f, "  total {:<16} {memory:>10}   at once; some {time} of one core, to a factor of two", "")?;
+        let (time, memory) = (
+            units::seconds(self.core_s),
+            units::bytes(self.total().memory_bytes),
+        );
+        writeln!(
+            f,
+            "  total {:<16} {memory:>10}   at once; some {time} of one core, to a factor of two",
+            ""
+        )?;
         if self.target != Target::Efficiency {
             writeln!(f, "  scan  {}", self.schedule())?;
         }
@@ -153,7 +186,11 @@ mod tests {
     }
 
     fn run_stages(plan: &Plan) -> Vec<&'static str> {
-        plan.stages.iter().filter(|s| s.runs).map(|s| s.stage.name()).collect()
+        plan.stages
+            .iter()
+            .filter(|s| s.runs)
+            .map(|s| s.stage.name())
+            .collect()
     }
 
     #[test]
@@ -162,7 +199,10 @@ mod tests {
         assert_eq!(stages(Target::Efficiency), ["efficiency", "files"]);
         let signal = ["efficiency", "lines of sight", "signals", "noise"];
         assert_eq!(stages(Target::Signal), [&signal[..], &["files"]].concat());
-        assert_eq!(stages(Target::Map), [&signal[..], &["estimates", "errors", "files"]].concat());
+        assert_eq!(
+            stages(Target::Map),
+            [&signal[..], &["estimates", "errors", "files"]].concat()
+        );
         assert_eq!(stages(Target::Run).len(), 8);
     }
 
@@ -172,8 +212,16 @@ mod tests {
             s.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
             s.detector.noise = NoiseModel::None;
         });
-        assert_eq!(run_stages(&lean), ["lines of sight", "signals", "estimates", "errors", "files"]);
-        assert!(lean.stages.iter().filter(|s| !s.runs).all(|s| !s.reason.is_empty()));
+        assert_eq!(
+            run_stages(&lean),
+            ["lines of sight", "signals", "estimates", "errors", "files"]
+        );
+        assert!(
+            lean.stages
+                .iter()
+                .filter(|s| !s.runs)
+                .all(|s| !s.reason.is_empty())
+        );
         let calm = plan(Target::Run, |s| s.flow = Flow::Calm {});
         assert!(!calm.runs(Stage::CrossPlane));
     }
@@ -188,17 +236,27 @@ mod tests {
     #[test]
     fn memory_is_that_of_the_threads_of_the_pool() {
         let with = |threads: usize, of: fn(&mut Scene)| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
             pool.install(|| plan(Target::Run, of).total().memory_bytes)
         };
         let screens = |s: &mut Scene| {
-            let t = RefractiveTurbulence { grid_points: 512, realisations: 64, ..RefractiveTurbulence::default() };
+            let t = RefractiveTurbulence {
+                grid_points: 512,
+                realisations: 64,
+                ..RefractiveTurbulence::default()
+            };
             s.atmosphere.turbulence = Turbulence::Refractive(t);
         };
         // Eight groups of realisations at most run at a time, each with some 80 bytes a point.
         let [one, two, eight, more] = [1, 2, 8, 16].map(|threads| with(threads, screens));
         let group = 512.0 * 512.0 * 80.0;
-        assert!(two - one > 0.9 * group && (6.9..7.1).contains(&((eight - one) / (two - one))), "{one} {two} {eight}");
+        assert!(
+            two - one > 0.9 * group && (6.9..7.1).contains(&((eight - one) / (two - one))),
+            "{one} {two} {eight}"
+        );
         assert!(more - eight < 0.2 * group, "{eight} {more}");
     }
 
@@ -206,13 +264,26 @@ mod tests {
     fn coarse_spectra_are_warned_of_with_the_bias_that_their_refinement_leaves() {
         use crate::scene::Refinement;
         let off_m_s = |refinement| {
-            let change = |s: &mut Scene| (s.estimator.padded_samples, s.estimator.refinement) = (64, refinement);
+            let change = |s: &mut Scene| {
+                (s.estimator.padded_samples, s.estimator.refinement) = (64, refinement)
+            };
             let text = plan(Target::Map, change).warnings.remove(0);
             assert!(text.contains("steps of 3.03 m/s"), "{text}");
-            text.split("up to ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap()
+            text.split("up to ")
+                .nth(1)
+                .unwrap()
+                .split(' ')
+                .next()
+                .unwrap()
+                .parse::<f64>()
+                .unwrap()
         };
         // half a step, and what the parabola and the image leave
-        assert!((off_m_s(Refinement::None) - 1.51).abs() < 0.04, "{}", off_m_s(Refinement::None));
+        assert!(
+            (off_m_s(Refinement::None) - 1.51).abs() < 0.04,
+            "{}",
+            off_m_s(Refinement::None)
+        );
         assert!(off_m_s(Refinement::Parabola) < 0.15 && off_m_s(Refinement::Exact) < 0.15);
     }
 
@@ -227,7 +298,10 @@ mod tests {
         // The largest speeds in brackets: where they are no radial velocities, nobody sees them.
         for (words, expected_m_s) in [
             // The horizontal line at 520 m; the air of the last line, 2.6 m/s faster each second.
-            ("[scan]\nelevation_min_rad = 0.0\n[flow]\nkind = \"linear\"\ngradient_v_per_s = [0.0, 0.2, 0.0]\n", 104.0),
+            (
+                "[scan]\nelevation_min_rad = 0.0\n[flow]\nkind = \"linear\"\ngradient_v_per_s = [0.0, 0.2, 0.0]\n",
+                104.0,
+            ),
             (
                 "[flow]\nkind = \"linear\"\nvelocity_m_s = [0.0, 0.0, 5.0]\ngradient_u_per_s = [0.3, 0.0, 0.0]\n",
                 f64::NAN,
@@ -257,20 +331,34 @@ mod tests {
             for line in 0..schedule.lines.len() {
                 let beam = schedule.middle(line);
                 let steps = ((scan.range_max_m - scan.range_min_m) / 0.05) as usize;
-                let points: Vec<[f64; 3]> =
-                    (0..=steps).map(|i| beam.at_range_m(scan.range_min_m + 0.05 * i as f64)).collect();
+                let points: Vec<[f64; 3]> = (0..=steps)
+                    .map(|i| beam.at_range_m(scan.range_min_m + 0.05 * i as f64))
+                    .collect();
                 let mut velocity = vec![[0.0; 3]; points.len()];
-                plan.wind.wind().velocity_into(&points, plan.wind.start_s + beam.time_s, &mut velocity).unwrap();
-                let seen = velocity.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s).abs());
+                plan.wind
+                    .wind()
+                    .velocity_into(&points, plan.wind.start_s + beam.time_s, &mut velocity)
+                    .unwrap();
+                let seen = velocity.iter().map(|v| {
+                    beam.direction
+                        .radial_velocity_m_s(*v, beam.velocity_m_s)
+                        .abs()
+                });
                 dense_m_s = dense_m_s.max(seen.fold(0.0, f64::max));
             }
             let found_m_s = plan.fastest_m_s;
-            assert!((found_m_s - dense_m_s).abs() <= 2e-3 * dense_m_s, "{words}: {found_m_s} for {dense_m_s}");
+            assert!(
+                (found_m_s - dense_m_s).abs() <= 2e-3 * dense_m_s,
+                "{words}: {found_m_s} for {dense_m_s}"
+            );
             assert!(
                 expected_m_s.is_nan() || (found_m_s - expected_m_s).abs() <= 0.015 * expected_m_s,
                 "{words}: {found_m_s}"
             );
-            let warned = plan.warnings.iter().any(|w| w.contains("reaches") && w.contains("19.4 m/s"));
+            let warned = plan
+                .warnings
+                .iter()
+                .any(|w| w.contains("reaches") && w.contains("19.4 m/s"));
             assert_eq!(warned, dense_m_s > 19.375, "{words}: {:?}", plan.warnings);
         }
         assert!(plan(Target::Map, |_| {}).warnings.is_empty());

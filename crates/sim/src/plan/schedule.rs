@@ -35,24 +35,43 @@ impl Plan {
     pub fn schedule(&self) -> ScanSchedule {
         let (scene, scan) = (&self.scene.content, &self.geometry.schedule);
         let (duration_s, revisit_s) = (scan.duration_s(), scan.revisit_s().unwrap_or(f64::NAN));
-        let meanwhile_s = if revisit_s.is_nan() { duration_s } else { revisit_s };
+        let meanwhile_s = if revisit_s.is_nan() {
+            duration_s
+        } else {
+            revisit_s
+        };
         let flows = || std::iter::once(&scene.flow).chain(&scene.added_flows);
-        let pair = flows().find_map(|flow| if let Flow::VortexPair(pair) = flow { Some(pair) } else { None });
+        let pair = flows().find_map(|flow| {
+            if let Flow::VortexPair(pair) = flow {
+                Some(pair)
+            } else {
+                None
+            }
+        });
         let wake_moves_m = pair.map_or(f64::NAN, |pair| {
             let sinks_m_s = crate::setup::wind::vortex_pair(pair).descent_speed_m_s();
             // Across and up, at the place of the pair and in the mean over the time.
             let carries = |flow: &Flow| match flow {
-                Flow::Uniform { lateral_m_s, vertical_m_s } => [*lateral_m_s, *vertical_m_s],
-                Flow::Linear(wind) => [(1, wind.gradient_v_per_s), (2, wind.gradient_w_per_s)].map(|(d, gradient)| {
-                    let [_, by_y, by_z] = gradient;
-                    wind.velocity_m_s[d]
-                        + 0.5 * meanwhile_s * wind.acceleration_m_s2[d]
-                        + by_y * pair.lateral_position_m
-                        + by_z * pair.height_m
-                }),
+                Flow::Uniform {
+                    lateral_m_s,
+                    vertical_m_s,
+                } => [*lateral_m_s, *vertical_m_s],
+                Flow::Linear(wind) => {
+                    [(1, wind.gradient_v_per_s), (2, wind.gradient_w_per_s)].map(|(d, gradient)| {
+                        let [_, by_y, by_z] = gradient;
+                        wind.velocity_m_s[d]
+                            + 0.5 * meanwhile_s * wind.acceleration_m_s2[d]
+                            + by_y * pair.lateral_position_m
+                            + by_z * pair.height_m
+                    })
+                }
                 _ => [0.0; 2],
             };
-            let wind_m_s = flows().map(carries).fold([pair.cross_wind_m_s, 0.0], |a, b| [a[0] + b[0], a[1] + b[1]]);
+            let wind_m_s = flows()
+                .map(carries)
+                .fold([pair.cross_wind_m_s, 0.0], |a, b| {
+                    [a[0] + b[0], a[1] + b[1]]
+                });
             meanwhile_s * (wind_m_s[1] - sinks_m_s).hypot(wind_m_s[0])
         });
         let turned = |line: &crate::setup::beams::Line| {
@@ -79,18 +98,35 @@ impl std::fmt::Display for ScanSchedule {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let many = |n: usize, word: &str| format!("{n} {word}{}", if n == 1 { "" } else { "s" });
         let (lines, sweeps) = (many(self.lines, "line"), many(self.sweeps, "sweep"));
-        write!(f, "{}: {lines} in {sweeps}, {} in {:.2} s", self.pattern, many(self.pulses, "pulse"), self.duration_s)?;
+        write!(
+            f,
+            "{}: {lines} in {sweeps}, {} in {:.2} s",
+            self.pattern,
+            many(self.pulses, "pulse"),
+            self.duration_s
+        )?;
         if self.revisit_s.is_finite() {
             write!(f, ", back after {:.2} s", self.revisit_s)?;
         }
         if self.wake_moves_m.is_finite() {
-            write!(f, "; a wake in free air moves {:.1} m meanwhile", self.wake_moves_m)?;
+            write!(
+                f,
+                "; a wake in free air moves {:.1} m meanwhile",
+                self.wake_moves_m
+            )?;
         }
         if self.smear_rad > 0.0 {
             let (mrad, smear_m) = (1e3 * self.smear_rad, self.smear_m);
-            write!(f, "; each line turns by {mrad:.2} mrad, {smear_m:.1} m at scan.range_max_m")?;
+            write!(
+                f,
+                "; each line turns by {mrad:.2} mrad, {smear_m:.1} m at scan.range_max_m"
+            )?;
         }
-        write!(f, "; the pulse before is {:.1} km away", 1e-3 * self.ambiguous_range_m)
+        write!(
+            f,
+            "; the pulse before is {:.1} km away",
+            1e-3 * self.ambiguous_range_m
+        )
     }
 }
 
@@ -101,16 +137,27 @@ mod tests {
     use std::path::Path;
 
     fn schedule(text: &str) -> super::ScanSchedule {
-        Plan::new(SceneFile::parse(text, Path::new("s.toml")).unwrap(), Target::Map).unwrap().schedule()
+        Plan::new(
+            SceneFile::parse(text, Path::new("s.toml")).unwrap(),
+            Target::Map,
+        )
+        .unwrap()
+        .schedule()
     }
 
     #[test]
     fn the_schedule_is_what_one_counts_by_hand() {
         let plain = schedule("");
-        assert_eq!((plain.lines, plain.pulses, plain.sweeps, plain.smear_rad), (185, 2960, 1, 0.0));
+        assert_eq!(
+            (plain.lines, plain.pulses, plain.sweeps, plain.smear_rad),
+            (185, 2960, 1, 0.0)
+        );
         assert!((plain.duration_s - 2959.0 / 400.0).abs() < 1e-9 && plain.revisit_s.is_nan());
         // V0 = 500/(2 pi 47) = 1.693 m/s.
-        assert!((plain.wake_moves_m - 1.6931 * 7.3975).abs() < 0.01, "{plain:?}");
+        assert!(
+            (plain.wake_moves_m - 1.6931 * 7.3975).abs() < 0.01,
+            "{plain:?}"
+        );
         // A cross wind is one whichever flow brings it.
         let [of_pair, added, linear] = [
             "[flow]\ncross_wind_m_s = 6.0\n",
@@ -118,14 +165,23 @@ mod tests {
             "[[added_flows]]\nkind = \"linear\"\nvelocity_m_s = [0.0, 5.06, 0.0]\ngradient_v_per_s = [0.0, 0.0, 0.02]\n",
         ]
         .map(|words| schedule(words).wake_moves_m);
-        assert!((of_pair - 7.3975 * 6.0_f64.hypot(1.6931)).abs() < 0.01, "{of_pair}");
-        assert!((added - of_pair).abs() < 1e-9 && (linear - of_pair).abs() < 1e-9, "{added} {linear} {of_pair}");
+        assert!(
+            (of_pair - 7.3975 * 6.0_f64.hypot(1.6931)).abs() < 0.01,
+            "{of_pair}"
+        );
+        assert!(
+            (added - of_pair).abs() < 1e-9 && (linear - of_pair).abs() < 1e-9,
+            "{added} {linear} {of_pair}"
+        );
         let text = "[scan]\nhead = { motion = \"continuous\", sweeps = 3, direction = \"alternate\", rate_rad_s = 0.03125, \
                     acceleration_rad_s2 = 0.5 }\n";
         let back = schedule(text);
         assert_eq!((back.lines, back.sweeps), (3 * 184, 3));
         assert!((back.revisit_s - 7.5).abs() < 1e-9 && (back.smear_rad - 1.25e-3).abs() < 1e-12);
         let words = back.to_string();
-        assert!(words.contains("552 lines in 3 sweeps") && words.contains("1.25 mrad, 0.7 m"), "{words}");
+        assert!(
+            words.contains("552 lines in 3 sweeps") && words.contains("1.25 mrad, 0.7 m"),
+            "{words}"
+        );
     }
 }

@@ -53,13 +53,30 @@ impl Sizes {
     pub(super) fn new(scene: &Scene, target: Target, g: &Geometry) -> Self {
         let (e, d) = (&scene.estimator, &scene.detector);
         let lines = g.elevation_rad.len() as f64;
-        let parts = if d.signal == DetectorSignal::Baseband { 2.0 } else { 1.0 };
+        let parts = if d.signal == DetectorSignal::Baseband {
+            2.0
+        } else {
+            1.0
+        };
         let window = e.window_samples as f64;
         let maps = matches!(target, Target::Run | Target::Map);
-        let middle_m = g.gate_range_m.get(g.gate_range_m.len() / 2).copied().unwrap_or(1.0);
-        let radius_m = g.gate_range_m.iter().map(|range_m| e.largest_radius_m(*range_m)).fold(0.0, f64::max);
-        let half_rad = if radius_m < middle_m { (radius_m / middle_m).asin() } else { std::f64::consts::PI };
-        let samples_kept = window + g.layers_per_sample as f64 * g.layer_thickness_m / g.sample_spacing_m;
+        let middle_m = g
+            .gate_range_m
+            .get(g.gate_range_m.len() / 2)
+            .copied()
+            .unwrap_or(1.0);
+        let radius_m = g
+            .gate_range_m
+            .iter()
+            .map(|range_m| e.largest_radius_m(*range_m))
+            .fold(0.0, f64::max);
+        let half_rad = if radius_m < middle_m {
+            (radius_m / middle_m).asin()
+        } else {
+            std::f64::consts::PI
+        };
+        let samples_kept =
+            window + g.layers_per_sample as f64 * g.layer_thickness_m / g.sample_spacing_m;
         Self {
             lines,
             records: g.schedule.pulses() as f64,
@@ -67,7 +84,11 @@ impl Sizes {
             parts,
             layers: g.layers as f64,
             layers_per_sample: g.layers_per_sample as f64,
-            realisations: if maps { scene.scan.realisations } else { kept_realisations(scene, target) } as f64,
+            realisations: if maps {
+                scene.scan.realisations
+            } else {
+                kept_realisations(scene, target)
+            } as f64,
             window,
             chord: (window + 2.0 * radius_m / g.sample_spacing_m).min(samples_kept.max(256.0)),
             windows: ((g.samples - e.window_samples) / e.window_step_samples + 1) as f64,

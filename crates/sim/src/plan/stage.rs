@@ -43,22 +43,44 @@ pub struct Forecast {
 }
 
 /// A stage that runs, and the memory that it works with and keeps.
-pub(super) fn run(stage: Stage, reason: String, [working_bytes, kept_bytes]: [f64; 2]) -> PlannedStage {
-    PlannedStage { stage, reason, runs: true, memory_bytes: working_bytes + kept_bytes, kept_bytes }
+pub(super) fn run(
+    stage: Stage,
+    reason: String,
+    [working_bytes, kept_bytes]: [f64; 2],
+) -> PlannedStage {
+    PlannedStage {
+        stage,
+        reason,
+        runs: true,
+        memory_bytes: working_bytes + kept_bytes,
+        kept_bytes,
+    }
 }
 
 /// A stage that is left out.
 pub(super) fn skip(stage: Stage, reason: &str) -> PlannedStage {
-    PlannedStage { stage, reason: reason.into(), runs: false, memory_bytes: 0.0, kept_bytes: 0.0 }
+    PlannedStage {
+        stage,
+        reason: reason.into(),
+        runs: false,
+        memory_bytes: 0.0,
+        kept_bytes: 0.0,
+    }
 }
 
 /// Memory of stages that run one after another.
 pub(super) fn total(stages: &[PlannedStage]) -> Forecast {
-    let mut forecast = Forecast { memory_bytes: 0.0, largest: None };
+    let mut forecast = Forecast {
+        memory_bytes: 0.0,
+        largest: None,
+    };
     let mut kept_bytes = 0.0;
     for stage in stages.iter().filter(|stage| stage.runs) {
         if kept_bytes + stage.memory_bytes > forecast.memory_bytes {
-            forecast = Forecast { memory_bytes: kept_bytes + stage.memory_bytes, largest: Some(stage.stage) };
+            forecast = Forecast {
+                memory_bytes: kept_bytes + stage.memory_bytes,
+                largest: Some(stage.stage),
+            };
         }
         kept_bytes += stage.kept_bytes;
     }
@@ -72,7 +94,10 @@ mod tests {
     #[test]
     fn memory_is_the_largest_of_what_is_held_at_once() {
         let planned = |stage, held_bytes: Option<[f64; 2]>| {
-            held_bytes.map_or_else(|| skip(stage, ""), |held_bytes| run(stage, String::new(), held_bytes))
+            held_bytes.map_or_else(
+                || skip(stage, ""),
+                |held_bytes| run(stage, String::new(), held_bytes),
+            )
         };
         let stages = [
             planned(Stage::FlowSimulation, None),
@@ -82,9 +107,18 @@ mod tests {
         ];
         let of = |count: usize| total(&stages[..count]);
         assert_eq!((of(1).memory_bytes, of(1).largest), (0.0, None));
-        assert_eq!((of(2).memory_bytes, of(2).largest), (60.0, Some(Stage::CrossPlane)));
+        assert_eq!(
+            (of(2).memory_bytes, of(2).largest),
+            (60.0, Some(Stage::CrossPlane))
+        );
         // 10 kept before, 40 at work and 30 of its own; the files then find 40 kept.
-        assert_eq!((of(3).memory_bytes, of(3).largest), (80.0, Some(Stage::Signals)));
-        assert_eq!((of(4).memory_bytes, of(4).largest), (80.0, Some(Stage::Signals)));
+        assert_eq!(
+            (of(3).memory_bytes, of(3).largest),
+            (80.0, Some(Stage::Signals))
+        );
+        assert_eq!(
+            (of(4).memory_bytes, of(4).largest),
+            (80.0, Some(Stage::Signals))
+        );
     }
 }

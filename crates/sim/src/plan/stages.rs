@@ -15,19 +15,39 @@ use crate::setup::sizes::{AIRS_BYTES, records_at_once};
 const RETRIEVED_NUMBERS: f64 = 60.0;
 
 /// All stages, in the order in which they run.
-pub(super) fn stages(setup: &Setup, target: Target, n: &Sizes, optics: [PlannedStage; 2]) -> Vec<PlannedStage> {
+pub(super) fn stages(
+    setup: &Setup,
+    target: Target,
+    n: &Sizes,
+    optics: [PlannedStage; 2],
+) -> Vec<PlannedStage> {
     let (scene, g) = (&setup.scene.content, &setup.geometry);
-    let mut out = vec![skip(Stage::FlowSimulation, &setup.wind.source), cross_plane(scene, target)];
+    let mut out = vec![
+        skip(Stage::FlowSimulation, &setup.wind.source),
+        cross_plane(scene, target),
+    ];
     out.extend(optics);
     if target == Target::Efficiency {
-        let rest = [Stage::LinesOfSight, Stage::Signals, Stage::Noise, Stage::Estimates, Stage::Errors];
+        let rest = [
+            Stage::LinesOfSight,
+            Stage::Signals,
+            Stage::Noise,
+            Stage::Estimates,
+            Stage::Errors,
+        ];
         out.extend(rest.map(|stage| skip(stage, "not asked for")));
     } else {
         out.extend([lines_of_sight(g, n), signals(scene, g, n), noise(scene, n)]);
         out.extend(match target {
-            Target::Signal => [skip(Stage::Estimates, "not asked for"), skip(Stage::Errors, "not asked for")],
+            Target::Signal => [
+                skip(Stage::Estimates, "not asked for"),
+                skip(Stage::Errors, "not asked for"),
+            ],
             _ => {
-                let truth = format!("against v_pulse (28) and v_gate over {} realisations", n.realisations);
+                let truth = format!(
+                    "against v_pulse (28) and v_gate over {} realisations",
+                    n.realisations
+                );
                 [estimates(scene, g, n), run(Stage::Errors, truth, [0.0; 2])]
             }
         });
@@ -41,9 +61,13 @@ pub(super) fn stages(setup: &Setup, target: Target, n: &Sizes, optics: [PlannedS
 fn retrieval(scene: &Scene, target: Target, n: &Sizes) -> Option<PlannedStage> {
     let wanted = scene.retrieval.as_ref().filter(|_| target == Target::Run)?;
     let has = |method| wanted.methods.contains(&method);
-    let signals = if has(RetrievalMethod::Signals) || has(RetrievalMethod::Envelope) { 3.0 } else { 0.0 };
-    let working =
-        n.cells * 8.0 * (n.realisations + RETRIEVED_NUMBERS) + signals * n.records * n.samples * n.parts * 8.0;
+    let signals = if has(RetrievalMethod::Signals) || has(RetrievalMethod::Envelope) {
+        3.0
+    } else {
+        0.0
+    };
+    let working = n.cells * 8.0 * (n.realisations + RETRIEVED_NUMBERS)
+        + signals * n.records * n.samples * n.parts * 8.0;
     let names: Vec<&str> = wanted.methods.iter().map(|method| method.name()).collect();
     let reason = format!("{} scans by {}", n.realisations, names.join(", "));
     let kept = n.realisations * wanted.methods.len() as f64 * 600.0;
@@ -60,11 +84,18 @@ fn cross_plane(scene: &Scene, target: Target) -> PlannedStage {
     let (ny, nz) = crate::setup::sizes::PLANE_POINTS;
     let points = (ny * nz) as f64;
     // Places and velocities are at work; two components are kept.
-    run(Stage::CrossPlane, format!("{ny} x {nz} points"), [points * 48.0, points * 16.0])
+    run(
+        Stage::CrossPlane,
+        format!("{ny} x {nz} points"),
+        [points * 48.0, points * 16.0],
+    )
 }
 
 fn lines_of_sight(g: &Geometry, n: &Sizes) -> PlannedStage {
-    let reason = format!("{} lines of {} layers of {:.3} m", n.lines, g.layers, g.layer_thickness_m);
+    let reason = format!(
+        "{} lines of {} layers of {:.3} m",
+        n.lines, g.layers, g.layer_thickness_m
+    );
     // Places and velocities of the lines at work.
     let bytes = air_bytes(n) + n.threads * n.layers * 64.0;
     run(Stage::LinesOfSight, reason, [bytes, 0.0])
@@ -80,8 +111,12 @@ fn air_bytes(n: &Sizes) -> f64 {
 /// transforms of a record; a piece of records.
 fn scan_bytes(g: &Geometry, n: &Sizes) -> f64 {
     let of_thread = n.layers * 48.0 + n.samples * 100.0;
-    let at_once = records_at_once::<f64>(g.samples * n.parts as usize, n.records.min(1e15) as usize) as f64;
-    air_bytes(n) + n.samples * 80.0 + n.threads * of_thread + at_once * (n.samples * n.parts * 8.0 + 64.0)
+    let at_once =
+        records_at_once::<f64>(g.samples * n.parts as usize, n.records.min(1e15) as usize) as f64;
+    air_bytes(n)
+        + n.samples * 80.0
+        + n.threads * of_thread
+        + at_once * (n.samples * n.parts * 8.0 + 64.0)
 }
 
 fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
@@ -89,13 +124,29 @@ fn signals(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
         "{} x {} records of {} samples, {} layers each",
         n.realisations, n.records, g.samples, g.layers_per_sample
     );
-    let kept_line_bytes = if n.kept > 0.0 { n.lines * n.layers * 8.0 } else { 0.0 };
+    let kept_line_bytes = if n.kept > 0.0 {
+        n.lines * n.layers * 8.0
+    } else {
+        0.0
+    };
     let kept_bytes = n.kept * n.records * n.samples * n.parts * 8.0 + kept_line_bytes;
     // The echo of the pulse before is made of lines of its own.
-    let before = if scene.scan.second_trip.is_some() { 16.0 * n.layers * n.lines } else { 0.0 };
+    let before = if scene.scan.second_trip.is_some() {
+        16.0 * n.layers * n.lines
+    } else {
+        0.0
+    };
     // Pulses with airs of their own: a piece of airs.
-    let airs = if scene.scan.wind_of_pulses == WindOfPulses::default() { 0.0 } else { AIRS_BYTES };
-    run(Stage::Signals, reason, [scan_bytes(g, n) + before + airs, kept_bytes])
+    let airs = if scene.scan.wind_of_pulses == WindOfPulses::default() {
+        0.0
+    } else {
+        AIRS_BYTES
+    };
+    run(
+        Stage::Signals,
+        reason,
+        [scan_bytes(g, n) + before + airs, kept_bytes],
+    )
 }
 
 fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
@@ -108,7 +159,12 @@ fn noise(scene: &Scene, n: &Sizes) -> PlannedStage {
 
 fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     let e = &scene.estimator;
-    let reason = format!("{} x {} gates, {}", n.lines, g.gate_range_m.len(), e.regions());
+    let reason = format!(
+        "{} x {} gates, {}",
+        n.lines,
+        g.gate_range_m.len(),
+        e.regions()
+    );
     let sums_bytes = n.lines * n.windows * n.numbers * 8.0;
     let (planned_bytes, planning_bytes) = planning(scene, n);
     // Of each point: sums over the realisations, their errors, truth and thresholds; then the velocities of one realisation.
@@ -118,10 +174,15 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     // While windows are added there is a piece of records, while velocities are sought there are sums over blocks of windows.
     let air = air_bytes(n);
     let adding = scan_bytes(g, n) + sums_bytes;
-    let seeking = air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES * maps;
+    let seeking =
+        air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES * maps;
     let at_work = adding.max(seeking) + points_bytes + planned_bytes;
     let working = at_work.max(air + planning_bytes);
-    run(Stage::Estimates, reason, [working, n.cells * MAP_FIELDS * 8.0 + scans_bytes])
+    run(
+        Stage::Estimates,
+        reason,
+        [working, n.cells * MAP_FIELDS * 8.0 + scans_bytes],
+    )
 }
 
 /// Of a point of the map: sums over the realisations, truth, thresholds.
@@ -137,13 +198,18 @@ fn planning(scene: &Scene, n: &Sizes) -> (f64, f64) {
     let matrix_bytes = n.window.powi(2) * 8.0;
     let (kept_matrices, matrices) = match scene.estimator.method {
         Method::Likelihood(_) => (1.0, 8.0),
-        Method::GradientLikelihood(g) => (2.0 * g.gradients as f64, 2.0 * g.gradients as f64 + 24.0),
+        Method::GradientLikelihood(g) => {
+            (2.0 * g.gradients as f64, 2.0 * g.gradients as f64 + 24.0)
+        }
         _ => (0.0, 0.0),
     };
     let has_bound = matches!(scene.estimator.radius, RegionRadius::Target { .. });
     let bound_bytes = if has_bound { bound_bytes(n) } else { 0.0 };
     let kept_bytes = kept_matrices * matrix_bytes + n.frequencies * 32.0;
-    (kept_bytes, kept_bytes + bound_bytes.max(matrices * matrix_bytes))
+    (
+        kept_bytes,
+        kept_bytes + bound_bytes.max(matrices * matrix_bytes),
+    )
 }
 
 /// Matrices of the bound of a record: the signal, the covariance and its derivative, its factor, a turned copy.
@@ -154,7 +220,15 @@ fn bound_bytes(n: &Sizes) -> f64 {
 /// What is held for the Cramer-Rao bound in place of a run of these stages: that of the air and the matrices of a record.
 pub(super) fn of_bound(stages: &[PlannedStage], n: &Sizes) -> Vec<PlannedStage> {
     let first = [Stage::PhaseScreens, Stage::Efficiency, Stage::LinesOfSight];
-    let mut out: Vec<PlannedStage> = stages.iter().filter(|s| first.contains(&s.stage)).cloned().collect();
-    out.push(run(Stage::Estimates, String::new(), [air_bytes(n) + bound_bytes(n), 0.0]));
+    let mut out: Vec<PlannedStage> = stages
+        .iter()
+        .filter(|s| first.contains(&s.stage))
+        .cloned()
+        .collect();
+    out.push(run(
+        Stage::Estimates,
+        String::new(),
+        [air_bytes(n) + bound_bytes(n), 0.0],
+    ));
     out
 }

@@ -53,9 +53,13 @@ mod tests {
         ] {
             assert_eq!(seconds(s), expected);
         }
-        for (b, expected) in
-            [(50.0, "0.1 kB"), (2.5e6, "2.5 MB"), (3.1e10, "31.0 GB"), (317_904.6e9, "317.9 TB"), (1e20, "1.0e8 TB")]
-        {
+        for (b, expected) in [
+            (50.0, "0.1 kB"),
+            (2.5e6, "2.5 MB"),
+            (3.1e10, "31.0 GB"),
+            (317_904.6e9, "317.9 TB"),
+            (1e20, "1.0e8 TB"),
+        ] {
             assert_eq!(bytes(b), expected);
         }
     }

@@ -25,10 +25,10 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
              to {off_m_s:.3} m/s off"
         ));
     }
-    let is_model = method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
+    let is_model =
+        method.order().is_some() || matches!(method, Method::FirstMoment(_) | Method::LagWindow(_));
     if is_model && e.weighting != Weighting::Rectangular {
-        let meant =
-            "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\"";
+        let meant = "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\"";
         out.push(meant.into());
     }
     if scene.scan.realisations < 2 {
@@ -47,7 +47,11 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
 fn of_fast_air(setup: &Setup, fastest_m_s: f64) -> Option<String> {
     let scene = &setup.scene.content;
     let half_band_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz;
-    let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] { "" } else { ", seen from the lidar," };
+    let seen = if scene.scan.lidar.velocity_m_s == [0.0; 3] {
+        ""
+    } else {
+        ", seen from the lidar,"
+    };
     (fastest_m_s > half_band_m_s).then(|| {
         format!(
             "the air on the lines of sight{seen} reaches {fastest_m_s:.1} m/s, the detector band ends at {half_band_m_s:.1} m/s: faster \
@@ -83,7 +87,9 @@ fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
 /// Brillouin scattering in the fibre of the amplifier.
 fn of_scattering(setup: &Setup) -> Option<String> {
     let (fibre, instrument) = (setup.scene.content.laser.fibre?, &setup.instrument);
-    let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
+    let threshold_w = fibre
+        .of_silica()
+        .brillouin_threshold_w(instrument.gaussian_fwhm_s());
     let peak_w = instrument.peak_power_w();
     (peak_w > threshold_w).then(|| {
         format!(
@@ -104,12 +110,30 @@ pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
     let (e, places) = (&scene.estimator, places(scene, g)?);
     let elevation_rad = places.line_elevation_rad()[0];
     let is_empty = |range_m: f64| {
-        places.chords(PolarPoint { range_m, elevation_rad }, e.largest_radius_m(range_m)).next().is_none()
+        places
+            .chords(
+                PolarPoint {
+                    range_m,
+                    elevation_rad,
+                },
+                e.largest_radius_m(range_m),
+            )
+            .next()
+            .is_none()
     };
-    let empty = g.gate_range_m.iter().filter(|range_m| is_empty(**range_m)).count();
+    let empty = g
+        .gate_range_m
+        .iter()
+        .filter(|range_m| is_empty(**range_m))
+        .count();
     let step_m = e.window_step_samples as f64 * scene.sample_spacing_m();
     let windows_m = places.gate_ranges_m();
-    let nearest_m = |gate_m: &f64| windows_m.iter().map(|at_m| (at_m - gate_m).abs()).fold(f64::INFINITY, f64::min);
+    let nearest_m = |gate_m: &f64| {
+        windows_m
+            .iter()
+            .map(|at_m| (at_m - gate_m).abs())
+            .fold(f64::INFINITY, f64::min)
+    };
     let farthest_m = g.gate_range_m.iter().map(nearest_m).fold(0.0, f64::max);
     Ok((empty > 0).then(|| {
         format!(
@@ -145,18 +169,38 @@ mod tests {
         };
         for (step, radius_m) in [(16, 2.0), (7, 0.5), (12, 1.5)] {
             let planned = plan(step, radius_m);
-            let found: Vec<&String> = planned.warnings.iter().filter(|text| text.contains("have no window")).collect();
-            let text = found.first().unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", planned.warnings));
+            let found: Vec<&String> = planned
+                .warnings
+                .iter()
+                .filter(|text| text.contains("have no window"))
+                .collect();
+            let text = found
+                .first()
+                .unwrap_or_else(|| panic!("{step} {radius_m}: {:?}", planned.warnings));
             let empty: usize = text.split(' ').next().unwrap().parse().unwrap();
             // by the distances themselves
             let (g, scene) = (&planned.geometry, &planned.scene.content);
             let places: ScanGeometry = crate::setup::region::places(scene, g).unwrap();
             let windows_m = places.gate_ranges_m();
-            let near = |gate_m: &f64| windows_m.iter().any(|window_m| (window_m - gate_m).abs() <= radius_m + 1e-5);
-            assert_eq!(empty, g.gate_range_m.iter().filter(|gate_m| !near(gate_m)).count(), "{text}");
+            let near = |gate_m: &f64| {
+                windows_m
+                    .iter()
+                    .any(|window_m| (window_m - gate_m).abs() <= radius_m + 1e-5)
+            };
+            assert_eq!(
+                empty,
+                g.gate_range_m.iter().filter(|gate_m| !near(gate_m)).count(),
+                "{text}"
+            );
             let words = text.split("estimator.radius_m of ").nth(1).unwrap();
             let good_m: f64 = words.split(' ').next().unwrap().parse().unwrap();
-            assert!(plan(step, good_m).warnings.iter().all(|text| !text.contains("have no window")), "{text}");
+            assert!(
+                plan(step, good_m)
+                    .warnings
+                    .iter()
+                    .all(|text| !text.contains("have no window")),
+                "{text}"
+            );
         }
         assert!(plan(1, 1.0).warnings.is_empty());
     }
@@ -165,11 +209,24 @@ mod tests {
     fn pulses_closer_than_the_scan_is_long_are_warned_of_with_a_rate_that_is_not() {
         let warnings = |rate_hz: f64| plan(|s| s.laser.pulse_repetition_hz = rate_hz).warnings;
         let found = warnings(1e6);
-        assert!(found.len() == 1 && found[0].contains("150 m") && found[0].contains("scan.range_max_m"), "{found:?}");
+        assert!(
+            found.len() == 1 && found[0].contains("150 m") && found[0].contains("scan.range_max_m"),
+            "{found:?}"
+        );
         let words: Vec<&str> = found[0].split(' ').collect();
-        let at = words.iter().position(|word| *word == "to" && found[0].contains("up to")).unwrap();
-        let rate_hz = words[at..].iter().filter_map(|word| word.parse().ok()).next_back().unwrap();
-        assert!((200e3..300e3).contains(&rate_hz) && warnings(rate_hz).is_empty(), "{rate_hz}");
+        let at = words
+            .iter()
+            .position(|word| *word == "to" && found[0].contains("up to"))
+            .unwrap();
+        let rate_hz = words[at..]
+            .iter()
+            .filter_map(|word| word.parse().ok())
+            .next_back()
+            .unwrap();
+        assert!(
+            (200e3..300e3).contains(&rate_hz) && warnings(rate_hz).is_empty(),
+            "{rate_hz}"
+        );
         assert!(!warnings(1.02 * rate_hz).is_empty());
         assert!(warnings(Scene::default().laser.pulse_repetition_hz).is_empty());
     }
@@ -178,9 +235,15 @@ mod tests {
     fn fibres_that_scatter_and_ranges_that_are_blind_are_warned_of() {
         let warnings = |change: fn(&mut Scene)| plan(change).warnings;
         let found = warnings(|s| s.laser.fibre = Some(AmplifierFibre::default()));
-        assert!(found.len() == 1 && found[0].contains("5.4 times") && found[0].contains("132 W"), "{found:?}");
+        assert!(
+            found.len() == 1 && found[0].contains("5.4 times") && found[0].contains("132 W"),
+            "{found:?}"
+        );
         let wide = |s: &mut Scene| {
-            s.laser.fibre = Some(AmplifierFibre { effective_area_m2: 3e-9, ..AmplifierFibre::default() });
+            s.laser.fibre = Some(AmplifierFibre {
+                effective_area_m2: 3e-9,
+                ..AmplifierFibre::default()
+            });
         };
         assert!(warnings(wide).is_empty());
         let found = warnings(|s| s.telescope.blind_range_m = 350.0);

@@ -17,12 +17,20 @@ pub struct Axis {
 impl Axis {
     /// A linear axis with its range from the data.
     pub fn linear(label: &str) -> Self {
-        Self { label: label.into(), log: false, range: None }
+        Self {
+            label: label.into(),
+            log: false,
+            range: None,
+        }
     }
 
     /// A logarithmic axis with its range from the data.
     pub fn log(label: &str) -> Self {
-        Self { label: label.into(), log: true, range: None }
+        Self {
+            label: label.into(),
+            log: true,
+            range: None,
+        }
     }
 
     /// The same axis from `low` to `high`.
@@ -33,14 +41,25 @@ impl Axis {
     }
 
     /// Range to draw: the asked one, or that of the values with a margin of `pad` of its length.
-    pub(crate) fn resolve(&self, values: impl Iterator<Item = f64>, pad: f64) -> OutputResult<(f64, f64)> {
+    pub(crate) fn resolve(
+        &self,
+        values: impl Iterator<Item = f64>,
+        pad: f64,
+    ) -> OutputResult<(f64, f64)> {
         let usable = |v: &f64| v.is_finite() && (!self.log || *v > 0.0);
         if let Some((low, high)) = self.range {
             if low < high && usable(&low) && usable(&high) {
                 return Ok((low, high));
             }
-            let (name, range) = (format!("range of axis '{}'", self.label), format!("{low} to {high}"));
-            return Err(OutputError::value(name, range, "finite and increasing, positive on a logarithmic axis"));
+            let (name, range) = (
+                format!("range of axis '{}'", self.label),
+                format!("{low} to {high}"),
+            );
+            return Err(OutputError::value(
+                name,
+                range,
+                "finite and increasing, positive on a logarithmic axis",
+            ));
         }
         let (low, high) = extremes(values.filter(usable).map(|v| forth(self.log, v)));
         if low > high {
@@ -63,7 +82,9 @@ impl Axis {
 
 /// Smallest and largest of the values; NaN is none.
 pub(crate) fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
-    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)))
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+        (low.min(v), high.max(v))
+    })
 }
 
 /// To what is in proportion to lengths on the paper.
@@ -107,8 +128,16 @@ impl Scale<'_> {
     /// Labelled ticks, about `gap` drawing units apart.
     pub(crate) fn ticks(&self, gap: f64) -> Vec<Tick> {
         let count = ((self.paper.1 - self.paper.0).abs() / gap).clamp(2.0, 12.0);
-        let ticks = if self.log { self.log_ticks(count) } else { Vec::new() };
-        if ticks.len() >= 2 { ticks } else { linear_ticks(self.range, count) }
+        let ticks = if self.log {
+            self.log_ticks(count)
+        } else {
+            Vec::new()
+        };
+        if ticks.len() >= 2 {
+            ticks
+        } else {
+            linear_ticks(self.range, count)
+        }
     }
 
     /// Values of the unlabelled ticks between the decades of a logarithmic axis.
@@ -131,7 +160,11 @@ impl Scale<'_> {
         let (low, high) = (self.range.0.log10(), self.range.1.log10());
         let (first, last) = ((low - 1e-9).ceil() as i32, (high + 1e-9).floor() as i32);
         let step = (((high - low) / count).ceil() as i32).max(1);
-        let factors: &[f64] = if high - low < 2.0 { &[1.0, 2.0, 5.0] } else { &[1.0] };
+        let factors: &[f64] = if high - low < 2.0 {
+            &[1.0, 2.0, 5.0]
+        } else {
+            &[1.0]
+        };
         let is_plain = first >= -3 && last <= 4;
         let tick = |(e, factor): (i32, f64)| {
             let value = factor * 10_f64.powi(e);
@@ -156,8 +189,12 @@ fn linear_ticks((low, high): (f64, f64), count: f64) -> Vec<Tick> {
     let steps = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0].map(|m| m * power_of_ten);
     let ends = |step: f64| ((low / step - 1e-6).ceil(), (high / step + 1e-6).floor());
     // Two ticks do not show a scale: then the next finer step.
-    let enough = steps.into_iter().filter(|step| ends(*step).1 - ends(*step).0 >= 2.0);
-    let step = enough.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap_or(raw);
+    let enough = steps
+        .into_iter()
+        .filter(|step| ends(*step).1 - ends(*step).0 >= 2.0);
+    let step = enough
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .unwrap_or(raw);
     let largest = low.abs().max(high.abs());
     let [exponent, common] = [step, largest].map(|v| (v.log10() + 1e-9).floor() as i32);
     let is_plain = (1e-3..1e5).contains(&largest);
@@ -165,11 +202,17 @@ fn linear_ticks((low, high): (f64, f64), count: f64) -> Vec<Tick> {
         true => decimal(value, usize::try_from(-exponent).unwrap_or(0)),
         false => {
             let digits = usize::try_from(common - exponent).unwrap_or(0);
-            power(&format!("{}·", decimal(value / 10_f64.powi(common), digits)), common)
+            power(
+                &format!("{}·", decimal(value / 10_f64.powi(common), digits)),
+                common,
+            )
         }
     };
     let (first, last) = ends(step);
-    (first as i64..=last as i64).map(|i| i as f64 * step).map(|value| (value, label(value))).collect()
+    (first as i64..=last as i64)
+        .map(|i| i as f64 * step)
+        .map(|value| (value, label(value)))
+        .collect()
 }
 
 /// A factor before a power of ten.
@@ -189,25 +232,50 @@ mod tests {
     use super::*;
 
     fn scale(range: (f64, f64), log: bool) -> Scale<'static> {
-        Scale { label: "", range, log, paper: (0.0, 600.0) }
+        Scale {
+            label: "",
+            range,
+            log,
+            paper: (0.0, 600.0),
+        }
     }
 
     fn labels(range: (f64, f64), log: bool) -> Vec<String> {
-        scale(range, log).ticks(100.0).into_iter().map(|t| t.1).collect()
+        scale(range, log)
+            .ticks(100.0)
+            .into_iter()
+            .map(|t| t.1)
+            .collect()
     }
 
     #[test]
     fn linear_ticks_are_round_and_inside() {
         assert_eq!(labels((0.0, 10.0), false), ["0", "2", "4", "6", "8", "10"]);
-        assert_eq!(labels((-0.23, 0.31), false), ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3"]);
-        assert_eq!(labels((0.0, 2e-14), false)[1..3], ["0.5·10^{−14}", "1.0·10^{−14}"]);
+        assert_eq!(
+            labels((-0.23, 0.31), false),
+            ["−0.2", "−0.1", "0.0", "0.1", "0.2", "0.3"]
+        );
+        assert_eq!(
+            labels((0.0, 2e-14), false)[1..3],
+            ["0.5·10^{−14}", "1.0·10^{−14}"]
+        );
         assert_eq!(labels((0.0, 3e6), false)[1], "0.5·10^{6}");
     }
 
     #[test]
     fn even_a_low_panel_has_three_ticks() {
-        for (low, high) in [(9.0, 11.0), (-3.7, 12.1), (0.02, 0.29), (-41.0, -39.5), (0.0, 0.99), (1e-3, 1.04e-3)] {
-            let low_panel = Scale { paper: (0.0, 100.0), ..scale((low, high), false) };
+        for (low, high) in [
+            (9.0, 11.0),
+            (-3.7, 12.1),
+            (0.02, 0.29),
+            (-41.0, -39.5),
+            (0.0, 0.99),
+            (1e-3, 1.04e-3),
+        ] {
+            let low_panel = Scale {
+                paper: (0.0, 100.0),
+                ..scale((low, high), false)
+            };
             let ticks = low_panel.ticks(48.0);
             assert!((3..=5).contains(&ticks.len()), "{low} to {high}: {ticks:?}");
             assert!(ticks.windows(2).all(|w| w[0].1 != w[1].1), "{ticks:?}");
@@ -216,16 +284,31 @@ mod tests {
 
     #[test]
     fn logarithmic_ticks_are_decades_or_their_parts() {
-        assert_eq!(labels((1e-15, 1e-11), true), ["10^{−15}", "10^{−14}", "10^{−13}", "10^{−12}", "10^{−11}"]);
+        assert_eq!(
+            labels((1e-15, 1e-11), true),
+            ["10^{−15}", "10^{−14}", "10^{−13}", "10^{−12}", "10^{−11}"]
+        );
         assert_eq!(labels((0.4, 12.0), true), ["0.5", "1", "2", "5", "10"]);
-        assert_eq!(labels((1e-20, 1e20), true).len(), 5, "every seventh decade of 41");
-        assert_eq!(labels((3.1, 4.2), true), ["3.2", "3.4", "3.6", "3.8", "4.0", "4.2"], "narrow: as on a linear axis");
+        assert_eq!(
+            labels((1e-20, 1e20), true).len(),
+            5,
+            "every seventh decade of 41"
+        );
+        assert_eq!(
+            labels((3.1, 4.2), true),
+            ["3.2", "3.4", "3.6", "3.8", "4.0", "4.2"],
+            "narrow: as on a linear axis"
+        );
     }
 
     #[test]
     fn places_are_linear_or_logarithmic() {
         assert_eq!(scale((0.0, 10.0), false).place(2.5), 150.0);
-        approx::assert_relative_eq!(scale((1.0, 1000.0), true).place(10.0), 200.0, max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            scale((1.0, 1000.0), true).place(10.0),
+            200.0,
+            max_relative = 1e-12
+        );
         assert!(scale((1.0, 1000.0), true).place(0.0).is_nan());
         assert!(scale((0.0, 10.0), false).place(f64::NAN).is_nan());
         assert!(scale((0.0, 1.0), false).place(1e300).is_finite());
@@ -234,13 +317,27 @@ mod tests {
     #[test]
     fn ranges_come_from_the_data_or_from_the_caller() {
         let axis = Axis::log("x");
-        let (low, high) = axis.resolve([1.0, -3.0, 100.0, f64::NAN].into_iter(), 0.0).unwrap();
+        let (low, high) = axis
+            .resolve([1.0, -3.0, 100.0, f64::NAN].into_iter(), 0.0)
+            .unwrap();
         approx::assert_relative_eq!(low, 1.0, max_relative = 1e-12);
         approx::assert_relative_eq!(high, 100.0, max_relative = 1e-12);
-        let (low, high) = Axis::linear("x").resolve([5.0, 5.0].into_iter(), 0.05).unwrap();
+        let (low, high) = Axis::linear("x")
+            .resolve([5.0, 5.0].into_iter(), 0.05)
+            .unwrap();
         assert!(low < 5.0 && high > 5.0);
         assert!(Axis::linear("x").resolve(std::iter::empty(), 0.0).is_ok());
-        assert!(Axis::log("x").between(0.0, 1.0).resolve(std::iter::empty(), 0.0).is_err());
-        assert!(Axis::linear("x").between(2.0, 1.0).resolve(std::iter::empty(), 0.0).is_err());
+        assert!(
+            Axis::log("x")
+                .between(0.0, 1.0)
+                .resolve(std::iter::empty(), 0.0)
+                .is_err()
+        );
+        assert!(
+            Axis::linear("x")
+                .between(2.0, 1.0)
+                .resolve(std::iter::empty(), 0.0)
+                .is_err()
+        );
     }
 }

@@ -8,8 +8,15 @@ pub type Rgb = [u8; 3];
 /// Drawn where a value is missing.
 pub const MISSING: Rgb = [178, 178, 178];
 
-const PALETTE: [Rgb; 7] =
-    [[0, 114, 178], [213, 94, 0], [0, 158, 115], [204, 121, 167], [230, 159, 0], [86, 180, 233], [40, 40, 40]];
+const PALETTE: [Rgb; 7] = [
+    [0, 114, 178],
+    [213, 94, 0],
+    [0, 158, 115],
+    [204, 121, 167],
+    [230, 159, 0],
+    [86, 180, 233],
+    [40, 40, 40],
+];
 
 /// Colour of curve `index`; repeats after seven.
 pub fn curve_colour(index: usize) -> Rgb {
@@ -86,7 +93,11 @@ fn from_oklch(lightness: f64, chroma: f64, hue_deg: f64) -> Rgb {
     ];
     linear.map(|c| {
         let c = c.clamp(0.0, 1.0);
-        let gamma = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * c.powf(1.0 / 2.4) - 0.055 };
+        let gamma = if c <= 0.003_130_8 {
+            12.92 * c
+        } else {
+            1.055 * c.powf(1.0 / 2.4) - 0.055
+        };
         (255.0 * gamma).round() as u8
     })
 }
@@ -99,7 +110,11 @@ mod tests {
     fn luminance(rgb: Rgb) -> f64 {
         let linear = rgb.map(|c| {
             let c = f64::from(c) / 255.0;
-            if c <= 0.04045 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) }
+            if c <= 0.04045 {
+                c / 12.92
+            } else {
+                ((c + 0.055) / 1.055).powf(2.4)
+            }
         });
         0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
     }
@@ -111,7 +126,10 @@ mod tests {
             let (down, up) = (map.colour(-v), map.colour(v));
             assert!(down[2] > down[0] && up[0] > up[2], "{v}: {down:?} {up:?}");
             let ratio = (luminance(down) + 0.05) / (luminance(up) + 0.05);
-            assert!((0.75..1.33).contains(&ratio), "{v}: {down:?} {up:?} {ratio}");
+            assert!(
+                (0.75..1.33).contains(&ratio),
+                "{v}: {down:?} {up:?} {ratio}"
+            );
         }
         let zero = map.colour(0.0);
         let spread = zero.iter().max().unwrap() - zero.iter().min().unwrap();
@@ -122,32 +140,66 @@ mod tests {
 
     #[test]
     fn both_maps_darken_steadily() {
-        let sequential = ColourMap::Sequential { low: 0.0, high: 1.0 };
+        let sequential = ColourMap::Sequential {
+            low: 0.0,
+            high: 1.0,
+        };
         let diverging = ColourMap::Diverging { limit: 1.0 };
         for map in [sequential, diverging] {
-            let path: Vec<f64> = (0..=50).map(|i| luminance(map.colour(f64::from(i) / 50.0))).collect();
-            assert!(path.windows(2).all(|w| w[1] < w[0] + 1e-3), "{map:?} {path:?}");
-            assert!(path[0] > 0.8 && path[50] < 0.2, "{map:?} {} {}", path[0], path[50]);
+            let path: Vec<f64> = (0..=50)
+                .map(|i| luminance(map.colour(f64::from(i) / 50.0)))
+                .collect();
+            assert!(
+                path.windows(2).all(|w| w[1] < w[0] + 1e-3),
+                "{map:?} {path:?}"
+            );
+            assert!(
+                path[0] > 0.8 && path[50] < 0.2,
+                "{map:?} {} {}",
+                path[0],
+                path[50]
+            );
         }
     }
 
     #[test]
     fn equal_steps_look_about_equal() {
-        for map in [ColourMap::Sequential { low: 0.0, high: 1.0 }, ColourMap::Diverging { limit: 1.0 }] {
+        for map in [
+            ColourMap::Sequential {
+                low: 0.0,
+                high: 1.0,
+            },
+            ColourMap::Diverging { limit: 1.0 },
+        ] {
             let colours: Vec<Rgb> = (0..=20)
-                .map(|i| map.colour(map.range().0 + f64::from(i) / 20.0 * (map.range().1 - map.range().0)))
+                .map(|i| {
+                    map.colour(
+                        map.range().0 + f64::from(i) / 20.0 * (map.range().1 - map.range().0),
+                    )
+                })
                 .collect();
             let steps: Vec<f64> = colours
                 .windows(2)
-                .map(|w| w[0].iter().zip(w[1]).map(|(a, b)| (f64::from(*a) - f64::from(b)).powi(2)).sum::<f64>().sqrt())
+                .map(|w| {
+                    w[0].iter()
+                        .zip(w[1])
+                        .map(|(a, b)| (f64::from(*a) - f64::from(b)).powi(2))
+                        .sum::<f64>()
+                        .sqrt()
+                })
                 .collect();
-            let (least, most) = steps.iter().fold((f64::MAX, 0.0_f64), |r, s| (r.0.min(*s), r.1.max(*s)));
+            let (least, most) = steps
+                .iter()
+                .fold((f64::MAX, 0.0_f64), |r, s| (r.0.min(*s), r.1.max(*s)));
             assert!(least > 0.0 && most < 2.5 * least, "{map:?} {steps:?}");
         }
     }
 
     #[test]
     fn missing_is_grey() {
-        assert_eq!(ColourMap::Diverging { limit: 1.0 }.colour(f64::NAN), MISSING);
+        assert_eq!(
+            ColourMap::Diverging { limit: 1.0 }.colour(f64::NAN),
+            MISSING
+        );
     }
 }

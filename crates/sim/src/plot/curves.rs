@@ -32,7 +32,14 @@ pub struct CurvePlot {
 impl CurvePlot {
     /// An empty plot of the usual shape.
     pub fn new(title: &str, x: Axis, y: Axis) -> Self {
-        Self { title: title.into(), x, y, series: Vec::new(), equal_scales: false, shape: 0.5 }
+        Self {
+            title: title.into(),
+            x,
+            y,
+            series: Vec::new(),
+            equal_scales: false,
+            shape: 0.5,
+        }
     }
 
     /// The same plot with one more curve.
@@ -44,8 +51,16 @@ impl CurvePlot {
 
     fn ranges(&self) -> OutputResult<((f64, f64), (f64, f64))> {
         let points = || self.series.iter().flat_map(|s| &s.points);
-        let bands = self.series.iter().flat_map(|s| s.band.iter().flatten()).flat_map(|b| [b.0, b.1]);
-        let pad = if self.equal_scales || self.series.iter().any(|s| s.style == Style::Markers) { 0.04 } else { 0.0 };
+        let bands = self
+            .series
+            .iter()
+            .flat_map(|s| s.band.iter().flatten())
+            .flat_map(|b| [b.0, b.1]);
+        let pad = if self.equal_scales || self.series.iter().any(|s| s.style == Style::Markers) {
+            0.04
+        } else {
+            0.0
+        };
         let x = self.x.resolve(points().map(|p| p.0), pad)?;
         let y = self.y.resolve(points().map(|p| p.1).chain(bands), 0.06)?;
         Ok((x, y))
@@ -64,14 +79,20 @@ impl CurvePlot {
     pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
         for series in &self.series {
             if let Some(band) = &series.band {
-                same_length(&format!("band of '{}'", series.label), band.len(), "its points", series.points.len())?;
+                same_length(
+                    &format!("band of '{}'", series.label),
+                    band.len(),
+                    "its points",
+                    series.points.len(),
+                )?;
             }
         }
         let frame = inner(cell, RIGHT, &self.title);
         let (mut x_range, mut y_range) = self.ranges()?;
         if self.equal_scales && !self.x.log && !self.y.log {
             // A unit is equally long on both axes.
-            let unit = ((x_range.1 - x_range.0) / frame.width).max((y_range.1 - y_range.0) / frame.height);
+            let unit =
+                ((x_range.1 - x_range.0) / frame.width).max((y_range.1 - y_range.0) / frame.height);
             for (range, length) in [(&mut x_range, frame.width), (&mut y_range, frame.height)] {
                 let (middle, half) = (0.5 * (range.0 + range.1), 0.5 * unit * length);
                 *range = (middle - half, middle + half);
@@ -80,8 +101,18 @@ impl CurvePlot {
         // A series without name has a colour, too.
         let mut named: Vec<(usize, &Series)> = self.coloured().collect();
         named.retain(|(_, series)| !series.label.is_empty());
-        let x = Scale { label: &self.x.label, range: x_range, log: self.x.log, paper: (frame.left, frame.right()) };
-        let mut y = Scale { label: &self.y.label, range: y_range, log: self.y.log, paper: (frame.bottom(), frame.top) };
+        let x = Scale {
+            label: &self.x.label,
+            range: x_range,
+            log: self.x.log,
+            paper: (frame.left, frame.right()),
+        };
+        let mut y = Scale {
+            label: &self.y.label,
+            range: y_range,
+            log: self.y.log,
+            paper: (frame.bottom(), frame.top),
+        };
         let (mut content, mut occupied) = self.content(&x, &y);
         let size = legend_size(&named, font);
         let (mut place, covered) = legend_place(frame, size, &occupied);
@@ -100,18 +131,33 @@ impl CurvePlot {
 
     /// The series with the indices of their colours.
     fn coloured(&self) -> impl Iterator<Item = (usize, &Series)> {
-        self.series.iter().enumerate().map(|(i, series)| (series.colour.unwrap_or(i), series))
+        self.series
+            .iter()
+            .enumerate()
+            .map(|(i, series)| (series.colour.unwrap_or(i), series))
     }
 
     /// The curves on the paper, and where their ink is.
     fn content(&self, x: &Scale<'_>, y: &Scale<'_>) -> (Vec<Shape>, Vec<(f64, f64)>) {
         let (mut content, mut occupied) = (Vec::new(), Vec::new());
         for (colour, series) in self.coloured() {
-            let points: Vec<_> = series.points.iter().map(|p| (x.place(p.0), y.place(p.1))).collect();
-            let band: Vec<_> = series.band.iter().flatten().map(|b| (y.place(b.0), y.place(b.1))).collect();
+            let points: Vec<_> = series
+                .points
+                .iter()
+                .map(|p| (x.place(p.0), y.place(p.1)))
+                .collect();
+            let band: Vec<_> = series
+                .band
+                .iter()
+                .flatten()
+                .map(|b| (y.place(b.0), y.place(b.1)))
+                .collect();
             series.shapes(colour, &points, &band, &mut content);
             occupied.extend(along(&points, series.style.has_line()));
-            let bars = points.iter().zip(&band).map(|(p, b)| [(p.0, b.0), (p.0, b.1)]);
+            let bars = points
+                .iter()
+                .zip(&band)
+                .map(|(p, b)| [(p.0, b.0), (p.0, b.1)]);
             occupied.extend(bars.flat_map(|bar| along(&bar, true)));
         }
         (content, occupied)
@@ -124,7 +170,11 @@ fn along(points: &[(f64, f64)], joined: bool) -> Vec<(f64, f64)> {
     for pair in pieces(points).filter(|_| joined).flat_map(|s| s.windows(2)) {
         let (dx, dy) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
         let steps = (dx.hypot(dy) / 8.0).min(400.0) as usize;
-        out.extend((1..steps).map(|k| k as f64 / steps as f64).map(|t| (pair[0].0 + t * dx, pair[0].1 + t * dy)));
+        out.extend(
+            (1..steps)
+                .map(|k| k as f64 / steps as f64)
+                .map(|t| (pair[0].0 + t * dx, pair[0].1 + t * dy)),
+        );
     }
     out
 }
@@ -187,13 +237,25 @@ pub struct Series {
 impl Series {
     /// A curve without band, in the next colour.
     pub fn new(label: &str, style: Style, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        Self { label: label.into(), points: points.into_iter().collect(), style, band: None, colour: None }
+        Self {
+            label: label.into(),
+            points: points.into_iter().collect(),
+            style,
+            band: None,
+            colour: None,
+        }
     }
 
     /// The same curve with a band of +- `half_width` about each point.
     #[must_use]
     pub fn with_band(mut self, half_width: &[f64]) -> Self {
-        self.band = Some(self.points.iter().zip(half_width).map(|(p, h)| (p.1 - h, p.1 + h)).collect());
+        self.band = Some(
+            self.points
+                .iter()
+                .zip(half_width)
+                .map(|(p, h)| (p.1 - h, p.1 + h))
+                .collect(),
+        );
         self
     }
 
@@ -205,45 +267,84 @@ impl Series {
     }
 
     fn pen(&self, colour: usize) -> Pen {
-        Pen { colour: curve_colour(colour), width: LINE_WIDTH, dash: self.style.dash() }
+        Pen {
+            colour: curve_colour(colour),
+            width: LINE_WIDTH,
+            dash: self.style.dash(),
+        }
     }
 
     /// The curve through its points on the paper, with its band between those at the same places.
-    fn shapes(&self, colour: usize, points: &[(f64, f64)], band: &[(f64, f64)], out: &mut Vec<Shape>) {
+    fn shapes(
+        &self,
+        colour: usize,
+        points: &[(f64, f64)],
+        band: &[(f64, f64)],
+        out: &mut Vec<Shape>,
+    ) {
         let fill = curve_colour(colour);
         // x, lower and upper edge.
-        let band: Vec<_> = points.iter().zip(band).map(|(p, b)| (p.0, b.0, b.1)).collect();
+        let band: Vec<_> = points
+            .iter()
+            .zip(band)
+            .map(|(p, b)| (p.0, b.0, b.1))
+            .collect();
         let bands = band.split(|b| !(b.0.is_finite() && b.1.is_finite() && b.2.is_finite()));
         if self.style == Style::Markers {
             for &(x, low, high) in bands.flatten() {
                 let cap = |y: f64| [(x - CAP, y), (x + CAP, y)];
-                out.extend([[(x, low), (x, high)], cap(low), cap(high)].map(|line| Shape::line(line, fill, 1.4)));
+                out.extend(
+                    [[(x, low), (x, high)], cap(low), cap(high)]
+                        .map(|line| Shape::line(line, fill, 1.4)),
+                );
             }
         } else {
             // One polygon for a stretch without gap: forth along the upper edge, back along the lower.
             for stretch in bands.filter(|stretch| stretch.len() > 1) {
-                let (upper, lower) = (stretch.iter().map(|b| (b.0, b.2)), stretch.iter().rev().map(|b| (b.0, b.1)));
-                out.push(Shape::Area { points: upper.chain(lower).collect(), fill, opacity: 0.22 });
+                let (upper, lower) = (
+                    stretch.iter().map(|b| (b.0, b.2)),
+                    stretch.iter().rev().map(|b| (b.0, b.1)),
+                );
+                out.push(Shape::Area {
+                    points: upper.chain(lower).collect(),
+                    fill,
+                    opacity: 0.22,
+                });
             }
         }
         if self.style.has_line() {
-            out.extend(pieces(points).map(|p| Shape::Line { points: p.to_vec(), pen: self.pen(colour) }));
+            out.extend(pieces(points).map(|p| Shape::Line {
+                points: p.to_vec(),
+                pen: self.pen(colour),
+            }));
         }
         if self.style.has_markers() {
-            out.extend(points.iter().filter(|p| finite(p)).map(|p| marker(*p, colour)));
+            out.extend(
+                points
+                    .iter()
+                    .filter(|p| finite(p))
+                    .map(|p| marker(*p, colour)),
+            );
         }
     }
 }
 
 /// The marker of a series: its shape differs as well as its colour.
 fn marker(at: (f64, f64), index: usize) -> Shape {
-    let (corners, radius, turn): (u32, f64, f64) =
-        [(24, 4.6, 0.0), (4, 5.6, 0.125), (3, 6.2, -0.25), (4, 5.8, 0.0)][index % 4];
+    let (corners, radius, turn): (u32, f64, f64) = [
+        (24, 4.6, 0.0),
+        (4, 5.6, 0.125),
+        (3, 6.2, -0.25),
+        (4, 5.8, 0.0),
+    ][index % 4];
     let corner = |i: u32| {
         let angle = std::f64::consts::TAU * (f64::from(i) / f64::from(corners) + turn);
         (at.0 + radius * angle.cos(), at.1 + radius * angle.sin())
     };
-    Shape::area((0..corners).map(corner).collect::<Vec<_>>(), curve_colour(index))
+    Shape::area(
+        (0..corners).map(corner).collect::<Vec<_>>(),
+        curve_colour(index),
+    )
 }
 
 fn finite(p: &(f64, f64)) -> bool {
@@ -267,49 +368,84 @@ const GRID_PLACES: u8 = 12;
 
 /// Room that the named series need, which come with the indices of their colours.
 fn legend_size(series: &[(usize, &Series)], font: &Font) -> (f64, f64) {
-    let widest = series.iter().map(|(_, s)| font.width(&s.label, TICK_SIZE)).fold(0.0, f64::max);
+    let widest = series
+        .iter()
+        .map(|(_, s)| font.width(&s.label, TICK_SIZE))
+        .fold(0.0, f64::max);
     // A seventh more than the letters need: the font of an SVG viewer may run wider.
-    (SAMPLE + 3.0 * PAD + 1.15 * widest, LINE * series.len() as f64 + PAD)
+    (
+        SAMPLE + 3.0 * PAD + 1.15 * widest,
+        LINE * series.len() as f64 + PAD,
+    )
 }
 
 /// Draws samples and names of the series into their place.
 fn draw_legend(series: &[(usize, &Series)], place: Frame, out: &mut Vec<Shape>) {
-    out.push(Shape::Area { points: place.outline(), fill: [255, 255, 255], opacity: 0.88 });
+    out.push(Shape::Area {
+        points: place.outline(),
+        fill: [255, 255, 255],
+        opacity: 0.88,
+    });
     out.push(Shape::line(place.outline(), GRID, 1.0));
     for (row, (colour, series)) in series.iter().enumerate() {
-        let (x, y) = (place.left + PAD, place.top + 0.5 * PAD + LINE * (row as f64 + 0.5));
+        let (x, y) = (
+            place.left + PAD,
+            place.top + 0.5 * PAD + LINE * (row as f64 + 0.5),
+        );
         if series.style.has_line() {
-            out.push(Shape::Line { points: vec![(x, y), (x + SAMPLE, y)], pen: series.pen(*colour) });
+            out.push(Shape::Line {
+                points: vec![(x, y), (x + SAMPLE, y)],
+                pen: series.pen(*colour),
+            });
         }
         if series.style.has_markers() {
             out.push(marker((x + SAMPLE / 2.0, y), *colour));
         }
-        out.push(Shape::text((x + SAMPLE + PAD, y + HALF_HEIGHT), &series.label, TICK_SIZE, Anchor::Start));
+        out.push(Shape::text(
+            (x + SAMPLE + PAD, y + HALF_HEIGHT),
+            &series.label,
+            TICK_SIZE,
+            Anchor::Start,
+        ));
     }
 }
 
 /// The place with the fewest points under the legend, and how many these are. Of equal ones it is the first: the corners
 /// from the upper right on, the middles of the edges, then all over the frame.
-fn legend_place(frame: Frame, (width, height): (f64, f64), occupied: &[(f64, f64)]) -> (Frame, usize) {
+fn legend_place(
+    frame: Frame,
+    (width, height): (f64, f64),
+    occupied: &[(f64, f64)],
+) -> (Frame, usize) {
     let corners = [(1.0, 0.0), (0.0, 0.0), (1.0, 1.0), (0.0, 1.0)];
     let edges = [(0.5, 0.0), (0.5, 1.0), (1.0, 0.5), (0.0, 0.5)];
     let part = |step: u8| f64::from(step) / f64::from(GRID_PLACES);
-    let all = (0..=GRID_PLACES).flat_map(|row| (0..=GRID_PLACES).map(move |column| (1.0 - part(column), part(row))));
-    let places = corners.into_iter().chain(edges).chain(all).map(|(across, down)| Frame {
-        left: frame.left + INSET + across * (frame.width - 2.0 * INSET - width),
-        top: frame.top + INSET + down * (frame.height - 2.0 * INSET - height),
-        width,
-        height,
-    });
+    let all = (0..=GRID_PLACES)
+        .flat_map(|row| (0..=GRID_PLACES).map(move |column| (1.0 - part(column), part(row))));
+    let places = corners
+        .into_iter()
+        .chain(edges)
+        .chain(all)
+        .map(|(across, down)| Frame {
+            left: frame.left + INSET + across * (frame.width - 2.0 * INSET - width),
+            top: frame.top + INSET + down * (frame.height - 2.0 * INSET - height),
+            width,
+            height,
+        });
     // Markers and the width of lines reach beyond their points.
     let covered = |f: &Frame| {
         let inside = |p: &&(f64, f64)| {
-            p.0 > f.left - REACH && p.0 < f.right() + REACH && p.1 > f.top - REACH && p.1 < f.bottom() + REACH
+            p.0 > f.left - REACH
+                && p.0 < f.right() + REACH
+                && p.1 > f.top - REACH
+                && p.1 < f.bottom() + REACH
         };
         occupied.iter().filter(inside).count()
     };
     let counted = places.map(|place| (place, covered(&place)));
-    counted.min_by_key(|(_, count)| *count).unwrap_or((frame, 0))
+    counted
+        .min_by_key(|(_, count)| *count)
+        .unwrap_or((frame, 0))
 }
 
 #[cfg(test)]
@@ -318,7 +454,12 @@ mod tests {
 
     fn shapes(plot: &CurvePlot) -> Vec<Shape> {
         let mut out = Vec::new();
-        let cell = Frame { left: 0.0, top: 0.0, width: 600.0, height: 400.0 };
+        let cell = Frame {
+            left: 0.0,
+            top: 0.0,
+            width: 600.0,
+            height: 400.0,
+        };
         plot.draw(cell, &Font::load().unwrap(), &mut out).unwrap();
         out
     }
@@ -332,24 +473,45 @@ mod tests {
     }
 
     fn plot(points: Vec<(f64, f64)>, style: Style) -> CurvePlot {
-        CurvePlot::new("t", Axis::linear("x").between(0.0, 10.0), Axis::linear("y").between(0.0, 1.0))
-            .with(Series::new("a", style, points))
+        CurvePlot::new(
+            "t",
+            Axis::linear("x").between(0.0, 10.0),
+            Axis::linear("y").between(0.0, 1.0),
+        )
+        .with(Series::new("a", style, points))
     }
 
     #[test]
     fn a_line_breaks_at_a_missing_value() {
         let content = content(&plot(
-            vec![(0.0, 0.0), (1.0, 1.0), (2.0, f64::NAN), (3.0, 0.0), (4.0, 1.0), (5.0, 0.5)],
+            vec![
+                (0.0, 0.0),
+                (1.0, 1.0),
+                (2.0, f64::NAN),
+                (3.0, 0.0),
+                (4.0, 1.0),
+                (5.0, 0.5),
+            ],
             Style::Line,
         ));
-        let lengths: Vec<usize> =
-            content.iter().map(|s| if let Shape::Line { points, .. } = s { points.len() } else { 0 }).collect();
+        let lengths: Vec<usize> = content
+            .iter()
+            .map(|s| {
+                if let Shape::Line { points, .. } = s {
+                    points.len()
+                } else {
+                    0
+                }
+            })
+            .collect();
         assert_eq!(lengths, [2, 3]);
     }
 
     #[test]
     fn values_land_at_their_coordinates_with_y_upward() {
-        let Shape::Line { points, .. } = &content(&plot(vec![(0.0, 0.0), (10.0, 1.0)], Style::Line))[0] else {
+        let Shape::Line { points, .. } =
+            &content(&plot(vec![(0.0, 0.0), (10.0, 1.0)], Style::Line))[0]
+        else {
             panic!("no line")
         };
         assert_eq!(points[0], (LEFT, 400.0 - BOTTOM));
@@ -358,13 +520,12 @@ mod tests {
 
     #[test]
     fn equal_scales_make_a_metre_equally_long() {
-        let mut plot = CurvePlot::new("", Axis::linear("y [m]"), Axis::linear("z [m]")).with(Series::new(
-            "",
-            Style::Line,
-            [(-50.0, 0.0), (50.0, 40.0)],
-        ));
+        let mut plot = CurvePlot::new("", Axis::linear("y [m]"), Axis::linear("z [m]"))
+            .with(Series::new("", Style::Line, [(-50.0, 0.0), (50.0, 40.0)]));
         plot.equal_scales = true;
-        let Shape::Line { points, .. } = &content(&plot)[0] else { panic!("no line") };
+        let Shape::Line { points, .. } = &content(&plot)[0] else {
+            panic!("no line")
+        };
         let (dx, dy) = (points[1].0 - points[0].0, points[0].1 - points[1].1);
         approx::assert_relative_eq!(dx / 100.0, dy / 40.0, max_relative = 1e-12);
     }
@@ -372,13 +533,21 @@ mod tests {
     #[test]
     fn a_legend_that_finds_no_free_place_gets_room_above_the_curves() {
         // Error bars from bottom to top all over the panel, as those of a hundred scans.
-        let bars = Series::new("scans", Style::Markers, (0..=100).map(|i| (0.1 * f64::from(i), 0.5)));
+        let bars = Series::new(
+            "scans",
+            Style::Markers,
+            (0..=100).map(|i| (0.1 * f64::from(i), 0.5)),
+        );
         let mut full = plot(Vec::new(), Style::Line);
         full.y.range = None;
         full.series = vec![bars.with_band(&[0.45; 101])];
         let drawn = shapes(&full);
-        let Some(Shape::Area { points: box_of_legend, .. }) =
-            drawn.iter().rfind(|s| matches!(s, Shape::Area { fill, .. } if *fill == [255; 3]))
+        let Some(Shape::Area {
+            points: box_of_legend,
+            ..
+        }) = drawn
+            .iter()
+            .rfind(|s| matches!(s, Shape::Area { fill, .. } if *fill == [255; 3]))
         else {
             panic!("no legend")
         };
@@ -388,15 +557,26 @@ mod tests {
             Shape::Line { points, .. } => points.iter().map(|p| p.1).collect(),
             _ => vec![f64::INFINITY],
         });
-        assert!(highest.fold(f64::INFINITY, f64::min) > bottom, "the bars begin below the legend");
+        assert!(
+            highest.fold(f64::INFINITY, f64::min) > bottom,
+            "the bars begin below the legend"
+        );
     }
 
     #[test]
     fn a_band_must_match_its_curve() {
         let mut plot = plot(vec![(0.0, 0.0), (1.0, 1.0)], Style::Line);
         plot.series[0].band = Some(vec![(0.0, 1.0)]);
-        let cell = Frame { left: 0.0, top: 0.0, width: 600.0, height: 400.0 };
-        assert!(plot.draw(cell, &Font::load().unwrap(), &mut Vec::new()).is_err());
+        let cell = Frame {
+            left: 0.0,
+            top: 0.0,
+            width: 600.0,
+            height: 400.0,
+        };
+        assert!(
+            plot.draw(cell, &Font::load().unwrap(), &mut Vec::new())
+                .is_err()
+        );
         let bars = plot.series[0].clone().with_band(&[0.1, 0.2]);
         assert_eq!(bars.band.unwrap()[1], (0.8, 1.2));
     }
@@ -408,28 +588,52 @@ mod legend_tests {
 
     #[test]
     fn the_legend_goes_to_the_empty_corner() {
-        let frame = Frame { left: 0.0, top: 0.0, width: 400.0, height: 300.0 };
+        let frame = Frame {
+            left: 0.0,
+            top: 0.0,
+            width: 400.0,
+            height: 300.0,
+        };
         let corners = [(390.0, 10.0), (10.0, 10.0), (390.0, 290.0), (10.0, 290.0)];
         for empty in 0..4 {
-            let ink: Vec<(f64, f64)> =
-                corners.iter().enumerate().filter(|(i, _)| *i != empty).map(|(_, p)| *p).collect();
+            let ink: Vec<(f64, f64)> = corners
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| *i != empty)
+                .map(|(_, p)| *p)
+                .collect();
             let (found, covered) = legend_place(frame, (100.0, 60.0), &ink);
             assert_eq!(covered, 0);
             let expected = corners[empty];
-            assert!((found.left < 200.0) == (expected.0 < 200.0) && (found.top < 150.0) == (expected.1 < 150.0));
+            assert!(
+                (found.left < 200.0) == (expected.0 < 200.0)
+                    && (found.top < 150.0) == (expected.1 < 150.0)
+            );
         }
     }
 
     #[test]
     fn the_only_free_place_is_found_away_from_corners_and_edges() {
-        let frame = Frame { left: 0.0, top: 0.0, width: 400.0, height: 300.0 };
-        let grid = (0..=80).flat_map(|i| (0..=60).map(move |j| (5.0 * f64::from(i), 5.0 * f64::from(j))));
+        let frame = Frame {
+            left: 0.0,
+            top: 0.0,
+            width: 400.0,
+            height: 300.0,
+        };
+        let grid =
+            (0..=80).flat_map(|i| (0..=60).map(move |j| (5.0 * f64::from(i), 5.0 * f64::from(j))));
         // A hole off the middle, a little larger than the legend.
-        let ink: Vec<(f64, f64)> =
-            grid.filter(|(x, y)| !(70.0..=210.0).contains(x) || !(60.0..=150.0).contains(y)).collect();
+        let ink: Vec<(f64, f64)> = grid
+            .filter(|(x, y)| !(70.0..=210.0).contains(x) || !(60.0..=150.0).contains(y))
+            .collect();
         let (found, covered) = legend_place(frame, (80.0, 40.0), &ink);
         assert_eq!(covered, 0, "{found:?}");
-        assert!(found.left > 70.0 && found.right() < 210.0 && found.top > 60.0 && found.bottom() < 150.0);
+        assert!(
+            found.left > 70.0
+                && found.right() < 210.0
+                && found.top > 60.0
+                && found.bottom() < 150.0
+        );
         let (_, covered) = legend_place(frame, (200.0, 100.0), &ink);
         assert!(covered > 0, "too large for the hole");
     }

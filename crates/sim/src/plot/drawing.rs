@@ -87,16 +87,34 @@ pub(crate) enum Shape {
 impl Shape {
     /// A solid line.
     pub(crate) fn line(points: impl Into<Vec<(f64, f64)>>, colour: Rgb, width: f64) -> Self {
-        Self::Line { points: points.into(), pen: Pen { colour, width, dash: &[] } }
+        Self::Line {
+            points: points.into(),
+            pen: Pen {
+                colour,
+                width,
+                dash: &[],
+            },
+        }
     }
 
     /// An area that hides what lies behind.
     pub(crate) fn area(points: impl Into<Vec<(f64, f64)>>, fill: Rgb) -> Self {
-        Self::Area { points: points.into(), fill, opacity: 1.0 }
+        Self::Area {
+            points: points.into(),
+            fill,
+            opacity: 1.0,
+        }
     }
 
     pub(crate) fn text(at: (f64, f64), text: &str, size: f64, anchor: Anchor) -> Self {
-        Self::Text(Text { at, text: text.into(), size, anchor, upward: false, bold: false })
+        Self::Text(Text {
+            at,
+            text: text.into(),
+            size,
+            anchor,
+            upward: false,
+            bold: false,
+        })
     }
 }
 
@@ -122,14 +140,32 @@ pub(crate) struct Run<'a> {
 pub(crate) fn runs(text: &str) -> Vec<Run<'_>> {
     let mut out = Vec::new();
     let mut rest = text;
-    let plain = |text| Run { text, scale: 1.0, rise: 0.0 };
+    let plain = |text| Run {
+        text,
+        scale: 1.0,
+        rise: 0.0,
+    };
     let marked = |rest: &str| {
-        let start = ["^{", "_{"].iter().filter_map(|mark| rest.find(mark)).min()?;
+        let start = ["^{", "_{"]
+            .iter()
+            .filter_map(|mark| rest.find(mark))
+            .min()?;
         Some((start, start + rest[start..].find('}')?))
     };
     while let Some((start, end)) = marked(rest) {
-        let rise = if rest[start..].starts_with('^') { 0.36 } else { -0.18 };
-        out.extend([plain(&rest[..start]), Run { text: &rest[start + 2..end], scale: 0.72, rise }]);
+        let rise = if rest[start..].starts_with('^') {
+            0.36
+        } else {
+            -0.18
+        };
+        out.extend([
+            plain(&rest[..start]),
+            Run {
+                text: &rest[start + 2..end],
+                scale: 0.72,
+                rise,
+            },
+        ]);
         rest = &rest[end + 1..];
     }
     out.push(plain(rest));
@@ -143,9 +179,28 @@ mod tests {
 
     #[test]
     fn raised_and_lowered_parts_are_split() {
-        let parts: Vec<(&str, f64)> = runs("Γ_{5-15} [m^{2}/s] v_mean").iter().map(|r| (r.text, r.rise)).collect();
-        assert_eq!(parts, [("Γ", 0.0), ("5-15", -0.18), (" [m", 0.0), ("2", 0.36), ("/s] v_mean", 0.0)]);
-        assert_eq!(runs("a^{b"), [Run { text: "a^{b", scale: 1.0, rise: 0.0 }]);
+        let parts: Vec<(&str, f64)> = runs("Γ_{5-15} [m^{2}/s] v_mean")
+            .iter()
+            .map(|r| (r.text, r.rise))
+            .collect();
+        assert_eq!(
+            parts,
+            [
+                ("Γ", 0.0),
+                ("5-15", -0.18),
+                (" [m", 0.0),
+                ("2", 0.36),
+                ("/s] v_mean", 0.0)
+            ]
+        );
+        assert_eq!(
+            runs("a^{b"),
+            [Run {
+                text: "a^{b",
+                scale: 1.0,
+                rise: 0.0
+            }]
+        );
         assert!(runs("").is_empty());
     }
 }

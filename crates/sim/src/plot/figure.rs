@@ -66,7 +66,12 @@ impl Figure {
     /// Panels one below the other.
     pub fn stacked(panels: impl IntoIterator<Item = impl Into<Panel>>) -> Self {
         let panels = panels.into_iter().map(Into::into).collect();
-        Self { title: String::new(), panels, columns: 1, width: 960.0 }
+        Self {
+            title: String::new(),
+            panels,
+            columns: 1,
+            width: 960.0,
+        }
     }
 
     /// Panels side by side.
@@ -105,14 +110,22 @@ impl Figure {
     /// As [`Self::svg`].
     pub fn svg_and_png(&self, provenance: &Provenance) -> OutputResult<(String, Vec<u8>)> {
         let drawing = self.draw()?;
-        Ok((svg_text(&drawing, provenance)?, encode([paint(&drawing)], 0.0, Some(provenance))?))
+        Ok((
+            svg_text(&drawing, provenance)?,
+            encode([paint(&drawing)], 0.0, Some(provenance))?,
+        ))
     }
 
     /// Adds both to files, as `name.svg` and `name.png`.
     ///
     /// # Errors
     /// As [`Self::svg`]; a file of that name among them.
-    pub fn add_to(&self, files: &mut FileGroup, name: &str, provenance: &Provenance) -> OutputResult<()> {
+    pub fn add_to(
+        &self,
+        files: &mut FileGroup,
+        name: &str,
+        provenance: &Provenance,
+    ) -> OutputResult<()> {
         let (svg, png) = self.svg_and_png(provenance)?;
         files.add(&format!("{name}.svg"), svg)?;
         files.add(&format!("{name}.png"), png)
@@ -122,7 +135,11 @@ impl Figure {
     pub(crate) fn draw(&self) -> OutputResult<Drawing> {
         if self.columns == 0 || !(200.0..=10_000.0).contains(&self.width) {
             let value = format!("{} columns, width {}", self.columns, self.width);
-            return Err(OutputError::value("figure", value, "at least one column, width 200 to 10000"));
+            return Err(OutputError::value(
+                "figure",
+                value,
+                "at least one column, width 200 to 10000",
+            ));
         }
         let font = Font::load()?;
         let (mut shapes, mut top) = (Vec::new(), MARGIN);
@@ -141,16 +158,32 @@ impl Figure {
             let highest = heights.iter().copied().fold(0.0, f64::max);
             for (column, (panel, own)) in row.iter().zip(heights).enumerate() {
                 let left = MARGIN + column as f64 * width;
-                let cell = Frame { left, top, width, height: highest };
+                let cell = Frame {
+                    left,
+                    top,
+                    width,
+                    height: highest,
+                };
                 match panel {
                     Panel::Curves(plot) => plot.draw(cell, &font, &mut shapes)?,
-                    Panel::Map(plot) => plot.draw(Frame { height: own, ..cell }, &font, &mut shapes)?,
+                    Panel::Map(plot) => plot.draw(
+                        Frame {
+                            height: own,
+                            ..cell
+                        },
+                        &font,
+                        &mut shapes,
+                    )?,
                     Panel::Surfaces(plot) => plot.draw(cell, &mut shapes)?,
                 }
             }
             top += highest;
         }
-        Ok(Drawing { width: self.width, height: (top + MARGIN).ceil(), shapes })
+        Ok(Drawing {
+            width: self.width,
+            height: (top + MARGIN).ceil(),
+            shapes,
+        })
     }
 }
 
@@ -162,7 +195,11 @@ pub fn apng(figures: &[Figure], frame_s: f64, provenance: &Provenance) -> Output
     if !(0.01..=60.0).contains(&frame_s) {
         return Err(OutputError::value("frame_s", frame_s, "0.01 to 60 s"));
     }
-    encode(figures.iter().map(|figure| paint(&figure.draw()?)), frame_s, Some(provenance))
+    encode(
+        figures.iter().map(|figure| paint(&figure.draw()?)),
+        frame_s,
+        Some(provenance),
+    )
 }
 
 #[cfg(test)]
@@ -175,8 +212,10 @@ mod tests {
 
     fn figure() -> Figure {
         let map = MapPlot::new(&samples::map(), 0, "radial_velocity").unwrap();
-        let curve = Series::new("a < b", Style::LineMarkers, [(1.0, 1e-3), (2.0, 1e-1)]).with_band(&[1e-4, 1e-2]);
-        let curves = CurvePlot::new("curves", Axis::linear("x"), Axis::log("C_{n}^{2}")).with(curve);
+        let curve = Series::new("a < b", Style::LineMarkers, [(1.0, 1e-3), (2.0, 1e-1)])
+            .with_band(&[1e-4, 1e-2]);
+        let curves =
+            CurvePlot::new("curves", Axis::linear("x"), Axis::log("C_{n}^{2}")).with(curve);
         Figure::stacked([Panel::Map(map), curves.clone().into(), curves.into()])
     }
 
@@ -185,7 +224,10 @@ mod tests {
         let (figure, origin) = (figure(), example());
         let svg = figure.svg(&origin).unwrap();
         assert_eq!(svg, figure.svg(&origin).unwrap());
-        assert_eq!((svg.clone(), figure.png(&origin).unwrap()), figure.svg_and_png(&origin).unwrap());
+        assert_eq!(
+            (svg.clone(), figure.png(&origin).unwrap()),
+            figure.svg_and_png(&origin).unwrap()
+        );
         assert_eq!(svg.matches("<image").count(), 2, "map and colour bar");
         assert_eq!(svg.matches("<svg").count(), svg.matches("</svg>").count());
         assert!(svg.contains("a &lt; b") && !svg.contains("NaN"));
@@ -199,7 +241,13 @@ mod tests {
         let boxes: Vec<Frame> = drawing
             .shapes
             .iter()
-            .filter_map(|shape| if let Shape::Clip { frame, .. } = shape { Some(*frame) } else { None })
+            .filter_map(|shape| {
+                if let Shape::Clip { frame, .. } = shape {
+                    Some(*frame)
+                } else {
+                    None
+                }
+            })
             .collect();
         assert_eq!(boxes.len(), 3);
         assert!(boxes[0].right() < boxes[1].left && boxes[1].right() < figure.width);
@@ -211,7 +259,11 @@ mod tests {
     #[test]
     fn impossible_figures_are_refused() {
         for (columns, width) in [(0, 960.0), (1, 10.0), (1, f64::NAN)] {
-            let figure = Figure { columns, width, ..figure() };
+            let figure = Figure {
+                columns,
+                width,
+                ..figure()
+            };
             assert!(figure.svg(&example()).is_err());
         }
     }

@@ -13,8 +13,8 @@ pub(crate) struct Font {
 
 impl Font {
     pub(crate) fn load() -> OutputResult<Self> {
-        let face =
-            Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0).map_err(|e| OutputError::unsupported("font", e))?;
+        let face = Face::parse(epaint_default_fonts::UBUNTU_LIGHT, 0)
+            .map_err(|e| OutputError::unsupported("font", e))?;
         Ok(Self { face })
     }
 
@@ -30,7 +30,14 @@ impl Font {
             let mut pen = Pen(PathBuilder::new());
             self.face.outline_glyph(glyph, &mut pen);
             // The font's y is upward.
-            let place = Transform::from_row(scale as f32, 0.0, 0.0, -scale as f32, x as f32, -rise as f32);
+            let place = Transform::from_row(
+                scale as f32,
+                0.0,
+                0.0,
+                -scale as f32,
+                x as f32,
+                -rise as f32,
+            );
             if let Some(path) = pen.0.finish().and_then(|path| path.transform(place)) {
                 out.push_path(&path);
             }
@@ -86,7 +93,11 @@ mod tests {
         let font = Font::load().unwrap();
         let sum = font.width("abc", 10.0) + font.width("12", 10.0);
         approx::assert_relative_eq!(font.width("abc12", 10.0), sum, max_relative = 1e-12);
-        approx::assert_relative_eq!(font.width("abc", 20.0), 2.0 * font.width("abc", 10.0), max_relative = 1e-12);
+        approx::assert_relative_eq!(
+            font.width("abc", 20.0),
+            2.0 * font.width("abc", 10.0),
+            max_relative = 1e-12
+        );
         assert!(font.width("10^{12}", 10.0) < font.width("1012", 10.0));
     }
 
@@ -94,7 +105,12 @@ mod tests {
     fn letters_of_the_labels_are_in_the_font() {
         let font = Font::load().unwrap();
         for c in "τρσηλθφβΓ°·×−±≤≥µ²³".chars() {
-            assert!(font.face.glyph_index(c).is_some_and(|glyph| glyph != GlyphId(0)), "{c}");
+            assert!(
+                font.face
+                    .glyph_index(c)
+                    .is_some_and(|glyph| glyph != GlyphId(0)),
+                "{c}"
+            );
         }
     }
 }

@@ -66,16 +66,30 @@ pub(crate) fn panel(
 ) {
     let across = |value: f64| [(x.place(value), f.top), (x.place(value), f.bottom())];
     let along = |value: f64| [(f.left, y.place(value)), (f.right(), y.place(value))];
-    let ticks = |scale: &Scale<'_>, side: Side| scale.ticks(side.gap()).into_iter().map(|tick| tick.0);
-    let minor = x.minor_ticks().into_iter().map(across).chain(y.minor_ticks().into_iter().map(along));
-    let major = ticks(x, Side::Bottom).map(across).chain(ticks(y, Side::Left).map(along));
+    let ticks =
+        |scale: &Scale<'_>, side: Side| scale.ticks(side.gap()).into_iter().map(|tick| tick.0);
+    let minor = x
+        .minor_ticks()
+        .into_iter()
+        .map(across)
+        .chain(y.minor_ticks().into_iter().map(along));
+    let major = ticks(x, Side::Bottom)
+        .map(across)
+        .chain(ticks(y, Side::Left).map(along));
     out.extend(minor.map(|line| Shape::line(line, FAINT_GRID, 1.0)));
     out.extend(major.map(|line| Shape::line(line, GRID, 1.0)));
-    out.push(Shape::Clip { frame: *f, shapes: content });
+    out.push(Shape::Clip {
+        frame: *f,
+        shapes: content,
+    });
     out.push(Shape::line(f.outline(), INK, 1.2));
     axis(Side::Bottom, x, f, font, out);
     axis(Side::Left, y, f, font, out);
-    out.push(title((f.left + f.width / 2.0, f.top - 11.0), text, TITLE_SIZE));
+    out.push(title(
+        (f.left + f.width / 2.0, f.top - 11.0),
+        text,
+        TITLE_SIZE,
+    ));
 }
 
 /// Ticks, their labels and the name of an axis at a side of a box.
@@ -86,24 +100,63 @@ pub(crate) fn axis(side: Side, scale: &Scale<'_>, f: &Frame, font: &Font, out: &
         widest = widest.max(font.width(&name, TICK_SIZE));
         let beyond = TICK_LENGTH + 4.0;
         let (from, to, label, anchor) = match side {
-            Side::Bottom => ((at, f.bottom()), (0.0, 1.0), (at, f.bottom() + TICK_LENGTH + TICK_SIZE), Anchor::Middle),
-            Side::Left => ((f.left, at), (-1.0, 0.0), (f.left - beyond, at + HALF_HEIGHT), Anchor::End),
-            Side::Right => ((f.right(), at), (1.0, 0.0), (f.right() + beyond, at + HALF_HEIGHT), Anchor::Start),
+            Side::Bottom => (
+                (at, f.bottom()),
+                (0.0, 1.0),
+                (at, f.bottom() + TICK_LENGTH + TICK_SIZE),
+                Anchor::Middle,
+            ),
+            Side::Left => (
+                (f.left, at),
+                (-1.0, 0.0),
+                (f.left - beyond, at + HALF_HEIGHT),
+                Anchor::End,
+            ),
+            Side::Right => (
+                (f.right(), at),
+                (1.0, 0.0),
+                (f.right() + beyond, at + HALF_HEIGHT),
+                Anchor::Start,
+            ),
         };
-        out.push(Shape::line([from, (from.0 + TICK_LENGTH * to.0, from.1 + TICK_LENGTH * to.1)], INK, 1.2));
+        out.push(Shape::line(
+            [
+                from,
+                (from.0 + TICK_LENGTH * to.0, from.1 + TICK_LENGTH * to.1),
+            ],
+            INK,
+            1.2,
+        ));
         out.push(Shape::text(label, &name, TICK_SIZE, anchor));
     }
-    let (middle, beyond) = ((f.left + f.width / 2.0, f.top + f.height / 2.0), TICK_LENGTH + widest);
+    let (middle, beyond) = (
+        (f.left + f.width / 2.0, f.top + f.height / 2.0),
+        TICK_LENGTH + widest,
+    );
     let at = match side {
         Side::Bottom => (middle.0, f.bottom() + BOTTOM - 14.0),
         Side::Left => (f.left - beyond - 18.0, middle.1),
         Side::Right => (f.right() + beyond + 24.0, middle.1),
     };
     let (upward, anchor) = (side != Side::Bottom, Anchor::Middle);
-    out.push(Shape::Text(Text { at, text: scale.label.into(), size: LABEL_SIZE, anchor, upward, bold: false }));
+    out.push(Shape::Text(Text {
+        at,
+        text: scale.label.into(),
+        size: LABEL_SIZE,
+        anchor,
+        upward,
+        bold: false,
+    }));
 }
 
 /// A title, centred on the point.
 pub(crate) fn title(at: (f64, f64), text: &str, size: f64) -> Shape {
-    Shape::Text(Text { at, text: text.into(), size, anchor: Anchor::Middle, upward: false, bold: true })
+    Shape::Text(Text {
+        at,
+        text: text.into(),
+        size,
+        anchor: Anchor::Middle,
+        upward: false,
+        bold: true,
+    })
 }

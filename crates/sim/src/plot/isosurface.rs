@@ -71,8 +71,14 @@ impl IsosurfacePlot {
     fn camera(&self) -> Camera {
         let [(sa, ca), (se, ce)] = self.view_rad.map(f64::sin_cos);
         let (right, up) = ([-sa, ca, 0.0], [-se * ca, -se * sa, ce]);
-        let range_m = [right, up].map(|axis| extremes(self.corners_m().into_iter().map(|corner| dot(corner, axis))));
-        Camera { right, up, into: [-ce * ca, -ce * sa, -se], range_m }
+        let range_m = [right, up]
+            .map(|axis| extremes(self.corners_m().into_iter().map(|corner| dot(corner, axis))));
+        Camera {
+            right,
+            up,
+            into: [-ce * ca, -ce * sa, -se],
+            range_m,
+        }
     }
 
     /// The eight corners; bit `d` of the place says which end of axis `d`.
@@ -91,12 +97,19 @@ impl IsosurfacePlot {
         for surface in &self.surfaces {
             if !(surface.level.is_finite() && (0.0..=1.0).contains(&surface.opacity)) {
                 let value = format!("level {}, opacity {}", surface.level, surface.opacity);
-                return Err(OutputError::value("surface", value, "a finite level, opacity 0 to 1"));
+                return Err(OutputError::value(
+                    "surface",
+                    value,
+                    "a finite level, opacity 0 to 1",
+                ));
             }
         }
         let camera = self.camera();
         let [across, up] = camera.size_m();
-        let room = (cell.width - 2.0 * MARGIN, cell.height - 2.0 * MARGIN - top_room(&self.title));
+        let room = (
+            cell.width - 2.0 * MARGIN,
+            cell.height - 2.0 * MARGIN - top_room(&self.title),
+        );
         let scale = (room.0 / across).min(room.1 / up);
         let frame = Frame {
             left: cell.left + 0.5 * (cell.width - scale * across),
@@ -107,26 +120,48 @@ impl IsosurfacePlot {
         let [left_m, low_m] = camera.range_m.map(|range| range.0);
         let corners_m = self.corners_m();
         let corners = corners_m.map(|at_m| {
-            let (x_m, y_m) = (dot(at_m, camera.right) - left_m, dot(at_m, camera.up) - low_m);
+            let (x_m, y_m) = (
+                dot(at_m, camera.right) - left_m,
+                dot(at_m, camera.up) - low_m,
+            );
             (frame.left + scale * x_m, frame.bottom() - scale * y_m)
         });
         // Of each edge the axis that it lies along, and its ends.
-        let edges = (0..3)
-            .flat_map(|d| (0..8).filter(move |from| from >> d & 1 == 0).map(move |from| (d, from, from | 1 << d)));
+        let edges = (0..3).flat_map(|d| {
+            (0..8)
+                .filter(move |from| from >> d & 1 == 0)
+                .map(move |from| (d, from, from | 1 << d))
+        });
         // The corner farthest from the eye has the hidden edges.
         let depth_m = |corner: &usize| dot(corners_m[*corner], camera.into);
         let far = (0..8).max_by(|a, b| depth_m(a).total_cmp(&depth_m(b)));
-        let (hidden, seen): (Vec<_>, Vec<_>) = edges.partition(|(_, a, b)| far == Some(*a) || far == Some(*b));
+        let (hidden, seen): (Vec<_>, Vec<_>) =
+            edges.partition(|(_, a, b)| far == Some(*a) || far == Some(*b));
         let lines = |edges: &[(usize, usize, usize)]| -> Vec<Shape> {
-            edges.iter().map(|(_, a, b)| Shape::line([corners[*a], corners[*b]], EDGE, 1.0)).collect()
+            edges
+                .iter()
+                .map(|(_, a, b)| Shape::line([corners[*a], corners[*b]], EDGE, 1.0))
+                .collect()
         };
-        out.push(Shape::area([0, 1, 3, 2].map(|corner| corners[corner]), GROUND));
+        out.push(Shape::area(
+            [0, 1, 3, 2].map(|corner| corners[corner]),
+            GROUND,
+        ));
         out.extend(lines(&hidden));
-        let size = [frame.width, frame.height].map(|length| ((length * DENSITY).round() as u32).max(1));
-        out.push(Shape::Image { frame, pixels: self.pixels(&camera, size)? });
+        let size =
+            [frame.width, frame.height].map(|length| ((length * DENSITY).round() as u32).max(1));
+        out.push(Shape::Image {
+            frame,
+            pixels: self.pixels(&camera, size)?,
+        });
         out.extend(lines(&seen));
         let middle = cell.left + cell.width / 2.0;
-        out.push(Shape::text((middle, cell.top + 20.0), &self.title, TICK_SIZE + 2.0, Anchor::Middle));
+        out.push(Shape::text(
+            (middle, cell.top + 20.0),
+            &self.title,
+            TICK_SIZE + 2.0,
+            Anchor::Middle,
+        ));
         // Names and ends of the axes at the lowest edges in the picture, of the vertical one at the leftmost; edges that share a corner
         // keep apart.
         let along = |(_, a, b): &(usize, usize, usize), share: f64| {
@@ -134,9 +169,17 @@ impl IsosurfacePlot {
             (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
         };
         for (d, name) in ["x", "y", "z"].into_iter().enumerate() {
-            let outward = |edge: &(usize, usize, usize)| if d == 2 { -along(edge, 0.5).0 } else { along(edge, 0.5).1 };
+            let outward = |edge: &(usize, usize, usize)| {
+                if d == 2 {
+                    -along(edge, 0.5).0
+                } else {
+                    along(edge, 0.5).1
+                }
+            };
             let of_axis = hidden.iter().chain(&seen).filter(|edge| edge.0 == d);
-            let Some(edge) = of_axis.max_by(|a, b| outward(a).total_cmp(&outward(b))) else { continue };
+            let Some(edge) = of_axis.max_by(|a, b| outward(a).total_cmp(&outward(b))) else {
+                continue;
+            };
             let [low, high] = self.volume.corners_m().map(|end| format!("{:.1}", end[d]));
             for (share, text) in [(0.5, name), (0.08, &low), (0.92, &high)] {
                 let (x, y) = along(edge, share);
@@ -148,9 +191,24 @@ impl IsosurfacePlot {
         }
         for (row, surface) in self.surfaces.iter().enumerate() {
             let (left, bottom) = (frame.left + 4.0, frame.top + 14.0 + 18.0 * row as f64);
-            let points = Frame { left, top: bottom - 9.0, width: 14.0, height: 9.0 }.outline();
-            out.push(Shape::Area { points, fill: surface.colour, opacity: surface.opacity.max(0.4) });
-            out.push(Shape::text((left + 20.0, bottom), &surface.level.to_string(), TICK_SIZE - 1.0, Anchor::Start));
+            let points = Frame {
+                left,
+                top: bottom - 9.0,
+                width: 14.0,
+                height: 9.0,
+            }
+            .outline();
+            out.push(Shape::Area {
+                points,
+                fill: surface.colour,
+                opacity: surface.opacity.max(0.4),
+            });
+            out.push(Shape::text(
+                (left + 20.0, bottom),
+                &surface.level.to_string(),
+                TICK_SIZE - 1.0,
+                Anchor::Start,
+            ));
         }
         Ok(())
     }
@@ -159,37 +217,48 @@ impl IsosurfacePlot {
     fn pixels(&self, camera: &Camera, [width, height]: [u32; 2]) -> OutputResult<Pixmap> {
         let levels: Vec<f64> = self.surfaces.iter().map(|s| s.level).collect();
         let mut rgba = vec![0; 4 * width as usize * height as usize];
-        rgba.as_chunks_mut::<4>().0.par_iter_mut().enumerate().for_each(|(place, pixel)| {
-            let (row, column) = (place / width as usize, place % width as usize);
-            let [(left_m, _), (_, top_m)] = camera.range_m;
-            let [across_m, up_m] = camera.size_m();
-            let a = left_m + (column as f64 + 0.5) / f64::from(width) * across_m;
-            let b = top_m - (row as f64 + 0.5) / f64::from(height) * up_m;
-            let from_m = std::array::from_fn(|d| a * camera.right[d] + b * camera.up[d]);
-            *pixel = self.pixel(camera, from_m, &levels);
-        });
+        rgba.as_chunks_mut::<4>()
+            .0
+            .par_iter_mut()
+            .enumerate()
+            .for_each(|(place, pixel)| {
+                let (row, column) = (place / width as usize, place % width as usize);
+                let [(left_m, _), (_, top_m)] = camera.range_m;
+                let [across_m, up_m] = camera.size_m();
+                let a = left_m + (column as f64 + 0.5) / f64::from(width) * across_m;
+                let b = top_m - (row as f64 + 0.5) / f64::from(height) * up_m;
+                let from_m = std::array::from_fn(|d| a * camera.right[d] + b * camera.up[d]);
+                *pixel = self.pixel(camera, from_m, &levels);
+            });
         pixels(width, height, rgba)
     }
 
     /// What a ray gathers of surfaces that let some of the light pass: colours times the opacity, and the opacity.
     fn pixel(&self, camera: &Camera, from_m: [f64; 3], levels: &[f64]) -> [u8; 4] {
         // A lamp above the eye's left shoulder.
-        let lamp: [f64; 3] =
-            std::array::from_fn(|d| -0.75 * camera.into[d] + 0.55 * camera.up[d] - 0.37 * camera.right[d]);
-        let mut met = [0.0; 4];
-        self.volume.cast(from_m, camera.into, levels, |_, level, normal| {
-            let surface = &self.surfaces[level];
-            // Both sides of a surface are lit.
-            let facing = if dot(normal, camera.into) > 0.0 { -1.0 } else { 1.0 };
-            let lit = (facing * dot(normal, lamp)).max(0.0);
-            let share = (1.0 - met[3]) * surface.opacity;
-            for (sum, colour) in met.iter_mut().zip(surface.colour) {
-                let light = f64::from(colour) / 255.0 * (0.35 + 0.65 * lit) + 0.35 * lit.powi(30);
-                *sum += share * light.min(1.0);
-            }
-            met[3] += share;
-            met[3] < OPAQUE
+        let lamp: [f64; 3] = std::array::from_fn(|d| {
+            -0.75 * camera.into[d] + 0.55 * camera.up[d] - 0.37 * camera.right[d]
         });
+        let mut met = [0.0; 4];
+        self.volume
+            .cast(from_m, camera.into, levels, |_, level, normal| {
+                let surface = &self.surfaces[level];
+                // Both sides of a surface are lit.
+                let facing = if dot(normal, camera.into) > 0.0 {
+                    -1.0
+                } else {
+                    1.0
+                };
+                let lit = (facing * dot(normal, lamp)).max(0.0);
+                let share = (1.0 - met[3]) * surface.opacity;
+                for (sum, colour) in met.iter_mut().zip(surface.colour) {
+                    let light =
+                        f64::from(colour) / 255.0 * (0.35 + 0.65 * lit) + 0.35 * lit.powi(30);
+                    *sum += share * light.min(1.0);
+                }
+                met[3] += share;
+                met[3] < OPAQUE
+            });
         met.map(|part| (255.0 * part).round() as u8)
     }
 }
@@ -216,23 +285,37 @@ impl Volume {
         for (name, axis) in ["x axis", "y axis", "z axis"].into_iter().zip(&axis_m) {
             increasing(name, axis)?;
             if axis.len() < 2 {
-                return Err(OutputError::value(name, axis.len(), "at least two positions"));
+                return Err(OutputError::value(
+                    name,
+                    axis.len(),
+                    "at least two positions",
+                ));
             }
         }
-        same_length("values", values.len(), "the points", axis_m.iter().map(Vec::len).product())?;
+        same_length(
+            "values",
+            values.len(),
+            "the points",
+            axis_m.iter().map(Vec::len).product(),
+        )?;
         Ok(Self { axis_m, values })
     }
 
     /// Low and high corner \[m\].
     fn corners_m(&self) -> [[f64; 3]; 2] {
-        [self.axis_m.each_ref().map(|axis| axis[0]), self.axis_m.each_ref().map(|axis| axis[axis.len() - 1])]
+        [
+            self.axis_m.each_ref().map(|axis| axis[0]),
+            self.axis_m.each_ref().map(|axis| axis[axis.len() - 1]),
+        ]
     }
 
     /// The cell of a position, the nearest one outside.
     fn cell(&self, at_m: [f64; 3]) -> [usize; 3] {
         std::array::from_fn(|d| {
             let axis = &self.axis_m[d];
-            axis.partition_point(|a| *a <= at_m[d]).clamp(1, axis.len() - 1) - 1
+            axis.partition_point(|a| *a <= at_m[d])
+                .clamp(1, axis.len() - 1)
+                - 1
         })
     }
 
@@ -254,7 +337,11 @@ impl Volume {
         let [a, b, c, d, e, f, g, h] = self.corners(cell).map(f64::from);
         let [low_low, high_low, low_high, high_high] =
             [(a, b), (c, d), (e, f), (g, h)].map(|(a, b)| between(a, b, part(0)));
-        between(between(low_low, high_low, part(1)), between(low_high, high_high, part(1)), part(2))
+        between(
+            between(low_low, high_low, part(1)),
+            between(low_high, high_high, part(1)),
+            part(2),
+        )
     }
 
     /// The interpolant; positions outside are moved to the nearest face.
@@ -273,7 +360,10 @@ impl Volume {
                 }
                 continue;
             }
-            let (a, b) = ((low[d] - from_m[d]) / along[d], (high[d] - from_m[d]) / along[d]);
+            let (a, b) = (
+                (low[d] - from_m[d]) / along[d],
+                (high[d] - from_m[d]) / along[d],
+            );
             span = (span.0.max(a.min(b)), span.1.min(a.max(b)));
         }
         (span.0 < span.1).then_some(span)
@@ -288,20 +378,24 @@ impl Volume {
         levels: &[f64],
         mut met: impl FnMut(f64, usize, [f64; 3]) -> bool,
     ) {
-        let Some((mut start, end)) = self.span_m(from_m, along) else { return };
+        let Some((mut start, end)) = self.span_m(from_m, along) else {
+            return;
+        };
         let on_ray = |t: f64| [0, 1, 2].map(|d| from_m[d] + t * along[d]);
         let mut cell = self.cell(on_ray(start));
         while start < end {
             // The face through which the ray leaves the cell.
             let mut leaves = (end, 0);
             for d in 0..3 {
-                let face = (self.axis_m[d][cell[d] + usize::from(along[d] > 0.0)] - from_m[d]) / along[d];
+                let face =
+                    (self.axis_m[d][cell[d] + usize::from(along[d] > 0.0)] - from_m[d]) / along[d];
                 if along[d].abs() >= 1e-12 && face < leaves.0 {
                     leaves = (face.max(start), d);
                 }
             }
             let corners = self.corners(cell).map(f64::from);
-            let is_crossed = |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
+            let is_crossed =
+                |level: &f64| corners.iter().any(|v| (v < level) != (corners[0] < *level));
             if levels.iter().any(is_crossed) {
                 for (at_m, level) in self.crossings(cell, on_ray, (start, leaves.0), levels) {
                     if !met(at_m, level, self.normal(on_ray(at_m))) {
@@ -329,7 +423,8 @@ impl Volume {
     ) -> Vec<(f64, usize)> {
         let is_below = |t: f64, wanted: f64| self.within(cell, on_ray(t)) < wanted;
         let place = |step: u32| start + f64::from(step) / f64::from(STEPS) * (end - start);
-        let steps = (0..STEPS).flat_map(|step| levels.iter().enumerate().map(move |level| (step, level)));
+        let steps =
+            (0..STEPS).flat_map(|step| levels.iter().enumerate().map(move |level| (step, level)));
         let crossing = |(step, (level, &wanted)): (u32, (usize, &f64))| {
             let (mut low, mut high) = (place(step), place(step + 1));
             let below = is_below(low, wanted);
@@ -338,7 +433,11 @@ impl Volume {
             }
             for _ in 0..BISECTIONS {
                 let middle = 0.5 * (low + high);
-                if is_below(middle, wanted) == below { low = middle } else { high = middle }
+                if is_below(middle, wanted) == below {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
             Some((0.5 * (low + high), level))
         };
@@ -357,7 +456,11 @@ impl Volume {
             (self.at(low) - self.at(high)) / reach_m
         });
         let length = slope.iter().map(|s| s * s).sum::<f64>().sqrt();
-        if length > 0.0 { slope.map(|s| s / length) } else { [0.0, 0.0, 1.0] }
+        if length > 0.0 {
+            slope.map(|s| s / length)
+        } else {
+            [0.0, 0.0, 1.0]
+        }
     }
 }
 
@@ -369,7 +472,11 @@ mod tests {
     use crate::io::provenance::example;
 
     fn plot(surfaces: &[(f64, Rgb, f64)]) -> IsosurfacePlot {
-        let surface = |&(level, colour, opacity): &(f64, Rgb, f64)| Surface { level, colour, opacity };
+        let surface = |&(level, colour, opacity): &(f64, Rgb, f64)| Surface {
+            level,
+            colour,
+            opacity,
+        };
         IsosurfacePlot {
             title: "sphere".into(),
             volume: cone(40),
@@ -384,13 +491,21 @@ mod tests {
         let plot = plot(&[(-0.7, blue, 1.0), (-0.3, [200, 0, 0], 1.0)]);
         let camera = plot.camera();
         let [across, up] = camera.size_m();
-        let picture = plot.pixels(&camera, [300, (300.0 * up / across).round() as u32]).unwrap();
+        let picture = plot
+            .pixels(&camera, [300, (300.0 * up / across).round() as u32])
+            .unwrap();
         let pixels = picture.data().as_chunks::<4>().0;
         let covered = pixels.iter().filter(|p| p[3] == 255).count() as f64;
         let area_m2 = covered * (across / 300.0).powi(2);
         let shadow_m2 = std::f64::consts::PI * 0.49;
-        assert!((area_m2 / shadow_m2 - 1.0).abs() < 0.01, "{area_m2} against {shadow_m2}");
-        assert!(pixels.iter().all(|p| p[3] == 0 || p[2] > p[0]), "the inner sphere is not seen");
+        assert!(
+            (area_m2 / shadow_m2 - 1.0).abs() < 0.01,
+            "{area_m2} against {shadow_m2}"
+        );
+        assert!(
+            pixels.iter().all(|p| p[3] == 0 || p[2] > p[0]),
+            "the inner sphere is not seen"
+        );
         // Light comes from above.
         let rows: Vec<&[[u8; 4]]> = pixels.chunks(300).collect();
         let row = |part: f64| rows[(part * rows.len() as f64) as usize][150][2];
@@ -402,7 +517,10 @@ mod tests {
         let plot = plot(&[(-0.7, [0, 0, 200], 0.3), (-0.3, [200, 0, 0], 1.0)]);
         let picture = plot.pixels(&plot.camera(), [120, 120]).unwrap();
         let centre = picture.data().as_chunks::<4>().0[60 * 120 + 60];
-        assert!(centre[0] > centre[2] && centre[2] > 20 && centre[3] == 255, "{centre:?}");
+        assert!(
+            centre[0] > centre[2] && centre[2] > 20 && centre[3] == 255,
+            "{centre:?}"
+        );
     }
 
     #[test]
@@ -411,8 +529,16 @@ mod tests {
         let good = figure(plot(&[(-0.5, [0, 0, 200], 0.5)]));
         assert_eq!(good.png(&example()).unwrap(), good.png(&example()).unwrap());
         assert!(good.svg(&example()).unwrap().contains("<image"));
-        assert!(figure(plot(&[(f64::NAN, [0, 0, 0], 1.0)])).png(&example()).is_err());
-        assert!(figure(plot(&[(-0.5, [0, 0, 0], 2.0)])).png(&example()).is_err());
+        assert!(
+            figure(plot(&[(f64::NAN, [0, 0, 0], 1.0)]))
+                .png(&example())
+                .is_err()
+        );
+        assert!(
+            figure(plot(&[(-0.5, [0, 0, 0], 2.0)]))
+                .png(&example())
+                .is_err()
+        );
     }
 }
 
@@ -421,7 +547,10 @@ mod volume_tests {
     use super::*;
 
     fn axis(n: usize, stretch: f64) -> Vec<f64> {
-        (0..n).map(|i| i as f64 / (n - 1) as f64).map(|s| -1.0 + 2.0 * s.powf(stretch)).collect()
+        (0..n)
+            .map(|i| i as f64 / (n - 1) as f64)
+            .map(|s| -1.0 + 2.0 * s.powf(stretch))
+            .collect()
     }
 
     /// Minus the distance from the origin.
@@ -451,9 +580,15 @@ mod volume_tests {
         let volume = Volume::new(axes, values).unwrap();
         for i in 0..200 {
             let [x, y, z] = [0.618, 0.755, 0.57].map(|step| -1.0 + 2.0 * (i as f64 * step).fract());
-            assert!((volume.at([x, y, z]) - field(x, y, z)).abs() < 1e-6, "{x} {y} {z}");
+            assert!(
+                (volume.at([x, y, z]) - field(x, y, z)).abs() < 1e-6,
+                "{x} {y} {z}"
+            );
         }
-        assert!((volume.at([9.0, 9.0, 9.0]) - field(1.0, 1.0, 1.0)).abs() < 1e-6, "outside: the nearest face");
+        assert!(
+            (volume.at([9.0, 9.0, 9.0]) - field(1.0, 1.0, 1.0)).abs() < 1e-6,
+            "outside: the nearest face"
+        );
     }
 
     #[test]
@@ -483,9 +618,14 @@ mod volume_tests {
         let levels = [-0.5, -0.8, -1.1];
         let mut all = 0;
         for ray in 0..200 {
-            let [a, b, c] = [0.618, 0.755, 0.57].map(|part| 2.0 * (f64::from(ray) * part).fract() - 1.0);
+            let [a, b, c] =
+                [0.618, 0.755, 0.57].map(|part| 2.0 * (f64::from(ray) * part).fract() - 1.0);
             let length = (a * a + b * b + 1.0_f64).sqrt();
-            let along = [a / length, b / length, if ray % 2 == 0 { 1.0 } else { -1.0 } / length];
+            let along = [
+                a / length,
+                b / length,
+                if ray % 2 == 0 { 1.0 } else { -1.0 } / length,
+            ];
             let from = [c, -a, 0.3 * b];
             let mut met = Vec::new();
             volume.cast(from, along, &levels, |at_m, level, _| {
@@ -497,18 +637,24 @@ mod volume_tests {
                 continue;
             };
             let at = |step: u32| start + f64::from(step) * 1e-3 * (end - start);
-            let value = |step: u32| volume.at(std::array::from_fn(|d| from[d] + at(step) * along[d]));
+            let value =
+                |step: u32| volume.at(std::array::from_fn(|d| from[d] + at(step) * along[d]));
             let values: Vec<f64> = (0..=1000).map(value).collect();
             let mut expected = Vec::new();
             for (step, pair) in (0..).zip(values.windows(2)) {
-                let crossed =
-                    levels.iter().enumerate().filter(|(_, wanted)| (pair[0] < **wanted) != (pair[1] < **wanted));
+                let crossed = levels
+                    .iter()
+                    .enumerate()
+                    .filter(|(_, wanted)| (pair[0] < **wanted) != (pair[1] < **wanted));
                 expected.extend(crossed.map(|(level, _)| (level, at(step))));
             }
             assert_eq!(met.len(), expected.len(), "ray {ray}");
             for ((level, at_m), (expected, from_m)) in met.iter().zip(&expected) {
                 let near = (from_m - 1e-9..=from_m + 1.001e-3 * (end - start)).contains(at_m);
-                assert!(level == expected && near, "ray {ray}: {at_m} after {from_m}");
+                assert!(
+                    level == expected && near,
+                    "ray {ray}: {at_m} after {from_m}"
+                );
             }
             all += met.len();
         }

@@ -53,19 +53,32 @@ impl MapPlot {
     pub fn new(map: &VelocityMap, sweep: usize, field: &str) -> OutputResult<Self> {
         map.check()?;
         if sweep >= map.sweeps.len() {
-            return Err(OutputError::value("sweep", sweep, format!("below {}", map.sweeps.len())));
+            return Err(OutputError::value(
+                "sweep",
+                sweep,
+                format!("below {}", map.sweeps.len()),
+            ));
         }
         let field = map.field(field).ok_or_else(|| OutputError::Missing {
             what: format!("field {field}"),
             needed: "the map must have the field that is to be drawn".into(),
         })?;
-        let from_above = matches!(map.sweeps[sweep].mode, SweepMode::AzimuthSurveillance | SweepMode::Sector);
+        let from_above = matches!(
+            map.sweeps[sweep].mode,
+            SweepMode::AzimuthSurveillance | SweepMode::Sector
+        );
         let cells = Cells::of_sweep(map, sweep, from_above, |r, g| field.values[[r, g]]);
-        let is_signed = field.name.starts_with("v_") || field.name == "radial_velocity" || field.name == "bias";
+        let is_signed =
+            field.name.starts_with("v_") || field.name == "radial_velocity" || field.name == "bias";
         let ((left, right), _) = cells.extent_m();
         let show_lidar = !from_above && left - map.lidar_y_m < 0.5 * (right - left);
         let plot = Self::of_cells(cells, &bar_label(&field.long_name, field.unit), is_signed);
-        Ok(Self { title: map.title.clone(), show_lidar, from_above, ..plot })
+        Ok(Self {
+            title: map.title.clone(),
+            show_lidar,
+            from_above,
+            ..plot
+        })
     }
 
     /// The picture of a field on a cross-plane; signed fields get symmetric colours.
@@ -129,7 +142,11 @@ impl MapPlot {
     pub(crate) fn draw(&self, cell: Frame, font: &Font, out: &mut Vec<Shape>) -> OutputResult<()> {
         let (low, high) = self.colours.range();
         if !(low < high && low.is_finite() && high.is_finite()) {
-            return Err(OutputError::value("range of colours", format!("{low} to {high}"), "finite and increasing"));
+            return Err(OutputError::value(
+                "range of colours",
+                format!("{low} to {high}"),
+                "finite and increasing",
+            ));
         }
         let frame = inner(cell, RIGHT, &self.title);
         let (y_m, z_m) = self.fitted(&frame);
@@ -137,23 +154,51 @@ impl MapPlot {
             true => ["across the flight [m]", "along the flight [m]"],
             false => ["distance [m]", "height [m]"],
         };
-        let scale = |label, range, paper| Scale { label, range, log: false, paper };
+        let scale = |label, range, paper| Scale {
+            label,
+            range,
+            log: false,
+            paper,
+        };
         let x = scale(x_label, y_m, (frame.left, frame.right()));
         let y = scale(y_label, z_m, (frame.bottom(), frame.top));
-        let size = ((frame.width * DENSITY) as u32, (frame.height * DENSITY) as u32);
-        let mut content = vec![Shape::Image { frame, pixels: self.cells.pixels(y_m, z_m, size, &self.colours)? }];
+        let size = (
+            (frame.width * DENSITY) as u32,
+            (frame.height * DENSITY) as u32,
+        );
+        let mut content = vec![Shape::Image {
+            frame,
+            pixels: self.cells.pixels(y_m, z_m, size, &self.colours)?,
+        }];
         if !self.from_above {
-            let ground = Frame { top: y.place(0.0), height: frame.bottom() - y.place(0.0), ..frame };
+            let ground = Frame {
+                top: y.place(0.0),
+                height: frame.bottom() - y.place(0.0),
+                ..frame
+            };
             content.insert(0, Shape::area(ground.outline(), GROUND));
-            content.push(Shape::line([(frame.left, ground.top), (frame.right(), ground.top)], INK, 1.4));
+            content.push(Shape::line(
+                [(frame.left, ground.top), (frame.right(), ground.top)],
+                INK,
+                1.4,
+            ));
         }
         self.push_marks(&x, &y, &mut content);
         panel(&frame, [&x, &y], &self.title, content, font, out);
-        let bar = Frame { left: frame.right() + 18.0, width: 18.0, ..frame };
-        let rows = (0..BAR.1).map(|row| high - (f64::from(row) + 0.5) / f64::from(BAR.1) * (high - low));
-        let rgba =
-            rows.map(|value| self.colours.colour(value)).flat_map(|[r, g, b]| [r, g, b, 255].repeat(BAR.0 as usize));
-        out.push(Shape::Image { frame: bar, pixels: pixels(BAR.0, BAR.1, rgba.collect())? });
+        let bar = Frame {
+            left: frame.right() + 18.0,
+            width: 18.0,
+            ..frame
+        };
+        let rows =
+            (0..BAR.1).map(|row| high - (f64::from(row) + 0.5) / f64::from(BAR.1) * (high - low));
+        let rgba = rows
+            .map(|value| self.colours.colour(value))
+            .flat_map(|[r, g, b]| [r, g, b, 255].repeat(BAR.0 as usize));
+        out.push(Shape::Image {
+            frame: bar,
+            pixels: pixels(BAR.0, BAR.1, rgba.collect())?,
+        });
         out.push(Shape::line(bar.outline(), INK, 1.2));
         let scale = scale(&self.bar_label, (low, high), (bar.bottom(), bar.top));
         axis(Side::Right, &scale, &bar, font, out);
@@ -166,7 +211,10 @@ impl MapPlot {
         let unit = ((y.1 - y.0) / frame.width).max((z.1 - z.0) / frame.height);
         let extra = unit * frame.width - (y.1 - y.0);
         // Room above, not below the ground.
-        ((y.0 - 0.5 * extra, y.1 + 0.5 * extra), (z.0, z.0 + unit * frame.height))
+        (
+            (y.0 - 0.5 * extra, y.1 + 0.5 * extra),
+            (z.0, z.0 + unit * frame.height),
+        )
     }
 
     fn push_marks(&self, x: &Scale<'_>, y: &Scale<'_>, out: &mut Vec<Shape>) {
@@ -174,13 +222,22 @@ impl MapPlot {
             // A tripod on the ground, large enough to be seen when the telescope is low.
             let (at, ground) = (x.place(lidar_m.0), y.place(0.0));
             let apex = (at, y.place(lidar_m.1).min(ground - 13.0));
-            out.push(Shape::area([apex, (at - 8.0, ground), (at + 8.0, ground)], INK));
-            out.push(Shape::text((at + 13.0, ground - 4.0), "lidar", TICK_SIZE, Anchor::Start));
+            out.push(Shape::area(
+                [apex, (at - 8.0, ground), (at + 8.0, ground)],
+                INK,
+            ));
+            out.push(Shape::text(
+                (at + 13.0, ground - 4.0),
+                "lidar",
+                TICK_SIZE,
+                Anchor::Start,
+            ));
         }
         for p in &self.points_m {
             let (px, py) = (x.place(p.0), y.place(p.1));
             for (colour, width) in [([255, 255, 255], 4.5), (INK, 2.0)] {
-                let arm = |d: f64| Shape::line([(px - 7.0, py - d), (px + 7.0, py + d)], colour, width);
+                let arm =
+                    |d: f64| Shape::line([(px - 7.0, py - d), (px + 7.0, py + d)], colour, width);
                 out.extend([7.0, -7.0].map(arm));
             }
         }
@@ -192,13 +249,24 @@ fn colours_for(values: &[f64], is_signed: bool) -> ColourMap {
     let (low, high) = extremes(values.iter().copied().filter(|v| v.is_finite()));
     if is_signed {
         let largest = high.max(-low);
-        let limit = if largest > 0.0 && largest.is_finite() { round_up(largest) } else { 1.0 };
+        let limit = if largest > 0.0 && largest.is_finite() {
+            round_up(largest)
+        } else {
+            1.0
+        };
         return ColourMap::Diverging { limit };
     }
     if low > high {
-        return ColourMap::Sequential { low: 0.0, high: 1.0 };
+        return ColourMap::Sequential {
+            low: 0.0,
+            high: 1.0,
+        };
     }
-    let low = if low >= 0.0 && low < 0.5 * high { 0.0 } else { low };
+    let low = if low >= 0.0 && low < 0.5 * high {
+        0.0
+    } else {
+        low
+    };
     let high = if high > low { high } else { low + 1.0 };
     ColourMap::Sequential { low, high }
 }
@@ -211,7 +279,11 @@ fn round_up(value: f64) -> f64 {
 fn bar_label(long_name: &str, unit: Unit) -> String {
     // The part after a comma explains the sign; a colour bar shows it.
     let short = long_name.split(',').next().unwrap_or(long_name);
-    if unit == Unit::ONE { short.into() } else { format!("{short} [{}]", unit.label) }
+    if unit == Unit::ONE {
+        short.into()
+    } else {
+        format!("{short} [{}]", unit.label)
+    }
 }
 
 /// Cells of one sweep, or of a cross-plane.
@@ -230,22 +302,50 @@ pub struct Cells {
 impl Cells {
     /// Cells of a sweep of a map: `value` gives a number for (ray, gate). A sweep of azimuth is seen from above: across the flight
     /// to the right, along it upwards; ranges along the ground, angles from the right.
-    fn of_sweep(map: &VelocityMap, sweep: usize, from_above: bool, value: impl Fn(usize, usize) -> f64) -> Self {
+    fn of_sweep(
+        map: &VelocityMap,
+        sweep: usize,
+        from_above: bool,
+        value: impl Fn(usize, usize) -> f64,
+    ) -> Self {
         let (x_m, x_azimuth_rad) = map.flight.unwrap_or_default();
         let mut rays: Vec<(f64, usize)> = Vec::new();
-        for (number, ray) in map.rays.iter().enumerate().filter(|(_, ray)| ray.sweep == sweep) {
+        for (number, ray) in map
+            .rays
+            .iter()
+            .enumerate()
+            .filter(|(_, ray)| ray.sweep == sweep)
+        {
             let from_right_rad = FRAC_PI_2 - (ray.azimuth_rad - x_azimuth_rad);
-            rays.push((if from_above { from_right_rad } else { ray.elevation_rad }, number));
+            rays.push((
+                if from_above {
+                    from_right_rad
+                } else {
+                    ray.elevation_rad
+                },
+                number,
+            ));
         }
         rays.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let turns = rays.first().map_or(0.0, |first| ((first.0 + PI) / TAU).floor() * TAU);
+        let turns = rays
+            .first()
+            .map_or(0.0, |first| ((first.0 + PI) / TAU).floor() * TAU);
         let angles_rad: Vec<f64> = rays.iter().map(|ray| ray.0 - turns).collect();
-        let mean_rad = rays.iter().map(|ray| map.rays[ray.1].elevation_rad).sum::<f64>() / rays.len().max(1) as f64;
+        let mean_rad = rays
+            .iter()
+            .map(|ray| map.rays[ray.1].elevation_rad)
+            .sum::<f64>()
+            / rays.len().max(1) as f64;
         let part = if from_above { mean_rad.cos() } else { 1.0 };
         let ranges_m: Vec<f64> = map.range_m.iter().map(|range_m| part * range_m).collect();
-        let cells = rays.iter().flat_map(|&(_, ray)| (0..ranges_m.len()).map(move |gate| (ray, gate)));
+        let cells = rays
+            .iter()
+            .flat_map(|&(_, ray)| (0..ranges_m.len()).map(move |gate| (ray, gate)));
         Self {
-            lidar_m: Some((map.lidar_y_m, if from_above { x_m } else { map.lidar_height_m })),
+            lidar_m: Some((
+                map.lidar_y_m,
+                if from_above { x_m } else { map.lidar_height_m },
+            )),
             first_edge_m: edges(&ranges_m, 0.5 * ranges_m[0]),
             second_edge: edges(&angles_rad, 0.005),
             values: cells.map(|(ray, gate)| value(ray, gate)).collect(),
@@ -254,7 +354,12 @@ impl Cells {
 
     /// Cells of a cross-plane about the centres `y_m` and `z_m` \[m\], increasing, with values `[z, y]`.
     pub fn of_plane(y_m: &[f64], z_m: &[f64], values: Vec<f64>) -> Self {
-        Self { lidar_m: None, first_edge_m: edges(y_m, 0.5), second_edge: edges(z_m, 0.5), values }
+        Self {
+            lidar_m: None,
+            first_edge_m: edges(y_m, 0.5),
+            second_edge: edges(z_m, 0.5),
+            values,
+        }
     }
 
     /// Value at a point; `None` outside the cells, NaN where it is missing.
@@ -276,18 +381,33 @@ impl Cells {
             let above = edges.partition_point(|edge| *edge <= value);
             (above > 0 && above < edges.len()).then(|| above - 1)
         };
-        Some(cell(&self.second_edge, second)? * (self.first_edge_m.len() - 1) + cell(&self.first_edge_m, first)?)
+        Some(
+            cell(&self.second_edge, second)? * (self.first_edge_m.len() - 1)
+                + cell(&self.first_edge_m, first)?,
+        )
     }
 
     /// Box around all cells: (left, right), (lowest, highest), m.
     pub fn extent_m(&self) -> ((f64, f64), (f64, f64)) {
-        let ends = || self.first_edge_m.first().into_iter().chain(self.first_edge_m.last());
-        let corners = || self.second_edge.iter().flat_map(move |second| ends().map(move |first| (*first, *second)));
+        let ends = || {
+            self.first_edge_m
+                .first()
+                .into_iter()
+                .chain(self.first_edge_m.last())
+        };
+        let corners = || {
+            self.second_edge
+                .iter()
+                .flat_map(move |second| ends().map(move |first| (*first, *second)))
+        };
         let place = |(first, second): (f64, f64)| match self.lidar_m {
             Some((y_m, z_m)) => (y_m + first * second.cos(), z_m + first * second.sin()),
             None => (first, second),
         };
-        (extremes(corners().map(|c| place(c).0)), extremes(corners().map(|c| place(c).1)))
+        (
+            extremes(corners().map(|c| place(c).0)),
+            extremes(corners().map(|c| place(c).1)),
+        )
     }
 
     /// Picture of the box `y_m` x `z_m` with that many pixels; transparent outside the cells, the first row is the highest.
@@ -298,7 +418,11 @@ impl Cells {
         (width, height): (u32, u32),
         colours: &ColourMap,
     ) -> OutputResult<Pixmap> {
-        let of_cells: Vec<_> = self.values.iter().map(|value| colours.colour(*value)).collect();
+        let of_cells: Vec<_> = self
+            .values
+            .iter()
+            .map(|value| colours.colour(*value))
+            .collect();
         let mut rgba = Vec::with_capacity(4 * width as usize * height as usize);
         for row in 0..height {
             let z = z_m.1 - (f64::from(row) + 0.5) / f64::from(height) * (z_m.1 - z_m.0);
@@ -337,7 +461,10 @@ mod tests {
         assert_eq!(low, -high);
         assert!((7.0..=8.0).contains(&high), "{high}");
         let spread = MapPlot::new(&map, 0, "velocity_standard_deviation").unwrap();
-        assert!(matches!(spread.colours, ColourMap::Sequential { low: 0.0, .. }));
+        assert!(matches!(
+            spread.colours,
+            ColourMap::Sequential { low: 0.0, .. }
+        ));
         assert_eq!(velocity.bar_label, "exact radial velocity [m/s]");
     }
 
@@ -346,9 +473,18 @@ mod tests {
         let map = samples::map();
         let plot = MapPlot::new(&map, 0, "v_exact").unwrap();
         for height in [180.0, 400.0] {
-            let frame = Frame { left: 0.0, top: 0.0, width: 500.0, height };
+            let frame = Frame {
+                left: 0.0,
+                top: 0.0,
+                width: 500.0,
+                height,
+            };
             let (y, z) = plot.fitted(&frame);
-            approx::assert_relative_eq!((y.1 - y.0) / 500.0, (z.1 - z.0) / height, max_relative = 1e-12);
+            approx::assert_relative_eq!(
+                (y.1 - y.0) / 500.0,
+                (z.1 - z.0) / height,
+                max_relative = 1e-12
+            );
             assert!(z.0 <= 0.0 && z.1 >= plot.view_m().1.1 - 1e-9);
         }
         assert!(plot.show_lidar);
@@ -358,14 +494,23 @@ mod tests {
     fn limits_are_rounded_up() {
         approx::assert_relative_eq!(round_up(7.31), 7.4, max_relative = 1e-12);
         approx::assert_relative_eq!(round_up(0.5), 0.5, max_relative = 1e-12);
-        assert_eq!(colours_for(&[f64::NAN], true), ColourMap::Diverging { limit: 1.0 });
+        assert_eq!(
+            colours_for(&[f64::NAN], true),
+            ColourMap::Diverging { limit: 1.0 }
+        );
     }
 
     #[test]
     fn what_is_not_there_is_refused() {
         let map = samples::map();
-        assert!(matches!(MapPlot::new(&map, 0, "nothing"), Err(OutputError::Missing { .. })));
-        assert!(matches!(MapPlot::new(&map, 2, "v_exact"), Err(OutputError::Value { .. })));
+        assert!(matches!(
+            MapPlot::new(&map, 0, "nothing"),
+            Err(OutputError::Missing { .. })
+        ));
+        assert!(matches!(
+            MapPlot::new(&map, 2, "v_exact"),
+            Err(OutputError::Value { .. })
+        ));
     }
 }
 
@@ -382,13 +527,23 @@ mod cells_tests {
         let cells = Cells::of_sweep(&map, 1, false, |r, g| field.values[[r, g]]);
         for ray in 6..12 {
             for gate in 0..map.range_m.len() {
-                let found = cells.at(map.place_m(ray, gate)[1], map.place_m(ray, gate)[2]).unwrap();
+                let found = cells
+                    .at(map.place_m(ray, gate)[1], map.place_m(ray, gate)[2])
+                    .unwrap();
                 let expected = field.values[[ray, gate]];
                 assert!(found == expected || (found.is_nan() && expected.is_nan()));
             }
         }
-        assert_eq!(cells.at(map.lidar_y_m + 10.0, map.lidar_height_m + 0.5), None, "before the first gate");
-        assert_eq!(cells.at(map.lidar_y_m + 100.0, map.lidar_height_m + 50.0), None, "above the scan");
+        assert_eq!(
+            cells.at(map.lidar_y_m + 10.0, map.lidar_height_m + 0.5),
+            None,
+            "before the first gate"
+        );
+        assert_eq!(
+            cells.at(map.lidar_y_m + 100.0, map.lidar_height_m + 50.0),
+            None,
+            "above the scan"
+        );
     }
 
     #[test]
@@ -396,9 +551,13 @@ mod cells_tests {
         let mut map = samples::map();
         map.flight = Some((5.0, 0.3));
         let turn = |i: usize| TAU * i as f64 / 6.0;
-        (0..6).for_each(|i| (map.rays[i].azimuth_rad, map.rays[i].elevation_rad) = (0.2 + turn(i), 0.4));
+        (0..6).for_each(|i| {
+            (map.rays[i].azimuth_rad, map.rays[i].elevation_rad) = (0.2 + turn(i), 0.4)
+        });
         let cells = Cells::of_sweep(&map, 0, true, |r, g| (10 * r + g) as f64);
-        for (ray, gate) in (0..6).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate))) {
+        for (ray, gate) in
+            (0..6).flat_map(|ray| (0..map.range_m.len()).map(move |gate| (ray, gate)))
+        {
             assert_eq!(
                 cells.at(map.place_m(ray, gate)[1], map.place_m(ray, gate)[0]),
                 Some((10 * ray + gate) as f64),
@@ -418,7 +577,11 @@ mod cells_tests {
 
     #[test]
     fn cells_of_a_plane_reach_half_way_to_their_neighbours() {
-        let cells = Cells::of_plane(&[0.0, 1.0, 3.0], &[1.0, 2.0], vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        let cells = Cells::of_plane(
+            &[0.0, 1.0, 3.0],
+            &[1.0, 2.0],
+            vec![1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+        );
         assert_eq!(cells.at(-0.4, 0.6), Some(1.0));
         assert_eq!(cells.at(1.9, 1.4), Some(2.0));
         assert_eq!(cells.at(2.1, 1.6), Some(6.0));
@@ -435,10 +598,18 @@ mod cells_tests {
             second_edge: vec![0.0, 0.5, 1.0],
             values: vec![1.0, 2.0, 3.0, f64::NAN],
         };
-        let colours = ColourMap::Sequential { low: 0.0, high: 3.0 };
-        let picture = cells.pixels((0.0, 30.0), (0.0, 30.0), (300, 300), &colours).unwrap();
+        let colours = ColourMap::Sequential {
+            low: 0.0,
+            high: 3.0,
+        };
+        let picture = cells
+            .pixels((0.0, 30.0), (0.0, 30.0), (300, 300), &colours)
+            .unwrap();
         let pixel = |range: f64, angle: f64| {
-            let (column, row) = (range * angle.cos() * 10.0, 299.0 - range * angle.sin() * 10.0);
+            let (column, row) = (
+                range * angle.cos() * 10.0,
+                299.0 - range * angle.sin() * 10.0,
+            );
             let at = picture.pixel(column as u32, row as u32).unwrap();
             [at.red(), at.green(), at.blue(), at.alpha()]
         };

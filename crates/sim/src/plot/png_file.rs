@@ -7,8 +7,8 @@ use super::drawing::{Drawing, INK, Shape, Text};
 use super::font::Font;
 use crate::io::{OutputError, OutputResult, Provenance};
 use tiny_skia::{
-    Color, FillRule, FilterQuality, IntSize, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap, PixmapPaint, Stroke,
-    StrokeDash, Transform,
+    Color, FillRule, FilterQuality, IntSize, LineJoin, Mask, Paint, Path, PathBuilder, Pixmap,
+    PixmapPaint, Stroke, StrokeDash, Transform,
 };
 
 /// Pixels per drawing unit.
@@ -18,11 +18,22 @@ const EMBOLDEN: f64 = 0.022;
 
 /// The pixels of a drawing, none of them transparent.
 pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Pixmap> {
-    let [width, height] = [drawing.width, drawing.height].map(|length| (length * SCALE).round() as u32);
-    let refuse = || OutputError::value("picture size", format!("{width} x {height}"), "1 to 32767 pixels each");
+    let [width, height] =
+        [drawing.width, drawing.height].map(|length| (length * SCALE).round() as u32);
+    let refuse = || {
+        OutputError::value(
+            "picture size",
+            format!("{width} x {height}"),
+            "1 to 32767 pixels each",
+        )
+    };
     let mut pixmap = Pixmap::new(width, height).ok_or_else(refuse)?;
     pixmap.fill(Color::WHITE);
-    let mut painter = Painter { pixmap, font: Font::load()?, mask: None };
+    let mut painter = Painter {
+        pixmap,
+        font: Font::load()?,
+        mask: None,
+    };
     painter.shapes(&drawing.shapes);
     Ok(painter.pixmap)
 }
@@ -30,9 +41,14 @@ pub(crate) fn paint(drawing: &Drawing) -> OutputResult<Pixmap> {
 /// Pixels, row by row from the top: red, green, blue, times the opacity, and the opacity.
 pub(crate) fn pixels(width: u32, height: u32, rgba: Vec<u8>) -> OutputResult<Pixmap> {
     let size = IntSize::from_wh(width, height);
-    size.and_then(|size| Pixmap::from_vec(rgba, size)).ok_or_else(|| {
-        OutputError::value("embedded picture", format!("{width} x {height}"), "4 bytes a pixel, at least one pixel")
-    })
+    size.and_then(|size| Pixmap::from_vec(rgba, size))
+        .ok_or_else(|| {
+            OutputError::value(
+                "embedded picture",
+                format!("{width} x {height}"),
+                "4 bytes a pixel, at least one pixel",
+            )
+        })
 }
 
 struct Painter {
@@ -47,19 +63,34 @@ impl Painter {
             match shape {
                 Shape::Line { points, pen } => {
                     let dash = StrokeDash::new(pen.dash.iter().map(|d| *d as f32).collect(), 0.0);
-                    let stroke =
-                        Stroke { width: pen.width as f32, line_join: LineJoin::Round, dash, ..Stroke::default() };
+                    let stroke = Stroke {
+                        width: pen.width as f32,
+                        line_join: LineJoin::Round,
+                        dash,
+                        ..Stroke::default()
+                    };
                     self.stroke(path(points), pen.colour, &stroke);
                 }
-                Shape::Area { points, fill, opacity } => self.fill(path(points), *fill, *opacity),
+                Shape::Area {
+                    points,
+                    fill,
+                    opacity,
+                } => self.fill(path(points), *fill, *opacity),
                 Shape::Text(text) => self.text(text),
                 Shape::Image { frame, pixels } => {
                     let [width, height] = [pixels.width(), pixels.height()].map(f64::from);
-                    let fit = Transform::from_scale((frame.width / width) as f32, (frame.height / height) as f32)
-                        .post_translate(frame.left as f32, frame.top as f32)
-                        .post_concat(scale());
-                    let how = PixmapPaint { quality: FilterQuality::Bilinear, ..PixmapPaint::default() };
-                    self.pixmap.draw_pixmap(0, 0, pixels.as_ref(), &how, fit, self.mask.as_ref());
+                    let fit = Transform::from_scale(
+                        (frame.width / width) as f32,
+                        (frame.height / height) as f32,
+                    )
+                    .post_translate(frame.left as f32, frame.top as f32)
+                    .post_concat(scale());
+                    let how = PixmapPaint {
+                        quality: FilterQuality::Bilinear,
+                        ..PixmapPaint::default()
+                    };
+                    self.pixmap
+                        .draw_pixmap(0, 0, pixels.as_ref(), &how, fit, self.mask.as_ref());
                 }
                 Shape::Clip { frame, shapes } => {
                     let mut mask = Mask::new(self.pixmap.width(), self.pixmap.height());
@@ -82,18 +113,37 @@ impl Painter {
         let path = outline.and_then(|path| path.transform(place.pre_translate(back as f32, 0.0)));
         self.fill(path.clone(), INK, 1.0);
         let part = if text.bold { 2.5 * EMBOLDEN } else { EMBOLDEN };
-        self.stroke(path, INK, &Stroke { width: (part * text.size) as f32, ..Stroke::default() });
+        self.stroke(
+            path,
+            INK,
+            &Stroke {
+                width: (part * text.size) as f32,
+                ..Stroke::default()
+            },
+        );
     }
 
     fn fill(&mut self, path: Option<Path>, colour: Rgb, opacity: f64) {
         if let Some(path) = path {
-            self.pixmap.fill_path(&path, &ink(colour, opacity), FillRule::Winding, scale(), self.mask.as_ref());
+            self.pixmap.fill_path(
+                &path,
+                &ink(colour, opacity),
+                FillRule::Winding,
+                scale(),
+                self.mask.as_ref(),
+            );
         }
     }
 
     fn stroke(&mut self, path: Option<Path>, colour: Rgb, stroke: &Stroke) {
         if let Some(path) = path {
-            self.pixmap.stroke_path(&path, &ink(colour, 1.0), stroke, scale(), self.mask.as_ref());
+            self.pixmap.stroke_path(
+                &path,
+                &ink(colour, 1.0),
+                stroke,
+                scale(),
+                self.mask.as_ref(),
+            );
         }
     }
 }
@@ -112,7 +162,11 @@ fn path(points: &[(f64, f64)]) -> Option<Path> {
     let mut builder = PathBuilder::with_capacity(points.len(), points.len());
     for (i, (x, y)) in points.iter().enumerate() {
         let (x, y) = (*x as f32, *y as f32);
-        if i == 0 { builder.move_to(x, y) } else { builder.line_to(x, y) }
+        if i == 0 {
+            builder.move_to(x, y)
+        } else {
+            builder.line_to(x, y)
+        }
     }
     builder.finish()
 }
@@ -126,7 +180,9 @@ pub(crate) fn encode(
     let refuse = |e: png::EncodingError| OutputError::unsupported("PNG", e);
     let mut pictures = pictures.into_iter();
     let count = pictures.len();
-    let first = pictures.next().ok_or_else(|| OutputError::value("figures", 0, "at least one"))??;
+    let first = pictures
+        .next()
+        .ok_or_else(|| OutputError::value("figures", 0, "at least one"))??;
     let size = (first.width(), first.height());
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, size.0, size.1);
@@ -135,7 +191,9 @@ pub(crate) fn encode(
     encoder.set_compression(png::Compression::Best);
     if count > 1 {
         encoder.set_animated(count as u32, 0).map_err(refuse)?;
-        encoder.set_frame_delay((1000.0 * frame_s).round() as u16, 1000).map_err(refuse)?;
+        encoder
+            .set_frame_delay((1000.0 * frame_s).round() as u16, 1000)
+            .map_err(refuse)?;
     }
     for (key, text) in provenance.map(Provenance::entries).into_iter().flatten() {
         encoder.add_itxt_chunk(key.into(), text).map_err(refuse)?;
@@ -145,9 +203,15 @@ pub(crate) fn encode(
         let picture = picture?;
         if (picture.width(), picture.height()) != size {
             let value = format!("{} x {}", picture.width(), picture.height());
-            return Err(OutputError::value("size of a figure", value, "that of the first"));
+            return Err(OutputError::value(
+                "size of a figure",
+                value,
+                "that of the first",
+            ));
         }
-        writer.write_image_data(&picture.take_demultiplied()).map_err(refuse)?;
+        writer
+            .write_image_data(&picture.take_demultiplied())
+            .map_err(refuse)?;
     }
     writer.finish().map_err(refuse)?;
     Ok(bytes)
@@ -161,23 +225,50 @@ mod tests {
     use crate::plot::{Axis, CurvePlot, Figure, Series, Style, apng};
 
     fn pixel(picture: &Pixmap, x: f64, y: f64) -> [u8; 3] {
-        let at = picture.pixel((x * SCALE) as u32, (y * SCALE) as u32).unwrap();
+        let at = picture
+            .pixel((x * SCALE) as u32, (y * SCALE) as u32)
+            .unwrap();
         [at.red(), at.green(), at.blue()]
     }
 
     #[test]
     fn areas_lines_and_images_land_where_they_should() {
-        let frame = Frame { left: 50.0, top: 10.0, width: 20.0, height: 20.0 };
+        let frame = Frame {
+            left: 50.0,
+            top: 10.0,
+            width: 20.0,
+            height: 20.0,
+        };
         // Upper row red, lower row blue.
-        let rgba = [[255, 0, 0, 255], [255, 0, 0, 255], [0, 0, 255, 255], [0, 0, 255, 255]].concat();
-        let picture = Frame { left: 10.0, top: 40.0, width: 20.0, height: 20.0 };
+        let rgba = [
+            [255, 0, 0, 255],
+            [255, 0, 0, 255],
+            [0, 0, 255, 255],
+            [0, 0, 255, 255],
+        ]
+        .concat();
+        let picture = Frame {
+            left: 10.0,
+            top: 40.0,
+            width: 20.0,
+            height: 20.0,
+        };
         let drawing = Drawing {
             width: 100.0,
             height: 80.0,
             shapes: vec![
-                Shape::area([(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)], [0, 128, 0]),
-                Shape::Clip { frame, shapes: vec![Shape::line([(30.0, 20.0), (90.0, 20.0)], [0, 0, 0], 4.0)] },
-                Shape::Image { frame: picture, pixels: pixels(2, 2, rgba).unwrap() },
+                Shape::area(
+                    [(0.0, 0.0), (20.0, 0.0), (20.0, 20.0), (0.0, 20.0)],
+                    [0, 128, 0],
+                ),
+                Shape::Clip {
+                    frame,
+                    shapes: vec![Shape::line([(30.0, 20.0), (90.0, 20.0)], [0, 0, 0], 4.0)],
+                },
+                Shape::Image {
+                    frame: picture,
+                    pixels: pixels(2, 2, rgba).unwrap(),
+                },
             ],
         };
         let raster = paint(&drawing).unwrap();
@@ -185,40 +276,62 @@ mod tests {
         assert_eq!(pixel(&raster, 10.0, 10.0), [0, 128, 0]);
         assert_eq!(pixel(&raster, 30.0, 10.0), [255, 255, 255]);
         assert_eq!(pixel(&raster, 60.0, 20.0), [0, 0, 0]);
-        assert_eq!(pixel(&raster, 40.0, 20.0), [255, 255, 255], "cut by the clip frame");
+        assert_eq!(
+            pixel(&raster, 40.0, 20.0),
+            [255, 255, 255],
+            "cut by the clip frame"
+        );
         let (top, bottom) = (pixel(&raster, 20.0, 43.0), pixel(&raster, 20.0, 57.0));
         assert!(top[0] > 200 && bottom[2] > 200, "{top:?} {bottom:?}");
     }
 
     #[test]
     fn provenance_is_in_the_chunks_and_the_bytes_do_not_change() {
-        let drawing = Drawing { width: 30.0, height: 20.0, shapes: vec![] };
+        let drawing = Drawing {
+            width: 30.0,
+            height: 20.0,
+            shapes: vec![],
+        };
         let png_bytes = || encode([paint(&drawing)], 0.0, Some(&example())).unwrap();
         let bytes = png_bytes();
         assert_eq!(bytes, png_bytes());
         let reader = png::Decoder::new(bytes.as_slice()).read_info().unwrap();
-        let chunks: Vec<(String, String)> =
-            reader.info().utf8_text.iter().map(|c| (c.keyword.clone(), c.get_text().unwrap())).collect();
+        let chunks: Vec<(String, String)> = reader
+            .info()
+            .utf8_text
+            .iter()
+            .map(|c| (c.keyword.clone(), c.get_text().unwrap()))
+            .collect();
         let expected = example().entries().map(|(k, t)| (k.to_owned(), t));
         assert_eq!(chunks, expected);
     }
 
     #[test]
     fn an_impossible_size_is_an_error() {
-        let drawing = Drawing { width: 0.0, height: 20.0, shapes: vec![] };
+        let drawing = Drawing {
+            width: 0.0,
+            height: 20.0,
+            shapes: vec![],
+        };
         assert!(matches!(paint(&drawing), Err(OutputError::Value { .. })));
     }
 
     fn figure(slope: f64, width: f64) -> Figure {
         let line = Series::new("", Style::Line, [(0.0, 0.0), (1.0, slope)]);
-        let mut figure = Figure::stacked([CurvePlot::new("", Axis::linear("t"), Axis::linear("q")).with(line)]);
+        let mut figure =
+            Figure::stacked([CurvePlot::new("", Axis::linear("t"), Axis::linear("q")).with(line)]);
         figure.width = width;
         figure
     }
 
     #[test]
     fn all_pictures_are_read_back_with_their_times() {
-        let bytes = apng(&[figure(1.0, 300.0), figure(2.0, 300.0), figure(5.0, 300.0)], 0.25, &example()).unwrap();
+        let bytes = apng(
+            &[figure(1.0, 300.0), figure(2.0, 300.0), figure(5.0, 300.0)],
+            0.25,
+            &example(),
+        )
+        .unwrap();
         let mut reader = png::Decoder::new(bytes.as_slice()).read_info().unwrap();
         assert_eq!(reader.info().animation_control.unwrap().num_frames, 3);
         let mut pixels = vec![0; 4 * reader.info().width as usize * reader.info().height as usize];

@@ -32,15 +32,28 @@ pub(crate) fn svg_text(drawing: &Drawing, provenance: &Provenance) -> OutputResu
 pub fn escape(text: &str) -> String {
     // XML has no place for other control characters.
     let plain = text.replace(|c: char| c.is_control() && !matches!(c, '\n' | '\t'), " ");
-    let signs = [('&', "&amp;"), ('<', "&lt;"), ('>', "&gt;"), ('"', "&quot;"), ('\'', "&#39;")];
-    signs.into_iter().fold(plain, |text, (sign, name)| text.replace(sign, name))
+    let signs = [
+        ('&', "&amp;"),
+        ('<', "&lt;"),
+        ('>', "&gt;"),
+        ('"', "&quot;"),
+        ('\'', "&#39;"),
+    ];
+    signs
+        .into_iter()
+        .fold(plain, |text, (sign, name)| text.replace(sign, name))
 }
 
 fn element(shape: &Shape) -> OutputResult<String> {
     Ok(match shape {
         Shape::Line { points, pen } => {
             let (points, colour, width) = (pairs(points), hex(pen.colour), number(pen.width));
-            let mut dash = pen.dash.iter().map(|d| number(*d)).collect::<Vec<_>>().join(" ");
+            let mut dash = pen
+                .dash
+                .iter()
+                .map(|d| number(*d))
+                .collect::<Vec<_>>()
+                .join(" ");
             if !dash.is_empty() {
                 dash = format!(" stroke-dasharray=\"{dash}\"");
             }
@@ -48,20 +61,37 @@ fn element(shape: &Shape) -> OutputResult<String> {
                 "<polyline points=\"{points}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" stroke-linejoin=\"round\"{dash}/>\n"
             )
         }
-        Shape::Area { points, fill, opacity } => {
+        Shape::Area {
+            points,
+            fill,
+            opacity,
+        } => {
             let (points, colour, opacity) = (pairs(points), hex(*fill), number(*opacity));
             format!("<polygon points=\"{points}\" fill=\"{colour}\" fill-opacity=\"{opacity}\"/>\n")
         }
         Shape::Text(text) => text_element(text),
         Shape::Image { frame, pixels } => {
-            let (place, data) = (place(frame), STANDARD.encode(encode([Ok(pixels.clone())], 0.0, None)?));
-            format!("<image {place} preserveAspectRatio=\"none\" href=\"data:image/png;base64,{data}\"/>\n")
+            let (place, data) = (
+                place(frame),
+                STANDARD.encode(encode([Ok(pixels.clone())], 0.0, None)?),
+            );
+            format!(
+                "<image {place} preserveAspectRatio=\"none\" href=\"data:image/png;base64,{data}\"/>\n"
+            )
         }
         Shape::Clip { frame, shapes } => {
             // A nested svg element clips to its own box, without an id.
-            let corner = [frame.left, frame.top, frame.width, frame.height].map(number).join(" ");
-            let inner = shapes.iter().map(element).collect::<OutputResult<String>>()?;
-            format!("<svg {} viewBox=\"{corner}\" overflow=\"hidden\">\n{inner}</svg>\n", place(frame))
+            let corner = [frame.left, frame.top, frame.width, frame.height]
+                .map(number)
+                .join(" ");
+            let inner = shapes
+                .iter()
+                .map(element)
+                .collect::<OutputResult<String>>()?;
+            format!(
+                "<svg {} viewBox=\"{corner}\" overflow=\"hidden\">\n{inner}</svg>\n",
+                place(frame)
+            )
         }
     })
 }
@@ -75,17 +105,27 @@ fn text_element(text: &Text) -> String {
         Anchor::End => "end",
     };
     let turn = if text.upward { " rotate(-90)" } else { "" };
-    let weight = if text.bold { " font-weight=\"bold\"" } else { "" };
+    let weight = if text.bold {
+        " font-weight=\"bold\""
+    } else {
+        ""
+    };
     let mut out = format!(
         "<text transform=\"translate({x} {y}){turn}\" font-size=\"{size}\" text-anchor=\"{anchor}\" fill=\"{colour}\"{weight}>"
     );
     let mut height = 0.0;
     for run in runs(&text.text) {
-        let (shift, size) = (number(text.size * (height - run.rise)), number(text.size * run.scale));
+        let (shift, size) = (
+            number(text.size * (height - run.rise)),
+            number(text.size * run.scale),
+        );
         height = run.rise;
         out += &match run.scale == 1.0 && shift == "0" {
             true => escape(run.text),
-            false => format!("<tspan dy=\"{shift}\" font-size=\"{size}\">{}</tspan>", escape(run.text)),
+            false => format!(
+                "<tspan dy=\"{shift}\" font-size=\"{size}\">{}</tspan>",
+                escape(run.text)
+            ),
         };
     }
     out + "</text>\n"
@@ -97,14 +137,22 @@ fn place(frame: &Frame) -> String {
 }
 
 fn pairs(points: &[(f64, f64)]) -> String {
-    points.iter().map(|p| format!("{},{}", number(p.0), number(p.1))).collect::<Vec<_>>().join(" ")
+    points
+        .iter()
+        .map(|p| format!("{},{}", number(p.0), number(p.1)))
+        .collect::<Vec<_>>()
+        .join(" ")
 }
 
 /// At most two decimals: a hundredth of a pixel.
 fn number(value: f64) -> String {
     let text = format!("{value:.2}");
     let short = text.trim_end_matches('0').trim_end_matches('.');
-    if short == "-0" { "0".into() } else { short.into() }
+    if short == "-0" {
+        "0".into()
+    } else {
+        short.into()
+    }
 }
 
 fn hex([r, g, b]: Rgb) -> String {
@@ -119,10 +167,22 @@ mod tests {
     #[test]
     fn text_and_metadata_are_escaped() {
         let label = Shape::text((10.0, 10.0), "a<b & \"c\"^{2}", 16.0, Anchor::Start);
-        let drawing = Drawing { width: 100.0, height: 50.0, shapes: vec![label] };
+        let drawing = Drawing {
+            width: 100.0,
+            height: 50.0,
+            shapes: vec![label],
+        };
         let svg = svg_text(&drawing, &example()).unwrap();
-        assert!(svg.contains("a&lt;b &amp; &quot;c&quot;<tspan dy=\"-5.76\" font-size=\"11.52\">2</tspan>"), "{svg}");
-        assert!(svg.contains("name = &quot;&lt;a &amp; b&gt;&quot;"), "{svg}");
+        assert!(
+            svg.contains(
+                "a&lt;b &amp; &quot;c&quot;<tspan dy=\"-5.76\" font-size=\"11.52\">2</tspan>"
+            ),
+            "{svg}"
+        );
+        assert!(
+            svg.contains("name = &quot;&lt;a &amp; b&gt;&quot;"),
+            "{svg}"
+        );
         assert!(svg.contains("seed: 18446744073709551615"));
         assert_eq!(escape("a\u{0}b\u{1b}"), "a b ");
     }

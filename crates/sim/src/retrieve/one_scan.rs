@@ -15,7 +15,8 @@ use crate::setup::instrument::Instrument;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
-    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, fit_scan, radial_velocity_method, with_secondary_vortices,
+    Flag, Gate, RetrievalOptions, ScanMap, ScanResult, fit_scan, radial_velocity_method,
+    with_secondary_vortices,
 };
 use wakescope_estimate::vortex_fit::{CorePrior, RangeKernel, Sharing, WakeModel};
 
@@ -30,9 +31,9 @@ const SPACING_M: f64 = 1.25;
 const WIDTH_OVER_STD: f64 = 2.354_820_045_030_949_4;
 
 /// What is told of gates whose weight is not wholly known.
-const WITHOUT_PULSE: &str = "the file says nothing of the pulse: --gate-std states the weight of a gate";
-const AT_POINTS: &str =
-    "velocities are taken for those at points: --gate-std states the weight of a gate, or --scene the instrument";
+const WITHOUT_PULSE: &str =
+    "the file says nothing of the pulse: --gate-std states the weight of a gate";
+const AT_POINTS: &str = "velocities are taken for those at points: --gate-std states the weight of a gate, or --scene the instrument";
 
 /// The gate of a scan: as stated, else of the scene, else of what the file says; points if it says nothing, with the remedy.
 ///
@@ -45,18 +46,26 @@ pub fn gate_of(
 ) -> Result<(Gate, Option<&'static str>), Error> {
     let pulse_width_s = scan.and_then(|scan| scan.pulse_width_s);
     let pulse_m = pulse_width_s.map(|width_s| 0.5 * SPEED_OF_LIGHT_M_S * width_s / WIDTH_OVER_STD);
-    let window_m = scan.and_then(|scan| scan.gate_length_m).map(|length_m| length_m / 12f64.sqrt());
+    let window_m = scan
+        .and_then(|scan| scan.gate_length_m)
+        .map(|length_m| length_m / 12f64.sqrt());
     Ok(match (stated_m, scene, pulse_m, window_m) {
         (Some(std_m), ..) => (of_std(std_m), None),
         (None, Some(scene), ..) => (of_scene(scene)?, None),
-        (None, None, Some(pulse_m), window_m) => (of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None),
+        (None, None, Some(pulse_m), window_m) => {
+            (of_std(pulse_m.hypot(window_m.unwrap_or(0.0))), None)
+        }
         (None, None, None, Some(window_m)) => (of_std(window_m), Some(WITHOUT_PULSE)),
         (None, None, None, None) => (Gate::Point, Some(AT_POINTS)),
     })
 }
 
 fn of_std(std_m: f64) -> Gate {
-    if std_m > 0.0 { Gate::Gaussian { std_m } } else { Gate::Point }
+    if std_m > 0.0 {
+        Gate::Gaussian { std_m }
+    } else {
+        Gate::Point
+    }
 }
 
 /// Pulse and window of a scene.
@@ -64,7 +73,9 @@ fn of_scene(scene: &Scene) -> Result<Gate, Error> {
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let sigma_s = Instrument::new(scene)?.pulse.sigma_s();
     let period_s = 1.0 / scene.detector.sampling_hz;
-    Ok(Gate::Kernel(RangeKernel::gaussian_gate(sigma_s, &window, period_s, SPACING_M)?))
+    Ok(Gate::Kernel(RangeKernel::gaussian_gate(
+        sigma_s, &window, period_s, SPACING_M,
+    )?))
 }
 
 /// The scene that a file of this program has in it.
@@ -72,11 +83,17 @@ fn of_scene(scene: &Scene) -> Result<Gate, Error> {
 /// # Errors
 /// A scene that this program does not read, with the key and the remedy.
 pub fn scene_of(scan: &ReadScan) -> Result<Option<SceneFile>, Error> {
-    let Some(toml) = &scan.scene_toml else { return Ok(None) };
-    SceneFile::parse(toml, &scan.path).map(Some).map_err(|error| Error::Input {
-        path: scan.path.clone(),
-        reason: format!("the scene in it is none that this program reads: {error}; --scene states another"),
-    })
+    let Some(toml) = &scan.scene_toml else {
+        return Ok(None);
+    };
+    SceneFile::parse(toml, &scan.path)
+        .map(Some)
+        .map_err(|error| Error::Input {
+            path: scan.path.clone(),
+            reason: format!(
+                "the scene in it is none that this program reads: {error}; --scene states another"
+            ),
+        })
 }
 
 /// How scans are retrieved: with the ground, the profile and the secondary vortices of the scene, if it is known; cores are fitted
@@ -87,11 +104,16 @@ pub fn options(scene: Option<&Scene>, gate: Gate, core_radius_m: Option<f64>) ->
         _ => None,
     });
     // Long gates do not show cores: without what is known of them they run away with the circulation.
-    let is_short = matches!(&gate, Gate::Point) || matches!(&gate, Gate::Gaussian { std_m } if *std_m <= LONG_GATE_M);
+    let is_short = matches!(&gate, Gate::Point)
+        || matches!(&gate, Gate::Gaussian { std_m } if *std_m <= LONG_GATE_M);
     let lidar_height_m = scene.map_or(0.0, |scene| scene.scan.lidar_height_m);
     let wanted = scene.and_then(|scene| scene.retrieval.as_ref());
     let mut options = RetrievalOptions {
-        model: WakeModel { profile: profile.unwrap_or_default(), lidar_height_m, ..WakeModel::default() },
+        model: WakeModel {
+            profile: profile.unwrap_or_default(),
+            lidar_height_m,
+            ..WakeModel::default()
+        },
         gate,
         core_radius_m,
         core_prior: (!is_short).then_some(CorePrior::TYPICAL),
@@ -134,18 +156,27 @@ pub fn retrieve_map(
     let refuse = |error: wakescope_estimate::Error| refused(&scan, &error);
     if method == Method::Rv {
         let result = radial_velocity_method(&scan.map, &options).map_err(refuse)?;
-        return Ok(RetrievedScan { scan, options, result });
+        return Ok(RetrievedScan {
+            scan,
+            options,
+            result,
+        });
     }
     let own = match velocities {
         Velocities::Shown(own) | Velocities::LikelyShown(own) => Some(own),
         Velocities::Means | Velocities::Unknown => None,
     };
     let few = own.map(|own| strided(&scan.map, (1, own.gate_step(&scan.map.range_m))));
-    let is_enough = |few: &&ScanMap| few.velocity_m_s.iter().filter(|v| v.is_finite()).count() >= ENOUGH;
+    let is_enough =
+        |few: &&ScanMap| few.velocity_m_s.iter().filter(|v| v.is_finite()).count() >= ENOUGH;
     let map = few.as_ref().filter(is_enough).unwrap_or(&scan.map);
     let shown = match own.zip(few.as_ref()) {
         Some((own, few)) => {
-            let mut rough = RetrievalOptions { core_radius_m: None, other_profile: false, ..options.clone() };
+            let mut rough = RetrievalOptions {
+                core_radius_m: None,
+                other_profile: false,
+                ..options.clone()
+            };
             rough.free.core_radius = Sharing::Fixed;
             let found = fit_scan(map, &rough).map_err(refuse)?;
             own.refined(few, &options, &found)
@@ -153,7 +184,13 @@ pub fn retrieve_map(
         None => None,
     };
     let (mut result, options) = match (shown, velocities) {
-        (Some(shown), Velocities::Shown(_)) => return Ok(RetrievedScan { result: shown.0, options: shown.1, scan }),
+        (Some(shown), Velocities::Shown(_)) => {
+            return Ok(RetrievedScan {
+                result: shown.0,
+                options: shown.1,
+                scan,
+            });
+        }
         (Some((mut result, with_secondary)), _) => {
             let means = fit_scan(map, &options).map_err(refuse)?;
             doubt(&mut result, &means, &scan, &with_secondary);
@@ -161,24 +198,48 @@ pub fn retrieve_map(
         }
         (None, _) => {
             let found = fit_scan(map, &options).map_err(refuse)?;
-            with_secondary_vortices(map, &options, &found).map_err(refuse)?.unwrap_or((found, options))
+            with_secondary_vortices(map, &options, &found)
+                .map_err(refuse)?
+                .unwrap_or((found, options))
         }
     };
     let are_means = matches!(velocities, Velocities::Means);
-    result.set(Flag::TakenForMeans, !are_means && !result.vortices.is_empty());
-    Ok(RetrievedScan { scan, options, result })
+    result.set(
+        Flag::TakenForMeans,
+        !are_means && !result.vortices.is_empty(),
+    );
+    Ok(RetrievedScan {
+        scan,
+        options,
+        result,
+    })
 }
 
 /// Counts the distance from another result as an error of one: of all numbers that it knows.
 fn doubt(result: &mut ScanResult, other: &ScanResult, scan: &ReadScan, options: &RetrievalOptions) {
-    let (Some(wake), Some(there)) = (result.wake, other.wake) else { return };
+    let (Some(wake), Some(there)) = (result.wake, other.wake) else {
+        return;
+    };
     let (a, b) = (wake.to_array(), there.to_array());
-    let known: Vec<f64> = result.covariance.diag().iter().map(|variance| f64::from(*variance > 0.0)).collect();
+    let known: Vec<f64> = result
+        .covariance
+        .diag()
+        .iter()
+        .map(|variance| f64::from(*variance > 0.0))
+        .collect();
     let apart = |i: usize| known[i] * (a[i] - b[i]);
-    let covariance =
-        Array2::from_shape_fn(result.covariance.dim(), |(i, j)| result.covariance[[i, j]] + apart(i) * apart(j));
+    let covariance = Array2::from_shape_fn(result.covariance.dim(), |(i, j)| {
+        result.covariance[[i, j]] + apart(i) * apart(j)
+    });
     let moves = !result.has(Flag::MotionIgnored);
-    *result = retold(result, &scan.map, options, (wake, covariance), result.tops.clone(), moves);
+    *result = retold(
+        result,
+        &scan.map,
+        options,
+        (wake, covariance),
+        result.tops.clone(),
+        moves,
+    );
 }
 
 #[cfg(test)]
@@ -203,7 +264,10 @@ mod tests {
             (_, told) => (0.0, told.is_some()),
         };
         assert_eq!(std_m(&scan, None), (0.0, true));
-        assert_eq!((std_m(&scan, Some(0.0)), std_m(&scan, Some(14.4))), ((0.0, false), (14.4, false)));
+        assert_eq!(
+            (std_m(&scan, Some(0.0)), std_m(&scan, Some(14.4))),
+            ((0.0, false), (14.4, false))
+        );
         scan.gate_length_m = Some(30.0);
         assert_eq!(std_m(&scan, None), (30.0 / 12f64.sqrt(), true));
         scan.pulse_width_s = Some(200e-9);

@@ -13,7 +13,8 @@ use std::ops::Range;
 use wakescope_estimate::Weighting;
 use wakescope_estimate::estimators::CellTest;
 use wakescope_estimate::retrieval::{
-    EnvelopeResult, Measured, ProfilePoint, ScanSpectra, Side, SpectralShape, circulation_profile, velocity_envelopes,
+    EnvelopeResult, Measured, ProfilePoint, ScanSpectra, Side, SpectralShape, circulation_profile,
+    velocity_envelopes,
 };
 
 /// Rate at which the highest cell of noise is above the threshold of an envelope.
@@ -34,23 +35,46 @@ pub fn envelopes(
     found: &mut RetrievedScan,
 ) -> Result<Vec<EnvelopeResult>, Error> {
     let scene = &plan.scene.content;
-    let refuse = |reason: &str| Error::Input { path: found.scan.path.clone(), reason: reason.into() };
-    let (true, Weighting::Gaussian { relative_half_width }) = (scene.pulse.is_gaussian(), estimators::weighting(scene))
+    let refuse = |reason: &str| Error::Input {
+        path: found.scan.path.clone(),
+        reason: reason.into(),
+    };
+    let (
+        true,
+        Weighting::Gaussian {
+            relative_half_width,
+        },
+    ) = (scene.pulse.is_gaussian(), estimators::weighting(scene))
     else {
         return Err(refuse(
             "--method envelope knows Gaussian pulses and windows alone: estimator.weighting = \"gaussian\"",
         ));
     };
-    let Some(about) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(Vec::new()) };
-    let window_sigma_s = relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
+    let Some(about) = found
+        .result
+        .wake
+        .filter(|_| found.result.vortices.len() == 2)
+    else {
+        return Ok(Vec::new());
+    };
+    let window_sigma_s =
+        relative_half_width * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
     let (wavelength_m, band_hz) = (scene.laser.wavelength_m, scene.detector.bandwidth_hz);
-    let shape = SpectralShape::gaussian(plan.instrument.pulse.sigma_s(), window_sigma_s, wavelength_m, band_hz)?;
+    let shape = SpectralShape::gaussian(
+        plan.instrument.pulse.sigma_s(),
+        window_sigma_s,
+        wavelength_m,
+        band_hz,
+    )?;
     let (gates, cells) = (spectra.range_m.len(), spectra.velocity_m_s.len());
     let order = upward(lines, &spectra.elevation_rad);
     let power = Array3::from_shape_fn((order.len(), gates, cells), |(line, gate, cell)| {
         f64::from(spectra.density[(order[line] * gates + gate) * cells + cell])
     });
-    let elevation_rad: Vec<f64> = order.iter().map(|line| spectra.elevation_rad[*line]).collect();
+    let elevation_rad: Vec<f64> = order
+        .iter()
+        .map(|line| spectra.elevation_rad[*line])
+        .collect();
     // Independent cells of the maximum over all frequencies of the band.
     let count = 3.0 * band_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
     let of_cell = -((-FALSE_ALARM).ln_1p() / count).exp_m1();
@@ -68,7 +92,10 @@ pub fn envelopes(
     for vortex in &mut found.result.vortices {
         if let Some(result) = results.iter().find(|result| result.side == vortex.side) {
             vortex.circulation_5_15_m2_s = result.inverted_m2_s;
-            vortex.circulation_m2_s = Measured { value: f64::NAN, std: f64::NAN };
+            vortex.circulation_m2_s = Measured {
+                value: f64::NAN,
+                std: f64::NAN,
+            };
         }
     }
     Ok(results.to_vec())
@@ -81,8 +108,14 @@ pub fn envelope_table(all: &[(usize, EnvelopeResult)]) -> Table {
         .text("side", all.iter().map(|(_, r)| name(r.side)))
         .float("raw_m2_s", all.iter().map(|(_, r)| r.raw_m2_s))
         .float("narrowed_m2_s", all.iter().map(|(_, r)| r.narrowed_m2_s))
-        .float("inverted_m2_s", all.iter().map(|(_, r)| r.inverted_m2_s.value))
-        .float("inverted_std_m2_s", all.iter().map(|(_, r)| r.inverted_m2_s.std))
+        .float(
+            "inverted_m2_s",
+            all.iter().map(|(_, r)| r.inverted_m2_s.value),
+        )
+        .float(
+            "inverted_std_m2_s",
+            all.iter().map(|(_, r)| r.inverted_m2_s.std),
+        )
         .int("lines", all.iter().map(|(_, r)| r.lines as i64))
         .int("left_out", all.iter().map(|(_, r)| r.left_out as i64))
 }
@@ -95,14 +128,25 @@ pub fn profile_table(scans: &[RetrievedScan]) -> Result<Table, Error> {
     let radii_m: Vec<f64> = RADII_M.map(f64::from).collect();
     let mut rows: Vec<(usize, Side, ProfilePoint)> = Vec::new();
     for (number, scan) in scans.iter().enumerate() {
-        let Some(wake) = &scan.result.wake else { continue };
+        let Some(wake) = &scan.result.wake else {
+            continue;
+        };
         for vortex in &scan.result.vortices {
-            let found = circulation_profile(&scan.scan.map, wake, vortex.side, &radii_m, &scan.options)
-                .map_err(|error| refused(&scan.scan, &error))?;
-            rows.extend(found.into_iter().map(|point| (number + 1, vortex.side, point)));
+            let found =
+                circulation_profile(&scan.scan.map, wake, vortex.side, &radii_m, &scan.options)
+                    .map_err(|error| refused(&scan.scan, &error))?;
+            rows.extend(
+                found
+                    .into_iter()
+                    .map(|point| (number + 1, vortex.side, point)),
+            );
         }
     }
-    let column = |get: fn(&ProfilePoint) -> f64| rows.iter().map(|(_, _, point)| get(point)).collect::<Vec<f64>>();
+    let column = |get: fn(&ProfilePoint) -> f64| {
+        rows.iter()
+            .map(|(_, _, point)| get(point))
+            .collect::<Vec<f64>>()
+    };
     Ok(Table::new()
         .int("scan", rows.iter().map(|(scan, ..)| *scan as i64))
         .text("side", rows.iter().map(|(_, side, _)| name(*side)))

@@ -17,8 +17,9 @@ use wakescope_estimate::retrieval::{
     Flag, Measured, Movement, RetrievalOptions, ScanMap, ScanResult, Side, Top, VortexResult,
 };
 use wakescope_estimate::vortex_fit::{
-    EstimatorResponse, MapFit, MapFitOptions, Parameter, SignalFit, SignalFitOptions, VelocityMap, Wake,
-    fit_map_of_estimator, fit_secondary_vortices, fit_signals, refine_map_fit_of_estimator, with_local_circulations,
+    EstimatorResponse, MapFit, MapFitOptions, Parameter, SignalFit, SignalFitOptions, VelocityMap,
+    Wake, fit_map_of_estimator, fit_secondary_vortices, fit_signals, refine_map_fit_of_estimator,
+    with_local_circulations,
 };
 use wakescope_estimate::window::Sample;
 
@@ -47,7 +48,8 @@ impl SceneResponse {
         if found.statistic.is_nan() || found.statistic < options.threshold {
             return None;
         }
-        let range_of = |vortex: &VortexResult| options.model.range_and_elevation(vortex.place_m()).0;
+        let range_of =
+            |vortex: &VortexResult| options.model.range_and_elevation(vortex.place_m()).0;
         let range_m = match found.vortices.len() {
             0 => 0.5 * (map.range_m.first()? + map.range_m.last()?),
             count => found.vortices.iter().map(range_of).sum::<f64>() / count as f64,
@@ -55,9 +57,14 @@ impl SceneResponse {
         let fits = Fits {
             scan: map,
             // Maps of one scan know no deviation, and those of a few scans hardly any.
-            view: VelocityMap { standard_deviation_m_s: None, ..map.view() },
+            view: VelocityMap {
+                standard_deviation_m_s: None,
+                ..map.view()
+            },
             still: self.shown(range_m)?,
-            moving: self.shown(range_m)?.moving(&map.elevation_rad, &map.after_middle_s()),
+            moving: self
+                .shown(range_m)?
+                .moving(&map.elevation_rad, &map.after_middle_s()),
             options,
             map_options: MapFitOptions {
                 free: options.free,
@@ -70,16 +77,26 @@ impl SceneResponse {
         };
         let sector = (&map.elevation_rad[..], &map.range_m[..]);
         let is_seen = |vortex: &VortexResult| options.model.sees(sector, vortex.place_m());
-        let is_certain =
-            |vortex: &VortexResult| vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std;
-        let unseen = |pair: &ScanResult| pair.vortices.iter().filter(|vortex| !is_seen(vortex)).count();
+        let is_certain = |vortex: &VortexResult| {
+            vortex.circulation_m2_s.value > CERTAIN_SIGMAS * vortex.circulation_m2_s.std
+        };
+        let unseen = |pair: &ScanResult| {
+            pair.vortices
+                .iter()
+                .filter(|vortex| !is_seen(vortex))
+                .count()
+        };
         match (fits.pair(found), found.vortices.len()) {
             (Some(pair), 2) => Some(pair),
             // What is beyond the scan acts on what is in it, but is not told. Where nothing is found in it, anything may be beyond.
-            (Some((pair, options)), count) if pair.vortices.iter().all(is_certain) && unseen(&pair) <= count => {
+            (Some((pair, options)), count)
+                if pair.vortices.iter().all(is_certain) && unseen(&pair) <= count =>
+            {
                 Some((telling(pair, is_seen), options))
             }
-            (_, 1) => fits.one(found).filter(|(one, _)| one.vortices.iter().all(is_certain)),
+            (_, 1) => fits
+                .one(found)
+                .filter(|(one, _)| one.vortices.iter().all(is_certain)),
             _ => None,
         }
     }
@@ -105,8 +122,9 @@ impl Fits<'_> {
             Movement::Auto => self.scan.lasts_s() >= RetrievalOptions::SHORT_S,
         } && self.scan.has_times();
         let (view, model, options) = (&self.view, &self.options.model, &self.map_options);
-        let from =
-            |moves, start: &Wake| refine_map_fit_of_estimator(view, model, self.shown(moves), start, options).ok();
+        let from = |moves, start: &Wake| {
+            refine_map_fit_of_estimator(view, model, self.shown(moves), start, options).ok()
+        };
         let first = match start {
             Some(start) => from(moves, start)?,
             None => fit_map_of_estimator(view, model, self.shown(moves), options).ok()?,
@@ -115,7 +133,8 @@ impl Fits<'_> {
             return Some((first, moves));
         }
         let chi2 = |fit: &MapFit| fit.tops.first().map_or(f64::INFINITY, |top| top.chi2);
-        let is_better = |other: &MapFit, than: &MapFit| chi2(than) - chi2(other) > RetrievalOptions::MOVES;
+        let is_better =
+            |other: &MapFit, than: &MapFit| chi2(than) - chi2(other) > RetrievalOptions::MOVES;
         let Some(other) = from(!moves, &first.wake).filter(|other| is_better(other, &first)) else {
             return Some((first, moves));
         };
@@ -135,14 +154,24 @@ impl Fits<'_> {
         let mut options = self.options.clone();
         let (mut fit, moves) = self.best(None)?;
         let shown = self.shown(moves);
-        let four =
-            fit_secondary_vortices(&self.view, &options.model, shown, &fit.wake, &self.map_options).ok().flatten();
+        let four = fit_secondary_vortices(
+            &self.view,
+            &options.model,
+            shown,
+            &fit.wake,
+            &self.map_options,
+        )
+        .ok()
+        .flatten();
         let are_shown = four.as_ref().is_some_and(|(_, secondary)| secondary.shown);
         if let Some((Some(with_secondary), secondary)) = four {
             fit = with_secondary;
             options.model.secondary = Some(secondary.vortices);
         }
-        let local = with_local_circulations(&self.view, &options.model, shown, &fit, &self.map_options).ok().flatten();
+        let local =
+            with_local_circulations(&self.view, &options.model, shown, &fit, &self.map_options)
+                .ok()
+                .flatten();
         let are_local = local.is_some();
         let mut result = of_fit(found, self.scan, &options, &local.unwrap_or(fit), moves);
         result.set(Flag::SecondaryVortices, are_shown);
@@ -154,7 +183,10 @@ impl Fits<'_> {
     fn one(&self, found: &ScanResult) -> Option<(ScanResult, RetrievalOptions)> {
         let (fit, moves) = self.best(found.wake.as_ref())?;
         let result = of_fit(found, self.scan, self.options, &fit, moves);
-        Some((telling(result, |vortex| found.vortex(vortex.side).is_some()), self.options.clone()))
+        Some((
+            telling(result, |vortex| found.vortex(vortex.side).is_some()),
+            self.options.clone(),
+        ))
     }
 }
 
@@ -162,13 +194,32 @@ impl Fits<'_> {
 fn telling(mut result: ScanResult, is_told: impl Fn(&VortexResult) -> bool) -> ScanResult {
     result.vortices.retain(is_told);
     result.set(Flag::OneVortex, result.vortices.len() == 1);
-    result.set(Flag::CoreKept, result.vortices.iter().any(|vortex| vortex.core_radius_m.is_none()));
+    result.set(
+        Flag::CoreKept,
+        result
+            .vortices
+            .iter()
+            .any(|vortex| vortex.core_radius_m.is_none()),
+    );
     result
 }
 
 /// The result of a fit to a map that tells other vortices than the means did.
-fn of_fit(found: &ScanResult, map: &ScanMap, options: &RetrievalOptions, fit: &MapFit, moves: bool) -> ScanResult {
-    let mut result = retold(found, map, options, (fit.wake, fit.covariance.clone()), fit.tops.clone(), moves);
+fn of_fit(
+    found: &ScanResult,
+    map: &ScanMap,
+    options: &RetrievalOptions,
+    fit: &MapFit,
+    moves: bool,
+) -> ScanResult {
+    let mut result = retold(
+        found,
+        map,
+        options,
+        (fit.wake, fit.covariance.clone()),
+        fit.tops.clone(),
+        moves,
+    );
     (result.cells_used, result.cells_rejected) = (fit.used - fit.outliers, fit.outliers);
     result.set(Flag::Outliers, 10 * fit.outliers > fit.used);
     result
@@ -187,12 +238,18 @@ pub fn retrieve_signals(
 ) -> Result<RetrievedScan, Error> {
     let ((range, elevation_rad), all) = (measured.lines.all_records(), 0..records.samples);
     match own.scene.detector.signal {
-        DetectorSignal::IntermediateFrequency => {
-            own.of_records(samples::<f64>(records, range, all)?.view(), elevation_rad, found, observer)
-        }
-        DetectorSignal::Baseband => {
-            own.of_records(samples::<Complex<f64>>(records, range, all)?.view(), elevation_rad, found, observer)
-        }
+        DetectorSignal::IntermediateFrequency => own.of_records(
+            samples::<f64>(records, range, all)?.view(),
+            elevation_rad,
+            found,
+            observer,
+        ),
+        DetectorSignal::Baseband => own.of_records(
+            samples::<Complex<f64>>(records, range, all)?.view(),
+            elevation_rad,
+            found,
+            observer,
+        ),
     }
 }
 
@@ -208,15 +265,31 @@ impl SceneResponse {
         mut found: RetrievedScan,
         observer: &dyn Observer,
     ) -> Result<RetrievedScan, Error> {
-        let Some(guess) = found.result.wake.filter(|_| found.result.vortices.len() == 2) else { return Ok(found) };
+        let Some(guess) = found
+            .result
+            .wake
+            .filter(|_| found.result.vortices.len() == 2)
+        else {
+            return Ok(found);
+        };
         let setup = self.setup(found.options.model, elevation_rad)?;
         let snr = |range_m: f64, _: f64| {
             // Whenever the fit makes a model of the lines.
             observer.advance(0);
             self.snr_at(range_m)
         };
-        let fit_options = SignalFitOptions { free: found.options.free, ..SignalFitOptions::default() };
-        let fit = match fit_signals(&setup, snr, samples, self.noise_power_a2, &guess, &fit_options) {
+        let fit_options = SignalFitOptions {
+            free: found.options.free,
+            ..SignalFitOptions::default()
+        };
+        let fit = match fit_signals(
+            &setup,
+            snr,
+            samples,
+            self.noise_power_a2,
+            &guess,
+            &fit_options,
+        ) {
             // what the map shows is what was found
             Err(wakescope_estimate::Error::NotConverged { .. }) => {
                 found.result.set(Flag::NotConverged, true);
@@ -224,12 +297,36 @@ impl SceneResponse {
             }
             fit => fit.map_err(|error| refused(&found.scan, &error))?,
         };
-        let SignalFit { wake, covariance, tops, log_likelihood_gain, used_rays, .. } = fit;
-        let least = tops.iter().map(|top| top.chi2).fold(f64::INFINITY, f64::min);
-        let tops = tops.iter().map(|top| Top { chi2: top.chi2 - least, ..*top }).collect();
-        let mut result = retold(&found.result, &found.scan.map, &found.options, (wake, covariance), tops, false);
+        let SignalFit {
+            wake,
+            covariance,
+            tops,
+            log_likelihood_gain,
+            used_rays,
+            ..
+        } = fit;
+        let least = tops
+            .iter()
+            .map(|top| top.chi2)
+            .fold(f64::INFINITY, f64::min);
+        let tops = tops
+            .iter()
+            .map(|top| Top {
+                chi2: top.chi2 - least,
+                ..*top
+            })
+            .collect();
+        let mut result = retold(
+            &found.result,
+            &found.scan.map,
+            &found.options,
+            (wake, covariance),
+            tops,
+            false,
+        );
         result.statistic = 2.0 * log_likelihood_gain;
-        (result.cells_used, result.cells_rejected) = (used_rays, setup.elevation_rad.len() - used_rays);
+        (result.cells_used, result.cells_rejected) =
+            (used_rays, setup.elevation_rad.len() - used_rays);
         result.chi2_per_dof = f64::NAN;
         Ok(RetrievedScan { result, ..found })
     }
@@ -245,9 +342,14 @@ pub(super) fn retold(
     moves: bool,
 ) -> ScanResult {
     let is_there = |side: &Side| wake.to_array()[side.parameters()[0] as usize] != 0.0;
-    let vortex = |side| VortexResult::at_its_line(map, &options.model, (&wake, &covariance), side, moves);
+    let vortex =
+        |side| VortexResult::at_its_line(map, &options.model, (&wake, &covariance), side, moves);
     let mut result = ScanResult {
-        vortices: Side::BOTH.into_iter().filter(is_there).map(vortex).collect(),
+        vortices: Side::BOTH
+            .into_iter()
+            .filter(is_there)
+            .map(vortex)
+            .collect(),
         wake: Some(wake),
         lateral_wind_m_s: Measured::of_wake(Parameter::Wind, &wake, &covariance),
         wind_shear_per_s: Measured::of_wake(Parameter::Shear, &wake, &covariance),
@@ -264,13 +366,22 @@ pub(super) fn retold(
     let is_instant = map.has_times() && map.lasts_s() == 0.0;
     result.set(Flag::MotionIgnored, !moves && !is_instant);
     result.set(Flag::NotConverged, false);
-    let competing = result.tops.iter().skip(1).any(|top| top.chi2 - result.tops[0].chi2 < COMPETES);
+    let competing = result
+        .tops
+        .iter()
+        .skip(1)
+        .any(|top| top.chi2 - result.tops[0].chi2 < COMPETES);
     result.set(Flag::Ambiguous, competing);
     telling(result, |_| true)
 }
 
 /// A scan of recorded signals as a map for a retrieval.
-pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: &MeasuredScan) -> ReadScan {
+pub fn scan_of_signals(
+    path: &std::path::Path,
+    sweep: usize,
+    plan: &Plan,
+    scan: &MeasuredScan,
+) -> ReadScan {
     let lines = &scan.lines;
     let mut velocity_m_s = scan.velocity_m_s.clone();
     velocity_m_s.zip_mut_with(&scan.flagged, |velocity, flagged| {
@@ -284,7 +395,13 @@ pub fn scan_of_signals(path: &std::path::Path, sweep: usize, plan: &Plan, scan: 
         sweep,
         reference: crate::io::UtcTime::parse(&plan.scene.content.site.start_utc),
         scene_toml: Some(plan.scene.toml.clone()),
-        ..scan_of_lines("", plan, &order, [&lines.elevation_rad, &lines.time_s], &velocity_m_s)
+        ..scan_of_lines(
+            "",
+            plan,
+            &order,
+            [&lines.elevation_rad, &lines.time_s],
+            &velocity_m_s,
+        )
     }
 }
 
@@ -296,8 +413,19 @@ pub(super) fn scan_of_lines(
     axes: [&[f64]; 2],
     velocity_m_s: &Array2<f64>,
 ) -> ReadScan {
-    let [elevation_rad, time_s] = axes.map(|values| lines.iter().map(|line| values[*line]).collect());
+    let [elevation_rad, time_s] =
+        axes.map(|values| lines.iter().map(|line| values[*line]).collect());
     let velocity_m_s = velocity_m_s.select(Axis(0), lines);
     let range_m = plan.geometry.gate_range_m.clone();
-    ReadScan::own(name, ScanMap { elevation_rad, time_s, range_m, velocity_m_s, sigma_m_s: None, fold_m_s: None })
+    ReadScan::own(
+        name,
+        ScanMap {
+            elevation_rad,
+            time_s,
+            range_m,
+            velocity_m_s,
+            sigma_m_s: None,
+            fold_m_s: None,
+        },
+    )
 }

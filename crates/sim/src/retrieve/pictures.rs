@@ -7,7 +7,9 @@ use crate::Error;
 use crate::io::{Field, Ray, Sweep, Unit, VelocityMap};
 use crate::plot::{Axis, CurvePlot, Figure, MapPlot, Series, Style};
 use ndarray::Array2;
-use wakescope_estimate::retrieval::{Flag, Measured, ScanResult, Side, Track, TrackPoint, expected_velocities};
+use wakescope_estimate::retrieval::{
+    Flag, Measured, ScanResult, Side, Track, TrackPoint, expected_velocities,
+};
 
 /// Velocities, the fitted wake and the residual of a scan side by side; velocities alone where no wake was found.
 ///
@@ -20,15 +22,22 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         let moving = !scan.result.has(Flag::MotionIgnored);
         let model = expected_velocities(map, &scan.options, wake, moving)?;
         let residual = &map.velocity_m_s - &model;
-        fields.extend([("v_model", "fitted wake", model), ("v_residual", "measured less fitted", residual)]);
+        fields.extend([
+            ("v_model", "fitted wake", model),
+            ("v_residual", "measured less fitted", residual),
+        ]);
     }
-    let rays = map.elevation_rad.iter().enumerate().map(|(i, elevation_rad)| Ray {
-        sweep: 0,
-        // The picture knows no times, and lines of a map may have any.
-        time_s: i as f64,
-        elevation_rad: *elevation_rad,
-        ..Ray::default()
-    });
+    let rays = map
+        .elevation_rad
+        .iter()
+        .enumerate()
+        .map(|(i, elevation_rad)| Ray {
+            sweep: 0,
+            // The picture knows no times, and lines of a map may have any.
+            time_s: i as f64,
+            elevation_rad: *elevation_rad,
+            ..Ray::default()
+        });
     let field = |(name, text, values): &(&'static str, &str, Array2<f64>)| {
         Field::float(name, Unit::METRE_PER_SECOND, text, values.clone())
     };
@@ -41,7 +50,12 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         lidar_height_m: scan.options.model.lidar_height_m,
         ..VelocityMap::default()
     };
-    let centres_m: Vec<(f64, f64)> = scan.result.vortices.iter().map(|vortex| vortex.place_m()).collect();
+    let centres_m: Vec<(f64, f64)> = scan
+        .result
+        .vortices
+        .iter()
+        .map(|vortex| vortex.place_m())
+        .collect();
     let mut panels = Vec::new();
     for (name, title, _) in &fields {
         let mut plot = MapPlot::new(&shown, 0, name)?.titled(title).labelled("m/s");
@@ -53,7 +67,10 @@ pub fn figure(scan: &RetrievedScan, number: usize) -> Result<Figure, Error> {
         panels.push(plot);
     }
     let width = 520.0 * panels.len() as f64;
-    Ok(Figure { width, ..Figure::side_by_side(panels).titled(&title(scan, number)) })
+    Ok(Figure {
+        width,
+        ..Figure::side_by_side(panels).titled(&title(scan, number))
+    })
 }
 
 fn title(scan: &RetrievedScan, number: usize) -> String {
@@ -61,10 +78,17 @@ fn title(scan: &RetrievedScan, number: usize) -> String {
         let vortex = scan.result.vortex(side)?;
         let name = super::name(side);
         let mean = vortex.circulation_5_15_m2_s;
-        Some(format!("{name} Γ(5-15 m) = {:.0} ± {:.0} m²/s", mean.value, mean.std))
+        Some(format!(
+            "{name} Γ(5-15 m) = {:.0} ± {:.0} m²/s",
+            mean.value, mean.std
+        ))
     };
     let found: Vec<String> = Side::BOTH.into_iter().filter_map(of).collect();
-    let found = if found.is_empty() { "no wake".to_owned() } else { found.join(", ") };
+    let found = if found.is_empty() {
+        "no wake".to_owned()
+    } else {
+        found.join(", ")
+    };
     format!("Scan {number}, radial velocity [m/s]: {found}")
 }
 
@@ -86,18 +110,32 @@ pub fn track_figure(track: &Track, scans: &[RetrievedScan]) -> Figure {
             let of_track: Vec<(f64, Measured)> = track.points.iter().filter_map(of_point).collect();
             let of_scan = |result: &ScanResult| {
                 let vortex = result.vortex(side)?;
-                let of = [vortex.circulation_m2_s, vortex.lateral_position_m, vortex.height_m];
+                let of = [
+                    vortex.circulation_m2_s,
+                    vortex.lateral_position_m,
+                    vortex.height_m,
+                ];
                 Some((result.reference_time_s, of[column].value))
             };
             let stds: Vec<f64> = of_track.iter().map(|(_, m)| m.std).collect();
-            let line = Series::new(&super::name(side), Style::Line, of_track.iter().map(|(t, m)| (*t, m.value)));
+            let line = Series::new(
+                &super::name(side),
+                Style::Line,
+                of_track.iter().map(|(t, m)| (*t, m.value)),
+            );
             let dots = scans.iter().filter_map(|scan| of_scan(&scan.result));
             plot = plot
                 .with(line.with_band(&stds).in_colour(colour))
                 .with(Series::new("", Style::Markers, dots).in_colour(colour));
         }
-        CurvePlot { shape: 0.75, ..plot }
+        CurvePlot {
+            shape: 0.75,
+            ..plot
+        }
     };
     let title = "Track of the vortices: smoothed, with one standard deviation";
-    Figure { width: 1560.0, ..Figure::side_by_side(panels.map(panel)).titled(title) }
+    Figure {
+        width: 1560.0,
+        ..Figure::side_by_side(panels.map(panel)).titled(title)
+    }
 }

@@ -16,7 +16,9 @@ use crate::plan::{Plan, Stage};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
 use ndarray::{Array2, ArrayView2};
-use wakescope_estimate::retrieval::{Measured, RetrievalOptions, ScanMap, VortexResult, circulation_profile};
+use wakescope_estimate::retrieval::{
+    Measured, RetrievalOptions, ScanMap, VortexResult, circulation_profile,
+};
 use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
@@ -66,35 +68,81 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
     observer: &dyn Observer,
 ) -> Result<Option<SceneRetrieval>, Error> {
     let scene = &plan.scene.content;
-    let Some(wanted) = &scene.retrieval else { return Ok(None) };
+    let Some(wanted) = &scene.retrieval else {
+        return Ok(None);
+    };
     let sweeps = upward_sweeps(plan);
-    let truths = sweeps.iter().map(|lines| true_vortices(plan, lines)).collect::<Result<Vec<_>, _>>()?;
+    let truths = sweeps
+        .iter()
+        .map(|lines| true_vortices(plan, lines))
+        .collect::<Result<Vec<_>, _>>()?;
     let own = SceneResponse::new(plan, scanner.layer_snr())?;
     let velocities = own.as_ref().map_or(Velocities::Unknown, Velocities::Shown);
-    let options = options(Some(scene), gate_of(None, None, Some(scene))?.0, wanted.core_radius_m);
+    let options = options(
+        Some(scene),
+        gate_of(None, None, Some(scene))?.0,
+        wanted.core_radius_m,
+    );
     let mut tests = Vec::new();
     if let Some(false_alarm) = wanted.false_alarm {
         tests = self::tests(plan, &options, false_alarm, maps, observer)?;
     }
-    observer.begin(Stage::Retrieval, (maps.len() * sweeps.len() * wanted.methods.len()) as u64);
+    observer.begin(
+        Stage::Retrieval,
+        (maps.len() * sweeps.len() * wanted.methods.len()) as u64,
+    );
     let (mut rows, g) = (Vec::new(), &plan.geometry);
-    let time_s: Vec<f64> = g.line_time_s.iter().map(|t| plan.wind.start_s + t).collect();
-    let each = maps.iter().enumerate().flat_map(|map| sweeps.iter().zip(&truths).enumerate().map(move |of| (map, of)));
+    let time_s: Vec<f64> = g
+        .line_time_s
+        .iter()
+        .map(|t| plan.wind.start_s + t)
+        .collect();
+    let each = maps.iter().enumerate().flat_map(|map| {
+        sweeps
+            .iter()
+            .zip(&truths)
+            .enumerate()
+            .map(move |of| (map, of))
+    });
     for ((realisation, velocity_m_s), (sweep, (lines, truth))) in each {
-        let scan = || scan_of_lines("retrieval", plan, lines, [&g.elevation_rad, &time_s], velocity_m_s);
+        let scan = || {
+            scan_of_lines(
+                "retrieval",
+                plan,
+                lines,
+                [&g.elevation_rad, &time_s],
+                velocity_m_s,
+            )
+        };
         let by = |method| retrieve_map(scan(), method, options.clone(), velocities).ok();
         // the fit of the map also starts that of the signals and the integrals
-        let of_map = wanted.methods.iter().any(|method| *method != Method::Rv).then(|| by(Method::Fit)).flatten();
+        let of_map = wanted
+            .methods
+            .iter()
+            .any(|method| *method != Method::Rv)
+            .then(|| by(Method::Fit))
+            .flatten();
         for &method in &wanted.methods {
             let found = match (method, of_map.clone(), &own) {
                 (Method::Rv, ..) => by(method),
-                (Method::Signals | Method::Envelope, Some(map), Some(own)) => {
-                    of_signals::<S>(plan, scanner, (method, own), (realisation, lines), map, observer)?
-                }
+                (Method::Signals | Method::Envelope, Some(map), Some(own)) => of_signals::<S>(
+                    plan,
+                    scanner,
+                    (method, own),
+                    (realisation, lines),
+                    map,
+                    observer,
+                )?,
                 (Method::Integral, Some(map), _) => integral(map).ok(),
                 (_, map, _) => map.filter(|_| method == Method::Fit),
             };
-            rows.extend(rows_of(scene, (realisation, sweep, method), truth, found.as_ref(), &options.model)?);
+            rows.extend(rows_of(
+                scene,
+                (realisation, sweep, method),
+                truth,
+                found.as_ref(),
+                &options.model,
+            )?);
             observer.advance(1);
         }
     }
@@ -122,36 +170,72 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
     mut of_map: RetrievedScan,
     observer: &dyn Observer,
 ) -> Result<Option<RetrievedScan>, Error> {
-    let Some(wake) = of_map.result.wake.filter(|_| of_map.result.vortices.len() == 2) else { return Ok(None) };
+    let Some(wake) = of_map
+        .result
+        .wake
+        .filter(|_| of_map.result.vortices.len() == 2)
+    else {
+        return Ok(None);
+    };
     let schedule = &plan.geometry.schedule;
     let is_own = |pulse: usize| lines.contains(&schedule.line_of(pulse));
     let (mut samples, mut elevation_rad): (Vec<S>, Vec<f64>) = (Vec::new(), Vec::new());
     scanner.in_pieces::<S>(realisation, &Silent, |first, records| {
-        for (pulse, record) in (first..).zip(records.outer_iter()).filter(|(pulse, _)| is_own(*pulse)) {
+        for (pulse, record) in (first..)
+            .zip(records.outer_iter())
+            .filter(|(pulse, _)| is_own(*pulse))
+        {
             samples.extend(record);
             let line = schedule.line_of(pulse);
-            elevation_rad.push(schedule.beam(line, (pulse - schedule.lines[line].first) as f64).elevation_rad);
+            elevation_rad.push(
+                schedule
+                    .beam(line, (pulse - schedule.lines[line].first) as f64)
+                    .elevation_rad,
+            );
         }
         Ok(())
     })?;
     let samples = ArrayView2::from_shape((elevation_rad.len(), plan.geometry.samples), &samples)
-        .map_err(|_| wakescope_estimate::Error::Empty { field: "records of a realisation" })?;
+        .map_err(|_| wakescope_estimate::Error::Empty {
+            field: "records of a realisation",
+        })?;
     if method == Method::Envelope {
         let spectra = Spectra::of_samples(plan, &scanner.layer_snr(), &elevation_rad, samples)?;
         let lines = 0..spectra.elevation_rad.len();
-        return Ok(envelopes(plan, &spectra, lines, own.snr_of(&wake), &mut of_map).ok().map(|_| of_map));
+        return Ok(
+            envelopes(plan, &spectra, lines, own.snr_of(&wake), &mut of_map)
+                .ok()
+                .map(|_| of_map),
+        );
     }
-    Ok(own.of_records(samples, elevation_rad, of_map, observer).ok())
+    Ok(own
+        .of_records(samples, elevation_rad, of_map, observer)
+        .ok())
 }
 
 /// The circulation over 5 to 15 m by integrals over the map itself, not corrected.
 fn integral(mut found: RetrievedScan) -> Result<RetrievedScan, Error> {
-    let Some(wake) = found.result.wake else { return Ok(found) };
+    let Some(wake) = found.result.wake else {
+        return Ok(found);
+    };
     for vortex in &mut found.result.vortices {
-        let profile = circulation_profile(&found.scan.map, &wake, vortex.side, &RADII_M, &found.options)?;
-        let value = profile.iter().map(|point| point.across_m2_s).sum::<f64>() / profile.len() as f64;
-        vortex.circulation_5_15_m2_s = Measured { value, std: f64::NAN };
-        vortex.circulation_m2_s = Measured { value: f64::NAN, std: f64::NAN };
+        let profile = circulation_profile(
+            &found.scan.map,
+            &wake,
+            vortex.side,
+            &RADII_M,
+            &found.options,
+        )?;
+        let value =
+            profile.iter().map(|point| point.across_m2_s).sum::<f64>() / profile.len() as f64;
+        vortex.circulation_5_15_m2_s = Measured {
+            value,
+            std: f64::NAN,
+        };
+        vortex.circulation_m2_s = Measured {
+            value: f64::NAN,
+            std: f64::NAN,
+        };
     }
     Ok(found)
 }
@@ -163,10 +247,24 @@ fn rows_of(
     found: Option<&RetrievedScan>,
     model: &WakeModel,
 ) -> Result<[RetrievalRow; 2], Error> {
-    let follower = scene.retrieval.as_ref().and_then(|r| r.follower).map(|aircraft| {
-        let FollowingAircraft { span_m, aspect_ratio, speed_m_s, slope } = aircraft;
-        Follower { span_m, aspect_ratio, speed_m_s, slope }
-    });
+    let follower = scene
+        .retrieval
+        .as_ref()
+        .and_then(|r| r.follower)
+        .map(|aircraft| {
+            let FollowingAircraft {
+                span_m,
+                aspect_ratio,
+                speed_m_s,
+                slope,
+            } = aircraft;
+            Follower {
+                span_m,
+                aspect_ratio,
+                speed_m_s,
+                slope,
+            }
+        });
     let moment = |wake: Option<Wake>, at: Option<(f64, f64)>| match (&follower, wake.zip(at)) {
         // the coefficient is known for the profile (3)
         (Some(follower), Some((wake, at))) if model.profile == CoreProfile::Algebraic => {
@@ -215,7 +313,13 @@ fn tests(
     let empty = noise.empty_scan(plan);
     let calibration = Calibration::new(&strided(&empty, settings.stride), &settings, observer)?;
     let test = |map: &Array2<f64>| {
-        let found = calibration.of_scan(&ScanMap { velocity_m_s: map.clone(), ..empty.clone() }, &settings)?;
+        let found = calibration.of_scan(
+            &ScanMap {
+                velocity_m_s: map.clone(),
+                ..empty.clone()
+            },
+            &settings,
+        )?;
         Ok((found.statistic.value, found.threshold))
     };
     maps.iter().map(test).collect()

@@ -18,16 +18,34 @@ const COMPARED: usize = 4;
 
 /// Names of the quantities.
 fn quantities() -> impl Iterator<Item = (usize, &'static str)> {
-    VORTEX[..COMPARED].iter().map(|(name, _)| *name).chain(["rolling_moment"]).enumerate()
+    VORTEX[..COMPARED]
+        .iter()
+        .map(|(name, _)| *name)
+        .chain(["rolling_moment"])
+        .enumerate()
 }
 
 /// What was found of a quantity, and the truth; NaN where it is not known.
 fn quantity(row: &RetrievalRow, number: usize) -> (Measured, f64) {
     let (found, truth) = match VORTEX[..COMPARED].get(number) {
-        Some((_, get)) => (row.found.as_ref().and_then(get), get(&row.truth).unwrap_or(UNKNOWN).value),
-        None => (Some(Measured { value: row.rolling_moment.0, ..UNKNOWN }), row.rolling_moment.1),
+        Some((_, get)) => (
+            row.found.as_ref().and_then(get),
+            get(&row.truth).unwrap_or(UNKNOWN).value,
+        ),
+        None => (
+            Some(Measured {
+                value: row.rolling_moment.0,
+                ..UNKNOWN
+            }),
+            row.rolling_moment.1,
+        ),
     };
-    (found.filter(|found| found.value.is_finite()).unwrap_or(UNKNOWN), truth)
+    (
+        found
+            .filter(|found| found.value.is_finite())
+            .unwrap_or(UNKNOWN),
+        truth,
+    )
 }
 
 impl SceneRetrieval {
@@ -35,11 +53,22 @@ impl SceneRetrieval {
     fn errors(&self) -> Vec<Errors> {
         let mut all = Vec::new();
         // One scan has each method and side once.
-        for first in self.rows.iter().filter(|row| (row.realisation, row.sweep) == (0, 0)) {
+        for first in self
+            .rows
+            .iter()
+            .filter(|row| (row.realisation, row.sweep) == (0, 0))
+        {
             let of = (first.method, first.truth.side);
-            let rows: Vec<_> = self.rows.iter().filter(|row| (row.method, row.truth.side) == of).collect();
+            let rows: Vec<_> = self
+                .rows
+                .iter()
+                .filter(|row| (row.method, row.truth.side) == of)
+                .collect();
             for (number, name) in quantities() {
-                all.extend(errors(number, &rows).map(|(counts, numbers)| (of.0, of.1, name, counts, numbers)));
+                all.extend(
+                    errors(number, &rows)
+                        .map(|(counts, numbers)| (of.0, of.1, name, counts, numbers)),
+                );
             }
         }
         all
@@ -48,7 +77,11 @@ impl SceneRetrieval {
     /// Share of the maps whose test says wake; nothing without a test.
     #[must_use]
     pub fn detected(&self) -> Option<f64> {
-        let found = self.tests.iter().filter(|(statistic, threshold)| statistic > threshold).count();
+        let found = self
+            .tests
+            .iter()
+            .filter(|(statistic, threshold)| statistic > threshold)
+            .count();
         (!self.tests.is_empty()).then(|| found as f64 / self.tests.len() as f64)
     }
 
@@ -75,23 +108,46 @@ impl SceneRetrieval {
     /// The table of all vortices.
     #[must_use]
     pub fn table(&self) -> Table {
-        let number = |get: &dyn Fn(&RetrievalRow) -> f64| self.rows.iter().map(get).collect::<Vec<_>>();
-        let mut table = Table::new().int("realisation", self.rows.iter().map(|row| row.realisation as i64));
+        let number =
+            |get: &dyn Fn(&RetrievalRow) -> f64| self.rows.iter().map(get).collect::<Vec<_>>();
+        let mut table = Table::new().int(
+            "realisation",
+            self.rows.iter().map(|row| row.realisation as i64),
+        );
         if self.rows.iter().any(|row| row.sweep > 0) {
             table = table.int("sweep", self.rows.iter().map(|row| row.sweep as i64));
         }
         table = table
             .text("method", self.rows.iter().map(|row| row.method.name()))
             .text("side", self.rows.iter().map(|row| word(row.truth.side)))
-            .float("time_s", number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)));
+            .float(
+                "time_s",
+                number(&|row| row.found.map_or(row.truth.time_s, |v| v.time_s)),
+            );
         for (i, name) in quantities() {
             table = measured(table, name, self.rows.iter().map(|row| quantity(row, i).0))
                 .float(&with(name, "true"), number(&|row| quantity(row, i).1));
         }
-        let of_test = |row: &RetrievalRow| self.tests.get(row.realisation).copied().unwrap_or((f64::NAN, f64::NAN));
+        let of_test = |row: &RetrievalRow| {
+            self.tests
+                .get(row.realisation)
+                .copied()
+                .unwrap_or((f64::NAN, f64::NAN))
+        };
         table
-            .float("core_m", number(&|row| row.found.and_then(|v| v.core_radius_m).unwrap_or(UNKNOWN).value))
-            .float("core_true_m", number(&|row| row.truth.core_radius_m.unwrap_or(UNKNOWN).value))
+            .float(
+                "core_m",
+                number(&|row| {
+                    row.found
+                        .and_then(|v| v.core_radius_m)
+                        .unwrap_or(UNKNOWN)
+                        .value
+                }),
+            )
+            .float(
+                "core_true_m",
+                number(&|row| row.truth.core_radius_m.unwrap_or(UNKNOWN).value),
+            )
             .float("chi2_per_dof", number(&|row| row.chi2_per_dof))
             .float("statistic", number(&|row| of_test(row).0))
             .float("threshold", number(&|row| of_test(row).1))
@@ -104,8 +160,13 @@ fn errors(number: usize, rows: &[&RetrievalRow]) -> Option<([usize; 2], [f64; 6]
     if !first.is_finite() {
         return None;
     }
-    let found = rows.iter().map(|row| quantity(row, number)).filter(|(found, _)| found.value.is_finite());
-    let values: Vec<(f64, f64)> = found.map(|(found, truth)| (found.value - truth, found.std)).collect();
+    let found = rows
+        .iter()
+        .map(|row| quantity(row, number))
+        .filter(|(found, _)| found.value.is_finite());
+    let values: Vec<(f64, f64)> = found
+        .map(|(found, truth)| (found.value - truth, found.std))
+        .collect();
     let n = values.len() as f64;
     let mean = |get: &dyn Fn(&(f64, f64)) -> f64| values.iter().map(get).sum::<f64>() / n;
     let bias = mean(&|v| v.0);
@@ -113,5 +174,8 @@ fn errors(number: usize, rows: &[&RetrievalRow]) -> Option<([usize; 2], [f64; 6]
     let (rms, stated) = (mean(&|v| v.0 * v.0).sqrt(), mean(&|v| v.1 * v.1).sqrt());
     // One value has no deviation.
     let own = if values.len() > 1 { std } else { f64::NAN };
-    Some(([rows.len(), rows.len() - values.len()], [first, bias, std / n.sqrt(), own, rms, stated]))
+    Some((
+        [rows.len(), rows.len() - values.len()],
+        [first, bias, std / n.sqrt(), own, rms, stated],
+    ))
 }

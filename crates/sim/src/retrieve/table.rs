@@ -24,7 +24,10 @@ pub struct RetrievedScan {
 
 /// An error of the fits with the file that caused it.
 pub(super) fn refused(scan: &ReadScan, error: &wakescope_estimate::Error) -> Error {
-    Error::Input { path: scan.path.clone(), reason: format!("sweep {}: {error}", scan.sweep) }
+    Error::Input {
+        path: scan.path.clone(),
+        reason: format!("sweep {}: {error}", scan.sweep),
+    }
 }
 
 /// The number of a scan from 1 on, the scan, and one of its vortices.
@@ -35,36 +38,81 @@ pub fn rows(scans: &[RetrievedScan]) -> Table {
     let mut of: Vec<Row<'_>> = Vec::new();
     for (number, scan) in scans.iter().enumerate() {
         let none = scan.result.vortices.is_empty().then_some(None);
-        of.extend(scan.result.vortices.iter().map(Some).chain(none).map(|vortex| (number + 1, scan, vortex)));
+        of.extend(
+            scan.result
+                .vortices
+                .iter()
+                .map(Some)
+                .chain(none)
+                .map(|vortex| (number + 1, scan, vortex)),
+        );
     }
-    let of_scan = |get: fn(&ScanResult) -> f64| of.iter().map(move |(_, scan, _)| get(&scan.result));
-    let time_s = |(_, scan, vortex): &Row<'_>| vortex.map_or(scan.result.reference_time_s, |v| v.time_s);
+    let of_scan =
+        |get: fn(&ScanResult) -> f64| of.iter().map(move |(_, scan, _)| get(&scan.result));
+    let time_s =
+        |(_, scan, vortex): &Row<'_>| vortex.map_or(scan.result.reference_time_s, |v| v.time_s);
     let mut table = Table::new()
         .int("scan", of.iter().map(|(number, ..)| *number as i64))
         .text("file", of.iter().map(|(_, scan, _)| scan.scan.file_name()))
-        .int("sweep", of.iter().map(|(_, scan, _)| scan.scan.sweep as i64))
+        .int(
+            "sweep",
+            of.iter().map(|(_, scan, _)| scan.scan.sweep as i64),
+        )
         .float("time_s", of.iter().map(time_s))
-        .text("side", of.iter().map(|(.., vortex)| vortex.map_or_else(|| "none".to_owned(), |v| name(v.side))));
+        .text(
+            "side",
+            of.iter()
+                .map(|(.., vortex)| vortex.map_or_else(|| "none".to_owned(), |v| name(v.side))),
+        );
     for (name, get) in VORTEX {
-        table = measured(table, name, of.iter().map(|(.., vortex)| vortex.and_then(get).unwrap_or(UNKNOWN)));
+        table = measured(
+            table,
+            name,
+            of.iter()
+                .map(|(.., vortex)| vortex.and_then(get).unwrap_or(UNKNOWN)),
+        );
     }
-    table = measured(table, "wind_m_s", of.iter().map(|(_, scan, _)| scan.result.lateral_wind_m_s));
-    measured(table, "shear_per_s", of.iter().map(|(_, scan, _)| scan.result.wind_shear_per_s))
-        .float("chi2_per_dof", of_scan(|result| result.chi2_per_dof))
-        .int("cells_used", of.iter().map(|(_, scan, _)| scan.result.cells_used as i64))
-        .int("cells_rejected", of.iter().map(|(_, scan, _)| scan.result.cells_rejected as i64))
-        .float("statistic", of_scan(|result| result.statistic))
-        .float("threshold", of_scan(|result| result.threshold))
-        .text("flags", of.iter().map(|(_, scan, _)| flags(&scan.result)))
+    table = measured(
+        table,
+        "wind_m_s",
+        of.iter().map(|(_, scan, _)| scan.result.lateral_wind_m_s),
+    );
+    measured(
+        table,
+        "shear_per_s",
+        of.iter().map(|(_, scan, _)| scan.result.wind_shear_per_s),
+    )
+    .float("chi2_per_dof", of_scan(|result| result.chi2_per_dof))
+    .int(
+        "cells_used",
+        of.iter().map(|(_, scan, _)| scan.result.cells_used as i64),
+    )
+    .int(
+        "cells_rejected",
+        of.iter()
+            .map(|(_, scan, _)| scan.result.cells_rejected as i64),
+    )
+    .float("statistic", of_scan(|result| result.statistic))
+    .float("threshold", of_scan(|result| result.threshold))
+    .text("flags", of.iter().map(|(_, scan, _)| flags(&scan.result)))
 }
 
 /// A column of numbers and one of their deviations.
-pub(super) fn measured(table: Table, name: &str, values: impl Iterator<Item = Measured> + Clone) -> Table {
-    table.float(name, values.clone().map(|m| m.value)).float(&with(name, "std"), values.map(|m| m.std))
+pub(super) fn measured(
+    table: Table,
+    name: &str,
+    values: impl Iterator<Item = Measured> + Clone,
+) -> Table {
+    table
+        .float(name, values.clone().map(|m| m.value))
+        .float(&with(name, "std"), values.map(|m| m.std))
 }
 
 /// What is not known.
-pub(super) const UNKNOWN: Measured = Measured { value: f64::NAN, std: f64::NAN };
+pub(super) const UNKNOWN: Measured = Measured {
+    value: f64::NAN,
+    std: f64::NAN,
+};
 
 pub(super) type OfVortex = (&'static str, fn(&VortexResult) -> Option<Measured>);
 
@@ -84,7 +132,9 @@ pub(super) const VORTEX: [OfVortex; 5] = [
 pub fn track_of(scans: &[RetrievedScan]) -> Result<Option<Track>, Error> {
     let mut results: Vec<&ScanResult> = scans.iter().map(|scan| &scan.result).collect();
     results.sort_by(|a, b| a.reference_time_s.total_cmp(&b.reference_time_s));
-    let increase = results.windows(2).all(|pair| pair[1].reference_time_s > pair[0].reference_time_s);
+    let increase = results
+        .windows(2)
+        .all(|pair| pair[1].reference_time_s > pair[0].reference_time_s);
     let found = results.iter().any(|result| !result.vortices.is_empty());
     if results.len() < 2 || !increase || !found {
         return Ok(None);
@@ -106,18 +156,31 @@ pub(super) const TRACK: [OfTrack; 6] = [
 
 /// A row for each vortex and time of a track.
 pub fn track_table(track: &Track) -> Table {
-    let all = track.points.iter().flat_map(|point| point.vortices.iter().map(move |vortex| (point.time_s, vortex)));
+    let all = track.points.iter().flat_map(|point| {
+        point
+            .vortices
+            .iter()
+            .map(move |vortex| (point.time_s, vortex))
+    });
     let all: Vec<(f64, &TrackedVortex)> = all.collect();
     let table = Table::new()
         .float("time_s", all.iter().map(|(time_s, _)| *time_s))
         .text("side", all.iter().map(|(_, vortex)| name(vortex.side)))
-        .int("detected", all.iter().map(|(_, vortex)| i64::from(vortex.detected)));
-    TRACK.iter().fold(table, |table, (name, get)| measured(table, name, all.iter().map(|(_, vortex)| get(vortex))))
+        .int(
+            "detected",
+            all.iter().map(|(_, vortex)| i64::from(vortex.detected)),
+        );
+    TRACK.iter().fold(table, |table, (name, get)| {
+        measured(table, name, all.iter().map(|(_, vortex)| get(vortex)))
+    })
 }
 
 /// `gamma_m2_s` to `gamma_std_m2_s`: the unit stays at the end.
 pub(super) fn with(name: &str, word: &str) -> String {
-    let unit = ["_m2_s", "_m_s", "_per_s", "_m"].into_iter().find(|unit| name.ends_with(unit)).unwrap_or_default();
+    let unit = ["_m2_s", "_m_s", "_per_s", "_m"]
+        .into_iter()
+        .find(|unit| name.ends_with(unit))
+        .unwrap_or_default();
     format!("{}_{word}{unit}", name.strip_suffix(unit).unwrap_or(name))
 }
 
@@ -136,7 +199,10 @@ pub fn json(scans: &[RetrievedScan]) -> serde_json::Value {
     let names = || PARAMETER_NAMES.split(' ');
     // JSON has no NaN: what is not known is null.
     let wake = |values: [f64; 10]| -> Value {
-        names().zip(values).map(|(name, value)| (name.to_owned(), json!(value))).collect()
+        names()
+            .zip(values)
+            .map(|(name, value)| (name.to_owned(), json!(value)))
+            .collect()
     };
     let of_vortex = |vortex: &VortexResult| -> Value {
         let mut object = json!({ "side": vortex.side, "time_s": vortex.time_s });

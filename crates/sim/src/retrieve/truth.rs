@@ -26,7 +26,12 @@ const ROUNDS: usize = 20;
 type Passage = ((f64, f64), f64);
 
 /// A vortex with its circulation and the mean of that over 5 to 15 m, m^2/s; NaN for what cannot be known.
-fn exact(side: Side, (place_m, time_s): Passage, [circulation, mean]: [f64; 2], core_m: Option<f64>) -> VortexResult {
+fn exact(
+    side: Side,
+    (place_m, time_s): Passage,
+    [circulation, mean]: [f64; 2],
+    core_m: Option<f64>,
+) -> VortexResult {
     let known = |value: f64| Measured { value, std: 0.0 };
     VortexResult {
         side,
@@ -50,20 +55,34 @@ pub(crate) fn true_vortices(plan: &Plan, lines: &[usize]) -> Result<[VortexResul
             let (air, profile) = (vortex_pair(pair), pair.profile);
             // Behind an aircraft, the wake in the plane of the scan has its age there.
             let x_m = plan.scene.content.scan.lidar.x_m;
-            let since_s = pair.aircraft.map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
+            let since_s = pair
+                .aircraft
+                .map_or(0.0, |aircraft| (aircraft.x_m - x_m) / aircraft.speed_m_s);
             let of = |side: Side| -> Result<VortexResult, Error> {
                 let centre = |time_s: f64| {
                     let centres = air.centres(time_s + since_s);
-                    let y_m = if side == Side::Left { centres.left_y_m } else { centres.right_y_m };
+                    let y_m = if side == Side::Left {
+                        centres.left_y_m
+                    } else {
+                        centres.right_y_m
+                    };
                     Ok((y_m, centres.height_m))
                 };
                 let mean_m2_s = pair.circulation_m2_s * profile.mean_5_15(pair.core_radius_m).0;
                 let passage = when_passed(plan, lines, centre)?;
-                Ok(exact(side, passage, [pair.circulation_m2_s, mean_m2_s], Some(pair.core_radius_m)))
+                Ok(exact(
+                    side,
+                    passage,
+                    [pair.circulation_m2_s, mean_m2_s],
+                    Some(pair.core_radius_m),
+                ))
             };
             Ok([of(Side::Left)?, of(Side::Right)?])
         }
-        _ => Ok([simulated(plan, lines, Side::Left)?, simulated(plan, lines, Side::Right)?]),
+        _ => Ok([
+            simulated(plan, lines, Side::Left)?,
+            simulated(plan, lines, Side::Right)?,
+        ]),
     }
 }
 
@@ -76,7 +95,12 @@ pub(crate) fn true_wake(truth: &[VortexResult; 2]) -> Option<Wake> {
         core_radius_m: v.core_radius_m.map_or(f64::NAN, |core| core.value),
     };
     let [left, right] = truth.each_ref().map(vortex);
-    let wake = Wake { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 };
+    let wake = Wake {
+        left,
+        right,
+        lateral_wind_m_s: 0.0,
+        wind_shear_per_s: 0.0,
+    };
     wake.validate().is_ok().then_some(wake)
 }
 
@@ -87,13 +111,20 @@ fn when_passed(
     centre: impl Fn(f64) -> Result<(f64, f64), Error>,
 ) -> Result<Passage, Error> {
     let (g, lidar_m) = (&plan.geometry, plan.scene.content.scan.lidar_height_m);
-    let times_s = || lines.iter().map(|line| plan.wind.start_s + g.line_time_s[*line]);
+    let times_s = || {
+        lines
+            .iter()
+            .map(|line| plan.wind.start_s + g.line_time_s[*line])
+    };
     let mut time_s = times_s().sum::<f64>() / lines.len().max(1) as f64;
     let mut place_m = centre(time_s)?;
     for _ in 0..ROUNDS {
         let elevation_rad = (place_m.1 - lidar_m).atan2(place_m.0);
         let away = |line: &usize| (g.elevation_rad[*line] - elevation_rad).abs();
-        let line = lines.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)));
+        let line = lines
+            .iter()
+            .copied()
+            .min_by(|a, b| away(a).total_cmp(&away(b)));
         let next_s = plan.wind.start_s + line.map_or(0.0, |line| g.line_time_s[line]);
         if next_s == time_s {
             break;
@@ -110,7 +141,13 @@ fn simulated(plan: &Plan, lines: &[usize], side: Side) -> Result<VortexResult, E
         let [left, right] = [-1.0, 1.0].map(|sense| strongest(plan, time_s, sense));
         let (left, right) = (left?, right?);
         let reach_m = REACH_OVER_SPACING * (left.0 - right.0).hypot(left.1 - right.1);
-        centroid(plan, time_s, if side == Side::Left { left } else { right }, sense, reach_m)
+        centroid(
+            plan,
+            time_s,
+            if side == Side::Left { left } else { right },
+            sense,
+            reach_m,
+        )
     };
     let passage @ ((y_m, z_m), time_s) = when_passed(plan, lines, centre)?;
     let mean_m2_s = mean_circulation_5_15_m2_s(plan.wind.wind(), [y_m, z_m], time_s, CIRCLE)?;
@@ -129,30 +166,54 @@ fn vorticity(
 ) -> Result<Vec<PlaceAndVorticity>, Error> {
     let count = |low: f64, high: f64| ((high - low) / step_m).ceil().max(0.0) as usize + 1;
     let (columns, rows) = (count(low_m.0, high_m.0), count(low_m.1, high_m.1));
-    let place = |i: usize| (low_m.0 + (i % columns) as f64 * step_m, low_m.1 + (i / columns) as f64 * step_m);
-    let points_m: Vec<[f64; 3]> = (0..columns * rows).map(place).map(|(y, z)| [0.0, y, z]).collect();
+    let place = |i: usize| {
+        (
+            low_m.0 + (i % columns) as f64 * step_m,
+            low_m.1 + (i / columns) as f64 * step_m,
+        )
+    };
+    let points_m: Vec<[f64; 3]> = (0..columns * rows)
+        .map(place)
+        .map(|(y, z)| [0.0, y, z])
+        .collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    plan.wind.wind().velocity_into(&points_m, time_s, &mut velocity_m_s)?;
-    let of_row = |row: usize| (1..columns.saturating_sub(1)).map(move |column| row * columns + column);
+    plan.wind
+        .wind()
+        .velocity_into(&points_m, time_s, &mut velocity_m_s)?;
+    let of_row =
+        |row: usize| (1..columns.saturating_sub(1)).map(move |column| row * columns + column);
     let value = |i: usize| {
         let up = velocity_m_s[i + 1][2] - velocity_m_s[i - 1][2];
         let across = velocity_m_s[i + columns][1] - velocity_m_s[i - columns][1];
         (place(i), (up - across) / (2.0 * step_m))
     };
     let inner = (1..rows.saturating_sub(1)).flat_map(of_row);
-    Ok(inner.map(value).filter(|(_, value)| value.is_finite()).collect())
+    Ok(inner
+        .map(value)
+        .filter(|(_, value)| value.is_finite())
+        .collect())
 }
 
 /// The place of the scan where the vorticity of a sign is strongest.
 fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> {
     let (scan, g) = (&plan.scene.content.scan, &plan.geometry);
-    let top = g.elevation_rad.iter().fold(0.0_f64, |top, e| top.max(*e)).min(std::f64::consts::FRAC_PI_2);
+    let top = g
+        .elevation_rad
+        .iter()
+        .fold(0.0_f64, |top, e| top.max(*e))
+        .min(std::f64::consts::FRAC_PI_2);
     let sector = (
         (scan.range_min_m * top.cos(), COARSE_M),
-        (scan.range_max_m, scan.lidar_height_m + scan.range_max_m * top.sin()),
+        (
+            scan.range_max_m,
+            scan.lidar_height_m + scan.range_max_m * top.sin(),
+        ),
     );
     let all = vorticity(plan, time_s, sector, COARSE_M)?;
-    let best = all.into_iter().max_by(|a, b| (sense * a.1).total_cmp(&(sense * b.1))).filter(|(_, w)| sense * w > 0.0);
+    let best = all
+        .into_iter()
+        .max_by(|a, b| (sense * a.1).total_cmp(&(sense * b.1)))
+        .filter(|(_, w)| sense * w > 0.0);
     best.map(|(place, _)| place).ok_or_else(|| Error::Input {
         path: "retrieval".into(),
         reason: format!("the simulated flow has no vortex in the scanned plane at {time_s} s: it must lie in the scan"),
@@ -160,11 +221,20 @@ fn strongest(plan: &Plan, time_s: f64, sense: f64) -> Result<(f64, f64), Error> 
 }
 
 /// Centroid of the vorticity of a sign within `reach_m`, from a first place on.
-fn centroid(plan: &Plan, time_s: f64, first_m: (f64, f64), sense: f64, reach_m: f64) -> Result<(f64, f64), Error> {
+fn centroid(
+    plan: &Plan,
+    time_s: f64,
+    first_m: (f64, f64),
+    sense: f64,
+    reach_m: f64,
+) -> Result<(f64, f64), Error> {
     let mut centre_m = first_m;
     for _ in 0..ROUNDS {
         let edge = reach_m + 2.0 * FINE_M;
-        let around = ((centre_m.0 - edge, centre_m.1 - edge), (centre_m.0 + edge, centre_m.1 + edge));
+        let around = (
+            (centre_m.0 - edge, centre_m.1 - edge),
+            (centre_m.0 + edge, centre_m.1 + edge),
+        );
         let (mut sum, mut y, mut z) = (0.0, 0.0, 0.0);
         for ((at_y, at_z), value) in vorticity(plan, time_s, around, FINE_M)? {
             let near = (at_y - centre_m.0).hypot(at_z - centre_m.1) <= reach_m;
@@ -225,10 +295,20 @@ mod tests {
             pair.age_tau = 0.5;
         });
         let [left, right] = true_vortices(&moving, &lines(&moving)).unwrap();
-        let Flow::VortexPair(pair) = moving.scene.content.flow else { unreachable!() };
+        let Flow::VortexPair(pair) = moving.scene.content.flow else {
+            unreachable!()
+        };
         let at = vortex_pair(&pair).centres(left.time_s);
-        assert_eq!((left.lateral_position_m.value, left.height_m.value), (at.left_y_m, at.height_m));
-        let line = moving.geometry.line_time_s.iter().position(|t| moving.wind.start_s + t == left.time_s).unwrap();
+        assert_eq!(
+            (left.lateral_position_m.value, left.height_m.value),
+            (at.left_y_m, at.height_m)
+        );
+        let line = moving
+            .geometry
+            .line_time_s
+            .iter()
+            .position(|t| moving.wind.start_s + t == left.time_s)
+            .unwrap();
         let elevation_rad = left.height_m.value.atan2(left.lateral_position_m.value);
         assert!((moving.geometry.elevation_rad[line] - elevation_rad).abs() < 1.25e-3);
         // the far one is lower in elevation, and so seen at another time

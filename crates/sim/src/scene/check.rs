@@ -7,8 +7,8 @@ use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    DetectorSignal, EfficiencyOfPulse, FieldFlow, Flow, Method, Outside, Pattern, PulseShape, Scan, Scene,
-    SnrReference, SpectrumKind, Turbulence,
+    DetectorSignal, EfficiencyOfPulse, FieldFlow, Flow, Method, Outside, Pattern, PulseShape, Scan,
+    Scene, SnrReference, SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
 use crate::setup::instrument::{medium, pulse};
@@ -25,22 +25,42 @@ impl Scene {
         self.check_limits("", &mut c);
         self.check_instrument(&mut c);
         self.check_receiver(&mut c);
-        let added = self.added_flows.iter().enumerate().map(|(i, flow)| (format!("added_flows[{i}]"), flow));
+        let added = self
+            .added_flows
+            .iter()
+            .enumerate()
+            .map(|(i, flow)| (format!("added_flows[{i}]"), flow));
         for (at, flow) in std::iter::once(("flow".to_owned(), &self.flow)).chain(added) {
             check_flow(flow, &at, &mut c);
-            if let (Flow::Fields(FieldFlow { backscatter: Some(carried), .. }), SnrReference::Fixed { .. }) =
-                (flow, self.detector.snr)
+            if let (
+                Flow::Fields(FieldFlow {
+                    backscatter: Some(carried),
+                    ..
+                }),
+                SnrReference::Fixed { .. },
+            ) = (flow, self.detector.snr)
             {
-                let allowed = "absent with detector.snr.reference = \"fixed\", which asks for no backscatter";
-                c.refuse(&format!("{at}.backscatter.name"), &format!("{:?}", carried.name), allowed);
+                let allowed =
+                    "absent with detector.snr.reference = \"fixed\", which asks for no backscatter";
+                c.refuse(
+                    &format!("{at}.backscatter.name"),
+                    &format!("{:?}", carried.name),
+                    allowed,
+                );
             }
         }
         self.check_head(&mut c);
         check_estimator(self, &mut c);
         check_retrieval(self, &mut c);
         let o = &self.outputs;
-        let allowed = "true, or else one of csv, netcdf, hpl, svg and png: nothing would be written";
-        c.require(o.csv || o.netcdf || o.hpl || o.svg || o.png, "outputs.csv", o.csv, allowed);
+        let allowed =
+            "true, or else one of csv, netcdf, hpl, svg and png: nothing would be written";
+        c.require(
+            o.csv || o.netcdf || o.hpl || o.svg || o.png,
+            "outputs.csv",
+            o.csv,
+            allowed,
+        );
         // Limits between keys make sense only once each key does.
         if c.is_good() {
             self.check_between(&mut c);
@@ -50,24 +70,47 @@ impl Scene {
 
     fn check_instrument(&self, c: &mut Checker<'_>) {
         if let PulseShape::Sampled(shape) = &self.pulse.shape {
-            let mut counts = vec![("pulse.shape.time_s", shape.time_s.len()), ("pulse.shape.power", shape.power.len())];
-            counts.extend(Some(("pulse.shape.phase_rad", shape.phase_rad.len())).filter(|(_, count)| *count > 0));
+            let mut counts = vec![
+                ("pulse.shape.time_s", shape.time_s.len()),
+                ("pulse.shape.power", shape.power.len()),
+            ];
+            counts.extend(
+                Some(("pulse.shape.phase_rad", shape.phase_rad.len()))
+                    .filter(|(_, count)| *count > 0),
+            );
             check_lengths(&counts, "pulse.shape", c);
         }
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
             let has_place = t.spectrum != SpectrumKind::HillAndrews || t.inner_scale_m > 0.0;
             let allowed = "above 0 m with atmosphere.turbulence.spectrum = \"hill_andrews\", whose bump stands at it";
-            c.require(has_place, "atmosphere.turbulence.inner_scale_m", t.inner_scale_m, allowed);
+            c.require(
+                has_place,
+                "atmosphere.turbulence.inner_scale_m",
+                t.inner_scale_m,
+                allowed,
+            );
             let is_asked = !matches!(self.detector.snr, SnrReference::Fixed { .. });
-            let allowed = "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency";
+            let allowed =
+                "\"mean\" with detector.snr.reference = \"fixed\", which asks for no efficiency";
             let is_one = t.efficiency == EfficiencyOfPulse::Mean;
-            c.require(is_one || is_asked, "atmosphere.turbulence.efficiency", "realisation", allowed);
+            c.require(
+                is_one || is_asked,
+                "atmosphere.turbulence.efficiency",
+                "realisation",
+                allowed,
+            );
         }
         if let Some(profile) = &self.atmosphere.profile {
             let counts = [
                 ("atmosphere.profile.range_m", profile.range_m.len()),
-                ("atmosphere.profile.backscatter_per_m_sr", profile.backscatter_per_m_sr.len()),
-                ("atmosphere.profile.extinction_per_m", profile.extinction_per_m.len()),
+                (
+                    "atmosphere.profile.backscatter_per_m_sr",
+                    profile.backscatter_per_m_sr.len(),
+                ),
+                (
+                    "atmosphere.profile.extinction_per_m",
+                    profile.extinction_per_m.len(),
+                ),
             ];
             check_lengths(&counts, "atmosphere.profile", c);
         }
@@ -81,7 +124,11 @@ impl Scene {
 
     /// Samples recorded of each pulse: from `range_min_m` to `range_max_m`, ends included.
     pub fn samples_per_record(&self) -> usize {
-        let Scan { range_min_m, range_max_m, .. } = self.scan;
+        let Scan {
+            range_min_m,
+            range_max_m,
+            ..
+        } = self.scan;
         ((range_max_m - range_min_m) / self.sample_spacing_m() + 1e-9) as usize + 1
     }
 
@@ -101,7 +148,9 @@ impl Scene {
     /// Full width at half maximum of the power of the pulse, s; of a sampled one that of the Gaussian with the same spread.
     pub fn pulse_width_s(&self) -> f64 {
         match &self.pulse.shape {
-            PulseShape::Gaussian(shape) if shape.definition == super::PulseDefinition::Fwhm => shape.duration_s,
+            PulseShape::Gaussian(shape) if shape.definition == super::PulseDefinition::Fwhm => {
+                shape.duration_s
+            }
             _ => 2.0 * std::f64::consts::LN_2.sqrt() * self.pulse_sigma_s(),
         }
     }
@@ -112,16 +161,29 @@ impl Scene {
     pub(super) fn check_between(&self, c: &mut Checker<'_>) {
         let t = &self.telescope;
         let radii = [t.obscuration_radius_m, t.aperture_radius_m];
-        c.compare(["telescope.obscuration_radius_m", "telescope.aperture_radius_m"], radii, "below");
+        c.compare(
+            [
+                "telescope.obscuration_radius_m",
+                "telescope.aperture_radius_m",
+            ],
+            radii,
+            "below",
+        );
         if let Turbulence::Refractive(t) = self.atmosphere.turbulence {
-            let keys = ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.inner_scale_m"];
+            let keys = [
+                "atmosphere.turbulence.outer_scale_m",
+                "atmosphere.turbulence.inner_scale_m",
+            ];
             c.compare(keys, [t.outer_scale_m, t.inner_scale_m], "above");
         }
         if let Flow::VortexPair(p) = &self.flow {
             let (core_m, spacing_m) = (p.core_radius_m, p.spacing_m);
             let below = format!("below half of flow.spacing_m, {} m", 0.5 * spacing_m);
             let above = format!("above twice flow.core_radius_m, {} m", 2.0 * core_m);
-            let sides = [side("flow.core_radius_m", core_m, below), side("flow.spacing_m", spacing_m, above)];
+            let sides = [
+                side("flow.core_radius_m", core_m, below),
+                side("flow.spacing_m", spacing_m, above),
+            ];
             c.between(core_m < 0.5 * spacing_m, &sides);
         }
         self.check_band(c);
@@ -135,28 +197,49 @@ impl Scene {
         }
         let o = &self.outputs;
         let ends = [o.profile_range_max_m, o.profile_range_min_m];
-        c.compare(["outputs.profile_range_max_m", "outputs.profile_range_min_m"], ends, "above");
+        c.compare(
+            ["outputs.profile_range_max_m", "outputs.profile_range_min_m"],
+            ends,
+            "above",
+        );
     }
 
     /// The detector band lies between 0 and half the sampling frequency; that of two quadratures, which are made of it, within the whole one.
     fn check_band(&self, c: &mut Checker<'_>) {
         let d = &self.detector;
-        let (centre_hz, half_hz, nyquist_hz) = (d.intermediate_frequency_hz, 0.5 * d.bandwidth_hz, 0.5 * d.sampling_hz);
+        let (centre_hz, half_hz, nyquist_hz) = (
+            d.intermediate_frequency_hz,
+            0.5 * d.bandwidth_hz,
+            0.5 * d.sampling_hz,
+        );
         let is_baseband = d.signal == DetectorSignal::Baseband;
         // Two quadratures hold the band about 0, whose upper end then bounds no frequency.
-        let (sampled_hz, highest_hz) =
-            if is_baseband { (0.0, f64::INFINITY) } else { (centre_hz, nyquist_hz - half_hz) };
+        let (sampled_hz, highest_hz) = if is_baseband {
+            (0.0, f64::INFINITY)
+        } else {
+            (centre_hz, nyquist_hz - half_hz)
+        };
         let why = match is_baseband {
-            true => "two quadratures of the sampling frequency hold the band about the intermediate one",
+            true => {
+                "two quadratures of the sampling frequency hold the band about the intermediate one"
+            }
             false => "the detector band lies between 0 and half of detector.sampling_hz",
         };
         let narrowest_hz = centre_hz.min(nyquist_hz - sampled_hz);
         let mut sides = Vec::new();
         // A key that can mend it alone; of sampling and intermediate frequency one that has to, where none can.
         if half_hz < highest_hz && (centre_hz <= half_hz || centre_hz >= highest_hz) {
-            let below = if is_baseband { String::new() } else { format!(" and below {highest_hz:e}") };
+            let below = if is_baseband {
+                String::new()
+            } else {
+                format!(" and below {highest_hz:e}")
+            };
             let allowed = format!("above {half_hz:e}{below} Hz, so that {why}");
-            sides.push(side("detector.intermediate_frequency_hz", centre_hz, allowed));
+            sides.push(side(
+                "detector.intermediate_frequency_hz",
+                centre_hz,
+                allowed,
+            ));
         }
         if nyquist_hz <= sampled_hz + half_hz && (centre_hz > half_hz || narrowest_hz <= 0.0) {
             let allowed = format!("above {:e} Hz, so that {why}", 2.0 * (sampled_hz + half_hz));
@@ -179,18 +262,30 @@ impl Scene {
             _ => ("estimator.padded_samples", e.padded_samples, 1.0),
         };
         let step_hz = d.sampling_hz / (value as f64 * points_of_one);
-        let place = |edge: f64| (d.intermediate_frequency_hz + edge * 0.5 * d.bandwidth_hz) / step_hz;
+        let place =
+            |edge: f64| (d.intermediate_frequency_hz + edge * 0.5 * d.bandwidth_hz) / step_hz;
         let why = "so that the spectrum has a frequency in the detector band";
         let needed = (d.sampling_hz / (d.bandwidth_hz * points_of_one)).ceil();
-        let wide = side("detector.bandwidth_hz", d.bandwidth_hz, format!("at least {step_hz:e} Hz, {why}"));
+        let wide = side(
+            "detector.bandwidth_hz",
+            d.bandwidth_hz,
+            format!("at least {step_hz:e} Hz, {why}"),
+        );
         let fine = (key, value.to_string(), format!("at least {needed}, {why}"));
-        c.between((place(-1.0) - 1e-9).ceil() <= (place(1.0) + 1e-9).floor(), &[wide, fine]);
+        c.between(
+            (place(-1.0) - 1e-9).ceil() <= (place(1.0) + 1e-9).floor(),
+            &[wide, fine],
+        );
     }
 
     fn check_lines(&self, c: &mut Checker<'_>) {
         let s = &self.scan;
         let (low_rad, high_rad) = (s.elevation_min_rad, s.elevation_max_rad);
-        c.compare(["scan.elevation_max_rad", "scan.elevation_min_rad"], [high_rad, low_rad], "at least");
+        c.compare(
+            ["scan.elevation_max_rad", "scan.elevation_min_rad"],
+            [high_rad, low_rad],
+            "at least",
+        );
         let lowest_m = s.lidar_height_m + s.range_max_m * low_rad.sin();
         let is_seen = lowest_m >= 0.0 || s.below_ground != (Outside::Error {});
         // Not -0.
@@ -225,8 +320,15 @@ impl Scene {
                 side("pulse.shape.duration_s", shape.duration_s, allowed)
             }
         };
-        c.between(first_m > reach_m, &[side("scan.range_min_m", first_m, far), of_pulse]);
-        let ordered = c.compare(["scan.range_max_m", "scan.range_min_m"], [last_m, first_m], "above");
+        c.between(
+            first_m > reach_m,
+            &[side("scan.range_min_m", first_m, far), of_pulse],
+        );
+        let ordered = c.compare(
+            ["scan.range_max_m", "scan.range_min_m"],
+            [last_m, first_m],
+            "above",
+        );
         if ordered {
             self.check_record(c);
         }
@@ -238,35 +340,66 @@ impl Scene {
         let sampling_hz = self.detector.sampling_hz;
         let (samples, spacing_m) = (self.samples_per_record(), self.sample_spacing_m());
         let many = format!("records of at most 10000000 samples; this one has {samples}");
-        let values =
-            [("scan.range_max_m", last_m), ("scan.range_min_m", first_m), ("detector.sampling_hz", sampling_hz)];
-        c.between(samples <= 10_000_000, &values.map(|(key, value)| side(key, value, many.clone())));
+        let values = [
+            ("scan.range_max_m", last_m),
+            ("scan.range_min_m", first_m),
+            ("detector.sampling_hz", sampling_hz),
+        ];
+        c.between(
+            samples <= 10_000_000,
+            &values.map(|(key, value)| side(key, value, many.clone())),
+        );
         let window = self.estimator.window_samples;
         let window_m = (window as f64 - 1.0) * spacing_m;
-        let why = format!("so that the record, {samples} samples, holds estimator.window_samples, {window}");
+        let why = format!(
+            "so that the record, {samples} samples, holds estimator.window_samples, {window}"
+        );
         // Rounded to the side that is accepted.
-        let (up_m, down_m) = (((first_m + window_m) * 1e3).ceil() / 1e3, ((last_m - window_m) * 1e3).floor() / 1e3);
-        let all = format!("at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m");
+        let (up_m, down_m) = (
+            ((first_m + window_m) * 1e3).ceil() / 1e3,
+            ((last_m - window_m) * 1e3).floor() / 1e3,
+        );
+        let all = format!(
+            "at most {samples}, the samples recorded from scan.range_min_m to scan.range_max_m"
+        );
         let faster_hz = sampling_hz * (window_m / (last_m - first_m)) * (1.0 + 1e-6);
         let sides = [
             ("estimator.window_samples", window.to_string(), all),
-            side("scan.range_max_m", last_m, format!("at least {up_m} m, {why}")),
-            side("scan.range_min_m", first_m, format!("at most {down_m} m, {why}")),
-            side("detector.sampling_hz", sampling_hz, format!("at least {faster_hz:.6e} Hz, {why}")),
+            side(
+                "scan.range_max_m",
+                last_m,
+                format!("at least {up_m} m, {why}"),
+            ),
+            side(
+                "scan.range_min_m",
+                first_m,
+                format!("at most {down_m} m, {why}"),
+            ),
+            side(
+                "detector.sampling_hz",
+                sampling_hz,
+                format!("at least {faster_hz:.6e} Hz, {why}"),
+            ),
         ];
         c.between(window <= samples, &sides);
     }
 
     /// A HALO raw file counts gates from the lidar and knows their length alone.
     pub(super) fn check_hpl(&self, c: &mut Checker<'_>) {
-        let (window, step) = (self.estimator.window_samples, self.estimator.gate_step_samples);
+        let (window, step) = (
+            self.estimator.window_samples,
+            self.estimator.gate_step_samples,
+        );
         let allowed = format!(
             "only with gates that touch and do not overlap: estimator.gate_step_samples = {window}, as estimator.window_samples, not {step}"
         );
         if !c.require(step == window, "outputs.hpl", true, allowed) {
             return;
         }
-        let (first_m, gate_m) = (self.scan.range_min_m, window as f64 * self.sample_spacing_m());
+        let (first_m, gate_m) = (
+            self.scan.range_min_m,
+            window as f64 * self.sample_spacing_m(),
+        );
         let near_m = |number: f64| (number * gate_m * 1e4).round() / 1e4;
         let before = (first_m / gate_m).floor();
         let allowed = format!(
@@ -277,7 +410,10 @@ impl Scene {
         // A millimetre is below what readers of the format keep.
         let is_whole = ((first_m / gate_m).round() * gate_m - first_m).abs() <= 1e-3;
         c.require(is_whole, "scan.range_min_m", first_m, allowed);
-        let allowed = format!("at least {:.4} m with outputs.hpl, which needs two gates", first_m + 2.0 * gate_m);
+        let allowed = format!(
+            "at least {:.4} m with outputs.hpl, which needs two gates",
+            first_m + 2.0 * gate_m
+        );
         let has_two = self.samples_per_record() >= 2 * window;
         c.require(has_two, "scan.range_max_m", self.scan.range_max_m, allowed);
     }
@@ -285,7 +421,9 @@ impl Scene {
 
 /// Lists of a table that belong together have the same length; the one that differs from the first is blamed.
 fn check_lengths(counts: &[(&str, usize)], table: &str, c: &mut Checker<'_>) {
-    let Some((first, count)) = counts.first() else { return };
+    let Some((first, count)) = counts.first() else {
+        return;
+    };
     if let Some((key, other)) = counts.iter().find(|(_, other)| other != count) {
         let allowed = format!("as many values as {first} has, {count}");
         c.refuse(key, &format!("a list of {other}"), allowed);
@@ -311,11 +449,18 @@ mod tests {
     fn a_spectrum_that_stands_on_its_inner_scale_needs_one() {
         let air = |spectrum, inner_scale_m| {
             keys(|s| {
-                let t = crate::scene::RefractiveTurbulence { spectrum, inner_scale_m, ..Default::default() };
+                let t = crate::scene::RefractiveTurbulence {
+                    spectrum,
+                    inner_scale_m,
+                    ..Default::default()
+                };
                 s.atmosphere.turbulence = Turbulence::Refractive(t);
             })
         };
-        assert_eq!(air(crate::scene::SpectrumKind::HillAndrews, 0.0), ["atmosphere.turbulence.inner_scale_m"]);
+        assert_eq!(
+            air(crate::scene::SpectrumKind::HillAndrews, 0.0),
+            ["atmosphere.turbulence.inner_scale_m"]
+        );
         assert!(air(crate::scene::SpectrumKind::HillAndrews, 0.01).is_empty());
         assert!(air(crate::scene::SpectrumKind::VonKarman, 0.0).is_empty());
     }
@@ -327,17 +472,38 @@ mod tests {
 
     #[test]
     fn impossible_values_are_named() {
-        assert_eq!(keys(|s| s.telescope.beam_radius_m = -0.03), ["telescope.beam_radius_m"]);
-        assert_eq!(keys(|s| s.pulse.shape = PulseShape::gaussian(f64::NAN)), ["pulse.shape.duration_s"]);
+        assert_eq!(
+            keys(|s| s.telescope.beam_radius_m = -0.03),
+            ["telescope.beam_radius_m"]
+        );
+        assert_eq!(
+            keys(|s| s.pulse.shape = PulseShape::gaussian(f64::NAN)),
+            ["pulse.shape.duration_s"]
+        );
         assert_eq!(keys(|s| s.telescope.focus_m = 0.0), ["telescope.focus_m"]);
-        assert_eq!(keys(|s| s.scan.elevation_min_rad = -0.01), ["scan.elevation_min_rad"]);
-        assert_eq!(keys(|s| s.scan.range_max_m = 281.0), ["estimator.window_samples"]);
+        assert_eq!(
+            keys(|s| s.scan.elevation_min_rad = -0.01),
+            ["scan.elevation_min_rad"]
+        );
+        assert_eq!(
+            keys(|s| s.scan.range_max_m = 281.0),
+            ["estimator.window_samples"]
+        );
         assert_eq!(keys(|s| s.scan.range_min_m = 40.0), ["scan.range_min_m"]);
-        assert_eq!(keys(|s| s.detector.intermediate_frequency_hz = 110e6), ["detector.intermediate_frequency_hz"]);
-        assert_eq!(keys(|s| s.estimator.padded_samples = 63), ["estimator.padded_samples"]);
+        assert_eq!(
+            keys(|s| s.detector.intermediate_frequency_hz = 110e6),
+            ["detector.intermediate_frequency_hz"]
+        );
+        assert_eq!(
+            keys(|s| s.estimator.padded_samples = 63),
+            ["estimator.padded_samples"]
+        );
         assert_eq!(keys(|s| s.seed = u64::MAX), ["seed"]);
         assert_eq!(keys(|s| s.format = 7), ["format"]);
-        let few = crate::scene::RefractiveTurbulence { realisations: 4, ..Default::default() };
+        let few = crate::scene::RefractiveTurbulence {
+            realisations: 4,
+            ..Default::default()
+        };
         let few = keys(|s| s.atmosphere.turbulence = Turbulence::Refractive(few));
         assert_eq!(few, ["atmosphere.turbulence.realisations"]);
     }
@@ -354,7 +520,9 @@ mod tests {
     #[test]
     fn age_needs_motion() {
         let mut scene = Scene::default();
-        let Flow::VortexPair(pair) = &mut scene.flow else { unreachable!() };
+        let Flow::VortexPair(pair) = &mut scene.flow else {
+            unreachable!()
+        };
         pair.age_tau = 1.0;
         assert_eq!(scene.problems()[0].key, "flow.age_tau");
     }
@@ -372,7 +540,9 @@ mod tests {
     }
 
     fn message(text: &str) -> String {
-        SceneFile::parse(text, Path::new("s.toml")).unwrap_err().to_string()
+        SceneFile::parse(text, Path::new("s.toml"))
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
@@ -386,13 +556,22 @@ mod tests {
                 "[detector]\nsampling_hz = 100e6\n",
                 "s.toml:2: detector.sampling_hz = 100e6 is not allowed: above 2.1e8 Hz",
             ),
-            ("[detector]\nbandwidth_hz = 95e6\n", "detector.bandwidth_hz = 95e6 is not allowed: below 9e7 Hz"),
-            ("[scan]\nrange_max_m = 300\n", "s.toml:2: scan.range_max_m = 300 is not allowed: at least 317.774 m"),
+            (
+                "[detector]\nbandwidth_hz = 95e6\n",
+                "detector.bandwidth_hz = 95e6 is not allowed: below 9e7 Hz",
+            ),
+            (
+                "[scan]\nrange_max_m = 300\n",
+                "s.toml:2: scan.range_max_m = 300 is not allowed: at least 317.774 m",
+            ),
             (
                 "[pulse.shape]\nduration_s = 1.2e-6\n",
                 "s.toml:2: pulse.shape.duration_s = 1.2e-6 is not allowed: below 8.36",
             ),
-            ("[flow]\nspacing_m = 3\n", "flow.spacing_m = 3 is not allowed: above twice flow.core_radius_m, 4.7 m"),
+            (
+                "[flow]\nspacing_m = 3\n",
+                "flow.spacing_m = 3 is not allowed: above twice flow.core_radius_m, 4.7 m",
+            ),
             (
                 "[telescope]\naperture_radius_m = 0.01\nobscuration_radius_m = 0.02\n",
                 "telescope.obscuration_radius_m = 0.02",
@@ -401,7 +580,10 @@ mod tests {
                 "[scan]\nelevation_min_rad = 0.5\n",
                 "scan.elevation_min_rad = 0.5 is not allowed: at most scan.elevation_max_rad",
             ),
-            ("[outputs]\nprofile_range_min_m = 4000\n", "outputs.profile_range_min_m = 4000 is not allowed: below"),
+            (
+                "[outputs]\nprofile_range_min_m = 4000\n",
+                "outputs.profile_range_min_m = 4000 is not allowed: below",
+            ),
             (
                 "[estimator]\nmethod.kind = \"capon\"\nwindow_samples = 10\n",
                 "estimator.window_samples = 10 is not allowed: above estimator.method.order, 16",
@@ -414,7 +596,11 @@ mod tests {
 
     #[test]
     fn what_a_limit_names_is_accepted() {
-        let good = |text: &str| SceneFile::parse(text, Path::new("s.toml")).map(|_| ()).map_err(|e| e.to_string());
+        let good = |text: &str| {
+            SceneFile::parse(text, Path::new("s.toml"))
+                .map(|_| ())
+                .map_err(|e| e.to_string())
+        };
         assert_eq!(good("[pulse.shape]\nduration_s = 8.36e-7\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_max_m = 317.774\n"), Ok(()));
         assert_eq!(good("[scan]\nrange_min_m = 482.226\n"), Ok(()));
@@ -426,20 +612,37 @@ mod tests {
             ))
         };
         let refused = band("70e6").unwrap_err();
-        assert!(refused.contains("above 3e7 and below 7e7 Hz") && band("30e6").is_err(), "{refused}");
+        assert!(
+            refused.contains("above 3e7 and below 7e7 Hz") && band("30e6").is_err(),
+            "{refused}"
+        );
         assert_eq!((band("30000001"), band("69999999")), (Ok(()), Ok(())));
         let fine = |words: &str| good(&format!("[detector]\nbandwidth_hz = 1e5\n{words}"));
-        assert!(fine("").unwrap_err().contains("detector.bandwidth_hz = 1e5 is not allowed: at least 2.44140625e5 Hz"));
+        assert!(
+            fine("")
+                .unwrap_err()
+                .contains("detector.bandwidth_hz = 1e5 is not allowed: at least 2.44140625e5 Hz")
+        );
         assert_eq!(fine("[estimator]\npadded_samples = 2500\n"), Ok(()));
         assert_eq!(good("[detector]\nbandwidth_hz = 244141\n"), Ok(()));
         for (pattern, count) in [("\"vad\", beams", 10_000), ("\"stare\", lines", 100_000)] {
-            let with =
-                |n: usize| good(&format!("[scan]\npulses_per_line = 1\npattern = {{ kind = {pattern} = {n} }}\n"));
+            let with = |n: usize| {
+                good(&format!(
+                    "[scan]\npulses_per_line = 1\npattern = {{ kind = {pattern} = {n} }}\n"
+                ))
+            };
             assert_eq!(with(count), Ok(()));
             assert!(with(count + 1).is_err());
         }
-        assert!(good("[scan]\npattern = { kind = \"vad\", beams = 3 }\n").unwrap_err().contains("from 4 to 10000"));
-        assert_eq!(good("[scan]\npattern = { kind = \"vad\", beams = 4 }\n"), Ok(()));
+        assert!(
+            good("[scan]\npattern = { kind = \"vad\", beams = 3 }\n")
+                .unwrap_err()
+                .contains("from 4 to 10000")
+        );
+        assert_eq!(
+            good("[scan]\npattern = { kind = \"vad\", beams = 4 }\n"),
+            Ok(())
+        );
     }
 
     /// A default beside a changed key is not what the user wrote: nobody looks for it in the file.
@@ -447,30 +650,47 @@ mod tests {
     fn no_single_change_of_a_number_is_blamed_on_a_default() {
         let defaults = toml::Table::try_from(Scene::default()).unwrap();
         let mut texts = Vec::new();
-        for (section, keys) in defaults.iter().filter_map(|(name, value)| Some((name, value.as_table()?))) {
+        for (section, keys) in defaults
+            .iter()
+            .filter_map(|(name, value)| Some((name, value.as_table()?)))
+        {
             for (key, value) in keys {
                 let values: Vec<String> = match value {
                     toml::Value::Float(x) => {
-                        let factors = [-1.0, 1e-9, 1e-4, 0.01, 0.1, 0.5, 2.0, 5.0, 20.0, 1e3, 1e6, 1e12];
-                        factors.iter().map(|f| format!("{:?}", x * f)).chain(["nan".into(), "inf".into()]).collect()
+                        let factors = [
+                            -1.0, 1e-9, 1e-4, 0.01, 0.1, 0.5, 2.0, 5.0, 20.0, 1e3, 1e6, 1e12,
+                        ];
+                        factors
+                            .iter()
+                            .map(|f| format!("{:?}", x * f))
+                            .chain(["nan".into(), "inf".into()])
+                            .collect()
                     }
-                    toml::Value::Integer(_) => {
-                        ["0", "1", "3", "100", "5000", "70000", "2000000"].map(String::from).into()
-                    }
+                    toml::Value::Integer(_) => ["0", "1", "3", "100", "5000", "70000", "2000000"]
+                        .map(String::from)
+                        .into(),
                     toml::Value::Boolean(_) => vec!["true".into(), "false".into()],
                     _ => continue,
                 };
                 for value in values {
-                    texts.push((format!("{section}.{key}"), format!("[{section}]\n{key} = {value}\n")));
+                    texts.push((
+                        format!("{section}.{key}"),
+                        format!("[{section}]\n{key} = {value}\n"),
+                    ));
                 }
             }
         }
         let mut refused = 0;
         for (key, text) in texts {
-            let Err(error) = SceneFile::parse(&text, Path::new("s.toml")) else { continue };
+            let Err(error) = SceneFile::parse(&text, Path::new("s.toml")) else {
+                continue;
+            };
             refused += 1;
             for line in error.to_string().lines() {
-                assert!(line.starts_with(&format!("s.toml:2: {key} = ")), "{text}{line}");
+                assert!(
+                    line.starts_with(&format!("s.toml:2: {key} = ")),
+                    "{text}{line}"
+                );
             }
         }
         assert!(refused > 150, "{refused}");
@@ -479,9 +699,15 @@ mod tests {
     #[test]
     fn place_and_date_have_limits() {
         assert_eq!(keys(|s| s.site.latitude_deg = 91.0), ["site.latitude_deg"]);
-        assert_eq!(keys(|s| s.site.longitude_deg = f64::NAN), ["site.longitude_deg"]);
+        assert_eq!(
+            keys(|s| s.site.longitude_deg = f64::NAN),
+            ["site.longitude_deg"]
+        );
         assert_eq!(keys(|s| s.site.altitude_m = 1e6), ["site.altitude_m"]);
-        assert_eq!(keys(|s| s.site.start_utc = "yesterday".into()), ["site.start_utc"]);
+        assert_eq!(
+            keys(|s| s.site.start_utc = "yesterday".into()),
+            ["site.start_utc"]
+        );
         assert_eq!(keys(|s| s.site.name = "two\nlines".into()), ["site.name"]);
     }
 
@@ -491,12 +717,22 @@ mod tests {
             let mut scene = Scene::default();
             scene.outputs.hpl = true;
             (scene.estimator.gate_step_samples, scene.scan.range_min_m) = (step, range_min_m);
-            scene.problems().iter().map(ToString::to_string).collect::<Vec<_>>()
+            scene
+                .problems()
+                .iter()
+                .map(ToString::to_string)
+                .collect::<Vec<_>>()
         };
         let overlap = problems(5, 280.0).join(" ");
-        assert!(overlap.contains("outputs.hpl") && overlap.contains("gate_step_samples = 64"), "{overlap}");
+        assert!(
+            overlap.contains("outputs.hpl") && overlap.contains("gate_step_samples = 64"),
+            "{overlap}"
+        );
         let shifted = problems(64, 280.0).join(" ");
-        assert!(shifted.contains("scan.range_min_m = 280") && shifted.contains("306.9875"), "{shifted}");
+        assert!(
+            shifted.contains("scan.range_min_m = 280") && shifted.contains("306.9875"),
+            "{shifted}"
+        );
         assert_eq!(problems(64, 306.9875), Vec::<String>::new());
     }
 }

@@ -167,7 +167,10 @@ impl Estimator {
             _ if self.method == (Method::Periodogram {}) => "no region".to_owned(),
             RegionRadius::Fixed {} => format!("regions of {} m", self.radius_m),
             RegionRadius::OfRange { .. } => "regions whose radius depends on range".to_owned(),
-            RegionRadius::Target { standard_deviation_m_s, .. } => {
+            RegionRadius::Target {
+                standard_deviation_m_s,
+                ..
+            } => {
                 format!("regions for a standard deviation of {standard_deviation_m_s} m/s")
             }
         }
@@ -177,7 +180,10 @@ impl Estimator {
     pub(crate) fn largest_radius_m(&self, range_m: f64) -> f64 {
         match &self.radius {
             _ if self.method == (Method::Periodogram {}) => 0.0,
-            RegionRadius::OfRange { range_m: at_m, radius_m } => of_table(at_m, radius_m, range_m),
+            RegionRadius::OfRange {
+                range_m: at_m,
+                radius_m,
+            } => of_table(at_m, radius_m, range_m),
             RegionRadius::Target { largest_m, .. } => *largest_m,
             RegionRadius::Fixed {} => self.radius_m,
         }
@@ -185,7 +191,10 @@ impl Estimator {
 
     /// Lags that are kept of a window where they are but those that a model of this order needs: of windows without weighting.
     pub(crate) fn few_lags(&self) -> Option<usize> {
-        self.method.order().filter(|_| self.weighting == Weighting::Rectangular).map(|model| model.order + 1)
+        self.method
+            .order()
+            .filter(|_| self.weighting == Weighting::Rectangular)
+            .map(|model| model.order + 1)
     }
 }
 
@@ -198,7 +207,9 @@ impl Method {
     /// The order of the model that the method fits, if it fits one.
     pub fn order(&self) -> Option<ModelOrder> {
         match self {
-            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => Some(*model),
+            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => {
+                Some(*model)
+            }
             _ => None,
         }
     }
@@ -207,7 +218,9 @@ impl Method {
     pub fn likelihood_snr_db(&self) -> Option<f64> {
         match self {
             Self::Likelihood(Likelihood { likelihood_snr_db })
-            | Self::GradientLikelihood(GradientLikelihood { likelihood_snr_db, .. }) => *likelihood_snr_db,
+            | Self::GradientLikelihood(GradientLikelihood {
+                likelihood_snr_db, ..
+            }) => *likelihood_snr_db,
             _ => None,
         }
     }
@@ -216,37 +229,67 @@ impl Method {
 /// Every limit of the estimator's keys, and those between them.
 pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
     let e = &scene.estimator;
-    let mut beside_window =
-        |key, value, word| c.compare([key, "estimator.window_samples"], [value, e.window_samples], word);
+    let mut beside_window = |key, value, word| {
+        c.compare(
+            [key, "estimator.window_samples"],
+            [value, e.window_samples],
+            word,
+        )
+    };
     beside_window("estimator.padded_samples", e.padded_samples, "at least");
     if let Method::LagWindow(own) = e.method {
-        beside_window("estimator.method.lag_window_lags", own.lag_window_lags, "below");
+        beside_window(
+            "estimator.method.lag_window_lags",
+            own.lag_window_lags,
+            "below",
+        );
     }
     if let Some(model) = e.method.order() {
         beside_window("estimator.method.order", model.order, "below");
     }
     if let RegionRadius::OfRange { range_m, radius_m } = &e.radius {
-        let fits = radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r));
+        let fits =
+            radius_m.len() == range_m.len() && radius_m.iter().all(|r| (0.0..=1e5).contains(r));
         let allowed = "one number from 0 to 1e5 m for each of estimator.radius.range_m";
         c.require(fits, "estimator.radius.radius_m", radius_m, allowed);
     }
     let without_region = e.method == (Method::Periodogram {});
     let allowed = "another one with estimator.radius: \"periodogram\" has no region";
     let is_fixed = e.radius == (RegionRadius::Fixed {});
-    c.require(is_fixed || !without_region, "estimator.method.kind", "periodogram", allowed);
+    c.require(
+        is_fixed || !without_region,
+        "estimator.method.kind",
+        "periodogram",
+        allowed,
+    );
     // Methods that exclude a knob.
     let is_biased_alone = e.method.has_own_tapers() || matches!(e.method, Method::FirstMoment(_));
-    let allowed = "\"biased\" with first_moment and the likelihoods, whose statistic has no unbiased form";
-    let is_biased = e.correlogram == CorrelogramForm::Biased;
-    c.require(is_biased || !is_biased_alone, "estimator.correlogram", "unbiased", allowed);
-    let has_gradient = matches!(e.method, Method::GradientLikelihood(_));
     let allowed =
-        "false with gradient_likelihood, which has the gradient itself, and with periodogram, which has no region";
+        "\"biased\" with first_moment and the likelihoods, whose statistic has no unbiased form";
+    let is_biased = e.correlogram == CorrelogramForm::Biased;
+    c.require(
+        is_biased || !is_biased_alone,
+        "estimator.correlogram",
+        "unbiased",
+        allowed,
+    );
+    let has_gradient = matches!(e.method, Method::GradientLikelihood(_));
+    let allowed = "false with gradient_likelihood, which has the gradient itself, and with periodogram, which has no region";
     let may_follow = !(has_gradient || without_region);
-    c.require(may_follow || !e.follow_wind, "estimator.follow_wind", e.follow_wind, allowed);
+    c.require(
+        may_follow || !e.follow_wind,
+        "estimator.follow_wind",
+        e.follow_wind,
+        allowed,
+    );
     let allowed = "another one for a pulse that is sampled or has a chirp: its covariance is that of a Gaussian pulse";
     let is_known = scene.pulse.is_gaussian();
-    c.require(is_known || !has_gradient, "estimator.method.kind", "gradient_likelihood", allowed);
+    c.require(
+        is_known || !has_gradient,
+        "estimator.method.kind",
+        "gradient_likelihood",
+        allowed,
+    );
 }
 
 #[cfg(test)]
@@ -262,16 +305,40 @@ mod tests {
     #[test]
     fn knobs_of_the_estimators_are_held_to_their_limits() {
         let own = |method| keys(|e| e.method = method);
-        let order = ModelOrder { order: 64, ..ModelOrder::default() };
+        let order = ModelOrder {
+            order: 64,
+            ..ModelOrder::default()
+        };
         assert_eq!(own(Method::Capon(order)), ["estimator.method.order"]);
-        let lags = LagWindow { lag_window_lags: 64 };
-        assert_eq!(own(Method::LagWindow(lags)), ["estimator.method.lag_window_lags"]);
-        let reach = FirstMoment { moment_reach: f64::NAN };
-        assert_eq!(own(Method::FirstMoment(reach)), ["estimator.method.moment_reach"]);
-        let strong = Likelihood { likelihood_snr_db: Some(200.0) };
-        assert_eq!(own(Method::Likelihood(strong)), ["estimator.method.likelihood_snr_db"]);
-        let even = GradientLikelihood { gradients: 4, ..GradientLikelihood::default() };
-        assert_eq!(own(Method::GradientLikelihood(even)), ["estimator.method.gradients"]);
+        let lags = LagWindow {
+            lag_window_lags: 64,
+        };
+        assert_eq!(
+            own(Method::LagWindow(lags)),
+            ["estimator.method.lag_window_lags"]
+        );
+        let reach = FirstMoment {
+            moment_reach: f64::NAN,
+        };
+        assert_eq!(
+            own(Method::FirstMoment(reach)),
+            ["estimator.method.moment_reach"]
+        );
+        let strong = Likelihood {
+            likelihood_snr_db: Some(200.0),
+        };
+        assert_eq!(
+            own(Method::Likelihood(strong)),
+            ["estimator.method.likelihood_snr_db"]
+        );
+        let even = GradientLikelihood {
+            gradients: 4,
+            ..GradientLikelihood::default()
+        };
+        assert_eq!(
+            own(Method::GradientLikelihood(even)),
+            ["estimator.method.gradients"]
+        );
         let with = |method, change: fn(&mut Estimator)| {
             keys(|e| {
                 e.method = method;
@@ -279,13 +346,25 @@ mod tests {
             })
         };
         let gradient = Method::GradientLikelihood(GradientLikelihood::default());
-        assert_eq!(with(gradient, |e| e.follow_wind = true), ["estimator.follow_wind"]);
+        assert_eq!(
+            with(gradient, |e| e.follow_wind = true),
+            ["estimator.follow_wind"]
+        );
         let moment = Method::FirstMoment(FirstMoment::default());
-        assert_eq!(with(moment, |e| e.correlogram = CorrelogramForm::Unbiased), ["estimator.correlogram"]);
+        assert_eq!(
+            with(moment, |e| e.correlogram = CorrelogramForm::Unbiased),
+            ["estimator.correlogram"]
+        );
         let model = Method::Autoregressive(ModelOrder::default());
-        assert_eq!(with(model, |e| e.false_alarm = 1.0), ["estimator.false_alarm"]);
+        assert_eq!(
+            with(model, |e| e.false_alarm = 1.0),
+            ["estimator.false_alarm"]
+        );
         let table = |e: &mut Estimator| {
-            e.radius = RegionRadius::OfRange { range_m: vec![300.0, 200.0], radius_m: vec![1.0, 2.0] };
+            e.radius = RegionRadius::OfRange {
+                range_m: vec![300.0, 200.0],
+                radius_m: vec![1.0, 2.0],
+            };
         };
         assert_eq!(with(model, table), ["estimator.radius.range_m"]);
     }

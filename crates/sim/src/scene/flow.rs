@@ -202,15 +202,31 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
         Flow::VortexLines(lines) => check_lines(lines, at, c),
         Flow::Simulated(flow) => {
             if let Some(time_s) = flow.time_s {
-                c.require(flow.age_tau.is_none(), &key("time_s"), time_s, "absent beside flow.age_tau");
+                c.require(
+                    flow.age_tau.is_none(),
+                    &key("time_s"),
+                    time_s,
+                    "absent beside flow.age_tau",
+                );
             }
         }
         Flow::VortexPair(p) => {
             let key = key("age_tau");
             let allowed = "0 for a pair at rest; an age needs flow.motion = \"inviscid\"";
-            c.require(p.age_tau == 0.0 || p.motion == VortexMotion::Inviscid, &key, p.age_tau, allowed);
-            let allowed = format!("0 with {at}.aircraft, which says how old the wake is at each place");
-            c.require(p.age_tau == 0.0 || p.aircraft.is_none(), &key, p.age_tau, allowed);
+            c.require(
+                p.age_tau == 0.0 || p.motion == VortexMotion::Inviscid,
+                &key,
+                p.age_tau,
+                allowed,
+            );
+            let allowed =
+                format!("0 with {at}.aircraft, which says how old the wake is at each place");
+            c.require(
+                p.age_tau == 0.0 || p.aircraft.is_none(),
+                &key,
+                p.age_tau,
+                allowed,
+            );
         }
     }
 }
@@ -219,12 +235,28 @@ fn check_lines(lines: &VortexLines, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");
     let (count, circulations) = (lines.nodes_m.len(), lines.circulation_m2_s.len());
     let allowed = "a list of 1 to 1000 vortices";
-    c.require((1..=1000).contains(&count), &key("nodes_m"), format!("a list of {count}"), allowed);
+    c.require(
+        (1..=1000).contains(&count),
+        &key("nodes_m"),
+        format!("a list of {count}"),
+        allowed,
+    );
     let allowed = format!("as many values as {at}.nodes_m has vortices, {count}");
-    c.require(circulations == count, &key("circulation_m2_s"), format!("a list of {circulations}"), allowed);
+    c.require(
+        circulations == count,
+        &key("circulation_m2_s"),
+        format!("a list of {circulations}"),
+        allowed,
+    );
     let axial = lines.endless || lines.axial_deficit_m_s == 0.0;
-    let allowed = format!("0 with {at}.endless = false: the middle of a polyline has no speed of its own");
-    c.require(axial, &key("axial_deficit_m_s"), lines.axial_deficit_m_s, allowed);
+    let allowed =
+        format!("0 with {at}.endless = false: the middle of a polyline has no speed of its own");
+    c.require(
+        axial,
+        &key("axial_deficit_m_s"),
+        lines.axial_deficit_m_s,
+        allowed,
+    );
     if c.is_good()
         && let Err(e) = crate::setup::wind::vortex_lines(lines)
     {

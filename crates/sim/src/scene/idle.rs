@@ -3,7 +3,10 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern, RefractiveTurbulence};
+use super::{
+    Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern,
+    RefractiveTurbulence,
+};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{Refinement, RegionRadius, SignalsOf};
 use crate::keys::{Text, lines_with_keys, value_at};
@@ -19,68 +22,162 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         }
     };
     let without_peak = matches!(method, Method::PulsePair {} | Method::FirstMoment(_));
-    unused(without_peak, &["estimator.refinement"], format!("{kind} refines no peak"));
+    unused(
+        without_peak,
+        &["estimator.refinement"],
+        format!("{kind} refines no peak"),
+    );
     let no_exact = method.order().is_some() && scene.estimator.refinement == Refinement::Exact;
     let purpose = format!("{kind} has no exact refinement, \"parabola\" is what it takes");
     unused(no_exact, &["estimator.refinement"], purpose);
     let none = !scene.outputs.signals && scene.outputs.signals_of == SignalsOf::All;
-    unused(none, &["outputs.signals_of"], "outputs.signals = false writes none".into());
+    unused(
+        none,
+        &["outputs.signals_of"],
+        "outputs.signals = false writes none".into(),
+    );
     let untested = scene.estimator.false_alarm != Estimator::default().false_alarm;
     let without_noise = untested && scene.detector.noise == NoiseModel::None;
-    unused(without_noise, &["estimator.false_alarm"], "detector.noise = \"none\" leaves nothing to test".into());
+    unused(
+        without_noise,
+        &["estimator.false_alarm"],
+        "detector.noise = \"none\" leaves nothing to test".into(),
+    );
     let without_spectrum = *method == (Method::PulsePair {});
-    unused(without_spectrum, &["estimator.padded_samples"], format!("{kind} has no spectrum"));
-    unused(method.has_own_tapers(), &["estimator.weighting"], format!("{kind} has tapers of its own"));
+    unused(
+        without_spectrum,
+        &["estimator.padded_samples"],
+        format!("{kind} has no spectrum"),
+    );
+    unused(
+        method.has_own_tapers(),
+        &["estimator.weighting"],
+        format!("{kind} has tapers of its own"),
+    );
     let without_region = *method == (Method::Periodogram {});
-    unused(without_region, &[Estimator::RADIUS], format!("{kind} has no region"));
+    unused(
+        without_region,
+        &[Estimator::RADIUS],
+        format!("{kind} has no region"),
+    );
     let own_radius = !without_region && scene.estimator.radius != RegionRadius::Fixed {};
-    unused(own_radius, &[Estimator::RADIUS], "this key is for estimator.radius.kind = \"fixed\"".into());
-    let air = ["atmosphere.backscatter_per_m_sr", "atmosphere.extinction_per_m"];
-    unused(scene.atmosphere.profile.is_some(), &air, "atmosphere.profile takes its place".into());
-    unused(scene.laser.amplifier.is_some(), &["pulse.energy_j"], "laser.amplifier takes its place".into());
-    let losses = ["telescope.optics_loss_db", "telescope.polarisation_loss_db", "telescope.blind_range_m"];
+    unused(
+        own_radius,
+        &[Estimator::RADIUS],
+        "this key is for estimator.radius.kind = \"fixed\"".into(),
+    );
+    let air = [
+        "atmosphere.backscatter_per_m_sr",
+        "atmosphere.extinction_per_m",
+    ];
+    unused(
+        scene.atmosphere.profile.is_some(),
+        &air,
+        "atmosphere.profile takes its place".into(),
+    );
+    unused(
+        scene.laser.amplifier.is_some(),
+        &["pulse.energy_j"],
+        "laser.amplifier takes its place".into(),
+    );
+    let losses = [
+        "telescope.optics_loss_db",
+        "telescope.polarisation_loss_db",
+        "telescope.blind_range_m",
+    ];
     let fixed = matches!(scene.detector.snr, SnrReference::Fixed { .. });
-    unused(fixed, &losses, "detector.snr.reference = \"fixed\" asks for no optics".into());
+    unused(
+        fixed,
+        &losses,
+        "detector.snr.reference = \"fixed\" asks for no optics".into(),
+    );
     if let Some(f) = &scene.detector.front_end {
         for (key, none, value) in [
-            ("detector.front_end.load_temperature_k", "load_ohm", f.load_ohm),
-            ("detector.front_end.rejection_db", "intensity_noise_db_hz", f.intensity_noise_db_hz),
+            (
+                "detector.front_end.load_temperature_k",
+                "load_ohm",
+                f.load_ohm,
+            ),
+            (
+                "detector.front_end.rejection_db",
+                "intensity_noise_db_hz",
+                f.intensity_noise_db_hz,
+            ),
             ("detector.front_end.poles", "half_power_hz", f.half_power_hz),
         ] {
-            let purpose = format!("detector.front_end.{none} = {value} leaves nothing for it to act on");
+            let purpose =
+                format!("detector.front_end.{none} = {value} leaves nothing for it to act on");
             unused(value.is_infinite(), &[key], purpose);
         }
     }
     let scan = &scene.scan;
-    let angles = format!("scan.pattern.kind = \"{}\" has angles of its own", scan.pattern.name());
+    let angles = format!(
+        "scan.pattern.kind = \"{}\" has angles of its own",
+        scan.pattern.name()
+    );
     let rows = matches!(scan.pattern, Pattern::Rhi {} | Pattern::Axial(_));
-    unused(!rows, &["scan.elevation_min_rad", "scan.elevation_max_rad"], angles.clone());
+    unused(
+        !rows,
+        &["scan.elevation_min_rad", "scan.elevation_max_rad"],
+        angles.clone(),
+    );
     unused(!rows, &["scan.elevation_step_rad"], angles.clone());
-    unused(!matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare(_)), &["scan.azimuth_rad"], angles);
+    unused(
+        !matches!(scan.pattern, Pattern::Rhi {} | Pattern::Stare(_)),
+        &["scan.azimuth_rad"],
+        angles,
+    );
     let moves = scan.head.motion == HeadMotion::Continuous;
-    let pace = "with scan.head.motion = \"continuous\" the rate and the pulses of a line set the step";
-    unused(moves && scan.pattern == Pattern::Rhi {}, &["scan.elevation_step_rad"], pace.into());
-    unused(moves, &["scan.pattern.azimuth_step_rad", "scan.head.dead_time_s"], pace.into());
+    let pace =
+        "with scan.head.motion = \"continuous\" the rate and the pulses of a line set the step";
+    unused(
+        moves && scan.pattern == Pattern::Rhi {},
+        &["scan.elevation_step_rad"],
+        pace.into(),
+    );
+    unused(
+        moves,
+        &["scan.pattern.azimuth_step_rad", "scan.head.dead_time_s"],
+        pace.into(),
+    );
     if let Turbulence::Refractive(turbulence) = &scene.atmosphere.turbulence {
         const SCREENS: [&str; 3] = [
             "atmosphere.turbulence.grid_points",
             "atmosphere.turbulence.grid_spacing_m",
             "atmosphere.turbulence.layers",
         ];
-        const OUTER: [&str; 2] =
-            ["atmosphere.turbulence.outer_scale_m", "atmosphere.turbulence.outer_scale_wavenumber"];
+        const OUTER: [&str; 2] = [
+            "atmosphere.turbulence.outer_scale_m",
+            "atmosphere.turbulence.outer_scale_wavenumber",
+        ];
         let derived = turbulence.sampling == ScreenSampling::Derived;
-        unused(derived, &SCREENS, "this key is for atmosphere.turbulence.sampling = \"explicit\"".into());
+        unused(
+            derived,
+            &SCREENS,
+            "this key is for atmosphere.turbulence.sampling = \"explicit\"".into(),
+        );
         let without_inner = turbulence.spectrum == SpectrumKind::Kolmogorov;
         let without_outer = without_inner || turbulence.spectrum == SpectrumKind::Tatarskii;
-        let purpose =
-            |scale| format!("atmosphere.turbulence.spectrum = \"{}\" has no {scale} scale", turbulence.spectrum.name());
-        unused(without_inner, &["atmosphere.turbulence.inner_scale_m"], purpose("inner"));
+        let purpose = |scale| {
+            format!(
+                "atmosphere.turbulence.spectrum = \"{}\" has no {scale} scale",
+                turbulence.spectrum.name()
+            )
+        };
+        unused(
+            without_inner,
+            &["atmosphere.turbulence.inner_scale_m"],
+            purpose("inner"),
+        );
         unused(without_outer, &OUTER, purpose("outer"));
         // A spectrum without outer scale has no wave number of it.
         let endless = !without_outer && turbulence.outer_scale_m == f64::INFINITY;
         let unset = turbulence.outer_scale_wavenumber == OuterScaleConvention::Inverse;
-        unused(endless && !unset, &OUTER[1..], "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into());
+        unused(
+            endless && !unset,
+            &OUTER[1..],
+            "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into(),
+        );
     }
     found
 }
@@ -90,9 +187,11 @@ impl Scene {
     ///
     /// Equal scenes give equal text; the hash of it names the scene.
     pub fn to_toml(&self) -> String {
-        let whole = toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+        let whole =
+            toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
         let idle = idle(self);
-        let kept = lines_with_keys(&whole).filter(|(key, _)| !idle.iter().any(|(idle, _)| idle == key));
+        let kept =
+            lines_with_keys(&whole).filter(|(key, _)| !idle.iter().any(|(idle, _)| idle == key));
         kept.map(|(_, line)| line.to_owned() + "\n").collect()
     }
 }
@@ -107,13 +206,20 @@ pub(super) fn problems(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
     let mut usual = Scene::default();
     usual.detector.front_end = Some(FrontEnd::default());
     usual.atmosphere.turbulence = Turbulence::Refractive(RefractiveTurbulence::default());
-    let table =
-        |scene: &Scene| toml::Value::try_from(scene).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+    let table = |scene: &Scene| {
+        toml::Value::try_from(scene).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"))
+    };
     let (own, usual) = (table(scene), table(&usual));
     idle.retain(|(key, _)| value_at(&own, key) != value_at(&usual, key));
     let problem = |(key, purpose): (&str, String)| {
-        let value = value_at(&own, key).map(|value| value.to_string()).unwrap_or_default();
-        Problem { key: key.into(), value, allowed: format!("{purpose}: take the line out") }
+        let value = value_at(&own, key)
+            .map(|value| value.to_string())
+            .unwrap_or_default();
+        Problem {
+            key: key.into(),
+            value,
+            allowed: format!("{purpose}: take the line out"),
+        }
     };
     idle.into_iter().map(problem).collect()
 }
@@ -135,12 +241,30 @@ mod tests {
              \"autoregressive\" or \"autoregressive_pole\" or \"capon\", and estimator.method.kind is \"periodogram\""
         );
         for (text, key) in [
-            ("[estimator.method]\norder = 16\n", "estimator.method.order = 16"),
-            ("[estimator.method]\nkind = \"capon\"\nmoment_reach = 2.0\n", "estimator.method.moment_reach = 2.0"),
-            ("[estimator.method]\nlikelihood_snr_db = 3\n", "estimator.method.likelihood_snr_db = 3"),
-            ("[estimator]\nmethod.kind = \"periodogram\"\nradius_m = 5.0\n", "estimator.radius_m = 5.0"),
-            ("[estimator]\nmethod.kind = \"likelihood\"\nweighting = \"hann\"\n", "estimator.weighting = \"hann\""),
-            ("[estimator]\nmethod.kind = \"pulse_pair\"\nrefinement = \"none\"\n", "estimator.refinement = \"none\""),
+            (
+                "[estimator.method]\norder = 16\n",
+                "estimator.method.order = 16",
+            ),
+            (
+                "[estimator.method]\nkind = \"capon\"\nmoment_reach = 2.0\n",
+                "estimator.method.moment_reach = 2.0",
+            ),
+            (
+                "[estimator.method]\nlikelihood_snr_db = 3\n",
+                "estimator.method.likelihood_snr_db = 3",
+            ),
+            (
+                "[estimator]\nmethod.kind = \"periodogram\"\nradius_m = 5.0\n",
+                "estimator.radius_m = 5.0",
+            ),
+            (
+                "[estimator]\nmethod.kind = \"likelihood\"\nweighting = \"hann\"\n",
+                "estimator.weighting = \"hann\"",
+            ),
+            (
+                "[estimator]\nmethod.kind = \"pulse_pair\"\nrefinement = \"none\"\n",
+                "estimator.refinement = \"none\"",
+            ),
             (
                 "[atmosphere]\nextinction_per_m = 1e-3\nprofile = { range_m = [0.0], backscatter_per_m_sr = [1e-7], \
                  extinction_per_m = [1e-4] }\n",
@@ -150,27 +274,41 @@ mod tests {
                 "[estimator]\nmethod.kind = \"autoregressive\"\nrefinement = \"exact\"\n",
                 "estimator.refinement = \"exact\"",
             ),
-            ("[outputs]\nsignals_of = \"all\"\n", "outputs.signals_of = \"all\""),
-            ("[detector]\nnoise = \"none\"\n[estimator]\nfalse_alarm = 0.02\n", "estimator.false_alarm = 0.02"),
+            (
+                "[outputs]\nsignals_of = \"all\"\n",
+                "outputs.signals_of = \"all\"",
+            ),
+            (
+                "[detector]\nnoise = \"none\"\n[estimator]\nfalse_alarm = 0.02\n",
+                "estimator.false_alarm = 0.02",
+            ),
             (
                 "[atmosphere.turbulence]\nkind = \"refractive\"\nsampling = \"derived\"\nlayers = 20\n",
                 "atmosphere.turbulence.layers = 20",
             ),
         ] {
             let message = parse(text).unwrap_err();
-            assert!(message.contains(&format!("{key} is not allowed: ")), "{message}");
+            assert!(
+                message.contains(&format!("{key} is not allowed: ")),
+                "{message}"
+            );
         }
     }
 
     #[test]
     fn what_the_first_scene_states_may_stay_and_written_scenes_read_again() {
         for method in ["periodogram", "pulse_pair", "first_moment"] {
-            let text = super::super::TABLE2_TOML.replace("\"periodogram_accumulation\"", &format!("\"{method}\""));
+            let text = super::super::TABLE2_TOML
+                .replace("\"periodogram_accumulation\"", &format!("\"{method}\""));
             let file = parse(&text).unwrap();
             assert_eq!(parse(&file.toml).unwrap().toml, file.toml);
         }
         let fitted = parse("[estimator.method]\nkind = \"capon\"\norder = 8\n").unwrap();
-        assert!(fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("gradients"), "{}", fitted.toml);
+        assert!(
+            fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("gradients"),
+            "{}",
+            fitted.toml
+        );
         assert_eq!(parse(&fitted.toml).unwrap().content, fitted.content);
     }
 }

@@ -28,7 +28,9 @@ pub use read::SceneFile;
 pub use retrieval::*;
 pub use wakescope_estimate::Refinement;
 pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope, Secondary};
-pub use wakescope_optics::{RadiusDefinition, air::OuterScaleConvention, plan::Receiver as ReceiverPath};
+pub use wakescope_optics::{
+    RadiusDefinition, air::OuterScaleConvention, plan::Receiver as ReceiverPath,
+};
 pub use wakescope_signal::{NoiseModel, sampled::Resampling};
 
 use crate::io::UtcTime;
@@ -218,7 +220,9 @@ mod tests {
     #[test]
     fn choices_of_other_crates_are_read_by_the_names_that_are_offered() {
         fn check<T: crate::keys::Declared + serde::de::DeserializeOwned>(count: usize) {
-            let Kind::Choice(words) = T::kind() else { panic!("no choice") };
+            let Kind::Choice(words) = T::kind() else {
+                panic!("no choice")
+            };
             assert_eq!(words.len(), count);
             for word in words {
                 assert!(toml::Value::from(word).try_into::<T>().is_ok(), "{word}");
@@ -263,7 +267,10 @@ mod tests {
             keys.sort();
             keys
         };
-        let (written, all) = (flat(TABLE2_TOML), flat(&toml::to_string(&Scene::default()).unwrap()));
+        let (written, all) = (
+            flat(TABLE2_TOML),
+            flat(&toml::to_string(&Scene::default()).unwrap()),
+        );
         for key in &written {
             assert!(all.contains(key), "{key} is no key");
         }
@@ -271,7 +278,9 @@ mod tests {
         names(&keys_of::<Scene>(), &mut known);
         let book = include_str!("../../../../docs/src/scene.md");
         for key in known {
-            let is_there = [format!("`{key}`"), format!("{key} = ")].iter().any(|text| book.contains(text));
+            let is_there = [format!("`{key}`"), format!("{key} = ")]
+                .iter()
+                .any(|text| book.contains(text));
             assert!(is_there, "{key} is not in the book");
         }
         // What a first scene does not need stands in the book alone.
@@ -295,17 +304,29 @@ mod tests {
             .take_while(|l| l.starts_with("# "))
             .map(|l| format!("{}\n", &l[2..]))
             .collect();
-        let read = scene_of(&format!("[atmosphere.turbulence]\n{commented}")).atmosphere.turbulence;
-        assert_eq!(read, Turbulence::Refractive(RefractiveTurbulence::default()));
+        let read = scene_of(&format!("[atmosphere.turbulence]\n{commented}"))
+            .atmosphere
+            .turbulence;
+        assert_eq!(
+            read,
+            Turbulence::Refractive(RefractiveTurbulence::default())
+        );
         let keys = commented.lines().filter(|l| l.contains(" = ")).count();
-        assert_eq!(keys, toml::to_string(&read).unwrap().lines().count(), "each key is there");
+        assert_eq!(
+            keys,
+            toml::to_string(&read).unwrap().lines().count(),
+            "each key is there"
+        );
     }
 
     #[test]
     fn scene_survives_a_round_trip() {
         let mut scene = Scene::default();
         scene.detector.snr = SnrReference::Fixed { snr_db: 0.1 + 0.2 };
-        scene.flow = Flow::Uniform { lateral_m_s: 1.0 / 3.0, vertical_m_s: -0.0 };
+        scene.flow = Flow::Uniform {
+            lateral_m_s: 1.0 / 3.0,
+            vertical_m_s: -0.0,
+        };
         assert_eq!(scene_of(&scene.to_toml()), scene);
     }
 }

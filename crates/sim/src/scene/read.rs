@@ -15,7 +15,11 @@ impl Content for Scene {
         let scene: Self = read.read(read.vet(&scene_format())?)?;
         let mut problems = scene.problems_where(&|key| read.line(key).is_some());
         problems.extend(idle::problems(&scene, &read));
-        if problems.is_empty() { Ok(scene) } else { Err(read.located(problems)) }
+        if problems.is_empty() {
+            Ok(scene)
+        } else {
+            Err(read.located(problems))
+        }
     }
 
     fn to_toml(&self) -> String {
@@ -49,7 +53,11 @@ impl SceneFile {
     /// All problems of the scene.
     pub fn new(scene: Scene) -> Result<Self, Vec<Problem>> {
         let problems = scene.problems();
-        if problems.is_empty() { Ok(Self::of(scene, Path::new("scene"), "")) } else { Err(problems) }
+        if problems.is_empty() {
+            Ok(Self::of(scene, Path::new("scene"), ""))
+        } else {
+            Err(problems)
+        }
     }
 
     /// A scene that comes of this one, with the folder and the lines of its file.
@@ -58,7 +66,11 @@ impl SceneFile {
     /// All problems of the scene.
     pub(crate) fn with(&self, scene: Scene) -> Result<Self, SceneError> {
         let problems = scene.problems();
-        if problems.is_empty() { Ok(self.changed(scene)) } else { Err(self.located(problems)) }
+        if problems.is_empty() {
+            Ok(self.changed(scene))
+        } else {
+            Err(self.located(problems))
+        }
     }
 
     /// The same instrument and scan in still air, of which nothing is retrieved: what says how velocities were measured, without the
@@ -75,19 +87,37 @@ impl SceneFile {
 
     /// An error of a key with the line of the file that states it.
     pub(crate) fn of_key(&self, error: Error) -> Error {
-        let Error::Key { key, reason } = error else { return error };
+        let Error::Key { key, reason } = error else {
+            return error;
+        };
         let whole = toml::Value::try_from(&self.content).ok();
-        let value = whole.as_ref().and_then(|whole| value_at(whole, key)).filter(|value| !value.is_table());
+        let value = whole
+            .as_ref()
+            .and_then(|whole| value_at(whole, key))
+            .filter(|value| !value.is_table());
         let value = value.map(|value| value.to_string()).unwrap_or_default();
-        self.located(vec![Problem { key: key.into(), value, allowed: reason }]).into()
+        self.located(vec![Problem {
+            key: key.into(),
+            value,
+            allowed: reason,
+        }])
+        .into()
     }
 }
 
 /// What a scene may say.
 fn scene_format() -> Format<'static> {
-    static MAY_SAY: LazyLock<(Vec<Key>, toml::Table)> =
-        LazyLock::new(|| (keys_of::<Scene>(), toml::Table::try_from(Scene::default()).unwrap_or_default()));
-    Format { keys: &MAY_SAY.0, defaults: &MAY_SAY.1, examples: &[SCENE_EXAMPLES, TABLE2_TOML] }
+    static MAY_SAY: LazyLock<(Vec<Key>, toml::Table)> = LazyLock::new(|| {
+        (
+            keys_of::<Scene>(),
+            toml::Table::try_from(Scene::default()).unwrap_or_default(),
+        )
+    });
+    Format {
+        keys: &MAY_SAY.0,
+        defaults: &MAY_SAY.1,
+        examples: &[SCENE_EXAMPLES, TABLE2_TOML],
+    }
 }
 
 #[cfg(test)]
@@ -97,17 +127,24 @@ mod tests {
     use crate::scene::{Flow, VortexPair};
 
     fn message(text: &str) -> String {
-        SceneFile::parse(text, Path::new("s.toml")).unwrap_err().to_string()
+        SceneFile::parse(text, Path::new("s.toml"))
+            .unwrap_err()
+            .to_string()
     }
 
     #[test]
     fn limits_are_reported_with_key_value_range_and_line() {
         let text = "seed = 3\n[scan]\nrange_min_m = 300.0\nrealisations = 0\n";
-        assert_eq!(message(text), "s.toml:4: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000");
-        let second =
-            "[[added_flows]]\nkind = \"calm\"\n[[added_flows]]\nkind = \"vortex_pair\"\ncirculation_m2_s = -166\n";
+        assert_eq!(
+            message(text),
+            "s.toml:4: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000"
+        );
+        let second = "[[added_flows]]\nkind = \"calm\"\n[[added_flows]]\nkind = \"vortex_pair\"\ncirculation_m2_s = -166\n";
         let told = message(second);
-        assert!(told.starts_with("s.toml:5: added_flows[1].circulation_m2_s = -166 is not allowed"), "{told}");
+        assert!(
+            told.starts_with("s.toml:5: added_flows[1].circulation_m2_s = -166 is not allowed"),
+            "{told}"
+        );
     }
 
     #[test]
@@ -118,16 +155,30 @@ mod tests {
              here: wavelength_m, pulse_repetition_hz, linewidth_hz, amplifier, fibre"
         );
         let elsewhere = message("wavelength_m = 1.5e-6\n");
-        assert!(elsewhere.starts_with("s.toml:1: wavelength_m = 1.5e-6 is not allowed"), "{elsewhere}");
+        assert!(
+            elsewhere.starts_with("s.toml:1: wavelength_m = 1.5e-6 is not allowed"),
+            "{elsewhere}"
+        );
         assert!(elsewhere.contains("it is a key of [laser]"), "{elsewhere}");
     }
 
     #[test]
     fn a_scene_of_another_format_is_told_the_format_and_where_its_keys_are() {
-        assert_eq!(message("format = 1\n"), "s.toml:1: format = 1 is not allowed: 2, the format of this program");
+        assert_eq!(
+            message("format = 1\n"),
+            "s.toml:1: format = 1 is not allowed: 2, the format of this program"
+        );
         let moved = message("[pulse]\nduration_s = 400e-9\n[estimator]\norder = 16\n");
-        assert!(moved.contains("s.toml:2: pulse.duration_s = 400e-9") && moved.contains("[pulse.shape]"), "{moved}");
-        assert!(moved.contains("s.toml:4: estimator.order = 16") && moved.contains("[estimator.method]"), "{moved}");
+        assert!(
+            moved.contains("s.toml:2: pulse.duration_s = 400e-9")
+                && moved.contains("[pulse.shape]"),
+            "{moved}"
+        );
+        assert!(
+            moved.contains("s.toml:4: estimator.order = 16")
+                && moved.contains("[estimator.method]"),
+            "{moved}"
+        );
     }
 
     #[test]
@@ -156,9 +207,20 @@ mod tests {
     #[test]
     fn a_table_without_its_kind_has_the_default_kind() {
         let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap().content;
-        let Flow::VortexPair(pair) = scene("[flow]\nlateral_position_m = 1500\n").flow else { panic!("a pair") };
-        assert_eq!(pair, VortexPair { lateral_position_m: 1500.0, ..VortexPair::default() });
-        assert_eq!(scene("[scan]\nbelow_ground = {}\n[detector]\nsnr = {}\n"), Scene::default());
+        let Flow::VortexPair(pair) = scene("[flow]\nlateral_position_m = 1500\n").flow else {
+            panic!("a pair")
+        };
+        assert_eq!(
+            pair,
+            VortexPair {
+                lateral_position_m: 1500.0,
+                ..VortexPair::default()
+            }
+        );
+        assert_eq!(
+            scene("[scan]\nbelow_ground = {}\n[detector]\nsnr = {}\n"),
+            Scene::default()
+        );
     }
 
     #[test]
@@ -186,24 +248,49 @@ mod tests {
     #[test]
     fn a_long_list_is_read_in_time_and_many_problems_are_counted() {
         let values = "1.0,\n".repeat(200_000);
-        let text = format!("[pulse.shape]\nkind = \"sampled\"\ntime_s = [{values}\"x\"]\npower = [1.0]\n");
-        assert!(message(&text).starts_with("s.toml:200003: pulse.shape.time_s[200000] = \"x\" is not allowed"));
+        let text =
+            format!("[pulse.shape]\nkind = \"sampled\"\ntime_s = [{values}\"x\"]\npower = [1.0]\n");
+        assert!(
+            message(&text)
+                .starts_with("s.toml:200003: pulse.shape.time_s[200000] = \"x\" is not allowed")
+        );
         let many: String = (0..1000).map(|i| format!("key{i} = 1\n")).collect();
         let m = message(&many);
-        assert!(m.lines().count() == 51 && m.ends_with("\nand 950 more"), "{m}");
+        assert!(
+            m.lines().count() == 51 && m.ends_with("\nand 950 more"),
+            "{m}"
+        );
     }
 
     /// Each key of each kind, with a value that no key takes.
-    fn wrong<'k>(keys: &'k [Key], path: &str, before: &str, out: &mut Vec<(String, &'k Kind, String)>) {
+    fn wrong<'k>(
+        keys: &'k [Key],
+        path: &str,
+        before: &str,
+        out: &mut Vec<(String, &'k Kind, String)>,
+    ) {
         for key in keys {
             let here = crate::keys::join(path, key.name);
-            out.push((here.clone(), &key.kind, format!("{before}{here} = 1979-05-27\n")));
+            out.push((
+                here.clone(),
+                &key.kind,
+                format!("{before}{here} = 1979-05-27\n"),
+            ));
             match &key.kind {
                 Kind::Table(inner) => wrong(inner, &here, before, out),
                 Kind::Tagged { tag, kinds } => {
-                    out.push((format!("{here}.{tag}"), &Kind::Switch, format!("{before}{here}.{tag} = \"?\"\n")));
+                    out.push((
+                        format!("{here}.{tag}"),
+                        &Kind::Switch,
+                        format!("{before}{here}.{tag} = \"?\"\n"),
+                    ));
                     for (name, inner) in kinds {
-                        wrong(inner, &here, &format!("{before}{here}.{tag} = \"{name}\"\n"), out);
+                        wrong(
+                            inner,
+                            &here,
+                            &format!("{before}{here}.{tag} = \"{name}\"\n"),
+                            out,
+                        );
                     }
                 }
                 _ => {}
@@ -219,21 +306,35 @@ mod tests {
         for (key, kind, text) in cases {
             let line = text.lines().count();
             let m = message(&text);
-            let own = m.lines().find(|l| l.starts_with(&format!("s.toml:{line}: {key} "))).unwrap_or_else(|| {
-                panic!("{text}{m}");
-            });
-            let says = ["e.g. ", "one of ", "true or false", "names out of"].iter().any(|word| own.contains(word));
+            let own = m
+                .lines()
+                .find(|l| l.starts_with(&format!("s.toml:{line}: {key} ")))
+                .unwrap_or_else(|| {
+                    panic!("{text}{m}");
+                });
+            let says = ["e.g. ", "one of ", "true or false", "names out of"]
+                .iter()
+                .any(|word| own.contains(word));
             assert!(says, "{own}");
-            let plain = matches!(kind, Kind::Number | Kind::Whole { .. } | Kind::Text | Kind::List { .. });
+            let plain = matches!(
+                kind,
+                Kind::Number | Kind::Whole { .. } | Kind::Text | Kind::List { .. }
+            );
             let example = scene_format().example(&key, kind);
-            assert!(!plain || example.is_some(), "{key} needs a value in scene/examples.toml");
+            assert!(
+                !plain || example.is_some(),
+                "{key} needs a value in scene/examples.toml"
+            );
         }
     }
 
     #[test]
     fn equal_scenes_have_equal_hashes() {
         let hash = |text: &str| SceneFile::parse(text, Path::new("s")).unwrap().hash;
-        assert_eq!(hash(""), hash("[laser]\nwavelength_m = 1.55e-6 # as the default\n"));
+        assert_eq!(
+            hash(""),
+            hash("[laser]\nwavelength_m = 1.55e-6 # as the default\n")
+        );
         assert_ne!(hash(""), hash("seed = 2\n"));
     }
 }

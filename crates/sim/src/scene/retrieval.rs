@@ -60,27 +60,53 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let key = "retrieval.methods";
     let estimator = &scene.estimator;
     let lacks = |method| !r.methods.contains(&method);
-    let has_edges = estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
+    let has_edges =
+        estimator.weighting == Weighting::Gaussian && !estimator.method.has_own_tapers();
     let allowed = "another method unless estimator.weighting = \"gaussian\" and the windows are weighted with it, as all are but those of the \
                    likelihoods";
-    c.require(lacks(RetrievalMethod::Envelope) || has_edges, key, "envelope", allowed);
+    c.require(
+        lacks(RetrievalMethod::Envelope) || has_edges,
+        key,
+        "envelope",
+        allowed,
+    );
     let one = "another method with more than one sweep (scan.head.sweeps)";
-    c.require(scene.scan.head.sweeps == 1 || lacks(RetrievalMethod::Envelope), key, "envelope", one);
+    c.require(
+        scene.scan.head.sweeps == 1 || lacks(RetrievalMethod::Envelope),
+        key,
+        "envelope",
+        one,
+    );
     if let Some(rate) = r.false_alarm {
         let noise = scene.detector.noise != NoiseModel::None;
-        c.require(noise, "retrieval.false_alarm", rate, "absent where detector.noise = \"none\": nothing is by chance");
+        c.require(
+            noise,
+            "retrieval.false_alarm",
+            rate,
+            "absent where detector.noise = \"none\": nothing is by chance",
+        );
     }
     let across = "absent but for scan.pattern.kind = \"rhi\" in the plane across the flight, where vortices are sought: with \
                   scan.lidar.velocity_m_s = [0.0, 0.0, 0.0], y_m = 0.0, and flight_azimuth_rad absent or a quarter turn before scan.azimuth_rad";
     c.require(scene.scan.is_across(), "retrieval", "a table", across);
     let one = "absent with more than one sweep (scan.head.sweeps): scans are tested one at a time";
-    c.require(r.false_alarm.is_none() || scene.scan.head.sweeps == 1, "retrieval.false_alarm", "a rate", one);
+    c.require(
+        r.false_alarm.is_none() || scene.scan.head.sweeps == 1,
+        "retrieval.false_alarm",
+        "a rate",
+        one,
+    );
     let has_vortices = match &scene.flow {
         Flow::VortexPair(pair) => pair.circulation_m2_s > 0.0,
         Flow::Simulated(_) => true,
-        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::VortexLines(_) | Flow::Fields(_) => false,
+        Flow::Calm {}
+        | Flow::Uniform { .. }
+        | Flow::Linear(_)
+        | Flow::VortexLines(_)
+        | Flow::Fields(_) => false,
     };
-    let allowed = "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
+    let allowed =
+        "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);
     let allowed = "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here";
     for method in [RetrievalMethod::Signals, RetrievalMethod::Envelope] {
@@ -93,7 +119,8 @@ impl Scan {
     /// Whether all lines are in the plane across the flight, seen from the origin of its lateral coordinate: where vortices are sought.
     pub(crate) fn is_across(&self) -> bool {
         let lidar = &self.lidar;
-        let is_quarter = |azimuth_rad: f64| sin_cos_of_turn(self.azimuth_rad - azimuth_rad) == (1.0, 0.0);
+        let is_quarter =
+            |azimuth_rad: f64| sin_cos_of_turn(self.azimuth_rad - azimuth_rad) == (1.0, 0.0);
         self.pattern == Pattern::default()
             && (lidar.velocity_m_s, lidar.y_m) == ([0.0; 3], 0.0)
             && lidar.flight_azimuth_rad.is_none_or(is_quarter)
@@ -123,25 +150,61 @@ mod tests {
         }
         for (text, key) in [
             ("[retrieval]\nmethods = []\n", "retrieval.methods"),
-            ("[retrieval]\nmethods = [\"rv\", \"fit\", \"rv\"]\n", "retrieval.methods"),
-            ("[retrieval]\nmethods = [\"envelope\"]\n[estimator]\nweighting = \"hann\"\n", "retrieval.methods"),
-            ("[retrieval]\nmethods = [\"envelope\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
-            ("[retrieval]\nmethods = [\"envelope\"]\n[scan.head]\nsweeps = 2\n", "retrieval.methods"),
-            ("[retrieval]\nmethods = [\"signals\"]\n[detector]\nnoise = \"none\"\n", "retrieval.methods"),
+            (
+                "[retrieval]\nmethods = [\"rv\", \"fit\", \"rv\"]\n",
+                "retrieval.methods",
+            ),
+            (
+                "[retrieval]\nmethods = [\"envelope\"]\n[estimator]\nweighting = \"hann\"\n",
+                "retrieval.methods",
+            ),
+            (
+                "[retrieval]\nmethods = [\"envelope\"]\n[detector]\nnoise = \"none\"\n",
+                "retrieval.methods",
+            ),
+            (
+                "[retrieval]\nmethods = [\"envelope\"]\n[scan.head]\nsweeps = 2\n",
+                "retrieval.methods",
+            ),
+            (
+                "[retrieval]\nmethods = [\"signals\"]\n[detector]\nnoise = \"none\"\n",
+                "retrieval.methods",
+            ),
             ("[retrieval]\nfalse_alarm = 0.9\n", "retrieval.false_alarm"),
-            ("[retrieval]\ncore_radius_m = 0.0\n", "retrieval.core_radius_m"),
-            ("[retrieval]\n[retrieval.follower]\nspan_m = -1.0\n", "retrieval.follower.span_m"),
+            (
+                "[retrieval]\ncore_radius_m = 0.0\n",
+                "retrieval.core_radius_m",
+            ),
+            (
+                "[retrieval]\n[retrieval.follower]\nspan_m = -1.0\n",
+                "retrieval.follower.span_m",
+            ),
             ("[retrieval]\n[flow]\nkind = \"calm\"\n", "retrieval"),
-            ("[retrieval]\n[scan.pattern]\nkind = \"stare\"\n", "retrieval"),
+            (
+                "[retrieval]\n[scan.pattern]\nkind = \"stare\"\n",
+                "retrieval",
+            ),
             ("[retrieval]\n[scan.lidar]\ny_m = 5.0\n", "retrieval"),
-            ("[retrieval]\n[scan.lidar]\nflight_azimuth_rad = 0.3\n", "retrieval"),
-            ("[retrieval]\nfalse_alarm = 0.01\n[scan.head]\nsweeps = 2\n", "retrieval.false_alarm"),
+            (
+                "[retrieval]\n[scan.lidar]\nflight_azimuth_rad = 0.3\n",
+                "retrieval",
+            ),
+            (
+                "[retrieval]\nfalse_alarm = 0.01\n[scan.head]\nsweeps = 2\n",
+                "retrieval.false_alarm",
+            ),
         ] {
             assert_eq!(keys(text), [key], "{text}");
         }
-        let refused =
-            SceneFile::without_limits("[retrieval]\nsecondary = \"sometimes\"\n", Path::new("s.toml")).unwrap_err();
-        assert!(refused.to_string().contains("retrieval.secondary"), "{refused}");
+        let refused = SceneFile::without_limits(
+            "[retrieval]\nsecondary = \"sometimes\"\n",
+            Path::new("s.toml"),
+        )
+        .unwrap_err();
+        assert!(
+            refused.to_string().contains("retrieval.secondary"),
+            "{refused}"
+        );
     }
 
     #[test]

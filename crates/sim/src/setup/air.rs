@@ -35,11 +35,21 @@ pub(crate) fn seen_m_s(
         filter.apply_into(g.first_layer_range_m, &values, &g.gate_range_m, &mut out)?;
         Ok(out)
     };
-    let Some(backscatter) = backscatter_per_m_sr else { return apply(velocity_m_s.to_vec()) };
+    let Some(backscatter) = backscatter_per_m_sr else {
+        return apply(velocity_m_s.to_vec());
+    };
     let pairs = || velocity_m_s.iter().zip(backscatter);
     let sums = apply(pairs().map(|(v, beta)| v * beta).collect())?;
-    let weights = apply(pairs().map(|(v, beta)| if v.is_nan() { f64::NAN } else { *beta }).collect())?;
-    Ok(sums.into_iter().zip(weights).map(|(sum, weight)| sum / weight).collect())
+    let weights = apply(
+        pairs()
+            .map(|(v, beta)| if v.is_nan() { f64::NAN } else { *beta })
+            .collect(),
+    )?;
+    Ok(sums
+        .into_iter()
+        .zip(weights)
+        .map(|(sum, weight)| sum / weight)
+        .collect())
 }
 
 /// The beam in the middle of the pulses that share an air of a line.
@@ -56,7 +66,12 @@ pub(crate) fn beam_of_air(setup: &Setup, line: usize, air: usize) -> Beam {
 }
 
 /// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
-pub(crate) fn air_of_line(setup: &Setup, filter: &RangeFilter, range_m: &[f64], line: usize) -> Result<Air, Error> {
+pub(crate) fn air_of_line(
+    setup: &Setup,
+    filter: &RangeFilter,
+    range_m: &[f64],
+    line: usize,
+) -> Result<Air, Error> {
     let g = &setup.geometry;
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
@@ -70,22 +85,45 @@ pub(crate) fn air_of_line(setup: &Setup, filter: &RangeFilter, range_m: &[f64], 
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
     let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
     for air in 0..airs {
-        let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64 / pulses as f64;
+        let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64
+            / pulses as f64;
         let here = air_along(setup, &beam_of_air(setup, line, air), range_m)?;
-        let here_seen_m_s = seen_m_s(filter, g, &here.radial_velocity_m_s, here.backscatter_per_m_sr.as_deref())?;
+        let here_seen_m_s = seen_m_s(
+            filter,
+            g,
+            &here.radial_velocity_m_s,
+            here.backscatter_per_m_sr.as_deref(),
+        )?;
         // About the first air, so that the mean of equal airs is that air.
         if air == 0 {
             (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
-            backscatter = here.backscatter_per_m_sr.as_ref().map(|carried| vec![0.0; carried.len()]);
+            backscatter = here
+                .backscatter_per_m_sr
+                .as_ref()
+                .map(|carried| vec![0.0; carried.len()]);
         }
-        let weight = |layer: usize| here.backscatter_per_m_sr.as_ref().map_or(1.0, |carried| carried[layer]);
-        for (layer, (sum, v)) in sums_m_s.iter_mut().zip(&here.radial_velocity_m_s).enumerate() {
+        let weight = |layer: usize| {
+            here.backscatter_per_m_sr
+                .as_ref()
+                .map_or(1.0, |carried| carried[layer])
+        };
+        for (layer, (sum, v)) in sums_m_s
+            .iter_mut()
+            .zip(&here.radial_velocity_m_s)
+            .enumerate()
+        {
             *sum += share * weight(layer) * (v - first_m_s[layer]);
         }
         if let Some(backscatter) = &mut backscatter {
-            backscatter.iter_mut().enumerate().for_each(|(layer, sum)| *sum += share * weight(layer));
+            backscatter
+                .iter_mut()
+                .enumerate()
+                .for_each(|(layer, sum)| *sum += share * weight(layer));
         }
-        for ((sum, square), (v, first)) in sums.iter_mut().zip(here_seen_m_s.iter().zip(&first_seen_m_s)) {
+        for ((sum, square), (v, first)) in sums
+            .iter_mut()
+            .zip(here_seen_m_s.iter().zip(&first_seen_m_s))
+        {
             let beside = v - first;
             *sum += share * beside;
             *square += share * beside * beside;
@@ -101,23 +139,42 @@ pub(crate) fn air_of_line(setup: &Setup, filter: &RangeFilter, range_m: &[f64], 
     }
     let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
     let spread_m_s = Some(sums.into_iter().map(spread).collect());
-    Ok(Air { radial_velocity_m_s: sums_m_s, backscatter_per_m_sr: backscatter, spread_m_s })
+    Ok(Air {
+        radial_velocity_m_s: sums_m_s,
+        backscatter_per_m_sr: backscatter,
+        spread_m_s,
+    })
 }
 
 /// Radial velocity, m/s, positive away from the lidar, at ranges along the middle of line of sight `line`; NaN where nothing
 /// returns light: below the ground or outside the flow, if the scene masks that.
-pub(crate) fn radial_velocity_m_s(setup: &Setup, line: usize, range_m: &[f64]) -> Result<Vec<f64>, Error> {
+pub(crate) fn radial_velocity_m_s(
+    setup: &Setup,
+    line: usize,
+    range_m: &[f64],
+) -> Result<Vec<f64>, Error> {
     Ok(velocity_along(setup, &setup.geometry.schedule.middle(line), range_m)?.1)
 }
 
 /// The air along a beam.
 pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
     let (points_m, radial_velocity_m_s) = velocity_along(setup, beam, range_m)?;
-    let mut backscatter_per_m_sr = setup.wind.backscatter_per_m_sr(&points_m, setup.wind.start_s + beam.time_s)?;
-    for (beta, range_m) in backscatter_per_m_sr.iter_mut().flatten().zip(range_m).filter(|(beta, _)| beta.is_nan()) {
+    let mut backscatter_per_m_sr = setup
+        .wind
+        .backscatter_per_m_sr(&points_m, setup.wind.start_s + beam.time_s)?;
+    for (beta, range_m) in backscatter_per_m_sr
+        .iter_mut()
+        .flatten()
+        .zip(range_m)
+        .filter(|(beta, _)| beta.is_nan())
+    {
         *beta = setup.instrument.air.backscatter_per_m_sr(*range_m)?;
     }
-    Ok(Air { radial_velocity_m_s, backscatter_per_m_sr, spread_m_s: None })
+    Ok(Air {
+        radial_velocity_m_s,
+        backscatter_per_m_sr,
+        spread_m_s: None,
+    })
 }
 
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
@@ -132,13 +189,26 @@ fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, 
             (false, false) => return Ok(known_m_s),
         };
         match outside {
-            Outside::Constant { radial_velocity_m_s } => Ok(radial_velocity_m_s),
+            Outside::Constant {
+                radial_velocity_m_s,
+            } => Ok(radial_velocity_m_s),
             // A scene with lines below the ground was refused, but for air behind its last sample.
-            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow { elevation_rad, range_m, x_m, y_m, z_m }),
+            Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow {
+                elevation_rad,
+                range_m,
+                x_m,
+                y_m,
+                z_m,
+            }),
             Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
         }
     };
-    let velocity_m_s = points_m.iter().zip(known_m_s).zip(range_m).map(checked).collect::<Result<_, Error>>()?;
+    let velocity_m_s = points_m
+        .iter()
+        .zip(known_m_s)
+        .zip(range_m)
+        .map(checked)
+        .collect::<Result<_, Error>>()?;
     Ok((points_m, velocity_m_s))
 }
 
@@ -146,10 +216,24 @@ fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, 
 type Along = (Vec<[f64; 3]>, Vec<f64>);
 
 /// The radial velocity of the flow along a beam; NaN where it is not known.
-pub(crate) fn known_velocity_m_s(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, Error> {
-    let points_m: Vec<[f64; 3]> = range_m.iter().map(|range_m| beam.at_range_m(*range_m)).collect();
+pub(crate) fn known_velocity_m_s(
+    setup: &Setup,
+    beam: &Beam,
+    range_m: &[f64],
+) -> Result<Along, Error> {
+    let points_m: Vec<[f64; 3]> = range_m
+        .iter()
+        .map(|range_m| beam.at_range_m(*range_m))
+        .collect();
     let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
-    setup.wind.wind().velocity_into(&points_m, setup.wind.start_s + beam.time_s, &mut velocity_m_s)?;
-    let along = velocity_m_s.iter().map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s)).collect();
+    setup.wind.wind().velocity_into(
+        &points_m,
+        setup.wind.start_s + beam.time_s,
+        &mut velocity_m_s,
+    )?;
+    let along = velocity_m_s
+        .iter()
+        .map(|v| beam.direction.radial_velocity_m_s(*v, beam.velocity_m_s))
+        .collect();
     Ok((points_m, along))
 }

@@ -9,9 +9,10 @@ pub(crate) fn sampled_velocities_m_s(scene: &Scene) -> (f64, f64) {
     let (d, half_m) = (&scene.detector, 0.5 * scene.laser.wavelength_m);
     let half_hz = 0.5 * d.sampling_hz;
     match d.signal {
-        DetectorSignal::IntermediateFrequency => {
-            (half_m * (d.intermediate_frequency_hz - half_hz), half_m * d.intermediate_frequency_hz)
-        }
+        DetectorSignal::IntermediateFrequency => (
+            half_m * (d.intermediate_frequency_hz - half_hz),
+            half_m * d.intermediate_frequency_hz,
+        ),
         DetectorSignal::Baseband => (-half_m * half_hz, half_m * half_hz),
     }
 }
@@ -39,26 +40,41 @@ mod tests {
         let mut scene = Scene::default();
         let info = pulse_info(&scene);
         // 45 MHz from the intermediate frequency to half of the rate: faster air comes back as slower.
-        assert!((info.nyquist_velocity_m_s - 34.875).abs() < 1e-9 && info.is_mirrored(), "{info:?}");
+        assert!(
+            (info.nyquist_velocity_m_s - 34.875).abs() < 1e-9 && info.is_mirrored(),
+            "{info:?}"
+        );
         scene.detector.intermediate_frequency_hz = 40e6;
         let info = pulse_info(&scene);
-        assert!((info.nyquist_velocity_m_s - 31.0).abs() < 1e-9 && info.is_mirrored(), "{info:?}");
+        assert!(
+            (info.nyquist_velocity_m_s - 31.0).abs() < 1e-9 && info.is_mirrored(),
+            "{info:?}"
+        );
         scene.detector.intermediate_frequency_hz = 62.5e6;
         assert!(pulse_info(&scene).is_mirrored());
         scene.detector.signal = DetectorSignal::Baseband;
         let info = pulse_info(&scene);
-        assert!((info.nyquist_velocity_m_s - 96.875).abs() < 1e-9 && !info.is_mirrored(), "{info:?}");
+        assert!(
+            (info.nyquist_velocity_m_s - 96.875).abs() < 1e-9 && !info.is_mirrored(),
+            "{info:?}"
+        );
     }
 
     #[test]
     fn the_width_of_a_pulse_is_that_at_half_height_however_it_is_stated() {
         let width_s = |duration_s, definition| {
-            let shape = GaussianShape { duration_s, definition };
+            let shape = GaussianShape {
+                duration_s,
+                definition,
+            };
             let mut scene = Scene::default();
             scene.pulse.shape = PulseShape::Gaussian(shape);
             pulse_info(&scene).pulse_width_s
         };
         assert_eq!(width_s(200e-9, PulseDefinition::Fwhm), 200e-9);
-        assert!((width_s(120.112_240_878e-9, PulseDefinition::OneOverEHalfWidth) - 200e-9).abs() < 1e-17);
+        assert!(
+            (width_s(120.112_240_878e-9, PulseDefinition::OneOverEHalfWidth) - 200e-9).abs()
+                < 1e-17
+        );
     }
 }

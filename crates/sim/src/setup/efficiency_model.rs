@@ -12,7 +12,9 @@ use wakescope_optics::plan::{Model, cheapest_model};
 pub(crate) fn model(scene: &Scene) -> Model {
     let cn2 = match turbulence(scene) {
         None => Cn2Path::None,
-        Some(t) => Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 },
+        Some(t) => Cn2Path::Uniform {
+            cn2_m_m23: t.cn2_m_m23,
+        },
     };
     cheapest_model(scene.telescope.receiver, &cn2)
 }
@@ -45,13 +47,24 @@ pub(crate) fn signals_cross_screens(scene: &Scene) -> bool {
 
 /// The stretches with phase screens of their own in which there are some of these ranges, m, increasing, with those ranges: the
 /// air of the signals, and what of the profile lies before it and behind it.
-pub(crate) fn stretches<'a>(scene: &Scene, g: &Geometry, mut range_m: &'a [f64]) -> Vec<([f64; 2], &'a [f64])> {
+pub(crate) fn stretches<'a>(
+    scene: &Scene,
+    g: &Geometry,
+    mut range_m: &'a [f64],
+) -> Vec<([f64; 2], &'a [f64])> {
     let o = &scene.outputs;
     let [first_m, last_m] = [o.profile_range_min_m, o.profile_range_max_m];
-    let (near_m, far_m) = (g.first_layer_range_m, g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m);
+    let (near_m, far_m) = (
+        g.first_layer_range_m,
+        g.first_layer_range_m + g.layers as f64 * g.layer_thickness_m,
+    );
     let all = match signals_cross_screens(scene) {
         true => {
-            vec![[first_m, near_m.next_down().min(last_m)], [near_m, far_m], [far_m.next_up().max(first_m), last_m]]
+            vec![
+                [first_m, near_m.next_down().min(last_m)],
+                [near_m, far_m],
+                [far_m.next_up().max(first_m), last_m],
+            ]
         }
         false => vec![[first_m, last_m]],
     };

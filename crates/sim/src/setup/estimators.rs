@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::scene::{
-    CorrelogramForm, DetectorSignal, GradientLikelihood, Method, ModelOrder, NoiseModel, OrderChoice, PulseShape,
-    Scene, Weighting,
+    CorrelogramForm, DetectorSignal, GradientLikelihood, Method, ModelOrder, NoiseModel,
+    OrderChoice, PulseShape, Scene, Weighting,
 };
 use crate::setup::instrument::Instrument;
 use crate::setup::table::{of_table, spaced};
@@ -11,12 +11,13 @@ use ndarray::Array2;
 use num_complex::Complex;
 use wakescope_estimate::bound::{GradientModel, Noise, RecordModel, WindowModel};
 use wakescope_estimate::estimators::{
-    FirstMoment, LagWindowPeak, ModelPeak, ModelReading, NoiseTest, PulsePair, Unbiased, likelihood_tapers,
-    model_lag_weights,
+    FirstMoment, LagWindowPeak, ModelPeak, ModelReading, NoiseTest, PulsePair, Unbiased,
+    likelihood_tapers, model_lag_weights,
 };
 use wakescope_estimate::spectrum::{ShortCorrelogram, Taper};
 use wakescope_estimate::{
-    self as estimate, Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak, Statistic,
+    self as estimate, Correlogram, Estimator, Sampling, Scratch, SignalKind, SpectralPeak,
+    Statistic,
 };
 use wakescope_estimate::{map::WindowCovariance, window::Sample};
 use wakescope_signal::Pulse;
@@ -29,11 +30,17 @@ pub fn sampling(scene: &Scene) -> Result<Sampling, Error> {
     let d = &scene.detector;
     let lambda_m = scene.laser.wavelength_m;
     let half_hz = 0.5 * d.bandwidth_hz;
-    let band_hz = (d.intermediate_frequency_hz - half_hz, d.intermediate_frequency_hz + half_hz);
+    let band_hz = (
+        d.intermediate_frequency_hz - half_hz,
+        d.intermediate_frequency_hz + half_hz,
+    );
     Ok(match d.signal {
-        DetectorSignal::IntermediateFrequency => {
-            Sampling::new(d.sampling_hz, d.intermediate_frequency_hz, lambda_m, band_hz)?
-        }
+        DetectorSignal::IntermediateFrequency => Sampling::new(
+            d.sampling_hz,
+            d.intermediate_frequency_hz,
+            lambda_m,
+            band_hz,
+        )?,
         DetectorSignal::Baseband => Sampling::baseband(d.sampling_hz, lambda_m, d.bandwidth_hz)?,
     })
 }
@@ -53,7 +60,11 @@ pub fn signal_kind(scene: &Scene) -> SignalKind {
 pub fn gates(scene: &Scene) -> Result<estimate::Gates, Error> {
     let e = &scene.estimator;
     let first_sample_time_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
-    Ok(estimate::Gates::new(e.window_samples, e.window_step_samples, first_sample_time_s)?)
+    Ok(estimate::Gates::new(
+        e.window_samples,
+        e.window_step_samples,
+        first_sample_time_s,
+    )?)
 }
 
 /// The weighting of the windows; the tapers of a likelihood together weigh nearly all samples alike.
@@ -72,12 +83,15 @@ pub fn weighting(scene: &Scene) -> estimate::Weighting {
 fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
     let (count, period_s) = (scene.samples_per_record(), 1.0 / scene.detector.sampling_hz);
     if matches!(scene.pulse.shape, PulseShape::Gaussian(_)) {
-        let broader = (std::f64::consts::TAU * scene.pulse.chirp_hz_s * pulse.sigma_s().powi(2)).hypot(1.0);
+        let broader =
+            (std::f64::consts::TAU * scene.pulse.chirp_hz_s * pulse.sigma_s().powi(2)).hypot(1.0);
         let lag = |m: usize| broader * m as f64 * period_s / pulse.sigma_s();
         return (0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect();
     }
     // Fine enough for the spectrum of the pulse; the sum over a smooth pulse that ends at 0 converges fast.
-    let parts = (16.0 * pulse.spectral_width_hz() * period_s).ceil().max(1.0) as usize;
+    let parts = (16.0 * pulse.spectral_width_hz() * period_s)
+        .ceil()
+        .max(1.0) as usize;
     let step_s = period_s / parts as f64;
     let (first_s, last_s) = pulse.support_s();
     let steps = ((last_s - first_s) / step_s).ceil() as usize;
@@ -88,10 +102,23 @@ fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
     };
     let envelope: Vec<Complex<f64>> = (0..=steps).map(at).collect();
     let lag = |m: usize| -> f64 {
-        envelope.iter().skip(m * parts).zip(&envelope).map(|(late, early)| (late * early.conj()).re).sum()
+        envelope
+            .iter()
+            .skip(m * parts)
+            .zip(&envelope)
+            .map(|(late, early)| (late * early.conj()).re)
+            .sum()
     };
     let energy = lag(0);
-    (0..count).map(|m| if m * parts <= steps { lag(m) / energy } else { 0.0 }).collect()
+    (0..count)
+        .map(|m| {
+            if m * parts <= steps {
+                lag(m) / energy
+            } else {
+                0.0
+            }
+        })
+        .collect()
 }
 
 /// Density of noise outside its band over that inside, which keeps covariances regular.
@@ -107,7 +134,9 @@ fn correlogram<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Corr
         return Ok(Correlogram::new(weighting(scene), n)?);
     }
     let correlation = pulse_correlation(scene, pulse);
-    let envelope = Array2::from_shape_fn((n, n), |(a, b)| correlation.get(a.abs_diff(b)).copied().unwrap_or(0.0));
+    let envelope = Array2::from_shape_fn((n, n), |(a, b)| {
+        correlation.get(a.abs_diff(b)).copied().unwrap_or(0.0)
+    });
     // The tapers are those of white noise and need no inverse, whatever the noise.
     let model = WindowModel::with_envelope(&sampling(scene)?, envelope, Noise::White)?;
     Ok(Correlogram::with_tapers(likelihood_tapers(&model, snr)?)?)
@@ -137,15 +166,29 @@ fn is_of_correlogram(scene: &Scene) -> bool {
 
 /// Signal-to-noise ratio for which a likelihood is planned: as the scene states it, else as it is.
 fn planned_snr(scene: &Scene, snr: f64) -> f64 {
-    scene.estimator.method.likelihood_snr_db().map_or(snr, |db| 10f64.powf(0.1 * db)).clamp(1e-8, 1e8)
+    scene
+        .estimator
+        .method
+        .likelihood_snr_db()
+        .map_or(snr, |db| 10f64.powf(0.1 * db))
+        .clamp(1e-8, 1e8)
 }
 
 /// Lags of a line at a velocity, whose sizes are given, as numbers of signals of a kind.
-fn lags_at(sampling: &Sampling, kind: SignalKind, velocity_m_s: f64, sizes: impl Iterator<Item = f64>) -> Vec<f64> {
+fn lags_at(
+    sampling: &Sampling,
+    kind: SignalKind,
+    velocity_m_s: f64,
+    sizes: impl Iterator<Item = f64>,
+) -> Vec<f64> {
     let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) * sampling.period_s();
     let lag = |(m, size): (usize, f64)| Complex::from_polar(size, turn * m as f64);
     let numbers = kind.lag_numbers(1);
-    sizes.enumerate().map(lag).flat_map(|lag| [lag.re, lag.im].into_iter().take(numbers)).collect()
+    sizes
+        .enumerate()
+        .map(lag)
+        .flat_map(|lag| [lag.re, lag.im].into_iter().take(numbers))
+        .collect()
 }
 
 /// Second-order model of the record of a pulse of the scene in a uniform wind, for the bound; white noise stands for none.
@@ -159,7 +202,13 @@ pub fn record_model(scene: &Scene, pulse: &Pulse) -> Result<RecordModel, Error> 
     };
     let is_gaussian = matches!(scene.pulse.shape, PulseShape::Gaussian(_));
     let correlation = pulse_correlation(scene, pulse);
-    Ok(RecordModel::new(&sampling(scene)?, signal_kind(scene), noise, correlation, is_gaussian)?)
+    Ok(RecordModel::new(
+        &sampling(scene)?,
+        signal_kind(scene),
+        noise,
+        correlation,
+        is_gaussian,
+    )?)
 }
 
 /// Covariance between windows of one pulse: of speckle of unit power, and of noise whose power in the detector band is one.
@@ -179,11 +228,18 @@ pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<WindowCovarianc
         (NoiseModel::White, _) => 0.0,
         (NoiseModel::BandLimited, 0) => 1.0,
         (NoiseModel::BandLimited, _) => {
-            (std::f64::consts::PI * band * lag as f64).sin() / (std::f64::consts::PI * band * lag as f64)
+            (std::f64::consts::PI * band * lag as f64).sin()
+                / (std::f64::consts::PI * band * lag as f64)
         }
     };
     let samples = scene.samples_per_record();
-    Ok(WindowCovariance::new(&window, e.window_step_samples, samples, signal, noise)?)
+    Ok(WindowCovariance::new(
+        &window,
+        e.window_step_samples,
+        samples,
+        signal,
+        noise,
+    )?)
 }
 
 /// What is known of the windows before any is seen, for estimators that are planned for it.
@@ -229,30 +285,57 @@ impl NoiseSeen {
         estimator: &dyn Estimator,
         seen: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
     ) -> Result<Self, Error> {
-        let (Some(noise), sampling, kind) = (noise_kind(scene), sampling(scene)?, signal_kind(scene)) else {
-            return Ok(Self { power_a2: f64::NAN, density_a2: f64::NAN, gain: Default::default() });
+        let (Some(noise), sampling, kind) =
+            (noise_kind(scene), sampling(scene)?, signal_kind(scene))
+        else {
+            return Ok(Self {
+                power_a2: f64::NAN,
+                density_a2: f64::NAN,
+                gain: Default::default(),
+            });
         };
         let n = scene.estimator.window_samples;
-        let found = |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut Scratch::new()));
+        let found =
+            |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut Scratch::new()));
         let of_noise = found(noise.expected_correlogram(&sampling, kind, 1.0, &vec![1.0; n])?)?;
         let pulse = pulse_correlation(scene, &instrument.pulse);
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let cells = n as f64 * scene.detector.bandwidth_hz / scene.detector.sampling_hz;
-        let velocity_m_s = spaced(low_m_s, high_m_s, (8.0 * cells).ceil().clamp(65.0, 257.0) as usize);
+        let velocity_m_s = spaced(
+            low_m_s,
+            high_m_s,
+            (8.0 * cells).ceil().clamp(65.0, 257.0) as usize,
+        );
         let gain = |velocity_m_s: &f64| {
-            let lags = lags_at(&sampling, kind, *velocity_m_s, pulse.iter().copied().take(n));
+            let lags = lags_at(
+                &sampling,
+                kind,
+                *velocity_m_s,
+                pulse.iter().copied().take(n),
+            );
             Ok(of_noise.power / found(lags)?.power)
         };
-        let gain = velocity_m_s.iter().map(gain).collect::<Result<Vec<f64>, Error>>()?;
+        let gain = velocity_m_s
+            .iter()
+            .map(gain)
+            .collect::<Result<Vec<f64>, Error>>()?;
         let unit_a2 = instrument.receiver.noise_variance_a2();
         let (power_a2, density_a2) = (of_noise.power * unit_a2, of_noise.detection * unit_a2);
-        Ok(Self { power_a2, density_a2, gain: (velocity_m_s, gain) })
+        Ok(Self {
+            power_a2,
+            density_a2,
+            gain: (velocity_m_s, gain),
+        })
     }
 
     /// Signal-to-noise ratio of a signal of that velocity over the excess of the power in the band over that of the noise; NaN without
     /// a velocity.
     pub fn gain(&self, velocity_m_s: f64) -> f64 {
-        if velocity_m_s.is_nan() { f64::NAN } else { of_table(&self.gain.0, &self.gain.1, velocity_m_s) }
+        if velocity_m_s.is_nan() {
+            f64::NAN
+        } else {
+            of_table(&self.gain.0, &self.gain.1, velocity_m_s)
+        }
     }
 }
 
@@ -261,7 +344,11 @@ impl<S: Sample> Toolkit<S> {
     ///
     /// # Errors
     /// What the estimators refuse, such as a covariance that cannot be diagonalised.
-    pub fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Self, Error> {
+    pub fn new(
+        scene: &Scene,
+        instrument: &Instrument,
+        known: &WindowStatistics,
+    ) -> Result<Self, Error> {
         let snr = planned_snr(scene, known.snr);
         if let Method::GradientLikelihood(own) = scene.estimator.method {
             return Self::of_gradients(scene, instrument, &own, snr);
@@ -275,31 +362,74 @@ impl<S: Sample> Toolkit<S> {
         // Lines that are shifted have complex lags, whatever the samples.
         let parts = if follows { 2 } else { per_lag };
         let seen = |lags: Vec<f64>| {
-            let weighted = lags
-                .chunks(per_lag)
-                .zip(&lag_weights)
-                .map(|(lag, weight)| [lag[0] * weight, lag.get(1).copied().unwrap_or(0.0) * weight]);
-            Ok(weighted.flat_map(|lag| lag.into_iter().take(parts)).collect())
+            let weighted = lags.chunks(per_lag).zip(&lag_weights).map(|(lag, weight)| {
+                [lag[0] * weight, lag.get(1).copied().unwrap_or(0.0) * weight]
+            });
+            Ok(weighted
+                .flat_map(|lag| lag.into_iter().take(parts))
+                .collect())
         };
-        let noise = NoiseSeen::new(scene, instrument, following.as_deref().unwrap_or(&*estimator), seen)?;
+        let noise = NoiseSeen::new(
+            scene,
+            instrument,
+            following.as_deref().unwrap_or(&*estimator),
+            seen,
+        )?;
         let test = noise_test(scene, &tapers, &lag_weights)?;
-        Ok(Self { statistic, estimator, following, test, noise })
+        Ok(Self {
+            statistic,
+            estimator,
+            following,
+            test,
+            noise,
+        })
     }
 
-    fn of_gradients(scene: &Scene, instrument: &Instrument, own: &GradientLikelihood, snr: f64) -> Result<Self, Error> {
+    fn of_gradients(
+        scene: &Scene,
+        instrument: &Instrument,
+        own: &GradientLikelihood,
+        snr: f64,
+    ) -> Result<Self, Error> {
         let e = &scene.estimator;
         let noise = noise_kind(scene).unwrap_or(Noise::Band { floor: 0.0 });
         let sampling = sampling(scene)?;
-        let model = GradientModel::new(&sampling, e.window_samples, instrument.pulse.sigma_s(), noise)?;
+        let model = GradientModel::new(
+            &sampling,
+            e.window_samples,
+            instrument.pulse.sigma_s(),
+            noise,
+        )?;
         let half = (own.gradients / 2) as f64;
-        let gradient = |k: usize| if half > 0.0 { own.gradient_max_per_s * (k as f64 - half) / half } else { 0.0 };
+        let gradient = |k: usize| {
+            if half > 0.0 {
+                own.gradient_max_per_s * (k as f64 - half) / half
+            } else {
+                0.0
+            }
+        };
         let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
-        let plan = estimate::estimators::GradientLikelihood::<S>::new(&model, snr, &gradients, e.padded_samples)?;
+        let plan = estimate::estimators::GradientLikelihood::<S>::new(
+            &model,
+            snr,
+            &gradients,
+            e.padded_samples,
+        )?;
         let gates = gates(scene)?;
-        let test = noise_kind(scene).map(|noise| plan.noise_test(&gates, noise)).transpose()?;
-        let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| Ok(plan.mean_statistic(&lags)?))?;
+        let test = noise_kind(scene)
+            .map(|noise| plan.noise_test(&gates, noise))
+            .transpose()?;
+        let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| {
+            Ok(plan.mean_statistic(&lags)?)
+        })?;
         let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
-        Ok(Self { statistic, estimator, following: None, test, noise })
+        Ok(Self {
+            statistic,
+            estimator,
+            following: None,
+            test,
+            noise,
+        })
     }
 }
 
@@ -319,23 +449,47 @@ impl ExpectedBias {
     ///
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
-    pub(crate) fn new(scene: &Scene, instrument: &Instrument, known: &WindowStatistics) -> Result<Option<Self>, Error> {
+    pub(crate) fn new(
+        scene: &Scene,
+        instrument: &Instrument,
+        known: &WindowStatistics,
+    ) -> Result<Option<Self>, Error> {
         let (kind, sampling, pulse) = (signal_kind(scene), sampling(scene)?, &instrument.pulse);
-        let Some(noise) = noise_kind(scene).filter(|_| is_of_correlogram(scene)) else { return Ok(None) };
+        let Some(noise) = noise_kind(scene).filter(|_| is_of_correlogram(scene)) else {
+            return Ok(None);
+        };
         // Real and complex samples have the same weights of lags.
         let (_, lag_weights, _) = statistic::<f64>(scene, pulse, planned_snr(scene, known.snr))?;
         let estimator = of_correlogram(scene, kind, &lag_weights, known)?;
         let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
         let lags = lag_weights.iter().zip(pulse_correlation(scene, pulse));
         let signal = lags.map(|(weight, lag)| weight * lag).collect();
-        Ok(Some(Self { estimator, sampling, kind, signal, noise }))
+        Ok(Some(Self {
+            estimator,
+            sampling,
+            kind,
+            signal,
+            noise,
+        }))
     }
 
     /// The velocity that it finds less the true one, m/s, at a signal-to-noise ratio.
     pub(crate) fn m_s(&self, velocity_m_s: f64, snr: f64) -> f64 {
-        let lags = lags_at(&self.sampling, self.kind, velocity_m_s, self.signal.iter().map(|power| snr * power));
-        let mean: Vec<f64> = lags.iter().zip(&self.noise).map(|(signal, noise)| signal + noise).collect();
-        self.estimator.estimate(&mean, &mut Scratch::new()).velocity_m_s - velocity_m_s
+        let lags = lags_at(
+            &self.sampling,
+            self.kind,
+            velocity_m_s,
+            self.signal.iter().map(|power| snr * power),
+        );
+        let mean: Vec<f64> = lags
+            .iter()
+            .zip(&self.noise)
+            .map(|(signal, noise)| signal + noise)
+            .collect();
+        self.estimator
+            .estimate(&mean, &mut Scratch::new())
+            .velocity_m_s
+            - velocity_m_s
     }
 }
 
@@ -347,7 +501,8 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
     let (e, sampling, kind) = (&scene.estimator, sampling(scene)?, signal_kind(scene));
     let weights = Correlogram::<f64>::new(weighting(scene), e.window_samples)?.lag_weights();
     let peak = SpectralPeak::new(&sampling, kind, &weights, e.padded_samples, e.refinement)?;
-    let step_m_s = 0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / e.padded_samples as f64;
+    let step_m_s =
+        0.5 * scene.laser.wavelength_m * scene.detector.sampling_hz / e.padded_samples as f64;
     let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
     let off_m_s = |part: i32| {
         let velocity_m_s = 0.5 * (low_m_s + high_m_s) + step_m_s * f64::from(part) / 64.0;
@@ -387,9 +542,15 @@ pub(crate) fn noise_kind(scene: &Scene) -> Option<Noise> {
 
 /// The test against noise of an estimator of correlograms; none without noise, and none of the spectrum of an unbiased
 /// correlogram with all its lags, which need not be positive.
-fn noise_test(scene: &Scene, tapers: &[Taper], lag_weights: &[f64]) -> Result<Option<NoiseTest>, Error> {
+fn noise_test(
+    scene: &Scene,
+    tapers: &[Taper],
+    lag_weights: &[f64],
+) -> Result<Option<NoiseTest>, Error> {
     let e = &scene.estimator;
-    let Some(noise) = noise_kind(scene) else { return Ok(None) };
+    let Some(noise) = noise_kind(scene) else {
+        return Ok(None);
+    };
     let window = match e.method {
         Method::LagWindow(window) => Some(model_lag_weights(window.lag_window_lags - 1)),
         method => method.order().map(|model| model_lag_weights(model.order)),
@@ -400,9 +561,20 @@ fn noise_test(scene: &Scene, tapers: &[Taper], lag_weights: &[f64]) -> Result<Op
     }
     let seen = |(at, gain): (&f64, &f64)| if unbiased { at / gain } else { *at };
     let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
-    let padded = if e.method == (Method::PulsePair {}) { 4 * lag_weights.len() } else { e.padded_samples };
+    let padded = if e.method == (Method::PulsePair {}) {
+        4 * lag_weights.len()
+    } else {
+        e.padded_samples
+    };
     let (sampling, gates) = (sampling(scene)?, gates(scene)?);
-    Ok(Some(NoiseTest::new(&sampling, &gates, tapers, window.as_deref(), padded, noise)?))
+    Ok(Some(NoiseTest::new(
+        &sampling,
+        &gates,
+        tapers,
+        window.as_deref(),
+        padded,
+        noise,
+    )?))
 }
 
 /// The estimator of a mean correlogram whose lags carry `lag_weights`.
@@ -417,7 +589,11 @@ fn of_correlogram(
     let (lags, padded) = (lag_weights.len(), e.padded_samples);
     // Divided by their weights, all lags count alike.
     let alike = vec![1.0; lags];
-    let seen = if e.correlogram == CorrelogramForm::Unbiased { &alike } else { lag_weights };
+    let seen = if e.correlogram == CorrelogramForm::Unbiased {
+        &alike
+    } else {
+        lag_weights
+    };
     let samples = e.window_samples as f64 * known.n_eff.max(1.0);
     let model = |reading, model: ModelOrder| {
         let peak = ModelPeak::new(reading, &sampling, kind, lags, model.order, padded, refine)?;
@@ -431,15 +607,28 @@ fn of_correlogram(
         Method::Periodogram {}
         | Method::PeriodogramAccumulation {}
         | Method::Likelihood(_)
-        | Method::GradientLikelihood(_) => Box::new(SpectralPeak::new(&sampling, kind, seen, padded, refine)?),
+        | Method::GradientLikelihood(_) => {
+            Box::new(SpectralPeak::new(&sampling, kind, seen, padded, refine)?)
+        }
         Method::Autoregressive(own) => model(ModelReading::Spectrum, own)?,
         Method::AutoregressivePole(own) => model(ModelReading::Pole, own)?,
         Method::Capon(own) => model(ModelReading::Capon, own)?,
-        Method::LagWindow(window) => {
-            Box::new(LagWindowPeak::new(&sampling, kind, seen, window.lag_window_lags, padded, refine)?)
-        }
+        Method::LagWindow(window) => Box::new(LagWindowPeak::new(
+            &sampling,
+            kind,
+            seen,
+            window.lag_window_lags,
+            padded,
+            refine,
+        )?),
         Method::PulsePair {} => Box::new(PulsePair::new(&sampling, kind, seen)?),
-        Method::FirstMoment(own) => Box::new(FirstMoment::new(&sampling, kind, seen, padded, own.moment_reach)?),
+        Method::FirstMoment(own) => Box::new(FirstMoment::new(
+            &sampling,
+            kind,
+            seen,
+            padded,
+            own.moment_reach,
+        )?),
     };
     Ok(match e.correlogram {
         CorrelogramForm::Biased => estimator,

@@ -44,7 +44,9 @@ impl Geometry {
     pub fn new(file: &SceneFile, pulse: &Pulse, wind: &SceneWind) -> Result<Self, Error> {
         let (scene, scan) = (&file.content, &file.content.scan);
         let schedule = scan_lines::schedule(file)?;
-        let middles: Vec<_> = (0..schedule.lines.len()).map(|line| schedule.middle(line)).collect();
+        let middles: Vec<_> = (0..schedule.lines.len())
+            .map(|line| schedule.middle(line))
+            .collect();
         let line_time_s: Vec<f64> = middles.iter().map(|beam| beam.time_s).collect();
         let max_gradient_per_s = wind.max_gradient_per_s(&line_time_s);
         let sample_spacing_m = scene.sample_spacing_m();
@@ -52,13 +54,22 @@ impl Geometry {
         let window = scene.estimator.window_samples;
         let first_samples = (0..=samples - window).step_by(scene.estimator.gate_step_samples);
         // Windows are indexed by their centre, R = c (t_p + N T_s/2)/2.
-        let centre_m = |first: usize| scan.range_min_m + (first as f64 + 0.5 * window as f64) * sample_spacing_m;
+        let centre_m = |first: usize| {
+            scan.range_min_m + (first as f64 + 0.5 * window as f64) * sample_spacing_m
+        };
         let (sample_rate_hz, wavelength_m) = (scene.detector.sampling_hz, scene.laser.wavelength_m);
-        let layer_thickness_m =
-            pulse.layer_thickness_m(LayerLimits { sample_rate_hz, wavelength_m, max_gradient_per_s })?;
+        let layer_thickness_m = pulse.layer_thickness_m(LayerLimits {
+            sample_rate_hz,
+            wavelength_m,
+            max_gradient_per_s,
+        })?;
         // Layers before and behind the range of a sample that the pulse lights.
         let (first_s, last_s) = pulse.support_s();
-        let reach = |time_s: f64| (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m).max(0.0).ceil() as usize;
+        let reach = |time_s: f64| {
+            (time_s * 0.5 * SPEED_OF_LIGHT_M_S / layer_thickness_m)
+                .max(0.0)
+                .ceil() as usize
+        };
         let (near, far) = (reach(last_s), reach(-first_s));
         let layers_per_sample = near.saturating_add(far).saturating_add(1);
         let record_m = (samples - 1) as f64 * sample_spacing_m;
@@ -71,7 +82,8 @@ impl Geometry {
             gate_range_m: first_samples.map(centre_m).collect(),
             layer_thickness_m,
             first_layer_range_m: scan.range_min_m - near as f64 * layer_thickness_m,
-            layers: ((record_m / layer_thickness_m).ceil() as usize).saturating_add(layers_per_sample),
+            layers: ((record_m / layer_thickness_m).ceil() as usize)
+                .saturating_add(layers_per_sample),
             layers_per_sample,
         })
     }

@@ -2,8 +2,8 @@
 
 use crate::Error;
 use crate::scene::{
-    AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseShape, RefractiveTurbulence, Scene,
-    ScreenSampling, SnrReference, SpectrumKind,
+    AirProfile, Atmosphere, DetectorSignal, Digitiser, NoiseModel, Pulse, PulseShape,
+    RefractiveTurbulence, Scene, ScreenSampling, SnrReference, SpectrumKind,
 };
 use crate::setup::efficiency_model::turbulence as turbulence_of;
 use num_complex::Complex;
@@ -41,7 +41,10 @@ impl Instrument {
         let (telescope, receiver) = (telescope(scene).validated()?, receiver(scene));
         let digitiser = match scene.detector.digitiser {
             Digitiser::None {} => None,
-            Digitiser::Quantised { bits, full_scale_over_noise } => {
+            Digitiser::Quantised {
+                bits,
+                full_scale_over_noise,
+            } => {
                 let full_scale_a = full_scale_over_noise * receiver.noise_variance_a2().sqrt();
                 Some(signal::digitise::Digitiser::new(bits, full_scale_a)?)
             }
@@ -49,12 +52,17 @@ impl Instrument {
         let turbulence = turbulence_of(scene).map(|t| turbulence(&t)).transpose()?;
         Ok(Self {
             telescope,
-            pulse: pulse(&Pulse { energy_j: scene.pulse_energy_j(), ..scene.pulse.clone() })?,
+            pulse: pulse(&Pulse {
+                energy_j: scene.pulse_energy_j(),
+                ..scene.pulse.clone()
+            })?,
             receiver,
             digitiser,
             turbulence,
             air: medium(&scene.atmosphere)?,
-            transmission: 10f64.powf(-0.1 * (scene.telescope.optics_loss_db + scene.telescope.polarisation_loss_db)),
+            transmission: 10f64.powf(
+                -0.1 * (scene.telescope.optics_loss_db + scene.telescope.polarisation_loss_db),
+            ),
             blind_range_m: scene.telescope.blind_range_m,
         })
     }
@@ -65,8 +73,15 @@ impl Instrument {
     /// # Errors
     /// What optics or signals refuse of a range.
     pub fn return_per_m(&self, range_m: f64) -> Result<f64, Error> {
-        let seen = if range_m < self.blind_range_m { 0.0 } else { self.transmission };
-        Ok(seen * self.air.return_per_m(range_m, self.telescope.aperture_area_m2())?)
+        let seen = if range_m < self.blind_range_m {
+            0.0
+        } else {
+            self.transmission
+        };
+        Ok(seen
+            * self
+                .air
+                .return_per_m(range_m, self.telescope.aperture_area_m2())?)
     }
 
     /// [`Self::return_per_m`] of air with a backscatter of 1/(m sr): K^2 A_R/R^2 less losses, sr.
@@ -74,8 +89,13 @@ impl Instrument {
     /// # Errors
     /// What optics or signals refuse of a range.
     pub(crate) fn return_of_backscatter_sr(&self, range_m: f64) -> Result<f64, Error> {
-        let one = self.air.transmission(range_m)?.powi(2) * self.telescope.aperture_area_m2() / (range_m * range_m);
-        Ok(if range_m < self.blind_range_m { 0.0 } else { self.transmission * one })
+        let one = self.air.transmission(range_m)?.powi(2) * self.telescope.aperture_area_m2()
+            / (range_m * range_m);
+        Ok(if range_m < self.blind_range_m {
+            0.0
+        } else {
+            self.transmission * one
+        })
     }
 
     /// Full width at half maximum of the Gaussian pulse with the same spread, s.
@@ -88,15 +108,24 @@ impl Instrument {
         const STEPS: u32 = 2000;
         let (first_s, last_s) = self.pulse.support_s();
         let time_s = |i: u32| first_s + (last_s - first_s) * f64::from(i) / f64::from(STEPS);
-        self.pulse.energy_j() * (0..=STEPS).map(|i| self.pulse.intensity_per_s(time_s(i))).fold(0.0, f64::max)
+        self.pulse.energy_j()
+            * (0..=STEPS)
+                .map(|i| self.pulse.intensity_per_s(time_s(i)))
+                .fold(0.0, f64::max)
     }
 
     /// Grid and layers of the phase screens for several runs, each with its ranges, m, increasing; with their cost.
     ///
     /// # Errors
     /// What cannot be resolved, with every limit and what would do for all of the runs.
-    pub fn screen_plans(&self, t: &RefractiveTurbulence, runs: &[&[f64]]) -> Result<Vec<ScreenPlan>, optics::Error> {
-        let Some(turbulence) = &self.turbulence else { return Ok(Vec::new()) };
+    pub fn screen_plans(
+        &self,
+        t: &RefractiveTurbulence,
+        runs: &[&[f64]],
+    ) -> Result<Vec<ScreenPlan>, optics::Error> {
+        let Some(turbulence) = &self.turbulence else {
+            return Ok(Vec::new());
+        };
         let case = optics::plan::Case {
             telescope: self.telescope,
             misalignment: optics::Misalignment::NONE,
@@ -124,7 +153,12 @@ impl Instrument {
     ) -> Result<(optics::MonteCarlo, f64), Error> {
         let plan = self.screen_plans(t, &[range_m])?.pop();
         let (Some(plan), Some(turbulence)) = (plan, &self.turbulence) else {
-            return Err(optics::Error::Length { field: "range_m", found: 0, expected: 1 }.into());
+            return Err(optics::Error::Length {
+                field: "range_m",
+                found: 0,
+                expected: 1,
+            }
+            .into());
         };
         let run = optics::MonteCarlo {
             telescope: self.telescope,
@@ -148,7 +182,11 @@ fn telescope(scene: &Scene) -> optics::Telescope {
         obscuration_radius_m: t.obscuration_radius_m,
         beam_radius_m: t.beam_radius_m,
         radius_definition: t.beam_radius_definition,
-        focus: if t.focus_m.is_infinite() { optics::Focus::Collimated } else { optics::Focus::At(t.focus_m) },
+        focus: if t.focus_m.is_infinite() {
+            optics::Focus::Collimated
+        } else {
+            optics::Focus::At(t.focus_m)
+        },
     }
 }
 
@@ -159,12 +197,21 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
         convention: t.outer_scale_wavenumber,
     };
     let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
-        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(scales, optics::air::CHAPTER_CONSTANT)?),
+        SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
+            scales,
+            optics::air::CHAPTER_CONSTANT,
+        )?),
         SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
         SpectrumKind::Tatarskii => Arc::new(optics::VonKarman::tatarskii(t.inner_scale_m)?),
         SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
     };
-    Ok(optics::Turbulence { spectrum, cn2: optics::Cn2Path::Uniform { cn2_m_m23: t.cn2_m_m23 }.validated()? })
+    Ok(optics::Turbulence {
+        spectrum,
+        cn2: optics::Cn2Path::Uniform {
+            cn2_m_m23: t.cn2_m_m23,
+        }
+        .validated()?,
+    })
 }
 
 /// The pulse of a scene.
@@ -173,17 +220,39 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
 /// What the signal simulation refuses, such as samples that are no pulse.
 pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
     let pulse = match &p.shape {
-        PulseShape::Gaussian(shape) => signal::Pulse::from(signal::GaussianPulse::new(shape.duration(), p.energy_j)?),
+        PulseShape::Gaussian(shape) => {
+            signal::Pulse::from(signal::GaussianPulse::new(shape.duration(), p.energy_j)?)
+        }
         PulseShape::Sampled(shape) => {
             let resampling = shape.resampling;
             let sampled = if shape.phase_rad.is_empty() {
-                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, resampling, p.energy_j)?
+                signal::sampled::SampledPulse::from_power(
+                    &shape.time_s,
+                    &shape.power,
+                    resampling,
+                    p.energy_j,
+                )?
             } else {
-                let polar = |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
-                let envelope: Vec<_> = shape.power.iter().zip(&shape.phase_rad).map(polar).collect();
-                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, resampling, p.energy_j)?
+                let polar =
+                    |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
+                let envelope: Vec<_> = shape
+                    .power
+                    .iter()
+                    .zip(&shape.phase_rad)
+                    .map(polar)
+                    .collect();
+                signal::sampled::SampledPulse::new(
+                    &shape.time_s,
+                    &envelope,
+                    resampling,
+                    p.energy_j,
+                )?
             };
-            signal::Pulse::from(if shape.centred { sampled.centred() } else { sampled })
+            signal::Pulse::from(if shape.centred {
+                sampled.centred()
+            } else {
+                sampled
+            })
         }
     };
     Ok(pulse.with_chirp(p.chirp_hz_s)?)
@@ -195,14 +264,25 @@ pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
 /// What the signal simulation refuses, such as ranges that do not increase.
 pub(crate) fn medium(atmosphere: &Atmosphere) -> Result<signal::Medium, Error> {
     let Some(profile) = &atmosphere.profile else {
-        return Ok(signal::Medium::uniform(atmosphere.backscatter_per_m_sr, atmosphere.extinction_per_m)?);
+        return Ok(signal::Medium::uniform(
+            atmosphere.backscatter_per_m_sr,
+            atmosphere.extinction_per_m,
+        )?);
     };
-    let AirProfile { mut range_m, mut backscatter_per_m_sr, mut extinction_per_m } = profile.clone();
+    let AirProfile {
+        mut range_m,
+        mut backscatter_per_m_sr,
+        mut extinction_per_m,
+    } = profile.clone();
     // Beyond the table the air is as at its end, to where the echo of the pulse before may come from at the slowest rate.
     range_m.push(range_m.last().copied().unwrap_or(0.0).max(0.0) + 1e12);
     backscatter_per_m_sr.extend(profile.backscatter_per_m_sr.last());
     extinction_per_m.extend(profile.extinction_per_m.last());
-    Ok(signal::Medium::new(range_m, backscatter_per_m_sr, extinction_per_m)?)
+    Ok(signal::Medium::new(
+        range_m,
+        backscatter_per_m_sr,
+        extinction_per_m,
+    )?)
 }
 
 /// The receiver of a scene.
@@ -226,10 +306,16 @@ pub fn receiver(scene: &Scene) -> signal::Receiver {
 
 /// What the receiver of a scene has beyond shot noise.
 fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
-    let (d, words) = (&scene.detector, scene.detector.front_end.unwrap_or_default());
+    let (d, words) = (
+        &scene.detector,
+        scene.detector.front_end.unwrap_or_default(),
+    );
     let converter = match d.digitiser {
         Digitiser::None {} => None,
-        Digitiser::Quantised { bits, full_scale_over_noise } => Some(signal::receiver::Converter {
+        Digitiser::Quantised {
+            bits,
+            full_scale_over_noise,
+        } => Some(signal::receiver::Converter {
             bits,
             full_scale_over_noise,
             bandwidth_hz: d.bandwidth_hz,
@@ -249,7 +335,10 @@ fn front_end(scene: &Scene) -> signal::receiver::FrontEnd {
         intensity_noise_db_hz: words.intensity_noise_db_hz,
         rejection_db: words.rejection_db,
         saturation_w: words.saturation_w,
-        response: signal::receiver::Butterworth { order: words.poles, half_power_hz: words.half_power_hz },
+        response: signal::receiver::Butterworth {
+            order: words.poles,
+            half_power_hz: words.half_power_hz,
+        },
         rounding_noise: converter.map_or(0.0, |converter| converter.rounding()),
         clipping_noise: converter.map_or(0.0, |converter| converter.clipping_noise()),
         linewidth_hz: scene.laser.linewidth_hz,
@@ -269,10 +358,17 @@ mod tests {
             backscatter_per_m_sr: vec![1e-7; 2],
             extinction_per_m: vec![1e-9; 2],
         };
-        let air = medium(&Atmosphere { profile: Some(profile), ..Atmosphere::default() }).unwrap();
+        let air = medium(&Atmosphere {
+            profile: Some(profile),
+            ..Atmosphere::default()
+        })
+        .unwrap();
         for range_m in [1e4, 3e7, 1.5e11] {
             let (found, expected) = (air.transmission(range_m).unwrap(), (-1e-9 * range_m).exp());
-            assert!((found - expected).abs() <= 1e-9 * expected, "{range_m} m: {found} {expected}");
+            assert!(
+                (found - expected).abs() <= 1e-9 * expected,
+                "{range_m} m: {found} {expected}"
+            );
             assert_eq!(air.backscatter_per_m_sr(range_m).unwrap(), 1e-7);
         }
     }

@@ -19,7 +19,11 @@ impl<T> Known<T> {
     ///
     /// # Errors
     /// Those of `make`.
-    pub(crate) fn of(&self, cause: String, make: impl FnOnce() -> Result<T, Error>) -> Result<Arc<T>, Error> {
+    pub(crate) fn of(
+        &self,
+        cause: String,
+        make: impl FnOnce() -> Result<T, Error>,
+    ) -> Result<Arc<T>, Error> {
         // A value that could not be made left nothing behind.
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(value) = known.get(&cause) {

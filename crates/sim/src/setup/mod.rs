@@ -57,7 +57,12 @@ impl Setup {
     pub(crate) fn new(scene: SceneFile, wind: Arc<SceneWind>) -> Result<Self, Error> {
         let instrument = Instrument::new(&scene.content)?;
         let geometry = Geometry::new(&scene, &instrument.pulse, &wind)?;
-        let setup = Self { scene, instrument, geometry, wind };
+        let setup = Self {
+            scene,
+            instrument,
+            geometry,
+            wind,
+        };
         let (last_s, end_s) = (setup.scan_end_s(), setup.wind.end_s);
         if last_s > end_s {
             let (key, what) = match setup.scene.content.flow {

@@ -98,7 +98,11 @@ mod tests {
     #[test]
     fn a_run_that_is_stopped_says_so_and_the_next_one_is_as_if_it_had_not_been() {
         let mut scene = Scene::default();
-        (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad, scene.scan.pulses_per_line) = (0.1, 0.11, 1);
+        (
+            scene.scan.elevation_min_rad,
+            scene.scan.elevation_max_rad,
+            scene.scan.pulses_per_line,
+        ) = (0.1, 0.11, 1);
         let plan = Plan::new(SceneFile::new(scene).unwrap(), Target::Map).unwrap();
         // Bits, for what is not known is no number, and no number is equal to itself.
         let bits = |found: RunResult| found.map.unwrap().v_mean_m_s.mapv(f64::to_bits);
@@ -106,7 +110,10 @@ mod tests {
         for steps in [0, 4, 12] {
             let observer = Impatient(AtomicU64::new(0), steps);
             let stopped = stoppable(|| run(&plan, &observer));
-            assert!(matches!(stopped, Err(Error::Stopped)), "after {steps} steps");
+            assert!(
+                matches!(stopped, Err(Error::Stopped)),
+                "after {steps} steps"
+            );
         }
         let patient = Impatient(AtomicU64::new(0), u64::MAX);
         assert_eq!(bits(stoppable(|| run(&plan, &patient)).unwrap()), whole);

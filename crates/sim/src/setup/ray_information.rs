@@ -17,7 +17,12 @@ pub(crate) fn range_filter(setup: &Setup) -> Result<RangeFilter, Error> {
     let scene = &setup.scene.content;
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
     let thickness_m = setup.geometry.layer_thickness_m;
-    Ok(RangeFilter::gate(&setup.instrument.pulse, &window, scene.detector.sampling_hz, thickness_m)?)
+    Ok(RangeFilter::gate(
+        &setup.instrument.pulse,
+        &window,
+        scene.detector.sampling_hz,
+        thickness_m,
+    )?)
 }
 
 /// Signal-to-noise ratio of the samples of a scene's records, and the information in windows of them.
@@ -37,17 +42,29 @@ impl<'a> RayInformation<'a> {
     /// # Errors
     /// What the crates refuse; a checked scene gives none.
     pub(crate) fn new(setup: &'a Setup, layer_snr: &[(f64, f64)]) -> Result<Self, Error> {
-        let (scene, g, pulse) = (&setup.scene.content, &setup.geometry, &setup.instrument.pulse);
+        let (scene, g, pulse) = (
+            &setup.scene.content,
+            &setup.geometry,
+            &setup.instrument.pulse,
+        );
         let (layer_m, layer_snr) = layer_snr.iter().copied().unzip();
         let model = estimators::record_model(scene, pulse)?;
         let by_pulse = RangeFilter::pulse(pulse, g.layer_thickness_m)?;
-        Ok(Self { setup, model, by_pulse, by_gate: range_filter(setup)?, layer_m, layer_snr })
+        Ok(Self {
+            setup,
+            model,
+            by_pulse,
+            by_gate: range_filter(setup)?,
+            layer_m,
+            layer_snr,
+        })
     }
 
     /// Signal-to-noise ratios of the windows about some ranges, power ratios: means over what pulse and window see.
     pub(crate) fn of_windows(&self, range_m: &[f64]) -> Result<Vec<f64>, Error> {
         let mut snr = vec![0.0; range_m.len()];
-        self.by_gate.apply_into(self.layer_m[0], &self.layer_snr, range_m, &mut snr)?;
+        self.by_gate
+            .apply_into(self.layer_m[0], &self.layer_snr, range_m, &mut snr)?;
         Ok(snr)
     }
 
@@ -60,16 +77,24 @@ impl<'a> RayInformation<'a> {
         let snr = |samples: f64| {
             // The samples of a window are centred half a sample before its range; the pulse lights layers before and behind each.
             let (at_m, mut snr) = (range_m + (samples - 0.5) * g.sample_spacing_m, [0.0]);
-            let seen = self.by_pulse.apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
+            let seen =
+                self.by_pulse
+                    .apply_into(self.layer_m[0], &self.layer_snr, &[at_m], &mut snr);
             seen.map_or(f64::NAN, |()| snr[0].clamp(0.0, *SNR.end()))
         };
-        Ok(self.model.information(&estimators::gates(scene)?, count, snr)?)
+        Ok(self
+            .model
+            .information(&estimators::gates(scene)?, count, snr)?)
     }
 
     /// The same where all samples have one signal-to-noise ratio.
     pub(crate) fn of_snr(&self, snr: f64, count: usize) -> Result<Vec<f64>, Error> {
         let snr = snr.clamp(*SNR.start(), *SNR.end());
-        Ok(self.model.information(&estimators::gates(&self.setup.scene.content)?, count, |_| snr)?)
+        Ok(self.model.information(
+            &estimators::gates(&self.setup.scene.content)?,
+            count,
+            |_| snr,
+        )?)
     }
 }
 
@@ -83,19 +108,30 @@ mod tests {
     #[test]
     fn a_window_has_the_ratio_that_pulse_and_window_see_where_it_falls_steeply() {
         let text = "[pulse.shape]\nduration_s = 200e-9\n[estimator]\nwindow_samples = 48\nweighting = \"hann\"\n";
-        let plan = Plan::new(SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(), Target::Map).unwrap();
+        let plan = Plan::new(
+            SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap(),
+            Target::Map,
+        )
+        .unwrap();
         // By e in 20 m, as behind a focus: exp(v/(2 * 20^2)) more through a pulse of the variance v.
         let (fall_m, thickness_m) = (20.0, plan.geometry.layer_thickness_m);
         let of_air = |range_m: f64| 3.0 * (-(range_m - 400.0) / fall_m).exp();
-        let layers: Vec<(f64, f64)> =
-            (0..4000).map(|i| 200.0 + f64::from(i) * thickness_m).map(|range_m| (range_m, of_air(range_m))).collect();
-        let found = RayInformation::new(&plan, &layers).unwrap().of_windows(&[350.0, 401.3]).unwrap();
+        let layers: Vec<(f64, f64)> = (0..4000)
+            .map(|i| 200.0 + f64::from(i) * thickness_m)
+            .map(|range_m| (range_m, of_air(range_m)))
+            .collect();
+        let found = RayInformation::new(&plan, &layers)
+            .unwrap()
+            .of_windows(&[350.0, 401.3])
+            .unwrap();
         let variance_m2 = 0.5 * plan.instrument.pulse.sigma_m().powi(2);
         let spacing_m = 0.5 * SPEED_OF_LIGHT_M_S / 250e6;
         for (found, range_m) in found.into_iter().zip([350.0, 401.3]) {
             let (mut sum, mut total) = (0.0, 0.0);
             for n in 0..48 {
-                let h2 = (std::f64::consts::PI * (f64::from(n) - 23.5) / 48.0).cos().powi(4);
+                let h2 = (std::f64::consts::PI * (f64::from(n) - 23.5) / 48.0)
+                    .cos()
+                    .powi(4);
                 sum += h2 * of_air(range_m + (f64::from(n) - 24.0) * spacing_m);
                 total += h2;
             }

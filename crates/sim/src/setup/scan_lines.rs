@@ -21,7 +21,10 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     let pace = Pace {
         prt_s: 1.0 / scene.laser.pulse_repetition_hz,
         pulses: s.pulses_per_line,
-        head: Head { rate_rad_s: head.rate_rad_s, acceleration_rad_s2: head.acceleration_rad_s2 },
+        head: Head {
+            rate_rad_s: head.rate_rad_s,
+            acceleration_rad_s2: head.acceleration_rad_s2,
+        },
         dead_time_s: head.dead_time_s,
     };
     let of_key = Error::of_key("scan.pattern.file");
@@ -35,7 +38,10 @@ pub(crate) fn schedule(file: &SceneFile) -> Result<Schedule, Error> {
     };
     let scan = Schedule::new(&stops, &pace, mount(scene)).map_err(|(i, reason)| {
         let time_s = stops.get(i).and_then(|stop| stop.time_s).unwrap_or(0.0);
-        of_key(Error::Input { path, reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1) })
+        of_key(Error::Input {
+            path,
+            reason: format!("row {}: time_s = {time_s:?}: {reason}", i + 1),
+        })
     })?;
     above_ground(file, &scan)?;
     Ok(scan)
@@ -63,13 +69,33 @@ fn mount(scene: &Scene) -> Mount {
 fn stops(scene: &Scene) -> Vec<Stop> {
     let s = &scene.scan;
     let moving = s.head.motion == HeadMotion::Continuous;
-    let rows = || path::steps(s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad);
+    let rows = || {
+        path::steps(
+            s.elevation_min_rad,
+            s.elevation_max_rad,
+            s.elevation_step_rad,
+        )
+    };
     let once = match &s.pattern {
         Pattern::Rhi {} => {
-            vec![path::rhi(s.azimuth_rad, s.elevation_min_rad, s.elevation_max_rad, s.elevation_step_rad, moving)]
+            vec![path::rhi(
+                s.azimuth_rad,
+                s.elevation_min_rad,
+                s.elevation_max_rad,
+                s.elevation_step_rad,
+                moving,
+            )]
         }
         Pattern::Ppi(p) => {
-            let row = |el: &f64| path::ppi(*el, p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad, moving);
+            let row = |el: &f64| {
+                path::ppi(
+                    *el,
+                    p.azimuth_min_rad,
+                    p.azimuth_max_rad,
+                    p.azimuth_step_rad,
+                    moving,
+                )
+            };
             p.elevations_rad.iter().map(row).collect()
         }
         Pattern::Vad(p) => vec![path::vad(p.elevation_rad, p.beams)],
@@ -79,7 +105,12 @@ fn stops(scene: &Scene) -> Vec<Stop> {
             let (zero_rad, from_x_rad) = mount(scene).reference_rad;
             let along_rad = zero_rad - from_x_rad;
             let axis_rad = along_rad + if p.towards == Towards::PlusX { 0.0 } else { PI };
-            path::raster(axis_rad, &rows(), [p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad], moving)
+            path::raster(
+                axis_rad,
+                &rows(),
+                [p.azimuth_min_rad, p.azimuth_max_rad, p.azimuth_step_rad],
+                moving,
+            )
         }
         Pattern::List { .. } => Vec::new(),
     };
@@ -100,8 +131,14 @@ fn above_ground(file: &SceneFile, scan: &Schedule) -> Result<(), Error> {
     if s.below_ground != (Outside::Error {}) {
         return Ok(());
     }
-    let low = |beam: &crate::setup::beams::Beam| beam.position_m[2].min(beam.at_range_m(s.range_max_m)[2]);
-    let Some(lowest) = scan.ends().min_by(|a, b| low(a).total_cmp(&low(b))).filter(|beam| low(beam) < -1e-9) else {
+    let low = |beam: &crate::setup::beams::Beam| {
+        beam.position_m[2].min(beam.at_range_m(s.range_max_m)[2])
+    };
+    let Some(lowest) = scan
+        .ends()
+        .min_by(|a, b| low(a).total_cmp(&low(b)))
+        .filter(|beam| low(beam) < -1e-9)
+    else {
         return Ok(());
     };
     let key = match &s.pattern {

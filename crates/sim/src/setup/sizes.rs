@@ -3,7 +3,9 @@
 /// Records that are in memory at a time: some ten megabytes of them, and enough for every thread.
 pub(crate) fn records_at_once<T>(samples: usize, pulses: usize) -> usize {
     let record_bytes = samples.max(1) * size_of::<T>();
-    (PIECE_BYTES / record_bytes).max(rayon::current_num_threads()).min(pulses.max(1))
+    (PIECE_BYTES / record_bytes)
+        .max(rayon::current_num_threads())
+        .min(pulses.max(1))
 }
 
 /// Size of a piece of records, bytes.

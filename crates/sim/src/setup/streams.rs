@@ -25,7 +25,12 @@ mod tests {
     #[test]
     fn streams_differ_in_seed_stage_and_index_and_repeat() {
         let first = |seed, stage, index| stream(seed, stage, index).next_u64();
-        let all = [first(1, "signal", 0), first(2, "signal", 0), first(1, "screens", 0), first(1, "signal", 1)];
+        let all = [
+            first(1, "signal", 0),
+            first(2, "signal", 0),
+            first(1, "screens", 0),
+            first(1, "signal", 1),
+        ];
         for (i, a) in all.iter().enumerate() {
             assert!(all[..i].iter().all(|b| a != b));
         }

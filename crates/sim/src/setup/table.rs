@@ -5,7 +5,15 @@
 /// `points` values from `low` to `high`, both included.
 pub(crate) fn spaced(low: f64, high: f64, points: usize) -> Vec<f64> {
     let step = (high - low) / (points.max(2) - 1) as f64;
-    (0..points).map(|i| if i + 1 == points { high } else { low + i as f64 * step }).collect()
+    (0..points)
+        .map(|i| {
+            if i + 1 == points {
+                high
+            } else {
+                low + i as f64 * step
+            }
+        })
+        .collect()
 }
 
 /// Straight lines between the points of a table that is not empty; beyond its ends as at the ends.

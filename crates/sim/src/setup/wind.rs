@@ -8,7 +8,9 @@ mod fields;
 mod planes;
 
 use crate::Error;
-use crate::scene::{CoreProfile, Flow, SceneFile, SimulatedMotion, VortexLines, VortexMotion, VortexPair};
+use crate::scene::{
+    CoreProfile, Flow, SceneFile, SimulatedMotion, VortexLines, VortexMotion, VortexPair,
+};
 use std::fmt;
 use wakescope_les::{self as les, Wind};
 
@@ -45,8 +47,10 @@ impl SceneWind {
     pub fn new(file: &SceneFile) -> Result<Self, Error> {
         let mut whole = Self::of_flow(&file.content.flow, file)?;
         for (i, flow) in file.content.added_flows.iter().enumerate() {
-            let added = Self::of_flow(flow, file)
-                .map_err(|source| Error::OfAddedFlow { number: i, source: Box::new(source) })?;
+            let added = Self::of_flow(flow, file).map_err(|source| Error::OfAddedFlow {
+                number: i,
+                source: Box::new(source),
+            })?;
             whole = whole.plus(added);
         }
         Ok(whole)
@@ -57,9 +61,17 @@ impl SceneWind {
             Flow::Simulated(flow) => planes::simulated(flow, file),
             Flow::Fields(flow) => fields::fields(flow, file),
             _ => {
-                let tau = if let Flow::VortexPair(pair) = flow { pair.age_tau } else { 0.0 };
+                let tau = if let Flow::VortexPair(pair) = flow {
+                    pair.age_tau
+                } else {
+                    0.0
+                };
                 let found = Self::of(analytic_wind(flow)?, "the flow is analytic".into());
-                Ok(Self { start_s: start_s(flow), tau, ..found })
+                Ok(Self {
+                    start_s: start_s(flow),
+                    tau,
+                    ..found
+                })
             }
         }
     }
@@ -67,12 +79,17 @@ impl SceneWind {
     /// Both winds, each from its own start.
     fn plus(self, other: Self) -> Self {
         let by_s = other.start_s - self.start_s;
-        let later = Box::new(Retimed { wind: other.wind, time_s: move |time_s| time_s + by_s });
+        let later = Box::new(Retimed {
+            wind: other.wind,
+            time_s: move |time_s| time_s + by_s,
+        });
         let mut field_times_s = self.field_times_s;
         field_times_s.extend(other.field_times_s.iter().map(|t| t - by_s));
         field_times_s.sort_by(f64::total_cmp);
         Self {
-            wind: Box::new(les::winds::Sum { winds: vec![self.wind, later] }),
+            wind: Box::new(les::winds::Sum {
+                winds: vec![self.wind, later],
+            }),
             end_s: self.end_s.min(other.end_s - by_s),
             max_speed_m_s: self.max_speed_m_s + other.max_speed_m_s,
             source: format!("{}; added: {}", self.source, other.source),
@@ -97,20 +114,42 @@ impl SceneWind {
     }
 
     /// A flow of files that starts at one time and whose last one is known, s.
-    fn of_files(wind: Box<dyn Wind>, motion: SimulatedMotion, [start_s, last_s]: [f64; 2], source: String) -> Self {
+    fn of_files(
+        wind: Box<dyn Wind>,
+        motion: SimulatedMotion,
+        [start_s, last_s]: [f64; 2],
+        source: String,
+    ) -> Self {
         match motion {
-            SimulatedMotion::Moving => Self { start_s, end_s: last_s, ..Self::of(wind, source) },
-            SimulatedMotion::Frozen => {
-                Self { start_s, ..Self::of(Box::new(Retimed { wind, time_s: move |_| start_s }), source) }
-            }
+            SimulatedMotion::Moving => Self {
+                start_s,
+                end_s: last_s,
+                ..Self::of(wind, source)
+            },
+            SimulatedMotion::Frozen => Self {
+                start_s,
+                ..Self::of(
+                    Box::new(Retimed {
+                        wind,
+                        time_s: move |_| start_s,
+                    }),
+                    source,
+                )
+            },
         }
     }
 
     /// Largest gradient of the radial velocity at times from the start of the scan, s; what lies beyond the end of the flow
     /// counts as its last time.
     pub fn max_gradient_per_s(&self, after_start_s: &[f64]) -> f64 {
-        let at = |after_s: &f64| self.wind.max_gradient_per_s((self.start_s + after_s).min(self.end_s));
-        after_start_s.iter().map(at).fold(self.wind.max_gradient_per_s(self.start_s), f64::max)
+        let at = |after_s: &f64| {
+            self.wind
+                .max_gradient_per_s((self.start_s + after_s).min(self.end_s))
+        };
+        after_start_s
+            .iter()
+            .map(at)
+            .fold(self.wind.max_gradient_per_s(self.start_s), f64::max)
     }
 
     /// Which stretch of its times a time, s, lies in: between two fields that are in memory together.
@@ -122,14 +161,23 @@ impl SceneWind {
     ///
     /// # Errors
     /// What the wind refuses.
-    pub(crate) fn backscatter_per_m_sr(&self, points_m: &[[f64; 3]], time_s: f64) -> Result<Option<Vec<f64>>, Error> {
+    pub(crate) fn backscatter_per_m_sr(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+    ) -> Result<Option<Vec<f64>>, Error> {
         if !self.carries_backscatter {
             return Ok(None);
         }
         let mut carried = vec![0.0; points_m.len()];
         self.wind.scalar_into(points_m, time_s, &mut carried)?;
         // (26) swings below zero beside the edge of a cloud.
-        Ok(Some(carried.into_iter().map(|beta| if beta < 0.0 { 0.0 } else { beta }).collect()))
+        Ok(Some(
+            carried
+                .into_iter()
+                .map(|beta| if beta < 0.0 { 0.0 } else { beta })
+                .collect(),
+        ))
     }
 
     /// The wind itself.
@@ -145,15 +193,26 @@ struct Retimed<T> {
 }
 
 impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), les::Error> {
-        self.wind.velocity_into(points_m, (self.time_s)(time_s), out_m_s)
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), les::Error> {
+        self.wind
+            .velocity_into(points_m, (self.time_s)(time_s), out_m_s)
     }
 
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.wind.max_gradient_per_s((self.time_s)(time_s))
     }
 
-    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), les::Error> {
+    fn scalar_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out: &mut [f64],
+    ) -> Result<(), les::Error> {
         self.wind.scalar_into(points_m, (self.time_s)(time_s), out)
     }
 }
@@ -165,13 +224,22 @@ impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
 fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
     Ok(match flow {
         Flow::Calm {} | Flow::Simulated(_) | Flow::Fields(_) => Box::<les::winds::Sum>::default(),
-        Flow::Uniform { lateral_m_s, vertical_m_s } => {
-            Box::new(les::winds::Linear::uniform([0.0, *lateral_m_s, *vertical_m_s])?)
-        }
+        Flow::Uniform {
+            lateral_m_s,
+            vertical_m_s,
+        } => Box::new(les::winds::Linear::uniform([
+            0.0,
+            *lateral_m_s,
+            *vertical_m_s,
+        ])?),
         Flow::Linear(wind) => {
             let linear = les::winds::Linear {
                 velocity_m_s: wind.velocity_m_s,
-                gradient_per_s: [wind.gradient_u_per_s, wind.gradient_v_per_s, wind.gradient_w_per_s],
+                gradient_per_s: [
+                    wind.gradient_u_per_s,
+                    wind.gradient_v_per_s,
+                    wind.gradient_w_per_s,
+                ],
                 acceleration_m_s2: wind.acceleration_m_s2,
             };
             Box::new(linear.validated()?)
@@ -179,14 +247,24 @@ fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
         Flow::VortexLines(lines) => Box::new(vortex_lines(lines)?),
         Flow::VortexPair(pair) => {
             let vortices: Box<dyn Wind> = match pair.aircraft {
-                Some(a) => Box::new(les::winds::AlongFlight::new(vortex_pair(pair), a.speed_m_s, a.x_m)?),
+                Some(a) => Box::new(les::winds::AlongFlight::new(
+                    vortex_pair(pair),
+                    a.speed_m_s,
+                    a.x_m,
+                )?),
                 None => Box::new(vortex_pair(pair).wind()?),
             };
             if pair.cross_wind_m_s == 0.0 {
                 return Ok(vortices);
             }
-            let cross = Box::new(les::winds::Linear::uniform([0.0, pair.cross_wind_m_s, 0.0])?);
-            Box::new(les::winds::Sum { winds: vec![vortices, cross] })
+            let cross = Box::new(les::winds::Linear::uniform([
+                0.0,
+                pair.cross_wind_m_s,
+                0.0,
+            ])?);
+            Box::new(les::winds::Sum {
+                winds: vec![vortices, cross],
+            })
         }
     })
 }
@@ -203,8 +281,20 @@ pub(crate) fn vortex_lines(lines: &VortexLines) -> Result<les::winds::VortexLine
         core_radius_m: lines.core_radius_m,
         axial_deficit_m_s: lines.axial_deficit_m_s,
     };
-    let ground = if lines.images { les::Ground::Image } else { les::Ground::None };
-    les::winds::VortexLines::new(lines.nodes_m.iter().zip(&lines.circulation_m2_s).map(line).collect(), ground)
+    let ground = if lines.images {
+        les::Ground::Image
+    } else {
+        les::Ground::None
+    };
+    les::winds::VortexLines::new(
+        lines
+            .nodes_m
+            .iter()
+            .zip(&lines.circulation_m2_s)
+            .map(line)
+            .collect(),
+        ground,
+    )
 }
 
 /// The vortex pair of a scene.

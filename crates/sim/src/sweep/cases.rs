@@ -53,7 +53,14 @@ impl Column {
     /// The key that a word names; `value` is what it is to be.
     fn named(word: &str, value: &str, tied: bool) -> Result<Self, Problem> {
         let key = resolve(word.trim(), value.trim())?;
-        Ok(Self { shown: VaryingKey { name: word.trim().into(), holds: Holds::of(&key.kind), tied }, key })
+        Ok(Self {
+            shown: VaryingKey {
+                name: word.trim().into(),
+                holds: Holds::of(&key.kind),
+                tied,
+            },
+            key,
+        })
     }
 }
 
@@ -85,17 +92,39 @@ impl Sweep {
     /// Keys, values and expressions that cannot be; more than [`MOST_CASES`]; no case; the first case whose scene is refused.
     pub fn parse(text: &str, path: &Path, request: &Request) -> Result<Self, Error> {
         // The reader of scenes says better what is no TOML.
-        let of_scene = |other: Error| SceneFile::parse(text, path).err().map_or(other, Error::from);
+        let of_scene = |other: Error| {
+            SceneFile::parse(text, path)
+                .err()
+                .map_or(other, Error::from)
+        };
         let base = toml::from_str::<Table>(text).map_err(|e| {
-            of_scene(SceneError::Malformed { path: path.to_owned(), line: 1, message: e.message().into() }.into())
+            of_scene(
+                SceneError::Malformed {
+                    path: path.to_owned(),
+                    line: 1,
+                    message: e.message().into(),
+                }
+                .into(),
+            )
         })?;
         let grid = Grid::new(path, base, request)?;
         // What is wrong without the sweep is told with its line.
         let cases = grid.cases().map_err(of_scene)?;
-        let seed = request.independent.then(|| Column::named("seed", "", true)).and_then(Result::ok);
-        let keys: Vec<VaryingKey> = grid.columns().chain(&seed).map(|column| column.shown.clone()).collect();
+        let seed = request
+            .independent
+            .then(|| Column::named("seed", "", true))
+            .and_then(Result::ok);
+        let keys: Vec<VaryingKey> = grid
+            .columns()
+            .chain(&seed)
+            .map(|column| column.shown.clone())
+            .collect();
         let origin = grid.origin(&keys, &cases);
-        Ok(Self { keys, cases, origin })
+        Ok(Self {
+            keys,
+            cases,
+            origin,
+        })
     }
 
     /// Names of the keys that vary, as they were written.
@@ -115,7 +144,11 @@ impl Sweep {
 }
 
 fn described<'a>(names: impl Iterator<Item = &'a str>, values: &[String]) -> String {
-    names.zip(values).map(|(name, value)| format!("{name} = {value}")).collect::<Vec<_>>().join(", ")
+    names
+        .zip(values)
+        .map(|(name, value)| format!("{name} = {value}"))
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
 /// An error of a case; the lines of its text are no lines of a file.
@@ -123,16 +156,32 @@ fn failed(case: usize, keys: String, others: usize, mut error: Error) -> Error {
     if let Error::Scene(SceneError::Invalid { problems, .. }) = &mut error {
         problems.iter_mut().for_each(|located| located.line = None);
     }
-    Error::Case { case, keys, others, source: Box::new(error) }
+    Error::Case {
+        case,
+        keys,
+        others,
+        source: Box::new(error),
+    }
 }
 
 /// A refusal of a word of the command line.
 fn refused(word: &str, problem: Problem) -> Error {
-    SceneError::Invalid { path: word.into(), problems: vec![Located { problem, line: None }] }.into()
+    SceneError::Invalid {
+        path: word.into(),
+        problems: vec![Located {
+            problem,
+            line: None,
+        }],
+    }
+    .into()
 }
 
 fn problem(key: &str, value: &str, allowed: impl Into<String>) -> Problem {
-    Problem { key: key.into(), value: value.into(), allowed: allowed.into() }
+    Problem {
+        key: key.into(),
+        value: value.into(),
+        allowed: allowed.into(),
+    }
 }
 
 /// Keys that vary together, and their values.
@@ -156,42 +205,80 @@ struct Grid<'a> {
 impl<'a> Grid<'a> {
     fn new(path: &'a Path, base: Table, request: &'a Request) -> Result<Self, Error> {
         let of = |word: &'static str| move |problem| refused(word, problem);
-        let mut axes: Vec<Axis> = request.list.as_deref().map(list).transpose()?.into_iter().collect();
+        let mut axes: Vec<Axis> = request
+            .list
+            .as_deref()
+            .map(list)
+            .transpose()?
+            .into_iter()
+            .collect();
         for text in &request.vary {
             axes.push(axis(text).map_err(of("--vary"))?);
         }
-        let lets = request.lets.iter().map(|text| binding(text).map_err(of("--let"))).collect::<Result<Vec<_>, _>>()?;
+        let lets = request
+            .lets
+            .iter()
+            .map(|text| binding(text).map_err(of("--let")))
+            .collect::<Result<Vec<_>, _>>()?;
         for text in &request.conditions {
-            expression::holds(text, None).map_err(|why| refused("--where", problem("condition", text, why)))?;
+            expression::holds(text, None)
+                .map_err(|why| refused("--where", problem("condition", text, why)))?;
         }
-        let count = axes.iter().map(|axis| axis.rows.len() as f64).product::<f64>();
-        let columns: Vec<&Column> =
-            axes.iter().flat_map(|axis| &axis.columns).chain(lets.iter().map(|(own, _)| own)).collect();
-        let again = |(i, column): &(usize, &&Column)| columns[..*i].iter().any(|c| c.key.path == column.key.path);
+        let count = axes
+            .iter()
+            .map(|axis| axis.rows.len() as f64)
+            .product::<f64>();
+        let columns: Vec<&Column> = axes
+            .iter()
+            .flat_map(|axis| &axis.columns)
+            .chain(lets.iter().map(|(own, _)| own))
+            .collect();
+        let again = |(i, column): &(usize, &&Column)| {
+            columns[..*i].iter().any(|c| c.key.path == column.key.path)
+        };
         if let Some((_, column)) = columns.iter().enumerate().find(again) {
             let why = "each key varies once, by --vary, --cases or --let";
             return Err(refused("sweep", problem(&column.shown.name, "", why)));
         }
         if request.independent && columns.iter().any(|column| column.key.path == "seed") {
-            let why = "with --independent each case has a seed of its own: leave one of the two out";
+            let why =
+                "with --independent each case has a seed of its own: leave one of the two out";
             return Err(refused("sweep", problem("seed", "", why)));
         }
         if count > MOST_CASES as f64 {
-            let why = format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
-            return Err(refused("sweep", problem("number of cases", &format!("{count:?}"), why)));
+            let why =
+                format!("a sweep has 1 to {MOST_CASES} cases: fewer values, or several sweeps");
+            return Err(refused(
+                "sweep",
+                problem("number of cases", &format!("{count:?}"), why),
+            ));
         }
         // The last axis is the fastest.
         let mut rows = vec![Vec::new()];
         for axis in &axes {
-            let longer = |row: &Vec<Value>| axis.rows.iter().map(|own| [&row[..], own].concat()).collect::<Vec<_>>();
+            let longer = |row: &Vec<Value>| {
+                axis.rows
+                    .iter()
+                    .map(|own| [&row[..], own].concat())
+                    .collect::<Vec<_>>()
+            };
             rows = rows.iter().flat_map(longer).collect();
         }
         let columns = axes.into_iter().flat_map(|axis| axis.columns).collect();
-        Ok(Self { path, base, request, columns, rows, lets })
+        Ok(Self {
+            path,
+            base,
+            request,
+            columns,
+            rows,
+            lets,
+        })
     }
 
     fn columns(&self) -> impl Iterator<Item = &Column> {
-        self.columns.iter().chain(self.lets.iter().map(|(column, _)| column))
+        self.columns
+            .iter()
+            .chain(self.lets.iter().map(|(column, _)| column))
     }
 
     fn cases(&self) -> Result<Vec<Case>, Error> {
@@ -199,37 +286,62 @@ impl<'a> Grid<'a> {
         for (combination, row) in self.rows.iter().enumerate() {
             let (index, mut values) = (cases.len(), Vec::new());
             match self.scene(row, index, &mut values) {
-                Ok(scene) => cases.extend(scene.map(|scene| Case { index, scene, values })),
+                Ok(scene) => cases.extend(scene.map(|scene| Case {
+                    index,
+                    scene,
+                    values,
+                })),
                 Err(error) => refusals.push((combination, values, error)),
             }
         }
         let others = refusals.len().saturating_sub(1);
         if let Some((combination, values, error)) = refusals.into_iter().next() {
             let names = self.columns().map(|column| column.shown.name.as_str());
-            return Err(failed(combination, described(names, &values), others, error));
+            return Err(failed(
+                combination,
+                described(names, &values),
+                others,
+                error,
+            ));
         }
         if cases.is_empty() {
             let why = format!("none of the {} cases is left", self.rows.len());
-            return Err(refused("--where", problem("condition", &self.request.conditions.join(" and "), why)));
+            return Err(refused(
+                "--where",
+                problem("condition", &self.request.conditions.join(" and "), why),
+            ));
         }
         Ok(cases)
     }
 
     /// The scene of a combination, whose values are told one after the other; none where a condition does not hold.
-    fn scene(&self, row: &[Value], index: usize, values: &mut Vec<String>) -> Result<Option<SceneFile>, Error> {
+    fn scene(
+        &self,
+        row: &[Value],
+        index: usize,
+        values: &mut Vec<String>,
+    ) -> Result<Option<SceneFile>, Error> {
         let mut table = self.base.clone();
         if let Some(seed) = self.request.seed {
-            table.insert("seed".into(), Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)));
+            table.insert(
+                "seed".into(),
+                Value::Integer(i64::try_from(seed).unwrap_or(i64::MAX)),
+            );
         }
         for (column, value) in self.columns.iter().zip(row) {
             values.push(shown(value));
             set(&mut table, &column.key.path, value.clone());
         }
         for (column, expression) in &self.lets {
-            let refused = |why: String| refused("--let", problem(&column.shown.name, expression, why));
+            let refused =
+                |why: String| refused("--let", problem(&column.shown.name, expression, why));
             let whole = self.whole(&table)?;
-            let number = expression::value(expression, Some(&|name| value_of(&whole, name))).map_err(refused)?;
-            let value = column.key.of_number(number).map_err(|problem| refused(problem.allowed))?;
+            let number = expression::value(expression, Some(&|name| value_of(&whole, name)))
+                .map_err(refused)?;
+            let value = column
+                .key
+                .of_number(number)
+                .map_err(|problem| refused(problem.allowed))?;
             values.push(shown(&value));
             set(&mut table, &column.key.path, value);
         }
@@ -237,7 +349,9 @@ impl<'a> Grid<'a> {
             let whole = self.whole(&table)?;
             for condition in &self.request.conditions {
                 let refused = |why| refused("--where", problem("condition", condition, why));
-                if !expression::holds(condition, Some(&|name| value_of(&whole, name))).map_err(refused)? {
+                if !expression::holds(condition, Some(&|name| value_of(&whole, name)))
+                    .map_err(refused)?
+                {
                     return Ok(None);
                 }
             }
@@ -259,16 +373,27 @@ impl<'a> Grid<'a> {
     }
 
     fn origin(&self, keys: &[VaryingKey], cases: &[Case]) -> Provenance {
-        let Request { vary, list, lets, conditions, independent, seed } = self.request;
+        let Request {
+            vary,
+            list,
+            lets,
+            conditions,
+            independent,
+            seed,
+        } = self.request;
         let mut words: Vec<String> = vary.iter().map(|word| format!("--vary {word}")).collect();
         words.extend(list.as_ref().map(|_| "--cases FILE".to_owned()));
         words.extend(lets.iter().map(|word| format!("--let \"{word}\"")));
         words.extend(conditions.iter().map(|word| format!("--where \"{word}\"")));
         words.extend(independent.then(|| "--independent".to_owned()));
         let names = keys.iter().map(|key| key.name.as_str());
-        let identity: Vec<&str> = names.chain(cases.iter().map(|case| case.scene.hash.as_str())).collect();
+        let identity: Vec<&str> = names
+            .chain(cases.iter().map(|case| case.scene.hash.as_str()))
+            .collect();
         let scene_toml = format!("# sweep {}\n{}", words.join(" "), text_of(&self.base));
-        let seed = seed.or(seed_of(&self.base)).unwrap_or(Scene::default().seed);
+        let seed = seed
+            .or(seed_of(&self.base))
+            .unwrap_or(Scene::default().seed);
         Provenance::new(&scene_toml, &hash_of(&identity.join("\n")), seed)
     }
 }
@@ -279,23 +404,41 @@ fn seed_of(table: &Table) -> Option<u64> {
 
 /// `KEY=VALUES`.
 fn axis(word: &str) -> Result<Axis, Problem> {
-    let example = "KEY=VALUES, e.g. pulse.energy_j=50e-6,150e-6 or pulse.energy_j=log:50e-6:600e-6:7";
-    let (name, text) = word.split_once('=').ok_or_else(|| problem("--vary", word, example))?;
+    let example =
+        "KEY=VALUES, e.g. pulse.energy_j=50e-6,150e-6 or pulse.energy_j=log:50e-6:600e-6:7";
+    let (name, text) = word
+        .split_once('=')
+        .ok_or_else(|| problem("--vary", word, example))?;
     let (name, text) = (name.trim(), text.trim());
     let column = Column::named(name, text, false)?;
     let (key, is_numeric) = (&column.key, column.shown.holds != Holds::Texts);
     if text.is_empty() {
-        return Err(problem(name, "an empty list", format!("at least one value is needed: {example}")));
+        return Err(problem(
+            name,
+            "an empty list",
+            format!("at least one value is needed: {example}"),
+        ));
     }
-    let range = text.split_once(':').filter(|(kind, _)| is_numeric && matches!(*kind, "lin" | "log"));
+    let range = text
+        .split_once(':')
+        .filter(|(kind, _)| is_numeric && matches!(*kind, "lin" | "log"));
     let values = match range {
         Some((kind, rest)) => {
             let numbers = range_of(kind == "log", rest).map_err(|why| problem(name, text, why))?;
-            numbers.into_iter().map(|number| key.of_number(number)).collect::<Result<Vec<Value>, _>>()?
+            numbers
+                .into_iter()
+                .map(|number| key.of_number(number))
+                .collect::<Result<Vec<Value>, _>>()?
         }
-        None => text.split(',').map(|value| key.read(value)).collect::<Result<_, _>>()?,
+        None => text
+            .split(',')
+            .map(|value| key.read(value))
+            .collect::<Result<_, _>>()?,
     };
-    Ok(Axis { columns: vec![column], rows: values.into_iter().map(|value| vec![value]).collect() })
+    Ok(Axis {
+        columns: vec![column],
+        rows: values.into_iter().map(|value| vec![value]).collect(),
+    })
 }
 
 /// `a:b:n`: from a to b, both as written.
@@ -306,8 +449,14 @@ fn range_of(is_log: bool, text: &str) -> Result<Vec<f64>, String> {
              {MOST_CASES}, e.g. log:100e-9:800e-9:7"
         )
     };
-    let [first, last, count] = text.split(':').collect::<Vec<_>>()[..] else { return Err(wrong()) };
-    let (Ok(first), Ok(last), Ok(count)) = (first.parse::<f64>(), last.parse::<f64>(), count.parse::<f64>()) else {
+    let [first, last, count] = text.split(':').collect::<Vec<_>>()[..] else {
+        return Err(wrong());
+    };
+    let (Ok(first), Ok(last), Ok(count)) = (
+        first.parse::<f64>(),
+        last.parse::<f64>(),
+        count.parse::<f64>(),
+    ) else {
         return Err(wrong());
     };
     let fine = first.is_finite() && last.is_finite() && (!is_log || (first > 0.0 && last > 0.0));
@@ -330,11 +479,15 @@ fn range_of(is_log: bool, text: &str) -> Result<Vec<f64>, String> {
 /// `KEY = EXPRESSION`.
 fn binding(word: &str) -> Result<(Column, &str), Problem> {
     let example = "KEY = EXPRESSION, e.g. pulse.energy_j = 0.06/laser.pulse_repetition_hz";
-    let (name, text) = word.split_once('=').ok_or_else(|| problem("--let", word, example))?;
+    let (name, text) = word
+        .split_once('=')
+        .ok_or_else(|| problem("--let", word, example))?;
     let column = Column::named(name, text, true)?;
     let refuse = |why: String| problem(&column.shown.name, text.trim(), why);
     if column.shown.holds == Holds::Texts {
-        return Err(refuse("an expression is a number, and this key takes none".into()));
+        return Err(refuse(
+            "an expression is a number, and this key takes none".into(),
+        ));
     }
     expression::value(text, None).map_err(refuse)?;
     Ok((column, text.trim()))
@@ -345,12 +498,25 @@ fn list(path: &Path) -> Result<Axis, Error> {
     let of_file = |problem: Problem| refused(&path.display().to_string(), problem);
     let table = TextTable::read(path)?;
     if table.rows.is_empty() {
-        return Err(of_file(problem("rows", "0", "at least one row below the names of the keys")));
+        return Err(of_file(problem(
+            "rows",
+            "0",
+            "at least one row below the names of the keys",
+        )));
     }
     let read = || {
-        let columns: Vec<Column> =
-            table.header.iter().map(|name| Column::named(name, "", false)).collect::<Result<_, _>>()?;
-        let row = |cells: &Vec<String>| columns.iter().zip(cells).map(|(column, cell)| column.key.read(cell)).collect();
+        let columns: Vec<Column> = table
+            .header
+            .iter()
+            .map(|name| Column::named(name, "", false))
+            .collect::<Result<_, _>>()?;
+        let row = |cells: &Vec<String>| {
+            columns
+                .iter()
+                .zip(cells)
+                .map(|(column, cell)| column.key.read(cell))
+                .collect()
+        };
         let rows = table.rows.iter().map(row).collect::<Result<_, Problem>>()?;
         Ok(Axis { columns, rows })
     };
@@ -367,15 +533,19 @@ fn shown(value: &Value) -> String {
 }
 
 fn text_of(table: &Table) -> String {
-    toml::to_string(table).unwrap_or_else(|e| unreachable!("a table that was read can be written: {e}"))
+    toml::to_string(table)
+        .unwrap_or_else(|e| unreachable!("a table that was read can be written: {e}"))
 }
 
 /// Sets a key, with the tables above it where they are missing.
 pub(crate) fn set(table: &mut Table, path: &str, value: Value) {
     let (above, last) = path.rsplit_once('.').unwrap_or(("", path));
-    let inner = above
-        .split_terminator('.')
-        .try_fold(table, |table, key| table.entry(key).or_insert_with(|| Value::Table(Table::new())).as_table_mut());
+    let inner = above.split_terminator('.').try_fold(table, |table, key| {
+        table
+            .entry(key)
+            .or_insert_with(|| Value::Table(Table::new()))
+            .as_table_mut()
+    });
     // What is no table there is refused when the scene is read.
     inner.map(|table| table.insert(last.into(), value));
 }
@@ -386,7 +556,9 @@ fn value_of(whole: &Value, name: &str) -> Result<f64, String> {
     match value_at(whole, &key.path) {
         Some(Value::Float(number)) => Ok(*number),
         Some(Value::Integer(number)) => Ok(*number as f64),
-        Some(other) => Err(format!("{name} is {other}, and only numbers can be computed with")),
+        Some(other) => Err(format!(
+            "{name} is {other}, and only numbers can be computed with"
+        )),
         None => Err(format!("{name} is no key of this scene")),
     }
 }

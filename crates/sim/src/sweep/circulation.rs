@@ -11,8 +11,8 @@ use crate::setup::wind::vortex_pair;
 use ndarray::{Array2, s};
 use wakescope_estimate::map::ErrorStatistics;
 use wakescope_estimate::vortex_fit::{
-    FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex, Wake, WakeModel,
-    fit_map_of_estimator,
+    FreeParameters, MapFitOptions, Parameter, Powers, ScanModel, Sharing, VelocityMap, Vortex,
+    Wake, WakeModel, fit_map_of_estimator,
 };
 
 /// What fits and bound need of a case whose flow is a pair.
@@ -28,14 +28,23 @@ impl<'p> Retrieval<'p> {
     /// the flight, or the pulse is no Gaussian without chirp.
     pub(crate) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
         let scene = &plan.scene.content;
-        let Flow::VortexPair(pair) = scene.flow else { return None };
+        let Flow::VortexPair(pair) = scene.flow else {
+            return None;
+        };
         let lines = &plan.geometry.schedule;
         let is_one_scan = scene.scan.is_across() && lines.is_plane() && lines.keeps_to_a_plane();
         if !is_one_scan || pair.circulation_m2_s <= 0.0 || pair.aircraft.is_some() {
             return None;
         }
-        let response = SceneResponse::new(plan, scanner.layer_snr()).ok().flatten()?;
-        Some(Self { plan, pair, response, circulations_m2_s: Vec::new() })
+        let response = SceneResponse::new(plan, scanner.layer_snr())
+            .ok()
+            .flatten()?;
+        Some(Self {
+            plan,
+            pair,
+            response,
+            circulations_m2_s: Vec::new(),
+        })
     }
 
     fn model(&self) -> WakeModel {
@@ -65,11 +74,23 @@ impl<'p> Retrieval<'p> {
             standard_deviation_m_s: None,
         };
         let step_rad = scene.scan.elevation_step_rad;
-        let correlated_lines = self.response.correlated_lines(step_rad, self.pair.lateral_position_m);
-        let core_radius_m = scene.retrieval.as_ref().and_then(|wanted| wanted.core_radius_m);
-        let options = MapFitOptions { free: free(), core_radius_m, correlated_lines, ..Default::default() };
+        let correlated_lines = self
+            .response
+            .correlated_lines(step_rad, self.pair.lateral_position_m);
+        let core_radius_m = scene
+            .retrieval
+            .as_ref()
+            .and_then(|wanted| wanted.core_radius_m);
+        let options = MapFitOptions {
+            free: free(),
+            core_radius_m,
+            correlated_lines,
+            ..Default::default()
+        };
         let fitted = fit_map_of_estimator(&map, &self.model(), &shown, &options);
-        Some(fitted.map_or(f64::NAN, |fit| 0.5 * (fit.wake.left.circulation_m2_s + fit.wake.right.circulation_m2_s)))
+        Some(fitted.map_or(f64::NAN, |fit| {
+            0.5 * (fit.wake.left.circulation_m2_s + fit.wake.right.circulation_m2_s)
+        }))
     }
 
     /// The bound on the circulation, m^2/s; the pair where it is in the middle of the scan.
@@ -84,7 +105,12 @@ impl<'p> Retrieval<'p> {
             core_radius_m: self.pair.core_radius_m,
         };
         let [left, right] = [centres.left_y_m, centres.right_y_m].map(vortex);
-        let truth = Wake { left, right, lateral_wind_m_s: self.pair.cross_wind_m_s, wind_shear_per_s: 0.0 };
+        let truth = Wake {
+            left,
+            right,
+            lateral_wind_m_s: self.pair.cross_wind_m_s,
+            wind_shear_per_s: 0.0,
+        };
         let rays = |line: &f64| std::iter::repeat_n(*line, scene.scan.pulses_per_line);
         let elevation_rad = g.elevation_rad.iter().flat_map(rays).collect();
         let setup = self.response.setup(self.model(), elevation_rad)?;
@@ -96,17 +122,33 @@ impl<'p> Retrieval<'p> {
     /// Mean error of the fits and root mean square, m^2/s, each with its standard error; the part of the fits that did not come to an
     /// end; the bound, m^2/s. NaN with all others but the bound where no fit was tried.
     pub(super) fn result(&self) -> [f64; 6] {
-        let errors = ErrorStatistics::of(self.circulations_m2_s.iter().map(|found| found - self.pair.circulation_m2_s));
-        let [bias, rms] =
-            [[errors.bias_m_s, errors.bias_standard_error_m_s], [errors.rms_m_s, errors.rms_standard_error_m_s]];
+        let errors = ErrorStatistics::of(
+            self.circulations_m2_s
+                .iter()
+                .map(|found| found - self.pair.circulation_m2_s),
+        );
+        let [bias, rms] = [
+            [errors.bias_m_s, errors.bias_standard_error_m_s],
+            [errors.rms_m_s, errors.rms_standard_error_m_s],
+        ];
         let failed = errors.missing as f64 / (errors.missing + errors.count) as f64;
-        [bias[0], bias[1], rms[0], rms[1], failed, self.bound_m2_s().unwrap_or(f64::NAN)]
+        [
+            bias[0],
+            bias[1],
+            rms[0],
+            rms[1],
+            failed,
+            self.bound_m2_s().unwrap_or(f64::NAN),
+        ]
     }
 }
 
 /// One circulation for both vortices; the core radius is not fitted.
 fn free() -> FreeParameters {
-    FreeParameters { core_radius: Sharing::Fixed, ..FreeParameters::common_circulation() }
+    FreeParameters {
+        core_radius: Sharing::Fixed,
+        ..FreeParameters::common_circulation()
+    }
 }
 
 #[cfg(test)]
@@ -128,7 +170,10 @@ mod tests {
     fn bound_on_the_circulation_of_one_scan_of_table_2_is_that_of_an_independent_study() {
         let plan = plan(|_| ());
         let scanner = Scanner::new(&plan, &Silent).unwrap();
-        let bound_m2_s = Retrieval::new(&plan, &scanner).unwrap().bound_m2_s().unwrap();
+        let bound_m2_s = Retrieval::new(&plan, &scanner)
+            .unwrap()
+            .bound_m2_s()
+            .unwrap();
         assert!((bound_m2_s / 6.9 - 1.0).abs() < 0.06, "{bound_m2_s}");
     }
 
@@ -142,27 +187,44 @@ mod tests {
         });
         let scanner = Scanner::new(&plan, &Silent).unwrap();
         let mut retrieval = Retrieval::new(&plan, &scanner).unwrap();
-        map::estimates::<f64>(&[&plan], &scanner, &Silent, |_| (), |_, v_m_s| retrieval.add(v_m_s)).unwrap();
+        map::estimates::<f64>(
+            &[&plan],
+            &scanner,
+            &Silent,
+            |_| (),
+            |_, v_m_s| retrieval.add(v_m_s),
+        )
+        .unwrap();
         let found = retrieval.result();
         let [_, _, rms_m2_s, _, failed, bound_m2_s] = found;
         assert_eq!(failed, 0.0);
         // A map of one scan at 0 dB and twice the lines has 19 m^2/s; at 10 dB speckle is left.
         assert!(rms_m2_s < 3.0 * 19.0 && bound_m2_s < 5.0, "{found:?}");
-        assert!(rms_m2_s > 0.2 * bound_m2_s, "no fit is so much better than the bound: {found:?}");
+        assert!(
+            rms_m2_s > 0.2 * bound_m2_s,
+            "no fit is so much better than the bound: {found:?}"
+        );
     }
 
     #[test]
     fn what_was_never_tried_did_not_fail() {
-        for change in
-            [(|scene| scene.detector.signal = crate::scene::DetectorSignal::Baseband) as fn(&mut Scene), |scene| {
-                scene.estimator.follow_wind = true
-            }]
-        {
+        for change in [
+            (|scene| scene.detector.signal = crate::scene::DetectorSignal::Baseband)
+                as fn(&mut Scene),
+            |scene| scene.estimator.follow_wind = true,
+        ] {
             let plan = plan(change);
-            let mut retrieval = Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).unwrap();
-            retrieval.add(&Array2::zeros((plan.geometry.elevation_rad.len(), plan.geometry.gate_range_m.len())));
+            let mut retrieval =
+                Retrieval::new(&plan, &Scanner::new(&plan, &Silent).unwrap()).unwrap();
+            retrieval.add(&Array2::zeros((
+                plan.geometry.elevation_rad.len(),
+                plan.geometry.gate_range_m.len(),
+            )));
             let found = retrieval.result();
-            assert!(found[4].is_nan() && found[2].is_nan() && found[5] > 0.0, "{found:?}");
+            assert!(
+                found[4].is_nan() && found[2].is_nan() && found[5] > 0.0,
+                "{found:?}"
+            );
         }
     }
 

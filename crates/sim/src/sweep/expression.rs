@@ -20,8 +20,16 @@ const SIGN: usize = 2;
 /// What is wrong in the text, and where; what `values` says of a name; a division by zero; numbers that give none. What is missing
 /// (NaN) stays so.
 pub(crate) fn value(text: &str, values: Values<'_>) -> Result<f64, String> {
-    let parser = Parser { rest: text, text, depth: 0, operators: 0, values };
-    parser.whole().map_err(|reason| format!("\"{}\" cannot be computed: {reason}", text.trim()))
+    let parser = Parser {
+        rest: text,
+        text,
+        depth: 0,
+        operators: 0,
+        values,
+    };
+    parser
+        .whole()
+        .map_err(|reason| format!("\"{}\" cannot be computed: {reason}", text.trim()))
 }
 
 /// Whether `a <= b`, or the same with `>=`, `<` or `>`, holds; false where a side is no number.
@@ -30,10 +38,18 @@ pub(crate) fn value(text: &str, values: Values<'_>) -> Result<f64, String> {
 /// No comparison; as [`value`].
 pub(crate) fn holds(text: &str, values: Values<'_>) -> Result<bool, String> {
     type Compare = fn(&f64, &f64) -> bool;
-    let operators: [(&str, Compare); 4] = [("<=", f64::le), (">=", f64::ge), ("<", f64::lt), (">", f64::gt)];
-    let found = operators.into_iter().find_map(|(operator, compare)| Some((text.split_once(operator)?, compare)));
-    let ((left, right), compare) =
-        found.ok_or_else(|| format!("\"{text}\" is no comparison: two expressions with <=, >=, < or > between"))?;
+    let operators: [(&str, Compare); 4] = [
+        ("<=", f64::le),
+        (">=", f64::ge),
+        ("<", f64::lt),
+        (">", f64::gt),
+    ];
+    let found = operators
+        .into_iter()
+        .find_map(|(operator, compare)| Some((text.split_once(operator)?, compare)));
+    let ((left, right), compare) = found.ok_or_else(|| {
+        format!("\"{text}\" is no comparison: two expressions with <=, >=, < or > between")
+    })?;
     Ok(compare(&value(left, values)?, &value(right, values)?))
 }
 
@@ -66,7 +82,11 @@ impl Parser<'_> {
     fn whole(mut self) -> Result<f64, String> {
         let value = self.chain(0)?;
         self.skip();
-        if self.rest.is_empty() { Ok(value) } else { Err(self.wrong("an operator, one of + - * / ^")) }
+        if self.rest.is_empty() {
+            Ok(value)
+        } else {
+            Err(self.wrong("an operator, one of + - * / ^"))
+        }
     }
 
     fn skip(&mut self) {
@@ -83,7 +103,11 @@ impl Parser<'_> {
 
     fn wrong(&self, wanted: &str) -> String {
         let at = self.text.len() - self.rest.len();
-        let place = if self.rest.is_empty() { "at its end".to_owned() } else { format!("at \"{}\"", self.rest) };
+        let place = if self.rest.is_empty() {
+            "at its end".to_owned()
+        } else {
+            format!("at \"{}\"", self.rest)
+        };
         format!("{wanted} is needed {place}, character {}", at + 1)
     }
 
@@ -98,13 +122,19 @@ impl Parser<'_> {
             Some(_) => self.chain(SIGN)?,
             None => self.primary()?,
         };
-        while let Some((binding, operator)) = (least..BINDING.len()).find_map(|i| Some((i, self.take(BINDING[i])?))) {
+        while let Some((binding, operator)) =
+            (least..BINDING.len()).find_map(|i| Some((i, self.take(BINDING[i])?)))
+        {
             self.operators += 1;
             if self.operators > MOST_OPERATORS {
                 return Err(format!("it has more than {MOST_OPERATORS} operators"));
             }
             // Powers are read from the right.
-            let right = self.chain(if operator == '^' { binding } else { binding + 1 })?;
+            let right = self.chain(if operator == '^' {
+                binding
+            } else {
+                binding + 1
+            })?;
             left = combined(left, operator, right)?;
         }
         self.depth -= 1;
@@ -114,19 +144,35 @@ impl Parser<'_> {
     fn primary(&mut self) -> Result<f64, String> {
         if self.take(&['(']).is_some() {
             let inner = self.chain(0)?;
-            return self.take(&[')']).map(|_| inner).ok_or_else(|| self.wrong("a closing bracket"));
+            return self
+                .take(&[')'])
+                .map(|_| inner)
+                .ok_or_else(|| self.wrong("a closing bracket"));
         }
         let (here, bytes) = (self.rest, self.rest.as_bytes());
         let split = |belongs: &dyn Fn(usize, u8) -> bool| {
             let end = bytes.iter().enumerate().position(|(i, b)| !belongs(i, *b));
             here.split_at(end.unwrap_or(bytes.len()))
         };
-        if bytes.first().is_some_and(|b| b.is_ascii_digit() || *b == b'.') {
-            let is_sign = |i: usize, b: u8| i > 0 && matches!(bytes[i - 1], b'e' | b'E') && matches!(b, b'+' | b'-');
-            let (number, rest) = split(&|i, b| b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'E') || is_sign(i, b));
-            let value = number.parse().map_err(|_| self.wrong("a number, e.g. 1.5e-6,"))?;
+        if bytes
+            .first()
+            .is_some_and(|b| b.is_ascii_digit() || *b == b'.')
+        {
+            let is_sign = |i: usize, b: u8| {
+                i > 0 && matches!(bytes[i - 1], b'e' | b'E') && matches!(b, b'+' | b'-')
+            };
+            let (number, rest) = split(&|i, b| {
+                b.is_ascii_digit() || matches!(b, b'.' | b'e' | b'E') || is_sign(i, b)
+            });
+            let value = number
+                .parse()
+                .map_err(|_| self.wrong("a number, e.g. 1.5e-6,"))?;
             self.rest = rest;
-            return Ok(if self.values.is_some() { value } else { f64::NAN });
+            return Ok(if self.values.is_some() {
+                value
+            } else {
+                f64::NAN
+            });
         }
         let (name, rest) = split(&|_, b| b.is_ascii_alphanumeric() || matches!(b, b'_' | b'.'));
         if name.is_empty() {
@@ -190,11 +236,20 @@ mod tests {
             let message = value(text).unwrap_err();
             assert!(message.contains(wanted), "{text}: {message}");
         }
-        assert!(value(&"(".repeat(100_000)).unwrap_err().contains("less nesting"));
+        assert!(
+            value(&"(".repeat(100_000))
+                .unwrap_err()
+                .contains("less nesting")
+        );
         for operator in ["+", "*"] {
             let long = |terms: usize| value(&vec!["1"; terms].join(operator));
             assert!(long(1001).is_ok());
-            assert!(long(100_000).unwrap_err().contains("more than 1000 operators"), "{operator}");
+            assert!(
+                long(100_000)
+                    .unwrap_err()
+                    .contains("more than 1000 operators"),
+                "{operator}"
+            );
         }
     }
 

@@ -26,11 +26,19 @@ fn leaves(keys: &[Key], path: &str, out: &mut Vec<SceneKey>) {
             Kind::Table(inner) => leaves(inner, &here, out),
             Kind::Tagged { tag, kinds } => {
                 let names = kinds.iter().map(|(name, _)| *name).collect();
-                out.push(SceneKey { path: join(&here, tag), kind: Kind::Choice(names) });
-                kinds.iter().for_each(|(_, inner)| leaves(inner, &here, out));
+                out.push(SceneKey {
+                    path: join(&here, tag),
+                    kind: Kind::Choice(names),
+                });
+                kinds
+                    .iter()
+                    .for_each(|(_, inner)| leaves(inner, &here, out));
             }
             _ if out.iter().any(|known| known.path == here) => {}
-            kind => out.push(SceneKey { path: here, kind: kind.clone() }),
+            kind => out.push(SceneKey {
+                path: here,
+                kind: kind.clone(),
+            }),
         }
     }
 }
@@ -57,26 +65,40 @@ fn shortens(short: &str, path: &str) -> bool {
 
 /// The key that a path names; `value` is what it was to be, for the message.
 pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
-    let refuse = |allowed: String| Problem { key: written.into(), value: value.into(), allowed };
+    let refuse = |allowed: String| Problem {
+        key: written.into(),
+        value: value.into(),
+        allowed,
+    };
     let exact = all().iter().find(|key| key.path == written);
     let named: Vec<&SceneKey> = match exact {
         Some(key) => vec![key],
-        None => all().iter().filter(|key| shortens(written, &key.path)).collect(),
+        None => all()
+            .iter()
+            .filter(|key| shortens(written, &key.path))
+            .collect(),
     };
     let key = match named[..] {
         [one] => one,
         [] => return Err(refuse(unknown(written))),
         _ => {
             let paths: Vec<&str> = named.iter().map(|key| key.path.as_str()).collect();
-            return Err(refuse(format!("several keys have this name; one of {} is needed", paths.join(", "))));
+            return Err(refuse(format!(
+                "several keys have this name; one of {} is needed",
+                paths.join(", ")
+            )));
         }
     };
     let section = key.path.split('.').next().unwrap_or_default();
     if WITHOUT_RESULT.contains(&section) {
-        return Err(refuse(format!("a key of [{section}] changes no result of a sweep and cannot vary")));
+        return Err(refuse(format!(
+            "a key of [{section}] changes no result of a sweep and cannot vary"
+        )));
     }
     if let Kind::List { .. } = key.kind {
-        return Err(refuse("a list cannot vary, only numbers, names and switches".into()));
+        return Err(refuse(
+            "a list cannot vary, only numbers, names and switches".into(),
+        ));
     }
     Ok(key.clone())
 }
@@ -84,24 +106,39 @@ pub(super) fn resolve(written: &str, value: &str) -> Result<SceneKey, Problem> {
 /// What to write instead of a path that no key has.
 fn unknown(written: &str) -> String {
     let paths = || all().iter().map(|key| key.path.as_str());
-    let below: Vec<&str> = paths().filter_map(|path| path.strip_prefix(&format!("{written}."))).collect();
+    let below: Vec<&str> = paths()
+        .filter_map(|path| path.strip_prefix(&format!("{written}.")))
+        .collect();
     if !below.is_empty() {
-        return format!("this is a table and cannot vary, its keys can: {}", below.join(", "));
+        return format!(
+            "this is a table and cannot vary, its keys can: {}",
+            below.join(", ")
+        );
     }
     let name = |path: &'static str| path.rsplit('.').next().unwrap_or(path);
     let last = written.rsplit('.').next().unwrap_or(written);
-    let meant = near(written, paths())
-        .or_else(|| near(last, paths().map(name)).and_then(|meant| paths().find(|path| name(path) == meant)));
+    let meant = near(written, paths()).or_else(|| {
+        near(last, paths().map(name)).and_then(|meant| paths().find(|path| name(path) == meant))
+    });
     let of = |path: &'static str| path.split('.').next().unwrap_or(path);
     let section = written.split('.').next().unwrap_or(written);
-    let hint = meant.map(|path| format!("; did you mean {path}?")).unwrap_or_default();
-    let (mut where_to_look, mut known) =
-        ("Known there", paths().filter(|path| of(path) == section).collect::<Vec<_>>());
+    let hint = meant
+        .map(|path| format!("; did you mean {path}?"))
+        .unwrap_or_default();
+    let (mut where_to_look, mut known) = (
+        "Known there",
+        paths()
+            .filter(|path| of(path) == section)
+            .collect::<Vec<_>>(),
+    );
     if known.is_empty() {
         (where_to_look, known) = ("Sections", paths().map(of).collect());
         known.dedup();
     }
-    format!("there is no such key{hint} {where_to_look}: {}", known.join(", "))
+    format!(
+        "there is no such key{hint} {where_to_look}: {}",
+        known.join(", ")
+    )
 }
 
 impl SceneKey {
@@ -109,7 +146,9 @@ impl SceneKey {
     pub(super) fn read(&self, text: &str) -> Result<Value, Problem> {
         let (text, word) = (text.trim(), text.trim().trim_matches('"'));
         let value = match &self.kind {
-            Kind::Number | Kind::Whole { .. } => text.parse().ok().and_then(|number| self.number(number)),
+            Kind::Number | Kind::Whole { .. } => {
+                text.parse().ok().and_then(|number| self.number(number))
+            }
             Kind::Switch => word.parse().ok().map(Value::Boolean),
             Kind::Choice(names) if !names.contains(&word) => None,
             _ => Some(Value::String(word.into())),
@@ -119,7 +158,8 @@ impl SceneKey {
 
     /// A number as a value of the key; whole ones may be off by rounding.
     pub(super) fn of_number(&self, number: f64) -> Result<Value, Problem> {
-        self.number(number).ok_or_else(|| self.refused(&format!("{number:?}")))
+        self.number(number)
+            .ok_or_else(|| self.refused(&format!("{number:?}")))
     }
 
     fn number(&self, number: f64) -> Option<Value> {
@@ -143,7 +183,11 @@ impl SceneKey {
             Kind::Choice(names) => one_of(names, value),
             _ => "true or false".into(),
         };
-        Problem { key: self.path.clone(), value: value.into(), allowed }
+        Problem {
+            key: self.path.clone(),
+            value: value.into(),
+            allowed,
+        }
     }
 }
 
@@ -191,7 +235,10 @@ mod tests {
                     assert!(key == *own && !is_list);
                     varying += 1;
                 }
-                Err(problem) => assert!(is_list || problem.allowed.contains("changes no result"), "{problem}"),
+                Err(problem) => assert!(
+                    is_list || problem.allowed.contains("changes no result"),
+                    "{problem}"
+                ),
             }
         }
         assert!(varying > 70, "{varying}");
@@ -212,25 +259,49 @@ mod tests {
             ("energy_j", "did you mean pulse.energy_j?"),
             ("pulse", "its keys can: energy_j"),
             ("colour", "Sections: "),
-            ("estimator.kind", "one of estimator.method.kind, estimator.radius.kind"),
+            (
+                "estimator.kind",
+                "one of estimator.method.kind, estimator.radius.kind",
+            ),
             ("pulse.shape.power", "a list cannot vary"),
             ("outputs.csv", "changes no result"),
             ("format", "changes no result"),
         ] {
             let problem = resolve(written, "1").unwrap_err();
-            assert!(problem.key == written && problem.allowed.contains(wanted), "{problem}");
+            assert!(
+                problem.key == written && problem.allowed.contains(wanted),
+                "{problem}"
+            );
         }
     }
 
     #[test]
     fn values_are_of_the_kind_of_their_key() {
         let value = |key: &str, text: &str| resolve(key, text).unwrap().read(text);
-        assert_eq!(value("pulse.energy_j", "50e-6").unwrap(), Value::Float(50e-6));
-        assert_eq!(value("telescope.focus_m", "inf").unwrap(), Value::Float(f64::INFINITY));
-        assert_eq!(value("scan.pulses_per_line", "16").unwrap(), Value::Integer(16));
-        assert_eq!(value("scan.pulses_per_line", "31.999999999999996").unwrap(), Value::Integer(32));
-        assert_eq!(value("estimator.follow_wind", "true").unwrap(), Value::Boolean(true));
-        assert_eq!(value("estimator.method.kind", "\"capon\"").unwrap(), Value::String("capon".into()));
+        assert_eq!(
+            value("pulse.energy_j", "50e-6").unwrap(),
+            Value::Float(50e-6)
+        );
+        assert_eq!(
+            value("telescope.focus_m", "inf").unwrap(),
+            Value::Float(f64::INFINITY)
+        );
+        assert_eq!(
+            value("scan.pulses_per_line", "16").unwrap(),
+            Value::Integer(16)
+        );
+        assert_eq!(
+            value("scan.pulses_per_line", "31.999999999999996").unwrap(),
+            Value::Integer(32)
+        );
+        assert_eq!(
+            value("estimator.follow_wind", "true").unwrap(),
+            Value::Boolean(true)
+        );
+        assert_eq!(
+            value("estimator.method.kind", "\"capon\"").unwrap(),
+            Value::String("capon".into())
+        );
         for (key, text) in [
             ("scan.pulses_per_line", "1.5"),
             ("scan.pulses_per_line", "-1"),
@@ -240,8 +311,16 @@ mod tests {
             ("estimator.follow_wind", "1"),
         ] {
             let problem = value(key, text).unwrap_err();
-            assert!(problem.value == text && !problem.allowed.is_empty(), "{problem}");
+            assert!(
+                problem.value == text && !problem.allowed.is_empty(),
+                "{problem}"
+            );
         }
-        assert!(value("estimator.method.kind", "carpon").unwrap_err().allowed.contains("did you mean \"capon\"?"));
+        assert!(
+            value("estimator.method.kind", "carpon")
+                .unwrap_err()
+                .allowed
+                .contains("did you mean \"capon\"?")
+        );
     }
 }

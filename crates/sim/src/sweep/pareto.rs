@@ -27,12 +27,18 @@ impl Objective {
     /// A column of which small values are better. Standard errors are in the same unit: none where all values are exact, NaN where one
     /// is not known, as of one realisation.
     pub fn small(values: Vec<f64>, standard_errors: Vec<f64>) -> Self {
-        Self { costs: values, standard_errors }
+        Self {
+            costs: values,
+            standard_errors,
+        }
     }
 
     /// A column of which large values are better, with standard errors as of a small one.
     pub fn large(values: Vec<f64>, standard_errors: Vec<f64>) -> Self {
-        Self::small(values.into_iter().map(|value| -value).collect(), standard_errors)
+        Self::small(
+            values.into_iter().map(|value| -value).collect(),
+            standard_errors,
+        )
     }
 
     /// By how much point `a` is better than `b`.
@@ -42,7 +48,11 @@ impl Objective {
 
     /// Standard error of the difference of two points; without end where one is not known.
     fn error(&self, a: usize, b: usize) -> f64 {
-        let error = |i: usize| self.standard_errors.get(i).map_or(0.0, |e| if e.is_nan() { f64::INFINITY } else { *e });
+        let error = |i: usize| {
+            self.standard_errors
+                .get(i)
+                .map_or(0.0, |e| if e.is_nan() { f64::INFINITY } else { *e })
+        };
         error(a).hypot(error(b))
     }
 }
@@ -65,13 +75,23 @@ pub fn front(objectives: &[Objective]) -> Vec<Place> {
     let is_finite = |i: &usize| objectives.iter().all(|o| o.costs[*i].is_finite());
     let finite: Vec<usize> = (0..points).filter(is_finite).collect();
     let dominates = |a: usize, b: usize, lenience: f64| {
-        let luck = |o: &Objective| if lenience > 0.0 { lenience * o.error(a, b) } else { 0.0 };
+        let luck = |o: &Objective| {
+            if lenience > 0.0 {
+                lenience * o.error(a, b)
+            } else {
+                0.0
+            }
+        };
         let gains = || objectives.iter().map(|o| o.gain(a, b) + luck(o));
         a != b && gains().all(|gain| gain >= 0.0) && gains().any(|gain| gain > 0.0)
     };
     let mut places = vec![Place::Off; points];
     for &point in &finite {
-        let beaten = |lenience: f64| finite.iter().any(|other| dominates(*other, point, lenience));
+        let beaten = |lenience: f64| {
+            finite
+                .iter()
+                .any(|other| dominates(*other, point, lenience))
+        };
         places[point] = match (beaten(0.0), beaten(NEAR)) {
             (true, _) => Place::Off,
             (false, true) => Place::Doubtful,
@@ -116,40 +136,79 @@ impl FrontTable {
         let known = || table.header.iter().map(String::as_str);
         let place = |name: &str| {
             table.column(name).ok_or_else(|| {
-                let hint = near(name, known()).map(|name| format!("; did you mean {name}?")).unwrap_or_default();
-                format!("there is no column {name}{hint} Known: {}", known().collect::<Vec<_>>().join(", "))
+                let hint = near(name, known())
+                    .map(|name| format!("; did you mean {name}?"))
+                    .unwrap_or_default();
+                format!(
+                    "there is no column {name}{hint} Known: {}",
+                    known().collect::<Vec<_>>().join(", ")
+                )
             })
         };
         let mut kept: Vec<usize> = (0..table.rows.len()).collect();
         for text in &wanted.conditions {
             // Of a table without rows, too.
             holds(text, None)?;
-            let of_row = |row: usize| holds(text, Some(&|name| Ok(table.number(row, place(name)?))));
-            let held = (0..table.rows.len()).map(of_row).collect::<Result<Vec<bool>, String>>()?;
+            let of_row =
+                |row: usize| holds(text, Some(&|name| Ok(table.number(row, place(name)?))));
+            let held = (0..table.rows.len())
+                .map(of_row)
+                .collect::<Result<Vec<bool>, String>>()?;
             kept.retain(|row| held[*row]);
         }
-        let column = |place: usize| kept.iter().map(|row| table.number(*row, place)).collect::<Vec<f64>>();
-        let objective = |name: &String, of: fn(Vec<f64>, Vec<f64>) -> Objective| -> Result<Objective, String> {
-            let standard_errors = standard_error_of(name, known()).map(place).transpose()?.map_or(Vec::new(), column);
-            Ok(of(column(place(name)?), standard_errors))
+        let column = |place: usize| {
+            kept.iter()
+                .map(|row| table.number(*row, place))
+                .collect::<Vec<f64>>()
         };
-        let small = wanted.min.iter().map(|name| objective(name, Objective::small));
-        let large = wanted.max.iter().map(|name| objective(name, Objective::large));
+        let objective =
+            |name: &String, of: fn(Vec<f64>, Vec<f64>) -> Objective| -> Result<Objective, String> {
+                let standard_errors = standard_error_of(name, known())
+                    .map(place)
+                    .transpose()?
+                    .map_or(Vec::new(), column);
+                Ok(of(column(place(name)?), standard_errors))
+            };
+        let small = wanted
+            .min
+            .iter()
+            .map(|name| objective(name, Objective::small));
+        let large = wanted
+            .max
+            .iter()
+            .map(|name| objective(name, Objective::large));
         let objectives = small.chain(large).collect::<Result<Vec<_>, String>>()?;
         if objectives.is_empty() {
             return Err("no column is to be small or large: at least one --min COLUMN or --max COLUMN is needed".into());
         }
-        let places = kept.iter().zip(front(&objectives)).filter(|(_, place)| *place != Place::Off);
-        let front = places.map(|(row, place)| (*row, place == Place::Doubtful)).collect();
+        let places = kept
+            .iter()
+            .zip(front(&objectives))
+            .filter(|(_, place)| *place != Place::Off);
+        let front = places
+            .map(|(row, place)| (*row, place == Place::Doubtful))
+            .collect();
         let (of, objectives) = (kept.len(), [&wanted.min[..], &wanted.max[..]].concat());
-        Ok(Self { table, objectives, of, front })
+        Ok(Self {
+            table,
+            objectives,
+            of,
+            front,
+        })
     }
 
     /// The front for people: what comes before the results of a sweep, and the objectives.
     pub fn text(&self) -> String {
-        let results = self.table.column("scene_hash").unwrap_or(1.min(self.table.header.len()));
+        let results = self
+            .table
+            .column("scene_hash")
+            .unwrap_or(1.min(self.table.header.len()));
         let mut shown: Vec<usize> = (0..results).collect();
-        for place in self.objectives.iter().filter_map(|name| self.table.column(name)) {
+        for place in self
+            .objectives
+            .iter()
+            .filter_map(|name| self.table.column(name))
+        {
             if !shown.contains(&place) {
                 shown.push(place);
             }
@@ -172,16 +231,30 @@ impl FrontTable {
 
     fn columns(&self, places: impl IntoIterator<Item = usize>) -> Table {
         let of_rows = places.into_iter().fold(Table::new(), |table, place| {
-            table
-                .text(&self.table.header[place], self.front.iter().map(|(row, _)| self.table.rows[*row][place].clone()))
+            table.text(
+                &self.table.header[place],
+                self.front
+                    .iter()
+                    .map(|(row, _)| self.table.rows[*row][place].clone()),
+            )
         });
-        of_rows.text("front", self.front.iter().map(|(_, doubtful)| if *doubtful { "doubtful" } else { "on" }))
+        of_rows.text(
+            "front",
+            self.front
+                .iter()
+                .map(|(_, doubtful)| if *doubtful { "doubtful" } else { "on" }),
+        )
     }
 
     /// The front for programs.
     pub fn json(&self) -> Value {
         let row = |(row, doubtful): &(usize, bool)| {
-            let cells = self.table.header.iter().cloned().zip(self.table.rows[*row].iter().map(|cell| json!(cell)));
+            let cells = self
+                .table
+                .header
+                .iter()
+                .cloned()
+                .zip(self.table.rows[*row].iter().map(|cell| json!(cell)));
             json!({ "row": row, "doubtful": doubtful, "cells": cells.collect::<Map<_, _>>() })
         };
         let front: Vec<Value> = self.front.iter().map(row).collect();

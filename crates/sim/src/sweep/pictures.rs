@@ -12,11 +12,36 @@ use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
 
 /// Panels of a picture: title, axis, whether it is logarithmic, the result and a bound, which is dashed.
 const PANELS: [(&str, &str, bool, [&str; 2]); 6] = [
-    ("Signal-to-noise ratio in the middle of the scan", "SNR [dB]", false, ["snr_db", ""]),
-    ("Error outside the vortices; dashed: bound", "rms [m/s]", true, ["rms_outside_m_s", "bound_m_s"]),
-    ("Error inside the vortices", "rms [m/s]", true, ["rms_inside_m_s", ""]),
-    ("Estimates outside that are spread over the band", "fraction", false, ["bad_fraction", ""]),
-    ("Range resolution", "full width at half maximum [m]", false, ["resolution_m", ""]),
+    (
+        "Signal-to-noise ratio in the middle of the scan",
+        "SNR [dB]",
+        false,
+        ["snr_db", ""],
+    ),
+    (
+        "Error outside the vortices; dashed: bound",
+        "rms [m/s]",
+        true,
+        ["rms_outside_m_s", "bound_m_s"],
+    ),
+    (
+        "Error inside the vortices",
+        "rms [m/s]",
+        true,
+        ["rms_inside_m_s", ""],
+    ),
+    (
+        "Estimates outside that are spread over the band",
+        "fraction",
+        false,
+        ["bad_fraction", ""],
+    ),
+    (
+        "Range resolution",
+        "full width at half maximum [m]",
+        false,
+        ["resolution_m", ""],
+    ),
     (
         "Error of the circulation; dashed: bound",
         "rms [m^{2}/s]",
@@ -29,13 +54,29 @@ const PANELS: [(&str, &str, bool, [&str; 2]); 6] = [
 const MOST_CURVES: usize = 6;
 
 /// The pictures: of each key that is a number, and the front.
-pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Outputs) -> Result<(), Error> {
-    for name in definition.free().filter(|key| key.holds != Holds::Texts).map(|key| &key.name) {
-        files.figure(&format!("results_{}", name.replace('.', "_")), rows, |rows| {
-            let panels = PANELS.map(|panel| against(definition, rows, name, &panel));
-            let figure = Figure::stacked(panels.into_iter().flatten());
-            Ok(Figure { columns: 2, width: 1240.0, ..figure })
-        })?;
+pub(super) fn list(
+    definition: &Definition,
+    rows: Option<&[Row]>,
+    files: &mut Outputs,
+) -> Result<(), Error> {
+    for name in definition
+        .free()
+        .filter(|key| key.holds != Holds::Texts)
+        .map(|key| &key.name)
+    {
+        files.figure(
+            &format!("results_{}", name.replace('.', "_")),
+            rows,
+            |rows| {
+                let panels = PANELS.map(|panel| against(definition, rows, name, &panel));
+                let figure = Figure::stacked(panels.into_iter().flatten());
+                Ok(Figure {
+                    columns: 2,
+                    width: 1240.0,
+                    ..figure
+                })
+            },
+        )?;
     }
     files.figure("front", rows, |rows| Ok(Figure::stacked([of_front(rows)])))
 }
@@ -47,10 +88,30 @@ fn against(
     key: &str,
     (title, label, is_log, [result, bound]): &(&str, &str, bool, [&str; 2]),
 ) -> Option<CurvePlot> {
-    let x: Vec<f64> = rows.iter().map(|row| row.key(key)).filter(|x| x.is_finite()).collect();
-    let (low, high) = x.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
-    let axis = if low > 0.0 && high >= 8.0 * low { Axis::log(key) } else { Axis::linear(key) };
-    let mut plot = CurvePlot::new(title, axis, if *is_log { Axis::log(label) } else { Axis::linear(label) });
+    let x: Vec<f64> = rows
+        .iter()
+        .map(|row| row.key(key))
+        .filter(|x| x.is_finite())
+        .collect();
+    let (low, high) = x
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| {
+            (low.min(*x), high.max(*x))
+        });
+    let axis = if low > 0.0 && high >= 8.0 * low {
+        Axis::log(key)
+    } else {
+        Axis::linear(key)
+    };
+    let mut plot = CurvePlot::new(
+        title,
+        axis,
+        if *is_log {
+            Axis::log(label)
+        } else {
+            Axis::linear(label)
+        },
+    );
     plot.shape = 0.6;
     let error = standard_error_of(result, results().map(|(name, ..)| name));
     let (curves, mut any) = (curves(definition, rows, key), false);
@@ -59,7 +120,9 @@ fn against(
     for (colour, (curve, members)) in curves.iter().enumerate() {
         let points = |name: &str| {
             let found = members.iter().map(|row| (row.key(key), row.result(name)));
-            let mut points: Vec<(f64, f64)> = found.filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
+            let mut points: Vec<(f64, f64)> = found
+                .filter(|(x, y)| x.is_finite() && y.is_finite())
+                .collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
             points
         };
@@ -71,9 +134,17 @@ fn against(
         }
         // In the order of the values, whose x they share.
         let bars: Vec<(f64, f64)> = error.map_or(Vec::new(), points);
-        let bar = |x: f64| bars.iter().find(|(at, _)| *at == x).map_or(0.0, |(_, error)| *error);
+        let bar = |x: f64| {
+            bars.iter()
+                .find(|(at, _)| *at == x)
+                .map_or(0.0, |(_, error)| *error)
+        };
         let half: Vec<f64> = values.iter().map(|(x, _)| bar(*x)).collect();
-        plot = plot.with(Series::new(curve, Style::Markers, values).with_band(&half).in_colour(colour));
+        plot = plot.with(
+            Series::new(curve, Style::Markers, values)
+                .with_band(&half)
+                .in_colour(colour),
+        );
     }
     any.then_some(plot)
 }
@@ -82,31 +153,57 @@ fn against(
 fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(String, Vec<&'r Row>)> {
     let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
     for row in rows {
-        let others = definition.free().map(|key| key.name.as_str()).filter(|name| *name != key);
+        let others = definition
+            .free()
+            .map(|key| key.name.as_str())
+            .filter(|name| *name != key);
         let short = |name: &'_ str| name.rsplit('.').next().unwrap_or_default().to_owned();
-        let label: Vec<String> = others.map(|name| format!("{} {}", short(name), row.text(name))).collect();
+        let label: Vec<String> = others
+            .map(|name| format!("{} {}", short(name), row.text(name)))
+            .collect();
         let label = label.join(", ");
         match curves.iter_mut().find(|(known, _)| *known == label) {
             Some((_, members)) => members.push(row),
             None => curves.push((label, vec![row])),
         }
     }
-    if curves.len() <= MOST_CURVES { curves } else { vec![(String::new(), rows.iter().collect())] }
+    if curves.len() <= MOST_CURVES {
+        curves
+    } else {
+        vec![(String::new(), rows.iter().collect())]
+    }
 }
 
 /// Precision against resolution, with the front.
 fn of_front(rows: &[Row]) -> CurvePlot {
     let column = |name: &str| rows.iter().map(|row| row.result(name)).collect::<Vec<_>>();
-    let (resolution_m, std_m_s, error_m_s) =
-        (column("resolution_m"), column("std_m_s"), column("std_standard_error_m_s"));
+    let (resolution_m, std_m_s, error_m_s) = (
+        column("resolution_m"),
+        column("std_m_s"),
+        column("std_standard_error_m_s"),
+    );
     let precision = Objective::small(std_m_s.clone(), error_m_s.clone());
-    let places = front(&[Objective::small(resolution_m.clone(), Vec::new()), precision]);
+    let places = front(&[
+        Objective::small(resolution_m.clone(), Vec::new()),
+        precision,
+    ]);
     let all = || resolution_m.iter().copied().zip(std_m_s.iter().copied());
-    let mut best: Vec<(f64, f64)> = all().zip(&places).filter(|(_, p)| **p != Place::Off).map(|(xy, _)| xy).collect();
+    let mut best: Vec<(f64, f64)> = all()
+        .zip(&places)
+        .filter(|(_, p)| **p != Place::Off)
+        .map(|(xy, _)| xy)
+        .collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let bars: Vec<f64> = error_m_s.iter().map(|error| if error.is_finite() { *error } else { 0.0 }).collect();
+    let bars: Vec<f64> = error_m_s
+        .iter()
+        .map(|error| if error.is_finite() { *error } else { 0.0 })
+        .collect();
     let x = Axis::linear("full width at half maximum in range [m]");
-    CurvePlot::new("Precision against resolution", x, Axis::log("standard deviation [m/s]"))
-        .with(Series::new("front", Style::Line, best))
-        .with(Series::new("cases", Style::Markers, all()).with_band(&bars))
+    CurvePlot::new(
+        "Precision against resolution",
+        x,
+        Axis::log("standard deviation [m/s]"),
+    )
+    .with(Series::new("front", Style::Line, best))
+    .with(Series::new("cases", Style::Markers, all()).with_band(&bars))
 }

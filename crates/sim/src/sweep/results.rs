@@ -38,8 +38,13 @@ pub(super) fn results() -> impl Iterator<Item = (&'static str, &'static str, &'s
 }
 
 /// Name of the column that has the standard error of a column: `std_m_s` has `std_standard_error_m_s`.
-pub(crate) fn standard_error_of<'a>(name: &str, mut columns: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    columns.find(|column| column.contains("_standard_error") && column.replacen("_standard_error", "", 1) == name)
+pub(crate) fn standard_error_of<'a>(
+    name: &str,
+    mut columns: impl Iterator<Item = &'a str>,
+) -> Option<&'a str> {
+    columns.find(|column| {
+        column.contains("_standard_error") && column.replacen("_standard_error", "", 1) == name
+    })
 }
 
 /// What is collected of the maps of a case.
@@ -65,74 +70,143 @@ pub(super) fn rows(
     observer: &dyn Observer,
     fits: bool,
 ) -> Result<Vec<Vec<f64>>, Error> {
-    let Some(first) = plans.first() else { return Ok(Vec::new()) };
+    let Some(first) = plans.first() else {
+        return Ok(Vec::new());
+    };
     let scanner = Scanner::with(first, known, observer)?;
     let mut all = Vec::with_capacity(plans.len());
     for plan in plans {
-        all.push(Collected::new(plan, if fits { Retrieval::new(plan, &scanner) } else { None })?);
+        all.push(Collected::new(
+            plan,
+            if fits {
+                Retrieval::new(plan, &scanner)
+            } else {
+                None
+            },
+        )?);
     }
     let of_plans: Vec<&Plan> = plans.iter().collect();
     let maps = map::of_plans(&of_plans, &scanner, observer, |i, velocity_m_s| {
         let own = &mut all[i];
-        own.velocity_m_s.extend(own.apart.iter().map(|cell| velocity_m_s[*cell]));
-        own.retrieval.iter_mut().for_each(|retrieval| retrieval.add(velocity_m_s));
+        own.velocity_m_s
+            .extend(own.apart.iter().map(|cell| velocity_m_s[*cell]));
+        own.retrieval
+            .iter_mut()
+            .for_each(|retrieval| retrieval.add(velocity_m_s));
     })?;
-    all.iter().zip(&maps).map(|(own, map)| own.row(map, &scanner)).collect()
+    all.iter()
+        .zip(&maps)
+        .map(|(own, map)| own.row(map, &scanner))
+        .collect()
 }
 
 impl<'p> Collected<'p> {
     fn new(plan: &'p Plan, retrieval: Option<Retrieval<'p>>) -> Result<Self, Error> {
         let (scene, g) = (&plan.scene.content, &plan.geometry);
-        let distance = Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
-            let (elevation_rad, range_m) = (g.elevation_rad[i], g.gate_range_m[j]);
-            let (y_m, z_m) = (range_m * elevation_rad.cos(), scene.scan.lidar_height_m + range_m * elevation_rad.sin());
-            match &scene.flow {
-                Flow::VortexPair(pair) => {
-                    let centres = vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
-                    let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
-                    to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
+        let distance =
+            Array2::from_shape_fn((g.elevation_rad.len(), g.gate_range_m.len()), |(i, j)| {
+                let (elevation_rad, range_m) = (g.elevation_rad[i], g.gate_range_m[j]);
+                let (y_m, z_m) = (
+                    range_m * elevation_rad.cos(),
+                    scene.scan.lidar_height_m + range_m * elevation_rad.sin(),
+                );
+                match &scene.flow {
+                    Flow::VortexPair(pair) => {
+                        let centres =
+                            vortex_pair(pair).centres(plan.wind.start_s + g.line_time_s[i]);
+                        let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
+                        to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
+                    }
+                    Flow::Simulated(_) | Flow::Fields(_) | Flow::VortexLines(_) => f64::NAN,
+                    Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
                 }
-                Flow::Simulated(_) | Flow::Fields(_) | Flow::VortexLines(_) => f64::NAN,
-                Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
-            }
-        });
-        let mut own = Self { plan, distance, retrieval, apart: Vec::new(), velocity_m_s: Vec::new() };
+            });
+        let mut own = Self {
+            plan,
+            distance,
+            retrieval,
+            apart: Vec::new(),
+            velocity_m_s: Vec::new(),
+        };
         let [lines, gates] = shared_cells(plan)?.map(|cells| cells.ceil() as usize);
         let outside = own.cells(OUTSIDE);
-        own.apart = if outside.is_empty() { own.cells(ALL) } else { outside };
-        own.apart.retain(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates));
+        own.apart = if outside.is_empty() {
+            own.cells(ALL)
+        } else {
+            outside
+        };
+        own.apart
+            .retain(|(i, j)| i.is_multiple_of(lines) && j.is_multiple_of(gates));
         Ok(own)
     }
 
     fn cells(&self, part: Part) -> Vec<(usize, usize)> {
-        self.distance.indexed_iter().filter(|(_, distance)| part(**distance)).map(|(cell, _)| cell).collect()
+        self.distance
+            .indexed_iter()
+            .filter(|(_, distance)| part(**distance))
+            .map(|(cell, _)| cell)
+            .collect()
     }
 
     /// Standard deviation, bias and root mean square over some cells, each with its standard error, m/s.
     fn averages(&self, map: &VelocityEstimates, part: Part) -> [f64; 6] {
         let a = CellAverage::over(map, &self.cells(part));
-        let [bias, std] = [[a.bias_m_s, a.bias_standard_error_m_s], [a.std_m_s, a.std_standard_error_m_s]];
-        [std[0], std[1], bias[0], bias[1], a.rms_m_s, a.standard_error_m_s]
+        let [bias, std] = [
+            [a.bias_m_s, a.bias_standard_error_m_s],
+            [a.std_m_s, a.std_standard_error_m_s],
+        ];
+        [
+            std[0],
+            std[1],
+            bias[0],
+            bias[1],
+            a.rms_m_s,
+            a.standard_error_m_s,
+        ]
     }
 
     fn row(&self, map: &VelocityEstimates, scanner: &Scanner<'_>) -> Result<Vec<f64>, Error> {
         let (plan, scene) = (self.plan, &self.plan.scene.content);
-        let middle = ScanMiddle::of(plan, None, Some(scanner))
-            .ok_or(wakescope_estimate::Error::Empty { field: "layers of a line" })?;
+        let middle =
+            ScanMiddle::of(plan, None, Some(scanner)).ok_or(wakescope_estimate::Error::Empty {
+                field: "layers of a line",
+            })?;
         // The bound of velocity alone is none on a velocity beside a gradient.
         let has_bound = scene.detector.noise != NoiseModel::None
             && !matches!(scene.estimator.method, Method::GradientLikelihood(_));
-        let bound_m_s = if has_bound { bound_in_the_middle(plan, scanner)?.region_m_s } else { f64::NAN };
+        let bound_m_s = if has_bound {
+            bound_in_the_middle(plan, scanner)?.region_m_s
+        } else {
+            f64::NAN
+        };
         let filter = range_filter(plan)?;
-        let mut out = vec![middle.snr_db, filter.full_width_half_maximum_m(), filter.standard_deviation_m(), bound_m_s];
+        let mut out = vec![
+            middle.snr_db,
+            filter.full_width_half_maximum_m(),
+            filter.standard_deviation_m(),
+            bound_m_s,
+        ];
         for part in [ALL, INSIDE, OUTSIDE] {
             out.extend(self.averages(map, part));
         }
         out.extend(flagged_fraction(map));
         let truths_m_s = self.apart.iter().map(|cell| map.v_gate_m_s[*cell]).cycle();
-        let known = self.velocity_m_s.iter().zip(truths_m_s).filter(|(_, truth)| truth.is_finite());
-        out.extend(bad_fraction(plan, &known.map(|(velocity, truth)| velocity - truth).collect::<Vec<_>>())?);
-        out.extend(self.retrieval.as_ref().map_or([f64::NAN; 6], Retrieval::result));
+        let known = self
+            .velocity_m_s
+            .iter()
+            .zip(truths_m_s)
+            .filter(|(_, truth)| truth.is_finite());
+        out.extend(bad_fraction(
+            plan,
+            &known
+                .map(|(velocity, truth)| velocity - truth)
+                .collect::<Vec<_>>(),
+        )?);
+        out.extend(
+            self.retrieval
+                .as_ref()
+                .map_or([f64::NAN; 6], Retrieval::result),
+        );
         Ok(out)
     }
 }
@@ -142,16 +216,32 @@ impl<'p> Collected<'p> {
 fn bad_fraction(plan: &Plan, errors_m_s: &[f64]) -> Result<[f64; 2], Error> {
     let (scene, pulse) = (&plan.scene.content, &plan.instrument.pulse);
     let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    let moment = |power: i32| window.iter().enumerate().map(|(n, h)| h * h * (n as f64).powi(power)).sum::<f64>();
+    let moment = |power: i32| {
+        window
+            .iter()
+            .enumerate()
+            .map(|(n, h)| h * h * (n as f64).powi(power))
+            .sum::<f64>()
+    };
     let mean = moment(1) / moment(0);
-    let window_s = (moment(2) / moment(0) - mean * mean).max(1.0 / 12.0).sqrt() / scene.detector.sampling_hz;
+    let window_s =
+        (moment(2) / moment(0) - mean * mean).max(1.0 / 12.0).sqrt() / scene.detector.sampling_hz;
     // A window cannot be narrower in frequency than the inverse of its length.
-    let width_hz = pulse.spectral_width_hz().hypot(0.25 * std::f64::consts::FRAC_1_PI / window_s);
+    let width_hz = pulse
+        .spectral_width_hz()
+        .hypot(0.25 * std::f64::consts::FRAC_1_PI / window_s);
     let part = (2.0 * BEYOND_WIDTHS * width_hz / scene.detector.bandwidth_hz).min(0.9);
     let limit_m_s = 0.25 * scene.laser.wavelength_m * scene.detector.bandwidth_hz * part;
     let (of, share) = (errors_m_s.len() as f64, 1.0 - part);
-    let beyond = errors_m_s.iter().filter(|error| error.is_nan() || error.abs() > limit_m_s).count() as f64 / of;
-    Ok([(beyond / share).min(1.0), error_of_fraction(beyond, of) / share])
+    let beyond = errors_m_s
+        .iter()
+        .filter(|error| error.is_nan() || error.abs() > limit_m_s)
+        .count() as f64
+        / of;
+    Ok([
+        (beyond / share).min(1.0),
+        error_of_fraction(beyond, of) / share,
+    ])
 }
 
 /// Whether a cell at a distance of a centre, over the spacing, is among those about which a column speaks.

@@ -45,7 +45,9 @@ impl std::str::FromStr for Shard {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let parts = text.split_once('/').and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
+        let parts = text
+            .split_once('/')
+            .and_then(|(number, of)| Some((number.parse().ok()?, of.parse().ok()?)));
         match parts {
             Some((number, of)) if (1..=of).contains(&number) => Ok(Self { number, of }),
             _ => Err("a shard is NUMBER/COUNT with a number from 1 to the count, e.g. 2/8".into()),
@@ -95,12 +97,21 @@ pub struct Summary {
 ///
 /// # Errors
 /// The first case that is refused, before anything is written; a case that cannot be run; what the system says.
-pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn Observer) -> Result<Summary, Error> {
-    let (definition, existing) =
-        (Definition::of(sweep, !settings.no_circulation), Existing::with_overwrite(settings.overwrite));
+pub fn run<'s>(
+    sweep: &'s Sweep,
+    out: &Path,
+    settings: Settings,
+    observer: &dyn Observer,
+) -> Result<Summary, Error> {
+    let (definition, existing) = (
+        Definition::of(sweep, !settings.no_circulation),
+        Existing::with_overwrite(settings.overwrite),
+    );
     let common = Common::default();
     let core_s = check(sweep, &common, settings.allow_large)?;
-    let times = settings.shard.map_or("times.csv".into(), |s| format!("times-{}-of-{}.csv", s.number, s.of));
+    let times = settings.shard.map_or("times.csv".into(), |s| {
+        format!("times-{}-of-{}.csv", s.number, s.of)
+    });
     let mut names = vec![SWEEP.to_owned(), times.clone()];
     if settings.shard.is_none() {
         let list = |files: &mut outputs::Outputs| tables::list(&definition, None, files);
@@ -109,22 +120,39 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
     // Shards may begin at the same time, in one folder: each writes files of its own.
     outputs::prepare(out, &names, existing, false)?;
     definition.write(out, existing)?;
-    let mine: Vec<&Case> = sweep.cases.iter().filter(|c| settings.shard.is_none_or(|s| s.has(c.index))).collect();
+    let mine: Vec<&Case> = sweep
+        .cases
+        .iter()
+        .filter(|c| settings.shard.is_none_or(|s| s.has(c.index)))
+        .collect();
     let is_due = |case: &&Case| !(settings.resume && definition.stored(out, case.index).is_some());
     let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
     observer.begin(Stage::Cases, due.len() as u64);
     let of_due_s = due.iter().filter_map(|case| core_s.get(case.index)).sum();
-    observer.reach(&format!("forecast: {} of one core, to a factor of two", seconds(of_due_s)));
+    observer.reach(&format!(
+        "forecast: {} of one core, to a factor of two",
+        seconds(of_due_s)
+    ));
     let (mut signals, mut walls) = (0, Vec::new());
     for group in groups(due.iter().map(|case| &case.scene)) {
         let planned = |&place: &usize| {
             let case: &'s Case = due[place];
-            Ok((case, common.plan(&case.scene, Target::Map).map_err(|e| sweep.failed(case, 0, e))?))
+            Ok((
+                case,
+                common
+                    .plan(&case.scene, Target::Map)
+                    .map_err(|e| sweep.failed(case, 0, e))?,
+            ))
         };
         for batch in batches(group.iter().map(planned).collect::<Result<_, Error>>()?) {
             let begun = Instant::now();
             let (cases, plans): (Vec<&Case>, Vec<Plan>) = batch.into_iter().unzip();
-            let found = rows(&plans, &common.efficiencies, observer, !settings.no_circulation);
+            let found = rows(
+                &plans,
+                &common.efficiencies,
+                observer,
+                !settings.no_circulation,
+            );
             let found = found.map_err(|e| sweep.failed(cases[0], 0, e))?;
             signals += 1;
             let wall_s = begun.elapsed().as_secs_f64() / found.len() as f64;
@@ -139,12 +167,29 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
     observer.end();
     let mut files = vec![write_times(out, &times, &definition, &mut walls)?];
     if settings.shard.is_none() {
-        let all: Option<Vec<_>> = (0..sweep.cases.len()).map(|case| definition.stored(out, case)).collect();
-        let gone = || Error::Input { path: out.join("cases"), reason: "a result that was written is gone".into() };
-        files.extend(tables::write(&definition, &all.ok_or_else(gone)?, out, existing)?);
+        let all: Option<Vec<_>> = (0..sweep.cases.len())
+            .map(|case| definition.stored(out, case))
+            .collect();
+        let gone = || Error::Input {
+            path: out.join("cases"),
+            reason: "a result that was written is gone".into(),
+        };
+        files.extend(tables::write(
+            &definition,
+            &all.ok_or_else(gone)?,
+            out,
+            existing,
+        )?);
     }
     let (flows, efficiencies) = (common.winds.len(), common.efficiencies.computed());
-    Ok(Summary { run: due.len(), kept: mine.len() - due.len(), flows, efficiencies, signals, files })
+    Ok(Summary {
+        run: due.len(),
+        kept: mine.len() - due.len(),
+        flows,
+        efficiencies,
+        signals,
+        files,
+    })
 }
 
 /// The plan and the map of every scene, in their order, without any file; what they have in common is computed once: flows,
@@ -152,7 +197,10 @@ pub fn run<'s>(sweep: &'s Sweep, out: &Path, settings: Settings, observer: &dyn 
 ///
 /// # Errors
 /// What a plan refuses; a scene that cannot be run.
-pub fn maps(scenes: &[SceneFile], observer: &dyn Observer) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
+pub fn maps(
+    scenes: &[SceneFile],
+    observer: &dyn Observer,
+) -> Result<Vec<(Plan, VelocityEstimates)>, Error> {
     measured(scenes, 0, &Common::default(), observer, |_, _, map| Ok(map))
 }
 
@@ -170,7 +218,14 @@ impl Common {
     /// # Errors
     /// As [`Plan::new`].
     pub(crate) fn plan(&self, scene: &SceneFile, target: Target) -> Result<Plan, Error> {
-        let cause = hash_of(&format!("{:?}", (&scene.content.flow, &scene.content.added_flows, scene.folder())));
+        let cause = hash_of(&format!(
+            "{:?}",
+            (
+                &scene.content.flow,
+                &scene.content.added_flows,
+                scene.folder()
+            )
+        ));
         let wind = self.winds.of(cause, || SceneWind::new(scene))?;
         Plan::sharing(scene.clone(), target, wind, &self.screens)
     }
@@ -191,12 +246,22 @@ pub(crate) fn measured<T>(
 ) -> Result<Vec<(Plan, T)>, Error> {
     let mut out: Vec<(usize, (Plan, T))> = Vec::with_capacity(scenes.len());
     for places in groups(scenes.iter()) {
-        let plans: Vec<Plan> =
-            places.iter().map(|&i| common.plan(&scenes[i], Target::Map)).collect::<Result<_, _>>()?;
+        let plans: Vec<Plan> = places
+            .iter()
+            .map(|&i| common.plan(&scenes[i], Target::Map))
+            .collect::<Result<_, _>>()?;
         let mut scanner = Scanner::with(&plans[0], &common.efficiencies, observer)?;
         scanner.first = first;
-        let found = map::of_plans(&plans.iter().collect::<Vec<_>>(), &scanner, observer, |_, _| ())?;
-        let found = plans.iter().zip(found).map(|(plan, map)| finish(plan, &scanner, map));
+        let found = map::of_plans(
+            &plans.iter().collect::<Vec<_>>(),
+            &scanner,
+            observer,
+            |_, _| (),
+        )?;
+        let found = plans
+            .iter()
+            .zip(found)
+            .map(|(plan, map)| finish(plan, &scanner, map));
         let found: Vec<T> = found.collect::<Result<_, _>>()?;
         out.extend(places.into_iter().zip(plans.into_iter().zip(found)));
     }
@@ -214,8 +279,17 @@ fn check(sweep: &Sweep, common: &Common, allow_large: bool) -> Result<Vec<f64>, 
         Ok(plan.core_s)
     };
     let found: Vec<_> = sweep.cases.par_iter().map(checked).collect();
-    let others = found.iter().filter(|found| found.is_err()).count().saturating_sub(1);
-    sweep.cases.iter().zip(found).map(|(case, found)| found.map_err(|e| sweep.failed(case, others, e))).collect()
+    let others = found
+        .iter()
+        .filter(|found| found.is_err())
+        .count()
+        .saturating_sub(1);
+    sweep
+        .cases
+        .iter()
+        .zip(found)
+        .map(|(case, found)| found.map_err(|e| sweep.failed(case, others, e)))
+        .collect()
 }
 
 /// Places of the scenes with the same signals: those that differ in what is done with the records alone.
@@ -230,7 +304,8 @@ fn groups<'s>(scenes: impl Iterator<Item = &'s SceneFile>) -> Vec<Vec<usize>> {
         };
         // Where pulses have airs of their own, a scan holds what they spread over at the gates.
         let (e, of_pulses) = (&file.content.estimator, file.content.scan.wind_of_pulses);
-        let gates = (of_pulses != WindOfPulses::default()).then_some((e.window_samples, e.gate_step_samples));
+        let gates = (of_pulses != WindOfPulses::default())
+            .then_some((e.window_samples, e.gate_step_samples));
         let cause = hash_of(&format!("{:?}", (signals, gates, file.folder())));
         match groups.iter_mut().find(|(known, _)| *known == cause) {
             Some((_, group)) => group.push(place),
@@ -247,7 +322,8 @@ fn batches(planned: Vec<(&Case, Plan)>) -> Vec<Vec<(&Case, Plan)>> {
     let mut held_bytes = 0.0;
     for (case, plan) in planned {
         // Beside what a run takes, the errors of each realisation are kept.
-        let of_scan_bytes = 9.0 * (plan.geometry.elevation_rad.len() * plan.geometry.gate_range_m.len()) as f64;
+        let of_scan_bytes =
+            9.0 * (plan.geometry.elevation_rad.len() * plan.geometry.gate_range_m.len()) as f64;
         let bytes = plan.total().memory_bytes + plan.realisations() as f64 * of_scan_bytes;
         match batches.last_mut() {
             Some(batch) if held_bytes + bytes <= room_bytes => {
@@ -264,12 +340,20 @@ fn batches(planned: Vec<(&Case, Plan)>) -> Vec<Vec<(&Case, Plan)>> {
 }
 
 /// Wall-clock times of the cases that were run, s; they differ from run to run and stand apart from the results.
-fn write_times(out: &Path, name: &str, definition: &Definition, walls: &mut [(usize, f64)]) -> Result<PathBuf, Error> {
+fn write_times(
+    out: &Path,
+    name: &str,
+    definition: &Definition,
+    walls: &mut [(usize, f64)],
+) -> Result<PathBuf, Error> {
     walls.sort_by_key(|(case, _)| *case);
     let table = Table::new()
         .int("case", walls.iter().map(|(case, _)| *case as i64))
         .float("wall_s", walls.iter().map(|(_, wall_s)| *wall_s))
-        .int("threads", walls.iter().map(|_| rayon::current_num_threads() as i64));
+        .int(
+            "threads",
+            walls.iter().map(|_| rayon::current_num_threads() as i64),
+        );
     crate::io::write_atomic(&out.join(name), table.to_csv(&definition.origin())?)?;
     Ok(out.join(name))
 }

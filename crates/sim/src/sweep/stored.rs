@@ -32,7 +32,10 @@ pub(super) struct Row {
 impl Row {
     /// A result as a number; NaN where it is none.
     pub(super) fn result(&self, name: &str) -> f64 {
-        self.results.get(name).and_then(|cell| cell.parse().ok()).unwrap_or(f64::NAN)
+        self.results
+            .get(name)
+            .and_then(|cell| cell.parse().ok())
+            .unwrap_or(f64::NAN)
     }
 
     /// A key that varies as a number.
@@ -61,7 +64,12 @@ pub(super) struct Definition {
 
 impl Definition {
     pub(super) fn of(sweep: &Sweep, fits: bool) -> Self {
-        let Provenance { program, scene_toml, scene_hash, seed } = sweep.origin.clone();
+        let Provenance {
+            program,
+            scene_toml,
+            scene_hash,
+            seed,
+        } = sweep.origin.clone();
         Self {
             source: program,
             seed,
@@ -69,13 +77,20 @@ impl Definition {
             scene: scene_toml,
             keys: sweep.keys.clone(),
             circulation: fits,
-            scene_hashes: sweep.cases.iter().map(|case| case.scene.hash.clone()).collect(),
+            scene_hashes: sweep
+                .cases
+                .iter()
+                .map(|case| case.scene.hash.clone())
+                .collect(),
         }
     }
 
     pub(super) fn origin(&self) -> Provenance {
         let program = self.source.clone();
-        Provenance { program, ..Provenance::new(&self.scene, &self.sweep_hash, self.seed) }
+        Provenance {
+            program,
+            ..Provenance::new(&self.scene, &self.sweep_hash, self.seed)
+        }
     }
 
     /// Names of the keys that are free, and what they hold.
@@ -100,7 +115,10 @@ impl Definition {
             if existing == Existing::Own && !is_same {
                 let reason = "it is of another sweep, of another version of the program or not all with or without \
                               --no-circulation: take another folder, or replace it with --overwrite";
-                return Err(Error::Input { path, reason: reason.into() });
+                return Err(Error::Input {
+                    path,
+                    reason: reason.into(),
+                });
             }
         }
         Ok(write_atomic(&path, format!("{:#}\n", json!(self)))?)
@@ -110,7 +128,10 @@ impl Definition {
         let path = folder.join(SWEEP);
         let text = text_file::read(&path).map_err(Error::io("read what was swept from", &path))?;
         let reason = "it does not say what was swept, as `wakescope sweep --out` writes it";
-        serde_json::from_str(&text).map_err(|_| Error::Input { path, reason: reason.into() })
+        serde_json::from_str(&text).map_err(|_| Error::Input {
+            path,
+            reason: reason.into(),
+        })
     }
 
     pub(super) fn is_same(&self, other: &Self) -> bool {
@@ -122,20 +143,39 @@ impl Definition {
     ///
     /// # Errors
     /// What the system says; a file of somebody else in the way.
-    pub(super) fn store(&self, folder: &Path, case: &Case, results: &[f64], existing: Existing) -> Result<(), Error> {
+    pub(super) fn store(
+        &self,
+        folder: &Path,
+        case: &Case,
+        results: &[f64],
+        existing: Existing,
+    ) -> Result<(), Error> {
         let names = columns().map(|(name, ..)| name.to_owned());
         let row = Row {
             source: crate::PROGRAM.into(),
             scene_hash: case.scene.hash.clone(),
             case: case.index,
-            keys: self.keys.iter().map(|key| key.name.clone()).zip(case.values.iter().cloned()).collect(),
+            keys: self
+                .keys
+                .iter()
+                .map(|key| key.name.clone())
+                .zip(case.values.iter().cloned())
+                .collect(),
             circulation: self.circulation,
-            results: names.zip(results.iter().map(|result| float_text(*result))).collect(),
+            results: names
+                .zip(results.iter().map(|result| float_text(*result)))
+                .collect(),
         };
         let of = (Outputs::default(), case.scene.provenance());
         outputs::Outputs::write(&folder_of(folder, case.index), existing, of, |files| {
-            files.add("scene.toml", Some(case), |_, origin| Ok(origin.scene_file()))?;
-            files.add(RESULT, Some(&row), |row, _| Ok(format!("{:#}\n", json!(row))))
+            files.add(
+                "scene.toml",
+                Some(case),
+                |_, origin| Ok(origin.scene_file()),
+            )?;
+            files.add(RESULT, Some(&row), |row, _| {
+                Ok(format!("{:#}\n", json!(row)))
+            })
         })
         .map(drop)
     }

@@ -13,7 +13,10 @@ use wakescope_signal::RangeFilter;
 
 /// The rows of a stored table.
 fn reference(name: &str) -> crate::io::csv_input::TextTable {
-    let path = format!("{}/../../tests/reference/sweep/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/../../tests/reference/sweep/{name}.csv",
+        env!("CARGO_MANIFEST_DIR")
+    );
     crate::io::csv_input::TextTable::read(Path::new(&path)).unwrap()
 }
 
@@ -22,26 +25,37 @@ fn sweep(scene: &str, request: &Request) -> Result<Sweep, crate::Error> {
 }
 
 fn vary(words: &[&str]) -> Request {
-    Request { vary: words.iter().map(|word| (*word).to_owned()).collect(), ..Request::default() }
+    Request {
+        vary: words.iter().map(|word| (*word).to_owned()).collect(),
+        ..Request::default()
+    }
 }
 
 #[test]
 fn cases_are_the_stored_ones_to_the_last_bit() {
     let table = reference("sweep_cases");
     let mut compared = 0;
-    for words in table.rows.iter().map(|row| &row[0]).collect::<std::collections::BTreeSet<_>>() {
+    for words in table
+        .rows
+        .iter()
+        .map(|row| &row[0])
+        .collect::<std::collections::BTreeSet<_>>()
+    {
         let request = vary(&words.split(' ').collect::<Vec<_>>());
         let found = sweep("[estimator]\npadded_samples = 1024\n", &request).unwrap();
         for row in table.rows.iter().filter(|row| row[0] == *words) {
             let case = &found.cases[row[1].parse::<usize>().unwrap()];
             let place = found.keys().position(|key| key == row[2]).unwrap();
-            let (value, expected): (f64, f64) = (case.values[place].parse().unwrap(), row[3].parse().unwrap());
+            let (value, expected): (f64, f64) =
+                (case.values[place].parse().unwrap(), row[3].parse().unwrap());
             assert_eq!(value.to_bits(), expected.to_bits(), "{row:?}");
             compared += 1;
         }
         // The scene has the value, not only the table.
         let last = found.cases.last().unwrap();
-        assert!(words.starts_with("laser") == (last.scene.content.laser.pulse_repetition_hz == 40e3));
+        assert!(
+            words.starts_with("laser") == (last.scene.content.laser.pulse_repetition_hz == 40e3)
+        );
     }
     assert_eq!(compared, table.rows.len());
 }
@@ -63,12 +77,24 @@ fn constant_mean_power_gives_the_stored_energies_pulses_and_ratios() {
         assert_eq!(scene.pulse.energy_j.to_bits(), of("energy_j").to_bits());
         assert_eq!(scene.scan.pulses_per_line as f64, of("pulses"));
         let instrument = crate::setup::instrument::Instrument::new(scene).unwrap();
-        let efficiency = wakescope_optics::theory::free_space_efficiency(&instrument.telescope, 400.0).unwrap();
+        let efficiency =
+            wakescope_optics::theory::free_space_efficiency(&instrument.telescope, 400.0).unwrap();
         let back_per_m = instrument.return_per_m(400.0).unwrap() * efficiency;
-        let snr_db = 10.0 * instrument.receiver.slowly_varying_snr(scene.pulse.energy_j, back_per_m).log10();
-        assert!((snr_db - of("snr_db")).abs() < 1e-3, "{snr_db} {}", of("snr_db"));
+        let snr_db = 10.0
+            * instrument
+                .receiver
+                .slowly_varying_snr(scene.pulse.energy_j, back_per_m)
+                .log10();
+        assert!(
+            (snr_db - of("snr_db")).abs() < 1e-3,
+            "{snr_db} {}",
+            of("snr_db")
+        );
         let weak_db = snr_db + 5.0 * (scene.scan.pulses_per_line as f64).log10();
-        assert!((weak_db - of("weak_signal_figure_db")).abs() < 1e-3, "{weak_db}");
+        assert!(
+            (weak_db - of("weak_signal_figure_db")).abs() < 1e-3,
+            "{weak_db}"
+        );
     }
 }
 
@@ -78,11 +104,17 @@ fn shards_have_the_stored_cases() {
     for row in &table.rows {
         let of = |place: usize| row[place].parse::<usize>().unwrap();
         let shard: Shard = format!("{}/{}", of(2), of(1)).parse().unwrap();
-        let cases: Vec<String> = (0..of(0)).filter(|case| shard.has(*case)).map(|case| case.to_string()).collect();
+        let cases: Vec<String> = (0..of(0))
+            .filter(|case| shard.has(*case))
+            .map(|case| case.to_string())
+            .collect();
         assert_eq!(cases.join(" "), row[3]);
     }
     for wrong in ["0/3", "4/3", "1", "1/0", "a/b", "-1/2"] {
-        assert!(wrong.parse::<Shard>().unwrap_err().contains("e.g. 2/8"), "{wrong}");
+        assert!(
+            wrong.parse::<Shard>().unwrap_err().contains("e.g. 2/8"),
+            "{wrong}"
+        );
     }
 }
 
@@ -98,12 +130,15 @@ fn resolution_is_the_stored_one() {
             _ => Weighting::Gaussian,
         };
         let pulse = crate::setup::instrument::pulse(&scene.pulse).unwrap();
-        let window = crate::setup::estimators::weighting(&scene).weights(number(1) as usize).unwrap();
+        let window = crate::setup::estimators::weighting(&scene)
+            .weights(number(1) as usize)
+            .unwrap();
         let filter = RangeFilter::gate(&pulse, &window, number(2), 0.3).unwrap();
         // The stored width is interpolated on a grid.
-        for (found, expected, within) in
-            [(filter.full_width_half_maximum_m(), number(5), 1e-5), (filter.standard_deviation_m(), number(6), 1e-13)]
-        {
+        for (found, expected, within) in [
+            (filter.full_width_half_maximum_m(), number(5), 1e-5),
+            (filter.standard_deviation_m(), number(6), 1e-13),
+        ] {
             assert!((found / expected - 1.0).abs() < within, "{row:?}: {found}");
         }
     }
@@ -118,12 +153,20 @@ fn fronts_are_the_stored_ones() {
         let senses: Vec<&str> = rows[0][3].split(' ').collect();
         let objective = |(i, sense): (usize, &&str)| {
             let values = rows.iter().map(|row| row[4 + i].parse().unwrap()).collect();
-            let of = if *sense == "max" { Objective::large } else { Objective::small };
+            let of = if *sense == "max" {
+                Objective::large
+            } else {
+                Objective::small
+            };
             of(values, Vec::new())
         };
         let objectives: Vec<Objective> = senses.iter().enumerate().map(objective).collect();
         for (row, place) in rows.iter().zip(front(&objectives)) {
-            let expected = if row[7] == "true" { Place::On } else { Place::Off };
+            let expected = if row[7] == "true" {
+                Place::On
+            } else {
+                Place::Off
+            };
             assert_eq!(place, expected, "{row:?}");
         }
     }
@@ -164,14 +207,26 @@ fn the_front_of_1000_random_points_is_that_of_every_pair() {
 fn members_within_two_standard_errors_of_being_beaten_are_doubtful() {
     let with = |errors: [f64; 3]| {
         let precision = Objective::small(vec![1.0, 1.2, 2.0], errors.to_vec());
-        front(&[Objective::small(vec![20.0, 10.0, 30.0], Vec::new()), precision])
+        front(&[
+            Objective::small(vec![20.0, 10.0, 30.0], Vec::new()),
+            precision,
+        ])
     };
     assert_eq!(with([0.0; 3]), [Place::On, Place::On, Place::Off]);
     // 0.2 apart: 2 sqrt(2) 0.08 is more, 2 sqrt(2) 0.07 less.
-    assert_eq!(with([0.08, 0.08, 0.0]), [Place::Doubtful, Place::On, Place::Off]);
-    assert_eq!(with([0.07, 0.07, f64::NAN]), [Place::On, Place::On, Place::Off]);
+    assert_eq!(
+        with([0.08, 0.08, 0.0]),
+        [Place::Doubtful, Place::On, Place::Off]
+    );
+    assert_eq!(
+        with([0.07, 0.07, f64::NAN]),
+        [Place::On, Place::On, Place::Off]
+    );
     // An error that is not known is not small.
-    assert_eq!(with([f64::NAN; 3]), [Place::Doubtful, Place::On, Place::Off]);
+    assert_eq!(
+        with([f64::NAN; 3]),
+        [Place::Doubtful, Place::On, Place::Off]
+    );
 }
 
 /// Counts what is computed.
@@ -180,7 +235,12 @@ struct Counter(Mutex<Vec<Stage>>);
 
 impl Counter {
     fn count(&self, stage: Stage) -> usize {
-        self.0.lock().unwrap().iter().filter(|s| **s == stage).count()
+        self.0
+            .lock()
+            .unwrap()
+            .iter()
+            .filter(|s| **s == stage)
+            .count()
     }
 }
 
@@ -198,8 +258,21 @@ fn ran(scene: &str, request: &Request) -> (Counter, Summary, crate::io::csv_inpu
     let temp = tempfile::tempdir().unwrap();
     let counter = Counter::default();
     let found = sweep(scene, request).unwrap();
-    let summary = run(&found, temp.path(), Settings { no_circulation: true, ..Settings::default() }, &counter).unwrap();
-    (counter, summary, crate::io::csv_input::TextTable::read(&temp.path().join("results.csv")).unwrap())
+    let summary = run(
+        &found,
+        temp.path(),
+        Settings {
+            no_circulation: true,
+            ..Settings::default()
+        },
+        &counter,
+    )
+    .unwrap();
+    (
+        counter,
+        summary,
+        crate::io::csv_input::TextTable::read(&temp.path().join("results.csv")).unwrap(),
+    )
 }
 
 #[test]
@@ -207,20 +280,36 @@ fn what_cases_have_in_common_is_computed_once() {
     // Two estimators see the signals of each energy; all share the screens and the flow.
     let turbulent = "[atmosphere.turbulence]\nkind = \"refractive\"\ncn2_m_m23 = 1e-15\ngrid_points = 80\n\
                      grid_spacing_m = 0.003\nrealisations = 5\nlayers = 4\n[telescope]\nfocus_m = 400.0\n";
-    let request = vary(&["pulse.energy_j=50e-6,150e-6,600e-6", "estimator.radius_m=1,2"]);
+    let request = vary(&[
+        "pulse.energy_j=50e-6,150e-6,600e-6",
+        "estimator.radius_m=1,2",
+    ]);
     let (counter, summary, table) = ran(&(SMALL.to_owned() + turbulent), &request);
-    assert_eq!((summary.flows, summary.efficiencies, summary.signals), (1, 1, 3));
+    assert_eq!(
+        (summary.flows, summary.efficiencies, summary.signals),
+        (1, 1, 3)
+    );
     // Counted where it is done.
-    let counts = [Stage::PhaseScreens, Stage::LinesOfSight, Stage::Estimates].map(|stage| counter.count(stage));
+    let counts = [Stage::PhaseScreens, Stage::LinesOfSight, Stage::Estimates]
+        .map(|stage| counter.count(stage));
     assert_eq!(counts, [1, 3, 3]);
     // Each case is what it is by itself.
-    for (row, (energy, radius)) in
-        [("5e-5", "1"), ("5e-5", "2"), ("1.5e-4", "1"), ("1.5e-4", "2"), ("6e-4", "1"), ("6e-4", "2")]
-            .iter()
-            .enumerate()
+    for (row, (energy, radius)) in [
+        ("5e-5", "1"),
+        ("5e-5", "2"),
+        ("1.5e-4", "1"),
+        ("1.5e-4", "2"),
+        ("6e-4", "1"),
+        ("6e-4", "2"),
+    ]
+    .iter()
+    .enumerate()
     {
         if row % 3 == 1 {
-            let alone = vary(&[&format!("pulse.energy_j={energy}"), &format!("estimator.radius_m={radius}")]);
+            let alone = vary(&[
+                &format!("pulse.energy_j={energy}"),
+                &format!("estimator.radius_m={radius}"),
+            ]);
             let (_, _, one) = ran(&(SMALL.to_owned() + turbulent), &alone);
             assert_eq!(one.rows[0][1..], table.rows[row][1..]);
         }
@@ -240,7 +329,9 @@ fn seeds_share_an_efficiency_where_no_screens_are_drawn() {
 fn maps_of_scenes_together_are_those_of_each_alone() {
     let scene = |text: &str| SceneFile::parse(text, Path::new("s.toml")).unwrap();
     let other = format!("seed = 2\n{SMALL}[estimator]\nradius_m = 1.0\n");
-    let windy = format!("added_flows = [{{ kind = \"uniform\", lateral_m_s = 3.0, vertical_m_s = 0.0 }}]\n{SMALL}");
+    let windy = format!(
+        "added_flows = [{{ kind = \"uniform\", lateral_m_s = 3.0, vertical_m_s = 0.0 }}]\n{SMALL}"
+    );
     let narrow = format!("{SMALL}[estimator]\nradius_m = 1.0\n");
     // Other gates, and other gates where pulses have airs of their own.
     let few = format!("{SMALL}[estimator]\nwindow_samples = 32\ngate_step_samples = 9\n");
@@ -254,7 +345,8 @@ fn maps_of_scenes_together_are_those_of_each_alone() {
         let alone = crate::run(&alone, &crate::Silent).unwrap().map.unwrap();
         let bits = |of: &crate::measure::map::VelocityEstimates| {
             let spread_m_s = of.v_spread_m_s.clone().unwrap_or_default();
-            [&of.v_scan_m_s, &of.rms_m_s, &of.snr_db, &spread_m_s].map(|values| values.mapv(f64::to_bits))
+            [&of.v_scan_m_s, &of.rms_m_s, &of.snr_db, &spread_m_s]
+                .map(|values| values.mapv(f64::to_bits))
         };
         assert_eq!(bits(&alone), bits(map));
     }
@@ -263,15 +355,26 @@ fn maps_of_scenes_together_are_those_of_each_alone() {
 #[test]
 fn results_are_those_of_the_map_of_the_case() {
     let (_, _, table) = ran(SMALL, &vary(&["pulse.energy_j=150e-6"]));
-    let plan = crate::plan::Plan::new(SceneFile::parse(SMALL, Path::new("s.toml")).unwrap(), crate::plan::Target::Map)
-        .unwrap();
+    let plan = crate::plan::Plan::new(
+        SceneFile::parse(SMALL, Path::new("s.toml")).unwrap(),
+        crate::plan::Target::Map,
+    )
+    .unwrap();
     let result = crate::run::run(&plan, &crate::Silent).unwrap();
     let of = |name: &str| table.number(0, table.column(name).unwrap());
     assert_eq!(of("snr_db"), result.middle.as_ref().unwrap().snr_db);
     // What both call a standard deviation, a root mean square error, is one number.
     for (line, column) in [("std_mean_m_s", "std_m_s"), ("rms_mean_m_s", "rms_m_s")] {
-        let (_, _, told) = result.summary().into_iter().find(|(key, ..)| *key == line).unwrap();
-        assert!((told - of(column)).abs() < 1e-12, "{line} {told}, {column} {}", of(column));
+        let (_, _, told) = result
+            .summary()
+            .into_iter()
+            .find(|(key, ..)| *key == line)
+            .unwrap();
+        assert!(
+            (told - of(column)).abs() < 1e-12,
+            "{line} {told}, {column} {}",
+            of(column)
+        );
     }
     let map = result.map.unwrap();
     let mean = |field: &ndarray::Array2<f64>| field.sum() / field.len() as f64;
@@ -284,7 +387,9 @@ fn results_are_those_of_the_map_of_the_case() {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
     // Each result has a value or a reason: nothing is inside of the vortices here but the nearest cells.
-    assert!(of("bound_m_s") > 0.0 && of("rms_standard_error_m_s") > 0.0 && of("bad_fraction") >= 0.0);
+    assert!(
+        of("bound_m_s") > 0.0 && of("rms_standard_error_m_s") > 0.0 && of("bad_fraction") >= 0.0
+    );
     assert!((of("resolution_m") - 33.879).abs() < 1e-3);
 }
 
@@ -292,9 +397,16 @@ fn results_are_those_of_the_map_of_the_case() {
 fn seeds_are_shared_unless_each_case_is_to_have_its_own() {
     let same = sweep("seed = 7\n", &vary(&["pulse.energy_j=50e-6,150e-6"])).unwrap();
     assert!(same.cases.iter().all(|case| case.scene.content.seed == 7));
-    let own = Request { independent: true, ..vary(&["pulse.energy_j=50e-6,150e-6"]) };
+    let own = Request {
+        independent: true,
+        ..vary(&["pulse.energy_j=50e-6,150e-6"])
+    };
     let own = sweep("seed = 7\n", &own).unwrap();
-    let seeds: Vec<u64> = own.cases.iter().map(|case| case.scene.content.seed).collect();
+    let seeds: Vec<u64> = own
+        .cases
+        .iter()
+        .map(|case| case.scene.content.seed)
+        .collect();
     assert!(seeds[0] != seeds[1] && !seeds.contains(&7), "{seeds:?}");
     assert_eq!(own.keys().collect::<Vec<_>>(), ["pulse.energy_j", "seed"]);
     assert_eq!(own.cases[0].values[1], seeds[0].to_string());
@@ -303,34 +415,76 @@ fn seeds_are_shared_unless_each_case_is_to_have_its_own() {
 #[test]
 fn words_that_cannot_be_followed_say_what_is_allowed() {
     for (request, wanted) in [
-        (vary(&["pulse.enrgy_j=1"]), "--vary: pulse.enrgy_j = 1 is not allowed: there is no such key; did you mean"),
+        (
+            vary(&["pulse.enrgy_j=1"]),
+            "--vary: pulse.enrgy_j = 1 is not allowed: there is no such key; did you mean",
+        ),
         (vary(&["pulse.energy_j="]), "at least one value is needed"),
         (vary(&["pulse.energy_j"]), "KEY=VALUES, e.g."),
         (vary(&["pulse.energy_j=1e-6,,2e-6"]), "a number, e.g."),
         (vary(&["pulse.energy_j=log:0:1:3"]), "log: above 0"),
-        (vary(&["pulse.energy_j=lin:1e-6:1e-3:1"]), "a count from 2 to 10000"),
-        (vary(&["pulse.energy_j=lin:1e-6:1e-3:1000000000"]), "a count from 2 to 10000"),
         (
-            vary(&["pulse.energy_j=lin:1e-6:1e-3:1000", "seed=lin:1:1e6:1000", "estimator.radius_m=lin:1:2:1000"]),
+            vary(&["pulse.energy_j=lin:1e-6:1e-3:1"]),
+            "a count from 2 to 10000",
+        ),
+        (
+            vary(&["pulse.energy_j=lin:1e-6:1e-3:1000000000"]),
+            "a count from 2 to 10000",
+        ),
+        (
+            vary(&[
+                "pulse.energy_j=lin:1e-6:1e-3:1000",
+                "seed=lin:1:1e6:1000",
+                "estimator.radius_m=lin:1:2:1000",
+            ]),
             "number of cases = 1000000000.0 is not allowed: a sweep has 1 to 10000 cases",
         ),
         (vary(&["outputs.csv=true,false"]), "changes no result"),
-        (vary(&["pulse.energy_j=1e-6", "pulse.energy_j=2e-6"]), "each key varies once"),
+        (
+            vary(&["pulse.energy_j=1e-6", "pulse.energy_j=2e-6"]),
+            "each key varies once",
+        ),
         (vary(&["scan.pulses_per_line=lin:1:2:3"]), "a whole number"),
         (
-            Request { lets: vec!["pulse.energy_j = 1e-6/flow.cross_wind_m_s".into()], ..vary(&["seed=1,2"]) },
+            Request {
+                lets: vec!["pulse.energy_j = 1e-6/flow.cross_wind_m_s".into()],
+                ..vary(&["seed=1,2"])
+            },
             "divides by zero",
         ),
-        (Request { lets: vec!["pulse.energy_j = 1/colour".into()], ..vary(&["seed=1,2"]) }, "colour"),
-        (Request { conditions: vec!["seed > 2".into()], ..vary(&["seed=1,2"]) }, "none of the 2 cases is left"),
-        (Request { independent: true, ..vary(&["seed=1,2"]) }, "leave one of the two out"),
-        (vary(&["pulse.energy_j=150e-6,-1,-2"]), "case 1 of the sweep (pulse.energy_j = -1.0): "),
+        (
+            Request {
+                lets: vec!["pulse.energy_j = 1/colour".into()],
+                ..vary(&["seed=1,2"])
+            },
+            "colour",
+        ),
+        (
+            Request {
+                conditions: vec!["seed > 2".into()],
+                ..vary(&["seed=1,2"])
+            },
+            "none of the 2 cases is left",
+        ),
+        (
+            Request {
+                independent: true,
+                ..vary(&["seed=1,2"])
+            },
+            "leave one of the two out",
+        ),
+        (
+            vary(&["pulse.energy_j=150e-6,-1,-2"]),
+            "case 1 of the sweep (pulse.energy_j = -1.0): ",
+        ),
     ] {
         let message = sweep("", &request).unwrap_err().to_string();
         assert!(message.contains(wanted), "{message}");
     }
     // The scene itself is blamed with its line.
-    let message = sweep("seed = 1\ncolour = 2\n", &vary(&["seed=1,2"])).unwrap_err().to_string();
+    let message = sweep("seed = 1\ncolour = 2\n", &vary(&["seed=1,2"]))
+        .unwrap_err()
+        .to_string();
     assert!(message.contains("s.toml:2: colour"), "{message}");
 }
 
@@ -338,18 +492,49 @@ fn words_that_cannot_be_followed_say_what_is_allowed() {
 fn conditions_and_lists_choose_the_cases() {
     let request = Request {
         conditions: vec!["pulse.energy_j*laser.pulse_repetition_hz <= 0.05".into()],
-        ..vary(&["pulse.energy_j=50e-6,150e-6", "laser.pulse_repetition_hz=100,400,1000"])
+        ..vary(&[
+            "pulse.energy_j=50e-6,150e-6",
+            "laser.pulse_repetition_hz=100,400,1000",
+        ])
     };
-    let values: Vec<Vec<String>> = sweep("", &request).unwrap().cases.into_iter().map(|case| case.values).collect();
-    assert_eq!(values, [["5e-5", "100.0"], ["5e-5", "400.0"], ["5e-5", "1000.0"], ["0.00015", "100.0"]]);
+    let values: Vec<Vec<String>> = sweep("", &request)
+        .unwrap()
+        .cases
+        .into_iter()
+        .map(|case| case.values)
+        .collect();
+    assert_eq!(
+        values,
+        [
+            ["5e-5", "100.0"],
+            ["5e-5", "400.0"],
+            ["5e-5", "1000.0"],
+            ["0.00015", "100.0"]
+        ]
+    );
     let temp = tempfile::tempdir().unwrap();
     let list = temp.path().join("cases.csv");
-    std::fs::write(&list, "# mine\nestimator.method.kind,estimator.radius_m\ncapon,1\nlag_window,2\n").unwrap();
-    let request = Request { list: Some(list.clone()), ..vary(&["scan.pulses_per_line=1,2"]) };
-    let values: Vec<Vec<String>> = sweep("", &request).unwrap().cases.into_iter().map(|case| case.values).collect();
+    std::fs::write(
+        &list,
+        "# mine\nestimator.method.kind,estimator.radius_m\ncapon,1\nlag_window,2\n",
+    )
+    .unwrap();
+    let request = Request {
+        list: Some(list.clone()),
+        ..vary(&["scan.pulses_per_line=1,2"])
+    };
+    let values: Vec<Vec<String>> = sweep("", &request)
+        .unwrap()
+        .cases
+        .into_iter()
+        .map(|case| case.values)
+        .collect();
     assert_eq!(values[1], ["capon", "1.0", "2"]);
     assert_eq!(values[2], ["lag_window", "2.0", "1"]);
     std::fs::write(&list, "estimator.method.kind\ncarpon\n").unwrap();
     let message = sweep("", &request).unwrap_err().to_string();
-    assert!(message.contains("cases.csv: estimator.method.kind = carpon") && message.contains("capon"), "{message}");
+    assert!(
+        message.contains("cases.csv: estimator.method.kind = carpon") && message.contains("capon"),
+        "{message}"
+    );
 }

@@ -22,12 +22,19 @@ pub fn merge(
     out: &Path,
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
-    let refuse = |reason: String| Error::Input { path: "--merge".into(), reason };
+    let refuse = |reason: String| Error::Input {
+        path: "--merge".into(),
+        reason,
+    };
     let mut first: Option<(Definition, String)> = None;
     for folder in folders {
         let found = Definition::read(folder)?;
-        let asked =
-            sweep.map(|sweep| (Definition::of(sweep, found.circulation), "the sweep that was asked for".into()));
+        let asked = sweep.map(|sweep| {
+            (
+                Definition::of(sweep, found.circulation),
+                "the sweep that was asked for".into(),
+            )
+        });
         for (other, of) in first.iter().chain(&asked) {
             if !other.is_same(&found) {
                 let reason = format!(
@@ -35,7 +42,10 @@ pub fn merge(
                      without --no-circulation, fit together",
                     found.sweep_hash, found.source, other.sweep_hash, other.source
                 );
-                return Err(Error::Input { path: folder.join(SWEEP), reason });
+                return Err(Error::Input {
+                    path: folder.join(SWEEP),
+                    reason,
+                });
             }
         }
         first = first.or(Some((found, folder.display().to_string())));
@@ -45,7 +55,10 @@ pub fn merge(
     };
     let (mut rows, mut missing) = (Vec::new(), Vec::new());
     for case in 0..definition.scene_hashes.len() {
-        match folders.iter().find_map(|folder| definition.stored(folder, case)) {
+        match folders
+            .iter()
+            .find_map(|folder| definition.stored(folder, case))
+        {
             Some(row) => rows.push(row),
             None => missing.push(case.to_string()),
         }
@@ -71,11 +84,17 @@ pub(super) fn write(
     existing: Existing,
 ) -> Result<Vec<PathBuf>, Error> {
     let of = (Formats::default(), definition.origin());
-    Outputs::write(out, existing, of, |files| list(definition, Some(rows), files))
+    Outputs::write(out, existing, of, |files| {
+        list(definition, Some(rows), files)
+    })
 }
 
 /// The files of all cases, whose rows are not there before they are run.
-pub(super) fn list(definition: &Definition, rows: Option<&[Row]>, files: &mut Outputs) -> Result<(), Error> {
+pub(super) fn list(
+    definition: &Definition,
+    rows: Option<&[Row]>,
+    files: &mut Outputs,
+) -> Result<(), Error> {
     files.table("results", rows, |rows| Ok(table(definition, rows)))?;
     files.netcdf("results", rows, |rows, _| netcdf(definition, rows))?;
     #[cfg(feature = "plots")]
@@ -88,7 +107,9 @@ fn table(definition: &Definition, rows: &[Row]) -> Table {
     for VaryingKey { name, holds, .. } in &definition.keys {
         table = match holds {
             Holds::Numbers => table.float(name, rows.iter().map(|row| row.key(name))),
-            Holds::WholeNumbers | Holds::Texts => table.text(name, rows.iter().map(|row| row.text(name))),
+            Holds::WholeNumbers | Holds::Texts => {
+                table.text(name, rows.iter().map(|row| row.text(name)))
+            }
         };
     }
     table = table.text("scene_hash", rows.iter().map(|row| row.scene_hash.clone()));
@@ -104,19 +125,44 @@ const EXACT_BELOW: f64 = 9_007_199_254_740_992.0;
 fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
     use crate::io::netcdf::{Data, Layout, Variable};
     use crate::keys::unit_of;
-    let texts = definition.keys.iter().flat_map(|key| rows.iter().map(|row| row.text(&key.name).len()));
-    let width = texts.chain(rows.iter().map(|row| row.scene_hash.len())).chain([1]).max().unwrap_or(1);
+    let texts = definition
+        .keys
+        .iter()
+        .flat_map(|key| rows.iter().map(|row| row.text(&key.name).len()));
+    let width = texts
+        .chain(rows.iter().map(|row| row.scene_hash.len()))
+        .chain([1])
+        .max()
+        .unwrap_or(1);
     // What is not used is NUL: blanks stay in the words of readers.
     let words = |name: &str, of: &dyn Fn(&Row) -> &str| {
-        let padded = |row: &Row| of(row).bytes().chain(std::iter::repeat(0)).take(width).collect::<Vec<u8>>();
-        Variable::new(name, &["case", "string_length"], Data::text(rows.iter().flat_map(padded).collect::<Vec<u8>>()))
+        let padded = |row: &Row| {
+            of(row)
+                .bytes()
+                .chain(std::iter::repeat(0))
+                .take(width)
+                .collect::<Vec<u8>>()
+        };
+        Variable::new(
+            name,
+            &["case", "string_length"],
+            Data::text(rows.iter().flat_map(padded).collect::<Vec<u8>>()),
+        )
     };
-    let numbers = |name: &str, of: &dyn Fn(&Row) -> f64| Variable::new(name, &["case"], Data::f64(rows.iter().map(of)));
-    let case = rows.iter().map(|row| i32::try_from(row.case).unwrap_or(i32::MAX));
-    let mut variables = vec![Variable::new("case", &["case"], Data::i32(case)).text("long_name", "number of the case")];
+    let numbers = |name: &str, of: &dyn Fn(&Row) -> f64| {
+        Variable::new(name, &["case"], Data::f64(rows.iter().map(of)))
+    };
+    let case = rows
+        .iter()
+        .map(|row| i32::try_from(row.case).unwrap_or(i32::MAX));
+    let mut variables = vec![
+        Variable::new("case", &["case"], Data::i32(case)).text("long_name", "number of the case"),
+    ];
     for VaryingKey { name, holds, .. } in &definition.keys {
         // Whole numbers that a double would round, such as drawn seeds, are words.
-        let is_round = rows.iter().all(|row| row.key(name).abs() < EXACT_BELOW || *holds == Holds::Numbers);
+        let is_round = rows
+            .iter()
+            .all(|row| row.key(name).abs() < EXACT_BELOW || *holds == Holds::Numbers);
         let variable = if is_round && *holds != Holds::Texts {
             numbers(name, &|row| row.key(name)).text("units", unit_of(name).unwrap_or("1"))
         } else {
@@ -124,9 +170,13 @@ fn netcdf(definition: &Definition, rows: &[Row]) -> Result<Vec<u8>, Error> {
         };
         variables.push(variable.text("long_name", &format!("key {name} of the scene")));
     }
-    variables.push(words("scene_hash", &|row| &row.scene_hash).text("long_name", "hash of the scene of the case"));
+    variables.push(
+        words("scene_hash", &|row| &row.scene_hash)
+            .text("long_name", "hash of the scene of the case"),
+    );
     for (name, unit, meaning) in results() {
-        let variable = numbers(name, &|row| row.result(name)).attr("_FillValue", Data::f64([f64::NAN]));
+        let variable =
+            numbers(name, &|row| row.result(name)).attr("_FillValue", Data::f64([f64::NAN]));
         variables.push(variable.text("units", unit).text("long_name", meaning));
     }
     let dims = vec![("case", rows.len()), ("string_length", width)];

@@ -15,7 +15,13 @@ use wakescope_optics::EfficiencyProfile;
 pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     let e = &profile.efficiency;
     let range = || Axis::linear("range [m]");
-    let points = |y: &[f64]| e.range_m.iter().copied().zip(y.iter().copied()).collect::<Vec<_>>();
+    let points = |y: &[f64]| {
+        e.range_m
+            .iter()
+            .copied()
+            .zip(y.iter().copied())
+            .collect::<Vec<_>>()
+    };
     let curve = |label: &str, style: Style, profile: &EfficiencyProfile| {
         let series = Series::new(label, style, points(&profile.mean));
         match has_error(profile) {
@@ -30,7 +36,10 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
     let styles = [Style::Line, Style::Dash, Style::DashDot, Style::Dot];
     for ((name, other), style) in profile.others.iter().zip(styles) {
         // The column of a model in words.
-        let label = name.replace("efficiency_", "").replace('_', " ").replace("monte carlo", "Monte Carlo");
+        let label = name
+            .replace("efficiency_", "")
+            .replace('_', " ")
+            .replace("monte carlo", "Monte Carlo");
         efficiency = efficiency.with(curve(&label, style, other));
     }
     let mut snr = Series::new("", Style::Line, points(&profile.snr_db));
@@ -39,8 +48,14 @@ pub(super) fn profile(plan: &Plan, profile: &RangeProfile) -> Figure {
         snr.band = Some(snr_band_db(profile));
     }
     let snr = CurvePlot::new("Signal-to-noise ratio", range(), Axis::linear("SNR [dB]")).with(snr);
-    let figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot { shape: 0.75, ..plot }));
-    Figure { width: 1120.0, ..figure }
+    let figure = Figure::side_by_side([snr, efficiency].map(|plot| CurvePlot {
+        shape: 0.75,
+        ..plot
+    }));
+    Figure {
+        width: 1120.0,
+        ..figure
+    }
 }
 
 fn has_error(profile: &EfficiencyProfile) -> bool {
@@ -62,17 +77,29 @@ fn snr_band_db(profile: &RangeProfile) -> Vec<(f64, f64)> {
 ///
 /// Sweeps of elevation are seen from the side, those of azimuth from above, the middle one of several; beams of few directions
 /// are curves over range. A VAD has its sine curve beside it.
-pub(super) fn map(plan: &Plan, map: &VelocityMap, winds: Option<&[BeamWind]>) -> Result<Figure, Error> {
+pub(super) fn map(
+    plan: &Plan,
+    map: &VelocityMap,
+    winds: Option<&[BeamWind]>,
+) -> Result<Figure, Error> {
     let centres_m = centres_m(plan);
-    let sweep = if plan.geometry.schedule.is_plane() { 0 } else { map.sweeps.len() / 2 };
-    if let Some(SweepMode::VerticalPointing | SweepMode::Pointing) = map.sweeps.get(sweep).map(|sweep| sweep.mode) {
+    let sweep = if plan.geometry.schedule.is_plane() {
+        0
+    } else {
+        map.sweeps.len() / 2
+    };
+    if let Some(SweepMode::VerticalPointing | SweepMode::Pointing) =
+        map.sweeps.get(sweep).map(|sweep| sweep.mode)
+    {
         return Ok(lines(plan, map));
     }
     if let Some(winds) = winds {
         return Ok(azimuth_display(plan, map, winds));
     }
     let panel = |field: &str, title: &str| -> Result<MapPlot, Error> {
-        let mut plot = MapPlot::new(map, sweep, field)?.titled(title).labelled("m/s");
+        let mut plot = MapPlot::new(map, sweep, field)?
+            .titled(title)
+            .labelled("m/s");
         if !plot.from_above {
             plot.points_m.clone_from(&centres_m);
         }
@@ -85,18 +112,31 @@ pub(super) fn map(plan: &Plan, map: &VelocityMap, winds: Option<&[BeamWind]>) ->
     let panels = if realisations == 1 {
         vec![exact, scan, panel("bias", "its error")?]
     } else {
-        let mean = panel("radial_velocity", &format!("mean of {realisations} realisations"))?.coloured(colours);
+        let mean = panel(
+            "radial_velocity",
+            &format!("mean of {realisations} realisations"),
+        )?
+        .coloured(colours);
         vec![
             exact,
             scan,
             mean,
             panel("bias", "mean error (bias)")?,
-            panel("velocity_standard_deviation", "standard deviation of one scan")?,
+            panel(
+                "velocity_standard_deviation",
+                "standard deviation of one scan",
+            )?,
             panel("rms", "root mean square error")?,
         ]
     };
-    let has_gaps = panels.iter().any(|plot| plot.cells.values.iter().any(|v| v.is_nan()));
-    Ok(Figure { columns: 3, width: 1560.0, ..Figure::stacked(panels).titled(&title(plan, has_gaps)) })
+    let has_gaps = panels
+        .iter()
+        .any(|plot| plot.cells.values.iter().any(|v| v.is_nan()));
+    Ok(Figure {
+        columns: 3,
+        width: 1560.0,
+        ..Figure::stacked(panels).titled(&title(plan, has_gaps))
+    })
 }
 
 /// The first scan of recorded signals: velocity, its predicted error, signal-to-noise ratio.
@@ -105,24 +145,49 @@ pub(super) fn measured(map: &VelocityMap) -> Result<Figure, Error> {
         Ok(MapPlot::new(map, 0, field)?.titled(title).labelled(unit))
     };
     let panels = vec![
-        panel("radial_velocity", "radial velocity, positive away from the lidar", "m/s")?,
-        panel("velocity_standard_deviation", "predicted standard deviation", "m/s")?,
+        panel(
+            "radial_velocity",
+            "radial velocity, positive away from the lidar",
+            "m/s",
+        )?,
+        panel(
+            "velocity_standard_deviation",
+            "predicted standard deviation",
+            "m/s",
+        )?,
         panel("signal_to_noise_ratio", "signal-to-noise ratio", "dB")?,
     ];
     let figure = Figure::stacked(panels).titled("One scan of recorded signals; grey: no value");
-    Ok(Figure { columns: 3, width: 1560.0, ..figure })
+    Ok(Figure {
+        columns: 3,
+        width: 1560.0,
+        ..figure
+    })
 }
 
 /// Curves of the first lines over range: the air, and the mean estimates.
 fn lines(plan: &Plan, map: &VelocityMap) -> Figure {
-    let mut plot = CurvePlot::new("", Axis::linear("range [m]"), Axis::linear("radial velocity [m/s]"));
+    let mut plot = CurvePlot::new(
+        "",
+        Axis::linear("range [m]"),
+        Axis::linear("radial velocity [m/s]"),
+    );
     for line in 0..map.rays.len().min(5) {
         let ray = &map.rays[line];
         let (azimuth, elevation) = (ray.azimuth_rad.to_degrees(), ray.elevation_rad.to_degrees());
-        for (field, style, what) in [("v_pulse", Style::Line, "air"), ("radial_velocity", Style::Markers, "estimate")] {
-            let Some(field) = map.field(field) else { continue };
-            let points: Vec<(f64, f64)> =
-                map.range_m.iter().enumerate().map(|(gate, range_m)| (*range_m, field.values[[line, gate]])).collect();
+        for (field, style, what) in [
+            ("v_pulse", Style::Line, "air"),
+            ("radial_velocity", Style::Markers, "estimate"),
+        ] {
+            let Some(field) = map.field(field) else {
+                continue;
+            };
+            let points: Vec<(f64, f64)> = map
+                .range_m
+                .iter()
+                .enumerate()
+                .map(|(gate, range_m)| (*range_m, field.values[[line, gate]]))
+                .collect();
             let label = format!("{what}, azimuth {azimuth:.0}°, elevation {elevation:.0}°");
             plot = plot.with(Series::new(&label, style, points).in_colour(line));
         }
@@ -135,18 +200,36 @@ fn azimuth_display(plan: &Plan, map: &VelocityMap, winds: &[BeamWind]) -> Figure
     let gate = map.range_m.len() / 2;
     let x = Axis::linear("azimuth [degrees]");
     let mut plot = CurvePlot::new("", x, Axis::linear("radial velocity [m/s]"));
-    let rays: Vec<usize> = (0..map.rays.len()).filter(|ray| map.rays[*ray].sweep == 0).collect();
-    for (field, label) in [("v_pulse", "air, weighted with the pulse"), ("v_scan", "one scan, estimated")] {
-        let Some(field) = map.field(field) else { continue };
-        let points = rays.iter().map(|&ray| (map.rays[ray].azimuth_rad.to_degrees(), field.values[[ray, gate]]));
+    let rays: Vec<usize> = (0..map.rays.len())
+        .filter(|ray| map.rays[*ray].sweep == 0)
+        .collect();
+    for (field, label) in [
+        ("v_pulse", "air, weighted with the pulse"),
+        ("v_scan", "one scan, estimated"),
+    ] {
+        let Some(field) = map.field(field) else {
+            continue;
+        };
+        let points = rays.iter().map(|&ray| {
+            (
+                map.rays[ray].azimuth_rad.to_degrees(),
+                field.values[[ray, gate]],
+            )
+        });
         plot = plot.with(Series::new(label, Style::Markers, points));
     }
     if let (Some(wind), Some(&ray)) = (winds.get(gate), rays.first()) {
         let (zero_rad, from_x_rad) = plan.geometry.schedule.mount.reference_rad;
         let curve = (0..=180).map(|i| {
             let azimuth_rad = f64::from(2 * i).to_radians();
-            let direction = Direction::new((azimuth_rad - zero_rad) + from_x_rad, map.rays[ray].elevation_rad);
-            (f64::from(2 * i), direction.radial_velocity_m_s(wind.wind_m_s, [0.0; 3]))
+            let direction = Direction::new(
+                (azimuth_rad - zero_rad) + from_x_rad,
+                map.rays[ray].elevation_rad,
+            );
+            (
+                f64::from(2 * i),
+                direction.radial_velocity_m_s(wind.wind_m_s, [0.0; 3]),
+            )
         });
         plot = plot.with(Series::new("its sine curve", Style::Line, curve));
     }
@@ -170,11 +253,17 @@ pub(super) fn scan(plan: &Plan) -> Figure {
     };
     let (x_m, y_m) = (spread_m(0, 0.2 * ends[1]), spread_m(1, 0.0));
     let panel = |title: &str, label: &str, up: usize| {
-        let mut plot = CurvePlot::new(title, Axis::linear("across the flight [m]"), Axis::linear(label));
+        let mut plot = CurvePlot::new(
+            title,
+            Axis::linear("across the flight [m]"),
+            Axis::linear(label),
+        );
         plot.equal_scales = true;
         for line in (0..lines).step_by(lines.div_ceil(DRAWN_LINES).max(1)) {
             let beam = g.schedule.middle(line);
-            let points = ends.map(|range_m| beam.at_range_m(range_m)).map(|p| (p[1], p[up]));
+            let points = ends
+                .map(|range_m| beam.at_range_m(range_m))
+                .map(|p| (p[1], p[up]));
             plot = plot.with(Series::new("", Style::Line, points).in_colour(0));
         }
         let vortices = centres_m(plan);
@@ -186,20 +275,33 @@ pub(super) fn scan(plan: &Plan) -> Figure {
             });
         }
         if up == 2 {
-            plot = plot.with(Series::new("ground", Style::Line, y_m.map(|y_m| (y_m, 0.0))).in_colour(3));
+            plot = plot
+                .with(Series::new("ground", Style::Line, y_m.map(|y_m| (y_m, 0.0))).in_colour(3));
         }
         plot.with(Series::new("lidar", Style::Markers, [(start_m[1], start_m[up])]).in_colour(2))
     };
-    let panels = [panel("from above", "along the flight [m]", 0), panel("from behind", "height [m]", 2)];
-    Figure { width: 1120.0, ..Figure::side_by_side(panels).titled(&plan.schedule().to_string()) }
+    let panels = [
+        panel("from above", "along the flight [m]", 0),
+        panel("from behind", "height [m]", 2),
+    ];
+    Figure {
+        width: 1120.0,
+        ..Figure::side_by_side(panels).titled(&plan.schedule().to_string())
+    }
 }
 
 /// What is shown, of which age and from how many realisations.
 fn title(plan: &Plan, has_gaps: bool) -> String {
     let mut words = vec!["Radial velocity [m/s], positive away from the lidar".to_owned()];
-    if matches!(plan.scene.content.flow, Flow::VortexPair(_) | Flow::Simulated(_)) {
+    if matches!(
+        plan.scene.content.flow,
+        Flow::VortexPair(_) | Flow::Simulated(_)
+    ) {
         let scan_s = plan.scan_end_s() - plan.wind.start_s;
-        words.push(format!("age τ = {:.2} at the start of the scan, which takes {scan_s:.2} s", plan.wind.tau));
+        words.push(format!(
+            "age τ = {:.2} at the start of the scan, which takes {scan_s:.2} s",
+            plan.wind.tau
+        ));
     }
     words.push(match plan.scene.content.scan.realisations {
         1 => "one realisation".into(),

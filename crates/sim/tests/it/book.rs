@@ -55,32 +55,69 @@ fn pages() -> Vec<(String, String)> {
     let crates = ["optics", "les", "signal", "estimate", "sim"];
     paths.extend(crates.map(|name| root().join("crates").join(name).join("README.md")));
     for folder in ["docs/src", "docs/src/theory"] {
-        let entries = std::fs::read_dir(root().join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        let entries = std::fs::read_dir(root().join(folder))
+            .unwrap()
+            .map(|entry| entry.unwrap().path());
         paths.extend(entries.filter(|path| path.extension().is_some_and(|end| end == "md")));
     }
     paths.sort();
-    paths.iter().map(|path| (path.display().to_string(), std::fs::read_to_string(path).unwrap())).collect()
+    paths
+        .iter()
+        .map(|path| {
+            (
+                path.display().to_string(),
+                std::fs::read_to_string(path).unwrap(),
+            )
+        })
+        .collect()
 }
 
 /// Blocks of a kind in a page.
 fn blocks<'t>(page: &'t str, kind: &str) -> Vec<&'t str> {
     let begin = format!("```{kind}\n");
-    page.split(begin.as_str()).skip(1).filter_map(|rest| rest.split_once("```")).map(|(block, _)| block).collect()
+    page.split(begin.as_str())
+        .skip(1)
+        .filter_map(|rest| rest.split_once("```"))
+        .map(|(block, _)| block)
+        .collect()
 }
 
 /// Words between single backticks outside of blocks.
 fn spans(page: &str) -> Vec<&str> {
     let prose = page.split("```").step_by(2);
-    prose.flat_map(|part| part.split('`').skip(1).step_by(2)).collect()
+    prose
+        .flat_map(|part| part.split('`').skip(1).step_by(2))
+        .collect()
 }
 
 /// Lines of the program in a page: all its blocks, without comments and redirections, 1 for what the shell knows.
 fn command_lines(page: &str) -> Vec<Vec<String>> {
     let lines = page.split("```").skip(1).step_by(2).flat_map(str::lines);
     let commands = lines.filter(|line| line.starts_with("wakescope ") && !line.contains('['));
-    let number = |part: &str| if part.starts_with('$') { "1".to_owned() } else { part.to_owned() };
-    let word = |word: &str| word.split('/').map(number).collect::<Vec<String>>().join("/");
-    commands.map(|line| line.split(['#', '>']).next().unwrap().split_whitespace().skip(1).map(word).collect()).collect()
+    let number = |part: &str| {
+        if part.starts_with('$') {
+            "1".to_owned()
+        } else {
+            part.to_owned()
+        }
+    };
+    let word = |word: &str| {
+        word.split('/')
+            .map(number)
+            .collect::<Vec<String>>()
+            .join("/")
+    };
+    commands
+        .map(|line| {
+            line.split(['#', '>'])
+                .next()
+                .unwrap()
+                .split_whitespace()
+                .skip(1)
+                .map(word)
+                .collect()
+        })
+        .collect()
 }
 
 #[test]
@@ -89,16 +126,27 @@ fn commands_of_the_tutorials_run() {
         let page = std::fs::read_to_string(root().join("docs/src").join(name)).unwrap();
         let temp = tempfile::tempdir().unwrap();
         for block in blocks(&page, "toml") {
-            let file = block.lines().next().and_then(|line| line.strip_prefix("# ")).unwrap();
+            let file = block
+                .lines()
+                .next()
+                .and_then(|line| line.strip_prefix("# "))
+                .unwrap();
             std::fs::write(temp.path().join(file), block).unwrap();
         }
-        let commands: Vec<&str> = blocks(&page, "sh").iter().flat_map(|block| block.lines()).collect();
+        let commands: Vec<&str> = blocks(&page, "sh")
+            .iter()
+            .flat_map(|block| block.lines())
+            .collect();
         assert!(commands.len() >= 4, "{name}: {commands:?}");
         for command in commands {
             let words: Vec<&str> = command.split_whitespace().collect();
             assert_eq!(words[0], "wakescope", "{name}: {command}");
             let out = wakescope(temp.path(), &[&words[1..], &["--quiet"]].concat());
-            assert!(out.status.success(), "{name}: {command}: {}", String::from_utf8_lossy(&out.stderr));
+            assert!(
+                out.status.success(),
+                "{name}: {command}: {}",
+                String::from_utf8_lossy(&out.stderr)
+            );
         }
     }
 }
@@ -112,12 +160,19 @@ fn lines_of_the_program_that_pages_show_are_understood() {
         for line in command_lines(&page.replace("\\\n", " ")) {
             let words: Vec<&str> = line.iter().map(String::as_str).chain(["--help"]).collect();
             let out = wakescope(temp.path(), &words);
-            assert!(out.status.success(), "{name}: {line:?}: {}", String::from_utf8_lossy(&out.stderr));
+            assert!(
+                out.status.success(),
+                "{name}: {line:?}: {}",
+                String::from_utf8_lossy(&out.stderr)
+            );
             count += 1;
         }
     }
     assert!(count > 25, "{count}");
-    let wrong = wakescope(temp.path(), &["retrieve", "map.nc", "--no-such-option", "--help"]);
+    let wrong = wakescope(
+        temp.path(),
+        &["retrieve", "map.nc", "--no-such-option", "--help"],
+    );
     assert!(!wrong.status.success());
 }
 
@@ -135,9 +190,12 @@ fn scenes_and_cases_that_pages_show_are_good() {
             };
             let out = wakescope(temp.path(), words);
             let told = String::from_utf8_lossy(&out.stderr);
-            let is_file_missing =
-                told.contains("neither a file nor the beginning of files") && block.contains("planes = ");
-            assert!(out.status.success() || is_file_missing, "{name}: {block}\n{told}");
+            let is_file_missing = told.contains("neither a file nor the beginning of files")
+                && block.contains("planes = ");
+            assert!(
+                out.status.success() || is_file_missing,
+                "{name}: {block}\n{told}"
+            );
             count += 1;
         }
     }
@@ -166,7 +224,10 @@ fn options_that_pages_name_exist() {
         "flow",
         "wake",
     ];
-    let mut known: String = commands.iter().map(|command| help(&[command, "--help"])).collect();
+    let mut known: String = commands
+        .iter()
+        .map(|command| help(&[command, "--help"]))
+        .collect();
     let mut folders = vec![root().join("xtask/src")];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
@@ -183,8 +244,14 @@ fn options_that_pages_name_exist() {
     let mut missing = Vec::new();
     for (name, page) in pages() {
         for span in spans(&page) {
-            for word in span.split(is_end).filter(|word| word.len() > 3 && word.starts_with("--")) {
-                if !known.contains(word) && !known.contains(&word[2..]) && !OF_OTHERS.contains(&word) {
+            for word in span
+                .split(is_end)
+                .filter(|word| word.len() > 3 && word.starts_with("--"))
+            {
+                if !known.contains(word)
+                    && !known.contains(&word[2..])
+                    && !OF_OTHERS.contains(&word)
+                {
                     missing.push(format!("{name}: {word}"));
                 }
             }
@@ -199,11 +266,26 @@ fn keys_that_pages_name_exist() {
     let is_key = |span: &&str| {
         let parts: Vec<&str> = span.split('.').collect();
         let is_name = |part: &&str| {
-            !part.is_empty() && part.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
+            !part.is_empty()
+                && part
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_')
         };
         parts.len() > 1 && SECTIONS.contains(&parts[0]) && parts.iter().all(is_name)
     };
-    let files = ["csv", "nc", "toml", "json", "svg", "png", "md", "rs", "hpl", "checkpoint", "previous"];
+    let files = [
+        "csv",
+        "nc",
+        "toml",
+        "json",
+        "svg",
+        "png",
+        "md",
+        "rs",
+        "hpl",
+        "checkpoint",
+        "previous",
+    ];
     let mut keys: BTreeSet<(String, String)> = BTreeSet::new();
     for (name, page) in pages() {
         let named = spans(&page)

@@ -28,8 +28,10 @@ profile_points = 5
 "#;
 
 pub(super) fn names(folder: &Path) -> Vec<String> {
-    let mut names: Vec<String> =
-        std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    let mut names: Vec<String> = std::fs::read_dir(folder)
+        .unwrap()
+        .map(|e| e.unwrap().file_name().into_string().unwrap())
+        .collect();
     names.sort();
     names
 }
@@ -39,7 +41,12 @@ fn refused(scene: &str, words: &[&str]) -> String {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), scene).unwrap();
     let out = wakescope(temp.path(), words);
-    assert_eq!(out.status.code(), Some(2), "{}", String::from_utf8_lossy(&out.stderr));
+    assert_eq!(
+        out.status.code(),
+        Some(2),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     assert_eq!(names(temp.path()), ["s.toml"], "nothing may be left behind");
     assert!(out.stdout.is_empty());
     String::from_utf8(out.stderr).unwrap()
@@ -52,15 +59,40 @@ fn wrong_scenes_are_refused_with_key_value_range_and_line() {
     for (scene, wanted) in [
         (
             "[laser]\ncolour = 1.0\n",
-            ["s.toml:2", "laser.colour = 1.0 is not allowed: there is no such key", "wavelength_m"],
+            [
+                "s.toml:2",
+                "laser.colour = 1.0 is not allowed: there is no such key",
+                "wavelength_m",
+            ],
         ),
         (
             "[telescope]\naperture_radius_m = -0.05\n",
-            ["s.toml:2", "telescope.aperture_radius_m = -0.05", "from 0.0001 to 10.0 m"],
+            [
+                "s.toml:2",
+                "telescope.aperture_radius_m = -0.05",
+                "from 0.0001 to 10.0 m",
+            ],
         ),
-        ("[pulse.shape]\nduration_s = nan\n", ["s.toml:2", "pulse.shape.duration_s = nan", "1e-9"]),
-        ("[scan]\nelevation_min_rad = -0.1\n", ["s.toml:2", "scan.elevation_min_rad = -0.1", "below the ground"]),
-        ("[scan]\nrange_max_m = 300.0\n", ["s.toml:2: scan.range_max_m = 300.0", "at least 317.774 m", "34 samples"]),
+        (
+            "[pulse.shape]\nduration_s = nan\n",
+            ["s.toml:2", "pulse.shape.duration_s = nan", "1e-9"],
+        ),
+        (
+            "[scan]\nelevation_min_rad = -0.1\n",
+            [
+                "s.toml:2",
+                "scan.elevation_min_rad = -0.1",
+                "below the ground",
+            ],
+        ),
+        (
+            "[scan]\nrange_max_m = 300.0\n",
+            [
+                "s.toml:2: scan.range_max_m = 300.0",
+                "at least 317.774 m",
+                "34 samples",
+            ],
+        ),
         (
             "[estimator]\nwindow_samples = 1000\npadded_samples = 2048\n",
             ["s.toml:2", "estimator.window_samples = 1000", "at most 401"],
@@ -93,9 +125,16 @@ fn a_folder_in_the_way_of_a_file_is_found_before_the_computing() {
         let out = wakescope(temp.path(), words);
         let message = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(2), "{message}");
-        assert!(message.contains("o/map.csv") && !message.contains("phase screens"), "{words:?}: {message}");
+        assert!(
+            message.contains("o/map.csv") && !message.contains("phase screens"),
+            "{words:?}: {message}"
+        );
     }
-    assert!(wakescope(temp.path(), &["check", "s.toml"]).status.success());
+    assert!(
+        wakescope(temp.path(), &["check", "s.toml"])
+            .status
+            .success()
+    );
     // Each file that a run writes is among those that are looked for.
     for (target, left_out) in [
         (Target::Efficiency, "none"),
@@ -107,13 +146,25 @@ fn a_folder_in_the_way_of_a_file_is_found_before_the_computing() {
         (Target::Run, "png"),
         (Target::Run, "flow"),
     ] {
-        let kinds = ["csv", "netcdf", "svg", "png", "flow"].map(|kind| format!("{kind} = {}\n", kind != left_out));
+        let kinds = ["csv", "netcdf", "svg", "png", "flow"]
+            .map(|kind| format!("{kind} = {}\n", kind != left_out));
         let scene = SMALL.replace("realisations = 3", "realisations = 1") + &kinds.concat();
-        let plan = Plan::new(SceneFile::parse(&scene, Path::new("s.toml")).unwrap(), target).unwrap();
+        let plan = Plan::new(
+            SceneFile::parse(&scene, Path::new("s.toml")).unwrap(),
+            target,
+        )
+        .unwrap();
         let result = wakescope_sim::run::run(&plan, &Silent).unwrap();
         let written = write::write(&plan, &result, &temp.path().join("w"), Existing::Own).unwrap();
-        let written: Vec<_> = written.iter().map(|p| p.file_name().unwrap().to_str().unwrap()).collect();
-        assert_eq!(write::names(&plan).unwrap(), written, "{target:?} without {left_out}");
+        let written: Vec<_> = written
+            .iter()
+            .map(|p| p.file_name().unwrap().to_str().unwrap())
+            .collect();
+        assert_eq!(
+            write::names(&plan).unwrap(),
+            written,
+            "{target:?} without {left_out}"
+        );
     }
 }
 
@@ -122,7 +173,12 @@ fn what_is_larger_than_the_machine_is_refused_unless_asked_for() {
     let scene = "[scan]\npulses_per_line = 1000000\nrealisations = 100000\n[outputs]\nsignals = true\nnetcdf = false\n";
     for words in [&["check", "s.toml"][..], &RUN] {
         let message = refused(scene, words);
-        for part in ["616.2 GB of memory", "are available", "outputs.signals = false", "--allow-large"] {
+        for part in [
+            "616.2 GB of memory",
+            "are available",
+            "outputs.signals = false",
+            "--allow-large",
+        ] {
             assert!(message.contains(part), "{part} is not in: {message}");
         }
     }
@@ -130,17 +186,25 @@ fn what_is_larger_than_the_machine_is_refused_unless_asked_for() {
     std::fs::write(temp.path().join("s.toml"), scene).unwrap();
     let out = wakescope(temp.path(), &["check", "s.toml", "--allow-large"]);
     let text = String::from_utf8(out.stdout).unwrap();
-    assert!(out.status.success() && text.contains(" years") && text.contains("616.2 GB"), "{text}");
+    assert!(
+        out.status.success() && text.contains(" years") && text.contains("616.2 GB"),
+        "{text}"
+    );
     let too_large_for_a_file = scene.replace("netcdf = false", "netcdf = true");
     let message = refused(&too_large_for_a_file, &["check", "s.toml", "--allow-large"]);
-    assert!(message.contains("outputs.signals") && message.contains("signals.nc"), "{message}");
+    assert!(
+        message.contains("outputs.signals") && message.contains("signals.nc"),
+        "{message}"
+    );
 }
 
 #[test]
 fn the_summary_speaks_of_the_middle_of_the_scan() {
     let temp = tempfile::tempdir().unwrap();
-    let scene = SMALL.replace("reference = \"fixed\"\nsnr_db = 10.0", "reference = \"physical\"")
-        + "profile_range_min_m = 340.0\nprofile_range_max_m = 420.0\nsvg = false\npng = false\n";
+    let scene = SMALL.replace(
+        "reference = \"fixed\"\nsnr_db = 10.0",
+        "reference = \"physical\"",
+    ) + "profile_range_min_m = 340.0\nprofile_range_max_m = 420.0\nsvg = false\npng = false\n";
     std::fs::write(temp.path().join("s.toml"), scene).unwrap();
     let mut found = Vec::new();
     for stage in ["run", "efficiency", "map"] {
@@ -150,10 +214,19 @@ fn the_summary_speaks_of_the_middle_of_the_scan() {
         found.push(json["results"]["scan_snr_db"].as_f64().unwrap());
     }
     let text = std::fs::read_to_string(temp.path().join("run/profile.csv")).unwrap();
-    let rows: Vec<Vec<&str>> = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').collect()).collect();
+    let rows: Vec<Vec<&str>> = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|l| l.split(',').collect())
+        .collect();
     let column = rows[0].iter().position(|name| *name == "snr_db").unwrap();
-    let at_380: f64 = rows.iter().find(|r| r[0] == "380.0").unwrap()[column].parse().unwrap();
-    assert!(found.iter().all(|snr_db| (snr_db - at_380).abs() < 0.01), "{found:?} {at_380}");
+    let at_380: f64 = rows.iter().find(|r| r[0] == "380.0").unwrap()[column]
+        .parse()
+        .unwrap();
+    assert!(
+        found.iter().all(|snr_db| (snr_db - at_380).abs() < 0.01),
+        "{found:?} {at_380}"
+    );
 }
 
 #[test]
@@ -163,7 +236,12 @@ fn an_initial_scene_is_good_and_its_plan_says_what_is_left_out() {
     let out = wakescope(temp.path(), &["check", "scene.toml"]);
     assert!(out.status.success());
     let text = String::from_utf8(out.stdout).unwrap();
-    for part in ["skip  phase screens", "skip  flow simulation", "run   signals", "run   estimates"] {
+    for part in [
+        "skip  phase screens",
+        "skip  flow simulation",
+        "run   signals",
+        "run   estimates",
+    ] {
         assert!(text.contains(part), "{part} is not in:\n{text}");
     }
 }
@@ -174,22 +252,44 @@ fn check_draws_the_set_up() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
     let draw = |file: &str| wakescope(temp.path(), &["check", "s.toml", "--picture", file]);
-    assert!(draw("set-up.svg").status.success() && draw("set-up.svg").status.success(), "its own picture is replaced");
+    assert!(
+        draw("set-up.svg").status.success() && draw("set-up.svg").status.success(),
+        "its own picture is replaced"
+    );
     let text = std::fs::read_to_string(temp.path().join("set-up.svg")).unwrap();
-    assert!(["lidar", "vortices", "ground"].iter().all(|word| text.contains(word)));
-    assert!(String::from_utf8(draw("set-up.jpg").stderr).unwrap().contains(".svg or .png"));
+    assert!(
+        ["lidar", "vortices", "ground"]
+            .iter()
+            .all(|word| text.contains(word))
+    );
+    assert!(
+        String::from_utf8(draw("set-up.jpg").stderr)
+            .unwrap()
+            .contains(".svg or .png")
+    );
     std::fs::write(temp.path().join("mine.svg"), "mine").unwrap();
     assert_eq!(draw("mine.svg").status.code(), Some(2));
-    assert_eq!(std::fs::read_to_string(temp.path().join("mine.svg")).unwrap(), "mine");
+    assert_eq!(
+        std::fs::read_to_string(temp.path().join("mine.svg")).unwrap(),
+        "mine"
+    );
 }
 
 #[test]
 fn each_stage_can_be_asked_for_alone() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
-    for (stage, csv) in [("efficiency", "profile.csv"), ("signal", "signals.csv"), ("map", "map.csv")] {
+    for (stage, csv) in [
+        ("efficiency", "profile.csv"),
+        ("signal", "signals.csv"),
+        ("map", "map.csv"),
+    ] {
         let out = wakescope(temp.path(), &[stage, "s.toml", "--out", stage, "--quiet"]);
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(
+            out.status.success(),
+            "{}",
+            String::from_utf8_lossy(&out.stderr)
+        );
         assert!(out.stderr.is_empty(), "--quiet");
         let files = names(&temp.path().join(stage));
         assert!(files.contains(&csv.to_owned()), "{files:?}");
@@ -203,8 +303,23 @@ fn a_run_gives_the_same_tables_for_one_and_two_threads_and_says_where_they_come_
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
     for threads in ["1", "2"] {
-        let out = wakescope(temp.path(), &["run", "s.toml", "--out", threads, "--threads", threads, "--json"]);
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let out = wakescope(
+            temp.path(),
+            &[
+                "run",
+                "s.toml",
+                "--out",
+                threads,
+                "--threads",
+                threads,
+                "--json",
+            ],
+        );
+        assert!(
+            out.status.success(),
+            "{}",
+            String::from_utf8_lossy(&out.stderr)
+        );
         let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
         assert_eq!(json["seed"], 5);
         assert!(json["results"]["rms_mean_m_s"].as_f64().unwrap() > 0.0);
@@ -214,10 +329,17 @@ fn a_run_gives_the_same_tables_for_one_and_two_threads_and_says_where_they_come_
     let mut tables = 0;
     for name in names(&one) {
         let bytes = std::fs::read(one.join(&name)).unwrap();
-        assert_eq!(bytes, std::fs::read(two.join(&name)).unwrap(), "{name} depends on the number of threads");
+        assert_eq!(
+            bytes,
+            std::fs::read(two.join(&name)).unwrap(),
+            "{name} depends on the number of threads"
+        );
         if name.ends_with(".csv") {
             let text = String::from_utf8(bytes).unwrap();
-            assert!(text.contains("# seed: 5\n") && text.contains(concat!("wakescope ", env!("CARGO_PKG_VERSION"))));
+            assert!(
+                text.contains("# seed: 5\n")
+                    && text.contains(concat!("wakescope ", env!("CARGO_PKG_VERSION")))
+            );
             assert!(text.contains("snr_db = 10.0"), "{name} carries the scene");
             tables += 1;
         }
@@ -229,13 +351,40 @@ fn a_run_gives_the_same_tables_for_one_and_two_threads_and_says_where_they_come_
 fn a_written_scene_runs_again_to_the_same_files() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
-    assert!(wakescope(temp.path(), &["map", "s.toml", "--out", "a", "--seed", "9", "--quiet"]).status.success());
-    assert!(wakescope(temp.path(), &["map", "a/scene.toml", "--out", "b", "--quiet"]).status.success());
+    assert!(
+        wakescope(
+            temp.path(),
+            &["map", "s.toml", "--out", "a", "--seed", "9", "--quiet"]
+        )
+        .status
+        .success()
+    );
+    assert!(
+        wakescope(
+            temp.path(),
+            &["map", "a/scene.toml", "--out", "b", "--quiet"]
+        )
+        .status
+        .success()
+    );
     let read = |file: &str| std::fs::read_to_string(temp.path().join(file)).unwrap();
     assert_eq!(read("a/map.csv"), read("b/map.csv"));
-    assert!(wakescope(temp.path(), &["map", "s.toml", "--out", "c", "--quiet"]).status.success());
-    let body = |text: String| text.lines().filter(|l| !l.starts_with('#')).collect::<Vec<_>>().join("\n");
-    assert_ne!(body(read("a/map.csv")), body(read("c/map.csv")), "the seed matters");
+    assert!(
+        wakescope(temp.path(), &["map", "s.toml", "--out", "c", "--quiet"])
+            .status
+            .success()
+    );
+    let body = |text: String| {
+        text.lines()
+            .filter(|l| !l.starts_with('#'))
+            .collect::<Vec<_>>()
+            .join("\n")
+    };
+    assert_ne!(
+        body(read("a/map.csv")),
+        body(read("c/map.csv")),
+        "the seed matters"
+    );
 }
 
 #[test]
@@ -243,30 +392,51 @@ fn files_of_others_are_not_replaced_unless_asked_for() {
     let temp = tempfile::tempdir().unwrap();
     let (folder, out) = (temp.path(), temp.path().join("o"));
     std::fs::write(folder.join("s.toml"), SMALL).unwrap();
-    let run = |words: &[&str]| wakescope(folder, &[&["run", "s.toml", "--out", "o", "--quiet"], words].concat());
+    let run = |words: &[&str]| {
+        wakescope(
+            folder,
+            &[&["run", "s.toml", "--out", "o", "--quiet"], words].concat(),
+        )
+    };
     assert!(run(&[]).status.success());
     assert!(run(&[]).status.success(), "its own files are replaced");
     let measured = "# my own measurement\nrange_m,v_m_s\n1,2\n";
-    for (name, foreign) in [("map.csv", measured), ("scene.toml", SMALL), ("map.png", "not a picture")] {
+    for (name, foreign) in [
+        ("map.csv", measured),
+        ("scene.toml", SMALL),
+        ("map.png", "not a picture"),
+    ] {
         let own = std::fs::read(out.join(name)).unwrap();
         std::fs::write(out.join(name), foreign).unwrap();
         let refused = run(&[]);
         assert_eq!(refused.status.code(), Some(2), "{name}");
         let message = String::from_utf8(refused.stderr).unwrap();
-        assert!(message.contains(name) && message.contains("--overwrite"), "{message}");
-        assert_eq!(std::fs::read_to_string(out.join(name)).unwrap(), foreign, "untouched");
+        assert!(
+            message.contains(name) && message.contains("--overwrite"),
+            "{message}"
+        );
+        assert_eq!(
+            std::fs::read_to_string(out.join(name)).unwrap(),
+            foreign,
+            "untouched"
+        );
         assert!(run(&["--overwrite"]).status.success());
         assert_eq!(std::fs::read(out.join(name)).unwrap(), own, "{name}");
     }
     // A scene that was edited where the program wrote it is no longer the program's.
-    let edited = std::fs::read_to_string(out.join("scene.toml")).unwrap().replace("seed = 5", "seed = 6");
+    let edited = std::fs::read_to_string(out.join("scene.toml"))
+        .unwrap()
+        .replace("seed = 5", "seed = 6");
     std::fs::write(out.join("scene.toml"), edited).unwrap();
     assert_eq!(run(&[]).status.code(), Some(2));
     // A folder in the way is found before the computing, and no option removes it.
     std::fs::remove_file(out.join("map.csv")).unwrap();
     std::fs::create_dir(out.join("map.csv")).unwrap();
     let blocked = run(&["--overwrite"]);
-    assert!(String::from_utf8_lossy(&blocked.stderr).contains("a folder of that name"), "{blocked:?}");
+    assert!(
+        String::from_utf8_lossy(&blocked.stderr).contains("a folder of that name"),
+        "{blocked:?}"
+    );
     std::fs::write(folder.join("bound.csv"), measured).unwrap();
     let bound = wakescope(folder, &["bound", "s.toml", "--out", "bound.csv"]);
     assert_eq!(bound.status.code(), Some(2));
@@ -275,43 +445,76 @@ fn files_of_others_are_not_replaced_unless_asked_for() {
     std::fs::write(folder.join("case.toml"), case).unwrap();
     let flow = wakescope(folder, &["flow", "case.toml", "--out", ".", "--quiet"]);
     assert_eq!(flow.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&flow.stderr).contains("case.toml"), "{flow:?}");
-    assert_eq!(std::fs::read_to_string(folder.join("case.toml")).unwrap(), case);
+    assert!(
+        String::from_utf8_lossy(&flow.stderr).contains("case.toml"),
+        "{flow:?}"
+    );
+    assert_eq!(
+        std::fs::read_to_string(folder.join("case.toml")).unwrap(),
+        case
+    );
 }
 
 #[test]
 fn the_files_of_a_run_are_those_that_it_announces() {
     use wakescope_sim::plan::{Plan, Target};
     let temp = tempfile::tempdir().unwrap();
-    let all =
-        SMALL.replace("[outputs]", "[estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nsignals_of = \"all\"");
-    let all = all.replace("range_min_m = 330.0", "range_min_m = 345.3609").replace("430.0", "480.0");
+    let all = SMALL.replace(
+        "[outputs]",
+        "[estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nsignals_of = \"all\"",
+    );
+    let all = all
+        .replace("range_min_m = 330.0", "range_min_m = 345.3609")
+        .replace("430.0", "480.0");
     std::fs::write(temp.path().join("s.toml"), &all).unwrap();
-    for (word, target) in [("run", Target::Run), ("map", Target::Map), ("signal", Target::Signal)] {
+    for (word, target) in [
+        ("run", Target::Run),
+        ("map", Target::Map),
+        ("signal", Target::Signal),
+    ] {
         let out = wakescope(temp.path(), &[word, "s.toml", "--out", word, "--quiet"]);
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(
+            out.status.success(),
+            "{}",
+            String::from_utf8_lossy(&out.stderr)
+        );
         let file = wakescope_sim::scene::SceneFile::read(&temp.path().join("s.toml")).unwrap();
         let mut announced = wakescope_sim::write::names(&Plan::new(file, target).unwrap()).unwrap();
         announced.sort();
         assert_eq!(names(&temp.path().join(word)), announced, "{word}");
     }
     // Nine lines of two pulses, three times; the table has the first pulses of the first.
-    let length = |word: &str| std::fs::metadata(temp.path().join(word).join("signals.nc")).unwrap().len();
+    let length = |word: &str| {
+        std::fs::metadata(temp.path().join(word).join("signals.nc"))
+            .unwrap()
+            .len()
+    };
     let samples = 225;
     assert!(length("run") > 9 * 2 * 3 * samples * 8, "{}", length("run"));
     let (run, signal) = ("run/signals.nc", "signal/signals.nc");
-    assert_eq!(std::fs::read(temp.path().join(run)).unwrap(), std::fs::read(temp.path().join(signal)).unwrap());
+    assert_eq!(
+        std::fs::read(temp.path().join(run)).unwrap(),
+        std::fs::read(temp.path().join(signal)).unwrap()
+    );
 }
 
 #[test]
 fn extreme_scenes_run_to_the_end() {
     let nothing_returns = "[atmosphere]\nbackscatter_per_m_sr = 0.0\n";
     let short_pulse = "[pulse.shape]\nduration_s = 1e-9\n";
-    let long_pulse = "[pulse.shape]\nduration_s = 1.2e-6\n[scan]\nrange_min_m = 500.0\nrange_max_m = 560.0\n";
+    let long_pulse =
+        "[pulse.shape]\nduration_s = 1.2e-6\n[scan]\nrange_min_m = 500.0\nrange_max_m = 560.0\n";
     let faint = "[detector.snr]\nreference = \"fixed\"\nsnr_db = -40.0\n";
     let loud = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 60.0\n";
     let silent = "[detector]\nnoise = \"none\"\n[flow]\nkind = \"calm\"\n";
-    for scene in [nothing_returns, short_pulse, long_pulse, faint, loud, silent] {
+    for scene in [
+        nothing_returns,
+        short_pulse,
+        long_pulse,
+        faint,
+        loud,
+        silent,
+    ] {
         let temp = tempfile::tempdir().unwrap();
         let scan = "elevation_max_rad = 0.0025\npulses_per_line = 1\nrealisations = 2\n";
         let text = match scene.contains("[scan]") {
@@ -320,7 +523,11 @@ fn extreme_scenes_run_to_the_end() {
         };
         std::fs::write(temp.path().join("s.toml"), text).unwrap();
         let out = wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]);
-        assert!(out.status.success(), "{scene}: {}", String::from_utf8_lossy(&out.stderr));
+        assert!(
+            out.status.success(),
+            "{scene}: {}",
+            String::from_utf8_lossy(&out.stderr)
+        );
     }
 }
 
@@ -332,11 +539,21 @@ fn a_profile_is_empty_where_no_light_comes_back() {
         "[atmosphere]\nbackscatter_per_m_sr = 0.0\n[outputs]\nprofile_points = 3\n",
     )
     .unwrap();
-    let out = wakescope(temp.path(), &["efficiency", "s.toml", "--out", "o", "--quiet"]);
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let out = wakescope(
+        temp.path(),
+        &["efficiency", "s.toml", "--out", "o", "--quiet"],
+    );
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     let text = std::fs::read_to_string(temp.path().join("o/profile.csv")).unwrap();
     let rows: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
-    assert!(rows[0].ends_with("snr_db") && rows[1..].iter().all(|row| row.ends_with(',')), "{rows:?}");
+    assert!(
+        rows[0].ends_with("snr_db") && rows[1..].iter().all(|row| row.ends_with(',')),
+        "{rows:?}"
+    );
 }
 
 #[test]
@@ -346,25 +563,52 @@ fn turbulence_gives_theory_and_monte_carlo_side_by_side() {
                      [outputs]\nprofile_range_min_m = 200.0\nprofile_range_max_m = 600.0\nprofile_points = 3\n";
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), turbulent).unwrap();
-    let out = wakescope(temp.path(), &["efficiency", "s.toml", "--out", "o", "--quiet"]);
-    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    let out = wakescope(
+        temp.path(),
+        &["efficiency", "s.toml", "--out", "o", "--quiet"],
+    );
+    assert!(
+        out.status.success(),
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     let text = std::fs::read_to_string(temp.path().join("o/profile.csv")).unwrap();
-    let mut rows = text.lines().filter(|l| !l.starts_with('#')).map(|l| l.split(',').collect::<Vec<_>>());
+    let mut rows = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|l| l.split(',').collect::<Vec<_>>());
     let header = rows.next().unwrap();
-    let last: Vec<f64> = rows.next_back().unwrap().iter().map(|c| c.parse().unwrap()).collect();
+    let last: Vec<f64> = rows
+        .next_back()
+        .unwrap()
+        .iter()
+        .map(|c| c.parse().unwrap())
+        .collect();
     let value = |name: &str| last[header.iter().position(|h| *h == name).unwrap()];
-    assert_eq!(value("efficiency"), value("efficiency_monostatic_monte_carlo"), "the scene is monostatic");
+    assert_eq!(
+        value("efficiency"),
+        value("efficiency_monostatic_monte_carlo"),
+        "the scene is monostatic"
+    );
     let error = value("efficiency_bistatic_monte_carlo_standard_error");
     let z = (value("efficiency_bistatic_monte_carlo") - value("efficiency_bistatic_exact")) / error;
     assert!(error > 0.0 && z.abs() < 4.0, "z = {z}");
     assert!(value("efficiency_bistatic_exact") < value("efficiency_free_space"));
 
     // Independent paths have an exact theory: a map needs no screens.
-    let bistatic = format!("{turbulent}[telescope]\nreceiver = \"bistatic\"\n[scan]\nelevation_max_rad = 0.0025\n");
+    let bistatic = format!(
+        "{turbulent}[telescope]\nreceiver = \"bistatic\"\n[scan]\nelevation_max_rad = 0.0025\n"
+    );
     std::fs::write(temp.path().join("b.toml"), bistatic).unwrap();
     let out = wakescope(temp.path(), &["map", "b.toml", "--out", "b", "--json"]);
     let json: serde_json::Value = serde_json::from_slice(&out.stdout).unwrap();
-    let stage = json["stages"].as_array().unwrap().iter().find(|s| s["stage"] == "phase screens").unwrap().clone();
+    let stage = json["stages"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .find(|s| s["stage"] == "phase screens")
+        .unwrap()
+        .clone();
     assert_eq!(stage["runs"], false, "{stage}");
 }
 
@@ -374,7 +618,10 @@ fn screens_that_cannot_resolve_the_scene_are_refused_before_the_run() {
     for (keys, wanted) in [
         ("cn2_m_m23 = 1e-13\ngrid_points = 16\n", "grid"),
         ("cn2_m_m23 = 1e-12\n", "grid"),
-        ("spectrum = \"hill_andrews\"\ninner_scale_m = 0.0\n", "inner_scale_m"),
+        (
+            "spectrum = \"hill_andrews\"\ninner_scale_m = 0.0\n",
+            "inner_scale_m",
+        ),
     ] {
         let message = refused(&screens(keys), &["check", "s.toml"]);
         assert!(message.contains(wanted), "{wanted} is not in: {message}");
@@ -384,7 +631,10 @@ fn screens_that_cannot_resolve_the_scene_are_refused_before_the_run() {
         std::fs::write(temp.path().join("s.toml"), screens(keys)).unwrap();
         String::from_utf8(wakescope(temp.path(), &["check", "s.toml"]).stdout).unwrap()
     };
-    assert!(check("cn2_m_m23 = 1e-13\n").contains("atmosphere.turbulence.layers = "), "thick layers are warned of");
+    assert!(
+        check("cn2_m_m23 = 1e-13\n").contains("atmosphere.turbulence.layers = "),
+        "thick layers are warned of"
+    );
     assert!(!check("cn2_m_m23 = 1e-13\nsampling = \"derived\"\n").contains("Rytov"));
 }
 
@@ -396,32 +646,67 @@ fn a_flow_runs_pauses_and_continues_and_every_example_is_printed() {
     let text = String::from_utf8(printed.stdout).unwrap();
     assert!(printed.status.success() && text.contains("kind = \"taylor_green_plane\""));
     let unknown = wakescope(folder, &["flow", "--example", "tornado"]);
-    assert!(!unknown.status.success() && String::from_utf8_lossy(&unknown.stderr).contains("vortex_pair"));
-    let small =
-        text.replace("cells = 64 ", "cells = 12 ").replace("end_s = 0.5", "end_s = 0.02\npause_after_steps = 4");
-    std::fs::write(folder.join("case.toml"), small.replace("every_s = 0.1\n", "")).unwrap();
+    assert!(
+        !unknown.status.success()
+            && String::from_utf8_lossy(&unknown.stderr).contains("vortex_pair")
+    );
+    let small = text
+        .replace("cells = 64 ", "cells = 12 ")
+        .replace("end_s = 0.5", "end_s = 0.02\npause_after_steps = 4");
+    std::fs::write(
+        folder.join("case.toml"),
+        small.replace("every_s = 0.1\n", ""),
+    )
+    .unwrap();
     let run = |words: &[&str]| {
-        let out = wakescope(folder, &[&["flow", "case.toml", "--out", "o", "--json"], words].concat());
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let out = wakescope(
+            folder,
+            &[&["flow", "case.toml", "--out", "o", "--json"], words].concat(),
+        );
+        assert!(
+            out.status.success(),
+            "{}",
+            String::from_utf8_lossy(&out.stderr)
+        );
         serde_json::from_slice::<serde_json::Value>(&out.stdout).unwrap()
     };
     let paused = run(&["--threads", "2"]);
-    assert_eq!((paused["steps"].as_u64(), paused["is_complete"].as_bool()), (Some(4), Some(false)));
+    assert_eq!(
+        (paused["steps"].as_u64(), paused["is_complete"].as_bool()),
+        (Some(4), Some(false))
+    );
     let text = std::fs::read_to_string(folder.join("case.toml")).unwrap();
-    std::fs::write(folder.join("case.toml"), text.replace("pause_after_steps = 4", "")).unwrap();
+    std::fs::write(
+        folder.join("case.toml"),
+        text.replace("pause_after_steps = 4", ""),
+    )
+    .unwrap();
     let again = wakescope(folder, &["flow", "case.toml", "--out", "o"]);
     assert_eq!(again.status.code(), Some(2));
     assert!(String::from_utf8_lossy(&again.stderr).contains("--restart"));
     let done = run(&["--restart", "--threads", "1"]);
-    assert_eq!((done["steps"].as_u64(), done["time_s"].as_f64()), (Some(10), Some(0.02)));
+    assert_eq!(
+        (done["steps"].as_u64(), done["time_s"].as_f64()),
+        (Some(10), Some(0.02))
+    );
     let files = names(&folder.join("o"));
-    assert!(files.contains(&"steps.csv".to_owned()) && files.contains(&"flow.checkpoint".to_owned()), "{files:?}");
+    assert!(
+        files.contains(&"steps.csv".to_owned()) && files.contains(&"flow.checkpoint".to_owned()),
+        "{files:?}"
+    );
 
     // A flow that blows up: exit code, place, checkpoint.
     let text = std::fs::read_to_string(folder.join("case.toml")).unwrap();
-    std::fs::write(folder.join("case.toml"), text.replace("step_s = 0.002", "step_s = 0.2").replace("0.02", "1.0"))
-        .unwrap();
+    std::fs::write(
+        folder.join("case.toml"),
+        text.replace("step_s = 0.002", "step_s = 0.2")
+            .replace("0.02", "1.0"),
+    )
+    .unwrap();
     let blown = wakescope(folder, &["flow", "case.toml", "--out", "p", "--quiet"]);
     assert_eq!(blown.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&blown.stderr).contains("Courant number"), "{blown:?}");
+    assert!(
+        String::from_utf8_lossy(&blown.stderr).contains("Courant number"),
+        "{blown:?}"
+    );
 }

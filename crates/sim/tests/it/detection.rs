@@ -12,28 +12,44 @@ const SCENE: &str = "seed = 5\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 1
 fn json(folder: &Path, words: &[&str]) -> Value {
     let words: Vec<&str> = words.iter().copied().chain(["--quiet", "--json"]).collect();
     let output = wakescope(folder, &words);
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
 /// Rows of a table without its comments.
 fn rows(path: &Path) -> Vec<Vec<String>> {
     let text = std::fs::read_to_string(path).unwrap();
-    let rows = text.lines().filter(|line| !line.starts_with('#') && !line.is_empty());
-    rows.map(|line| line.split(',').map(str::to_owned).collect()).collect()
+    let rows = text
+        .lines()
+        .filter(|line| !line.starts_with('#') && !line.is_empty());
+    rows.map(|line| line.split(',').map(str::to_owned).collect())
+        .collect()
 }
 
 #[test]
 fn sweeps_back_and_forth_are_retrieved_one_by_one_against_the_wake_of_their_time() {
     let folder = tempfile::tempdir().unwrap();
-    let scene =
-        SCENE.replace("[scan]\n", "[flow]\nkind = \"vortex_pair\"\nmotion = \"inviscid\"\n[scan]\nazimuth_rad = 1.0\n");
+    let scene = SCENE.replace(
+        "[scan]\n",
+        "[flow]\nkind = \"vortex_pair\"\nmotion = \"inviscid\"\n[scan]\nazimuth_rad = 1.0\n",
+    );
     let head = "[scan.head]\nsweeps = 2\ndirection = \"alternate\"\ndead_time_s = 0.02\n";
-    std::fs::write(folder.path().join("s.toml"), format!("{scene}{head}[retrieval]\nmethods = [\"rv\"]\n")).unwrap();
+    std::fs::write(
+        folder.path().join("s.toml"),
+        format!("{scene}{head}[retrieval]\nmethods = [\"rv\"]\n"),
+    )
+    .unwrap();
     let run = json(folder.path(), &["run", "s.toml", "--out", "out"]);
     let table = rows(&folder.path().join("out/retrieval.csv"));
     // Two realisations, sweeps and vortices.
-    assert_eq!((table.len(), table[0][..4].join(",")), (9, "realisation,sweep,method,side".to_owned()));
+    assert_eq!(
+        (table.len(), table[0][..4].join(",")),
+        (9, "realisation,sweep,method,side".to_owned())
+    );
     let column = |name: &str| table[0].iter().position(|n| n == name).unwrap();
     let (truth, found) = (column("z_true_m"), column("z_m"));
     for row in &table[1..] {
@@ -43,10 +59,16 @@ fn sweeps_back_and_forth_are_retrieved_one_by_one_against_the_wake_of_their_time
         assert!((found_m - truth_m).abs() < 4.0, "{row:?}");
     }
     for error in run["retrieval"]["errors"].as_array().unwrap() {
-        assert!(error["failures"] == 0 && error["realisations"] == 4, "{error}");
+        assert!(
+            error["failures"] == 0 && error["realisations"] == 4,
+            "{error}"
+        );
         if error["quantity"] == "gamma_m2_s" {
             // The radial-velocity method finds too little, as in a single sweep.
-            assert!((-230.0..20.0).contains(&error["bias"].as_f64().unwrap()), "{error}");
+            assert!(
+                (-230.0..20.0).contains(&error["bias"].as_f64().unwrap()),
+                "{error}"
+            );
         }
     }
 }
@@ -62,28 +84,68 @@ fn a_run_is_held_against_its_pair_and_its_map_is_found_to_hold_a_wake() {
     assert_eq!(run["retrieval"]["detected"], 1.0);
     let errors = run["retrieval"]["errors"].as_array().unwrap();
     let of = |side: &str, quantity: &str| {
-        let found = errors.iter().find(|e| e["side"] == side && e["quantity"] == quantity).unwrap();
-        (found["truth"].as_f64().unwrap(), found["bias"].as_f64().unwrap(), found["failures"].as_u64().unwrap())
+        let found = errors
+            .iter()
+            .find(|e| e["side"] == side && e["quantity"] == quantity)
+            .unwrap();
+        (
+            found["truth"].as_f64().unwrap(),
+            found["bias"].as_f64().unwrap(),
+            found["failures"].as_u64().unwrap(),
+        )
     };
     let (truth, bias, failures) = of("left", "gamma_m2_s");
     // in noise and with gates of 14 m the radial-velocity method finds too little
-    assert!(truth == 500.0 && (-230.0..20.0).contains(&bias) && failures == 0, "{run:#}");
+    assert!(
+        truth == 500.0 && (-230.0..20.0).contains(&bias) && failures == 0,
+        "{run:#}"
+    );
     let (truth, bias, _) = of("right", "z_m");
     assert!(truth == 47.0 && bias.abs() < 4.0, "{run:#}");
     // twice the 0.127 of 250 m^2/s in the closed form for one vortex alone
     let (truth, ..) = of("right", "rolling_moment");
     assert!((0.2..0.3).contains(&truth), "{truth}");
     let table = rows(&folder.path().join("out/retrieval.csv"));
-    assert_eq!((table.len(), table[0][..3].join(",")), (5, "realisation,method,side".to_owned()));
-    assert_eq!(rows(&folder.path().join("out/retrieval_summary.csv")).len(), 11);
+    assert_eq!(
+        (table.len(), table[0][..3].join(",")),
+        (5, "realisation,method,side".to_owned())
+    );
+    assert_eq!(
+        rows(&folder.path().join("out/retrieval_summary.csv")).len(),
+        11
+    );
 
-    let detect = json(folder.path(), &["detect", "out/map.nc", "--empty-scans", "2000", "--out", "found"]);
+    let detect = json(
+        folder.path(),
+        &[
+            "detect",
+            "out/map.nc",
+            "--empty-scans",
+            "2000",
+            "--out",
+            "found",
+        ],
+    );
     assert_eq!(detect["scans"][0]["wake"], true, "{detect:#}");
     assert!(detect["scans"][0]["false_alarm"].as_f64().unwrap() < 1e-6);
-    assert!(detect["background"].as_str().unwrap().contains("independent noise"));
-    let files: Vec<String> =
-        detect["files"].as_array().unwrap().iter().map(|f| f.as_str().unwrap().to_owned()).collect();
-    for name in ["detection.csv", "detection_power.csv", "detection_roc.csv", "detection_gates.csv"] {
+    assert!(
+        detect["background"]
+            .as_str()
+            .unwrap()
+            .contains("independent noise")
+    );
+    let files: Vec<String> = detect["files"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|f| f.as_str().unwrap().to_owned())
+        .collect();
+    for name in [
+        "detection.csv",
+        "detection_power.csv",
+        "detection_roc.csv",
+        "detection_gates.csv",
+    ] {
         assert!(files.iter().any(|file| file.ends_with(name)), "{files:?}");
     }
 }
@@ -93,18 +155,43 @@ fn a_scene_alone_says_what_would_be_found_in_it() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("s.toml"), SCENE).unwrap();
     let of = |name: &str, more: &[&str]| {
-        let words = [&["detect", "--scene", "s.toml", "--empty-scans", "2000", "--out", name], more].concat();
+        let words = [
+            &[
+                "detect",
+                "--scene",
+                "s.toml",
+                "--empty-scans",
+                "2000",
+                "--out",
+                name,
+            ],
+            more,
+        ]
+        .concat();
         json(folder.path(), &words)
     };
     let found = of("white", &[]);
-    let (measured, foretold) =
-        (found["smallest_detectable_m2_s"].as_f64().unwrap(), found["smallest_foretold_m2_s"].as_f64().unwrap());
-    assert!(measured > 5.0 && (measured / foretold - 1.0).abs() < 0.3, "{found:#}");
+    let (measured, foretold) = (
+        found["smallest_detectable_m2_s"].as_f64().unwrap(),
+        found["smallest_foretold_m2_s"].as_f64().unwrap(),
+    );
+    assert!(
+        measured > 5.0 && (measured / foretold - 1.0).abs() < 0.3,
+        "{found:#}"
+    );
     assert!((found["gumbel"][1].as_f64().unwrap() - 2.0).abs() < 0.5);
     // turbulence hides wakes
     let hidden = of("turbulent", &["--turbulence", "0.8,25"]);
-    assert!(hidden["smallest_detectable_m2_s"].as_f64().unwrap() > 1.5 * measured, "{hidden:#}");
-    assert!(hidden["background"].as_str().unwrap().contains("0.8 m/s correlated over 25 m"));
+    assert!(
+        hidden["smallest_detectable_m2_s"].as_f64().unwrap() > 1.5 * measured,
+        "{hidden:#}"
+    );
+    assert!(
+        hidden["background"]
+            .as_str()
+            .unwrap()
+            .contains("0.8 m/s correlated over 25 m")
+    );
     // closed form: 1e-2 for each gate, more where the best of many cells counts
     let gates = rows(&folder.path().join("white/detection_gates.csv"));
     let column = |name: &str| gates[0].iter().position(|column| column == name).unwrap();
@@ -119,7 +206,10 @@ fn a_map_of_several_realisations_is_tested_with_the_deviation_of_their_mean() {
     let folder = tempfile::tempdir().unwrap();
     let of = |realisations: usize| {
         let flow = "[flow]\nkind = \"uniform\"\nlateral_m_s = 4.0\nvertical_m_s = 0.0\n[scan]\n";
-        SCENE.replace("[scan]\n", flow).replace("realisations = 2", &format!("realisations = {realisations}"))
+        SCENE.replace("[scan]\n", flow).replace(
+            "realisations = 2",
+            &format!("realisations = {realisations}"),
+        )
     };
     std::fs::write(folder.path().join("one.toml"), of(1)).unwrap();
     std::fs::write(folder.path().join("nine.toml"), of(9)).unwrap();
@@ -128,7 +218,17 @@ fn a_map_of_several_realisations_is_tested_with_the_deviation_of_their_mean() {
     let found = ["one/map.csv", "nine/map.csv", "nine/map.nc"].map(|map| {
         let found = json(
             folder.path(),
-            &["detect", map, "--scene", "one.toml", "--empty-scans", "2000", "--out", "found", "--overwrite"],
+            &[
+                "detect",
+                map,
+                "--scene",
+                "one.toml",
+                "--empty-scans",
+                "2000",
+                "--out",
+                "found",
+                "--overwrite",
+            ],
         );
         let chi2 = found["scans"][0]["chi2_per_dof"]["wind"].as_f64().unwrap();
         // some sixty velocities: known to a fifth
@@ -136,7 +236,8 @@ fn a_map_of_several_realisations_is_tested_with_the_deviation_of_their_mean() {
         found["smallest_detectable_m2_s"].as_f64().unwrap()
     });
     assert!(
-        (found[0] / found[1] / 3.0 - 1.0).abs() < 0.1 && (found[1] - found[2]).abs() < 1e-6 * found[1],
+        (found[0] / found[1] / 3.0 - 1.0).abs() < 0.1
+            && (found[1] - found[2]).abs() < 1e-6 * found[1],
         "{found:?}"
     );
 }
@@ -144,15 +245,27 @@ fn a_map_of_several_realisations_is_tested_with_the_deviation_of_their_mean() {
 #[test]
 fn data_and_words_that_cannot_be_tested_are_refused_and_nothing_is_written() {
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("few.csv"), "range_m,elevation_rad,velocity_m_s\n300,0.1,1\n310,0.1,2\n")
-        .unwrap();
+    std::fs::write(
+        folder.path().join("few.csv"),
+        "range_m,elevation_rad,velocity_m_s\n300,0.1,1\n310,0.1,2\n",
+    )
+    .unwrap();
     for (words, message) in [
         (&["detect", "few.csv", "--out", "o"][..], "few.csv"),
         (&["detect", "none.nc", "--out", "o"], "none.nc"),
         (&["detect", "--out", "o"], "--scene"),
-        (&["detect", "few.csv", "--turbulence", "0.8", "--out", "o"], "1.2,25"),
-        (&["detect", "few.csv", "--false-alarm", "2", "--out", "o"], "0.01"),
-        (&["detect", "few.csv", "--empty-scans", "10", "--out", "o"], "2000"),
+        (
+            &["detect", "few.csv", "--turbulence", "0.8", "--out", "o"],
+            "1.2,25",
+        ),
+        (
+            &["detect", "few.csv", "--false-alarm", "2", "--out", "o"],
+            "0.01",
+        ),
+        (
+            &["detect", "few.csv", "--empty-scans", "10", "--out", "o"],
+            "2000",
+        ),
     ] {
         let output = wakescope(folder.path(), words);
         let text = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -17,14 +17,20 @@ fn recorded_run(words: &str) -> tempfile::TempDir {
 }
 
 /// The lines of the small scene.
-const RHI: &str = "elevation_min_rad = 0.1\nelevation_max_rad = 0.12\nelevation_step_rad = 2.5e-3\n";
+const RHI: &str =
+    "elevation_min_rad = 0.1\nelevation_max_rad = 0.12\nelevation_step_rad = 2.5e-3\n";
 
 /// The same with other lines.
 fn recorded_scan(scan: &str, words: &str) -> tempfile::TempDir {
     let temp = tempfile::tempdir().unwrap();
     let lines = "azimuth_rad,elevation_rad,pulses\n0.3,0.2,2\n0.4,0.2,5\n0.5,0.3,1\n";
     fs::write(temp.path().join("lines.csv"), lines).unwrap();
-    let scene = SMALL.replace("signals = true", "signals = true\nsignals_of = \"all\"\npng = false").replace(RHI, scan);
+    let scene = SMALL
+        .replace(
+            "signals = true",
+            "signals = true\nsignals_of = \"all\"\npng = false",
+        )
+        .replace(RHI, scan);
     fs::write(temp.path().join("s.toml"), format!("{scene}{words}")).unwrap();
     let out = wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]);
     assert!(out.status.success(), "{out:?}");
@@ -35,7 +41,9 @@ fn recorded_scan(scan: &str, words: &str) -> tempfile::TempDir {
 fn column(path: &Path, name: &str) -> Vec<u64> {
     let table = TextTable::read(path).unwrap();
     let place = table.column(name).unwrap();
-    (0..table.rows.len()).map(|row| table.number(row, place).to_bits()).collect()
+    (0..table.rows.len())
+        .map(|row| table.number(row, place).to_bits())
+        .collect()
 }
 
 /// The samples of `signals.nc`, record after record, and the samples of one.
@@ -48,23 +56,62 @@ fn samples(folder: &Path) -> (Vec<f64>, usize) {
 #[test]
 fn a_runs_own_signals_give_the_bytes_of_the_run() {
     let temp = recorded_run("");
-    let out = wakescope(temp.path(), &["estimate", "o/signals.nc", "--scene", "s.toml", "--out", "e", "--quiet"]);
+    let out = wakescope(
+        temp.path(),
+        &[
+            "estimate",
+            "o/signals.nc",
+            "--scene",
+            "s.toml",
+            "--out",
+            "e",
+            "--quiet",
+        ],
+    );
     assert!(out.status.success(), "{out:?}");
-    assert_eq!(names(&temp.path().join("e")), ["map.csv", "map.nc", "map.svg", "predicted.csv", "scene.toml"]);
+    assert_eq!(
+        names(&temp.path().join("e")),
+        [
+            "map.csv",
+            "map.nc",
+            "map.svg",
+            "predicted.csv",
+            "scene.toml"
+        ]
+    );
     for name in ["map.csv", "map.nc", "map.svg", "scene.toml"] {
         let of = |folder: &str| fs::read(temp.path().join(folder).join(name)).unwrap();
         assert_eq!(of("o"), of("e"), "{name}");
     }
     let predicted = column(&temp.path().join("e/predicted.csv"), "predicted_std_m_s");
-    let known: Vec<f64> = predicted.into_iter().map(f64::from_bits).filter(|v| v.is_finite()).collect();
+    let known: Vec<f64> = predicted
+        .into_iter()
+        .map(f64::from_bits)
+        .filter(|v| v.is_finite())
+        .collect();
     // 10 dB, some ten independent windows.
-    assert!(known.len() > 150 && known.iter().all(|v| (0.01..1.0).contains(v)), "{known:?}");
+    assert!(
+        known.len() > 150 && known.iter().all(|v| (0.01..1.0).contains(v)),
+        "{known:?}"
+    );
 }
 
 #[test]
 fn signals_of_any_pattern_give_the_bytes_of_the_run() {
     let estimate = |folder: &Path, out: &'static str, words: &[&str]| {
-        let all = [&["estimate", "o/signals.nc", "--scene", "s.toml", "--out", out, "--quiet"], words].concat();
+        let all = [
+            &[
+                "estimate",
+                "o/signals.nc",
+                "--scene",
+                "s.toml",
+                "--out",
+                out,
+                "--quiet",
+            ],
+            words,
+        ]
+        .concat();
         wakescope(folder, &all)
     };
     let back = format!("{RHI}head = {{ sweeps = 3, direction = \"alternate\" }}\n");
@@ -81,12 +128,14 @@ fn signals_of_any_pattern_give_the_bytes_of_the_run() {
         assert!(out.status.success(), "{scan}: {out:?}");
         let found = names(&folder.join("e"));
         assert!(
-            found.contains(&"map.nc".to_owned()) && found.contains(&"scan.svg".to_owned()) == (scan != back),
+            found.contains(&"map.nc".to_owned())
+                && found.contains(&"scan.svg".to_owned()) == (scan != back),
             "{found:?}"
         );
         for name in found.iter().filter(|name| *name != "predicted.csv") {
             assert!(
-                fs::read(folder.join("e").join(name)).unwrap() == fs::read(folder.join("o").join(name)).unwrap(),
+                fs::read(folder.join("e").join(name)).unwrap()
+                    == fs::read(folder.join("o").join(name)).unwrap(),
                 "{name}"
             );
         }
@@ -97,7 +146,8 @@ fn signals_of_any_pattern_give_the_bytes_of_the_run() {
             // The lines at the turns are lines of their own, and the truth is known as without spectra.
             for name in ["map.csv", "map.nc", "predicted.csv"] {
                 assert!(
-                    fs::read(folder.join("x").join(name)).unwrap() == fs::read(folder.join("e").join(name)).unwrap(),
+                    fs::read(folder.join("x").join(name)).unwrap()
+                        == fs::read(folder.join("e").join(name)).unwrap(),
                     "{name}"
                 );
             }
@@ -105,7 +155,10 @@ fn signals_of_any_pattern_give_the_bytes_of_the_run() {
             assert_eq!(file.data_set().dim_size("line"), Some(3 * 3 * 9));
         } else {
             let message = String::from_utf8(out.stderr).unwrap();
-            assert!(out.status.code() == Some(2) && message.contains("others need kind = \"rhi\""), "{message}");
+            assert!(
+                out.status.code() == Some(2) && message.contains("others need kind = \"rhi\""),
+                "{message}"
+            );
         }
     }
 }
@@ -115,18 +168,32 @@ fn signals_of_any_pattern_give_the_bytes_of_the_run() {
 fn signals_of_another_draw_are_not_taken_for_those_of_the_scene() {
     let temp = recorded_run("");
     let scene = fs::read_to_string(temp.path().join("s.toml")).unwrap();
-    fs::write(temp.path().join("seed.toml"), scene.replace("seed = 5", "seed = 6")).unwrap();
-    fs::write(temp.path().join("more.toml"), scene.replace("realisations = 3", "realisations = 7")).unwrap();
+    fs::write(
+        temp.path().join("seed.toml"),
+        scene.replace("seed = 5", "seed = 6"),
+    )
+    .unwrap();
+    fs::write(
+        temp.path().join("more.toml"),
+        scene.replace("realisations = 3", "realisations = 7"),
+    )
+    .unwrap();
     for (words, part) in [
         ("--scene seed.toml", "with seed = 5, and seed is 6"),
         ("--scene s.toml --seed 77", "with seed = 5, and seed is 77"),
-        ("--scene more.toml", "with scan.realisations = 3, and scan.realisations is 7"),
+        (
+            "--scene more.toml",
+            "with scan.realisations = 3, and scan.realisations is 7",
+        ),
     ] {
         let mut all = vec!["estimate", "o/signals.nc", "--out", "e", "--quiet"];
         all.extend(words.split_whitespace());
         let out = wakescope(temp.path(), &all);
         let message = String::from_utf8(out.stderr).unwrap();
-        assert!(out.status.code() == Some(2) && message.contains(part), "{words}: {message}");
+        assert!(
+            out.status.code() == Some(2) && message.contains(part),
+            "{words}: {message}"
+        );
         assert!(!temp.path().join("e").exists());
     }
 }
@@ -134,11 +201,24 @@ fn signals_of_another_draw_are_not_taken_for_those_of_the_scene() {
 #[test]
 fn another_estimator_sees_the_truth_of_the_same_signals() {
     let temp = recorded_run("");
-    let scene = fs::read_to_string(temp.path().join("s.toml")).unwrap() + "[estimator]\nradius_m = 4.0\n";
+    let scene =
+        fs::read_to_string(temp.path().join("s.toml")).unwrap() + "[estimator]\nradius_m = 4.0\n";
     fs::write(temp.path().join("t.toml"), scene).unwrap();
     for (words, folder) in [
         (["map", "t.toml", "--out", "run", "--quiet"].to_vec(), "run"),
-        (["estimate", "o/signals.nc", "--scene", "t.toml", "--out", "est", "--quiet"].to_vec(), "est"),
+        (
+            [
+                "estimate",
+                "o/signals.nc",
+                "--scene",
+                "t.toml",
+                "--out",
+                "est",
+                "--quiet",
+            ]
+            .to_vec(),
+            "est",
+        ),
     ] {
         assert!(wakescope(temp.path(), &words).status.success(), "{folder}");
     }
@@ -152,29 +232,64 @@ fn every_format_and_order_gives_the_velocities_of_the_run() {
     let (all, samples) = samples(temp.path());
     let one = &all[..all.len() / 3];
     let rows = one.len() / samples;
-    let bytes = |at: &dyn Fn(usize) -> f64| (0..one.len()).flat_map(|i| at(i).to_be_bytes()).collect::<Vec<u8>>();
-    let text: Vec<String> =
-        one.chunks(samples).map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(",")).collect();
+    let bytes = |at: &dyn Fn(usize) -> f64| {
+        (0..one.len())
+            .flat_map(|i| at(i).to_be_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let text: Vec<String> = one
+        .chunks(samples)
+        .map(|row| row.iter().map(f64::to_string).collect::<Vec<_>>().join(","))
+        .collect();
     let npy = {
-        let header = format!("{{'descr': '>f8', 'fortran_order': False, 'shape': ({rows}, {samples}), }}\n");
+        let header =
+            format!("{{'descr': '>f8', 'fortran_order': False, 'shape': ({rows}, {samples}), }}\n");
         let length = (header.len() as u16).to_le_bytes();
-        [b"\x93NUMPY\x01\x00", &length[..], header.as_bytes(), &bytes(&|i| one[i])].concat()
+        [
+            b"\x93NUMPY\x01\x00",
+            &length[..],
+            header.as_bytes(),
+            &bytes(&|i| one[i]),
+        ]
+        .concat()
     };
     let lines = rows / 2;
     // One time for all pulses of a line.
     let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
-    let elevation_rad = Plan::new(scene, wakescope_sim::Target::Map).unwrap().geometry.elevation_rad.clone();
-    let rays: Vec<String> = elevation_rad.iter().enumerate().map(|(i, e)| format!("{e},{i}\n")).collect();
-    fs::write(temp.path().join("rays.csv"), format!("elevation_rad,time_s\n{}", rays.concat())).unwrap();
+    let elevation_rad = Plan::new(scene, wakescope_sim::Target::Map)
+        .unwrap()
+        .geometry
+        .elevation_rad
+        .clone();
+    let rays: Vec<String> = elevation_rad
+        .iter()
+        .enumerate()
+        .map(|(i, e)| format!("{e},{i}\n"))
+        .collect();
+    fs::write(
+        temp.path().join("rays.csv"),
+        format!("elevation_rad,time_s\n{}", rays.concat()),
+    )
+    .unwrap();
     for (name, content, words) in [
-        ("a.bin", [b"head".to_vec(), bytes(&|i| one[i])].concat(), "--format f64 --byte-order big --header-bytes 4"),
+        (
+            "a.bin",
+            [b"head".to_vec(), bytes(&|i| one[i])].concat(),
+            "--format f64 --byte-order big --header-bytes 4",
+        ),
         // [pulse, line, sample] and [sample, line, pulse] of [line, pulse, sample].
         (
             "b.bin",
-            bytes(&|i| one[(i / samples % lines * 2 + i / samples / lines) * samples + i % samples]),
+            bytes(&|i| {
+                one[(i / samples % lines * 2 + i / samples / lines) * samples + i % samples]
+            }),
             "--format f64 --byte-order big --order pulse-major",
         ),
-        ("c.bin", bytes(&|i| one[i % rows * samples + i / rows]), "--format f64 --byte-order big --order sample-major"),
+        (
+            "c.bin",
+            bytes(&|i| one[i % rows * samples + i / rows]),
+            "--format f64 --byte-order big --order sample-major",
+        ),
         ("d.csv", text.join("\n").into_bytes(), "--rays rays.csv"),
         ("e.npy", npy, ""),
     ] {
@@ -193,11 +308,21 @@ fn every_format_and_order_gives_the_velocities_of_the_run() {
         all.extend(words.split_whitespace());
         let out = wakescope(temp.path(), &all);
         assert!(out.status.success(), "{name}: {out:?}");
-        let found = temp.path().join(name.split('.').next().unwrap()).join("map.csv");
+        let found = temp
+            .path()
+            .join(name.split('.').next().unwrap())
+            .join("map.csv");
         let run = temp.path().join("o/map.csv");
-        assert_eq!(column(&found, "v_mean_m_s"), column(&run, "v_scan_m_s"), "{name}");
+        assert_eq!(
+            column(&found, "v_mean_m_s"),
+            column(&run, "v_scan_m_s"),
+            "{name}"
+        );
         assert_eq!(column(&found, "n_eff"), column(&run, "n_eff"), "{name}");
-        let snr_db: Vec<f64> = column(&found, "snr_db").into_iter().map(f64::from_bits).collect();
+        let snr_db: Vec<f64> = column(&found, "snr_db")
+            .into_iter()
+            .map(f64::from_bits)
+            .collect();
         let mean_db = snr_db.iter().sum::<f64>() / snr_db.len() as f64;
         assert!((8.0..12.0).contains(&mean_db), "{name}: {mean_db}");
     }
@@ -208,8 +333,12 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
     // np.savez("numpy.npz", signals=np.arange(24, dtype="<i2").reshape(4, 6), elevation_rad=[0.1, 0.1, 0.2, 0.2])
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference/sim/numpy.npz");
     let scene = SceneFile::parse(SMALL, Path::new("s.toml")).unwrap();
-    let mut records = RawRecords::open(&path, &RawFormat::default(), record_shape(&scene.content)).unwrap();
-    assert_eq!((records.records, records.samples, records.is_complex), (4, 6, false));
+    let mut records =
+        RawRecords::open(&path, &RawFormat::default(), record_shape(&scene.content)).unwrap();
+    assert_eq!(
+        (records.records, records.samples, records.is_complex),
+        (4, 6, false)
+    );
     assert_eq!(records.about.elevation_rad, Some(vec![0.1, 0.1, 0.2, 0.2]));
     let found: Vec<f64> = records.read(1..3).unwrap().iter().map(|z| z.re).collect();
     assert_eq!(found, (6..18).map(f64::from).collect::<Vec<_>>());
@@ -217,7 +346,10 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
 
 #[test]
 fn tiles_of_lines_and_gates_change_no_bit() {
-    for words in ["follow_wind = true", "method = { kind = \"autoregressive\" }\nweighting = \"rectangular\""] {
+    for words in [
+        "follow_wind = true",
+        "method = { kind = \"autoregressive\" }\nweighting = \"rectangular\"",
+    ] {
         tiles_change_no_bit(&format!("[estimator]\nradius_m = 6.0\n{words}\n"));
     }
 }
@@ -226,10 +358,16 @@ fn tiles_change_no_bit(words: &str) {
     let temp = recorded_run(words);
     let scene = SceneFile::read(&temp.path().join("s.toml")).unwrap();
     let with = |block_bytes: Option<usize>| {
-        let (path, shape) = (temp.path().join("o/signals.nc"), record_shape(&scene.content));
+        let (path, shape) = (
+            temp.path().join("o/signals.nc"),
+            record_shape(&scene.content),
+        );
         let mut records = RawRecords::open(&path, &RawFormat::default(), shape).unwrap();
         let plan = Plan::new(scene.clone(), wakescope_sim::Target::Map).unwrap();
-        let options = RecordedOptions { block_bytes, ..RecordedOptions::default() };
+        let options = RecordedOptions {
+            block_bytes,
+            ..RecordedOptions::default()
+        };
         match recorded::estimate((&plan, false), &mut records, &options, &Silent).unwrap() {
             Recorded::Measured { scans, .. } => scans,
             Recorded::OfRun { .. } => panic!("nothing is known of them"),
@@ -240,8 +378,15 @@ fn tiles_change_no_bit(words: &str) {
     for bytes in [1, 100_000] {
         for (a, b) in whole.iter().zip(&with(Some(bytes))) {
             let bits = |values: &ndarray::Array2<f64>| values.mapv(f64::to_bits);
-            assert_eq!(bits(&a.velocity_m_s), bits(&b.velocity_m_s), "{words} {bytes}");
-            assert_eq!((bits(&a.n_eff), &a.flagged, bits(&a.snr_db)), (bits(&b.n_eff), &b.flagged, bits(&b.snr_db)));
+            assert_eq!(
+                bits(&a.velocity_m_s),
+                bits(&b.velocity_m_s),
+                "{words} {bytes}"
+            );
+            assert_eq!(
+                (bits(&a.n_eff), &a.flagged, bits(&a.snr_db)),
+                (bits(&b.n_eff), &b.flagged, bits(&b.snr_db))
+            );
         }
     }
 }
@@ -250,8 +395,14 @@ fn tiles_change_no_bit(words: &str) {
 fn complex_signals_and_spectra_on_request() {
     let temp = recorded_run("[detector]\nsignal = \"baseband\"\n");
     let estimate = |words: &[&str]| {
-        let out =
-            wakescope(temp.path(), &[&["estimate", "o/signals.nc", "--scene", "s.toml", "--quiet"], words].concat());
+        let out = wakescope(
+            temp.path(),
+            &[
+                &["estimate", "o/signals.nc", "--scene", "s.toml", "--quiet"],
+                words,
+            ]
+            .concat(),
+        );
         assert!(out.status.success(), "{out:?}");
     };
     estimate(&["--out", "own"]);
@@ -259,14 +410,19 @@ fn complex_signals_and_spectra_on_request() {
     assert_eq!(of("o"), of("own"));
     estimate(&["--out", "spectra", "--spectra"]);
     let mut file = netcdf3::FileReader::open(temp.path().join("spectra/spectra.nc")).unwrap();
-    let (density, velocity) = (file.read_var_f32("density").unwrap(), file.read_var_f64("velocity").unwrap());
+    let (density, velocity) = (
+        file.read_var_f32("density").unwrap(),
+        file.read_var_f64("velocity").unwrap(),
+    );
     // The first of three realisations.
     let found = column(&temp.path().join("spectra/map.csv"), "v_scan_m_s");
     assert!(velocity.windows(2).all(|pair| pair[1] > pair[0]));
     assert_eq!(density.len(), 3 * found.len() * velocity.len());
     let step_m_s = velocity[1] - velocity[0];
     for (spectrum, found) in density.chunks(velocity.len()).zip(found) {
-        let peak = (0..spectrum.len()).max_by(|a, b| spectrum[*a].total_cmp(&spectrum[*b])).unwrap();
+        let peak = (0..spectrum.len())
+            .max_by(|a, b| spectrum[*a].total_cmp(&spectrum[*b]))
+            .unwrap();
         assert!(
             (velocity[peak] - f64::from_bits(found)).abs() < step_m_s,
             "{} {}",
@@ -282,7 +438,9 @@ fn noise_bytes(count: usize, seed: u64, also: impl Fn(usize) -> f64) -> Vec<u8> 
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(seed);
     let mut uniform = || (rng.next_u64() as f64 + 0.5) / 2f64.powi(64);
     let mut normal = || (-2.0 * uniform().ln()).sqrt() * (std::f64::consts::TAU * uniform()).cos();
-    (0..count).flat_map(|i| (normal() + also(i)).to_le_bytes()).collect()
+    (0..count)
+        .flat_map(|i| (normal() + also(i)).to_le_bytes())
+        .collect()
 }
 
 #[test]
@@ -297,12 +455,20 @@ fn the_quietest_gates_tell_the_noise_for_any_number_of_lines() {
                 0.095 + 0.01 * f64::from(lines)
             ),
         );
-        let scene =
-            scene.replace("range_max_m = 430.0\npulses_per_line = 2", "range_max_m = 750.0\npulses_per_line = 1");
-        let scene = scene.replace("[detector.snr]", "[detector]\nnoise = \"white\"\n[detector.snr]")
-            + "[estimator]\ngate_step_samples = 16\n";
+        let scene = scene.replace(
+            "range_max_m = 430.0\npulses_per_line = 2",
+            "range_max_m = 750.0\npulses_per_line = 1",
+        );
+        let scene = scene.replace(
+            "[detector.snr]",
+            "[detector]\nnoise = \"white\"\n[detector.snr]",
+        ) + "[estimator]\ngate_step_samples = 16\n";
         fs::write(folder.join("s.toml"), scene).unwrap();
-        let plan = Plan::new(SceneFile::read(&folder.join("s.toml")).unwrap(), wakescope_sim::Target::Map).unwrap();
+        let plan = Plan::new(
+            SceneFile::read(&folder.join("s.toml")).unwrap(),
+            wakescope_sim::Target::Map,
+        )
+        .unwrap();
         let (samples, count) = (plan.geometry.samples, plan.geometry.elevation_rad.len());
         assert_eq!(count, lines as usize);
         let (mut passed, mut gates, mut tones) = (0.0, 0.0, Vec::new());
@@ -311,29 +477,62 @@ fn the_quietest_gates_tell_the_noise_for_any_number_of_lines() {
             let tone = |i: usize| {
                 let place = i % samples;
                 let is_lit = file % 2 == 1 && place < samples / 2;
-                if is_lit { 8f64.sqrt() * (0.3 * std::f64::consts::TAU * place as f64).cos() } else { 0.0 }
+                if is_lit {
+                    8f64.sqrt() * (0.3 * std::f64::consts::TAU * place as f64).cos()
+                } else {
+                    0.0
+                }
             };
-            fs::write(folder.join("n.bin"), noise_bytes(samples * count, 10 + file, tone)).unwrap();
-            let words =
-                ["estimate", "n.bin", "--scene", "s.toml", "--format", "f64", "--out", "x", "--quiet", "--overwrite"];
+            fs::write(
+                folder.join("n.bin"),
+                noise_bytes(samples * count, 10 + file, tone),
+            )
+            .unwrap();
+            let words = [
+                "estimate",
+                "n.bin",
+                "--scene",
+                "s.toml",
+                "--format",
+                "f64",
+                "--out",
+                "x",
+                "--quiet",
+                "--overwrite",
+            ];
             let out = wakescope(folder, &words);
             assert!(out.status.success(), "{out:?}");
-            let of = |name: &str| column(&folder.join("x/map.csv"), name).into_iter().map(f64::from_bits);
+            let of = |name: &str| {
+                column(&folder.join("x/map.csv"), name)
+                    .into_iter()
+                    .map(f64::from_bits)
+            };
             if file % 2 == 0 {
                 passed += of("flagged").filter(|flagged| *flagged == 0.0).count() as f64;
                 gates += of("flagged").count() as f64;
             } else {
                 let per_line = plan.geometry.gate_range_m.len();
-                let near = of("snr_db").enumerate().filter(|(i, _)| i % per_line < per_line / 4);
+                let near = of("snr_db")
+                    .enumerate()
+                    .filter(|(i, _)| i % per_line < per_line / 4);
                 tones.push(near.clone().map(|(_, db)| db).sum::<f64>() / near.count() as f64);
             }
         }
         let snr_db = tones.iter().sum::<f64>() / tones.len() as f64;
-        println!("{lines} lines: {} of {gates} pass, tone {snr_db} dB", passed);
+        println!(
+            "{lines} lines: {} of {gates} pass, tone {snr_db} dB",
+            passed
+        );
         // of one line the noise itself is known to a tenth, which raises the rate
         let error = (0.01 * gates).sqrt() / gates;
-        assert!(passed / gates < 0.016 + 3.0 * error, "{lines} lines: {passed} of {gates}");
-        assert!((snr_db - 10.0).abs() < 0.25 + 0.6 / f64::from(lines).sqrt(), "{lines} lines: {snr_db}");
+        assert!(
+            passed / gates < 0.016 + 3.0 * error,
+            "{lines} lines: {passed} of {gates}"
+        );
+        assert!(
+            (snr_db - 10.0).abs() < 0.25 + 0.6 / f64::from(lines).sqrt(),
+            "{lines} lines: {snr_db}"
+        );
     }
 }
 
@@ -343,19 +542,40 @@ fn missing_samples_of_any_kind_cost_their_windows_alone() {
     let folder = temp.path();
     let (all, samples) = samples(folder);
     let level = |name: &str, words: &[&str]| -> Vec<f64> {
-        let mut every = vec!["estimate", name, "--scene", "s.toml", "--out", "x", "--quiet", "--overwrite"];
+        let mut every = vec![
+            "estimate",
+            name,
+            "--scene",
+            "s.toml",
+            "--out",
+            "x",
+            "--quiet",
+            "--overwrite",
+        ];
         every.extend(words);
         let out = wakescope(folder, &every);
         assert!(out.status.success(), "{out:?}");
-        let of =
-            |name: &str| column(&folder.join("x/map.csv"), name).into_iter().map(f64::from_bits).collect::<Vec<_>>();
-        assert!(of("snr_db").iter().all(|db| db.is_nan() || *db <= 30.0), "{name}");
+        let of = |name: &str| {
+            column(&folder.join("x/map.csv"), name)
+                .into_iter()
+                .map(f64::from_bits)
+                .collect::<Vec<_>>()
+        };
+        assert!(
+            of("snr_db").iter().all(|db| db.is_nan() || *db <= 30.0),
+            "{name}"
+        );
         of("level")
     };
     let binary = |missing: f64| {
         let at = |i: usize| if i == 70 { missing } else { all[i] };
-        fs::write(folder.join("a.bin"), (0..all.len() / 3).flat_map(|i| at(i).to_le_bytes()).collect::<Vec<u8>>())
-            .unwrap();
+        fs::write(
+            folder.join("a.bin"),
+            (0..all.len() / 3)
+                .flat_map(|i| at(i).to_le_bytes())
+                .collect::<Vec<u8>>(),
+        )
+        .unwrap();
         level("a.bin", &["--format", "f64"])
     };
     let whole = binary(all[70]);
@@ -370,11 +590,25 @@ fn missing_samples_of_any_kind_cost_their_windows_alone() {
 fn own_signals_obey_noise_and_scale() {
     let temp = recorded_run("");
     let estimate = |out: &'static str, words: &[&str]| {
-        let all = [&["estimate", "o/signals.nc", "--scene", "s.toml", "--out", out, "--quiet"], words].concat();
+        let all = [
+            &[
+                "estimate",
+                "o/signals.nc",
+                "--scene",
+                "s.toml",
+                "--out",
+                out,
+                "--quiet",
+            ],
+            words,
+        ]
+        .concat();
         let done = wakescope(temp.path(), &all);
         assert!(done.status.success(), "{done:?}");
-        let found: Vec<f64> =
-            column(&temp.path().join(out).join("map.csv"), "snr_db").into_iter().map(f64::from_bits).collect();
+        let found: Vec<f64> = column(&temp.path().join(out).join("map.csv"), "snr_db")
+            .into_iter()
+            .map(f64::from_bits)
+            .collect();
         found.iter().sum::<f64>() / found.len() as f64
     };
     let own_db = estimate("own", &[]);
@@ -393,9 +627,16 @@ fn own_signals_obey_noise_and_scale() {
 /// A `signals.nc` whose samples all have one value.
 fn with_all_samples(nc: &[u8], all: &[f64], value: f64) -> Vec<u8> {
     let stored: Vec<u8> = all.iter().flat_map(|sample| sample.to_be_bytes()).collect();
-    let at = nc.windows(stored.len()).position(|part| part == stored).unwrap();
+    let at = nc
+        .windows(stored.len())
+        .position(|part| part == stored)
+        .unwrap();
     let mut out = nc.to_vec();
-    out[at..at + stored.len()].copy_from_slice(&all.iter().flat_map(|_| value.to_be_bytes()).collect::<Vec<u8>>());
+    out[at..at + stored.len()].copy_from_slice(
+        &all.iter()
+            .flat_map(|_| value.to_be_bytes())
+            .collect::<Vec<u8>>(),
+    );
     out
 }
 
@@ -404,18 +645,59 @@ fn npz(arrays: &[(&str, &[f64], &[usize])]) -> Vec<u8> {
     let (mut out, mut table) = (Vec::new(), Vec::new());
     for (name, values, shape) in arrays {
         let shape: Vec<String> = shape.iter().map(|length| format!("{length},")).collect();
-        let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}\n", shape.concat());
-        let mut data = [&b"\x93NUMPY\x01\x00"[..], &(header.len() as u16).to_le_bytes(), header.as_bytes()].concat();
+        let header = format!(
+            "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}), }}\n",
+            shape.concat()
+        );
+        let mut data = [
+            &b"\x93NUMPY\x01\x00"[..],
+            &(header.len() as u16).to_le_bytes(),
+            header.as_bytes(),
+        ]
+        .concat();
         data.extend(values.iter().flat_map(|value| value.to_le_bytes()));
         let (name, at) = (format!("{name}.npy"), out.len() as u32);
         let size = (data.len() as u32).to_le_bytes();
-        let head = [&[0_u8; 12][..], &[0; 4], &size, &size, &(name.len() as u16).to_le_bytes(), &[0; 2]].concat();
+        let head = [
+            &[0_u8; 12][..],
+            &[0; 4],
+            &size,
+            &size,
+            &(name.len() as u16).to_le_bytes(),
+            &[0; 2],
+        ]
+        .concat();
         out.extend([&b"PK\x03\x04"[..], &head[2..], name.as_bytes(), &data].concat());
-        table.extend([&b"PK\x01\x02"[..], &[0; 2], &head[2..], &[0; 10], &at.to_le_bytes(), name.as_bytes()].concat());
+        table.extend(
+            [
+                &b"PK\x01\x02"[..],
+                &[0; 2],
+                &head[2..],
+                &[0; 10],
+                &at.to_le_bytes(),
+                name.as_bytes(),
+            ]
+            .concat(),
+        );
     }
-    let (at, size, count) = (out.len() as u32, table.len() as u32, (arrays.len() as u16).to_le_bytes());
+    let (at, size, count) = (
+        out.len() as u32,
+        table.len() as u32,
+        (arrays.len() as u16).to_le_bytes(),
+    );
     out.extend(table);
-    out.extend([&b"PK\x05\x06"[..], &[0; 4], &count, &count, &size.to_le_bytes(), &at.to_le_bytes(), &[0; 2]].concat());
+    out.extend(
+        [
+            &b"PK\x05\x06"[..],
+            &[0; 4],
+            &count,
+            &count,
+            &size.to_le_bytes(),
+            &at.to_le_bytes(),
+            &[0; 2],
+        ]
+        .concat(),
+    );
     out
 }
 
@@ -425,7 +707,11 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     let folder = temp.path();
     let (all, samples) = samples(folder);
     let one: Vec<f64> = all[..all.len() / 3].to_vec();
-    let binary = |scale: f64| one.iter().flat_map(|a| ((a * scale) as i16).to_le_bytes()).collect::<Vec<u8>>();
+    let binary = |scale: f64| {
+        one.iter()
+            .flat_map(|a| ((a * scale) as i16).to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
     let counts = binary(1000.0 / one.iter().fold(0.0_f64, |m, a| m.max(a.abs())));
     let nc = fs::read(folder.join("o/signals.nc")).unwrap();
     fs::write(folder.join("cut.nc"), &nc[..nc.len() - 4000]).unwrap();
@@ -433,10 +719,18 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     fs::write(folder.join("cut.bin"), &counts[..counts.len() - 7]).unwrap();
     fs::write(folder.join("zero.bin"), vec![0_u8; counts.len()]).unwrap();
     fs::write(folder.join("few.bin"), &counts[..2 * samples * 4]).unwrap();
-    fs::write(folder.join("nan.csv"), vec![vec!["nan"; samples].join(","); 18].join("\n")).unwrap();
+    fs::write(
+        folder.join("nan.csv"),
+        vec![vec!["nan"; samples].join(","); 18].join("\n"),
+    )
+    .unwrap();
     let ones = vec!["1"; samples].join(",") + "\n";
     fs::write(folder.join("ragged.csv"), "1,2,3\n1,2\n").unwrap();
-    fs::write(folder.join("word.csv"), format!("{}{}x\n", ones.repeat(17), "1,".repeat(samples - 1))).unwrap();
+    fs::write(
+        folder.join("word.csv"),
+        format!("{}{}x\n", ones.repeat(17), "1,".repeat(samples - 1)),
+    )
+    .unwrap();
     fs::write(
         folder.join("short.npy"),
         b"\x93NUMPY\x01\x00\x46\x00{'descr': '<f8', 'fortran_order': False, 'shape': (18, 167), }         \n",
@@ -444,42 +738,108 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
     .unwrap();
     fs::write(folder.join("rays.csv"), "elevation_deg,time_s\n1,0\n2,1\n").unwrap();
     let scene = fs::read_to_string(folder.join("s.toml")).unwrap();
-    fs::write(folder.join("fast.toml"), format!("{scene}[detector]\nsampling_hz = 260e6\n")).unwrap();
-    fs::write(folder.join("wave.toml"), format!("{scene}[laser]\nwavelength_m = 1.6e-6\n")).unwrap();
-    fs::write(folder.join("base.toml"), format!("{scene}[detector]\nsignal = \"baseband\"\n")).unwrap();
-    let bits = "[detector]\ndigitiser = { kind = \"quantised\", bits = 8, full_scale_over_noise = 5.0 }\n";
+    fs::write(
+        folder.join("fast.toml"),
+        format!("{scene}[detector]\nsampling_hz = 260e6\n"),
+    )
+    .unwrap();
+    fs::write(
+        folder.join("wave.toml"),
+        format!("{scene}[laser]\nwavelength_m = 1.6e-6\n"),
+    )
+    .unwrap();
+    fs::write(
+        folder.join("base.toml"),
+        format!("{scene}[detector]\nsignal = \"baseband\"\n"),
+    )
+    .unwrap();
+    let bits =
+        "[detector]\ndigitiser = { kind = \"quantised\", bits = 8, full_scale_over_noise = 5.0 }\n";
     fs::write(folder.join("bits.toml"), format!("{scene}{bits}")).unwrap();
     for (name, value) in [("void.nc", f64::NAN), ("still.nc", 0.0)] {
         fs::write(folder.join(name), with_all_samples(&nc, &all, value)).unwrap();
     }
-    let angles: Vec<f64> = (0..2 * all.len() / samples).map(|i| 0.1 + 1e-3 * i as f64).collect();
+    let angles: Vec<f64> = (0..2 * all.len() / samples)
+        .map(|i| 0.1 + 1e-3 * i as f64)
+        .collect();
     fs::write(
         folder.join("more.npz"),
-        npz(&[("signals", &all, &[all.len() / samples, samples]), ("elevation_rad", &angles, &[angles.len()])]),
+        npz(&[
+            ("signals", &all, &[all.len() / samples, samples]),
+            ("elevation_rad", &angles, &[angles.len()]),
+        ]),
     )
     .unwrap();
     let before = names(folder);
     for (words, parts) in [
-        ("void.nc --scene s.toml", &["void.nc", "all of its samples are missing"][..]),
-        ("still.nc --scene s.toml", &["still.nc", "all of its samples are 0"]),
-        ("more.npz --scene s.toml", &["more.npz", "elevation_rad has 108 values", "54 records"]),
+        (
+            "void.nc --scene s.toml",
+            &["void.nc", "all of its samples are missing"][..],
+        ),
+        (
+            "still.nc --scene s.toml",
+            &["still.nc", "all of its samples are 0"],
+        ),
+        (
+            "more.npz --scene s.toml",
+            &["more.npz", "elevation_rad has 108 values", "54 records"],
+        ),
         ("none.nc --scene s.toml", &["none.nc"][..]),
-        ("cut.nc --scene s.toml", &["cut.nc", "more than the file holds"]),
+        (
+            "cut.nc --scene s.toml",
+            &["cut.nc", "more than the file holds"],
+        ),
         ("s.toml --scene s.toml", &["s.toml", "--format"]),
         ("c.bin --scene s.toml", &["--format i16"]),
-        ("cut.bin --scene s.toml --format i16", &["cut.bin", "records of 167 samples", "left over"]),
-        ("few.bin --scene s.toml --format i16", &["few.bin", "4 records", "9 lines", "scan.pulses_per_line"]),
-        ("zero.bin --scene s.toml --format i16", &["zero.bin", "all of its samples are 0"]),
-        ("c.bin --scene bits.toml --format i16", &["c.bin", "beyond the 8 bits of detector.digitiser"]),
-        ("nan.csv --scene s.toml", &["nan.csv", "all of its samples are missing"]),
-        ("ragged.csv --scene s.toml", &["ragged.csv", "line 2", "2 samples", "3"]),
-        ("word.csv --scene s.toml", &["word.csv", "line 18", "no number"]),
+        (
+            "cut.bin --scene s.toml --format i16",
+            &["cut.bin", "records of 167 samples", "left over"],
+        ),
+        (
+            "few.bin --scene s.toml --format i16",
+            &["few.bin", "4 records", "9 lines", "scan.pulses_per_line"],
+        ),
+        (
+            "zero.bin --scene s.toml --format i16",
+            &["zero.bin", "all of its samples are 0"],
+        ),
+        (
+            "c.bin --scene bits.toml --format i16",
+            &["c.bin", "beyond the 8 bits of detector.digitiser"],
+        ),
+        (
+            "nan.csv --scene s.toml",
+            &["nan.csv", "all of its samples are missing"],
+        ),
+        (
+            "ragged.csv --scene s.toml",
+            &["ragged.csv", "line 2", "2 samples", "3"],
+        ),
+        (
+            "word.csv --scene s.toml",
+            &["word.csv", "line 18", "no number"],
+        ),
         ("short.npy --scene s.toml", &["short.npy", "cut short"]),
-        ("o/signals.nc --scene s.toml --variable voltage", &["no variable voltage"]),
-        ("o/signals.nc --scene s.toml --rays rays.csv", &["rays.csv", "2 rows", "54 records"]),
-        ("o/signals.nc --scene fast.toml", &["signals.nc", "samples", "scan.range_max_m"]),
-        ("o/signals.nc --scene wave.toml", &["signals.nc", "its wavelength is", "laser.wavelength_m"]),
-        ("o/signals.nc --scene base.toml", &["signals.nc", "its samples are real", "detector.signal"]),
+        (
+            "o/signals.nc --scene s.toml --variable voltage",
+            &["no variable voltage"],
+        ),
+        (
+            "o/signals.nc --scene s.toml --rays rays.csv",
+            &["rays.csv", "2 rows", "54 records"],
+        ),
+        (
+            "o/signals.nc --scene fast.toml",
+            &["signals.nc", "samples", "scan.range_max_m"],
+        ),
+        (
+            "o/signals.nc --scene wave.toml",
+            &["signals.nc", "its wavelength is", "laser.wavelength_m"],
+        ),
+        (
+            "o/signals.nc --scene base.toml",
+            &["signals.nc", "its samples are real", "detector.signal"],
+        ),
         ("o/signals.nc --scene s.toml --noise loud", &["--noise"]),
     ] {
         let mut all = vec!["estimate"];
@@ -489,7 +849,10 @@ fn signals_that_are_none_are_refused_and_nothing_is_written() {
         let message = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(2), "{words}: {message}");
         for part in parts {
-            assert!(message.contains(part), "{words}: {part} is not in: {message}");
+            assert!(
+                message.contains(part),
+                "{words}: {part} is not in: {message}"
+            );
         }
         assert_eq!(names(folder), before, "{words}");
     }

@@ -15,10 +15,23 @@ use wakescope_sim::{Silent, write_contents};
 const SCENE: &str = "scan.elevation_min_rad = 0.1\nscan.elevation_max_rad = 0.11\nscan.pulses_per_line = 1\n\
                      outputs.signals = true\noutputs.svg = false\noutputs.png = false\n";
 
-fn run(words: &[&str], text: &str, signals: Option<RawRecords>, keeps_files: bool) -> Result<Answer, Refusal> {
+fn run(
+    words: &[&str],
+    text: &str,
+    signals: Option<RawRecords>,
+    keeps_files: bool,
+) -> Result<Answer, Refusal> {
     let words: Vec<OsString> = words.iter().map(OsString::from).collect();
     let texts = BTreeMap::from([(PathBuf::from("scene"), text.to_owned())]);
-    call(&words, Host { observer: Arc::new(Silent), texts, signals: Mutex::new(signals), keeps_files })
+    call(
+        &words,
+        Host {
+            observer: Arc::new(Silent),
+            texts,
+            signals: Mutex::new(signals),
+            keeps_files,
+        },
+    )
 }
 
 #[test]
@@ -26,13 +39,28 @@ fn kept_files_are_those_that_are_written() {
     let temp = tempfile::tempdir().unwrap();
     let out = temp.path().join("out");
     let kept = run(&["run", "scene", "--out", "."], SCENE, None, true).unwrap();
-    let written = run(&["run", "scene", "--out", out.to_str().unwrap()], SCENE, None, false).unwrap();
-    assert!(written.files.is_empty() && kept.files.len() > 4 && kept.object["results"] == written.object["results"]);
+    let written = run(
+        &["run", "scene", "--out", out.to_str().unwrap()],
+        SCENE,
+        None,
+        false,
+    )
+    .unwrap();
+    assert!(
+        written.files.is_empty()
+            && kept.files.len() > 4
+            && kept.object["results"] == written.object["results"]
+    );
     for (name, content) in &kept.files {
         assert_eq!(&std::fs::read(out.join(name)).unwrap(), content, "{name}");
     }
     assert_eq!(std::fs::read_dir(&out).unwrap().count(), kept.files.len());
-    let again = write_contents(&temp.path().join("again"), kept.files.clone(), Existing::Own).unwrap();
+    let again = write_contents(
+        &temp.path().join("again"),
+        kept.files.clone(),
+        Existing::Own,
+    )
+    .unwrap();
     assert_eq!(again.len(), kept.files.len());
     let bound = run(&["bound", "scene", "--out", "bound.csv"], SCENE, None, true).unwrap();
     assert!(bound.files[0].0 == "bound.csv" && !Path::new("bound.csv").exists());
@@ -43,9 +71,16 @@ fn kept_files_are_those_that_are_written() {
 struct Memory(Vec<f64>, usize);
 
 impl Source for Memory {
-    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
-        let of_record =
-            |record: usize| self.0[record * self.1..][samples.clone()].iter().map(|a| Complex::new(*a, 0.0));
+    fn read(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> Result<Vec<Complex<f64>>, String> {
+        let of_record = |record: usize| {
+            self.0[record * self.1..][samples.clone()]
+                .iter()
+                .map(|a| Complex::new(*a, 0.0))
+        };
         Ok(records.flat_map(of_record).collect())
     }
 }
@@ -56,18 +91,25 @@ fn signals_of_an_array_give_the_map_of_those_of_a_file() {
     let out = temp.path().to_str().unwrap();
     run(&["run", "scene", "--out", out], SCENE, None, false).unwrap();
     let table = std::fs::read_to_string(temp.path().join("signals.csv")).unwrap();
-    let rows: Vec<Vec<&str>> =
-        table.lines().filter(|line| !line.starts_with('#')).map(|line| line.split(',').collect()).collect();
+    let rows: Vec<Vec<&str>> = table
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split(',').collect())
+        .collect();
     let column = |name: &str| rows[0].iter().position(|cell| *cell == name).unwrap();
     let of_column = |name: &str| -> Vec<f64> {
         let place = column(name);
-        rows[1..].iter().map(|row| row[place].parse().unwrap()).collect()
+        rows[1..]
+            .iter()
+            .map(|row| row[place].parse().unwrap())
+            .collect()
     };
     let current_a = of_column("current_a");
     let records = 1 + of_column("ray").into_iter().fold(0.0, f64::max) as usize;
     let samples = current_a.len() / records;
     let npy = temp.path().join("signals.npy");
-    let head = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({records}, {samples}), }}");
+    let head =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({records}, {samples}), }}");
     let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
     bytes.extend((head.len() as u16).to_le_bytes());
     bytes.extend(head.bytes());
@@ -75,27 +117,71 @@ fn signals_of_an_array_give_the_map_of_those_of_a_file() {
     std::fs::write(&npy, bytes).unwrap();
     let of = |scale: f64, records: usize| {
         let memory = Memory(current_a.iter().map(|a| a * scale).collect(), samples);
-        RawRecords::new(Path::new("signals"), memory, [records, samples], false, false)
+        RawRecords::new(
+            Path::new("signals"),
+            memory,
+            [records, samples],
+            false,
+            false,
+        )
     };
     let array = |scale: f64| of(scale, records);
     let words = |data| ["estimate", data, "--scene", "scene", "--out", "."];
     let of_file = run(&words(npy.to_str().unwrap()), SCENE, None, true).unwrap();
     let of_array = run(&words("signals"), SCENE, Some(array(1.0)), true).unwrap();
     assert_eq!(of_array.files, of_file.files);
-    let scaled = run(&[&words("signals")[..], &["--scale", "0.125"]].concat(), SCENE, Some(array(8.0)), true).unwrap();
+    let scaled = run(
+        &[&words("signals")[..], &["--scale", "0.125"]].concat(),
+        SCENE,
+        Some(array(8.0)),
+        true,
+    )
+    .unwrap();
     assert_eq!(scaled.files, of_file.files);
     let none = run(&words("signals"), SCENE, Some(of(1.0, 0)), true).unwrap_err();
-    assert!(none.0["error"].as_str().unwrap().contains("no records"), "{none:?}");
+    assert!(
+        none.0["error"].as_str().unwrap().contains("no records"),
+        "{none:?}"
+    );
 }
 
 #[test]
 fn refusals_are_objects_with_key_value_and_limit_and_no_line_of_a_text_that_nobody_wrote() {
-    let refused = run(&["run", "scene", "--out", "."], "[scan]\nrealisations = 0\n", None, true).unwrap_err().0;
+    let refused = run(
+        &["run", "scene", "--out", "."],
+        "[scan]\nrealisations = 0\n",
+        None,
+        true,
+    )
+    .unwrap_err()
+    .0;
     let problem = &refused["problems"][0];
     assert_eq!(problem["key"], "scan.realisations");
-    assert!(problem["line"].is_null() && problem["value"] == "0" && problem["file"] == "scene", "{refused}");
-    assert_eq!(refused["error"], "scene: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000");
-    let word = run(&["detect", "--scene", "scene", "--false-alarm", "0.7", "--out", "."], SCENE, None, true);
+    assert!(
+        problem["line"].is_null() && problem["value"] == "0" && problem["file"] == "scene",
+        "{refused}"
+    );
+    assert_eq!(
+        refused["error"],
+        "scene: scan.realisations = 0 is not allowed: a whole number from 1 to 1000000"
+    );
+    let word = run(
+        &[
+            "detect",
+            "--scene",
+            "scene",
+            "--false-alarm",
+            "0.7",
+            "--out",
+            ".",
+        ],
+        SCENE,
+        None,
+        true,
+    );
     let problem = &word.unwrap_err().0["problems"][0];
-    assert_eq!((problem["key"].as_str(), problem["value"].as_str()), (Some("--false-alarm <RATE>"), Some("0.7")));
+    assert_eq!(
+        (problem["key"].as_str(), problem["value"].as_str()),
+        (Some("--false-alarm <RATE>"), Some("0.7"))
+    );
 }

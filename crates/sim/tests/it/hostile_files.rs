@@ -12,12 +12,21 @@ fn npy(kind: &[u8], shape: &str, numbers: &[u8]) -> Vec<u8> {
     let mut header = b"{'descr': '".to_vec();
     header.extend(kind);
     header.extend(format!("', 'fortran_order': False, 'shape': ({shape}), }}\n").as_bytes());
-    [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], &header, numbers].concat()
+    [
+        b"\x93NUMPY\x01\x00",
+        &(header.len() as u16).to_le_bytes()[..],
+        &header,
+        numbers,
+    ]
+    .concat()
 }
 
 /// Numbers of eight bytes.
 fn doubles(values: &[f64]) -> Vec<u8> {
-    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+    values
+        .iter()
+        .flat_map(|value| value.to_le_bytes())
+        .collect()
 }
 
 /// Writes an archive of arrays that is not compressed; each has so many more bytes of nothing at its end.
@@ -32,7 +41,8 @@ fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>, u64)]) {
         head.resize(26, 0);
         head.extend((name.len() as u32).to_le_bytes());
         head.extend(name.as_bytes());
-        file.write_all(&[head.clone(), bytes.clone()].concat()).unwrap();
+        file.write_all(&[head.clone(), bytes.clone()].concat())
+            .unwrap();
         // A table for files beyond 4 GiB: lengths and places stand in an extra field.
         let mut entry = b"PK\x01\x02".to_vec();
         entry.resize(20, 0);
@@ -54,7 +64,11 @@ fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>, u64)]) {
     // Bytes of the record behind this number.
     end.extend(44_u64.to_le_bytes());
     end.resize(32, 0);
-    end.extend([arrays.len() as u64, size, at].iter().flat_map(|n| n.to_le_bytes()));
+    end.extend(
+        [arrays.len() as u64, size, at]
+            .iter()
+            .flat_map(|n| n.to_le_bytes()),
+    );
     end.extend(b"PK\x06\x07\0\0\0\0");
     end.extend((at + size).to_le_bytes());
     end.extend([1, 0, 0, 0]);
@@ -65,7 +79,10 @@ fn write_npz(path: &Path, arrays: &[(&str, Vec<u8>, u64)]) {
 }
 
 fn opened(path: &Path) -> Result<RawRecords, String> {
-    let shape = RecordShape { samples: 3, pulses_per_line: 1 };
+    let shape = RecordShape {
+        samples: 3,
+        pulses_per_line: 1,
+    };
     RawRecords::open(path, &RawFormat::default(), shape).map_err(|e| e.to_string())
 }
 
@@ -73,19 +90,41 @@ fn opened(path: &Path) -> Result<RawRecords, String> {
 fn angles_of_an_archive_that_are_not_those_of_the_records_are_refused() {
     let temp = tempfile::tempdir().unwrap();
     let path = temp.path().join("x.npz");
-    let signals = ("signals", npy(b"<f8", "2, 3", &doubles(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])), 0);
-    let angles = |count: usize| ("elevation_rad", npy(b"<f8", &format!("{count},"), &doubles(&vec![0.1; count])), 0);
+    let signals = (
+        "signals",
+        npy(b"<f8", "2, 3", &doubles(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0])),
+        0,
+    );
+    let angles = |count: usize| {
+        (
+            "elevation_rad",
+            npy(b"<f8", &format!("{count},"), &doubles(&vec![0.1; count])),
+            0,
+        )
+    };
     write_npz(&path, &[signals.clone(), angles(2)]);
-    assert_eq!(opened(&path).unwrap().about.elevation_rad, Some(vec![0.1, 0.1]));
+    assert_eq!(
+        opened(&path).unwrap().about.elevation_rad,
+        Some(vec![0.1, 0.1])
+    );
     for count in [0, 1, 3, 4] {
         write_npz(&path, &[signals.clone(), angles(count)]);
         let message = opened(&path).unwrap_err();
         assert!(
-            message.contains(&format!("elevation_rad has {count} values; one for each of the 2 records")),
+            message.contains(&format!(
+                "elevation_rad has {count} values; one for each of the 2 records"
+            )),
             "{message}"
         );
     }
-    write_npz(&path, &[signals, angles(2), ("time_s", npy(b"<f8", "1,", &doubles(&[0.0])), 0)]);
+    write_npz(
+        &path,
+        &[
+            signals,
+            angles(2),
+            ("time_s", npy(b"<f8", "1,", &doubles(&[0.0])), 0),
+        ],
+    );
     assert!(opened(&path).unwrap_err().contains("time_s has 1 values"));
 }
 
@@ -96,12 +135,32 @@ fn arrays_of_nothing_are_held_against_the_memory_before_they_are_read() {
     const COUNT: u64 = 1 << 36;
     let temp = tempfile::tempdir().unwrap();
     let path = temp.path().join("x.npz");
-    let angles = ("elevation_rad", npy(b"|i1", &format!("{COUNT},"), &[]), COUNT);
-    write_npz(&path, &[("signals", npy(b"|i1", "2, 3", &[0; 6]), 0), angles.clone()]);
-    assert!(opened(&path).unwrap_err().contains("one for each of the 2 records"));
-    write_npz(&path, &[("signals", npy(b"|i1", &format!("{COUNT}, 1"), &[]), COUNT), angles]);
+    let angles = (
+        "elevation_rad",
+        npy(b"|i1", &format!("{COUNT},"), &[]),
+        COUNT,
+    );
+    write_npz(
+        &path,
+        &[("signals", npy(b"|i1", "2, 3", &[0; 6]), 0), angles.clone()],
+    );
+    assert!(
+        opened(&path)
+            .unwrap_err()
+            .contains("one for each of the 2 records")
+    );
+    write_npz(
+        &path,
+        &[
+            ("signals", npy(b"|i1", &format!("{COUNT}, 1"), &[]), COUNT),
+            angles,
+        ],
+    );
     let message = opened(&path).unwrap_err();
-    assert!(message.contains("elevation_rad would take 2.7 TB of memory"), "{message}");
+    assert!(
+        message.contains("elevation_rad would take 2.7 TB of memory"),
+        "{message}"
+    );
 }
 
 #[test]
@@ -111,13 +170,21 @@ fn headers_of_arrays_may_hold_any_byte_and_integers_of_eight() {
     for kind in ["é8".as_bytes(), b"\xff\xfe", "日本".as_bytes(), b"", b"<"] {
         fs::write(&path, npy(kind, "2, 3", &[0; 48])).unwrap();
         let message = opened(&path).unwrap_err();
-        assert!(message.contains("x.npy") && message.contains("are of the kind"), "{message}");
+        assert!(
+            message.contains("x.npy") && message.contains("are of the kind"),
+            "{message}"
+        );
     }
     for (kind, sign) in [(b"<i8", -1_i64), (b"<u8", 1)] {
-        let numbers: Vec<u8> = (0..6).flat_map(|i| (sign * 1_000_000_007 * i).to_le_bytes()).collect();
+        let numbers: Vec<u8> = (0..6)
+            .flat_map(|i| (sign * 1_000_000_007 * i).to_le_bytes())
+            .collect();
         fs::write(&path, npy(kind, "2, 3", &numbers)).unwrap();
         let found = opened(&path).unwrap().read(0..2).unwrap();
-        assert!((0..6).all(|i| found[i].re == (sign * 1_000_000_007 * i as i64) as f64), "{found:?}");
+        assert!(
+            (0..6).all(|i| found[i].re == (sign * 1_000_000_007 * i as i64) as f64),
+            "{found:?}"
+        );
     }
 }
 
@@ -127,7 +194,11 @@ fn a_text_without_an_end_of_its_line_is_refused() {
     let temp = tempfile::tempdir().unwrap();
     let path = temp.path().join("x.txt");
     fs::File::create(&path).unwrap().set_len(1 << 33).unwrap();
-    assert!(opened(&path).unwrap_err().contains("line 1 is longer than 64 MiB"));
+    assert!(
+        opened(&path)
+            .unwrap_err()
+            .contains("line 1 is longer than 64 MiB")
+    );
 }
 
 #[cfg(unix)]
@@ -137,7 +208,10 @@ fn names_that_are_no_text_are_no_obstacle() {
     let temp = tempfile::tempdir().unwrap();
     fs::write(temp.path().join("s.toml"), SMALL).unwrap();
     let folder = std::ffi::OsStr::from_bytes(b"o\xff");
-    for words in [&["efficiency", "s.toml"][..], &["efficiency", "s.toml", "--json"]] {
+    for words in [
+        &["efficiency", "s.toml"][..],
+        &["efficiency", "s.toml", "--json"],
+    ] {
         let out = std::process::Command::new(env!("CARGO_BIN_EXE_wakescope"))
             .args(words)
             .args(["--quiet", "--out"])
@@ -157,23 +231,46 @@ fn gates_and_ranges_without_measure_are_refused() {
     let map = |step_m: f64| {
         let rows = (0..900).map(|i| {
             let (line, gate) = (f64::from(i / 30), f64::from(i % 30));
-            format!("{},{},{}\n", 300.0 + step_m * gate, 0.03 + 4e-3 * line, (7.3 * f64::from(i)).sin())
+            format!(
+                "{},{},{}\n",
+                300.0 + step_m * gate,
+                0.03 + 4e-3 * line,
+                (7.3 * f64::from(i)).sin()
+            )
         });
-        format!("range_m,elevation_rad,velocity_m_s\n{}", rows.collect::<String>())
+        format!(
+            "range_m,elevation_rad,velocity_m_s\n{}",
+            rows.collect::<String>()
+        )
     };
     fs::write(temp.path().join("near.csv"), map(10.0)).unwrap();
     fs::write(temp.path().join("far.csv"), map(3e7)).unwrap();
     for (words, part) in [
-        ("retrieve near.csv --gate-std 1e9", "std_m of the gate = 1000000000.0: must be at most"),
-        ("detect near.csv --gate-std 1e9", "std_m of the gate = 1000000000.0: must be at most"),
-        ("retrieve far.csv", "far.csv: sweep 0: range reaches 870000300 m"),
-        ("detect far.csv", "far.csv: sweep 0: range reaches 870000300 m"),
+        (
+            "retrieve near.csv --gate-std 1e9",
+            "std_m of the gate = 1000000000.0: must be at most",
+        ),
+        (
+            "detect near.csv --gate-std 1e9",
+            "std_m of the gate = 1000000000.0: must be at most",
+        ),
+        (
+            "retrieve far.csv",
+            "far.csv: sweep 0: range reaches 870000300 m",
+        ),
+        (
+            "detect far.csv",
+            "far.csv: sweep 0: range reaches 870000300 m",
+        ),
     ] {
         let mut all: Vec<&str> = words.split_whitespace().collect();
         all.extend(["--out", "o", "--quiet"]);
         let out = wakescope(temp.path(), &all);
         let message = String::from_utf8(out.stderr).unwrap();
-        assert!(out.status.code() == Some(2) && message.contains(part), "{words}: {message}");
+        assert!(
+            out.status.code() == Some(2) && message.contains(part),
+            "{words}: {message}"
+        );
     }
 }
 
@@ -182,14 +279,25 @@ fn gates_and_ranges_without_measure_are_refused() {
 #[test]
 fn a_limit_of_the_shell_counts_as_memory() {
     let temp = tempfile::tempdir().unwrap();
-    let lines = "[scan]\nelevation_min_rad = 0.0\nelevation_max_rad = 0.09999\nelevation_step_rad = 2e-5\n";
+    let lines =
+        "[scan]\nelevation_min_rad = 0.0\nelevation_max_rad = 0.09999\nelevation_step_rad = 2e-5\n";
     fs::write(temp.path().join("s.toml"), lines).unwrap();
     let check = |limit: &str| {
-        let words = format!("ulimit -v {limit} && exec {} check s.toml --threads 1", env!("CARGO_BIN_EXE_wakescope"));
-        let out = std::process::Command::new("sh").args(["-c", &words]).current_dir(temp.path()).output().unwrap();
+        let words = format!(
+            "ulimit -v {limit} && exec {} check s.toml --threads 1",
+            env!("CARGO_BIN_EXE_wakescope")
+        );
+        let out = std::process::Command::new("sh")
+            .args(["-c", &words])
+            .current_dir(temp.path())
+            .output()
+            .unwrap();
         (out.status.code(), String::from_utf8(out.stderr).unwrap())
     };
     assert_eq!(check("unlimited").0, Some(0));
     let (code, message) = check("1000000");
-    assert!(code == Some(2) && message.contains("of memory") && message.contains("MB are available"), "{message}");
+    assert!(
+        code == Some(2) && message.contains("of memory") && message.contains("MB are available"),
+        "{message}"
+    );
 }

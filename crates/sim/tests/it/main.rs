@@ -37,5 +37,9 @@ mod wake;
 /// The program, run in a folder.
 #[cfg(feature = "cli")]
 fn wakescope(folder: &std::path::Path, words: &[&str]) -> std::process::Output {
-    std::process::Command::new(env!("CARGO_BIN_EXE_wakescope")).args(words).current_dir(folder).output().unwrap()
+    std::process::Command::new(env!("CARGO_BIN_EXE_wakescope"))
+        .args(words)
+        .current_dir(folder)
+        .output()
+        .unwrap()
 }

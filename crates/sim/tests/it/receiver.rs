@@ -12,7 +12,11 @@ fn plan(words: &str, target: Target) -> Plan {
          [scan]\nelevation_min_rad = 0.05\nelevation_max_rad = 0.058\nelevation_step_rad = 2e-3\nrange_min_m = 300.0\n\
          range_max_m = 400.0\npulses_per_line = 40\nrealisations = 3\nSECOND\n[outputs]\nsignals = true\nprofile_points = 3\n"
     );
-    let second = if words.contains("# second") { "second_trip = { radial_velocity_m_s = -6.0 }" } else { "" };
+    let second = if words.contains("# second") {
+        "second_trip = { radial_velocity_m_s = -6.0 }"
+    } else {
+        ""
+    };
     let file = SceneFile::parse(&text.replace("SECOND", second), Path::new("s.toml"));
     Plan::new(file.unwrap_or_else(|e| panic!("{e}\n{text}")), target).unwrap()
 }
@@ -27,7 +31,10 @@ fn signals(words: &str) -> (Plan, RunResult) {
 fn mean_square(result: &RunResult, independent: f64) -> (f64, f64) {
     let signals = result.signals_a.as_ref().unwrap();
     let mean = signals.iter().map(|x| x * x).sum::<f64>() / signals.len() as f64;
-    (mean, mean * (2.0 / (signals.nrows() as f64 * independent)).sqrt())
+    (
+        mean,
+        mean * (2.0 / (signals.nrows() as f64 * independent)).sqrt(),
+    )
 }
 
 const DARK: &str = "[atmosphere]\nbackscatter_per_m_sr = 0.0\n[detector]\nnoise = \"white\"\n";
@@ -41,9 +48,16 @@ fn the_noise_of_the_signals_is_that_which_the_ratio_counts() {
     let receiver = plan.instrument.receiver;
     let (found, error) = mean_square(&result, plan.geometry.samples as f64);
     let expected = receiver.noise_density_a2_hz() * 125e6;
-    assert!((found - expected).abs() < 3.0 * error, "{found} {expected} {error}");
-    let lost_db = 10.0 * (ideal.slowly_varying_snr(1.0, 1.0) / receiver.slowly_varying_snr(1.0, 1.0)).log10();
-    assert!((lost_db - receiver.penalties().total_db()).abs() < 1e-9 && lost_db > 3.0, "{lost_db}");
+    assert!(
+        (found - expected).abs() < 3.0 * error,
+        "{found} {expected} {error}"
+    );
+    let lost_db =
+        10.0 * (ideal.slowly_varying_snr(1.0, 1.0) / receiver.slowly_varying_snr(1.0, 1.0)).log10();
+    assert!(
+        (lost_db - receiver.penalties().total_db()).abs() < 1e-9 && lost_db > 3.0,
+        "{lost_db}"
+    );
 }
 
 #[test]
@@ -54,7 +68,10 @@ fn losses_and_an_amplifier_of_the_laser_change_the_profile_by_their_decibels() {
     };
     let plain = snr_db("");
     for (words, change_db) in [
-        ("[telescope]\noptics_loss_db = 2.0\npolarisation_loss_db = 0.25\n", -2.25),
+        (
+            "[telescope]\noptics_loss_db = 2.0\npolarisation_loss_db = 0.25\n",
+            -2.25,
+        ),
         // 0.75 W for 400 pulses a second, of which the medium keeps what 200 us bring.
         (
             "[laser]\namplifier = { mean_power_w = 0.75, storage_time_s = 2e-4 }\n",
@@ -62,7 +79,10 @@ fn losses_and_an_amplifier_of_the_laser_change_the_profile_by_their_decibels() {
         ),
     ] {
         for (found, plain) in snr_db(words).iter().zip(&plain) {
-            assert!((found - plain - change_db).abs() < 1e-9, "{words}: {found} {plain}");
+            assert!(
+                (found - plain - change_db).abs() < 1e-9,
+                "{words}: {found} {plain}"
+            );
         }
     }
     let blind = snr_db("[telescope]\nblind_range_m = 150.0\n");
@@ -75,8 +95,14 @@ fn the_echo_of_the_pulse_before_is_weaker_by_what_the_budget_says() {
     let words = "[laser]\npulse_repetition_hz = 100e3\n[detector]\nnoise = \"none\"\n";
     let (_, alone) = signals(words);
     let (plan, both) = signals(&format!("{words}# second"));
-    let (first, second) = (alone.signals_a.as_ref().unwrap(), both.signals_a.as_ref().unwrap());
-    let echo = RunResult { signals_a: Some(second - first), ..RunResult::default() };
+    let (first, second) = (
+        alone.signals_a.as_ref().unwrap(),
+        both.signals_a.as_ref().unwrap(),
+    );
+    let echo = RunResult {
+        signals_a: Some(second - first),
+        ..RunResult::default()
+    };
     // The record is some two pulses long.
     let (found, error) = mean_square(&echo, 2.0);
     let reference = mean_square(&alone, 2.0);
@@ -84,20 +110,40 @@ fn the_echo_of_the_pulse_before_is_weaker_by_what_the_budget_says() {
     let expected = 10f64.powf(0.1 * budget.rows.last().unwrap().db[0]);
     let relative = (error / found).hypot(reference.1 / reference.0);
     assert_eq!(budget.rows.last().unwrap().name, "= pulse before over echo");
-    assert!((found / reference.0 / expected - 1.0).abs() < 3.0 * relative, "{} {expected}", found / reference.0);
+    assert!(
+        (found / reference.0 / expected - 1.0).abs() < 3.0 * relative,
+        "{} {expected}",
+        found / reference.0
+    );
 }
 
 #[test]
 fn two_quadratures_hold_a_band_that_a_real_current_of_their_rate_does_not() {
     let words = "[detector]\nsignal = \"baseband\"\nsampling_hz = 50e6\nbandwidth_hz = 49e6\n\
         snr = { reference = \"fixed\", snr_db = 10.0 }\n[estimator]\nwindow_samples = 10\n";
-    let map = run(&plan(words, Target::Map), &Silent).unwrap().map.unwrap();
+    let map = run(&plan(words, Target::Map), &Silent)
+        .unwrap()
+        .map
+        .unwrap();
     let count = map.v_mean_m_s.len() as f64;
-    let error_m_s = map.v_mean_m_s.iter().zip(&map.v_pulse_m_s).map(|(a, b)| a - b).sum::<f64>() / count;
+    let error_m_s = map
+        .v_mean_m_s
+        .iter()
+        .zip(&map.v_pulse_m_s)
+        .map(|(a, b)| a - b)
+        .sum::<f64>()
+        / count;
     assert!(error_m_s.abs() < 0.15, "{error_m_s}");
-    let refused = |words: &str| SceneFile::parse(words, Path::new("s.toml")).unwrap_err().to_string();
+    let refused = |words: &str| {
+        SceneFile::parse(words, Path::new("s.toml"))
+            .unwrap_err()
+            .to_string()
+    };
     let message = refused("[detector]\nsignal = \"baseband\"\nsampling_hz = 50e6\n");
-    assert!(message.contains("detector.sampling_hz = 50e6 is not allowed: above 5e7 Hz"), "{message}");
+    assert!(
+        message.contains("detector.sampling_hz = 50e6 is not allowed: above 5e7 Hz"),
+        "{message}"
+    );
 }
 
 #[cfg(feature = "cli")]
@@ -107,19 +153,41 @@ fn the_command_prints_tables_and_presets_that_check_takes() {
     let output = |words: &[&str]| crate::wakescope(temp.path(), words);
     let stdout = |words: &[&str]| {
         let output = output(words);
-        assert!(output.status.success(), "{words:?}: {}", String::from_utf8_lossy(&output.stderr));
+        assert!(
+            output.status.success(),
+            "{words:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        );
         String::from_utf8(output.stdout).unwrap()
     };
     stdout(&["init", "--preset", "halo_streamline", "s.toml"]);
-    assert!(std::fs::read_to_string(temp.path().join("s.toml")).unwrap().contains("Nominal"));
+    assert!(
+        std::fs::read_to_string(temp.path().join("s.toml"))
+            .unwrap()
+            .contains("Nominal")
+    );
     let checked = stdout(&["check", "s.toml", "--json"]);
     assert!(checked.contains("\"snr_db\""), "{checked}");
     let text = stdout(&["budget", "s.toml", "--range", "300,450", "--out", "out"]);
-    assert!(text.contains("= SNR in the band") && text.contains("        300        450"), "{text}");
+    assert!(
+        text.contains("= SNR in the band") && text.contains("        300        450"),
+        "{text}"
+    );
     let table = std::fs::read_to_string(temp.path().join("out/budget.csv")).unwrap();
-    assert!(table.contains("range_m,row,symbol,db") && table.contains("450.0,photons sent,E/(h nu),"), "{table}");
+    assert!(
+        table.contains("range_m,row,symbol,db") && table.contains("450.0,photons sent,E/(h nu),"),
+        "{table}"
+    );
     let json = stdout(&["budget", "s.toml", "--json"]);
     assert!(json.contains("\"mean_power_w\": 0.3"), "{json}");
-    assert_eq!(output(&["budget", "s.toml", "--range", "0"]).status.code(), Some(2));
-    assert_eq!(output(&["init", "--preset", "lidar", "t.toml"]).status.code(), Some(2));
+    assert_eq!(
+        output(&["budget", "s.toml", "--range", "0"]).status.code(),
+        Some(2)
+    );
+    assert_eq!(
+        output(&["init", "--preset", "lidar", "t.toml"])
+            .status
+            .code(),
+        Some(2)
+    );
 }

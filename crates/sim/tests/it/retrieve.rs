@@ -12,7 +12,9 @@ const SCENE: &str = "seed = 3\n[detector.snr]\nreference = \"fixed\"\nsnr_db = 1
     [estimator]\ngate_step_samples = 16\n[outputs]\nsignals = true\nflow = false\nsvg = false\npng = false\nprofile_points = 3\n";
 
 fn reference(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../tests/reference")
+        .join(name)
 }
 
 /// Runs a retrieval that must succeed; the rows of its table.
@@ -21,7 +23,11 @@ fn retrieved(folder: &Path, words: &str) -> TextTable {
     all.extend(words.split_whitespace());
     all.extend(["--out", "r", "--quiet", "--overwrite"]);
     let out = wakescope(folder, &all);
-    assert!(out.status.success(), "{words}: {}", String::from_utf8_lossy(&out.stderr));
+    assert!(
+        out.status.success(),
+        "{words}: {}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     TextTable::read(&folder.join("r/retrieval.csv")).unwrap()
 }
 
@@ -36,27 +42,53 @@ fn text<'t>(table: &'t TextTable, row: usize, name: &str) -> &'t str {
 #[test]
 fn reference_maps_are_retrieved_from_tables() {
     let temp = tempfile::tempdir().unwrap();
-    let path = |name: &str| reference(&format!("estimate/{name}.csv")).display().to_string();
+    let path = |name: &str| {
+        reference(&format!("estimate/{name}.csv"))
+            .display()
+            .to_string()
+    };
     let pair = retrieved(temp.path(), &path("map_a"));
     // Truth and bounds of the file's makers: 466.635 m^2/s of 500, at 376.5 and 423.5 m.
     for (row, y_m) in [(0, 376.5), (1, 423.5)] {
         let within = |name: &str, std: &str, truth: f64| {
             let (value, std) = (number(&pair, row, name), number(&pair, row, std));
-            assert!((value - truth).abs() < 3.0 * std && std > 0.0, "{name}: {value} +- {std}, {truth}");
+            assert!(
+                (value - truth).abs() < 3.0 * std && std > 0.0,
+                "{name}: {value} +- {std}, {truth}"
+            );
         };
         within("gamma_5_15_m2_s", "gamma_5_15_std_m2_s", 466.635);
         within("y_m", "y_std_m", y_m);
         within("z_m", "z_std_m", 60.0);
     }
-    assert_eq!((text(&pair, 0, "side"), text(&pair, 1, "side"), pair.rows.len()), ("left", "right", 2));
-    assert_eq!(names(&temp.path().join("r")), ["retrieval.csv", "retrieval.json", "scan_001.png", "scan_001.svg"]);
+    assert_eq!(
+        (
+            text(&pair, 0, "side"),
+            text(&pair, 1, "side"),
+            pair.rows.len()
+        ),
+        ("left", "right", 2)
+    );
+    assert_eq!(
+        names(&temp.path().join("r")),
+        [
+            "retrieval.csv",
+            "retrieval.json",
+            "scan_001.png",
+            "scan_001.svg"
+        ]
+    );
     let json: serde_json::Value =
-        serde_json::from_str(&fs::read_to_string(temp.path().join("r/retrieval.json")).unwrap()).unwrap();
+        serde_json::from_str(&fs::read_to_string(temp.path().join("r/retrieval.json")).unwrap())
+            .unwrap();
     let scan = &json["scans"][0];
     let variance = scan["covariance"][0][0].as_f64().unwrap();
     assert!((variance.sqrt() / number(&pair, 0, "gamma_std_m2_s") - 1.0).abs() < 1e-12);
     assert_eq!(
-        (scan["covariance"].as_array().unwrap().len(), scan["tops"].as_array().unwrap().is_empty()),
+        (
+            scan["covariance"].as_array().unwrap().len(),
+            scan["tops"].as_array().unwrap().is_empty()
+        ),
         (10, false)
     );
 }
@@ -74,12 +106,23 @@ fn a_scan_beyond_the_zenith_sees_the_wake_on_the_other_side() {
         mirrored += &(cells.join(",") + "\n");
     }
     fs::write(temp.path().join("mirrored.csv"), mirrored).unwrap();
-    let [here, there] =
-        [path.display().to_string().as_str(), "mirrored.csv"].map(|words| retrieved(temp.path(), words));
+    let [here, there] = [path.display().to_string().as_str(), "mirrored.csv"]
+        .map(|words| retrieved(temp.path(), words));
     for (row, other) in [(0, 1), (1, 0)] {
-        for (name, sign) in [("gamma_m2_s", 1.0), ("y_m", -1.0), ("z_m", 1.0), ("wind_m_s", -1.0)] {
-            let (seen, std) = (sign * number(&there, other, name), number(&here, row, &name.replace("_m", "_std_m")));
-            assert!((seen - number(&here, row, name)).abs() < 0.02 * std, "{name}: {seen}, {here:?}");
+        for (name, sign) in [
+            ("gamma_m2_s", 1.0),
+            ("y_m", -1.0),
+            ("z_m", 1.0),
+            ("wind_m_s", -1.0),
+        ] {
+            let (seen, std) = (
+                sign * number(&there, other, name),
+                number(&here, row, &name.replace("_m", "_std_m")),
+            );
+            assert!(
+                (seen - number(&here, row, name)).abs() < 0.02 * std,
+                "{name}: {seen}, {here:?}"
+            );
         }
     }
 }
@@ -92,9 +135,20 @@ fn a_pair_of_which_peaks_show_one_vortex_is_found_by_what_the_estimator_shows() 
         flow = false\nsvg = false\npng = false\nprofile_points = 2\n";
     let temp = tempfile::tempdir().unwrap();
     fs::write(temp.path().join("s.toml"), scene).unwrap();
-    assert!(wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+    assert!(
+        wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"])
+            .status
+            .success()
+    );
     let pair = retrieved(temp.path(), "o/map.nc");
-    assert_eq!((text(&pair, 0, "side"), text(&pair, 1, "side"), pair.rows.len()), ("left", "right", 2));
+    assert_eq!(
+        (
+            text(&pair, 0, "side"),
+            text(&pair, 1, "side"),
+            pair.rows.len()
+        ),
+        ("left", "right", 2)
+    );
     for (row, y_m) in [(0, 376.5), (1, 423.5)] {
         for (name, std, truth) in [
             ("gamma_m2_s", "gamma_std_m2_s", 500.0),
@@ -103,7 +157,10 @@ fn a_pair_of_which_peaks_show_one_vortex_is_found_by_what_the_estimator_shows() 
             ("z_m", "z_std_m", 47.0),
         ] {
             let (value, std) = (number(&pair, row, name), number(&pair, row, std));
-            assert!((value - truth).abs() < 4.0 * std, "{name}: {value} +- {std}, {truth}");
+            assert!(
+                (value - truth).abs() < 4.0 * std,
+                "{name}: {value} +- {std}, {truth}"
+            );
         }
         assert!(!text(&pair, row, "flags").contains("one_vortex"));
     }
@@ -122,16 +179,32 @@ fn a_vortex_has_its_circulation_though_its_partner_is_beyond_the_scan() {
         );
         let temp = tempfile::tempdir().unwrap();
         fs::write(temp.path().join("s.toml"), scene).unwrap();
-        assert!(wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+        assert!(
+            wakescope(temp.path(), &["run", "s.toml", "--out", "o", "--quiet"])
+                .status
+                .success()
+        );
         let one = retrieved(temp.path(), "o/map.nc");
         assert_eq!((one.rows.len(), text(&one, 0, "side")), (1, "right"));
         let flags = text(&one, 0, "flags");
-        assert!(flags.contains("one_vortex") && !flags.contains("core_kept"), "{flags}");
+        assert!(
+            flags.contains("one_vortex") && !flags.contains("core_kept"),
+            "{flags}"
+        );
         // (3) over radii of 5 to 15 m
-        let (mean, std) = (number(&one, 0, "gamma_5_15_m2_s"), number(&one, 0, "gamma_5_15_std_m2_s"));
-        assert!((mean - 333.74).abs() < 3.0 * std && std < 40.0, "seed {seed}: {mean} +- {std}");
+        let (mean, std) = (
+            number(&one, 0, "gamma_5_15_m2_s"),
+            number(&one, 0, "gamma_5_15_std_m2_s"),
+        );
+        assert!(
+            (mean - 333.74).abs() < 3.0 * std && std < 40.0,
+            "seed {seed}: {mean} +- {std}"
+        );
         let (y_m, std_m) = (number(&one, 0, "y_m"), number(&one, 0, "y_std_m"));
-        assert!((y_m - middle_m - 23.5).abs() < 4.0 * std_m && std_m < 2.0, "seed {seed}: {y_m} +- {std_m}");
+        assert!(
+            (y_m - middle_m - 23.5).abs() < 4.0 * std_m && std_m < 2.0,
+            "seed {seed}: {y_m} +- {std_m}"
+        );
     }
 }
 
@@ -145,14 +218,23 @@ fn wind_without_a_wake_is_a_result() {
         place = (place * 997.13 + 0.123).fract();
         let velocity = -3.0 * elevation_deg.to_radians().cos() + place - 0.5;
         // Some cells are missing.
-        let cell = if (line + gate) % 7 == 0 { String::new() } else { velocity.to_string() };
+        let cell = if (line + gate) % 7 == 0 {
+            String::new()
+        } else {
+            velocity.to_string()
+        };
         rows += &format!("{range_m},{elevation_deg},{cell},0.29\n");
     }
     fs::write(temp.path().join("calm.csv"), rows).unwrap();
     let table = retrieved(temp.path(), "calm.csv");
     assert_eq!((table.rows.len(), text(&table, 0, "side")), (1, "none"));
-    assert!(text(&table, 0, "flags").contains("no_wake") && number(&table, 0, "gamma_m2_s").is_nan());
-    assert!((number(&table, 0, "wind_m_s") + 3.0).abs() < 0.3, "{table:?}");
+    assert!(
+        text(&table, 0, "flags").contains("no_wake") && number(&table, 0, "gamma_m2_s").is_nan()
+    );
+    assert!(
+        (number(&table, 0, "wind_m_s") + 3.0).abs() < 0.3,
+        "{table:?}"
+    );
 }
 
 #[test]
@@ -164,10 +246,19 @@ fn a_map_of_a_run_is_retrieved_within_its_deviations_from_every_file_and_from_it
     // 500 m^2/s with a core of 2.35 m.
     let truth = |table: &TextTable, what: &str| {
         for (row, y_m) in [(0, 376.5), (1, 423.5)] {
-            let (mean, std) = (number(table, row, "gamma_5_15_m2_s"), number(table, row, "gamma_5_15_std_m2_s"));
-            assert!((mean - 466.635).abs() < 3.0 * std && std < 60.0, "{what}: {mean} +- {std}");
+            let (mean, std) = (
+                number(table, row, "gamma_5_15_m2_s"),
+                number(table, row, "gamma_5_15_std_m2_s"),
+            );
+            assert!(
+                (mean - 466.635).abs() < 3.0 * std && std < 60.0,
+                "{what}: {mean} +- {std}"
+            );
             let (y, std) = (number(table, row, "y_m"), number(table, row, "y_std_m"));
-            assert!((y - y_m).abs() < 3.0 * std + 0.1, "{what}: {y} +- {std}, {y_m}");
+            assert!(
+                (y - y_m).abs() < 3.0 * std + 0.1,
+                "{what}: {y} +- {std}, {y_m}"
+            );
         }
     };
     let map = retrieved(temp.path(), "o/map.nc");
@@ -175,11 +266,17 @@ fn a_map_of_a_run_is_retrieved_within_its_deviations_from_every_file_and_from_it
     let same = |other: &TextTable, what: &str| {
         for (row, name) in [(0, "gamma_m2_s"), (1, "gamma_m2_s"), (0, "y_m"), (1, "z_m")] {
             let (a, b) = (number(&map, row, name), number(other, row, name));
-            assert!((a - b).abs() < 1e-2 * a.abs().max(1.0), "{what}: {name} {a}, {b}");
+            assert!(
+                (a - b).abs() < 1e-2 * a.abs().max(1.0),
+                "{what}: {name} {a}, {b}"
+            );
         }
     };
     same(&retrieved(temp.path(), "o/map.csv"), "map.csv");
-    same(&retrieved(temp.path(), "o/signals.nc --scene s.toml"), "signals.nc");
+    same(
+        &retrieved(temp.path(), "o/signals.nc --scene s.toml"),
+        "signals.nc",
+    );
     let signals = retrieved(temp.path(), "o/signals.nc --scene s.toml --method signals");
     truth(&signals, "signals");
     assert!(
@@ -195,7 +292,10 @@ const TOUCHING: &str = "seed = 5\n[pulse]\nenergy_j = 5e-3\n[scan]\nelevation_st
 /// The lines of a table that programs write again: without what stands before the header.
 fn without_comments(path: &Path) -> String {
     let text = fs::read_to_string(path).unwrap();
-    text.lines().filter(|line| !line.starts_with('#')).map(|line| format!("{line}\n")).collect()
+    text.lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| format!("{line}\n"))
+        .collect()
 }
 
 #[test]
@@ -204,19 +304,38 @@ fn equal_velocities_have_equal_circulations_whether_their_scene_is_found_or_stat
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path();
     fs::write(folder.join("s.toml"), TOUCHING).unwrap();
-    assert!(wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
-    fs::write(folder.join("bare.csv"), without_comments(&folder.join("o/map.csv"))).unwrap();
+    assert!(
+        wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"])
+            .status
+            .success()
+    );
+    fs::write(
+        folder.join("bare.csv"),
+        without_comments(&folder.join("o/map.csv")),
+    )
+    .unwrap();
     let own = retrieved(folder, "o/map.nc");
     let head = fs::read_to_string(folder.join("r/retrieval.csv")).unwrap();
-    assert!(head.contains("# seed: 5\n") && head.contains("#   energy_j = 0.005\n"), "the scene that the fit has read");
-    for words in ["o/map.csv", "o/map.nc --scene s.toml", "bare.csv --scene s.toml", "o/halo.hpl --scene s.toml"] {
+    assert!(
+        head.contains("# seed: 5\n") && head.contains("#   energy_j = 0.005\n"),
+        "the scene that the fit has read"
+    );
+    for words in [
+        "o/map.csv",
+        "o/map.nc --scene s.toml",
+        "bare.csv --scene s.toml",
+        "o/halo.hpl --scene s.toml",
+    ] {
         let other = retrieved(folder, words);
         for (row, name) in [(0, "gamma_m2_s"), (1, "gamma_m2_s"), (0, "y_m"), (1, "z_m")] {
             let (a, b) = (number(&own, row, name), number(&other, row, name));
             // files round velocities and angles
             assert!((a - b).abs() < 0.02 * a.abs(), "{words}: {name} {a}, {b}");
         }
-        assert!(!text(&other, 0, "flags").contains("taken_for_means"), "{words}");
+        assert!(
+            !text(&other, 0, "flags").contains("taken_for_means"),
+            "{words}"
+        );
     }
     // NetCDF without its scenes keeps what says how velocities were estimated; without that it is as the others that are lost.
     let renamed = |bytes: &[u8], name: &[u8]| {
@@ -233,29 +352,59 @@ fn equal_velocities_have_equal_circulations_whether_their_scene_is_found_or_stat
     fs::write(folder.join("part.nc"), &bytes).unwrap();
     fs::write(folder.join("lost.nc"), renamed(&bytes, b"instrument")).unwrap();
     let part = retrieved(folder, "part.nc");
-    assert_eq!(number(&part, 0, "gamma_m2_s"), number(&own, 0, "gamma_m2_s"));
+    assert_eq!(
+        number(&part, 0, "gamma_m2_s"),
+        number(&own, 0, "gamma_m2_s")
+    );
     for words in ["bare.csv", "o/halo.hpl", "lost.nc"] {
         let out = wakescope(folder, &["retrieve", words, "--out", "r", "--overwrite"]);
         let told = String::from_utf8_lossy(&out.stderr).into_owned();
-        assert!(out.status.success() && told.contains("has lost its scene") && told.contains("--scene"), "{told}");
+        assert!(
+            out.status.success() && told.contains("has lost its scene") && told.contains("--scene"),
+            "{told}"
+        );
         let lost = TextTable::read(&folder.join("r/retrieval.csv")).unwrap();
         for row in 0..2 {
-            let [mean, std] = ["gamma_5_15_m2_s", "gamma_5_15_std_m2_s"].map(|name| number(&lost, row, name));
-            assert!((mean - 466.635).abs() < 2.0 * std && std < mean, "{words}: {mean} +- {std}");
-            assert!(text(&lost, row, "flags").contains("taken_for_means"), "{words}");
+            let [mean, std] =
+                ["gamma_5_15_m2_s", "gamma_5_15_std_m2_s"].map(|name| number(&lost, row, name));
+            assert!(
+                (mean - 466.635).abs() < 2.0 * std && std < mean,
+                "{words}: {mean} +- {std}"
+            );
+            assert!(
+                text(&lost, row, "flags").contains("taken_for_means"),
+                "{words}"
+            );
         }
     }
     // What is stated in words stands for the scene: 256 ns of a Gaussian window.
-    let stated = "bare.csv --estimator periodogram --pulse 200e-9 --window 256e-9 --weighting gaussian";
+    let stated =
+        "bare.csv --estimator periodogram --pulse 200e-9 --window 256e-9 --weighting gaussian";
     let stated = retrieved(folder, stated);
     for row in 0..2 {
         let [a, b] = [&own, &stated].map(|table| number(table, row, "gamma_5_15_m2_s"));
-        assert!((a - b).abs() < 0.1 * a && !text(&stated, row, "flags").contains("taken_for_means"), "{a}, {b}");
+        assert!(
+            (a - b).abs() < 0.1 * a && !text(&stated, row, "flags").contains("taken_for_means"),
+            "{a}, {b}"
+        );
     }
-    let refused = wakescope(folder, &["retrieve", "bare.csv", "--estimator", "median", "--out", "x", "--quiet"]);
+    let refused = wakescope(
+        folder,
+        &[
+            "retrieve",
+            "bare.csv",
+            "--estimator",
+            "median",
+            "--out",
+            "x",
+            "--quiet",
+        ],
+    );
     let told = String::from_utf8_lossy(&refused.stderr).into_owned();
     assert!(
-        refused.status.code() == Some(2) && told.contains("estimator.method.kind") && told.contains("median"),
+        refused.status.code() == Some(2)
+            && told.contains("estimator.method.kind")
+            && told.contains("median"),
         "{told}"
     );
 }
@@ -266,29 +415,62 @@ fn a_fit_opens_no_flow_and_a_scene_that_is_not_read_is_refused_with_its_key() {
     let temp = tempfile::tempdir().unwrap();
     let folder = temp.path();
     fs::write(folder.join("s.toml"), SCENE).unwrap();
-    assert!(wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"]).status.success());
+    assert!(
+        wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"])
+            .status
+            .success()
+    );
     let own = retrieved(folder, "o/map.csv");
     let map = fs::read_to_string(folder.join("o/map.csv")).unwrap();
     let (before, flow) = map.split_once("#   [flow]\n").unwrap();
     let (_, after) = flow.split_once("#   [scan").unwrap();
-    let simulated = format!("{before}#   [flow]\n#   kind = \"simulated\"\n#   planes = \"gone.nc\"\n#   [scan{after}");
+    let simulated = format!(
+        "{before}#   [flow]\n#   kind = \"simulated\"\n#   planes = \"gone.nc\"\n#   [scan{after}"
+    );
     fs::write(folder.join("simulated.csv"), simulated).unwrap();
     let found = retrieved(folder, "simulated.csv");
-    assert_eq!(number(&found, 0, "gamma_m2_s"), number(&own, 0, "gamma_m2_s"));
+    assert_eq!(
+        number(&found, 0, "gamma_m2_s"),
+        number(&own, 0, "gamma_m2_s")
+    );
     let detected = wakescope(
         folder,
-        &["detect", "simulated.csv", "--out", "d", "--empty-scans", "2000", "--stride", "2,2", "--quiet"],
+        &[
+            "detect",
+            "simulated.csv",
+            "--out",
+            "d",
+            "--empty-scans",
+            "2000",
+            "--stride",
+            "2,2",
+            "--quiet",
+        ],
     );
-    assert!(detected.status.success(), "{}", String::from_utf8_lossy(&detected.stderr));
-    fs::write(folder.join("unknown.csv"), map.replace("#   [flow]\n", "#   [flow]\n#   colour = 3\n")).unwrap();
+    assert!(
+        detected.status.success(),
+        "{}",
+        String::from_utf8_lossy(&detected.stderr)
+    );
+    fs::write(
+        folder.join("unknown.csv"),
+        map.replace("#   [flow]\n", "#   [flow]\n#   colour = 3\n"),
+    )
+    .unwrap();
     for command in ["retrieve", "detect"] {
         let out = wakescope(folder, &[command, "unknown.csv", "--out", "x", "--quiet"]);
         let told = String::from_utf8_lossy(&out.stderr).into_owned();
         assert_eq!(out.status.code(), Some(2), "{told}");
-        assert!(told.contains("flow.colour") && told.contains("--scene"), "{told}");
+        assert!(
+            told.contains("flow.colour") && told.contains("--scene"),
+            "{told}"
+        );
     }
     let stated = retrieved(folder, "unknown.csv --scene s.toml");
-    assert_eq!(number(&stated, 0, "gamma_m2_s"), number(&own, 0, "gamma_m2_s"));
+    assert_eq!(
+        number(&stated, 0, "gamma_m2_s"),
+        number(&own, 0, "gamma_m2_s")
+    );
 }
 
 /// Part of a map of `SCENE`, opened and written again by Py-ART 2.3.0 and xradar 0.12.0, classic NetCDF and NetCDF-4.
@@ -299,7 +481,10 @@ fn maps_that_other_programs_wrote_again_give_the_same_circulations() {
         // the scene, which one of the files has, says the profile
         retrieved(
             temp.path(),
-            &format!("{} --gate-std 14.4 --profile algebraic", reference(&format!("sim/{name}")).display()),
+            &format!(
+                "{} --gate-std 14.4 --profile algebraic",
+                reference(&format!("sim/{name}")).display()
+            ),
         )
     };
     let own = of("map_own.nc");
@@ -307,7 +492,15 @@ fn maps_that_other_programs_wrote_again_give_the_same_circulations() {
         let table = of(name);
         assert_eq!(table.rows.len(), own.rows.len(), "{name}");
         for row in 0..table.rows.len() {
-            for column in ["gamma_m2_s", "gamma_std_m2_s", "gamma_5_15_m2_s", "y_m", "z_m", "wind_m_s", "statistic"] {
+            for column in [
+                "gamma_m2_s",
+                "gamma_std_m2_s",
+                "gamma_5_15_m2_s",
+                "y_m",
+                "z_m",
+                "wind_m_s",
+                "statistic",
+            ] {
                 let (a, b) = (number(&table, row, column), number(&own, row, column));
                 assert!((a - b).abs() < 1e-6 * b.abs(), "{name}: {column} {a}, {b}");
             }
@@ -321,15 +514,34 @@ fn maps_that_other_programs_wrote_again_give_the_same_circulations() {
 #[test]
 fn a_map_that_lost_its_global_scene_is_retrieved_as_the_original() {
     let temp = tempfile::tempdir().unwrap();
-    let of = |name: &str| retrieved(temp.path(), &reference(&format!("sim/{name}")).display().to_string());
+    let of = |name: &str| {
+        retrieved(
+            temp.path(),
+            &reference(&format!("sim/{name}")).display().to_string(),
+        )
+    };
     let (own, other) = (of("map_own_scene.nc"), of("map_xradar_scene.nc"));
-    for column in ["gamma_m2_s", "gamma_std_m2_s", "gamma_5_15_m2_s", "y_m", "z_m", "core_m", "chi2_per_dof"] {
+    for column in [
+        "gamma_m2_s",
+        "gamma_std_m2_s",
+        "gamma_5_15_m2_s",
+        "y_m",
+        "z_m",
+        "core_m",
+        "chi2_per_dof",
+    ] {
         for row in 0..2 {
             let (a, b) = (number(&other, row, column), number(&own, row, column));
             assert!(a == b || a.is_nan() && b.is_nan(), "{column}: {a}, {b}");
         }
     }
-    let bare = retrieved(temp.path(), &format!("{} --gate-std 14.4", reference("sim/map_xradar_scene.nc").display()));
+    let bare = retrieved(
+        temp.path(),
+        &format!(
+            "{} --gate-std 14.4",
+            reference("sim/map_xradar_scene.nc").display()
+        ),
+    );
     assert_ne!(
         number(&bare, 0, "gamma_m2_s"),
         number(&own, 0, "gamma_m2_s"),
@@ -338,7 +550,12 @@ fn a_map_that_lost_its_global_scene_is_retrieved_as_the_original() {
 }
 
 #[cfg(feature = "netcdf4")]
-const OTHERS: [&str; 4] = ["map_pyart.nc", "map_xradar.nc", "map_xradar_cfradial2.nc", "map_windcube_groups.nc"];
+const OTHERS: [&str; 4] = [
+    "map_pyart.nc",
+    "map_xradar.nc",
+    "map_xradar_cfradial2.nc",
+    "map_windcube_groups.nc",
+];
 #[cfg(not(feature = "netcdf4"))]
 const OTHERS: [&str; 2] = ["map_pyart.nc", "map_xradar.nc"];
 
@@ -357,7 +574,10 @@ fn several_scans_are_tracked() {
             let (range_m, angle) = (330.0 + 7.0 * f64::from(gate), 0.07 + 4e-3 * f64::from(line));
             place = (place * 997.13 + 0.123).fract();
             let velocity = model.radial_velocity_m_s(&wake, range_m, angle) + 0.5 * (place - 0.5);
-            rows += &format!("{range_m},{angle},{},{velocity},0.145,{scan}\n", 10.0 * f64::from(scan));
+            rows += &format!(
+                "{range_m},{angle},{},{velocity},0.145,{scan}\n",
+                10.0 * f64::from(scan)
+            );
         }
     }
     fs::write(temp.path().join("scans.csv"), rows).unwrap();
@@ -366,8 +586,14 @@ fn several_scans_are_tracked() {
     let track = TextTable::read(&temp.path().join("r/track.csv")).unwrap();
     assert_eq!((track.rows.len(), track.rows[0].len()), (8, 15));
     for row in 0..8 {
-        let (rate, std) = (number(&track, row, "z_rate_m_s"), number(&track, row, "z_rate_std_m_s"));
-        assert!((rate + 0.3).abs() < 4.0 * std && std < 0.3, "{rate} +- {std}");
+        let (rate, std) = (
+            number(&track, row, "z_rate_m_s"),
+            number(&track, row, "z_rate_std_m_s"),
+        );
+        assert!(
+            (rate + 0.3).abs() < 4.0 * std && std < 0.3,
+            "{rate} +- {std}"
+        );
         assert!((number(&track, row, "gamma_m2_s") - 400.0).abs() < 20.0);
     }
     assert!(temp.path().join("r/track.svg").exists());
@@ -382,26 +608,74 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
     fs::write(folder.join("empty.csv"), "").unwrap();
     let table = |rows: &str| format!("range_m,elevation_rad,velocity_m_s\n{rows}");
     let grid = |cell: &dyn Fn(usize) -> String| -> String {
-        (0..100).map(|i| format!("{},{},{}\n", 300 + 10 * (i % 10), 0.1 + 0.01 * (i / 10) as f64, cell(i))).collect()
+        (0..100)
+            .map(|i| {
+                format!(
+                    "{},{},{}\n",
+                    300 + 10 * (i % 10),
+                    0.1 + 0.01 * (i / 10) as f64,
+                    cell(i)
+                )
+            })
+            .collect()
     };
     fs::write(folder.join("masked.csv"), table(&grid(&|_| String::new()))).unwrap();
-    fs::write(folder.join("word.csv"), table(&grid(&|i| if i == 7 { "fast".into() } else { "1".into() }))).unwrap();
+    fs::write(
+        folder.join("word.csv"),
+        table(&grid(&|i| if i == 7 { "fast".into() } else { "1".into() })),
+    )
+    .unwrap();
     fs::write(folder.join("fill.csv"), table(&grid(&|_| "-9999".into()))).unwrap();
-    fs::write(folder.join("twice.csv"), table(&(grid(&|_| "1".into()) + "300,0.1,2\n"))).unwrap();
-    fs::write(folder.join("line.csv"), table("300,0.1,1\n310,0.1,1\n320,0.1,1\n")).unwrap();
-    fs::write(folder.join("names.csv"), "range_m,elevation_rad,speed\n1,2,3\n").unwrap();
-    let planes: String =
-        (0..100).map(|i| format!("{},{},1,{}\n", 300 + 10 * (i % 10), 0.1 + 0.01 * (i / 10) as f64, i / 50)).collect();
-    fs::write(folder.join("planes.csv"), format!("range_m,elevation_rad,velocity_m_s,azimuth_rad\n{planes}")).unwrap();
+    fs::write(
+        folder.join("twice.csv"),
+        table(&(grid(&|_| "1".into()) + "300,0.1,2\n")),
+    )
+    .unwrap();
+    fs::write(
+        folder.join("line.csv"),
+        table("300,0.1,1\n310,0.1,1\n320,0.1,1\n"),
+    )
+    .unwrap();
+    fs::write(
+        folder.join("names.csv"),
+        "range_m,elevation_rad,speed\n1,2,3\n",
+    )
+    .unwrap();
+    let planes: String = (0..100)
+        .map(|i| {
+            format!(
+                "{},{},1,{}\n",
+                300 + 10 * (i % 10),
+                0.1 + 0.01 * (i / 10) as f64,
+                i / 50
+            )
+        })
+        .collect();
+    fs::write(
+        folder.join("planes.csv"),
+        format!("range_m,elevation_rad,velocity_m_s,azimuth_rad\n{planes}"),
+    )
+    .unwrap();
     fs::write(folder.join("cut.hpl"), HPL.split_once("  2 ").unwrap().0).unwrap();
-    fs::write(folder.join("gates.hpl"), HPL.replace("Number of gates:\t4", "Number of gates:\t-4")).unwrap();
-    fs::write(folder.join("rays.hpl"), HPL.replace("rays in file:\t2", "rays in file:\t9")).unwrap();
+    fs::write(
+        folder.join("gates.hpl"),
+        HPL.replace("Number of gates:\t4", "Number of gates:\t-4"),
+    )
+    .unwrap();
+    fs::write(
+        folder.join("rays.hpl"),
+        HPL.replace("rays in file:\t2", "rays in file:\t9"),
+    )
+    .unwrap();
     let before = names(folder);
     for (words, parts) in [
         ("none.csv", &["none.csv"][..]),
         ("empty.csv", &["empty.csv", "no header"]),
         ("cut.nc", &["cut.nc", "more than the file holds"]),
-        ("masked.csv", &["masked.csv", "all of its velocities are missing"]),
+        (
+            "masked.csv",
+            &["masked.csv", "all of its velocities are missing"],
+        ),
         ("word.csv", &["word.csv", "row 8", "no number"]),
         ("fill.csv", &["fill.csv", "-9999", "fill value"]),
         ("twice.csv", &["twice.csv", "row 101", "twice", "sweep"]),
@@ -421,7 +695,10 @@ fn what_is_no_map_is_refused_and_nothing_is_written() {
         let message = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(2), "{words}: {message}");
         for part in parts {
-            assert!(message.contains(part), "{words}: {part} is not in: {message}");
+            assert!(
+                message.contains(part),
+                "{words}: {part} is not in: {message}"
+            );
         }
         assert_eq!(names(folder), before, "{words}");
     }

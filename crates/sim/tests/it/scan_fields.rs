@@ -15,32 +15,71 @@ use wakescope_sim::scene::SceneFile;
 /// A smooth field that varies along the flight.
 fn wave([x, y, z]: [f64; 3]) -> [f64; 3] {
     let (a, b, c) = (x / 400.0, y / 500.0, z / 300.0);
-    [3.0 * a.sin() * b.cos(), 4.0 * (a + b).cos() * c.cos(), 2.0 * a.cos() * (b + c).sin()]
+    [
+        3.0 * a.sin() * b.cos(),
+        4.0 * (a + b).cos() * c.cos(),
+        2.0 * a.cos() * (b + c).sin(),
+    ]
 }
 
 fn axis(low: f64, high: f64, count: usize) -> Vec<f64> {
-    (0..count).map(|i| low + (high - low) * i as f64 / (count - 1) as f64).collect()
+    (0..count)
+        .map(|i| low + (high - low) * i as f64 / (count - 1) as f64)
+        .collect()
 }
 
 fn sampled(nodes_m: [&[f64]; 3], component: usize, of: impl Fn([f64; 3]) -> [f64; 3]) -> Vec<f64> {
     let [xs, ys, zs] = nodes_m;
-    let places = zs.iter().flat_map(|&z| ys.iter().flat_map(move |&y| xs.iter().map(move |&x| [x, y, z])));
+    let places = zs.iter().flat_map(|&z| {
+        ys.iter()
+            .flat_map(move |&y| xs.iter().map(move |&x| [x, y, z]))
+    });
     places.map(|p| of(p)[component]).collect()
 }
 
 #[test]
 fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
     let folder = tempfile::tempdir().unwrap();
-    let centre_m = [axis(-60.0, 60.0, 41), axis(220.0, 500.0, 95), axis(-4.0, 60.0, 33)];
-    let face_m = centre_m.clone().map(|c| c.iter().map(|x| x - 0.5 * (c[1] - c[0])).collect::<Vec<f64>>());
+    let centre_m = [
+        axis(-60.0, 60.0, 41),
+        axis(220.0, 500.0, 95),
+        axis(-4.0, 60.0, 33),
+    ];
+    let face_m = centre_m.clone().map(|c| {
+        c.iter()
+            .map(|x| x - 0.5 * (c[1] - c[0]))
+            .collect::<Vec<f64>>()
+    });
     let velocity_m_s = std::array::from_fn(|d| {
-        let nodes = std::array::from_fn(|k| if k == d { &face_m[k][..] } else { &centre_m[k][..] });
+        let nodes = std::array::from_fn(|k| {
+            if k == d {
+                &face_m[k][..]
+            } else {
+                &centre_m[k][..]
+            }
+        });
         sampled(nodes, d, wave)
     });
-    let origin = Provenance { program: "t".into(), scene_toml: String::new(), scene_hash: "0".into(), seed: 1 };
+    let origin = Provenance {
+        program: "t".into(),
+        scene_toml: String::new(),
+        scene_hash: "0".into(),
+        seed: 1,
+    };
     let share = Share::whole(centre_m[2].len());
-    let faces = FaceVelocities { title: "wave".into(), time_s: 2.0, centre_m, face_m, velocity_m_s, share };
-    std::fs::write(folder.path().join("wave.nc"), cf_faces_parts(&faces, &origin).unwrap().into_bytes()).unwrap();
+    let faces = FaceVelocities {
+        title: "wave".into(),
+        time_s: 2.0,
+        centre_m,
+        face_m,
+        velocity_m_s,
+        share,
+    };
+    std::fs::write(
+        folder.path().join("wave.nc"),
+        cf_faces_parts(&faces, &origin).unwrap().into_bytes(),
+    )
+    .unwrap();
     let flow = "kind = \"fields\"\nfiles = \"wave.nc\"\nmotion = \"frozen\"\n";
     let scan = format!(
         "elevation_min_rad = 0.02\nelevation_max_rad = 0.08\nelevation_step_rad = 0.02\n{}",
@@ -49,44 +88,94 @@ fn an_rhi_off_the_cross_plane_sees_what_a_field_along_the_flight_says() {
     let plan = plan_in(folder.path(), [flow, &scan, ""], Target::Map).unwrap();
     assert_eq!(plan.wind.start_s, 2.0);
     let map = map(&plan);
-    for (line, gate) in (0..4).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate))) {
+    for (line, gate) in (0..4).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate)))
+    {
         let beam = plan.geometry.schedule.middle(line);
-        let expected = beam.direction.radial_velocity_m_s(wave(beam.at_range_m(map.range_m[gate])), [0.0; 3]);
-        assert!((map.v_exact_m_s[[line, gate]] - expected).abs() < 1e-6, "{line} {gate} {expected}");
+        let expected = beam
+            .direction
+            .radial_velocity_m_s(wave(beam.at_range_m(map.range_m[gate])), [0.0; 3]);
+        assert!(
+            (map.v_exact_m_s[[line, gate]] - expected).abs() < 1e-6,
+            "{line} {gate} {expected}"
+        );
     }
     let left = scan.replace("31.7", "300.0");
-    let message = plan_in(folder.path(), [flow, &left, ""], Target::Map).unwrap_err().to_string();
-    assert!(message.contains("leaves the simulated flow") && message.contains("x = 300.00 m"), "{message}");
+    let message = plan_in(folder.path(), [flow, &left, ""], Target::Map)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.contains("leaves the simulated flow") && message.contains("x = 300.00 m"),
+        "{message}"
+    );
     // The only field is of 2 s, and the scan goes on.
     let moving = flow.replace("frozen", "moving");
-    let message = plan_in(folder.path(), [&moving, &scan, ""], Target::Map).unwrap_err().to_string();
-    assert!(message.contains("flow.files") && message.contains("the fields at 2.000 s: begin earlier"), "{message}");
+    let message = plan_in(folder.path(), [&moving, &scan, ""], Target::Map)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.contains("flow.files") && message.contains("the fields at 2.000 s: begin earlier"),
+        "{message}"
+    );
 }
 
 #[cfg(feature = "netcdf4")]
 #[test]
 fn fields_in_netcdf4_are_read_time_by_time() {
     // Written by netCDF4 of Python, compressed in chunks, of a wind that is linear in place and time; w is packed into 16 bits.
-    let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/sim"));
+    let folder = Path::new(concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../tests/reference/sim"
+    ));
     let wind = |[x, y, z]: [f64; 3], t: f64| {
-        [1.0 + x / 64.0, 2.0 + (y - 360.0) / 128.0 + z / 32.0 + t / 2.0, 0.5 + (z - 16.0) / 64.0 - t / 4.0]
+        [
+            1.0 + x / 64.0,
+            2.0 + (y - 360.0) / 128.0 + z / 32.0 + t / 2.0,
+            0.5 + (z - 16.0) / 64.0 - t / 4.0,
+        ]
     };
     let flow = "kind = \"fields\"\nfiles = \"linear_fields_netcdf4.nc\"\n";
     let scan = "elevation_min_rad = 0.02\nelevation_max_rad = 0.08\nelevation_step_rad = 0.02\nlidar.x_m = 5.0\n";
     let plan = plan_in(folder, [flow, scan, ""], Target::Map).unwrap();
     let map = map(&plan);
-    for (line, gate) in (0..4).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate))) {
+    for (line, gate) in (0..4).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate)))
+    {
         let beam = plan.geometry.schedule.middle(line);
-        let air = wind(beam.at_range_m(map.range_m[gate]), plan.wind.start_s + beam.time_s);
+        let air = wind(
+            beam.at_range_m(map.range_m[gate]),
+            plan.wind.start_s + beam.time_s,
+        );
         let expected = beam.direction.radial_velocity_m_s(air, [0.0; 3]);
-        assert!((map.v_exact_m_s[[line, gate]] - expected).abs() < 1e-9, "{line} {gate} {expected}");
+        assert!(
+            (map.v_exact_m_s[[line, gate]] - expected).abs() < 1e-9,
+            "{line} {gate} {expected}"
+        );
     }
-    let absent = plan_in(folder, [&format!("{flow}names = [\"u\", \"v\", \"up\"]\n"), scan, ""], Target::Map);
-    assert!(absent.unwrap_err().to_string().contains("it has no variable up"));
+    let absent = plan_in(
+        folder,
+        [&format!("{flow}names = [\"u\", \"v\", \"up\"]\n"), scan, ""],
+        Target::Map,
+    );
+    assert!(
+        absent
+            .unwrap_err()
+            .to_string()
+            .contains("it has no variable up")
+    );
     // Begun by its writer, and nothing written: the library's default fill, which the file does not state.
-    let unwritten = plan_in(folder, [&format!("{flow}names = [\"u\", \"v\", \"unwritten\"]\n"), scan, ""], Target::Map);
+    let unwritten = plan_in(
+        folder,
+        [
+            &format!("{flow}names = [\"u\", \"v\", \"unwritten\"]\n"),
+            scan,
+            "",
+        ],
+        Target::Map,
+    );
     let message = unwritten.unwrap_err().to_string();
-    assert!(message.contains("unwritten is missing or not finite at place"), "{message}");
+    assert!(
+        message.contains("unwritten is missing or not finite at place"),
+        "{message}"
+    );
 }
 
 /// One vortex at (y, z), anticlockwise as one looks along +x with y to the right; `side` -1 in right-handed axes.
@@ -137,11 +226,17 @@ fn near_vortex(folder: &Path, flow: &str) {
     let plan = plan_in(folder, [flow, scan, ""], Target::Map).unwrap();
     let map = map(&plan);
     let mut largest = 0.0_f64;
-    for (line, gate) in (0..6).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate))) {
+    for (line, gate) in (0..6).flat_map(|line| (0..map.range_m.len()).map(move |gate| (line, gate)))
+    {
         let beam = plan.geometry.schedule.middle(line);
-        let expected = beam.direction.radial_velocity_m_s(vortex(1.0)(beam.at_range_m(map.range_m[gate])), [0.0; 3]);
+        let expected = beam
+            .direction
+            .radial_velocity_m_s(vortex(1.0)(beam.at_range_m(map.range_m[gate])), [0.0; 3]);
         let found = map.v_exact_m_s[[line, gate]];
-        assert!((found - expected).abs() < 2e-3, "{flow} {line} {gate} {found} {expected}");
+        assert!(
+            (found - expected).abs() < 2e-3,
+            "{flow} {line} {gate} {found} {expected}"
+        );
         largest = largest.max(expected.abs());
     }
     assert!(largest > 0.5);
@@ -151,7 +246,11 @@ fn near_vortex(folder: &Path, flow: &str) {
 fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
     let folder = tempfile::tempdir().unwrap();
     // Right-handed: the scan at y > 0 of the scene looks at y < 0 of the file. The cloud thickens away from the lidar, and moves on.
-    let (x, y, z) = (axis(-60.0, 60.0, 4), axis(-560.0, -200.0, 91), axis(2.0, 42.0, 5));
+    let (x, y, z) = (
+        axis(-60.0, 60.0, 4),
+        axis(-560.0, -200.0, 91),
+        axis(2.0, 42.0, 5),
+    );
     let slope_per_m = 0.004;
     let cloud = |y: f64, time_s: f64| 3.0 * (1.0 + slope_per_m * (-y - 360.0 - 20.0 * time_s));
     let shear_per_s = -0.05;
@@ -159,7 +258,11 @@ fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
     let both = |of: &dyn Fn(f64) -> Vec<f64>| [of(0.0), of(1.0)].concat();
     let dims = ["time", "z", "y", "x"];
     let component = |name, c| (name, dims, both(&|_| sampled([&x, &y, &z], c, wind)));
-    let amount = both(&|time_s| sampled([&x, &y, &z], 0, |[_, y, _]| [cloud(y, time_s).max(0.0), 0.0, 0.0]));
+    let amount = both(&|time_s| {
+        sampled([&x, &y, &z], 0, |[_, y, _]| {
+            [cloud(y, time_s).max(0.0), 0.0, 0.0]
+        })
+    });
     let written = |name: &str, amount: Vec<f64>| {
         netcdf(
             &folder.path().join(name),
@@ -170,18 +273,36 @@ fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
                 ("y", &["y"], y.clone()),
                 ("x", &["x"], x.clone()),
             ],
-            &[component("u", 0), component("v", 1), component("w", 2), ("dust", dims, amount)],
+            &[
+                component("u", 0),
+                component("v", 1),
+                component("w", 2),
+                ("dust", dims, amount),
+            ],
             &[],
         );
     };
     written("dusty.nc", amount.clone());
-    let flow =
-        |more: &str| format!("kind = \"fields\"\nfiles = \"dusty.nc\"\nmirror_y = true\nground = \"slip\"\n{more}");
+    let flow = |more: &str| {
+        format!(
+            "kind = \"fields\"\nfiles = \"dusty.nc\"\nmirror_y = true\nground = \"slip\"\n{more}"
+        )
+    };
     let level = "elevation_max_rad = 1e-7\nelevation_step_rad = 1e-7\nlidar_height_m = 12.0\n";
     let of = |flow: &str, scan: &str| {
         let snr = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n";
-        let text = SCENE.replace("ADDED", "").replace(snr, "").replace("FLOW", flow).replace("SCAN", scan);
-        Plan::new(SceneFile::parse(&text.replace("OUTPUTS", ""), &folder.path().join("scene.toml"))?, Target::Map)
+        let text = SCENE
+            .replace("ADDED", "")
+            .replace(snr, "")
+            .replace("FLOW", flow)
+            .replace("SCAN", scan);
+        Plan::new(
+            SceneFile::parse(
+                &text.replace("OUTPUTS", ""),
+                &folder.path().join("scene.toml"),
+            )?,
+            Target::Map,
+        )
     };
     let dusty = flow("backscatter = { name = \"dust\", unit_per_m_sr = 1e-7 }\n");
     let (plain, dusty) = (of(&flow(""), level).unwrap(), of(&dusty, level).unwrap());
@@ -191,13 +312,21 @@ fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
     for layer in 0..clear.layers() {
         // The atmosphere has 1e-7/(m sr); between the times and nodes the cloud is linear.
         let expected = clear.weight_per_m[layer] * cloud(-clear.range_m(layer), time_s);
-        assert!((seen.weight_per_m[layer] / expected - 1.0).abs() < 1e-9, "{layer}");
+        assert!(
+            (seen.weight_per_m[layer] / expected - 1.0).abs() < 1e-9,
+            "{layer}"
+        );
     }
     // Linear air in a linear cloud, seen with a weight of variance s^2 about its middle r: v(r) + g k s^2/(1 + k (r - r0)).
     let (without, with) = (map(&plain), map(&dusty));
     assert_eq!(without.v_exact_m_s, with.v_exact_m_s);
     let s_m = 0.5 * 299_792_458.0 * dusty.instrument.pulse.sigma_s() / 2f64.sqrt();
-    for (gate, range_m) in with.range_m.iter().enumerate().filter(|(_, r)| (330.0..390.0).contains(*r)) {
+    for (gate, range_m) in with
+        .range_m
+        .iter()
+        .enumerate()
+        .filter(|(_, r)| (330.0..390.0).contains(*r))
+    {
         let density = 1.0 + slope_per_m * (range_m - 360.0 - 20.0 * time_s);
         let expected = -shear_per_s * slope_per_m * s_m * s_m / density;
         let found = with.v_pulse_m_s[[0, gate]] - without.v_pulse_m_s[[0, gate]];
@@ -207,30 +336,60 @@ fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
     }
     // Each pulse meets the cloud as it is then: the mean of equal lines is that line.
     let slow = format!("{level}wind_of_pulses.kind = \"pulse\"\n");
-    let each = of(&flow("backscatter = { name = \"dust\", unit_per_m_sr = 1e-7 }\n"), &slow).unwrap();
+    let each = of(
+        &flow("backscatter = { name = \"dust\", unit_per_m_sr = 1e-7 }\n"),
+        &slow,
+    )
+    .unwrap();
     let each = lines(&each);
     for layer in 0..each.layers() {
-        assert!((each.weight_per_m[layer] / seen.weight_per_m[layer] - 1.0).abs() < 1e-6, "{layer}");
+        assert!(
+            (each.weight_per_m[layer] / seen.weight_per_m[layer] - 1.0).abs() < 1e-6,
+            "{layer}"
+        );
     }
     // Refused: no such variable, a density below nothing, a stated signal-to-noise ratio.
     let message = |text: &str, scan: &str| of(&flow(text), scan).unwrap_err().to_string();
     let absent = message("backscatter = { name = \"smoke\" }\n", level);
-    assert!(absent.contains("flow.files") && absent.contains("smoke"), "{absent}");
+    assert!(
+        absent.contains("flow.files") && absent.contains("smoke"),
+        "{absent}"
+    );
     assert!(message("backscatter = {}\n", level).contains("flow.backscatter.name"));
-    let fixed = plan_in(folder.path(), [&flow("backscatter.name = \"dust\"\n"), level, ""], Target::Map);
+    let fixed = plan_in(
+        folder.path(),
+        [&flow("backscatter.name = \"dust\"\n"), level, ""],
+        Target::Map,
+    );
     let fixed = fixed.unwrap_err().to_string();
-    assert!(fixed.contains("flow.backscatter.name = \"dust\"") && fixed.contains("detector.snr.reference"), "{fixed}");
+    assert!(
+        fixed.contains("flow.backscatter.name = \"dust\"")
+            && fixed.contains("detector.snr.reference"),
+        "{fixed}"
+    );
     written("dusty.nc", amount.iter().map(|beta| beta - 2.0).collect());
     let negative = message("backscatter.name = \"dust\"\n", level);
-    assert!(negative.contains("dust") && negative.contains("must not be negative"), "{negative}");
+    assert!(
+        negative.contains("dust") && negative.contains("must not be negative"),
+        "{negative}"
+    );
 }
 
 #[test]
 fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
     let folder = tempfile::tempdir().unwrap();
     // PALM: right-handed, y to the left of x, so the scan at y > 0 of the scene is at y < 0 of the file.
-    let (x, y, z) = (axis(-100.0, 100.0, 6), axis(-500.0, -220.0, 71), axis(0.0, 80.0, 21));
-    let half = |nodes: &[f64]| -> Vec<f64> { nodes.iter().map(|x| x - 0.5 * (nodes[1] - nodes[0])).collect() };
+    let (x, y, z) = (
+        axis(-100.0, 100.0, 6),
+        axis(-500.0, -220.0, 71),
+        axis(0.0, 80.0, 21),
+    );
+    let half = |nodes: &[f64]| -> Vec<f64> {
+        nodes
+            .iter()
+            .map(|x| x - 0.5 * (nodes[1] - nodes[0]))
+            .collect()
+    };
     let (xu, yv) = (half(&x), half(&y));
     let zw: Vec<f64> = z.iter().map(|z| z + 2.0).collect();
     let times = |mut values: Vec<f64>| {
@@ -240,7 +399,15 @@ fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
     let right = || vortex(-1.0);
     netcdf(
         &folder.path().join("palm.nc"),
-        &[("time", 2), ("zu_3d", 21), ("zw_3d", 21), ("y", 71), ("yv", 71), ("x", 6), ("xu", 6)],
+        &[
+            ("time", 2),
+            ("zu_3d", 21),
+            ("zw_3d", 21),
+            ("y", 71),
+            ("yv", 71),
+            ("x", 6),
+            ("xu", 6),
+        ],
         &[
             ("time", &["time"], vec![600.0, 660.0]),
             ("zu_3d", &["zu_3d"], z.clone()),
@@ -251,27 +418,55 @@ fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
             ("xu", &["xu"], xu.clone()),
         ],
         &[
-            ("u", ["time", "zu_3d", "y", "xu"], times(sampled([&xu, &y, &z], 0, right()))),
-            ("v", ["time", "zu_3d", "yv", "x"], times(sampled([&x, &yv, &z], 1, right()))),
-            ("w", ["time", "zw_3d", "y", "x"], times(sampled([&x, &y, &zw], 2, right()))),
+            (
+                "u",
+                ["time", "zu_3d", "y", "xu"],
+                times(sampled([&xu, &y, &z], 0, right())),
+            ),
+            (
+                "v",
+                ["time", "zu_3d", "yv", "x"],
+                times(sampled([&x, &yv, &z], 1, right())),
+            ),
+            (
+                "w",
+                ["time", "zw_3d", "y", "x"],
+                times(sampled([&x, &y, &zw], 2, right())),
+            ),
         ],
         &[],
     );
     let flow = "kind = \"fields\"\nfiles = \"palm.nc\"\nmirror_y = true\nmotion = \"frozen\"\n";
     // The lowest w is 2 m up: open below, so the lines stay above.
     near_vortex(folder.path(), flow);
-    let mirrored =
-        plan_in(folder.path(), [&flow.replace("true", "false"), RHI, ""], Target::Map).unwrap_err().to_string();
+    let mirrored = plan_in(
+        folder.path(),
+        [&flow.replace("true", "false"), RHI, ""],
+        Target::Map,
+    )
+    .unwrap_err()
+    .to_string();
     assert!(mirrored.contains("leaves the simulated flow"), "{mirrored}");
     // WRF: no coordinates but DX, DY and the geopotential; faces one more than centres. Moved to where the scan is.
     let (nx, ny, nz) = (6, 71, 20);
-    let faces = |count: usize, step: f64| -> Vec<f64> { (0..=count).map(|i| i as f64 * step).collect() };
-    let centres = |count: usize, step: f64| -> Vec<f64> { (0..count).map(|i| (i as f64 + 0.5) * step).collect() };
-    let (xs, xc, ys, yc) = (faces(nx, 40.0), centres(nx, 40.0), faces(ny, 4.0), centres(ny, 4.0));
+    let faces =
+        |count: usize, step: f64| -> Vec<f64> { (0..=count).map(|i| i as f64 * step).collect() };
+    let centres = |count: usize, step: f64| -> Vec<f64> {
+        (0..count).map(|i| (i as f64 + 0.5) * step).collect()
+    };
+    let (xs, xc, ys, yc) = (
+        faces(nx, 40.0),
+        centres(nx, 40.0),
+        faces(ny, 4.0),
+        centres(ny, 4.0),
+    );
     let (zs, zc) = (faces(nz, 4.0), centres(nz, 4.0));
     // The file's y runs against the scene's: its origin is at y = 500 m, x = -120 m.
     let moved = |[x, y, z]: [f64; 3]| vortex(-1.0)([x - 120.0, y - 500.0, z]);
-    let geopotential: Vec<f64> = zs.iter().flat_map(|z| vec![9.81 * (z + 55.0); nx * ny]).collect();
+    let geopotential: Vec<f64> = zs
+        .iter()
+        .flat_map(|z| vec![9.81 * (z + 55.0); nx * ny])
+        .collect();
     let mass = ["Time", "bottom_top_stag", "south_north", "west_east"];
     netcdf(
         &folder.path().join("wrfout.nc"),
@@ -286,8 +481,16 @@ fn staggered_fields_of_palm_and_wrf_come_out_unmirrored() {
         ],
         &[("XTIME", &["Time"], vec![0.0])],
         &[
-            ("U", ["Time", "bottom_top", "south_north", "west_east_stag"], sampled([&xs, &yc, &zc], 0, moved)),
-            ("V", ["Time", "bottom_top", "south_north_stag", "west_east"], sampled([&xc, &ys, &zc], 1, moved)),
+            (
+                "U",
+                ["Time", "bottom_top", "south_north", "west_east_stag"],
+                sampled([&xs, &yc, &zc], 0, moved),
+            ),
+            (
+                "V",
+                ["Time", "bottom_top", "south_north_stag", "west_east"],
+                sampled([&xc, &ys, &zc], 1, moved),
+            ),
             ("W", mass, sampled([&xc, &yc, &zs], 2, moved)),
             ("PH", mass, vec![0.0; geopotential.len()]),
             ("PHB", mass, geopotential.clone()),

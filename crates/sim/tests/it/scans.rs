@@ -36,8 +36,16 @@ OUTPUTS
 
 pub(crate) const RHI: &str = "elevation_max_rad = 0.02\nelevation_step_rad = 4e-3\n";
 
-pub(crate) fn plan_in(folder: &Path, [flow, scan, outputs]: [&str; 3], target: Target) -> Result<Plan, Error> {
-    let text = SCENE.replace("ADDED", "").replace("FLOW", flow).replace("SCAN", scan).replace("OUTPUTS", outputs);
+pub(crate) fn plan_in(
+    folder: &Path,
+    [flow, scan, outputs]: [&str; 3],
+    target: Target,
+) -> Result<Plan, Error> {
+    let text = SCENE
+        .replace("ADDED", "")
+        .replace("FLOW", flow)
+        .replace("SCAN", scan)
+        .replace("OUTPUTS", outputs);
     Plan::new(SceneFile::parse(&text, &folder.join("scene.toml"))?, target)
 }
 
@@ -46,7 +54,9 @@ fn plan(flow: &str, scan: &str) -> Plan {
 }
 
 fn refused(flow: &str, scan: &str) -> String {
-    plan_in(Path::new(""), [flow, scan, ""], Target::Map).unwrap_err().to_string()
+    plan_in(Path::new(""), [flow, scan, ""], Target::Map)
+        .unwrap_err()
+        .to_string()
 }
 
 pub(crate) fn map(plan: &Plan) -> VelocityEstimates {
@@ -55,13 +65,24 @@ pub(crate) fn map(plan: &Plan) -> VelocityEstimates {
 
 /// Names and bytes of the files of a run.
 fn files(scan: &str, threads: usize) -> Vec<(String, Vec<u8>)> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-    let plan = plan_in(Path::new(""), ["", scan, "signals = true\nhpl = false"], Target::Run).unwrap();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
+    let plan = plan_in(
+        Path::new(""),
+        ["", scan, "signals = true\nhpl = false"],
+        Target::Run,
+    )
+    .unwrap();
     let folder = tempfile::tempdir().unwrap();
     let result = pool.install(|| run(&plan, &Silent)).unwrap();
     let paths = write(&plan, &result, folder.path(), Existing::Own).unwrap();
     let read = |path: &std::path::PathBuf| {
-        (path.file_name().unwrap().to_string_lossy().into_owned(), std::fs::read(path).unwrap())
+        (
+            path.file_name().unwrap().to_string_lossy().into_owned(),
+            std::fs::read(path).unwrap(),
+        )
     };
     let mut all: Vec<_> = paths.iter().map(read).collect();
     all.sort();
@@ -75,24 +96,51 @@ fn an_rhi_has_the_same_bytes_however_it_is_said_and_with_any_number_of_threads()
     assert!(plain == files(RHI, 2));
     // Defaults that are stated are the defaults.
     assert!(
-        plain == files(&format!("{RHI}pattern.kind = \"rhi\"\nhead.sweeps = 1\nwind_of_pulses.kind = \"line\"\n"), 2)
+        plain
+            == files(
+                &format!(
+                    "{RHI}pattern.kind = \"rhi\"\nhead.sweeps = 1\nwind_of_pulses.kind = \"line\"\n"
+                ),
+                2
+            )
     );
     // Another azimuth is another label: numbers of the map and of the signals stay.
     let same = |a: &Plan, b: &Plan| {
         let [a, b] = [a, b].map(|plan| run(plan, &Silent).unwrap());
-        assert!(a.signals_a.is_some() && a.signals_a == b.signals_a && a.line_velocity_m_s == b.line_velocity_m_s);
+        assert!(
+            a.signals_a.is_some()
+                && a.signals_a == b.signals_a
+                && a.line_velocity_m_s == b.line_velocity_m_s
+        );
         let [a, b] = [a.map.unwrap(), b.map.unwrap()];
         assert_eq!(a.v_mean_m_s, b.v_mean_m_s);
-        assert_eq!((a.v_exact_m_s, a.v_pulse_m_s, a.v_gate_m_s), (b.v_exact_m_s, b.v_pulse_m_s, b.v_gate_m_s));
+        assert_eq!(
+            (a.v_exact_m_s, a.v_pulse_m_s, a.v_gate_m_s),
+            (b.v_exact_m_s, b.v_pulse_m_s, b.v_gate_m_s)
+        );
         b.v_spread_m_s
     };
-    let of = |scan: &str| plan_in(Path::new(""), ["", &format!("{RHI}{scan}"), "signals = true"], Target::Run).unwrap();
+    let of = |scan: &str| {
+        plan_in(
+            Path::new(""),
+            ["", &format!("{RHI}{scan}"), "signals = true"],
+            Target::Run,
+        )
+        .unwrap()
+    };
     let plain = of("");
     assert_eq!(same(&plain, &of("azimuth_rad = 1.0")), None);
     // Air that stands still is the same for each pulse, and each pulse looks at it through the general path.
-    let spread = same(&plain, &of("azimuth_rad = 1.0\nwind_of_pulses.kind = \"pulse\"")).unwrap();
+    let spread = same(
+        &plain,
+        &of("azimuth_rad = 1.0\nwind_of_pulses.kind = \"pulse\""),
+    )
+    .unwrap();
     assert!(spread.iter().all(|s| *s == 0.0));
-    same(&plain, &of("wind_of_pulses = { kind = \"groups\", groups = 3 }"));
+    same(
+        &plain,
+        &of("wind_of_pulses = { kind = \"groups\", groups = 3 }"),
+    );
 }
 
 const PPI: &str = "pattern = { kind = \"ppi\", elevations_rad = [0.05, 0.08], azimuth_min_rad = 1.3, azimuth_max_rad = 1.5 }\n\
@@ -104,7 +152,10 @@ fn a_moving_scan_with_jitter_has_the_same_bytes_with_any_number_of_threads() {
     let files_of = files(PPI, 1);
     assert!(files_of == files(PPI, 2));
     let names: Vec<&str> = files_of.iter().map(|(name, _)| name.as_str()).collect();
-    assert!(names.contains(&"scan.svg") && names.contains(&"map.svg"), "{names:?}");
+    assert!(
+        names.contains(&"scan.svg") && names.contains(&"map.svg"),
+        "{names:?}"
+    );
 }
 
 /// A wind that is linear in place, as scene and as function.
@@ -113,7 +164,11 @@ const LINEAR: &str = "kind = \"linear\"\nvelocity_m_s = [4.0, 1.0, -0.2]\ngradie
 
 fn linear(p: [f64; 3]) -> [f64; 3] {
     let dot = |g: [f64; 3]| g[0] * p[0] + g[1] * p[1] + g[2] * p[2];
-    [4.0 + dot([0.004, 0.0, 0.03]), 1.0 + dot([0.002, -0.003, -0.01]), -0.2 + dot([0.001, 0.0, -0.002])]
+    [
+        4.0 + dot([0.004, 0.0, 0.03]),
+        1.0 + dot([0.002, -0.003, -0.01]),
+        -0.2 + dot([0.001, 0.0, -0.002]),
+    ]
 }
 
 #[test]
@@ -128,7 +183,10 @@ fn truths_of_a_linear_wind_are_exact_in_any_direction() {
         let spacing_m = plan.geometry.sample_spacing_m;
         for line in 0..map.elevation_rad.len() {
             let beam = plan.geometry.schedule.middle(line);
-            let seen = |range_m: f64| beam.direction.radial_velocity_m_s(linear(beam.at_range_m(range_m)), [0.0; 3]);
+            let seen = |range_m: f64| {
+                beam.direction
+                    .radial_velocity_m_s(linear(beam.at_range_m(range_m)), [0.0; 3])
+            };
             for (gate, &range_m) in map.range_m.iter().enumerate() {
                 let at = [line, gate];
                 assert!((map.v_exact_m_s[at] - seen(range_m)).abs() < 1e-9);
@@ -150,12 +208,20 @@ fn the_truth_of_a_line_is_the_mean_over_its_pulses_with_their_spread() {
     assert!(schedule.lines.len() >= 4);
     for line in 0..schedule.lines.len() {
         let seen: Vec<f64> = (0..8)
-            .map(|pulse| schedule.beam_of_pulse(line, pulse).direction.radial_velocity_m_s([-8.0, 3.0, 0.5], [0.0; 3]))
+            .map(|pulse| {
+                schedule
+                    .beam_of_pulse(line, pulse)
+                    .direction
+                    .radial_velocity_m_s([-8.0, 3.0, 0.5], [0.0; 3])
+            })
             .collect();
         let mean = seen.iter().sum::<f64>() / 8.0;
         let sd = (seen.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / 8.0).sqrt();
         let spread = map.v_spread_m_s.as_ref().unwrap()[[line, 0]];
-        assert!((map.v_pulse_m_s[[line, 0]] - mean).abs() < 1e-9 && (spread - sd).abs() < 1e-9, "{spread} {sd}");
+        assert!(
+            (map.v_pulse_m_s[[line, 0]] - mean).abs() < 1e-9 && (spread - sd).abs() < 1e-9,
+            "{spread} {sd}"
+        );
         assert!(sd > 0.1);
     }
     // Without noise to speak of the estimates are that mean, not the wind at the middle of the line.
@@ -168,8 +234,14 @@ fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
     let uniform = "kind = \"linear\"\nvelocity_m_s = [6.0, -3.0, 0.2]";
     let wind = [6.0, -3.0, 0.2];
     for (scan, beams) in [
-        ("pattern = { kind = \"vad\", elevation_rad = 1.1, beams = 24 }\nhead.sweeps = 2", 24.0),
-        ("pattern = { kind = \"dbs\", elevation_rad = 1.1 }\nhead.sweeps = 2", 4.0f64),
+        (
+            "pattern = { kind = \"vad\", elevation_rad = 1.1, beams = 24 }\nhead.sweeps = 2",
+            24.0,
+        ),
+        (
+            "pattern = { kind = \"dbs\", elevation_rad = 1.1 }\nhead.sweeps = 2",
+            4.0f64,
+        ),
     ] {
         let plan = plan(uniform, scan);
         let map = map(&plan);
@@ -181,10 +253,19 @@ fn vad_and_dbs_of_a_scan_tell_the_wind_with_their_errors() {
             let gate = i % map.range_m.len();
             let sigma = map.std_m_s.column(gate).mean().unwrap().max(0.1);
             for (d, wind) in wind.iter().enumerate() {
-                assert!((found.true_m_s[d] - wind).abs() < 1e-12 && (found.noiseless_m_s[d] - wind).abs() < 1e-9);
+                assert!(
+                    (found.true_m_s[d] - wind).abs() < 1e-12
+                        && (found.noiseless_m_s[d] - wind).abs() < 1e-9
+                );
                 // (u, v) of white noise: sigma sqrt(2/N)/cos.
-                assert!((found.mean_m_s[d] - wind).abs() < 6.0 * sigma * (2.0 / beams).sqrt() / cos, "{found:?}");
-                assert!(found.std_m_s[d] > 0.0 && found.std_m_s[d] < 10.0 * sigma * (2.0 / beams).sqrt() / cos);
+                assert!(
+                    (found.mean_m_s[d] - wind).abs() < 6.0 * sigma * (2.0 / beams).sqrt() / cos,
+                    "{found:?}"
+                );
+                assert!(
+                    found.std_m_s[d] > 0.0
+                        && found.std_m_s[d] < 10.0 * sigma * (2.0 / beams).sqrt() / cos
+                );
                 assert_eq!(found.error_bar_m_s[d].is_nan(), beams == 4.0);
             }
         }
@@ -196,7 +277,10 @@ fn the_wake_begins_where_the_aircraft_is_when_the_scan_begins() {
     let pair = "kind = \"vortex_pair\"\nmotion = \"inviscid\"\n";
     let velocity = |plan: &Plan, x_m: f64| {
         let mut out = [[f64::NAN; 3]];
-        plan.wind.wind().velocity_into(&[[x_m, 410.0, 40.0]], plan.wind.start_s, &mut out).unwrap();
+        plan.wind
+            .wind()
+            .velocity_into(&[[x_m, 410.0, 40.0]], plan.wind.start_s, &mut out)
+            .unwrap();
         out[0]
     };
     let of = |aircraft: &str| plan(&format!("{pair}aircraft = {{ {aircraft} }}"), RHI);
@@ -206,7 +290,10 @@ fn the_wake_begins_where_the_aircraft_is_when_the_scan_begins() {
     // 700 m behind it the wake is 10 s old, and everywhere so is a pair of that age.
     let age_tau = 10.0 * 500.0 / (TAU * 47.0 * 47.0);
     let aged = plan(&format!("{pair}age_tau = {age_tau:?}"), RHI);
-    for (found, expected) in velocity(&coming, -1000.0).into_iter().zip(velocity(&aged, 0.0)) {
+    for (found, expected) in velocity(&coming, -1000.0)
+        .into_iter()
+        .zip(velocity(&aged, 0.0))
+    {
         assert!((found - expected).abs() < 1e-9, "{found} {expected}");
     }
 }
@@ -224,10 +311,16 @@ fn winds_add_up_each_from_its_own_start() {
         .replace("OUTPUTS", "");
     let file = SceneFile::parse(&text, Path::new("s.toml")).unwrap();
     let again = SceneFile::parse(&file.toml, Path::new("s.toml")).unwrap();
-    assert_eq!((again.content, again.hash), (file.content.clone(), file.hash.clone()));
+    assert_eq!(
+        (again.content, again.hash),
+        (file.content.clone(), file.hash.clone())
+    );
     let plan = Plan::new(file, Target::Map).unwrap();
     let mut out = [[0.0; 3]];
-    plan.wind.wind().velocity_into(&[[10.0, 20.0, 30.0]], 0.0, &mut out).unwrap();
+    plan.wind
+        .wind()
+        .velocity_into(&[[10.0, 20.0, 30.0]], 0.0, &mut out)
+        .unwrap();
     let expected = linear([10.0, 20.0, 30.0]);
     for (found, (base, added)) in out[0].iter().zip(expected.iter().zip([3.0, 2.0, 1.0])) {
         assert!((found - base - added).abs() < 1e-12);
@@ -237,7 +330,11 @@ fn winds_add_up_each_from_its_own_start() {
 /// Text of a variable of fixed length, up to its first NUL.
 fn words(file: &mut FileReader, name: &str) -> Vec<String> {
     let bytes = file.read_var_u8(name).unwrap();
-    let word = |part: &[u8]| String::from_utf8_lossy(part).trim_end_matches('\0').to_owned();
+    let word = |part: &[u8]| {
+        String::from_utf8_lossy(part)
+            .trim_end_matches('\0')
+            .to_owned()
+    };
     bytes.chunks_exact(32).map(word).collect()
 }
 
@@ -256,7 +353,13 @@ fn each_kind_of_sweep_has_its_word_and_angle_in_files_of_its_own() {
     let run_in = |scan: &str| {
         let plan = plan_in(folder.path(), ["", scan, outputs], Target::Run).unwrap();
         let out = tempfile::tempdir().unwrap();
-        write(&plan, &run(&plan, &Silent).unwrap(), out.path(), Existing::Own).unwrap();
+        write(
+            &plan,
+            &run(&plan, &Silent).unwrap(),
+            out.path(),
+            Existing::Own,
+        )
+        .unwrap();
         out
     };
     for (scan, mode, fixed, ends) in [
@@ -266,24 +369,61 @@ fn each_kind_of_sweep_has_its_word_and_angle_in_files_of_its_own() {
             0.1f64,
             vec![6, 13],
         ),
-        ("pattern = { kind = \"ppi\", azimuth_max_rad = 1.0, azimuth_step_rad = 0.5 }", "sector", 0.05, vec![2]),
-        ("pattern = { kind = \"stare\", lines = 4 }", "vertical_pointing", FRAC_PI_2, vec![3]),
-        ("pattern = { kind = \"dbs\", elevation_rad = 1.0 }", "pointing", 1.0, vec![4]),
+        (
+            "pattern = { kind = \"ppi\", azimuth_max_rad = 1.0, azimuth_step_rad = 0.5 }",
+            "sector",
+            0.05,
+            vec![2],
+        ),
+        (
+            "pattern = { kind = \"stare\", lines = 4 }",
+            "vertical_pointing",
+            FRAC_PI_2,
+            vec![3],
+        ),
+        (
+            "pattern = { kind = \"dbs\", elevation_rad = 1.0 }",
+            "pointing",
+            1.0,
+            vec![4],
+        ),
     ] {
         let out = run_in(scan);
         let (modes, angles, last) = sweeps(out.path(), "map.nc");
-        assert!(modes.iter().all(|m| m == mode) && modes.len() == ends.len(), "{modes:?}");
-        assert!((f64::from(angles[0]) - fixed.to_degrees()).abs() < 1e-4 && last == ends, "{angles:?} {last:?}");
+        assert!(
+            modes.iter().all(|m| m == mode) && modes.len() == ends.len(),
+            "{modes:?}"
+        );
+        assert!(
+            (f64::from(angles[0]) - fixed.to_degrees()).abs() < 1e-4 && last == ends,
+            "{angles:?} {last:?}"
+        );
     }
     let flying = "pattern = { kind = \"stare\", elevation_rad = 0.2, lines = 3 }\nlidar.velocity_m_s = [9.0, 0.0, 1.0]";
-    for (scan, name, mobile, dims) in
-        [("pattern = { kind = \"vad\" }", "azimuth_surveillance", "false", 0), (flying, "pointing", "true", 1)]
-    {
+    for (scan, name, mobile, dims) in [
+        (
+            "pattern = { kind = \"vad\" }",
+            "azimuth_surveillance",
+            "false",
+            0,
+        ),
+        (flying, "pointing", "true", 1),
+    ] {
         let out = run_in(scan);
         let file = FileReader::open(out.path().join("map.nc")).unwrap();
         let of = |name: &str| file.data_set().get_global_attr_as_string(name).unwrap();
-        assert_eq!((of("scan_name"), of("platform_is_mobile")), (name.to_owned(), mobile.to_owned()));
-        assert_eq!(file.data_set().get_var("latitude").unwrap().get_dims().len(), dims);
+        assert_eq!(
+            (of("scan_name"), of("platform_is_mobile")),
+            (name.to_owned(), mobile.to_owned())
+        );
+        assert_eq!(
+            file.data_set()
+                .get_var("latitude")
+                .unwrap()
+                .get_dims()
+                .len(),
+            dims
+        );
     }
     let list = "azimuth_rad,elevation_rad,pulses,sweep,mode\n1.5,0.1,4,0,rhi\n1.5,0.2,4,0,rhi\n0.5,0.3,9,1,pointing\n";
     std::fs::write(folder.path().join("list.csv"), list).unwrap();
@@ -298,31 +438,73 @@ fn each_kind_of_sweep_has_its_word_and_angle_in_files_of_its_own() {
 fn what_a_scan_cannot_be_is_refused_with_key_and_what_is_allowed() {
     let calm = "kind = \"calm\"";
     for (scan, wanted) in [
-        ("pattern = { kind = \"ppi\", elevations_rad = [0.1, -0.1] }", "scan.pattern.elevations_rad = -0.1"),
-        ("pattern = { kind = \"ppi\", elevations_rad = [] }", "a list of 1 to 1000 elevations"),
-        ("pattern = { kind = \"ppi\", azimuth_max_rad = 7.0 }", "scan.pattern.azimuth_max_rad = 7.0"),
-        ("pattern = { kind = \"vad\", beams = 2 }", "scan.pattern.beams = 2"),
-        ("pattern = { kind = \"vad\" }\nhead.motion = \"continuous\"", "rhi, ppi and axial may be continuous"),
+        (
+            "pattern = { kind = \"ppi\", elevations_rad = [0.1, -0.1] }",
+            "scan.pattern.elevations_rad = -0.1",
+        ),
+        (
+            "pattern = { kind = \"ppi\", elevations_rad = [] }",
+            "a list of 1 to 1000 elevations",
+        ),
+        (
+            "pattern = { kind = \"ppi\", azimuth_max_rad = 7.0 }",
+            "scan.pattern.azimuth_max_rad = 7.0",
+        ),
+        (
+            "pattern = { kind = \"vad\", beams = 2 }",
+            "scan.pattern.beams = 2",
+        ),
+        (
+            "pattern = { kind = \"vad\" }\nhead.motion = \"continuous\"",
+            "rhi, ppi and axial may be continuous",
+        ),
         ("head.motion = \"continuous\"", "scan.head.rate_rad_s = inf"),
-        ("head.pointing_jitter_rad = [1e-3, 0.0]", "wind_of_pulses.kind = \"pulse\""),
+        (
+            "head.pointing_jitter_rad = [1e-3, 0.0]",
+            "wind_of_pulses.kind = \"pulse\"",
+        ),
         (
             "pattern.kind = \"stare\"\nelevation_max_rad = 0.2",
             "scan.elevation_max_rad = 0.2 is not allowed: scan.pattern.kind",
         ),
-        ("pattern = { kind = \"stare\", elevation_rad = -0.2 }", "scan.below_ground.policy"),
-        ("pattern = { kind = \"list\", file = \"nowhere.csv\" }", "nowhere.csv"),
+        (
+            "pattern = { kind = \"stare\", elevation_rad = -0.2 }",
+            "scan.below_ground.policy",
+        ),
+        (
+            "pattern = { kind = \"list\", file = \"nowhere.csv\" }",
+            "nowhere.csv",
+        ),
         ("pattern = { kind = \"spiral\" }", "one of \"rhi\", \"ppi\""),
         ("head.sweeps = 100000", "at most 100000 lines"),
     ] {
         let message = refused(calm, scan);
         assert!(message.contains(wanted), "{scan}: {message}");
-        assert!(message.contains("scene.toml:") || message.contains("nowhere"), "{message}");
+        assert!(
+            message.contains("scene.toml:") || message.contains("nowhere"),
+            "{message}"
+        );
     }
-    let message = refused("kind = \"vortex_lines\"\nnodes_m = [[[0.0, 1.0, 2.0]]]\ncirculation_m2_s = [5.0]", RHI);
-    assert!(message.contains("flow.nodes_m") && message.contains("2 of an endless vortex"), "{message}");
+    let message = refused(
+        "kind = \"vortex_lines\"\nnodes_m = [[[0.0, 1.0, 2.0]]]\ncirculation_m2_s = [5.0]",
+        RHI,
+    );
+    assert!(
+        message.contains("flow.nodes_m") && message.contains("2 of an endless vortex"),
+        "{message}"
+    );
     let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("l.csv"), "time_s,azimuth_rad,elevation_rad\n1.0,0,0.1\n0.5,0,0.1\n").unwrap();
+    std::fs::write(
+        folder.path().join("l.csv"),
+        "time_s,azimuth_rad,elevation_rad\n1.0,0,0.1\n0.5,0,0.1\n",
+    )
+    .unwrap();
     let scan = "pattern = { kind = \"list\", file = \"l.csv\" }";
-    let message = plan_in(folder.path(), [calm, scan, ""], Target::Map).unwrap_err().to_string();
-    assert!(message.contains("row 2: time_s = 0.5: at least"), "{message}");
+    let message = plan_in(folder.path(), [calm, scan, ""], Target::Map)
+        .unwrap_err()
+        .to_string();
+    assert!(
+        message.contains("row 2: time_s = 0.5: at least"),
+        "{message}"
+    );
 }

@@ -64,7 +64,10 @@ fn flow(folder: &Path) {
 
 fn plan(folder: &Path, more: &str, scan: &str) -> Result<Plan, Error> {
     let text = SCENE.replace("MORE", more).replace("SCAN", scan);
-    Plan::new(SceneFile::parse(&text, &folder.join("scene.toml")).map_err(Error::Scene)?, Target::Map)
+    Plan::new(
+        SceneFile::parse(&text, &folder.join("scene.toml")).map_err(Error::Scene)?,
+        Target::Map,
+    )
 }
 
 fn map(plan: &Plan) -> VelocityEstimates {
@@ -76,15 +79,25 @@ fn snapshot(folder: &Path, index: usize) -> (f64, GridSnapshot) {
     let mut file = FileReader::open(folder.join(format!("wake/plane1_000{index}.nc"))).unwrap();
     let [y_m, z_m, time] = ["y", "z", "time"].map(|name| file.read_var_f64(name).unwrap());
     let [v, w] = ["v", "w"].map(|name| file.read_var_f32(name).unwrap());
-    let ground = Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] };
+    let ground = Side::NoSlipWall {
+        position_m: 0.0,
+        velocity_m_s: [0.0; 3],
+    };
     let mesh = PlaneMesh {
         y_m,
         z_m,
         y_edges: Edges::Periodic { period_m: 4.0 },
-        z_edges: Edges::Bounded { low: ground, high: Side::SlipWall { position_m: 2.5 } },
+        z_edges: Edges::Bounded {
+            low: ground,
+            high: Side::SlipWall { position_m: 2.5 },
+        },
         outside: OutsidePolicy::Error,
     };
-    let velocity: Vec<[f64; 3]> = v.iter().zip(&w).map(|(v, w)| [0.0, f64::from(*v), f64::from(*w)]).collect();
+    let velocity: Vec<[f64; 3]> = v
+        .iter()
+        .zip(&w)
+        .map(|(v, w)| [0.0, f64::from(*v), f64::from(*w)])
+        .collect();
     (time[0], GridSnapshot::new(&mesh, &velocity).unwrap())
 }
 
@@ -101,8 +114,14 @@ fn assert_shows(map: &VelocityEstimates, expected: impl Fn(usize, f64, f64) -> f
     let mut fastest = 0.0_f64;
     for (line, &elevation_rad) in map.elevation_rad.iter().enumerate() {
         for (gate, &range_m) in map.range_m.iter().enumerate() {
-            let (found, expected) = (map.v_exact_m_s[[line, gate]], expected(line, range_m, elevation_rad));
-            assert!((found - expected).abs() < 1e-9, "line {line}, {range_m} m: {found}, {expected}");
+            let (found, expected) = (
+                map.v_exact_m_s[[line, gate]],
+                expected(line, range_m, elevation_rad),
+            );
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "line {line}, {range_m} m: {found}, {expected}"
+            );
             fastest = fastest.max(found.abs());
         }
     }
@@ -117,15 +136,24 @@ fn the_exact_map_of_a_frozen_flow_is_the_flow_as_sampled_at_the_requested_time()
     let late = plan(folder.path(), "motion = \"frozen\"\nage_tau = 0.04", "").unwrap();
     assert_eq!(late.wind.tau, 0.04);
     let late = map(&late);
-    assert_shows(&late, |_, range_m, elevation_rad| radial_m_s(&third, range_m, elevation_rad));
+    assert_shows(&late, |_, range_m, elevation_rad| {
+        radial_m_s(&third, range_m, elevation_rad)
+    });
     let moved = |range_m, elevation_rad| {
         radial_m_s(&first, range_m, elevation_rad) - radial_m_s(&third, range_m, elevation_rad)
     };
-    assert!(late.range_m.iter().any(|&r| moved(r, 0.1_f64).abs() > 0.05), "the two times differ");
+    assert!(
+        late.range_m.iter().any(|&r| moved(r, 0.1_f64).abs() > 0.05),
+        "the two times differ"
+    );
     // At 10 dB the estimates follow the pulse-weighted velocity where the wind is smooth.
     let far = late.std_m_s.dim().1 - 1;
     let error = (&late.v_mean_m_s - &late.v_gate_m_s).mapv(f64::abs);
-    assert!(error.column(far).mean().unwrap() < 2.0, "{}", error.column(far));
+    assert!(
+        error.column(far).mean().unwrap() < 2.0,
+        "{}",
+        error.column(far)
+    );
 }
 
 #[test]
@@ -151,12 +179,16 @@ fn scans_that_outlast_or_leave_the_flow_are_refused_masked_or_filled() {
     flow(folder.path());
     let refused = |more: &str, scan: &str| {
         let plan = plan(folder.path(), more, scan);
-        plan.and_then(|plan| run::run(&plan, &Silent).map(|_| ())).unwrap_err().to_string()
+        plan.and_then(|plan| run::run(&plan, &Silent).map(|_| ()))
+            .unwrap_err()
+            .to_string()
     };
     assert!(refused("time_s = 1.0", "").contains("the planes at 1.106 s"));
     assert!(refused("age_tau = 0.05", "").contains("from tau = 0.0 to 0.04"));
     let outside = "elevation_max_rad = 0.4";
-    let leaves = SCENE.replace("elevation_max_rad = 0.15", outside).replace("SCAN", "");
+    let leaves = SCENE
+        .replace("elevation_max_rad = 0.15", outside)
+        .replace("SCAN", "");
     let with = |policy: &str| {
         let text = leaves.replace("MORE", "motion = \"frozen\"") + policy;
         let file = SceneFile::parse(&text, &folder.path().join("scene.toml")).unwrap();
@@ -164,11 +196,21 @@ fn scans_that_outlast_or_leave_the_flow_are_refused_masked_or_filled() {
     };
     // The plan refuses it, before any computing.
     let message = with("").unwrap_err().to_string();
-    assert!(message.contains("leaves the simulated flow") && message.contains("scan.outside_flow.policy"), "{message}");
+    assert!(
+        message.contains("leaves the simulated flow")
+            && message.contains("scan.outside_flow.policy"),
+        "{message}"
+    );
     let masked = map(&with("outside_flow = { policy = \"mask\" }\n").unwrap());
-    let filled = map(&with("outside_flow = { policy = \"constant\", radial_velocity_m_s = -2.5 }\n").unwrap());
+    let filled = map(&with(
+        "outside_flow = { policy = \"constant\", radial_velocity_m_s = -2.5 }\n",
+    )
+    .unwrap());
     let last = masked.elevation_rad.len() - 1;
-    assert!(masked.v_exact_m_s.row(last).iter().all(|v| v.is_nan()), "the top line sees nothing");
+    assert!(
+        masked.v_exact_m_s.row(last).iter().all(|v| v.is_nan()),
+        "the top line sees nothing"
+    );
     assert!(filled.v_exact_m_s.row(last).iter().all(|v| *v == -2.5));
     let mean_m_s = filled.v_mean_m_s.row(last).mean().unwrap();
     assert!((mean_m_s + 2.5).abs() < 0.4, "{mean_m_s}");

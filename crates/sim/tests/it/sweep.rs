@@ -26,7 +26,11 @@ fn folder() -> tempfile::TempDir {
 
 fn ran(folder: &Path, words: &[&str]) -> String {
     let out = wakescope(folder, words);
-    assert!(out.status.success(), "{words:?}: {}", String::from_utf8_lossy(&out.stderr));
+    assert!(
+        out.status.success(),
+        "{words:?}: {}",
+        String::from_utf8_lossy(&out.stderr)
+    );
     String::from_utf8(out.stdout).unwrap()
 }
 
@@ -43,21 +47,43 @@ fn read(folder: &Path, file: &str) -> Vec<u8> {
 fn results_have_the_same_bytes_for_threads_shards_and_after_a_kill() {
     let temp = folder();
     let at = temp.path();
-    let summary: serde_json::Value = serde_json::from_str(&swept(at, &["--out", "one", "--threads", "1"])).unwrap();
+    let summary: serde_json::Value =
+        serde_json::from_str(&swept(at, &["--out", "one", "--threads", "1"])).unwrap();
     // A duration has its ranges and so its curve; an energy has its signals.
-    let counts = ["cases", "run", "flows", "efficiencies", "signals"].map(|name| summary[name].as_u64().unwrap());
+    let counts = ["cases", "run", "flows", "efficiencies", "signals"]
+        .map(|name| summary[name].as_u64().unwrap());
     assert_eq!(counts, [9, 9, 1, 3, 9]);
-    let files = ["cases", "front.png", "front.svg", "results.csv", "results.nc"];
-    assert!(files.iter().all(|file| names(&at.join("one")).contains(&(*file).to_owned())));
-    assert_eq!(names(&at.join("one/cases/00008")), ["result.json", "scene.toml"]);
+    let files = [
+        "cases",
+        "front.png",
+        "front.svg",
+        "results.csv",
+        "results.nc",
+    ];
+    assert!(
+        files
+            .iter()
+            .all(|file| names(&at.join("one")).contains(&(*file).to_owned()))
+    );
+    assert_eq!(
+        names(&at.join("one/cases/00008")),
+        ["result.json", "scene.toml"]
+    );
     let expected = read(at, "one/results.csv");
     assert!(
-        String::from_utf8_lossy(&expected).contains("\ncase,pulse.energy_j,pulse.duration_s,detector.bandwidth_hz,")
+        String::from_utf8_lossy(&expected)
+            .contains("\ncase,pulse.energy_j,pulse.duration_s,detector.bandwidth_hz,")
     );
 
     swept(at, &["--out", "two", "--threads", "2"]);
-    for file in names(&at.join("one")).iter().filter(|f| !["cases", "times.csv"].contains(&f.as_str())) {
-        assert!(read(at, &format!("one/{file}")) == read(at, &format!("two/{file}")), "{file}");
+    for file in names(&at.join("one"))
+        .iter()
+        .filter(|f| !["cases", "times.csv"].contains(&f.as_str()))
+    {
+        assert!(
+            read(at, &format!("one/{file}")) == read(at, &format!("two/{file}")),
+            "{file}"
+        );
     }
 
     // Three shards, two of them in one folder; one cannot be merged without the others.
@@ -68,18 +94,46 @@ fn results_have_the_same_bytes_for_threads_shards_and_after_a_kill() {
     let lacking = wakescope(at, &["sweep", "--merge", "b", "--out", "half"]);
     let message = String::from_utf8(lacking.stderr).unwrap();
     assert_eq!(lacking.status.code(), Some(2));
-    assert!(message.contains("3 of the 9 cases have no result") && message.contains("0, 3, 6"), "{message}");
+    assert!(
+        message.contains("3 of the 9 cases have no result") && message.contains("0, 3, 6"),
+        "{message}"
+    );
     assert!(!at.join("half").exists());
     ran(at, &["sweep", "--merge", "b", "a", "--out", "merged"]);
-    assert!(read(at, "merged/results.csv") == expected && read(at, "merged/results.nc") == read(at, "one/results.nc"));
-    ran(at, &[&SWEEP[..], &["--merge", "a", "b", "--out", "again"]].concat());
+    assert!(
+        read(at, "merged/results.csv") == expected
+            && read(at, "merged/results.nc") == read(at, "one/results.nc")
+    );
+    ran(
+        at,
+        &[&SWEEP[..], &["--merge", "a", "b", "--out", "again"]].concat(),
+    );
     assert!(read(at, "again/results.csv") == expected);
 
     // A shard of another sweep does not fit.
-    ran(at, &["sweep", "s.toml", "--vary", "pulse.energy_j=1e-6,2e-6", "--quiet", "--shard", "1/2", "--out", "other"]);
-    let foreign = wakescope(at, &["sweep", "--merge", "a", "b", "other", "--out", "mixed"]);
+    ran(
+        at,
+        &[
+            "sweep",
+            "s.toml",
+            "--vary",
+            "pulse.energy_j=1e-6,2e-6",
+            "--quiet",
+            "--shard",
+            "1/2",
+            "--out",
+            "other",
+        ],
+    );
+    let foreign = wakescope(
+        at,
+        &["sweep", "--merge", "a", "b", "other", "--out", "mixed"],
+    );
     let message = String::from_utf8(foreign.stderr).unwrap();
-    assert!(foreign.status.code() == Some(2) && message.contains("only shards of one sweep"), "{message}");
+    assert!(
+        foreign.status.code() == Some(2) && message.contains("only shards of one sweep"),
+        "{message}"
+    );
 
     // Killed as soon as two cases have results, then resumed; a result of another version is made anew.
     let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_wakescope"))
@@ -87,20 +141,27 @@ fn results_have_the_same_bytes_for_threads_shards_and_after_a_kill() {
         .current_dir(at)
         .spawn()
         .unwrap();
-    while !at.join("killed/cases/00001/result.json").exists() && child.try_wait().unwrap().is_none() {
+    while !at.join("killed/cases/00001/result.json").exists() && child.try_wait().unwrap().is_none()
+    {
         std::thread::sleep(std::time::Duration::from_millis(1));
     }
     child.kill().unwrap();
     child.wait().unwrap();
     let old = at.join("killed/cases/00000/result.json");
-    let text =
-        std::fs::read_to_string(&old).unwrap().replace("\"source\": \"wakescope ", "\"source\": \"wakescope 0.0.");
+    let text = std::fs::read_to_string(&old)
+        .unwrap()
+        .replace("\"source\": \"wakescope ", "\"source\": \"wakescope 0.0.");
     std::fs::write(&old, text).unwrap();
-    let summary: serde_json::Value = serde_json::from_str(&swept(at, &["--resume", "--out", "killed"])).unwrap();
-    let (run, kept) = (summary["run"].as_u64().unwrap(), summary["kept"].as_u64().unwrap());
+    let summary: serde_json::Value =
+        serde_json::from_str(&swept(at, &["--resume", "--out", "killed"])).unwrap();
+    let (run, kept) = (
+        summary["run"].as_u64().unwrap(),
+        summary["kept"].as_u64().unwrap(),
+    );
     assert!(run + kept == 9 && kept >= 1 && run >= 1, "{run} {kept}");
     assert!(read(at, "killed/results.csv") == expected);
-    let summary: serde_json::Value = serde_json::from_str(&swept(at, &["--resume", "--out", "killed"])).unwrap();
+    let summary: serde_json::Value =
+        serde_json::from_str(&swept(at, &["--resume", "--out", "killed"])).unwrap();
     assert_eq!(summary["run"], 0);
 }
 
@@ -112,7 +173,21 @@ fn shards_that_begin_together_in_one_folder_all_end() {
     let begin = |shard: usize| {
         let shard = format!("{shard}/9");
         std::process::Command::new(env!("CARGO_BIN_EXE_wakescope"))
-            .args([&SWEEP[..], &["--quiet", "--threads", "1", "--shard", &shard, "--out", "deep/all"]].concat())
+            .args(
+                [
+                    &SWEEP[..],
+                    &[
+                        "--quiet",
+                        "--threads",
+                        "1",
+                        "--shard",
+                        &shard,
+                        "--out",
+                        "deep/all",
+                    ],
+                ]
+                .concat(),
+            )
             .current_dir(at)
             .stderr(std::process::Stdio::piped())
             .stdout(std::process::Stdio::null())
@@ -122,12 +197,19 @@ fn shards_that_begin_together_in_one_folder_all_end() {
     let begun: Vec<_> = (1..=9).map(begin).collect();
     for child in begun {
         let out = child.wait_with_output().unwrap();
-        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        assert!(
+            out.status.success(),
+            "{}",
+            String::from_utf8_lossy(&out.stderr)
+        );
     }
     ran(at, &["sweep", "--merge", "deep/all", "--out", "merged"]);
     assert!(read(at, "merged/results.csv") == read(at, "one/results.csv"));
     let hidden = names(&at.join("deep/all"));
-    assert!(!hidden.iter().any(|name| name.starts_with('.')), "{hidden:?}");
+    assert!(
+        !hidden.iter().any(|name| name.starts_with('.')),
+        "{hidden:?}"
+    );
 }
 
 #[test]
@@ -138,21 +220,45 @@ fn a_sweep_replaces_another_one_and_damaged_results_only_when_it_is_told_to() {
         let vary = format!("pulse.energy_j={energies}");
         wakescope(
             at,
-            &[&["sweep", "s.toml", "--vary", &vary, "--quiet", "--out", "o", "--no-circulation"], more].concat(),
+            &[
+                &[
+                    "sweep",
+                    "s.toml",
+                    "--vary",
+                    &vary,
+                    "--quiet",
+                    "--out",
+                    "o",
+                    "--no-circulation",
+                ],
+                more,
+            ]
+            .concat(),
         )
     };
     assert!(of("50e-6,150e-6", &[]).status.success());
     let expected = read(at, "o/results.csv");
     let other = of("60e-6", &[]);
     let message = String::from_utf8(other.stderr).unwrap();
-    assert!(other.status.code() == Some(2) && message.contains("another sweep") && message.contains("--overwrite"));
+    assert!(
+        other.status.code() == Some(2)
+            && message.contains("another sweep")
+            && message.contains("--overwrite")
+    );
     assert!(read(at, "o/results.csv") == expected);
     // A result that another program damaged.
     std::fs::write(at.join("o/cases/00001/result.json"), "[]").unwrap();
     let damaged = of("50e-6,150e-6", &["--resume"]);
     let message = String::from_utf8(damaged.stderr).unwrap();
-    assert!(damaged.status.code() == Some(2) && message.contains("--overwrite"), "{message}");
-    assert!(of("50e-6,150e-6", &["--resume", "--overwrite"]).status.success());
+    assert!(
+        damaged.status.code() == Some(2) && message.contains("--overwrite"),
+        "{message}"
+    );
+    assert!(
+        of("50e-6,150e-6", &["--resume", "--overwrite"])
+            .status
+            .success()
+    );
     assert!(read(at, "o/results.csv") == expected);
     assert!(of("60e-6", &["--overwrite"]).status.success());
 }
@@ -161,12 +267,35 @@ fn a_sweep_replaces_another_one_and_damaged_results_only_when_it_is_told_to() {
 fn what_cannot_be_swept_is_refused_before_anything_is_written() {
     let temp = folder();
     for (words, wanted) in [
-        (&["--vary", "pulse.enrgy_j=1e-6"][..], "did you mean pulse.energy_j?"),
-        (&["--vary", "pulse.energy_j="], "at least one value is needed"),
-        (&["--vary", "estimator.radius.range_m=1,2"], "a list cannot vary"),
-        (&["--vary", "seed=1", "--let", "pulse.energy_j = 1/scan.lidar_height_m"], "divides by zero"),
-        (&["--vary", "pulse.energy_j=lin:1e-6:1e-3:1000000000"], "a count from 2 to 10000"),
-        (&["--vary", "pulse.energy_j=1e-6,2e-6", "--shard", "3/2"], "a number from 1 to the count"),
+        (
+            &["--vary", "pulse.enrgy_j=1e-6"][..],
+            "did you mean pulse.energy_j?",
+        ),
+        (
+            &["--vary", "pulse.energy_j="],
+            "at least one value is needed",
+        ),
+        (
+            &["--vary", "estimator.radius.range_m=1,2"],
+            "a list cannot vary",
+        ),
+        (
+            &[
+                "--vary",
+                "seed=1",
+                "--let",
+                "pulse.energy_j = 1/scan.lidar_height_m",
+            ],
+            "divides by zero",
+        ),
+        (
+            &["--vary", "pulse.energy_j=lin:1e-6:1e-3:1000000000"],
+            "a count from 2 to 10000",
+        ),
+        (
+            &["--vary", "pulse.energy_j=1e-6,2e-6", "--shard", "3/2"],
+            "a number from 1 to the count",
+        ),
         (&["--merge", "nowhere"], "sweep.json"),
         // The second case alone cannot be planned: its beam has too many Fresnel zones.
         (
@@ -174,7 +303,10 @@ fn what_cannot_be_swept_is_refused_before_anything_is_written() {
             "case 1 of the sweep (telescope.focus_m = 0.0001777): s.toml: telescope.focus_m = 0.0001777",
         ),
     ] {
-        let out = wakescope(temp.path(), &[&["sweep", "s.toml", "--out", "o", "--json"], words].concat());
+        let out = wakescope(
+            temp.path(),
+            &[&["sweep", "s.toml", "--out", "o", "--json"], words].concat(),
+        );
         let message = String::from_utf8(out.stderr).unwrap();
         assert_eq!(out.status.code(), Some(2), "{words:?}: {message}");
         assert!(message.contains(wanted), "{words:?}: {message}");
@@ -189,46 +321,111 @@ fn the_front_of_a_table_is_printed_and_written() {
                  case,scene_hash,resolution_m,std_m_s,std_standard_error_m_s\n0,a,10,1,0.01\n1,b,20,0.5,0.01\n2,c,30,0.4,0.01\n\
                  3,d,25,0.6,0.01\n4,e,5,,\n5,f,9,1.01,0.01\n";
     std::fs::write(temp.path().join("results.csv"), table).unwrap();
-    let words = ["pareto", "results.csv", "--min", "resolution_m", "--min", "std_m_s"];
+    let words = [
+        "pareto",
+        "results.csv",
+        "--min",
+        "resolution_m",
+        "--min",
+        "std_m_s",
+    ];
     let text = ran(temp.path(), &[&words[..], &["--out", "front.csv"]].concat());
     assert!(text.contains("4 of 6 rows are on the front"), "{text}");
     let front = String::from_utf8(read(temp.path(), "front.csv")).unwrap();
-    let rows: Vec<&str> = front.lines().filter(|line| !line.starts_with('#')).collect();
+    let rows: Vec<&str> = front
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .collect();
     // Another with a smaller width may have as small a deviation within the errors.
-    assert_eq!(rows[1..], ["0,a,10,1,0.01,doubtful", "1,b,20,0.5,0.01,on", "2,c,30,0.4,0.01,on", "5,f,9,1.01,0.01,on"]);
+    assert_eq!(
+        rows[1..],
+        [
+            "0,a,10,1,0.01,doubtful",
+            "1,b,20,0.5,0.01,on",
+            "2,c,30,0.4,0.01,on",
+            "5,f,9,1.01,0.01,on"
+        ]
+    );
     // The best under a constraint: one objective.
-    let best =
-        ran(temp.path(), &["pareto", "results.csv", "--min", "std_m_s", "--where", "resolution_m <= 22", "--json"]);
+    let best = ran(
+        temp.path(),
+        &[
+            "pareto",
+            "results.csv",
+            "--min",
+            "std_m_s",
+            "--where",
+            "resolution_m <= 22",
+            "--json",
+        ],
+    );
     let best: serde_json::Value = serde_json::from_str(&best).unwrap();
-    assert_eq!((best["front"][0]["cells"]["case"].as_str(), best["front"].as_array().unwrap().len()), (Some("1"), 1));
+    assert_eq!(
+        (
+            best["front"][0]["cells"]["case"].as_str(),
+            best["front"].as_array().unwrap().len()
+        ),
+        (Some("1"), 1)
+    );
     for (words, wanted) in [
         (&["--min", "std_ms"][..], "did you mean std_m_s?"),
         (&[], "at least one --min COLUMN"),
-        (&["--min", "std_m_s", "--where", "colour <= 1"], "there is no column colour"),
+        (
+            &["--min", "std_m_s", "--where", "colour <= 1"],
+            "there is no column colour",
+        ),
     ] {
         let out = wakescope(temp.path(), &[&["pareto", "results.csv"], words].concat());
         let message = String::from_utf8(out.stderr).unwrap();
-        assert!(out.status.code() == Some(2) && message.contains(wanted), "{message}");
+        assert!(
+            out.status.code() == Some(2) && message.contains(wanted),
+            "{message}"
+        );
     }
 }
 
 #[test]
 fn words_hashes_and_drawn_seeds_are_whole_in_netcdf() {
     let temp = folder();
-    let words = ["sweep", "s.toml", "--vary", "estimator.weighting=hann,rectangular", "--independent", "--quiet"];
-    ran(temp.path(), &[&words[..], &["--no-circulation", "--out", "o"]].concat());
-    let table = wakescope_sim::io::csv_input::TextTable::read(&temp.path().join("o/results.csv")).unwrap();
+    let words = [
+        "sweep",
+        "s.toml",
+        "--vary",
+        "estimator.weighting=hann,rectangular",
+        "--independent",
+        "--quiet",
+    ];
+    ran(
+        temp.path(),
+        &[&words[..], &["--no-circulation", "--out", "o"]].concat(),
+    );
+    let table =
+        wakescope_sim::io::csv_input::TextTable::read(&temp.path().join("o/results.csv")).unwrap();
     let mut file = netcdf3::FileReader::open(temp.path().join("o/results.nc")).unwrap();
     for name in ["estimator.weighting", "scene_hash", "seed"] {
         let column = table.column(name).unwrap();
         let bytes = file.read_var_u8(name).unwrap();
-        let found: Vec<&str> = bytes.chunks(bytes.len() / 2).map(|row| std::str::from_utf8(row).unwrap()).collect();
+        let found: Vec<&str> = bytes
+            .chunks(bytes.len() / 2)
+            .map(|row| std::str::from_utf8(row).unwrap())
+            .collect();
         for (row, text) in found.iter().enumerate() {
-            assert_eq!(text.trim_end_matches('\0'), table.rows[row][column], "{name}");
+            assert_eq!(
+                text.trim_end_matches('\0'),
+                table.rows[row][column],
+                "{name}"
+            );
         }
-        assert!(file.data_set().get_var_attr_as_string(name, "long_name").is_some(), "{name}");
+        assert!(
+            file.data_set()
+                .get_var_attr_as_string(name, "long_name")
+                .is_some(),
+            "{name}"
+        );
     }
     // Drawn seeds have more digits than a double.
-    let seed: i64 = table.rows[0][table.column("seed").unwrap()].parse().unwrap();
+    let seed: i64 = table.rows[0][table.column("seed").unwrap()]
+        .parse()
+        .unwrap();
     assert!(seed > 1 << 53, "{seed}");
 }

@@ -44,11 +44,23 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     ///
     /// # Errors
     /// [`Error::Length`] if statistic and gates have windows of different lengths; as [`Gates::count`].
-    pub fn new(statistic: &'s T, gates: &Gates, geometry: ScanGeometry, record_samples: usize) -> Result<Self, Error> {
+    pub fn new(
+        statistic: &'s T,
+        gates: &Gates,
+        geometry: ScanGeometry,
+        record_samples: usize,
+    ) -> Result<Self, Error> {
         let held = 0..geometry.gates();
         let sums = Self::of_gates(statistic, gates, geometry, held)?;
-        length("windows of a record", sums.geometry.gates(), gates.count(record_samples)?)?;
-        Ok(Self { record_samples, ..sums })
+        length(
+            "windows of a record",
+            sums.geometry.gates(),
+            gates.count(record_samples)?,
+        )?;
+        Ok(Self {
+            record_samples,
+            ..sums
+        })
     }
 
     /// The same for some gates of the records, whose samples [`Gates::samples`] tells: regions hold windows of these gates alone.
@@ -70,7 +82,19 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         let rows = vec![0.0; geometry.line_elevation_rad().len() * held.len() * numbers];
         let (invalid, gates, scale, sample) = (BTreeMap::new(), *gates, None, PhantomData);
         let rule = Rule::NOT_FINITE;
-        Ok(Self { statistic, gates, geometry, held, record_samples, numbers, rows, rule, invalid, scale, sample })
+        Ok(Self {
+            statistic,
+            gates,
+            geometry,
+            held,
+            record_samples,
+            numbers,
+            rows,
+            rule,
+            invalid,
+            scale,
+            sample,
+        })
     }
 
     /// The same with a rule for missing samples.
@@ -96,11 +120,24 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
         length("samples of a record", self.record_samples, samples)?;
         let scale = self.rescale(records);
         let (gates, rule, count) = (&self.gates, &self.rule, self.held.len());
-        let found = map_each(rays, |ray| invalid_windows(records.row(ray).iter().copied(), rule, gates, count));
-        let found = found.into_iter().enumerate().filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
+        let found = map_each(rays, |ray| {
+            invalid_windows(records.row(ray).iter().copied(), rule, gates, count)
+        });
+        let found = found
+            .into_iter()
+            .enumerate()
+            .filter_map(|(ray, invalid)| Some((first_ray + ray, invalid?)));
         self.invalid.extend(found);
-        let (statistic, invalid, lines, numbers) = (self.statistic, &self.invalid, &self.geometry.rays, self.numbers);
-        let (piece, first_sample) = (first_ray..first_ray + rays, self.held.start * gates.step_samples);
+        let (statistic, invalid, lines, numbers) = (
+            self.statistic,
+            &self.invalid,
+            &self.geometry.rays,
+            self.numbers,
+        );
+        let (piece, first_sample) = (
+            first_ray..first_ray + rays,
+            self.held.start * gates.step_samples,
+        );
         for_each_chunk(
             &mut self.rows,
             count * numbers,
@@ -108,11 +145,25 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             |(scratch, row), line, chunk| {
                 for ray in lines.within(line, &piece) {
                     row.clear();
-                    row.extend(records.row(ray - first_ray).iter().map(|s| s.scaled(scale.recip())));
+                    row.extend(
+                        records
+                            .row(ray - first_ray)
+                            .iter()
+                            .map(|s| s.scaled(scale.recip())),
+                    );
                     let invalid = invalid.get(&ray);
                     let valid = |gate: usize| !invalid.is_some_and(|invalid| invalid[gate]);
-                    let mut sum = |gate: usize, one: &[f64]| add(&mut chunk[gate * numbers..][..numbers], one);
-                    statistic.evaluate_record(row, first_sample, gates.step_samples, &valid, scratch, &mut sum);
+                    let mut sum = |gate: usize, one: &[f64]| {
+                        add(&mut chunk[gate * numbers..][..numbers], one)
+                    };
+                    statistic.evaluate_record(
+                        row,
+                        first_sample,
+                        gates.step_samples,
+                        &valid,
+                        scratch,
+                        &mut sum,
+                    );
                 }
             },
         );
@@ -139,7 +190,15 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
     /// The scan of the records that have come, ready to be averaged over any region.
     #[must_use]
     pub fn finish(self) -> Scan {
-        let Self { geometry, held, numbers, rows, invalid, scale, .. } = self;
+        let Self {
+            geometry,
+            held,
+            numbers,
+            rows,
+            invalid,
+            scale,
+            ..
+        } = self;
         // Blocks have the same gates whatever is held.
         let skipped = (held.start.next_multiple_of(BLOCK) - held.start).min(held.len());
         let line_numbers = held.len() * numbers;
@@ -150,24 +209,40 @@ impl<'s, S: Sample, T: Statistic<S> + ?Sized> ScanSums<'s, S, T> {
             line_blocks.max(1),
             || (),
             |(), line, chunk| {
-                let rows = &rows[line * line_numbers + skipped * numbers..(line + 1) * line_numbers];
+                let rows =
+                    &rows[line * line_numbers + skipped * numbers..(line + 1) * line_numbers];
                 for (sum, rows) in chunk.chunks_mut(numbers).zip(rows.chunks(BLOCK * numbers)) {
                     rows.chunks(numbers).for_each(|row| add(sum, row));
                 }
             },
         );
         let counts = valid_before(&geometry, held.len(), &invalid);
-        Scan { geometry, held, numbers, rows, blocks, counts, invalid, scale: scale.unwrap_or(1.0) }
+        Scan {
+            geometry,
+            held,
+            numbers,
+            rows,
+            blocks,
+            counts,
+            invalid,
+            scale: scale.unwrap_or(1.0),
+        }
     }
 }
 
 /// Valid windows before each gate held, for all lines.
-fn valid_before(geometry: &ScanGeometry, gates: usize, invalid: &BTreeMap<usize, Vec<bool>>) -> Vec<usize> {
+fn valid_before(
+    geometry: &ScanGeometry,
+    gates: usize,
+    invalid: &BTreeMap<usize, Vec<bool>>,
+) -> Vec<usize> {
     let lines = geometry.line_elevation_rad().len();
     let mut counts = Vec::with_capacity(lines * (gates + 1));
     for line in 0..lines {
         let rays_with_invalid = geometry.line_rays(line).take_while(|_| !invalid.is_empty());
-        let broken: Vec<&Vec<bool>> = rays_with_invalid.filter_map(|ray| invalid.get(&ray)).collect();
+        let broken: Vec<&Vec<bool>> = rays_with_invalid
+            .filter_map(|ray| invalid.get(&ray))
+            .collect();
         let rays = geometry.rays.count(line);
         let mut before = 0;
         counts.push(0);

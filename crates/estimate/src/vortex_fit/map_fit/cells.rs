@@ -18,9 +18,18 @@ pub(crate) struct Cell {
 pub(crate) fn cells(map: &VelocityMap<'_>) -> Vec<Cell> {
     let cell = |((line, gate), velocity_m_s): ((usize, usize), &f64)| {
         let sigma_m_s = map.deviation(line, gate);
-        Cell { line, gate, velocity_m_s: *velocity_m_s, sigma_m_s }
+        Cell {
+            line,
+            gate,
+            velocity_m_s: *velocity_m_s,
+            sigma_m_s,
+        }
     };
-    map.velocity_m_s.indexed_iter().map(cell).filter(|cell| cell.velocity_m_s.is_finite()).collect()
+    map.velocity_m_s
+        .indexed_iter()
+        .map(cell)
+        .filter(|cell| cell.velocity_m_s.is_finite())
+        .collect()
 }
 
 /// Numbers times their weights.
@@ -60,6 +69,9 @@ pub(crate) fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
 pub(crate) fn remove(basis: &[Vec<f64>], numbers: &mut [f64]) {
     for direction in basis {
         let part = dot(direction, numbers);
-        numbers.iter_mut().zip(direction).for_each(|(number, d)| *number -= part * d);
+        numbers
+            .iter_mut()
+            .zip(direction)
+            .for_each(|(number, d)| *number -= part * d);
     }
 }

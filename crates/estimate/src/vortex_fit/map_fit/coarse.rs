@@ -36,8 +36,12 @@ impl Coarse {
     /// The lines and gates that hold a place which is near, `is_near(line, gate)`; without the velocities of those that are not.
     pub(crate) fn near(map: &VelocityMap<'_>, is_near: impl Fn(usize, usize) -> bool) -> Self {
         let (all_lines, all_gates) = map.velocity_m_s.dim();
-        let lines: Vec<usize> = (0..all_lines).filter(|line| (0..all_gates).any(|gate| is_near(*line, gate))).collect();
-        let gates: Vec<usize> = (0..all_gates).filter(|gate| (0..all_lines).any(|line| is_near(line, *gate))).collect();
+        let lines: Vec<usize> = (0..all_lines)
+            .filter(|line| (0..all_gates).any(|gate| is_near(*line, gate)))
+            .collect();
+        let gates: Vec<usize> = (0..all_gates)
+            .filter(|gate| (0..all_lines).any(|line| is_near(line, *gate)))
+            .collect();
         let mut near = Self::at(map, lines, gates, 1);
         for ((line, gate), velocity_m_s) in near.velocity_m_s.indexed_iter_mut() {
             if !is_near(near.lines[line], near.gates[gate]) {
@@ -66,14 +70,21 @@ impl Coarse {
             elevation_rad: &self.elevation_rad,
             range_m: &self.range_m,
             velocity_m_s: self.velocity_m_s.view(),
-            standard_deviation_m_s: self.standard_deviation_m_s.as_ref().map(|deviation| deviation.view()),
+            standard_deviation_m_s: self
+                .standard_deviation_m_s
+                .as_ref()
+                .map(|deviation| deviation.view()),
         }
     }
 
     /// Numbers of these places at all places of a map of that size: linear between, and beyond the outermost as there. Numbers
     /// that are not finite are left out.
     pub(crate) fn everywhere(&self, some: &Array2<f64>, size: (usize, usize)) -> Array2<f64> {
-        let about = |chosen: &[usize], count: usize| (0..count).map(|at| neighbours(chosen, at)).collect::<Vec<_>>();
+        let about = |chosen: &[usize], count: usize| {
+            (0..count)
+                .map(|at| neighbours(chosen, at))
+                .collect::<Vec<_>>()
+        };
         let (lines, gates) = (about(&self.lines, size.0), about(&self.gates, size.1));
         Array2::from_shape_fn(size, |(line, gate)| {
             let [mut sum, mut shares] = [0.0; 2];
@@ -94,7 +105,12 @@ impl Coarse {
 fn every(count: usize, step: f64) -> (usize, Vec<usize>) {
     // also 1 for NaN
     let step = (step.max(1.0) as usize).min(count.max(1));
-    (step, (count.saturating_sub(1) % step / 2..count).step_by(step).collect())
+    (
+        step,
+        (count.saturating_sub(1) % step / 2..count)
+            .step_by(step)
+            .collect(),
+    )
 }
 
 /// The chosen places before and after a place, with their shares.
@@ -102,7 +118,11 @@ fn neighbours(chosen: &[usize], at: usize) -> [(usize, f64); 2] {
     let next = chosen.partition_point(|&place| place <= at);
     let (low, high) = (next.saturating_sub(1), next.min(chosen.len() - 1));
     let gap = chosen[high] - chosen[low];
-    let share = if gap == 0 { 0.0 } else { (at - chosen[low]) as f64 / gap as f64 };
+    let share = if gap == 0 {
+        0.0
+    } else {
+        (at - chosen[low]) as f64 / gap as f64
+    };
     [(low, 1.0 - share), (high, share)]
 }
 
@@ -112,13 +132,18 @@ mod tests {
 
     fn axes() -> (Vec<f64>, Vec<f64>) {
         // 1 m and 5 m at 500 m
-        ((0..90).map(|i| f64::from(i) * 2e-3).collect(), (0..41).map(|j| 400.0 + 5.0 * f64::from(j)).collect())
+        (
+            (0..90).map(|i| f64::from(i) * 2e-3).collect(),
+            (0..41).map(|j| 400.0 + 5.0 * f64::from(j)).collect(),
+        )
     }
 
     #[test]
     fn planes_are_known_everywhere_from_some_places_even_next_to_holes() {
         let (elevation_rad, range_m) = axes();
-        let plane = Array2::from_shape_fn((90, 41), |(line, gate)| 1.0 + 0.5 * line as f64 - 0.25 * gate as f64);
+        let plane = Array2::from_shape_fn((90, 41), |(line, gate)| {
+            1.0 + 0.5 * line as f64 - 0.25 * gate as f64
+        });
         let map = VelocityMap {
             elevation_rad: &elevation_rad,
             range_m: &range_m,
@@ -130,14 +155,21 @@ mod tests {
         assert_eq!((coarse.line_step, some.velocity_m_s.dim()), (3, (30, 21)));
         assert_eq!(some.elevation_rad[1], elevation_rad[coarse.lines[1]]);
         assert_eq!(some.range_m[1], range_m[coarse.gates[1]]);
-        assert_eq!(some.standard_deviation_m_s.unwrap()[[1, 1]], plane[[coarse.lines[1], coarse.gates[1]]]);
+        assert_eq!(
+            some.standard_deviation_m_s.unwrap()[[1, 1]],
+            plane[[coarse.lines[1], coarse.gates[1]]]
+        );
         let mut numbers = coarse.velocity_m_s.clone();
         let everywhere = coarse.everywhere(&numbers, plane.dim());
         for ((line, gate), number) in everywhere.indexed_iter() {
             // beyond the outermost places as there
-            let at = |place: usize, chosen: &[usize]| place.clamp(chosen[0], chosen[chosen.len() - 1]);
+            let at =
+                |place: usize, chosen: &[usize]| place.clamp(chosen[0], chosen[chosen.len() - 1]);
             let expected = plane[[at(line, &coarse.lines), at(gate, &coarse.gates)]];
-            assert!((number - expected).abs() < 1e-12, "{line} {gate}: {number} {expected}");
+            assert!(
+                (number - expected).abs() < 1e-12,
+                "{line} {gate}: {number} {expected}"
+            );
         }
         numbers[[3, 4]] = f64::NAN;
         let holed = coarse.everywhere(&numbers, plane.dim());
@@ -161,7 +193,10 @@ mod tests {
         assert!(Coarse::of(&map, 0.0, 9.0).is_none());
         assert!(Coarse::of(&map, f64::NAN, 9.0).is_none());
         assert!(Coarse::of(&map, 9.0, 20.0).is_none());
-        assert!(Coarse::of(&map, 0.0, 11.0).is_some_and(|coarse| coarse.map().velocity_m_s.dim() == (90, 21)));
+        assert!(
+            Coarse::of(&map, 0.0, 11.0)
+                .is_some_and(|coarse| coarse.map().velocity_m_s.dim() == (90, 21))
+        );
         let one = VelocityMap {
             elevation_rad: &elevation_rad[..1],
             velocity_m_s: velocity.slice(ndarray::s![..1, ..]),

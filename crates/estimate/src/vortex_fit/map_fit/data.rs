@@ -47,7 +47,10 @@ impl VelocityMap<'_> {
 
     /// Mean distance of neighbouring gates.
     pub(crate) fn gate_spacing_m(&self) -> f64 {
-        self.range_m.first().zip(self.range_m.last()).map_or(0.0, |(a, b)| (b - a) / self.range_m.len() as f64)
+        self.range_m
+            .first()
+            .zip(self.range_m.last())
+            .map_or(0.0, |(a, b)| (b - a) / self.range_m.len() as f64)
     }
 
     /// Lines and gates of blocks, about as wide as long, of which the map has no more than `most`.
@@ -56,7 +59,9 @@ impl VelocityMap<'_> {
         let (line_m, gate_m) = (self.line_spacing_m(), self.gate_spacing_m());
         let (mut by_line, mut by_gate) = (1, 1);
         while lines.div_ceil(by_line) * gates.div_ceil(by_gate) > most {
-            if by_line as f64 * line_m <= by_gate as f64 * gate_m && by_line < lines || by_gate >= gates {
+            if by_line as f64 * line_m <= by_gate as f64 * gate_m && by_line < lines
+                || by_gate >= gates
+            {
                 by_line += 1;
             } else {
                 by_gate += 1;
@@ -66,27 +71,40 @@ impl VelocityMap<'_> {
     }
 
     /// Places of the velocities that there are in a block of so many lines and gates.
-    pub(crate) fn known_in(&self, (line, gate): (usize, usize), (by_line, by_gate): (usize, usize)) -> Vec<[usize; 2]> {
+    pub(crate) fn known_in(
+        &self,
+        (line, gate): (usize, usize),
+        (by_line, by_gate): (usize, usize),
+    ) -> Vec<[usize; 2]> {
         let lines = (line * by_line..self.elevation_rad.len()).take(by_line);
         let gates = (gate * by_gate..self.range_m.len()).take(by_gate);
         let places = lines.flat_map(|line| gates.clone().map(move |gate| [line, gate]));
-        places.filter(|place| self.velocity_m_s[*place].is_finite()).collect()
+        places
+            .filter(|place| self.velocity_m_s[*place].is_finite())
+            .collect()
     }
 
     /// Standard deviation of one velocity, 1 if none was given.
     pub(crate) fn deviation(&self, line: usize, gate: usize) -> f64 {
-        self.standard_deviation_m_s.as_ref().map_or(1.0, |d| d[[line, gate]])
+        self.standard_deviation_m_s
+            .as_ref()
+            .map_or(1.0, |d| d[[line, gate]])
     }
 }
 
 /// The first and the last number of an axis; zeros if it has none.
 pub(crate) fn ends(axis: &[f64]) -> (f64, f64) {
-    (axis.first().copied().unwrap_or(0.0), axis.last().copied().unwrap_or(0.0))
+    (
+        axis.first().copied().unwrap_or(0.0),
+        axis.last().copied().unwrap_or(0.0),
+    )
 }
 
 /// Means of an axis over blocks of so many.
 pub(crate) fn block_means(axis: &[f64], by: usize) -> Vec<f64> {
-    axis.chunks(by).map(|block| block.iter().sum::<f64>() / block.len() as f64).collect()
+    axis.chunks(by)
+        .map(|block| block.iter().sum::<f64>() / block.len() as f64)
+        .collect()
 }
 
 /// Both axes are finite and increase.
@@ -118,7 +136,11 @@ impl Loss {
             Self::Cauchy { width } => {
                 let square = (residual / width).powi(2);
                 let weight = 1.0 / (1.0 + square);
-                (0.5 * width * width * square.ln_1p(), weight, (1.0 - square) * weight * weight)
+                (
+                    0.5 * width * width * square.ln_1p(),
+                    weight,
+                    (1.0 - square) * weight * weight,
+                )
             }
         }
     }
@@ -128,7 +150,11 @@ impl Loss {
 /// residuals far better than chance, and stand where such vortices do.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum Secondary {
     /// Where the map shows them.
     #[default]

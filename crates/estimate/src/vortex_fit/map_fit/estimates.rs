@@ -18,22 +18,33 @@ use crate::vortex_fit::map_fit::prediction::{Predicted, Prediction, quotients};
 use crate::vortex_fit::map_fit::setting::Setting;
 use crate::vortex_fit::map_fit::starts::{best_of, rivals, starts, with_typical_core};
 use crate::vortex_fit::{
-    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices, Sharing, VelocityMap,
-    Wake, WakeModel,
+    EstimatorResponse, FreeParameters, MapFit, MapFitOptions, RangeKernel, SecondaryVortices,
+    Sharing, VelocityMap, Wake, WakeModel,
 };
 
 /// The least core radius over a region's radius, or over the distance of lines.
 const SMALLEST_CORE: f64 = 0.25;
 /// Fits end at a step of this many standard deviations at the latest, with neighbours that are alike counted once: estimators
 /// round.
-const NEAR: Stop = Stop { iterations: 40, sigmas: 0.03, learns: false };
+const NEAR: Stop = Stop {
+    iterations: 40,
+    sigmas: 0.03,
+    learns: false,
+};
 /// Fits that only lead to a start may end at such a step, and fits of means for themselves.
 const ROUGH_SIGMAS: f64 = 0.1;
 const FINE_SIGMAS: f64 = 0.01;
 /// So may those to few places, which all places correct at once.
-const COARSE: Stop = Stop { iterations: 40, sigmas: 0.5, learns: false };
+const COARSE: Stop = Stop {
+    iterations: 40,
+    sigmas: 0.5,
+    learns: false,
+};
 /// And those to all places from one of several starts; what takes longer is on its way to where another start is nearer, or nowhere.
-const SHORT: Stop = Stop { iterations: 12, ..COARSE };
+const SHORT: Stop = Stop {
+    iterations: 12,
+    ..COARSE
+};
 /// Places that tell nearly all of a map: no farther apart than this part of the radius of its regions, for starts and for slopes (half the
 /// radius for these saves a tenth of the time, but heights scatter by some per cent more), and of the width of its gates.
 const LINES_OVER_RADIUS: [f64; 2] = [0.8, 0.3];
@@ -55,7 +66,14 @@ pub fn fit_map(
 ) -> Result<MapFit, Error> {
     let guess = first_guess(map, model, kernel)?;
     let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
-    let setting = Setting { map, model, prediction: &gates, kernel, options, least_core_m: 0.0 };
+    let setting = Setting {
+        map,
+        model,
+        prediction: &gates,
+        kernel,
+        options,
+        least_core_m: 0.0,
+    };
     let refine = |start: &Wake| setting.descended(start, FINE_SIGMAS);
     with_typical_core(best_of(&starts(&guess, options), refine)?, options, refine)
 }
@@ -78,10 +96,23 @@ pub fn fit_map_of_estimator(
     let coarse = all.coarse(LINES_OVER_RADIUS[0]);
     let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
     // taken for means, peaks mislead above all the core radius, and may lead nowhere: then the guess is the start
-    let rough = MapFitOptions { free: FreeParameters { core_radius: Sharing::Fixed, ..options.free }, ..*options };
+    let rough = MapFitOptions {
+        free: FreeParameters {
+            core_radius: Sharing::Fixed,
+            ..options.free
+        },
+        ..*options
+    };
     let by_means = |map: &VelocityMap<'_>, kernel: &RangeKernel| {
         let gates = Gates::at_rest(model, kernel.clone(), (map.elevation_rad, map.range_m));
-        let setting = Setting { map, model, prediction: &gates, kernel, options: &rough, least_core_m: 0.0 };
+        let setting = Setting {
+            map,
+            model,
+            prediction: &gates,
+            kernel,
+            options: &rough,
+            least_core_m: 0.0,
+        };
         setting.descended(&guess, ROUGH_SIGMAS)
     };
     let by_means = match &few {
@@ -123,7 +154,9 @@ pub fn refine_map_fit_of_estimator(
     map.validate()?;
     let all = Shown::new(map, model, response, options, 1.0)?;
     let for_slopes = all.coarse(LINES_OVER_RADIUS[1]);
-    all.with_slopes_at(for_slopes.as_ref())?.setting().refined(guess, NEAR)
+    all.with_slopes_at(for_slopes.as_ref())?
+        .setting()
+        .refined(guess, NEAR)
 }
 
 /// Secondary vortices beside the pair of a fit, if the map shows them or the options want them anyway, and that pair with them: both are fitted at
@@ -144,15 +177,26 @@ pub fn fit_secondary_vortices(
     let all = Shown::new(map, model, response, options, 1.0)?;
     let coarse = all.coarse(LINES_OVER_RADIUS[0]);
     let few = coarse.as_ref().map(|coarse| all.at(coarse)).transpose()?;
-    let found =
-        few.as_ref().map_or_else(|| all.setting().with_secondary(pair), |few| few.setting().with_secondary(pair));
+    let found = few.as_ref().map_or_else(
+        || all.setting().with_secondary(pair),
+        |few| few.setting().with_secondary(pair),
+    );
     let Some(found) = found else { return Ok(None) };
     if !found.secondary.fitted {
         return Ok(Some((None, found.secondary)));
     }
-    let model = WakeModel { secondary: Some(found.secondary.vortices), ..*model };
+    let model = WakeModel {
+        secondary: Some(found.secondary.vortices),
+        ..*model
+    };
     let fit = refine_map_fit_of_estimator(map, &model, response, &found.wake, options)?;
-    Ok(Some((Some(MapFit { covariance: found.covariance, ..fit }), found.secondary)))
+    Ok(Some((
+        Some(MapFit {
+            covariance: found.covariance,
+            ..fit
+        }),
+        found.secondary,
+    )))
 }
 
 /// The same pair with the circulation of each vortex from what is near it, in a wind of its own, where that explains the map clearly better: what
@@ -172,7 +216,8 @@ pub fn with_local_circulations(
     let vortices = [pair.wake.left, pair.wake.right];
     let local = [0, 1].map(|side| {
         let near = Coarse::near(map, |line, gate| {
-            vortices[side].away_m(model.position_m(map.range_m[gate], map.elevation_rad[line])) < REACH_M
+            vortices[side].away_m(model.position_m(map.range_m[gate], map.elevation_rad[line]))
+                < REACH_M
         });
         let shown = Shown::new(&near.map(), model, response, options, 1.0).ok()?;
         shown.setting().local_circulation(&pair.wake, side, NEAR)
@@ -201,14 +246,27 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         coarser: f64,
     ) -> Result<Self, Error> {
         let prepared = response.prepared(model, (map.elevation_rad, map.range_m), coarser)?;
-        let least_core_m = SMALLEST_CORE * map.line_spacing_m().max(response.least_radius_m(map.range_m));
-        Ok(Self { map: *map, prepared, slopes_at: None, options: *options, least_core_m })
+        let least_core_m = SMALLEST_CORE
+            * map
+                .line_spacing_m()
+                .max(response.least_radius_m(map.range_m));
+        Ok(Self {
+            map: *map,
+            prepared,
+            slopes_at: None,
+            options: *options,
+            least_core_m,
+        })
     }
 
     /// The places that tell nearly all of the map.
     fn coarse(&self, lines_over_radius: f64) -> Option<Coarse> {
         let line_m = lines_over_radius * self.prepared.response.least_radius_m(self.map.range_m);
-        Coarse::of(&self.map, line_m, GATES_OVER_WIDTH * self.prepared.kernel.width_m())
+        Coarse::of(
+            &self.map,
+            line_m,
+            GATES_OVER_WIDTH * self.prepared.kernel.width_m(),
+        )
     }
 
     /// What the estimator shows at some of the places.
@@ -217,19 +275,43 @@ impl<'a, 'm: 'a> Shown<'a, 'm> {
         'a: 'c,
     {
         let correlated_lines = self.options.correlated_lines.div_ceil(places.line_step);
-        let options = MapFitOptions { correlated_lines, ..self.options };
-        Shown::new(&places.map(), self.prepared.model, self.prepared.response, &options, COARSER_NODES)
+        let options = MapFitOptions {
+            correlated_lines,
+            ..self.options
+        };
+        Shown::new(
+            &places.map(),
+            self.prepared.model,
+            self.prepared.response,
+            &options,
+            COARSER_NODES,
+        )
     }
 
     /// The same with slopes at some places.
     fn with_slopes_at(self, places: Option<&'a Coarse>) -> Result<Self, Error> {
-        let slopes_at = places.map(|places| Ok((places, self.at(places)?.prepared))).transpose()?;
+        let slopes_at = places
+            .map(|places| Ok((places, self.at(places)?.prepared)))
+            .transpose()?;
         Ok(Self { slopes_at, ..self })
     }
 
     fn setting(&self) -> Setting<'_, 'm> {
-        let Self { map, prepared: Prepared { model, kernel, .. }, options, least_core_m, .. } = self;
-        Setting { map, model, prediction: self, kernel, options, least_core_m: *least_core_m }
+        let Self {
+            map,
+            prepared: Prepared { model, kernel, .. },
+            options,
+            least_core_m,
+            ..
+        } = self;
+        Setting {
+            map,
+            model,
+            prediction: self,
+            kernel,
+            options,
+            least_core_m: *least_core_m,
+        }
     }
 
     /// Where the fits from some starts end that do, without those that are one.
@@ -256,15 +338,27 @@ impl Prediction for Shown<'_, '_> {
             Some(_) if groups.is_empty() => Vec::new(),
             Some((coarse, few)) => {
                 let slopes = quotients(|p| of(few, p), p, &of(few, p), groups);
-                slopes.iter().map(|slope| coarse.everywhere(slope, velocity_m_s.dim())).collect()
+                slopes
+                    .iter()
+                    .map(|slope| coarse.everywhere(slope, velocity_m_s.dim()))
+                    .collect()
             }
         };
-        Predicted { velocity_m_s, slopes }
+        Predicted {
+            velocity_m_s,
+            slopes,
+        }
     }
 
     fn of_other_profile(&self, wake: &Wake) -> Array2<f64> {
         let model = self.prepared.model;
-        self.prepared.velocities(&WakeModel { profile: model.profile.other(), ..*model }, wake)
+        self.prepared.velocities(
+            &WakeModel {
+                profile: model.profile.other(),
+                ..*model
+            },
+            wake,
+        )
     }
 
     fn air_variances(&self, p: &[f64]) -> Option<Array2<f64>> {
@@ -286,18 +380,34 @@ mod tests {
     #[test]
     fn slopes_from_few_places_are_near_those_of_all() {
         let sampling = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 105e6)).unwrap();
-        let peak =
-            SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
+        let peak = SpectralPeak::new(
+            &sampling,
+            SignalKind::Real,
+            &unweighted_lags(64),
+            1024,
+            Refinement::Parabola,
+        )
+        .unwrap();
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
         let pulse = PulseShape::gaussian(120e-9).unwrap();
-        let response = EstimatorResponse::new(&statistic, &peak, &sampling, &pulse, (Noise::White, 1.0), 2.0).unwrap();
+        let response = EstimatorResponse::new(
+            &statistic,
+            &peak,
+            &sampling,
+            &pulse,
+            (Noise::White, 1.0),
+            2.0,
+        )
+        .unwrap();
         let (elevation_rad, range_m): (Vec<f64>, Vec<f64>) = (
             (0..130).map(|i| 0.05 + f64::from(i) * 1e-3).collect(),
             (0..40).map(|i| 320.0 + 4.0 * f64::from(i)).collect(),
         );
         let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.0]);
         let (model, options) = (WakeModel::default(), MapFitOptions::default());
-        let velocity_m_s = response.map(&model, &wake, &elevation_rad, &range_m).unwrap();
+        let velocity_m_s = response
+            .map(&model, &wake, &elevation_rad, &range_m)
+            .unwrap();
         let map = VelocityMap {
             elevation_rad: &elevation_rad,
             range_m: &range_m,
@@ -316,8 +426,15 @@ mod tests {
             let size = (product(some, some) / product(all, all)).sqrt();
             let alike = product(some, all) / (product(some, some) * product(all, all)).sqrt();
             // slopes of cores are narrow, and peaks that jump make them rough
-            let least = if group[0] == 6 || group[0] == 7 { 0.8 } else { 0.93 };
-            assert!((size - 1.0).abs() < 0.15 && alike > least, "{group:?}: {size} {alike}");
+            let least = if group[0] == 6 || group[0] == 7 {
+                0.8
+            } else {
+                0.93
+            };
+            assert!(
+                (size - 1.0).abs() < 0.15 && alike > least,
+                "{group:?}: {size} {alike}"
+            );
         }
     }
 }

@@ -80,13 +80,23 @@ impl<'a> EstimatorResponse<'a> {
         noise.validate()?;
         positive("snr", snr)?;
         let lags = statistic.lags();
-        length("statistic", estimator.statistic_len(), S::KIND.lag_numbers(lags))?;
+        length(
+            "statistic",
+            estimator.statistic_len(),
+            S::KIND.lag_numbers(lags),
+        )?;
         not_negative("radius_m", radius_m)?;
-        let in_band = Noise::Band { floor: 0.0 }.covariance(sampling, 0.0, S::KIND).re;
-        let numbers = statistic.lag_weights().into_iter().enumerate().flat_map(|(m, weight)| {
-            let lag = noise.covariance(sampling, m as f64, S::KIND) * (weight / in_band / snr);
-            [lag.re, lag.im].into_iter().take(S::KIND.lag_numbers(1))
-        });
+        let in_band = Noise::Band { floor: 0.0 }
+            .covariance(sampling, 0.0, S::KIND)
+            .re;
+        let numbers = statistic
+            .lag_weights()
+            .into_iter()
+            .enumerate()
+            .flat_map(|(m, weight)| {
+                let lag = noise.covariance(sampling, m as f64, S::KIND) * (weight / in_band / snr);
+                [lag.re, lag.im].into_iter().take(S::KIND.lag_numbers(1))
+            });
         Ok(Self {
             estimator,
             kind: S::KIND,
@@ -102,14 +112,24 @@ impl<'a> EstimatorResponse<'a> {
     /// The same with regions whose radius \[m\] depends on the range \[m\].
     #[must_use]
     pub fn with_radius(self, radius_m: impl Fn(f64) -> f64 + Send + Sync + 'a) -> Self {
-        Self { radius_m: Box::new(radius_m), ..self }
+        Self {
+            radius_m: Box::new(radius_m),
+            ..self
+        }
     }
 
     /// The same with vortices that move while the lines, at `elevation_rad` \[rad\], are measured: `seconds` \[s\] after the time that the
     /// wake is given for. A line that is none of these sees it as it is then.
     #[must_use]
     pub fn moving(self, elevation_rad: &[f64], seconds: &[f64]) -> Self {
-        Self { line_times: elevation_rad.iter().copied().zip(seconds.iter().copied()).collect(), ..self }
+        Self {
+            line_times: elevation_rad
+                .iter()
+                .copied()
+                .zip(seconds.iter().copied())
+                .collect(),
+            ..self
+        }
     }
 
     /// The map \[line, gate\] of velocities \[m/s\] at `elevation_rad` \[rad\] and `range_m` \[m\], both increasing;
@@ -126,12 +146,17 @@ impl<'a> EstimatorResponse<'a> {
     ) -> Result<Array2<f64>, Error> {
         wake.validate()?;
         crate::vortex_fit::map_fit::data::validate_axes(elevation_rad, range_m)?;
-        Ok(self.prepared(model, (elevation_rad, range_m), 1.0)?.velocities(model, wake))
+        Ok(self
+            .prepared(model, (elevation_rad, range_m), 1.0)?
+            .velocities(model, wake))
     }
 
     /// Least radius of the regions at those ranges \[m\].
     pub(crate) fn least_radius_m(&self, range_m: &[f64]) -> f64 {
-        range_m.iter().map(|range_m| (self.radius_m)(*range_m)).fold(f64::INFINITY, f64::min)
+        range_m
+            .iter()
+            .map(|range_m| (self.radius_m)(*range_m))
+            .fold(f64::INFINITY, f64::min)
     }
 
     /// The weights of the air on nodes that fit the gates of those elevations and ranges, `coarser` times as far apart as maps need.
@@ -146,22 +171,43 @@ impl<'a> EstimatorResponse<'a> {
     ) -> Result<Prepared<'r>, Error> {
         let (period_s, sigma_s) = (self.sampling.period_s(), self.pulse.sigma_s);
         let lags = self.tapers[0].weights.len();
-        let gap_m = range_m.windows(2).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min);
+        let gap_m = range_m
+            .windows(2)
+            .map(|pair| pair[1] - pair[0])
+            .fold(f64::INFINITY, f64::min);
         let widest_m = coarser * NODE_M.min(NODE_OVER_PULSE * 0.5 * SPEED_OF_LIGHT_M_S * sigma_s);
         // gates fall on nodes unless they are so close that this would take many more
         let fits = gap_m.is_finite() && gap_m > 0.25 * widest_m;
-        let spacing_m = if fits { gap_m / (gap_m / widest_m).ceil() } else { widest_m };
+        let spacing_m = if fits {
+            gap_m / (gap_m / widest_m).ceil()
+        } else {
+            widest_m
+        };
         let half_s = 0.5 * lags as f64 * period_s;
-        let reach = (0.5 * SPEED_OF_LIGHT_M_S * (half_s + self.pulse.reach_s()) / spacing_m).ceil() as i64;
+        let reach =
+            (0.5 * SPEED_OF_LIGHT_M_S * (half_s + self.pulse.reach_s()) / spacing_m).ceil() as i64;
         let numbers = self.kind.lag_numbers(lags);
         let mut weights = Vec::with_capacity((2 * reach + 1) as usize * numbers);
         for node in -reach..=reach {
             let away_s = 2.0 * node as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
-            let seen: Vec<f64> = (0..lags).map(|n| self.pulse.at(n as f64 * period_s - half_s - away_s)).collect();
-            let tapered: Vec<Vec<f64>> =
-                self.tapers.iter().map(|taper| taper.weights.iter().zip(&seen).map(|(h, f)| h * f).collect()).collect();
+            let seen: Vec<f64> = (0..lags)
+                .map(|n| self.pulse.at(n as f64 * period_s - half_s - away_s))
+                .collect();
+            let tapered: Vec<Vec<f64>> = self
+                .tapers
+                .iter()
+                .map(|taper| {
+                    taper
+                        .weights
+                        .iter()
+                        .zip(&seen)
+                        .map(|(h, f)| h * f)
+                        .collect()
+                })
+                .collect();
             for m in 0..lags {
-                let of = |(taper, g): (&Taper, &Vec<f64>)| taper.factor * dot(&g[m..], &g[..lags - m]);
+                let of =
+                    |(taper, g): (&Taper, &Vec<f64>)| taper.factor * dot(&g[m..], &g[..lags - m]);
                 let weight: f64 = self.tapers.iter().zip(&tapered).map(of).sum();
                 weights.extend(std::iter::repeat_n(weight, numbers / lags));
             }
@@ -169,21 +215,48 @@ impl<'a> EstimatorResponse<'a> {
         let powers: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
         let power: f64 = powers.iter().sum();
         let least = 0.5 * LEFT_OUT * power;
-        let (before, after) = (below(powers.iter(), least), below(powers.iter().rev(), least));
+        let (before, after) = (
+            below(powers.iter(), least),
+            below(powers.iter().rev(), least),
+        );
         weights.truncate((powers.len() - after) * numbers);
         weights.drain(..before * numbers);
         weights.iter_mut().for_each(|weight| *weight /= power);
-        let regions = Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
-            region(elevation_rad, line, range_m[gate], (self.radius_m)(range_m[gate])).collect()
-        });
+        let regions =
+            Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
+                region(
+                    elevation_rad,
+                    line,
+                    range_m[gate],
+                    (self.radius_m)(range_m[gate]),
+                )
+                .collect()
+            });
         let of_lag_0: Vec<f64> = weights.iter().step_by(numbers).copied().collect();
-        let kernel = RangeKernel::new((before as f64 - reach as f64) * spacing_m, spacing_m, &of_lag_0)?;
+        let kernel = RangeKernel::new(
+            (before as f64 - reach as f64) * spacing_m,
+            spacing_m,
+            &of_lag_0,
+        )?;
         let seconds_of = |elevation_rad: &f64| {
-            let line = self.line_times.iter().find(|(elevation, _)| elevation == elevation_rad);
+            let line = self
+                .line_times
+                .iter()
+                .find(|(elevation, _)| elevation == elevation_rad);
             line.map_or(0.0, |(_, seconds)| *seconds)
         };
         let seconds = elevation_rad.iter().map(seconds_of).collect();
-        Ok(Prepared { response: self, model, elevation_rad, range_m, kernel, numbers, weights, regions, seconds })
+        Ok(Prepared {
+            response: self,
+            model,
+            elevation_rad,
+            range_m,
+            kernel,
+            numbers,
+            weights,
+            regions,
+            seconds,
+        })
     }
 }
 
@@ -209,7 +282,10 @@ impl Prepared<'_> {
     /// The wake when each line is measured.
     fn wakes(&self, model: &WakeModel, wake: &Wake) -> Vec<Wake> {
         let motion = Motion::new(model, wake);
-        self.seconds.iter().map(|seconds| motion.wake_after(wake, *seconds)).collect()
+        self.seconds
+            .iter()
+            .map(|seconds| motion.wake_after(wake, *seconds))
+            .collect()
     }
 
     /// The map of a wake by a model.
@@ -217,7 +293,11 @@ impl Prepared<'_> {
         let (lines, gates) = (self.elevation_rad.len(), self.range_m.len());
         let wakes = self.wakes(model, wake);
         let correlograms = map_indexed(lines, Vec::new, |phasors, line| {
-            self.line((model, &wakes[line]), Ray::new(self.elevation_rad[line]), phasors)
+            self.line(
+                (model, &wakes[line]),
+                Ray::new(self.elevation_rad[line]),
+                phasors,
+            )
         });
         let state = || (Scratch::new(), vec![0.0; self.numbers]);
         let rows = map_indexed(lines, state, |(scratch, mean), line| {
@@ -225,7 +305,9 @@ impl Prepared<'_> {
                 mean.copy_from_slice(&self.response.noise);
                 for &(other, share) in &self.regions[[line, gate]] {
                     let lags = &correlograms[other][gate * self.numbers..][..self.numbers];
-                    mean.iter_mut().zip(lags).for_each(|(sum, lag)| *sum += share * lag);
+                    mean.iter_mut()
+                        .zip(lags)
+                        .for_each(|(sum, lag)| *sum += share * lag);
                 }
                 self.response.estimator.estimate(mean, scratch).velocity_m_s
             };
@@ -240,21 +322,32 @@ impl Prepared<'_> {
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
         let wakes = self.wakes(self.model, wake);
         let moments = map_each(lines, |line| {
-            let velocities = self.velocities_on((self.model, &wakes[line]), Ray::new(self.elevation_rad[line]));
+            let velocities = self.velocities_on(
+                (self.model, &wakes[line]),
+                Ray::new(self.elevation_rad[line]),
+            );
             let one = |range_m: &f64| {
                 let (index, part) = self.kernel.place(range_m - nearest_m);
                 let index = index + usize::from(part >= 0.5);
-                let seen = self.weights.iter().step_by(self.numbers).zip(&velocities[index..]);
-                seen.fold([0.0, 0.0], |[mean, square], (w, v)| [mean + w * v, square + w * v * v])
+                let seen = self
+                    .weights
+                    .iter()
+                    .step_by(self.numbers)
+                    .zip(&velocities[index..]);
+                seen.fold([0.0, 0.0], |[mean, square], (w, v)| {
+                    [mean + w * v, square + w * v * v]
+                })
             };
             self.range_m.iter().map(one).collect::<Vec<[f64; 2]>>()
         });
         Array2::from_shape_fn((lines, gates), |(line, gate)| {
-            let [mean, square] =
-                self.regions[[line, gate]].iter().fold([0.0, 0.0], |[mean, square], &(other, share)| {
+            let [mean, square] = self.regions[[line, gate]].iter().fold(
+                [0.0, 0.0],
+                |[mean, square], &(other, share)| {
                     let [m, s] = moments[other][gate];
                     [mean + share * m, square + share * s]
-                });
+                },
+            );
             (square - mean * mean).max(0.0)
         })
     }
@@ -262,7 +355,12 @@ impl Prepared<'_> {
     /// Velocities of the air at the nodes of a line that its gates see.
     fn velocities_on(&self, (model, wake): (&WakeModel, &Wake), ray: Ray) -> Vec<f64> {
         let mut velocities = [Vec::new()];
-        model.along(wake, &self.kernel.points_m(self.range_m).collect::<Vec<f64>>(), ray, &mut velocities);
+        model.along(
+            wake,
+            &self.kernel.points_m(self.range_m).collect::<Vec<f64>>(),
+            ray,
+            &mut velocities,
+        );
         let [velocities] = velocities;
         velocities
     }
@@ -271,7 +369,9 @@ impl Prepared<'_> {
     fn line(&self, air: (&WakeModel, &Wake), ray: Ray, phasors: &mut Vec<f64>) -> Vec<f64> {
         let sampling = &self.response.sampling;
         let nearest_m = self.range_m.first().copied().unwrap_or(0.0);
-        let turn = |velocity: f64| (TAU * (sampling.frequency_hz(velocity) * sampling.period_s())).sin_cos();
+        let turn = |velocity: f64| {
+            (TAU * (sampling.frequency_hz(velocity) * sampling.period_s())).sin_cos()
+        };
         let turns: Vec<(f64, f64)> = self.velocities_on(air, ray).into_iter().map(turn).collect();
         phasors.resize(turns.len() * self.numbers, 0.0);
         fill_powers(phasors, &turns, self.response.kind);
@@ -324,7 +424,10 @@ fn fill_powers(phasors: &mut [f64], turns: &[(f64, f64)], kind: SignalKind) {
 fn add_seen(lags: &mut [f64], weights: &[f64], phasors: &[f64], share: f64) {
     let count = lags.len();
     // two nodes at a time: the sums are loaded and stored half as often
-    let (pairs, nodes) = (weights.chunks_exact(2 * count), phasors.chunks_exact(2 * count));
+    let (pairs, nodes) = (
+        weights.chunks_exact(2 * count),
+        phasors.chunks_exact(2 * count),
+    );
     let last = weights.len() / (2 * count) * 2 * count;
     for (weights, phasors) in pairs.zip(nodes) {
         let ((w, x), (t, u)) = (weights.split_at(count), phasors.split_at(count));
@@ -370,13 +473,22 @@ mod tests {
     fn uniform_wind_is_shown_as_it_is() {
         let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 6.0, 0.0]);
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let peak =
-            SpectralPeak::new(&sampling(), SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
+        let peak = SpectralPeak::new(
+            &sampling(),
+            SignalKind::Real,
+            &unweighted_lags(64),
+            1024,
+            Refinement::Parabola,
+        )
+        .unwrap();
         let shown = response(&statistic, &peak, (Noise::White, 1.0), 2.0)
             .map(&WakeModel::default(), &calm, &LINES_RAD, &RANGES_M)
             .unwrap();
         for ((line, _), velocity) in shown.indexed_iter() {
-            assert!((velocity - 6.0 * LINES_RAD[line].cos()).abs() < 0.01, "{shown}");
+            assert!(
+                (velocity - 6.0 * LINES_RAD[line].cos()).abs() < 0.01,
+                "{shown}"
+            );
         }
     }
 
@@ -384,19 +496,35 @@ mod tests {
     #[test]
     fn a_pulse_pair_of_complex_samples_shows_the_mean_over_the_gate() {
         let sampling = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
-        let statistic = Correlogram::<num_complex::Complex<f64>>::new(Weighting::Rectangular, 64).unwrap();
+        let statistic =
+            Correlogram::<num_complex::Complex<f64>>::new(Weighting::Rectangular, 64).unwrap();
         let pair = PulsePair::new(&sampling, SignalKind::Complex, &unweighted_lags(64)).unwrap();
         let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
-        let response = EstimatorResponse::new(&statistic, &pair, &sampling, &pulse, (Noise::White, 10.0), 2.0).unwrap();
+        let response = EstimatorResponse::new(
+            &statistic,
+            &pair,
+            &sampling,
+            &pulse,
+            (Noise::White, 10.0),
+            2.0,
+        )
+        .unwrap();
         let weak = Wake::from_array(&[96.0, 104.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
-        let shown = response.map(&WakeModel::default(), &weak, &LINES_RAD, &RANGES_M).unwrap();
+        let shown = response
+            .map(&WakeModel::default(), &weak, &LINES_RAD, &RANGES_M)
+            .unwrap();
         let kernel = RangeKernel::gaussian_gate(SIGMA_S, &[1.0; 64], 4e-9, 0.5).unwrap();
-        let means = WakeModel::default().map(&weak, &kernel, &LINES_RAD, &RANGES_M, 2.0).unwrap();
+        let means = WakeModel::default()
+            .map(&weak, &kernel, &LINES_RAD, &RANGES_M, 2.0)
+            .unwrap();
         for (shown, mean) in shown.iter().zip(&means) {
             // a window has one pair less than samples
             assert!((shown - mean).abs() < 0.01, "{shown} {mean}");
         }
-        assert!(means.iter().any(|v| (v - means[[0, 0]]).abs() > 0.2), "{means}");
+        assert!(
+            means.iter().any(|v| (v - means[[0, 0]]).abs() > 0.2),
+            "{means}"
+        );
     }
 
     /// Covariance of real samples summed over layers of 5 cm, its correlogram pair by pair, the lines of a region added.
@@ -404,31 +532,54 @@ mod tests {
     fn velocities_are_those_of_the_mean_correlogram_of_thin_layers() {
         let (model, sampling) = (WakeModel::default(), sampling());
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let lags =
-            LagWindowPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 16, 1024, Refinement::Parabola)
-                .unwrap();
-        let peak =
-            SpectralPeak::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
+        let lags = LagWindowPeak::new(
+            &sampling,
+            SignalKind::Real,
+            &unweighted_lags(64),
+            16,
+            1024,
+            Refinement::Parabola,
+        )
+        .unwrap();
+        let peak = SpectralPeak::new(
+            &sampling,
+            SignalKind::Real,
+            &unweighted_lags(64),
+            1024,
+            Refinement::Parabola,
+        )
+        .unwrap();
         let (snr, radius_m) = (2.0, 1.5);
         let h = &statistic.tapers()[0].weights;
         let correlogram = |line: usize, range_m: f64| -> Vec<f64> {
             let mut sum = vec![0.0; 64];
             for layer in -1600..1600 {
                 let away_m = f64::from(layer) * 0.05;
-                let velocity = model.radial_velocity_m_s(&wake(), range_m + away_m, LINES_RAD[line]);
+                let velocity =
+                    model.radial_velocity_m_s(&wake(), range_m + away_m, LINES_RAD[line]);
                 let seen: Vec<f64> = (0..64)
                     .map(|n| (f64::from(n) - 32.0) * 4e-9 - 2.0 * away_m / SPEED_OF_LIGHT_M_S)
-                    .map(|t_s| (-0.5 * (t_s / SIGMA_S).powi(2)).exp() / (std::f64::consts::PI.sqrt() * SIGMA_S).sqrt())
+                    .map(|t_s| {
+                        (-0.5 * (t_s / SIGMA_S).powi(2)).exp()
+                            / (std::f64::consts::PI.sqrt() * SIGMA_S).sqrt()
+                    })
                     .collect();
                 for m in 0..64 {
                     let turn = TAU * sampling.frequency_hz(velocity) * m as f64 * 4e-9;
-                    let pairs: f64 = (0..64 - m).map(|n| h[n] * h[n + m] * seen[n] * seen[n + m]).sum();
+                    let pairs: f64 = (0..64 - m)
+                        .map(|n| h[n] * h[n + m] * seen[n] * seen[n + m])
+                        .sum();
                     sum[m] += pairs * turn.cos() * 0.05 * 2.0 / SPEED_OF_LIGHT_M_S;
                 }
             }
             for (m, sum) in sum.iter_mut().enumerate() {
                 let pairs: f64 = (0..64 - m).map(|n| h[n] * h[n + m]).sum();
-                *sum += pairs * Noise::White.covariance(&sampling, m as f64, SignalKind::Real).re / 0.2 / snr;
+                *sum += pairs
+                    * Noise::White
+                        .covariance(&sampling, m as f64, SignalKind::Real)
+                        .re
+                    / 0.2
+                    / snr;
             }
             sum
         };
@@ -442,18 +593,29 @@ mod tests {
                 .map(&model, &wake(), &LINES_RAD, &close)
                 .unwrap();
             for (gate, place) in [(0, 0), (1, 1), (1, 2), (2, 3)] {
-                assert!((between[[1, place]] - shown[[1, gate]]).abs() < 0.02, "{name} {between} {shown}");
+                assert!(
+                    (between[[1, place]] - shown[[1, gate]]).abs() < 0.02,
+                    "{name} {between} {shown}"
+                );
             }
             for (gate, &range_m) in RANGES_M.iter().enumerate() {
                 // the other lines are 1.1 and 0.93 m away at 372 m
-                let chord = |line: usize| (radius_m.powi(2) - (range_m * (LINES_RAD[line] - 0.115)).powi(2)).sqrt();
+                let chord = |line: usize| {
+                    (radius_m.powi(2) - (range_m * (LINES_RAD[line] - 0.115)).powi(2)).sqrt()
+                };
                 let mut mean = vec![0.0; 64];
                 for line in 0..3 {
                     let one = correlogram(line, range_m);
-                    mean.iter_mut().zip(one).for_each(|(mean, one)| *mean += chord(line) * one);
+                    mean.iter_mut()
+                        .zip(one)
+                        .for_each(|(mean, one)| *mean += chord(line) * one);
                 }
                 let expected = estimator.estimate(&mean, &mut Scratch::new()).velocity_m_s;
-                assert!((shown[[1, gate]] - expected).abs() < 0.01, "{name} {range_m} {} {expected}", shown[[1, gate]]);
+                assert!(
+                    (shown[[1, gate]] - expected).abs() < 0.01,
+                    "{name} {range_m} {} {expected}",
+                    shown[[1, gate]]
+                );
             }
         }
     }
@@ -461,20 +623,48 @@ mod tests {
     #[test]
     fn what_does_not_match_is_refused() {
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let peak =
-            SpectralPeak::new(&sampling(), SignalKind::Real, &unweighted_lags(64), 1024, Refinement::Parabola).unwrap();
-        let short =
-            SpectralPeak::new(&sampling(), SignalKind::Real, &unweighted_lags(32), 1024, Refinement::Parabola).unwrap();
+        let peak = SpectralPeak::new(
+            &sampling(),
+            SignalKind::Real,
+            &unweighted_lags(64),
+            1024,
+            Refinement::Parabola,
+        )
+        .unwrap();
+        let short = SpectralPeak::new(
+            &sampling(),
+            SignalKind::Real,
+            &unweighted_lags(32),
+            1024,
+            Refinement::Parabola,
+        )
+        .unwrap();
         let pulse = PulseShape::gaussian(SIGMA_S).unwrap();
         let new = |estimator: &SpectralPeak, snr, radius_m| {
             let noise = (Noise::White, snr);
-            EstimatorResponse::new(&statistic, estimator, &sampling(), &pulse, noise, radius_m).map(|_| ())
+            EstimatorResponse::new(&statistic, estimator, &sampling(), &pulse, noise, radius_m)
+                .map(|_| ())
         };
         assert!(matches!(new(&short, 1.0, 2.0), Err(Error::Length { .. })));
-        assert!(matches!(new(&peak, 0.0, 2.0), Err(Error::OutOfRange { field: "snr", .. })));
-        assert!(matches!(new(&peak, 1.0, f64::NAN), Err(Error::OutOfRange { field: "radius_m", .. })));
+        assert!(matches!(
+            new(&peak, 0.0, 2.0),
+            Err(Error::OutOfRange { field: "snr", .. })
+        ));
+        assert!(matches!(
+            new(&peak, 1.0, f64::NAN),
+            Err(Error::OutOfRange {
+                field: "radius_m",
+                ..
+            })
+        ));
         let response = response(&statistic, &peak, (Noise::White, 1.0), 2.0);
         let map = response.map(&WakeModel::default(), &wake(), &LINES_RAD, &[400.0, 390.0]);
-        assert!(matches!(map, Err(Error::OutOfRange { field: "range_m", .. })));
+        assert!(matches!(
+            map,
+            Err(Error::OutOfRange {
+                field: "range_m",
+                ..
+            })
+        ));
     }
 }

@@ -38,16 +38,34 @@ struct Thinned {
 }
 
 fn thin(map: &VelocityMap<'_>) -> Thinned {
-    let (by_line, by_gate) = (map.elevation_rad.len().div_ceil(BLOCKS), map.range_m.len().div_ceil(BLOCKS));
-    let (elevation_rad, range_m) = (block_means(map.elevation_rad, by_line), block_means(map.range_m, by_gate));
+    let (by_line, by_gate) = (
+        map.elevation_rad.len().div_ceil(BLOCKS),
+        map.range_m.len().div_ceil(BLOCKS),
+    );
+    let (elevation_rad, range_m) = (
+        block_means(map.elevation_rad, by_line),
+        block_means(map.range_m, by_gate),
+    );
     let block = |index: usize| {
-        let known = map.known_in((index / range_m.len(), index % range_m.len()), (by_line, by_gate));
+        let known = map.known_in(
+            (index / range_m.len(), index % range_m.len()),
+            (by_line, by_gate),
+        );
         let of = |place: &[usize; 2]| (map.velocity_m_s[*place], map.deviation(place[0], place[1]));
         let (mut velocities, mut deviations): (Vec<f64>, Vec<f64>) = known.iter().map(of).unzip();
-        if known.is_empty() { (0.0, 0.0) } else { (median(&mut velocities), median(&mut deviations).recip()) }
+        if known.is_empty() {
+            (0.0, 0.0)
+        } else {
+            (median(&mut velocities), median(&mut deviations).recip())
+        }
     };
     let (velocity, weight) = (0..elevation_rad.len() * range_m.len()).map(block).unzip();
-    Thinned { elevation_rad, range_m, velocity, weight }
+    Thinned {
+        elevation_rad,
+        range_m,
+        velocity,
+        weight,
+    }
 }
 
 /// A pair of places with the circulations that fit best there.
@@ -78,15 +96,30 @@ pub(crate) struct Search {
 ///
 /// # Errors
 /// [`Error::TooFewVelocities`] with less than a hundred velocities, [`Error::NoVortex`] if no pair stands out.
-pub(crate) fn first_guess(map: &VelocityMap<'_>, model: &WakeModel, kernel: &RangeKernel) -> Result<Wake, Error> {
+pub(crate) fn first_guess(
+    map: &VelocityMap<'_>,
+    model: &WakeModel,
+    kernel: &RangeKernel,
+) -> Result<Wake, Error> {
     let search = Search::new(map, model, kernel)?;
     // the first of equals, whoever computed it
-    let best =
-        search.pairs().into_iter().reduce(|most, next| if next.explained > most.explained { next } else { most });
-    let best = best.ok_or(Error::NoVortex { significance: 0.0, needed: SIGNIFICANT })?;
+    let best = search.pairs().into_iter().reduce(|most, next| {
+        if next.explained > most.explained {
+            next
+        } else {
+            most
+        }
+    });
+    let best = best.ok_or(Error::NoVortex {
+        significance: 0.0,
+        needed: SIGNIFICANT,
+    })?;
     let significance = search.significance(&best);
     if significance.is_nan() || significance < SIGNIFICANT {
-        return Err(Error::NoVortex { significance, needed: SIGNIFICANT });
+        return Err(Error::NoVortex {
+            significance,
+            needed: SIGNIFICANT,
+        });
     }
     Ok(search.wake(&best))
 }
@@ -94,7 +127,11 @@ pub(crate) fn first_guess(map: &VelocityMap<'_>, model: &WakeModel, kernel: &Ran
 impl Search {
     /// # Errors
     /// [`Error::TooFewVelocities`] with less than a hundred velocities.
-    pub(crate) fn new(map: &VelocityMap<'_>, model: &WakeModel, kernel: &RangeKernel) -> Result<Self, Error> {
+    pub(crate) fn new(
+        map: &VelocityMap<'_>,
+        model: &WakeModel,
+        kernel: &RangeKernel,
+    ) -> Result<Self, Error> {
         enough_velocities(map.validate()?, NEEDED)?;
         let thinned = thin(map);
         let weighted = |shape: &[f64]| scaled(&thinned.weight, shape);
@@ -108,7 +145,8 @@ impl Search {
             shape
         });
         let (data, blocks) = (Array1::from_vec(data), thinned.weight.len());
-        let shapes = Array2::from_shape_fn((rows.len(), blocks), |(place, block)| rows[place][block]);
+        let shapes =
+            Array2::from_shape_fn((rows.len(), blocks), |(place, block)| rows[place][block]);
         Ok(Self {
             places_m: seen.iter().map(|(place_m, _)| *place_m).collect(),
             gram: shapes.dot(&shapes.t()),
@@ -133,7 +171,10 @@ impl Search {
     pub(crate) fn wake(&self, pair: &Pair) -> Wake {
         let (left, right) = (self.places_m[pair.left], self.places_m[pair.right]);
         let core_m = CORE_OVER_SPACING * (right.0 - left.0);
-        Wake::calm(Vortex::at(left, pair.strength.0, core_m), Vortex::at(right, pair.strength.1, core_m))
+        Wake::calm(
+            Vortex::at(left, pair.strength.0, core_m),
+            Vortex::at(right, pair.strength.1, core_m),
+        )
     }
 
     /// For each place of a left vortex the best one of a right vortex with positive circulations of both.
@@ -142,31 +183,57 @@ impl Search {
             // a clockwise vortex shows the opposite shape
             let (a, aa) = (-self.towards[left], self.gram[[left, left]]);
             let pair = |right: usize| {
-                let (b, bb, ab) = (self.towards[right], self.gram[[right, right]], -self.gram[[left, right]]);
+                let (b, bb, ab) = (
+                    self.towards[right],
+                    self.gram[[right, right]],
+                    -self.gram[[left, right]],
+                );
                 let determinant = aa * bb - ab * ab;
-                let strength = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
+                let strength = (
+                    (a * bb - b * ab) / determinant,
+                    (b * aa - a * ab) / determinant,
+                );
                 let possible = strength.0 > 0.0 && strength.1 > 0.0 && determinant > 1e-6 * aa * bb;
-                possible.then_some(Pair { explained: strength.0 * a + strength.1 * b, left, right, strength })
+                possible.then_some(Pair {
+                    explained: strength.0 * a + strength.1 * b,
+                    left,
+                    right,
+                    strength,
+                })
             };
-            let apart = |right: &usize| self.places_m[*right].0 - self.places_m[left].0 >= CLOSEST_M;
+            let apart =
+                |right: &usize| self.places_m[*right].0 - self.places_m[left].0 >= CLOSEST_M;
             let pairs = (0..self.places_m.len()).filter(apart).filter_map(pair);
             // the first of equals
-            pairs.reduce(|most, next| if next.explained > most.explained { next } else { most })
+            pairs.reduce(|most, next| {
+                if next.explained > most.explained {
+                    next
+                } else {
+                    most
+                }
+            })
         };
         (0..self.places_m.len()).filter_map(best).collect()
     }
 
     /// The best place of one vortex of that sense of turning (-1 left, +1 right) alone, and its circulation.
     pub(crate) fn single(&self, sense: f64) -> Option<((f64, f64), f64)> {
-        let explained = |place: usize| (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]];
-        let best = (0..self.places_m.len()).reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
+        let explained = |place: usize| {
+            (sense * self.towards[place]).max(0.0).powi(2) / self.gram[[place, place]]
+        };
+        let best = (0..self.places_m.len())
+            .reduce(|a, b| if explained(b) > explained(a) { b } else { a })?;
         let strength = sense * self.towards[best] / self.gram[[best, best]];
         (strength > 0.0).then_some((self.places_m[best], strength))
     }
 }
 
 /// The grid of places, with what an anticlockwise vortex of unit circulation at each shows on the thinned map.
-fn places(thinned: &Thinned, model: &WakeModel, kernel: &RangeKernel) -> Vec<((f64, f64), Vec<f64>)> {
+fn places(
+    thinned: &Thinned,
+    model: &WakeModel,
+    kernel: &RangeKernel,
+) -> Vec<((f64, f64), Vec<f64>)> {
     let (first_rad, last_rad) = ends(&thinned.elevation_rad);
     let (near_m, far_m) = ends(&thinned.range_m);
     let step = |from: f64, to: f64, i: usize| from + (to - from) * (i as f64 + 0.5) / PLACES as f64;
@@ -180,7 +247,13 @@ fn places(thinned: &Thinned, model: &WakeModel, kernel: &RangeKernel) -> Vec<((f
         let mut shape = Vec::with_capacity(thinned.velocity.len());
         for &elevation_rad in &thinned.elevation_rad {
             let ray = Ray::new(elevation_rad);
-            kernel.apply((model, &wake, ray), &thinned.range_m, false, scratch, |_, velocity, _| shape.push(velocity));
+            kernel.apply(
+                (model, &wake, ray),
+                &thinned.range_m,
+                false,
+                scratch,
+                |_, velocity, _| shape.push(velocity),
+            );
         }
         (place_m, shape)
     })

@@ -68,10 +68,15 @@ impl LeastSquares<'_> {
                     Some(slope) => predicted.slopes[slope][place],
                     None => {
                         let away = cell.velocity_m_s - predicted.velocity_m_s[place];
-                        self.fold_m_s.map_or(away, |fold| away - fold * (away / fold).round())
+                        self.fold_m_s
+                            .map_or(away, |fold| away - fold * (away / fold).round())
                     }
                 };
-                if self.whitening.is_some() { number } else { number / cell.sigma_m_s }
+                if self.whitening.is_some() {
+                    number
+                } else {
+                    number / cell.sigma_m_s
+                }
             };
             let mut numbers: Vec<f64> = self.cells.iter().map(number).collect();
             if let Some(whitening) = &self.whitening {
@@ -80,7 +85,10 @@ impl LeastSquares<'_> {
             numbers
         });
         let mut columns = columns.into_iter();
-        Rows { residuals: columns.next().unwrap_or_default(), slopes: columns.collect() }
+        Rows {
+            residuals: columns.next().unwrap_or_default(),
+            slopes: columns.collect(),
+        }
     }
 
     /// Scale of the residuals over their deviations, from their median.
@@ -90,19 +98,27 @@ impl LeastSquares<'_> {
 
     /// The same with deviations so many times as large; a millionth of a metre per second at least, where a fit is exact.
     pub(crate) fn rescaled(mut self, scale: f64) -> Self {
-        self.cells.iter_mut().for_each(|cell| cell.sigma_m_s = (cell.sigma_m_s * scale).max(1e-6));
+        self.cells
+            .iter_mut()
+            .for_each(|cell| cell.sigma_m_s = (cell.sigma_m_s * scale).max(1e-6));
         self
     }
 
     /// What is known before: distances in deviations, and their slopes.
     fn known(&self, p: &[f64], groups: &[Vec<usize>]) -> Vec<(f64, Vec<f64>)> {
         let at = self.prediction.about(p);
-        let mut known = self.prior.map_or_else(Vec::new, |prior| prior.terms(&Wake::from_list(at), groups));
+        let mut known = self
+            .prior
+            .map_or_else(Vec::new, |prior| prior.terms(&Wake::from_list(at), groups));
         if at.len() > PARAMETERS {
             known.extend(secondary_terms(at, groups));
         }
         for (away, slope) in &mut known {
-            *away += groups.iter().zip(slope).map(|(group, s)| *s * (p[group[0]] - at[group[0]])).sum::<f64>();
+            *away += groups
+                .iter()
+                .zip(slope)
+                .map(|(group, s)| *s * (p[group[0]] - at[group[0]]))
+                .sum::<f64>();
         }
         known
     }
@@ -114,28 +130,63 @@ impl LeastSquares<'_> {
         }
         let rows = self.rows(p, groups);
         let costs = rows.residuals.iter().map(|r| self.loss.at(*r));
-        let (costs, weights): (Vec<f64>, Vec<f64>) = costs.map(|(cost, weight, _)| (cost, weight)).unzip();
-        let gradient = rows.slopes.iter().map(|slope| -dot(&scaled(&weights, slope), &rows.residuals)).collect();
-        let mut normal = Normal { cost: costs.iter().sum(), gradient, curvature: products(&weights, &rows.slopes) };
+        let (costs, weights): (Vec<f64>, Vec<f64>) =
+            costs.map(|(cost, weight, _)| (cost, weight)).unzip();
+        let gradient = rows
+            .slopes
+            .iter()
+            .map(|slope| -dot(&scaled(&weights, slope), &rows.residuals))
+            .collect();
+        let mut normal = Normal {
+            cost: costs.iter().sum(),
+            gradient,
+            curvature: products(&weights, &rows.slopes),
+        };
         for (away, slope) in self.known(p, groups) {
             normal.cost += 0.5 * self.counted * away * away;
-            normal.gradient.iter_mut().zip(&slope).for_each(|(g, s)| *g += self.counted * away * s);
+            normal
+                .gradient
+                .iter_mut()
+                .zip(&slope)
+                .for_each(|(g, s)| *g += self.counted * away * s);
             add_square(&mut normal.curvature, &slope, self.counted);
         }
         Some(normal)
     }
 
     /// The minimum from a start on; nothing from an impossible one.
-    pub(crate) fn minimum(&self, start: &[f64], groups: &[Vec<usize>], stop: Stop) -> Option<Minimum<Vec<f64>>> {
-        lowest(start.to_vec(), stop, |p| self.normal(p, groups), |p, step| stepped(groups, p, step))
+    pub(crate) fn minimum(
+        &self,
+        start: &[f64],
+        groups: &[Vec<usize>],
+        stop: Stop,
+    ) -> Option<Minimum<Vec<f64>>> {
+        lowest(
+            start.to_vec(),
+            stop,
+            |p| self.normal(p, groups),
+            |p, step| stepped(groups, p, step),
+        )
     }
 
     /// The minimum of a model that is linear in the parameters, by least squares with weights taken anew: each round lowers the cost, whatever the
     /// loss.
-    pub(crate) fn reweighted(&self, start: &[f64], groups: &[Vec<usize>], stop: Stop) -> Result<Vec<f64>, Error> {
+    pub(crate) fn reweighted(
+        &self,
+        start: &[f64],
+        groups: &[Vec<usize>],
+        stop: Stop,
+    ) -> Result<Vec<f64>, Error> {
         let mut p = start.to_vec();
         for _ in 0..stop.iterations {
-            let Some(Normal { gradient, curvature, .. }) = self.normal(&p, groups) else { break };
+            let Some(Normal {
+                gradient,
+                curvature,
+                ..
+            }) = self.normal(&p, groups)
+            else {
+                break;
+            };
             let down: Vec<f64> = gradient.iter().map(|g| -g).collect();
             let step = solve(&curvature, &down).ok_or(singular(CURVATURE, down.len()))?;
             p = stepped(groups, &p, &step);
@@ -149,9 +200,18 @@ impl LeastSquares<'_> {
     /// ln p of the residuals but for a constant, as if all were independent: losses and logarithms of the deviations; with what is known before
     /// as often as it counts.
     pub(crate) fn log_likelihood(&self, p: &[f64], groups: &[Vec<usize>]) -> f64 {
-        let losses: f64 = self.rows(p, &[]).residuals.iter().map(|r| self.loss.at(*r).0).sum();
+        let losses: f64 = self
+            .rows(p, &[])
+            .residuals
+            .iter()
+            .map(|r| self.loss.at(*r).0)
+            .sum();
         let deviations: f64 = self.cells.iter().map(|cell| cell.sigma_m_s.ln()).sum();
-        let known: f64 = self.known(p, groups).iter().map(|(away, _)| 0.5 * self.counted * away * away).sum();
+        let known: f64 = self
+            .known(p, groups)
+            .iter()
+            .map(|(away, _)| 0.5 * self.counted * away * away)
+            .sum();
         -losses - deviations - known
     }
 
@@ -159,7 +219,16 @@ impl LeastSquares<'_> {
     pub(crate) fn alike(&self, p: &[f64], lines: usize) -> f64 {
         let residuals = self.rows(p, &[]).residuals;
         let weighted: Vec<f64> = residuals.iter().map(|r| self.loss.at(*r).1 * r).collect();
-        of_neighbours(Cells { cells: &self.cells, residuals: &weighted, slopes: &[] }, &Array2::zeros((0, 0)), lines).1
+        of_neighbours(
+            Cells {
+                cells: &self.cells,
+                residuals: &weighted,
+                slopes: &[],
+            },
+            &Array2::zeros((0, 0)),
+            lines,
+        )
+        .1
     }
 
     /// What the map tells of the free numbers at a minimum.
@@ -171,16 +240,25 @@ impl LeastSquares<'_> {
     ) -> Result<Uncertainty<'g>, Error> {
         let rows = self.rows(p, groups);
         let losses: Vec<_> = rows.residuals.iter().map(|r| self.loss.at(*r)).collect();
-        let (weights, curved): (Vec<f64>, Vec<f64>) =
-            losses.iter().map(|(_, weight, second)| (*weight, *second)).unzip();
+        let (weights, curved): (Vec<f64>, Vec<f64>) = losses
+            .iter()
+            .map(|(_, weight, second)| (*weight, *second))
+            .unzip();
         let known = self.known(p, groups);
         let mut of_known = Array2::zeros((groups.len(), groups.len()));
-        known.iter().for_each(|(_, slope)| add_square(&mut of_known, slope, self.counted));
+        known
+            .iter()
+            .for_each(|(_, slope)| add_square(&mut of_known, slope, self.counted));
         let curvature = |weights: &[f64]| products(weights, &rows.slopes) + &of_known;
         if matches!(from, Scores::Stated) {
             let curvature = curvature(&vec![1.0; weights.len()]);
             let scores = &curvature * inflation(self.loss);
-            return Ok(Uncertainty { groups, curvature, scores, alike: 1.0 });
+            return Ok(Uncertainty {
+                groups,
+                curvature,
+                scores,
+                alike: 1.0,
+            });
         }
         // with many outliers the second derivatives need not be positive: their weights are, and are larger
         let mut a = curvature(&curved);
@@ -188,13 +266,22 @@ impl LeastSquares<'_> {
             a = curvature(&weights);
         }
         let weighted = scaled(&weights, &rows.residuals);
-        let all = Cells { cells: &self.cells, residuals: &weighted, slopes: &rows.slopes };
+        let all = Cells {
+            cells: &self.cells,
+            residuals: &weighted,
+            slopes: &rows.slopes,
+        };
         let (scores, alike) = match from {
             Scores::OfNeighbours { lines } => of_neighbours(all, &inverse(CURVATURE, &a)?, lines),
             Scores::Decaying { blocks } => decaying(all, blocks),
             Scores::Stated => (a.clone(), 1.0),
         };
-        Ok(Uncertainty { groups, curvature: a, scores: scores + of_known * self.counted, alike })
+        Ok(Uncertainty {
+            groups,
+            curvature: a,
+            scores: scores + of_known * self.counted,
+            alike,
+        })
     }
 }
 
@@ -211,8 +298,13 @@ pub(crate) struct Uncertainty<'g> {
 
 impl Uncertainty<'_> {
     /// Covariance A^-1 B A^-1 of the ten parameters of the wake where only those of the wanted groups are free.
-    pub(crate) fn covariance(&self, wanted: impl Fn(&[usize]) -> bool) -> Result<Array2<f64>, Error> {
-        let free: Vec<usize> = (0..self.groups.len()).filter(|i| wanted(&self.groups[*i])).collect();
+    pub(crate) fn covariance(
+        &self,
+        wanted: impl Fn(&[usize]) -> bool,
+    ) -> Result<Array2<f64>, Error> {
+        let free: Vec<usize> = (0..self.groups.len())
+            .filter(|i| wanted(&self.groups[*i]))
+            .collect();
         let of = |all: &Array2<f64>| all.select(Axis(0), &free).select(Axis(1), &free);
         let bread = inverse(CURVATURE, &of(&self.curvature))?;
         let groups: Vec<Vec<usize>> = free.iter().map(|i| self.groups[*i].clone()).collect();
@@ -236,5 +328,6 @@ fn inflation(loss: Loss) -> f64 {
 
 /// a += weight v v^T.
 fn add_square(a: &mut Array2<f64>, v: &[f64], weight: f64) {
-    a.indexed_iter_mut().for_each(|((i, j), a)| *a += weight * v[i] * v[j]);
+    a.indexed_iter_mut()
+        .for_each(|((i, j), a)| *a += weight * v[i] * v[j]);
 }

@@ -40,8 +40,13 @@ impl Setting<'_, '_> {
         if best.shared_with(&alone).len() < 10 * groups.len() || best.tangent.at[own] <= 0.0 {
             return None;
         }
-        let scores = Scores::OfNeighbours { lines: self.options.correlated_lines };
-        let uncertainty = self.about(&best).uncertainty(&best.tangent.at, &groups, scores).ok()?;
+        let scores = Scores::OfNeighbours {
+            lines: self.options.correlated_lines,
+        };
+        let uncertainty = self
+            .about(&best)
+            .uncertainty(&best.tangent.at, &groups, scores)
+            .ok()?;
         Some(Local {
             circulation_m2_s: best.tangent.at[own],
             variance: uncertainty.covariance(|_| true).ok()?[[own, own]],
@@ -57,10 +62,18 @@ pub(crate) fn joined(pair: &MapFit, local: &[Option<Local>; 2]) -> Option<MapFit
         return None;
     }
     let (mut p, mut covariance) = (pair.wake.to_array(), pair.covariance.clone());
-    for (at, local) in CIRCULATIONS.into_iter().map(|parameter| parameter as usize).zip(local) {
+    for (at, local) in CIRCULATIONS
+        .into_iter()
+        .map(|parameter| parameter as usize)
+        .zip(local)
+    {
         let Some(local) = local else { continue };
         p[at] = local.circulation_m2_s;
         covariance[[at, at]] = local.variance.max(covariance[[at, at]]);
     }
-    Some(MapFit { wake: Wake::from_array(&p), covariance, ..pair.clone() })
+    Some(MapFit {
+        wake: Wake::from_array(&p),
+        covariance,
+        ..pair.clone()
+    })
 }

@@ -66,7 +66,11 @@ const LOG_CORE: f64 = 0.1;
 /// Step of a difference quotient.
 fn step(p: &[f64], place: usize) -> f64 {
     let wake = Wake::from_list(p);
-    let spacing_m = if wake.is_pair() { wake.spacing_m() } else { LONE_M };
+    let spacing_m = if wake.is_pair() {
+        wake.spacing_m()
+    } else {
+        LONE_M
+    };
     match place {
         0 | 1 => 0.01 * p[place].abs().max(1.0),
         2..=5 => 0.006 * spacing_m,
@@ -100,8 +104,10 @@ pub(crate) struct Tangent {
 impl Tangent {
     /// The part of the way to other parameters that the slopes can speak for.
     pub(crate) fn reach(&self, to: &[f64]) -> f64 {
-        let part =
-            |place: usize| REACH * step(&self.at, place) / (to[place] - self.at[place]).abs().max(f64::MIN_POSITIVE);
+        let part = |place: usize| {
+            REACH * step(&self.at, place)
+                / (to[place] - self.at[place]).abs().max(f64::MIN_POSITIVE)
+        };
         (0..to.len()).map(part).fold(1.0, f64::min)
     }
 }
@@ -116,9 +122,14 @@ impl Prediction for Tangent {
         let mut velocity_m_s = self.here.velocity_m_s.clone();
         for (group, slope) in groups.iter().zip(&self.here.slopes) {
             let away = p[group[0]] - self.at[group[0]];
-            Zip::from(&mut velocity_m_s).and(slope).for_each(|velocity, slope| *velocity += slope * away);
+            Zip::from(&mut velocity_m_s)
+                .and(slope)
+                .for_each(|velocity, slope| *velocity += slope * away);
         }
-        Predicted { velocity_m_s, slopes: self.here.slopes.clone() }
+        Predicted {
+            velocity_m_s,
+            slopes: self.here.slopes.clone(),
+        }
     }
 
     fn about<'p>(&'p self, _p: &'p [f64]) -> &'p [f64] {

@@ -78,26 +78,45 @@ impl<'a> Plane<'a> {
         let most = |of: fn(&Cell) -> usize| cells.iter().map(of).max().unwrap_or(0) + 1;
         let extent = (most(|cell| cell.line), most(|cell| cell.gate));
         let (lines, gates) = (fast_length(2 * extent.0), fast_length(2 * extent.1));
-        Self { cells, extent, lines, gates, along: complex_transforms(gates), across: complex_transforms(lines) }
+        Self {
+            cells,
+            extent,
+            lines,
+            gates,
+            along: complex_transforms(gates),
+            across: complex_transforms(lines),
+        }
     }
 
     fn transform(&self, grid: &mut [Complex<f64>], inverse: usize) {
         self.along[inverse].process(grid);
         let mut turned = vec![Complex::default(); grid.len()];
         for (i, row) in grid.chunks_exact(self.gates).enumerate() {
-            row.iter().enumerate().for_each(|(j, value)| turned[j * self.lines + i] = *value);
+            row.iter()
+                .enumerate()
+                .for_each(|(j, value)| turned[j * self.lines + i] = *value);
         }
         self.across[inverse].process(&mut turned);
-        let scale = if inverse == 1 { (grid.len() as f64).recip() } else { 1.0 };
+        let scale = if inverse == 1 {
+            (grid.len() as f64).recip()
+        } else {
+            1.0
+        };
         for (j, column) in turned.chunks_exact(self.lines).enumerate() {
-            column.iter().enumerate().for_each(|(i, value)| grid[i * self.gates + j] = value * scale);
+            column
+                .iter()
+                .enumerate()
+                .for_each(|(i, value)| grid[i * self.gates + j] = value * scale);
         }
     }
 
     /// Transform of numbers of the cells, 0 elsewhere.
     fn spectrum(&self, numbers: &[f64]) -> Vec<Complex<f64>> {
         let mut grid = vec![Complex::default(); self.lines * self.gates];
-        self.cells.iter().zip(numbers).for_each(|(cell, x)| grid[cell.line * self.gates + cell.gate] = (*x).into());
+        self.cells
+            .iter()
+            .zip(numbers)
+            .for_each(|(cell, x)| grid[cell.line * self.gates + cell.gate] = (*x).into());
         self.transform(&mut grid, 0);
         grid
     }
@@ -118,19 +137,28 @@ impl<'a> Plane<'a> {
         let rows = function.chunks_exact(self.gates).enumerate();
         let rows = rows.filter(|(line, _)| is_within(*line, self.extent.0, self.lines));
         let near = rows.flat_map(|(_, row)| row.iter().enumerate());
-        near.filter(|(gate, _)| is_within(*gate, self.extent.1, self.gates)).map(|(_, value)| value).sum()
+        near.filter(|(gate, _)| is_within(*gate, self.extent.1, self.gates))
+            .map(|(_, value)| value)
+            .sum()
     }
 
     /// A function of the distances (lines, gates) on the grid.
     fn of_distance<T>(&self, f: impl Fn(f64, f64) -> T) -> Vec<T> {
         let short = |i: usize, of: usize| i.min(of - i) as f64;
         let places = (0..self.lines).flat_map(|i| (0..self.gates).map(move |j| (i, j)));
-        places.map(|(i, j)| f(short(i, self.lines), short(j, self.gates))).collect()
+        places
+            .map(|(i, j)| f(short(i, self.lines), short(j, self.gates)))
+            .collect()
     }
 
     /// Sums of products of the numbers of all pairs of cells, by distance.
     fn power(&self, numbers: &[f64]) -> Vec<f64> {
-        self.back(self.spectrum(numbers).into_iter().map(|value| value.norm_sqr().into()).collect())
+        self.back(
+            self.spectrum(numbers)
+                .into_iter()
+                .map(|value| value.norm_sqr().into())
+                .collect(),
+        )
     }
 
     /// Transform of a function of the distance.
@@ -143,15 +171,28 @@ impl<'a> Plane<'a> {
     /// Sums over all pairs of cells of a function of their distance times the products of columns of numbers.
     fn quadratic(&self, columns: &[Vec<f64>], function: &[f64]) -> Array2<f64> {
         let function = self.transformed(function);
-        let smooth: Vec<Vec<f64>> = columns.iter().map(|column| self.convolve(column, &function)).collect();
-        Array2::from_shape_fn((columns.len(), columns.len()), |(i, j)| dot(&columns[j], &smooth[i]))
+        let smooth: Vec<Vec<f64>> = columns
+            .iter()
+            .map(|column| self.convolve(column, &function))
+            .collect();
+        Array2::from_shape_fn((columns.len(), columns.len()), |(i, j)| {
+            dot(&columns[j], &smooth[i])
+        })
     }
 
     /// Sums of the numbers of the cells with the weights of a function of the distance, whose transform is given.
     fn convolve(&self, numbers: &[f64], function: &[Complex<f64>]) -> Vec<f64> {
-        let product = self.spectrum(numbers).iter().zip(function).map(|(a, b)| a * b).collect();
+        let product = self
+            .spectrum(numbers)
+            .iter()
+            .zip(function)
+            .map(|(a, b)| a * b)
+            .collect();
         let grid = self.back(product);
-        self.cells.iter().map(|cell| grid[cell.line * self.gates + cell.gate]).collect()
+        self.cells
+            .iter()
+            .map(|cell| grid[cell.line * self.gates + cell.gate])
+            .collect()
     }
 }
 
@@ -185,34 +226,63 @@ struct Correlogram<'a> {
 
 impl<'a> Correlogram<'a> {
     fn new(plane: &'a Plane<'a>, residuals: &[f64], slopes: &[Vec<f64>]) -> Self {
-        let (pairs, sums) = (plane.power(&vec![1.0; residuals.len()]), plane.power(residuals));
+        let (pairs, sums) = (
+            plane.power(&vec![1.0; residuals.len()]),
+            plane.power(residuals),
+        );
         let basis = orthonormal(slopes);
         let basis_spectra: Vec<_> = basis.iter().map(|column| plane.spectrum(column)).collect();
         let mut white: Vec<f64> = vec![0.0; pairs.len()];
         white[0] = residuals.len() as f64;
         for column in &basis {
-            white.iter_mut().zip(plane.power(column)).for_each(|(white, taken)| *white -= taken);
+            white
+                .iter_mut()
+                .zip(plane.power(column))
+                .for_each(|(white, taken)| *white -= taken);
         }
         // far cells are few and have little to say
         let (most_lines, most_gates) = plane.half();
-        let near = plane.of_distance(|i, j| if i <= most_lines && j <= most_gates { 1.0 } else { 0.0 });
-        let mut weights: Vec<f64> =
-            near.iter().zip(&pairs).map(|(near, pairs)| if *pairs > 0.5 { near / pairs } else { 0.0 }).collect();
+        let near = plane.of_distance(|i, j| {
+            if i <= most_lines && j <= most_gates {
+                1.0
+            } else {
+                0.0
+            }
+        });
+        let mut weights: Vec<f64> = near
+            .iter()
+            .zip(&pairs)
+            .map(|(near, pairs)| if *pairs > 0.5 { near / pairs } else { 0.0 })
+            .collect();
         weights[0] *= 0.5;
-        Self { plane, basis, basis_spectra, pairs, sums, white, weights }
+        Self {
+            plane,
+            basis,
+            basis_spectra,
+            pairs,
+            sums,
+            white,
+            weights,
+        }
     }
 
     /// Expected sums of products of residuals of noise with that correlation.
     fn expected(&self, correlation: &[f64]) -> Vec<f64> {
         let plane = self.plane;
         let function = plane.transformed(correlation);
-        let smooth: Vec<Vec<f64>> = self.basis.iter().map(|column| plane.convolve(column, &function)).collect();
+        let smooth: Vec<Vec<f64>> = self
+            .basis
+            .iter()
+            .map(|column| plane.convolve(column, &function))
+            .collect();
         let mut taken = vec![Complex::default(); function.len()];
         for (column, spectrum) in smooth.iter().zip(&self.basis_spectra) {
             let mut rest = column.clone();
             for other in &self.basis {
                 let part = 0.5 * dot(other, column);
-                rest.iter_mut().zip(other).for_each(|(rest, other)| *rest -= part * other);
+                rest.iter_mut()
+                    .zip(other)
+                    .for_each(|(rest, other)| *rest -= part * other);
             }
             let rest = plane.spectrum(&rest);
             for ((taken, a), b) in taken.iter_mut().zip(spectrum).zip(rest) {
@@ -220,47 +290,86 @@ impl<'a> Correlogram<'a> {
             }
         }
         let taken = plane.back(taken);
-        correlation.iter().zip(&self.pairs).zip(taken).map(|((c, pairs), taken)| c * pairs - taken).collect()
+        correlation
+            .iter()
+            .zip(&self.pairs)
+            .zip(taken)
+            .map(|((c, pairs), taken)| c * pairs - taken)
+            .collect()
     }
 
     fn product(&self, a: &[f64], b: &[f64]) -> f64 {
-        self.weights.iter().zip(a).zip(b).map(|((w, a), b)| w * a * b).sum()
+        self.weights
+            .iter()
+            .zip(a)
+            .zip(b)
+            .map(|((w, a), b)| w * a * b)
+            .sum()
     }
 
     /// White noise alone.
     fn white_alone(&self) -> Fitted {
         let white = self.product(&self.sums, &self.white) / self.product(&self.white, &self.white);
-        Fitted { white, correlated: 0.0, lengths: (0.0, 0.0), left: self.left(white, 0.0, &self.white) }
+        Fitted {
+            white,
+            correlated: 0.0,
+            lengths: (0.0, 0.0),
+            left: self.left(white, 0.0, &self.white),
+        }
     }
 
     /// Sum of squares of what white noise and a correlated part of that shape leave of the correlogram.
     fn left(&self, white: f64, correlated: f64, shape: &[f64]) -> f64 {
         let left = self.sums.iter().zip(&self.white).zip(shape);
-        let left: Vec<f64> = left.map(|((sum, w), s)| sum - white * w - correlated * s).collect();
+        let left: Vec<f64> = left
+            .map(|((sum, w), s)| sum - white * w - correlated * s)
+            .collect();
         self.product(&left, &left)
     }
 
     /// The best strengths at given lengths.
     fn at(&self, lengths: (f64, f64)) -> Fitted {
         let shape = self.expected(&exponential(self.plane, lengths));
-        let (aa, ab, bb) =
-            (self.product(&self.white, &self.white), self.product(&self.white, &shape), self.product(&shape, &shape));
-        let (a, b) = (self.product(&self.sums, &self.white), self.product(&self.sums, &shape));
+        let (aa, ab, bb) = (
+            self.product(&self.white, &self.white),
+            self.product(&self.white, &shape),
+            self.product(&shape, &shape),
+        );
+        let (a, b) = (
+            self.product(&self.sums, &self.white),
+            self.product(&self.sums, &shape),
+        );
         let determinant = aa * bb - ab * ab;
-        let (mut white, mut correlated) = ((a * bb - b * ab) / determinant, (b * aa - a * ab) / determinant);
+        let (mut white, mut correlated) = (
+            (a * bb - b * ab) / determinant,
+            (b * aa - a * ab) / determinant,
+        );
         if white < 0.0 {
             (white, correlated) = (0.0, b / bb);
         }
-        let left = if correlated > 0.0 { self.left(white, correlated, &shape) } else { f64::INFINITY };
-        Fitted { white, correlated, lengths, left }
+        let left = if correlated > 0.0 {
+            self.left(white, correlated, &shape)
+        } else {
+            f64::INFINITY
+        };
+        Fitted {
+            white,
+            correlated,
+            lengths,
+            left,
+        }
     }
 
     fn fit(&self) -> Fitted {
         let alone = self.white_alone();
         let longest = self.plane.half();
         let better = |a: Fitted, b: Fitted| if b.left < a.left { b } else { a };
-        let parts = (0..).map(|i| COARSE.powi(-i)).take_while(|part| longest.0.max(longest.1) * part > 0.4);
-        let best = parts.map(|part| self.at((longest.0 * part, longest.1 * part))).fold(alone, better);
+        let parts = (0..)
+            .map(|i| COARSE.powi(-i))
+            .take_while(|part| longest.0.max(longest.1) * part > 0.4);
+        let best = parts
+            .map(|part| self.at((longest.0 * part, longest.1 * part)))
+            .fold(alone, better);
         // distances come twice, one for each sign
         if alone.left - best.left < 2.0 * BEYOND_CHANCE * alone.white * alone.white {
             return alone;
@@ -268,8 +377,16 @@ impl<'a> Correlogram<'a> {
         let (mut best, mut ratio) = (best, COARSE);
         while ratio > FINE {
             let (i, j) = best.lengths;
-            let tried = [(i * ratio, j), (i / ratio, j), (i, j * ratio), (i, j / ratio)];
-            let next = tried.map(|lengths| self.at(lengths)).into_iter().fold(best, better);
+            let tried = [
+                (i * ratio, j),
+                (i / ratio, j),
+                (i, j * ratio),
+                (i, j / ratio),
+            ];
+            let next = tried
+                .map(|lengths| self.at(lengths))
+                .into_iter()
+                .fold(best, better);
             if next.left >= best.left {
                 ratio = ratio.sqrt();
             }
@@ -280,7 +397,11 @@ impl<'a> Correlogram<'a> {
 }
 
 /// B, and the number of cells that count as one, from the correlogram of the residuals over at most so many `lines`; `bread` is A^-1.
-pub(crate) fn of_neighbours(all: Cells<'_>, bread: &Array2<f64>, lines: usize) -> (Array2<f64>, f64) {
+pub(crate) fn of_neighbours(
+    all: Cells<'_>,
+    bread: &Array2<f64>,
+    lines: usize,
+) -> (Array2<f64>, f64) {
     let order = all.slopes.len();
     let plane = Plane::new(all.cells);
     let Some(correlation) = neighbours(&plane, all.residuals, lines) else {
@@ -307,21 +428,37 @@ pub(crate) fn of_neighbours(all: Cells<'_>, bread: &Array2<f64>, lines: usize) -
 
 /// Correlation of residuals with those of their neighbours on the grid, 0 beyond where it ends.
 fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<f64>> {
-    let (sums, pairs) = (plane.power(residuals), plane.power(&vec![1.0; residuals.len()]));
-    let means = sums.iter().zip(&pairs).map(|(sum, pairs)| if *pairs > 0.5 { sum / pairs } else { 0.0 });
+    let (sums, pairs) = (
+        plane.power(residuals),
+        plane.power(&vec![1.0; residuals.len()]),
+    );
+    let means = sums
+        .iter()
+        .zip(&pairs)
+        .map(|(sum, pairs)| if *pairs > 0.5 { sum / pairs } else { 0.0 });
     let means: Vec<f64> = means.collect();
     let variance = means[0];
     if variance <= 0.0 || !variance.is_finite() {
         return None;
     }
-    let last =
-        |most: usize, of: &dyn Fn(usize) -> f64| (1..=most).find(|k| of(*k) < LEAST * variance).map_or(most, |k| k - 1);
-    let last_line = last(lines.min(plane.extent.0 / 3), &|line| means[line * plane.gates]) as f64;
+    let last = |most: usize, of: &dyn Fn(usize) -> f64| {
+        (1..=most)
+            .find(|k| of(*k) < LEAST * variance)
+            .map_or(most, |k| k - 1)
+    };
+    let last_line = last(lines.min(plane.extent.0 / 3), &|line| {
+        means[line * plane.gates]
+    }) as f64;
     let last_gate = last(plane.extent.1 / 3, &|gate| means[gate]) as f64;
     let near = plane.of_distance(|line, gate| line <= last_line && gate <= last_gate);
-    let correlation = |(mean, near): (&f64, bool)| (mean / variance, near && (mean / variance).abs() >= LEAST);
+    let correlation =
+        |(mean, near): (&f64, bool)| (mean / variance, near && (mean / variance).abs() >= LEAST);
     let correlations = means.iter().zip(near).map(correlation);
-    Some(correlations.map(|(correlation, counts)| if counts { correlation } else { 0.0 }).collect())
+    Some(
+        correlations
+            .map(|(correlation, counts)| if counts { correlation } else { 0.0 })
+            .collect(),
+    )
 }
 
 /// B, and the number of cells that count as one. Residuals and slopes are summed over blocks of so many lines and gates, over the root of their
@@ -329,12 +466,25 @@ fn neighbours(plane: &Plane<'_>, residuals: &[f64], lines: usize) -> Option<Vec<
 pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array2<f64>, f64) {
     let mut places: BTreeMap<(usize, usize), Vec<usize>> = BTreeMap::new();
     for (i, cell) in all.cells.iter().enumerate() {
-        places.entry((cell.line / lines, cell.gate / gates)).or_default().push(i);
+        places
+            .entry((cell.line / lines, cell.gate / gates))
+            .or_default()
+            .push(i);
     }
-    let blocks: Vec<Cell> =
-        places.keys().map(|&(line, gate)| Cell { line, gate, velocity_m_s: 0.0, sigma_m_s: 1.0 }).collect();
+    let blocks: Vec<Cell> = places
+        .keys()
+        .map(|&(line, gate)| Cell {
+            line,
+            gate,
+            velocity_m_s: 0.0,
+            sigma_m_s: 1.0,
+        })
+        .collect();
     let summed = |numbers: &[f64]| -> Vec<f64> {
-        places.values().map(|own| own.iter().map(|i| numbers[*i]).sum::<f64>() / (own.len() as f64).sqrt()).collect()
+        places
+            .values()
+            .map(|own| own.iter().map(|i| numbers[*i]).sum::<f64>() / (own.len() as f64).sqrt())
+            .collect()
     };
     let slopes: Vec<Vec<f64>> = all.slopes.iter().map(|slope| summed(slope)).collect();
     let plane = Plane::new(&blocks);
@@ -344,8 +494,12 @@ pub(crate) fn decaying(all: Cells<'_>, (lines, gates): (usize, usize)) -> (Array
         return (white, 1.0);
     }
     let correlation = exponential(&plane, found.lengths);
-    let alike = 1.0 + found.correlated / (found.white + found.correlated) * (plane.sum(&correlation) - 1.0);
-    (white + plane.quadratic(&slopes, &correlation) * found.correlated, alike)
+    let alike =
+        1.0 + found.correlated / (found.white + found.correlated) * (plane.sum(&correlation) - 1.0);
+    (
+        white + plane.quadratic(&slopes, &correlation) * found.correlated,
+        alike,
+    )
 }
 
 #[cfg(test)]
@@ -360,12 +514,34 @@ mod tests {
 
     fn cells(lines: usize, gates: usize, is_there: impl Fn(usize, usize) -> bool) -> Vec<Cell> {
         let places = (0..lines).flat_map(|line| (0..gates).map(move |gate| (line, gate)));
-        let cell = |(line, gate)| Cell { line, gate, velocity_m_s: 0.0, sigma_m_s: 1.0 };
-        places.filter(|(line, gate)| is_there(*line, *gate)).map(cell).collect()
+        let cell = |(line, gate)| Cell {
+            line,
+            gate,
+            velocity_m_s: 0.0,
+            sigma_m_s: 1.0,
+        };
+        places
+            .filter(|(line, gate)| is_there(*line, *gate))
+            .map(cell)
+            .collect()
     }
 
-    fn neighbours_of(cells: &[Cell], residuals: &[f64], slopes: &[Vec<f64>], lines: usize) -> Array2<f64> {
-        of_neighbours(Cells { cells, residuals, slopes }, &Array2::eye(slopes.len()), lines).0
+    fn neighbours_of(
+        cells: &[Cell],
+        residuals: &[f64],
+        slopes: &[Vec<f64>],
+        lines: usize,
+    ) -> Array2<f64> {
+        of_neighbours(
+            Cells {
+                cells,
+                residuals,
+                slopes,
+            },
+            &Array2::eye(slopes.len()),
+            lines,
+        )
+        .0
     }
 
     /// Where the slopes are, the residuals are three times as large as elsewhere.
@@ -374,9 +550,14 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);
         let cells = cells(60, 60, |_, _| true);
         let inside = |cell: &Cell| cell.line.is_multiple_of(3) && cell.gate.is_multiple_of(3);
-        let residuals: Vec<f64> =
-            cells.iter().map(|cell| if inside(cell) { 3.0 } else { 1.0 } * normal(&mut rng)).collect();
-        let slope = cells.iter().map(|cell| f64::from(u8::from(inside(cell)))).collect();
+        let residuals: Vec<f64> = cells
+            .iter()
+            .map(|cell| if inside(cell) { 3.0 } else { 1.0 } * normal(&mut rng))
+            .collect();
+        let slope = cells
+            .iter()
+            .map(|cell| f64::from(u8::from(inside(cell))))
+            .collect();
         let stated = neighbours_of(&cells, &residuals, &[slope], 8)[[0, 0]];
         // 400 independent cells of variance 9: the mean square is known to 7 %.
         assert!((stated / (400.0 * 9.0) - 1.0).abs() < 0.21, "{stated}");
@@ -389,19 +570,31 @@ mod tests {
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let cells = cells(lines, gates, |_, _| true);
         // a wave over the map
-        let slope: Vec<f64> =
-            cells.iter().map(|cell| (0.2 * cell.line as f64).sin() * (0.25 * cell.gate as f64).cos()).collect();
+        let slope: Vec<f64> = cells
+            .iter()
+            .map(|cell| (0.2 * cell.line as f64).sin() * (0.25 * cell.gate as f64).cos())
+            .collect();
         let (mut stated, mut squares) = (0.0, 0.0);
         for _ in 0..repeats {
             let white = Array2::from_shape_fn((lines + 3, gates + 2), |_| normal(&mut rng));
-            let moving =
-                |cell: &Cell| white.slice(ndarray::s![cell.line..cell.line + 4, cell.gate..cell.gate + 3]).sum();
+            let moving = |cell: &Cell| {
+                white
+                    .slice(ndarray::s![
+                        cell.line..cell.line + 4,
+                        cell.gate..cell.gate + 3
+                    ])
+                    .sum()
+            };
             let residuals: Vec<f64> = cells.iter().map(moving).collect();
-            stated += neighbours_of(&cells, &residuals, std::slice::from_ref(&slope), 8)[[0, 0]] / f64::from(repeats);
+            stated += neighbours_of(&cells, &residuals, std::slice::from_ref(&slope), 8)[[0, 0]]
+                / f64::from(repeats);
             squares += dot(&residuals, &slope).powi(2) / f64::from(repeats);
         }
         // the mean of 40 squares scatters by sqrt(2/40)
-        assert!((stated / squares - 1.0).abs() < 3.0 * (2.0 / f64::from(repeats)).sqrt(), "{stated} {squares}");
+        assert!(
+            (stated / squares - 1.0).abs() < 3.0 * (2.0 / f64::from(repeats)).sqrt(),
+            "{stated} {squares}"
+        );
     }
 
     /// Every pair of cells written out, with holes.
@@ -410,9 +603,15 @@ mod tests {
         let (lines, gates) = (9, 7);
         let cells = cells(lines, gates, |line, gate| line * gate % 5 != 3);
         let of = |number: fn(f64) -> f64| -> Vec<f64> {
-            cells.iter().map(|cell| number((cell.line * gates + cell.gate) as f64)).collect()
+            cells
+                .iter()
+                .map(|cell| number((cell.line * gates + cell.gate) as f64))
+                .collect()
         };
-        let (residuals, slopes) = (of(|x| (x * x).sin() + 1.0), [of(|x| (1.3 * x).cos()), of(f64::sin)]);
+        let (residuals, slopes) = (
+            of(|x| (x * x).sin() + 1.0),
+            [of(|x| (1.3 * x).cos()), of(f64::sin)],
+        );
         let plane = Plane::new(&cells);
         let correlation = neighbours(&plane, &residuals, 3).unwrap();
         let at = |a: &Cell, b: &Cell| {
@@ -421,31 +620,55 @@ mod tests {
         };
         let pairs = || (0..cells.len()).flat_map(|i| (0..cells.len()).map(move |k| (i, k)));
         let variance = dot(&residuals, &residuals) / cells.len() as f64;
-        let (mut products, mut counts) = (vec![0.0; correlation.len()], vec![0.0; correlation.len()]);
+        let (mut products, mut counts) =
+            (vec![0.0; correlation.len()], vec![0.0; correlation.len()]);
         let mut sum = Array2::<f64>::zeros((2, 2));
         for (i, k) in pairs() {
             let place = at(&cells[i], &cells[k]);
             products[place] += residuals[i] * residuals[k];
             counts[place] += 1.0;
-            sum.indexed_iter_mut().for_each(|((a, b), sum)| *sum += correlation[place] * slopes[a][i] * slopes[b][k]);
+            sum.indexed_iter_mut()
+                .for_each(|((a, b), sum)| *sum += correlation[place] * slopes[a][i] * slopes[b][k]);
         }
-        for (place, correlation) in correlation.iter().enumerate().filter(|(_, correlation)| **correlation != 0.0) {
-            assert!((correlation * variance - products[place] / counts[place]).abs() < 1e-12, "{place}");
+        for (place, correlation) in correlation
+            .iter()
+            .enumerate()
+            .filter(|(_, correlation)| **correlation != 0.0)
+        {
+            assert!(
+                (correlation * variance - products[place] / counts[place]).abs() < 1e-12,
+                "{place}"
+            );
         }
-        assert!(correlation.iter().filter(|correlation| **correlation != 0.0).count() > 8);
+        assert!(
+            correlation
+                .iter()
+                .filter(|correlation| **correlation != 0.0)
+                .count()
+                > 8
+        );
         let found = neighbours_of(&cells, &residuals, &slopes, 3);
         // but for the size of the residuals
         let shape = |a: &Array2<f64>| a / a[[0, 0]];
-        assert!((shape(&found) - shape(&sum)).iter().all(|d| d.abs() < 1e-12), "{found} {sum}");
+        assert!(
+            (shape(&found) - shape(&sum))
+                .iter()
+                .all(|d| d.abs() < 1e-12),
+            "{found} {sum}"
+        );
     }
 
     /// Variance of the sums of residuals with slopes that the fit takes out, stated and found.
     #[test]
-    fn sums_of_white_and_correlated_noise_have_their_variance_although_the_fit_takes_from_the_residuals() {
+    fn sums_of_white_and_correlated_noise_have_their_variance_although_the_fit_takes_from_the_residuals()
+     {
         let (lines, gates, repeats) = (40, 24, 24);
         let cells = cells(lines, gates, |line, gate| (7 * line + gate) % 23 != 0);
         let wave = |a: f64, b: f64| -> Vec<f64> {
-            cells.iter().map(|cell| (a * cell.line as f64).cos() * (b * cell.gate as f64).sin() + 0.3 * b).collect()
+            cells
+                .iter()
+                .map(|cell| (a * cell.line as f64).cos() * (b * cell.gate as f64).sin() + 0.3 * b)
+                .collect()
         };
         let slopes = vec![wave(0.1, 0.2), wave(0.25, 0.15), wave(0.0, 0.5)];
         let basis = orthonormal(&slopes);
@@ -455,22 +678,36 @@ mod tests {
             for _ in 0..repeats {
                 // moving means of white numbers: correlated over about `smooth` lines and half as many gates
                 let room = smooth + 1;
-                let numbers = Array2::from_shape_fn((lines + room, gates + room), |_| normal(&mut rng));
+                let numbers =
+                    Array2::from_shape_fn((lines + room, gates + room), |_| normal(&mut rng));
                 let noise: Vec<f64> = cells
                     .iter()
                     .map(|cell| {
-                        let block = numbers
-                            .slice(ndarray::s![cell.line..=cell.line + smooth, cell.gate..=cell.gate + smooth / 2]);
-                        let correlated = if smooth > 0 { block.sum() / (block.len() as f64).sqrt() } else { 0.0 };
+                        let block = numbers.slice(ndarray::s![
+                            cell.line..=cell.line + smooth,
+                            cell.gate..=cell.gate + smooth / 2
+                        ]);
+                        let correlated = if smooth > 0 {
+                            block.sum() / (block.len() as f64).sqrt()
+                        } else {
+                            0.0
+                        };
                         correlated + white * normal(&mut rng)
                     })
                     .collect();
                 let mut residuals = noise.clone();
                 for column in &basis {
                     let part = dot(column, &noise);
-                    residuals.iter_mut().zip(column).for_each(|(r, c)| *r -= part * c);
+                    residuals
+                        .iter_mut()
+                        .zip(column)
+                        .for_each(|(r, c)| *r -= part * c);
                 }
-                let all = Cells { cells: &cells, residuals: &residuals, slopes: &slopes };
+                let all = Cells {
+                    cells: &cells,
+                    residuals: &residuals,
+                    slopes: &slopes,
+                };
                 let scores = decaying(all, (1, 1)).0;
                 for (i, slope) in slopes.iter().enumerate() {
                     stated += scores[[i, i]] / dot(slope, slope);
@@ -486,11 +723,22 @@ mod tests {
     #[test]
     fn white_residuals_are_taken_as_white() {
         let cells = cells(60, 30, |line, gate| (7 * line + gate) % 23 != 0);
-        let slopes = vec![vec![1.0; cells.len()], cells.iter().map(|cell| cell.line as f64).collect()];
+        let slopes = vec![
+            vec![1.0; cells.len()],
+            cells.iter().map(|cell| cell.line as f64).collect(),
+        ];
         let white = (0..20).filter(|&seed| {
             let mut rng = Xoshiro256PlusPlus::seed_from_u64(seed);
             let residuals: Vec<f64> = cells.iter().map(|_| 2.0 * normal(&mut rng)).collect();
-            decaying(Cells { cells: &cells, residuals: &residuals, slopes: &slopes }, (1, 1)).1 == 1.0
+            decaying(
+                Cells {
+                    cells: &cells,
+                    residuals: &residuals,
+                    slopes: &slopes,
+                },
+                (1, 1),
+            )
+            .1 == 1.0
         });
         assert!(white.count() >= 18);
     }

@@ -30,7 +30,11 @@ const LEAST_GAIN: f64 = 20.0;
 /// Numbers of the secondary vortices that are fitted.
 const NUMBERS: usize = 2 * SECONDARY_PARAMETERS;
 /// The end of a fit of four; of those that are there it takes five to ten steps.
-const NEAR: Stop = Stop { iterations: 15, sigmas: 0.3, learns: false };
+const NEAR: Stop = Stop {
+    iterations: 15,
+    sigmas: 0.3,
+    learns: false,
+};
 
 /// Secondary vortices, of the left and of the right vortex, that were found beside a pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,16 +96,31 @@ impl Setting<'_, '_> {
         if gain < LEAST_GAIN.max(counted) && !always {
             return None;
         }
-        let numbers = |v: &Vortex| [v.circulation_m2_s, v.lateral_position_m, v.height_m, KNOWN_CORE.0.ln()];
-        let start: Vec<f64> = two.iter().copied().chain(secondary.iter().flat_map(numbers)).collect();
+        let numbers = |v: &Vortex| {
+            [
+                v.circulation_m2_s,
+                v.lateral_position_m,
+                v.height_m,
+                KNOWN_CORE.0.ln(),
+            ]
+        };
+        let start: Vec<f64> = two
+            .iter()
+            .copied()
+            .chain(secondary.iter().flat_map(numbers))
+            .collect();
         groups.extend((PARAMETERS..PARAMETERS + NUMBERS).map(|place| vec![place]));
         let mut settled = self.settled(start, &groups, NEAR, Some(counted)).ok()?;
         // what two vortices miss looks like noise that neighbours share: what four leave tells how many velocities count as one
-        settled.counted = self.about(&settled).alike(&settled.tangent.at, lines).min(counted);
+        settled.counted = self
+            .about(&settled)
+            .alike(&settled.tangent.at, lines)
+            .min(counted);
         let p = &settled.tangent.at;
         let gain = self.gain(&settled, &alone) - of_profile / settled.counted;
         // one far from its vortex stands for something else; a little beyond the scan it may be
-        let stands = |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
+        let stands =
+            |(ratio, distance): (f64, f64)| (RATIOS.0..0.0).contains(&ratio) && is_near(distance);
         let shown = gain >= LEAST_GAIN && secondary_ratios(p).into_iter().all(stands);
         let fitted = always || shown && self.options.secondary == Secondary::Auto;
         if !shown && !fitted {
@@ -109,9 +128,20 @@ impl Setting<'_, '_> {
         }
         let (model, wake) = self.model.with(p);
         let scores = Scores::OfNeighbours { lines };
-        let uncertainty = self.about(&settled).uncertainty(p, &settled.groups, scores).ok()?;
-        let secondary = SecondaryVortices { vortices: model.secondary?, shown, fitted };
-        Some(Found { wake, secondary, covariance: uncertainty.covariance(|_| true).ok()? })
+        let uncertainty = self
+            .about(&settled)
+            .uncertainty(p, &settled.groups, scores)
+            .ok()?;
+        let secondary = SecondaryVortices {
+            vortices: model.secondary?,
+            shown,
+            fitted,
+        };
+        Some(Found {
+            wake,
+            secondary,
+            covariance: uncertainty.covariance(|_| true).ok()?,
+        })
     }
 
     /// The vortices of the other sense, one beside each of the pair, that explain most of its residuals by their means over gates if the pair
@@ -122,15 +152,37 @@ impl Setting<'_, '_> {
         let mut slopes = rows.slopes;
         // a profile that does not fit is not mended by vortices
         let other = self.prediction.of_other_profile(pair) - &alone.tangent.here.velocity_m_s;
-        let of_profile = alone.cells.iter().map(|cell| other[[cell.line, cell.gate]] / cell.sigma_m_s);
-        slopes.push(of_profile.map(|slope| if slope.is_finite() { slope } else { 0.0 }).collect());
-        let weights: Vec<f64> = rows.residuals.iter().map(|r| self.options.loss.at(*r).1).collect();
+        let of_profile = alone
+            .cells
+            .iter()
+            .map(|cell| other[[cell.line, cell.gate]] / cell.sigma_m_s);
+        slopes.push(
+            of_profile
+                .map(|slope| if slope.is_finite() { slope } else { 0.0 })
+                .collect(),
+        );
+        let weights: Vec<f64> = rows
+            .residuals
+            .iter()
+            .map(|r| self.options.loss.at(*r).1)
+            .collect();
         let residuals = scaled(&weights, &rows.residuals);
         let inverse = inverse("curvature of the fit", &products(&weights, &slopes)).ok()?;
-        let gradient: Array1<f64> = slopes.iter().map(|slope| crate::linalg::dot(slope, &residuals)).collect();
+        let gradient: Array1<f64> = slopes
+            .iter()
+            .map(|slope| crate::linalg::dot(slope, &residuals))
+            .collect();
         let step = inverse.dot(&gradient);
         let explained = 0.5 * gradient.dot(&step);
-        let free = Residuals { pair, linear: alone, weights, residuals, slopes, inverse, step };
+        let free = Residuals {
+            pair,
+            linear: alone,
+            weights,
+            residuals,
+            slopes,
+            inverse,
+            step,
+        };
         let ((left, a), (right, b)) = (self.beside(0, &free)?, self.beside(1, &free)?);
         Some(([left, right], a + b, explained))
     }
@@ -139,7 +191,9 @@ impl Setting<'_, '_> {
     fn beside(&self, side: usize, free: &Residuals<'_>) -> Option<(Vortex, f64)> {
         let count = (DISTANCES.1 / GRID_OVER_HEIGHT).ceil() as i64;
         let best = |rows: Range<i64>, columns: Range<i64>, step: usize| {
-            let places = rows.step_by(step).flat_map(|i| columns.clone().step_by(step).map(move |j| (i, j)));
+            let places = rows
+                .step_by(step)
+                .flat_map(|i| columns.clone().step_by(step).map(move |j| (i, j)));
             let gains = places.filter_map(|at| Some((at, self.at_place(side, at, free)?)));
             gains.max_by(|(_, a), (_, b)| a.1.total_cmp(&b.1))
         };
@@ -148,35 +202,70 @@ impl Setting<'_, '_> {
     }
 
     /// The best vortex at a place of the grid about one of the pair, and what it gains; nothing where there can be none.
-    fn at_place(&self, side: usize, (i, j): (i64, i64), free: &Residuals<'_>) -> Option<(Vortex, f64)> {
+    fn at_place(
+        &self,
+        side: usize,
+        (i, j): (i64, i64),
+        free: &Residuals<'_>,
+    ) -> Option<(Vortex, f64)> {
         let own = [free.pair.left, free.pair.right][side];
         let step_m = GRID_OVER_HEIGHT * own.height_m;
-        let place_m = (own.lateral_position_m + i as f64 * step_m, own.height_m + j as f64 * step_m);
+        let place_m = (
+            own.lateral_position_m + i as f64 * step_m,
+            own.height_m + j as f64 * step_m,
+        );
         let vortex = Vortex::at(place_m, 1.0, KNOWN_CORE.0 * own.height_m);
         let distance = GRID_OVER_HEIGHT * (i as f64).hypot(j as f64);
         if !is_near(distance) || vortex.height_m <= 0.0 || !self.sees(&vortex) {
             return None;
         }
-        let plain = WakeModel { secondary: None, ..*self.model };
-        let nowhere = Vortex { circulation_m2_s: 0.0, ..own };
-        let (left, right) = if side == 0 { (vortex, nowhere) } else { (nowhere, vortex) };
+        let plain = WakeModel {
+            secondary: None,
+            ..*self.model
+        };
+        let nowhere = Vortex {
+            circulation_m2_s: 0.0,
+            ..own
+        };
+        let (left, right) = if side == 0 {
+            (vortex, nowhere)
+        } else {
+            (nowhere, vortex)
+        };
         let places = (self.map.elevation_rad, self.map.range_m);
-        let shown = Gates::at_rest(&plain, self.kernel.clone(), places).velocities(&Wake::calm(left, right));
+        let shown = Gates::at_rest(&plain, self.kernel.clone(), places)
+            .velocities(&Wake::calm(left, right));
         let cells = free.linear.cells.iter();
-        let shown: Vec<f64> = cells.map(|cell| shown[[cell.line, cell.gate]] / cell.sigma_m_s).collect();
+        let shown: Vec<f64> = cells
+            .map(|cell| shown[[cell.line, cell.gate]] / cell.sigma_m_s)
+            .collect();
         let weighted = scaled(&free.weights, &shown);
-        let shared: Array1<f64> = free.slopes.iter().map(|slope| crate::linalg::dot(slope, &weighted)).collect();
+        let shared: Array1<f64> = free
+            .slopes
+            .iter()
+            .map(|slope| crate::linalg::dot(slope, &weighted))
+            .collect();
         // what the pair could do as well does not count
         let square = crate::linalg::dot(&shown, &weighted) - shared.dot(&free.inverse.dot(&shared));
         let slope = crate::linalg::dot(&shown, &free.residuals) - shared.dot(&free.step);
-        let allowed = (RATIOS.0 * own.circulation_m2_s, RATIOS.1 * own.circulation_m2_s);
+        let allowed = (
+            RATIOS.0 * own.circulation_m2_s,
+            RATIOS.1 * own.circulation_m2_s,
+        );
         let circulation_m2_s = (slope / square).clamp(allowed.0, allowed.1);
         let gain = circulation_m2_s * (slope - 0.5 * circulation_m2_s * square);
-        (square > 0.0 && gain.is_finite()).then_some((Vortex { circulation_m2_s, ..vortex }, gain))
+        (square > 0.0 && gain.is_finite()).then_some((
+            Vortex {
+                circulation_m2_s,
+                ..vortex
+            },
+            gain,
+        ))
     }
 
     /// Whether a centre lies within the scan.
     fn sees(&self, vortex: &Vortex) -> bool {
-        self.model.sees((self.map.elevation_rad, self.map.range_m), vortex.place_m())
+        self.model
+            .sees((self.map.elevation_rad, self.map.range_m), vortex.place_m())
     }
 }

@@ -16,10 +16,16 @@ use crate::vortex_fit::map_fit::gates::Gates;
 use crate::vortex_fit::map_fit::least_squares::{LeastSquares, Scores};
 use crate::vortex_fit::map_fit::prediction::{Prediction, Tangent, near};
 use crate::vortex_fit::wake::core_prior::is_core;
-use crate::vortex_fit::{CorePrior, MapFit, MapFitOptions, Parameter, RangeKernel, Top, VelocityMap, Wake, WakeModel};
+use crate::vortex_fit::{
+    CorePrior, MapFit, MapFitOptions, Parameter, RangeKernel, Top, VelocityMap, Wake, WakeModel,
+};
 
 /// Most evaluations in a descent, and the step that is left at its end \[standard deviations\].
-const DESCENT: Stop = Stop { iterations: 200, sigmas: 1e-2, learns: false };
+const DESCENT: Stop = Stop {
+    iterations: 200,
+    sigmas: 1e-2,
+    learns: false,
+};
 /// The scale of residuals from means is taken anew this often.
 const ROUNDS: usize = 5;
 
@@ -50,7 +56,8 @@ pub(crate) struct Linear {
 impl Linear {
     /// Its cells at which another one has a velocity, too.
     pub(crate) fn shared_with(&self, other: &Self) -> Vec<Cell> {
-        let is_seen = |cell: &&Cell| other.tangent.here.velocity_m_s[[cell.line, cell.gate]].is_finite();
+        let is_seen =
+            |cell: &&Cell| other.tangent.here.velocity_m_s[[cell.line, cell.gate]].is_finite();
         self.cells.iter().filter(is_seen).cloned().collect()
     }
 }
@@ -60,7 +67,10 @@ impl Setting<'_, '_> {
     fn groups(&self, start: &Wake) -> Result<Vec<Vec<usize>>, Error> {
         let found = self.map.validate()?;
         start.validate()?;
-        self.options.core_prior.as_ref().map_or(Ok(()), CorePrior::validate)?;
+        self.options
+            .core_prior
+            .as_ref()
+            .map_or(Ok(()), CorePrior::validate)?;
         let groups = self.options.free.groups_of(start);
         enough_velocities(found, 10 * groups.len().max(1))?;
         Ok(groups)
@@ -68,12 +78,23 @@ impl Setting<'_, '_> {
 
     fn squares<'s>(&'s self, prediction: &'s dyn Prediction, cells: Vec<Cell>) -> LeastSquares<'s> {
         let (loss, prior) = (self.options.loss, self.options.core_prior);
-        LeastSquares { prediction, fold_m_s: None, cells, whitening: None, loss, prior, counted: 1.0 }
+        LeastSquares {
+            prediction,
+            fold_m_s: None,
+            cells,
+            whitening: None,
+            loss,
+            prior,
+            counted: 1.0,
+        }
     }
 
     /// Least squares about the parameters at which the model was made linear.
     pub(crate) fn about<'s>(&'s self, linear: &'s Linear) -> LeastSquares<'s> {
-        LeastSquares { counted: linear.counted, ..self.squares(&linear.tangent, linear.cells.clone()) }
+        LeastSquares {
+            counted: linear.counted,
+            ..self.squares(&linear.tangent, linear.cells.clone())
+        }
     }
 
     /// What a model gains over another one in the logarithm of the likelihood, with as many velocities counted once for both as for it. Deviations
@@ -82,7 +103,11 @@ impl Setting<'_, '_> {
     pub(crate) fn gain(&self, better: &Linear, than: &Linear) -> f64 {
         let (cells, counted) = (better.shared_with(than), better.counted);
         let of = |linear: &Linear| {
-            let squares = LeastSquares { cells: cells.clone(), counted, ..self.about(linear) };
+            let squares = LeastSquares {
+                cells: cells.clone(),
+                counted,
+                ..self.about(linear)
+            };
             squares.log_likelihood(&linear.tangent.at, &linear.groups)
         };
         (of(better) - of(than)) / counted
@@ -92,7 +117,11 @@ impl Setting<'_, '_> {
     pub(crate) fn descended(&self, start: &Wake, sigmas: f64) -> Result<MapFit, Error> {
         let stop = Stop { sigmas, ..DESCENT };
         let mut groups = self.groups(start)?;
-        let coreless: Vec<Vec<usize>> = groups.iter().filter(|group| !is_core(group)).cloned().collect();
+        let coreless: Vec<Vec<usize>> = groups
+            .iter()
+            .filter(|group| !is_core(group))
+            .cloned()
+            .collect();
         let mut p = self.options.free.start(start).to_array().to_vec();
         let scaled = |p: &[f64]| {
             let squares = self.squares(self.prediction, cells(self.map));
@@ -121,7 +150,12 @@ impl Setting<'_, '_> {
         let groups = self.groups(start)?;
         let start = self.options.free.start(start).to_array().to_vec();
         let linear = self.settled(start, &groups, stop, None)?;
-        self.outcome(&self.about(&linear), &linear.tangent.at, &linear.groups, linear.scale)
+        self.outcome(
+            &self.about(&linear),
+            &linear.tangent.at,
+            &linear.groups,
+            linear.scale,
+        )
     }
 
     /// Steps of Gauss and Newton, with so many velocities counted as one or as many as the residuals say.
@@ -133,12 +167,15 @@ impl Setting<'_, '_> {
         counted: Option<f64>,
     ) -> Result<Linear, Error> {
         let (mut groups, mut released) = (all.to_vec(), false);
-        let (mut averaging, mut last, mut sigmas_left) = (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
+        let (mut averaging, mut last, mut sigmas_left) =
+            (Averaging::default(), vec![0.0; p.len()], f64::INFINITY);
         let mut known: Option<Tangent> = None;
         let (mut alike, mut steps, mut most) = (counted.unwrap_or(1.0), 0, stop.iterations);
         while steps < most {
             steps += 1;
-            let serves = |known: &Tangent| near(&known.slopes_at, &p) && known.here.slopes.len() == groups.len();
+            let serves = |known: &Tangent| {
+                near(&known.slopes_at, &p) && known.here.slopes.len() == groups.len()
+            };
             let kept = known.take().filter(serves);
             let is_kept = kept.is_some();
             let mut linear = self.linear(&p, &groups, kept)?;
@@ -147,11 +184,22 @@ impl Setting<'_, '_> {
             }
             linear.counted = alike;
             let squares = self.about(&linear);
-            let no_way = |sigmas_left| Error::NotConverged { iterations: steps, sigmas_left };
+            let no_way = |sigmas_left| Error::NotConverged {
+                iterations: steps,
+                sigmas_left,
+            };
             let next = squares.reweighted(&p, &groups, DESCENT)?;
-            let curvature = squares.normal(&p, &groups).ok_or(no_way(sigmas_left))?.curvature;
+            let curvature = squares
+                .normal(&p, &groups)
+                .ok_or(no_way(sigmas_left))?
+                .curvature;
             let way: Vec<f64> = next.iter().zip(&p).map(|(next, p)| next - p).collect();
-            let free = |step: &[f64]| groups.iter().map(|group| step[group[0]]).collect::<Array1<f64>>();
+            let free = |step: &[f64]| {
+                groups
+                    .iter()
+                    .map(|group| step[group[0]])
+                    .collect::<Array1<f64>>()
+            };
             let product = |a: &[f64], b: &[f64]| free(a).dot(&curvature.dot(&free(b)));
             let share = averaging.part(product(&way, &last), product(&last, &last));
             sigmas_left = share * (product(&way, &way) / alike).sqrt();
@@ -171,12 +219,22 @@ impl Setting<'_, '_> {
             (last, known) = (way, Some(linear.tangent));
             keep_small_cores(&mut p, &mut groups, self.least_core_m);
         }
-        Err(Error::NotConverged { iterations: steps, sigmas_left })
+        Err(Error::NotConverged {
+            iterations: steps,
+            sigmas_left,
+        })
     }
 
     /// The model made linear about `p`, with slopes that are known from parameters near by or taken anew.
-    pub(crate) fn linear(&self, p: &[f64], groups: &[Vec<usize>], known: Option<Tangent>) -> Result<Linear, Error> {
-        let mut here = self.prediction.predict(p, if known.is_some() { &[] } else { groups });
+    pub(crate) fn linear(
+        &self,
+        p: &[f64],
+        groups: &[Vec<usize>],
+        known: Option<Tangent>,
+    ) -> Result<Linear, Error> {
+        let mut here = self
+            .prediction
+            .predict(p, if known.is_some() { &[] } else { groups });
         let mut slopes_at = p.to_vec();
         if let Some(known) = known {
             (slopes_at, here.slopes) = (known.slopes_at, known.here.slopes);
@@ -184,19 +242,35 @@ impl Setting<'_, '_> {
         let mut cells = cells(self.map);
         cells.retain(|cell| {
             let place = [cell.line, cell.gate];
-            here.velocity_m_s[place].is_finite() && here.slopes.iter().all(|slope| slope[place].is_finite())
+            here.velocity_m_s[place].is_finite()
+                && here.slopes.iter().all(|slope| slope[place].is_finite())
         });
-        let residual = |cell: &Cell| (cell.velocity_m_s - here.velocity_m_s[[cell.line, cell.gate]]) / cell.sigma_m_s;
+        let residual = |cell: &Cell| {
+            (cell.velocity_m_s - here.velocity_m_s[[cell.line, cell.gate]]) / cell.sigma_m_s
+        };
         if let Some(variances) = self.prediction.air_variances(p) {
             let deviations = learnt_deviations(&variances, &cells, residual);
-            cells.iter_mut().zip(deviations).for_each(|(cell, deviation)| cell.sigma_m_s *= deviation);
+            cells
+                .iter_mut()
+                .zip(deviations)
+                .for_each(|(cell, deviation)| cell.sigma_m_s *= deviation);
         }
         let scale = robust_scale(cells.iter().map(residual));
         finite("scale of the residuals", scale)?;
         let scale = scale.max(1e-6);
         cells.iter_mut().for_each(|cell| cell.sigma_m_s *= scale);
-        let tangent = Tangent { at: p.to_vec(), here, slopes_at };
-        Ok(Linear { tangent, groups: groups.to_vec(), cells, scale, counted: 1.0 })
+        let tangent = Tangent {
+            at: p.to_vec(),
+            here,
+            slopes_at,
+        };
+        Ok(Linear {
+            tangent,
+            groups: groups.to_vec(),
+            cells,
+            scale,
+            counted: 1.0,
+        })
     }
 
     fn outcome(
@@ -206,18 +280,28 @@ impl Setting<'_, '_> {
         groups: &[Vec<usize>],
         scale: f64,
     ) -> Result<MapFit, Error> {
-        let from = Scores::OfNeighbours { lines: self.options.correlated_lines };
+        let from = Scores::OfNeighbours {
+            lines: self.options.correlated_lines,
+        };
         let uncertainty = squares.uncertainty(p, groups, from)?;
         let residuals = squares.rows(p, &[]).residuals;
         let cost: f64 = residuals.iter().map(|r| self.options.loss.at(*r).0).sum();
         // without vortices a gate shows its mean, which is the wind at its middle, as that is linear in height
         let places = (self.map.elevation_rad, self.map.range_m);
         let middle = Gates::at_rest(self.model, self.kernel.middle(), places);
-        let wind: Vec<Vec<usize>> =
-            groups.iter().filter(|group| group[0] >= Parameter::Wind as usize).cloned().collect();
+        let wind: Vec<Vec<usize>> = groups
+            .iter()
+            .filter(|group| group[0] >= Parameter::Wind as usize)
+            .cloned()
+            .collect();
         let mut calm = p.to_vec();
         calm[..2].fill(0.0);
-        let calm = LeastSquares { prediction: &middle, prior: None, ..squares.clone() }.minimum(&calm, &wind, DESCENT);
+        let calm = LeastSquares {
+            prediction: &middle,
+            prior: None,
+            ..squares.clone()
+        }
+        .minimum(&calm, &wind, DESCENT);
         let wake = Wake::from_list(p);
         Ok(MapFit {
             wake,
@@ -227,25 +311,51 @@ impl Setting<'_, '_> {
             outliers: residuals.iter().filter(|r| r.abs() > 3.0).count(),
             residual_scale: scale,
             explained_fraction: 1.0 - cost / calm.map_or(f64::NAN, |calm| calm.normal.cost),
-            tops: vec![Top { wake, chi2: -2.0 * squares.log_likelihood(p, groups) / uncertainty.alike }],
+            tops: vec![Top {
+                wake,
+                chi2: -2.0 * squares.log_likelihood(p, groups) / uncertainty.alike,
+            }],
         })
     }
 }
 
 /// Standard deviations of the velocities of cells over those in uniform wind, as their residuals tell: ln|r| is a straight line over ln(1 +
 /// variance / its median).
-fn learnt_deviations(variances: &Array2<f64>, cells: &[Cell], residual: impl Fn(&Cell) -> f64) -> Vec<f64> {
-    let typical = median(&mut variances.iter().copied().collect::<Vec<f64>>()).max(f64::MIN_POSITIVE);
-    let broad: Vec<f64> = cells.iter().map(|cell| (variances[[cell.line, cell.gate]] / typical).ln_1p()).collect();
+fn learnt_deviations(
+    variances: &Array2<f64>,
+    cells: &[Cell],
+    residual: impl Fn(&Cell) -> f64,
+) -> Vec<f64> {
+    let typical =
+        median(&mut variances.iter().copied().collect::<Vec<f64>>()).max(f64::MIN_POSITIVE);
+    let broad: Vec<f64> = cells
+        .iter()
+        .map(|cell| (variances[[cell.line, cell.gate]] / typical).ln_1p())
+        .collect();
     let [mut n, mut x, mut y, mut xx, mut xy] = [0.0; 5];
     for (cell, broad) in cells.iter().zip(&broad) {
         let log = residual(cell).abs().ln();
         if log.is_finite() {
-            (n, x, y, xx, xy) = (n + 1.0, x + broad, y + log, xx + broad * broad, xy + broad * log);
+            (n, x, y, xx, xy) = (
+                n + 1.0,
+                x + broad,
+                y + log,
+                xx + broad * broad,
+                xy + broad * log,
+            );
         }
     }
     let power = ((n * xy - x * y) / (n * xx - x * x)).clamp(0.0, 1.0);
-    broad.into_iter().map(|broad| if power.is_finite() { (power * broad).exp() } else { 1.0 }).collect()
+    broad
+        .into_iter()
+        .map(|broad| {
+            if power.is_finite() {
+                (power * broad).exp()
+            } else {
+                1.0
+            }
+        })
+        .collect()
 }
 
 /// Raises free core radii below the least one, which are kept from then on; those of the other vortex stay free.
@@ -253,7 +363,9 @@ fn keep_small_cores(p: &mut [f64], groups: &mut Vec<Vec<usize>>, least_m: f64) {
     groups.retain(|group| {
         let is_small = is_core(group) && group.iter().any(|&place| p[place] < least_m);
         if is_small {
-            group.iter().for_each(|&place| p[place] = p[place].max(least_m));
+            group
+                .iter()
+                .for_each(|&place| p[place] = p[place].max(least_m));
         }
         !is_small
     });
@@ -266,9 +378,15 @@ mod tests {
     #[test]
     fn a_core_that_does_not_show_is_kept_alone() {
         let wake = Wake::from_array(&[480.0, 20.0, 376.5, 45.0, 423.5, 49.0, 4.0, 0.3, 1.3, 0.0]);
-        let (mut p, mut groups) = (wake.to_array().to_vec(), vec![vec![0], vec![6], vec![7], vec![8]]);
+        let (mut p, mut groups) = (
+            wake.to_array().to_vec(),
+            vec![vec![0], vec![6], vec![7], vec![8]],
+        );
         keep_small_cores(&mut p, &mut groups, 0.5);
-        assert_eq!((p[6], p[7], groups), (4.0, 0.5, vec![vec![0], vec![6], vec![8]]));
+        assert_eq!(
+            (p[6], p[7], groups),
+            (4.0, 0.5, vec![vec![0], vec![6], vec![8]])
+        );
         let mut common = vec![vec![6, 7]];
         keep_small_cores(&mut p, &mut common, 0.6);
         assert_eq!((p[6], p[7], common.len()), (4.0, 0.6, 0));
@@ -277,7 +395,9 @@ mod tests {
     /// Residuals whose size grows with the variance of the air to a known power.
     #[test]
     fn the_power_of_the_scatter_is_learnt_from_the_residuals() {
-        let variance = Array2::from_shape_fn((40, 50), |(i, j)| 0.1 * (0.2 * i as f64).exp() + 0.01 * j as f64);
+        let variance = Array2::from_shape_fn((40, 50), |(i, j)| {
+            0.1 * (0.2 * i as f64).exp() + 0.01 * j as f64
+        });
         let typical = median(&mut variance.iter().copied().collect::<Vec<f64>>());
         let grown = |power: f64| variance.mapv(|v| (1.0 + v / typical).powf(power));
         for (power, learnt) in [(0.4, 0.4), (0.0, 0.0), (-0.3, 0.0)] {
@@ -288,11 +408,18 @@ mod tests {
                 let number = (place * 12.9898).sin() * 43_758.545;
                 size * (number - number.floor() - 0.5)
             });
-            let cell =
-                |((line, gate), v): ((usize, usize), &f64)| Cell { line, gate, velocity_m_s: *v, sigma_m_s: 1.0 };
+            let cell = |((line, gate), v): ((usize, usize), &f64)| Cell {
+                line,
+                gate,
+                velocity_m_s: *v,
+                sigma_m_s: 1.0,
+            };
             let cells: Vec<Cell> = residual.indexed_iter().map(cell).collect();
             let found = learnt_deviations(&variance, &cells, |cell| cell.velocity_m_s);
-            let worst = found.iter().zip(&grown(learnt)).fold(0.0_f64, |worst, (a, b)| worst.max((a / b).ln().abs()));
+            let worst = found
+                .iter()
+                .zip(&grown(learnt))
+                .fold(0.0_f64, |worst, (a, b)| worst.max((a / b).ln().abs()));
             assert!(worst < 0.2, "{power}: {worst}");
         }
     }

@@ -32,7 +32,10 @@ pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
             Sharing::Common | Sharing::Separate => typical_m.to_vec(),
         }
     };
-    let mut starts: Vec<Wake> = cores_m(about).into_iter().map(|core_m| about.with_cores(core_m)).collect();
+    let mut starts: Vec<Wake> = cores_m(about)
+        .into_iter()
+        .map(|core_m| about.with_cores(core_m))
+        .collect();
     if let Some(equal) = with_equal_partner(about) {
         starts.truncate(1);
         starts.push(equal.with_cores(cores_m(&equal)[0]));
@@ -43,19 +46,32 @@ pub(crate) fn starts(about: &Wake, options: &MapFitOptions) -> Vec<Wake> {
 /// A vortex whose partner is far weaker with one like itself in its place, as where the partner is beyond the scan and what is taken for it is not.
 fn with_equal_partner(wake: &Wake) -> Option<Wake> {
     let Wake { left, right, .. } = *wake;
-    let is_weak = |one: &Vortex, other: &Vortex| one.circulation_m2_s < WEAK * other.circulation_m2_s;
-    let beside = |own: Vortex, by_m: f64| Vortex { lateral_position_m: own.lateral_position_m + by_m, ..own };
+    let is_weak =
+        |one: &Vortex, other: &Vortex| one.circulation_m2_s < WEAK * other.circulation_m2_s;
+    let beside = |own: Vortex, by_m: f64| Vortex {
+        lateral_position_m: own.lateral_position_m + by_m,
+        ..own
+    };
     if is_weak(&left, &right) {
-        Some(Wake { left: beside(right, -LONE_M), ..*wake })
+        Some(Wake {
+            left: beside(right, -LONE_M),
+            ..*wake
+        })
     } else if is_weak(&right, &left) {
-        Some(Wake { right: beside(left, LONE_M), ..*wake })
+        Some(Wake {
+            right: beside(left, LONE_M),
+            ..*wake
+        })
     } else {
         None
     }
 }
 
 /// The best end of the fits from some starts; the first error if none comes to an end.
-pub(crate) fn best_of(starts: &[Wake], fit: impl Fn(&Wake) -> Result<MapFit, Error>) -> Result<MapFit, Error> {
+pub(crate) fn best_of(
+    starts: &[Wake],
+    fit: impl Fn(&Wake) -> Result<MapFit, Error>,
+) -> Result<MapFit, Error> {
     let (mut ends, mut failed) = (Vec::new(), None);
     for start in starts {
         match fit(start) {
@@ -75,9 +91,13 @@ pub(crate) fn with_typical_core(
 ) -> Result<MapFit, Error> {
     for _ in 0..ROUNDS {
         let next = starts(&end.wake, options);
-        let off = |wake: &Wake| (end.wake.left.core_radius_m / wake.left.core_radius_m - 1.0).abs() > TYPICAL;
+        let off = |wake: &Wake| {
+            (end.wake.left.core_radius_m / wake.left.core_radius_m - 1.0).abs() > TYPICAL
+        };
         match next.first() {
-            Some(wake) if options.free.core_radius == Sharing::Fixed && off(wake) => end = fit(wake)?,
+            Some(wake) if options.free.core_radius == Sharing::Fixed && off(wake) => {
+                end = fit(wake)?
+            }
             _ => break,
         }
     }
@@ -91,8 +111,15 @@ fn chi2(end: &MapFit) -> f64 {
 
 /// Whether two ends are closer than so many errors of the first.
 fn same(a: &MapFit, b: &MapFit, sigmas: f64) -> bool {
-    let apart = b.wake.to_array().into_iter().zip(a.wake.to_array()).map(|(b, a)| b - a);
-    apart.enumerate().all(|(i, d)| d.powi(2) <= sigmas.powi(2) * a.covariance[[i, i]])
+    let apart = b
+        .wake
+        .to_array()
+        .into_iter()
+        .zip(a.wake.to_array())
+        .map(|(b, a)| b - a);
+    apart
+        .enumerate()
+        .all(|(i, d)| d.powi(2) <= sigmas.powi(2) * a.covariance[[i, i]])
 }
 
 /// The wakes of those ends of rough fits that lead to different ends, the best first, but for those that are hopeless.
@@ -100,7 +127,10 @@ pub(crate) fn rivals(mut ends: Vec<MapFit>) -> Vec<Wake> {
     ends.sort_by(|a, b| chi2(a).total_cmp(&chi2(b)));
     let hopeless = ends.first().map_or(f64::INFINITY, chi2) + HOPELESS;
     ends.retain(|end| chi2(end) <= hopeless);
-    distinct(ends, |better, end| same(better, end, ONE_SIGMAS)).into_iter().map(|end| end.wake).collect()
+    distinct(ends, |better, end| same(better, end, ONE_SIGMAS))
+        .into_iter()
+        .map(|end| end.wake)
+        .collect()
 }
 
 /// The best of some ends with the others as its competing tops.
@@ -109,9 +139,22 @@ fn merged(mut ends: Vec<MapFit>) -> Option<MapFit> {
     let (best, others) = ends.split_first()?;
     let others = others.iter().filter(|end| !same(best, end, SAME_SIGMAS));
     let all: Vec<&MapFit> = std::iter::once(best).chain(others).collect();
-    let weighted = all.iter().map(|end| ((0.5 * (chi2(best) - chi2(end))).exp(), &end.wake, &end.covariance));
-    let (covariance, tops) = (mixed(weighted, &best.wake), all.iter().flat_map(|end| end.tops.clone()).collect());
-    Some(MapFit { covariance, tops, ..best.clone() })
+    let weighted = all.iter().map(|end| {
+        (
+            (0.5 * (chi2(best) - chi2(end))).exp(),
+            &end.wake,
+            &end.covariance,
+        )
+    });
+    let (covariance, tops) = (
+        mixed(weighted, &best.wake),
+        all.iter().flat_map(|end| end.tops.clone()).collect(),
+    );
+    Some(MapFit {
+        covariance,
+        tops,
+        ..best.clone()
+    })
 }
 
 #[cfg(test)]
@@ -122,7 +165,18 @@ mod tests {
 
     /// An end at so many errors of its first circulation from 400 m^2/s.
     fn end(sigmas: f64, chi2: f64) -> MapFit {
-        let wake = Wake::from_array(&[400.0 + 10.0 * sigmas, 400.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.0, 0.0]);
+        let wake = Wake::from_array(&[
+            400.0 + 10.0 * sigmas,
+            400.0,
+            376.5,
+            45.0,
+            423.5,
+            49.0,
+            2.0,
+            2.0,
+            1.0,
+            0.0,
+        ]);
         MapFit {
             wake,
             covariance: Array2::from_diag_elem(PARAMETERS, 100.0),
@@ -138,8 +192,10 @@ mod tests {
     #[test]
     fn ends_are_followed_that_differ_from_better_ones_and_are_not_hopeless() {
         let ends = [end(6.0, 25.0), end(3.0, 19.0), end(0.5, 2.0), end(0.0, 0.0)];
-        let kept: Vec<f64> =
-            rivals(ends.to_vec()).iter().map(|wake| (wake.left.circulation_m2_s - 400.0) / 10.0).collect();
+        let kept: Vec<f64> = rivals(ends.to_vec())
+            .iter()
+            .map(|wake| (wake.left.circulation_m2_s - 400.0) / 10.0)
+            .collect();
         assert_eq!(kept, [0.0, 3.0]);
         // alone it is followed, however large its chi-square is
         assert_eq!(rivals(ends[..1].to_vec()).len(), 1);

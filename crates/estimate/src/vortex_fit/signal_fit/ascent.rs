@@ -44,14 +44,20 @@ impl Ascent<'_> {
     /// The state after a step of the free numbers.
     pub(crate) fn stepped(&self, state: &State, step: &[f64]) -> State {
         let numbers = stepped(&self.groups(), &numbers(state), step);
-        let powers = Powers { log_signal: numbers[PARAMETERS], log_noise: numbers[PARAMETERS + 1] };
+        let powers = Powers {
+            log_signal: numbers[PARAMETERS],
+            log_noise: numbers[PARAMETERS + 1],
+        };
         (Wake::from_list(&numbers), powers)
     }
 
     /// The free numbers of `to`, counted from `from`.
     pub(crate) fn steps(&self, from: &State, to: &State) -> Vec<f64> {
         let (a, b) = (numbers(from), numbers(to));
-        self.groups().iter().map(|group| b[group[0]] - a[group[0]]).collect()
+        self.groups()
+            .iter()
+            .map(|group| b[group[0]] - a[group[0]])
+            .collect()
     }
 
     /// ln p and its gradient by the free numbers; nothing where the model does not exist.
@@ -66,16 +72,29 @@ impl Ascent<'_> {
             let away = self.steps(&others.about, state);
             let pull = times(&others.information, &away);
             log_likelihood += dot(&others.gradient, &away) - 0.5 * dot(&pull, &away);
-            gradient.iter_mut().zip(&others.gradient).zip(&pull).for_each(|((g, o), p)| *g += o - p);
+            gradient
+                .iter_mut()
+                .zip(&others.gradient)
+                .zip(&pull)
+                .for_each(|((g, o), p)| *g += o - p);
         }
         Some((log_likelihood, gradient))
     }
 
     /// Information on the free numbers, from every so-manyth line of the model.
-    pub(crate) fn information(&self, (wake, powers): &State, stride: usize) -> Result<Array2<f64>, Error> {
+    pub(crate) fn information(
+        &self,
+        (wake, powers): &State,
+        stride: usize,
+    ) -> Result<Array2<f64>, Error> {
         let options = self.options;
-        let mut information =
-            self.model.information(wake, *powers, &options.free, options.fit_powers, stride.max(1))?;
+        let mut information = self.model.information(
+            wake,
+            *powers,
+            &options.free,
+            options.fit_powers,
+            stride.max(1),
+        )?;
         if let Some(others) = &self.others {
             information += &others.information;
         }
@@ -94,15 +113,29 @@ impl Ascent<'_> {
             let (log_likelihood, mut gradient) = self.value(&self.stepped(&start, x))?;
             gradient.iter_mut().for_each(|g| *g = -*g);
             if let Some((x_before, gradient_before)) = &last {
-                let difference = |a: &[f64], b: &[f64]| -> Vec<f64> { a.iter().zip(b).map(|(a, b)| a - b).collect() };
-                learn(&mut curvature, &difference(x, x_before), &difference(&gradient, gradient_before));
+                let difference = |a: &[f64], b: &[f64]| -> Vec<f64> {
+                    a.iter().zip(b).map(|(a, b)| a - b).collect()
+                };
+                learn(
+                    &mut curvature,
+                    &difference(x, x_before),
+                    &difference(&gradient, gradient_before),
+                );
             }
             last = Some((x.clone(), gradient.clone()));
-            Some(Normal { cost: -log_likelihood, gradient, curvature: curvature.clone() })
+            Some(Normal {
+                cost: -log_likelihood,
+                gradient,
+                curvature: curvature.clone(),
+            })
         };
         let step = |x: &Vec<f64>, step: &[f64]| x.iter().zip(step).map(|(x, s)| x + s).collect();
         let (iterations, sigmas) = (self.options.max_iterations, self.options.tolerance_sigmas);
-        let stop = Stop { iterations, sigmas, learns: true };
+        let stop = Stop {
+            iterations,
+            sigmas,
+            learns: true,
+        };
         let end = converged(lowest(origin, stop, evaluate, step), stop)?;
         Ok((self.stepped(&start, &end.at), -end.normal.cost))
     }
@@ -110,12 +143,19 @@ impl Ascent<'_> {
 
 /// The parameters of the wake and the logarithms of the powers.
 fn numbers((wake, powers): &State) -> Vec<f64> {
-    wake.to_array().into_iter().chain([powers.log_signal, powers.log_noise]).collect()
+    wake.to_array()
+        .into_iter()
+        .chain([powers.log_signal, powers.log_noise])
+        .collect()
 }
 
 /// A matrix times a vector.
 pub(crate) fn times(matrix: &Array2<f64>, vector: &[f64]) -> Vec<f64> {
-    matrix.rows().into_iter().map(|row| dot(&row.to_vec(), vector)).collect()
+    matrix
+        .rows()
+        .into_iter()
+        .map(|row| dot(&row.to_vec(), vector))
+        .collect()
 }
 
 /// Corrects the curvature so that it explains the change `y` of the gradient over the step `s`: the update of Broyden, Fletcher,
@@ -126,8 +166,16 @@ fn learn(curvature: &mut Array2<f64>, s: &[f64], y: &[f64]) {
     if shs <= 0.0 {
         return;
     }
-    let part = if sy >= 0.2 * shs { 1.0 } else { 0.8 * shs / (shs - sy) };
-    let r: Vec<f64> = y.iter().zip(&hs).map(|(y, h)| part * y + (1.0 - part) * h).collect();
+    let part = if sy >= 0.2 * shs {
+        1.0
+    } else {
+        0.8 * shs / (shs - sy)
+    };
+    let r: Vec<f64> = y
+        .iter()
+        .zip(&hs)
+        .map(|(y, h)| part * y + (1.0 - part) * h)
+        .collect();
     let sr = dot(s, &r);
     for ((i, j), c) in curvature.indexed_iter_mut() {
         *c += r[i] * r[j] / sr - hs[i] * hs[j] / shs;

@@ -21,7 +21,12 @@ pub(crate) struct Banded {
 #[inline(always)]
 fn subtract(target: (&mut [f64], &mut [f64]), source: (&[f64], &[f64]), (a, b): (f64, f64)) {
     let n = target.0.len();
-    let (tr, ti, sr, si) = (&mut target.0[..n], &mut target.1[..n], &source.0[..n], &source.1[..n]);
+    let (tr, ti, sr, si) = (
+        &mut target.0[..n],
+        &mut target.1[..n],
+        &source.0[..n],
+        &source.1[..n],
+    );
     for i in 0..n {
         tr[i] -= sr[i] * a + si[i] * b;
         ti[i] -= si[i] * a - sr[i] * b;
@@ -45,7 +50,10 @@ impl Banded {
 
     /// Multiplies all entries.
     pub(crate) fn scale(&mut self, factor: f64) {
-        self.re.iter_mut().chain(&mut self.im).for_each(|entry| *entry *= factor);
+        self.re
+            .iter_mut()
+            .chain(&mut self.im)
+            .for_each(|entry| *entry *= factor);
     }
 
     /// Entries of a column below and on the diagonal.
@@ -90,8 +98,14 @@ pub(crate) fn factorize(band: &mut Banded) -> Option<f64> {
             let target = (k - 1) * (band.width + 1);
             let count = height - k;
             subtract(
-                (&mut re_tail[target..target + count], &mut im_tail[target..target + count]),
-                (&re_head[start + k..start + height], &im_head[start + k..start + height]),
+                (
+                    &mut re_tail[target..target + count],
+                    &mut im_tail[target..target + count],
+                ),
+                (
+                    &re_head[start + k..start + height],
+                    &im_head[start + k..start + height],
+                ),
                 factor,
             );
         }
@@ -112,7 +126,10 @@ pub(crate) fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize
         // x -= L value: `subtract` conjugates its factor
         subtract(
             (&mut re[j + 1..end], &mut im[j + 1..end]),
-            (&band.re[start + 1..start + 1 + count], &band.im[start + 1..start + 1 + count]),
+            (
+                &band.re[start + 1..start + 1 + count],
+                &band.im[start + 1..start + 1 + count],
+            ),
             (value.0, -value.1),
         );
     }
@@ -123,7 +140,12 @@ pub(crate) fn forward(band: &Banded, re: &mut [f64], im: &mut [f64], from: usize
 pub(crate) fn inverse_into(band: &Banded, out: &mut Banded) {
     out.reset(band.order, band.width);
     let stride = band.width + 1;
-    let (mut lr, mut li, mut xr, mut xi) = (vec![0.0; stride], vec![0.0; stride], vec![0.0; stride], vec![0.0; stride]);
+    let (mut lr, mut li, mut xr, mut xi) = (
+        vec![0.0; stride],
+        vec![0.0; stride],
+        vec![0.0; stride],
+        vec![0.0; stride],
+    );
     for j in (0..band.order).rev() {
         let (start, count) = (band.at(j, 0), band.height(j) - 1);
         let scale = band.re[start].recip();
@@ -137,9 +159,17 @@ pub(crate) fn inverse_into(band: &Banded, out: &mut Banded) {
         for k in 0..count {
             let column = (j + 1 + k) * stride;
             let rows = count - k;
-            let (vr, vi) = (&out.re[column..column + rows], &out.im[column..column + rows]);
-            subtract((&mut xr[k..count], &mut xi[k..count]), (vr, vi), (-lr[k], li[k]));
-            let (sum_re, sum_im) = conjugate_dot(&vr[1..], &vi[1..], &lr[k + 1..count], &li[k + 1..count]);
+            let (vr, vi) = (
+                &out.re[column..column + rows],
+                &out.im[column..column + rows],
+            );
+            subtract(
+                (&mut xr[k..count], &mut xi[k..count]),
+                (vr, vi),
+                (-lr[k], li[k]),
+            );
+            let (sum_re, sum_im) =
+                conjugate_dot(&vr[1..], &vi[1..], &lr[k + 1..count], &li[k + 1..count]);
             xr[k] += sum_re;
             xi[k] += sum_im;
         }
@@ -171,7 +201,10 @@ fn conjugate_dot(vr: &[f64], vi: &[f64], lr: &[f64], li: &[f64]) -> (f64, f64) {
         re[0] += vr[i] * lr[i] + vi[i] * li[i];
         im[0] += vr[i] * li[i] - vi[i] * lr[i];
     }
-    ((re[0] + re[1]) + (re[2] + re[3]), (im[0] + im[1]) + (im[2] + im[3]))
+    (
+        (re[0] + re[1]) + (re[2] + re[3]),
+        (im[0] + im[1]) + (im[2] + im[3]),
+    )
 }
 
 #[cfg(test)]
@@ -191,8 +224,11 @@ mod tests {
         let mut dense = Array2::zeros((order, order));
         for j in 0..order {
             for d in 0..=band.width.min(order - 1 - j) {
-                let value =
-                    if d == 0 { C64::new(3.0 * width as f64 + normal(), 0.0) } else { C64::new(normal(), normal()) };
+                let value = if d == 0 {
+                    C64::new(3.0 * width as f64 + normal(), 0.0)
+                } else {
+                    C64::new(normal(), normal())
+                };
                 let place = band.at(j, d);
                 (band.re[place], band.im[place]) = (value.re, value.im);
                 dense[[j + d, j]] = value;
@@ -216,7 +252,10 @@ mod tests {
                 for d in 0..=out.width.min(order - 1 - j) {
                     let place = out.at(j, d);
                     let found = C64::new(out.re[place], out.im[place]);
-                    assert!((found - inverse[[j + d, j]]).norm() < 1e-12, "{order} {width} {j} {d}");
+                    assert!(
+                        (found - inverse[[j + d, j]]).norm() < 1e-12,
+                        "{order} {width} {j} {d}"
+                    );
                 }
             }
         }
@@ -226,7 +265,15 @@ mod tests {
     fn forward_and_backward_solve_with_the_dense_matrix() {
         let (mut band, dense) = random(25, 6);
         factorize(&mut band).unwrap();
-        let x: Vec<C64> = (0..25).map(|i| if i < 4 { C64::ZERO } else { C64::new(i as f64, 1.0 - i as f64) }).collect();
+        let x: Vec<C64> = (0..25)
+            .map(|i| {
+                if i < 4 {
+                    C64::ZERO
+                } else {
+                    C64::new(i as f64, 1.0 - i as f64)
+                }
+            })
+            .collect();
         let (mut re, mut im): (Vec<f64>, Vec<f64>) = x.iter().map(|x| (x.re, x.im)).unzip();
         forward(&band, &mut re, &mut im, 4, 25);
         let mut solution: Vec<C64> = re.iter().zip(&im).map(|(a, b)| C64::new(*a, *b)).collect();

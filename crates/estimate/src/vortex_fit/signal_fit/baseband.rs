@@ -39,7 +39,11 @@ impl Baseband {
         sampling.validate_for(kind)?;
         let (low_hz, high_hz) = sampling.band_hz;
         if kind == SignalKind::Real && (low_hz <= 0.0 || high_hz >= 0.5 * sampling.sample_rate_hz) {
-            return Err(Error::Band { low_hz, high_hz, allowed: "inside 0 Hz and half the rate for real samples" });
+            return Err(Error::Band {
+                low_hz,
+                high_hz,
+                allowed: "inside 0 Hz and half the rate for real samples",
+            });
         }
         let bandwidth_hz = high_hz - low_hz;
         let decimation = (sampling.sample_rate_hz / bandwidth_hz * (1.0 + 1e-9)).floor() as usize;
@@ -51,11 +55,20 @@ impl Baseband {
             if kind == SignalKind::Real {
                 // the mirror image, as seen from the middle of the band
                 stop_hz = stop_hz.min(2.0 * low_hz + 0.5 * bandwidth_hz);
-                stop_hz = stop_hz.min(2.0 * (0.5 * sampling.sample_rate_hz - high_hz) + 0.5 * bandwidth_hz);
+                stop_hz = stop_hz
+                    .min(2.0 * (0.5 * sampling.sample_rate_hz - high_hz) + 0.5 * bandwidth_hz);
             }
-            low_pass(0.5 * PASS * bandwidth_hz / sampling.sample_rate_hz, stop_hz / sampling.sample_rate_hz)
+            low_pass(
+                0.5 * PASS * bandwidth_hz / sampling.sample_rate_hz,
+                stop_hz / sampling.sample_rate_hz,
+            )
         };
-        Ok(Self { sampling: *sampling, kind, decimation, taps })
+        Ok(Self {
+            sampling: *sampling,
+            kind,
+            decimation,
+            taps,
+        })
     }
 
     /// Interval between the samples of the baseband \[s\].
@@ -71,7 +84,10 @@ impl Baseband {
     pub fn samples(&self, record_samples: usize) -> Result<usize, Error> {
         let window_samples = self.taps.len();
         if window_samples > record_samples {
-            return Err(Error::WindowLongerThanRecord { window_samples, record_samples });
+            return Err(Error::WindowLongerThanRecord {
+                window_samples,
+                record_samples,
+            });
         }
         Ok((record_samples - window_samples) / self.decimation + 1)
     }
@@ -88,7 +104,11 @@ impl Baseband {
     /// As [`Baseband::samples`].
     pub fn convert<S: Sample>(&self, record: &[S]) -> Result<Vec<Complex<f64>>, Error> {
         let count = self.samples(record.len())?;
-        let gain = if self.kind == SignalKind::Real { SQRT_2 } else { 1.0 };
+        let gain = if self.kind == SignalKind::Real {
+            SQRT_2
+        } else {
+            1.0
+        };
         let turns = self.centre_hz() * self.sampling.period_s();
         let demodulated: Vec<Complex<f64>> = record
             .iter()
@@ -99,7 +119,13 @@ impl Baseband {
             })
             .collect();
         Ok((0..count)
-            .map(|k| self.taps.iter().zip(&demodulated[k * self.decimation..]).map(|(h, z)| z * *h).sum())
+            .map(|k| {
+                self.taps
+                    .iter()
+                    .zip(&demodulated[k * self.decimation..])
+                    .map(|(h, z)| z * *h)
+                    .sum()
+            })
             .collect())
     }
 
@@ -121,7 +147,11 @@ impl Baseband {
     fn gain(&self, turn_rad_s: f64) -> f64 {
         let middle = self.taps.len() / 2;
         let angle = turn_rad_s * self.sampling.period_s();
-        self.taps[middle] + 2.0 * (1..=middle).map(|n| self.taps[middle + n] * (angle * n as f64).cos()).sum::<f64>()
+        self.taps[middle]
+            + 2.0
+                * (1..=middle)
+                    .map(|n| self.taps[middle + n] * (angle * n as f64).cos())
+                    .sum::<f64>()
     }
 
     /// Table of the power gain against velocity, from -`reach` to `reach` about the middle of the band.
@@ -131,9 +161,16 @@ impl Baseband {
         let points = 2048;
         let step_m_s = 2.0 * half_m_s / points as f64;
         let values = (0..=points)
-            .map(|i| self.gain(self.turn_rad_s(centre_m_s - half_m_s + i as f64 * step_m_s)).powi(2))
+            .map(|i| {
+                self.gain(self.turn_rad_s(centre_m_s - half_m_s + i as f64 * step_m_s))
+                    .powi(2)
+            })
             .collect();
-        PowerGain { first_m_s: centre_m_s - half_m_s, step_m_s, values }
+        PowerGain {
+            first_m_s: centre_m_s - half_m_s,
+            step_m_s,
+            values,
+        }
     }
 
     /// Covariance of the noise at lags 0 .. `lags` of the baseband, for unit noise power in the detector band.
@@ -155,11 +192,17 @@ impl Baseband {
                 let turn = TAU * (from_hz + (i as f64 + 0.5) * step_hz);
                 let power = density * self.gain(turn).powi(2) * step_hz / half_hz;
                 let angle = turn * self.interval_s();
-                covariance.iter_mut().enumerate().for_each(|(m, c)| *c += power * (angle * m as f64).cos());
+                covariance
+                    .iter_mut()
+                    .enumerate()
+                    .for_each(|(m, c)| *c += power * (angle * m as f64).cos());
             }
         }
         let width = 0.25 * (lags as f64 + 1.0);
-        covariance.iter_mut().enumerate().for_each(|(m, c)| *c *= (-0.5 * (m as f64 / width).powi(2)).exp());
+        covariance
+            .iter_mut()
+            .enumerate()
+            .for_each(|(m, c)| *c *= (-0.5 * (m as f64 / width).powi(2)).exp());
         covariance
     }
 }
@@ -179,7 +222,10 @@ impl PowerGain {
         let place = ((velocity_m_s - self.first_m_s) / self.step_m_s).rem_euclid(intervals as f64);
         let index = (place as usize).min(intervals - 1);
         let (a, b) = (self.values[index], self.values[index + 1]);
-        (a + (place - index as f64) * (b - a), (b - a) / self.step_m_s)
+        (
+            a + (place - index as f64) * (b - a),
+            (b - a) / self.step_m_s,
+        )
     }
 }
 
@@ -190,7 +236,11 @@ fn low_pass(pass: f64, stop: f64) -> Vec<f64> {
     let cut = pass + stop;
     let taps: Vec<f64> = (-half..=half)
         .map(|n| {
-            let sinc = if n == 0 { cut } else { (PI * cut * n as f64).sin() / (PI * n as f64) };
+            let sinc = if n == 0 {
+                cut
+            } else {
+                (PI * cut * n as f64).sin() / (PI * n as f64)
+            };
             let x = n as f64 / (half as f64 + 1.0);
             sinc * bessel_i0(beta * (1.0 - x * x).sqrt())
         })
@@ -227,14 +277,20 @@ mod tests {
         assert!(baseband.taps.len() < 60, "{}", baseband.taps.len());
         for velocity in [-11.0, 0.0, 3.3, 15.0] {
             let turn = TAU * table_2().frequency_hz(velocity) / 250e6;
-            let record: Vec<f64> = (0..400).map(|n| SQRT_2 * (turn * n as f64 + 0.4).cos()).collect();
+            let record: Vec<f64> = (0..400)
+                .map(|n| SQRT_2 * (turn * n as f64 + 0.4).cos())
+                .collect();
             let out = baseband.convert(&record).unwrap();
             let (gain, _) = baseband.power_gain().at(velocity);
             for (k, z) in out.iter().enumerate() {
                 let time_s = baseband.delay_s() + k as f64 * baseband.interval_s();
                 // the demodulation begins at phase 0 with the record
-                let expected = Complex::from_polar(gain.sqrt(), baseband.turn_rad_s(velocity) * time_s + 0.4);
-                assert!((z - expected).norm() < 3e-3, "{velocity} m/s: {z} {expected}");
+                let expected =
+                    Complex::from_polar(gain.sqrt(), baseband.turn_rad_s(velocity) * time_s + 0.4);
+                assert!(
+                    (z - expected).norm() < 3e-3,
+                    "{velocity} m/s: {z} {expected}"
+                );
             }
             assert!(velocity.abs() > 11.5 || (gain - 1.0).abs() < 4e-3);
         }
@@ -247,7 +303,10 @@ mod tests {
         let record: Vec<Complex<f64>> = (0..9).map(|n| Complex::new(f64::from(n), -1.0)).collect();
         assert_eq!(baseband.convert(&record).unwrap(), record);
         let white = baseband.noise_covariance(Noise::White, 8);
-        assert!((white[0] - 1.0).abs() < 1e-12 && white[3].abs() < 1e-3, "{white:?}");
+        assert!(
+            (white[0] - 1.0).abs() < 1e-12 && white[3].abs() < 1e-3,
+            "{white:?}"
+        );
     }
 
     #[test]
@@ -255,24 +314,40 @@ mod tests {
         let baseband = Baseband::new(&table_2(), SignalKind::Real).unwrap();
         let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(3);
         // variance 125/50 for unit power in the band
-        let record: Vec<f64> =
-            (0..1_000_000).map(|_| 2.5_f64.sqrt() * rng.sample::<f64, _>(rand_distr::StandardNormal)).collect();
+        let record: Vec<f64> = (0..1_000_000)
+            .map(|_| 2.5_f64.sqrt() * rng.sample::<f64, _>(rand_distr::StandardNormal))
+            .collect();
         let out = baseband.convert(&record).unwrap();
         let model = baseband.noise_covariance(Noise::White, 45);
         for lag in [0, 1, 2, 5] {
             let pairs = out.len() - lag;
-            let mean: Complex<f64> =
-                (0..pairs).map(|k| out[k + lag] * out[k].conj()).sum::<Complex<f64>>() / pairs as f64;
+            let mean: Complex<f64> = (0..pairs)
+                .map(|k| out[k + lag] * out[k].conj())
+                .sum::<Complex<f64>>()
+                / pairs as f64;
             let error = (pairs as f64).sqrt().recip() * model[0] * 1.3;
-            assert!((mean - model[lag]).norm() < 4.0 * error, "lag {lag}: {mean} {}", model[lag]);
+            assert!(
+                (mean - model[lag]).norm() < 4.0 * error,
+                "lag {lag}: {mean} {}",
+                model[lag]
+            );
         }
     }
 
     #[test]
     fn records_shorter_than_the_filter_and_bands_at_the_edge_are_refused() {
         let baseband = Baseband::new(&table_2(), SignalKind::Real).unwrap();
-        assert!(matches!(baseband.samples(10), Err(Error::WindowLongerThanRecord { record_samples: 10, .. })));
+        assert!(matches!(
+            baseband.samples(10),
+            Err(Error::WindowLongerThanRecord {
+                record_samples: 10,
+                ..
+            })
+        ));
         let edge = Sampling::new(250e6, 80e6, 1.55e-6, (55e6, 125e6)).unwrap();
-        assert!(matches!(Baseband::new(&edge, SignalKind::Real), Err(Error::Band { .. })));
+        assert!(matches!(
+            Baseband::new(&edge, SignalKind::Real),
+            Err(Error::Band { .. })
+        ));
     }
 }

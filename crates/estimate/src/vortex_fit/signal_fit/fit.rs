@@ -14,7 +14,8 @@ use crate::vortex_fit::signal_fit::tops::{CORES_OVER_SPACING, Candidate, near_li
 use crate::vortex_fit::top::mixed;
 use crate::vortex_fit::wake::free_parameters::spread;
 use crate::vortex_fit::{
-    FreeParameters, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing, SignalFitOptions, Starts, Top, Wake,
+    FreeParameters, Parameter, Powers, ScanModel, ScanSetup, ScanSignals, Sharing,
+    SignalFitOptions, Starts, Top, Wake,
 };
 use crate::window::Sample;
 
@@ -72,7 +73,10 @@ impl ScanModel {
         powers_free: bool,
     ) -> Result<Array2<f64>, Error> {
         let information = self.information(wake, powers, free, powers_free, 1)?;
-        Ok(spread(&free.groups(), &inverse("information on the wake", &information)?))
+        Ok(spread(
+            &free.groups(),
+            &inverse("information on the wake", &information)?,
+        ))
     }
 }
 
@@ -100,7 +104,12 @@ pub fn fit_signals<S: Sample>(
     }
     let model = ScanModel::new(setup, &snr, &start)?;
     let signals = ScanSignals::new(&model, records, noise_power)?;
-    let search = Search { setup, snr: &snr, signals: &signals, options };
+    let search = Search {
+        setup,
+        snr: &snr,
+        signals: &signals,
+        options,
+    };
     let mut tops = vec![search.settle((start, Powers::default()), true)?];
     if options.starts == Starts::Several {
         for other in search.others(&tops[0])? {
@@ -108,7 +117,11 @@ pub fn fit_signals<S: Sample>(
                 search.settle(other.state, false)
             } else {
                 let log_likelihood = tops[0].log_likelihood + other.gain;
-                Ok(Settled { model: Rc::clone(&tops[0].model), state: other.state, log_likelihood })
+                Ok(Settled {
+                    model: Rc::clone(&tops[0].model),
+                    state: other.state,
+                    log_likelihood,
+                })
             };
             // a start that leads nowhere is no top
             tops.extend(settled);
@@ -138,13 +151,32 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         let (mut state, signals, options) = (start, self.signals, self.options);
         for round in 0..ROUNDS {
             let model = ScanModel::new(self.setup, self.snr, &state.0)?;
-            let ascent = Ascent { model: &model, signals, options, others: None };
+            let ascent = Ascent {
+                model: &model,
+                signals,
+                options,
+                others: None,
+            };
             // The likelihood of a strong signal has many tops; that of the same signal said to be weak leads to the highest.
             let weaker = |wake: Wake, snr: f64| {
-                let weak = Powers { log_signal: (snr / model.largest_snr).ln(), log_noise: 0.0 };
-                let options = SignalFitOptions { fit_powers: false, tolerance_sigmas: ROUGH_SIGMAS, ..*options };
-                let ascent = Ascent { model: &model, signals, options: &options, others: None };
-                ascent.climb((wake, weak)).map(|((wake, _), _)| (wake, Powers::default()))
+                let weak = Powers {
+                    log_signal: (snr / model.largest_snr).ln(),
+                    log_noise: 0.0,
+                };
+                let options = SignalFitOptions {
+                    fit_powers: false,
+                    tolerance_sigmas: ROUGH_SIGMAS,
+                    ..*options
+                };
+                let ascent = Ascent {
+                    model: &model,
+                    signals,
+                    options: &options,
+                    others: None,
+                };
+                ascent
+                    .climb((wake, weak))
+                    .map(|((wake, _), _)| (wake, Powers::default()))
             };
             if rough && round == 0 && model.largest_snr > 1.0 {
                 state = weaker(state.0, 1.0)?;
@@ -158,10 +190,17 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
             };
             state = end.0;
             if model.covers(&state.0) {
-                return Ok(Settled { model: Rc::new(model), state, log_likelihood: end.1 });
+                return Ok(Settled {
+                    model: Rc::new(model),
+                    state,
+                    log_likelihood: end.1,
+                });
             }
         }
-        Err(Error::NotConverged { iterations: ROUNDS, sigmas_left: f64::INFINITY })
+        Err(Error::NotConverged {
+            iterations: ROUNDS,
+            sigmas_left: f64::INFINITY,
+        })
     }
 
     /// States near other tops than the first.
@@ -172,7 +211,12 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
         }
         let rough = ScanModel::with_layers(self.setup, self.snr, &guess, ROUGH_LAYERS)?;
         let near = near_lines(&rough, &first.state.0);
-        let ascent = Ascent { model: &first.model, signals: self.signals, options: self.options, others: None };
+        let ascent = Ascent {
+            model: &first.model,
+            signals: self.signals,
+            options: self.options,
+            others: None,
+        };
         ascent.other_tops(&near, first.state)
     }
 
@@ -180,25 +224,51 @@ impl<F: Fn(f64, f64) -> f64> Search<'_, F> {
     fn finish(&self, mut settled: Vec<Settled>) -> Result<SignalFit, Error> {
         let (options, signals) = (self.options, self.signals);
         settled.sort_by(|a, b| b.log_likelihood.total_cmp(&a.log_likelihood));
-        let failed = Error::NotConverged { iterations: ROUNDS, sigmas_left: f64::NAN };
+        let failed = Error::NotConverged {
+            iterations: ROUNDS,
+            sigmas_left: f64::NAN,
+        };
         let mut tops: Vec<(&Settled, Array2<f64>, Array2<f64>)> = Vec::new();
         for next in &settled {
-            let ascent = Ascent { model: &next.model, signals, options, others: None };
-            if tops.iter().any(|(top, information, _)| ascent.same(information, &top.state, &next.state)) {
+            let ascent = Ascent {
+                model: &next.model,
+                signals,
+                options,
+                others: None,
+            };
+            if tops
+                .iter()
+                .any(|(top, information, _)| ascent.same(information, &top.state, &next.state))
+            {
                 continue;
             }
-            let stride = if tops.is_empty() { 1 } else { options.information_stride };
+            let stride = if tops.is_empty() {
+                1
+            } else {
+                options.information_stride
+            };
             let share = signals.used_rays() as f64 / next.model.rays as f64;
             let information = ascent.information(&next.state, stride)? * share;
-            let within = spread(&options.free.groups(), &inverse("information on the wake", &information)?);
+            let within = spread(
+                &options.free.groups(),
+                &inverse("information on the wake", &information)?,
+            );
             tops.push((next, information, within));
         }
         let (best, _, bound) = tops.first().ok_or(failed.clone())?;
         let (wake, powers) = best.state;
-        let without = best.model.log_likelihood(signals, &wake.wind_alone(), powers).ok_or(failed)?;
+        let without = best
+            .model
+            .log_likelihood(signals, &wake.wind_alone(), powers)
+            .ok_or(failed)?;
         let weight = |top: &Settled| (top.log_likelihood - best.log_likelihood).exp();
-        let weighted = tops.iter().map(|(top, _, within)| (weight(top), &top.state.0, within));
-        let top = |(top, ..): &(&Settled, _, _)| Top { wake: top.state.0, chi2: -2.0 * top.log_likelihood };
+        let weighted = tops
+            .iter()
+            .map(|(top, _, within)| (weight(top), &top.state.0, within));
+        let top = |(top, ..): &(&Settled, _, _)| Top {
+            wake: top.state.0,
+            chi2: -2.0 * top.log_likelihood,
+        };
         Ok(SignalFit {
             wake,
             powers,

@@ -53,17 +53,31 @@ impl ScanSignals {
     /// # Errors
     /// [`Error::Length`] if rays or samples are not those of the model, [`Error::OutOfRange`] for a power that is not positive,
     /// [`Error::Empty`] if no ray is left.
-    pub fn new<S: Sample>(model: &ScanModel, records: ArrayView2<'_, S>, noise_power: f64) -> Result<Self, Error> {
+    pub fn new<S: Sample>(
+        model: &ScanModel,
+        records: ArrayView2<'_, S>,
+        noise_power: f64,
+    ) -> Result<Self, Error> {
         length("rays of the records", model.rays, records.nrows())?;
         length("samples of a record", model.record_samples, records.ncols())?;
         positive("noise_power", noise_power)?;
         let scale = noise_power.sqrt().recip();
         positive("1 / sqrt(noise_power)", scale)?;
         let rays = map_each(records.nrows(), |ray| {
-            let row: Vec<S> = records.row(ray).iter().map(|sample| sample.scaled(scale)).collect();
-            if row.iter().all(|sample| sample.is_finite()) { model.baseband.convert(&row).map(Some) } else { Ok(None) }
+            let row: Vec<S> = records
+                .row(ray)
+                .iter()
+                .map(|sample| sample.scaled(scale))
+                .collect();
+            if row.iter().all(|sample| sample.is_finite()) {
+                model.baseband.convert(&row).map(Some)
+            } else {
+                Ok(None)
+            }
         });
-        let signals = Self { rays: rays.into_iter().collect::<Result<_, _>>()? };
+        let signals = Self {
+            rays: rays.into_iter().collect::<Result<_, _>>()?,
+        };
         not_empty("rays without missing samples", signals.used_rays())?;
         Ok(signals)
     }
@@ -88,7 +102,12 @@ impl ScanModel {
     /// Log-likelihood and gradient of a wake; nothing where the model does not exist (a core without radius, or a
     /// covariance that is not positive definite).
     #[must_use]
-    pub fn log_likelihood(&self, signals: &ScanSignals, wake: &Wake, powers: Powers) -> Option<LikelihoodValue> {
+    pub fn log_likelihood(
+        &self,
+        signals: &ScanSignals,
+        wake: &Wake,
+        powers: Powers,
+    ) -> Option<LikelihoodValue> {
         wake.validate().ok()?;
         let (signal_power, noise_power) = (powers.log_signal.exp(), powers.log_noise.exp());
         let of_line = |space: &mut Space, index: usize| {
@@ -102,16 +121,28 @@ impl ScanModel {
             let log_determinant = factorize(&mut space.factor)?;
             inverse_into(&space.factor, &mut space.inverse);
             // the inverse becomes the weight of the gradient: sum of x x^H - R^-1, off the diagonal for both triangles
-            let Space { work, signal, factor, inverse: weight } = space;
+            let Space {
+                work,
+                signal,
+                factor,
+                inverse: weight,
+            } = space;
             weight.scale(-(rays.len() as f64));
             for z in rays {
                 let x = solve(factor, z);
-                let quadratic: f64 = x.iter().zip(z).map(|(x, z)| x.re * z.re + x.im * z.im).sum();
+                let quadratic: f64 = x
+                    .iter()
+                    .zip(z)
+                    .map(|(x, z)| x.re * z.re + x.im * z.im)
+                    .sum();
                 value.log_likelihood -= log_determinant + quadratic;
                 add_outer(weight, &x);
             }
             double_off_diagonal(weight);
-            value.by_powers = [signal_power * product(weight, signal), noise_power * self.noise_product(weight)];
+            value.by_powers = [
+                signal_power * product(weight, signal),
+                noise_power * self.noise_product(weight),
+            ];
             weight.scale(signal_power);
             self.pull_back(line, weight, work, &mut value.by_wake);
             Some(value)
@@ -121,15 +152,26 @@ impl ScanModel {
         for line in map_indexed(self.lines.len(), Space::default, of_line) {
             let line = line?;
             sum.log_likelihood += line.log_likelihood;
-            sum.by_wake.iter_mut().zip(line.by_wake).for_each(|(s, l)| *s += l);
-            sum.by_powers.iter_mut().zip(line.by_powers).for_each(|(s, l)| *s += l);
+            sum.by_wake
+                .iter_mut()
+                .zip(line.by_wake)
+                .for_each(|(s, l)| *s += l);
+            sum.by_powers
+                .iter_mut()
+                .zip(line.by_powers)
+                .for_each(|(s, l)| *s += l);
         }
         sum.log_likelihood.is_finite().then_some(sum)
     }
 
     /// Covariance of a line in `space.factor`, that of its signal for unit noise power in `space.signal`.
     fn covariance_into(&self, line: &Line, wake: &Wake, powers: Powers, space: &mut Space) {
-        let Space { work, signal, factor, .. } = space;
+        let Space {
+            work,
+            signal,
+            factor,
+            ..
+        } = space;
         self.wind_into(line, wake, work);
         self.signal_into(line, work, signal);
         factor.clone_from(signal);
@@ -140,14 +182,25 @@ impl ScanModel {
     /// Adds the covariance of noise of that power.
     fn add_noise(&self, power: f64, band: &mut Banded) {
         for column in band.re.chunks_exact_mut(band.width + 1) {
-            column.iter_mut().zip(&self.noise).for_each(|(c, n)| *c += power * n);
+            column
+                .iter_mut()
+                .zip(&self.noise)
+                .for_each(|(c, n)| *c += power * n);
         }
     }
 
     /// Sum of the weights times the covariance of the noise.
     fn noise_product(&self, weight: &Banded) -> f64 {
         let columns = weight.re.chunks_exact(weight.width + 1);
-        columns.map(|column| column.iter().zip(&self.noise).map(|(w, n)| w * n).sum::<f64>()).sum()
+        columns
+            .map(|column| {
+                column
+                    .iter()
+                    .zip(&self.noise)
+                    .map(|(w, n)| w * n)
+                    .sum::<f64>()
+            })
+            .sum()
     }
 
     /// Fisher information \[n, n\] of all rays of the scan on the free parameters of a wake; with `powers_free` the logarithms of
@@ -173,8 +226,11 @@ impl ScanModel {
         let of_line = |space: &mut Space, index: usize| {
             self.covariance_into(lines[index], wake, powers, space);
             let order = space.factor.order;
-            let indefinite =
-                Error::Linalg { what: "covariance of a line of sight", order, reason: "is not positive definite" };
+            let indefinite = Error::Linalg {
+                what: "covariance of a line of sight",
+                order,
+                reason: "is not positive definite",
+            };
             factorize(&mut space.factor).ok_or(indefinite)?;
             let whitened = groups.iter().map(|group| {
                 let change = &mut space.inverse;
@@ -188,14 +244,22 @@ impl ScanModel {
                         self.add_noise(noise_power, change);
                     }
                     _ => {
-                        let slope = |slopes: &[f64; PARAMETERS]| group.iter().map(|&place| slopes[place]).sum::<f64>();
-                        self.change_into(lines[index], &mut space.work, |slopes| signal_power * slope(slopes), change);
+                        let slope = |slopes: &[f64; PARAMETERS]| {
+                            group.iter().map(|&place| slopes[place]).sum::<f64>()
+                        };
+                        self.change_into(
+                            lines[index],
+                            &mut space.work,
+                            |slopes| signal_power * slope(slopes),
+                            change,
+                        );
                     }
                 }
                 whiten(&space.factor, change)
             });
             let (whitened, rays) = (whitened.collect::<Vec<_>>(), lines[index].rays.len() as f64);
-            let product = |(i, j): (usize, usize)| rays * dot(&whitened[i.max(j)], &whitened[i.min(j)]);
+            let product =
+                |(i, j): (usize, usize)| rays * dot(&whitened[i.max(j)], &whitened[i.min(j)]);
             Ok(Array2::from_shape_fn((groups.len(), groups.len()), product))
         };
         let mut sum = Array2::zeros((groups.len(), groups.len()));
@@ -214,7 +278,12 @@ const NOISE: usize = PARAMETERS + 1;
 /// The places that change together with each free number; with `powers_free` the powers stand behind the wake.
 pub(crate) fn groups(free: &FreeParameters, powers_free: bool) -> Vec<Vec<usize>> {
     let mut groups = free.groups();
-    groups.extend([SIGNAL, NOISE].into_iter().filter(|_| powers_free).map(|place| vec![place]));
+    groups.extend(
+        [SIGNAL, NOISE]
+            .into_iter()
+            .filter(|_| powers_free)
+            .map(|place| vec![place]),
+    );
     groups
 }
 
@@ -222,7 +291,11 @@ pub(crate) fn groups(free: &FreeParameters, powers_free: bool) -> Vec<Vec<usize>
 fn solve(factor: &Banded, z: &[Complex<f64>]) -> Vec<Complex<f64>> {
     let (mut re, mut im): (Vec<f64>, Vec<f64>) = z.iter().map(|z| (z.re, z.im)).unzip();
     forward(factor, &mut re, &mut im, 0, z.len());
-    let mut x: Vec<_> = re.iter().zip(&im).map(|(re, im)| Complex::new(*re, *im)).collect();
+    let mut x: Vec<_> = re
+        .iter()
+        .zip(&im)
+        .map(|(re, im)| Complex::new(*re, *im))
+        .collect();
     factor.backward(&mut x);
     x
 }
@@ -281,9 +354,17 @@ fn whiten(factor: &Banded, d: &Banded) -> Vec<f64> {
     }
     let mut out = Vec::with_capacity(n * (n + 1));
     for column in 0..n {
-        let (re, im) = (&mut half_re[column * n..(column + 1) * n], &mut half_im[column * n..(column + 1) * n]);
+        let (re, im) = (
+            &mut half_re[column * n..(column + 1) * n],
+            &mut half_im[column * n..(column + 1) * n],
+        );
         forward(factor, re, im, 0, column + 1);
-        out.extend(re[..column].iter().chain(&im[..column]).map(|v| v * std::f64::consts::SQRT_2));
+        out.extend(
+            re[..column]
+                .iter()
+                .chain(&im[..column])
+                .map(|v| v * std::f64::consts::SQRT_2),
+        );
         out.push(re[column]);
     }
     out

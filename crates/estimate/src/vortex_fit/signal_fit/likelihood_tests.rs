@@ -19,7 +19,12 @@ fn wake() -> Wake {
         height_m: 47.0,
         core_radius_m: 2.35,
     };
-    Wake { left: vortex(376.5), right: vortex(423.5), lateral_wind_m_s: 1.0, wind_shear_per_s: 0.01 }
+    Wake {
+        left: vortex(376.5),
+        right: vortex(423.5),
+        lateral_wind_m_s: 1.0,
+        wind_shear_per_s: 0.01,
+    }
 }
 
 /// Complex records of three rays, two of them along one line, through and beside the cores; 40 samples at 50 MHz.
@@ -29,7 +34,10 @@ fn setup(profile: CoreProfile) -> ScanSetup {
         kind: SignalKind::Complex,
         noise: Noise::White,
         pulse: PulseShape::gaussian(SIGMA_S).unwrap(),
-        wake: WakeModel { profile, ..Default::default() },
+        wake: WakeModel {
+            profile,
+            ..Default::default()
+        },
         elevation_rad: vec![0.12, 0.118, 0.12],
         first_sample_time_s: 2.0 * 345.0 / SPEED_OF_LIGHT_M_S,
         record_samples: 40,
@@ -54,7 +62,10 @@ fn plain_covariance(setup: &ScanSetup, wake: &Wake, elevation_rad: f64) -> Array
         let a: Vec<C64> = (0..n)
             .map(|k| {
                 let f = pulse(time_s(k) - 2.0 * range_m / SPEED_OF_LIGHT_M_S);
-                C64::from_polar(f * weight.sqrt(), -4.0 * PI * velocity / 1.55e-6 * time_s(k))
+                C64::from_polar(
+                    f * weight.sqrt(),
+                    -4.0 * PI * velocity / 1.55e-6 * time_s(k),
+                )
             })
             .collect();
         for k in 0..n {
@@ -71,7 +82,9 @@ fn draws(model: &ScanModel, setup: &ScanSetup, seed: u64) -> ScanSignals {
     let mut records = Array2::zeros((setup.elevation_rad.len(), setup.record_samples));
     for mut row in records.rows_mut() {
         row.mapv_inplace(|_: C64| {
-            let normal = |rng: &mut rand_xoshiro::Xoshiro256PlusPlus| rng.sample::<f64, _>(rand_distr::StandardNormal);
+            let normal = |rng: &mut rand_xoshiro::Xoshiro256PlusPlus| {
+                rng.sample::<f64, _>(rand_distr::StandardNormal)
+            };
             C64::new(normal(&mut rng), normal(&mut rng))
         });
     }
@@ -108,27 +121,47 @@ fn gradient_is_the_difference_quotient_of_the_likelihood() {
     let setup = setup(CoreProfile::Algebraic);
     let model = ScanModel::new(&setup, snr, &wake()).unwrap();
     let signals = draws(&model, &setup, 5);
-    let powers = Powers { log_signal: 0.2, log_noise: -0.1 };
+    let powers = Powers {
+        log_signal: 0.2,
+        log_noise: -0.1,
+    };
     let value = model.log_likelihood(&signals, &wake(), powers).unwrap();
     for index in 0..PARAMETERS {
         let at = |by: f64| {
             let mut p = wake().to_array();
             p[index] += by;
-            model.log_likelihood(&signals, &Wake::from_array(&p), powers).unwrap().log_likelihood
+            model
+                .log_likelihood(&signals, &Wake::from_array(&p), powers)
+                .unwrap()
+                .log_likelihood
         };
         let h = [1e-2, 1e-2, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-3, 1e-4, 1e-6][index];
         let quotient = (8.0 * (at(h) - at(-h)) - (at(2.0 * h) - at(-2.0 * h))) / (12.0 * h);
         let error = (value.by_wake[index] - quotient).abs();
-        assert!(error < 1e-5 * quotient.abs() + 1e-6 / h, "{index}: {} {quotient}", value.by_wake[index]);
+        assert!(
+            error < 1e-5 * quotient.abs() + 1e-6 / h,
+            "{index}: {} {quotient}",
+            value.by_wake[index]
+        );
     }
     for (which, found) in value.by_powers.into_iter().enumerate() {
         let at = |by: f64| {
             let mut moved = powers;
-            *(if which == 0 { &mut moved.log_signal } else { &mut moved.log_noise }) += by;
-            model.log_likelihood(&signals, &wake(), moved).unwrap().log_likelihood
+            *(if which == 0 {
+                &mut moved.log_signal
+            } else {
+                &mut moved.log_noise
+            }) += by;
+            model
+                .log_likelihood(&signals, &wake(), moved)
+                .unwrap()
+                .log_likelihood
         };
         let quotient = (at(1e-4) - at(-1e-4)) / 2e-4;
-        assert!((found - quotient).abs() < 1e-5 * quotient.abs() + 1e-4, "{which}: {found} {quotient}");
+        assert!(
+            (found - quotient).abs() < 1e-5 * quotient.abs() + 1e-4,
+            "{which}: {found} {quotient}"
+        );
     }
 }
 
@@ -136,13 +169,19 @@ fn gradient_is_the_difference_quotient_of_the_likelihood() {
 fn information_is_the_trace_of_dense_matrices() {
     let setup = setup(CoreProfile::Algebraic);
     let model = ScanModel::new(&setup, snr, &wake()).unwrap();
-    let free = FreeParameters { wind: WindFit::Linear, ..FreeParameters::common_circulation() };
-    let found = model.information(&wake(), Powers::default(), &free, true, 1).unwrap();
+    let free = FreeParameters {
+        wind: WindFit::Linear,
+        ..FreeParameters::common_circulation()
+    };
+    let found = model
+        .information(&wake(), Powers::default(), &free, true, 1)
+        .unwrap();
     let groups = free.groups();
     let mut expected = Array2::<f64>::zeros(found.raw_dim());
     // the line at 0.12 rad has two rays
     for (elevation_rad, rays) in [(0.12, 2.0), (0.118, 1.0)] {
-        let at = |p: &[f64; PARAMETERS]| plain_covariance(&setup, &Wake::from_array(p), elevation_rad);
+        let at =
+            |p: &[f64; PARAMETERS]| plain_covariance(&setup, &Wake::from_array(p), elevation_rad);
         let middle = at(&wake().to_array());
         let mut changes: Vec<Array2<C64>> = Vec::new();
         for group in &groups {
@@ -168,9 +207,15 @@ fn information_is_the_trace_of_dense_matrices() {
     }
     for ((i, j), value) in found.indexed_iter() {
         let size = (expected[[i, i]] * expected[[j, j]]).sqrt();
-        assert!((value - expected[[i, j]]).abs() < 2e-3 * size, "{i} {j}: {value} {}", expected[[i, j]]);
+        assert!(
+            (value - expected[[i, j]]).abs() < 2e-3 * size,
+            "{i} {j}: {value} {}",
+            expected[[i, j]]
+        );
     }
-    let strided = model.information(&wake(), Powers::default(), &free, true, 2).unwrap();
+    let strided = model
+        .information(&wake(), Powers::default(), &free, true, 2)
+        .unwrap();
     // the first line alone, weighted for all three rays
     assert!(strided[[0, 0]] > 0.0 && strided[[0, 0]] != found[[0, 0]]);
 }
@@ -180,7 +225,9 @@ fn covariance_of_the_gradient_over_draws_is_the_information() {
     let setup = setup(CoreProfile::Algebraic);
     let model = ScanModel::new(&setup, snr, &wake()).unwrap();
     let free = FreeParameters::common_circulation();
-    let information = model.information(&wake(), Powers::default(), &free, false, 1).unwrap();
+    let information = model
+        .information(&wake(), Powers::default(), &free, false, 1)
+        .unwrap();
     // samples of the model itself: z = L w
     let mut rng = rand_xoshiro::Xoshiro256PlusPlus::seed_from_u64(17);
     let mut normal = || rng.sample::<f64, _>(rand_distr::StandardNormal) / SQRT_2;
@@ -209,8 +256,12 @@ fn covariance_of_the_gradient_over_draws_is_the_information() {
             }
             Some(z)
         });
-        let signals = ScanSignals { rays: rays.to_vec() };
-        let value = model.log_likelihood(&signals, &wake(), Powers::default()).unwrap();
+        let signals = ScanSignals {
+            rays: rays.to_vec(),
+        };
+        let value = model
+            .log_likelihood(&signals, &wake(), Powers::default())
+            .unwrap();
         // score of the common circulation in units of its expected standard deviation
         let score = (value.by_wake[0] + value.by_wake[1]) / information[[0, 0]].sqrt();
         mean += score / f64::from(trials);
@@ -219,7 +270,10 @@ fn covariance_of_the_gradient_over_draws_is_the_information() {
     let root = f64::from(trials).sqrt();
     assert!(mean.abs() < 3.5 / root, "mean {mean}");
     // kurtosis of a sum of exponentials: allow twice the error of normal numbers
-    assert!((square - 1.0).abs() < 7.0 * SQRT_2 / root, "variance {square}");
+    assert!(
+        (square - 1.0).abs() < 7.0 * SQRT_2 / root,
+        "variance {square}"
+    );
 }
 
 #[test]
@@ -230,15 +284,41 @@ fn rays_with_missing_samples_are_left_out_and_impossible_input_is_refused() {
     records[[1, 7]] = C64::new(f64::NAN, 0.0);
     let signals = ScanSignals::new(&model, records.view(), 1.0).unwrap();
     assert_eq!(signals.used_rays(), 2);
-    assert!(model.log_likelihood(&signals, &wake(), Powers::default()).is_some());
+    assert!(
+        model
+            .log_likelihood(&signals, &wake(), Powers::default())
+            .is_some()
+    );
     let mut coreless = wake();
     coreless.left.core_radius_m = -1.0;
-    assert!(model.log_likelihood(&signals, &coreless, Powers::default()).is_none());
+    assert!(
+        model
+            .log_likelihood(&signals, &coreless, Powers::default())
+            .is_none()
+    );
     records.fill(C64::new(f64::INFINITY, 0.0));
-    assert!(matches!(ScanSignals::new(&model, records.view(), 1.0), Err(Error::Empty { .. })));
-    assert!(matches!(ScanSignals::new(&model, records.view(), 0.0), Err(Error::OutOfRange { .. })));
-    assert!(matches!(ScanModel::new(&setup, |_, _| 0.0, &wake()), Err(Error::OutOfRange { .. })));
-    assert!(matches!(ScanModel::new(&setup, |_, _| f64::NAN, &wake()), Err(Error::OutOfRange { field: "snr", .. })));
-    let rayless = ScanSetup { elevation_rad: vec![], ..setup };
-    assert!(matches!(ScanModel::new(&rayless, snr, &wake()), Err(Error::Empty { .. })));
+    assert!(matches!(
+        ScanSignals::new(&model, records.view(), 1.0),
+        Err(Error::Empty { .. })
+    ));
+    assert!(matches!(
+        ScanSignals::new(&model, records.view(), 0.0),
+        Err(Error::OutOfRange { .. })
+    ));
+    assert!(matches!(
+        ScanModel::new(&setup, |_, _| 0.0, &wake()),
+        Err(Error::OutOfRange { .. })
+    ));
+    assert!(matches!(
+        ScanModel::new(&setup, |_, _| f64::NAN, &wake()),
+        Err(Error::OutOfRange { field: "snr", .. })
+    ));
+    let rayless = ScanSetup {
+        elevation_rad: vec![],
+        ..setup
+    };
+    assert!(matches!(
+        ScanModel::new(&rayless, snr, &wake()),
+        Err(Error::Empty { .. })
+    ));
 }

@@ -32,7 +32,8 @@ impl ScanModel {
     pub(crate) fn wind_into(&self, line: &Line, wake: &Wake, work: &mut Work) {
         work.wind.clear();
         let range_m: Vec<f64> = line.layers.iter().map(|layer| layer.range_m).collect();
-        work.wind.extend(self.wake.gradients(wake, &range_m, line.ray));
+        work.wind
+            .extend(self.wake.gradients(wake, &range_m, line.ray));
     }
 
     /// Phasors exp(j m omega T) of all lags m for one velocity.
@@ -55,7 +56,10 @@ impl ScanModel {
     /// m T d omega / dv of each place.
     fn lag_phase_slopes(&self) -> Vec<f64> {
         let per_lag = self.baseband.turn_per_velocity_rad_m() * self.baseband.interval_s();
-        self.weights.lag_of_place().map(|lag| lag as f64 * per_lag).collect()
+        self.weights
+            .lag_of_place()
+            .map(|lag| lag as f64 * per_lag)
+            .collect()
     }
 
     /// Covariance of the signal of a line for unit noise power, without the noise.
@@ -85,9 +89,18 @@ impl ScanModel {
             let (re, im) = work.phasor.split_at_mut(phase_slopes.len());
             for ((re, im), turn) in re.iter_mut().zip(im).zip(&phase_slopes) {
                 let (a, b) = (*re, *im);
-                (*re, *im) = (gain_slope * a - gain * turn * b, gain_slope * b + gain * turn * a);
+                (*re, *im) = (
+                    gain_slope * a - gain * turn * b,
+                    gain_slope * b + gain * turn * a,
+                );
             }
-            add_to_nodes(&mut work.nodes, &work.phasor, layer.node, layer.share, slope(slopes));
+            add_to_nodes(
+                &mut work.nodes,
+                &work.phasor,
+                layer.node,
+                layer.share,
+                slope(slopes),
+            );
         }
         self.weigh_into(work, out);
     }
@@ -117,7 +130,13 @@ impl ScanModel {
             work.sums.resize(2 * count, 0.0);
             let (sum_re, sum_im) = work.sums.split_at_mut(count);
             let row = (lags, places.start);
-            sum_nodes(&self.weights.rows, &work.nodes[first * 2 * lags..], row, sum_re, sum_im);
+            sum_nodes(
+                &self.weights.rows,
+                &work.nodes[first * 2 * lags..],
+                row,
+                sum_re,
+                sum_im,
+            );
             for i in 0..count {
                 let lag = 2 * i + twice % 2;
                 let place = out.at((twice - lag) / 2, lag);
@@ -127,7 +146,13 @@ impl ScanModel {
     }
 
     /// Adds to `gradient` the derivatives of the scalar whose change is Re sum of conj(weight(k, l)) dR(k, l) over k >= l.
-    pub(crate) fn pull_back(&self, line: &Line, weight: &Banded, work: &mut Work, gradient: &mut [f64; PARAMETERS]) {
+    pub(crate) fn pull_back(
+        &self,
+        line: &Line,
+        weight: &Banded,
+        work: &mut Work,
+        gradient: &mut [f64; PARAMETERS],
+    ) {
         self.clear_nodes(work);
         let lags = self.weights.lags + 1;
         for twice in 0..2 * self.samples - 1 {
@@ -142,7 +167,13 @@ impl ScanModel {
                 (sum_re[i], sum_im[i]) = (weight.re[place], weight.im[place]);
             }
             let row = (lags, places.start);
-            spread_to_nodes(&self.weights.rows, &mut work.nodes[first * 2 * lags..], row, sum_re, sum_im);
+            spread_to_nodes(
+                &self.weights.rows,
+                &mut work.nodes[first * 2 * lags..],
+                row,
+                sum_re,
+                sum_im,
+            );
         }
         let phase_slopes = self.lag_phase_slopes();
         let mut seen = vec![0.0; 2 * lags];
@@ -161,7 +192,10 @@ impl ScanModel {
                 by_velocity += gain * phase_slopes[m] * (re[m] * seen_im[m] - im[m] * seen_re[m])
                     + gain_slope * (re[m] * seen_re[m] + im[m] * seen_im[m]);
             }
-            gradient.iter_mut().zip(slopes).for_each(|(g, s)| *g += by_velocity * s);
+            gradient
+                .iter_mut()
+                .zip(slopes)
+                .for_each(|(g, s)| *g += by_velocity * s);
         }
     }
 }
@@ -169,12 +203,26 @@ impl ScanModel {
 /// Sums over nodes with the weights of one middle. The weight of a node at distance d from the middle is that of the middle at
 /// -d from the node: rows of `lags` weights run against the nodes. Lags are taken from place `start` of each row on.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn sum_nodes(weights: &[f64], nodes: &[f64], (lags, start): (usize, usize), sum_re: &mut [f64], sum_im: &mut [f64]) {
+fn sum_nodes(
+    weights: &[f64],
+    nodes: &[f64],
+    (lags, start): (usize, usize),
+    sum_re: &mut [f64],
+    sum_im: &mut [f64],
+) {
     let count = sum_re.len().min(sum_im.len());
     let (sum_re, sum_im) = (&mut sum_re[..count], &mut sum_im[..count]);
-    for (weights, node) in weights.chunks_exact(lags).rev().zip(nodes.chunks_exact(2 * lags)) {
+    for (weights, node) in weights
+        .chunks_exact(lags)
+        .rev()
+        .zip(nodes.chunks_exact(2 * lags))
+    {
         let (re, im) = node.split_at(lags);
-        let (weights, re, im) = (&weights[start..][..count], &re[start..][..count], &im[start..][..count]);
+        let (weights, re, im) = (
+            &weights[start..][..count],
+            &re[start..][..count],
+            &im[start..][..count],
+        );
         for i in 0..count {
             sum_re[i] += weights[i] * re[i];
             sum_im[i] += weights[i] * im[i];
@@ -184,12 +232,26 @@ fn sum_nodes(weights: &[f64], nodes: &[f64], (lags, start): (usize, usize), sum_
 
 /// The transpose of [`sum_nodes`]: adds the sums to the nodes.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn spread_to_nodes(weights: &[f64], nodes: &mut [f64], (lags, start): (usize, usize), sum_re: &[f64], sum_im: &[f64]) {
+fn spread_to_nodes(
+    weights: &[f64],
+    nodes: &mut [f64],
+    (lags, start): (usize, usize),
+    sum_re: &[f64],
+    sum_im: &[f64],
+) {
     let count = sum_re.len().min(sum_im.len());
     let (sum_re, sum_im) = (&sum_re[..count], &sum_im[..count]);
-    for (weights, node) in weights.chunks_exact(lags).rev().zip(nodes.chunks_exact_mut(2 * lags)) {
+    for (weights, node) in weights
+        .chunks_exact(lags)
+        .rev()
+        .zip(nodes.chunks_exact_mut(2 * lags))
+    {
         let (re, im) = node.split_at_mut(lags);
-        let (weights, re, im) = (&weights[start..][..count], &mut re[start..][..count], &mut im[start..][..count]);
+        let (weights, re, im) = (
+            &weights[start..][..count],
+            &mut re[start..][..count],
+            &mut im[start..][..count],
+        );
         for i in 0..count {
             re[i] += weights[i] * sum_re[i];
             im[i] += weights[i] * sum_im[i];
@@ -204,6 +266,8 @@ fn add_to_nodes(nodes: &mut [f64], phasor: &[f64], first: usize, share: [f64; 4]
     for (i, share) in share.iter().enumerate() {
         let weight = factor * share;
         let node = &mut nodes[(first + i) * numbers..(first + i + 1) * numbers];
-        node.iter_mut().zip(phasor).for_each(|(n, p)| *n += weight * p);
+        node.iter_mut()
+            .zip(phasor)
+            .for_each(|(n, p)| *n += weight * p);
     }
 }

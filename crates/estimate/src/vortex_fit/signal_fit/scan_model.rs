@@ -86,7 +86,11 @@ impl ScanModel {
     /// # Errors
     /// [`Error::Empty`] without rays; [`Error::OutOfRange`] for an impossible guess, angle or SNR, or one that is 0
     /// everywhere; [`Error::WindowLongerThanRecord`] for records shorter than the filter; as [`Baseband::new`].
-    pub fn new(setup: &ScanSetup, snr: impl Fn(f64, f64) -> f64, guess: &Wake) -> Result<Self, Error> {
+    pub fn new(
+        setup: &ScanSetup,
+        snr: impl Fn(f64, f64) -> f64,
+        guess: &Wake,
+    ) -> Result<Self, Error> {
         Self::with_layers(setup, snr, guess, 1.0)
     }
 
@@ -99,7 +103,10 @@ impl ScanModel {
     ) -> Result<Self, Error> {
         guess.validate()?;
         finite("first_sample_time_s", setup.first_sample_time_s)?;
-        setup.elevation_rad.iter().try_for_each(|e| finite("elevation_rad", *e))?;
+        setup
+            .elevation_rad
+            .iter()
+            .try_for_each(|e| finite("elevation_rad", *e))?;
         not_empty("elevation_rad", setup.elevation_rad.len())?;
         let baseband = Baseband::new(&setup.sampling, setup.kind)?;
         let samples = baseband.samples(setup.record_samples)?;
@@ -111,7 +118,9 @@ impl ScanModel {
             setup,
             guess,
             thicker,
-            first_range_m: 0.5 * SPEED_OF_LIGHT_M_S * (setup.first_sample_time_s + baseband.delay_s()),
+            first_range_m: 0.5
+                * SPEED_OF_LIGHT_M_S
+                * (setup.first_sample_time_s + baseband.delay_s()),
             spacing_m: 0.25 * SPEED_OF_LIGHT_M_S * interval_s,
             samples,
             half: probe.half,
@@ -123,7 +132,14 @@ impl ScanModel {
                 Some((_, line)) => line.rays.push(ray),
                 None => {
                     let layers = cutter.layers(elevation_rad, &snr, &mut largest)?;
-                    lines.push((elevation_rad, Line { ray: Ray::new(elevation_rad), layers, rays: vec![ray] }));
+                    lines.push((
+                        elevation_rad,
+                        Line {
+                            ray: Ray::new(elevation_rad),
+                            layers,
+                            rays: vec![ray],
+                        },
+                    ));
                 }
             }
         }
@@ -156,8 +172,17 @@ impl ScanModel {
 
     /// The model of some of the lines alone.
     pub(crate) fn of_lines(&self, keep: impl Fn(&Line) -> bool) -> Self {
-        let lines: Vec<Line> = self.lines.iter().filter(|line| keep(line)).cloned().collect();
-        Self { rays: lines.iter().map(|line| line.rays.len()).sum(), lines, ..self.clone() }
+        let lines: Vec<Line> = self
+            .lines
+            .iter()
+            .filter(|line| keep(line))
+            .cloned()
+            .collect();
+        Self {
+            rays: lines.iter().map(|line| line.rays.len()).sum(),
+            lines,
+            ..self.clone()
+        }
     }
 
     /// Whether a line of another model of the same scan is one of this model.
@@ -202,8 +227,11 @@ impl Cutter<'_> {
                 vortex.circulation_m2_s.abs() / (2.0 * PI * radius_m * radius_m)
             })
             .sum();
-        let limit_m = self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s * gradient_per_s);
-        (self.spacing_m / (self.thicker * limit_m)).ceil().clamp(1.0, MOST_LAYERS)
+        let limit_m =
+            self.setup.sampling.wavelength_m / (16.0 * self.setup.pulse.sigma_s * gradient_per_s);
+        (self.spacing_m / (self.thicker * limit_m))
+            .ceil()
+            .clamp(1.0, MOST_LAYERS)
     }
 
     fn layers(
@@ -226,7 +254,11 @@ impl Cutter<'_> {
                 *largest = largest.max(ratio);
                 if range_m > 0.0 && ratio > 0.0 {
                     let node = (interval + self.pad() as i64 - 1) as usize;
-                    layers.push(Layer { range_m, node, share: mean_cubic(s, 0.5 / parts).map(|w| w * ratio / parts) });
+                    layers.push(Layer {
+                        range_m,
+                        node,
+                        share: mean_cubic(s, 0.5 / parts).map(|w| w * ratio / parts),
+                    });
                 }
             }
         }

@@ -50,22 +50,56 @@ impl Ascent<'_> {
     /// # Errors
     /// As [`ScanModel::information`].
     pub(crate) fn other_tops(&self, near: &ScanModel, top: State) -> Result<Vec<Candidate>, Error> {
-        let Self { model, signals, options, .. } = self;
-        let rough = SignalFitOptions { tolerance_sigmas: 0.1, information_stride: 2, ..**options };
-        let mut ascent = Ascent { model: near, signals, options: &rough, others: None };
-        let Some((value_at_top, at_top)) = ascent.value(&top) else { return Ok(Vec::new()) };
+        let Self {
+            model,
+            signals,
+            options,
+            ..
+        } = self;
+        let rough = SignalFitOptions {
+            tolerance_sigmas: 0.1,
+            information_stride: 2,
+            ..**options
+        };
+        let mut ascent = Ascent {
+            model: near,
+            signals,
+            options: &rough,
+            others: None,
+        };
+        let Some((value_at_top, at_top)) = ascent.value(&top) else {
+            return Ok(Vec::new());
+        };
         let far = model.of_lines(|line| !near.has(line));
-        let information =
-            far.information(&top.0, top.1, &options.free, options.fit_powers, options.information_stride)?;
+        let information = far.information(
+            &top.0,
+            top.1,
+            &options.free,
+            options.fit_powers,
+            options.information_stride,
+        )?;
         // at the top of all lines those far pull as the near ones do, the other way
         let gradient = at_top.iter().map(|g| -g).collect();
-        ascent.others = Some(Parabola { about: top, gradient, information });
+        ascent.others = Some(Parabola {
+            about: top,
+            gradient,
+            information,
+        });
         let information = ascent.information(&top, 1)?;
         let starts = ascent.places(&top, &information);
-        let ends = starts.into_iter().filter_map(|start| ascent.climb(start).ok());
-        let mut found = distinct(ends, |other, end| ascent.same(&information, &end.0, &other.0));
-        let best = found.iter().map(|(_, log_likelihood)| *log_likelihood).fold(value_at_top, f64::max);
-        found.retain(|(state, value)| *value > best - FAR_BELOW && !ascent.same(&information, state, &top));
+        let ends = starts
+            .into_iter()
+            .filter_map(|start| ascent.climb(start).ok());
+        let mut found = distinct(ends, |other, end| {
+            ascent.same(&information, &end.0, &other.0)
+        });
+        let best = found
+            .iter()
+            .map(|(_, log_likelihood)| *log_likelihood)
+            .fold(value_at_top, f64::max);
+        found.retain(|(state, value)| {
+            *value > best - FAR_BELOW && !ascent.same(&information, state, &top)
+        });
         found.sort_by(|a, b| b.1.total_cmp(&a.1));
         let candidate = |(state, value): (State, f64)| Candidate {
             state,
@@ -84,11 +118,22 @@ impl Ascent<'_> {
     /// Places to climb from, the most promising first: no two of them are neighbours.
     fn places(&self, top: &State, information: &Array2<f64>) -> Vec<State> {
         let (heights, cores) = axes(self.options);
-        let Ok(covariance) = inverse("information on the wake", information) else { return Vec::new() };
-        let deviations: Vec<f64> = covariance.diag().iter().map(|variance| variance.max(0.0).sqrt()).collect();
-        let rows = if cores.is_empty() { 1 } else { CORES_OVER_SPACING.len() };
-        let quick: Vec<usize> =
-            (0..information.nrows()).filter(|i| !heights.contains(i) && !cores.contains(i)).collect();
+        let Ok(covariance) = inverse("information on the wake", information) else {
+            return Vec::new();
+        };
+        let deviations: Vec<f64> = covariance
+            .diag()
+            .iter()
+            .map(|variance| variance.max(0.0).sqrt())
+            .collect();
+        let rows = if cores.is_empty() {
+            1
+        } else {
+            CORES_OVER_SPACING.len()
+        };
+        let quick: Vec<usize> = (0..information.nrows())
+            .filter(|i| !heights.contains(i) && !cores.contains(i))
+            .collect();
         let mut scores: Vec<(f64, usize, Vec<i32>, State)> = Vec::new();
         for (row, over_spacing) in CORES_OVER_SPACING.iter().enumerate().take(rows) {
             let mut at = *top;
@@ -115,13 +160,19 @@ impl Ascent<'_> {
             // adds up what the heights do, for all pairs of them
             let count = 2 * STEPS as usize + 1;
             for index in 0..count.pow(heights.len() as u32) {
-                let steps: Vec<usize> = (0..heights.len()).map(|axis| index / count.pow(axis as u32) % count).collect();
+                let steps: Vec<usize> = (0..heights.len())
+                    .map(|axis| index / count.pow(axis as u32) % count)
+                    .collect();
                 let mut value = middle.0;
                 let mut by = vec![0.0; deviations.len()];
                 for (axis, &step) in steps.iter().enumerate() {
-                    let Some((score, state)) = &alone[axis][step] else { continue };
+                    let Some((score, state)) = &alone[axis][step] else {
+                        continue;
+                    };
                     value += score - middle.0;
-                    by.iter_mut().zip(self.steps(&middle.1, state)).for_each(|(b, s)| *b += s);
+                    by.iter_mut()
+                        .zip(self.steps(&middle.1, state))
+                        .for_each(|(b, s)| *b += s);
                 }
                 let steps = steps.iter().map(|&step| step as i32 - STEPS).collect();
                 scores.push((value, row, steps, self.stepped(&middle.1, &by)));
@@ -131,7 +182,12 @@ impl Ascent<'_> {
     }
 
     /// The step of Newton of the numbers `quick` alone, at most 3 standard deviations long, with the ln p that it promises.
-    fn stepped_quickly(&self, state: State, information: &Array2<f64>, quick: &[usize]) -> Option<(f64, State)> {
+    fn stepped_quickly(
+        &self,
+        state: State,
+        information: &Array2<f64>,
+        quick: &[usize],
+    ) -> Option<(f64, State)> {
         let (value, gradient) = self.value(&state)?;
         let n = quick.len();
         let part = Array2::from_shape_fn((n, n), |(i, j)| information[[quick[i], quick[j]]]);
@@ -140,8 +196,14 @@ impl Ascent<'_> {
         let promised = dot(&step, &pull);
         let share = (3.0 / promised.max(0.0).sqrt()).min(1.0);
         let mut by = vec![0.0; gradient.len()];
-        quick.iter().zip(&step).for_each(|(&i, s)| by[i] = share * s);
-        Some((value + (share - 0.5 * share * share) * promised, self.stepped(&state, &by)))
+        quick
+            .iter()
+            .zip(&step)
+            .for_each(|(&i, s)| by[i] = share * s);
+        Some((
+            value + (share - 0.5 * share * share) * promised,
+            self.stepped(&state, &by),
+        ))
     }
 }
 
@@ -156,16 +218,36 @@ pub(crate) fn near_lines(model: &ScanModel, wake: &Wake) -> ScanModel {
 fn axes(options: &SignalFitOptions) -> (Vec<usize>, Vec<usize>) {
     let groups = options.free.groups();
     let of = |places: [Parameter; 2]| {
-        (0..groups.len()).filter(|&g| groups[g].iter().all(|p| places.iter().any(|q| *q as usize == *p))).collect()
+        (0..groups.len())
+            .filter(|&g| {
+                groups[g]
+                    .iter()
+                    .all(|p| places.iter().any(|q| *q as usize == *p))
+            })
+            .collect()
     };
-    (of([Parameter::LeftHeight, Parameter::RightHeight]), of([Parameter::LeftCore, Parameter::RightCore]))
+    (
+        of([Parameter::LeftHeight, Parameter::RightHeight]),
+        of([Parameter::LeftCore, Parameter::RightCore]),
+    )
 }
 
 /// The best of the scored places, without neighbours of a better one.
 fn chosen(mut scores: Vec<(f64, usize, Vec<i32>, State)>) -> Vec<State> {
     scores.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let taken = distinct(scores, |(_, row, steps, _), (_, other_row, other_steps, _)| {
-        row.abs_diff(*other_row) <= 1 && steps.iter().zip(other_steps).all(|(a, b)| (a - b).abs() <= 1)
-    });
-    taken.into_iter().take(PLACES).map(|(_, _, _, state)| state).collect()
+    let taken = distinct(
+        scores,
+        |(_, row, steps, _), (_, other_row, other_steps, _)| {
+            row.abs_diff(*other_row) <= 1
+                && steps
+                    .iter()
+                    .zip(other_steps)
+                    .all(|(a, b)| (a - b).abs() <= 1)
+        },
+    );
+    taken
+        .into_iter()
+        .take(PLACES)
+        .map(|(_, _, _, state)| state)
+        .collect()
 }

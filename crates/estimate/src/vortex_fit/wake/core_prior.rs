@@ -22,7 +22,10 @@ pub struct CorePrior {
 impl CorePrior {
     /// Median 4.5 % (3.5 % of the span of an elliptic wing, pi/4 of which is the spacing; the chapter: 3 to 5 % of the span, 3.8 to 6.4 % of the
     /// spacing); 2.5 and 8 % are 1.2 standard deviations away.
-    pub const TYPICAL: Self = Self { median_ratio: 0.045, log_deviation: 0.5 };
+    pub const TYPICAL: Self = Self {
+        median_ratio: 0.045,
+        log_deviation: 0.5,
+    };
 
     pub(crate) fn validate(&self) -> Result<(), Error> {
         positive("median_ratio", self.median_ratio)?;
@@ -46,7 +49,11 @@ impl CorePrior {
             gathered(groups, &all, &mut slope);
             (away, slope)
         };
-        groups.iter().filter(|group| is_core(group)).map(|group| term(group[0])).collect()
+        groups
+            .iter()
+            .filter(|group| is_core(group))
+            .map(|group| term(group[0]))
+            .collect()
     }
 }
 
@@ -61,7 +68,11 @@ pub(crate) const KNOWN_CORE: (f64, f64) = (0.12, 0.3);
 /// For a list of parameters with secondary vortices, left before right: circulation of each over that of its vortex, distance over the height of the latter.
 pub(crate) fn secondary_ratios(p: &[f64]) -> [(f64, f64); 2] {
     let wake = Wake::from_list(p);
-    [(wake.left, PARAMETERS), (wake.right, PARAMETERS + SECONDARY_PARAMETERS)].map(|(own, at)| {
+    [
+        (wake.left, PARAMETERS),
+        (wake.right, PARAMETERS + SECONDARY_PARAMETERS),
+    ]
+    .map(|(own, at)| {
         let distance_m = (p[at + 1] - own.lateral_position_m).hypot(p[at + 2] - own.height_m);
         (p[at] / own.circulation_m2_s, distance_m / own.height_m)
     })
@@ -72,7 +83,11 @@ pub(crate) fn secondary_terms(p: &[f64], groups: &[Vec<usize>]) -> Vec<(f64, Vec
     let away = |p: &[f64]| {
         let known = |(ratio, distance), log_core: f64| {
             let core = (log_core - KNOWN_CORE.0.ln()) / KNOWN_CORE.1;
-            [(ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1, (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1, core]
+            [
+                (ratio - KNOWN_RATIO.0) / KNOWN_RATIO.1,
+                (distance - KNOWN_DISTANCE.0) / KNOWN_DISTANCE.1,
+                core,
+            ]
         };
         let [left, right] = secondary_ratios(p);
         let log_core = |side: usize| p[PARAMETERS + side * SECONDARY_PARAMETERS + 3];
@@ -86,12 +101,21 @@ pub(crate) fn secondary_terms(p: &[f64], groups: &[Vec<usize>]) -> Vec<(f64, Vec
     });
     let slopes: Vec<[f64; 6]> = slopes.collect();
     let here = away(p);
-    (0..6).map(|i| (here[i / 3][i % 3], slopes.iter().map(|slope| slope[i]).collect())).collect()
+    (0..6)
+        .map(|i| {
+            (
+                here[i / 3][i % 3],
+                slopes.iter().map(|slope| slope[i]).collect(),
+            )
+        })
+        .collect()
 }
 
 /// Whether a free number moves core radii.
 pub(crate) fn is_core(group: &[usize]) -> bool {
-    group.iter().all(|&place| place == Parameter::LeftCore as usize || place == Parameter::RightCore as usize)
+    group.iter().all(|&place| {
+        place == Parameter::LeftCore as usize || place == Parameter::RightCore as usize
+    })
 }
 
 #[cfg(test)]
@@ -106,7 +130,12 @@ mod tests {
         // one deviation stronger, farther and wider; half of one weaker, nearer and narrower
         let mut p = wake.to_array().to_vec();
         p.extend([-0.65 * 480.0, 376.5 - 1.2 * 40.0, 40.0, 0.12_f64.ln() + 0.3]);
-        p.extend([-0.275 * 520.0, 423.5, 50.0 + 0.6 * 50.0, 0.12_f64.ln() - 0.15]);
+        p.extend([
+            -0.275 * 520.0,
+            423.5,
+            50.0 + 0.6 * 50.0,
+            0.12_f64.ln() - 0.15,
+        ]);
         let terms = secondary_terms(&p, &[vec![PARAMETERS + 3]]);
         let away: Vec<f64> = terms.iter().map(|(away, _)| *away).collect();
         for (away, right) in away.iter().zip([-1.0, 1.0, 1.0, 0.5, -0.5, -0.5]) {
@@ -119,23 +148,41 @@ mod tests {
     fn terms_are_distances_in_deviations_and_their_slopes_difference_quotients() {
         let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.0, 1.3, 0.02]);
         for core_radius in [Sharing::Common, Sharing::Separate] {
-            let groups = FreeParameters { core_radius, ..Default::default() }.groups();
+            let groups = FreeParameters {
+                core_radius,
+                ..Default::default()
+            }
+            .groups();
             let terms = CorePrior::TYPICAL.terms(&wake, &groups);
-            assert_eq!(terms.len(), if core_radius == Sharing::Common { 1 } else { 2 });
+            assert_eq!(
+                terms.len(),
+                if core_radius == Sharing::Common { 1 } else { 2 }
+            );
             for (index, (away, slope)) in terms.iter().enumerate() {
                 assert!((away - (2.0 / 47.0 / 0.045_f64).ln() / 0.5).abs() < 1e-12);
                 for (number, slope) in slope.iter().enumerate() {
                     let at = |by: f64| {
-                        let step: Vec<f64> = (0..groups.len()).map(|i| if i == number { by } else { 0.0 }).collect();
-                        CorePrior::TYPICAL.terms(&Wake::from_list(&stepped(&groups, &wake.to_array(), &step)), &groups)
-                            [index]
+                        let step: Vec<f64> = (0..groups.len())
+                            .map(|i| if i == number { by } else { 0.0 })
+                            .collect();
+                        CorePrior::TYPICAL.terms(
+                            &Wake::from_list(&stepped(&groups, &wake.to_array(), &step)),
+                            &groups,
+                        )[index]
                             .0
                     };
-                    assert!((slope - (at(1e-4) - at(-1e-4)) / 2e-4).abs() < 1e-7, "{number}");
+                    assert!(
+                        (slope - (at(1e-4) - at(-1e-4)) / 2e-4).abs() < 1e-7,
+                        "{number}"
+                    );
                 }
             }
         }
-        let fixed = FreeParameters { core_radius: Sharing::Fixed, ..Default::default() }.groups();
+        let fixed = FreeParameters {
+            core_radius: Sharing::Fixed,
+            ..Default::default()
+        }
+        .groups();
         assert!(CorePrior::TYPICAL.terms(&wake, &fixed).is_empty());
     }
 }

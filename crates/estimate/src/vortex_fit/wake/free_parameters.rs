@@ -61,7 +61,10 @@ impl FreeParameters {
     /// The same with one circulation for both vortices.
     #[must_use]
     pub fn common_circulation() -> Self {
-        Self { circulation: Sharing::Common, ..Self::default() }
+        Self {
+            circulation: Sharing::Common,
+            ..Self::default()
+        }
     }
 
     /// Places of the parameters that each free number moves.
@@ -96,13 +99,21 @@ impl FreeParameters {
             _ => true,
         };
         let own = |group: Vec<usize>| group.into_iter().filter(has).collect::<Vec<usize>>();
-        self.groups().into_iter().map(own).filter(|group| !group.is_empty()).collect()
+        self.groups()
+            .into_iter()
+            .map(own)
+            .filter(|group| !group.is_empty())
+            .collect()
     }
 
     /// A start that obeys the ties: common quantities at their mean.
     pub(crate) fn start(&self, wake: &Wake) -> Wake {
         let mut p = wake.to_array();
-        for (sharing, [a, b]) in [(self.circulation, [0, 1]), (self.height, [3, 5]), (self.core_radius, [6, 7])] {
+        for (sharing, [a, b]) in [
+            (self.circulation, [0, 1]),
+            (self.height, [3, 5]),
+            (self.core_radius, [6, 7]),
+        ] {
             if sharing == Sharing::Common {
                 let mean = 0.5 * (p[a] + p[b]);
                 (p[a], p[b]) = (mean, mean);
@@ -133,7 +144,9 @@ pub(crate) fn spread(groups: &[Vec<usize>], covariance: &Array2<f64>) -> Array2<
     // each place belongs to one free number at most
     let number = |place: usize| groups.iter().position(|group| group.contains(&place));
     Array2::from_shape_fn((PARAMETERS, PARAMETERS), |(row, column)| {
-        number(row).zip(number(column)).map_or(0.0, |(i, j)| covariance[[i, j]])
+        number(row)
+            .zip(number(column))
+            .map_or(0.0, |(i, j)| covariance[[i, j]])
     })
 }
 
@@ -166,7 +179,9 @@ mod tests {
     #[test]
     fn tied_parameters_share_their_variance_and_fixed_ones_have_none() {
         let groups = FreeParameters::common_circulation().groups();
-        let covariance = Array2::from_diag(&ndarray::Array1::from_iter((0..groups.len()).map(|i| 1.0 + i as f64)));
+        let covariance = Array2::from_diag(&ndarray::Array1::from_iter(
+            (0..groups.len()).map(|i| 1.0 + i as f64),
+        ));
         let all = spread(&groups, &covariance);
         assert_eq!(all[[0, 0]], 1.0);
         assert_eq!(all[[0, 1]], 1.0);

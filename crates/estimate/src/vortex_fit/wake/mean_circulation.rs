@@ -49,15 +49,24 @@ impl Wake {
     ) -> [(f64, f64); 2] {
         let sides = [
             (&self.left, Parameter::LeftCirculation, Parameter::LeftCore),
-            (&self.right, Parameter::RightCirculation, Parameter::RightCore),
+            (
+                &self.right,
+                Parameter::RightCirculation,
+                Parameter::RightCore,
+            ),
         ];
         sides.map(|(vortex, circulation, core)| {
             let (share, by_core) = profile.mean_5_15(vortex.core_radius_m);
             let mut slope = [0.0; PARAMETERS];
             slope[circulation as usize] = share;
             slope[core as usize] = vortex.circulation_m2_s * by_core;
-            let terms = covariance.indexed_iter().map(|((i, j), c)| slope[i] * c * slope[j]);
-            (vortex.circulation_m2_s * share, terms.sum::<f64>().max(0.0).sqrt())
+            let terms = covariance
+                .indexed_iter()
+                .map(|((i, j), c)| slope[i] * c * slope[j]);
+            (
+                vortex.circulation_m2_s * share,
+                terms.sum::<f64>().max(0.0).sqrt(),
+            )
         })
     }
 }
@@ -69,11 +78,20 @@ mod tests {
 
     #[test]
     fn means_of_500_m2_s_are_those_of_the_page_and_their_slopes_difference_quotients() {
-        for (profile, expected) in [(CoreProfile::Algebraic, 466.635), (CoreProfile::LambOseen, 499.931)] {
+        for (profile, expected) in [
+            (CoreProfile::Algebraic, 466.635),
+            (CoreProfile::LambOseen, 499.931),
+        ] {
             assert!((500.0 * profile.mean_5_15(2.35).0 - expected).abs() < 1e-3);
             for core in [0.5, 2.35, 6.0, 20.0] {
-                let quotient = (profile.mean_5_15(core + 1e-5).0 - profile.mean_5_15(core - 1e-5).0) / 2e-5;
-                assert_relative_eq!(profile.mean_5_15(core).1, quotient, max_relative = 1e-6, epsilon = 1e-9);
+                let quotient =
+                    (profile.mean_5_15(core + 1e-5).0 - profile.mean_5_15(core - 1e-5).0) / 2e-5;
+                assert_relative_eq!(
+                    profile.mean_5_15(core).1,
+                    quotient,
+                    max_relative = 1e-6,
+                    epsilon = 1e-9
+                );
             }
         }
     }
@@ -84,10 +102,12 @@ mod tests {
         let mut covariance = ndarray::Array2::<f64>::zeros((PARAMETERS, PARAMETERS));
         (covariance[[0, 0]], covariance[[6, 6]]) = (100.0, 0.25);
         (covariance[[0, 6]], covariance[[6, 0]]) = (3.0, 3.0);
-        let [left, right] = wake.mean_circulations_5_15_m2_s(CoreProfile::Algebraic, covariance.view());
+        let [left, right] =
+            wake.mean_circulations_5_15_m2_s(CoreProfile::Algebraic, covariance.view());
         let (share, by_core) = CoreProfile::Algebraic.mean_5_15(2.35);
         let by_core = 500.0 * by_core;
-        let variance = share * share * 100.0 + 2.0 * share * by_core * 3.0 + by_core * by_core * 0.25;
+        let variance =
+            share * share * 100.0 + 2.0 * share * by_core * 3.0 + by_core * by_core * 0.25;
         assert_relative_eq!(left.1, variance.sqrt(), max_relative = 1e-12);
         assert_eq!(right.1, 0.0);
     }

@@ -6,7 +6,8 @@
 use crate::vortex_fit::{PARAMETERS, Parameter, Wake, WakeModel};
 
 /// Places of the moving coordinates among the parameters: lateral position and height of the left, then of the right vortex.
-const MOVING: std::ops::Range<usize> = Parameter::LeftLateral as usize..Parameter::LeftCore as usize;
+const MOVING: std::ops::Range<usize> =
+    Parameter::LeftLateral as usize..Parameter::LeftCore as usize;
 
 /// Velocities of the centres and their derivatives by all parameters.
 #[derive(Debug, Clone)]
@@ -31,13 +32,18 @@ impl Motion {
                 row[place] = (ahead - behind) / (2.0 * step);
             }
         }
-        Self { velocity_m_s, slopes }
+        Self {
+            velocity_m_s,
+            slopes,
+        }
     }
 
     /// The wake after so many seconds.
     pub(crate) fn wake_after(&self, wake: &Wake, seconds: f64) -> Wake {
         let mut p = wake.to_array();
-        MOVING.zip(self.velocity_m_s).for_each(|(place, velocity)| p[place] += seconds * velocity);
+        MOVING
+            .zip(self.velocity_m_s)
+            .for_each(|(place, velocity)| p[place] += seconds * velocity);
         Wake::from_array(&p)
     }
 
@@ -45,7 +51,10 @@ impl Motion {
     pub(crate) fn carry_back(&self, seconds: f64, slope: &mut [f64; PARAMETERS]) {
         let then = *slope;
         for (place, row) in MOVING.zip(&self.slopes) {
-            slope.iter_mut().zip(row).for_each(|(slope, by)| *slope += then[place] * seconds * by);
+            slope
+                .iter_mut()
+                .zip(row)
+                .for_each(|(slope, by)| *slope += then[place] * seconds * by);
         }
     }
 }
@@ -54,7 +63,10 @@ impl WakeModel {
     /// Range \[m\] and elevation \[rad\] at which the lidar sees a place (y, z) \[m\].
     #[must_use]
     pub fn range_and_elevation(&self, (lateral_m, height_m): (f64, f64)) -> (f64, f64) {
-        let (dy, dz) = (lateral_m - self.lidar_lateral_position_m, height_m - self.lidar_height_m);
+        let (dy, dz) = (
+            lateral_m - self.lidar_lateral_position_m,
+            height_m - self.lidar_height_m,
+        );
         (dy.hypot(dz), dz.atan2(dy))
     }
 
@@ -62,8 +74,11 @@ impl WakeModel {
     #[must_use]
     pub fn sees(&self, (elevation_rad, range_m): (&[f64], &[f64]), place_m: (f64, f64)) -> bool {
         let (at_m, at_rad) = self.range_and_elevation(place_m);
-        let within =
-            |axis: &[f64], at: f64| axis.first().zip(axis.last()).is_some_and(|(a, b)| (*a..=*b).contains(&at));
+        let within = |axis: &[f64], at: f64| {
+            axis.first()
+                .zip(axis.last())
+                .is_some_and(|(a, b)| (*a..=*b).contains(&at))
+        };
         within(range_m, at_m) && within(elevation_rad, at_rad)
     }
 
@@ -77,7 +92,9 @@ impl WakeModel {
             for (vortex, _, side, sense) in self.sources(wake) {
                 let dy = own.lateral_position_m - vortex.lateral_position_m;
                 let dz = own.height_m - side * vortex.height_m;
-                let (omega, _, _) = self.profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
+                let (omega, _, _) = self
+                    .profile
+                    .angular(dy * dy + dz * dz, vortex.core_radius_m);
                 lateral_m_s -= sense * vortex.circulation_m2_s * omega * dz;
                 vertical_m_s += sense * vortex.circulation_m2_s * omega * dy;
             }
@@ -98,13 +115,18 @@ mod tests {
         let wake = Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.5, 3.0, 0.02]);
         let found = WakeModel::default().centre_velocities_m_s(&wake);
         let stored = [3.497_550_2, -0.910_882_06, 3.528_323_08, -1.125_207_24];
-        assert!(found.iter().zip(stored).all(|(f, s)| (f - s).abs() < 2e-3), "{found:?}");
+        assert!(
+            found.iter().zip(stored).all(|(f, s)| (f - s).abs() < 2e-3),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn derivatives_carried_back_are_difference_quotients() {
-        let (model, wake) =
-            (WakeModel::default(), Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02]));
+        let (model, wake) = (
+            WakeModel::default(),
+            Wake::from_array(&[420.0, 340.0, 380.0, 48.0, 424.0, 38.0, 2.5, 2.0, 3.0, 0.02]),
+        );
         let seen = |wake: &Wake| {
             let moved = Motion::new(&model, wake).wake_after(wake, 2.5);
             model.radial_velocity_m_s(&moved, 400.0, 0.12)
@@ -119,7 +141,10 @@ mod tests {
                 seen(&Wake::from_array(&p))
             };
             let quotient = (moved(1e-4) - moved(-1e-4)) / 2e-4;
-            assert!((slope - quotient).abs() < 1e-5 * quotient.abs().max(1.0), "{place}: {slope} {quotient}");
+            assert!(
+                (slope - quotient).abs() < 1e-5 * quotient.abs().max(1.0),
+                "{place}: {slope} {quotient}"
+            );
         }
     }
 }

@@ -61,8 +61,17 @@ pub struct Vortex {
 
 impl Vortex {
     /// One with its centre at that lateral coordinate and height.
-    pub(crate) fn at((lateral_position_m, height_m): (f64, f64), circulation_m2_s: f64, core_radius_m: f64) -> Self {
-        Self { circulation_m2_s, lateral_position_m, height_m, core_radius_m }
+    pub(crate) fn at(
+        (lateral_position_m, height_m): (f64, f64),
+        circulation_m2_s: f64,
+        core_radius_m: f64,
+    ) -> Self {
+        Self {
+            circulation_m2_s,
+            lateral_position_m,
+            height_m,
+            core_radius_m,
+        }
     }
 
     /// Lateral coordinate and height of the centre.
@@ -128,25 +137,47 @@ impl Wake {
 
     /// Two vortices without wind.
     pub(crate) fn calm(left: Vortex, right: Vortex) -> Self {
-        Self { left, right, lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0 }
+        Self {
+            left,
+            right,
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+        }
     }
 
     /// An anticlockwise vortex of unit circulation alone, at that lateral position and height.
     pub(crate) fn of_unit_vortex(place_m: (f64, f64), core_radius_m: f64) -> Self {
         let right = Vortex::at(place_m, 1.0, core_radius_m);
-        Self::calm(Vortex::at((place_m.0 - 1.0, place_m.1), 0.0, core_radius_m), right)
+        Self::calm(
+            Vortex::at((place_m.0 - 1.0, place_m.1), 0.0, core_radius_m),
+            right,
+        )
     }
 
     /// The same vortices with that core radius.
     pub(crate) fn with_cores(&self, core_radius_m: f64) -> Self {
-        let [left, right] = [self.left, self.right].map(|vortex| Vortex { core_radius_m, ..vortex });
-        Self { left, right, ..*self }
+        let [left, right] = [self.left, self.right].map(|vortex| Vortex {
+            core_radius_m,
+            ..vortex
+        });
+        Self {
+            left,
+            right,
+            ..*self
+        }
     }
 
     /// The same wind without vortices.
     pub(crate) fn wind_alone(&self) -> Self {
-        let [left, right] = [self.left, self.right].map(|vortex| Vortex { circulation_m2_s: 0.0, ..vortex });
-        Self { left, right, ..*self }
+        let [left, right] = [self.left, self.right].map(|vortex| Vortex {
+            circulation_m2_s: 0.0,
+            ..vortex
+        });
+        Self {
+            left,
+            right,
+            ..*self
+        }
     }
 
     /// The wake of a list of parameters that begins with those of a wake.
@@ -161,7 +192,10 @@ impl Wake {
     pub fn validate(&self) -> Result<(), Error> {
         self.left.validate()?;
         self.right.validate()?;
-        positive("distance of the right vortex from the left one", self.spacing_m())?;
+        positive(
+            "distance of the right vortex from the left one",
+            self.spacing_m(),
+        )?;
         finite("lateral_wind_m_s", self.lateral_wind_m_s)?;
         finite("wind_shear_per_s", self.wind_shear_per_s)
     }
@@ -181,7 +215,11 @@ impl Wake {
 /// Circulation of a vortex as a function of the distance from its centre.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum CoreProfile {
     /// Gamma r^2 / (r^2 + r_c^2), equation (3).
     #[default]
@@ -219,7 +257,11 @@ impl CoreProfile {
                     (-(-s).exp_m1() / s, (decay * (1.0 + s) - 1.0) / (s * s))
                 };
                 let scale = LAMB_OSEEN_BETA / (2.0 * PI * core2);
-                (scale * ratio, scale * slope * LAMB_OSEEN_BETA / core2, -2.0 * scale * decay / core_m)
+                (
+                    scale * ratio,
+                    scale * slope * LAMB_OSEEN_BETA / core2,
+                    -2.0 * scale * decay / core_m,
+                )
             }
         }
     }
@@ -278,7 +320,10 @@ impl WakeModel {
 
     #[inline(always)]
     fn place(&self, range_m: f64, ray: Ray) -> (f64, f64) {
-        (self.lidar_lateral_position_m + range_m * ray.cos, self.lidar_height_m + range_m * ray.sin)
+        (
+            self.lidar_lateral_position_m + range_m * ray.cos,
+            self.lidar_height_m + range_m * ray.sin,
+        )
     }
 
     /// Radial velocity \[m/s\], positive away from the lidar.
@@ -291,14 +336,21 @@ impl WakeModel {
 
     /// Radial velocity \[m/s\] and its derivatives, in the order of [`Parameter`].
     #[must_use]
-    pub fn gradient(&self, wake: &Wake, range_m: f64, elevation_rad: f64) -> (f64, [f64; PARAMETERS]) {
+    pub fn gradient(
+        &self,
+        wake: &Wake,
+        range_m: f64,
+        elevation_rad: f64,
+    ) -> (f64, [f64; PARAMETERS]) {
         self.gradients(wake, &[range_m], Ray::new(elevation_rad))[0]
     }
 
     /// Whether the model exists for a list of parameters: with images, above the ground only.
     pub(crate) fn allows(&self, p: &[f64]) -> bool {
         let (Self { secondary, .. }, wake) = self.with(p);
-        let mut all = [&wake.left, &wake.right].into_iter().chain(secondary.iter().flatten());
+        let mut all = [&wake.left, &wake.right]
+            .into_iter()
+            .chain(secondary.iter().flatten());
         wake.validate().is_ok() && (!self.images || all.all(|vortex| vortex.height_m > 0.0))
     }
 
@@ -306,7 +358,11 @@ impl WakeModel {
     pub(crate) fn with(&self, p: &[f64]) -> (Self, Wake) {
         let wake = Wake::from_list(p);
         let of = |own: &Vortex, [circulation_m2_s, lateral_m, height_m, log_core]: [f64; _]| {
-            Vortex::at((lateral_m, height_m), circulation_m2_s, own.height_m * log_core.exp())
+            Vortex::at(
+                (lateral_m, height_m),
+                circulation_m2_s,
+                own.height_m * log_core.exp(),
+            )
         };
         let secondary = match p[PARAMETERS..].as_chunks::<SECONDARY_PARAMETERS>().0 {
             [left, right] => Some([of(&wake.left, *left), of(&wake.right, *right)]),
@@ -317,8 +373,10 @@ impl WakeModel {
 
     /// Distance at which a line of sight passes the centre of a vortex \[m\].
     pub(crate) fn passes_m(&self, ray: Ray, vortex: &Vortex) -> f64 {
-        let (dy, dz) =
-            (vortex.lateral_position_m - self.lidar_lateral_position_m, vortex.height_m - self.lidar_height_m);
+        let (dy, dz) = (
+            vortex.lateral_position_m - self.lidar_lateral_position_m,
+            vortex.height_m - self.lidar_height_m,
+        );
         (dy * ray.sin - dz * ray.cos).abs()
     }
 
@@ -327,17 +385,35 @@ impl WakeModel {
         &self,
         wake: &'w Wake,
     ) -> impl Iterator<Item = (&'w Vortex, [usize; 4], f64, f64)> + use<'w> {
-        let (left, right, images) = ((&wake.left, [0, 2, 3, 6]), (&wake.right, [1, 4, 5, 7]), self.images);
+        let (left, right, images) = (
+            (&wake.left, [0, 2, 3, 6]),
+            (&wake.right, [1, 4, 5, 7]),
+            self.images,
+        );
         let of = move |((vortex, places), side, sense)| (vortex, places, side, sense);
-        let all = [(left, 1.0, -1.0), (left, -1.0, 1.0), (right, 1.0, 1.0), (right, -1.0, -1.0)];
-        all.into_iter().filter(move |source| images || source.1 > 0.0).map(of)
+        let all = [
+            (left, 1.0, -1.0),
+            (left, -1.0, 1.0),
+            (right, 1.0, 1.0),
+            (right, -1.0, -1.0),
+        ];
+        all.into_iter()
+            .filter(move |source| images || source.1 > 0.0)
+            .map(of)
     }
 
     /// Radial velocities at points of a line with their derivatives.
-    pub(crate) fn gradients(&self, wake: &Wake, range_m: &[f64], ray: Ray) -> Vec<(f64, [f64; PARAMETERS])> {
+    pub(crate) fn gradients(
+        &self,
+        wake: &Wake,
+        range_m: &[f64],
+        ray: Ray,
+    ) -> Vec<(f64, [f64; PARAMETERS])> {
         let mut rows = vec![Vec::new(); PARAMETERS + 1];
         self.along(wake, range_m, ray, &mut rows);
-        (0..range_m.len()).map(|i| (rows[0][i], std::array::from_fn(|place| rows[place + 1][i]))).collect()
+        (0..range_m.len())
+            .map(|i| (rows[0][i], std::array::from_fn(|place| rows[place + 1][i])))
+            .collect()
     }
 
     /// Radial velocities at points of a line, in the first row, and, if there are more rows, their derivatives.
@@ -356,11 +432,25 @@ impl WakeModel {
             }
         }
         // a search tries vortices one by one
-        for (vortex, places, side, sense) in self.sources(wake).filter(|s| slopes || s.0.circulation_m2_s != 0.0) {
-            add_along((self, (vortex, side, sense), range_m, ray), rows, slopes.then_some(places));
+        for (vortex, places, side, sense) in self
+            .sources(wake)
+            .filter(|s| slopes || s.0.circulation_m2_s != 0.0)
+        {
+            add_along(
+                (self, (vortex, side, sense), range_m, ray),
+                rows,
+                slopes.then_some(places),
+            );
         }
-        let secondary = self.secondary.map(|[left, right]| Wake { left, right, ..*wake });
-        for (vortex, _, side, sense) in secondary.iter().flat_map(|secondary| self.sources(secondary)) {
+        let secondary = self.secondary.map(|[left, right]| Wake {
+            left,
+            right,
+            ..*wake
+        });
+        for (vortex, _, side, sense) in secondary
+            .iter()
+            .flat_map(|secondary| self.sources(secondary))
+        {
             add_along((self, (vortex, side, sense), range_m, ray), rows, None);
         }
     }
@@ -377,13 +467,24 @@ fn of_source(
     (y_m, z_m): (f64, f64),
     ray: Ray,
 ) -> (f64, [f64; 4]) {
-    let (dy, dz) = (y_m - vortex.lateral_position_m, z_m - side * vortex.height_m);
+    let (dy, dz) = (
+        y_m - vortex.lateral_position_m,
+        z_m - side * vortex.height_m,
+    );
     let (omega, by_r2, by_core) = profile.angular(dy * dy + dz * dz, vortex.core_radius_m);
     let arm = dy * ray.sin - dz * ray.cos;
     let strength = sense * vortex.circulation_m2_s;
     let by_lateral = -strength * (2.0 * dy * by_r2 * arm + omega * ray.sin);
     let by_height = side * strength * (omega * ray.cos - 2.0 * dz * by_r2 * arm);
-    (strength * omega * arm, [sense * omega * arm, by_lateral, by_height, strength * by_core * arm])
+    (
+        strength * omega * arm,
+        [
+            sense * omega * arm,
+            by_lateral,
+            by_height,
+            strength * by_core * arm,
+        ],
+    )
 }
 
 /// A source, and the points of a line.
@@ -412,7 +513,9 @@ fn add(
         }
         return;
     };
-    let Ok(rows) = rows.get_disjoint_mut([0, a + 1, b + 1, c + 1, d + 1]) else { return };
+    let Ok(rows) = rows.get_disjoint_mut([0, a + 1, b + 1, c + 1, d + 1]) else {
+        return;
+    };
     let mut rows = rows.map(|row| &mut row[..range_m.len()]);
     for (i, &range_m) in range_m.iter().enumerate() {
         let (velocity, [a, b, c, d]) = of_source(profile, source, model.place(range_m, ray), ray);
@@ -453,17 +556,25 @@ mod tests {
             core_radius_m: 5.0,
         };
         let secondary = Some([vortex(-200.0, 350.0, 30.0), vortex(-100.0, 450.0, 40.0)]);
-        let level = WakeModel { lidar_height_m: 42.0, ..Default::default() };
+        let level = WakeModel {
+            lidar_height_m: 42.0,
+            ..Default::default()
+        };
         let with = WakeModel { secondary, ..level };
         // along y at z = 42 m, right above the left one
-        let lateral_m_s = |turn: f64, dy: f64, dz: f64| turn * dz / (2.0 * PI * (dy * dy + dz * dz + 25.0));
+        let lateral_m_s =
+            |turn: f64, dy: f64, dz: f64| turn * dz / (2.0 * PI * (dy * dy + dz * dz + 25.0));
         let expected = lateral_m_s(-200.0, 0.0, 12.0) + lateral_m_s(200.0, 0.0, 72.0)
             - lateral_m_s(-100.0, -100.0, 2.0)
             - lateral_m_s(100.0, -100.0, 82.0);
-        let seen = with.radial_velocity_m_s(&wake(), 350.0, 0.0) - level.radial_velocity_m_s(&wake(), 350.0, 0.0);
+        let seen = with.radial_velocity_m_s(&wake(), 350.0, 0.0)
+            - level.radial_velocity_m_s(&wake(), 350.0, 0.0);
         assert!(expected < -1.5);
         assert_relative_eq!(seen, expected, max_relative = 1e-12);
-        let ((v, slope), (plain, alone)) = (with.gradient(&wake(), 350.0, 0.0), level.gradient(&wake(), 350.0, 0.0));
+        let ((v, slope), (plain, alone)) = (
+            with.gradient(&wake(), 350.0, 0.0),
+            level.gradient(&wake(), 350.0, 0.0),
+        );
         assert_relative_eq!(v - plain, expected, max_relative = 1e-12);
         assert_eq!(slope, alone);
     }
@@ -480,10 +591,17 @@ mod tests {
                     secondary: None,
                 };
                 // the last two are inside a core, one within the series of the Lamb-Oseen profile
-                for (range_m, elevation_rad) in [(300.0, 0.05), (420.0, 0.2), (399.0, 0.109_3), (398.923_6, 0.109_261)]
-                {
+                for (range_m, elevation_rad) in [
+                    (300.0, 0.05),
+                    (420.0, 0.2),
+                    (399.0, 0.109_3),
+                    (398.923_6, 0.109_261),
+                ] {
                     let (velocity, slope) = model.gradient(&wake(), range_m, elevation_rad);
-                    assert_eq!(velocity, model.radial_velocity_m_s(&wake(), range_m, elevation_rad));
+                    assert_eq!(
+                        velocity,
+                        model.radial_velocity_m_s(&wake(), range_m, elevation_rad)
+                    );
                     for index in 0..PARAMETERS {
                         let moved = |by: f64| {
                             let mut p = wake().to_array();
@@ -491,8 +609,15 @@ mod tests {
                             model.radial_velocity_m_s(&Wake::from_array(&p), range_m, elevation_rad)
                         };
                         let h = 1e-4;
-                        let quotient = (8.0 * (moved(h) - moved(-h)) - (moved(2.0 * h) - moved(-2.0 * h))) / (12.0 * h);
-                        assert_relative_eq!(slope[index], quotient, max_relative = 1e-8, epsilon = 1e-9);
+                        let quotient = (8.0 * (moved(h) - moved(-h))
+                            - (moved(2.0 * h) - moved(-2.0 * h)))
+                            / (12.0 * h);
+                        assert_relative_eq!(
+                            slope[index],
+                            quotient,
+                            max_relative = 1e-8,
+                            epsilon = 1e-9
+                        );
                     }
                 }
             }
@@ -501,8 +626,15 @@ mod tests {
 
     #[test]
     fn the_ground_is_a_streamline_and_the_air_between_the_vortices_moves_down() {
-        let model = WakeModel { lidar_lateral_position_m: 410.0, ..Default::default() };
-        let wake = Wake { lateral_wind_m_s: 0.0, wind_shear_per_s: 0.0, ..wake() };
+        let model = WakeModel {
+            lidar_lateral_position_m: 410.0,
+            ..Default::default()
+        };
+        let wake = Wake {
+            lateral_wind_m_s: 0.0,
+            wind_shear_per_s: 0.0,
+            ..wake()
+        };
         let up = std::f64::consts::FRAC_PI_2;
         assert!(model.radial_velocity_m_s(&wake, 0.0, up).abs() < 1e-12);
         assert!(model.radial_velocity_m_s(&wake, 47.0, up) < -5.0);
@@ -512,7 +644,10 @@ mod tests {
     fn a_vertical_line_through_a_core_sees_the_peak_velocity_at_the_core_radius() {
         // beside a lone right vortex, r_c to its right, the air rises at Gamma/(4 pi r_c)
         let wake = Wake {
-            left: Vortex { circulation_m2_s: 0.0, ..wake().left },
+            left: Vortex {
+                circulation_m2_s: 0.0,
+                ..wake().left
+            },
             lateral_wind_m_s: 0.0,
             wind_shear_per_s: 0.0,
             ..wake()
@@ -520,7 +655,10 @@ mod tests {
         let right = wake.right;
         for (profile, peak_m_s) in [
             (CoreProfile::Algebraic, 520.0 / (4.0 * PI * 2.7)),
-            (CoreProfile::LambOseen, 520.0 * (1.0 - (-LAMB_OSEEN_BETA).exp()) / (2.0 * PI * 2.7)),
+            (
+                CoreProfile::LambOseen,
+                520.0 * (1.0 - (-LAMB_OSEEN_BETA).exp()) / (2.0 * PI * 2.7),
+            ),
         ] {
             let model = WakeModel {
                 profile,
@@ -528,7 +666,8 @@ mod tests {
                 lidar_lateral_position_m: right.lateral_position_m + right.core_radius_m,
                 ..Default::default()
             };
-            let velocity = model.radial_velocity_m_s(&wake, right.height_m, std::f64::consts::FRAC_PI_2);
+            let velocity =
+                model.radial_velocity_m_s(&wake, right.height_m, std::f64::consts::FRAC_PI_2);
             assert_relative_eq!(velocity, peak_m_s, max_relative = 1e-12);
         }
     }
@@ -538,9 +677,19 @@ mod tests {
         assert!(wake().validate().is_ok());
         let mut bad = wake();
         bad.left.core_radius_m = 0.0;
-        assert!(bad.validate().unwrap_err().to_string().contains("core_radius_m"));
+        assert!(
+            bad.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("core_radius_m")
+        );
         let mut bad = wake();
         std::mem::swap(&mut bad.left, &mut bad.right);
-        assert!(bad.validate().unwrap_err().to_string().contains("right vortex"));
+        assert!(
+            bad.validate()
+                .unwrap_err()
+                .to_string()
+                .contains("right vortex")
+        );
     }
 }

@@ -60,11 +60,27 @@ impl PairWeights {
             pulse.at(middle_s + apart_s) * pulse.at(middle_s - apart_s)
         };
         let nodes = -(half as i64)..=half as i64;
-        let covariance = |lag: usize| nodes.clone().map(|node| weight(node, lag) * step_s).sum::<f64>().abs();
-        let longest = (0..samples).rev().find(|&lag| covariance(lag) > cut).unwrap_or(0);
-        let mut weights = Self { lags: longest, half, even: longest / 2 + 1, rows: Vec::new() };
+        let covariance = |lag: usize| {
+            nodes
+                .clone()
+                .map(|node| weight(node, lag) * step_s)
+                .sum::<f64>()
+                .abs()
+        };
+        let longest = (0..samples)
+            .rev()
+            .find(|&lag| covariance(lag) > cut)
+            .unwrap_or(0);
+        let mut weights = Self {
+            lags: longest,
+            half,
+            even: longest / 2 + 1,
+            rows: Vec::new(),
+        };
         let places = nodes.flat_map(|node| weights.lag_of_place().map(move |lag| (node, lag)));
-        weights.rows = places.map(|(node, lag)| weight(node, lag) * step_s).collect();
+        weights.rows = places
+            .map(|(node, lag)| weight(node, lag) * step_s)
+            .collect();
         weights
     }
 
@@ -78,7 +94,11 @@ impl PairWeights {
     /// Places of the even or of the odd lags in a row, those up to `longest`.
     pub(crate) fn places(&self, odd: usize, longest: usize) -> std::ops::Range<usize> {
         let longest = longest.min(self.lags);
-        let count = if longest < odd { 0 } else { (longest - odd) / 2 + 1 };
+        let count = if longest < odd {
+            0
+        } else {
+            (longest - odd) / 2 + 1
+        };
         let first = odd * self.even;
         first..first + count
     }
@@ -100,7 +120,9 @@ mod tests {
         let exact = PairWeights::new(&PulseShape::gaussian(sigma_s).unwrap(), 20e-9, 300, 1e-6);
         assert_eq!(exact.lags, 44);
         for (place, lag) in exact.lag_of_place().enumerate() {
-            let sum: f64 = (0..=2 * exact.half).map(|offset| exact.row(offset)[place]).sum();
+            let sum: f64 = (0..=2 * exact.half)
+                .map(|offset| exact.row(offset)[place])
+                .sum();
             let expected = (-(lag as f64 * 20e-9 / (2.0 * sigma_s)).powi(2)).exp();
             assert!((sum - expected).abs() < 1e-6, "{lag}: {sum} {expected}");
         }

@@ -35,7 +35,11 @@ impl RangeKernel {
         let sum: f64 = weights.iter().sum();
         positive("sum of the weights", sum)?;
         let weights = weights.iter().map(|w| w / sum).collect();
-        Ok(Self { first_offset_m, spacing_m, weights })
+        Ok(Self {
+            first_offset_m,
+            spacing_m,
+            weights,
+        })
     }
 
     /// The weights of a Gaussian pulse of 1/e half-width `pulse_sigma_s` \[s\] seen through the window `window`, h_n, of samples
@@ -44,18 +48,28 @@ impl RangeKernel {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for numbers that are not positive or a window without power.
-    pub fn gaussian_gate(pulse_sigma_s: f64, window: &[f64], period_s: f64, spacing_m: f64) -> Result<Self, Error> {
+    pub fn gaussian_gate(
+        pulse_sigma_s: f64,
+        window: &[f64],
+        period_s: f64,
+        spacing_m: f64,
+    ) -> Result<Self, Error> {
         positive("pulse_sigma_s", pulse_sigma_s)?;
         positive("period_s", period_s)?;
         positive("spacing_m", spacing_m)?;
         positive("power of the window", window.iter().map(|h| h * h).sum())?;
         let half_s = 0.5 * window.len() as f64 * period_s;
-        let reach = (0.5 * SPEED_OF_LIGHT_M_S * (half_s + 4.0 * pulse_sigma_s) / spacing_m).ceil() as i64;
+        let reach =
+            (0.5 * SPEED_OF_LIGHT_M_S * (half_s + 4.0 * pulse_sigma_s) / spacing_m).ceil() as i64;
         let weights: Vec<f64> = (-reach..=reach)
             .map(|i| {
                 let time_s = 2.0 * i as f64 * spacing_m / SPEED_OF_LIGHT_M_S;
                 let away = |n: usize| (time_s - n as f64 * period_s + half_s) / pulse_sigma_s;
-                window.iter().enumerate().map(|(n, h)| h * h * (-away(n) * away(n)).exp()).sum()
+                window
+                    .iter()
+                    .enumerate()
+                    .map(|(n, h)| h * h * (-away(n) * away(n)).exp())
+                    .sum()
             })
             .collect();
         Self::new(-(reach as f64) * spacing_m, spacing_m, &weights)
@@ -64,8 +78,12 @@ impl RangeKernel {
     /// Root mean square width of the weights \[m\].
     pub(crate) fn width_m(&self) -> f64 {
         let moment = |power: i32, centre_m: f64| -> f64 {
-            let offsets = (0..self.weights.len()).map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
-            offsets.zip(&self.weights).map(|(offset_m, w)| offset_m.powi(power) * w).sum()
+            let offsets = (0..self.weights.len())
+                .map(|i| self.first_offset_m + i as f64 * self.spacing_m - centre_m);
+            offsets
+                .zip(&self.weights)
+                .map(|(offset_m, w)| offset_m.powi(power) * w)
+                .sum()
         };
         moment(2, moment(1, 0.0)).max(0.0).sqrt()
     }
@@ -77,8 +95,17 @@ impl RangeKernel {
 
     /// The centre of the weights alone, which sees of a linear wind what they see.
     pub(crate) fn middle(&self) -> Self {
-        let away = self.weights.iter().enumerate().map(|(i, w)| i as f64 * self.spacing_m * w).sum::<f64>();
-        Self { first_offset_m: self.first_offset_m + away, spacing_m: self.spacing_m, weights: vec![1.0] }
+        let away = self
+            .weights
+            .iter()
+            .enumerate()
+            .map(|(i, w)| i as f64 * self.spacing_m * w)
+            .sum::<f64>();
+        Self {
+            first_offset_m: self.first_offset_m + away,
+            spacing_m: self.spacing_m,
+            weights: vec![1.0],
+        }
     }
 
     /// The same kernel on a grid about `factor` times as coarse.
@@ -86,7 +113,11 @@ impl RangeKernel {
         if factor <= 1 || self.weights.len() <= factor {
             return self.clone();
         }
-        let weights: Vec<f64> = self.weights.chunks(factor).map(|chunk| chunk.iter().sum()).collect();
+        let weights: Vec<f64> = self
+            .weights
+            .chunks(factor)
+            .map(|chunk| chunk.iter().sum())
+            .collect();
         Self {
             first_offset_m: self.first_offset_m + 0.5 * (factor - 1) as f64 * self.spacing_m,
             spacing_m: factor as f64 * self.spacing_m,
@@ -109,7 +140,11 @@ impl RangeKernel {
             weights[place] += (1.0 - part) * weight;
             weights[place + 1] += part * weight;
         }
-        Self { first_offset_m: self.first_offset_m, spacing_m, weights }
+        Self {
+            first_offset_m: self.first_offset_m,
+            spacing_m,
+            weights,
+        }
     }
 
     /// The weights for a gate that lies by that share of the way to the next point: linear between both.
@@ -117,7 +152,10 @@ impl RangeKernel {
         out.clear();
         out.extend(self.weights.iter().map(|weight| (1.0 - share) * weight));
         out.push(0.0);
-        out[1..].iter_mut().zip(&self.weights).for_each(|(out, weight)| *out += share * weight);
+        out[1..]
+            .iter_mut()
+            .zip(&self.weights)
+            .for_each(|(out, weight)| *out += share * weight);
         out
     }
 
@@ -125,7 +163,8 @@ impl RangeKernel {
     pub(crate) fn points_m(&self, range_m: &[f64]) -> impl Iterator<Item = f64> {
         let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
         let farthest_m = range_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-        let points = ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + self.weights.len() + 1;
+        let points =
+            ((farthest_m - nearest_m) / self.spacing_m).ceil() as usize + self.weights.len() + 1;
         (0..points).map(move |i| nearest_m + self.first_offset_m + i as f64 * self.spacing_m)
     }
 
@@ -148,11 +187,17 @@ impl RangeKernel {
         let nearest_m = range_m.iter().copied().fold(f64::INFINITY, f64::min);
         scratch.points_m.clear();
         scratch.points_m.extend(self.points_m(range_m));
-        scratch.rows.resize_with(if slopes { PARAMETERS + 1 } else { 1 }, Vec::new);
+        scratch
+            .rows
+            .resize_with(if slopes { PARAMETERS + 1 } else { 1 }, Vec::new);
         model.along(wake, &scratch.points_m, ray, &mut scratch.rows);
         for (gate, &r_m) in range_m.iter().enumerate() {
             let (index, part) = self.place(r_m - nearest_m);
-            let weights = if part > 1e-6 { self.between(part, &mut scratch.weights) } else { &self.weights };
+            let weights = if part > 1e-6 {
+                self.between(part, &mut scratch.weights)
+            } else {
+                &self.weights
+            };
             let found = means(weights, &scratch.rows, index);
             let mut slope = [0.0; PARAMETERS];
             slope.copy_from_slice(&found[1..]);
@@ -189,7 +234,9 @@ mod tests {
     }
 
     fn gate() -> RangeKernel {
-        let window: Vec<f64> = (0..64).map(|n| (-0.5 * ((f64::from(n) - 31.5) / 16.0).powi(2)).exp()).collect();
+        let window: Vec<f64> = (0..64)
+            .map(|n| (-0.5 * ((f64::from(n) - 31.5) / 16.0).powi(2)).exp())
+            .collect();
         RangeKernel::gaussian_gate(120e-9, &window, 4e-9, 0.6).unwrap()
     }
 
@@ -215,18 +262,29 @@ mod tests {
     #[test]
     fn weights_have_the_width_of_pulse_and_window_and_a_coarser_grid_keeps_it() {
         // variance of |f|^2: sigma^2 / 2; of h^2: 8^2 * 2 samples^2
-        let expected = 0.5 * SPEED_OF_LIGHT_M_S * (120e-9_f64.powi(2) / 2.0 + (16.0 * 4e-9_f64).powi(2) / 2.0).sqrt();
+        let expected = 0.5
+            * SPEED_OF_LIGHT_M_S
+            * (120e-9_f64.powi(2) / 2.0 + (16.0 * 4e-9_f64).powi(2) / 2.0).sqrt();
         assert_relative_eq!(gate().width_m(), expected, max_relative = 2e-2);
         assert_relative_eq!(gate().coarser(4).width_m(), expected, max_relative = 3e-2);
         assert!(gate().coarser(4).weights.len() < gate().weights.len() / 3);
         for (step_m, factor) in [(6.0, 1), (5.9, 2), (2.9, 4)] {
             let dividing = gate().dividing(step_m, factor);
             assert_relative_eq!(dividing.width_m(), expected, max_relative = 3e-2);
-            assert_relative_eq!(dividing.middle().first_offset_m, gate().middle().first_offset_m, epsilon = 1e-9);
-            assert_relative_eq!(dividing.weights.iter().sum::<f64>(), 1.0, max_relative = 1e-12);
+            assert_relative_eq!(
+                dividing.middle().first_offset_m,
+                gate().middle().first_offset_m,
+                epsilon = 1e-9
+            );
+            assert_relative_eq!(
+                dividing.weights.iter().sum::<f64>(),
+                1.0,
+                max_relative = 1e-12
+            );
             let parts = step_m / dividing.spacing_m;
             assert!(
-                (parts - parts.round()).abs() < 1e-9 && dividing.spacing_m < 1.5 * factor as f64 * gate().spacing_m
+                (parts - parts.round()).abs() < 1e-9
+                    && dividing.spacing_m < 1.5 * factor as f64 * gate().spacing_m
             );
         }
     }
@@ -237,21 +295,33 @@ mod tests {
         let ranges = [377.7, 400.0];
         let values = |wake: &Wake| {
             let mut values = vec![];
-            kernel.apply((&model, wake, ray), &ranges, false, &mut LineScratch::default(), |_, v, _| values.push(v));
+            kernel.apply(
+                (&model, wake, ray),
+                &ranges,
+                false,
+                &mut LineScratch::default(),
+                |_, v, _| values.push(v),
+            );
             values
         };
-        kernel.apply((&model, &wake(), ray), &ranges, true, &mut LineScratch::default(), |gate, velocity, slope| {
-            assert_eq!(velocity, values(&wake())[gate]);
-            for (index, slope) in slope.iter().enumerate() {
-                let moved = |by: f64| {
-                    let mut p = wake().to_array();
-                    p[index] += by;
-                    values(&Wake::from_array(&p))[gate]
-                };
-                let quotient = (moved(1e-4) - moved(-1e-4)) / 2e-4;
-                assert_relative_eq!(*slope, quotient, max_relative = 1e-6, epsilon = 1e-8);
-            }
-        });
+        kernel.apply(
+            (&model, &wake(), ray),
+            &ranges,
+            true,
+            &mut LineScratch::default(),
+            |gate, velocity, slope| {
+                assert_eq!(velocity, values(&wake())[gate]);
+                for (index, slope) in slope.iter().enumerate() {
+                    let moved = |by: f64| {
+                        let mut p = wake().to_array();
+                        p[index] += by;
+                        values(&Wake::from_array(&p))[gate]
+                    };
+                    let quotient = (moved(1e-4) - moved(-1e-4)) / 2e-4;
+                    assert_relative_eq!(*slope, quotient, max_relative = 1e-6, epsilon = 1e-8);
+                }
+            },
+        );
     }
 
     #[test]

@@ -16,7 +16,11 @@ use crate::vortex_fit::{Wake, WakeModel};
 
 /// Slope of the lift of a wing of finite span; the literature has both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum LiftSlope {
     /// 2 pi A / (A + 2).
     Span,
@@ -43,7 +47,12 @@ impl Follower {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for an impossible aircraft or wake.
-    pub fn rolling_moment(&self, model: &WakeModel, wake: &Wake, at_m: (f64, f64)) -> Result<f64, Error> {
+    pub fn rolling_moment(
+        &self,
+        model: &WakeModel,
+        wake: &Wake,
+        at_m: (f64, f64),
+    ) -> Result<f64, Error> {
         positive("span_m", self.span_m)?;
         positive("aspect_ratio", self.aspect_ratio)?;
         positive("speed_m_s", self.speed_m_s)?;
@@ -54,7 +63,10 @@ impl Follower {
         };
         let slope = 2.0 * PI * self.aspect_ratio / (self.aspect_ratio + two);
         let moments = model.sources(wake).map(|(vortex, _, side, sense)| {
-            let away_m = (vortex.lateral_position_m - at_m.0, side * vortex.height_m - at_m.1);
+            let away_m = (
+                vortex.lateral_position_m - at_m.0,
+                side * vortex.height_m - at_m.1,
+            );
             let core2 = vortex.core_radius_m.powi(2) + away_m.1.powi(2);
             let core = core2.sqrt();
             let upto = |y: f64| {

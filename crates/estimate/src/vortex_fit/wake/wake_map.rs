@@ -25,13 +25,22 @@ impl WakeModel {
         radius_m: f64,
     ) -> Result<Array2<f64>, Error> {
         wake.validate()?;
-        elevation_rad.iter().try_for_each(|value| finite("elevation_rad", *value))?;
-        range_m.iter().try_for_each(|value| finite("range_m", *value))?;
+        elevation_rad
+            .iter()
+            .try_for_each(|value| finite("elevation_rad", *value))?;
+        range_m
+            .iter()
+            .try_for_each(|value| finite("range_m", *value))?;
         not_negative("radius_m", radius_m)?;
         let rows = Gates::at_rest(self, kernel.clone(), (elevation_rad, range_m)).velocities(wake);
-        Ok(Array2::from_shape_fn((elevation_rad.len(), range_m.len()), |(line, gate)| {
-            region(elevation_rad, line, range_m[gate], radius_m).map(|(other, share)| share * rows[[other, gate]]).sum()
-        }))
+        Ok(Array2::from_shape_fn(
+            (elevation_rad.len(), range_m.len()),
+            |(line, gate)| {
+                region(elevation_rad, line, range_m[gate], radius_m)
+                    .map(|(other, share)| share * rows[[other, gate]])
+                    .sum()
+            },
+        ))
     }
 }
 
@@ -47,8 +56,15 @@ pub(crate) fn region(
         let away_m = range_m * (elevation_rad[line] - elevation_rad[other]).abs();
         (radius_m * radius_m - away_m * away_m).max(0.0).sqrt()
     };
-    let first = (0..line).rev().take_while(|&other| chord(other) > 0.0).last().unwrap_or(line);
-    let last = (line + 1..elevation_rad.len()).take_while(|&other| chord(other) > 0.0).last().unwrap_or(line);
+    let first = (0..line)
+        .rev()
+        .take_while(|&other| chord(other) > 0.0)
+        .last()
+        .unwrap_or(line);
+    let last = (line + 1..elevation_rad.len())
+        .take_while(|&other| chord(other) > 0.0)
+        .last()
+        .unwrap_or(line);
     let sum: f64 = (first..=last).map(chord).sum();
     (first..=last).map(move |other| (other, if sum > 0.0 { chord(other) / sum } else { 1.0 }))
 }
@@ -58,14 +74,21 @@ mod tests {
     use super::*;
 
     /// 1 m apart at the near vortex, whose centre is at the fifth.
-    const ELEVATIONS_RAD: [f64; 9] = [0.1098, 0.1124, 0.1150, 0.1177, 0.1203, 0.1230, 0.1256, 0.1283, 0.1309];
+    const ELEVATIONS_RAD: [f64; 9] = [
+        0.1098, 0.1124, 0.1150, 0.1177, 0.1203, 0.1230, 0.1256, 0.1283, 0.1309,
+    ];
     const RANGES_M: [f64; 3] = [377.0, 400.0, 423.0];
 
     #[test]
     fn a_region_of_no_radius_gives_the_velocities_of_the_kernel() {
         let wake = Wake::from_array(&[480.0, 520.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.3, 0.02]);
-        let (model, point) = (WakeModel::default(), RangeKernel::new(0.0, 1.0, &[1.0]).unwrap());
-        let map = model.map(&wake, &point, &ELEVATIONS_RAD, &RANGES_M, 0.0).unwrap();
+        let (model, point) = (
+            WakeModel::default(),
+            RangeKernel::new(0.0, 1.0, &[1.0]).unwrap(),
+        );
+        let map = model
+            .map(&wake, &point, &ELEVATIONS_RAD, &RANGES_M, 0.0)
+            .unwrap();
         for ((line, gate), velocity) in map.indexed_iter() {
             let expected = model.radial_velocity_m_s(&wake, RANGES_M[gate], ELEVATIONS_RAD[line]);
             assert!((velocity - expected).abs() < 1e-12);
@@ -75,23 +98,58 @@ mod tests {
     #[test]
     fn regions_keep_a_wind_that_is_linear_in_height_and_blur_a_core() {
         let calm = Wake::from_array(&[0.0, 0.0, 376.5, 45.0, 423.5, 49.0, 2.0, 2.7, 1.0, 0.1]);
-        let wake = Wake { left: crate::vortex_fit::Vortex { circulation_m2_s: 500.0, ..calm.left }, ..calm };
-        let (model, point) = (WakeModel::default(), RangeKernel::new(0.0, 1.0, &[1.0]).unwrap());
-        let map = |wake, radius_m| model.map(wake, &point, &ELEVATIONS_RAD, &RANGES_M, radius_m).unwrap();
+        let wake = Wake {
+            left: crate::vortex_fit::Vortex {
+                circulation_m2_s: 500.0,
+                ..calm.left
+            },
+            ..calm
+        };
+        let (model, point) = (
+            WakeModel::default(),
+            RangeKernel::new(0.0, 1.0, &[1.0]).unwrap(),
+        );
+        let map = |wake, radius_m| {
+            model
+                .map(wake, &point, &ELEVATIONS_RAD, &RANGES_M, radius_m)
+                .unwrap()
+        };
         let change = map(&calm, 2.0) - map(&calm, 0.0);
         assert!(change.row(4).iter().all(|v| v.abs() < 1e-3), "{change}");
         // 2 m above the centre, where the air is fastest, it is averaged with slower air
         let (sharp, blurred) = (map(&wake, 0.0)[[6, 0]], map(&wake, 2.0)[[6, 0]]);
-        assert!(blurred.abs() < 0.98 * sharp.abs() && blurred.abs() > 0.5 * sharp.abs(), "{blurred} {sharp}");
+        assert!(
+            blurred.abs() < 0.98 * sharp.abs() && blurred.abs() > 0.5 * sharp.abs(),
+            "{blurred} {sharp}"
+        );
     }
 
     #[test]
     fn impossible_wakes_and_radii_are_refused() {
         let wake = Wake::from_array(&[500.0, 500.0, 376.5, 47.0, 423.5, 47.0, 2.0, 2.0, 0.0, 0.0]);
-        let (model, point) = (WakeModel::default(), RangeKernel::new(0.0, 1.0, &[1.0]).unwrap());
-        assert!(model.map(&wake, &point, &ELEVATIONS_RAD, &RANGES_M, -1.0).is_err());
-        assert!(model.map(&wake, &point, &[f64::NAN], &RANGES_M, 1.0).is_err());
-        let crossed = Wake { left: wake.right, right: wake.left, ..wake };
-        assert!(model.map(&crossed, &point, &ELEVATIONS_RAD, &RANGES_M, 1.0).is_err());
+        let (model, point) = (
+            WakeModel::default(),
+            RangeKernel::new(0.0, 1.0, &[1.0]).unwrap(),
+        );
+        assert!(
+            model
+                .map(&wake, &point, &ELEVATIONS_RAD, &RANGES_M, -1.0)
+                .is_err()
+        );
+        assert!(
+            model
+                .map(&wake, &point, &[f64::NAN], &RANGES_M, 1.0)
+                .is_err()
+        );
+        let crossed = Wake {
+            left: wake.right,
+            right: wake.left,
+            ..wake
+        };
+        assert!(
+            model
+                .map(&crossed, &point, &ELEVATIONS_RAD, &RANGES_M, 1.0)
+                .is_err()
+        );
     }
 }

@@ -54,7 +54,8 @@ impl EdgePlane<'_> {
         let mut core = self.moments(guess_m, sign, radius_m)?;
         for _ in 0..ITERATIONS {
             let next = self.moments(core.centre_m, sign, radius_m)?;
-            let moved_m = (next.centre_m[0] - core.centre_m[0]).hypot(next.centre_m[1] - core.centre_m[1]);
+            let moved_m =
+                (next.centre_m[0] - core.centre_m[0]).hypot(next.centre_m[1] - core.centre_m[1]);
             core = next;
             if moved_m < 1e-9 * radius_m {
                 break;
@@ -83,7 +84,8 @@ impl EdgePlane<'_> {
                     continue;
                 }
                 let area_m2 = y_length_m * z_length_m;
-                let covered = ((radius_m - dy_m.hypot(dz_m)) / area_m2.sqrt() + 0.5).clamp(0.0, 1.0);
+                let covered =
+                    ((radius_m - dy_m.hypot(dz_m)) / area_m2.sqrt() + 0.5).clamp(0.0, 1.0);
                 let part = covered * area_m2 * value;
                 sum += part;
                 y_sum += part * dy_m;
@@ -97,7 +99,11 @@ impl EdgePlane<'_> {
     }
 
     /// The place of the strongest vorticity of the given sign where `is_in(y, z)` \[m\].
-    pub(super) fn strongest_m(&self, sign: f64, is_in: impl Fn(f64, f64) -> bool) -> Option<[f64; 2]> {
+    pub(super) fn strongest_m(
+        &self,
+        sign: f64,
+        is_in: impl Fn(f64, f64) -> bool,
+    ) -> Option<[f64; 2]> {
         let mut best = (0.0, None);
         for (at_m, value, _) in self.edges() {
             if sign * value > best.0 && is_in(at_m[0], at_m[1]) {
@@ -109,17 +115,26 @@ impl EdgePlane<'_> {
 
     /// Vorticity of the given sign where `is_in(y, z)`, summed \[m^2/s\].
     pub(super) fn circulation_m2_s(&self, sign: f64, is_in: impl Fn(f64, f64) -> bool) -> f64 {
-        let inside = self.edges().filter(|(at_m, value, _)| sign * value > 0.0 && is_in(at_m[0], at_m[1]));
+        let inside = self
+            .edges()
+            .filter(|(at_m, value, _)| sign * value > 0.0 && is_in(at_m[0], at_m[1]));
         inside.map(|(_, value, area_m2)| value * area_m2).sum()
     }
 
     /// Position, vorticity and area of all edges.
     fn edges(&self) -> impl Iterator<Item = ([f64; 2], f64, f64)> + '_ {
         let (grid, ny) = (self.grid, self.grid.y_m.len());
-        self.vorticity_per_s.iter().enumerate().map(move |(place, value)| {
-            let (j, k) = (place % ny, place / ny);
-            ([grid.y_m[j], grid.z_m[k]], *value, grid.y_length_m[j] * grid.z_length_m[k])
-        })
+        self.vorticity_per_s
+            .iter()
+            .enumerate()
+            .map(move |(place, value)| {
+                let (j, k) = (place % ny, place / ny);
+                (
+                    [grid.y_m[j], grid.z_m[k]],
+                    *value,
+                    grid.y_length_m[j] * grid.z_length_m[k],
+                )
+            })
     }
 }
 
@@ -131,25 +146,43 @@ mod tests {
 
     fn axes() -> EdgeGrid {
         let y_m: Vec<f64> = (0..100).map(|j| -1.5 + 0.03 * f64::from(j)).collect();
-        let z_m: Vec<f64> = (0..=60).map(|k| 2.0 * (f64::from(k) / 60.0).powf(1.3)).collect();
+        let z_m: Vec<f64> = (0..=60)
+            .map(|k| 2.0 * (f64::from(k) / 60.0).powf(1.3))
+            .collect();
         let middle = |k: usize| 0.5 * (z_m[k.min(59)] + z_m[(k + 1).min(60)]);
-        let z_length_m = (0..=60).map(|k: usize| middle(k) - if k == 0 { 0.0 } else { middle(k - 1) }).collect();
-        EdgeGrid { y_length_m: vec![0.03; 100], y_m, z_m, z_length_m, period_m: Some(3.0) }
+        let z_length_m = (0..=60)
+            .map(|k: usize| middle(k) - if k == 0 { 0.0 } else { middle(k - 1) })
+            .collect();
+        EdgeGrid {
+            y_length_m: vec![0.03; 100],
+            y_m,
+            z_m,
+            z_length_m,
+            period_m: Some(3.0),
+        }
     }
 
     fn plane(axes: &EdgeGrid, vortices: &[(f64, f64, f64)]) -> Vec<f64> {
         let at = |y: f64, z: f64| {
             let one = |&(sign, y0, z0): &(f64, f64, f64)| {
                 let dy = (y - y0) - 3.0 * ((y - y0) / 3.0).round();
-                sign * (-(dy * dy + (z - z0) * (z - z0)) / 0.01).exp() / (std::f64::consts::PI * 0.01)
+                sign * (-(dy * dy + (z - z0) * (z - z0)) / 0.01).exp()
+                    / (std::f64::consts::PI * 0.01)
             };
             vortices.iter().map(one).sum()
         };
-        axes.z_m.iter().flat_map(|z| axes.y_m.iter().map(move |y| (*y, *z))).map(|(y, z)| at(y, z)).collect()
+        axes.z_m
+            .iter()
+            .flat_map(|z| axes.y_m.iter().map(move |y| (*y, *z)))
+            .map(|(y, z)| at(y, z))
+            .collect()
     }
 
     fn edges(grid: &EdgeGrid, vorticity_per_s: Vec<f64>) -> EdgePlane<'_> {
-        EdgePlane { grid, vorticity_per_s }
+        EdgePlane {
+            grid,
+            vorticity_per_s,
+        }
     }
 
     #[test]
@@ -161,23 +194,50 @@ mod tests {
             let core = plane.core([y + 0.06, z - 0.05], 1.0, RADIUS_M).unwrap();
             let off_m = (core.centre_m[0] - y).hypot(core.centre_m[1] - z);
             assert!(off_m < 3e-4, "{off_m} from ({y}, {z})");
-            assert!((core.circulation_m2_s / within - 1.0).abs() < 2e-3, "{}", core.circulation_m2_s);
+            assert!(
+                (core.circulation_m2_s / within - 1.0).abs() < 2e-3,
+                "{}",
+                core.circulation_m2_s
+            );
             let other = plane.core([y - 0.45, z], -1.0, RADIUS_M).unwrap();
-            assert!((axes.lateral_m(y - 0.5, other.centre_m[0])).abs() < 3e-4, "{:?}", other.centre_m);
-            assert!((other.circulation_m2_s / within + 0.8).abs() < 2e-3, "it keeps its sign");
+            assert!(
+                (axes.lateral_m(y - 0.5, other.centre_m[0])).abs() < 3e-4,
+                "{:?}",
+                other.centre_m
+            );
+            assert!(
+                (other.circulation_m2_s / within + 0.8).abs() < 2e-3,
+                "it keeps its sign"
+            );
         }
     }
 
     #[test]
     fn sums_and_strongest_places_keep_to_their_side_and_sign() {
         let axes = axes();
-        let plane = edges(&axes, plane(&axes, &[(1.0, -0.6, 0.8), (-0.5, 0.3, 0.7), (2.0, 0.9, 1.1)]));
+        let plane = edges(
+            &axes,
+            plane(
+                &axes,
+                &[(1.0, -0.6, 0.8), (-0.5, 0.3, 0.7), (2.0, 0.9, 1.1)],
+            ),
+        );
         let right = |y: f64, z: f64| y > 0.0 && z > 0.15;
         assert!((plane.circulation_m2_s(-1.0, right) + 0.5).abs() < 1e-3);
         assert!((plane.circulation_m2_s(1.0, |y, _| y < 0.2) - 1.0).abs() < 1e-3);
         let strongest = plane.strongest_m(-1.0, right).unwrap();
-        assert!((strongest[0] - 0.3).abs() < 0.02 && (strongest[1] - 0.7).abs() < 0.03, "{strongest:?}");
-        assert!(plane.strongest_m(-1.0, |y, _| y < -1.4).is_none() || plane.strongest_m(1.0, right).is_some());
-        assert!(edges(&axes, vec![0.0; 6100]).core([0.0, 1.0], 1.0, 0.2).is_none());
+        assert!(
+            (strongest[0] - 0.3).abs() < 0.02 && (strongest[1] - 0.7).abs() < 0.03,
+            "{strongest:?}"
+        );
+        assert!(
+            plane.strongest_m(-1.0, |y, _| y < -1.4).is_none()
+                || plane.strongest_m(1.0, right).is_some()
+        );
+        assert!(
+            edges(&axes, vec![0.0; 6100])
+                .core([0.0, 1.0], 1.0, 0.2)
+                .is_none()
+        );
     }
 }

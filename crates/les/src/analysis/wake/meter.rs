@@ -53,7 +53,12 @@ impl WakeMeter {
     ///
     /// # Errors
     /// [`Error::BadDirection`] unless x is periodic and z bounded; scales out of range.
-    pub fn new(mesh: &Mesh, viscosity_m2_s: f64, scales: WakeScales, centres_m: [[f64; 2]; 2]) -> Result<Self, Error> {
+    pub fn new(
+        mesh: &Mesh,
+        viscosity_m2_s: f64,
+        scales: WakeScales,
+        centres_m: [[f64; 2]; 2],
+    ) -> Result<Self, Error> {
         scales.validate()?;
         let curl = Curl::new(mesh)?;
         let lateral = &mesh.directions()[1];
@@ -64,7 +69,13 @@ impl WakeMeter {
             scales,
             window: WINDOW,
             core_radius: CORE_RADIUS,
-            grid: EdgeGrid { y_m, z_m, y_length_m, z_length_m, period_m },
+            grid: EdgeGrid {
+                y_m,
+                z_m,
+                y_length_m,
+                z_length_m,
+                period_m,
+            },
             viscosity_m2_s,
             first_height_m: mesh.centre_m(2)[0] - mesh.face_m(2)[0],
             track: centres_m.map(|[y, z]| [[f64::NAN; 3], [f64::NAN, y, z]]),
@@ -78,7 +89,9 @@ impl WakeMeter {
     /// [`Error::OutOfRange`] unless the radii are positive and increase.
     pub fn with_window(self, window: [f64; 2]) -> Result<Self, Error> {
         check("radius of the window", window[0], "positive", |r| r > 0.0)?;
-        check("radius of the window", window[1], "above the first", |r| r > window[0])?;
+        check("radius of the window", window[1], "above the first", |r| {
+            r > window[0]
+        })?;
         Ok(Self { window, ..self })
     }
 
@@ -89,7 +102,10 @@ impl WakeMeter {
     /// [`Error::OutOfRange`] for a radius that is not positive.
     pub fn with_core_radius(self, core_radius: f64) -> Result<Self, Error> {
         check("core_radius", core_radius, "positive", |r| r > 0.0)?;
-        Ok(Self { core_radius, ..self })
+        Ok(Self {
+            core_radius,
+            ..self
+        })
     }
 
     /// The same, told how the two vortices move at first, `(v, w)` \[m/s\]: needed where they move by more than a core radius
@@ -99,14 +115,20 @@ impl WakeMeter {
             let unit_s = self.scales.time_unit_s();
             let [_, y_m, z_m] = track[1];
             track[1][0] = 0.0;
-            track[0] = [-unit_s, y_m - velocity_m_s[0] * unit_s, z_m - velocity_m_s[1] * unit_s];
+            track[0] = [
+                -unit_s,
+                y_m - velocity_m_s[0] * unit_s,
+                z_m - velocity_m_s[1] * unit_s,
+            ];
         }
         self
     }
 
     /// Radii of the circulation profile \[m\].
     pub fn radii_m(&self) -> Vec<f64> {
-        (1..=PROFILE.0).map(|i| i as f64 * PROFILE.1 * self.scales.spacing_m).collect()
+        (1..=PROFILE.0)
+            .map(|i| i as f64 * PROFILE.1 * self.scales.spacing_m)
+            .collect()
     }
 
     /// What the meter remembers, to be kept in a checkpoint.
@@ -116,7 +138,10 @@ impl WakeMeter {
 
     /// Takes back what [`Self::state`] gave.
     pub fn restore(&mut self, state: [f64; 12]) {
-        self.track.as_flattened_mut().as_flattened_mut().copy_from_slice(&state);
+        self.track
+            .as_flattened_mut()
+            .as_flattened_mut()
+            .copy_from_slice(&state);
     }
 
     /// Measures the flow, which is on the mesh of the meter and not earlier than the one before. Of a flow on several ranks all
@@ -132,7 +157,8 @@ impl WakeMeter {
         let wind = flow.plane_snapshot(&flow.mean_plane_of(&seen)?, OutsidePolicy::Mask)?;
         let radius_m = self.core_radius * self.scales.spacing_m;
         let time_s = flow.time_s();
-        let core = |v: usize| seen.core(|| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
+        let core =
+            |v: usize| seen.core(|| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
         let cores = [core(0)?, core(1)?];
         let mut tracks = self.track;
         for (track, core) in tracks.iter_mut().zip(&cores) {
@@ -148,16 +174,32 @@ impl WakeMeter {
         let (shear, wall_shear_per_s) = self.wall_shear(&seen)?;
         let vortex = |own: usize| {
             let (is_found, floor_m) = (cores[own].is_some(), ABOVE_LAYER * self.scales.spacing_m);
-            let side = Side { plane: &plane, centres_m, own, is_found, floor_m };
+            let side = Side {
+                plane: &plane,
+                centres_m,
+                own,
+                is_found,
+                floor_m,
+            };
             let mut record = self.vortex(&seen, &side, &wind)?;
-            let faces = self.grid.y_m.iter().zip(&shear).filter(|(y_m, _)| side.has(**y_m));
-            record.outward_shear_per_s = faces.map(|(_, shear)| SIGN[own] * shear).fold(f64::NAN, f64::min);
+            let faces = self
+                .grid
+                .y_m
+                .iter()
+                .zip(&shear)
+                .filter(|(y_m, _)| side.has(**y_m));
+            record.outward_shear_per_s = faces
+                .map(|(_, shear)| SIGN[own] * shear)
+                .fold(f64::NAN, f64::min);
             Ok::<_, Error>(record)
         };
         let length_m: f64 = self.curl.cell_m[0].iter().sum();
         let friction_m_s = (self.viscosity_m2_s * wall_shear_per_s).sqrt();
-        let wall_units =
-            if friction_m_s > 0.0 { self.first_height_m * friction_m_s / self.viscosity_m2_s } else { 0.0 };
+        let wall_units = if friction_m_s > 0.0 {
+            self.first_height_m * friction_m_s / self.viscosity_m2_s
+        } else {
+            0.0
+        };
         let record = WakeRecord {
             time_s,
             left: vortex(0)?,
@@ -186,41 +228,76 @@ impl WakeMeter {
             }
         });
         let vorticity_per_s = seen.slabs.all_gather(mean)?;
-        Ok(EdgePlane { grid: &self.grid, vorticity_per_s })
+        Ok(EdgePlane {
+            grid: &self.grid,
+            vorticity_per_s,
+        })
     }
 
     /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank seeks it in some of the planes.
-    fn slices(&self, seen: &Faces, about: Core, sign: f64, floor_m: f64) -> Result<Vec<[f64; 2]>, Error> {
+    fn slices(
+        &self,
+        seen: &Faces,
+        about: Core,
+        sign: f64,
+        floor_m: f64,
+    ) -> Result<Vec<[f64; 2]>, Error> {
         let radius_m = self.core_radius * self.scales.spacing_m;
-        let (ny, nz, nx) = (self.grid.y_m.len(), self.grid.z_m.len(), self.curl.cell_m[0].len());
+        let (ny, nz, nx) = (
+            self.grid.y_m.len(),
+            self.grid.z_m.len(),
+            self.curl.cell_m[0].len(),
+        );
         let near = |k: &usize| {
             let z_m = self.grid.z_m[*k];
             z_m > floor_m && (z_m - about.centre_m[1]).abs() < 2.0 * radius_m
         };
         let lateral_m = |j: usize| self.grid.lateral_m(about.centre_m[0], self.grid.y_m[j]);
-        let beside: Vec<usize> = (0..ny).filter(|j| lateral_m(*j).abs() < 2.0 * radius_m).collect();
+        let beside: Vec<usize> = (0..ny)
+            .filter(|j| lateral_m(*j).abs() < 2.0 * radius_m)
+            .collect();
         // Each rank gives the vorticity of its planes across z to all, and seeks in some planes across x.
         let own = self.curl.own_faces(seen.shape.own()).filter(near);
-        let rows: Vec<[usize; 2]> = own.flat_map(|k| beside.iter().map(move |j| [*j, k])).collect();
+        let rows: Vec<[usize; 2]> = own
+            .flat_map(|k| beside.iter().map(move |j| [*j, k]))
+            .collect();
         let mut values = vec![0.0; rows.len() * nx];
-        values.par_chunks_mut(nx).zip(&rows).for_each(|(row, [j, k])| self.curl.row(seen, 0, *j, *k, row));
+        values
+            .par_chunks_mut(nx)
+            .zip(&rows)
+            .for_each(|(row, [j, k])| self.curl.row(seen, 0, *j, *k, row));
         let values = seen.slabs.all_gather(values)?;
-        let places: Vec<usize> = (0..nz).filter(near).flat_map(|k| beside.iter().map(move |j| k * ny + j)).collect();
+        let places: Vec<usize> = (0..nz)
+            .filter(near)
+            .flat_map(|k| beside.iter().map(move |j| k * ny + j))
+            .collect();
         let (rank, count) = (seen.slabs.ranks.rank(), seen.slabs.ranks.count());
         let own: Vec<[f64; 2]> = (nx * rank / count..nx * (rank + 1) / count)
             .into_par_iter()
             .map(|i| {
                 let mut plane = vec![0.0; ny * nz];
                 let column = values.iter().skip(i).step_by(nx);
-                places.iter().zip(column).for_each(|(place, value)| plane[*place] = *value);
-                let core = EdgePlane { grid: &self.grid, vorticity_per_s: plane }.core(about.centre_m, sign, radius_m);
+                places
+                    .iter()
+                    .zip(column)
+                    .for_each(|(place, value)| plane[*place] = *value);
+                let core = EdgePlane {
+                    grid: &self.grid,
+                    vorticity_per_s: plane,
+                }
+                .core(about.centre_m, sign, radius_m);
                 core.map_or([f64::NAN; 2], |core| core.centre_m)
             })
             .collect();
         seen.slabs.planes(own)
     }
 
-    fn vortex(&self, seen: &Faces, side: &Side<'_>, wind: &GridSnapshot) -> Result<VortexRecord, Error> {
+    fn vortex(
+        &self,
+        seen: &Faces,
+        side: &Side<'_>,
+        wind: &GridSnapshot,
+    ) -> Result<VortexRecord, Error> {
         let (sign, centre_m) = (SIGN[side.own], side.centres_m[side.own]);
         let spacing_m = self.scales.spacing_m;
         let circulation = |radius_m: f64| circulation_m2_s(wind, centre_m, radius_m, 0.0, POINTS);
@@ -230,8 +307,15 @@ impl WakeMeter {
         for i in 0..WINDOW_RADII {
             mean += circulation(from + i as f64 * step_m)? / WINDOW_RADII as f64;
         }
-        let gamma_m2_s = self.radii_m().into_iter().map(circulation).collect::<Result<_, _>>()?;
-        let slices_m = match seen.core(|| side.plane.core(centre_m, sign, self.core_radius * spacing_m))? {
+        let gamma_m2_s = self
+            .radii_m()
+            .into_iter()
+            .map(circulation)
+            .collect::<Result<_, _>>()?;
+        let slices_m = match seen.core(|| {
+            side.plane
+                .core(centre_m, sign, self.core_radius * spacing_m)
+        })? {
             Some(core) if side.is_found => self.slices(seen, core, sign, f64::NEG_INFINITY)?,
             _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
         };
@@ -245,7 +329,9 @@ impl WakeMeter {
             z_spread_m,
             gamma_5_15_m2_s: mean + missing,
             gamma_m2_s,
-            gamma_opposite_m2_s: side.plane.circulation_m2_s(-sign, |y_m, z_m| side.has_above(y_m, z_m)),
+            gamma_opposite_m2_s: side
+                .plane
+                .circulation_m2_s(-sign, |y_m, z_m| side.has_above(y_m, z_m)),
             secondary: self.secondary(seen, side)?,
             outward_shear_per_s: f64::NAN,
         })
@@ -259,30 +345,50 @@ impl WakeMeter {
         upper.vorticity_per_s[..below].fill(0.0);
         let radius_m = self.core_radius * self.scales.spacing_m;
         // The first vortex of the other side has the same sign: a search that slides over to it has found nothing.
-        let core_at = |guess_m: [f64; 2]| upper.core(guess_m, sign, radius_m).filter(|core| side.has(core.centre_m[0]));
+        let core_at = |guess_m: [f64; 2]| {
+            upper
+                .core(guess_m, sign, radius_m)
+                .filter(|core| side.has(core.centre_m[0]))
+        };
         let above = |y_m: f64, z_m: f64| side.has_above(y_m, z_m);
         let first = || side.plane.strongest_m(sign, above).and_then(core_at);
         // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
         let apart = |y_m: f64, z_m: f64, core: &Core| {
-            side.plane.grid.lateral_m(core.centre_m[0], y_m).hypot(z_m - core.centre_m[1]) > 2.0 * radius_m
+            side.plane
+                .grid
+                .lateral_m(core.centre_m[0], y_m)
+                .hypot(z_m - core.centre_m[1])
+                > 2.0 * radius_m
         };
         let second = |core: Core| {
-            side.plane.strongest_m(sign, |y_m, z_m| above(y_m, z_m) && apart(y_m, z_m, &core)).and_then(core_at)
+            side.plane
+                .strongest_m(sign, |y_m, z_m| above(y_m, z_m) && apart(y_m, z_m, &core))
+                .and_then(core_at)
         };
         let size = |core: &Core| core.circulation_m2_s.abs();
         let found = seen.core(|| {
             let first = first();
-            first.into_iter().chain(first.and_then(second)).max_by(|a, b| size(a).total_cmp(&size(b)))
+            first
+                .into_iter()
+                .chain(first.and_then(second))
+                .max_by(|a, b| size(a).total_cmp(&size(b)))
         })?;
         let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
         Ok(match found {
             Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
-                let [y_spread_m, z_spread_m] = spread(&self.slices(seen, core, sign, side.floor_m)?);
+                let [y_spread_m, z_spread_m] =
+                    spread(&self.slices(seen, core, sign, side.floor_m)?);
                 let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
                 // Beside its own vortex, which is counted on over the sides.
                 let own_y_m = side.centres_m[side.own][0];
                 let y_m = own_y_m + side.plane.grid.lateral_m(own_y_m, y_m);
-                SecondaryRecord { y_m, z_m, y_spread_m, z_spread_m, gamma_m2_s }
+                SecondaryRecord {
+                    y_m,
+                    z_m,
+                    y_spread_m,
+                    z_spread_m,
+                    gamma_m2_s,
+                }
             }
             _ => SecondaryRecord::NONE,
         })
@@ -301,7 +407,11 @@ impl WakeMeter {
                 self.curl.row(seen, 0, j, 0, &mut across);
                 self.curl.row(seen, 1, j, 0, &mut along);
                 found.push(-across.iter().sum::<f64>() / nx as f64);
-                largest = across.iter().zip(&along).map(|(a, b)| a.hypot(*b)).fold(largest, f64::max);
+                largest = across
+                    .iter()
+                    .zip(&along)
+                    .map(|(a, b)| a.hypot(*b))
+                    .fold(largest, f64::max);
             }
             found.push(largest);
             found
@@ -315,8 +425,13 @@ impl Faces {
     /// The core that rank 0 finds: which planes are looked at depends on it.
     fn core(&self, find: impl FnOnce() -> Option<Core>) -> Result<Option<Core>, Error> {
         let numbers = |core: Core| vec![core.centre_m[0], core.centre_m[1], core.circulation_m2_s];
-        let found = self.slabs.broadcast(|| find().map_or_else(Vec::new, numbers))?;
-        let core = |&[y_m, z_m, circulation_m2_s]: &[f64; 3]| Core { centre_m: [y_m, z_m], circulation_m2_s };
+        let found = self
+            .slabs
+            .broadcast(|| find().map_or_else(Vec::new, numbers))?;
+        let core = |&[y_m, z_m, circulation_m2_s]: &[f64; 3]| Core {
+            centre_m: [y_m, z_m],
+            circulation_m2_s,
+        };
         Ok(found.first_chunk().map(core))
     }
 }
@@ -359,7 +474,11 @@ fn guess(track: &[Fix; 2], time_s: f64) -> [f64; 2] {
 /// Standard deviations over the slices that have a centre.
 fn spread(slices_m: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|c| {
-        let values: Vec<f64> = slices_m.iter().map(|s| s[c]).filter(|x| x.is_finite()).collect();
+        let values: Vec<f64> = slices_m
+            .iter()
+            .map(|s| s[c])
+            .filter(|x| x.is_finite())
+            .collect();
         let mean = values.iter().sum::<f64>() / values.len() as f64;
         (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
     })

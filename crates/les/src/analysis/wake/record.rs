@@ -71,8 +71,13 @@ pub struct SecondaryRecord {
 
 impl SecondaryRecord {
     /// None is there.
-    pub(super) const NONE: Self =
-        Self { y_m: f64::NAN, z_m: f64::NAN, y_spread_m: f64::NAN, z_spread_m: f64::NAN, gamma_m2_s: f64::NAN };
+    pub(super) const NONE: Self = Self {
+        y_m: f64::NAN,
+        z_m: f64::NAN,
+        y_spread_m: f64::NAN,
+        z_spread_m: f64::NAN,
+        gamma_m2_s: f64::NAN,
+    };
 }
 
 impl WakeRecord {
@@ -93,21 +98,29 @@ pub struct WakeScales {
 
 impl WakeScales {
     /// `b0` = 1 m and `Gamma0` = 2 pi m^2/s: then `V0` = 1 m/s, and seconds are `tau`.
-    pub const REDUCED: Self = Self { spacing_m: 1.0, circulation_m2_s: TAU };
+    pub const REDUCED: Self = Self {
+        spacing_m: 1.0,
+        circulation_m2_s: TAU,
+    };
 
     /// The scales of the wake of an aircraft, equation (5).
     ///
     /// # Errors
     /// As [`Aircraft::circulation_m2_s`].
     pub fn of_aircraft(aircraft: &Aircraft) -> Result<Self, Error> {
-        Ok(Self { spacing_m: aircraft.spacing_m()?, circulation_m2_s: aircraft.circulation_m2_s()? })
+        Ok(Self {
+            spacing_m: aircraft.spacing_m()?,
+            circulation_m2_s: aircraft.circulation_m2_s()?,
+        })
     }
 
     /// # Errors
     /// [`Error::OutOfRange`] for a scale that is not positive.
     pub fn validate(&self) -> Result<(), Error> {
         check("spacing_m", self.spacing_m, "positive", |b| b > 0.0)?;
-        check("circulation_m2_s", self.circulation_m2_s, "positive", |g| g > 0.0)
+        check("circulation_m2_s", self.circulation_m2_s, "positive", |g| {
+            g > 0.0
+        })
     }
 
     /// Initial speed of descent `V0` \[m/s\].
@@ -132,7 +145,10 @@ mod tests {
 
     #[test]
     fn scales_are_those_of_the_analytic_pair_and_of_the_aircraft() {
-        let scales = WakeScales { spacing_m: 47.0, circulation_m2_s: 500.0 };
+        let scales = WakeScales {
+            spacing_m: 47.0,
+            circulation_m2_s: 500.0,
+        };
         let pair = crate::winds::VortexPair {
             circulation_m2_s: 500.0,
             spacing_m: 47.0,
@@ -146,11 +162,23 @@ mod tests {
         assert_eq!(scales.descent_speed_m_s(), pair.descent_speed_m_s());
         assert!((scales.time_unit_s() - pair.time_s(1.0)).abs() < 1e-12);
         assert_eq!(WakeScales::REDUCED.time_unit_s(), 1.0);
-        let aircraft = Aircraft { mass_kg: 2.5e5, speed_m_s: 70.0, span_m: 60.0, air_density_kg_m3: 1.2 };
+        let aircraft = Aircraft {
+            mass_kg: 2.5e5,
+            speed_m_s: 70.0,
+            span_m: 60.0,
+            air_density_kg_m3: 1.2,
+        };
         let scales = WakeScales::of_aircraft(&aircraft).unwrap();
         // M g = rho U b0 Gamma0.
         let lift_n = 1.2 * 70.0 * scales.spacing_m * scales.circulation_m2_s;
         assert!((lift_n / (2.5e5 * 9.806_65) - 1.0).abs() < 1e-14);
-        assert!(WakeScales { spacing_m: -1.0, circulation_m2_s: 1.0 }.validate().is_err());
+        assert!(
+            WakeScales {
+                spacing_m: -1.0,
+                circulation_m2_s: 1.0
+            }
+            .validate()
+            .is_err()
+        );
     }
 }

@@ -29,7 +29,11 @@ impl VortexRecord {
         Self {
             y_m: self.y_m * length,
             z_m: self.z_m * length,
-            slices_m: self.slices_m.iter().map(|c| c.map(|x| x * length)).collect(),
+            slices_m: self
+                .slices_m
+                .iter()
+                .map(|c| c.map(|x| x * length))
+                .collect(),
             y_spread_m: self.y_spread_m * length,
             z_spread_m: self.z_spread_m * length,
             gamma_5_15_m2_s: self.gamma_5_15_m2_s * gamma,

@@ -19,7 +19,13 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Result<Vec<f
     let modes = nx / 2 + 1;
     let mut energies = vec![0.0; modes];
     for (component, field) in velocity.field.iter().enumerate() {
-        let length_m = |d: usize| if component == d { &curl.face_m[d] } else { &curl.cell_m[d] };
+        let length_m = |d: usize| {
+            if component == d {
+                &curl.face_m[d]
+            } else {
+                &curl.cell_m[d]
+            }
+        };
         let (y_m, z_m) = (length_m(1), length_m(2));
         let plane = |plane: &[f64]| {
             let (mut row, mut scratch) = (vec![0.0; nx], transform.make_scratch_vec());
@@ -28,7 +34,10 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Result<Vec<f
             for (values, y_m) in plane.chunks(nx).zip(y_m) {
                 row.copy_from_slice(values);
                 // The buffers were made by the plan: their lengths are right.
-                if transform.process_with_scratch(&mut row, &mut spectrum, &mut scratch).is_ok() {
+                if transform
+                    .process_with_scratch(&mut row, &mut spectrum, &mut scratch)
+                    .is_ok()
+                {
                     for (sum, value) in sums.iter_mut().zip(&spectrum) {
                         *sum += y_m * value.norm_sqr();
                     }
@@ -38,7 +47,12 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Result<Vec<f
         };
         let own = field[velocity.shape.own_places()].par_chunks(velocity.shape.plane());
         let own: Vec<Vec<f64>> = own.map(plane).collect();
-        for (sums, z_m) in velocity.slabs.all_gather(own.concat())?.chunks(modes).zip(z_m) {
+        for (sums, z_m) in velocity
+            .slabs
+            .all_gather(own.concat())?
+            .chunks(modes)
+            .zip(z_m)
+        {
             for (energy, sum) in energies.iter_mut().zip(sums) {
                 *energy += 0.5 * z_m * sum;
             }
@@ -65,31 +79,55 @@ mod tests {
         for nx in [9, 12] {
             let x = Direction::periodic(nx, 0.0, 3.0);
             let y = Direction::periodic(8, 0.0, 2.0).stretched(Spread::Sine.by(0.3));
-            let z = Direction::between(16, 0.0, 0.5, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(1.0));
+            let z = Direction::between(16, 0.0, 0.5, Wall::AT_REST, Wall::Slip)
+                .stretched(Spread::TanhLow.by(1.0));
             let mesh = Mesh::new(x, y, z).unwrap();
             let curl = Curl::new(&mesh).unwrap();
             let x_m = mesh.face_m(0);
             let u: Vec<f64> = (0..8 * 16)
-                .flat_map(|_| x_m[..nx].iter().map(|x| 0.7 + 0.5 * (2.0 * TAU * x / 3.0 + 0.3).cos()))
+                .flat_map(|_| {
+                    x_m[..nx]
+                        .iter()
+                        .map(|x| 0.7 + 0.5 * (2.0 * TAU * x / 3.0 + 0.3).cos())
+                })
                 .collect();
-            let v: Vec<f64> = (0..8 * 16).flat_map(|_| x_m[..nx].iter().map(|x| (TAU * x / 3.0).sin())).collect();
+            let v: Vec<f64> = (0..8 * 16)
+                .flat_map(|_| x_m[..nx].iter().map(|x| (TAU * x / 3.0).sin()))
+                .collect();
             let w = vec![0.0; u.len()];
-            let faces = Faces { shape: Shape::whole([nx, 8, 16]), field: [u, v, w], slabs: Layout::new(&mesh).slabs };
+            let faces = Faces {
+                shape: Shape::whole([nx, 8, 16]),
+                field: [u, v, w],
+                slabs: Layout::new(&mesh).slabs,
+            };
             let energies = mode_energies_m4_s2(&curl, &faces).unwrap();
             assert_eq!(energies.len(), nx / 2 + 1);
             // The area is 1; a wave of amplitude a has the energy a^2/4.
             for (m, expected) in [0.5 * 0.49, 0.25, 0.25 * 0.25, 0.0].into_iter().enumerate() {
-                assert!((energies[m] - expected).abs() < 1e-13, "{nx}, {m}: {}", energies[m]);
+                assert!(
+                    (energies[m] - expected).abs() < 1e-13,
+                    "{nx}, {m}: {}",
+                    energies[m]
+                );
             }
         }
         let even = Direction::periodic(4, 0.0, 1.0);
         let z = Direction::between(4, 0.0, 1.0, Wall::Slip, Wall::Slip);
         let mesh = Mesh::new(even.clone(), even, z).unwrap();
         let curl = Curl::new(&mesh).unwrap();
-        let saw: Vec<f64> = (0..64).map(|i| if i % 2 == 0 { 1.0 } else { -1.0 }).collect();
+        let saw: Vec<f64> = (0..64)
+            .map(|i| if i % 2 == 0 { 1.0 } else { -1.0 })
+            .collect();
         let field = [saw, vec![0.0; 64], vec![0.0; 64]];
-        let faces = Faces { shape: Shape::whole([4; 3]), field, slabs: Layout::new(&mesh).slabs };
+        let faces = Faces {
+            shape: Shape::whole([4; 3]),
+            field,
+            slabs: Layout::new(&mesh).slabs,
+        };
         let energies = mode_energies_m4_s2(&curl, &faces).unwrap();
-        assert!((energies[2] - 0.5).abs() < 1e-14 && energies[0].abs() < 1e-14, "the shortest wave: {energies:?}");
+        assert!(
+            (energies[2] - 0.5).abs() < 1e-14 && energies[0].abs() < 1e-14,
+            "the shortest wave: {energies:?}"
+        );
     }
 }

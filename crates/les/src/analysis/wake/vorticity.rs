@@ -41,7 +41,12 @@ impl Curl {
     pub(super) fn new(mesh: &Mesh) -> Result<Self, Error> {
         let ends = |axis: usize| mesh.directions()[axis].ends;
         if ends(0) != Ends::Periodic {
-            return Err(refused(0, "period", 0.0, "there: a wake repeats itself along the flight"));
+            return Err(refused(
+                0,
+                "period",
+                0.0,
+                "there: a wake repeats itself along the flight",
+            ));
         }
         if ends(2) == Ends::Periodic {
             return Err(refused(2, "ground", 0.0, "there: z must be bounded"));
@@ -71,7 +76,9 @@ impl Curl {
             corrected_m,
             cells,
             faces: std::array::from_fn(|d| cells[d] + usize::from(!periodic[d])),
-            slope: std::array::from_fn(|along| std::array::from_fn(|c| Slope::new(&directions[along], c))),
+            slope: std::array::from_fn(|along| {
+                std::array::from_fn(|c| Slope::new(&directions[along], c))
+            }),
             cell_m: lengths.each_ref().map(|l| l.0.clone()),
             face_m: lengths.each_ref().map(|l| l.1.clone()),
         })
@@ -107,13 +114,21 @@ impl Curl {
         if along == 0 {
             let Some(values) = row(j, k) else { return };
             for (out, taps) in out.iter_mut().zip(&slope.taps) {
-                *out += sign * taps.iter().map(|(i, weight)| weight * values[*i]).sum::<f64>();
+                *out += sign
+                    * taps
+                        .iter()
+                        .map(|(i, weight)| weight * values[*i])
+                        .sum::<f64>();
             }
             return;
         }
         let place = if along == 1 { j } else { k };
         for &(cell, weight) in &slope.taps[place] {
-            let values = if along == 1 { row(cell, k) } else { row(j, cell) };
+            let values = if along == 1 {
+                row(cell, k)
+            } else {
+                row(j, cell)
+            };
             for (out, value) in out.iter_mut().zip(values.unwrap_or_default()) {
                 *out += sign * weight * value;
             }
@@ -126,7 +141,11 @@ impl Curl {
 
     /// The faces across z of the cells in the planes that are owned; the highest one is with the last cells.
     pub(super) fn own_faces(&self, own: Range<usize>) -> Range<usize> {
-        if own.end == self.cells[2] { own.start..self.faces[2] } else { own }
+        if own.end == self.cells[2] {
+            own.start..self.faces[2]
+        } else {
+            own
+        }
     }
 
     /// Half the integral of the squared vorticity over the box, per length of x \[m^2/s^2\].
@@ -136,9 +155,19 @@ impl Curl {
     pub(super) fn enstrophy_m2_s2(&self, velocity: &Faces) -> Result<f64, Error> {
         let nx = self.cells[0];
         let component = |c: usize| {
-            let weight = |d: usize| if c == d { &self.cell_m[d] } else { &self.face_m[d] };
+            let weight = |d: usize| {
+                if c == d {
+                    &self.cell_m[d]
+                } else {
+                    &self.face_m[d]
+                }
+            };
             let (x_m, y_m) = (weight(0), weight(1));
-            let z_m = if c == 2 { &self.cell_m[2] } else { &self.corrected_m };
+            let z_m = if c == 2 {
+                &self.cell_m[2]
+            } else {
+                &self.corrected_m
+            };
             let plane = |k: usize| {
                 let mut row = vec![0.0; nx];
                 let mut sum = 0.0;
@@ -151,8 +180,15 @@ impl Curl {
             let own = velocity.shape.own();
             let own = if c == 2 { own } else { self.own_faces(own) };
             // Collected first, so that the order of the sum is that of the planes.
-            let planes = velocity.slabs.all_gather(own.into_par_iter().map(plane).collect())?;
-            Ok(0.5 * planes.iter().zip(z_m).map(|(sum, z_m)| sum * z_m).sum::<f64>())
+            let planes = velocity
+                .slabs
+                .all_gather(own.into_par_iter().map(plane).collect())?;
+            Ok(0.5
+                * planes
+                    .iter()
+                    .zip(z_m)
+                    .map(|(sum, z_m)| sum * z_m)
+                    .sum::<f64>())
         };
         let components = [component(0)?, component(1)?, component(2)?];
         Ok(components.iter().sum::<f64>() / self.cell_m[0].iter().sum::<f64>())
@@ -164,30 +200,43 @@ impl Curl {
         let (shape, nx) = (velocity.shape, self.cells[0]);
         let next = |d: usize, i: usize| (i + 1) % self.faces[d];
         let mut out = vec![0.0; shape.own_places().len()];
-        out.par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
-            let mut edges = vec![0.0; nx];
-            for (j, out) in plane.chunks_mut(nx).enumerate() {
-                let (j_high, k_high) = (next(1, j), next(2, k));
-                for c in 0..3 {
-                    let mut mean = vec![0.0; nx];
-                    let (ys, zs): (&[usize], &[usize]) = match c {
-                        0 => (&[j, j_high], &[k, k_high]),
-                        1 => (&[j], &[k, k_high]),
-                        _ => (&[j, j_high], &[k]),
-                    };
-                    for &(j, k) in ys.iter().flat_map(|j| zs.iter().map(move |k| (*j, *k))).collect::<Vec<_>>().iter() {
-                        self.row(velocity, c, j, k, &mut edges);
-                        for i in 0..nx {
-                            // Components 1 and 2 lie at the faces of x.
-                            mean[i] += if c == 0 { edges[i] } else { 0.5 * (edges[i] + edges[next(0, i)]) };
+        out.par_chunks_mut(shape.plane())
+            .zip(shape.own())
+            .for_each(|(plane, k)| {
+                let mut edges = vec![0.0; nx];
+                for (j, out) in plane.chunks_mut(nx).enumerate() {
+                    let (j_high, k_high) = (next(1, j), next(2, k));
+                    for c in 0..3 {
+                        let mut mean = vec![0.0; nx];
+                        let (ys, zs): (&[usize], &[usize]) = match c {
+                            0 => (&[j, j_high], &[k, k_high]),
+                            1 => (&[j], &[k, k_high]),
+                            _ => (&[j, j_high], &[k]),
+                        };
+                        for &(j, k) in ys
+                            .iter()
+                            .flat_map(|j| zs.iter().map(move |k| (*j, *k)))
+                            .collect::<Vec<_>>()
+                            .iter()
+                        {
+                            self.row(velocity, c, j, k, &mut edges);
+                            for i in 0..nx {
+                                // Components 1 and 2 lie at the faces of x.
+                                mean[i] += if c == 0 {
+                                    edges[i]
+                                } else {
+                                    0.5 * (edges[i] + edges[next(0, i)])
+                                };
+                            }
                         }
+                        let count = (ys.len() * zs.len()) as f64;
+                        out.iter_mut()
+                            .zip(&mean)
+                            .for_each(|(out, mean)| *out += (mean / count).powi(2));
                     }
-                    let count = (ys.len() * zs.len()) as f64;
-                    out.iter_mut().zip(&mean).for_each(|(out, mean)| *out += (mean / count).powi(2));
+                    out.iter_mut().for_each(|out| *out = out.sqrt());
                 }
-                out.iter_mut().for_each(|out| *out = out.sqrt());
-            }
-        });
+            });
         out
     }
 }
@@ -230,7 +279,10 @@ impl Slope {
         let periodic = direction.ends == Ends::Periodic;
         let faces = if periodic { n } else { n + 1 };
         if n == 1 {
-            return Self { taps: vec![Vec::new(); faces], from_walls: vec![0.0; faces] };
+            return Self {
+                taps: vec![Vec::new(); faces],
+                from_walls: vec![0.0; faces],
+            };
         }
         let nodes = extended(direction, component);
         let at_face = |face: usize| {
@@ -273,7 +325,9 @@ fn extended(direction: &Direction, component: usize) -> Vec<(f64, Node)> {
         Ends::Walls { low, high } => {
             for (wall, at_m, cell) in [(low, direction.low_m, 0), (high, direction.high_m, n - 1)] {
                 match wall {
-                    Wall::NoSlip { velocity_m_s } => nodes.push((at_m, Node::Wall(velocity_m_s[component]))),
+                    Wall::NoSlip { velocity_m_s } => {
+                        nodes.push((at_m, Node::Wall(velocity_m_s[component])))
+                    }
                     Wall::Slip => {
                         for i in 0..TAPS / 2 {
                             let cell = if cell == 0 { i } else { cell - i };
@@ -294,7 +348,12 @@ fn derivative_weights(position_m: [f64; TAPS], at_m: f64) -> [f64; TAPS] {
         let others = || (0..TAPS).filter(move |j| *j != i);
         let scale: f64 = others().map(|j| position_m[i] - position_m[j]).product();
         let sum: f64 = others()
-            .map(|left_out| others().filter(|j| *j != left_out).map(|j| at_m - position_m[j]).product::<f64>())
+            .map(|left_out| {
+                others()
+                    .filter(|j| *j != left_out)
+                    .map(|j| at_m - position_m[j])
+                    .product::<f64>()
+            })
             .sum();
         sum / scale
     })
@@ -311,7 +370,13 @@ mod tests {
         let periodic = || Direction::periodic(cells, 0.0, 2.0);
         let z = Direction::between(cells / 2, 0.0, 1.0, Wall::Slip, Wall::Slip);
         let settings = FlowSettings::new(viscosity, TimeStep::Fixed { step_s: 1e-4 });
-        Flow::new(Mesh::new(periodic(), periodic(), z).unwrap(), settings, field).unwrap().0
+        Flow::new(
+            Mesh::new(periodic(), periodic(), z).unwrap(),
+            settings,
+            field,
+        )
+        .unwrap()
+        .0
     }
 
     /// Free of divergence, no flow through the planes, different in all directions.
@@ -333,18 +398,28 @@ mod tests {
         };
         let flow = start(48, 0.01, field);
         let found = flow.own_vorticity_magnitude_per_s().unwrap();
-        let (x_m, y_m, z_m) = (flow.mesh().centre_m(0), flow.mesh().centre_m(1), flow.mesh().centre_m(2));
+        let (x_m, y_m, z_m) = (
+            flow.mesh().centre_m(0),
+            flow.mesh().centre_m(1),
+            flow.mesh().centre_m(2),
+        );
         let largest = 3.0 * PI;
         for (place, found) in found.iter().enumerate() {
             let expected = magnitude([x_m[place % 48], y_m[place / 48 % 48], z_m[place / 48 / 48]]);
-            assert!((found - expected).abs() < 0.005 * largest, "{place}: {found} for {expected}");
+            assert!(
+                (found - expected).abs() < 0.005 * largest,
+                "{place}: {found} for {expected}"
+            );
         }
         // -dE/dt = nu int omega^2 = 2 nu times the enstrophy, between planes without friction.
         let curl = Curl::new(flow.mesh()).unwrap();
         let enstrophy = curl.enstrophy_m2_s2(&flow.faces().unwrap()).unwrap();
         let mut flow = flow;
         let power = flow.step().unwrap().viscous_power_m5_s3 / 2.0;
-        assert!((-power / (2.0 * 0.01 * enstrophy) - 1.0).abs() < 1e-4, "{power} for {enstrophy}");
+        assert!(
+            (-power / (2.0 * 0.01 * enstrophy) - 1.0).abs() < 1e-4,
+            "{power} for {enstrophy}"
+        );
     }
 
     #[test]
@@ -357,7 +432,13 @@ mod tests {
         .unwrap();
         let curl = Curl::new(&mesh).unwrap();
         let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
-        let stream = |[_, y, z]: [f64; 3]| [0.0, (PI * y).sin() * (PI * z).cos(), -(PI * y).cos() * (PI * z).sin()];
+        let stream = |[_, y, z]: [f64; 3]| {
+            [
+                0.0,
+                (PI * y).sin() * (PI * z).cos(),
+                -(PI * y).cos() * (PI * z).sin(),
+            ]
+        };
         let (flow, _) = Flow::new(mesh, settings, stream).unwrap();
         let velocity = flow.faces().unwrap();
         let mut row = [0.0];
@@ -365,7 +446,11 @@ mod tests {
             curl.row(&velocity, 0, j, k, &mut row);
             let (y, z) = (flow.mesh().face_m(1)[j], flow.mesh().face_m(2)[k]);
             let expected = TAU * (PI * y).sin() * (PI * z).sin();
-            assert!((row[0] - expected).abs() < 2e-4 * TAU, "{} for {expected}", row[0]);
+            assert!(
+                (row[0] - expected).abs() < 2e-4 * TAU,
+                "{} for {expected}",
+                row[0]
+            );
         }
     }
 }
@@ -379,18 +464,29 @@ mod slope_tests {
         let slope = Slope::new(direction, component);
         let value = |i: usize| field(direction.at(i as f64 + 0.5).0);
         let sum = |taps: &Vec<(usize, f64)>| taps.iter().map(|(i, w)| w * value(*i)).sum::<f64>();
-        slope.taps.iter().zip(&slope.from_walls).map(|(taps, wall)| sum(taps) + wall).collect()
+        slope
+            .taps
+            .iter()
+            .zip(&slope.from_walls)
+            .map(|(taps, wall)| sum(taps) + wall)
+            .collect()
     }
 
     #[test]
     fn cubics_that_meet_a_moving_wall_are_exact_and_mirror_images_flat() {
-        let belt = Wall::NoSlip { velocity_m_s: [0.0, 0.7, 0.0] };
-        let line = Direction::between(16, 0.0, 2.0, belt, Wall::Slip).stretched(Spread::TanhLow.by(1.5));
+        let belt = Wall::NoSlip {
+            velocity_m_s: [0.0, 0.7, 0.0],
+        };
+        let line =
+            Direction::between(16, 0.0, 2.0, belt, Wall::Slip).stretched(Spread::TanhLow.by(1.5));
         let found = derive(&line, 1, |z| 0.7 + 2.0 * z - 3.0 * z * z + z.powi(3));
         // The last two faces see the mirror image in the plane at the top.
         for (k, slope) in found.iter().enumerate().take(15) {
             let z = line.at(k as f64).0;
-            assert!((slope - (2.0 - 6.0 * z + 3.0 * z * z)).abs() < 1e-11, "{k}: {slope}");
+            assert!(
+                (slope - (2.0 - 6.0 * z + 3.0 * z * z)).abs() < 1e-11,
+                "{k}: {slope}"
+            );
         }
         assert!(found[16].abs() < 1e-11, "flat at the plane");
         // Of another component the wall is at rest.
@@ -401,7 +497,10 @@ mod slope_tests {
     fn periodic_lines_go_round() {
         let tau = std::f64::consts::TAU;
         let line = Direction::periodic(64, -1.0, 1.0);
-        for (j, slope) in derive(&line, 2, |y| (0.5 * tau * y).sin()).iter().enumerate() {
+        for (j, slope) in derive(&line, 2, |y| (0.5 * tau * y).sin())
+            .iter()
+            .enumerate()
+        {
             let exact = 0.5 * tau * (0.5 * tau * line.at(j as f64).0).cos();
             assert!((slope - exact).abs() < 2e-4, "{j}: {slope} for {exact}");
         }

@@ -17,18 +17,36 @@ pub(super) const RADIUS_M: f64 = 0.1;
 ///
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
-pub fn dipole_between_walls(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> Result<Case, Error> {
+pub fn dipole_between_walls(
+    cells: [usize; 2],
+    strength: [f64; 2],
+    reynolds: f64,
+) -> Result<Case, Error> {
     let middle = Spread::Cluster.by(strength[0]);
-    dipole(stretched(Direction::periodic(cells[0], -1.0, 1.0), middle), cells[1], strength[1], reynolds)
+    dipole(
+        stretched(Direction::periodic(cells[0], -1.0, 1.0), middle),
+        cells[1],
+        strength[1],
+        reynolds,
+    )
 }
 
 /// The same in a box closed by no-slip walls at y = -1 and 1 as well; y is refined by [`Spread::SinhMiddle`].
 ///
 /// # Errors
 /// As [`dipole_between_walls`].
-pub fn dipole_in_a_box(cells: [usize; 2], strength: [f64; 2], reynolds: f64) -> Result<Case, Error> {
+pub fn dipole_in_a_box(
+    cells: [usize; 2],
+    strength: [f64; 2],
+    reynolds: f64,
+) -> Result<Case, Error> {
     let middle = Spread::SinhMiddle.by(strength[0]);
-    dipole(stretched(walls(cells[0]), middle), cells[1], strength[1], reynolds)
+    dipole(
+        stretched(walls(cells[0]), middle),
+        cells[1],
+        strength[1],
+        reynolds,
+    )
 }
 
 fn walls(cells: usize) -> Direction {
@@ -38,19 +56,31 @@ fn walls(cells: usize) -> Direction {
 fn dipole(y: Direction, cells: usize, strength: f64, reynolds: f64) -> Result<Case, Error> {
     let z = stretched(walls(cells), Spread::TanhBoth.by(strength));
     let mesh = Mesh::new(Direction::thin(1.0), y, z)?;
-    let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 1e-3 });
+    let settings = FlowSettings::new(
+        1.0 / reynolds,
+        TimeStep::Courant {
+            courant: 0.35,
+            longest_s: 1e-3,
+        },
+    );
     let initial = |at_m: [f64; 3]| {
         let mut velocity = [0.0; 3];
         for (y_m, sign) in [(RADIUS_M, 1.0), (-RADIUS_M, -1.0)] {
             let (y, z) = (at_m[1] - y_m, at_m[2]);
             // r times the tangential speed over r^2 of a shielded vortex.
-            let rotation_per_s = 0.5 * sign * CENTRE_VORTICITY_PER_S * (-(y * y + z * z) / RADIUS_M.powi(2)).exp();
+            let rotation_per_s =
+                0.5 * sign * CENTRE_VORTICITY_PER_S * (-(y * y + z * z) / RADIUS_M.powi(2)).exp();
             velocity[1] -= rotation_per_s * z;
             velocity[2] += rotation_per_s * y;
         }
         velocity
     };
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 0.75 })
+    Ok(Case {
+        mesh,
+        settings,
+        initial: Initial::Field(Box::new(initial)),
+        end_s: 0.75,
+    })
 }
 
 /// The unit square in y and z, at rest, whose lid z = 1 moves along y with speed 1; `1/reynolds` is the viscosity.
@@ -58,12 +88,29 @@ fn dipole(y: Direction, cells: usize, strength: f64, reynolds: f64) -> Result<Ca
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
 pub fn lid_driven_cavity(cells: usize, strength: f64, reynolds: f64) -> Result<Case, Error> {
-    let lid = Wall::NoSlip { velocity_m_s: [0.0, 1.0, 0.0] };
+    let lid = Wall::NoSlip {
+        velocity_m_s: [0.0, 1.0, 0.0],
+    };
     let direction = |high| {
         let uniform = Direction::between(cells, 0.0, 1.0, Wall::AT_REST, high);
         stretched(uniform, Spread::TanhBoth.by(strength))
     };
-    let mesh = Mesh::new(Direction::thin(1.0), direction(Wall::AT_REST), direction(lid))?;
-    let settings = FlowSettings::new(1.0 / reynolds, TimeStep::Courant { courant: 0.35, longest_s: 0.02 });
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(|_| [0.0; 3])), end_s: 60.0 })
+    let mesh = Mesh::new(
+        Direction::thin(1.0),
+        direction(Wall::AT_REST),
+        direction(lid),
+    )?;
+    let settings = FlowSettings::new(
+        1.0 / reynolds,
+        TimeStep::Courant {
+            courant: 0.35,
+            longest_s: 0.02,
+        },
+    );
+    Ok(Case {
+        mesh,
+        settings,
+        initial: Initial::Field(Box::new(|_| [0.0; 3])),
+        end_s: 60.0,
+    })
 }

@@ -7,8 +7,13 @@ use crate::Error;
 
 /// The plates at z = -1 and 1 with the velocities of the walls along x, `strength` 0 giving equal cells.
 pub(super) fn between_plates(cells: usize, strength: f64, velocity_m_s: [f64; 2]) -> Direction {
-    let [low, high] = velocity_m_s.map(|u| Wall::NoSlip { velocity_m_s: [u, 0.0, 0.0] });
-    stretched(Direction::between(cells, -1.0, 1.0, low, high), Spread::TanhBoth.by(strength))
+    let [low, high] = velocity_m_s.map(|u| Wall::NoSlip {
+        velocity_m_s: [u, 0.0, 0.0],
+    });
+    stretched(
+        Direction::between(cells, -1.0, 1.0, low, high),
+        Spread::TanhBoth.by(strength),
+    )
 }
 
 /// A laminar flow between the plates at z = -1 and 1, one cell in x and y.
@@ -68,9 +73,19 @@ impl Plates {
     ) -> Result<Case, Error> {
         let plates = between_plates(self.cells, self.strength, wall_m_s);
         let mesh = Mesh::new(Direction::thin(1.0), Direction::thin(1.0), plates)?;
-        let settings = FlowSettings::new(self.viscosity_m2_s, TimeStep::Fixed { step_s: self.step_s });
+        let settings = FlowSettings::new(
+            self.viscosity_m2_s,
+            TimeStep::Fixed {
+                step_s: self.step_s,
+            },
+        );
         let initial = Initial::Field(Box::new(move |at_m: [f64; 3]| [u(at_m[2]), 0.0, 0.0]));
-        Ok(Case { mesh, settings, initial, end_s: viscous_times / self.viscosity_m2_s })
+        Ok(Case {
+            mesh,
+            settings,
+            initial,
+            end_s: viscous_times / self.viscosity_m2_s,
+        })
     }
 }
 
@@ -87,20 +102,32 @@ pub fn channel(cells: [usize; 3], strength: f64, reynolds_tau: f64) -> Result<Ca
         Direction::periodic(cells[1], 0.0, 0.5 * TAU),
         between_plates(cells[2], strength, [0.0; 2]),
     )?;
-    let mut settings = FlowSettings::new(1.0 / reynolds_tau, TimeStep::Courant { courant: 0.35, longest_s: 0.01 });
+    let mut settings = FlowSettings::new(
+        1.0 / reynolds_tau,
+        TimeStep::Courant {
+            courant: 0.35,
+            longest_s: 0.01,
+        },
+    );
     settings.force_m_s2 = [1.0, 0.0, 0.0];
     let initial = move |at_m: [f64; 3]| {
         let [x, y, z] = at_m;
         let wall = 1.0 - z.abs();
         let plus = wall * reynolds_tau;
         // Reichardt's law of the wall.
-        let mean =
-            (1.0 + 0.41 * plus).ln() / 0.41 + 7.8 * (1.0 - (-plus / 11.0).exp() - plus / 11.0 * (-plus / 3.0).exp());
+        let mean = (1.0 + 0.41 * plus).ln() / 0.41
+            + 7.8 * (1.0 - (-plus / 11.0).exp() - plus / 11.0 * (-plus / 3.0).exp());
         let shape = (1.0 - z * z).powi(2);
         let streaks = 4.0 * (8.0 * y).cos() * shape * (1.0 + 0.3 * (2.0 * x).sin());
-        let v = 1.5 * (4.0 * y + x).sin() * (-4.0 * z * (1.0 - z * z)) / 4.0 + 0.5 * (3.0 * x).sin() * shape;
+        let v = 1.5 * (4.0 * y + x).sin() * (-4.0 * z * (1.0 - z * z)) / 4.0
+            + 0.5 * (3.0 * x).sin() * shape;
         let w = -1.5 * (4.0 * y + x).cos() * shape;
         [mean + streaks, v, w]
     };
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 20.0 })
+    Ok(Case {
+        mesh,
+        settings,
+        initial: Initial::Field(Box::new(initial)),
+        end_s: 20.0,
+    })
 }

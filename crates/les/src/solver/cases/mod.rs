@@ -14,7 +14,9 @@ pub use boxes::{dipole_between_walls, dipole_in_a_box, lid_driven_cavity};
 pub use channel::{Plates, channel};
 pub use orr_sommerfeld::TollmienSchlichting;
 pub use resolution::{Resolution, VortexLengths};
-pub use taylor_green::{taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact};
+pub use taylor_green::{
+    taylor_green_3d, taylor_green_eighth, taylor_green_plane, taylor_green_plane_exact,
+};
 pub use vortex_pair::VortexPairCase;
 
 use super::flow::Flow;
@@ -53,7 +55,8 @@ impl Initial {
         mesh: Mesh,
         settings: FlowSettings,
     ) -> Result<Flow, Error> {
-        let layout = super::layout::Layout::in_order(&mesh, direction).shared(settings.ranks.clone())?;
+        let layout =
+            super::layout::Layout::in_order(&mesh, direction).shared(settings.ranks.clone())?;
         let flow = Flow::laid_out(mesh, settings, layout)?;
         let started = match self {
             Self::Field(field) => flow.filled(field),
@@ -65,7 +68,11 @@ impl Initial {
 
 /// A direction with its cells spread by `mapping`, or equal ones for the strength 0.
 fn stretched(direction: Direction, mapping: Mapping) -> Direction {
-    if mapping.strength == 0.0 { direction } else { direction.stretched(mapping) }
+    if mapping.strength == 0.0 {
+        direction
+    } else {
+        direction.stretched(mapping)
+    }
 }
 
 /// A flow ready to be simulated.
@@ -92,6 +99,9 @@ impl Case {
 
 impl std::fmt::Debug for Case {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Case").field("mesh", &self.mesh).field("settings", &self.settings).finish_non_exhaustive()
+        f.debug_struct("Case")
+            .field("mesh", &self.mesh)
+            .field("settings", &self.settings)
+            .finish_non_exhaustive()
     }
 }

@@ -41,51 +41,91 @@ impl TollmienSchlichting {
     /// # Errors
     /// Values outside 500 to 1e6 and 0.3 to 2; the mode lost on the way there.
     pub fn new(reynolds: f64, alpha: f64) -> Result<Self, Error> {
-        check("reynolds", reynolds, "between 500 and 1e6", |r| (500.0..=1e6).contains(&r))?;
-        check("alpha", alpha, "between 0.3 and 2", |a| (0.3..=2.0).contains(&a))?;
+        check("reynolds", reynolds, "between 500 and 1e6", |r| {
+            (500.0..=1e6).contains(&r)
+        })?;
+        check("alpha", alpha, "between 0.3 and 2", |a| {
+            (0.3..=2.0).contains(&a)
+        })?;
         let (mut re, mut al, mut c) = (KNOWN.0, KNOWN.1, KNOWN.2 / KNOWN.1);
-        let ratio = (reynolds / re).ln().abs().max((alpha / al).ln().abs() * 4.0);
+        let ratio = (reynolds / re)
+            .ln()
+            .abs()
+            .max((alpha / al).ln().abs() * 4.0);
         let steps = (ratio / 0.05).ceil().max(1.0) as i32;
-        let (by_re, by_al) = ((reynolds / re).powf(1.0 / f64::from(steps)), (alpha / al).powf(1.0 / f64::from(steps)));
+        let (by_re, by_al) = (
+            (reynolds / re).powf(1.0 / f64::from(steps)),
+            (alpha / al).powf(1.0 / f64::from(steps)),
+        );
         let mut w = Vec::new();
         for step in 1..=steps {
-            (re, al) = if step == steps { (reynolds, alpha) } else { (re * by_re, al * by_al) };
+            (re, al) = if step == steps {
+                (reynolds, alpha)
+            } else {
+                (re * by_re, al * by_al)
+            };
             (c, w) = inverse_iteration(re, al, c)?;
         }
         let u = streamwise(&w, alpha);
         let largest = u.iter().map(|u| u.norm()).fold(0.0, f64::max);
         let scale = |x: Vec<C64>| x.into_iter().map(|x| x / largest).collect();
-        Ok(Self { reynolds, alpha, omega: c * alpha, w: scale(w), u: scale(u) })
+        Ok(Self {
+            reynolds,
+            alpha,
+            omega: c * alpha,
+            w: scale(w),
+            u: scale(u),
+        })
     }
 
     /// Velocities `(u, w)` of the wave at a point and time zero, of amplitude 1.
     pub fn velocity(&self, x: f64, z: f64) -> (f64, f64) {
         let phase = C64::new(0.0, self.alpha * x).exp();
-        ((interpolate(&self.u, z) * phase).re, (interpolate(&self.w, z) * phase).re)
+        (
+            (interpolate(&self.u, z) * phase).re,
+            (interpolate(&self.w, z) * phase).re,
+        )
     }
 
     /// The wave with amplitude `amplitude` on Poiseuille's flow, one wave length long, held up by a force.
     ///
     /// # Errors
     /// Cells, stretching or step out of range.
-    pub fn case(self, cells: [usize; 2], strength: f64, amplitude: f64, step_s: f64) -> Result<Case, Error> {
+    pub fn case(
+        self,
+        cells: [usize; 2],
+        strength: f64,
+        amplitude: f64,
+        step_s: f64,
+    ) -> Result<Case, Error> {
         let length = std::f64::consts::TAU / self.alpha;
         let plates = between_plates(cells[1], strength, [0.0; 2]);
-        let mesh = Mesh::new(Direction::periodic(cells[0], 0.0, length), Direction::thin(1.0), plates)?;
+        let mesh = Mesh::new(
+            Direction::periodic(cells[0], 0.0, length),
+            Direction::thin(1.0),
+            plates,
+        )?;
         let mut settings = FlowSettings::new(1.0 / self.reynolds, TimeStep::Fixed { step_s });
         settings.force_m_s2 = [2.0 / self.reynolds, 0.0, 0.0];
         let initial = move |at_m: [f64; 3]| {
             let (u, w) = self.velocity(at_m[0], at_m[2]);
             [1.0 - at_m[2].powi(2) + amplitude * u, 0.0, amplitude * w]
         };
-        Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 60.0 })
+        Ok(Case {
+            mesh,
+            settings,
+            initial: Initial::Field(Box::new(initial)),
+            end_s: 60.0,
+        })
     }
 }
 
 /// Chebyshev points and differentiation matrix.
 fn chebyshev() -> (Vec<f64>, Vec<Vec<f64>>) {
     let n = ORDER;
-    let z: Vec<f64> = (0..=n).map(|j| (std::f64::consts::PI * j as f64 / n as f64).cos()).collect();
+    let z: Vec<f64> = (0..=n)
+        .map(|j| (std::f64::consts::PI * j as f64 / n as f64).cos())
+        .collect();
     let weight = |j: usize| if j == 0 || j == n { 2.0 } else { 1.0 } * if j.is_multiple_of(2) { 1.0 } else { -1.0 };
     let mut d = vec![vec![0.0; n + 1]; n + 1];
     for i in 0..=n {
@@ -93,7 +133,8 @@ fn chebyshev() -> (Vec<f64>, Vec<Vec<f64>>) {
             if i != j {
                 // Differences of cosines without cancellation.
                 let half = 0.5 * std::f64::consts::PI / n as f64;
-                let difference = -2.0 * (half * (i + j) as f64).sin() * (half * (i as f64 - j as f64)).sin();
+                let difference =
+                    -2.0 * (half * (i + j) as f64).sin() * (half * (i as f64 - j as f64)).sin();
                 d[i][j] = weight(i) / weight(j) / difference;
             }
         }
@@ -133,12 +174,17 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
             let a = if boundary(i) {
                 let wall = if i < 2 { 0 } else { n - 1 };
                 let derivative = i == 1 || i + 2 == n;
-                C64::from(if derivative { d[wall][j] } else { f64::from(u8::from(j == wall)) })
+                C64::from(if derivative {
+                    d[wall][j]
+                } else {
+                    f64::from(u8::from(j == wall))
+                })
             } else {
                 let laplacian = d2[i][j] - a2 * one;
                 b[i][j] = C64::from(laplacian);
                 let speed = 1.0 - z[i] * z[i];
-                C64::from(speed * laplacian + 2.0 * one) - viscous * (d4[i][j] - 2.0 * a2 * d2[i][j] + a2 * a2 * one)
+                C64::from(speed * laplacian + 2.0 * one)
+                    - viscous * (d4[i][j] - 2.0 * a2 * d2[i][j] + a2 * a2 * one)
             };
             shifted[i][j] = a - guess * b[i][j];
         }
@@ -147,7 +193,10 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
     let mut w: Vec<C64> = z.iter().map(|z| C64::from((1.0 - z * z).powi(2))).collect();
     let mut c = guess;
     for _ in 0..60 {
-        let right: Vec<C64> = b.iter().map(|row| row.iter().zip(&w).map(|(b, w)| b * w).sum()).collect();
+        let right: Vec<C64> = b
+            .iter()
+            .map(|row| row.iter().zip(&w).map(|(b, w)| b * w).sum())
+            .collect();
         let next = solved(&factors, &order, &right);
         let norm: C64 = next.iter().zip(&w).map(|(x, w)| x * w.conj()).sum();
         let square: f64 = w.iter().map(|w| w.norm_sqr()).sum();
@@ -170,7 +219,9 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
 fn streamwise(w: &[C64], alpha: f64) -> Vec<C64> {
     let (_, d) = chebyshev();
     let factor = C64::new(0.0, 1.0 / alpha);
-    d.iter().map(|row| factor * row.iter().zip(w).map(|(d, w)| w * *d).sum::<C64>()).collect()
+    d.iter()
+        .map(|row| factor * row.iter().zip(w).map(|(d, w)| w * *d).sum::<C64>())
+        .collect()
 }
 
 /// Barycentric interpolation from the Chebyshev points.
@@ -182,8 +233,9 @@ fn interpolate(values: &[C64], z: f64) -> C64 {
         if (z - node).abs() < 1e-15 {
             return *value;
         }
-        let weight =
-            if j == 0 || j == n { 0.5 } else { 1.0 } * if j.is_multiple_of(2) { 1.0 } else { -1.0 } / (z - node);
+        let weight = if j == 0 || j == n { 0.5 } else { 1.0 }
+            * if j.is_multiple_of(2) { 1.0 } else { -1.0 }
+            / (z - node);
         above += value * weight;
         below += weight;
     }
@@ -195,7 +247,9 @@ fn factorised(mut rows: Vec<Vec<C64>>) -> (Vec<Vec<C64>>, Vec<usize>) {
     let n = rows.len();
     let mut order: Vec<usize> = (0..n).collect();
     for k in 0..n {
-        let best = (k..n).max_by(|&a, &b| rows[a][k].norm().total_cmp(&rows[b][k].norm())).unwrap_or(k);
+        let best = (k..n)
+            .max_by(|&a, &b| rows[a][k].norm().total_cmp(&rows[b][k].norm()))
+            .unwrap_or(k);
         rows.swap(k, best);
         order.swap(k, best);
         let (head, tail) = rows.split_at_mut(k + 1);
@@ -220,7 +274,11 @@ fn solved(factors: &[Vec<C64>], order: &[usize], right: &[C64]) -> Vec<C64> {
         x[i] -= sum;
     }
     for i in (0..n).rev() {
-        let sum: C64 = factors[i][i + 1..].iter().zip(&x[i + 1..]).map(|(u, x)| u * x).sum();
+        let sum: C64 = factors[i][i + 1..]
+            .iter()
+            .zip(&x[i + 1..])
+            .map(|(u, x)| u * x)
+            .sum();
         x[i] = (x[i] - sum) / factors[i][i];
     }
     x
@@ -239,7 +297,10 @@ mod tests {
             (3000.0, 1.0, 0.292_289_126, -0.010_184_469, 2e-7),
         ] {
             let omega = TollmienSchlichting::new(reynolds, alpha).unwrap().omega;
-            assert!((omega.re - re).abs() < within && (omega.im - im).abs() < within, "{reynolds}: {omega}");
+            assert!(
+                (omega.re - re).abs() < within && (omega.im - im).abs() < within,
+                "{reynolds}: {omega}"
+            );
         }
     }
 
@@ -260,6 +321,9 @@ mod tests {
 
     #[test]
     fn what_cannot_be_followed_is_refused() {
-        assert!(TollmienSchlichting::new(10.0, 1.0).is_err() && TollmienSchlichting::new(7500.0, f64::NAN).is_err());
+        assert!(
+            TollmienSchlichting::new(10.0, 1.0).is_err()
+                && TollmienSchlichting::new(7500.0, f64::NAN).is_err()
+        );
     }
 }

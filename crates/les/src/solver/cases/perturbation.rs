@@ -27,7 +27,12 @@ enum Envelope {
 impl Envelope {
     /// `g` and its slopes along y and z.
     fn at(self, y: f64, z: f64) -> [f64; 3] {
-        let rise = |d: f64| (1.0 - (-(d / 0.2).powi(2)).exp(), 2.0 * d / 0.04 * (-(d / 0.2).powi(2)).exp());
+        let rise = |d: f64| {
+            (
+                1.0 - (-(d / 0.2).powi(2)).exp(),
+                2.0 * d / 0.04 * (-(d / 0.2).powi(2)).exp(),
+            )
+        };
         let (near, near_slope) = rise(z);
         match self {
             Self::Wake => {
@@ -65,7 +70,13 @@ impl Perturbation {
     /// Noise about the vortices at `(+-1/2, height)` of the given root mean square of each component within 0.3 of them, in a
     /// box of the given length.
     pub(super) fn noise(length: f64, height: f64, rms: f64, seed: Option<u64>) -> Self {
-        let irrationals = [0.618_033_988_749_894_9, 2.0_f64.sqrt(), 7.0_f64.sqrt(), 11.0_f64.sqrt(), 13.0_f64.sqrt()];
+        let irrationals = [
+            0.618_033_988_749_894_9,
+            2.0_f64.sqrt(),
+            7.0_f64.sqrt(),
+            11.0_f64.sqrt(),
+            13.0_f64.sqrt(),
+        ];
         let fraction = |n: usize, which: usize| match seed {
             None => (n as f64 * irrationals[which]).fract(),
             Some(seed) => hashed(seed, (5 * n + which) as u64),
@@ -82,11 +93,21 @@ impl Perturbation {
                 phase: [2, 3, 4].map(|which| TAU * fraction(n, which)),
             }
         };
-        let raw = Self { envelope: Envelope::Wake, waves: (0..NOISE_WAVES).map(wave).collect() };
+        let raw = Self {
+            envelope: Envelope::Wake,
+            waves: (0..NOISE_WAVES).map(wave).collect(),
+        };
         let steps = -12..=12;
-        let disc = steps.clone().flat_map(|j| steps.clone().map(move |k| [0.025 * f64::from(j), 0.025 * f64::from(k)]));
+        let disc = steps.clone().flat_map(|j| {
+            steps
+                .clone()
+                .map(move |k| [0.025 * f64::from(j), 0.025 * f64::from(k)])
+        });
         let points = disc.filter(|[y, z]| y.hypot(*z) < 0.3);
-        raw.scaled_to(rms, points.flat_map(|[y, z]| [[y - 0.5, height + z], [y + 0.5, height + z]]))
+        raw.scaled_to(
+            rms,
+            points.flat_map(|[y, z]| [[y - 0.5, height + z], [y + 0.5, height + z]]),
+        )
     }
 
     /// Turbulence that fills the periodic box of the given size, of wave lengths from 2 to 1/4 whose energy falls with the
@@ -102,7 +123,12 @@ impl Perturbation {
             let axial = (flat * azimuth_rad.cos().abs() * length / TAU).round();
             let lateral = (flat * azimuth_rad.sin() * width / TAU).round();
             let vector = [TAU * axial / length, TAU * lateral / width, total * rise];
-            let length = vector.iter().map(|k| k * k).sum::<f64>().sqrt().max(TAU * 0.1);
+            let length = vector
+                .iter()
+                .map(|k| k * k)
+                .sum::<f64>()
+                .sqrt()
+                .max(TAU * 0.1);
             Wave {
                 axial: axial as usize,
                 vector,
@@ -110,9 +136,14 @@ impl Perturbation {
                 phase: [3, 4, 5].map(|which| TAU * fraction(which)),
             }
         };
-        let raw = Self { envelope: Envelope::Box(height), waves: (0..BACKGROUND_WAVES).map(wave).collect() };
+        let raw = Self {
+            envelope: Envelope::Box(height),
+            waves: (0..BACKGROUND_WAVES).map(wave).collect(),
+        };
         let cell = |n: u32, j: u32| (f64::from(j) + 0.5) / f64::from(n);
-        let points = (0..40).flat_map(|j| (0..40).map(move |k| [(cell(40, j) - 0.5) * width, cell(40, k) * height]));
+        let points = (0..40).flat_map(|j| {
+            (0..40).map(move |k| [(cell(40, j) - 0.5) * width, cell(40, k) * height])
+        });
         raw.scaled_to(rms, points)
     }
 
@@ -122,13 +153,19 @@ impl Perturbation {
         for [y, z] in points {
             for component in 0..3 {
                 for (m, [cos, sin]) in self.row(component, y, z).into_iter().enumerate() {
-                    sum += if m == 0 { cos * cos } else { 0.5 * (cos * cos + sin * sin) } / 3.0;
+                    sum += if m == 0 {
+                        cos * cos
+                    } else {
+                        0.5 * (cos * cos + sin * sin)
+                    } / 3.0;
                 }
             }
             count += 1.0;
         }
         let factor = rms / (sum / count).sqrt();
-        self.waves.iter_mut().for_each(|wave| wave.amplitude *= factor);
+        self.waves
+            .iter_mut()
+            .for_each(|wave| wave.amplitude *= factor);
         self
     }
 
@@ -163,7 +200,9 @@ fn hashed(seed: u64, index: u64) -> f64 {
         x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
         x ^ (x >> 31)
     };
-    let bits = mix(mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15)) ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let bits =
+        mix(mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15))
+            ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     (bits >> 11) as f64 * (0.5_f64).powi(53)
 }
 
@@ -177,7 +216,12 @@ mod tests {
                 let angle = TAU * m as f64 * x / length;
                 cos * angle.cos() + sin * angle.sin()
             };
-            field.row(component, y, z).into_iter().enumerate().map(term).sum()
+            field
+                .row(component, y, z)
+                .into_iter()
+                .enumerate()
+                .map(term)
+                .sum()
         })
     }
 
@@ -208,8 +252,14 @@ mod tests {
             let ground = velocity(field, 2.0, [0.3, 0.2, 0.0]);
             assert!(ground.iter().all(|v| v.abs() < 1e-15), "{ground:?}");
         }
-        let (left, right) = (velocity(&background, 2.0, [0.4, -2.0, 1.1]), velocity(&background, 2.0, [0.4, 2.0, 1.1]));
-        assert!(left.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-12), "periodic sides");
+        let (left, right) = (
+            velocity(&background, 2.0, [0.4, -2.0, 1.1]),
+            velocity(&background, 2.0, [0.4, 2.0, 1.1]),
+        );
+        assert!(
+            left.iter().zip(right).all(|(a, b)| (a - b).abs() < 1e-12),
+            "periodic sides"
+        );
     }
 
     #[test]
@@ -222,7 +272,8 @@ mod tests {
                     let (y, z) = (0.03 * f64::from(j), 0.03 * f64::from(k));
                     if y.hypot(z) < 0.3 {
                         for side in [-0.5, 0.5] {
-                            let there = velocity(&noise, 1.0, [0.05 * f64::from(i), side + y, 1.0 + z]);
+                            let there =
+                                velocity(&noise, 1.0, [0.05 * f64::from(i), side + y, 1.0 + z]);
                             sum += there.iter().map(|v| v * v).sum::<f64>() / 3.0;
                             count += 1.0;
                         }

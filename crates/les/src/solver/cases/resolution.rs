@@ -42,14 +42,20 @@ impl Resolution {
         let width_m = |axis: usize, at_m: f64| -> f64 {
             let faces = mesh.face_m(axis);
             let inside = |pair: &&[f64]| pair[0] <= at_m && at_m <= pair[1];
-            faces.windows(2).filter(inside).map(|pair| pair[1] - pair[0]).fold(f64::INFINITY, f64::min)
+            faces
+                .windows(2)
+                .filter(inside)
+                .map(|pair| pair[1] - pair[0])
+                .fold(f64::INFINITY, f64::min)
         };
-        let core_cells = std::array::from_fn(|i| lengths.core_radius_m / width_m(i + 1, lengths.core_m[i]));
+        let core_cells =
+            std::array::from_fn(|i| lengths.core_radius_m / width_m(i + 1, lengths.core_m[i]));
         let [_, _, z] = mesh.directions();
         let [low, high] = z.ends.no_slip();
         // Cells, and the part of the last one, within the layer.
         let within = |from_wall_m: Vec<f64>| -> f64 {
-            let part = |pair: &[f64]| ((lengths.layer_m - pair[0]) / (pair[1] - pair[0])).clamp(0.0, 1.0);
+            let part =
+                |pair: &[f64]| ((lengths.layer_m - pair[0]) / (pair[1] - pair[0])).clamp(0.0, 1.0);
             from_wall_m.windows(2).map(part).sum()
         };
         let faces = mesh.face_m(2);
@@ -58,7 +64,11 @@ impl Resolution {
         let layer_cells = at_low.into_iter().chain(at_high).reduce(f64::min);
         let rolls = lengths.rolls_up && layer_cells.is_some();
         let rolled_cells = rolls.then(|| lengths.layer_m / width_m(1, lengths.core_m[0]));
-        Self { core_cells, layer_cells, rolled_cells }
+        Self {
+            core_cells,
+            layer_cells,
+            rolled_cells,
+        }
     }
 
     /// One sentence for each length that has too few cells.
@@ -89,7 +99,12 @@ impl VortexLengths {
     /// Those of the dipole, in half widths of its box: the core 0.1, the layer `Re^-1/2`.
     pub fn dipole(reynolds: f64) -> Self {
         let radius_m = super::boxes::RADIUS_M;
-        Self { core_radius_m: radius_m, core_m: [radius_m, 0.0], layer_m: reynolds.powf(-0.5), rolls_up: true }
+        Self {
+            core_radius_m: radius_m,
+            core_m: [radius_m, 0.0],
+            layer_m: reynolds.powf(-0.5),
+            rolls_up: true,
+        }
     }
 
     /// Those of a vortex pair of the spacing `b0 = unit_m` \[m\] above ground, core and height in `b0`: the layer is
@@ -121,22 +136,38 @@ mod tests {
         assert_eq!(dipole(512, 0.0, 2500.0), Vec::<String>::new());
         let found = dipole(384, 0.0, 2500.0);
         assert!(
-            found.len() == 1 && found[0].contains("along the wall") && found[0].contains("3.84 cells"),
+            found.len() == 1
+                && found[0].contains("along the wall")
+                && found[0].contains("3.84 cells"),
             "{found:?}"
         );
         assert_eq!(dipole(384, 0.5, 2500.0), Vec::<String>::new());
         let found = dipole(32, 0.0, 2500.0);
-        assert!(found.len() == 4 && found[0].contains("core radius along y"), "{found:?}");
+        assert!(
+            found.len() == 4 && found[0].contains("core radius along y"),
+            "{found:?}"
+        );
     }
 
     #[test]
     fn the_presets_of_a_pair_above_ground_are_resolved_and_a_thin_core_is_not() {
         let found = |pair: VortexPairCase| {
             let lengths = VortexLengths::pair(pair.core_radius, pair.height, pair.reynolds, 1.0);
-            Resolution::new(&pair.case(VortexPairCase::steps(0.02)).unwrap().mesh, &lengths).warnings()
+            Resolution::new(
+                &pair.case(VortexPairCase::steps(0.02)).unwrap().mesh,
+                &lengths,
+            )
+            .warnings()
         };
         assert_eq!(found(VortexPairCase::coarse()), Vec::<String>::new());
-        let thin = found(VortexPairCase { core_radius: 0.05, reynolds: 2e4, ..VortexPairCase::coarse() });
-        assert!(thin.len() == 3 && thin[2].contains("boundary layer"), "{thin:?}");
+        let thin = found(VortexPairCase {
+            core_radius: 0.05,
+            reynolds: 2e4,
+            ..VortexPairCase::coarse()
+        });
+        assert!(
+            thin.len() == 3 && thin[2].contains("boundary layer"),
+            "{thin:?}"
+        );
     }
 }

@@ -12,12 +12,31 @@ use crate::Error;
 ///
 /// # Errors
 /// Cells, stretching or viscosity out of range.
-pub fn taylor_green_plane(cells: usize, stretch: [f64; 2], viscosity_m2_s: f64, step_s: f64) -> Result<Case, Error> {
-    let direction = |amplitude: f64| stretched(Direction::periodic(cells, 0.0, 1.0), Spread::Sine.by(amplitude));
-    let mesh = Mesh::new(Direction::thin(1.0), direction(stretch[0]), direction(stretch[1]))?;
+pub fn taylor_green_plane(
+    cells: usize,
+    stretch: [f64; 2],
+    viscosity_m2_s: f64,
+    step_s: f64,
+) -> Result<Case, Error> {
+    let direction = |amplitude: f64| {
+        stretched(
+            Direction::periodic(cells, 0.0, 1.0),
+            Spread::Sine.by(amplitude),
+        )
+    };
+    let mesh = Mesh::new(
+        Direction::thin(1.0),
+        direction(stretch[0]),
+        direction(stretch[1]),
+    )?;
     let initial = move |at_m: [f64; 3]| taylor_green_plane_exact(at_m, 0.0, viscosity_m2_s);
     let settings = FlowSettings::new(viscosity_m2_s, TimeStep::Fixed { step_s });
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 1.0 })
+    Ok(Case {
+        mesh,
+        settings,
+        initial: Initial::Field(Box::new(initial)),
+        end_s: 1.0,
+    })
 }
 
 /// Velocity of the vortices of the plane at any time: `v = sin(2 pi y) cos(2 pi z) exp(-8 pi^2 nu t)`.
@@ -42,16 +61,31 @@ pub fn taylor_green_3d(cells: usize, reynolds: f64) -> Result<Case, Error> {
 /// # Errors
 /// Cells or Reynolds number out of range.
 pub fn taylor_green_eighth(cells: usize, reynolds: f64) -> Result<Case, Error> {
-    in_space(|| Direction::between(cells, 0.0, PI, Wall::Slip, Wall::Slip), reynolds)
+    in_space(
+        || Direction::between(cells, 0.0, PI, Wall::Slip, Wall::Slip),
+        reynolds,
+    )
 }
 
 fn in_space(direction: impl Fn() -> Direction, reynolds: f64) -> Result<Case, Error> {
     let mesh = Mesh::new(direction(), direction(), direction())?;
     let initial = |at_m: [f64; 3]| {
         let [x, y, z] = at_m;
-        [x.sin() * y.cos() * z.cos(), -x.cos() * y.sin() * z.cos(), 0.0]
+        [
+            x.sin() * y.cos() * z.cos(),
+            -x.cos() * y.sin() * z.cos(),
+            0.0,
+        ]
     };
-    let time_step = TimeStep::Courant { courant: 0.35, longest_s: 0.1 };
+    let time_step = TimeStep::Courant {
+        courant: 0.35,
+        longest_s: 0.1,
+    };
     let settings = FlowSettings::new(1.0 / reynolds, time_step);
-    Ok(Case { mesh, settings, initial: Initial::Field(Box::new(initial)), end_s: 10.0 })
+    Ok(Case {
+        mesh,
+        settings,
+        initial: Initial::Field(Box::new(initial)),
+        end_s: 10.0,
+    })
 }

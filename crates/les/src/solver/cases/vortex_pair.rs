@@ -104,7 +104,10 @@ impl VortexPairCase {
 
     /// Steps of [`VortexPairCase::COURANT`], at most `longest_s`.
     pub fn steps(longest_s: f64) -> TimeStep {
-        TimeStep::Courant { courant: Self::COURANT, longest_s }
+        TimeStep::Courant {
+            courant: Self::COURANT,
+            longest_s,
+        }
     }
 
     /// The case with the given way to step in time, in the units of the pair.
@@ -132,7 +135,12 @@ impl VortexPairCase {
         let speed_m_s = scales.descent_speed_m_s();
         faces.iter_mut().flatten().for_each(|v| *v *= speed_m_s);
         let end_s = END * scales.time_unit_s();
-        Ok(Case { mesh: self.mesh(scales.spacing_m)?, settings, initial: Initial::Faces(faces), end_s })
+        Ok(Case {
+            mesh: self.mesh(scales.spacing_m)?,
+            settings,
+            initial: Initial::Faces(faces),
+            end_s,
+        })
     }
 
     /// A meter for this case in the given size.
@@ -142,7 +150,12 @@ impl VortexPairCase {
     pub fn meter(&self, scales: &WakeScales) -> Result<WakeMeter, Error> {
         let b0_m = scales.spacing_m;
         let centres_m = [-0.5, 0.5].map(|y| [y * b0_m, self.height * b0_m]);
-        let meter = WakeMeter::new(&self.mesh(b0_m)?, scales.circulation_m2_s / self.reynolds, *scales, centres_m)?;
+        let meter = WakeMeter::new(
+            &self.mesh(b0_m)?,
+            scales.circulation_m2_s / self.reynolds,
+            *scales,
+            centres_m,
+        )?;
         // Point vortices over a plane: dy/dtau = y^2/[2 z (y^2 + z^2)], dz/dtau = -z^2/[2 y (y^2 + z^2)].
         let (y, z) = (0.5, self.height);
         let scale = scales.descent_speed_m_s() / (2.0 * (y * y + z * z));
@@ -152,17 +165,39 @@ impl VortexPairCase {
     }
 
     fn validate(&self) -> Result<(), Error> {
-        check("height", self.height, "positive, below the top", |h| h > 0.0 && h < self.size[2])?;
+        check("height", self.height, "positive, below the top", |h| {
+            h > 0.0 && h < self.size[2]
+        })?;
         check("core_radius", self.core_radius, "positive", |r| r > 0.0)?;
         check("reynolds", self.reynolds, "positive", |r| r > 0.0)?;
-        check("lateral_stretch", self.lateral_stretch, "from 0 to 0.9", |a| (0.0..=0.9).contains(&a))?;
-        check("perturbation", self.perturbation, "zero or positive", |p| p >= 0.0)?;
-        check("wind_roughness", self.wind_roughness, "zero or positive", |r| r >= 0.0)?;
-        let periodic = !self.slip_sides;
-        check("background", self.background, "zero or positive, zero between frictionless sides", |b| {
-            b == 0.0 || (b > 0.0 && periodic)
+        check(
+            "lateral_stretch",
+            self.lateral_stretch,
+            "from 0 to 0.9",
+            |a| (0.0..=0.9).contains(&a),
+        )?;
+        check("perturbation", self.perturbation, "zero or positive", |p| {
+            p >= 0.0
         })?;
-        check("cross_wind", self.cross_wind, "zero between frictionless sides", |w| w == 0.0 || periodic)
+        check(
+            "wind_roughness",
+            self.wind_roughness,
+            "zero or positive",
+            |r| r >= 0.0,
+        )?;
+        let periodic = !self.slip_sides;
+        check(
+            "background",
+            self.background,
+            "zero or positive, zero between frictionless sides",
+            |b| b == 0.0 || (b > 0.0 && periodic),
+        )?;
+        check(
+            "cross_wind",
+            self.cross_wind,
+            "zero between frictionless sides",
+            |w| w == 0.0 || periodic,
+        )
     }
 
     /// The mesh in units of `unit_m` \[m\].
@@ -171,10 +206,17 @@ impl VortexPairCase {
         let x = Direction::periodic(self.cells[0], 0.0, length);
         let mut y = Direction::periodic(self.cells[1], -0.5 * width, 0.5 * width);
         if self.slip_sides {
-            y.ends = Ends::Walls { low: Wall::Slip, high: Wall::Slip };
+            y.ends = Ends::Walls {
+                low: Wall::Slip,
+                high: Wall::Slip,
+            };
         }
         let y = stretched(y, Spread::Sine.by(self.lateral_stretch));
-        let ground = if self.sticky_ground { Wall::AT_REST } else { Wall::Slip };
+        let ground = if self.sticky_ground {
+            Wall::AT_REST
+        } else {
+            Wall::Slip
+        };
         let z = Direction::between(self.cells[2], 0.0, height, ground, Wall::Slip);
         Mesh::new(x, y, stretched(z, Spread::TanhLow.by(self.ground_stretch)))
     }
@@ -185,35 +227,56 @@ impl VortexPairCase {
         let varies = self.cells[0] > 1;
         let noise = (varies && self.perturbation > 0.0)
             .then(|| Perturbation::noise(self.size[0], self.height, self.perturbation, self.seed));
-        let background = (varies && self.background > 0.0)
-            .then(|| Perturbation::background(self.size, self.background, self.seed.unwrap_or_default()));
+        let background = (varies && self.background > 0.0).then(|| {
+            Perturbation::background(self.size, self.background, self.seed.unwrap_or_default())
+        });
         let disturbances: Vec<Perturbation> = noise.into_iter().chain(background).collect();
         let [nx, ny, _] = self.cells;
         std::array::from_fn(|component| {
-            let at = |d: usize| if d == component { mesh.face_m(d) } else { mesh.centre_m(d) };
+            let at = |d: usize| {
+                if d == component {
+                    mesh.face_m(d)
+                } else {
+                    mesh.centre_m(d)
+                }
+            };
             let (x, y, z) = (at(0), at(1), at(2));
             // On the line where the box meets its copy the mean of both sides, so that left and right are alike.
             let seam = (component == 1 && !self.slip_sides).then_some(y[0]);
-            let at_seam = |z: f64| 0.5 * (self.pair(y[0], z)[1] + self.pair(y[0] + self.size[1], z)[1]);
+            let at_seam =
+                |z: f64| 0.5 * (self.pair(y[0], z)[1] + self.pair(y[0] + self.size[1], z)[1]);
             let mut field = vec![0.0; self.cells.iter().product()];
-            field.par_chunks_mut(nx * ny).zip(&z).for_each(|(plane, &z)| {
-                for (row, &y) in plane.chunks_mut(nx).zip(&y) {
-                    row.fill(if seam == Some(y) { at_seam(z) } else { self.pair(y, z)[component] });
-                    for disturbance in &disturbances {
-                        let waves = disturbance.row(component, y, z);
-                        for (value, x) in row.iter_mut().zip(&x) {
-                            *value += sum_of_waves(&waves, TAU * x / self.size[0]);
+            field
+                .par_chunks_mut(nx * ny)
+                .zip(&z)
+                .for_each(|(plane, &z)| {
+                    for (row, &y) in plane.chunks_mut(nx).zip(&y) {
+                        row.fill(if seam == Some(y) {
+                            at_seam(z)
+                        } else {
+                            self.pair(y, z)[component]
+                        });
+                        for disturbance in &disturbances {
+                            let waves = disturbance.row(component, y, z);
+                            for (value, x) in row.iter_mut().zip(&x) {
+                                *value += sum_of_waves(&waves, TAU * x / self.size[0]);
+                            }
                         }
                     }
-                }
-            });
+                });
             field
         })
     }
 
     /// Velocity of the vortices with their images and copies, and of the wind.
     fn pair(&self, y: f64, z: f64) -> [f64; 3] {
-        let shear = |z: f64| if self.wind_roughness > 0.0 { (1.0 + z / self.wind_roughness).ln() } else { 1.0 };
+        let shear = |z: f64| {
+            if self.wind_roughness > 0.0 {
+                (1.0 + z / self.wind_roughness).ln()
+            } else {
+                1.0
+            }
+        };
         let mut velocity = [0.0, self.cross_wind * shear(z) / shear(self.height), 0.0];
         // Planes mirror the pair, which is its own copy one width further; so copies serve both kinds of sides.
         for (y0, sign) in [(-0.5, -1.0), (0.5, 1.0)] {
@@ -221,7 +284,10 @@ impl VortexPairCase {
                 for copy in -NEAR_COPIES..=NEAR_COPIES {
                     let (dy, dz) = (y - y0 - f64::from(copy) * self.size[1], z - z0);
                     let r2 = dy * dy + dz * dz;
-                    let rotation_per_s = sign * self.profile.angular_velocity_rad_s(TAU, self.core_radius, r2);
+                    let rotation_per_s = sign
+                        * self
+                            .profile
+                            .angular_velocity_rad_s(TAU, self.core_radius, r2);
                     velocity[1] -= rotation_per_s * dz;
                     velocity[2] += rotation_per_s * dy;
                 }
@@ -255,7 +321,10 @@ fn sum_of_waves(waves: &[[f64; 2]], angle: f64) -> f64 {
     let mut sum = 0.0;
     for [a, b] in waves {
         sum += a * cos + b * sin;
-        (cos, sin) = (cos * step_cos - sin * step_sin, sin * step_cos + cos * step_sin);
+        (cos, sin) = (
+            cos * step_cos - sin * step_sin,
+            sin * step_cos + cos * step_sin,
+        );
     }
     sum
 }

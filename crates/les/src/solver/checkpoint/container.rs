@@ -29,7 +29,12 @@ pub(super) type Tag = [u8; 8];
 
 /// [`Error::File`] of a refusal.
 pub(super) fn refused(action: &'static str, path: &Path, error: &io::Error) -> Error {
-    Error::File { action, path: path.to_owned(), kind: error.kind(), reason: error.to_string() }
+    Error::File {
+        action,
+        path: path.to_owned(),
+        kind: error.kind(),
+        reason: error.to_string(),
+    }
 }
 
 /// The planes of a file that is written: where they begin, what they belong to.
@@ -52,8 +57,12 @@ pub(super) fn begin(
         bytes.extend((content.len() as u64).to_le_bytes());
         bytes.extend(content);
     }
-    let numbers = [bytes.len() as u64, planes, plane_bytes].into_iter().flat_map(u64::to_le_bytes);
-    let counts = [version, sections.len() as u32].into_iter().flat_map(u32::to_le_bytes);
+    let numbers = [bytes.len() as u64, planes, plane_bytes]
+        .into_iter()
+        .flat_map(u64::to_le_bytes);
+    let counts = [version, sections.len() as u32]
+        .into_iter()
+        .flat_map(u32::to_le_bytes);
     let mut head: Vec<u8> = MAGIC.into_iter().chain(counts).chain(numbers).collect();
     head.extend(bytes);
     let checksum: Checksum = Sha256::digest(&head).into();
@@ -78,7 +87,9 @@ pub(super) fn write_planes(
 ) -> Result<(), Error> {
     let write = || -> io::Result<()> {
         let mut file = OpenOptions::new().write(true).open(beside(path))?;
-        file.seek(SeekFrom::Start(planes.start + numbers.start as u64 * (plane_bytes + CHECKSUM_BYTES)))?;
+        file.seek(SeekFrom::Start(
+            planes.start + numbers.start as u64 * (plane_bytes + CHECKSUM_BYTES),
+        ))?;
         let mut out = BufWriter::with_capacity(1 << 18, file);
         let mut bytes = Vec::with_capacity(plane_bytes as usize);
         for number in numbers.clone() {
@@ -87,14 +98,18 @@ pub(super) fn write_planes(
             out.write_all(&bytes)?;
             out.write_all(&checksum_of(&planes.checksum, number, &bytes))?;
         }
-        out.into_inner().map_err(io::IntoInnerError::into_error)?.sync_all()
+        out.into_inner()
+            .map_err(io::IntoInnerError::into_error)?
+            .sync_all()
     };
     write().map_err(|error| refused("write", path, &error))
 }
 
 /// Checksum of a plane of the file whose head has the checksum `head`.
 fn checksum_of(head: &Checksum, number: usize, bytes: &[u8]) -> Checksum {
-    let hash = Sha256::new().chain_update(head).chain_update((number as u64).to_le_bytes());
+    let hash = Sha256::new()
+        .chain_update(head)
+        .chain_update((number as u64).to_le_bytes());
     hash.chain_update(bytes).finalize().into()
 }
 
@@ -110,7 +125,10 @@ pub(super) fn finish(path: &Path, previous: Option<&Path>) -> Result<(), Error> 
     };
     rename().map_err(|error| refused("write", path, &error))?;
     // Makes the renaming last through a power failure where the system can do so.
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let folder = path
+        .parent()
+        .filter(|p| !p.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
     let _ = File::open(folder).and_then(|f| f.sync_all());
     Ok(())
 }
@@ -146,23 +164,44 @@ impl Reader {
         let mut file = File::open(path).map_err(|e| io(&e))?;
         let length = file.metadata().map_err(|e| io(&e))?.len();
         let mut head = Vec::new();
-        (&mut file).take(HEAD_BYTES).read_to_end(&mut head).map_err(|e| io(&e))?;
+        (&mut file)
+            .take(HEAD_BYTES)
+            .read_to_end(&mut head)
+            .map_err(|e| io(&e))?;
         let magic = head.len().min(MAGIC.len());
         if head.is_empty() || head[..magic] != MAGIC[..magic] {
-            return Err(Error::NotACheckpoint { path: path.to_owned() });
+            return Err(Error::NotACheckpoint {
+                path: path.to_owned(),
+            });
         }
-        let damaged = |what| Error::CheckpointDamaged { path: path.to_owned(), what };
-        let words: Vec<u64> = head[magic..].as_chunks().0.iter().map(|word| u64::from_le_bytes(*word)).collect();
+        let damaged = |what| Error::CheckpointDamaged {
+            path: path.to_owned(),
+            what,
+        };
+        let words: Vec<u64> = head[magic..]
+            .as_chunks()
+            .0
+            .iter()
+            .map(|word| u64::from_le_bytes(*word))
+            .collect();
         let [counts, sections, planes, plane_bytes] = words[..] else {
             return Err(damaged("it ends within its first bytes"));
         };
         let version = counts as u32;
         if version != supported {
-            return Err(Error::CheckpointVersion { path: path.to_owned(), found: version, supported });
+            return Err(Error::CheckpointVersion {
+                path: path.to_owned(),
+                found: version,
+                supported,
+            });
         }
         let start = (HEAD_BYTES + CHECKSUM_BYTES).checked_add(sections);
-        let all = plane_bytes.checked_add(CHECKSUM_BYTES).and_then(|each| planes.checked_mul(each));
-        let whole = start.zip(all).and_then(|(start, all)| start.checked_add(all));
+        let all = plane_bytes
+            .checked_add(CHECKSUM_BYTES)
+            .and_then(|each| planes.checked_mul(each));
+        let whole = start
+            .zip(all)
+            .and_then(|(start, all)| start.checked_add(all));
         let (Some(start), true) = (start, whole == Some(length)) else {
             return Err(damaged("it has not the length that it should have"));
         };
@@ -170,25 +209,38 @@ impl Reader {
             path: path.to_owned(),
             file: BufReader::with_capacity(1 << 18, file),
             sections: Vec::new(),
-            planes: Planes { start, checksum: [0; CHECKSUM_BYTES as usize] },
+            planes: Planes {
+                start,
+                checksum: [0; CHECKSUM_BYTES as usize],
+            },
             counts: [planes, plane_bytes],
         };
         let (mut content, mut stored) = (vec![0; sections as usize], reader.planes.checksum);
         reader.fill(&mut content)?;
         reader.fill(&mut stored)?;
-        reader.planes.checksum = Sha256::new().chain_update(head).chain_update(&content).finalize().into();
+        reader.planes.checksum = Sha256::new()
+            .chain_update(head)
+            .chain_update(&content)
+            .finalize()
+            .into();
         if reader.planes.checksum != stored {
-            return Err(damaged("its checksum is wrong, so it was cut off or altered"));
+            return Err(damaged(
+                "its checksum is wrong, so it was cut off or altered",
+            ));
         }
-        reader.sections = sections_of(&content).ok_or_else(|| damaged("a section is not where it should be"))?;
+        reader.sections =
+            sections_of(&content).ok_or_else(|| damaged("a section is not where it should be"))?;
         Ok(reader)
     }
 
     /// The bytes of a plane.
     pub(super) fn plane(&mut self, number: usize) -> Result<Vec<u8>, Error> {
         let [_, plane_bytes] = self.counts;
-        let place = SeekFrom::Start(self.planes.start + number as u64 * (plane_bytes + CHECKSUM_BYTES));
-        self.file.seek(place).map_err(|e| refused("read", &self.path, &e))?;
+        let place =
+            SeekFrom::Start(self.planes.start + number as u64 * (plane_bytes + CHECKSUM_BYTES));
+        self.file
+            .seek(place)
+            .map_err(|e| refused("read", &self.path, &e))?;
         let mut bytes = vec![0; plane_bytes as usize];
         let mut stored = self.planes.checksum;
         self.fill(&mut bytes)?;
@@ -200,7 +252,10 @@ impl Reader {
     }
 
     pub(super) fn damaged(&self, what: &'static str) -> Error {
-        Error::CheckpointDamaged { path: self.path.clone(), what }
+        Error::CheckpointDamaged {
+            path: self.path.clone(),
+            what,
+        }
     }
 
     fn fill(&mut self, buffer: &mut [u8]) -> Result<(), Error> {
@@ -213,7 +268,9 @@ impl Reader {
     /// The section of this tag as bytes.
     pub(super) fn bytes(&self, tag: &Tag) -> Result<&[u8], Error> {
         let found = self.sections.iter().find(|section| section.0 == *tag);
-        found.map(|section| &section.1[..]).ok_or_else(|| self.damaged("a section is missing"))
+        found
+            .map(|section| &section.1[..])
+            .ok_or_else(|| self.damaged("a section is missing"))
     }
 
     /// The section of this tag as numbers.
@@ -231,7 +288,8 @@ fn sections_of(mut bytes: &[u8]) -> Option<Vec<(Tag, Vec<u8>)>> {
     while !bytes.is_empty() {
         let (tag, rest) = bytes.split_first_chunk::<8>()?;
         let (length, rest) = rest.split_first_chunk::<8>()?;
-        let (content, rest) = rest.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+        let (content, rest) =
+            rest.split_at_checked(usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
         sections.push((*tag, content.to_vec()));
         bytes = rest;
     }

@@ -46,11 +46,28 @@ impl Flow {
 
     /// As [`Self::save`], with the older file renamed to `previous`. Of several ranks the first begins and ends the file, and each
     /// writes its planes.
-    pub(crate) fn save_and_keep(&self, path: &Path, previous: Option<&Path>, user_data: &[u8]) -> Result<(), Error> {
+    pub(crate) fn save_and_keep(
+        &self,
+        path: &Path,
+        previous: Option<&Path>,
+        user_data: &[u8],
+    ) -> Result<(), Error> {
         let slabs = &self.layout.slabs;
-        let begun = if slabs.is_first() { self.begin(path, user_data).map(Some) } else { Ok(None) };
-        let written = slabs.all_agree(begun).and_then(|begun| slabs.all_agree(self.write_planes(path, begun)));
-        let put = |()| slabs.all_agree(if slabs.is_first() { container::finish(path, previous) } else { Ok(()) });
+        let begun = if slabs.is_first() {
+            self.begin(path, user_data).map(Some)
+        } else {
+            Ok(None)
+        };
+        let written = slabs
+            .all_agree(begun)
+            .and_then(|begun| slabs.all_agree(self.write_planes(path, begun)));
+        let put = |()| {
+            slabs.all_agree(if slabs.is_first() {
+                container::finish(path, previous)
+            } else {
+                Ok(())
+            })
+        };
         let result = written.and_then(put);
         if result.is_err() && slabs.is_first() {
             container::abandon(path);
@@ -65,30 +82,57 @@ impl Flow {
 
     /// Begins the file.
     fn begin(&self, path: &Path, user_data: &[u8]) -> Result<Planes, Error> {
-        let text: String =
-            identity(self.mesh(), self.settings(), &self.layout).iter().map(|(k, v)| format!("{k}\t{v}\n")).collect();
+        let text: String = identity(self.mesh(), self.settings(), &self.layout)
+            .iter()
+            .map(|(k, v)| format!("{k}\t{v}\n"))
+            .collect();
         let metrics = self.mesh().directions().each_ref().map(metrics);
         let mut sections = vec![(*IDENTITY, text.into_bytes())];
         let bytes = |values: &Vec<f64>| values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        sections.extend(METRICS.iter().zip(&metrics).map(|(tag, metrics)| (**tag, bytes(metrics))));
+        sections.extend(
+            METRICS
+                .iter()
+                .zip(&metrics)
+                .map(|(tag, metrics)| (**tag, bytes(metrics))),
+        );
         sections.push((*SCALARS, scalars(&self.state)));
         sections.push((*USER, user_data.to_vec()));
-        container::begin(path, VERSION, &sections, [self.layout.shape.n[2] as u64, self.plane_bytes()])
+        container::begin(
+            path,
+            VERSION,
+            &sections,
+            [self.layout.shape.n[2] as u64, self.plane_bytes()],
+        )
     }
 
     /// Writes the planes that this rank owns to the file that the first rank has begun, and tells of to the others.
     fn write_planes(&self, path: &Path, begun: Option<Planes>) -> Result<(), Error> {
         let told = begun.map_or_else(Vec::new, |planes| {
-            [planes.start as f64].into_iter().chain(planes.checksum.map(f64::from)).collect::<Vec<f64>>()
+            [planes.start as f64]
+                .into_iter()
+                .chain(planes.checksum.map(f64::from))
+                .collect::<Vec<f64>>()
         });
         let told = self.layout.slabs.all_gather(told)?;
         let checksum = std::array::from_fn(|i| told.get(i + 1).map_or(0, |byte| *byte as u8));
-        let planes = Planes { start: told.first().map_or(0, |start| *start as u64), checksum };
+        let planes = Planes {
+            start: told.first().map_or(0, |start| *start as u64),
+            checksum,
+        };
         let (shape, state) = (self.layout.shape, &self.state);
         container::write_planes(path, planes, shape.own(), self.plane_bytes(), |k, bytes| {
             let start = shape.place([0, 0, k]);
-            for field in state.velocity.iter().chain(&state.previous_terms).chain([&state.pressure]) {
-                bytes.extend(field[start..start + shape.plane()].iter().flat_map(|value| value.to_le_bytes()));
+            for field in state
+                .velocity
+                .iter()
+                .chain(&state.previous_terms)
+                .chain([&state.pressure])
+            {
+                bytes.extend(
+                    field[start..start + shape.plane()]
+                        .iter()
+                        .flat_map(|value| value.to_le_bytes()),
+                );
             }
         })
     }
@@ -99,12 +143,21 @@ impl Flow {
     /// # Errors
     /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`]; what
     /// [`Flow::new`] refuses; [`Error::CheckpointMismatch`] names what differs between the checkpoint and `mesh` or `settings`.
-    pub fn restore(path: impl AsRef<Path>, mesh: Mesh, settings: FlowSettings) -> Result<(Self, Vec<u8>), Error> {
+    pub fn restore(
+        path: impl AsRef<Path>,
+        mesh: Mesh,
+        settings: FlowSettings,
+    ) -> Result<(Self, Vec<u8>), Error> {
         let read = Self::read(path.as_ref(), &mesh, &settings);
         // The ranks that share the flow must agree on that, too.
-        let (mut flow, user_data) = Layout::new(&mesh).shared(settings.ranks)?.slabs.all_agree(read)?;
+        let (mut flow, user_data) = Layout::new(&mesh)
+            .shared(settings.ranks)?
+            .slabs
+            .all_agree(read)?;
         let [u, v, w] = flow.state.velocity.each_mut().map(|field| &mut field[..]);
-        flow.layout.slabs.halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
+        flow.layout
+            .slabs
+            .halos(&mut [u, v, w, &mut flow.state.pressure], WHOLE)?;
         Ok((flow, user_data))
     }
 
@@ -112,14 +165,22 @@ impl Flow {
     fn read(path: &Path, mesh: &Mesh, settings: &FlowSettings) -> Result<(Self, Vec<u8>), Error> {
         let mut file = Reader::open(path, VERSION)?;
         let text = file.bytes(IDENTITY)?;
-        let Ok(text) = std::str::from_utf8(text) else { return Err(file.damaged("its properties are no text")) };
+        let Ok(text) = std::str::from_utf8(text) else {
+            return Err(file.damaged("its properties are no text"));
+        };
         let wanted = identity(mesh, settings, &Layout::new(mesh));
         compare_identity(path, text, &wanted)?;
         for (axis, tag) in METRICS.iter().enumerate() {
-            compare_metrics(path, axis, &file.floats(tag)?, &metrics(&mesh.directions()[axis]))?;
+            compare_metrics(
+                path,
+                axis,
+                &file.floats(tag)?,
+                &metrics(&mesh.directions()[axis]),
+            )?;
         }
         let mut flow = Self::at_rest(mesh.clone(), settings.clone())?;
-        read_scalars(file.bytes(SCALARS)?, &mut flow.state).ok_or_else(|| file.damaged("its scalars are not whole"))?;
+        read_scalars(file.bytes(SCALARS)?, &mut flow.state)
+            .ok_or_else(|| file.damaged("its scalars are not whole"))?;
         let user_data = file.bytes(USER)?.to_vec();
         let shape = flow.layout.shape;
         if file.counts != [shape.n[2] as u64, flow.plane_bytes()] {
@@ -127,11 +188,23 @@ impl Flow {
         }
         for k in shape.own() {
             let bytes = file.plane(k)?;
-            let mut values = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b));
+            let mut values = bytes
+                .as_chunks::<8>()
+                .0
+                .iter()
+                .map(|b| f64::from_le_bytes(*b));
             let start = shape.place([0, 0, k]);
-            let State { velocity, previous_terms, pressure, .. } = &mut flow.state;
+            let State {
+                velocity,
+                previous_terms,
+                pressure,
+                ..
+            } = &mut flow.state;
             for field in velocity.iter_mut().chain(previous_terms).chain([pressure]) {
-                field[start..start + shape.plane()].iter_mut().zip(&mut values).for_each(|(to, value)| *to = value);
+                field[start..start + shape.plane()]
+                    .iter_mut()
+                    .zip(&mut values)
+                    .for_each(|(to, value)| *to = value);
             }
         }
         Ok((flow, user_data))
@@ -152,9 +225,15 @@ pub fn check_checkpoint(path: impl AsRef<Path>) -> Result<(), Error> {
 fn identity(mesh: &Mesh, settings: &FlowSettings, layout: &Layout) -> Vec<(String, String)> {
     let mut list = Vec::new();
     for (axis, d) in AXIS_NAMES.iter().zip(mesh.directions()) {
-        list.push((format!("the number of cells along {axis}"), d.cells.to_string()));
+        list.push((
+            format!("the number of cells along {axis}"),
+            d.cells.to_string(),
+        ));
         list.push((format!("the low end of {axis}"), format!("{:?} m", d.low_m)));
-        list.push((format!("the high end of {axis}"), format!("{:?} m", d.high_m)));
+        list.push((
+            format!("the high end of {axis}"),
+            format!("{:?} m", d.high_m),
+        ));
         list.push((format!("the mapping of {axis}"), format!("{:?}", d.mapping)));
         list.push((format!("what bounds {axis}"), format!("{:?}", d.ends)));
     }
@@ -163,7 +242,10 @@ fn identity(mesh: &Mesh, settings: &FlowSettings, layout: &Layout) -> Vec<(Strin
     add("force_m_s2", format!("{:?}", settings.force_m_s2));
     add("the time scheme", format!("{:?}", settings.scheme));
     add("the subgrid model", format!("{:?}", settings.subgrid));
-    add("the order of the directions in memory", format!("{:?}", layout.direction));
+    add(
+        "the order of the directions in memory",
+        format!("{:?}", layout.direction),
+    );
     list
 }
 
@@ -174,7 +256,10 @@ fn compare_identity(path: &Path, stored: &str, wanted: &[(String, String)]) -> R
         stored: stored.to_owned(),
         wanted: wanted.to_owned(),
     };
-    let found: Vec<(&str, &str)> = stored.lines().filter_map(|line| line.split_once('\t')).collect();
+    let found: Vec<(&str, &str)> = stored
+        .lines()
+        .filter_map(|line| line.split_once('\t'))
+        .collect();
     for (what, value) in wanted {
         match found.iter().find(|(name, _)| name == what) {
             Some((_, stored)) if stored == value => {}
@@ -187,7 +272,9 @@ fn compare_identity(path: &Path, stored: &str, wanted: &[(String, String)]) -> R
 
 /// Position and metric at all faces and centres \[m\].
 fn metrics(direction: &Direction) -> Vec<f64> {
-    (0..=2 * direction.cells).flat_map(|i| <[f64; 2]>::from(direction.at(0.5 * i as f64))).collect()
+    (0..=2 * direction.cells)
+        .flat_map(|i| <[f64; 2]>::from(direction.at(0.5 * i as f64)))
+        .collect()
 }
 
 /// Tells custom mappings apart, which have no name.
@@ -199,13 +286,19 @@ fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> 
         let scale_m = if i % 2 == 0 { scale_m[1] } else { b.abs() };
         (a - b).abs() > METRIC_TOLERANCE * scale_m
     };
-    let place =
-        if stored.len() == wanted.len() { stored.iter().zip(wanted).enumerate().position(differs) } else { Some(0) };
+    let place = if stored.len() == wanted.len() {
+        stored.iter().zip(wanted).enumerate().position(differs)
+    } else {
+        Some(0)
+    };
     let Some(i) = place else { return Ok(()) };
     let (kind, xi) = (["position [m]", "metric [m]"][i % 2], 0.5 * (i / 2) as f64);
     Err(Error::CheckpointMismatch {
         path: path.to_owned(),
-        what: format!("the {kind} at xi = {xi} of the mapping of {}", AXIS_NAMES[axis]),
+        what: format!(
+            "the {kind} at xi = {xi} of the mapping of {}",
+            AXIS_NAMES[axis]
+        ),
         stored: stored.get(i).map_or("absent".into(), |v| format!("{v:?}")),
         wanted: format!("{:?}", wanted[i]),
     })
@@ -213,14 +306,32 @@ fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> 
 
 /// The numbers of the state, eight bytes each.
 fn scalars(state: &State) -> Vec<u8> {
-    let [last_step, courant, energy] = [state.last_step_s, state.courant_per_s, state.energy].map(f64::to_bits);
-    let numbers = [state.time_s.to_bits(), state.step, last_step, courant, energy];
-    numbers.into_iter().chain(state.implicit.map(u64::from)).flat_map(u64::to_le_bytes).collect()
+    let [last_step, courant, energy] =
+        [state.last_step_s, state.courant_per_s, state.energy].map(f64::to_bits);
+    let numbers = [
+        state.time_s.to_bits(),
+        state.step,
+        last_step,
+        courant,
+        energy,
+    ];
+    numbers
+        .into_iter()
+        .chain(state.implicit.map(u64::from))
+        .flat_map(u64::to_le_bytes)
+        .collect()
 }
 
 fn read_scalars(bytes: &[u8], state: &mut State) -> Option<()> {
-    let (numbers, []) = bytes.as_chunks::<8>() else { return None };
-    let numbers: [u64; 8] = numbers.iter().map(|w| u64::from_le_bytes(*w)).collect::<Vec<_>>().try_into().ok()?;
+    let (numbers, []) = bytes.as_chunks::<8>() else {
+        return None;
+    };
+    let numbers: [u64; 8] = numbers
+        .iter()
+        .map(|w| u64::from_le_bytes(*w))
+        .collect::<Vec<_>>()
+        .try_into()
+        .ok()?;
     let [time, step, last_step, courant, energy, implicit @ ..] = numbers;
     state.time_s = f64::from_bits(time);
     state.step = step;

@@ -34,11 +34,23 @@ impl Flow {
         let corrected = self.correct(stage_s, &phi);
         self.phi = phi;
         corrected?;
-        let Err(Error::PressureNotSolved { reason, iterations, history, .. }) = &solved else { return solved };
+        let Err(Error::PressureNotSolved {
+            reason,
+            iterations,
+            history,
+            ..
+        }) = &solved
+        else {
+            return solved;
+        };
         match reason {
             PressureFailure::RoundOff { .. } => {
                 let mut right = Aligned::zeros(self.layout.shape.len());
-                self.divergence.apply(self.predicted.each_ref().map(|field| &field[..]), 1.0 / stage_s, &mut right);
+                self.divergence.apply(
+                    self.predicted.each_ref().map(|field| &field[..]),
+                    1.0 / stage_s,
+                    &mut right,
+                );
                 let size = norm(&self.layout.slabs, &right)?;
                 let left = self.repeat(stage_s, tolerance * size)?;
                 // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
@@ -46,19 +58,30 @@ impl Flow {
                 if left > tolerance * size && self.measure_divergence()? > tolerance {
                     return solved;
                 }
-                Ok(Solved { residual: left / size, iterations: (*iterations).max(history.len()), factor: None })
+                Ok(Solved {
+                    residual: left / size,
+                    iterations: (*iterations).max(history.len()),
+                    factor: None,
+                })
             }
             // The step names the place where the velocity is not finite.
-            PressureFailure::NotFinite => Ok(Solved { residual: f64::NAN, iterations: 0, factor: None }),
+            PressureFailure::NotFinite => Ok(Solved {
+                residual: f64::NAN,
+                iterations: 0,
+                factor: None,
+            }),
             PressureFailure::Stalled => solved,
         }
     }
 
     /// The weighted divergence of `predicted` over `stage_s` into `phi`.
     pub(super) fn take_divergence(&mut self, stage_s: f64) -> Result<(), Error> {
-        self.layout.slabs.halos(&mut [&mut self.predicted[2]], self.divergence.reach)?;
+        self.layout
+            .slabs
+            .halos(&mut [&mut self.predicted[2]], self.divergence.reach)?;
         let predicted = self.predicted.each_ref().map(|field| &field[..]);
-        self.divergence.apply(predicted, 1.0 / stage_s, &mut self.phi);
+        self.divergence
+            .apply(predicted, 1.0 / stage_s, &mut self.phi);
         Ok(())
     }
 
@@ -68,7 +91,11 @@ impl Flow {
         let mut rest = Aligned::zeros(self.layout.shape.len());
         let mut last = f64::INFINITY;
         for _ in 0..=MAX_REPETITIONS {
-            self.divergence.apply(self.state.velocity.each_ref().map(|field| &field[..]), 1.0 / stage_s, &mut rest);
+            self.divergence.apply(
+                self.state.velocity.each_ref().map(|field| &field[..]),
+                1.0 / stage_s,
+                &mut rest,
+            );
             let size = norm(&self.layout.slabs, &rest)?;
             if size <= enough || size > GAIN * last {
                 return Ok(size);
@@ -91,7 +118,11 @@ impl Flow {
         self.layout.slabs.halos(&mut velocity, WHOLE)?;
         let planes = self.layout.slabs.planes(planes)?;
         self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);
-        self.state.courant_per_s = planes.iter().fold(0.0, |most, plane| if plane[1] > most { plane[1] } else { most });
+        self.state.courant_per_s =
+            planes.iter().fold(
+                0.0,
+                |most, plane| if plane[1] > most { plane[1] } else { most },
+            );
         Ok(())
     }
 }

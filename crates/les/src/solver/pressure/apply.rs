@@ -37,7 +37,8 @@ impl Operator {
         let rows: [Vec<Taps>; 3] = std::array::from_fn(|b| stiffness(&layout.line[b]));
         let periodic = layout.line[0].is_periodic();
         let neighbours = |rows: &[Taps]| -> Vec<Taps> {
-            let others = |(i, row): (usize, &Taps)| row.iter().copied().filter(|tap| tap.0 != i).collect();
+            let others =
+                |(i, row): (usize, &Taps)| row.iter().copied().filter(|tap| tap.0 != i).collect();
             rows.iter().enumerate().map(others).collect()
         };
         Self {
@@ -53,7 +54,9 @@ impl Operator {
     /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`.
     pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) {
         let (shape, n0) = (self.slabs.shape, self.slabs.shape.n[0]);
-        let planes = residual[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+        let planes = residual[shape.own_places()]
+            .par_chunks_mut(shape.plane())
+            .zip(shape.own());
         planes.for_each_init(
             || vec![0.0; n0 + 2 * HALO],
             |padded, (plane, k)| {
@@ -73,9 +76,15 @@ impl Operator {
         let planes = self.slabs.shape.own().into_par_iter();
         let squares = planes.map_init(
             || (vec![0.0; n0], vec![0.0; n0 + 2 * HALO]),
-            |(out, padded), k| [(0..n1).map(|j| residual_row(self, g, phi, [j, k], out, padded)).sum()],
+            |(out, padded), k| {
+                [(0..n1)
+                    .map(|j| residual_row(self, g, phi, [j, k], out, padded))
+                    .sum()]
+            },
         );
-        self.slabs.sums(squares.collect()).map(|[squares]| squares.sqrt())
+        self.slabs
+            .sums(squares.collect())
+            .map(|[squares]| squares.sqrt())
     }
 
     /// Copies the right side `from` to `to`; returns its 2-norm. If its sum, which no pressure can balance, is more than `share` of
@@ -83,9 +92,16 @@ impl Operator {
     ///
     /// # Errors
     /// Those of the exchange between ranks.
-    pub(crate) fn copy_balanced(&self, from: &[f64], to: &mut [f64], share: f64) -> Result<f64, Error> {
+    pub(crate) fn copy_balanced(
+        &self,
+        from: &[f64],
+        to: &mut [f64],
+        share: f64,
+    ) -> Result<f64, Error> {
         let (plane, own) = (self.slabs.shape.plane(), self.slabs.shape.own_places());
-        let planes = to[own.clone()].par_chunks_mut(plane).zip(from[own].par_chunks(plane));
+        let planes = to[own.clone()]
+            .par_chunks_mut(plane)
+            .zip(from[own].par_chunks(plane));
         let parts = planes.map(|(to, from)| {
             to.copy_from_slice(from);
             [kernel::sum(to), kernel::dot(to, to)]
@@ -110,46 +126,77 @@ impl Operator {
     pub(crate) fn round_off(&self, phi: &[f64]) -> Result<f64, Error> {
         let (n0, shape) = (self.slabs.shape.n[0], self.slabs.shape);
         let sum = |taps: &Taps| {
-            taps.iter().map(|tap| tap.1 * tap.1).sum::<f64>() + taps.iter().map(|tap| tap.1).sum::<f64>().powi(2)
+            taps.iter().map(|tap| tap.1 * tap.1).sum::<f64>()
+                + taps.iter().map(|tap| tap.1).sum::<f64>().powi(2)
         };
         let own: [Vec<f64>; 3] = [
             self.along.squares(n0),
             self.across[0].iter().map(sum).collect(),
             self.across[1].iter().map(sum).collect(),
         ];
-        let squares = phi[shape.own_places()].par_chunks(shape.plane()).zip(shape.own()).map(|(plane, k)| {
-            let mass = |b: usize, i: usize| self.mass_m[b][i];
-            let terms = plane.iter().enumerate().map(|(place, phi)| {
-                let (i, j) = (place % n0, place / n0);
-                let [a, b, c] = [mass(1, j) * mass(2, k), mass(0, i) * mass(2, k), mass(0, i) * mass(1, j)];
-                (a * a * own[0][i] + b * b * own[1][j] + c * c * own[2][k]) * phi * phi
+        let squares = phi[shape.own_places()]
+            .par_chunks(shape.plane())
+            .zip(shape.own())
+            .map(|(plane, k)| {
+                let mass = |b: usize, i: usize| self.mass_m[b][i];
+                let terms = plane.iter().enumerate().map(|(place, phi)| {
+                    let (i, j) = (place % n0, place / n0);
+                    let [a, b, c] = [
+                        mass(1, j) * mass(2, k),
+                        mass(0, i) * mass(2, k),
+                        mass(0, i) * mass(1, j),
+                    ];
+                    (a * a * own[0][i] + b * b * own[1][j] + c * c * own[2][k]) * phi * phi
+                });
+                [terms.sum::<f64>()]
             });
-            [terms.sum::<f64>()]
-        });
-        self.slabs.sums(squares.collect()).map(|[squares]| 0.5 * f64::EPSILON * squares.sqrt())
+        self.slabs
+            .sums(squares.collect())
+            .map(|[squares]| 0.5 * f64::EPSILON * squares.sqrt())
     }
 
     /// Gives each value that is owned, with `scale` times the mass of its cell, to `act`.
-    pub(super) fn each_mass(&self, field: &mut [f64], scale: f64, act: impl Fn(&mut f64, f64) + Sync) {
+    pub(super) fn each_mass(
+        &self,
+        field: &mut [f64],
+        scale: f64,
+        act: impl Fn(&mut f64, f64) + Sync,
+    ) {
         let (n0, shape) = (self.slabs.shape.n[0], self.slabs.shape);
-        field[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own()).for_each(|(plane, k)| {
-            for (row, m1) in plane.chunks_mut(n0).zip(&self.mass_m[1]) {
-                let mass = m1 * self.mass_m[2][k] * scale;
-                row.iter_mut().zip(&self.mass_m[0]).for_each(|(value, m0)| act(value, mass * m0));
-            }
-        });
+        field[shape.own_places()]
+            .par_chunks_mut(shape.plane())
+            .zip(shape.own())
+            .for_each(|(plane, k)| {
+                for (row, m1) in plane.chunks_mut(n0).zip(&self.mass_m[1]) {
+                    let mass = m1 * self.mass_m[2][k] * scale;
+                    row.iter_mut()
+                        .zip(&self.mass_m[0])
+                        .for_each(|(value, m0)| act(value, mass * m0));
+                }
+            });
     }
 }
 
 /// Residual of row `(j, k)`; returns the sum of its squares.
-fn residual_row(op: &Operator, g: &[f64], phi: &[f64], [j, k]: [usize; 2], out: &mut [f64], padded: &mut [f64]) -> f64 {
+fn residual_row(
+    op: &Operator,
+    g: &[f64],
+    phi: &[f64],
+    [j, k]: [usize; 2],
+    out: &mut [f64],
+    padded: &mut [f64],
+) -> f64 {
     let at = op.slabs.shape.row(j, k);
     let own = &phi[at.clone()];
     let (m1, m2) = (op.mass_m[1][j], op.mass_m[2][k]);
     // Places that are not needed see the row itself.
     let mut taps = [(at.start, 0.0); MOST_TAPS];
-    let below = op.across[0][j].iter().map(|&(i, c)| (op.slabs.shape.row(i, k).start, c * m2));
-    let aside = op.across[1][k].iter().map(|&(i, c)| (op.slabs.shape.row(j, i).start, c * m1));
+    let below = op.across[0][j]
+        .iter()
+        .map(|&(i, c)| (op.slabs.shape.row(i, k).start, c * m2));
+    let aside = op.across[1][k]
+        .iter()
+        .map(|&(i, c)| (op.slabs.shape.row(j, i).start, c * m1));
     for (tap, new) in taps.iter_mut().zip(below.chain(aside)) {
         *tap = new;
     }
@@ -164,7 +211,11 @@ fn residual_row(op: &Operator, g: &[f64], phi: &[f64], [j, k]: [usize; 2], out: 
 }
 
 /// `out = -g - sum c mass (row - own)` over twelve rows, less the even differences along the row itself.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn row_differences(
     out: &mut [f64],
     g: &[f64],
@@ -188,9 +239,15 @@ fn row_differences(
     for i in 0..n {
         let o = own[i];
         let a = c[0].mul_add(x0[i] - o, c[1].mul_add(x1[i] - o, c[2] * (x2[i] - o)));
-        let a = c[3].mul_add(x3[i] - o, c[4].mul_add(x4[i] - o, c[5].mul_add(x5[i] - o, a)));
+        let a = c[3].mul_add(
+            x3[i] - o,
+            c[4].mul_add(x4[i] - o, c[5].mul_add(x5[i] - o, a)),
+        );
         let b = c[6].mul_add(x6[i] - o, c[7].mul_add(x7[i] - o, c[8] * (x8[i] - o)));
-        let b = c[9].mul_add(x9[i] - o, c[10].mul_add(x10[i] - o, c[11].mul_add(x11[i] - o, b)));
+        let b = c[9].mul_add(
+            x9[i] - o,
+            c[10].mul_add(x10[i] - o, c[11].mul_add(x11[i] - o, b)),
+        );
         let e = along[0].mul_add((p1[i] - o) + (q1[i] - o), g[i]);
         let e = along[1].mul_add((p2[i] - o) + (q2[i] - o), e);
         let e = along[2].mul_add((p3[i] - o) + (q3[i] - o), e);
@@ -199,7 +256,11 @@ fn row_differences(
 }
 
 /// Subtracts the rows that only cells at walls see, and the differences along a row whose cells are not all equal.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn other_differences(
     op: &Operator,
     out: &mut [f64],
@@ -211,7 +272,12 @@ fn other_differences(
 ) {
     let n = out.len();
     for &(start, c) in taps.iter().filter(|tap| tap.1 != 0.0) {
-        for (((out, x), own), m0) in out.iter_mut().zip(&phi[start..start + n]).zip(own).zip(&op.mass_m[0]) {
+        for (((out, x), own), m0) in out
+            .iter_mut()
+            .zip(&phi[start..start + n])
+            .zip(own)
+            .zip(&op.mass_m[0])
+        {
             *out = (-c * m0).mul_add(x - own, *out);
         }
     }
@@ -228,7 +294,12 @@ const MOST_TAPS: usize = 16;
 /// Coefficients of the pairs of neighbours at 1, 2 and 3 where all rows are equal and even.
 fn even(line: &Operators1d, rows: &[Taps]) -> Option<[f64; 3]> {
     let middle = line.cells / 2;
-    let at = |offset: usize| rows[middle].iter().find(|tap| tap.0 == middle + offset).map_or(0.0, |tap| tap.1);
+    let at = |offset: usize| {
+        rows[middle]
+            .iter()
+            .find(|tap| tap.0 == middle + offset)
+            .map_or(0.0, |tap| tap.1)
+    };
     (line.is_fourier() && line.cells >= 8).then(|| [at(1), at(2), at(3)])
 }
 
@@ -242,7 +313,10 @@ pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
                 sums[cell] += c * other / line.face_mass_m[face];
             }
         }
-        sums.into_iter().enumerate().filter(|(_, c)| *c != 0.0).collect()
+        sums.into_iter()
+            .enumerate()
+            .filter(|(_, c)| *c != 0.0)
+            .collect()
     };
     line.stored_divergence().iter().map(row).collect()
 }
@@ -253,5 +327,7 @@ pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
 /// Those of the exchange between ranks.
 pub(crate) fn norm(slabs: &Slabs, field: &[f64]) -> Result<f64, Error> {
     let planes = field[slabs.shape.own_places()].par_chunks(slabs.shape.plane());
-    slabs.sums(planes.map(|plane| [kernel::dot(plane, plane)]).collect()).map(|[squares]| squares.sqrt())
+    slabs
+        .sums(planes.map(|plane| [kernel::dot(plane, plane)]).collect())
+        .map(|[squares]| squares.sqrt())
 }

@@ -50,8 +50,14 @@ impl BandedCholesky {
     /// The operator of `line`, or `None` if it is not banded (periodic directions).
     pub(crate) fn new(line: &Operators1d) -> Option<Self> {
         let n = line.cells;
-        let mut columns: Vec<Column> =
-            line.cell_mass_m.iter().map(|mass| Column { mass: *mass, ..Column::default() }).collect();
+        let mut columns: Vec<Column> = line
+            .cell_mass_m
+            .iter()
+            .map(|mass| Column {
+                mass: *mass,
+                ..Column::default()
+            })
+            .collect();
         for (i, row) in stiffness(line).iter().enumerate() {
             for &(j, c) in row.iter().filter(|tap| tap.0 <= i) {
                 match i - j {
@@ -68,13 +74,28 @@ impl BandedCholesky {
     /// Replaces `rows` (one for each cell, one value for each line) by the solution, times `scale`, for the shifts
     /// `shift + shifts[line]`. For a shift of exactly zero the solution has zero weighted mean, and what is left of the
     /// right side's mean is ignored.
-    pub(crate) fn solve(&self, rows: &mut [&mut [f64]], shift: f64, shifts: &[f64], scale: f64, scratch: &mut Scratch) {
-        let singular: Vec<usize> = (0..shifts.len()).filter(|&l| shift + shifts[l] == 0.0).collect();
+    pub(crate) fn solve(
+        &self,
+        rows: &mut [&mut [f64]],
+        shift: f64,
+        shifts: &[f64],
+        scale: f64,
+        scratch: &mut Scratch,
+    ) {
+        let singular: Vec<usize> = (0..shifts.len())
+            .filter(|&l| shift + shifts[l] == 0.0)
+            .collect();
         for &l in &singular {
             self.remove_mean(rows, l, |column| column.mass);
         }
         let n = self.columns.len();
-        scratch.factors.resize(n, Factor { below: [ZERO; 3], corner: ZERO });
+        scratch.factors.resize(
+            n,
+            Factor {
+                below: [ZERO; 3],
+                corner: ZERO,
+            },
+        );
         scratch.right.resize(n, ZERO);
         for (shifts, start) in shifts.chunks(LANES).zip((0..).step_by(LANES)) {
             let range = start..start + shifts.len();
@@ -100,7 +121,10 @@ impl BandedCholesky {
     /// Subtracts from line `l` the multiple of `shape` that makes its sum, weighted so that `shape` is a constant, zero.
     fn remove_mean(&self, rows: &mut [&mut [f64]], l: usize, shape: impl Fn(&Column) -> f64) {
         let length: f64 = self.columns.iter().map(|column| column.mass).sum();
-        let weighted = rows.iter().zip(&self.columns).map(|(row, column)| row[l] * column.mass / shape(column));
+        let weighted = rows
+            .iter()
+            .zip(&self.columns)
+            .map(|(row, column)| row[l] * column.mass / shape(column));
         let mean = weighted.sum::<f64>() / length;
         for (row, column) in rows.iter_mut().zip(&self.columns) {
             row[l] -= mean * shape(column);
@@ -117,7 +141,11 @@ struct Reach {
 }
 
 /// Factorises and eliminates downwards; leaves the right side divided by the pivots.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratch) {
     let last = columns.len() - 1;
     // Of the three columns before, in the place of each modulo 3: entries before and after division by the pivot, and values of
@@ -152,7 +180,11 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
                 1 => &mut e1,
                 _ => &mut d,
             };
-            let by = if reach.left == 0 { &reach.factor.corner } else { &reach.factor.below[3 - reach.left] };
+            let by = if reach.left == 0 {
+                &reach.factor.corner
+            } else {
+                &reach.factor.below[3 - reach.left]
+            };
             for l in 0..LANES {
                 into[l] -= reach.entry[l] * by[l];
                 if reach.left == 0 {
@@ -161,10 +193,17 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
             }
         }
         reach = reach.filter(|reach| reach.left > 0);
-        let mut factor = Factor { below: [ZERO; 3], corner: ZERO };
+        let mut factor = Factor {
+            below: [ZERO; 3],
+            corner: ZERO,
+        };
         for l in 0..LANES {
             // The constant is free where the shift is zero.
-            let inverse = if k == last && shift[l] == 0.0 { 0.0 } else { 1.0 / d[l] };
+            let inverse = if k == last && shift[l] == 0.0 {
+                0.0
+            } else {
+                1.0 / d[l]
+            };
             factor.below[0][l] = e1[l] * inverse;
             factor.below[1][l] = e2[l] * inverse;
             factor.below[2][l] = e3[l] * inverse;
@@ -172,7 +211,12 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
             right[l] = r[l] * inverse;
         }
         if column.corner != 0.0 {
-            reach = Some(Reach { left: 4, entry: [column.corner; LANES], factor, value: r });
+            reach = Some(Reach {
+                left: 4,
+                entry: [column.corner; LANES],
+                factor,
+                value: r,
+            });
         }
         (u1[three], u2[three], u3[three]) = (e1, e2, e3);
         [l1[three], l2[three], l3[three]] = factor.below;
@@ -182,7 +226,11 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
 }
 
 /// Substitutes upwards.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn substitute(scratch: &mut Scratch) {
     let mut x = [ZERO; 4];
     for (factor, right) in scratch.factors.iter().zip(&mut scratch.right).rev() {
@@ -205,17 +253,29 @@ mod tests {
     #[test]
     fn the_factors_invert_the_operator_with_walls_at_either_end() {
         let (rest, slip) = (Wall::AT_REST, Wall::Slip);
-        for (n, low, high) in [(4, slip, slip), (12, rest, slip), (13, slip, rest), (16, rest, rest), (40, rest, rest)]
-        {
+        for (n, low, high) in [
+            (4, slip, slip),
+            (12, rest, slip),
+            (13, slip, rest),
+            (16, rest, rest),
+            (40, rest, rest),
+        ] {
             let mapping = Spread::TanhLow.by(0.8);
-            let line = Operators1d::new(&Direction::between(n, 0.0, n as f64, low, high).stretched(mapping));
+            let line = Operators1d::new(
+                &Direction::between(n, 0.0, n as f64, low, high).stretched(mapping),
+            );
             let band = BandedCholesky::new(&line).unwrap();
             let shifts: Vec<f64> = (0..19).map(|l| 0.05 * f64::from(l)).collect();
-            let mut right: Vec<Vec<f64>> =
-                (0..n).map(|k| (0..19).map(|l| ((k * 19 + l) as f64 * 0.7).sin()).collect()).collect();
+            let mut right: Vec<Vec<f64>> = (0..n)
+                .map(|k| (0..19).map(|l| ((k * 19 + l) as f64 * 0.7).sin()).collect())
+                .collect();
             // The singular line, of shift zero, needs a balanced right side.
-            let mean = right.iter().map(|row| row[0]).sum::<f64>() / line.cell_mass_m.iter().sum::<f64>();
-            right.iter_mut().zip(&line.cell_mass_m).for_each(|(row, mass)| row[0] -= mean * mass);
+            let mean =
+                right.iter().map(|row| row[0]).sum::<f64>() / line.cell_mass_m.iter().sum::<f64>();
+            right
+                .iter_mut()
+                .zip(&line.cell_mass_m)
+                .for_each(|(row, mass)| row[0] -= mean * mass);
             let mut x = right.clone();
             let mut rows: Vec<&mut [f64]> = x.iter_mut().map(Vec::as_mut_slice).collect();
             band.solve(&mut rows, 0.0, &shifts, -2.0, &mut Scratch::default());
@@ -223,16 +283,25 @@ mod tests {
                 for (l, shift) in shifts.iter().enumerate() {
                     let sum: f64 = row.iter().map(|&(i, c)| c * x[i][l]).sum();
                     let left = sum + shift * line.cell_mass_m[k] * x[k][l] + 2.0 * right[k][l];
-                    assert!(left.abs() < 1e-11, "{n} cells, cell {k}, line {l}: {left:e}");
+                    assert!(
+                        left.abs() < 1e-11,
+                        "{n} cells, cell {k}, line {l}: {left:e}"
+                    );
                 }
             }
-            let mean: f64 = x.iter().zip(&line.cell_mass_m).map(|(x, mass)| x[0] * mass).sum();
+            let mean: f64 = x
+                .iter()
+                .zip(&line.cell_mass_m)
+                .map(|(x, mass)| x[0] * mass)
+                .sum();
             assert!(mean.abs() < 1e-10, "{n} cells: {mean:e}");
         }
     }
 
     #[test]
     fn a_periodic_direction_is_not_banded() {
-        assert!(BandedCholesky::new(&Operators1d::new(&Direction::periodic(12, 0.0, 1.0))).is_none());
+        assert!(
+            BandedCholesky::new(&Operators1d::new(&Direction::periodic(12, 0.0, 1.0))).is_none()
+        );
     }
 }

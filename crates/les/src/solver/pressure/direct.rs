@@ -63,7 +63,13 @@ impl Direct {
             Along::Transformed(transform)
         };
         let along = [along(1), along(2)];
-        Self { slabs: layout.slabs.clone(), rows, along, value, scale: -factor }
+        Self {
+            slabs: layout.slabs.clone(),
+            rows,
+            along,
+            value,
+            scale: -factor,
+        }
     }
 
     /// What is done along the axes 1 and 2 of the places from `first` on of axis 0.
@@ -93,51 +99,78 @@ impl Direct {
     /// Transforms along axis 0, and along axis 1 where that is done plane by plane.
     fn rows(&self, way: Way, field: &mut [f64]) {
         let [n0, n1, n2] = self.slabs.shape.n;
-        let rows = if self.by_planes() { n1 } else { (n1 * n2).div_ceil(64).next_multiple_of(6) };
-        field.par_chunks_mut(n0 * rows).for_each_init(Work::default, |work, slab| {
-            if way == Way::There {
-                self.rows.apply(way, slab, work);
-            }
-            if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
-                let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
-                axis.apply(way, &mut rows, work);
-            }
-            if way == Way::Back {
-                self.rows.apply(way, slab, work);
-            }
-        });
+        let rows = if self.by_planes() {
+            n1
+        } else {
+            (n1 * n2).div_ceil(64).next_multiple_of(6)
+        };
+        field
+            .par_chunks_mut(n0 * rows)
+            .for_each_init(Work::default, |work, slab| {
+                if way == Way::There {
+                    self.rows.apply(way, slab, work);
+                }
+                if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
+                    let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
+                    axis.apply(way, &mut rows, work);
+                }
+                if way == Way::Back {
+                    self.rows.apply(way, slab, work);
+                }
+            });
     }
 
     /// Transforms along axis `which + 1` if it is transformed.
     fn lines(&self, way: Way, which: usize, field: &mut [f64], shape: Shape) {
-        let Along::Transformed(transform) = &self.along[which] else { return };
+        let Along::Transformed(transform) = &self.along[which] else {
+            return;
+        };
         let mut pencils = pencils(field, shape, which + 1, usize::MAX);
         let each = pencils.par_iter_mut();
-        each.for_each_init(Work::default, |work, pencil| transform.apply(way, &mut pencil.rows, work));
+        each.for_each_init(Work::default, |work, pencil| {
+            transform.apply(way, &mut pencil.rows, work)
+        });
     }
 
     /// Solves for the coefficients of the eigenvectors of the other axes along the factorised one.
-    fn banded(&self, axis: usize, band: &BandedCholesky, field: &mut [f64], shape: Shape, first: usize) {
+    fn banded(
+        &self,
+        axis: usize,
+        band: &BandedCholesky,
+        field: &mut [f64],
+        shape: Shape,
+        first: usize,
+    ) {
         let along = &self.value[0][first..first + shape.n[0]];
         let other = &self.value[3 - axis];
-        pencils(field, shape, axis, usize::MAX).par_iter_mut().for_each_init(Scratch::default, |scratch, pencil| {
-            let width = pencil.rows.first().map_or(0, |row| row.len());
-            let shifts = &along[pencil.start..pencil.start + width];
-            band.solve(&mut pencil.rows, other[pencil.other], shifts, self.scale, scratch);
-        });
+        pencils(field, shape, axis, usize::MAX)
+            .par_iter_mut()
+            .for_each_init(Scratch::default, |scratch, pencil| {
+                let width = pencil.rows.first().map_or(0, |row| row.len());
+                let shifts = &along[pencil.start..pencil.start + width];
+                band.solve(
+                    &mut pencil.rows,
+                    other[pencil.other],
+                    shifts,
+                    self.scale,
+                    scratch,
+                );
+            });
     }
 
     /// Divides the coefficients of the eigenvectors of all axes by their values, pencil by pencil between the transforms along axis 2.
     fn divide(&self, transform: &LineTransform, field: &mut [f64], shape: Shape, first: usize) {
         let value = &self.value;
-        pencils(field, shape, 2, usize::MAX).par_iter_mut().for_each_init(Work::default, |work, pencil| {
-            let along = &value[0][first + pencil.start..];
-            transform.apply(Way::There, &mut pencil.rows, work);
-            for (row, own) in pencil.rows.iter_mut().zip(&value[2]) {
-                kernel::divide(row, value[1][pencil.other] + own, along, self.scale);
-            }
-            transform.apply(Way::Back, &mut pencil.rows, work);
-        });
+        pencils(field, shape, 2, usize::MAX)
+            .par_iter_mut()
+            .for_each_init(Work::default, |work, pencil| {
+                let along = &value[0][first + pencil.start..];
+                transform.apply(Way::There, &mut pencil.rows, work);
+                for (row, own) in pencil.rows.iter_mut().zip(&value[2]) {
+                    kernel::divide(row, value[1][pencil.other] + own, along, self.scale);
+                }
+                transform.apply(Way::Back, &mut pencil.rows, work);
+            });
     }
 }
 
@@ -148,7 +181,9 @@ impl Method for Direct {
 
     fn solve(&self, own: &mut [f64], _: f64, _: f64) -> Result<usize, Error> {
         self.rows(Way::There, own);
-        self.slabs.transposed(own, 1, |field, shape, first| self.lines_once(field, shape, first))?;
+        self.slabs.transposed(own, 1, |field, shape, first| {
+            self.lines_once(field, shape, first)
+        })?;
         self.rows(Way::Back, own);
         Ok(0)
     }
@@ -157,7 +192,10 @@ impl Method for Direct {
 /// Axes that the direct solver treats by products with a dense matrix, axis 0 apart.
 pub(crate) fn dense_axes(layout: &Layout) -> Vec<usize> {
     let banded = banded_axis(layout);
-    [1, 2].into_iter().filter(|axis| Some(*axis) != banded).collect()
+    [1, 2]
+        .into_iter()
+        .filter(|axis| Some(*axis) != banded)
+        .collect()
 }
 
 /// The axis that is factorised: the longer of the bounded ones, axis 2 if they are about equal.

@@ -37,10 +37,22 @@ const NULL: f64 = 1e-13;
 impl Basis {
     /// The eigenvectors of `line`.
     pub(crate) fn new(line: &Operators1d) -> Self {
-        let slip = matches!(line.ends, Ends::Walls { low: Wall::Slip, high: Wall::Slip });
-        let uniform = line.cell_metric_m.iter().all(|h| *h == line.cell_metric_m[0]);
+        let slip = matches!(
+            line.ends,
+            Ends::Walls {
+                low: Wall::Slip,
+                high: Wall::Slip
+            }
+        );
+        let uniform = line
+            .cell_metric_m
+            .iter()
+            .all(|h| *h == line.cell_metric_m[0]);
         if line.is_thin() {
-            Self { value: vec![0.0], vector: vec![1.0 / line.cell_mass_m[0].sqrt()] }
+            Self {
+                value: vec![0.0],
+                vector: vec![1.0 / line.cell_mass_m[0].sqrt()],
+            }
         } else if line.is_fourier() {
             Self::waves(line)
         } else if slip && uniform {
@@ -58,15 +70,28 @@ impl Basis {
             let wave = m.div_ceil(2);
             let angle = 2.0 * PI * ((i * wave) % n) as f64 / n as f64;
             let single = m == 0 || 2 * wave == n;
-            let norm = if single { 1.0 / length.sqrt() } else { (2.0 / length).sqrt() };
-            norm * if m % 2 == 1 || m == 0 { angle.cos() } else { -angle.sin() }
+            let norm = if single {
+                1.0 / length.sqrt()
+            } else {
+                (2.0 / length).sqrt()
+            };
+            norm * if m % 2 == 1 || m == 0 {
+                angle.cos()
+            } else {
+                -angle.sin()
+            }
         };
-        Self { value: Self::wave_values(n, h), vector: (0..n * n).map(|p| entry(p / n, p % n)).collect() }
+        Self {
+            value: Self::wave_values(n, h),
+            vector: (0..n * n).map(|p| entry(p / n, p % n)).collect(),
+        }
     }
 
     /// Eigenvalues \[1/m^2\] of `n` periodic cells of width `h` \[m\]: the constant, then the waves, in pairs.
     pub(crate) fn wave_values(n: usize, h: f64) -> Vec<f64> {
-        (0..n).map(|m| symbol(2.0 * PI * m.div_ceil(2) as f64 / n as f64, h)).collect()
+        (0..n)
+            .map(|m| symbol(2.0 * PI * m.div_ceil(2) as f64 / n as f64, h))
+            .collect()
     }
 
     fn cosines(line: &Operators1d) -> Self {
@@ -75,10 +100,16 @@ impl Basis {
         let length = n as f64 * h;
         let entry = |i: usize, m: usize| {
             let angle = PI * (((2 * i + 1) * m) % (4 * n)) as f64 / (2 * n) as f64;
-            if m == 0 { 1.0 / length.sqrt() } else { (2.0 / length).sqrt() * angle.cos() }
+            if m == 0 {
+                1.0 / length.sqrt()
+            } else {
+                (2.0 / length).sqrt() * angle.cos()
+            }
         };
         Self {
-            value: (0..n).map(|m| symbol(PI * m as f64 / n as f64, h)).collect(),
+            value: (0..n)
+                .map(|m| symbol(PI * m as f64 / n as f64, h))
+                .collect(),
             vector: (0..n * n).map(|p| entry(p / n, p % n)).collect(),
         }
     }
@@ -88,8 +119,10 @@ impl Basis {
         let mass = &line.cell_mass_m;
         let mut columns = scaled_columns(line);
         orthogonalise(&mut columns);
-        let mut modes: Vec<(f64, Vec<f64>)> =
-            columns.into_iter().map(|column| (kernel::dot(&column, &column), column)).collect();
+        let mut modes: Vec<(f64, Vec<f64>)> = columns
+            .into_iter()
+            .map(|column| (kernel::dot(&column, &column), column))
+            .collect();
         modes.sort_by(|a, b| b.0.total_cmp(&a.0));
         modes.truncate(n - 1);
         modes.reverse();
@@ -98,7 +131,11 @@ impl Basis {
         let mut vector = vec![1.0 / length.sqrt(); n * n];
         for (m, (lambda, column)) in modes.into_iter().enumerate() {
             value.push(lambda);
-            let mut v: Vec<f64> = column.iter().zip(mass).map(|(w, mass)| w / (lambda * mass).sqrt()).collect();
+            let mut v: Vec<f64> = column
+                .iter()
+                .zip(mass)
+                .map(|(w, mass)| w / (lambda * mass).sqrt())
+                .collect();
             // Round-off along the constant would see the pressure's free level.
             let mean = v.iter().zip(mass).map(|(v, mass)| v * mass).sum::<f64>() / length;
             v.iter_mut().for_each(|v| *v -= mean);
@@ -128,7 +165,10 @@ fn scaled_columns(line: &Operators1d) -> Vec<Vec<f64>> {
 
 /// Rotates the columns in pairs until all are orthogonal.
 fn orthogonalise(columns: &mut [Vec<f64>]) {
-    let largest = columns.iter().map(|c| kernel::dot(c, c)).fold(0.0, f64::max);
+    let largest = columns
+        .iter()
+        .map(|c| kernel::dot(c, c))
+        .fold(0.0, f64::max);
     for _ in 0..MAX_SWEEPS {
         let mut worst = 0.0_f64;
         for p in 0..columns.len() {
@@ -166,7 +206,9 @@ mod tests {
             for (column, b) in line.stored_divergence().iter().enumerate() {
                 for &(face, x) in a {
                     let others = b.iter().filter(|tap| tap.0 == face);
-                    dense[row * n + column] += others.map(|tap| x * tap.1 / line.face_mass_m[face]).sum::<f64>();
+                    dense[row * n + column] += others
+                        .map(|tap| x * tap.1 / line.face_mass_m[face])
+                        .sum::<f64>();
                 }
             }
         }
@@ -185,7 +227,8 @@ mod tests {
             Direction::between(4, 0.0, 2.0, Wall::Slip, Wall::Slip),
             Direction::between(33, 0.0, 2.0, Wall::Slip, Wall::Slip).stretched(tanh.clone()),
             Direction::between(32, 0.0, 2.0, Wall::AT_REST, Wall::AT_REST).stretched(tanh),
-            Direction::between(64, 0.0, 2.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(5.0)),
+            Direction::between(64, 0.0, 2.0, Wall::AT_REST, Wall::Slip)
+                .stretched(Spread::TanhLow.by(5.0)),
         ]
     }
 
@@ -198,19 +241,29 @@ mod tests {
             let dense = stiffness(&line);
             let largest = value.iter().fold(0.0, |a: f64, b| a.max(*b));
             assert_eq!(value[0], 0.0);
-            assert!(value[1] > 0.0 && value.windows(2).all(|v| v[0] <= v[1]), "{direction:?}: {value:?}");
+            assert!(
+                value[1] > 0.0 && value.windows(2).all(|v| v[0] <= v[1]),
+                "{direction:?}: {value:?}"
+            );
             for m in 0..n {
                 for other in 0..n {
-                    let sum: f64 =
-                        (0..n).map(|i| vector[i * n + m] * line.cell_mass_m[i] * vector[i * n + other]).sum();
+                    let sum: f64 = (0..n)
+                        .map(|i| vector[i * n + m] * line.cell_mass_m[i] * vector[i * n + other])
+                        .sum();
                     let expected = f64::from(m == other);
-                    assert!((sum - expected).abs() < 1e-12, "{direction:?}: ({m}, {other}) {sum}");
+                    assert!(
+                        (sum - expected).abs() < 1e-12,
+                        "{direction:?}: ({m}, {other}) {sum}"
+                    );
                 }
                 for i in 0..n {
                     let product: f64 = (0..n).map(|j| dense[i * n + j] * vector[j * n + m]).sum();
                     let expected = value[m] * line.cell_mass_m[i] * vector[i * n + m];
                     let scale = largest * line.cell_mass_m[i].sqrt();
-                    assert!((product - expected).abs() < 1e-12 * scale, "{direction:?}: mode {m} cell {i}");
+                    assert!(
+                        (product - expected).abs() < 1e-12 * scale,
+                        "{direction:?}: mode {m} cell {i}"
+                    );
                 }
             }
         }
@@ -218,7 +271,10 @@ mod tests {
 
     #[test]
     fn rotations_find_the_closed_forms() {
-        for direction in [Direction::periodic(21, 0.0, 2.0), Direction::between(21, 0.0, 2.0, Wall::Slip, Wall::Slip)] {
+        for direction in [
+            Direction::periodic(21, 0.0, 2.0),
+            Direction::between(21, 0.0, 2.0, Wall::Slip, Wall::Slip),
+        ] {
             let line = Operators1d::new(&direction);
             let (closed, rotated) = (Basis::new(&line), Basis::rotations(&line));
             for (a, b) in closed.value.iter().zip(&rotated.value) {

@@ -34,20 +34,34 @@ impl Fold {
     /// The matrix as it is.
     pub(crate) fn none(n: usize, matrix: &[f64]) -> Self {
         let column = |m: usize| matrix.iter().skip(m).step_by(n).copied().collect();
-        Self { pairs: Vec::new(), blocks: vec![(0, (0..n).map(column).collect())], columns: (0..n).collect() }
+        Self {
+            pairs: Vec::new(),
+            blocks: vec![(0, (0..n).map(column).collect())],
+            columns: (0..n).collect(),
+        }
     }
 
     /// Adds a block of columns that begins at the place `start`, folded as often as it can be.
     fn add(&mut self, start: usize, columns: Vec<(usize, Vec<f64>)>) {
         let n = columns.len();
         let about = |centre: usize| move |place: usize| (centre + n - place) % n;
-        let (Some(split), true) = ([n - 1, 0].into_iter().find_map(|c| halves(&columns, about(c))), n >= WORTH) else {
+        let (Some(split), true) = (
+            [n - 1, 0]
+                .into_iter()
+                .find_map(|c| halves(&columns, about(c))),
+            n >= WORTH,
+        ) else {
             self.columns.extend(columns.iter().map(|column| column.0));
-            self.blocks.push((start, columns.into_iter().map(|column| column.1).collect()));
+            self.blocks
+                .push((start, columns.into_iter().map(|column| column.1).collect()));
             return;
         };
         let (pairs, even, odd) = split;
-        self.pairs.extend(pairs.into_iter().map(|pair| pair.map(|place| start + place)));
+        self.pairs.extend(
+            pairs
+                .into_iter()
+                .map(|pair| pair.map(|place| start + place)),
+        );
         let middle = start + even.len();
         self.add(start, even);
         self.add(middle, odd);
@@ -57,24 +71,43 @@ impl Fold {
 type Columns = Vec<(usize, Vec<f64>)>;
 
 /// Pairs of places, even columns and odd ones, if all are one or the other. Differences take the higher place of a pair.
-fn halves(columns: &Columns, mirror: impl Fn(usize) -> usize) -> Option<(Vec<[usize; 2]>, Columns, Columns)> {
+fn halves(
+    columns: &Columns,
+    mirror: impl Fn(usize) -> usize,
+) -> Option<(Vec<[usize; 2]>, Columns, Columns)> {
     let n = columns.len();
-    let small = ROUND_OFF * columns.iter().flat_map(|column| &column.1).fold(0.0, |a: f64, b| a.max(b.abs()));
+    let small = ROUND_OFF
+        * columns
+            .iter()
+            .flat_map(|column| &column.1)
+            .fold(0.0, |a: f64, b| a.max(b.abs()));
     let (mut even, mut odd) = (Columns::new(), Columns::new());
     for (m, column) in columns {
         let is = |sign: f64| (0..n).all(|i| (column[i] - sign * column[mirror(i)]).abs() <= small);
         if is(1.0) {
             even.push((
                 *m,
-                (0..n).filter(|&i| i <= mirror(i)).map(|i| 0.5 * (column[i] + column[mirror(i)])).collect(),
+                (0..n)
+                    .filter(|&i| i <= mirror(i))
+                    .map(|i| 0.5 * (column[i] + column[mirror(i)]))
+                    .collect(),
             ));
         } else if is(-1.0) {
-            odd.push((*m, (0..n).filter(|&i| i > mirror(i)).map(|i| 0.5 * (column[mirror(i)] - column[i])).collect()));
+            odd.push((
+                *m,
+                (0..n)
+                    .filter(|&i| i > mirror(i))
+                    .map(|i| 0.5 * (column[mirror(i)] - column[i]))
+                    .collect(),
+            ));
         } else {
             return None;
         }
     }
     let is_square = |half: &Columns| half.iter().all(|column| column.1.len() == half.len());
-    let pairs = (0..n).map(|i| [i, mirror(i)]).filter(|[low, high]| low < high).collect();
+    let pairs = (0..n)
+        .map(|i| [i, mirror(i)])
+        .filter(|[low, high]| low < high)
+        .collect();
     (is_square(&even) && is_square(&odd)).then_some((pairs, even, odd))
 }

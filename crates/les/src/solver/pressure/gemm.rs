@@ -51,18 +51,35 @@ impl Left {
         Self::new([&[], &fold.pairs], fold, |block, i, k| block[k][i])
     }
 
-    fn new(pairs: [&[[usize; 2]]; 2], fold: &Fold, at: impl Fn(&[Vec<f64>], usize, usize) -> f64) -> Self {
+    fn new(
+        pairs: [&[[usize; 2]]; 2],
+        fold: &Fold,
+        at: impl Fn(&[Vec<f64>], usize, usize) -> f64,
+    ) -> Self {
         let pack = |(start, block): &(usize, Vec<Vec<f64>>)| {
             let n = block.len();
             let group = |first: usize| -> Group {
-                let entry = |i: usize, k: usize| if first + i < n { at(block, first + i, k) } else { 0.0 };
-                (0..n).map(|k| std::array::from_fn(|i| entry(i, k))).collect()
+                let entry = |i: usize, k: usize| {
+                    if first + i < n {
+                        at(block, first + i, k)
+                    } else {
+                        0.0
+                    }
+                };
+                (0..n)
+                    .map(|k| std::array::from_fn(|i| entry(i, k)))
+                    .collect()
             };
             (*start, n, (0..n).step_by(ROWS).map(group).collect())
         };
         let n = fold.columns.len();
         let [before, after] = pairs.map(<[_]>::to_vec);
-        Self { n, before, blocks: fold.blocks.iter().map(pack).collect(), after }
+        Self {
+            n,
+            before,
+            blocks: fold.blocks.iter().map(pack).collect(),
+            after,
+        }
     }
 
     /// Replaces the `n` rows `f` of equal length by `A f`.
@@ -80,11 +97,16 @@ impl Left {
         let (panel, product) = packed.panels(self.n);
         for rows in f.chunks_mut(COLUMNS * self.n) {
             for (i, row) in rows.chunks(self.n).enumerate() {
-                panel.iter_mut().zip(row).for_each(|(packed, value)| packed[i] = *value);
+                panel
+                    .iter_mut()
+                    .zip(row)
+                    .for_each(|(packed, value)| packed[i] = *value);
             }
             self.multiply(panel, [0, rows.len() / self.n], product);
             for (i, row) in rows.chunks_mut(self.n).enumerate() {
-                row.iter_mut().zip(&*product).for_each(|(value, packed)| *value = packed[i]);
+                row.iter_mut()
+                    .zip(&*product)
+                    .for_each(|(value, packed)| *value = packed[i]);
             }
         }
     }
@@ -93,7 +115,10 @@ impl Left {
     fn multiply(&self, panel: &[TileRow], [start, end]: [usize; 2], product: &mut [TileRow]) {
         for &(first, rows, ref groups) in &self.blocks {
             let panel = &panel[first..first + rows];
-            for (group, out) in groups.iter().zip(product[first..first + rows].chunks_mut(ROWS)) {
+            for (group, out) in groups
+                .iter()
+                .zip(product[first..first + rows].chunks_mut(ROWS))
+            {
                 multiply(group, panel, end - start, out);
             }
         }
@@ -112,7 +137,9 @@ impl Packed {
 /// First column of each panel of `f`, and the one after its last.
 fn panels(f: &[&mut [f64]]) -> impl Iterator<Item = [usize; 2]> + use<> {
     let width = f.first().map_or(0, |row| row.len());
-    (0..width).step_by(COLUMNS).map(move |start| [start, width.min(start + COLUMNS)])
+    (0..width)
+        .step_by(COLUMNS)
+        .map(move |start| [start, width.min(start + COLUMNS)])
 }
 
 /// Copies some columns of `f` and puts sums and differences of pairs of rows in their places.
@@ -128,7 +155,12 @@ fn take(pairs: &[[usize; 2]], f: &[&mut [f64]], [start, end]: [usize; 2], panel:
 
 /// The other way round.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn give(pairs: &[[usize; 2]], product: &mut [TileRow], f: &mut [&mut [f64]], [start, end]: [usize; 2]) {
+fn give(
+    pairs: &[[usize; 2]],
+    product: &mut [TileRow],
+    f: &mut [&mut [f64]],
+    [start, end]: [usize; 2],
+) {
     for pair in pairs.iter().rev() {
         sum_and_difference(*pair, product);
     }
@@ -139,7 +171,9 @@ fn give(pairs: &[[usize; 2]], product: &mut [TileRow], f: &mut [&mut [f64]], [st
 
 #[inline(always)]
 fn sum_and_difference(pair: [usize; 2], rows: &mut [TileRow]) {
-    let Ok([low, high]) = rows.get_disjoint_mut(pair) else { return };
+    let Ok([low, high]) = rows.get_disjoint_mut(pair) else {
+        return;
+    };
     for l in 0..COLUMNS {
         (low[l], high[l]) = (low[l] + high[l], low[l] - high[l]);
     }
@@ -166,7 +200,11 @@ fn paste(from: &TileRow, to: &mut [f64]) {
 }
 
 /// The rows of `tile`, at most 6, `= a b` over the first `columns` columns (rounded up to 8).
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn multiply(a: &[[f64; ROWS]], b: &[TileRow], columns: usize, tile: &mut [TileRow]) {
     if target_cfg_f!(target_feature = "avx512f") && columns > COLUMNS - NARROW {
         multiply_part::<COLUMNS>(a, b, 0, tile);
@@ -179,7 +217,12 @@ fn multiply(a: &[[f64; ROWS]], b: &[TileRow], columns: usize, tile: &mut [TileRo
 
 /// The columns `first` to `first + WIDTH` of a tile.
 #[inline(always)]
-fn multiply_part<const WIDTH: usize>(a: &[[f64; ROWS]], b: &[TileRow], first: usize, tile: &mut [TileRow]) {
+fn multiply_part<const WIDTH: usize>(
+    a: &[[f64; ROWS]],
+    b: &[TileRow],
+    first: usize,
+    tile: &mut [TileRow],
+) {
     let mut sum = [[0.0_f64; WIDTH]; ROWS];
     for (a, b) in a.iter().zip(b) {
         let b = &b[first..first + WIDTH];
@@ -211,17 +254,24 @@ mod tests {
             let matrix: Vec<f64> = (0..n * n).map(|p| entry(p / n, p % n)).collect();
             Left::same(&Fold::new(n, &matrix)).apply(&mut rows, &mut Packed::default());
             let mut right = f.clone();
-            Left::transpose(&Fold::none(n, &matrix)).apply_to_rows(&mut right, &mut Packed::default());
+            Left::transpose(&Fold::none(n, &matrix))
+                .apply_to_rows(&mut right, &mut Packed::default());
             for r in 0..n {
                 for c in 0..width {
                     let sum: f64 = (0..n).map(|k| entry(r, k) * f[k * width + c]).sum();
-                    assert!((left[r * width + c] - sum).abs() < 1e-11, "{n} {width} left ({r}, {c})");
+                    assert!(
+                        (left[r * width + c] - sum).abs() < 1e-11,
+                        "{n} {width} left ({r}, {c})"
+                    );
                 }
             }
             for r in 0..width {
                 for c in 0..n {
                     let sum: f64 = (0..n).map(|k| f[r * n + k] * entry(k, c)).sum();
-                    assert!((right[r * n + c] - sum).abs() < 1e-11, "{n} {width} right ({r}, {c})");
+                    assert!(
+                        (right[r * n + c] - sum).abs() < 1e-11,
+                        "{n} {width} right ({r}, {c})"
+                    );
                 }
             }
         }

@@ -9,7 +9,8 @@ const LANES: usize = 8;
 
 /// Sum of eight lanes in a fixed order.
 fn total(lanes: [f64; LANES]) -> f64 {
-    ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6])) + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
+    ((lanes[0] + lanes[4]) + (lanes[2] + lanes[6]))
+        + ((lanes[1] + lanes[5]) + (lanes[3] + lanes[7]))
 }
 
 /// `sum a b`.
@@ -70,6 +71,10 @@ pub(crate) fn sum(values: &[f64]) -> f64 {
 pub(crate) fn divide(values: &mut [f64], shift: f64, shifts: &[f64], scale: f64) {
     for (value, other) in values.iter_mut().zip(shifts) {
         let divisor = shift + other;
-        *value = if divisor == 0.0 { 0.0 } else { *value * (scale / divisor) };
+        *value = if divisor == 0.0 {
+            0.0
+        } else {
+            *value * (scale / divisor)
+        };
     }
 }

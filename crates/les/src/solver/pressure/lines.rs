@@ -14,13 +14,26 @@ pub(crate) struct Pencil<'a> {
 }
 
 /// Cuts `field` into pencils of at most `widest` lines along `axis` (1 or 2), in an order and with widths that depend on the shape alone.
-pub(crate) fn pencils(field: &mut [f64], shape: Shape, axis: usize, widest: usize) -> Vec<Pencil<'_>> {
+pub(crate) fn pencils(
+    field: &mut [f64],
+    shape: Shape,
+    axis: usize,
+    widest: usize,
+) -> Vec<Pencil<'_>> {
     let [n0, n1, _] = shape.n;
-    let (along, others) = if axis == 1 { (n1, shape.n[2]) } else { (shape.n[2], n1) };
+    let (along, others) = if axis == 1 {
+        (n1, shape.n[2])
+    } else {
+        (shape.n[2], n1)
+    };
     let width = width(n0, others).min(widest);
     let pieces = n0.div_ceil(width);
     let mut pencils: Vec<Pencil<'_>> = (0..others * pieces)
-        .map(|b| Pencil { other: b / pieces, start: b % pieces * width, rows: Vec::with_capacity(along) })
+        .map(|b| Pencil {
+            other: b / pieces,
+            start: b % pieces * width,
+            rows: Vec::with_capacity(along),
+        })
         .collect();
     for (r, row) in field.chunks_mut(n0).enumerate() {
         let other = if axis == 1 { r / n1 } else { r % n1 };
@@ -54,7 +67,10 @@ fn width(n0: usize, others: usize) -> usize {
     if others >= ENOUGH {
         return n0;
     }
-    (n0 * others).div_ceil(ENOUGH).next_multiple_of(STEP).min(n0)
+    (n0 * others)
+        .div_ceil(ENOUGH)
+        .next_multiple_of(STEP)
+        .min(n0)
 }
 
 #[cfg(test)]
@@ -71,7 +87,11 @@ mod tests {
                 for pencil in pencils(&mut field, shape, axis, usize::MAX) {
                     assert_eq!(pencil.rows.len(), n[axis]);
                     for (i, row) in pencil.rows.iter().enumerate() {
-                        let (j, k) = if axis == 1 { (i, pencil.other) } else { (pencil.other, i) };
+                        let (j, k) = if axis == 1 {
+                            (i, pencil.other)
+                        } else {
+                            (pencil.other, i)
+                        };
                         assert_eq!(row[0], ((k * n[1] + j) * n[0] + pencil.start) as f64);
                         seen += row.len();
                     }

@@ -21,8 +21,11 @@ fn layout([x, y, z]: [Direction; 3]) -> Layout {
 /// A balanced right side from a divergence at the places of the cells, as fractions of the three lengths.
 fn right_side(layout: &Layout, divergence: impl Fn([f64; 3]) -> f64) -> Vec<f64> {
     let n = layout.shape.n;
-    let fraction = |p: usize| std::array::from_fn(|b| (layout.shape.index(p)[b] as f64 + 0.5) / n[b] as f64);
-    let mut g: Vec<f64> = (0..layout.shape.len()).map(|p| divergence(fraction(p))).collect();
+    let fraction =
+        |p: usize| std::array::from_fn(|b| (layout.shape.index(p)[b] as f64 + 0.5) / n[b] as f64);
+    let mut g: Vec<f64> = (0..layout.shape.len())
+        .map(|p| divergence(fraction(p)))
+        .collect();
     let operator = Operator::new(layout);
     tests::weigh(&operator, &mut g);
     let mut balanced = g.clone();
@@ -40,7 +43,9 @@ fn long_waves(layout: &Layout) -> Vec<f64> {
 
 /// Values without any order.
 fn rough(layout: &Layout) -> Vec<f64> {
-    right_side(layout, |at| (12345.6 * at[0] + 2345.6 * at[1] + 5432.1 * at[2]).sin())
+    right_side(layout, |at| {
+        (12345.6 * at[0] + 2345.6 * at[1] + 5432.1 * at[2]).sin()
+    })
 }
 
 /// Relative residual by the gradients and divergences of the three directions, one after the other.
@@ -53,12 +58,21 @@ fn residual_by_parts(layout: &Layout, g: &[f64], phi: &[f64]) -> f64 {
         for (p, left) in left.iter_mut().enumerate() {
             let at = layout.shape.index(p);
             let first = p - at[b] * stride;
-            let across: f64 = (0..3).filter(|&d| d != b).map(|d| layout.line[d].cell_mass_m[at[d]]).product();
+            let across: f64 = (0..3)
+                .filter(|&d| d != b)
+                .map(|d| layout.line[d].cell_mass_m[at[d]])
+                .product();
             let slope = |face: usize| {
                 let own = phi[p];
-                gradient[face].iter().map(|&(i, c)| c * (phi[first + i * stride] - own)).sum::<f64>()
+                gradient[face]
+                    .iter()
+                    .map(|&(i, c)| c * (phi[first + i * stride] - own))
+                    .sum::<f64>()
             };
-            let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * slope(face)).sum();
+            let sum: f64 = divergence[at[b]]
+                .iter()
+                .map(|&(face, c)| c * slope(face))
+                .sum();
             *left += across * sum;
         }
     }
@@ -73,16 +87,36 @@ fn meshes() -> Vec<(String, Layout)> {
         for length_m in [1.0, 1e2, 1e3, 1e4, 1e5] {
             let walls = |length_m| Direction::between(64, 0.0, length_m, wall, wall);
             let plane = [Direction::thin(1.0), walls(length_m), walls(1.0)];
-            meshes.push((format!("{wall:?}, {length_m:e} times longer than high"), layout(plane)));
+            meshes.push((
+                format!("{wall:?}, {length_m:e} times longer than high"),
+                layout(plane),
+            ));
         }
     }
     let flat = |y: f64, z: f64| [Direction::periodic(16, 0.0, 2.0), slip(64, y), slip(64, z)];
-    meshes.push(("cells 1e4 times wider than high".into(), layout(flat(1e4, 1.0))));
-    meshes.push(("cells 1e4 times higher than wide".into(), layout(flat(1.0, 1e4))));
-    meshes.push(("long along x".into(), layout([Direction::periodic(16, 0.0, 2e4), slip(24, 6.0), slip(20, 3.0)])));
+    meshes.push((
+        "cells 1e4 times wider than high".into(),
+        layout(flat(1e4, 1.0)),
+    ));
+    meshes.push((
+        "cells 1e4 times higher than wide".into(),
+        layout(flat(1.0, 1e4)),
+    ));
+    meshes.push((
+        "long along x".into(),
+        layout([
+            Direction::periodic(16, 0.0, 2e4),
+            slip(24, 6.0),
+            slip(20, 3.0),
+        ]),
+    ));
     let sinh = slip(48, 6.0).stretched(Spread::SinhMiddle.by(5.0));
-    let tanh = Direction::between(60, 0.0, 3.0, Wall::AT_REST, Wall::Slip).stretched(Spread::TanhLow.by(5.0));
-    meshes.push(("sinh 5 x tanh 5".into(), layout([Direction::periodic(16, 0.0, 2.0), sinh, tanh])));
+    let tanh = Direction::between(60, 0.0, 3.0, Wall::AT_REST, Wall::Slip)
+        .stretched(Spread::TanhLow.by(5.0));
+    meshes.push((
+        "sinh 5 x tanh 5".into(),
+        layout([Direction::periodic(16, 0.0, 2.0), sinh, tanh]),
+    ));
     meshes
 }
 
@@ -100,7 +134,10 @@ fn every_solve_meets_the_tolerance_or_says_that_round_off_forbids_it() {
                 match found {
                     Ok(solved) => {
                         met += 1;
-                        assert!(solved.residual <= 1e-10 && residual <= 2e-10, "{about}: {residual:e} {solved:?}");
+                        assert!(
+                            solved.residual <= 1e-10 && residual <= 2e-10,
+                            "{about}: {residual:e} {solved:?}"
+                        );
                     }
                     Err(Error::PressureNotSolved {
                         reason: PressureFailure::RoundOff { attainable },
@@ -110,9 +147,18 @@ fn every_solve_meets_the_tolerance_or_says_that_round_off_forbids_it() {
                     }) => {
                         refused += 1;
                         let last = history.last().copied().unwrap();
-                        assert!(iterations.max(history.len()) < 40, "{about}: {iterations}, {history:?}");
-                        assert!((0.3..3.0).contains(&(residual / last)), "{about}: {residual:e}, told {last:e}");
-                        assert!(residual < 4.0 * attainable, "{about}: {residual:e} of {attainable:e}");
+                        assert!(
+                            iterations.max(history.len()) < 40,
+                            "{about}: {iterations}, {history:?}"
+                        );
+                        assert!(
+                            (0.3..3.0).contains(&(residual / last)),
+                            "{about}: {residual:e}, told {last:e}"
+                        );
+                        assert!(
+                            residual < 4.0 * attainable,
+                            "{about}: {residual:e} of {attainable:e}"
+                        );
                         // What is said to be attainable can be had.
                         let possible = (4.0 * attainable).min(0.5);
                         let solved = solver.solve(&mut g.clone(), possible);
@@ -133,8 +179,13 @@ fn waves_along_one_direction_alone_leave_round_off_however_long_they_are() {
         let along = layout.axis_of(1);
         let g = right_side(&layout, |at| (PI * at[along]).cos());
         let mut phi = g.clone();
-        let solved = PressureSolver::new(&layout, PressureMethod::Direct).solve(&mut phi, 1e-10).unwrap();
-        assert!(residual_by_parts(&layout, &g, &phi) < 1e-10, "{length_m:e}: {solved:?}");
+        let solved = PressureSolver::new(&layout, PressureMethod::Direct)
+            .solve(&mut phi, 1e-10)
+            .unwrap();
+        assert!(
+            residual_by_parts(&layout, &g, &phi) < 1e-10,
+            "{length_m:e}: {solved:?}"
+        );
     }
 }
 
@@ -148,14 +199,38 @@ fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretchin
     };
     let waves = |cells, length_m| Direction::periodic(cells, 0.0, length_m);
     let meshes = [
-        ("sinh 5 x tanh 5", [waves(16, 2.0), sinh(96, 5.0), ground(120, 5.0)]),
-        ("sinh 5 x tanh 5", [waves(32, 2.0), sinh(128, 5.0), ground(96, 5.0)]),
-        ("sinh 3 x tanh 3", [waves(13, 2.0), sinh(127, 3.0), ground(131, 3.0)]),
-        ("equal cells", [waves(13, 2.0), slip(127, 6.0), slip(131, 3.0)]),
-        ("uniform x tanh 2, a plane", [Direction::thin(1.0), slip(384, 6.0), ground(384, 2.0)]),
-        ("cells 1e4 wide", [waves(16, 2.0), slip(64, 1e4), slip(64, 1.0)]),
-        ("cells 1e4 high", [waves(16, 2.0), slip(64, 1.0), slip(64, 1e4)]),
-        ("cells 1e4 long", [waves(16, 2e4), slip(64, 6.0), slip(64, 3.0)]),
+        (
+            "sinh 5 x tanh 5",
+            [waves(16, 2.0), sinh(96, 5.0), ground(120, 5.0)],
+        ),
+        (
+            "sinh 5 x tanh 5",
+            [waves(32, 2.0), sinh(128, 5.0), ground(96, 5.0)],
+        ),
+        (
+            "sinh 3 x tanh 3",
+            [waves(13, 2.0), sinh(127, 3.0), ground(131, 3.0)],
+        ),
+        (
+            "equal cells",
+            [waves(13, 2.0), slip(127, 6.0), slip(131, 3.0)],
+        ),
+        (
+            "uniform x tanh 2, a plane",
+            [Direction::thin(1.0), slip(384, 6.0), ground(384, 2.0)],
+        ),
+        (
+            "cells 1e4 wide",
+            [waves(16, 2.0), slip(64, 1e4), slip(64, 1.0)],
+        ),
+        (
+            "cells 1e4 high",
+            [waves(16, 2.0), slip(64, 1.0), slip(64, 1e4)],
+        ),
+        (
+            "cells 1e4 long",
+            [waves(16, 2e4), slip(64, 6.0), slip(64, 3.0)],
+        ),
     ];
     println!("| mesh | right side | tolerance | iterations | factor |");
     for (name, mesh) in meshes {
@@ -168,16 +243,22 @@ fn an_iteration_of_multigrid_gains_a_factor_of_ten_on_odd_sizes_strong_stretchin
             ("long waves", long_waves(&layout), 1e-10),
         ];
         for (kind, g, tolerance) in sides {
-            match PressureSolver::new(&layout, PressureMethod::Multigrid).solve(&mut g.clone(), tolerance) {
+            match PressureSolver::new(&layout, PressureMethod::Multigrid)
+                .solve(&mut g.clone(), tolerance)
+            {
                 Ok(solved) => {
                     let (n, factor) = (solved.iterations, solved.factor.unwrap());
                     println!("| {about} | {kind} | {tolerance:.0e} | {n} | {factor:.3} |");
                     assert!(factor <= 0.1, "{about}, {kind}: {solved:?}");
                 }
-                Err(Error::PressureNotSolved { reason: PressureFailure::RoundOff { .. }, iterations, .. })
-                    if is_flat && kind == "long waves" =>
-                {
-                    println!("| {about} | {kind} | {tolerance:.0e} | {iterations} | at round-off |");
+                Err(Error::PressureNotSolved {
+                    reason: PressureFailure::RoundOff { .. },
+                    iterations,
+                    ..
+                }) if is_flat && kind == "long waves" => {
+                    println!(
+                        "| {about} | {kind} | {tolerance:.0e} | {iterations} | at round-off |"
+                    );
                     assert!(iterations <= 20, "{about}, {kind}: {iterations}");
                 }
                 Err(other) => panic!("{about}, {kind}: {other}"),
@@ -193,7 +274,10 @@ fn a_right_side_that_is_not_finite_is_called_so() {
         let mut field = rough(&layout);
         field[77] = f64::NAN;
         match PressureSolver::new(&layout, method).solve(&mut field, 1e-6) {
-            Err(Error::PressureNotSolved { reason: PressureFailure::NotFinite, .. }) => {}
+            Err(Error::PressureNotSolved {
+                reason: PressureFailure::NotFinite,
+                ..
+            }) => {}
             other => panic!("{method:?}: {other:?}"),
         }
     }

@@ -73,10 +73,17 @@ impl Multigrid {
         let unit_m = mean(lines[usize::from(lines[1].cells >= lines[0].cells)]);
         let lanes = |at: &dyn Fn(usize) -> f64| -> Vec<Wide> {
             let of = |m: usize| if m < value.len() { at(m) } else { 1.0 };
-            (0..value.len().div_ceil(LANES)).map(|b| std::array::from_fn(|l| of(b * LANES + l))).collect()
+            (0..value.len().div_ceil(LANES))
+                .map(|b| std::array::from_fn(|l| of(b * LANES + l)))
+                .collect()
         };
         let in_units = |row: Taps| row.into_iter().map(|(i, c)| (i, c * unit_m)).collect();
-        let stiffness = lines.map(|line| stiffness(line).into_iter().map(in_units).collect::<Vec<Taps>>());
+        let stiffness = lines.map(|line| {
+            stiffness(line)
+                .into_iter()
+                .map(in_units)
+                .collect::<Vec<Taps>>()
+        });
         let finest = std::array::from_fn(|a| Axis::finest(lines[a], unit_m, &stiffness[a]));
         Self {
             slabs: layout.slabs.clone(),
@@ -91,15 +98,34 @@ impl Multigrid {
 
     /// Solves one group of modes for the right side in `rows`, one for each cell of the plane, till its share of `tolerance` is
     /// reached, of which `allowed` is the square for all modes; returns the iterations.
-    fn group(&self, group: usize, rows: &mut [&mut [f64]], allowed: f64, tolerance: f64, work: &mut Work) -> usize {
-        let (mode, single) = (&self.mode[group], self.mode[group].map(|lambda| lambda as f32));
+    fn group(
+        &self,
+        group: usize,
+        rows: &mut [&mut [f64]],
+        allowed: f64,
+        tolerance: f64,
+        work: &mut Work,
+    ) -> usize {
+        let (mode, single) = (
+            &self.mode[group],
+            self.mode[group].map(|lambda| lambda as f32),
+        );
         let masses = self.levels[0].axes.each_ref().map(|axis| &*axis.mass);
-        let Work { x, r, p, q, fields, lines } = work;
+        let Work {
+            x,
+            r,
+            p,
+            q,
+            fields,
+            lines,
+        } = work;
         for field in [&mut *x, &mut *r, &mut *p, &mut *q] {
             field.fill([0.0; LANES]);
         }
         for (out, row) in r.iter_mut().zip(rows.iter()) {
-            out.iter_mut().zip(row.iter()).for_each(|(out, value)| *out = value * self.scale);
+            out.iter_mut()
+                .zip(row.iter())
+                .for_each(|(out, value)| *out = value * self.scale);
         }
         // The sum of the residual of a mode that ignores constants is round-off; left alone, it would grow.
         let constant = mode.iter().position(|lambda| *lambda == 0.0);
@@ -107,17 +133,26 @@ impl Multigrid {
         // Each mode is solved in units of its right side, which suit single precision.
         let size = dot(r, r).map(f64::sqrt);
         let inverse = size.map(|size| if size == 0.0 { 0.0 } else { 1.0 / size });
-        r.iter_mut().for_each(|r| (0..LANES).for_each(|l| r[l] *= inverse[l]));
+        r.iter_mut()
+            .for_each(|r| (0..LANES).for_each(|l| r[l] *= inverse[l]));
         let weight = &self.weight[group];
-        let total = |r: &Wide| (0..LANES).map(|l| weight[l] * size[l] * size[l] * r[l]).sum::<f64>();
+        let total = |r: &Wide| {
+            (0..LANES)
+                .map(|l| weight[l] * size[l] * size[l] * r[l])
+                .sum::<f64>()
+        };
         let mut squares = total(&dot(r, r));
         let n0 = self.slabs.shape.n[0];
         let part = (n0 - group * LANES).min(LANES) as f64 / n0 as f64;
-        let enough = PROPORTIONAL * tolerance * tolerance * squares + (1.0 - PROPORTIONAL) * part * allowed;
+        let enough =
+            PROPORTIONAL * tolerance * tolerance * squares + (1.0 - PROPORTIONAL) * part * allowed;
         let [mut rz, mut alpha] = [[0.0; LANES]; 2];
         let (mut iterations, mut least, mut since) = (0, f64::INFINITY, 0);
         while squares > enough && iterations < MAX_ITERATIONS && since < PATIENCE {
-            fields[0][1].iter_mut().zip(&*r).for_each(|(f, r)| *f = r.map(|r| r as f32));
+            fields[0][1]
+                .iter_mut()
+                .zip(&*r)
+                .for_each(|(f, r)| *f = r.map(|r| r as f32));
             v_cycle(&self.levels, &single, fields, lines);
             let z = &fields[0][0];
             let before = rz;
@@ -138,7 +173,9 @@ impl Multigrid {
         }
         self.remove_mean(x, constant, |_| 1.0);
         for (value, row) in x.iter().zip(rows) {
-            row.iter_mut().enumerate().for_each(|(l, out)| *out = size[l] * value[l]);
+            row.iter_mut()
+                .enumerate()
+                .for_each(|(l, out)| *out = size[l] * value[l]);
         }
         iterations
     }
@@ -150,8 +187,15 @@ impl Multigrid {
         let n = first.mass.len();
         let mass = |p: usize| first.mass[p % n] * second.mass[p / n];
         let volume: f64 = (0..field.len()).map(mass).sum();
-        let sum: f64 = field.iter().enumerate().map(|(p, value)| value[l] * mass(p) / shape(mass(p))).sum();
-        field.iter_mut().enumerate().for_each(|(p, value)| value[l] -= sum / volume * shape(mass(p)));
+        let sum: f64 = field
+            .iter()
+            .enumerate()
+            .map(|(p, value)| value[l] * mass(p) / shape(mass(p)))
+            .sum();
+        field
+            .iter_mut()
+            .enumerate()
+            .for_each(|(p, value)| value[l] -= sum / volume * shape(mass(p)));
     }
 
     /// Room for the work of one thread.
@@ -163,7 +207,11 @@ impl Multigrid {
             r: wide(),
             p: wide(),
             q: wide(),
-            fields: self.levels.iter().map(|level| [field(level), field(level)]).collect(),
+            fields: self
+                .levels
+                .iter()
+                .map(|level| [field(level), field(level)])
+                .collect(),
             lines: Lines::of(&self.levels[0]),
         }
     }
@@ -173,7 +221,9 @@ impl Multigrid {
         let n0 = self.slabs.shape.n[0];
         let rows = (field.len() / n0).div_ceil(64).next_multiple_of(6);
         let slabs = field.par_chunks_mut(rows * n0);
-        slabs.for_each_init(transform::Work::default, |work, slab| self.rows.apply(way, slab, work));
+        slabs.for_each_init(transform::Work::default, |work, slab| {
+            self.rows.apply(way, slab, work)
+        });
     }
 }
 
@@ -189,7 +239,9 @@ impl Method for Multigrid {
             let mut groups = columns(field, shape, LANES);
             let groups = groups.par_iter_mut().enumerate().map_init(
                 || self.work(),
-                |work, (group, rows)| self.group(first / LANES + group, rows, allowed, tolerance, work),
+                |work, (group, rows)| {
+                    self.group(first / LANES + group, rows, allowed, tolerance, work)
+                },
             );
             groups.max()
         })?;
@@ -205,7 +257,11 @@ fn quotient(a: f64, b: f64) -> f64 {
 }
 
 /// `a b` of each mode.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn dot<T: Copy + Into<f64>>(a: &[[T; LANES]], b: &[Wide]) -> Wide {
     let mut sum = [0.0; LANES];
     for (a, b) in a.iter().zip(b) {
@@ -217,7 +273,11 @@ fn dot<T: Copy + Into<f64>>(a: &[[T; LANES]], b: &[Wide]) -> Wide {
 }
 
 /// `p = z + beta p`.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn turn(z: &[Lanes], beta: &Wide, p: &mut [Wide]) {
     for (p, z) in p.iter_mut().zip(z) {
         for l in 0..LANES {
@@ -227,7 +287,11 @@ fn turn(z: &[Lanes], beta: &Wide, p: &mut [Wide]) {
 }
 
 /// `q = (K1 M2 + M1 K2 + lambda M1 M2) p` with the fourth-order rows of `K1` and `K2`.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn apply(stiffness: &[Vec<Taps>; 2], mass: [&[f64]; 2], mode: &Wide, p: &[Wide], q: &mut [Wide]) {
     let n = mass[0].len();
     for (k, row) in q.chunks_mut(n).enumerate() {
@@ -257,7 +321,11 @@ fn add_wide(sum: &mut Wide, c: f64, p: &Wide) {
 }
 
 /// `x += alpha p`, `r -= alpha q`.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn advance(alpha: &Wide, p: &[Wide], q: &[Wide], x: &mut [Wide], r: &mut [Wide]) {
     for ((p, q), (x, r)) in p.iter().zip(q).zip(x.iter_mut().zip(r)) {
         for l in 0..LANES {

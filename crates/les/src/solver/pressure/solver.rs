@@ -21,7 +21,11 @@ use rayon::prelude::*;
 /// How the pressure equation is solved.
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize), serde(rename_all = "snake_case"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(rename_all = "snake_case")
+)]
 pub enum PressureMethod {
     /// The faster one for the mesh.
     #[default]
@@ -40,11 +44,19 @@ impl PressureMethod {
     /// the time of `n^3` to find, and its products that of `n` per cell and solve.
     pub fn dense_directions(self, mesh: &Mesh) -> Vec<usize> {
         let layout = Layout::new(mesh);
-        let mut dense = if self.takes_multigrid(&layout) { Vec::new() } else { direct::dense_axes(&layout) };
+        let mut dense = if self.takes_multigrid(&layout) {
+            Vec::new()
+        } else {
+            direct::dense_axes(&layout)
+        };
         if RowTransform::is_dense(&layout.line[0]) {
             dense.push(0);
         }
-        dense.into_iter().map(|axis| layout.shape.n[axis]).filter(|n| *n > 1).collect()
+        dense
+            .into_iter()
+            .map(|axis| layout.shape.n[axis])
+            .filter(|n| *n > 1)
+            .collect()
     }
 
     /// Whether this method solves the planes of `mesh` by multigrid, in passes over all cells.
@@ -54,7 +66,9 @@ impl PressureMethod {
 
     pub(super) fn takes_multigrid(self, layout: &Layout) -> bool {
         match self {
-            Self::Auto => direct::dense_axes(layout).into_iter().any(|axis| layout.shape.n[axis] > DENSE_LIMIT),
+            Self::Auto => direct::dense_axes(layout)
+                .into_iter()
+                .any(|axis| layout.shape.n[axis] > DENSE_LIMIT),
             Self::Direct => false,
             Self::Multigrid => true,
         }
@@ -102,7 +116,12 @@ impl PressureSolver {
             Box::new(Direct::new(layout))
         };
         let right = Aligned::zeros(layout.shape.len());
-        Self { operator: Operator::new(layout), method, right, left: Aligned::default() }
+        Self {
+            operator: Operator::new(layout),
+            method,
+            right,
+            left: Aligned::default(),
+        }
     }
 
     /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos included.
@@ -111,30 +130,56 @@ impl PressureSolver {
     /// [`Error::PressureNotSolved`] if the residual does not reach `tolerance` (2-norm, relative to the right side); the field is then
     /// the last solution found.
     pub(crate) fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
-        let Self { operator, method, right, left } = self;
-        check("tolerance", tolerance, "above 0 and below 1", |t| t > 0.0 && t < 1.0)?;
+        let Self {
+            operator,
+            method,
+            right,
+            left,
+        } = self;
+        check("tolerance", tolerance, "above 0 and below 1", |t| {
+            t > 0.0 && t < 1.0
+        })?;
         // The methods ignore what no pressure can balance; only the residual must not hold it against them.
         let size = operator.copy_balanced(field, right, BALANCED * tolerance)?;
         if size == 0.0 {
             field.fill(0.0);
-            return Ok(Solved { residual: 0.0, iterations: 0, factor: None });
+            return Ok(Solved {
+                residual: 0.0,
+                iterations: 0,
+                factor: None,
+            });
         }
         let own = operator.slabs.shape.own_places();
         let (mut iterations, mut history, mut last, mut attainable) = (0, Vec::new(), 1.0, 0.0);
         let reason = loop {
             // Of a later solve the right side is what the field so far leaves.
             let refines = !history.is_empty();
-            let unknown = if refines { &mut left[own.clone()] } else { &mut field[own.clone()] };
-            iterations += method.solve(unknown, last * size, f64::max(SAFETY * tolerance, 0.25 * attainable) / last)?;
+            let unknown = if refines {
+                &mut left[own.clone()]
+            } else {
+                &mut field[own.clone()]
+            };
+            iterations += method.solve(
+                unknown,
+                last * size,
+                f64::max(SAFETY * tolerance, 0.25 * attainable) / last,
+            )?;
             if refines {
-                field.par_iter_mut().zip(&left[..]).for_each(|(phi, more)| *phi += more);
+                field
+                    .par_iter_mut()
+                    .zip(&left[..])
+                    .for_each(|(phi, more)| *phi += more);
             }
             operator.slabs.halos(&mut [field], WHOLE)?;
             let residual = operator.residual_norm(right, field)? / size;
             history.push(residual);
             if residual <= tolerance {
                 let factor = (iterations > 0).then(|| residual.powf(1.0 / iterations as f64));
-                return Ok(Solved { residual, iterations, factor });
+                return Ok(Solved {
+                    residual,
+                    iterations,
+                    factor,
+                });
             }
             if residual.is_nan() {
                 break PressureFailure::NotFinite;
@@ -142,7 +187,11 @@ impl PressureSolver {
             attainable = operator.round_off(field)? / size;
             if residual > STALLED * last || history.len() == MAX_SOLVES {
                 let at_round_off = residual.min(last) <= ROUND_OFF * attainable;
-                break if at_round_off { PressureFailure::RoundOff { attainable } } else { PressureFailure::Stalled };
+                break if at_round_off {
+                    PressureFailure::RoundOff { attainable }
+                } else {
+                    PressureFailure::Stalled
+                };
             }
             last = residual;
             if left.is_empty() {
@@ -152,7 +201,13 @@ impl PressureSolver {
             // The methods take the negative of their right side.
             left.par_iter_mut().for_each(|value| *value = -*value);
         };
-        Err(Error::PressureNotSolved { method: method.name(), tolerance, reason, iterations, history })
+        Err(Error::PressureNotSolved {
+            method: method.name(),
+            tolerance,
+            reason,
+            iterations,
+            history,
+        })
     }
 }
 
@@ -162,7 +217,10 @@ impl PressureSolver {
 /// Those of a solve that stalled, or of the exchange between ranks.
 pub(crate) fn unless_stalled(solved: Result<Solved, Error>) -> Result<(), Error> {
     match solved {
-        Err(Error::PressureNotSolved { reason: PressureFailure::Stalled, .. }) => solved.map(drop),
+        Err(Error::PressureNotSolved {
+            reason: PressureFailure::Stalled,
+            ..
+        }) => solved.map(drop),
         Err(Error::PressureNotSolved { .. }) => Ok(()),
         other => other.map(drop),
     }
@@ -187,9 +245,20 @@ mod tests {
             let mesh = Mesh::new(x, y, z).unwrap();
             for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
                 let dense = method.dense_directions(&mesh);
-                let solver = format!("{:?}", super::super::solver::PressureSolver::new(&Layout::new(&mesh), method));
-                assert_eq!(solver.matches("Dense").count(), dense.len(), "{method:?}: {dense:?}");
-                assert_eq!(solver.contains("Multigrid"), method.is_multigrid(&mesh), "{method:?}");
+                let solver = format!(
+                    "{:?}",
+                    super::super::solver::PressureSolver::new(&Layout::new(&mesh), method)
+                );
+                assert_eq!(
+                    solver.matches("Dense").count(),
+                    dense.len(),
+                    "{method:?}: {dense:?}"
+                );
+                assert_eq!(
+                    solver.contains("Multigrid"),
+                    method.is_multigrid(&mesh),
+                    "{method:?}"
+                );
                 assert!(dense.iter().all(|n| mesh.cells().contains(n)));
             }
         }

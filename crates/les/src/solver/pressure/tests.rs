@@ -27,14 +27,23 @@ pub(super) fn turbulent_right_side(layout: &Layout) -> Vec<f64> {
     for b in 0..3 {
         let divergence = layout.line[b].stored_divergence();
         let velocity = eddies(shape, b);
-        let mass = |d: usize, i: usize| if d == b { 1.0 } else { layout.line[d].cell_mass_m[i] };
+        let mass = |d: usize, i: usize| {
+            if d == b {
+                1.0
+            } else {
+                layout.line[d].cell_mass_m[i]
+            }
+        };
         g.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
             let (j, k) = (r % n[1], r / n[1]);
             for (i, g) in row.iter_mut().enumerate() {
                 let at = [i, j, k];
                 let stride = [1, n[0], n[0] * n[1]][b];
                 let line = (k * n[1] + j) * n[0] + i - at[b] * stride;
-                let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * velocity[line + face * stride]).sum();
+                let sum: f64 = divergence[at[b]]
+                    .iter()
+                    .map(|&(face, c)| c * velocity[line + face * stride])
+                    .sum();
                 *g += mass(0, i) * mass(1, j) * mass(2, k) * sum;
             }
         });
@@ -48,19 +57,29 @@ fn eddies(shape: Shape, b: usize) -> Vec<f64> {
     let n = shape.n;
     let wave = |d: usize, octave: usize| -> Vec<f64> {
         let k = f64::from(1 << octave);
-        let angle = |i: usize| TAU * k * i as f64 / n[d] as f64 + 1.7 * (b + octave) as f64 + 0.9 * d as f64;
-        (0..n[d]).map(|i| k.powf(-1.0 / 9.0) * angle(i).sin()).collect()
+        let angle = |i: usize| {
+            TAU * k * i as f64 / n[d] as f64 + 1.7 * (b + octave) as f64 + 0.9 * d as f64
+        };
+        (0..n[d])
+            .map(|i| k.powf(-1.0 / 9.0) * angle(i).sin())
+            .collect()
     };
-    let waves: Vec<[Vec<f64>; 3]> = (0..5).map(|octave| std::array::from_fn(|d| wave(d, octave))).collect();
+    let waves: Vec<[Vec<f64>; 3]> = (0..5)
+        .map(|octave| std::array::from_fn(|d| wave(d, octave)))
+        .collect();
     let mut velocity = vec![0.0; shape.len()];
-    velocity.par_chunks_mut(n[0]).enumerate().for_each(|(r, row)| {
-        let (j, k) = (r % n[1], r / n[1]);
-        for (i, velocity) in row.iter_mut().enumerate() {
-            let hash = (i * 73_856_093 + j * 19_349_663 + k * 83_492_791 + b * 2_654_435) % 1_000_003;
-            let eddies: f64 = waves.iter().map(|[x, y, z]| x[i] * y[j] * z[k]).sum();
-            *velocity = eddies + 0.01 * (hash as f64 / 500_001.5 - 1.0);
-        }
-    });
+    velocity
+        .par_chunks_mut(n[0])
+        .enumerate()
+        .for_each(|(r, row)| {
+            let (j, k) = (r % n[1], r / n[1]);
+            for (i, velocity) in row.iter_mut().enumerate() {
+                let hash =
+                    (i * 73_856_093 + j * 19_349_663 + k * 83_492_791 + b * 2_654_435) % 1_000_003;
+                let eddies: f64 = waves.iter().map(|[x, y, z]| x[i] * y[j] * z[k]).sum();
+                *velocity = eddies + 0.01 * (hash as f64 / 500_001.5 - 1.0);
+            }
+        });
     velocity
 }
 
@@ -96,22 +115,74 @@ fn meshes() -> Vec<(&'static str, [Direction; 3], f64)> {
     let sine = || Spread::Sine.by(0.6);
     vec![
         ("uniform", [waves(32), slip(48), ground(40)], 1e-12),
-        ("aspect 144", [waves(32), slip(64).stretched(sinh(3.0)), ground(48).stretched(tanh(3.0))], 1e-12),
-        ("aspect 1e4", [waves(32), slip(128).stretched(sinh(5.0)), ground(96).stretched(tanh(5.0))], 1e-11),
-        ("prime", [waves(97), slip(61).stretched(sinh(3.0)), ground(53).stretched(tanh(3.0))], 1e-12),
+        (
+            "aspect 144",
+            [
+                waves(32),
+                slip(64).stretched(sinh(3.0)),
+                ground(48).stretched(tanh(3.0)),
+            ],
+            1e-12,
+        ),
+        (
+            "aspect 1e4",
+            [
+                waves(32),
+                slip(128).stretched(sinh(5.0)),
+                ground(96).stretched(tanh(5.0)),
+            ],
+            1e-11,
+        ),
+        (
+            "prime",
+            [
+                waves(97),
+                slip(61).stretched(sinh(3.0)),
+                ground(53).stretched(tanh(3.0)),
+            ],
+            1e-12,
+        ),
         ("all periodic", [waves(16), waves(12), waves(10)], 1e-12),
         (
             "all periodic and stretched",
-            [waves(17).stretched(sine()), waves(19).stretched(sine()), waves(23).stretched(sine())],
+            [
+                waves(17).stretched(sine()),
+                waves(19).stretched(sine()),
+                waves(23).stretched(sine()),
+            ],
             1e-12,
         ),
-        ("closed box", [closed(20), closed(17), closed(24).stretched(Spread::TanhBoth.by(2.0))], 1e-12),
-        ("long axis 1", [slip(12), ground(60).stretched(tanh(2.0)), slip(20)], 1e-12),
-        ("one cell in x, y long", [thin(), waves(48), ground(40).stretched(tanh(3.0))], 1e-12),
-        ("one cell in x, z long", [thin(), slip(40), closed(64)], 1e-12),
+        (
+            "closed box",
+            [
+                closed(20),
+                closed(17),
+                closed(24).stretched(Spread::TanhBoth.by(2.0)),
+            ],
+            1e-12,
+        ),
+        (
+            "long axis 1",
+            [slip(12), ground(60).stretched(tanh(2.0)), slip(20)],
+            1e-12,
+        ),
+        (
+            "one cell in x, y long",
+            [thin(), waves(48), ground(40).stretched(tanh(3.0))],
+            1e-12,
+        ),
+        (
+            "one cell in x, z long",
+            [thin(), slip(40), closed(64)],
+            1e-12,
+        ),
         ("one cell in y", [waves(36), thin(), ground(32)], 1e-12),
         ("one cell in z", [closed(24), slip(32), thin()], 1e-12),
-        ("one cell in z, periodic", [waves(24), waves(33), thin()], 1e-12),
+        (
+            "one cell in z, periodic",
+            [waves(24), waves(33), thin()],
+            1e-12,
+        ),
         ("cells in x only", [closed(40), thin(), thin()], 1e-12),
         ("cells in z only", [thin(), thin(), ground(40)], 1e-12),
         ("one cell", [thin(), thin(), thin()], 1e-12),
@@ -136,7 +207,12 @@ fn mean_of(layout: &Layout, phi: &[f64]) -> f64 {
     let operator = Operator::new(layout);
     let mut weighted = phi.to_vec();
     weigh(&operator, &mut weighted);
-    weighted.iter().sum::<f64>() / weighted.iter().map(|value| value.abs()).sum::<f64>().max(f64::MIN_POSITIVE)
+    weighted.iter().sum::<f64>()
+        / weighted
+            .iter()
+            .map(|value| value.abs())
+            .sum::<f64>()
+            .max(f64::MIN_POSITIVE)
 }
 
 #[test]
@@ -170,12 +246,25 @@ fn the_operator_is_symmetric_and_ignores_constants() {
             operator.residual(&vec![0.0; phi.len()], phi, &mut out);
             out
         };
-        let wave = |f: f64| (0..layout.shape.len()).map(|p| (p as f64 * f).sin()).collect::<Vec<f64>>();
+        let wave = |f: f64| {
+            (0..layout.shape.len())
+                .map(|p| (p as f64 * f).sin())
+                .collect::<Vec<f64>>()
+        };
         let (a, b) = (wave(0.7), wave(1.3));
         let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-        let (ab, ba, aa) = (dot(&a, &apply(&b)), dot(&b, &apply(&a)), dot(&a, &apply(&a)));
-        assert!((ab - ba).abs() <= 1e-12 * aa.abs(), "{name}: {ab} against {ba}");
-        let flat = apply(&vec![1.0; a.len()]).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let (ab, ba, aa) = (
+            dot(&a, &apply(&b)),
+            dot(&b, &apply(&a)),
+            dot(&a, &apply(&a)),
+        );
+        assert!(
+            (ab - ba).abs() <= 1e-12 * aa.abs(),
+            "{name}: {ab} against {ba}"
+        );
+        let flat = apply(&vec![1.0; a.len()])
+            .iter()
+            .fold(0.0_f64, |m, v| m.max(v.abs()));
         let rough = apply(&a).iter().fold(0.0_f64, |m, v| m.max(v.abs()));
         assert!(flat <= 1e-13 * rough, "{name}: {flat:e} of {rough:e}");
     }
@@ -183,17 +272,34 @@ fn the_operator_is_symmetric_and_ignores_constants() {
 
 #[test]
 fn the_operator_is_the_divergence_of_the_gradient() {
-    let layout = layout([waves(8).stretched(Spread::Sine.by(0.4)), slip(7), ground(13).stretched(tanh(1.0))]);
+    let layout = layout([
+        waves(8).stretched(Spread::Sine.by(0.4)),
+        slip(7),
+        ground(13).stretched(tanh(1.0)),
+    ]);
     let [n0, n1, n2] = layout.shape.n;
-    let phi: Vec<f64> = (0..layout.shape.len()).map(|p| (p as f64 * 0.37).sin()).collect();
+    let phi: Vec<f64> = (0..layout.shape.len())
+        .map(|p| (p as f64 * 0.37).sin())
+        .collect();
     let mut expected = vec![0.0; phi.len()];
     for (b, stride) in [1, n0, n0 * n1].into_iter().enumerate() {
-        let (gradient, divergence) = (layout.line[b].gradient(), layout.line[b].stored_divergence());
+        let (gradient, divergence) = (
+            layout.line[b].gradient(),
+            layout.line[b].stored_divergence(),
+        );
         for (p, expected) in expected.iter_mut().enumerate() {
             let at = layout.shape.index(p);
             let first = p - at[b] * stride;
-            let slope = |face: usize| gradient[face].iter().map(|(i, c)| c * phi[first + i * stride]).sum::<f64>();
-            let sum: f64 = divergence[at[b]].iter().map(|&(face, c)| c * slope(face)).sum();
+            let slope = |face: usize| {
+                gradient[face]
+                    .iter()
+                    .map(|(i, c)| c * phi[first + i * stride])
+                    .sum::<f64>()
+            };
+            let sum: f64 = divergence[at[b]]
+                .iter()
+                .map(|&(face, c)| c * slope(face))
+                .sum();
             *expected += sum * mass_of(&layout, at) / layout.line[b].cell_mass_m[at[b]];
         }
     }
@@ -212,7 +318,11 @@ fn mass_of(layout: &Layout, at: [usize; 3]) -> f64 {
 
 #[test]
 fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
-    let layout = layout([waves(16), slip(64).stretched(sinh(5.0)), ground(64).stretched(tanh(5.0))]);
+    let layout = layout([
+        waves(16),
+        slip(64).stretched(sinh(5.0)),
+        ground(64).stretched(tanh(5.0)),
+    ]);
     let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
     let operator = Operator::new(&layout);
     let g = turbulent_right_side(&layout);
@@ -222,9 +332,14 @@ fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
     let mut phi = g.clone();
     let solved = solver.solve(&mut phi, 0.5 * once).unwrap();
     let refined = relative_residual(&operator, &g, &phi).unwrap();
-    assert!(refined < 0.5 * once && (solved.residual / refined - 1.0).abs() < 0.2, "{once:e} {refined:e}");
+    assert!(
+        refined < 0.5 * once && (solved.residual / refined - 1.0).abs() < 0.2,
+        "{once:e} {refined:e}"
+    );
     match solver.solve(&mut g.clone(), 1e-17).unwrap_err() {
-        Error::PressureNotSolved { history, tolerance, .. } => {
+        Error::PressureNotSolved {
+            history, tolerance, ..
+        } => {
             assert!(history.len() > 1 && tolerance == 1e-17, "{history:?}");
         }
         other => panic!("{other}"),
@@ -233,9 +348,11 @@ fn refinement_reaches_what_one_solve_does_not_and_says_where_it_ends() {
 
 #[test]
 fn what_no_pressure_balances_is_removed() {
-    for directions in
-        [[waves(16), slip(12), ground(14)], [slip(8), ground(40), closed(20)], [waves(8), waves(6), waves(5)]]
-    {
+    for directions in [
+        [waves(16), slip(12), ground(14)],
+        [slip(8), ground(40), closed(20)],
+        [waves(8), waves(6), waves(5)],
+    ] {
         let layout = layout(directions);
         let operator = Operator::new(&layout);
         let mut solver = PressureSolver::new(&layout, PressureMethod::Direct);
@@ -244,12 +361,24 @@ fn what_no_pressure_balances_is_removed() {
         weigh(&operator, &mut mass);
         let moduli: f64 = balanced.iter().map(|g| g.abs()).sum();
         let excess = 0.1 * moduli / mass.iter().sum::<f64>();
-        let mut phi: Vec<f64> = balanced.iter().zip(&mass).map(|(g, m)| g + excess * m).collect();
+        let mut phi: Vec<f64> = balanced
+            .iter()
+            .zip(&mass)
+            .map(|(g, m)| g + excess * m)
+            .collect();
         let mut copy = phi.clone();
         operator.copy_balanced(&phi, &mut copy, 1e-8).unwrap();
         let left = copy.iter().sum::<f64>() / moduli;
-        let removed = phi.iter().zip(&copy).map(|(phi, copy)| phi - copy).sum::<f64>() / moduli;
-        assert!(left.abs() < 1e-12 && (removed - 0.1).abs() < 1e-12, "{left:e} {removed}");
+        let removed = phi
+            .iter()
+            .zip(&copy)
+            .map(|(phi, copy)| phi - copy)
+            .sum::<f64>()
+            / moduli;
+        assert!(
+            left.abs() < 1e-12 && (removed - 0.1).abs() < 1e-12,
+            "{left:e} {removed}"
+        );
         solver.solve(&mut phi, 1e-6).unwrap();
         let residual = relative_residual(&operator, &balanced, &phi).unwrap();
         assert!(residual < 1e-12, "{residual:e}");
@@ -258,10 +387,15 @@ fn what_no_pressure_balances_is_removed() {
 
 /// The field that `method` finds with a number of threads.
 fn with_threads(layout: &Layout, method: PressureMethod, threads: usize) -> Vec<f64> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .unwrap();
     pool.install(|| {
         let mut phi = turbulent_right_side(layout);
-        PressureSolver::new(layout, method).solve(&mut phi, 1e-8).unwrap();
+        PressureSolver::new(layout, method)
+            .solve(&mut phi, 1e-8)
+            .unwrap();
         phi
     })
 }
@@ -277,7 +411,10 @@ fn every_number_of_threads_gives_the_same_bits() {
         for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
             let reference = with_threads(&layout, method, 1);
             for threads in [2, 7] {
-                assert!(with_threads(&layout, method, threads) == reference, "{method:?}, {threads} threads");
+                assert!(
+                    with_threads(&layout, method, threads) == reference,
+                    "{method:?}, {threads} threads"
+                );
             }
         }
     }
@@ -286,10 +423,18 @@ fn every_number_of_threads_gives_the_same_bits() {
 #[test]
 fn a_scale_of_the_mesh_scales_the_solution() {
     let scaled = |size: f64, method: PressureMethod| {
-        let d = |n: usize, length: f64| Direction::between(n, 0.0, size * length, Wall::AT_REST, Wall::Slip);
-        let layout = layout([Direction::periodic(16, 0.0, size), d(20, 1.0), d(24, 2.0).stretched(tanh(3.0))]);
+        let d = |n: usize, length: f64| {
+            Direction::between(n, 0.0, size * length, Wall::AT_REST, Wall::Slip)
+        };
+        let layout = layout([
+            Direction::periodic(16, 0.0, size),
+            d(20, 1.0),
+            d(24, 2.0).stretched(tanh(3.0)),
+        ]);
         let mut phi = turbulent_right_side(&layout);
-        PressureSolver::new(&layout, method).solve(&mut phi, 1e-8).unwrap();
+        PressureSolver::new(&layout, method)
+            .solve(&mut phi, 1e-8)
+            .unwrap();
         phi
     };
     for method in [PressureMethod::Direct, PressureMethod::Multigrid] {
@@ -298,7 +443,10 @@ fn a_scale_of_the_mesh_scales_the_solution() {
         for size in [1e-9, 1e9] {
             // The right side is a flux, in m^2 times the velocity; phi then grows with the length.
             for (a, b) in scaled(size, method).iter().zip(&reference) {
-                assert!((a / size - b).abs() < 1e-12 * largest, "{method:?} {size:e}");
+                assert!(
+                    (a / size - b).abs() < 1e-12 * largest,
+                    "{method:?} {size:e}"
+                );
             }
         }
     }
@@ -309,7 +457,13 @@ fn tolerances_that_make_no_sense_are_refused() {
     let layout = layout([waves(8), waves(8), waves(8)]);
     let mut solver = PressureSolver::new(&layout, PressureMethod::Auto);
     for tolerance in [0.0, 1.0, f64::NAN] {
-        assert!(solver.solve(&mut [0.0; 512], tolerance).unwrap_err().to_string().contains("tolerance"));
+        assert!(
+            solver
+                .solve(&mut [0.0; 512], tolerance)
+                .unwrap_err()
+                .to_string()
+                .contains("tolerance")
+        );
     }
     let mut still = [0.0; 512];
     solver.solve(&mut still, 1e-16).unwrap();
@@ -325,19 +479,36 @@ fn multigrid_agrees_with_the_direct_solver_and_converges_as_fast_on_every_mesh()
         let mut multigrid = PressureSolver::new(&layout, PressureMethod::Multigrid);
         let mut phi = g.clone();
         let solved = multigrid.solve(&mut phi, 1e-6).unwrap();
-        let (factor, residual) = (solved.factor.unwrap_or(0.0), relative_residual(&operator, &g, &phi).unwrap());
-        let found = format!("{name}: {} iterations, factor {factor:.3}, residual {residual:.1e}", solved.iterations);
-        assert!(residual <= 1e-6 && (solved.residual - residual).abs() <= 1e-6 * residual + 1e-14, "{found}");
+        let (factor, residual) = (
+            solved.factor.unwrap_or(0.0),
+            relative_residual(&operator, &g, &phi).unwrap(),
+        );
+        let found = format!(
+            "{name}: {} iterations, factor {factor:.3}, residual {residual:.1e}",
+            solved.iterations
+        );
+        assert!(
+            residual <= 1e-6 && (solved.residual - residual).abs() <= 1e-6 * residual + 1e-14,
+            "{found}"
+        );
         assert!(solved.iterations <= 6 && factor <= 0.1, "{found}");
         let mut phi = g.clone();
         multigrid.solve(&mut phi, 1e-10).unwrap();
         let mean = mean_of(&layout, &phi);
         assert!(mean.abs() <= 1e-12, "{name}: mean {mean:e}");
         let mut exact = g;
-        PressureSolver::new(&layout, PressureMethod::Direct).solve(&mut exact, 1e-6).unwrap();
+        PressureSolver::new(&layout, PressureMethod::Direct)
+            .solve(&mut exact, 1e-6)
+            .unwrap();
         let largest = exact.iter().fold(0.0_f64, |m, phi| m.max(phi.abs()));
-        let apart = exact.iter().zip(&phi).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
-        assert!(apart <= 3e-10 * largest, "{name}: the fields differ by {apart:e} of {largest:e}");
+        let apart = exact
+            .iter()
+            .zip(&phi)
+            .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+        assert!(
+            apart <= 3e-10 * largest,
+            "{name}: the fields differ by {apart:e} of {largest:e}"
+        );
     }
 }
 
@@ -348,15 +519,34 @@ fn multigrid_that_cannot_reach_the_tolerance_tells_its_history() {
         .solve(&mut turbulent_right_side(&layout), 1e-17)
         .unwrap_err()
     {
-        Error::PressureNotSolved { iterations, history, method, .. } => {
+        Error::PressureNotSolved {
+            iterations,
+            history,
+            method,
+            ..
+        } => {
             assert_eq!(method, "multigrid");
             let least = history.iter().copied().fold(1.0, f64::min);
-            assert!(iterations > 10 && history.len() > 1 && least < 1e-13, "{iterations}, {history:?}");
+            assert!(
+                iterations > 10 && history.len() > 1 && least < 1e-13,
+                "{iterations}, {history:?}"
+            );
         }
         other => panic!("{other}"),
     }
     let mut field = turbulent_right_side(&layout);
     field[77] = f64::NAN;
-    let refused = PressureSolver::new(&layout, PressureMethod::Multigrid).solve(&mut field, 1e-6).unwrap_err();
-    assert!(matches!(refused, Error::PressureNotSolved { reason: PressureFailure::NotFinite, .. }), "{refused}");
+    let refused = PressureSolver::new(&layout, PressureMethod::Multigrid)
+        .solve(&mut field, 1e-6)
+        .unwrap_err();
+    assert!(
+        matches!(
+            refused,
+            Error::PressureNotSolved {
+                reason: PressureFailure::NotFinite,
+                ..
+            }
+        ),
+        "{refused}"
+    );
 }

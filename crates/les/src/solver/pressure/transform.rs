@@ -39,7 +39,11 @@ pub(crate) enum RowTransform {
     /// One cell: nothing to do.
     Thin,
     /// Fourier transform; the modes are stored as real and imaginary parts in the places of the row.
-    Fourier { cells: usize, forward: Arc<dyn RealToComplex<f64>>, inverse: Arc<dyn ComplexToReal<f64>> },
+    Fourier {
+        cells: usize,
+        forward: Arc<dyn RealToComplex<f64>>,
+        inverse: Arc<dyn ComplexToReal<f64>>,
+    },
     /// Products with the transpose of the eigenvectors, and with them.
     Dense(Box<[Left; 2]>),
 }
@@ -78,13 +82,21 @@ impl RowTransform {
         } else if !Self::is_dense(line) {
             let mut planner = RealFftPlanner::new();
             let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
-            let transform = Self::Fourier { cells: n, forward, inverse };
+            let transform = Self::Fourier {
+                cells: n,
+                forward,
+                inverse,
+            };
             let h = line.cell_mass_m[0];
             (transform, Basis::wave_values(n, h), 1.0 / (n as f64 * h))
         } else {
             let Basis { value, vector } = Basis::new(line);
             let vectors = Fold::none(n, &vector);
-            (Self::Dense(Box::new([Left::transpose(&vectors), Left::same(&vectors)])), value, 1.0)
+            (
+                Self::Dense(Box::new([Left::transpose(&vectors), Left::same(&vectors)])),
+                value,
+                1.0,
+            )
         }
     }
 
@@ -96,7 +108,10 @@ impl RowTransform {
             Self::Fourier { cells, forward, .. } if way == Way::There => {
                 let (spectrum, scratch) = work.fourier(*cells, forward.get_scratch_len());
                 for row in rows.chunks_mut(*cells) {
-                    if forward.process_with_scratch(row, spectrum, scratch).is_err() {
+                    if forward
+                        .process_with_scratch(row, spectrum, scratch)
+                        .is_err()
+                    {
                         spoil(row);
                     }
                     row[0] = spectrum[0].re;
@@ -120,7 +135,10 @@ impl RowTransform {
                     if let Some(last) = last.first() {
                         spectrum[cells / 2] = Complex::new(*last, 0.0);
                     }
-                    if inverse.process_with_scratch(spectrum, row, scratch).is_err() {
+                    if inverse
+                        .process_with_scratch(spectrum, row, scratch)
+                        .is_err()
+                    {
                         spoil(row);
                     }
                 }
@@ -134,7 +152,11 @@ impl RowTransform {
         match self {
             Self::Fourier { cells, .. } => {
                 let single = m == 0 || 2 * m.div_ceil(2) == *cells;
-                if single { 1.0 / *cells as f64 } else { 2.0 / *cells as f64 }
+                if single {
+                    1.0 / *cells as f64
+                } else {
+                    2.0 / *cells as f64
+                }
             }
             Self::Thin => 1.0,
             Self::Dense(_) => mass_m,
@@ -148,7 +170,11 @@ fn spoil(row: &mut [f64]) {
 }
 
 impl Work {
-    fn fourier(&mut self, cells: usize, scratch: usize) -> (&mut [Complex<f64>], &mut [Complex<f64>]) {
+    fn fourier(
+        &mut self,
+        cells: usize,
+        scratch: usize,
+    ) -> (&mut [Complex<f64>], &mut [Complex<f64>]) {
         self.spectrum.resize(cells / 2 + 1, Complex::default());
         if self.scratch.len() < scratch {
             self.scratch.resize(scratch, Complex::default());
@@ -175,7 +201,10 @@ impl LineTransform {
         }
         let fold = Fold::new(line.cells, &vector);
         let value = fold.columns.iter().map(|&m| value[m]).collect();
-        (Self::Dense(Box::new([Left::transpose(&fold), Left::same(&fold)])), value)
+        (
+            Self::Dense(Box::new([Left::transpose(&fold), Left::same(&fold)])),
+            value,
+        )
     }
 
     /// Lines to modes, or back.
@@ -188,7 +217,9 @@ impl LineTransform {
 }
 
 fn scale_rows(rows: &mut [&mut [f64]], scale: f64) {
-    rows.iter_mut().flat_map(|row| row.iter_mut()).for_each(|value| *value *= scale);
+    rows.iter_mut()
+        .flat_map(|row| row.iter_mut())
+        .for_each(|value| *value *= scale);
 }
 
 /// Largest prime factor.
@@ -226,7 +257,10 @@ mod tests {
                 let single = m == 0 || m == n - 1 && n % 2 == 0;
                 let norm = if single { 1.0 } else { 0.5_f64.sqrt() } * factor.sqrt();
                 let scaled = mode * norm * if single { 1.0 } else { 2.0 };
-                assert!((product - scaled).abs() < 1e-13, "{n}, mode {m}: {product} against {scaled}");
+                assert!(
+                    (product - scaled).abs() < 1e-13,
+                    "{n}, mode {m}: {product} against {scaled}"
+                );
             }
             transform.apply(Way::Back, &mut modes, &mut Work::default());
             for (a, b) in modes.iter().zip(&row) {
@@ -264,22 +298,33 @@ mod tests {
             for (at, &m) in fold.columns.iter().enumerate() {
                 assert_eq!(values[at], value[m]);
                 for l in 0..width {
-                    let product: f64 = (0..n).map(|i| vector[i * n + m] * field[i * width + l]).sum();
+                    let product: f64 = (0..n)
+                        .map(|i| vector[i * n + m] * field[i * width + l])
+                        .sum();
                     let mode = modes[at * width + l];
-                    assert!((product - mode).abs() < 2e-13 * n as f64, "{direction:?} mode {m}: {mode} for {product}");
+                    assert!(
+                        (product - mode).abs() < 2e-13 * n as f64,
+                        "{direction:?} mode {m}: {mode} for {product}"
+                    );
                 }
             }
             let mut rows: Vec<&mut [f64]> = modes.chunks_mut(width).collect();
             transform.apply(Way::Back, &mut rows, &mut Work::default());
             for (place, (back, given)) in modes.iter().zip(&field).enumerate() {
                 let back = back * line.cell_mass_m[place / width];
-                assert!((back - given).abs() < 1e-12, "{direction:?}: {back} for {given}");
+                assert!(
+                    (back - given).abs() < 1e-12,
+                    "{direction:?}: {back} for {given}"
+                );
             }
         }
     }
 
     #[test]
     fn the_largest_prime_factor_is_found() {
-        assert_eq!([1, 2, 64, 97, 98, 121, 510].map(largest_factor), [1, 2, 2, 97, 7, 11, 17]);
+        assert_eq!(
+            [1, 2, 64, 97, 98, 121, 510].map(largest_factor),
+            [1, 2, 2, 97, 7, 11, 17]
+        );
     }
 }

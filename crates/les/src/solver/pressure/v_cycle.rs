@@ -61,13 +61,20 @@ struct Cell {
     border: Lanes,
 }
 
-const NO_CELL: Cell = Cell { inverse: [0.0; LANES], right: [0.0; LANES], border: [0.0; LANES] };
+const NO_CELL: Cell = Cell {
+    inverse: [0.0; LANES],
+    right: [0.0; LANES],
+    border: [0.0; LANES],
+};
 
 impl Lines {
     /// Those of the finest mesh, which are the longest.
     pub(super) fn of(finest: &Level) -> Self {
         let [first, second] = finest.axes.each_ref().map(Axis::len);
-        Self { line: vec![[NO_CELL; TOGETHER]; first.max(second)], row: vec![[0.0; LANES]; first] }
+        Self {
+            line: vec![[NO_CELL; TOGETHER]; first.max(second)],
+            row: vec![[0.0; LANES]; first],
+        }
     }
 }
 
@@ -80,11 +87,25 @@ impl Axis {
             *x += distance;
             Some(*x)
         }));
-        let period = centre.pop().filter(|_| line.is_periodic() && line.cells > 1);
-        let axis = Self::new(line.cell_mass_m.iter().map(|mass| mass / unit_m).collect(), centre, period);
+        let period = centre
+            .pop()
+            .filter(|_| line.is_periodic() && line.cells > 1);
+        let axis = Self::new(
+            line.cell_mass_m.iter().map(|mass| mass / unit_m).collect(),
+            centre,
+            period,
+        );
         let link = axis.link.iter().map(|c| RAISED * c).collect();
-        let others = |(i, row): (usize, &Taps)| row.iter().filter(|tap| tap.0 != i).map(|&(j, c)| (j, -c)).collect();
-        Self { link, ..axis.coupled(&stiffness.iter().enumerate().map(others).collect::<Vec<_>>()) }
+        let others = |(i, row): (usize, &Taps)| {
+            row.iter()
+                .filter(|tap| tap.0 != i)
+                .map(|&(j, c)| (j, -c))
+                .collect()
+        };
+        Self {
+            link,
+            ..axis.coupled(&stiffness.iter().enumerate().map(others).collect::<Vec<_>>())
+        }
     }
 
     /// Cells of these masses and positions with couplings of second order: the masses of the fourth-order operator make its
@@ -99,24 +120,50 @@ impl Axis {
         }
         link.push(if n > 2 { wrap } else { 0.0 });
         let coupling = |i: usize| -> Taps {
-            let both = [((i + n - 1) % n, link[(i + n - 1) % n]), ((i + 1) % n, link[i])];
+            let both = [
+                ((i + n - 1) % n, link[(i + n - 1) % n]),
+                ((i + 1) % n, link[i]),
+            ];
             both.into_iter().filter(|tap| tap.1 != 0.0).collect()
         };
         let taps: Vec<Taps> = (0..n).map(coupling).collect();
         // The last of an odd number of periodic lines touches the first.
         let end = n - usize::from(link[n - 1] != 0.0 && n % 2 == 1);
-        let colours: [Vec<usize>; 3] =
-            [(0..end).step_by(2).collect(), (1..end).step_by(2).collect(), (end..n).collect()];
-        let lines = colours.iter().flat_map(|colour| colour.chunks(TOGETHER).map(<[usize]>::to_vec)).collect();
+        let colours: [Vec<usize>; 3] = [
+            (0..end).step_by(2).collect(),
+            (1..end).step_by(2).collect(),
+            (end..n).collect(),
+        ];
+        let lines = colours
+            .iter()
+            .flat_map(|colour| colour.chunks(TOGETHER).map(<[usize]>::to_vec))
+            .collect();
         let link = link.into_iter().map(|c| c as f32).collect();
-        Self { mass, centre, period, link, taps: Vec::new(), diagonal: Vec::new(), lines }.coupled(&taps)
+        Self {
+            mass,
+            centre,
+            period,
+            link,
+            taps: Vec::new(),
+            diagonal: Vec::new(),
+            lines,
+        }
+        .coupled(&taps)
     }
 
     fn coupled(self, taps: &[Taps]) -> Self {
-        let sum = |(row, mass): (&Taps, &f64)| (row.iter().map(|tap| tap.1).sum::<f64>() / mass) as f32;
+        let sum =
+            |(row, mass): (&Taps, &f64)| (row.iter().map(|tap| tap.1).sum::<f64>() / mass) as f32;
         let diagonal = taps.iter().zip(&self.mass).map(sum).collect();
-        let taps = taps.iter().map(|row| row.iter().map(|&(j, c)| (j, c as f32)).collect()).collect();
-        Self { taps, diagonal, ..self }
+        let taps = taps
+            .iter()
+            .map(|row| row.iter().map(|&(j, c)| (j, c as f32)).collect())
+            .collect();
+        Self {
+            taps,
+            diagonal,
+            ..self
+        }
     }
 
     fn len(&self) -> usize {
@@ -126,7 +173,11 @@ impl Axis {
     /// The mesh of pairs, of which the last of an odd number stays alone.
     fn coarsened(&self) -> Self {
         let mass = self.mass.chunks(2).map(|pair| pair.iter().sum()).collect();
-        let centre = self.centre.chunks(2).map(|pair| pair.iter().sum::<f64>() / pair.len() as f64).collect();
+        let centre = self
+            .centre
+            .chunks(2)
+            .map(|pair| pair.iter().sum::<f64>() / pair.len() as f64)
+            .collect();
         Self::new(mass, centre, self.period)
     }
 
@@ -143,7 +194,11 @@ impl Axis {
                 (false, Some(_)) => (last, centre[last] - period),
                 (_, None) => (own, x + 1.0),
             };
-            let share = if other == own { 0.0 } else { (x - centre[own]) / (position - centre[own]) };
+            let share = if other == own {
+                0.0
+            } else {
+                (x - centre[own]) / (position - centre[own])
+            };
             [(own, (1.0 - share) as f32), (other, share as f32)]
         };
         self.centre.iter().enumerate().map(of).collect()
@@ -158,19 +213,37 @@ impl Level {
 
     /// The meshes from `finest` to one with a single line, which relaxation solves.
     pub(super) fn hierarchy(finest: [Axis; 2]) -> Vec<Self> {
-        let mut levels = vec![Self { axes: finest, weights: Default::default(), sweeps: SWEEPS[0] }];
-        while let Some(fine) = levels.last_mut().filter(|level| level.axes.iter().all(|axis| axis.len() > 1)) {
+        let mut levels = vec![Self {
+            axes: finest,
+            weights: Default::default(),
+            sweeps: SWEEPS[0],
+        }];
+        while let Some(fine) = levels
+            .last_mut()
+            .filter(|level| level.axes.iter().all(|axis| axis.len() > 1))
+        {
             let axes = fine.axes.each_ref().map(Axis::coarsened);
             fine.weights = std::array::from_fn(|a| fine.axes[a].weights_from(&axes[a]));
-            levels.push(Self { axes, weights: Default::default(), sweeps: SWEEPS[1] });
+            levels.push(Self {
+                axes,
+                weights: Default::default(),
+                sweeps: SWEEPS[1],
+            });
         }
         levels
     }
 }
 
 /// One V-cycle from zero: relaxation afterwards in reverse order makes it symmetric.
-pub(super) fn v_cycle(levels: &[Level], mode: &Lanes, fields: &mut [[Vec<Lanes>; 2]], lines: &mut Lines) {
-    let ([level, coarser @ ..], [[u, f], below @ ..]) = (levels, fields) else { return };
+pub(super) fn v_cycle(
+    levels: &[Level],
+    mode: &Lanes,
+    fields: &mut [[Vec<Lanes>; 2]],
+    lines: &mut Lines,
+) {
+    let ([level, coarser @ ..], [[u, f], below @ ..]) = (levels, fields) else {
+        return;
+    };
     u.fill([0.0; LANES]);
     for _ in 0..level.sweeps {
         relax(level, 0, mode, u, f, false, &mut lines.line);
@@ -222,7 +295,11 @@ fn add_difference(sum: &mut Lanes, c: f32, other: &Lanes, own: &Lanes) {
 /// The elimination works with the excess of the pivot over the link ahead, `e_k = s m_k + e_(k-1) c_(k-1)/(c_(k-1) + e_(k-1))`, a sum of
 /// positive terms. A line that is singular (no neighbours, and a mode that is constant) has an excess of exactly zero at its end and
 /// keeps its level. A periodic line is cut before its last cell, which is solved for at the end.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn relax(
     level: &Level,
     a: usize,
@@ -248,7 +325,11 @@ fn relax(
             for (g, &across_at) in lines.iter().enumerate() {
                 let left = residual_at(level, cell(across_at, k), mode, u, f);
                 let inverse_mass = 1.0 / across.mass[across_at] as f32;
-                let before = if k == 0 || k == inner { NO_CELL } else { line[k - 1][g] };
+                let before = if k == 0 || k == inner {
+                    NO_CELL
+                } else {
+                    line[k - 1][g]
+                };
                 let (now, excess) = (&mut line[k][g], &mut excess[g]);
                 for l in 0..LANES {
                     let ratio = behind * before.inverse[l];
@@ -271,7 +352,8 @@ fn relax(
                 let (now, next) = (&mut line[k][g], &mut next[g]);
                 for l in 0..LANES {
                     now.right[l] = now.inverse[l] * ahead.mul_add(next.right[l], now.right[l]);
-                    now.border[l] = now.inverse[l] * ahead.mul_add(next.border[l], now.border[l] + to_cut);
+                    now.border[l] =
+                        now.inverse[l] * ahead.mul_add(next.border[l], now.border[l] + to_cut);
                     weighted[g][l] = (along.mass[k] as f32).mul_add(now.border[l], weighted[g][l]);
                 }
                 *next = *now;
@@ -280,13 +362,22 @@ fn relax(
         for (g, &across_at) in lines.iter().enumerate() {
             let mut cut = [0.0; LANES];
             if inner < n {
-                let (first, last, right) = (&line[0][g].right, &line[inner - 1][g].right, &line[inner][g].right);
+                let (first, last, right) = (
+                    &line[0][g].right,
+                    &line[inner - 1][g].right,
+                    &line[inner][g].right,
+                );
                 for l in 0..LANES {
-                    let pivot = (mode[l] + across.diagonal[across_at]) * (along.mass[inner] as f32 + weighted[g][l]);
-                    let right = wrap.mul_add(first[l], along.link[inner - 1].mul_add(last[l], right[l]));
+                    let pivot = (mode[l] + across.diagonal[across_at])
+                        * (along.mass[inner] as f32 + weighted[g][l]);
+                    let right =
+                        wrap.mul_add(first[l], along.link[inner - 1].mul_add(last[l], right[l]));
                     cut[l] = if pivot == 0.0 { 0.0 } else { right / pivot };
                 }
-                line[inner][g] = Cell { right: cut, ..NO_CELL };
+                line[inner][g] = Cell {
+                    right: cut,
+                    ..NO_CELL
+                };
             }
             for (k, line) in line[..n].iter().enumerate() {
                 let [j, k] = cell(across_at, k);
@@ -300,8 +391,19 @@ fn relax(
 }
 
 /// Replaces `coarse` by the transposed interpolation of the residual; `row` is as long as its rows.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
-fn restrict(level: &Level, mode: &Lanes, u: &[Lanes], f: &[Lanes], coarse: &mut [Lanes], row: &mut [Lanes]) {
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
+fn restrict(
+    level: &Level,
+    mode: &Lanes,
+    u: &[Lanes],
+    f: &[Lanes],
+    coarse: &mut [Lanes],
+    row: &mut [Lanes],
+) {
     coarse.fill([0.0; LANES]);
     for (k, across) in level.weights[1].iter().enumerate() {
         row.fill([0.0; LANES]);
@@ -320,7 +422,11 @@ fn restrict(level: &Level, mode: &Lanes, u: &[Lanes], f: &[Lanes], coarse: &mut 
 }
 
 /// Adds the interpolated coarse solution to `u`.
-#[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+#[multiversion(targets(
+    "x86_64+avx512f+avx512dq+avx512vl+fma",
+    "x86_64+avx2+fma",
+    "aarch64+neon"
+))]
 fn interpolate(level: &Level, coarse: &[Lanes], u: &mut [Lanes], row: &mut [Lanes]) {
     let n = row.len();
     for (u, across) in u.chunks_mut(level.axes[0].len()).zip(&level.weights[1]) {

@@ -40,14 +40,22 @@ pub(super) struct EnergyBound {
 impl EnergyBound {
     pub(super) fn new(flow: &Flow) -> Self {
         let energy = flow.kinetic_energy_m5_s2();
-        Self { bound_m5_s2: energy, largest_m5_s2: energy }
+        Self {
+            bound_m5_s2: energy,
+            largest_m5_s2: energy,
+        }
     }
 
     /// Takes a step of `step_s` that brought `energy_before` to the present energy.
     ///
     /// # Errors
     /// [`Error::EnergyGrew`] if the energy is more than the flow may have.
-    pub(super) fn pass(&mut self, flow: &Flow, energy_before: f64, step_s: f64) -> Result<(), Error> {
+    pub(super) fn pass(
+        &mut self,
+        flow: &Flow,
+        energy_before: f64,
+        step_s: f64,
+    ) -> Result<(), Error> {
         let energy = flow.kinetic_energy_m5_s2();
         let [force, wall] = sources(flow);
         let forced = (self.bound_m5_s2.sqrt() + step_s * force).powi(2);
@@ -63,7 +71,12 @@ impl EnergyBound {
 
 /// What the force adds to `sqrt(E)` in a second, and what walls that move add once.
 fn sources(flow: &Flow) -> [f64; 2] {
-    let volume_m3: f64 = flow.layout.line.iter().map(|line| line.cell_mass_m.iter().sum::<f64>()).product();
+    let volume_m3: f64 = flow
+        .layout
+        .line
+        .iter()
+        .map(|line| line.cell_mass_m.iter().sum::<f64>())
+        .product();
     let length = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
     let walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
     let fastest_m_s = walls.fold(0.0, |fastest: f64, wall| match wall {
@@ -99,8 +112,11 @@ fn cause(flow: &Flow) -> Result<String, Error> {
     }
     let stability = flow.stability()?;
     if let Some(growth) = stability.undamped(flow.judged_step_s(&stability, step_s)) {
-        let remedy =
-            if settings.scheme == TimeScheme::AdamsBashforth2 { "take Runge-Kutta" } else { "shorten the step" };
+        let remedy = if settings.scheme == TimeScheme::AdamsBashforth2 {
+            "take Runge-Kutta"
+        } else {
+            "shorten the step"
+        };
         return Ok(format!("{growth}: {remedy}"));
     }
     if let Some(note) = flow.stiffness().note(step_s, settings.damped_steps) {
@@ -161,23 +177,47 @@ impl StepEnergy {
     /// takes about with the cube.
     pub fn suited_courant(&self) -> f64 {
         let part = 0.5 * NOTED / self.share.abs();
-        let factor = if self.share > 0.0 { part.sqrt() } else { part.cbrt() };
+        let factor = if self.share > 0.0 {
+            part.sqrt()
+        } else {
+            part.cbrt()
+        };
         (100.0 * self.courant * factor).floor() / 100.0
     }
 }
 
 impl std::fmt::Display for StepEnergy {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { pressure_tolerance, .. } = self;
-        let does = if self.share > 0.0 { "feeds the flow with" } else { "takes" };
-        if self.share.is_finite() {
-            write!(f, "the time step {does} {:.2} times what viscosity and subgrid model take", self.share.abs())?;
+        let Self {
+            pressure_tolerance, ..
+        } = self;
+        let does = if self.share > 0.0 {
+            "feeds the flow with"
         } else {
-            write!(f, "the time step {does} energy, of which nothing else takes any,")?;
+            "takes"
+        };
+        if self.share.is_finite() {
+            write!(
+                f,
+                "the time step {does} {:.2} times what viscosity and subgrid model take",
+                self.share.abs()
+            )?;
+        } else {
+            write!(
+                f,
+                "the time step {does} energy, of which nothing else takes any,"
+            )?;
         }
-        write!(f, " (energy_residual over {STEPS} steps at Courant number {:.2}): ", self.courant)?;
+        write!(
+            f,
+            " (energy_residual over {STEPS} steps at Courant number {:.2}): ",
+            self.courant
+        )?;
         if self.share > 0.0 && *pressure_tolerance > LOOSE {
-            return write!(f, "the pressure tolerance {pressure_tolerance:e} leaves divergence, take 1e-8 or less");
+            return write!(
+                f,
+                "the pressure tolerance {pressure_tolerance:e} leaves divergence, take 1e-8 or less"
+            );
         }
         if self.share > 0.0 && self.scheme == TimeScheme::AdamsBashforth2 {
             write!(f, "take Runge-Kutta, or ")?;
@@ -212,7 +252,10 @@ impl Window {
         if !report.step.is_multiple_of(STEPS) {
             return None;
         }
-        let Self { fed_m5_s3, taken_m5_s3 } = std::mem::take(self);
+        let Self {
+            fed_m5_s3,
+            taken_m5_s3,
+        } = std::mem::take(self);
         let settings = flow.settings();
         let energy = StepEnergy {
             share: fed_m5_s3 / taken_m5_s3,
@@ -221,11 +264,16 @@ impl Window {
             pressure_tolerance: settings.pressure_tolerance,
         };
         let mut walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
-        let moves = |wall| matches!(wall, Wall::NoSlip { velocity_m_s } if velocity_m_s != [0.0; 3]);
+        let moves =
+            |wall| matches!(wall, Wall::NoSlip { velocity_m_s } if velocity_m_s != [0.0; 3]);
         if walls.any(moves) || !flow.stiffness().is_resolved(report.step_s) {
             return None;
         }
-        let negligible = if taken_m5_s3 > 0.0 { NEGLIGIBLE } else { UNDAMPED_NEGLIGIBLE };
+        let negligible = if taken_m5_s3 > 0.0 {
+            NEGLIGIBLE
+        } else {
+            UNDAMPED_NEGLIGIBLE
+        };
         let is_seen = fed_m5_s3.abs() * report.step_s > negligible * report.kinetic_energy_m5_s2;
         (is_seen && energy.share.abs() > NOTED).then_some(energy)
     }

@@ -169,7 +169,11 @@ impl Run {
     /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
-        let kept = Kept { open: None, energy: EnergyBound::new(&flow), window: Window::default() };
+        let kept = Kept {
+            open: None,
+            energy: EnergyBound::new(&flow),
+            window: Window::default(),
+        };
         Ok(Self::with(flow, plan, kept, true))
     }
 
@@ -187,7 +191,10 @@ impl Run {
         let (flow, bytes) = Flow::restore(path, mesh, settings)?;
         let what = "it was written by another kind of program";
         let Some((kept, user_data)) = Kept::read(&bytes) else {
-            return Err(Error::CheckpointDamaged { path: path.to_owned(), what });
+            return Err(Error::CheckpointDamaged {
+                path: path.to_owned(),
+                what,
+            });
         };
         plan.check(f64::NEG_INFINITY)?;
         Ok((Self::with(flow, plan, kept, false), user_data.to_vec()))
@@ -195,7 +202,15 @@ impl Run {
 
     fn with(flow: Flow, plan: RunPlan, kept: Kept, is_fresh: bool) -> Self {
         let (has_warned_of_energy, has_warned_of_growth, stepping) = Default::default();
-        Self { flow, plan, kept, has_warned_of_energy, has_warned_of_growth, is_fresh, stepping }
+        Self {
+            flow,
+            plan,
+            kept,
+            has_warned_of_energy,
+            has_warned_of_growth,
+            is_fresh,
+            stepping,
+        }
     }
 
     /// The simulation, or the part that this rank has.
@@ -222,15 +237,34 @@ impl Run {
         let (start_s, end_s) = (self.flow.time_s(), self.plan.end_s);
         // A fresh run gives the output of its start; a resumed one gave it before its checkpoint.
         let (was_fresh, begun_at) = (self.is_fresh, self.flow.steps());
-        let given = |&t: &f64| if self.is_fresh { t < start_s } else { self.is_reached(t) };
-        let mut next_output = self.plan.output_times_s.iter().take_while(|t| given(t)).count();
+        let given = |&t: &f64| {
+            if self.is_fresh {
+                t < start_s
+            } else {
+                self.is_reached(t)
+            }
+        };
+        let mut next_output = self
+            .plan
+            .output_times_s
+            .iter()
+            .take_while(|t| given(t))
+            .count();
         self.is_fresh = false;
         self.give_outputs(&mut next_output, observer)?;
         while !self.is_reached(end_s) {
-            if self.plan.pause_after_steps.is_some_and(|steps| self.flow.steps() >= steps) {
+            if self
+                .plan
+                .pause_after_steps
+                .is_some_and(|steps| self.flow.steps() >= steps)
+            {
                 break;
             }
-            let target_s = self.plan.output_times_s.get(next_output).map_or(end_s, |t| t.min(end_s));
+            let target_s = self
+                .plan
+                .output_times_s
+                .get(next_output)
+                .map_or(end_s, |t| t.min(end_s));
             let before_s = self.flow.time_s();
             let energy = self.flow.kinetic_energy_m5_s2();
             self.look_for_growth(observer);
@@ -240,7 +274,12 @@ impl Run {
             self.stepping.exchange_s += self.flow.layout.slabs.ranks.spent_s() - exchanged_s;
             if report.step_s < SHORTEST_SHARE * (end_s - start_s) && !self.is_reached(target_s) {
                 let (step, step_s) = (report.step, report.step_s);
-                return Err(Error::StepTooShort { step, time_s: report.time_s, step_s, end_s });
+                return Err(Error::StepTooShort {
+                    step,
+                    time_s: report.time_s,
+                    step_s,
+                    end_s,
+                });
             }
             let record = self.record(report, energy)?;
             self.all_agree(observer.step(&self.flow, &record))?;
@@ -263,8 +302,17 @@ impl Run {
         time_s - self.flow.time_s() <= SAME_TIME * time_s.abs().max(self.plan.end_s.abs())
     }
 
-    fn give_outputs(&mut self, next: &mut usize, observer: &mut dyn RunObserver) -> Result<(), Error> {
-        while self.plan.output_times_s.get(*next).is_some_and(|&t| self.is_reached(t)) {
+    fn give_outputs(
+        &mut self,
+        next: &mut usize,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), Error> {
+        while self
+            .plan
+            .output_times_s
+            .get(*next)
+            .is_some_and(|&t| self.is_reached(t))
+        {
             self.all_agree(observer.output(&self.flow, *next))?;
             *next += 1;
         }
@@ -274,7 +322,11 @@ impl Run {
     /// What stops one rank stops all.
     fn all_agree(&self, seen: Result<(), String>) -> Result<(), Error> {
         let flow = &self.flow;
-        let stopped = |reason| Error::Stopped { step: flow.steps(), time_s: flow.time_s(), reason };
+        let stopped = |reason| Error::Stopped {
+            step: flow.steps(),
+            time_s: flow.time_s(),
+            reason,
+        };
         flow.layout.slabs.all_agree(seen.map_err(stopped))
     }
 
@@ -287,7 +339,9 @@ impl Run {
 
     /// Tells of energy that the steps themselves feed or take, and refuses more than viscosity and model take.
     fn watch(&mut self, report: &StepReport, observer: &mut dyn RunObserver) -> Result<(), Error> {
-        let Some(energy) = self.kept.window.close(&self.flow, report) else { return Ok(()) };
+        let Some(energy) = self.kept.window.close(&self.flow, report) else {
+            return Ok(());
+        };
         if energy.share > 1.0 && energy.share.is_finite() {
             return Err(Error::StepFeeds {
                 step: report.step,
@@ -299,7 +353,13 @@ impl Run {
         }
         if !self.has_warned_of_energy {
             self.has_warned_of_energy = true;
-            self.tell(observer, &RunWarning::StepEnergy { step: report.step, energy });
+            self.tell(
+                observer,
+                &RunWarning::StepEnergy {
+                    step: report.step,
+                    energy,
+                },
+            );
         }
         Ok(())
     }
@@ -314,7 +374,11 @@ impl Run {
         let left_s = self.plan.end_s - self.flow.time_s();
         let step_s = self.flow.next_step_s();
         // If a rank is lost, the next step says so.
-        let growth = self.flow.stability().ok().and_then(|s| s.undamped(self.flow.judged_step_s(&s, step_s)));
+        let growth = self
+            .flow
+            .stability()
+            .ok()
+            .and_then(|s| s.undamped(self.flow.judged_step_s(&s, step_s)));
         if let Some(growth) = growth.filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
             self.has_warned_of_growth = true;
             self.tell(observer, &RunWarning::UndampedGrowth { step, growth });
@@ -322,20 +386,34 @@ impl Run {
     }
 
     fn record(&mut self, report: StepReport, energy_before: f64) -> Result<StepRecord, Error> {
-        let power_m5_s3 = report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
-        let mean = |open: EnergyBudget| EnergyBudget { power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3), ..open };
+        let power_m5_s3 =
+            report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
+        let mean = |open: EnergyBudget| EnergyBudget {
+            power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3),
+            ..open
+        };
         let budget_before = self.kept.open.map(mean);
         if let (Some(open), Some(closed)) = (self.kept.open, budget_before) {
             self.kept.window.add(open, closed, &report);
         }
         let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
-        self.kept.open = Some(EnergyBudget { step: report.step, rate_m5_s3, power_m5_s3 });
-        Ok(StepRecord { report, relative_divergence: self.flow.measure_divergence()?, budget_before })
+        self.kept.open = Some(EnergyBudget {
+            step: report.step,
+            rate_m5_s3,
+            power_m5_s3,
+        });
+        Ok(StepRecord {
+            report,
+            relative_divergence: self.flow.measure_divergence()?,
+            budget_before,
+        })
     }
 
     fn checkpoint_is_due(&self, before_s: f64, report: &StepReport) -> bool {
         // The last step's checkpoint is written by the end of the run.
-        let Some(plan) = &self.plan.checkpoint else { return false };
+        let Some(plan) = &self.plan.checkpoint else {
+            return false;
+        };
         if self.is_reached(self.plan.end_s) {
             return false;
         }
@@ -344,16 +422,21 @@ impl Run {
         self.flow.refuse_courant(courant, report.step_s).is_ok()
             && match plan.every {
                 Interval::Steps(steps) => report.step.is_multiple_of(steps),
-                Interval::Time { time_s } => (report.time_s / time_s).floor() > (before_s / time_s).floor(),
+                Interval::Time { time_s } => {
+                    (report.time_s / time_s).floor() > (before_s / time_s).floor()
+                }
             }
     }
 
     fn write_checkpoint(&self, observer: &dyn RunObserver) -> Result<(), Error> {
-        let Some(plan) = &self.plan.checkpoint else { return Ok(()) };
+        let Some(plan) = &self.plan.checkpoint else {
+            return Ok(());
+        };
         let mut previous = plan.path.clone().into_os_string();
         previous.push(".previous");
         let bytes = [self.kept.bytes(), observer.user_data()].concat();
-        self.flow.save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
+        self.flow
+            .save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
     }
 }
 
@@ -363,18 +446,33 @@ impl RunPlan {
     /// # Errors
     /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
     pub fn check(&self, start_s: f64) -> Result<(), Error> {
-        check("end_s", self.end_s, "finite and not before the start", |t| t >= start_s)?;
+        check(
+            "end_s",
+            self.end_s,
+            "finite and not before the start",
+            |t| t >= start_s,
+        )?;
         let mut last_s = start_s;
         for (i, &time_s) in self.output_times_s.iter().enumerate() {
             let apart = if i == 0 { 0.0 } else { 1e-9 * self.end_s.abs() };
-            check("output_times_s", time_s, "increasing, from the start to the end of the run", |t| {
-                t >= last_s + apart && t <= self.end_s
-            })?;
+            check(
+                "output_times_s",
+                time_s,
+                "increasing, from the start to the end of the run",
+                |t| t >= last_s + apart && t <= self.end_s,
+            )?;
             last_s = time_s;
         }
         match self.checkpoint.as_ref().map(|plan| plan.every) {
-            Some(Interval::Steps(steps)) => check("checkpoint interval", steps as f64, "at least 1 step", |n| n >= 1.0),
-            Some(Interval::Time { time_s }) => check("checkpoint interval", time_s, "positive", |t| t > 0.0),
+            Some(Interval::Steps(steps)) => check(
+                "checkpoint interval",
+                steps as f64,
+                "at least 1 step",
+                |n| n >= 1.0,
+            ),
+            Some(Interval::Time { time_s }) => {
+                check("checkpoint interval", time_s, "positive", |t| t > 0.0)
+            }
             None => Ok(()),
         }
     }
@@ -383,10 +481,20 @@ impl RunPlan {
 impl Kept {
     /// The first number is 3 if a budget is open, else 2.
     fn bytes(&self) -> Vec<u8> {
-        let open = self.open.map_or([2, 0, 0, 0], |b| [3, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]);
+        let open = self.open.map_or([2, 0, 0, 0], |b| {
+            [3, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]
+        });
         let Self { energy, window, .. } = self;
-        let numbers = [energy.bound_m5_s2, energy.largest_m5_s2, window.fed_m5_s3, window.taken_m5_s3];
-        open.into_iter().chain(numbers.map(f64::to_bits)).flat_map(u64::to_le_bytes).collect()
+        let numbers = [
+            energy.bound_m5_s2,
+            energy.largest_m5_s2,
+            window.fed_m5_s3,
+            window.taken_m5_s3,
+        ];
+        open.into_iter()
+            .chain(numbers.map(f64::to_bits))
+            .flat_map(u64::to_le_bytes)
+            .collect()
     }
 
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
@@ -394,10 +502,27 @@ impl Kept {
         let float = |at: usize| number(at).map(f64::from_bits);
         let is_open = number(0).filter(|kind| matches!(kind, 2 | 3))? == 3;
         let (rate_m5_s3, power_m5_s3) = (float(2)?, float(3)?);
-        let open = is_open.then_some(EnergyBudget { step: number(1)?, rate_m5_s3, power_m5_s3 });
-        let energy = EnergyBound { bound_m5_s2: float(4)?, largest_m5_s2: float(5)? };
-        let window = Window { fed_m5_s3: float(6)?, taken_m5_s3: float(7)? };
-        Some((Self { open, energy, window }, bytes.get(64..)?))
+        let open = is_open.then_some(EnergyBudget {
+            step: number(1)?,
+            rate_m5_s3,
+            power_m5_s3,
+        });
+        let energy = EnergyBound {
+            bound_m5_s2: float(4)?,
+            largest_m5_s2: float(5)?,
+        };
+        let window = Window {
+            fed_m5_s3: float(6)?,
+            taken_m5_s3: float(7)?,
+        };
+        Some((
+            Self {
+                open,
+                energy,
+                window,
+            },
+            bytes.get(64..)?,
+        ))
     }
 }
 

@@ -10,12 +10,24 @@ use crate::ranks::{Ranks, Single, on_threads};
 
 fn wake() -> Case {
     let subgrid = SubgridModel::MULTISCALE_WALE;
-    let pair = VortexPairCase { cells: [8, 24, 28], perturbation: 0.05, subgrid, ..VortexPairCase::coarse() };
-    pair.case(TimeStep::Courant { courant: 0.65, longest_s: 0.1 }).unwrap()
+    let pair = VortexPairCase {
+        cells: [8, 24, 28],
+        perturbation: 0.05,
+        subgrid,
+        ..VortexPairCase::coarse()
+    };
+    pair.case(TimeStep::Courant {
+        courant: 0.65,
+        longest_s: 0.1,
+    })
+    .unwrap()
 }
 
 fn start(case: &Case, ranks: Arc<dyn Ranks>, plan: RunPlan) -> Result<Run, Error> {
-    let settings = FlowSettings { ranks, ..case.settings.clone() };
+    let settings = FlowSettings {
+        ranks,
+        ..case.settings.clone()
+    };
     Run::new(case.initial.start(case.mesh.clone(), settings)?.0, plan)
 }
 
@@ -29,17 +41,34 @@ struct Witness {
 
 impl RunObserver for Witness {
     fn step(&mut self, flow: &Flow, record: &StepRecord) -> Result<(), String> {
-        assert_eq!((flow.steps(), flow.time_s()), (record.report.step, record.report.time_s));
-        assert_eq!(flow.kinetic_energy_m5_s2(), record.report.kinetic_energy_m5_s2);
+        assert_eq!(
+            (flow.steps(), flow.time_s()),
+            (record.report.step, record.report.time_s)
+        );
+        assert_eq!(
+            flow.kinetic_energy_m5_s2(),
+            record.report.kinetic_energy_m5_s2
+        );
         self.records.push(*record);
         Ok(())
     }
 
     fn output(&mut self, flow: &Flow, index: usize) -> Result<(), String> {
-        self.fields.extend([0, 1, 2].map(|d| flow.whole(flow.own_centre_velocity_m_s(d))));
-        self.fields.extend([flow.pressure_m2_s2(), flow.subgrid_viscosity_m2_s().unwrap()]);
-        self.fields.extend([flow.whole(flow.own_vorticity_magnitude_per_s()), vec![flow.relative_divergence()]]);
-        if self.fails && index == 1 { Err("no space left on device".into()) } else { Ok(()) }
+        self.fields
+            .extend([0, 1, 2].map(|d| flow.whole(flow.own_centre_velocity_m_s(d))));
+        self.fields.extend([
+            flow.pressure_m2_s2(),
+            flow.subgrid_viscosity_m2_s().unwrap(),
+        ]);
+        self.fields.extend([
+            flow.whole(flow.own_vorticity_magnitude_per_s()),
+            vec![flow.relative_divergence()],
+        ]);
+        if self.fails && index == 1 {
+            Err("no space left on device".into())
+        } else {
+            Ok(())
+        }
     }
 
     fn user_data(&self) -> Vec<u8> {
@@ -48,8 +77,16 @@ impl RunObserver for Witness {
 }
 
 fn plan(path: &Path, pause_after_steps: Option<u64>) -> RunPlan {
-    let checkpoint = Some(CheckpointPlan { path: path.to_owned(), every: Interval::Steps(2) });
-    RunPlan { end_s: 0.25, output_times_s: vec![0.0, 0.1, 0.25], checkpoint, pause_after_steps }
+    let checkpoint = Some(CheckpointPlan {
+        path: path.to_owned(),
+        every: Interval::Steps(2),
+    });
+    RunPlan {
+        end_s: 0.25,
+        output_times_s: vec![0.0, 0.1, 0.25],
+        checkpoint,
+        pause_after_steps,
+    }
 }
 
 #[test]
@@ -63,14 +100,22 @@ fn checkpoints_have_the_same_bytes_and_continue_on_any_other_number_of_ranks() {
             let mut run = match pause {
                 Some(3) => start(&case, ranks, plan(&path, pause)).unwrap(),
                 _ => {
-                    let settings = FlowSettings { ranks, ..case.settings.clone() };
-                    Run::resume(&path, case.mesh.clone(), settings, plan(&path, pause)).unwrap().0
+                    let settings = FlowSettings {
+                        ranks,
+                        ..case.settings.clone()
+                    };
+                    Run::resume(&path, case.mesh.clone(), settings, plan(&path, pause))
+                        .unwrap()
+                        .0
                 }
             };
             run.to_end(&mut witness).unwrap();
             witness
         });
-        assert!(seen.iter().all(|other| *other == seen[0]), "all see the same");
+        assert!(
+            seen.iter().all(|other| *other == seen[0]),
+            "all see the same"
+        );
         (bytes(), seen.swap_remove(0).unwrap())
     };
     let stages = [Some(3), Some(5), None];
@@ -79,7 +124,10 @@ fn checkpoints_have_the_same_bytes_and_continue_on_any_other_number_of_ranks() {
     for counts in [[3, 1, 5], [1, 5, 3], [7, 2, 1]] {
         for ((pause, count), expected) in stages.into_iter().zip(counts).zip(&alone) {
             let found = advance(pause, count);
-            assert!(found.0 == expected.0, "the checkpoint of {count} ranks, {pause:?}");
+            assert!(
+                found.0 == expected.0,
+                "the checkpoint of {count} ranks, {pause:?}"
+            );
             assert!(found.1 == expected.1, "what {count} ranks show, {pause:?}");
         }
     }
@@ -87,7 +135,10 @@ fn checkpoints_have_the_same_bytes_and_continue_on_any_other_number_of_ranks() {
 
 /// The error of each rank, as words.
 fn words(found: Vec<Option<Result<bool, Error>>>) -> Vec<String> {
-    found.into_iter().map(|one| one.map_or("a panic".into(), |result| result.unwrap_err().to_string())).collect()
+    found
+        .into_iter()
+        .map(|one| one.map_or("a panic".into(), |result| result.unwrap_err().to_string()))
+        .collect()
 }
 
 #[test]
@@ -96,7 +147,10 @@ fn what_fails_on_one_rank_stops_all_with_the_words_of_one_process() {
     let path = folder.path().join("run.ckpt");
     let compare_with = |name: &str, case: &Case, fails: bool, implicit: Option<[bool; 3]>| {
         let run = |ranks: Arc<dyn Ranks>| {
-            let mut witness = Witness { fails: fails && ranks.rank() == 0, ..Witness::default() };
+            let mut witness = Witness {
+                fails: fails && ranks.rank() == 0,
+                ..Witness::default()
+            };
             let mut run = start(case, ranks, plan(&path, None))?;
             run.flow.state.implicit = implicit.unwrap_or(run.flow.state.implicit);
             run.to_end(&mut witness)
@@ -112,7 +166,11 @@ fn what_fails_on_one_rank_stops_all_with_the_words_of_one_process() {
     compare("a step that is too long", &case, false);
     let mut case = wake();
     case.initial = super::super::cases::Initial::Field(Box::new(|at_m| {
-        if at_m[2] > 1.0 && at_m[1] > 1.0 { [0.0, f64::NAN, 1.0] } else { [0.0; 3] }
+        if at_m[2] > 1.0 && at_m[1] > 1.0 {
+            [0.0, f64::NAN, 1.0]
+        } else {
+            [0.0; 3]
+        }
     }));
     compare("a field that is not finite", &case, false);
     let mut case = wake();
@@ -136,23 +194,48 @@ fn a_rank_that_panics_or_cannot_read_stops_the_others() {
     };
     let found = words(on_threads(3, panicking));
     let lost = Error::RankLost { rank: 2 }.to_string();
-    assert!(found[2] == "a panic" && found[..2].contains(&lost), "{found:?}");
+    assert!(
+        found[2] == "a panic" && found[..2].contains(&lost),
+        "{found:?}"
+    );
     super::super::checkpoint::check_checkpoint(&path).unwrap();
     // Rank 1 finds no checkpoint where the others do.
     let reading = |ranks: Arc<dyn Ranks>| {
-        let path = if ranks.rank() == 1 { folder.path().join("none") } else { path.clone() };
-        let settings = FlowSettings { ranks, ..case.settings.clone() };
-        Run::resume(&path, case.mesh.clone(), settings, plan(&path, None)).map(|_| ()).unwrap_err().to_string()
+        let path = if ranks.rank() == 1 {
+            folder.path().join("none")
+        } else {
+            path.clone()
+        };
+        let settings = FlowSettings {
+            ranks,
+            ..case.settings.clone()
+        };
+        Run::resume(&path, case.mesh.clone(), settings, plan(&path, None))
+            .map(|_| ())
+            .unwrap_err()
+            .to_string()
     };
     let found = on_threads(3, reading);
-    assert!(found[0].as_ref().unwrap().contains("none") && found.iter().all(|words| *words == found[0]), "{found:?}");
+    assert!(
+        found[0].as_ref().unwrap().contains("none") && found.iter().all(|words| *words == found[0]),
+        "{found:?}"
+    );
 }
 
 #[test]
 fn more_ranks_than_the_mesh_has_planes_for_are_refused_with_what_is_allowed() {
     let case = wake();
     let refused = on_threads(8, |ranks| start(&case, ranks, RunPlan::default()).map(drop));
-    let expected = Error::TooManyRanks { ranks: 8, planes: 28, most: 7 };
+    let expected = Error::TooManyRanks {
+        ranks: 8,
+        planes: 28,
+        most: 7,
+    };
     assert!(expected.to_string().contains("at most 7"), "{expected}");
-    assert!(refused.iter().all(|found| *found == Some(Err(expected.clone()))), "{refused:?}");
+    assert!(
+        refused
+            .iter()
+            .all(|found| *found == Some(Err(expected.clone()))),
+        "{refused:?}"
+    );
 }

@@ -27,7 +27,11 @@ struct Ghost {
 
 impl Ghost {
     /// A value as it is.
-    const PLAIN: Self = Self { index: 0, sign: 1.0, offset: 0.0 };
+    const PLAIN: Self = Self {
+        index: 0,
+        sign: 1.0,
+        offset: 0.0,
+    };
 }
 
 /// For each place along an axis what stands for the values at distances 1, 2, ... below and above; empty along a thin axis.
@@ -63,7 +67,11 @@ impl Filter {
                 neighbours(line, order, |index| cell_ghost(line, wall_m_s, index))
             })
         });
-        Self { shape: layout.shape, weights: weights(order), axes }
+        Self {
+            shape: layout.shape,
+            weights: weights(order),
+            axes,
+        }
     }
 
     /// Writes the small scales of `velocity` to `small`.
@@ -75,16 +83,28 @@ impl Filter {
             padded: vec![0.0; shape.n[0] + 2 * HALO],
         };
         for (axes, (field, small)) in self.axes.iter().zip(velocity.into_iter().zip(small)) {
-            let planes = small[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
-            planes.for_each_init(scratch, |scratch, (out, k)| small_plane(self, axes, field, k, out, scratch));
+            let planes = small[shape.own_places()]
+                .par_chunks_mut(shape.plane())
+                .zip(shape.own());
+            planes.for_each_init(scratch, |scratch, (out, k)| {
+                small_plane(self, axes, field, k, out, scratch)
+            });
         }
     }
 }
 
 /// The neighbours of the places along an axis; `ghost` tells what stands for the value at any index, also beyond the ends.
 fn neighbours(line: &Operators1d, order: usize, ghost: impl Fn(isize) -> Ghost) -> Neighbours {
-    let at = |place: isize| (1..=order as isize).map(|d| [-d, d].map(|d| ghost(place + d))).collect();
-    let places = if line.is_thin() { 0 } else { line.cells as isize };
+    let at = |place: isize| {
+        (1..=order as isize)
+            .map(|d| [-d, d].map(|d| ghost(place + d)))
+            .collect()
+    };
+    let places = if line.is_thin() {
+        0
+    } else {
+        line.cells as isize
+    };
     (0..places).map(at).collect()
 }
 
@@ -93,7 +113,11 @@ fn face_ghost(line: &Operators1d, index: isize) -> Ghost {
     let (face, sign) = resolve_face(line.cells, line.ends, index);
     // The face on the high wall is not stored, and nothing flows through it.
     let at_high_wall = face == line.cells;
-    Ghost { index: if at_high_wall { 0 } else { face }, sign: if at_high_wall { 0.0 } else { sign }, offset: 0.0 }
+    Ghost {
+        index: if at_high_wall { 0 } else { face },
+        sign: if at_high_wall { 0.0 } else { sign },
+        offset: 0.0,
+    }
 }
 
 /// What stands for the velocity along the walls at cell `index`, which may lie beyond the ends.
@@ -112,7 +136,9 @@ fn cell_ghost(line: &Operators1d, wall_m_s: [f64; 2], index: isize) -> Ghost {
 /// Weights of the pairs of neighbours in `1 - (-delta^2/4)^order`, to be applied to `(q_m - q_0) + (q_-m - q_0)`.
 fn weights(order: usize) -> Vec<f64> {
     // The coefficient of q_m in (-delta^2/4)^n is (-1)^m C(2n, n + m)/4^n.
-    let mut binomial = (0..order).fold(1.0, |product, i| product * ((2 * order - i) as f64 / (i + 1) as f64));
+    let mut binomial = (0..order).fold(1.0, |product, i| {
+        product * ((2 * order - i) as f64 / (i + 1) as f64)
+    });
     let weight = |m: usize| {
         binomial *= (order + 1 - m) as f64 / (order + m) as f64;
         let sign = if m.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -134,10 +160,14 @@ fn small_plane(
     let (shape, n) = (filter.shape, filter.shape.n[0]);
     let Scratch { plane, row, padded } = scratch;
     for (j, low) in plane.chunks_mut(n).enumerate() {
-        smooth(low, &filter.weights, &over[..], k, |index| &field[shape.row(j, index)]);
+        smooth(low, &filter.weights, &over[..], k, |index| {
+            &field[shape.row(j, index)]
+        });
     }
     for (j, out) in out.chunks_mut(n).enumerate() {
-        smooth(row, &filter.weights, &across[..], j, |index| &plane[index * n..(index + 1) * n]);
+        smooth(row, &filter.weights, &across[..], j, |index| {
+            &plane[index * n..(index + 1) * n]
+        });
         let own = &field[shape.row(j, k)];
         if let [first, .., last] = &along[..] {
             pad_with_ghosts(padded, row, first, last);
@@ -164,7 +194,13 @@ fn smooth<'a>(
     let own = row(index);
     out.copy_from_slice(own);
     for (weight, pair) in weights.iter().zip(axis.get(index).into_iter().flatten()) {
-        add_pair(out, own, *weight, [row(pair[0].index), row(pair[1].index)], *pair);
+        add_pair(
+            out,
+            own,
+            *weight,
+            [row(pair[0].index), row(pair[1].index)],
+            *pair,
+        );
     }
 }
 
@@ -206,20 +242,30 @@ mod tests {
         let layout = Layout::in_order(&mesh.unwrap(), [0, 1, 2]);
         for order in 1..=HIGHEST_ORDER {
             for waves in [[1, 0, 0], [0, 3, 0], [0, 0, 6], [5, 2, 3], [12, 0, 1]] {
-                let theta: [f64; 3] =
-                    std::array::from_fn(|d| std::f64::consts::TAU * f64::from(waves[d]) / layout.shape.n[d] as f64);
+                let theta: [f64; 3] = std::array::from_fn(|d| {
+                    std::f64::consts::TAU * f64::from(waves[d]) / layout.shape.n[d] as f64
+                });
                 let removed = |t: f64| (0.5 * t).sin().powi(2 * order as i32);
                 let share = 1.0 - theta.iter().map(|&t| 1.0 - removed(t)).product::<f64>();
                 let value = |place: usize| {
                     let index = [place % 24, place / 24 % 10, place / 240];
-                    (0..3).map(|d| theta[d] * index[d] as f64).sum::<f64>().cos()
+                    (0..3)
+                        .map(|d| theta[d] * index[d] as f64)
+                        .sum::<f64>()
+                        .cos()
                 };
                 let field: Vec<f64> = (0..layout.shape.len()).map(value).collect();
                 let mut small = [0, 1, 2].map(|_| vec![0.0; field.len()]);
                 let filter = Filter::new(&layout, order);
-                filter.small_scales([&field, &field, &field], &mut small.each_mut().map(Vec::as_mut_slice));
+                filter.small_scales(
+                    [&field, &field, &field],
+                    &mut small.each_mut().map(Vec::as_mut_slice),
+                );
                 for (small, field) in small.iter().flatten().zip(field.iter().cycle()) {
-                    assert!((small - share * field).abs() < 5e-14, "order {order}, {waves:?}: {small}");
+                    assert!(
+                        (small - share * field).abs() < 5e-14,
+                        "order {order}, {waves:?}: {small}"
+                    );
                 }
             }
         }

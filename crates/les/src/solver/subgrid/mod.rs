@@ -74,7 +74,10 @@ impl SubgridModel {
     pub const WALE: Self = Self::Wale { constant: 0.5 };
     /// The multiscale model with a filter of third order, the lowest that leaves vortex cores of four cells and more a tenth
     /// of WALE's stress; its constant is [`Self::multiscale_constant`] of 0.5.
-    pub const MULTISCALE_WALE: Self = Self::MultiscaleWale { constant: 0.9838, order: 3 };
+    pub const MULTISCALE_WALE: Self = Self::MultiscaleWale {
+        constant: 0.9838,
+        order: 3,
+    };
 
     /// The constant with which the multiscale model of the given order has the mean dissipation of WALE with `wale_constant`
     /// in isotropic turbulence with a `k^(-5/3)` spectrum up to the cutoff of the mesh: `C_w` over the root of the share of the
@@ -107,12 +110,19 @@ impl Subgrid {
     /// # Errors
     /// [`Error::OutOfRange`] for a constant that is not positive and an order that is not 1 to 4.
     pub(crate) fn new(layout: &Layout, model: SubgridModel) -> Result<Option<Self>, Error> {
-        let Some((formula, order)) = formula_and_order(model)? else { return Ok(None) };
+        let Some((formula, order)) = formula_and_order(model)? else {
+            return Ok(None);
+        };
         let cells = layout.shape.len();
         Ok(Some(Self {
             formula,
             operators: Operators::new(layout),
-            small: order.map(|order| (Filter::new(layout, order), [0, 1].map(|_| Aligned::zeros(cells)))),
+            small: order.map(|order| {
+                (
+                    Filter::new(layout, order),
+                    [0, 1].map(|_| Aligned::zeros(cells)),
+                )
+            }),
             viscosity_m2_s: Aligned::zeros(cells),
             largest: Largest::default(),
             across: [0, 1, 2].map(|_| Aligned::zeros(cells)),
@@ -133,8 +143,22 @@ impl Subgrid {
         in_plane: &mut [Aligned; 3],
         free: &mut [f64],
     ) -> Result<(), Error> {
-        let Self { operators, formula, viscosity_m2_s: viscosity, small, slabs, across, .. } = self;
-        self.largest = slabs.largest(eddy_viscosity(operators, *formula, velocity_m_s, limit_per_s, viscosity))?;
+        let Self {
+            operators,
+            formula,
+            viscosity_m2_s: viscosity,
+            small,
+            slabs,
+            across,
+            ..
+        } = self;
+        self.largest = slabs.largest(eddy_viscosity(
+            operators,
+            *formula,
+            velocity_m_s,
+            limit_per_s,
+            viscosity,
+        ))?;
         let strained = match small {
             Some((filter, small)) => {
                 let [second, third] = small;
@@ -156,9 +180,21 @@ impl Subgrid {
 
     /// Adds the rest of the divergence of the stress to the acceleration of row `(j, k)` of one component, which has that in
     /// planes \[m/s^2\]. Rows of walls get nothing.
-    pub(crate) fn add_divergence_row(&self, component: usize, j: usize, k: usize, out_m_s2: &mut [f64]) {
-        let Operators { to_cells, to_faces, .. } = &self.operators;
-        let operator = if component == 2 { &to_faces[2] } else { &to_cells[2] };
+    pub(crate) fn add_divergence_row(
+        &self,
+        component: usize,
+        j: usize,
+        k: usize,
+        out_m_s2: &mut [f64],
+    ) {
+        let Operators {
+            to_cells, to_faces, ..
+        } = &self.operators;
+        let operator = if component == 2 {
+            &to_faces[2]
+        } else {
+            &to_cells[2]
+        };
         add_divergence_row(operator, &self.across[component], [j, k], out_m_s2);
     }
 }
@@ -167,14 +203,33 @@ impl Subgrid {
 ///
 /// # Errors
 /// As [`Subgrid::new`].
-pub(super) fn formula_and_order(model: SubgridModel) -> Result<Option<(Formula, Option<usize>)>, Error> {
+pub(super) fn formula_and_order(
+    model: SubgridModel,
+) -> Result<Option<(Formula, Option<usize>)>, Error> {
     Ok(match model {
         SubgridModel::None => None,
-        SubgridModel::Smagorinsky { constant } => Some((Formula::Smagorinsky { square: square(constant)? }, None)),
-        SubgridModel::Wale { constant } => Some((Formula::Wale { square: square(constant)? }, None)),
+        SubgridModel::Smagorinsky { constant } => Some((
+            Formula::Smagorinsky {
+                square: square(constant)?,
+            },
+            None,
+        )),
+        SubgridModel::Wale { constant } => Some((
+            Formula::Wale {
+                square: square(constant)?,
+            },
+            None,
+        )),
         SubgridModel::MultiscaleWale { constant, order } => {
-            check("order", order as f64, "1 to 4", |_| (1..=HIGHEST_ORDER).contains(&order))?;
-            Some((Formula::Wale { square: square(constant)? }, Some(order)))
+            check("order", order as f64, "1 to 4", |_| {
+                (1..=HIGHEST_ORDER).contains(&order)
+            })?;
+            Some((
+                Formula::Wale {
+                    square: square(constant)?,
+                },
+                Some(order),
+            ))
         }
     })
 }

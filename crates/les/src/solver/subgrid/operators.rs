@@ -40,32 +40,50 @@ impl Operators {
         let to_cells = std::array::from_fn(|axis| operator(axis, divergence(&layout.line[axis])));
         let to_faces = std::array::from_fn(|axis| operator(axis, layout.line[axis].gradient()));
         // of the viscosity the plane below
-        let [[a, b], [c, d]] = [&to_cells, &to_faces].map(|of: &[RowOperator; 3]| layout.slabs.reach(&of[2].rows));
+        let [[a, b], [c, d]] =
+            [&to_cells, &to_faces].map(|of: &[RowOperator; 3]| layout.slabs.reach(&of[2].rows));
         Self {
             shape: layout.shape,
             reach: [a.max(c).max(1), b.max(d)],
             periodic: std::array::from_fn(|axis| layout.line[axis].is_periodic()),
             to_cells,
             to_faces,
-            half_mean_gradient: std::array::from_fn(|axis| operator(axis, layout.line[axis].half_mean_gradient().0)),
+            half_mean_gradient: std::array::from_fn(|axis| {
+                operator(axis, layout.line[axis].half_mean_gradient().0)
+            }),
             wall_source: std::array::from_fn(|axis| {
                 let walls = layout.line[axis].half_mean_gradient().1;
                 std::array::from_fn(|component| layout.wall_source(axis, component, &walls))
             }),
             width: std::array::from_fn(|axis| {
-                layout.line[axis].cell_metric_m.iter().map(|h| h.powf(2.0 / 3.0)).collect()
+                layout.line[axis]
+                    .cell_metric_m
+                    .iter()
+                    .map(|h| h.powf(2.0 / 3.0))
+                    .collect()
             }),
             decay: std::array::from_fn(|axis| {
                 let line = &layout.line[axis];
-                let symbol = if line.is_thin() { 0.0 } else { LAPLACIAN_SYMBOL };
-                line.cell_metric_m.iter().map(|h| symbol / (h * h)).collect()
+                let symbol = if line.is_thin() {
+                    0.0
+                } else {
+                    LAPLACIAN_SYMBOL
+                };
+                line.cell_metric_m
+                    .iter()
+                    .map(|h| symbol / (h * h))
+                    .collect()
             }),
         }
     }
 
     /// The index of the face or centre after `index`; `None` beyond the end of a bounded axis.
     pub(super) fn after(&self, axis: usize, index: usize) -> Option<usize> {
-        if index + 1 < self.shape.n[axis] { Some(index + 1) } else { self.periodic[axis].then_some(0) }
+        if index + 1 < self.shape.n[axis] {
+            Some(index + 1)
+        } else {
+            self.periodic[axis].then_some(0)
+        }
     }
 
     /// The index of the centre before `index`. On a wall, where there is none and no stress, it is `index`.

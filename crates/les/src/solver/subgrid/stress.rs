@@ -41,25 +41,43 @@ pub(super) fn update_stress(
 ) {
     let shape = operators.shape;
     let (n, plane) = (shape.n[0], shape.plane());
-    let [a0, a1, a2] = in_plane.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
-    let [t0, t1, t2] = across.each_mut().map(|field| field[shape.own_places()].par_chunks_mut(plane));
-    (a0, a1, a2, t0, t1, t2, shape.own()).into_par_iter().for_each_init(
-        || Scratch {
-            shear: vec![0.0; plane],
-            normal: vec![0.0; plane],
-            row: vec![0.0; n],
-            viscosity: vec![0.0; n],
-            padded: vec![0.0; n + 2 * HALO],
-        },
-        |scratch, (a0, a1, a2, t0, t1, t2, k)| {
-            stress_plane(operators, (viscosity, velocity), k, [a0, a1, a2], [t0, t1, t2], scratch);
-        },
-    );
+    let [a0, a1, a2] = in_plane
+        .each_mut()
+        .map(|field| field[shape.own_places()].par_chunks_mut(plane));
+    let [t0, t1, t2] = across
+        .each_mut()
+        .map(|field| field[shape.own_places()].par_chunks_mut(plane));
+    (a0, a1, a2, t0, t1, t2, shape.own())
+        .into_par_iter()
+        .for_each_init(
+            || Scratch {
+                shear: vec![0.0; plane],
+                normal: vec![0.0; plane],
+                row: vec![0.0; n],
+                viscosity: vec![0.0; n],
+                padded: vec![0.0; n + 2 * HALO],
+            },
+            |scratch, (a0, a1, a2, t0, t1, t2, k)| {
+                stress_plane(
+                    operators,
+                    (viscosity, velocity),
+                    k,
+                    [a0, a1, a2],
+                    [t0, t1, t2],
+                    scratch,
+                );
+            },
+        );
 }
 
 /// Adds the divergence of the stresses `across` the planes to the acceleration of the row `at` of a component \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-pub(super) fn add_divergence_row(operator: &RowOperator, across: &[f64], at: [usize; 2], out: &mut [f64]) {
+pub(super) fn add_divergence_row(
+    operator: &RowOperator,
+    across: &[f64],
+    at: [usize; 2],
+    out: &mut [f64],
+) {
     operator.add_across(out, across, at);
 }
 
@@ -71,12 +89,25 @@ fn stress_plane(
     k: usize,
     [in_0, in_1, in_2]: [&mut [f64]; 3],
     [across_0, across_1, across_2]: [&mut [f64]; 3],
-    Scratch { shear, normal, row: diagonal, viscosity: sum, padded }: &mut Scratch,
+    Scratch {
+        shear,
+        normal,
+        row: diagonal,
+        viscosity: sum,
+        padded,
+    }: &mut Scratch,
 ) {
     let shape = operators.shape;
     let n = shape.n[0];
     for j in 0..shape.n[1] {
-        let (row, place) = (Row { operators, velocity, at: [j, k] }, j * n..(j + 1) * n);
+        let (row, place) = (
+            Row {
+                operators,
+                velocity,
+                at: [j, k],
+            },
+            j * n..(j + 1) * n,
+        );
         let (before_j, before_k) = (operators.before(1, j), operators.before(2, k));
         let nu = |j: usize, k: usize| &viscosity[shape.row(j, k)];
 
@@ -95,7 +126,15 @@ fn stress_plane(
 
         let across_1 = &mut across_1[place];
         row.shear_strain([1, 2], across_1, padded);
-        scale_by_mean(across_1, [nu(before_j, before_k), nu(j, before_k), nu(before_j, k), nu(j, k)]);
+        scale_by_mean(
+            across_1,
+            [
+                nu(before_j, before_k),
+                nu(j, before_k),
+                nu(before_j, k),
+                nu(j, k),
+            ],
+        );
     }
     for j in 0..shape.n[1] {
         let place = j * n..(j + 1) * n;

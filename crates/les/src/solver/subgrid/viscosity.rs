@@ -45,7 +45,9 @@ pub(super) fn eddy_viscosity(
         row: vec![0.0; n + 1],
         padded: vec![0.0; n + 2 * HALO],
     };
-    let planes = viscosity[shape.own_places()].par_chunks_mut(shape.plane()).zip(shape.own());
+    let planes = viscosity[shape.own_places()]
+        .par_chunks_mut(shape.plane())
+        .zip(shape.own());
     let largest = planes.map_init(scratch, |scratch, (plane, k)| {
         viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
     });
@@ -72,11 +74,18 @@ fn viscosity_plane(
     let n = operators.shape.n[0];
     let mut largest = Largest::default();
     for (j, row) in plane.chunks_mut(n).enumerate() {
-        Row { operators, velocity, at: [j, k] }.gradient(scratch);
+        Row {
+            operators,
+            velocity,
+            at: [j, k],
+        }
+        .gradient(scratch);
         let across = operators.width[1][j] * operators.width[2][k];
         let (gradient, width) = (&scratch.gradient, &operators.width[0]);
         match formula {
-            Formula::Smagorinsky { square } => apply(row, gradient, square * across, width, smagorinsky),
+            Formula::Smagorinsky { square } => {
+                apply(row, gradient, square * across, width, smagorinsky)
+            }
             Formula::Wale { square } => apply(row, gradient, square * across, width, wale),
         }
         let decay = operators.decay[1][j] + operators.decay[2][k];
@@ -90,11 +99,20 @@ fn viscosity_plane(
 fn limit(row: &mut [f64], along: &[f64], across: f64, limit_per_s: f64) -> Largest {
     let mut largest = [Largest::default(); LANES];
     for (row, along) in row.chunks_mut(LANES).zip(along.chunks(LANES)) {
-        for ((value, along), [most_m2_s, most_per_s]) in row.iter_mut().zip(along).zip(&mut largest) {
+        for ((value, along), [most_m2_s, most_per_s]) in row.iter_mut().zip(along).zip(&mut largest)
+        {
             let decay = *value * (along + across);
-            let cut = if decay > limit_per_s { limit_per_s / (along + across) } else { *value };
+            let cut = if decay > limit_per_s {
+                limit_per_s / (along + across)
+            } else {
+                *value
+            };
             *value = cut;
-            *most_per_s = if decay > *most_per_s { decay } else { *most_per_s };
+            *most_per_s = if decay > *most_per_s {
+                decay
+            } else {
+                *most_per_s
+            };
             *most_m2_s = if cut > *most_m2_s { cut } else { *most_m2_s };
         }
     }
@@ -107,7 +125,14 @@ const LANES: usize = 8;
 impl Row<'_> {
     /// The nine derivatives at the centres.
     #[inline(always)]
-    fn gradient(&self, Scratch { gradient, row, padded }: &mut Scratch) {
+    fn gradient(
+        &self,
+        Scratch {
+            gradient,
+            row,
+            padded,
+        }: &mut Scratch,
+    ) {
         for (component, gradient) in gradient.iter_mut().enumerate() {
             for (axis, out) in gradient.iter_mut().enumerate() {
                 if axis == component {
@@ -139,7 +164,13 @@ impl Row<'_> {
 
     /// Derivative along `axis` of a component along axis 1 or 2, averaged over the two faces of each cell of the row.
     #[inline(always)]
-    fn mean_across(&self, [component, axis]: [usize; 2], out: &mut [f64], row: &mut [f64], padded: &mut [f64]) {
+    fn mean_across(
+        &self,
+        [component, axis]: [usize; 2],
+        out: &mut [f64],
+        row: &mut [f64],
+        padded: &mut [f64],
+    ) {
         let (operators, field, at) = (self.operators, self.velocity[component], self.at);
         let gradient = &operators.half_mean_gradient[axis];
         let source = &operators.wall_source[axis][component];
@@ -174,7 +205,8 @@ impl Row<'_> {
 #[inline(always)]
 fn strain_square(g: [[f64; 3]; 3]) -> f64 {
     let [xy, xz, yz] = [g[0][1] + g[1][0], g[0][2] + g[2][0], g[1][2] + g[2][1]];
-    (g[0][0] * g[0][0] + g[1][1] * g[1][1] + g[2][2] * g[2][2]) + 0.5 * (xy * xy + xz * xz + yz * yz)
+    (g[0][0] * g[0][0] + g[1][1] * g[1][1] + g[2][2] * g[2][2])
+        + 0.5 * (xy * xy + xz * xz + yz * yz)
 }
 
 /// `Sd:Sd`, `Sd` the deviator of the symmetric part of `g g`.
@@ -182,7 +214,11 @@ fn strain_square(g: [[f64; 3]; 3]) -> f64 {
 fn squared_gradient_square(g: [[f64; 3]; 3]) -> f64 {
     let product = |a: usize, b: usize| g[a][0] * g[0][b] + g[a][1] * g[1][b] + g[a][2] * g[2][b];
     let (xx, yy, zz) = (product(0, 0), product(1, 1), product(2, 2));
-    let (xy, xz, yz) = (product(0, 1) + product(1, 0), product(0, 2) + product(2, 0), product(1, 2) + product(2, 1));
+    let (xy, xz, yz) = (
+        product(0, 1) + product(1, 0),
+        product(0, 2) + product(2, 0),
+        product(1, 2) + product(2, 1),
+    );
     let third = (xx + yy + zz) * (1.0 / 3.0);
     let (xx, yy, zz) = (xx - third, yy - third, zz - third);
     (xx * xx + yy * yy + zz * zz) + 0.5 * (xy * xy + xz * xz + yz * yz)
@@ -203,7 +239,11 @@ fn apply(
     let ([xx, xy, xz], [yx, yy, yz]) = (cut_rows!(x, n, 0 1 2), cut_rows!(y, n, 0 1 2));
     let [zx, zy, zz] = cut_rows!(z, n, 0 1 2);
     for i in 0..n {
-        let g = [[xx[i], xy[i], xz[i]], [yx[i], yy[i], yz[i]], [zx[i], zy[i], zz[i]]];
+        let g = [
+            [xx[i], xy[i], xz[i]],
+            [yx[i], yy[i], yz[i]],
+            [zx[i], zy[i], zz[i]],
+        ];
         out[i] = scale * width[i] * formula(g);
     }
 }

@@ -61,10 +61,24 @@ impl PairScale {
     pub fn scales(self) -> Result<WakeScales, wakescope_les::Error> {
         let of = |aircraft: &Aircraft| WakeScales::of_aircraft(aircraft);
         match self {
-            Self::Circulation { spacing_m, circulation_m2_s } => Ok(WakeScales { spacing_m, circulation_m2_s }),
-            Self::Aircraft { mass_kg, speed_m_s, span_m, air_density_kg_m3 } => {
-                of(&Aircraft { mass_kg, speed_m_s, span_m, air_density_kg_m3 })
-            }
+            Self::Circulation {
+                spacing_m,
+                circulation_m2_s,
+            } => Ok(WakeScales {
+                spacing_m,
+                circulation_m2_s,
+            }),
+            Self::Aircraft {
+                mass_kg,
+                speed_m_s,
+                span_m,
+                air_density_kg_m3,
+            } => of(&Aircraft {
+                mass_kg,
+                speed_m_s,
+                span_m,
+                air_density_kg_m3,
+            }),
             Self::A320 {} => of(&Aircraft::A320),
             Self::A340 {} => of(&Aircraft::A340_300),
             Self::B747 {} => of(&Aircraft::B747_400),
@@ -127,7 +141,10 @@ impl WakeFlow {
 
     /// Keys that do nothing, or less than they seem to, in sentences.
     pub(in super::super) fn idle(&self) -> Vec<String> {
-        let height_m = self.pair.scales().map_or(f64::INFINITY, |scales| self.height * scales.spacing_m);
+        let height_m = self
+            .pair
+            .scales()
+            .map_or(f64::INFINITY, |scales| self.height * scales.spacing_m);
         let is_noisy = self.perturbation > 0.0 || self.background > 0.0;
         let [_, to] = self.circulation_radii_m;
         let mut idle = Vec::new();
@@ -173,7 +190,11 @@ impl WakeFlow {
             wind_roughness: self.wind_roughness_m / scales.spacing_m,
             ..VortexPairCase::coarse()
         };
-        if self.profile == WakeProfile::TwoScale { pair.with_two_scales() } else { Ok(pair) }
+        if self.profile == WakeProfile::TwoScale {
+            pair.with_two_scales()
+        } else {
+            Ok(pair)
+        }
     }
 
     pub(in super::super) fn setup(&self) -> Result<Setup, Error> {
@@ -181,12 +202,33 @@ impl WakeFlow {
         let pair = self.pair_case().map_err(Error::Flow)?;
         let unit_s = scales.time_unit_s();
         let window = self.circulation_radii_m.map(|r| r / scales.spacing_m);
-        let meter = pair.meter(&scales).and_then(|meter| meter.with_window(window)).map_err(Error::Flow)?;
-        let Case { mesh, settings, initial, end_s } =
-            pair.scaled(&scales, VortexPairCase::steps(LONGEST_STEP * unit_s)).map_err(Error::Flow)?;
+        let meter = pair
+            .meter(&scales)
+            .and_then(|meter| meter.with_window(window))
+            .map_err(Error::Flow)?;
+        let Case {
+            mesh,
+            settings,
+            initial,
+            end_s,
+        } = pair
+            .scaled(&scales, VortexPairCase::steps(LONGEST_STEP * unit_s))
+            .map_err(Error::Flow)?;
         let circulation_radii_m = self.circulation_radii_m;
-        let wake =
-            Some(WakeSetup { meter, circulation_radii_m, scales, core_radius_m: self.core_radius * scales.spacing_m });
-        Ok(Setup { mesh, settings, initial, end_s: Some(end_s), tau_per_s: 1.0 / unit_s, wake, undamped: None })
+        let wake = Some(WakeSetup {
+            meter,
+            circulation_radii_m,
+            scales,
+            core_radius_m: self.core_radius * scales.spacing_m,
+        });
+        Ok(Setup {
+            mesh,
+            settings,
+            initial,
+            end_s: Some(end_s),
+            tau_per_s: 1.0 / unit_s,
+            wake,
+            undamped: None,
+        })
     }
 }

@@ -34,7 +34,10 @@ impl FinishedWake {
     /// # Errors
     /// Files that are not there or not those of a wake; a run that has not come to its end.
     pub fn read(folder: &Path) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::Input { path: folder.to_owned(), reason };
+        let refuse = |reason: String| Error::Input {
+            path: folder.to_owned(),
+            reason,
+        };
         let file = CaseFile::read(&folder.join("case.toml"))?;
         let (CaseKind::Wake(flow), Some(output)) = (&file.content.case, &file.content.wake) else {
             return Err(refuse("the case is no wake".into()));
@@ -58,7 +61,10 @@ impl FinishedWake {
         // The last record need not be at the end.
         let last = (output.end_tau / output.every_tau + 1e-6).floor() * output.every_tau;
         if reached < last - 1e-9 {
-            return Err(refuse(format!("the run stands at tau = {reached} of {}", output.end_tau)));
+            return Err(refuse(format!(
+                "the run stands at tau = {reached} of {}",
+                output.end_tau
+            )));
         }
         Ok(wake)
     }
@@ -68,10 +74,13 @@ impl FinishedWake {
     /// # Errors
     /// There is none of that name.
     pub fn column(&self, name: &str) -> Result<&[f64], Error> {
-        self.columns.get(name).map(Vec::as_slice).ok_or_else(|| Error::Input {
-            path: self.folder.clone(),
-            reason: format!("the history of the wake has no column {name}"),
-        })
+        self.columns
+            .get(name)
+            .map(Vec::as_slice)
+            .ok_or_else(|| Error::Input {
+                path: self.folder.clone(),
+                reason: format!("the history of the wake has no column {name}"),
+            })
     }
 
     /// A column against `tau`.
@@ -79,12 +88,23 @@ impl FinishedWake {
     /// # Errors
     /// As [`FinishedWake::column`].
     pub fn curve(&self, name: &str) -> Result<Vec<(f64, f64)>, Error> {
-        Ok(self.column("tau")?.iter().copied().zip(self.column(name)?.iter().copied()).collect())
+        Ok(self
+            .column("tau")?
+            .iter()
+            .copied()
+            .zip(self.column(name)?.iter().copied())
+            .collect())
     }
 
     /// The run in words, its noise among them.
     pub fn words(&self) -> String {
-        let WakeFlow { cells: [x, y, z], reynolds, core_radius, perturbation, .. } = self.flow;
+        let WakeFlow {
+            cells: [x, y, z],
+            reynolds,
+            core_radius,
+            perturbation,
+            ..
+        } = self.flow;
         let subgrid = match self.file.content.solver.subgrid {
             Subgrid::None {} => "no",
             Subgrid::Smagorinsky { .. } => "Smagorinsky's",
@@ -105,14 +125,26 @@ impl FinishedWake {
 /// A file that cannot be read; a value that is no number.
 pub fn table(path: &Path) -> Result<HashMap<String, Vec<f64>>, Error> {
     let text = std::fs::read_to_string(path).map_err(Error::io("read", path))?;
-    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+    let refuse = |reason: String| Error::Input {
+        path: path.to_owned(),
+        reason,
+    };
     let table = TextTable::parse(&text).map_err(&refuse)?;
     let number = |cell: &String| match cell.as_str() {
         "" => Ok(f64::NAN),
-        text => text.parse().map_err(|_| refuse(format!("{text} is no number"))),
+        text => text
+            .parse()
+            .map_err(|_| refuse(format!("{text} is no number"))),
     };
     let column = |(place, name): (usize, &String)| {
-        Ok((name.clone(), table.rows.iter().map(|row| number(&row[place])).collect::<Result<_, Error>>()?))
+        Ok((
+            name.clone(),
+            table
+                .rows
+                .iter()
+                .map(|row| number(&row[place]))
+                .collect::<Result<_, Error>>()?,
+        ))
     };
     table.header.iter().enumerate().map(column).collect()
 }

@@ -24,10 +24,25 @@ struct Kind {
     unit: fn(&WakeScales) -> f64,
 }
 
-const LENGTH: &Kind = &Kind { suffix: "_m", udunits: "m", is_named: false, unit: |s| s.spacing_m };
-const GAMMA: &Kind = &Kind { suffix: "_m2_s", udunits: "m2 s-1", is_named: false, unit: |s| s.circulation_m2_s };
+const LENGTH: &Kind = &Kind {
+    suffix: "_m",
+    udunits: "m",
+    is_named: false,
+    unit: |s| s.spacing_m,
+};
+const GAMMA: &Kind = &Kind {
+    suffix: "_m2_s",
+    udunits: "m2 s-1",
+    is_named: false,
+    unit: |s| s.circulation_m2_s,
+};
 /// The tag of 1/s in column names, which readers of tables know: `_per_s` would read as seconds.
-const RATE: &Kind = &Kind { suffix: "_hz", udunits: "s-1", is_named: false, unit: |s| 1.0 / s.time_unit_s() };
+const RATE: &Kind = &Kind {
+    suffix: "_hz",
+    udunits: "s-1",
+    is_named: false,
+    unit: |s| 1.0 / s.time_unit_s(),
+};
 const ENERGY: &Kind = &Kind {
     suffix: "_m4_s2",
     udunits: "m4 s-2",
@@ -40,34 +55,125 @@ const ENSTROPHY: &Kind = &Kind {
     is_named: true,
     unit: |s| s.descent_speed_m_s() * s.descent_speed_m_s(),
 };
-const NUMBER: &Kind = &Kind { suffix: "", udunits: "1", is_named: false, unit: |_| 1.0 };
+const NUMBER: &Kind = &Kind {
+    suffix: "",
+    udunits: "1",
+    is_named: false,
+    unit: |_| 1.0,
+};
 
-type OfVortex = (&'static str, &'static Kind, &'static str, fn(&VortexRecord) -> f64);
-type OfFlow = (&'static str, &'static Kind, &'static str, fn(&WakeRecord) -> f64);
+type OfVortex = (
+    &'static str,
+    &'static Kind,
+    &'static str,
+    fn(&VortexRecord) -> f64,
+);
+type OfFlow = (
+    &'static str,
+    &'static Kind,
+    &'static str,
+    fn(&WakeRecord) -> f64,
+);
 
 /// Numbers of each vortex with what they are; the first is the one whose ratio to its start is given, too.
 const VORTEX: [OfVortex; 12] = [
     // Name and text have the radii of the case.
-    ("gamma", GAMMA, "circulation averaged over radii", |v| v.gamma_5_15_m2_s),
-    ("y", LENGTH, "lateral position of the centroid of axial vorticity", |v| v.y_m),
-    ("z", LENGTH, "height of the centroid of axial vorticity", |v| v.z_m),
-    ("y_spread", LENGTH, "standard deviation along x of the lateral position", |v| v.y_spread_m),
-    ("z_spread", LENGTH, "standard deviation along x of the height", |v| v.z_spread_m),
-    ("gamma_opposite", GAMMA, "vorticity of the other sign on this side", |v| v.gamma_opposite_m2_s),
-    ("secondary_gamma", GAMMA, "circulation of the secondary vortex", |v| v.secondary.gamma_m2_s),
-    ("secondary_y", LENGTH, "lateral position of the secondary vortex", |v| v.secondary.y_m),
-    ("secondary_z", LENGTH, "height of the secondary vortex", |v| v.secondary.z_m),
-    ("secondary_y_spread", LENGTH, "standard deviation along x of its lateral position", |v| v.secondary.y_spread_m),
-    ("secondary_z_spread", LENGTH, "standard deviation along x of its height", |v| v.secondary.z_spread_m),
-    ("outward_shear", RATE, "least shear at the ground of the outward velocity", |v| v.outward_shear_per_s),
+    ("gamma", GAMMA, "circulation averaged over radii", |v| {
+        v.gamma_5_15_m2_s
+    }),
+    (
+        "y",
+        LENGTH,
+        "lateral position of the centroid of axial vorticity",
+        |v| v.y_m,
+    ),
+    (
+        "z",
+        LENGTH,
+        "height of the centroid of axial vorticity",
+        |v| v.z_m,
+    ),
+    (
+        "y_spread",
+        LENGTH,
+        "standard deviation along x of the lateral position",
+        |v| v.y_spread_m,
+    ),
+    (
+        "z_spread",
+        LENGTH,
+        "standard deviation along x of the height",
+        |v| v.z_spread_m,
+    ),
+    (
+        "gamma_opposite",
+        GAMMA,
+        "vorticity of the other sign on this side",
+        |v| v.gamma_opposite_m2_s,
+    ),
+    (
+        "secondary_gamma",
+        GAMMA,
+        "circulation of the secondary vortex",
+        |v| v.secondary.gamma_m2_s,
+    ),
+    (
+        "secondary_y",
+        LENGTH,
+        "lateral position of the secondary vortex",
+        |v| v.secondary.y_m,
+    ),
+    (
+        "secondary_z",
+        LENGTH,
+        "height of the secondary vortex",
+        |v| v.secondary.z_m,
+    ),
+    (
+        "secondary_y_spread",
+        LENGTH,
+        "standard deviation along x of its lateral position",
+        |v| v.secondary.y_spread_m,
+    ),
+    (
+        "secondary_z_spread",
+        LENGTH,
+        "standard deviation along x of its height",
+        |v| v.secondary.z_spread_m,
+    ),
+    (
+        "outward_shear",
+        RATE,
+        "least shear at the ground of the outward velocity",
+        |v| v.outward_shear_per_s,
+    ),
 ];
 /// Numbers of the flow with what they are.
 const FLOW: [OfFlow; 5] = [
-    ("energy", ENERGY, "kinetic energy per length of x", |r| r.energy_m4_s2),
-    ("energy_3d", ENERGY, "kinetic energy of all that varies along x, per length of x", |r| r.energy_3d_m4_s2()),
-    ("enstrophy", ENSTROPHY, "half the integral of the squared vorticity, per length of x", |r| r.enstrophy_m2_s2),
-    ("wall_shear", RATE, "largest shear at the ground", |r| r.wall_shear_per_s),
-    ("wall_units", NUMBER, "height of the first centre in wall units of that shear", |r| r.wall_units),
+    ("energy", ENERGY, "kinetic energy per length of x", |r| {
+        r.energy_m4_s2
+    }),
+    (
+        "energy_3d",
+        ENERGY,
+        "kinetic energy of all that varies along x, per length of x",
+        |r| r.energy_3d_m4_s2(),
+    ),
+    (
+        "enstrophy",
+        ENSTROPHY,
+        "half the integral of the squared vorticity, per length of x",
+        |r| r.enstrophy_m2_s2,
+    ),
+    ("wall_shear", RATE, "largest shear at the ground", |r| {
+        r.wall_shear_per_s
+    }),
+    (
+        "wall_units",
+        NUMBER,
+        "height of the first centre in wall units of that shear",
+        |r| r.wall_units,
+    ),
 ];
 const SIDES: [&str; 2] = ["left", "right"];
 /// Axial modes as columns of the table and variables of the same names; the list in NetCDF has all.
@@ -102,7 +208,12 @@ pub(in super::super) struct WakeRun {
 impl WakeRun {
     /// An empty history of flows on the mesh of `flow`.
     pub(in super::super) fn new(setup: WakeSetup, flow: &Flow) -> Self {
-        Self { radius_m: setup.meter.radii_m(), x_m: flow.mesh().centre_m(0), rows: Vec::new(), setup }
+        Self {
+            radius_m: setup.meter.radii_m(),
+            x_m: flow.mesh().centre_m(0),
+            rows: Vec::new(),
+            setup,
+        }
     }
 
     /// Axial modes of a record.
@@ -120,7 +231,12 @@ impl WakeRun {
 
     /// Takes back what [`Self::kept`] gave.
     pub(in super::super) fn restore(&mut self, bytes: &[u8]) -> Option<()> {
-        let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let numbers: Vec<f64> = bytes
+            .as_chunks::<8>()
+            .0
+            .iter()
+            .map(|b| f64::from_le_bytes(*b))
+            .collect();
         let (state, rows) = numbers.split_first_chunk::<12>()?;
         let [.., length] = self.starts();
         if rows.len() % length != 0 || !bytes.len().is_multiple_of(8) {
@@ -134,7 +250,11 @@ impl WakeRun {
     /// What a checkpoint must keep.
     pub(in super::super) fn kept(&self) -> Vec<u8> {
         let state = self.setup.meter.state();
-        state.iter().chain(self.rows.iter().flatten()).flat_map(|x| x.to_le_bytes()).collect()
+        state
+            .iter()
+            .chain(self.rows.iter().flatten())
+            .flat_map(|x| x.to_le_bytes())
+            .collect()
     }
 
     /// Measures the flow, for which all ranks must ask together.
@@ -147,29 +267,63 @@ impl WakeRun {
     /// The numbers that tables have, those over their first value first.
     fn columns(&self) -> Vec<Column> {
         let [from, to] = self.setup.circulation_radii_m;
-        let radii = [format!("_{from}_{to}").replace('.', "p"), format!(" from {from:?} to {to:?} m")];
+        let radii = [
+            format!("_{from}_{to}").replace('.', "p"),
+            format!(" from {from:?} to {to:?} m"),
+        ];
         let mut out = Vec::new();
-        let mut add = |name: String, kind, text: String, values| out.push(Column { name, kind, text, values });
+        let mut add = |name: String, kind, text: String, values| {
+            out.push(Column {
+                name,
+                kind,
+                text,
+                values,
+            })
+        };
         for (side, which) in SIDES.iter().enumerate() {
             let gamma = self.column(1 + side * VORTEX.len());
             let first = gamma.first().copied().unwrap_or(f64::NAN);
             let text = format!("{}{}, over its first value", VORTEX[0].2, radii[1]);
-            add(format!("gamma_ratio_{which}"), NUMBER, text, gamma.iter().map(|g| g / first).collect());
+            add(
+                format!("gamma_ratio_{which}"),
+                NUMBER,
+                text,
+                gamma.iter().map(|g| g / first).collect(),
+            );
         }
         for (side, which) in SIDES.iter().enumerate() {
             for (i, (name, kind, text, _)) in VORTEX.iter().enumerate() {
-                let [in_name, in_text] = if i == 0 { radii.clone() } else { Default::default() };
+                let [in_name, in_text] = if i == 0 {
+                    radii.clone()
+                } else {
+                    Default::default()
+                };
                 let values = self.column(1 + side * VORTEX.len() + i);
-                add(format!("{name}{in_name}_{which}"), kind, format!("{which} vortex: {text}{in_text}"), values);
+                add(
+                    format!("{name}{in_name}_{which}"),
+                    kind,
+                    format!("{which} vortex: {text}{in_text}"),
+                    values,
+                );
             }
         }
         for (i, (name, kind, text, _)) in FLOW.iter().enumerate() {
-            add((*name).into(), kind, (*text).into(), self.column(1 + 2 * VORTEX.len() + i));
+            add(
+                (*name).into(),
+                kind,
+                (*text).into(),
+                self.column(1 + 2 * VORTEX.len() + i),
+            );
         }
         let [.., modes, _] = self.starts();
         for mode in 0..self.modes().min(TABLE_MODES + 1) {
             let text = format!("kinetic energy of axial mode {mode}, per length of x");
-            add(format!("energy_mode_{mode}"), ENERGY, text, self.column(modes + mode));
+            add(
+                format!("energy_mode_{mode}"),
+                ENERGY,
+                text,
+                self.column(modes + mode),
+            );
         }
         out
     }
@@ -180,29 +334,47 @@ impl WakeRun {
 
     fn tau(&self) -> Vec<f64> {
         let time_unit_s = self.setup.scales.time_unit_s();
-        self.rows.iter().map(|row| super::super::age_tau(row[0], 1.0 / time_unit_s)).collect()
+        self.rows
+            .iter()
+            .map(|row| super::super::age_tau(row[0], 1.0 / time_unit_s))
+            .collect()
     }
 
     /// The history in SI units: the columns of which NetCDF has a variable each.
     fn table(&self) -> Table {
-        let table = Table::new().float("tau", self.tau()).float("time_s", self.column(0));
+        let table = Table::new()
+            .float("tau", self.tau())
+            .float("time_s", self.column(0));
         let named = |c: Column| (format!("{}{}", c.name, c.kind.suffix), c.values);
-        self.columns().into_iter().map(named).fold(table, |table, (name, values)| table.float(&name, values))
+        self.columns()
+            .into_iter()
+            .map(named)
+            .fold(table, |table, (name, values)| table.float(&name, values))
     }
 
     /// The history in the scales of the pair, circulations in `Gamma0`.
     fn scaled_table(&self) -> Table {
         let table = Table::new().float("tau", self.tau());
-        self.columns().iter().skip(SIDES.len()).fold(table, |table, column| {
-            let unit = (column.kind.unit)(&self.setup.scales);
-            table.float(&column.name, column.values.iter().map(|value| value / unit))
-        })
+        self.columns()
+            .iter()
+            .skip(SIDES.len())
+            .fold(table, |table, column| {
+                let unit = (column.kind.unit)(&self.setup.scales);
+                table.float(&column.name, column.values.iter().map(|value| value / unit))
+            })
     }
 
     /// Writes the tables of the history so far.
-    pub(in super::super) fn write_tables(&self, folder: &Path, origin: &Provenance) -> Result<(), Error> {
+    pub(in super::super) fn write_tables(
+        &self,
+        folder: &Path,
+        origin: &Provenance,
+    ) -> Result<(), Error> {
         write_atomic(&folder.join(TABLE), self.table().to_csv(origin)?)?;
-        Ok(write_atomic(&folder.join(SCALED_TABLE), self.scaled_table().to_csv(origin)?)?)
+        Ok(write_atomic(
+            &folder.join(SCALED_TABLE),
+            self.scaled_table().to_csv(origin)?,
+        )?)
     }
 
     /// Writes all files of the whole history.
@@ -215,19 +387,65 @@ impl WakeRun {
     fn netcdf(&self, origin: &Provenance) -> Result<Vec<u8>, Error> {
         use crate::io::netcdf::{Data, Layout, Variable};
         let [gamma, slices, modes, end] = self.starts();
-        let part =
-            |from: usize, to: usize| self.rows.iter().flat_map(|row| row[from..to].to_vec()).collect::<Vec<f64>>();
-        let lists = |name: &str, dims: &'static [&'static str], values: Vec<f64>, units: &str, long_name: &str| {
-            Variable::new(name, dims, Data::f64(values)).text("units", units).text("long_name", long_name)
+        let part = |from: usize, to: usize| {
+            self.rows
+                .iter()
+                .flat_map(|row| row[from..to].to_vec())
+                .collect::<Vec<f64>>()
+        };
+        let lists = |name: &str,
+                     dims: &'static [&'static str],
+                     values: Vec<f64>,
+                     units: &str,
+                     long_name: &str| {
+            Variable::new(name, dims, Data::f64(values))
+                .text("units", units)
+                .text("long_name", long_name)
         };
         let middle = slices + 2 * self.x_m.len();
         let mut variables = vec![
-            lists("tau", &["tau"], self.tau(), "1", "age of the wake, t Gamma0 / (2 pi b0^2)"),
-            lists("time", &["tau"], self.column(0), "s", "time since the start of the flow"),
-            lists("radius", &["radius"], self.radius_m.clone(), "m", "radius of a circle about the centre of a vortex"),
-            lists("x", &["x"], self.x_m.clone(), "m", "position along the flight direction"),
-            lists("vortex", &["vortex"], vec![0.0, 1.0], "1", "0: began at smaller y; 1: at larger y"),
-            lists("mode", &["mode"], (0..self.modes()).map(|m| m as f64).collect(), "1", "waves along x in the box"),
+            lists(
+                "tau",
+                &["tau"],
+                self.tau(),
+                "1",
+                "age of the wake, t Gamma0 / (2 pi b0^2)",
+            ),
+            lists(
+                "time",
+                &["tau"],
+                self.column(0),
+                "s",
+                "time since the start of the flow",
+            ),
+            lists(
+                "radius",
+                &["radius"],
+                self.radius_m.clone(),
+                "m",
+                "radius of a circle about the centre of a vortex",
+            ),
+            lists(
+                "x",
+                &["x"],
+                self.x_m.clone(),
+                "m",
+                "position along the flight direction",
+            ),
+            lists(
+                "vortex",
+                &["vortex"],
+                vec![0.0, 1.0],
+                "1",
+                "0: began at smaller y; 1: at larger y",
+            ),
+            lists(
+                "mode",
+                &["mode"],
+                (0..self.modes()).map(|m| m as f64).collect(),
+                "1",
+                "waves along x in the box",
+            ),
             lists(
                 "gamma",
                 &["tau", "vortex", "radius"],
@@ -235,8 +453,20 @@ impl WakeRun {
                 "m2 s-1",
                 "circulation of the flow averaged along x; NaN where the circle leaves the flow",
             ),
-            lists("y_centre", &["tau", "vortex", "x"], part(slices, middle), "m", "lateral position of the vortex"),
-            lists("z_centre", &["tau", "vortex", "x"], part(middle, modes), "m", "height of the vortex"),
+            lists(
+                "y_centre",
+                &["tau", "vortex", "x"],
+                part(slices, middle),
+                "m",
+                "lateral position of the vortex",
+            ),
+            lists(
+                "z_centre",
+                &["tau", "vortex", "x"],
+                part(middle, modes),
+                "m",
+                "height of the vortex",
+            ),
             lists(
                 "mode_energy",
                 &["tau", "mode"],
@@ -246,7 +476,11 @@ impl WakeRun {
             ),
         ];
         variables.extend(self.columns().into_iter().map(|c| {
-            let name = if c.kind.is_named { format!("{}{}", c.name, c.kind.suffix) } else { c.name };
+            let name = if c.kind.is_named {
+                format!("{}{}", c.name, c.kind.suffix)
+            } else {
+                c.name
+            };
             lists(&name, &["tau"], c.values, c.kind.udunits, &c.text).text("coordinates", "time")
         }));
         let dims = vec![
@@ -257,9 +491,18 @@ impl WakeRun {
             ("mode", self.modes()),
         ];
         let mut layout = Layout::cf("History of a simulated wake", dims, variables, origin);
-        let WakeScales { spacing_m, circulation_m2_s, .. } = self.setup.scales;
-        let scales = [("spacing_m", spacing_m), ("circulation_m2_s", circulation_m2_s)];
-        layout.globals.extend(scales.map(|(name, value)| (name, format!("{value:?}"))));
+        let WakeScales {
+            spacing_m,
+            circulation_m2_s,
+            ..
+        } = self.setup.scales;
+        let scales = [
+            ("spacing_m", spacing_m),
+            ("circulation_m2_s", circulation_m2_s),
+        ];
+        layout
+            .globals
+            .extend(scales.map(|(name, value)| (name, format!("{value:?}"))));
         Ok(layout.into_bytes(origin)?)
     }
 }
@@ -268,11 +511,19 @@ impl WakeRun {
 fn row(record: &WakeRecord) -> Vec<f64> {
     let vortices = [&record.left, &record.right];
     let mut row = vec![record.time_s];
-    row.extend(vortices.iter().flat_map(|v| VORTEX.map(|(_, _, _, of)| of(v))));
+    row.extend(
+        vortices
+            .iter()
+            .flat_map(|v| VORTEX.map(|(_, _, _, of)| of(v))),
+    );
     row.extend(FLOW.map(|(_, _, _, of)| of(record)));
     row.extend(vortices.iter().flat_map(|v| v.gamma_m2_s.iter()));
     for c in 0..2 {
-        row.extend(vortices.iter().flat_map(|v| v.slices_m.iter().map(move |slice| slice[c])));
+        row.extend(
+            vortices
+                .iter()
+                .flat_map(|v| v.slices_m.iter().map(move |slice| slice[c])),
+        );
     }
     row.extend(&record.mode_energy_m4_s2);
     row

@@ -34,7 +34,9 @@ impl WakeOutput {
         }
         self.fields_tau.get_or_insert_with(|| {
             let whole = (1..=WHOLE_AGES).map(|tau| tau as f64);
-            let ages = std::iter::once(0.5).chain(whole).take_while(|tau| *tau < end);
+            let ages = std::iter::once(0.5)
+                .chain(whole)
+                .take_while(|tau| *tau < end);
             ages.chain(std::iter::once(end)).collect()
         });
         self.planes_tau.get_or_insert_with(|| vec![0.5 * end, end]);
@@ -43,11 +45,18 @@ impl WakeOutput {
     /// Ends at another age: lists of fields and planes that the case has not of its own follow the new one, others lose what lies
     /// behind it.
     pub(in super::super) fn end_at(&mut self, end_tau: f64, is_own: [bool; 2]) {
-        for (list, is_own) in [&mut self.fields_tau, &mut self.planes_tau].into_iter().zip(is_own) {
+        for (list, is_own) in [&mut self.fields_tau, &mut self.planes_tau]
+            .into_iter()
+            .zip(is_own)
+        {
             *list = list.take().filter(|_| is_own);
-            list.iter_mut().for_each(|list| list.retain(|tau| *tau <= end_tau));
+            list.iter_mut()
+                .for_each(|list| list.retain(|tau| *tau <= end_tau));
         }
-        self.series_tau = self.series_tau.map(|[from, to]| [from, to.min(end_tau)]).filter(|[from, to]| to > from);
+        self.series_tau = self
+            .series_tau
+            .map(|[from, to]| [from, to.min(end_tau)])
+            .filter(|[from, to]| to > from);
         self.end_tau = end_tau;
         self.complete();
     }
@@ -56,20 +65,37 @@ impl WakeOutput {
     pub(in super::super) fn idle(&self) -> Option<String> {
         let (end, every) = (self.end_tau, self.every_tau);
         let rows = end / every;
-        ((rows - rows.round()).abs() > 1e-6)
-            .then(|| format!("wake.every_tau = {every:?} does not divide the end, {end:?}: there is no row of it"))
+        ((rows - rows.round()).abs() > 1e-6).then(|| {
+            format!(
+                "wake.every_tau = {every:?} does not divide the end, {end:?}: there is no row of it"
+            )
+        })
     }
 
     pub(in super::super) fn check(&self, p: &mut Checker<'_>) {
         let end = self.end_tau;
-        let within =
-            |list: &[f64]| list.windows(2).all(|w| w[1] > w[0]) && list.iter().all(|tau| (0.0..=end).contains(tau));
-        for (key, list) in [("wake.fields_tau", &self.fields_tau), ("wake.planes_tau", &self.planes_tau)] {
+        let within = |list: &[f64]| {
+            list.windows(2).all(|w| w[1] > w[0]) && list.iter().all(|tau| (0.0..=end).contains(tau))
+        };
+        for (key, list) in [
+            ("wake.fields_tau", &self.fields_tau),
+            ("wake.planes_tau", &self.planes_tau),
+        ] {
             let list = list.as_deref().unwrap_or_default();
-            p.require(within(list), key, list, "increasing, from 0 to wake.end_tau");
+            p.require(
+                within(list),
+                key,
+                list,
+                "increasing, from 0 to wake.end_tau",
+            );
         }
         if let Some(range) = self.series_tau {
-            p.require(within(&range), "wake.series_tau", range, "two ages that increase, from 0 to wake.end_tau");
+            p.require(
+                within(&range),
+                "wake.series_tau",
+                range,
+                "two ages that increase, from 0 to wake.end_tau",
+            );
         }
     }
 }

@@ -8,15 +8,21 @@ use crate::Error;
 use crate::io::fields_input::{FieldPlace, read_scalar};
 use crate::io::{CrossPlanes, FileGroup, planes_input};
 use crate::plot::{
-    Axis, Cells, ColourMap, CurvePlot, Figure, IsosurfacePlot, MapPlot, Panel, Series, Style, Surface, Volume, apng,
+    Axis, Cells, ColourMap, CurvePlot, Figure, IsosurfacePlot, MapPlot, Panel, Series, Style,
+    Surface, Volume, apng,
 };
 use std::path::PathBuf;
 use wakescope_les::VortexPair;
 use wakescope_les::winds::VolumeComponent;
 
 /// Names of the pictures.
-pub(in super::super) const PICTURES: [&str; 5] =
-    ["wake.svg", "wake.png", "surfaces.svg", "surfaces.png", "plane1.apng"];
+pub(in super::super) const PICTURES: [&str; 5] = [
+    "wake.svg",
+    "wake.png",
+    "surfaces.svg",
+    "surfaces.png",
+    "plane1.apng",
+];
 
 /// How long a cross-plane is shown, s.
 const FRAME_S: f64 = 0.15;
@@ -33,9 +39,17 @@ impl FinishedWake {
     /// # Errors
     /// A history without these columns.
     pub fn circulation_plot(&self) -> Result<CurvePlot, Error> {
-        let mut plot = CurvePlot::new("", Axis::linear("τ"), Axis::linear("Γ_{5-15}(τ)/Γ_{5-15}(0)"));
+        let mut plot = CurvePlot::new(
+            "",
+            Axis::linear("τ"),
+            Axis::linear("Γ_{5-15}(τ)/Γ_{5-15}(0)"),
+        );
         for side in SIDES {
-            plot = plot.with(Series::new(side, Style::Line, self.curve(&format!("gamma_ratio_{side}"))?));
+            plot = plot.with(Series::new(
+                side,
+                Style::Line,
+                self.curve(&format!("gamma_ratio_{side}"))?,
+            ));
         }
         Ok(plot)
     }
@@ -48,7 +62,9 @@ impl FinishedWake {
         let mut plot = CurvePlot::new("", Axis::linear("y/b₀"), Axis::linear("z/b₀"));
         for side in SIDES {
             let y = self.column(&format!("y_{side}"))?.iter().copied();
-            let path: Vec<(f64, f64)> = y.zip(self.column(&format!("z_{side}"))?.iter().copied()).collect();
+            let path: Vec<(f64, f64)> = y
+                .zip(self.column(&format!("z_{side}"))?.iter().copied())
+                .collect();
             plot = plot.with(Series::new(side, Style::Line, path));
         }
         Ok(plot)
@@ -86,7 +102,8 @@ impl FinishedWake {
         for (name, path) in ["inviscid", ""].into_iter().zip(self.inviscid_path()?) {
             paths = paths.with(Series::new(name, Style::Dash, path).in_colour(2));
         }
-        let mut figure = Figure::side_by_side([self.circulation_plot()?, paths]).titled(&self.words());
+        let mut figure =
+            Figure::side_by_side([self.circulation_plot()?, paths]).titled(&self.words());
         figure.width = 1200.0;
         let mut pictures = vec![("wake", figure)];
         pictures.extend(self.surfaces_figure()?.map(|figure| ("surfaces", figure)));
@@ -113,23 +130,39 @@ impl FinishedWake {
             if !path.exists() {
                 return Ok(None);
             }
-            let place = FieldPlace { path, place: Some(0), time_s: 0.0 };
-            let VolumeComponent { nodes_m: [x, y, z], values } = read_scalar(&place, "vorticity_magnitude")?;
+            let place = FieldPlace {
+                path,
+                place: Some(0),
+                time_s: 0.0,
+            };
+            let VolumeComponent {
+                nodes_m: [x, y, z],
+                values,
+            } = read_scalar(&place, "vorticity_magnitude")?;
             let (scales, unit_per_s) = (self.scales, self.scales.vorticity_per_s());
             let length = self.flow.size[0];
             let nx = x.len();
-            let repeated =
-                (0..REPEATS * nx + 1).map(|i| x[i % nx] / scales.spacing_m + (i / nx) as f64 * length).collect();
+            let repeated = (0..REPEATS * nx + 1)
+                .map(|i| x[i % nx] / scales.spacing_m + (i / nx) as f64 * length)
+                .collect();
             let rows = values.chunks(nx);
-            let values =
-                rows.flat_map(|row| (0..REPEATS * nx + 1).map(|i| (row[i % nx] / unit_per_s) as f32)).collect();
+            let values = rows
+                .flat_map(|row| (0..REPEATS * nx + 1).map(|i| (row[i % nx] / unit_per_s) as f32))
+                .collect();
             let in_b0 = |axis: Vec<f64>| axis.into_iter().map(|a| a / scales.spacing_m).collect();
             let volume = Volume::new([repeated, in_b0(y), in_b0(z)], values)?;
-            let surface = |level: f64, colour, opacity| Surface { level, colour, opacity };
+            let surface = |level: f64, colour, opacity| Surface {
+                level,
+                colour,
+                opacity,
+            };
             panels.push(Panel::Surfaces(IsosurfacePlot {
                 title: format!("τ = {tau}"),
                 volume,
-                surfaces: vec![surface(1.0, [120, 170, 215], 0.35), surface(10.0, [200, 60, 40], 1.0)],
+                surfaces: vec![
+                    surface(1.0, [120, 170, 215], 0.35),
+                    surface(10.0, [200, 60, 40], 1.0),
+                ],
                 view_rad: [-0.55, 0.35],
             }));
         }
@@ -155,7 +188,10 @@ impl FinishedWake {
         for path in planes_input::files(&name)? {
             let planes = planes_input::read(&path)?;
             for (place, tau) in planes.tau.iter().enumerate() {
-                let vorticity = axial_vorticity_per_s(&planes, place).into_iter().map(|w| w / unit_per_s).collect();
+                let vorticity = axial_vorticity_per_s(&planes, place)
+                    .into_iter()
+                    .map(|w| w / unit_per_s)
+                    .collect();
                 let cells = Cells::of_plane(&planes.y_m, &planes.z_m, vorticity);
                 let map = MapPlot::of_cells(cells, "ω_{x} b₀²/Γ₀", true)
                     .coloured(ColourMap::Diverging { limit: 10.0 })
@@ -181,7 +217,10 @@ fn axial_vorticity_per_s(planes: &CrossPlanes, place: usize) -> Vec<f64> {
             let (left, right) = (j.saturating_sub(1), (j + 1).min(ny - 1));
             let dw = planes.w_m_s[[place, k, right]] - planes.w_m_s[[place, k, left]];
             let dv = planes.v_m_s[[place, high, j]] - planes.v_m_s[[place, low, j]];
-            out.push(dw / (planes.y_m[right] - planes.y_m[left]) - dv / (planes.z_m[high] - planes.z_m[low]));
+            out.push(
+                dw / (planes.y_m[right] - planes.y_m[left])
+                    - dv / (planes.z_m[high] - planes.z_m[low]),
+            );
         }
     }
     out
@@ -198,29 +237,44 @@ mod tests {
     #[test]
     fn a_finished_wake_is_drawn_and_an_unfinished_one_is_refused() {
         let mut case = WakePreset::Coarse.case();
-        let CaseKind::Wake(wake) = &mut case.case else { panic!("a wake") };
+        let CaseKind::Wake(wake) = &mut case.case else {
+            panic!("a wake")
+        };
         wake.cells = [4, 16, 12];
         if let Some(output) = &mut case.wake {
             (output.end_tau, output.every_tau) = (0.04, 0.02);
             output.fields_tau = Some(vec![0.04]);
             output.planes_tau = Some(vec![0.0, 0.04]);
         }
-        let file = |case: &FlowCase| CaseFile::parse(&toml::to_string(case).unwrap(), Path::new("case.toml")).unwrap();
+        let file = |case: &FlowCase| {
+            CaseFile::parse(&toml::to_string(case).unwrap(), Path::new("case.toml")).unwrap()
+        };
         let folder = tempfile::tempdir().unwrap();
         case.time.pause_after_steps = Some(1);
         run(&file(&case), folder.path(), Begin::New, &Silent).unwrap();
-        assert!(FinishedWake::read(folder.path()).unwrap_err().to_string().contains("the run stands at tau = "));
+        assert!(
+            FinishedWake::read(folder.path())
+                .unwrap_err()
+                .to_string()
+                .contains("the run stands at tau = ")
+        );
         case.time.pause_after_steps = None;
         run(&file(&case), folder.path(), Begin::Restart, &Silent).unwrap();
         let wake = FinishedWake::read(folder.path()).unwrap();
         let written = wake.draw().unwrap();
-        let names: Vec<_> = written.iter().map(|path| path.file_name().unwrap().to_str().unwrap()).collect();
+        let names: Vec<_> = written
+            .iter()
+            .map(|path| path.file_name().unwrap().to_str().unwrap())
+            .collect();
         let count = 5;
         assert_eq!(names, PICTURES[..count]);
         // The pair begins where the inviscid one does and has hardly sunk.
         let [left, right] = wake.inviscid_path().unwrap();
         for (found, expected) in [(left[0], (-0.5, 1.0)), (right[0], (0.5, 1.0))] {
-            assert!((found.0 - expected.0).hypot(found.1 - expected.1) < 1e-12, "{found:?}");
+            assert!(
+                (found.0 - expected.0).hypot(found.1 - expected.1) < 1e-12,
+                "{found:?}"
+            );
         }
         let sunk = 1.0 - right.last().unwrap().1;
         assert!((sunk - 0.04).abs() < 0.01, "{sunk}: about tau at first");
@@ -229,28 +283,47 @@ mod tests {
     #[test]
     fn fields_and_planes_of_a_run_come_back() {
         let mut case = WakePreset::Coarse.case();
-        let CaseKind::Wake(wake) = &mut case.case else { panic!("a wake") };
+        let CaseKind::Wake(wake) = &mut case.case else {
+            panic!("a wake")
+        };
         wake.cells = [4, 16, 12];
         if let Some(output) = &mut case.wake {
             output.end_tau = 0.02;
             output.fields_tau = Some(vec![0.02]);
             output.planes_tau = Some(vec![0.0, 0.02]);
         }
-        let file = CaseFile::parse(&toml::to_string(&case).unwrap(), Path::new("case.toml")).unwrap();
+        let file =
+            CaseFile::parse(&toml::to_string(&case).unwrap(), Path::new("case.toml")).unwrap();
         let folder = tempfile::tempdir().unwrap();
         let outcome = run(&file, folder.path(), Begin::New, &Silent).unwrap();
         let path = folder.path().join("fields_0001.nc");
-        let [place] = &places(&path, "vorticity_magnitude").unwrap()[..] else { panic!("one time") };
+        let [place] = &places(&path, "vorticity_magnitude").unwrap()[..] else {
+            panic!("one time")
+        };
         let field = read_scalar(place, "vorticity_magnitude").unwrap();
         assert_eq!(field.nodes_m.each_ref().map(Vec::len), [4, 16, 12]);
         assert!((place.time_s - outcome.time_s).abs() < 1e-9);
         // The core turns by Gamma0/(pi r_c^2) at its centre; three cells see part of it.
         let largest = field.values.iter().copied().fold(0.0, f64::max);
         let core_per_s = 500.0 / (std::f64::consts::PI * 4.7_f64.powi(2));
-        assert!(largest > 0.05 * core_per_s && largest < 3.0 * core_per_s, "{largest} of {core_per_s}");
+        assert!(
+            largest > 0.05 * core_per_s && largest < 3.0 * core_per_s,
+            "{largest} of {core_per_s}"
+        );
         let planes = planes_input::files(&folder.path().join("plane1")).unwrap();
-        assert_eq!(planes.iter().map(|path| planes_input::read(path).unwrap().tau.len()).sum::<usize>(), 2);
-        assert!(read_scalar(place, "nothing").unwrap_err().to_string().contains("nothing"));
+        assert_eq!(
+            planes
+                .iter()
+                .map(|path| planes_input::read(path).unwrap().tau.len())
+                .sum::<usize>(),
+            2
+        );
+        assert!(
+            read_scalar(place, "nothing")
+                .unwrap_err()
+                .to_string()
+                .contains("nothing")
+        );
         assert!(planes_input::files(&folder.path().join("plane7")).is_err());
     }
 }

@@ -35,7 +35,11 @@ impl WakePreset {
         match self {
             Self::Coarse => WakeFlow::default(),
             // Case B of the independent reference, the same flow in a wider box.
-            Self::Medium => WakeFlow { cells: [48, 240, 128], size: [1.0, 5.0, 2.5], ..WakeFlow::default() },
+            Self::Medium => WakeFlow {
+                cells: [48, 240, 128],
+                size: [1.0, 5.0, 2.5],
+                ..WakeFlow::default()
+            },
             Self::Fine => refined([64, 256, 144], [1.0, 5.0, 2.5], 2.0),
             Self::Chapter => refined([128, 432, 224], [2.0, 6.0, 3.0], 2.2),
         }
@@ -45,12 +49,21 @@ impl WakePreset {
     pub fn case(self) -> FlowCase {
         let subgrid = match self {
             Self::Coarse | Self::Medium => Subgrid::None {},
-            Self::Fine | Self::Chapter => Subgrid::MultiscaleWale { constant: None, order: None },
+            Self::Fine | Self::Chapter => Subgrid::MultiscaleWale {
+                constant: None,
+                order: None,
+            },
         };
         FlowCase {
             case: CaseKind::Wake(Box::new(self.flow())),
-            solver: Solver { subgrid, ..Solver::default() },
-            output: Output { fields: vec![FileFormat::Netcdf], ..Output::default() },
+            solver: Solver {
+                subgrid,
+                ..Solver::default()
+            },
+            output: Output {
+                fields: vec![FileFormat::Netcdf],
+                ..Output::default()
+            },
             wake: Some(WakeOutput::default()),
             ..FlowCase::default()
         }

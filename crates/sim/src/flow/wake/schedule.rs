@@ -28,7 +28,13 @@ pub(in super::super) struct Schedule {
 impl Schedule {
     /// Fields and planes at all times.
     pub(in super::super) fn plain(times_s: Vec<f64>) -> Self {
-        let due = (0..times_s.len()).map(|i| Due { record: false, fields: Some(i), planes: Some(i) }).collect();
+        let due = (0..times_s.len())
+            .map(|i| Due {
+                record: false,
+                fields: Some(i),
+                planes: Some(i),
+            })
+            .collect();
         Self { times_s, due }
     }
 
@@ -37,23 +43,42 @@ impl Schedule {
         let end_tau = end_s * tau_per_s;
         let every = |[from, to]: [f64; 2], step: f64| {
             let count = ((to - from) / step + SAME).floor() as usize;
-            (0..=count).map(move |i| from + i as f64 * step).collect::<Vec<f64>>()
+            (0..=count)
+                .map(move |i| from + i as f64 * step)
+                .collect::<Vec<f64>>()
         };
         let mut planes = output.planes_tau.clone().unwrap_or_default();
-        planes.extend(output.series_tau.map(|range| every(range, output.series_every_tau)).unwrap_or_default());
-        let lists = [every([0.0, end_tau], output.every_tau), output.fields_tau.clone().unwrap_or_default(), planes];
-        let mut all: Vec<(f64, usize)> =
-            lists.iter().enumerate().flat_map(|(kind, list)| list.iter().map(move |tau| (*tau, kind))).collect();
+        planes.extend(
+            output
+                .series_tau
+                .map(|range| every(range, output.series_every_tau))
+                .unwrap_or_default(),
+        );
+        let lists = [
+            every([0.0, end_tau], output.every_tau),
+            output.fields_tau.clone().unwrap_or_default(),
+            planes,
+        ];
+        let mut all: Vec<(f64, usize)> = lists
+            .iter()
+            .enumerate()
+            .flat_map(|(kind, list)| list.iter().map(move |tau| (*tau, kind)))
+            .collect();
         all.retain(|(tau, _)| *tau <= end_tau + SAME);
         all.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let mut schedule = Self { times_s: Vec::new(), due: Vec::new() };
+        let mut schedule = Self {
+            times_s: Vec::new(),
+            due: Vec::new(),
+        };
         let (mut last, mut fields, mut planes) = (f64::NEG_INFINITY, 0..usize::MAX, 0..usize::MAX);
         for (tau, kind) in all {
             if tau - last > SAME {
                 last = tau;
                 // The last age may be the end but for rounding.
                 let is_end = (tau - end_tau).abs() <= SAME;
-                schedule.times_s.push(if is_end { end_s } else { tau / tau_per_s });
+                schedule
+                    .times_s
+                    .push(if is_end { end_s } else { tau / tau_per_s });
                 schedule.due.push(Due::default());
             }
             if let Some(due) = schedule.due.last_mut() {
@@ -85,9 +110,20 @@ mod tests {
         let schedule = Schedule::of_wake(&output, 0.1, 20.0);
         let expected = [0.0, 2.5, 5.0, 10.0, 12.5, 15.0, 20.0];
         assert_eq!(schedule.times_s.len(), expected.len());
-        assert!(schedule.times_s.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-9), "{:?}", schedule.times_s);
+        assert!(
+            schedule
+                .times_s
+                .iter()
+                .zip(expected)
+                .all(|(a, b)| (a - b).abs() < 1e-9),
+            "{:?}",
+            schedule.times_s
+        );
         let planes: Vec<Option<usize>> = schedule.due.iter().map(|d| d.planes).collect();
-        assert_eq!(planes, [None, Some(0), None, Some(1), Some(2), Some(3), None]);
+        assert_eq!(
+            planes,
+            [None, Some(0), None, Some(1), Some(2), Some(3), None]
+        );
         let fields: Vec<Option<usize>> = schedule.due.iter().map(|d| d.fields).collect();
         assert_eq!(fields, [None, None, None, Some(0), None, None, Some(1)]);
         let records: Vec<bool> = schedule.due.iter().map(|d| d.record).collect();

@@ -36,7 +36,11 @@ pub(super) struct ArrayInFile {
 }
 
 impl Source for ArrayInFile {
-    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+    fn read(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> Result<Vec<Complex<f64>>, String> {
         self.part(records, samples).map_err(|e| match e.kind() {
             ErrorKind::UnexpectedEof => "it became shorter while it was read".into(),
             _ => e.to_string(),
@@ -46,13 +50,24 @@ impl Source for ArrayInFile {
 
 impl ArrayInFile {
     /// Some samples of some records, one record after the other.
-    fn part(&mut self, records: Range<usize>, samples: Range<usize>) -> std::io::Result<Vec<Complex<f64>>> {
+    fn part(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> std::io::Result<Vec<Complex<f64>>> {
         let count = samples.len();
         let mut out = vec![Complex::new(0.0, 0.0); records.len() * count];
         if self.order == Order::SampleMajor {
             for (place, sample) in samples.enumerate() {
-                let row = self.run(sample as u64 * self.records as u64 + records.start as u64, records.len())?;
-                out.iter_mut().skip(place).step_by(count).zip(row).for_each(|(out, sample)| *out = sample);
+                let row = self.run(
+                    sample as u64 * self.records as u64 + records.start as u64,
+                    records.len(),
+                )?;
+                out.iter_mut()
+                    .skip(place)
+                    .step_by(count)
+                    .zip(row)
+                    .for_each(|(out, sample)| *out = sample);
             }
             return Ok(out);
         }
@@ -62,7 +77,10 @@ impl ArrayInFile {
             false => 1,
         };
         let pulses = self.pulses_per_line.max(1);
-        for (first, out) in records.step_by(together).zip(out.chunks_mut((together * count).max(1))) {
+        for (first, out) in records
+            .step_by(together)
+            .zip(out.chunks_mut((together * count).max(1)))
+        {
             // The place in the file of a record in the order of lines and their pulses.
             let row = match self.order {
                 Order::PulseMajor => first % pulses * (self.records / pulses) + first / pulses,
@@ -77,12 +95,20 @@ impl ArrayInFile {
     fn run(&mut self, first: u64, count: usize) -> std::io::Result<Vec<Complex<f64>>> {
         let (stored, size) = (&self.stored, self.stored.sample_bytes());
         let mut raw = vec![0; count * size as usize];
-        self.file.seek(SeekFrom::Start(stored.begin + first * size))?;
+        self.file
+            .seek(SeekFrom::Start(stored.begin + first * size))?;
         self.file.read_exact(&mut raw)?;
         let number = |bytes: &[u8]| stored.number.value(bytes, stored.byte_order);
         let sample = |bytes: &[u8]| {
             let (first, second) = bytes.split_at(stored.number.bytes as usize);
-            Complex::new(number(first), if stored.is_complex { number(second) } else { 0.0 })
+            Complex::new(
+                number(first),
+                if stored.is_complex {
+                    number(second)
+                } else {
+                    0.0
+                },
+            )
         };
         Ok(raw.chunks_exact(size as usize).map(sample).collect())
     }
@@ -100,7 +126,11 @@ mod tests {
         let mut file = tempfile::tempfile().unwrap();
         for number in numbers {
             let number = *number as i16;
-            let bytes = if order == ByteOrder::Big { number.to_be_bytes() } else { number.to_le_bytes() };
+            let bytes = if order == ByteOrder::Big {
+                number.to_be_bytes()
+            } else {
+                number.to_le_bytes()
+            };
             file.write_all(&bytes).unwrap();
         }
         file
@@ -127,12 +157,24 @@ mod tests {
     #[test]
     fn every_order_gives_the_same_records() {
         // Records of two lines with two pulses: hundreds count lines, tens pulses, ones samples.
-        let of = |line: usize, pulse: usize, sample: usize| (100 * line + 10 * pulse + sample) as f64;
-        let wanted: Vec<f64> =
-            (0..12).map(|i| if i == 5 { f64::NAN } else { 2.0 * of(i / 6, i / 3 % 2, i % 3) }).collect();
+        let of =
+            |line: usize, pulse: usize, sample: usize| (100 * line + 10 * pulse + sample) as f64;
+        let wanted: Vec<f64> = (0..12)
+            .map(|i| {
+                if i == 5 {
+                    f64::NAN
+                } else {
+                    2.0 * of(i / 6, i / 3 % 2, i % 3)
+                }
+            })
+            .collect();
         let with = |places: &dyn Fn(usize) -> (usize, usize, usize)| -> Vec<f64> {
             let value = |place: (usize, usize, usize)| {
-                if place == (0, 1, 2) { -1.0 } else { of(place.0, place.1, place.2) }
+                if place == (0, 1, 2) {
+                    -1.0
+                } else {
+                    of(place.0, place.1, place.2)
+                }
             };
             (0..12).map(|i| value(places(i))).collect()
         };
@@ -141,16 +183,26 @@ mod tests {
             (Order::PulseMajor, with(&|i| (i / 3 % 2, i / 6, i % 3))),
             (Order::SampleMajor, with(&|i| (i / 2 % 2, i % 2, i / 4))),
         ] {
-            let mut array = RawRecords::new(Path::new("x"), array(&numbers, order), [4, 3], false, true);
+            let mut array =
+                RawRecords::new(Path::new("x"), array(&numbers, order), [4, 3], false, true);
             (array.fills, array.scale) = (vec![-1.0], 2.0);
             for records in [0..4, 1..3, 3..4] {
                 for samples in [0..3, 1..2, 1..3] {
-                    let found = array.read_samples(records.clone(), samples.clone()).unwrap();
-                    let wanted: Vec<f64> =
-                        records.clone().flat_map(|record| &wanted[3 * record..][samples.clone()]).copied().collect();
-                    let same =
-                        |(a, b): (&Complex<f64>, &f64)| a.im == 0.0 && (a.re == *b || (a.re.is_nan() && b.is_nan()));
-                    assert!(found.iter().zip(&wanted).all(same), "{order:?} {records:?} {samples:?}: {found:?}");
+                    let found = array
+                        .read_samples(records.clone(), samples.clone())
+                        .unwrap();
+                    let wanted: Vec<f64> = records
+                        .clone()
+                        .flat_map(|record| &wanted[3 * record..][samples.clone()])
+                        .copied()
+                        .collect();
+                    let same = |(a, b): (&Complex<f64>, &f64)| {
+                        a.im == 0.0 && (a.re == *b || (a.re.is_nan() && b.is_nan()))
+                    };
+                    assert!(
+                        found.iter().zip(&wanted).all(same),
+                        "{order:?} {records:?} {samples:?}: {found:?}"
+                    );
                     assert_eq!(found.len(), wanted.len());
                 }
             }
@@ -159,10 +211,17 @@ mod tests {
 
     #[test]
     fn the_parts_of_complex_samples_stand_together() {
-        let mut together = ArrayInFile { samples: 3, records: 2, ..array(&[], Order::LineMajor) };
+        let mut together = ArrayInFile {
+            samples: 3,
+            records: 2,
+            ..array(&[], Order::LineMajor)
+        };
         together.file = file(&(0..12).map(f64::from).collect::<Vec<_>>(), ByteOrder::Big);
         together.stored.is_complex = true;
         let found = together.read(1..2, 0..3).unwrap();
-        assert_eq!(found, [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im)));
+        assert_eq!(
+            found,
+            [(6.0, 7.0), (8.0, 9.0), (10.0, 11.0)].map(|(re, im)| Complex::new(re, im))
+        );
     }
 }

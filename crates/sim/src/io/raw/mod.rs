@@ -39,7 +39,10 @@ pub struct RawFormat {
     #[cfg_attr(feature = "cli", arg(id = "format", long, value_name = "KIND", value_parser = KINDS))]
     pub number: Option<String>,
     /// Their byte order: the lowest or the highest byte first.
-    #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t, requires = "format"))]
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, value_enum, default_value_t, requires = "format")
+    )]
     pub byte_order: ByteOrder,
     /// Samples are pairs of numbers, in phase and quadrature.
     #[cfg_attr(feature = "cli", arg(long))]
@@ -48,7 +51,10 @@ pub struct RawFormat {
     #[cfg_attr(feature = "cli", arg(long, value_enum, default_value_t))]
     pub order: Order,
     /// Bytes before the first number.
-    #[cfg_attr(feature = "cli", arg(long, value_name = "N", default_value_t = 0, requires = "format"))]
+    #[cfg_attr(
+        feature = "cli",
+        arg(long, value_name = "N", default_value_t = 0, requires = "format")
+    )]
     pub header_bytes: u64,
     /// The variable of a NetCDF file, or the array of an NPZ file, that holds the samples.
     #[cfg_attr(feature = "cli", arg(long, value_name = "NAME"))]
@@ -92,7 +98,11 @@ pub trait Source: std::fmt::Debug {
     ///
     /// # Errors
     /// Why they cannot be read.
-    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String>;
+    fn read(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> Result<Vec<Complex<f64>>, String>;
 }
 
 /// Records of samples, in a file or in the memory of a program.
@@ -127,10 +137,21 @@ impl RawRecords {
     /// # Errors
     /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks.
     pub fn open(path: &Path, format: &RawFormat, shape: RecordShape) -> Result<Self, Error> {
-        let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+        let refuse = |reason: String| Error::Input {
+            path: path.to_owned(),
+            reason,
+        };
         let (mut file, length, magic) = text_file::begin(path)?;
-        let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-        let numbers = Numbers { path, format, shape };
+        let extension = path
+            .extension()
+            .and_then(|e| e.to_str())
+            .unwrap_or_default()
+            .to_ascii_lowercase();
+        let numbers = Numbers {
+            path,
+            format,
+            shape,
+        };
         let found = match &magic[..] {
             _ if format.number.is_some() => numbers.binary(length).and_then(|array| numbers.records(file, array)),
             [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => Ok(netcdf::read(path, format)?),
@@ -165,7 +186,11 @@ impl RawRecords {
             is_complex,
             are_integers,
             // Of a converter's codes each may be a sample.
-            fills: if are_integers { Vec::new() } else { MissingSamples::default().fill },
+            fills: if are_integers {
+                Vec::new()
+            } else {
+                MissingSamples::default().fill
+            },
             packed_scale: 1.0,
             scale: 1.0,
             outsized: f64::INFINITY,
@@ -191,7 +216,10 @@ impl RawRecords {
 
     /// An error of this file.
     pub fn refuse(&self, reason: String) -> Error {
-        Error::Input { path: self.path.clone(), reason }
+        Error::Input {
+            path: self.path.clone(),
+            reason,
+        }
     }
 
     /// The samples of some records, one record after the other; the second parts of real samples are 0. A missing sample has a
@@ -207,11 +235,31 @@ impl RawRecords {
     ///
     /// # Errors
     /// As [`RawRecords::read`].
-    pub fn read_samples(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, Error> {
-        let mut found = self.source.read(records, samples).map_err(|reason| self.refuse(reason))?;
-        let number = |stored: f64| if self.fills.contains(&stored) { f64::NAN } else { stored * self.scale };
+    pub fn read_samples(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> Result<Vec<Complex<f64>>, Error> {
+        let mut found = self
+            .source
+            .read(records, samples)
+            .map_err(|reason| self.refuse(reason))?;
+        let number = |stored: f64| {
+            if self.fills.contains(&stored) {
+                f64::NAN
+            } else {
+                stored * self.scale
+            }
+        };
         for sample in &mut found {
-            *sample = Complex::new(number(sample.re), if self.is_complex { number(sample.im) } else { 0.0 });
+            *sample = Complex::new(
+                number(sample.re),
+                if self.is_complex {
+                    number(sample.im)
+                } else {
+                    0.0
+                },
+            );
             if sample.re.abs().max(sample.im.abs()) >= self.outsized {
                 sample.re = f64::NAN;
             }
@@ -233,8 +281,8 @@ impl Numbers<'_> {
     fn binary(self, length: u64) -> Result<StoredArray, String> {
         let Self { format, shape, .. } = self;
         let name = format.number.as_deref().unwrap_or_default();
-        let number =
-            NumberType::named(name).ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
+        let number = NumberType::named(name)
+            .ok_or_else(|| format!("{name} is no kind of number: --format i16, for example"))?;
         let array = StoredArray {
             number,
             byte_order: format.byte_order,
@@ -246,7 +294,12 @@ impl Numbers<'_> {
         let sample_bytes = array.sample_bytes();
         let record_bytes = shape.samples as u64 * sample_bytes;
         let data = length.checked_sub(format.header_bytes);
-        let data = data.ok_or_else(|| format!("it has {length} bytes, --header-bytes says {}", format.header_bytes))?;
+        let data = data.ok_or_else(|| {
+            format!(
+                "it has {length} bytes, --header-bytes says {}",
+                format.header_bytes
+            )
+        })?;
         let rest = data.checked_rem(record_bytes).unwrap_or(data);
         if rest != 0 {
             return Err(format!(
@@ -255,18 +308,29 @@ impl Numbers<'_> {
                 format.header_bytes, shape.samples
             ));
         }
-        let mut lengths = vec![data.checked_div(record_bytes).unwrap_or(0), shape.samples as u64];
+        let mut lengths = vec![
+            data.checked_div(record_bytes).unwrap_or(0),
+            shape.samples as u64,
+        ];
         if format.order == Order::SampleMajor {
             lengths.reverse();
         }
-        Ok(StoredArray { shape: lengths, ..array })
+        Ok(StoredArray {
+            shape: lengths,
+            ..array
+        })
     }
 
     /// The records of an array.
     fn records(self, file: File, mut stored: StoredArray) -> Result<RawRecords, String> {
-        let Self { path, format, shape } = self;
+        let Self {
+            path,
+            format,
+            shape,
+        } = self;
         let mut lengths = std::mem::take(&mut stored.shape);
-        let pairs = format.complex && !stored.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
+        let pairs =
+            format.complex && !stored.is_complex && lengths.len() > 1 && lengths.last() == Some(&2);
         if pairs {
             lengths.pop();
             stored.is_complex = true;
@@ -275,38 +339,73 @@ impl Numbers<'_> {
         if is_fortran && (pairs || lengths.len() > 2) {
             return Err("it is an array in the order of Fortran: numpy.ascontiguousarray makes one that is read".into());
         }
-        let order = if is_fortran { Order::SampleMajor } else { format.order };
+        let order = if is_fortran {
+            Order::SampleMajor
+        } else {
+            format.order
+        };
         // Whatever the order, the header says how long each dimension is; the samples are the last, or the first.
         let are_first = order == Order::SampleMajor && !stored.fortran_order && !lengths.is_empty();
-        let samples = if are_first { Some(lengths.remove(0)) } else { lengths.pop() };
+        let samples = if are_first {
+            Some(lengths.remove(0))
+        } else {
+            lengths.pop()
+        };
         let samples = samples.ok_or("it holds a single number, no records")? as usize;
         let (records, is_complex) = (lengths.iter().product::<u64>() as usize, stored.is_complex);
         let are_integers = !stored.number.is_float();
-        let array = ArrayInFile { file, stored, order, records, samples, pulses_per_line: shape.pulses_per_line };
-        Ok(RawRecords::new(path, array, [records, samples], is_complex, are_integers))
+        let array = ArrayInFile {
+            file,
+            stored,
+            order,
+            records,
+            samples,
+            pulses_per_line: shape.pulses_per_line,
+        };
+        Ok(RawRecords::new(
+            path,
+            array,
+            [records, samples],
+            is_complex,
+            are_integers,
+        ))
     }
 
     fn of_archive(self, mut file: File, length: u64) -> Result<RawRecords, String> {
         let arrays = numpy::archive(&mut file, length)?;
-        let named = |names: &[&str]| arrays.iter().find(|(name, _)| names.contains(&name.as_str()));
+        let named = |names: &[&str]| {
+            arrays
+                .iter()
+                .find(|(name, _)| names.contains(&name.as_str()))
+        };
         let mut large = arrays.iter().filter(|(_, array)| array.shape.len() > 1);
         let chosen = match (&self.format.variable, large.next(), large.next()) {
             (Some(name), ..) => named(&[name]),
             (None, Some(one), None) => Some(one),
             (None, ..) => named(&["signals", "current_a"]),
         };
-        let (_, signals) =
-            chosen.ok_or("it has several arrays, or none: --variable names the one that holds the samples")?;
+        let (_, signals) = chosen.ok_or(
+            "it has several arrays, or none: --variable names the one that holds the samples",
+        )?;
         let records_of = |array: &StoredArray, format: &RawFormat| {
-            Numbers { format, ..self }.records(file.try_clone().map_err(|e| e.to_string())?, array.clone())
+            Numbers { format, ..self }
+                .records(file.try_clone().map_err(|e| e.to_string())?, array.clone())
         };
         let mut signals = records_of(signals, self.format)?;
         let records = signals.records;
         let values = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
-            let Some((name, array)) = named(&names) else { return Ok(None) };
-            let count = array.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length)).unwrap_or(u64::MAX);
+            let Some((name, array)) = named(&names) else {
+                return Ok(None);
+            };
+            let count = array
+                .shape
+                .iter()
+                .try_fold(1_u64, |n, length| n.checked_mul(*length))
+                .unwrap_or(u64::MAX);
             if count != records as u64 {
-                return Err(format!("{name} has {count} values; one for each of the {records} records is needed"));
+                return Err(format!(
+                    "{name} has {count} values; one for each of the {records} records is needed"
+                ));
             }
             // The numbers of the array, both parts of them, and what is made of them.
             machine::holds(name, 40.0 * records as f64)?;

@@ -11,8 +11,7 @@ use std::ops::Range;
 use std::path::Path;
 
 /// Names of the constants of a recording.
-const CONSTANTS: &str =
-    "sampling_frequency intermediate_frequency bandwidth wavelength pulse_repetition_frequency pulse_sigma";
+const CONSTANTS: &str = "sampling_frequency intermediate_frequency bandwidth wavelength pulse_repetition_frequency pulse_sigma";
 
 /// Records of samples in a NetCDF file.
 #[derive(Debug)]
@@ -37,20 +36,35 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
     let name = match &format.variable {
         Some(name) => name.clone(),
         None if file.has("current_a") => "current_a".to_owned(),
-        None => return Err("it has no variable current_a: --variable names the one that holds the samples".into()),
+        None => {
+            return Err(
+                "it has no variable current_a: --variable names the one that holds the samples"
+                    .into(),
+            );
+        }
     };
-    let mut lengths = file.shape(&name).ok_or_else(|| format!("it has no variable {name}"))?;
-    let of_current = || (name == "current_a" && file.has("quadrature_a")).then(|| "quadrature_a".to_owned());
+    let mut lengths = file
+        .shape(&name)
+        .ok_or_else(|| format!("it has no variable {name}"))?;
+    let of_current =
+        || (name == "current_a" && file.has("quadrature_a")).then(|| "quadrature_a".to_owned());
     let second = format.quadrature.clone().or_else(of_current);
-    if let Some(second) = second.as_ref().filter(|second| file.shape(second).as_ref() != Some(&lengths)) {
-        return Err(format!("variable {second} has not the dimensions of {name}"));
+    if let Some(second) = second
+        .as_ref()
+        .filter(|second| file.shape(second).as_ref() != Some(&lengths))
+    {
+        return Err(format!(
+            "variable {second} has not the dimensions of {name}"
+        ));
     }
     let are_pairs = second.is_none() && format.complex && lengths.last() == Some(&2);
     if are_pairs {
         lengths.pop();
     }
     let (Some(samples), true) = (lengths.pop(), lengths.iter().all(|length| *length > 0)) else {
-        return Err(format!("variable {name} has no dimension: records with samples are needed"));
+        return Err(format!(
+            "variable {name} has no dimension: records with samples are needed"
+        ));
     };
     let number = |attribute: &str| file.number(&name, attribute);
     let scale = number("scale_factor").unwrap_or(1.0);
@@ -62,18 +76,35 @@ fn signals(path: &Path, file: &NetcdfFile, format: &RawFormat) -> Result<RawReco
         Some(NcType::Int) => (true, Some(-2_147_483_647.0)),
         _ => (true, None),
     };
-    let (shape, is_complex) =
-        ([lengths.iter().product::<u64>() as usize, samples as usize], are_pairs || second.is_some());
+    let (shape, is_complex) = (
+        [lengths.iter().product::<u64>() as usize, samples as usize],
+        are_pairs || second.is_some(),
+    );
     let about = about(file, shape[0])?;
-    let source = NetcdfRecords { file: file.clone(), name: name.clone(), second, are_pairs, lengths };
+    let source = NetcdfRecords {
+        file: file.clone(),
+        name: name.clone(),
+        second,
+        are_pairs,
+        lengths,
+    };
     let mut out = RawRecords::new(path, source, shape, is_complex, are_integers);
     let unwritten = fill.filter(|_| !is_filled);
-    out.fills.extend(unwritten.map(|fill| fill * scale + number("add_offset").unwrap_or(0.0)));
-    Ok(RawRecords { packed_scale: scale, about, ..out })
+    out.fills
+        .extend(unwritten.map(|fill| fill * scale + number("add_offset").unwrap_or(0.0)));
+    Ok(RawRecords {
+        packed_scale: scale,
+        about,
+        ..out
+    })
 }
 
 impl Source for NetcdfRecords {
-    fn read(&mut self, records: Range<usize>, samples: Range<usize>) -> Result<Vec<Complex<f64>>, String> {
+    fn read(
+        &mut self,
+        records: Range<usize>,
+        samples: Range<usize>,
+    ) -> Result<Vec<Complex<f64>>, String> {
         let mut out = Vec::with_capacity(records.len() * samples.len());
         for mut part in blocks(&self.lengths, records.start as u64..records.end as u64) {
             part.push(samples.start as u64..samples.end as u64);
@@ -81,10 +112,19 @@ impl Source for NetcdfRecords {
             match &self.second {
                 Some(second) => {
                     let second = self.file.part(second, &part)?;
-                    out.extend(first.into_iter().zip(second).map(|(re, im)| Complex::new(re, im)));
+                    out.extend(
+                        first
+                            .into_iter()
+                            .zip(second)
+                            .map(|(re, im)| Complex::new(re, im)),
+                    );
                 }
                 None if self.are_pairs => {
-                    out.extend(first.chunks_exact(2).map(|pair| Complex::new(pair[0], pair[1])));
+                    out.extend(
+                        first
+                            .chunks_exact(2)
+                            .map(|pair| Complex::new(pair[0], pair[1])),
+                    );
                 }
                 None => out.extend(first.into_iter().map(|re| Complex::new(re, 0.0))),
             }
@@ -95,18 +135,28 @@ impl Source for NetcdfRecords {
 
 /// Some places in the order of an array, as ranges of its dimensions: whole rows together.
 fn blocks(lengths: &[u64], places: Range<u64>) -> Vec<Vec<Range<u64>>> {
-    let Some((_, inner)) = lengths.split_first() else { return vec![Vec::new()] };
+    let Some((_, inner)) = lengths.split_first() else {
+        return vec![Vec::new()];
+    };
     let row = inner.iter().product::<u64>();
     let (mut at, mut out) = (places.start, Vec::new());
     while at < places.end {
         let (first, rows) = (at / row, (places.end - at) / row);
         if at % row == 0 && rows > 0 {
-            out.push(std::iter::once(first..first + rows).chain(inner.iter().map(|length| 0..*length)).collect());
+            out.push(
+                std::iter::once(first..first + rows)
+                    .chain(inner.iter().map(|length| 0..*length))
+                    .collect(),
+            );
             at += rows * row;
         } else {
             let end = places.end.min((first + 1) * row);
             let within = blocks(inner, at % row..at % row + end - at).into_iter();
-            out.extend(within.map(|part| std::iter::once(first..first + 1).chain(part).collect::<Vec<_>>()));
+            out.extend(within.map(|part| {
+                std::iter::once(first..first + 1)
+                    .chain(part)
+                    .collect::<Vec<_>>()
+            }));
             at = end;
         }
     }
@@ -114,14 +164,28 @@ fn blocks(lengths: &[u64], places: Range<u64>) -> Vec<Vec<Range<u64>>> {
 }
 
 fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
-    let mut about = About { scene_toml: file.global_text("scene").map(str::to_owned), ..About::default() };
+    let mut about = About {
+        scene_toml: file.global_text("scene").map(str::to_owned),
+        ..About::default()
+    };
     let of_records = |names: [&str; 2]| -> Result<Option<Vec<f64>>, String> {
-        let Some(name) = names.into_iter().find(|name| file.has(name)) else { return Ok(None) };
-        let units = file.text(name, "units").unwrap_or_default().to_ascii_lowercase();
+        let Some(name) = names.into_iter().find(|name| file.has(name)) else {
+            return Ok(None);
+        };
+        let units = file
+            .text(name, "units")
+            .unwrap_or_default()
+            .to_ascii_lowercase();
         let values = file.floats(name)?;
-        let factor = if units.starts_with("deg") { 1f64.to_radians() } else { 1.0 };
+        let factor = if units.starts_with("deg") {
+            1f64.to_radians()
+        } else {
+            1.0
+        };
         match values.len() == records {
-            true => Ok(Some(values.into_iter().map(|value| value * factor).collect())),
+            true => Ok(Some(
+                values.into_iter().map(|value| value * factor).collect(),
+            )),
             // A coordinate of the samples, such as time, is none of the records.
             false => Ok(None),
         }
@@ -130,7 +194,9 @@ fn about(file: &NetcdfFile, records: usize) -> Result<About, String> {
     about.time_s = of_records(["pulse_time", "ray_time"])?;
     about.line = of_records(["ray_line", "line"])?;
     for name in CONSTANTS.split(' ').filter(|name| file.has(name)) {
-        about.constants.extend(file.floats(name)?.first().map(|value| (name, *value)));
+        about
+            .constants
+            .extend(file.floats(name)?.first().map(|value| (name, *value)));
     }
     Ok(about)
 }
@@ -144,7 +210,15 @@ mod tests {
     fn opened(bytes: Vec<u8>, format: &RawFormat) -> RawRecords {
         let file = tempfile::NamedTempFile::new().unwrap();
         std::fs::write(file.path(), bytes).unwrap();
-        RawRecords::open(file.path(), format, RecordShape { samples: 4, pulses_per_line: 3 }).unwrap()
+        RawRecords::open(
+            file.path(),
+            format,
+            RecordShape {
+                samples: 4,
+                pulses_per_line: 3,
+            },
+        )
+        .unwrap()
     }
 
     #[test]
@@ -152,26 +226,59 @@ mod tests {
         const DIMS: &[&str] = &["line", "pulse", "sample"];
         let numbers = |from: i32| Data::i32((0..24).map(|i| if i == 5 { -1 } else { from + i }));
         let packed = |name: &str, from: i32| {
-            let with = [("scale_factor", 2.0), ("add_offset", 1.0), ("_FillValue", -1.0)];
+            let with = [
+                ("scale_factor", 2.0),
+                ("add_offset", 1.0),
+                ("_FillValue", -1.0),
+            ];
             let variable = Variable::new(name, DIMS, numbers(from));
-            with.into_iter().fold(variable, |variable, (name, value)| variable.attr(name, Data::f64([value])))
+            with.into_iter().fold(variable, |variable, (name, value)| {
+                variable.attr(name, Data::f64([value]))
+            })
         };
         let variables = vec![packed("current_a", 0), packed("quadrature_a", 100)];
-        let layout = Layout { dims: vec![("line", 2), ("pulse", 3), ("sample", 4)], globals: Vec::new(), variables };
-        let mut found = opened(layout.into_bytes(&crate::io::provenance::example()).unwrap(), &RawFormat::default());
-        assert_eq!((found.records, found.samples, found.is_complex, found.whole_scale()), (6, 4, true, 2.0));
+        let layout = Layout {
+            dims: vec![("line", 2), ("pulse", 3), ("sample", 4)],
+            globals: Vec::new(),
+            variables,
+        };
+        let mut found = opened(
+            layout
+                .into_bytes(&crate::io::provenance::example())
+                .unwrap(),
+            &RawFormat::default(),
+        );
+        assert_eq!(
+            (
+                found.records,
+                found.samples,
+                found.is_complex,
+                found.whole_scale()
+            ),
+            (6, 4, true, 2.0)
+        );
         assert!(found.are_integers);
         for records in (0..6).flat_map(|first| (first + 1..=6).map(move |end| first..end)) {
             for samples in [0..4, 1..3, 3..4] {
-                let part = found.read_samples(records.clone(), samples.clone()).unwrap();
-                let places = records.clone().flat_map(|record| samples.clone().map(move |sample| 4 * record + sample));
-                let wanted = places.map(|i| (2.0 * i as f64 + 1.0, 2.0 * (100 + i) as f64 + 1.0, i == 5));
-                let is_same = |(sample, (re, im, missing)): (&Complex<f64>, (f64, f64, bool))| match missing {
-                    true => sample.re.is_nan() && sample.im.is_nan(),
-                    false => *sample == Complex::new(re, im),
+                let part = found
+                    .read_samples(records.clone(), samples.clone())
+                    .unwrap();
+                let places = records
+                    .clone()
+                    .flat_map(|record| samples.clone().map(move |sample| 4 * record + sample));
+                let wanted =
+                    places.map(|i| (2.0 * i as f64 + 1.0, 2.0 * (100 + i) as f64 + 1.0, i == 5));
+                let is_same = |(sample, (re, im, missing)): (&Complex<f64>, (f64, f64, bool))| {
+                    match missing {
+                        true => sample.re.is_nan() && sample.im.is_nan(),
+                        false => *sample == Complex::new(re, im),
+                    }
                 };
                 assert_eq!(part.len(), records.len() * samples.len());
-                assert!(part.iter().zip(wanted).all(is_same), "{records:?} {samples:?}: {part:?}");
+                assert!(
+                    part.iter().zip(wanted).all(is_same),
+                    "{records:?} {samples:?}: {part:?}"
+                );
             }
         }
     }
@@ -185,20 +292,35 @@ mod tests {
         let real = ("current_a", &[2, 3, 4][..], numbers(0.5));
         let second = ("quadrature_a", &[2, 3, 4][..], numbers(100.0));
         let lines = ("ray_line", &[6][..], vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]);
-        let open = |arrays: &[(&str, &[u64], Vec<f64>)], format: &RawFormat| opened(of_arrays(arrays), format);
+        let open = |arrays: &[(&str, &[u64], Vec<f64>)], format: &RawFormat| {
+            opened(of_arrays(arrays), format)
+        };
         let mut found = open(&[real.clone(), lines], &RawFormat::default());
         found.scale = 2.0;
-        assert_eq!((found.records, found.samples, found.is_complex), (6, 4, false));
+        assert_eq!(
+            (found.records, found.samples, found.is_complex),
+            (6, 4, false)
+        );
         assert_eq!(found.about.line, Some(vec![0.0, 0.0, 0.0, 1.0, 1.0, 1.0]));
         let some = found.read_samples(1..3, 1..3).unwrap();
-        assert_eq!(some, [5.5, 6.5, 9.5, 10.5].map(|re| Complex::new(2.0 * re, 0.0)));
+        assert_eq!(
+            some,
+            [5.5, 6.5, 9.5, 10.5].map(|re| Complex::new(2.0 * re, 0.0))
+        );
         let mut found = open(&[real, second], &RawFormat::default());
         assert!(found.is_complex);
         assert_eq!(found.read(5..6).unwrap()[3], Complex::new(23.5, 123.0));
         let mut pairs = open(
             &[("volts", &[3, 4, 2], numbers(0.0))],
-            &RawFormat { variable: Some("volts".into()), complex: true, ..RawFormat::default() },
+            &RawFormat {
+                variable: Some("volts".into()),
+                complex: true,
+                ..RawFormat::default()
+            },
         );
-        assert_eq!((pairs.records, pairs.read(1..2).unwrap()[0]), (3, Complex::new(8.0, 9.0)));
+        assert_eq!(
+            (pairs.records, pairs.read(1..2).unwrap()[0]),
+            (3, Complex::new(8.0, 9.0))
+        );
     }
 }

@@ -21,7 +21,8 @@ pub(super) struct StoredArray {
 
 const TRUNCATED: &str = "it is cut short: it ends before its last array does";
 const NO_ARRAY: &str = "it is no sound NPY file: its header is damaged";
-const NO_ARCHIVE: &str = "it is no sound NPZ file: it is cut short, or its table of contents is damaged";
+const NO_ARCHIVE: &str =
+    "it is no sound NPZ file: it is cut short, or its table of contents is damaged";
 /// Longest header that is read \[bytes\].
 const LONGEST_HEADER_BYTES: u64 = 1 << 20;
 
@@ -35,35 +36,58 @@ impl StoredArray {
     pub(super) fn read(file: &mut File, at: u64, end: u64) -> Result<Self, String> {
         let mut bytes = Vec::new();
         let read = file.seek(SeekFrom::Start(at)).and_then(|_| {
-            Read::by_ref(file).take(LONGEST_HEADER_BYTES.min(end.saturating_sub(at))).read_to_end(&mut bytes)
+            Read::by_ref(file)
+                .take(LONGEST_HEADER_BYTES.min(end.saturating_sub(at)))
+                .read_to_end(&mut bytes)
         });
         read.map_err(|e| e.to_string())?;
         let (length, head) = match bytes.get(..12) {
-            Some([0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, a, b, ..]) => (u32::from(u16::from_le_bytes([*a, *b])), 10),
+            Some([0x93, b'N', b'U', b'M', b'P', b'Y', 1, _, a, b, ..]) => {
+                (u32::from(u16::from_le_bytes([*a, *b])), 10)
+            }
             Some([0x93, b'N', b'U', b'M', b'P', b'Y', 2 | 3, _, a, b, c, d]) => {
                 (u32::from_le_bytes([*a, *b, *c, *d]), 12)
             }
             _ => return Err(NO_ARRAY.into()),
         };
         let text = bytes.get(head..head + length as usize).ok_or(NO_ARRAY)?;
-        let found = Self::of_text(&String::from_utf8_lossy(text), at + head as u64 + u64::from(length))?;
-        let numbers = found.shape.iter().try_fold(1_u64, |n, length| n.checked_mul(*length));
+        let found = Self::of_text(
+            &String::from_utf8_lossy(text),
+            at + head as u64 + u64::from(length),
+        )?;
+        let numbers = found
+            .shape
+            .iter()
+            .try_fold(1_u64, |n, length| n.checked_mul(*length));
         let bytes = numbers.and_then(|n| n.checked_mul(found.sample_bytes()));
-        let over = bytes.and_then(|bytes| bytes.checked_add(found.begin)).ok_or(TRUNCATED)?;
+        let over = bytes
+            .and_then(|bytes| bytes.checked_add(found.begin))
+            .ok_or(TRUNCATED)?;
         match over {
             over if over > end => Err(format!("{TRUNCATED} by {} bytes", over - end)),
-            over if over < end => Err(format!("it has {} bytes more than its header says", end - over)),
+            over if over < end => Err(format!(
+                "it has {} bytes more than its header says",
+                end - over
+            )),
             _ => Ok(found),
         }
     }
 
     fn of_text(text: &str, begin: u64) -> Result<Self, String> {
         let after = |key: &str| Some(text.split_once(&format!("'{key}':"))?.1.trim_start());
-        let kind = after("descr").and_then(|rest| rest.strip_prefix('\'')?.split('\'').next()).ok_or(NO_ARRAY)?;
+        let kind = after("descr")
+            .and_then(|rest| rest.strip_prefix('\'')?.split('\'').next())
+            .ok_or(NO_ARRAY)?;
         let fortran_order = after("fortran_order").ok_or(NO_ARRAY)?.starts_with("True");
-        let shape = after("shape").and_then(|rest| rest.strip_prefix('(')?.split(')').next()).ok_or(NO_ARRAY)?;
-        let shape: Option<Vec<u64>> =
-            shape.split(',').map(str::trim).filter(|n| !n.is_empty()).map(|n| n.parse().ok()).collect();
+        let shape = after("shape")
+            .and_then(|rest| rest.strip_prefix('(')?.split(')').next())
+            .ok_or(NO_ARRAY)?;
+        let shape: Option<Vec<u64>> = shape
+            .split(',')
+            .map(str::trim)
+            .filter(|n| !n.is_empty())
+            .map(|n| n.parse().ok())
+            .collect();
         // A sign of the byte order, then the kind; bytes that are no text may be several to a sign.
         let mut signs = kind.chars();
         let (order, name) = (signs.next(), signs.as_str());
@@ -72,14 +96,25 @@ impl StoredArray {
             "c16" => (Some(NumberType::F64), true),
             name => (NumberType::of_numpy(name), false),
         };
-        let byte_order = if order == Some('>') { ByteOrder::Big } else { ByteOrder::Little };
+        let byte_order = if order == Some('>') {
+            ByteOrder::Big
+        } else {
+            ByteOrder::Little
+        };
         let number = number.ok_or_else(|| {
             format!(
                 "its numbers are of the kind {kind:?}; integers, floats of 32 and 64 bits and complex numbers are read: \
                  numpy's astype(\"f4\") makes them"
             )
         })?;
-        Ok(Self { number, byte_order, is_complex, fortran_order, shape: shape.ok_or(NO_ARRAY)?, begin })
+        Ok(Self {
+            number,
+            byte_order,
+            is_complex,
+            fortran_order,
+            shape: shape.ok_or(NO_ARRAY)?,
+            begin,
+        })
     }
 }
 
@@ -92,13 +127,18 @@ pub(super) fn archive(file: &mut File, length: u64) -> Result<Vec<(String, Store
     let (mut entries, mut found) = (archive.entries(&mut table), Vec::new());
     while let Some(entry) = entries.next_entry().map_err(damaged)? {
         let name = String::from_utf8_lossy(entry.file_path().as_bytes()).into_owned();
-        let Some(name) = name.strip_suffix(".npy") else { continue };
+        let Some(name) = name.strip_suffix(".npy") else {
+            continue;
+        };
         if entry.compression_method() != CompressionMethod::STORE {
             return Err(
                 "its arrays are compressed: numpy.savez writes them as they are, savez_compressed does not".into()
             );
         }
-        let (begin, end) = archive.get_entry(entry.wayfinder()).map_err(damaged)?.compressed_data_range();
+        let (begin, end) = archive
+            .get_entry(entry.wayfinder())
+            .map_err(damaged)?
+            .compressed_data_range();
         if end > length {
             return Err(NO_ARCHIVE.into());
         }

@@ -24,7 +24,8 @@ const ONE_PLANE_RAD: f64 = 0.02;
 /// Part of a scan's elevations that a line must go back for another scan to begin.
 const TURN: f64 = 0.1;
 /// Elevations of a scan, with rounding, rad: beyond the zenith it looks to the other side.
-const ALLOWED_RAD: std::ops::RangeInclusive<f64> = -std::f64::consts::FRAC_PI_2 - 1e-6..=std::f64::consts::PI + 1e-6;
+const ALLOWED_RAD: std::ops::RangeInclusive<f64> =
+    -std::f64::consts::FRAC_PI_2 - 1e-6..=std::f64::consts::PI + 1e-6;
 /// Farthest range of a gate, m: that of a scene.
 const FARTHEST_M: f64 = 1e6;
 /// Least lines, gates and velocities of a map.
@@ -44,7 +45,9 @@ pub(super) fn of_mean(sigma_m_s: f64, count: Option<f64>) -> f64 {
 
 /// Scans of which the velocities of a map are means, from those of each cell; 1 where none are counted.
 pub(super) fn mean_count(counts: impl Iterator<Item = f64>) -> f64 {
-    let (sum, cells) = counts.filter(|count| *count > 0.0).fold((0.0, 0.0), |(sum, cells), c| (sum + c, cells + 1.0));
+    let (sum, cells) = counts
+        .filter(|count| *count > 0.0)
+        .fold((0.0, 0.0), |(sum, cells), c| (sum + c, cells + 1.0));
     if cells > 0.0 { sum / cells } else { 1.0 }
 }
 
@@ -55,25 +58,42 @@ pub(super) fn scan_map(
     fold_m_s: Option<f64>,
     what: &str,
 ) -> Result<ScanMap, String> {
-    if let Some(bad) = rays.iter().find(|ray| !ALLOWED_RAD.contains(&ray.elevation_rad)) {
+    if let Some(bad) = rays
+        .iter()
+        .find(|ray| !ALLOWED_RAD.contains(&ray.elevation_rad))
+    {
         return Err(format!(
             "{what}: elevation is {} degrees: from -90 to 180 are allowed, beyond 90 to the other side",
             bad.elevation_rad.to_degrees()
         ));
     }
     let gates = range_m.len();
-    if let Some(pair) = range_m.windows(2).find(|pair| pair[1].is_nan() || pair[1] <= pair[0]) {
+    if let Some(pair) = range_m
+        .windows(2)
+        .find(|pair| pair[1].is_nan() || pair[1] <= pair[0])
+    {
         let (one_m, next_m) = (pair[0], pair[1]);
-        return Err(format!("{what}: range must increase from gate to gate, and {one_m} m is followed by {next_m} m"));
+        return Err(format!(
+            "{what}: range must increase from gate to gate, and {one_m} m is followed by {next_m} m"
+        ));
     }
-    if !range_m.first().is_some_and(|first| *first >= 0.0 && first.is_finite()) {
-        return Err(format!("{what}: range must be at least 0 m at the first gate"));
+    if !range_m
+        .first()
+        .is_some_and(|first| *first >= 0.0 && first.is_finite())
+    {
+        return Err(format!(
+            "{what}: range must be at least 0 m at the first gate"
+        ));
     }
     if let Some(far) = range_m.last().filter(|last| **last > FARTHEST_M) {
-        return Err(format!("{what}: range reaches {far} m: at most {FARTHEST_M} m are read"));
+        return Err(format!(
+            "{what}: range reaches {far} m: at most {FARTHEST_M} m are read"
+        ));
     }
     rays.sort_by(|a, b| a.elevation_rad.total_cmp(&b.elevation_rad));
-    let lines: Vec<&[RayRow]> = rays.chunk_by(|a, b| a.elevation_rad == b.elevation_rad).collect();
+    let lines: Vec<&[RayRow]> = rays
+        .chunk_by(|a, b| a.elevation_rad == b.elevation_rad)
+        .collect();
     let (least_lines, least_gates, least_values) = LEAST;
     if lines.len() < least_lines || gates < least_gates {
         return Err(format!(
@@ -84,18 +104,27 @@ pub(super) fn scan_map(
     }
     let has_sigma = rays.iter().all(|ray| !ray.sigma_m_s.is_empty());
     let mean_at = |line: &[RayRow], of: &dyn Fn(&RayRow) -> f64| {
-        let values: Vec<f64> = line.iter().map(of).filter(|value| value.is_finite()).collect();
+        let values: Vec<f64> = line
+            .iter()
+            .map(of)
+            .filter(|value| value.is_finite())
+            .collect();
         values.iter().sum::<f64>() / values.len() as f64
     };
     let sigma_at = |line: usize, gate: usize| {
         let rows = lines[line];
-        let count = rows.iter().filter(|ray| ray.velocity_m_s[gate].is_finite()).count();
+        let count = rows
+            .iter()
+            .filter(|ray| ray.velocity_m_s[gate].is_finite())
+            .count();
         mean_at(rows, &|ray| ray.sigma_m_s[gate]) / (count as f64).sqrt()
     };
-    let mut velocity_m_s =
-        Array2::from_shape_fn((lines.len(), gates), |(line, gate)| mean_at(lines[line], &|ray| ray.velocity_m_s[gate]));
+    let mut velocity_m_s = Array2::from_shape_fn((lines.len(), gates), |(line, gate)| {
+        mean_at(lines[line], &|ray| ray.velocity_m_s[gate])
+    });
     let is_known = |sigma: &f64| sigma.is_finite() && *sigma > 0.0;
-    let sigma_m_s = has_sigma.then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
+    let sigma_m_s = has_sigma
+        .then(|| Array2::from_shape_fn((lines.len(), gates), |(line, gate)| sigma_at(line, gate)));
     let mut sigma_m_s = sigma_m_s.filter(|sigma| sigma.iter().any(is_known));
     if let Some(sigma) = &mut sigma_m_s {
         // A velocity of unknown error counts for nothing.
@@ -104,21 +133,35 @@ pub(super) fn scan_map(
         });
         sigma.mapv_inplace(|sigma| if is_known(&sigma) { sigma } else { 1.0 });
     }
-    let values = velocity_m_s.iter().filter(|value| value.is_finite()).count();
+    let values = velocity_m_s
+        .iter()
+        .filter(|value| value.is_finite())
+        .count();
     if values < least_values {
         return Err(match values {
             0 => format!("{what}: all of its velocities are missing"),
-            _ => format!("{what}: it has {values} velocities that are not missing; at least {least_values} are needed"),
+            _ => format!(
+                "{what}: it has {values} velocities that are not missing; at least {least_values} are needed"
+            ),
         });
     }
     if let Some(bad) = velocity_m_s.iter().find(|value| value.abs() > 500.0) {
-        return Err(format!("{what}: a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"));
+        return Err(format!(
+            "{what}: a velocity is {bad} m/s: its unit must be m/s, and a missing one its fill value"
+        ));
     }
-    let time_s: Vec<f64> = lines.iter().map(|line| mean_at(line, &|ray| ray.time_s)).collect();
+    let time_s: Vec<f64> = lines
+        .iter()
+        .map(|line| mean_at(line, &|ray| ray.time_s))
+        .collect();
     Ok(ScanMap {
         elevation_rad: lines.iter().map(|line| line[0].elevation_rad).collect(),
         // Of all lines, or of none.
-        time_s: if time_s.iter().all(|time| time.is_finite()) { time_s } else { vec![f64::NAN; lines.len()] },
+        time_s: if time_s.iter().all(|time| time.is_finite()) {
+            time_s
+        } else {
+            vec![f64::NAN; lines.len()]
+        },
         range_m,
         velocity_m_s,
         sigma_m_s,
@@ -128,25 +171,42 @@ pub(super) fn scan_map(
 
 /// Refuses rays that do not lie in one vertical plane on one side of the lidar; `what` names the scan in messages.
 pub(super) fn one_plane(rays: &[RayRow], what: &str) -> Result<(), String> {
-    let Some(first) = rays.iter().map(|ray| ray.azimuth_rad).find(|azimuth| azimuth.is_finite()) else { return Ok(()) };
+    let Some(first) = rays
+        .iter()
+        .map(|ray| ray.azimuth_rad)
+        .find(|azimuth| azimuth.is_finite())
+    else {
+        return Ok(());
+    };
     let apart = |azimuth: f64| {
-        (azimuth - first + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU) - std::f64::consts::PI
+        (azimuth - first + std::f64::consts::PI).rem_euclid(std::f64::consts::TAU)
+            - std::f64::consts::PI
     };
     // Near the zenith an azimuth says nothing.
-    let known = rays.iter().filter(|ray| ray.azimuth_rad.is_finite() && ray.elevation_rad.cos() > 0.05);
-    let (low, high) =
-        known.map(|ray| apart(ray.azimuth_rad)).fold((0.0_f64, 0.0_f64), |(low, high), a| (low.min(a), high.max(a)));
+    let known = rays
+        .iter()
+        .filter(|ray| ray.azimuth_rad.is_finite() && ray.elevation_rad.cos() > 0.05);
+    let (low, high) = known
+        .map(|ray| apart(ray.azimuth_rad))
+        .fold((0.0_f64, 0.0_f64), |(low, high), a| {
+            (low.min(a), high.max(a))
+        });
     if high - low <= ONE_PLANE_RAD {
         return Ok(());
     }
     let [low, high] = [first + low, first + high].map(f64::to_degrees);
-    Err(format!("{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one"))
+    Err(format!(
+        "{what}: it has azimuths from {low:.2} to {high:.2} degrees; a scan in elevation (RHI) has one"
+    ))
 }
 
 /// Scans that follow each other: a line that goes back by more than a tenth of all elevations begins another.
 pub(super) fn between_turns(elevation_rad: &[f64]) -> Vec<Range<usize>> {
-    let ends =
-        elevation_rad.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| (low.min(*e), high.max(*e)));
+    let ends = elevation_rad
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), e| {
+            (low.min(*e), high.max(*e))
+        });
     let back = TURN * (ends.1 - ends.0);
     let mut out = Vec::new();
     let (mut first, mut extreme, mut direction) = (0, 0, 0.0);
@@ -193,7 +253,10 @@ mod tests {
     fn lines_are_sorted_and_equal_ones_averaged() {
         let map = scan_map(rays([0.3, 0.2, 0.2, 0.1]), range_m(), Some(20.0), "it").unwrap();
         assert_eq!(map.elevation_rad, [0.1, 0.2, 0.3]);
-        assert_eq!((map.time_s.clone(), map.velocity_m_s[[1, 5]]), (vec![3.0, 1.5, 0.0], 1.5));
+        assert_eq!(
+            (map.time_s.clone(), map.velocity_m_s[[1, 5]]),
+            (vec![3.0, 1.5, 0.0], 1.5)
+        );
         assert_eq!((map.fold_m_s, map.sigma_m_s.clone()), (Some(20.0), None));
         assert!(map.validate().is_ok());
     }
@@ -207,23 +270,37 @@ mod tests {
         assert_eq!(between_turns(&again), [0..20, 20..40, 40..60]);
         let mut shaky: Vec<f64> = up(20).collect();
         shaky[7] -= 0.011;
-        assert_eq!(between_turns(&shaky), vec![std::ops::Range { start: 0, end: 20 }]);
+        assert_eq!(
+            between_turns(&shaky),
+            vec![std::ops::Range { start: 0, end: 20 }]
+        );
     }
 
     #[test]
     fn what_is_no_scan_is_refused_by_name() {
-        let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| scan_map(rays, range_m, None, "sweep 3").unwrap_err();
-        assert!(refused(rays([0.1; 9]), range_m()).contains("sweep 3: it has 1 different elevations"));
+        let refused = |rays: Vec<RayRow>, range_m: Vec<f64>| {
+            scan_map(rays, range_m, None, "sweep 3").unwrap_err()
+        };
+        assert!(
+            refused(rays([0.1; 9]), range_m()).contains("sweep 3: it has 1 different elevations")
+        );
         assert!(refused(rays([0.1, 0.2, 3.2]), range_m()).contains("elevation"));
         let mut falling = range_m();
         falling.swap(3, 4);
         assert!(refused(rays([0.1, 0.2, 0.3]), falling).contains("range must increase"));
         let far = range_m().into_iter().map(|range_m| 1e7 * range_m).collect();
-        assert!(refused(rays([0.1, 0.2, 0.3]), far).contains("range reaches 1200000000 m: at most 1000000 m"));
+        assert!(
+            refused(rays([0.1, 0.2, 0.3]), far)
+                .contains("range reaches 1200000000 m: at most 1000000 m")
+        );
         let mut missing = rays([0.1, 0.2, 0.3]);
-        missing.iter_mut().for_each(|ray| ray.velocity_m_s = vec![f64::NAN; 12]);
+        missing
+            .iter_mut()
+            .for_each(|ray| ray.velocity_m_s = vec![f64::NAN; 12]);
         assert!(refused(missing.clone(), range_m()).contains("all of its velocities are missing"));
-        missing.iter_mut().for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
+        missing
+            .iter_mut()
+            .for_each(|ray| ray.velocity_m_s = vec![-9999.0; 12]);
         assert!(refused(missing, range_m()).contains("fill value"));
         let mut planes = rays([0.1, 0.2, 0.3]);
         assert_eq!(one_plane(&planes, "scan 1"), Ok(()));

@@ -35,8 +35,9 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
         head.push(line.trim());
     }
     let header = Header::new(&head)?;
-    let range_m: Vec<f64> =
-        (0..header.gates).map(|gate| 0.5 * header.gate_length_m + gate as f64 * header.gate_step_m).collect();
+    let range_m: Vec<f64> = (0..header.gates)
+        .map(|gate| 0.5 * header.gate_length_m + gate as f64 * header.gate_step_m)
+        .collect();
     let mut rays: Vec<RayRow> = Vec::new();
     let mut intensities: Vec<Vec<f64>> = Vec::new();
     let mut days_h = 0.0;
@@ -44,17 +45,30 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
     while let Some((number, line)) = rest.next() {
         let [hours, azimuth, elevation] = numbers(line)
             .and_then(|n| n.get(..3)?.try_into().ok())
-            .ok_or_else(|| format!("line {}: hours, azimuth and elevation of a ray are expected", number + 1))?;
+            .ok_or_else(|| {
+            format!(
+                "line {}: hours, azimuth and elevation of a ray are expected",
+                number + 1
+            )
+        })?;
         if let Some(before) = rays.last() {
             // Hours count from midnight.
-            days_h += if 3600.0 * (hours + days_h) < before.time_s - 43_200.0 { 24.0 } else { 0.0 };
+            days_h += if 3600.0 * (hours + days_h) < before.time_s - 43_200.0 {
+                24.0
+            } else {
+                0.0
+            };
         }
-        let (mut velocity_m_s, mut intensity) = (vec![f64::NAN; header.gates], vec![f64::NAN; header.gates]);
+        let (mut velocity_m_s, mut intensity) =
+            (vec![f64::NAN; header.gates], vec![f64::NAN; header.gates]);
         let ray = rays.len() + 1;
         for gate in 0..header.gates {
-            let (number, line) = rest
-                .next()
-                .ok_or_else(|| format!("it is cut short: ray {ray} has {gate} of {} gates", header.gates))?;
+            let (number, line) = rest.next().ok_or_else(|| {
+                format!(
+                    "it is cut short: ray {ray} has {gate} of {} gates",
+                    header.gates
+                )
+            })?;
             let row = numbers(line).filter(|row| row.len() >= 3 && row[0] == gate as f64).ok_or_else(|| {
                 format!("line {}: gate {gate} of ray {ray} is expected, with velocity and intensity", number + 1)
             })?;
@@ -70,7 +84,10 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
         intensities.push(intensity);
     }
     if let Some(stated) = header.rays.filter(|stated| *stated > rays.len()) {
-        return Err(format!("it is cut short: it has {} of {stated} rays", rays.len()));
+        return Err(format!(
+            "it is cut short: it has {} of {stated} rays",
+            rays.len()
+        ));
     }
     mask_noise(&mut rays, &intensities, format);
     let elevation_rad: Vec<f64> = rays.iter().map(|ray| ray.elevation_rad).collect();
@@ -95,19 +112,28 @@ impl Header {
         let value = |key: &str| {
             lines.iter().find_map(|line| {
                 let (name, value) = line.split_once(':')?;
-                name.trim().to_ascii_lowercase().starts_with(key).then(|| value.trim())
+                name.trim()
+                    .to_ascii_lowercase()
+                    .starts_with(key)
+                    .then(|| value.trim())
             })
         };
         let number = |key: &str| value(key).and_then(|text| numbers(text)?.first().copied());
-        let gates = number("number of gates").filter(|n| *n >= 1.0 && *n <= MOST_GATES as f64 && n.fract() == 0.0);
+        let gates = number("number of gates")
+            .filter(|n| *n >= 1.0 && *n <= MOST_GATES as f64 && n.fract() == 0.0);
         let gates = gates.ok_or("its header has no number of gates")? as usize;
-        let gate_length_m = number("range gate length").filter(|length| *length > 0.0 && length.is_finite());
+        let gate_length_m =
+            number("range gate length").filter(|length| *length > 0.0 && length.is_finite());
         let gate_length_m = gate_length_m.ok_or("its header has no range gate length above 0 m")?;
         let formula = lines
             .iter()
             .map(|line| line.to_ascii_lowercase())
-            .find(|line| line.starts_with("range of measurement") || line.starts_with("altitude of measurement"));
-        let overlapping = value("scan type").is_some_and(|kind| kind.to_ascii_lowercase().contains("overlapping"))
+            .find(|line| {
+                line.starts_with("range of measurement")
+                    || line.starts_with("altitude of measurement")
+            });
+        let overlapping = value("scan type")
+            .is_some_and(|kind| kind.to_ascii_lowercase().contains("overlapping"))
             || formula.is_some_and(|formula| formula.replace(' ', "").contains("/2+"));
         let points = number("gate length (pts)").filter(|points| *points >= 1.0);
         let gate_step_m = match (overlapping, points) {
@@ -119,15 +145,28 @@ impl Header {
         // YYYYMMDD hh:mm:ss; times of rays count from its midnight.
         let start = value("start time").and_then(|text| {
             let day = text.get(..8)?;
-            UtcTime::parse(&format!("{}-{}-{}T00:00:00Z", day.get(..4)?, day.get(4..6)?, day.get(6..8)?))
+            UtcTime::parse(&format!(
+                "{}-{}-{}T00:00:00Z",
+                day.get(..4)?,
+                day.get(4..6)?,
+                day.get(6..8)?
+            ))
         });
-        Ok(Self { gates, rays, gate_length_m, gate_step_m, start })
+        Ok(Self {
+            gates,
+            rays,
+            gate_length_m,
+            gate_step_m,
+            start,
+        })
     }
 }
 
 /// Numbers of a line; a comma in a number is its point.
 fn numbers(line: &str) -> Option<Vec<f64>> {
-    line.split_whitespace().map(|word| word.replace(',', ".").parse().ok()).collect()
+    line.split_whitespace()
+        .map(|word| word.replace(',', ".").parse().ok())
+        .collect()
 }
 
 /// Takes out the velocities of noise.
@@ -136,8 +175,12 @@ fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat
         Some(db) => 1.0 + 10f64.powf(0.1 * db),
         None => {
             // Noise is on both sides of 1, signals above.
-            let below: Vec<f64> =
-                intensities.iter().flatten().filter(|i| **i < 1.0).map(|i| (i - 1.0).powi(2)).collect();
+            let below: Vec<f64> = intensities
+                .iter()
+                .flatten()
+                .filter(|i| **i < 1.0)
+                .map(|i| (i - 1.0).powi(2))
+                .collect();
             let deviation = (below.iter().sum::<f64>() / below.len().max(1) as f64).sqrt();
             1.0 + SIGMAS_ABOVE_NOISE * deviation
         }
@@ -145,7 +188,11 @@ fn mask_noise(rays: &mut [RayRow], intensities: &[Vec<f64>], format: &ScanFormat
     for (ray, intensity) in rays.iter_mut().zip(intensities) {
         for (velocity, intensity) in ray.velocity_m_s.iter_mut().zip(intensity) {
             // This program writes intensity 1 where there is none.
-            *velocity = if *intensity > 1.0 && *intensity >= least { format.sign() * *velocity } else { f64::NAN };
+            *velocity = if *intensity > 1.0 && *intensity >= least {
+                format.sign() * *velocity
+            } else {
+                f64::NAN
+            };
         }
     }
 }
@@ -164,13 +211,25 @@ mod tests {
         );
         for ray in 0..6 {
             let hours = (23.99 + 0.005 * f64::from(ray)) % 24.0;
-            out += &format!("{hours:.5} 90.00 {:.2} 0.0 0.0\n", 1.0 + 0.5 * f64::from(ray));
+            out += &format!(
+                "{hours:.5} 90.00 {:.2} 0.0 0.0\n",
+                1.0 + 0.5 * f64::from(ray)
+            );
             for gate in 0..8 {
-                let intensity = if gate < 6 { 1.2 } else { 1.0 + 0.004 * f64::from(2 * (ray % 2) - 1) };
-                out += &format!("{gate:3} {:.4} {intensity:.6} 1.0E-6\n", f64::from(gate) - 2.5);
+                let intensity = if gate < 6 {
+                    1.2
+                } else {
+                    1.0 + 0.004 * f64::from(2 * (ray % 2) - 1)
+                };
+                out += &format!(
+                    "{gate:3} {:.4} {intensity:.6} 1.0E-6\n",
+                    f64::from(gate) - 2.5
+                );
             }
         }
-        changes.iter().fold(out, |text, (from, to)| text.replace(from, to))
+        changes
+            .iter()
+            .fold(out, |text, (from, to)| text.replace(from, to))
     }
 
     fn read(text: &str, format: &ScanFormat) -> ReadScan {
@@ -183,16 +242,35 @@ mod tests {
     fn noise_is_left_out_and_hours_go_on_after_midnight() {
         let found = read(&file(&[]), &ScanFormat::default());
         let map = &found.map;
-        assert_eq!((map.range_m[0], map.range_m[7], map.velocity_m_s.dim()), (15.0, 225.0, (6, 8)));
+        assert_eq!(
+            (map.range_m[0], map.range_m[7], map.velocity_m_s.dim()),
+            (15.0, 225.0, (6, 8))
+        );
         assert!(
             map.velocity_m_s.column(5).iter().all(|v| *v == 2.5)
                 && map.velocity_m_s.column(6).iter().all(|v| v.is_nan())
         );
-        assert!(map.time_s.windows(2).all(|pair| (pair[1] - pair[0] - 18.0).abs() < 0.1), "{:?}", map.time_s);
+        assert!(
+            map.time_s
+                .windows(2)
+                .all(|pair| (pair[1] - pair[0] - 18.0).abs() < 0.1),
+            "{:?}",
+            map.time_s
+        );
         assert_eq!(found.reference.unwrap().to_string(), "2024-01-31T00:00:00Z");
-        let loud = ScanFormat { min_snr_db: Some(-6.0), towards: true, ..ScanFormat::default() };
-        assert!(scans(&file(&[]), Path::new("x.hpl"), &loud).is_err(), "0.2 is -7 dB");
-        let towards = ScanFormat { towards: true, ..ScanFormat::default() };
+        let loud = ScanFormat {
+            min_snr_db: Some(-6.0),
+            towards: true,
+            ..ScanFormat::default()
+        };
+        assert!(
+            scans(&file(&[]), Path::new("x.hpl"), &loud).is_err(),
+            "0.2 is -7 dB"
+        );
+        let towards = ScanFormat {
+            towards: true,
+            ..ScanFormat::default()
+        };
         assert_eq!(read(&file(&[]), &towards).map.velocity_m_s[[0, 5]], -2.5);
     }
 
@@ -203,14 +281,34 @@ mod tests {
             (map.range_m[0], map.range_m[1] - map.range_m[0])
         };
         // Whatever the formula says: the scan type is right.
-        assert_eq!(ranges(&[("Scan type:\tRHI", "Scan type:\tRHI - overlapping")]), (15.0, 3.0));
-        assert_eq!(ranges(&[("(range gate + 0.5) * Gate length", "gate length / 2 + (range gate x 3)")]), (15.0, 3.0));
         assert_eq!(
-            ranges(&[("Range of measurement", "Altitude of measurement"), ("No. of rays", "No. of waypoints")]),
+            ranges(&[("Scan type:\tRHI", "Scan type:\tRHI - overlapping")]),
+            (15.0, 3.0)
+        );
+        assert_eq!(
+            ranges(&[(
+                "(range gate + 0.5) * Gate length",
+                "gate length / 2 + (range gate x 3)"
+            )]),
+            (15.0, 3.0)
+        );
+        assert_eq!(
+            ranges(&[
+                ("Range of measurement", "Altitude of measurement"),
+                ("No. of rays", "No. of waypoints")
+            ]),
             (15.0, 30.0)
         );
-        let commas = file(&[]).replace(".000000", ",000000").replace(".200000", ",200000").replace("30.0", "30,0");
-        let velocities = |text: &str| read(text, &ScanFormat::default()).map.velocity_m_s.mapv(f64::to_bits);
+        let commas = file(&[])
+            .replace(".000000", ",000000")
+            .replace(".200000", ",200000")
+            .replace("30.0", "30,0");
+        let velocities = |text: &str| {
+            read(text, &ScanFormat::default())
+                .map
+                .velocity_m_s
+                .mapv(f64::to_bits)
+        };
         assert_eq!(velocities(&commas), velocities(&file(&[])));
     }
 
@@ -219,15 +317,26 @@ mod tests {
         let mut map: VelocityMap = samples::map();
         let shape = map.field("radial_velocity").unwrap().values.dim();
         let ratio = ndarray::Array2::from_elem(shape, 3.0);
-        map.fields.retain(|field| field.name != "signal_to_noise_ratio");
-        map.fields.push(crate::io::Field::float("signal_to_noise_ratio", Unit::DECIBEL, "ratio", ratio));
+        map.fields
+            .retain(|field| field.name != "signal_to_noise_ratio");
+        map.fields.push(crate::io::Field::float(
+            "signal_to_noise_ratio",
+            Unit::DECIBEL,
+            "ratio",
+            ratio,
+        ));
         // Two sweeps of six rays and five gates: 30 velocities are as few as a scan may have.
         let bytes = hpl::hpl_bytes(&map, 0, "halo.hpl").unwrap();
         let found = read(&String::from_utf8(bytes).unwrap(), &ScanFormat::default());
         let written = &map.field("radial_velocity").unwrap().values;
         let gates = map.range_m.len();
         let before = found.map.range_m.len() - gates;
-        for ((ray, gate), velocity) in found.map.velocity_m_s.indexed_iter().filter(|((_, gate), _)| *gate >= before) {
+        for ((ray, gate), velocity) in found
+            .map
+            .velocity_m_s
+            .indexed_iter()
+            .filter(|((_, gate), _)| *gate >= before)
+        {
             assert!((velocity - written[[ray, gate - before]]).abs() < 1e-4);
         }
         assert!((found.map.range_m[before] - map.range_m[0]).abs() < 1e-3);

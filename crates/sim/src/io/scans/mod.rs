@@ -38,7 +38,8 @@ impl ScanFormat {
 
     /// Whether a velocity with this signal-to-noise ratio, dB, is left out; that of an unknown one is.
     fn is_noise(&self, snr_db: f64) -> bool {
-        self.min_snr_db.is_some_and(|least| snr_db.is_nan() || snr_db < least)
+        self.min_snr_db
+            .is_some_and(|least| snr_db.is_nan() || snr_db < least)
     }
 }
 
@@ -68,12 +69,19 @@ pub struct ReadScan {
 impl ReadScan {
     /// Name of the file without its folder.
     pub fn file_name(&self) -> String {
-        self.path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+        self.path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned()
     }
 
     /// A map that was just made by this program, named `name` in messages.
     pub fn own(name: &str, map: ScanMap) -> Self {
-        Self { is_own: true, ..Self::new(Path::new(name), 0, map) }
+        Self {
+            is_own: true,
+            ..Self::new(Path::new(name), 0, map)
+        }
     }
 
     /// A map of which nothing else is known.
@@ -100,7 +108,10 @@ type Found = (Vec<ReadScan>, Vec<String>);
 /// # Errors
 /// A file that cannot be read, is damaged or cut short, has no scan in elevation, or no velocity that is not missing.
 pub fn read(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
-    let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+    let refuse = |reason: String| Error::Input {
+        path: path.to_owned(),
+        reason,
+    };
     let (_, length, magic) = text_file::begin(path)?;
     match &magic[..] {
         [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
@@ -114,21 +125,33 @@ pub fn read(path: &Path, format: &ScanFormat) -> Result<Found, Error> {
             }
             if out.is_empty() {
                 let left_out = left_out.join("; ");
-                return Err(refuse(format!("it has no scan in elevation (RHI) that can be used: {left_out}")));
+                return Err(refuse(format!(
+                    "it has no scan in elevation (RHI) that can be used: {left_out}"
+                )));
             }
             Ok((out, left_out))
         }
         _ => {
             if length > LARGEST_TEXT_BYTES {
-                return Err(refuse(format!("it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read")));
+                return Err(refuse(format!(
+                    "it has {length} bytes; texts of at most {LARGEST_TEXT_BYTES} are read"
+                )));
             }
             let bytes = std::fs::read(path).map_err(Error::io("read", path))?;
             // The text, and a text of its own for each cell.
-            let cells = bytes.iter().filter(|byte| matches!(byte, b',' | b'\n' | b' ' | b'\t')).count();
-            machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64).map_err(refuse)?;
+            let cells = bytes
+                .iter()
+                .filter(|byte| matches!(byte, b',' | b'\n' | b' ' | b'\t'))
+                .count();
+            machine::holds("its table", 2.0 * length as f64 + 64.0 * cells as f64)
+                .map_err(refuse)?;
             // Files of instruments have names of places in all encodings; numbers are the same in each.
             let text = String::from_utf8_lossy(&bytes);
-            let found = match text.lines().take(60).any(|line| line.trim_start().starts_with("****")) {
+            let found = match text
+                .lines()
+                .take(60)
+                .any(|line| line.trim_start().starts_with("****"))
+            {
                 true => hpl::scans(&text, path, format),
                 false => table::scans(&text, path, format),
             };

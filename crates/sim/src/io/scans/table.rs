@@ -9,7 +9,12 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Names of the velocity, the first that is there is taken.
-const VELOCITIES: [&str; 4] = ["velocity_m_s", OWN, "radial_velocity_m_s", "radial_velocity"];
+const VELOCITIES: [&str; 4] = [
+    "velocity_m_s",
+    OWN,
+    "radial_velocity_m_s",
+    "radial_velocity",
+];
 /// That of the estimates of this program.
 const OWN: &str = "v_mean_m_s";
 /// Names of its standard deviation.
@@ -37,7 +42,8 @@ struct Row {
 pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<ReadScan>, String> {
     let table = TextTable::parse(text)?;
     // Programs that write it again keep the names of its columns.
-    let is_own = table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
+    let is_own =
+        table.comment.trim_start().starts_with("source: wakescope ") || table.column(OWN).is_some();
     let rows = rows(&table, format, is_own)?;
     if rows.is_empty() {
         return Err("it has a header and no rows".into());
@@ -60,7 +66,11 @@ pub(super) fn scans(text: &str, path: &Path, format: &ScanFormat) -> Result<Vec<
 
 /// The rows of each sweep. Numbers of this program's maps have the digits of their NetCDF files, single precision and angles in degrees:
 /// fits to what jumps tell the same of both.
-fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<BTreeMap<u64, Vec<Row>>, String> {
+fn rows(
+    table: &TextTable,
+    format: &ScanFormat,
+    is_own: bool,
+) -> Result<BTreeMap<u64, Vec<Row>>, String> {
     let one_of = |names: &[&str]| names.iter().find_map(|name| table.column(name));
     let needed = |names: &[&str]| {
         one_of(names).ok_or_else(|| {
@@ -74,17 +84,33 @@ fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<BTreeMap
         Some(name) => needed(&[name])?,
         None => needed(&VELOCITIES)?,
     };
-    let elevation =
-        table.angle("elevation").map_or_else(|| needed(&["elevation_rad"]).map(|column| (column, 1.0)), Ok)?;
-    let (range, azimuth, time) = (needed(&["range_m"])?, table.angle("azimuth"), table.column("time_s"));
-    let (sweep, snr, flagged) = (one_of(&["sweep", "scan"]), table.column("snr_db"), table.column("flagged"));
+    let elevation = table.angle("elevation").map_or_else(
+        || needed(&["elevation_rad"]).map(|column| (column, 1.0)),
+        Ok,
+    )?;
+    let (range, azimuth, time) = (
+        needed(&["range_m"])?,
+        table.angle("azimuth"),
+        table.column("time_s"),
+    );
+    let (sweep, snr, flagged) = (
+        one_of(&["sweep", "scan"]),
+        table.column("snr_db"),
+        table.column("flagged"),
+    );
     let is_mean = table.header[velocity] == OWN;
     let (sigma, count) = (one_of(&SIGMAS), table.column("count").filter(|_| is_mean));
     let mut out: BTreeMap<u64, Vec<Row>> = BTreeMap::new();
     for (row, cells) in table.rows.iter().enumerate() {
         let refuse = |reason: &str| Err(format!("row {}: {reason}", row + 1));
         let number = |column: usize| table.number(row, column);
-        let single = |column: usize| if is_own { f64::from(number(column) as f32) } else { number(column) };
+        let single = |column: usize| {
+            if is_own {
+                f64::from(number(column) as f32)
+            } else {
+                number(column)
+            }
+        };
         let radians = |(column, unit): (usize, f64)| unit * number(column);
         let sweep = sweep.map_or(0.0, number);
         if !(sweep >= 0.0 && sweep.fract() == 0.0) {
@@ -98,7 +124,8 @@ fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<BTreeMap
         if velocity_m_s.is_nan() && !(text.is_empty() || text.eq_ignore_ascii_case("nan")) {
             return refuse("its velocity is no number; an empty cell is a missing one");
         }
-        let is_noise = snr.is_some_and(|c| format.is_noise(number(c))) || flagged.is_some_and(|c| number(c) > 0.5);
+        let is_noise = snr.is_some_and(|c| format.is_noise(number(c)))
+            || flagged.is_some_and(|c| number(c) > 0.5);
         out.entry(sweep as u64).or_default().push(Row {
             number: row + 1,
             range_m,
@@ -108,7 +135,11 @@ fn rows(table: &TextTable, format: &ScanFormat, is_own: bool) -> Result<BTreeMap
             },
             azimuth_rad: azimuth.map_or(f64::NAN, radians),
             time_s: time.map_or(f64::NAN, number),
-            velocity_m_s: if is_noise { f64::NAN } else { format.sign() * velocity_m_s },
+            velocity_m_s: if is_noise {
+                f64::NAN
+            } else {
+                format.sign() * velocity_m_s
+            },
             sigma_m_s: sigma.map(|column| of_mean(single(column), count.map(number))),
             count: count.map_or(f64::NAN, number),
         });
@@ -133,12 +164,19 @@ fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
         azimuth_rad: f64::NAN,
         time_s: f64::NAN,
         velocity_m_s: vec![f64::NAN; gates],
-        sigma_m_s: if has_sigma { vec![f64::NAN; gates] } else { Vec::new() },
+        sigma_m_s: if has_sigma {
+            vec![f64::NAN; gates]
+        } else {
+            Vec::new()
+        },
     };
     let mut rays: Vec<RayRow> = elevation_rad.iter().map(empty).collect();
     let mut seen = vec![false; gates * lines];
     for row in rows {
-        let (line, gate) = (nearest(&elevation_rad, row.elevation_rad), nearest(&range_m, row.range_m));
+        let (line, gate) = (
+            nearest(&elevation_rad, row.elevation_rad),
+            nearest(&range_m, row.range_m),
+        );
         if std::mem::replace(&mut seen[line * gates + gate], true) {
             return Err(format!(
                 "row {}: range {} m at elevation {} rad is there twice: a column sweep tells scans apart",
@@ -150,7 +188,10 @@ fn grid(rows: &[Row]) -> Result<(Vec<RayRow>, Vec<f64>), String> {
         if let Some(sigma_m_s) = row.sigma_m_s {
             ray.sigma_m_s[gate] = sigma_m_s;
         }
-        for (of, value) in [(&mut ray.time_s, row.time_s), (&mut ray.azimuth_rad, row.azimuth_rad)] {
+        for (of, value) in [
+            (&mut ray.time_s, row.time_s),
+            (&mut ray.azimuth_rad, row.azimuth_rad),
+        ] {
             if value.is_finite() {
                 *of = value;
             }
@@ -174,6 +215,13 @@ fn axis(values: impl Iterator<Item = f64>) -> Vec<f64> {
 
 fn nearest(axis: &[f64], value: f64) -> usize {
     let above = axis.partition_point(|x| *x <= value);
-    let near = [above.saturating_sub(1), above.min(axis.len().saturating_sub(1))];
-    if (axis[near[0]] - value).abs() <= (axis[near[1]] - value).abs() { near[0] } else { near[1] }
+    let near = [
+        above.saturating_sub(1),
+        above.min(axis.len().saturating_sub(1)),
+    ];
+    if (axis[near[0]] - value).abs() <= (axis[near[1]] - value).abs() {
+        near[0]
+    } else {
+        near[1]
+    }
 }

@@ -9,17 +9,30 @@ pub(super) fn si(value: f64, unit: &str) -> String {
     const PREFIXES: [&str; 9] = ["G", "M", "k", "", "m", "u", "n", "p", "f"];
     let sizes = (-15..=9).rev().step_by(3).map(|power| 10f64.powi(power));
     // 999.6 is 1.00 of the next prefix.
-    match sizes.zip(PREFIXES).find(|(size, _)| value.abs() >= 0.9995 * size) {
-        Some((size, prefix)) if value.is_finite() => format!("{} {prefix}{unit}", digits(value / size)),
+    match sizes
+        .zip(PREFIXES)
+        .find(|(size, _)| value.abs() >= 0.9995 * size)
+    {
+        Some((size, prefix)) if value.is_finite() => {
+            format!("{} {prefix}{unit}", digits(value / size))
+        }
         _ => format!("{} {unit}", scientific(value)),
     }
 }
 
 /// Three digits of a number from 1 to 1000, without zeros behind the point.
 pub(super) fn digits(value: f64) -> String {
-    let places = if value.abs() >= 99.95 { 0 } else { 1 + usize::from(value.abs() < 9.995) };
+    let places = if value.abs() >= 99.95 {
+        0
+    } else {
+        1 + usize::from(value.abs() < 9.995)
+    };
     let text = format!("{value:.places$}");
-    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
+    if text.contains('.') {
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    } else {
+        text
+    }
 }
 
 /// Three digits and a power of ten, as few of them as it takes.

@@ -32,13 +32,20 @@ impl Limits {
     pub fn new(plan: &Plan) -> Result<Self, Error> {
         let (scene, instrument) = (&plan.scene.content, &plan.instrument);
         let (receiver, pulse, d) = (&instrument.receiver, &instrument.pulse, &scene.detector);
-        let mut found = Self { values: Vec::new(), lines: Vec::new() };
+        let mut found = Self {
+            values: Vec::new(),
+            lines: Vec::new(),
+        };
         let mean_w = scene.pulse_energy_j() * scene.laser.pulse_repetition_hz;
         let peak_w = instrument.peak_power_w();
         let mut power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
-        found.values.extend([("mean_power_w", mean_w), ("peak_power_w", peak_w)]);
+        found
+            .values
+            .extend([("mean_power_w", mean_w), ("peak_power_w", peak_w)]);
         if let Some(fibre) = &scene.laser.fibre {
-            let threshold_w = fibre.of_silica().brillouin_threshold_w(instrument.gaussian_fwhm_s());
+            let threshold_w = fibre
+                .of_silica()
+                .brillouin_threshold_w(instrument.gaussian_fwhm_s());
             found.values.push(("brillouin_threshold_w", threshold_w));
             power += &format!(
                 "; Brillouin threshold of {} um^2 x {}: {}",
@@ -53,14 +60,22 @@ impl Limits {
         found.lines.push(power);
         let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
         let blind_m = 0.5 * SPEED_OF_LIGHT_M_S * receiver.blind_time_s(pulse, HARMLESS_SNR);
-        found.values.extend([("reflex_range_m", blind_m), ("ambiguous_range_m", apart_m)]);
+        found
+            .values
+            .extend([("reflex_range_m", blind_m), ("ambiguous_range_m", apart_m)]);
         let mut blind = Vec::new();
         if receiver.front_end.reflection > 0.0 {
             let reflection_db = scene.telescope.reflection_db;
-            blind.push(format!("blind to {} (reflection {reflection_db} dB, until -20 dB)", si(blind_m, "m")));
+            blind.push(format!(
+                "blind to {} (reflection {reflection_db} dB, until -20 dB)",
+                si(blind_m, "m")
+            ));
         }
         if instrument.blind_range_m > 0.0 {
-            blind.push(format!("blind to {} (key blind_range_m)", si(instrument.blind_range_m, "m")));
+            blind.push(format!(
+                "blind to {} (key blind_range_m)",
+                si(instrument.blind_range_m, "m")
+            ));
         }
         blind.push(format!("ambiguous from {}", si(apart_m, "m")));
         found.lines.push(format!("range: {}", blind.join("; ")));
@@ -69,12 +84,19 @@ impl Limits {
             found.phase_noise(plan)?;
         }
         let n = receiver.noise_densities();
-        let mut oscillator = vec![format!("local oscillator {}", si(d.local_oscillator_w, "W"))];
+        let mut oscillator = vec![format!(
+            "local oscillator {}",
+            si(d.local_oscillator_w, "W")
+        )];
         if n.amplifier_a2_hz > 0.0 {
             // Shot noise grows with the power, this noise does not.
-            let equal_w = n.amplifier_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * receiver.responsivity_a_w());
+            let equal_w =
+                n.amplifier_a2_hz / (2.0 * ELEMENTARY_CHARGE_C * receiver.responsivity_a_w());
             found.values.push(("amplifier_equals_shot_w", equal_w));
-            oscillator.push(format!("amplifier noise equals shot noise at {}", si(equal_w, "W")));
+            oscillator.push(format!(
+                "amplifier noise equals shot noise at {}",
+                si(equal_w, "W")
+            ));
         }
         if n.intensity_a2_hz > 0.0 {
             let equal_w = d.local_oscillator_w * n.shot_a2_hz / n.intensity_a2_hz;
@@ -87,18 +109,29 @@ impl Limits {
             oscillator.push(format!("best at {}", si(best_w, "W")));
         }
         let (first, rest) = oscillator.split_at(1);
-        let rest = if rest.is_empty() { "shot noise alone".into() } else { rest.join("; ") };
+        let rest = if rest.is_empty() {
+            "shot noise alone".into()
+        } else {
+            rest.join("; ")
+        };
         found.lines.push(format!("{}: {rest}", first.concat()));
         found.resolution(plan)?;
         Ok(found)
     }
 
     fn velocities(&mut self, plan: &Plan) {
-        let (d, half_m) = (&plan.scene.content.detector, 0.5 * plan.scene.content.laser.wavelength_m);
+        let (d, half_m) = (
+            &plan.scene.content.detector,
+            0.5 * plan.scene.content.laser.wavelength_m,
+        );
         let band_m_s = 0.5 * half_m * d.bandwidth_hz;
         let (low_m_s, high_m_s) = sampled_velocities_m_s(&plan.scene.content);
         let flow_m_s = plan.fastest_m_s;
-        self.values.extend([("band_m_s", band_m_s), ("sampled_from_m_s", low_m_s), ("sampled_to_m_s", high_m_s)]);
+        self.values.extend([
+            ("band_m_s", band_m_s),
+            ("sampled_from_m_s", low_m_s),
+            ("sampled_to_m_s", high_m_s),
+        ]);
         self.lines.push(format!(
             "velocity: band +-{band_m_s:.1} m/s; sampled {low_m_s:+.1} to {high_m_s:+.1} m/s; flow reaches {flow_m_s:.0} m/s"
         ));
@@ -116,7 +149,10 @@ impl Limits {
         let at = |s: f64| weights[(((s + 0.5) * PLACES as f64) as usize).min(PLACES - 1)];
         let peak_m_s = mean_m_s * peak_variance_factor(at).sqrt();
         let spectrum_m_s = 0.5 * wavelength_m * plan.instrument.pulse.spectral_width_hz();
-        self.values.extend([("phase_noise_m_s", mean_m_s), ("phase_noise_of_peak_m_s", peak_m_s)]);
+        self.values.extend([
+            ("phase_noise_m_s", mean_m_s),
+            ("phase_noise_of_peak_m_s", peak_m_s),
+        ]);
         self.lines.push(format!(
             "linewidth {}: {mean_m_s:.3} m/s a window, its peak {peak_m_s:.3} m/s (spectrum of one pulse {spectrum_m_s:.2} m/s)",
             si(linewidth_hz, "Hz")
@@ -134,7 +170,10 @@ impl Limits {
             Weighting::Rectangular => "rectangular",
             Weighting::Hann => "Hann",
         };
-        self.values.extend([("pulse_resolution_m", pulse_m), ("gate_resolution_m", gate_m)]);
+        self.values.extend([
+            ("pulse_resolution_m", pulse_m),
+            ("gate_resolution_m", gate_m),
+        ]);
         self.lines.push(format!(
             "resolution: pulse {pulse_m:.1} m, gate (pulse and {weighting} window of {}) {gate_m:.1} m, full width at half maximum",
             scene.estimator.window_samples

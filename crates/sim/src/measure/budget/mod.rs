@@ -65,21 +65,38 @@ impl Budget {
     /// # Errors
     /// What the optics refuse, such as a range beyond both in turbulence.
     pub fn new(plan: &Plan, range_m: &[f64], observer: &dyn Observer) -> Result<Self, Error> {
-        let optics = LineOptics { plan, known: &Efficiencies::default(), observer };
+        let optics = LineOptics {
+            plan,
+            known: &Efficiencies::default(),
+            observer,
+        };
         let mut rows = Rows::new(plan, range_m, |sorted_m| optics.efficiency_at(sorted_m))?;
         rows.beside_the_ratio()?;
         let limits = Limits::new(plan)?;
-        Ok(Self { range_m: range_m.to_vec(), rows: rows.rows, limits, warnings: plan.warnings.clone() })
+        Ok(Self {
+            range_m: range_m.to_vec(),
+            rows: rows.rows,
+            limits,
+            warnings: plan.warnings.clone(),
+        })
     }
 
     /// The signal-to-noise ratio in the detector band at each range, dB.
     pub fn snr_db(&self) -> &[f64] {
-        self.rows.iter().find(|row| row.name == TOTAL).map_or(&[], |row| &row.db)
+        self.rows
+            .iter()
+            .find(|row| row.name == TOTAL)
+            .map_or(&[], |row| &row.db)
     }
 
     /// The table `range_m,row,symbol,db`, range after range.
     pub fn table(&self) -> Table {
-        let rows = || self.range_m.iter().enumerate().flat_map(|(i, r)| self.rows.iter().map(move |row| (i, *r, row)));
+        let rows = || {
+            self.range_m
+                .iter()
+                .enumerate()
+                .flat_map(|(i, r)| self.rows.iter().map(move |row| (i, *r, row)))
+        };
         Table::new()
             .float("range_m", rows().map(|(_, range_m, _)| range_m))
             .text("row", rows().map(|(_, _, row)| row.name))
@@ -89,8 +106,9 @@ impl Budget {
 
     /// The table for people, with the limits and the warnings.
     pub fn text(&self) -> String {
-        let columns =
-            |cells: &mut dyn Iterator<Item = String>| cells.map(|cell| format!("{cell:>11}")).collect::<String>();
+        let columns = |cells: &mut dyn Iterator<Item = String>| {
+            cells.map(|cell| format!("{cell:>11}")).collect::<String>()
+        };
         let mut out = format!("power budget, dB; range in m\n{:66}", "");
         out += &(columns(&mut self.range_m.iter().map(f64::to_string)) + "\n");
         for row in &self.rows {
@@ -113,9 +131,15 @@ impl Budget {
 /// # Errors
 /// What the optics refuse.
 pub fn snr_without_screens_db(plan: &Plan, range_m: &[f64]) -> Result<Vec<f64>, Error> {
-    let rows = Rows::new(plan, range_m, |sorted_m| efficiency_by_theory(&plan.instrument, sorted_m))?;
+    let rows = Rows::new(plan, range_m, |sorted_m| {
+        efficiency_by_theory(&plan.instrument, sorted_m)
+    })?;
     // The last row of all.
-    Ok(rows.rows.into_iter().next_back().map_or(Vec::new(), |row| row.db))
+    Ok(rows
+        .rows
+        .into_iter()
+        .next_back()
+        .map_or(Vec::new(), |row| row.db))
 }
 
 fn increasing(range_m: &[f64]) -> Vec<f64> {
@@ -143,9 +167,15 @@ impl<'a> Rows<'a> {
         range_m: &'a [f64],
         efficiency: impl FnOnce(&[f64]) -> Result<EfficiencyProfile, Error>,
     ) -> Result<Self, Error> {
-        let mut rows = Self { plan, range_m, rows: Vec::new() };
+        let mut rows = Self {
+            plan,
+            range_m,
+            rows: Vec::new(),
+        };
         match plan.scene.content.detector.snr {
-            SnrReference::Fixed { snr_db } => rows.same("stated by the scene", "", "detector.snr".into(), snr_db),
+            SnrReference::Fixed { snr_db } => {
+                rows.same("stated by the scene", "", "detector.snr".into(), snr_db)
+            }
             _ => {
                 rows.transmitter_and_path(&efficiency(&increasing(range_m))?)?;
                 rows.sum("= shot-noise limit", "(14)", "(14)".into());
@@ -171,14 +201,22 @@ impl<'a> Rows<'a> {
         self.push("= in the width of the pulse", "", value, wide);
         if scene.scan.second_trip.is_some() {
             let echoes = self.at_each(&|range_m| second_trip(scene, instrument, range_m))?;
-            let value = format!("from {} farther", si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m"));
+            let value = format!(
+                "from {} farther",
+                si(ambiguous_range_m(scene.laser.pulse_repetition_hz), "m")
+            );
             self.push("= pulse before over echo", "", value, echoes);
         }
         Ok(())
     }
 
     fn push(&mut self, name: &'static str, symbol: &'static str, value: String, db: Vec<f64>) {
-        self.rows.push(Row { name, symbol, value, db });
+        self.rows.push(Row {
+            name,
+            symbol,
+            value,
+            db,
+        });
     }
 
     /// A factor that is the same at every range.
@@ -187,7 +225,14 @@ impl<'a> Rows<'a> {
     }
 
     /// A factor that a scene need not have.
-    fn optional(&mut self, is_there: bool, name: &'static str, symbol: &'static str, value: String, db: f64) {
+    fn optional(
+        &mut self,
+        is_there: bool,
+        name: &'static str,
+        symbol: &'static str,
+        value: String,
+        db: f64,
+    ) {
         if is_there {
             self.same(name, symbol, value, db);
         }
@@ -200,7 +245,9 @@ impl<'a> Rows<'a> {
 
     fn sums(&self) -> Vec<f64> {
         let factors = self.rows.iter().filter(|row| !row.name.starts_with('='));
-        factors.fold(vec![0.0; self.range_m.len()], |sums, row| sums.iter().zip(&row.db).map(|(a, b)| a + b).collect())
+        factors.fold(vec![0.0; self.range_m.len()], |sums, row| {
+            sums.iter().zip(&row.db).map(|(a, b)| a + b).collect()
+        })
     }
 
     fn sum(&mut self, name: &'static str, symbol: &'static str, value: String) {
@@ -210,53 +257,130 @@ impl<'a> Rows<'a> {
 
     /// A factor at each range, dB.
     fn at_each(&self, of: &dyn Fn(f64) -> Result<f64, Error>) -> Result<Vec<f64>, Error> {
-        self.range_m.iter().map(|&range_m| Ok(decibels(of(range_m)?))).collect()
+        self.range_m
+            .iter()
+            .map(|&range_m| Ok(decibels(of(range_m)?)))
+            .collect()
     }
 
     /// From the photons of the pulse to the electrons that it gives.
     fn transmitter_and_path(&mut self, efficiency: &EfficiencyProfile) -> Result<(), Error> {
         let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
-        let (telescope, receiver, t) = (&instrument.telescope, &instrument.receiver, &scene.telescope);
+        let (telescope, receiver, t) = (
+            &instrument.telescope,
+            &instrument.receiver,
+            &scene.telescope,
+        );
         let (energy_j, photon_j) = (scene.pulse_energy_j(), receiver.photon_energy_j());
         let area_m2 = telescope.aperture_area_m2();
         let solid_angle = |r: f64| area_m2 / (r * r);
         let sent = format!("{} / {photon_j:.2e} J", si(energy_j, "J"));
-        self.same("photons sent", "E/(h nu)", sent, decibels(energy_j / photon_j));
+        self.same(
+            "photons sent",
+            "E/(h nu)",
+            sent,
+            decibels(energy_j / photon_j),
+        );
         let printed = scene.detector.snr == SnrReference::Chapter {};
-        self.optional(printed, "hbar for h", "2 pi", "as the chapter prints (14)".into(), decibels(2.0 * PI));
+        self.optional(
+            printed,
+            "hbar for h",
+            "2 pi",
+            "as the chapter prints (14)".into(),
+            decibels(2.0 * PI),
+        );
         let bandwidth_hz = receiver.bandwidth_hz;
-        self.same("per bandwidth", "1/B", si(bandwidth_hz, "Hz"), -decibels(bandwidth_hz));
-        self.same("range per time", "c/2", "c/2".into(), decibels(0.5 * crate::SPEED_OF_LIGHT_M_S));
+        self.same(
+            "per bandwidth",
+            "1/B",
+            si(bandwidth_hz, "Hz"),
+            -decibels(bandwidth_hz),
+        );
+        self.same(
+            "range per time",
+            "c/2",
+            "c/2".into(),
+            decibels(0.5 * crate::SPEED_OF_LIGHT_M_S),
+        );
         let profile = || "profile".to_owned();
-        let (air, beta) = (scene.atmosphere.profile.as_ref(), scene.atmosphere.backscatter_per_m_sr);
+        let (air, beta) = (
+            scene.atmosphere.profile.as_ref(),
+            scene.atmosphere.backscatter_per_m_sr,
+        );
         let backscatter = self.at_each(&|r| {
-            let clear = Instrument { blind_range_m: 0.0, transmission: 1.0, ..instrument.clone() };
+            let clear = Instrument {
+                blind_range_m: 0.0,
+                transmission: 1.0,
+                ..instrument.clone()
+            };
             Ok(clear.return_per_m(r)? / (instrument.air.transmission(r)?.powi(2) * solid_angle(r)))
         })?;
         let value = air.map_or_else(|| format!("{} /(m sr)", scientific(beta)), |_| profile());
         self.push("backscatter", "beta", value, backscatter);
-        let value = format!("A_R/R^2, aperture {}", si(2.0 * telescope.aperture_radius_m, "m"));
-        self.push("solid angle", "A_R/R^2", value, self.at_each(&|r| Ok(solid_angle(r)))?);
-        let value = air.map_or_else(|| format!("{} /m", scientific(scene.atmosphere.extinction_per_m)), |_| profile());
-        self.push("air, out and back", "K^2", value, self.at_each(&|r| Ok(instrument.air.transmission(r)?.powi(2)))?);
+        let value = format!(
+            "A_R/R^2, aperture {}",
+            si(2.0 * telescope.aperture_radius_m, "m")
+        );
+        self.push(
+            "solid angle",
+            "A_R/R^2",
+            value,
+            self.at_each(&|r| Ok(solid_angle(r)))?,
+        );
+        let value = air.map_or_else(
+            || format!("{} /m", scientific(scene.atmosphere.extinction_per_m)),
+            |_| profile(),
+        );
+        self.push(
+            "air, out and back",
+            "K^2",
+            value,
+            self.at_each(&|r| Ok(instrument.air.transmission(r)?.powi(2)))?,
+        );
         let passed = telescope.transmitted_fraction();
-        self.same("truncation, two beams", "T^2", format!("T = {passed:.4}"), 2.0 * decibels(passed));
+        self.same(
+            "truncation, two beams",
+            "T^2",
+            format!("T = {passed:.4}"),
+            2.0 * decibels(passed),
+        );
         let empty = free_space(instrument, &increasing(self.range_m))?;
         let antenna = self.at_each(&|r| Ok(empty.interpolated(r)? / passed.powi(2)))?;
         self.push("antenna efficiency", "eta_a", "free space".into(), antenna);
         if let Some(air) = turbulence(scene) {
             let value = format!("Cn2 {} m^(-2/3)", scientific(air.cn2_m_m23));
-            let left = self.at_each(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;
+            let left =
+                self.at_each(&|r| Ok(efficiency.interpolated(r)? / empty.interpolated(r)?))?;
             self.push("turbulence", "eta_s/eta_s(0)", value, left);
         }
         let lost = |db: f64| if db == 0.0 { 0.0 } else { -db };
-        self.same("optics", "both ways", "key optics_loss_db".into(), lost(t.optics_loss_db));
-        self.same("polarisation", "", "key polarisation_loss_db".into(), lost(t.polarisation_loss_db));
+        self.same(
+            "optics",
+            "both ways",
+            "key optics_loss_db".into(),
+            lost(t.optics_loss_db),
+        );
+        self.same(
+            "polarisation",
+            "",
+            "key polarisation_loss_db".into(),
+            lost(t.polarisation_loss_db),
+        );
         let efficiency = receiver.quantum_efficiency;
-        self.same("quantum efficiency", "eta_Q", format!("{efficiency:.2}"), decibels(efficiency));
+        self.same(
+            "quantum efficiency",
+            "eta_Q",
+            format!("{efficiency:.2}"),
+            decibels(efficiency),
+        );
         if self.range_m.iter().any(|r| *r < t.blind_range_m) {
             let seen = self.at_each(&|r| Ok(f64::from(u8::from(r >= t.blind_range_m))))?;
-            self.push("blind range", "", format!("to {}", si(t.blind_range_m, "m")), seen);
+            self.push(
+                "blind range",
+                "",
+                format!("to {}", si(t.blind_range_m, "m")),
+                seen,
+            );
         }
         Ok(())
     }
@@ -264,28 +388,76 @@ impl<'a> Rows<'a> {
     /// What the receiver loses against the shot-noise limit.
     fn receiver(&mut self) {
         let (scene, instrument) = (&self.plan.scene.content, &self.plan.instrument);
-        let (receiver, front) = (&instrument.receiver, scene.detector.front_end.unwrap_or_default());
+        let (receiver, front) = (
+            &instrument.receiver,
+            scene.detector.front_end.unwrap_or_default(),
+        );
         let (lost, n) = (receiver.penalties(), receiver.noise_densities());
-        let FrontEnd { saturation_w, half_power_hz, dark_current_a, intensity_noise_db_hz, rejection_db, .. } = front;
-        let value = format!("{} of {}", si(receiver.local_oscillator_w, "W"), si(saturation_w, "W"));
-        self.optional(saturation_w.is_finite(), "saturation", "(1 + P/Ps)^-3", value, -lost.saturation_db);
+        let FrontEnd {
+            saturation_w,
+            half_power_hz,
+            dark_current_a,
+            intensity_noise_db_hz,
+            rejection_db,
+            ..
+        } = front;
+        let value = format!(
+            "{} of {}",
+            si(receiver.local_oscillator_w, "W"),
+            si(saturation_w, "W")
+        );
+        self.optional(
+            saturation_w.is_finite(),
+            "saturation",
+            "(1 + P/Ps)^-3",
+            value,
+            -lost.saturation_db,
+        );
         let (amplifier_a2_hz, shot_a2_hz) = (n.amplifier_a2_hz, n.shot_a2_hz);
         let root = si(amplifier_a2_hz.sqrt(), "A/rtHz");
         let value = format!("{root}: {amplifier_a2_hz:.1e} of shot {shot_a2_hz:.1e}");
-        self.or_none(amplifier_a2_hz > 0.0, "amplifier noise", value, -lost.amplifier_db);
-        self.or_none(dark_current_a > 0.0, "dark current", si(dark_current_a, "A"), -lost.dark_db);
+        self.or_none(
+            amplifier_a2_hz > 0.0,
+            "amplifier noise",
+            value,
+            -lost.amplifier_db,
+        );
+        self.or_none(
+            dark_current_a > 0.0,
+            "dark current",
+            si(dark_current_a, "A"),
+            -lost.dark_db,
+        );
         let value = format!("{intensity_noise_db_hz} dB/Hz, {rejection_db} dB rejected");
-        self.or_none(n.intensity_a2_hz > 0.0, "intensity noise of the LO", value, -lost.intensity_db);
+        self.or_none(
+            n.intensity_a2_hz > 0.0,
+            "intensity noise of the LO",
+            value,
+            -lost.intensity_db,
+        );
         let value = format!("half power at {}", si(half_power_hz, "Hz"));
-        self.optional(half_power_hz.is_finite(), "response of the detector", "|H|^2", value, -lost.response_db);
+        self.optional(
+            half_power_hz.is_finite(),
+            "response of the detector",
+            "|H|^2",
+            value,
+            -lost.response_db,
+        );
         let (value, is_clipped) = match scene.detector.digitiser {
             Digitiser::None {} => ("none".into(), false),
-            Digitiser::Quantised { bits, full_scale_over_noise: k } => {
-                (format!("{bits} bits, {k} x noise"), lost.clipping_db > 0.0)
-            }
+            Digitiser::Quantised {
+                bits,
+                full_scale_over_noise: k,
+            } => (format!("{bits} bits, {k} x noise"), lost.clipping_db > 0.0),
         };
         self.same("converter", "", value, -lost.rounding_db);
-        self.optional(is_clipped, "clipping", "", "beyond full scale".into(), -lost.clipping_db);
+        self.optional(
+            is_clipped,
+            "clipping",
+            "",
+            "beyond full scale".into(),
+            -lost.clipping_db,
+        );
     }
 }
 
@@ -307,7 +479,12 @@ mod tests {
 
     fn budget(text: &str, range_m: &[f64]) -> Budget {
         let file = SceneFile::parse(text, std::path::Path::new("s.toml")).unwrap();
-        Budget::new(&Plan::new(file, Target::Efficiency).unwrap(), range_m, &Silent).unwrap()
+        Budget::new(
+            &Plan::new(file, Target::Efficiency).unwrap(),
+            range_m,
+            &Silent,
+        )
+        .unwrap()
     }
 
     const REAL: &str = "[laser]\nlinewidth_hz = 1e3\nfibre = { effective_area_m2 = 3e-10, length_m = 2.0 }\n\
@@ -318,7 +495,10 @@ mod tests {
 
     #[test]
     fn rows_of_table_2_and_of_a_real_receiver_are_the_stored_ones() {
-        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../tests/reference/receiver/budget.csv");
+        let path = concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../tests/reference/receiver/budget.csv"
+        );
         let stored = std::fs::read_to_string(path).unwrap();
         for (case, text) in [("table2,", ""), ("table2_real,", REAL)] {
             let found = budget(text, &[400.0]);
@@ -329,7 +509,12 @@ mod tests {
                 .collect();
             assert_eq!(expected.len(), 17);
             for (row, expected) in found.rows.iter().zip(expected) {
-                assert!((row.db[0] - expected).abs() < 1e-6, "{}: {} {expected}", row.name, row.db[0]);
+                assert!(
+                    (row.db[0] - expected).abs() < 1e-6,
+                    "{}: {} {expected}",
+                    row.name,
+                    row.db[0]
+                );
             }
         }
     }
@@ -354,7 +539,9 @@ mod tests {
             |s| s.detector.snr = SnrReference::Chapter {},
             |s| s.detector.snr = SnrReference::Fixed { snr_db: 3.0 },
             |s| s.telescope.blind_range_m = 250.0,
-            |s| (s.telescope.receiver, s.atmosphere.turbulence) = (ReceiverPath::Bistatic, coarse()),
+            |s| {
+                (s.telescope.receiver, s.atmosphere.turbulence) = (ReceiverPath::Bistatic, coarse())
+            },
             |s| s.atmosphere.turbulence = coarse(),
             |s| {
                 let front_end = FrontEnd {
@@ -365,7 +552,10 @@ mod tests {
                     ..Default::default()
                 };
                 s.detector.front_end = Some(front_end);
-                s.detector.digitiser = Digitiser::Quantised { bits: 5, full_scale_over_noise: 1.5 };
+                s.detector.digitiser = Digitiser::Quantised {
+                    bits: 5,
+                    full_scale_over_noise: 1.5,
+                };
                 s.scan.second_trip = Some(SecondTrip::default());
             },
             |s| {
@@ -378,19 +568,36 @@ mod tests {
         ];
         for (i, change) in changes.into_iter().enumerate() {
             let mut scene = Scene::default();
-            (scene.outputs.profile_range_min_m, scene.outputs.profile_range_max_m) = (200.0, 600.0);
+            (
+                scene.outputs.profile_range_min_m,
+                scene.outputs.profile_range_max_m,
+            ) = (200.0, 600.0);
             scene.outputs.profile_points = 3;
             change(&mut scene);
-            let plan = Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Efficiency).unwrap();
+            let plan =
+                Plan::new(SceneFile::new(scene.clone()).unwrap(), Target::Efficiency).unwrap();
             let profile = run(&plan, &Silent).unwrap().profile.unwrap();
             let found = Budget::new(&plan, &profile.efficiency.range_m, &Silent).unwrap();
             let sums: Vec<f64> = (0..3)
-                .map(|at| found.rows.iter().filter(|row| !row.name.starts_with('=')).map(|row| row.db[at]).sum())
+                .map(|at| {
+                    found
+                        .rows
+                        .iter()
+                        .filter(|row| !row.name.starts_with('='))
+                        .map(|row| row.db[at])
+                        .sum()
+                })
                 .collect();
             for (at, snr_db) in profile.snr_db.iter().enumerate() {
                 // Where no light comes back the profile has no ratio.
-                let close = |sum: f64| (sum - snr_db).abs() < 1e-9 || (snr_db.is_nan() && sum == f64::NEG_INFINITY);
-                assert!(close(sums[at]) && close(found.snr_db()[at]), "{i}: {} {snr_db}", sums[at]);
+                let close = |sum: f64| {
+                    (sum - snr_db).abs() < 1e-9 || (snr_db.is_nan() && sum == f64::NEG_INFINITY)
+                };
+                assert!(
+                    close(sums[at]) && close(found.snr_db()[at]),
+                    "{i}: {} {snr_db}",
+                    sums[at]
+                );
             }
         }
     }
@@ -402,9 +609,17 @@ mod tests {
              resampling = \"linear\"\n";
         for (text, width_hz) in [(flat, 2.4478e6), ("", 2.0 * LN_2 / PI / 200e-9)] {
             let found = budget(text, &[400.0]);
-            let row = found.rows.iter().find(|row| row.name.contains("width of the pulse")).unwrap();
+            let row = found
+                .rows
+                .iter()
+                .find(|row| row.name.contains("width of the pulse"))
+                .unwrap();
             let gain_db = row.db[0] - found.snr_db()[0];
-            assert!((gain_db - 10.0 * (50e6 / width_hz).log10()).abs() < 0.02, "{gain_db}: {}", row.value);
+            assert!(
+                (gain_db - 10.0 * (50e6 / width_hz).log10()).abs() < 0.02,
+                "{gain_db}: {}",
+                row.value
+            );
         }
     }
 
@@ -422,7 +637,12 @@ mod tests {
         ] {
             assert!(text.lines().any(|found| found == line), "{line}\n{text}");
         }
-        for part in ["5.4 times", "blind to 85.6 m", "linewidth 1 kHz: 0.027 m/s", "equals it at 320 mW"] {
+        for part in [
+            "5.4 times",
+            "blind to 85.6 m",
+            "linewidth 1 kHz: 0.027 m/s",
+            "equals it at 320 mW",
+        ] {
             assert!(text.contains(part), "{part}\n{text}");
         }
     }

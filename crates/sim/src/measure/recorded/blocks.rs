@@ -44,17 +44,39 @@ pub(super) fn scans<S: FromParts>(
     options: &RecordedOptions,
     observer: &dyn Observer,
 ) -> Result<Vec<ScanCells>, Error> {
-    let spectra = options.spectra.then(|| GateSpectra::new(plan, S::KIND)).transpose()?;
-    spectra.iter().try_for_each(|spectra| spectra.fit_a_file(plan))?;
+    let spectra = options
+        .spectra
+        .then(|| GateSpectra::new(plan, S::KIND))
+        .transpose()?;
+    spectra
+        .iter()
+        .try_for_each(|spectra| spectra.fit_a_file(plan))?;
     let layer_snr = Scanner::expected_layer_snr(plan, observer)?;
-    let (range_m, most_bytes) = (&plan.geometry.gate_range_m, options.block_bytes.unwrap_or(BLOCK_BYTES));
+    let (range_m, most_bytes) = (
+        &plan.geometry.gate_range_m,
+        options.block_bytes.unwrap_or(BLOCK_BYTES),
+    );
     let mut out = Vec::with_capacity(scans.len());
     // Repetitions of a scan share what was made for the first.
     for alike in scans.chunk_by(|a, b| a.elevation_rad == b.elevation_rad) {
         let places = places_of(plan, &alike[0].all_records().1)?;
         let estimator = MapEstimator::<S>::new(plan, &layer_snr, &places)?;
-        let tiles = tiles(&estimator, &places, &alike[0].elevation_rad, range_m, most_bytes)?;
-        let blocks = Blocks { plan, largest, observer, estimator, places, tiles, spectra: spectra.as_ref() };
+        let tiles = tiles(
+            &estimator,
+            &places,
+            &alike[0].elevation_rad,
+            range_m,
+            most_bytes,
+        )?;
+        let blocks = Blocks {
+            plan,
+            largest,
+            observer,
+            estimator,
+            places,
+            tiles,
+            spectra: spectra.as_ref(),
+        };
         for lines in alike {
             out.push(blocks.scan(records, lines)?);
         }
@@ -77,16 +99,32 @@ impl<S: FromParts> Blocks<'_, S> {
     fn scan(&self, records: &mut RawRecords, lines: &ScanLines) -> Result<ScanCells, Error> {
         let range_m = &self.plan.geometry.gate_range_m;
         let shape = (lines.elevation_rad.len(), range_m.len());
-        let none = MapPoint { estimate: GateVelocity::none(Quality::Empty), level: 0, left_out: 0, n_eff: 0.0 };
+        let none = MapPoint {
+            estimate: GateVelocity::none(Quality::Empty),
+            level: 0,
+            left_out: 0,
+            n_eff: 0.0,
+        };
         let [power_a2, gain, detection_ratio, deviation] = [f64::NAN; 4];
-        let empty = GateEstimate { found: none, power_a2, gain, detection_ratio, deviation };
-        let radius_m = range_m.iter().map(|range_m| self.estimator.radius.at_m(*range_m)).collect::<Result<_, _>>()?;
+        let empty = GateEstimate {
+            found: none,
+            power_a2,
+            gain,
+            detection_ratio,
+            deviation,
+        };
+        let radius_m = range_m
+            .iter()
+            .map(|range_m| self.estimator.radius.at_m(*range_m))
+            .collect::<Result<_, _>>()?;
         let mut cells = ScanCells {
             lines: lines.clone(),
             gates: Array2::from_elem(shape, empty),
             noise_a2: self.estimator.tools.noise.power_a2,
             regions: (self.places.clone(), radius_m),
-            spectra: self.spectra.map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]),
+            spectra: self
+                .spectra
+                .map(|of_gate| vec![0.0; shape.0 * shape.1 * of_gate.len()]),
         };
         for tile in &self.tiles {
             self.tile(records, tile, &mut cells)?;
@@ -97,12 +135,20 @@ impl<S: FromParts> Blocks<'_, S> {
         Ok(cells)
     }
 
-    fn tile(&self, records: &mut RawRecords, tile: &Tile, cells: &mut ScanCells) -> Result<(), Error> {
-        let (plan, estimator, (read, held), lines) = (self.plan, &self.estimator, &tile.windows, &cells.lines);
+    fn tile(
+        &self,
+        records: &mut RawRecords,
+        tile: &Tile,
+        cells: &mut ScanCells,
+    ) -> Result<(), Error> {
+        let (plan, estimator, (read, held), lines) =
+            (self.plan, &self.estimator, &tile.windows, &cells.lines);
         let of_records = lines.records(read);
         let of_samples = estimators::gates(&plan.scene.content)?.samples(held);
         let places = places_of(plan, &lines.record_elevation_rad(read))?;
-        let mut sums = estimator.sums(places, Some(held.clone()))?.scaled_for(self.largest);
+        let mut sums = estimator
+            .sums(places, Some(held.clone()))?
+            .scaled_for(self.largest);
         for piece in pieces(of_records.clone(), of_samples.len()) {
             let samples = samples::<S>(records, piece.clone(), of_samples.clone())?;
             sums.add(piece.start - of_records.start, samples.view())?;
@@ -111,15 +157,23 @@ impl<S: FromParts> Blocks<'_, S> {
         // The estimator takes lines by increasing elevation.
         let (guessed, gates) = &tile.guessed;
         let order = upward(guessed.clone(), &lines.elevation_rad);
-        let angles: Vec<f64> = order.iter().map(|line| lines.elevation_rad[*line]).collect();
+        let angles: Vec<f64> = order
+            .iter()
+            .map(|line| lines.elevation_rad[*line])
+            .collect();
         let points = polar_points(&angles, &plan.geometry.gate_range_m[gates.clone()]);
         let found = estimator.gates(&scan, &points, &estimator.noise(&self.places, &points)?)?;
-        for (row, line) in order.into_iter().enumerate().filter(|(_, line)| tile.lines.contains(line)) {
+        for (row, line) in order
+            .into_iter()
+            .enumerate()
+            .filter(|(_, line)| tile.lines.contains(line))
+        {
             for gate in tile.gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
                 cells.gates[[line, gate]] = found[at];
                 if let (Some(spectra), Some(of_gate)) = (&mut cells.spectra, self.spectra) {
-                    let (radius_m, density_a2) = (cells.regions.1[gate], estimator.tools.noise.density_a2);
+                    let (radius_m, density_a2) =
+                        (cells.regions.1[gate], estimator.tools.noise.density_a2);
                     let one = of_gate.density(&scan, points[at], radius_m, density_a2)?;
                     let place = (line * cells.gates.ncols() + gate) * one.len();
                     spectra[place..place + one.len()].copy_from_slice(&one);

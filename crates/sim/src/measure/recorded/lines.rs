@@ -29,18 +29,34 @@ impl RayTable {
     /// A table that cannot be read, without an elevation, or with a cell that is no number.
     pub fn read(path: &Path) -> Result<Self, Error> {
         let table = TextTable::read(path)?;
-        let refuse = |reason: String| Error::Input { path: path.to_owned(), reason };
+        let refuse = |reason: String| Error::Input {
+            path: path.to_owned(),
+            reason,
+        };
         let values = |(column, unit): (usize, f64)| -> Result<Vec<f64>, Error> {
-            let values: Vec<f64> = (0..table.rows.len()).map(|row| unit * table.number(row, column)).collect();
+            let values: Vec<f64> = (0..table.rows.len())
+                .map(|row| unit * table.number(row, column))
+                .collect();
             match values.iter().position(|value| !value.is_finite()) {
-                Some(row) => Err(refuse(format!("row {}: {} is no number", row + 1, table.header[column]))),
+                Some(row) => Err(refuse(format!(
+                    "row {}: {} is no number",
+                    row + 1,
+                    table.header[column]
+                ))),
                 None => Ok(values),
             }
         };
         let missing = || refuse("it has no column elevation_rad or elevation_deg".into());
         let elevation_rad = values(table.angle("elevation").ok_or_else(missing)?)?;
-        let time_s = table.column("time_s").map(|column| values((column, 1.0))).transpose()?;
-        Ok(Self { path: path.to_owned(), elevation_rad, time_s })
+        let time_s = table
+            .column("time_s")
+            .map(|column| values((column, 1.0)))
+            .transpose()?;
+        Ok(Self {
+            path: path.to_owned(),
+            elevation_rad,
+            time_s,
+        })
     }
 }
 
@@ -89,7 +105,11 @@ pub(crate) fn upward(lines: impl IntoIterator<Item = usize>, elevation_rad: &[f6
 ///
 /// # Errors
 /// Records that do not fit the angles, angles that are none, times that do not increase.
-pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>) -> Result<Vec<ScanLines>, Error> {
+pub(super) fn scans(
+    plan: &Plan,
+    records: &RawRecords,
+    table: Option<&RayTable>,
+) -> Result<Vec<ScanLines>, Error> {
     let count = records.records;
     let per_line = plan.scene.content.scan.pulses_per_line;
     let (elevation_rad, time_s) = match table {
@@ -100,8 +120,15 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
         },
     };
     let prt_s = 1.0 / plan.scene.content.laser.pulse_repetition_hz;
-    let time_s = time_s.unwrap_or_else(|| (0..count).map(|i| plan.wind.start_s + i as f64 * prt_s).collect());
-    if let Some(bad) = elevation_rad.iter().find(|angle| !(-MOST_RAD..=MOST_RAD).contains(*angle)) {
+    let time_s = time_s.unwrap_or_else(|| {
+        (0..count)
+            .map(|i| plan.wind.start_s + i as f64 * prt_s)
+            .collect()
+    });
+    if let Some(bad) = elevation_rad
+        .iter()
+        .find(|angle| !(-MOST_RAD..=MOST_RAD).contains(*angle))
+    {
         return Err(records.refuse(format!(
             "an elevation is {bad} rad: from -pi/2 to pi/2 are allowed; degrees need the unit degrees, or a column elevation_deg"
         )));
@@ -112,9 +139,16 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
         }
     }
     if let Some(bad) = time_s.iter().find(|time| !time.is_finite()) {
-        return Err(records.refuse(format!("the time of a record is {bad}: each must be finite")));
+        return Err(records.refuse(format!(
+            "the time of a record is {bad}: each must be finite"
+        )));
     }
-    let marks = records.about.line.as_ref().filter(|_| table.is_none()).unwrap_or(&elevation_rad);
+    let marks = records
+        .about
+        .line
+        .as_ref()
+        .filter(|_| table.is_none())
+        .unwrap_or(&elevation_rad);
     let mut found: Vec<ScanLines> = Vec::new();
     let mut direction = 0.0;
     let all: Vec<usize> = (0..count).collect();
@@ -122,7 +156,9 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
     for line in all.chunk_by(|a, b| marks[*a] == marks[*b] && time_s[*b] >= time_s[*a]) {
         let (first, last) = (line[0], line[line.len() - 1]);
         // The middle of angles that pulses may have of their own.
-        let beside = elevation_rad[first..=last].iter().map(|angle| angle - elevation_rad[first]);
+        let beside = elevation_rad[first..=last]
+            .iter()
+            .map(|angle| angle - elevation_rad[first]);
         let angle_rad = elevation_rad[first] + beside.sum::<f64>() / line.len() as f64;
         let before = found.last().and_then(|scan| scan.elevation_rad.last());
         let step = before.map_or(0.0, |before| angle_rad - before);
@@ -140,9 +176,20 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
             scan.first_record.push(first);
         }
     }
-    let ends: Vec<usize> = found.iter().skip(1).map(|scan| scan.first_record[0]).chain([count]).collect();
-    found.iter_mut().zip(ends).for_each(|(scan, end)| scan.first_record.push(end));
-    let times: Vec<f64> = found.iter().flat_map(|scan| scan.time_s.iter().copied()).collect();
+    let ends: Vec<usize> = found
+        .iter()
+        .skip(1)
+        .map(|scan| scan.first_record[0])
+        .chain([count])
+        .collect();
+    found
+        .iter_mut()
+        .zip(ends)
+        .for_each(|(scan, end)| scan.first_record.push(end));
+    let times: Vec<f64> = found
+        .iter()
+        .flat_map(|scan| scan.time_s.iter().copied())
+        .collect();
     if let Some(last) = times.windows(2).position(|pair| pair[1] <= pair[0]) {
         // Realisations of a simulated scan, of one sweep or several, have the same times.
         let lines = last + 1;
@@ -151,13 +198,23 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
             Some(*begin)
         });
         if !begins.any(|begin| begin == lines)
-            || times.iter().enumerate().any(|(line, time_s)| *time_s != times[line % lines])
+            || times
+                .iter()
+                .enumerate()
+                .any(|(line, time_s)| *time_s != times[line % lines])
         {
-            let reason = format!("the times of its lines do not increase: {} s, then {} s", times[last], times[lines]);
+            let reason = format!(
+                "the times of its lines do not increase: {} s, then {} s",
+                times[last], times[lines]
+            );
             return Err(records.refuse(reason));
         }
         let whole_s = times[last] - times[0] + prt_s;
-        for (line, time_s) in found.iter_mut().flat_map(|scan| &mut scan.time_s).enumerate() {
+        for (line, time_s) in found
+            .iter_mut()
+            .flat_map(|scan| &mut scan.time_s)
+            .enumerate()
+        {
             *time_s += (line / lines) as f64 * whole_s;
         }
     }
@@ -165,7 +222,11 @@ pub(super) fn scans(plan: &Plan, records: &RawRecords, table: Option<&RayTable>)
 }
 
 /// Angles and times of all records from those of records or lines.
-fn of_table(table: &RayTable, count: usize, per_line: usize) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
+fn of_table(
+    table: &RayTable,
+    count: usize,
+    per_line: usize,
+) -> Result<(Vec<f64>, Option<Vec<f64>>), Error> {
     let rows = table.elevation_rad.len();
     if rows == count {
         return Ok((table.elevation_rad.clone(), table.time_s.clone()));
@@ -175,9 +236,17 @@ fn of_table(table: &RayTable, count: usize, per_line: usize) -> Result<(Vec<f64>
             "it has {rows} rows; the {count} records need as many, or {} lines of scan.pulses_per_line = {per_line}",
             count / per_line.max(1)
         );
-        return Err(Error::Input { path: table.path.clone(), reason });
+        return Err(Error::Input {
+            path: table.path.clone(),
+            reason,
+        });
     }
-    let each = |values: &Vec<f64>| values.iter().flat_map(|v| std::iter::repeat_n(*v, per_line)).collect::<Vec<_>>();
+    let each = |values: &Vec<f64>| {
+        values
+            .iter()
+            .flat_map(|v| std::iter::repeat_n(*v, per_line))
+            .collect::<Vec<_>>()
+    };
     Ok((each(&table.elevation_rad), table.time_s.as_ref().map(each)))
 }
 
@@ -193,6 +262,8 @@ fn of_scene(plan: &Plan, records: &RawRecords) -> Result<Vec<f64>, Error> {
             lines.len()
         )));
     }
-    let scan = lines.iter().flat_map(|angle| std::iter::repeat_n(*angle, per_line));
+    let scan = lines
+        .iter()
+        .flat_map(|angle| std::iter::repeat_n(*angle, per_line));
     Ok(scan.cycle().take(count).collect())
 }

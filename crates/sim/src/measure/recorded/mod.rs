@@ -96,7 +96,10 @@ impl FromParts for Complex<f64> {
 
 /// What a scene says of a record.
 pub fn record_shape(scene: &Scene) -> RecordShape {
-    RecordShape { samples: scene.samples_per_record(), pulses_per_line: scene.scan.pulses_per_line }
+    RecordShape {
+        samples: scene.samples_per_record(),
+        pulses_per_line: scene.scan.pulses_per_line,
+    }
 }
 
 /// The plan for the records of a file: that of the scene with as many repetitions as the file has, and whether the truth of the
@@ -108,12 +111,23 @@ pub fn record_shape(scene: &Scene) -> RecordShape {
 pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Error> {
     fits(&scene.content, records)?;
     let whole = scan_lines::schedule(&scene)?.pulses();
-    let own = records.about.scene_toml.as_deref().and_then(|toml| SceneFile::parse(toml, "scene".as_ref()).ok());
+    let own = records
+        .about
+        .scene_toml
+        .as_deref()
+        .and_then(|toml| SceneFile::parse(toml, "scene".as_ref()).ok());
     let own = own.filter(|own| signals_of(&own.content) == signals_of(&scene.content));
     if let Some(own) = &own {
-        let drawn = |s: &Scene| [("seed", s.seed), ("scan.realisations", s.scan.realisations as u64)];
-        if let Some(((key, of_file), (_, stated))) =
-            drawn(&own.content).into_iter().zip(drawn(&scene.content)).find(|(a, b)| a != b)
+        let drawn = |s: &Scene| {
+            [
+                ("seed", s.seed),
+                ("scan.realisations", s.scan.realisations as u64),
+            ]
+        };
+        if let Some(((key, of_file), (_, stated))) = drawn(&own.content)
+            .into_iter()
+            .zip(drawn(&scene.content))
+            .find(|(a, b)| a != b)
         {
             return Err(records.refuse(format!(
                 "it has the signals of this scene with {key} = {of_file}, and {key} is {stated}: only estimator, outputs and site may differ"
@@ -149,7 +163,8 @@ fn signals_of(scene: &Scene) -> String {
 fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
     let samples = scene.samples_per_record();
     if records.samples != samples {
-        let last_m = scene.scan.range_min_m + (records.samples as f64 - 0.5) * scene.sample_spacing_m();
+        let last_m =
+            scene.scan.range_min_m + (records.samples as f64 - 0.5) * scene.sample_spacing_m();
         return Err(records.refuse(format!(
             "a record has {} samples, {samples} in the scene: scan.range_max_m = {last_m:.3} makes it as many",
             records.samples
@@ -166,19 +181,35 @@ fn fits(scene: &Scene, records: &RawRecords) -> Result<(), Error> {
         )));
     }
     let d = &scene.detector;
-    let at_rest_hz = if needed { 0.0 } else { d.intermediate_frequency_hz };
+    let at_rest_hz = if needed {
+        0.0
+    } else {
+        d.intermediate_frequency_hz
+    };
     for (name, key, own) in [
         ("sampling_frequency", "detector.sampling_hz", d.sampling_hz),
-        ("intermediate_frequency", "detector.intermediate_frequency_hz", at_rest_hz),
+        (
+            "intermediate_frequency",
+            "detector.intermediate_frequency_hz",
+            at_rest_hz,
+        ),
         ("bandwidth", "detector.bandwidth_hz", d.bandwidth_hz),
         ("wavelength", "laser.wavelength_m", scene.laser.wavelength_m),
-        ("pulse_repetition_frequency", "laser.pulse_repetition_hz", scene.laser.pulse_repetition_hz),
+        (
+            "pulse_repetition_frequency",
+            "laser.pulse_repetition_hz",
+            scene.laser.pulse_repetition_hz,
+        ),
         ("pulse_sigma", "pulse", scene.pulse_sigma_s()),
     ] {
-        let Some(value) = records.about.constants.get(name) else { continue };
+        let Some(value) = records.about.constants.get(name) else {
+            continue;
+        };
         let off = (value - own).abs();
         if off.is_nan() || off > 1e-6 * own.abs() {
-            return Err(records.refuse(format!("its {name} is {value:?}, the scene's {key} says {own:?}")));
+            return Err(records.refuse(format!(
+                "its {name} is {value:?}, the scene's {key} says {own:?}"
+            )));
         }
     }
     Ok(())
@@ -195,8 +226,12 @@ pub fn estimate(
     observer: &dyn Observer,
 ) -> Result<Recorded, Error> {
     match plan.scene.content.detector.signal {
-        DetectorSignal::IntermediateFrequency => of_samples::<f64>(plan, is_own, records, options, observer),
-        DetectorSignal::Baseband => of_samples::<Complex<f64>>(plan, is_own, records, options, observer),
+        DetectorSignal::IntermediateFrequency => {
+            of_samples::<f64>(plan, is_own, records, options, observer)
+        }
+        DetectorSignal::Baseband => {
+            of_samples::<Complex<f64>>(plan, is_own, records, options, observer)
+        }
     }
     .map_err(|error| plan.scene.of_key(error))
 }
@@ -211,10 +246,17 @@ fn of_samples<S: FromParts>(
     let largest = largest_part(plan, records)?;
     // Numbers that are scaled are not those of the scene any more, and another noise gives another map.
     let is_own = is_own && records.whole_scale() == 1.0;
-    let noise = options.noise.unwrap_or(if is_own { NoiseLevel::OfScene } else { NoiseLevel::Quietest });
+    let noise = options.noise.unwrap_or(if is_own {
+        NoiseLevel::OfScene
+    } else {
+        NoiseLevel::Quietest
+    });
     let is_run = is_own && noise == NoiseLevel::OfScene && options.rays.is_none();
     if is_run && !options.spectra {
-        return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra: None });
+        return Ok(Recorded::OfRun {
+            map: of_run::<S>(plan, records, observer)?,
+            spectra: None,
+        });
     }
     if !plan.geometry.schedule.keeps_to_a_plane() {
         let kind = plan.scene.content.scan.pattern.name();
@@ -225,16 +267,36 @@ fn of_samples<S: FromParts>(
         )));
     }
     let scans = lines::scans(plan, records, options.rays.as_ref())?;
-    observer.begin(Stage::Estimates, scans.iter().map(|scan| scan.elevation_rad.len() as u64).sum());
+    observer.begin(
+        Stage::Estimates,
+        scans
+            .iter()
+            .map(|scan| scan.elevation_rad.len() as u64)
+            .sum(),
+    );
     let found = blocks::scans::<S>(plan, records, largest, &scans, options, observer)?;
     observer.end();
-    let density: Vec<_> = found.iter().filter_map(|scan| Some((&scan.lines, scan.spectra.as_deref()?))).collect();
-    let spectra = (!density.is_empty()).then(|| Spectra::of(plan, &density)).transpose()?;
+    let density: Vec<_> = found
+        .iter()
+        .filter_map(|scan| Some((&scan.lines, scan.spectra.as_deref()?)))
+        .collect();
+    let spectra = (!density.is_empty())
+        .then(|| Spectra::of(plan, &density))
+        .transpose()?;
     if is_run {
-        return Ok(Recorded::OfRun { map: of_run::<S>(plan, records, observer)?, spectra });
+        return Ok(Recorded::OfRun {
+            map: of_run::<S>(plan, records, observer)?,
+            spectra,
+        });
     }
-    let measured = found.into_iter().map(|scan| result::measured(plan, scan, noise)).collect::<Result<_, _>>()?;
-    Ok(Recorded::Measured { scans: measured, spectra })
+    let measured = found
+        .into_iter()
+        .map(|scan| result::measured(plan, scan, noise))
+        .collect::<Result<_, _>>()?;
+    Ok(Recorded::Measured {
+        scans: measured,
+        spectra,
+    })
 }
 
 /// The maps of a simulation's own records, held against the truth of its scene.
@@ -262,7 +324,9 @@ fn of_run<S: FromParts>(
 fn pieces(records: Range<usize>, samples: usize) -> impl Iterator<Item = Range<usize>> {
     let size = records_at_once::<Complex<f64>>(samples, records.len());
     let end = records.end;
-    records.step_by(size).map(move |first| first..(first + size).min(end))
+    records
+        .step_by(size)
+        .map(move |first| first..(first + size).min(end))
 }
 
 /// Some samples of some records \[record, sample\].
@@ -272,8 +336,13 @@ pub(crate) fn samples<S: FromParts>(
     some: Range<usize>,
 ) -> Result<ndarray::Array2<S>, Error> {
     let shape = (range.len(), some.len());
-    let samples: Vec<S> = records.read_samples(range, some)?.into_iter().map(S::from_parts).collect();
-    ndarray::Array2::from_shape_vec(shape, samples).map_err(|_| records.refuse("it became shorter".into()))
+    let samples: Vec<S> = records
+        .read_samples(range, some)?
+        .into_iter()
+        .map(S::from_parts)
+        .collect();
+    ndarray::Array2::from_shape_vec(shape, samples)
+        .map_err(|_| records.refuse("it became shorter".into()))
 }
 
 /// The largest part of all samples, the outsized ones left out from here on; refuses records without any, and codes that the
@@ -281,16 +350,26 @@ pub(crate) fn samples<S: FromParts>(
 fn largest_part(plan: &Plan, records: &mut RawRecords) -> Result<f64, Error> {
     let (mut sizes, mut any) = (SampleSizes::default(), false);
     for piece in pieces(0..records.records, records.samples) {
-        for sample in records.read(piece)?.into_iter().filter(|sample| sample.is_finite()) {
+        for sample in records
+            .read(piece)?
+            .into_iter()
+            .filter(|sample| sample.is_finite())
+        {
             any = true;
             sizes.add(sample.largest_part());
         }
     }
-    let outsized = if records.are_integers { f64::INFINITY } else { sizes.outsized() };
+    let outsized = if records.are_integers {
+        f64::INFINITY
+    } else {
+        sizes.outsized()
+    };
     records.outsized = outsized;
     let largest = sizes.largest_below(outsized);
     if !any {
-        return Err(records.refuse("all of its samples are missing: none is a finite number".into()));
+        return Err(
+            records.refuse("all of its samples are missing: none is a finite number".into())
+        );
     }
     if largest == 0.0 {
         return Err(records.refuse("all of its samples are 0".into()));

@@ -29,20 +29,42 @@ pub(super) struct PredictedError {
 
 impl PredictedError {
     /// For regions of a scan of a scene that have at most the radius `largest_m` and about `n_eff` independent windows.
-    pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64, n_eff: f64) -> Result<Self, Error> {
+    pub(super) fn new(
+        plan: &Plan,
+        places: ScanGeometry,
+        largest_m: f64,
+        n_eff: f64,
+    ) -> Result<Self, Error> {
         let is_noisy = plan.scene.content.detector.noise != NoiseModel::None;
-        let (of_rays, count) = (RayInformation::new(plan, &[])?, places.most_gates(largest_m));
+        let (of_rays, count) = (
+            RayInformation::new(plan, &[])?,
+            places.most_gates(largest_m),
+        );
         let of_snr = |db: f64| of_rays.of_snr(10f64.powf(0.1 * db), count);
         // Without noise no estimate has a ratio.
         let snr_db: Vec<f64> = SNR_DB.filter(|_| is_noisy).map(f64::from).collect();
-        let by_gates = snr_db.iter().map(|db| of_snr(*db)).collect::<Result<_, Error>>()?;
-        let bias = ExpectedBias::new(&plan.scene.content, &plan.instrument, &WindowStatistics { snr: 1.0, n_eff })?;
-        Ok(Self { bias, places, snr_db, by_gates })
+        let by_gates = snr_db
+            .iter()
+            .map(|db| of_snr(*db))
+            .collect::<Result<_, Error>>()?;
+        let bias = ExpectedBias::new(
+            &plan.scene.content,
+            &plan.instrument,
+            &WindowStatistics { snr: 1.0, n_eff },
+        )?;
+        Ok(Self {
+            bias,
+            places,
+            snr_db,
+            by_gates,
+        })
     }
 
     /// The bias of an estimate, m/s: that at the velocity which it would have without; NaN where it is not known.
     pub(super) fn bias_m_s(&self, velocity_m_s: f64, snr_db: f64) -> f64 {
-        let Some(bias) = &self.bias else { return f64::NAN };
+        let Some(bias) = &self.bias else {
+            return f64::NAN;
+        };
         if velocity_m_s.is_nan() || snr_db.is_nan() {
             return f64::NAN;
         }
@@ -51,16 +73,29 @@ impl PredictedError {
     }
 
     /// The standard deviation of an estimate from `level` of the windows about a point, m/s; NaN where there is none, or no ratio.
-    pub(super) fn deviation_m_s(&self, point: PolarPoint, radius_m: f64, level: f64, snr_db: f64) -> f64 {
+    pub(super) fn deviation_m_s(
+        &self,
+        point: PolarPoint,
+        radius_m: f64,
+        level: f64,
+        snr_db: f64,
+    ) -> f64 {
         let whole = self.places.windows(point, radius_m) as f64;
         if snr_db.is_nan() || level.is_nan() || level <= 0.0 {
             return f64::NAN;
         }
         // Nearly straight between the ratios of the curve.
-        let below = (self.snr_db.partition_point(|db| *db <= snr_db)).clamp(1, self.snr_db.len() - 1) - 1;
-        let information = |at: usize| self.places.information(point, radius_m, &self.by_gates[at]).ln();
+        let below =
+            (self.snr_db.partition_point(|db| *db <= snr_db)).clamp(1, self.snr_db.len() - 1) - 1;
+        let information = |at: usize| {
+            self.places
+                .information(point, radius_m, &self.by_gates[at])
+                .ln()
+        };
         let ends = [information(below), information(below + 1)];
-        (of_table(&self.snr_db[below..below + 2], &ends, snr_db).exp() * level / whole).sqrt().recip()
+        (of_table(&self.snr_db[below..below + 2], &ends, snr_db).exp() * level / whole)
+            .sqrt()
+            .recip()
     }
 }
 
@@ -73,16 +108,28 @@ pub fn predicted_table(plan: &Plan, map: &VelocityEstimates) -> Result<Table, Er
     let points = polar_points(places.line_elevation_rad(), &map.range_m);
     let largest_m = map.radius_m.iter().copied().fold(0.0, f64::max);
     let n_eff = map.n_eff.mean().unwrap_or(1.0);
-    let (predicted, gates) = (PredictedError::new(plan, places, largest_m, n_eff)?, map.range_m.len());
+    let (predicted, gates) = (
+        PredictedError::new(plan, places, largest_m, n_eff)?,
+        map.range_m.len(),
+    );
     let of = |(at, ((snr_db, level), velocity_m_s)): (usize, ((&f64, &f64), &f64))| {
-        let deviation_m_s = predicted.deviation_m_s(points[at], map.radius_m[at % gates], *level, *snr_db);
+        let deviation_m_s =
+            predicted.deviation_m_s(points[at], map.radius_m[at % gates], *level, *snr_db);
         (deviation_m_s, predicted.bias_m_s(*velocity_m_s, *snr_db))
     };
-    let rows = map.snr_db.iter().zip(&map.level).zip(&map.v_mean_m_s).enumerate();
+    let rows = map
+        .snr_db
+        .iter()
+        .zip(&map.level)
+        .zip(&map.v_mean_m_s)
+        .enumerate();
     let (column, bias_m_s): (Vec<f64>, Vec<f64>) = rows.map(of).unzip();
     Ok(Table::new()
         .float("range_m", (0..column.len()).map(|i| map.range_m[i % gates]))
-        .float("elevation_rad", (0..column.len()).map(|i| map.elevation_rad[i / gates]))
+        .float(
+            "elevation_rad",
+            (0..column.len()).map(|i| map.elevation_rad[i / gates]),
+        )
         .float("snr_db", map.snr_db.iter().copied())
         .float("n_eff", map.n_eff.iter().copied())
         .float("predicted_std_m_s", column)
@@ -103,18 +150,38 @@ mod tests {
              [scan]\nelevation_min_rad = 0.0\nelevation_max_rad = 0.06\nelevation_step_rad = 0.02\nrange_min_m = 320.0\n\
              range_max_m = 400.0\npulses_per_line = 20\nrealisations = 16\n[estimator]\nradius_m = 3.0\ngate_step_samples = 8\n{estimator}"
         );
-        Plan::new(SceneFile::parse(&text, std::path::Path::new("s.toml")).unwrap(), Target::Map).unwrap()
+        Plan::new(
+            SceneFile::parse(&text, std::path::Path::new("s.toml")).unwrap(),
+            Target::Map,
+        )
+        .unwrap()
     }
 
     #[test]
     fn stated_bias_is_that_of_many_pulses() {
         for (detector, method, least_m_s) in [
             ("", "method.kind = \"pulse_pair\"\n", 0.4),
-            ("", "method = { kind = \"autoregressive\", order = 12 }\nweighting = \"rectangular\"\n", 0.03),
-            ("", "method = { kind = \"capon\", order = 12 }\nweighting = \"rectangular\"\n", 0.0),
+            (
+                "",
+                "method = { kind = \"autoregressive\", order = 12 }\nweighting = \"rectangular\"\n",
+                0.03,
+            ),
+            (
+                "",
+                "method = { kind = \"capon\", order = 12 }\nweighting = \"rectangular\"\n",
+                0.0,
+            ),
             ("", "method.kind = \"lag_window\"\n", 0.0),
-            ("signal = \"baseband\"", "method.kind = \"pulse_pair\"\n", 0.2),
-            ("noise = \"white\"\nsignal = \"baseband\"", "method.kind = \"pulse_pair\"\n", 0.0),
+            (
+                "signal = \"baseband\"",
+                "method.kind = \"pulse_pair\"\n",
+                0.2,
+            ),
+            (
+                "noise = \"white\"\nsignal = \"baseband\"",
+                "method.kind = \"pulse_pair\"\n",
+                0.0,
+            ),
         ] {
             let plan = plan(detector, method);
             let map = run(&plan, &Silent).unwrap().map.unwrap();
@@ -144,12 +211,23 @@ mod tests {
             let places = places(&plan.scene.content, &plan.geometry).unwrap();
             let elevation_rad = places.line_elevation_rad()[2];
             let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
-            let point = PolarPoint { range_m: found.range_m, elevation_rad };
+            let point = PolarPoint {
+                range_m: found.range_m,
+                elevation_rad,
+            };
             let of = |level: f64, snr_db: f64| predicted.deviation_m_s(point, 3.0, level, snr_db);
             let whole = found.level as f64;
-            assert!((of(whole, 10.0) / found.region_m_s - 1.0).abs() < 1e-6, "{} {found:?}", of(whole, 10.0));
+            assert!(
+                (of(whole, 10.0) / found.region_m_s - 1.0).abs() < 1e-6,
+                "{} {found:?}",
+                of(whole, 10.0)
+            );
             assert!((of(0.25 * whole, 10.0) / of(whole, 10.0) - 2.0).abs() < 1e-9);
-            assert!(of(0.0, 10.0).is_nan() && of(whole, f64::NAN).is_nan() && of(whole, 7.3) > of(whole, 7.4));
+            assert!(
+                of(0.0, 10.0).is_nan()
+                    && of(whole, f64::NAN).is_nan()
+                    && of(whole, 7.3) > of(whole, 7.4)
+            );
         }
     }
 }

@@ -42,17 +42,36 @@ pub struct MeasuredScan {
 }
 
 /// Holds the gates of a scan against the noise.
-pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Result<MeasuredScan, Error> {
+pub(super) fn measured(
+    plan: &Plan,
+    scan: ScanCells,
+    noise: NoiseLevel,
+) -> Result<MeasuredScan, Error> {
     // The noise over that of the scene.
     let factor = match noise {
         NoiseLevel::OfScene => 1.0,
         NoiseLevel::Given(power) => power / plan.instrument.receiver.noise_variance_a2(),
         NoiseLevel::Quietest => quietest(plan, &scan),
     };
-    let ScanCells { lines, gates, noise_a2, regions: (places, radius_m), .. } = scan;
-    let n_eff: Vec<f64> = gates.iter().map(|gate| gate.found.n_eff).filter(|n_eff| n_eff.is_finite()).collect();
+    let ScanCells {
+        lines,
+        gates,
+        noise_a2,
+        regions: (places, radius_m),
+        ..
+    } = scan;
+    let n_eff: Vec<f64> = gates
+        .iter()
+        .map(|gate| gate.found.n_eff)
+        .filter(|n_eff| n_eff.is_finite())
+        .collect();
     let n_eff = n_eff.iter().sum::<f64>() / n_eff.len().max(1) as f64;
-    let predicted = PredictedError::new(plan, places, radius_m.iter().copied().fold(0.0, f64::max), n_eff)?;
+    let predicted = PredictedError::new(
+        plan,
+        places,
+        radius_m.iter().copied().fold(0.0, f64::max),
+        n_eff,
+    )?;
     let velocity_m_s = gates.map(|gate| gate.found.estimate.velocity_m_s);
     let sums = gates.map(|gate| {
         let mut sums = GateSums::default();
@@ -61,10 +80,17 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
     });
     let snr_db = sums.map(|gate| gate.snr_db(noise_a2, factor));
     let deviation_m_s = |at: (usize, usize)| {
-        predicted.deviation_m_s(point(plan, &lines, at), radius_m[at.1], sums[at].level, snr_db[at])
+        predicted.deviation_m_s(
+            point(plan, &lines, at),
+            radius_m[at.1],
+            sums[at].level,
+            snr_db[at],
+        )
     };
     let predicted_m_s = Array2::from_shape_fn(sums.dim(), deviation_m_s);
-    let bias_m_s = Array2::from_shape_fn(sums.dim(), |at| predicted.bias_m_s(velocity_m_s[at], snr_db[at]));
+    let bias_m_s = Array2::from_shape_fn(sums.dim(), |at| {
+        predicted.bias_m_s(velocity_m_s[at], snr_db[at])
+    });
     Ok(MeasuredScan {
         predicted_m_s,
         bias_m_s,
@@ -81,23 +107,42 @@ pub(super) fn measured(plan: &Plan, scan: ScanCells, noise: NoiseLevel) -> Resul
 
 /// The place of a gate of a line.
 fn point(plan: &Plan, lines: &ScanLines, (line, gate): (usize, usize)) -> PolarPoint {
-    PolarPoint { range_m: plan.geometry.gate_range_m[gate], elevation_rad: lines.elevation_rad[line] }
+    PolarPoint {
+        range_m: plan.geometry.gate_range_m[gate],
+        elevation_rad: lines.elevation_rad[line],
+    }
 }
 
 /// Power of the gates without a signal over that of the scene's noise, from the means over the lines.
 fn quietest(plan: &Plan, scan: &ScanCells) -> f64 {
-    let ScanCells { lines, gates, noise_a2, regions: (places, radius_m), .. } = scan;
+    let ScanCells {
+        lines,
+        gates,
+        noise_a2,
+        regions: (places, radius_m),
+        ..
+    } = scan;
     let ratio = gates.map(|gate| gate.power_a2 / noise_a2);
     let mean_of_lines = |of: &dyn Fn((usize, usize)) -> f64| {
         let mean = |gate: usize| {
-            let known = || (0..gates.nrows()).map(|line| (line, gate)).filter(|at| ratio[*at].is_finite());
+            let known = || {
+                (0..gates.nrows())
+                    .map(|line| (line, gate))
+                    .filter(|at| ratio[*at].is_finite())
+            };
             known().map(of).sum::<f64>() / known().count() as f64
         };
-        (0..gates.ncols()).map(mean).filter(|value| value.is_finite()).collect::<Vec<f64>>()
+        (0..gates.ncols())
+            .map(mean)
+            .filter(|value| value.is_finite())
+            .collect::<Vec<f64>>()
     };
     // Regions that reach over several lines share their windows.
     let variances = mean_of_lines(&|at| {
-        gates[at].deviation.powi(2) * places.chords(point(plan, lines, at), radius_m[at.1]).count() as f64
+        gates[at].deviation.powi(2)
+            * places
+                .chords(point(plan, lines, at), radius_m[at.1])
+                .count() as f64
     });
     let variance = variances.iter().sum::<f64>() / (variances.len() * gates.nrows()) as f64;
     noise_floor(&mean_of_lines(&|at| ratio[at]), variance.sqrt())
@@ -110,35 +155,89 @@ pub fn measured_map(plan: &Plan, scans: &[MeasuredScan]) -> Result<VelocityMap, 
     let (azimuth_rad, pulses) = (scene.scan.azimuth_rad, scene.scan.pulses_per_line as u32);
     let of_scan = |(sweep, scan): (usize, &MeasuredScan)| -> Vec<Ray> {
         let rays = scan.lines.elevation_rad.iter().zip(&scan.lines.time_s);
-        rays.map(|(&elevation_rad, &time_s)| Ray { sweep, time_s, elevation_rad, azimuth_rad, pulses, carrier: None })
-            .collect()
+        rays.map(|(&elevation_rad, &time_s)| Ray {
+            sweep,
+            time_s,
+            elevation_rad,
+            azimuth_rad,
+            pulses,
+            carrier: None,
+        })
+        .collect()
     };
     let stacked = |of: Of| -> Result<Array2<f64>, Error> {
         let views: Vec<_> = scans.iter().map(|scan| of(scan).view()).collect();
-        concatenate(Axis(0), &views).map_err(|_| wakescope_estimate::Error::Empty { field: "scans" }.into())
+        concatenate(Axis(0), &views)
+            .map_err(|_| wakescope_estimate::Error::Empty { field: "scans" }.into())
     };
     let speed = Unit::METRE_PER_SECOND;
-    let of_bound = "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio";
+    let of_bound =
+        "predicted standard deviation: Cramer-Rao bound at the estimated signal-to-noise ratio";
     let in_band = "signal-to-noise ratio in the detector band that the spectra show";
     let fields: [(&str, Unit, &str, Of); 9] = [
-        ("radial_velocity", speed, "estimated radial velocity, positive away from the lidar", |s| &s.velocity_m_s),
-        ("velocity_standard_deviation", speed, of_bound, |s| &s.predicted_m_s),
-        ("bias", speed, "predicted bias of the method in this noise, not taken off", |s| &s.bias_m_s),
-        ("level", Unit::ONE, "windows accumulated for one estimate", |s| &s.level),
-        ("n_eff", Unit::ONE, "independent windows that these are worth", |s| &s.n_eff),
-        ("flagged", Unit::ONE, "1 where the estimate was flagged", |s| &s.flagged),
-        ("width", speed, "spectral width of air and pulse", |s| &s.width_m_s),
-        ("signal_to_noise_ratio", Unit::DECIBEL, in_band, |s| &s.snr_db),
-        ("quality", Unit::ONE, "density of the peak over the mean density in the band", |s| &s.quality),
+        (
+            "radial_velocity",
+            speed,
+            "estimated radial velocity, positive away from the lidar",
+            |s| &s.velocity_m_s,
+        ),
+        ("velocity_standard_deviation", speed, of_bound, |s| {
+            &s.predicted_m_s
+        }),
+        (
+            "bias",
+            speed,
+            "predicted bias of the method in this noise, not taken off",
+            |s| &s.bias_m_s,
+        ),
+        (
+            "level",
+            Unit::ONE,
+            "windows accumulated for one estimate",
+            |s| &s.level,
+        ),
+        (
+            "n_eff",
+            Unit::ONE,
+            "independent windows that these are worth",
+            |s| &s.n_eff,
+        ),
+        (
+            "flagged",
+            Unit::ONE,
+            "1 where the estimate was flagged",
+            |s| &s.flagged,
+        ),
+        ("width", speed, "spectral width of air and pulse", |s| {
+            &s.width_m_s
+        }),
+        ("signal_to_noise_ratio", Unit::DECIBEL, in_band, |s| {
+            &s.snr_db
+        }),
+        (
+            "quality",
+            Unit::ONE,
+            "density of the peak over the mean density in the band",
+            |s| &s.quality,
+        ),
     ];
-    let field = |(name, unit, text, of): (&str, Unit, &str, Of)| Ok(Field::float(name, unit, text, stacked(of)?));
-    let mut fields = fields.into_iter().map(field).collect::<Result<Vec<Field>, Error>>()?;
-    fields[0].ancillary = "velocity_standard_deviation bias level n_eff flagged signal_to_noise_ratio quality".into();
+    let field = |(name, unit, text, of): (&str, Unit, &str, Of)| {
+        Ok(Field::float(name, unit, text, stacked(of)?))
+    };
+    let mut fields = fields
+        .into_iter()
+        .map(field)
+        .collect::<Result<Vec<Field>, Error>>()?;
+    fields[0].ancillary =
+        "velocity_standard_deviation bias level n_eff flagged signal_to_noise_ratio quality".into();
     Ok(VelocityMap {
         title: "Radial velocity estimated from recorded signals".into(),
         rays: scans.iter().enumerate().flat_map(of_scan).collect(),
         range_m: plan.geometry.gate_range_m.clone(),
-        sweeps: scans.iter().map(|_| Sweep::rhi(f64::NAN, azimuth_rad)).collect(),
+        sweeps: scans
+            .iter()
+            .map(|_| Sweep::rhi(f64::NAN, azimuth_rad))
+            .collect(),
         pulse: pulse_info(scene),
         fields,
         lidar_height_m: scene.scan.lidar_height_m,

@@ -35,9 +35,16 @@ impl Spectra {
     pub(super) fn of(plan: &Plan, scans: &[(&ScanLines, &[f32])]) -> Result<Self, Error> {
         let of_gate = GateSpectra::new(plan, estimators::signal_kind(&plan.scene.content))?;
         let lines = || scans.iter().map(|(lines, _)| lines);
-        let elevation_rad = lines().flat_map(|lines| lines.elevation_rad.iter().copied()).collect();
-        let time_s = lines().flat_map(|lines| lines.time_s.iter().copied()).collect();
-        let density = scans.iter().flat_map(|(_, density)| density.iter().copied()).collect();
+        let elevation_rad = lines()
+            .flat_map(|lines| lines.elevation_rad.iter().copied())
+            .collect();
+        let time_s = lines()
+            .flat_map(|lines| lines.time_s.iter().copied())
+            .collect();
+        let density = scans
+            .iter()
+            .flat_map(|(_, density)| density.iter().copied())
+            .collect();
         Ok(of_gate.spectra(plan, [elevation_rad, time_s], density))
     }
 
@@ -56,14 +63,30 @@ impl Spectra {
         let estimator = MapEstimator::<S>::new(plan, layer_snr, &places)?;
         let mut sums = estimator.sums(places, None)?;
         sums.add(0, samples)?;
-        let (scan, of_gate, mut density) = (sums.finish(), GateSpectra::new(plan, S::KIND)?, Vec::new());
+        let (scan, of_gate, mut density) =
+            (sums.finish(), GateSpectra::new(plan, S::KIND)?, Vec::new());
         for &elevation_rad in &g.elevation_rad {
             for &range_m in &g.gate_range_m {
-                let (point, radius_m) = (PolarPoint { range_m, elevation_rad }, estimator.radius.at_m(range_m)?);
-                density.extend(of_gate.density(&scan, point, radius_m, estimator.tools.noise.density_a2)?);
+                let (point, radius_m) = (
+                    PolarPoint {
+                        range_m,
+                        elevation_rad,
+                    },
+                    estimator.radius.at_m(range_m)?,
+                );
+                density.extend(of_gate.density(
+                    &scan,
+                    point,
+                    radius_m,
+                    estimator.tools.noise.density_a2,
+                )?);
             }
         }
-        Ok(of_gate.spectra(plan, [g.elevation_rad.clone(), g.line_time_s.clone()], density))
+        Ok(of_gate.spectra(
+            plan,
+            [g.elevation_rad.clone(), g.line_time_s.clone()],
+            density,
+        ))
     }
 }
 
@@ -87,7 +110,10 @@ impl GateSpectra {
         if matches!(e.method, Method::GradientLikelihood(_)) || e.few_lags().is_some() {
             let reason =
                 "--spectra needs the correlogram of the whole window, which this estimator.method does not make".into();
-            return Err(Error::Key { key: "estimator.method", reason });
+            return Err(Error::Key {
+                key: "estimator.method",
+                reason,
+            });
         }
         let (sampling, padded) = (estimators::sampling(scene)?, e.padded_samples);
         let spectrum = LagSpectrum::new(kind, e.window_samples, padded)?;
@@ -96,25 +122,53 @@ impl GateSpectra {
             let frequency_hz = bin as f64 * sampling.sample_rate_hz / padded as f64;
             // Complex signals have negative frequencies in the upper half; a real one is known by its lower half.
             let folded = kind == SignalKind::Complex && 2 * bin > padded;
-            sampling.velocity_m_s(if folded { frequency_hz - sampling.sample_rate_hz } else { frequency_hz })
+            sampling.velocity_m_s(if folded {
+                frequency_hz - sampling.sample_rate_hz
+            } else {
+                frequency_hz
+            })
         };
-        let last = if kind == SignalKind::Complex { padded } else { padded / 2 + 1 };
-        let mut bins: Vec<(usize, f64)> =
-            (0..last).map(|bin| (bin, of_bin(bin))).filter(|(_, v)| (low_m_s..=high_m_s).contains(v)).collect();
+        let last = if kind == SignalKind::Complex {
+            padded
+        } else {
+            padded / 2 + 1
+        };
+        let mut bins: Vec<(usize, f64)> = (0..last)
+            .map(|bin| (bin, of_bin(bin)))
+            .filter(|(_, v)| (low_m_s..=high_m_s).contains(v))
+            .collect();
         bins.sort_by(|a, b| a.1.total_cmp(&b.1));
         let (bins, velocity_m_s) = bins.into_iter().unzip();
-        Ok(Self { spectrum, bins, velocity_m_s })
+        Ok(Self {
+            spectrum,
+            bins,
+            velocity_m_s,
+        })
     }
 
     /// Those of lines at elevations, rad, and times, s, with these densities.
-    fn spectra(self, plan: &Plan, [elevation_rad, time_s]: [Vec<f64>; 2], density: Vec<f32>) -> Spectra {
+    fn spectra(
+        self,
+        plan: &Plan,
+        [elevation_rad, time_s]: [Vec<f64>; 2],
+        density: Vec<f32>,
+    ) -> Spectra {
         let (velocity_m_s, range_m) = (self.velocity_m_s, plan.geometry.gate_range_m.clone());
-        Spectra { velocity_m_s, range_m, elevation_rad, time_s, density }
+        Spectra {
+            velocity_m_s,
+            range_m,
+            elevation_rad,
+            time_s,
+            density,
+        }
     }
 
     /// Refuses more spectra than a file holds.
     pub(super) fn fit_a_file(&self, plan: &Plan) -> Result<(), Error> {
-        let bytes = 4 * self.bins.len() * plan.geometry.gate_range_m.len() * plan.geometry.elevation_rad.len();
+        let bytes = 4
+            * self.bins.len()
+            * plan.geometry.gate_range_m.len()
+            * plan.geometry.elevation_rad.len();
         if bytes > MOST_BYTES {
             let reason = format!(
                 "--spectra makes {bytes} bytes, at most {MOST_BYTES}: larger estimator.gate_step_samples or smaller \

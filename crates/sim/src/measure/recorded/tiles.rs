@@ -50,8 +50,17 @@ fn reaches<S: Sample>(
     let own = range_m.iter().enumerate().map(|(gate, range_m)| {
         let radius_m = estimator.radius.at_m(*range_m)?;
         let windows = places.gates_between(range_m - radius_m, range_m + radius_m);
-        let windows_rad = if radius_m < *range_m { (radius_m / range_m).asin() } else { std::f64::consts::PI };
-        Ok(Reach { guessed_rad: 0.0, guessed: gate..gate + 1, windows_rad, windows })
+        let windows_rad = if radius_m < *range_m {
+            (radius_m / range_m).asin()
+        } else {
+            std::f64::consts::PI
+        };
+        Ok(Reach {
+            guessed_rad: 0.0,
+            guessed: gate..gate + 1,
+            windows_rad,
+            windows,
+        })
     });
     let reach = own.collect::<Result<Vec<Reach>, Error>>()?;
     if estimator.tools.following.is_none() {
@@ -60,12 +69,21 @@ fn reaches<S: Sample>(
     let followed = reach.iter().zip(range_m).map(|(own, at_m)| {
         // The gates between which the wind is interpolated.
         let radius_m = estimator.radius.at_m(*at_m)?;
-        let start = range_m.partition_point(|range_m| *range_m <= at_m - radius_m).saturating_sub(1);
+        let start = range_m
+            .partition_point(|range_m| *range_m <= at_m - radius_m)
+            .saturating_sub(1);
         let end = range_m.partition_point(|range_m| *range_m < at_m + radius_m) + 1;
         let guessed = start..end.min(range_m.len());
-        let others = reach[guessed.clone()].iter().fold(own.clone(), |all, one| all.and(one));
+        let others = reach[guessed.clone()]
+            .iter()
+            .fold(own.clone(), |all, one| all.and(one));
         let windows_rad = own.windows_rad + others.windows_rad;
-        Ok(Reach { guessed_rad: own.windows_rad, guessed, windows_rad, windows: others.windows })
+        Ok(Reach {
+            guessed_rad: own.windows_rad,
+            guessed,
+            windows_rad,
+            windows: others.windows,
+        })
     });
     followed.collect()
 }
@@ -82,8 +100,12 @@ pub(super) fn tiles<S: Sample>(
     let reaches = reaches(estimator, places, range_m)?;
     // Sums of windows, and those of eight of them.
     let window_bytes = estimator.tools.statistic.statistic_len() * size_of::<f64>() * 9 / 8;
-    let step_rad = elevation_rad.windows(2).map(|pair| (pair[1] - pair[0]).abs()).fold(f64::INFINITY, f64::min);
-    let bytes = |lines: usize, reach: &Reach| lines.saturating_mul(reach.windows.len()) * window_bytes;
+    let step_rad = elevation_rad
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs())
+        .fold(f64::INFINITY, f64::min);
+    let bytes =
+        |lines: usize, reach: &Reach| lines.saturating_mul(reach.windows.len()) * window_bytes;
     let mut tiles = Vec::new();
     let mut gates = 0..0;
     while let Some(first) = reaches.get(gates.end) {
@@ -104,12 +126,20 @@ pub(super) fn tiles<S: Sample>(
             some = some.end..some.end + 1;
             let read = |end: usize| within(elevation_rad, &(some.start..end), reach.windows_rad);
             let fits = |end: &usize| bytes(read(*end).len(), &reach) <= most_bytes;
-            some.end += (some.end + 1..=elevation_rad.len()).take_while(fits).count();
+            some.end += (some.end + 1..=elevation_rad.len())
+                .take_while(fits)
+                .count();
             tiles.push(Tile {
                 lines: some.clone(),
                 gates: gates.clone(),
-                guessed: (within(elevation_rad, &some, reach.guessed_rad), reach.guessed.clone()),
-                windows: (within(elevation_rad, &some, reach.windows_rad), reach.windows.clone()),
+                guessed: (
+                    within(elevation_rad, &some, reach.guessed_rad),
+                    reach.guessed.clone(),
+                ),
+                windows: (
+                    within(elevation_rad, &some, reach.windows_rad),
+                    reach.windows.clone(),
+                ),
             });
         }
     }
@@ -119,9 +149,16 @@ pub(super) fn tiles<S: Sample>(
 /// The lines around some lines that are at most so far from one of them; the lines of a scan go up or down.
 fn within(elevation_rad: &[f64], some: &Range<usize>, reach_rad: f64) -> Range<usize> {
     // A millionth of the reach for rounding.
-    let near = |line: usize, end: usize| (elevation_rad[line] - elevation_rad[end]).abs() <= reach_rad * (1.0 + 1e-6);
-    let before = (0..some.start).rev().take_while(|line| near(*line, some.start)).count();
-    let after = (some.end..elevation_rad.len()).take_while(|line| near(*line, some.end - 1)).count();
+    let near = |line: usize, end: usize| {
+        (elevation_rad[line] - elevation_rad[end]).abs() <= reach_rad * (1.0 + 1e-6)
+    };
+    let before = (0..some.start)
+        .rev()
+        .take_while(|line| near(*line, some.start))
+        .count();
+    let after = (some.end..elevation_rad.len())
+        .take_while(|line| near(*line, some.end - 1))
+        .count();
     some.start - before..some.end + after
 }
 
@@ -147,38 +184,63 @@ mod tests {
 
     #[test]
     fn tiles_hold_each_gate_once_with_all_that_it_reaches_and_do_not_grow_with_the_record() {
-        for (samples, words) in [(5_000, ""), (5_000, "follow_wind = true"), (250_000, "gate_step_samples = 100")] {
+        for (samples, words) in [
+            (5_000, ""),
+            (5_000, "follow_wind = true"),
+            (250_000, "gate_step_samples = 100"),
+        ] {
             let plan = scene(samples, words);
             let elevation_rad = plan.geometry.elevation_rad.clone();
             let places = places_of(&plan, &elevation_rad).unwrap();
             assert_eq!(plan.geometry.samples, samples);
-            let layer_snr: Vec<(f64, f64)> = plan.geometry.layer_range_m().map(|range_m| (range_m, 1.0)).collect();
+            let layer_snr: Vec<(f64, f64)> = plan
+                .geometry
+                .layer_range_m()
+                .map(|range_m| (range_m, 1.0))
+                .collect();
             let estimator = MapEstimator::<f64>::new(&plan, &layer_snr, &places).unwrap();
             let range_m = &plan.geometry.gate_range_m;
             let most_bytes = 16 << 20;
             let mut held = vec![0_u8; elevation_rad.len() * range_m.len()];
             for tile in tiles(&estimator, &places, &elevation_rad, range_m, most_bytes).unwrap() {
                 let (read, windows) = &tile.windows;
-                let bytes = read.len() * windows.len() * estimator.tools.statistic.statistic_len() * 9;
-                assert!(bytes <= most_bytes, "{samples} samples: {bytes} bytes for {tile:?}");
+                let bytes =
+                    read.len() * windows.len() * estimator.tools.statistic.statistic_len() * 9;
+                assert!(
+                    bytes <= most_bytes,
+                    "{samples} samples: {bytes} bytes for {tile:?}"
+                );
                 for line in tile.lines.clone() {
-                    tile.gates.clone().for_each(|gate| held[line * range_m.len() + gate] += 1);
+                    tile.gates
+                        .clone()
+                        .for_each(|gate| held[line * range_m.len() + gate] += 1);
                 }
                 // What the estimates at the corners depend on: their own windows, and those of the first estimates.
                 let (guessed, guesses) = &tile.guessed;
                 for line in [guessed.start, guessed.end - 1] {
                     for gate in [guesses.start, guesses.end - 1] {
-                        let point = PolarPoint { range_m: range_m[gate], elevation_rad: elevation_rad[line] };
+                        let point = PolarPoint {
+                            range_m: range_m[gate],
+                            elevation_rad: elevation_rad[line],
+                        };
                         for chord in places.chords(point, 5.0) {
                             assert!(read.contains(&chord.line), "{point:?} {chord:?} {tile:?}");
-                            assert!(windows.start <= chord.first && chord.last < windows.end, "{point:?} {tile:?}");
+                            assert!(
+                                windows.start <= chord.first && chord.last < windows.end,
+                                "{point:?} {tile:?}"
+                            );
                         }
                     }
                 }
-                let own =
-                    PolarPoint { range_m: range_m[tile.gates.start], elevation_rad: elevation_rad[tile.lines.start] };
+                let own = PolarPoint {
+                    range_m: range_m[tile.gates.start],
+                    elevation_rad: elevation_rad[tile.lines.start],
+                };
                 let reached = places.chords(own, 5.0).map(|chord| chord.line);
-                assert!(estimator.tools.following.is_none() || reached.into_iter().all(|line| guessed.contains(&line)));
+                assert!(
+                    estimator.tools.following.is_none()
+                        || reached.into_iter().all(|line| guessed.contains(&line))
+                );
             }
             assert!(held.iter().all(|count| *count == 1), "{samples} samples");
         }

@@ -34,7 +34,10 @@ impl Direction {
     pub fn cos_sin_to(&self, other: &Self) -> (f64, f64) {
         let ([a, b, c], [d, e, f]) = (self.0, other.0);
         let cross = [b * f - c * e, c * d - a * f, a * e - b * d];
-        (a * d + b * e + c * f, cross.iter().map(|x| x * x).sum::<f64>().sqrt())
+        (
+            a * d + b * e + c * f,
+            cross.iter().map(|x| x * x).sum::<f64>().sqrt(),
+        )
     }
 }
 

@@ -14,7 +14,8 @@ pub struct Head {
 impl Head {
     /// Time from rest to rest over an angle, s: `2 sqrt(d/A)` as long as the rate is not reached, `d/S + S/A` beyond.
     pub fn time_s(&self, angle_rad: f64) -> f64 {
-        let (angle_rad, rate, acceleration) = (angle_rad.abs(), self.rate_rad_s, self.acceleration_rad_s2);
+        let (angle_rad, rate, acceleration) =
+            (angle_rad.abs(), self.rate_rad_s, self.acceleration_rad_s2);
         if acceleration.is_infinite() {
             return angle_rad / rate;
         }
@@ -26,6 +27,10 @@ impl Head {
 
     /// Time from leaving the end of a sweep at full rate to coming back to it at full rate, s: `2 S/A`.
     pub fn turn_round_s(&self) -> f64 {
-        if self.acceleration_rad_s2.is_infinite() { 0.0 } else { 2.0 * self.rate_rad_s / self.acceleration_rad_s2 }
+        if self.acceleration_rad_s2.is_infinite() {
+            0.0
+        } else {
+            2.0 * self.rate_rad_s / self.acceleration_rad_s2
+        }
     }
 }

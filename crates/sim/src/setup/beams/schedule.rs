@@ -117,7 +117,12 @@ impl Schedule {
     /// The index of a stop that the head cannot reach in the time that it asks for, and why.
     pub fn new(stops: &[Stop], pace: &Pace, mount: Mount) -> Result<Self, (usize, String)> {
         let prt_s = pace.prt_s;
-        let mut scan = Self { lines: Vec::new(), sweeps: Vec::new(), prt_s, mount };
+        let mut scan = Self {
+            lines: Vec::new(),
+            sweeps: Vec::new(),
+            prt_s,
+            mount,
+        };
         // When and where the head has done its last line, and the way it then moves.
         let mut last: Option<(f64, Angles, Angles)> = None;
         for (i, stop) in stops.iter().enumerate() {
@@ -127,7 +132,10 @@ impl Schedule {
             let tick = match (stop.time_s, last) {
                 (None, None) => 0.0,
                 (None, Some((end, _, moving))) => {
-                    let turns = moving.iter().zip(rate_rad_s).any(|(before, now)| before * now < 0.0);
+                    let turns = moving
+                        .iter()
+                        .zip(rate_rad_s)
+                        .any(|(before, now)| before * now < 0.0);
                     let least_s = match stop.to_rad {
                         None => pace.dead_time_s,
                         Some(_) if turns => pace.head.turn_round_s(),
@@ -138,20 +146,45 @@ impl Schedule {
                 }
                 (Some(time_s), last) => {
                     let end = last.map_or(f64::NEG_INFINITY, |(end, ..)| end);
-                    scan.in_time(time_s, end, head_s).map_err(|reason| (i, reason))?
+                    scan.in_time(time_s, end, head_s)
+                        .map_err(|reason| (i, reason))?
                 }
             };
             if scan.sweeps.len() <= stop.sweep {
-                scan.sweeps.push((stop.mode, if stop.mode == SweepMode::Rhi { from[0] } else { from[1] }));
+                scan.sweeps.push((
+                    stop.mode,
+                    if stop.mode == SweepMode::Rhi {
+                        from[0]
+                    } else {
+                        from[1]
+                    },
+                ));
             }
-            let group = if stop.apart { stops.len() + i } else { stop.sweep };
+            let group = if stop.apart {
+                stops.len() + i
+            } else {
+                stop.sweep
+            };
             for line in 0..lines {
                 let before = (line * pulses) as f64;
-                let angles_rad = std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * prt_s));
+                let angles_rad =
+                    std::array::from_fn(|d| from[d] + rate_rad_s[d] * (before * prt_s));
                 let (sweep, first, tick) = (stop.sweep, scan.pulses(), tick + before);
                 let own = |d: usize| mount.position_m[d] + mount.velocity_m_s[d] * (tick * prt_s);
-                let (position_m, velocity_m_s) = stop.carrier.unwrap_or((std::array::from_fn(own), mount.velocity_m_s));
-                let line = Line { sweep, group, tick, first, pulses, angles_rad, rate_rad_s, position_m, velocity_m_s };
+                let (position_m, velocity_m_s) = stop
+                    .carrier
+                    .unwrap_or((std::array::from_fn(own), mount.velocity_m_s));
+                let line = Line {
+                    sweep,
+                    group,
+                    tick,
+                    first,
+                    pulses,
+                    angles_rad,
+                    rate_rad_s,
+                    position_m,
+                    velocity_m_s,
+                };
                 scan.lines.push(line);
             }
             last = Some((tick + periods, stop.to_rad.unwrap_or(from), rate_rad_s));
@@ -180,7 +213,9 @@ impl Schedule {
 
     /// The line of a pulse of the scan.
     pub fn line_of(&self, pulse: usize) -> usize {
-        self.lines.partition_point(|line| line.first <= pulse).saturating_sub(1)
+        self.lines
+            .partition_point(|line| line.first <= pulse)
+            .saturating_sub(1)
     }
 
     /// The beam without jitter at a place among the pulses of a line, which may lie between two.
@@ -204,21 +239,31 @@ impl Schedule {
         let mut random = stream(self.mount.seed, "pointing", (line.first + pulse) as u64);
         let mut part = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
         // Box and Muller (1958): two normal numbers.
-        let (radius, (sin, cos)) = ((-2.0 * (1.0 - part()).ln()).sqrt(), (TAU * part()).sin_cos());
-        self.beam_beside(line, pulse as f64, [jitter[0] * radius * cos, jitter[1] * radius * sin])
+        let (radius, (sin, cos)) = (
+            (-2.0 * (1.0 - part()).ln()).sqrt(),
+            (TAU * part()).sin_cos(),
+        );
+        self.beam_beside(
+            line,
+            pulse as f64,
+            [jitter[0] * radius * cos, jitter[1] * radius * sin],
+        )
     }
 
     fn beam_beside(&self, line: &Line, pulse: f64, beside_rad: Angles) -> Beam {
         let after_s = pulse * self.prt_s;
-        let [azimuth_rad, elevation_rad] =
-            std::array::from_fn(|d| line.angles_rad[d] + line.rate_rad_s[d] * after_s + beside_rad[d]);
+        let [azimuth_rad, elevation_rad] = std::array::from_fn(|d| {
+            line.angles_rad[d] + line.rate_rad_s[d] * after_s + beside_rad[d]
+        });
         let (zero_rad, from_x_rad) = self.mount.reference_rad;
         Beam {
             time_s: (line.tick + pulse) * self.prt_s,
             azimuth_rad,
             elevation_rad,
             direction: Direction::new((azimuth_rad - zero_rad) + from_x_rad, elevation_rad),
-            position_m: std::array::from_fn(|d| line.position_m[d] + line.velocity_m_s[d] * after_s),
+            position_m: std::array::from_fn(|d| {
+                line.position_m[d] + line.velocity_m_s[d] * after_s
+            }),
             velocity_m_s: line.velocity_m_s,
         }
     }
@@ -230,28 +275,43 @@ impl Schedule {
 
     /// First and last beam of each line, by which the whole line is bounded.
     pub fn ends(&self) -> impl Iterator<Item = Beam> + '_ {
-        let of_line = |i: usize| [0.0, (self.lines[i].pulses - 1) as f64].map(|pulse| self.beam(i, pulse));
+        let of_line =
+            |i: usize| [0.0, (self.lines[i].pulses - 1) as f64].map(|pulse| self.beam(i, pulse));
         (0..self.lines.len()).flat_map(of_line)
     }
 
     /// Time from the first pulse to the last, s.
     pub fn duration_s(&self) -> f64 {
-        let end = self.lines.last().map_or(0.0, |line| line.tick + line.pulses as f64 - 1.0);
+        let end = self
+            .lines
+            .last()
+            .map_or(0.0, |line| line.tick + line.pulses as f64 - 1.0);
         (end - self.lines.first().map_or(0.0, |line| line.tick)) * self.prt_s
     }
 
     /// Longest time between the beginnings of sweeps, s; none for one sweep.
     pub fn revisit_s(&self) -> Option<f64> {
-        let first = |sweep: usize| self.lines.iter().find(|line| line.sweep == sweep).map(|line| line.tick);
+        let first = |sweep: usize| {
+            self.lines
+                .iter()
+                .find(|line| line.sweep == sweep)
+                .map(|line| line.tick)
+        };
         let ticks: Vec<f64> = (0..self.sweeps.len()).filter_map(first).collect();
-        ticks.windows(2).map(|pair| (pair[1] - pair[0]) * self.prt_s).reduce(f64::max)
+        ticks
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) * self.prt_s)
+            .reduce(f64::max)
     }
 
     /// Whether all is one RHI upwards of equal lines from a lidar that stands still: the scan that regions in a plane are for.
     pub fn is_plane(&self) -> bool {
         self.is_of_one_plane()
             && self.sweeps.len() == 1
-            && self.lines.windows(2).all(|pair| pair[1].angles_rad[1] > pair[0].angles_rad[1])
+            && self
+                .lines
+                .windows(2)
+                .all(|pair| pair[1].angles_rad[1] > pair[0].angles_rad[1])
     }
 
     /// Whether all lines are in one vertical plane, up or down, and the head stands still during each.
@@ -260,10 +320,14 @@ impl Schedule {
     }
 
     fn is_of_one_plane(&self) -> bool {
-        let first = self.lines.first().map(|line| (line.pulses, line.angles_rad[0]));
+        let first = self
+            .lines
+            .first()
+            .map(|line| (line.pulses, line.angles_rad[0]));
         let (here_m, still) = (self.mount.position_m, [0.0; 3]);
         let alike = |line: &Line| {
-            Some((line.pulses, line.angles_rad[0])) == first && (line.position_m, line.velocity_m_s) == (here_m, still)
+            Some((line.pulses, line.angles_rad[0])) == first
+                && (line.position_m, line.velocity_m_s) == (here_m, still)
         };
         self.sweeps.iter().all(|(mode, _)| *mode == SweepMode::Rhi) && self.lines.iter().all(alike)
     }
@@ -271,12 +335,18 @@ impl Schedule {
 
 /// Lines of a stop or a way, how many periods of the pulses the head is on it, and its rate, rad/s.
 fn way(stop: &Stop, pulses: usize, pace: &Pace) -> (usize, f64, Angles) {
-    let Some(to) = stop.to_rad else { return (1, pulses as f64, [0.0; 2]) };
+    let Some(to) = stop.to_rad else {
+        return (1, pulses as f64, [0.0; 2]);
+    };
     let turn_rad = difference(stop.angles_rad, to);
     let length_rad = turn_rad.iter().fold(0.0_f64, |most, d| most.max(d.abs()));
     let way_s = length_rad / pace.head.rate_rad_s;
     let lines = (way_s / (pulses as f64 * pace.prt_s) + 1e-9) as usize;
-    (lines, way_s / pace.prt_s, turn_rad.map(|d| d / length_rad * pace.head.rate_rad_s))
+    (
+        lines,
+        way_s / pace.prt_s,
+        turn_rad.map(|d| d / length_rad * pace.head.rate_rad_s),
+    )
 }
 
 /// From one pair of angles to another, rad; azimuths as they are given.
@@ -287,5 +357,7 @@ fn difference(from: Angles, to: Angles) -> Angles {
 /// How far the head turns, rad: the longer of its two ways, azimuths the shorter way round.
 fn apart_rad(from: Angles, to: Angles) -> f64 {
     let [azimuth, elevation] = difference(from, to);
-    (azimuth - TAU * (azimuth / TAU).round()).abs().max(elevation.abs())
+    (azimuth - TAU * (azimuth / TAU).round())
+        .abs()
+        .max(elevation.abs())
 }

@@ -9,7 +9,10 @@ use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
 
 /// The rows of a table by the names of their columns.
 fn rows(name: &str) -> Vec<impl Fn(&str) -> f64> {
-    let path = format!("{}/../../tests/reference/scans/{name}.csv", env!("CARGO_MANIFEST_DIR"));
+    let path = format!(
+        "{}/../../tests/reference/scans/{name}.csv",
+        env!("CARGO_MANIFEST_DIR")
+    );
     let table = TextTable::read(std::path::Path::new(&path)).unwrap();
     let count = table.rows.len();
     assert!(count > 2, "{name}");
@@ -20,7 +23,11 @@ fn rows(name: &str) -> Vec<impl Fn(&str) -> f64> {
                 let at = table.column(column).unwrap_or_else(|| panic!("{column}"));
                 // Names of cases count as numbers.
                 let value = table.number(row, at);
-                let name = || table.rows[row][at].bytes().fold(0.0, |sum, b| 3.0 * sum + f64::from(b));
+                let name = || {
+                    table.rows[row][at]
+                        .bytes()
+                        .fold(0.0, |sum, b| 3.0 * sum + f64::from(b))
+                };
                 if value.is_nan() { name() } else { value }
             }
         })
@@ -28,20 +35,39 @@ fn rows(name: &str) -> Vec<impl Fn(&str) -> f64> {
 }
 
 fn near(found: f64, expected: f64) {
-    assert!((found - expected).abs() < 1e-9 * expected.abs().max(1.0), "{found} {expected}");
+    assert!(
+        (found - expected).abs() < 1e-9 * expected.abs().max(1.0),
+        "{found} {expected}"
+    );
 }
 
-const HERE: Mount =
-    Mount { position_m: [0.0; 3], velocity_m_s: [0.0; 3], reference_rad: (0.0, 0.0), jitter_rad: [0.0; 2], seed: 7 };
+const HERE: Mount = Mount {
+    position_m: [0.0; 3],
+    velocity_m_s: [0.0; 3],
+    reference_rad: (0.0, 0.0),
+    jitter_rad: [0.0; 2],
+    seed: 7,
+};
 
 fn pace(prf_hz: f64, pulses: usize, rate_rad_s: f64, acceleration_rad_s2: f64) -> Pace {
-    Pace { prt_s: 1.0 / prf_hz, pulses, head: Head { rate_rad_s, acceleration_rad_s2 }, dead_time_s: 0.0 }
+    Pace {
+        prt_s: 1.0 / prf_hz,
+        pulses,
+        head: Head {
+            rate_rad_s,
+            acceleration_rad_s2,
+        },
+        dead_time_s: 0.0,
+    }
 }
 
 #[test]
 fn directions_and_what_a_moving_lidar_sees_are_those_of_the_table() {
     for row in rows("directions") {
-        let direction = Direction::new(row("azimuth_rad") - row("flow_azimuth_rad"), row("elevation_rad"));
+        let direction = Direction::new(
+            row("azimuth_rad") - row("flow_azimuth_rad"),
+            row("elevation_rad"),
+        );
         let xyz = |names: [&str; 3]| names.map(&row);
         for (found, expected) in direction.0.iter().zip(xyz(["e_x", "e_y", "e_z"])) {
             near(*found, expected);
@@ -53,9 +79,15 @@ fn directions_and_what_a_moving_lidar_sees_are_those_of_the_table() {
         }
         let wind_m_s = xyz(["wind_u_m_s", "wind_v_m_s", "wind_w_m_s"]);
         let lidar_m_s = xyz(["lidar_u_m_s", "lidar_v_m_s", "lidar_w_m_s"]);
-        near(direction.radial_velocity_m_s(wind_m_s, lidar_m_s), row("radial_velocity_m_s"));
+        near(
+            direction.radial_velocity_m_s(wind_m_s, lidar_m_s),
+            row("radial_velocity_m_s"),
+        );
     }
-    assert_eq!(Direction::new(std::f64::consts::FRAC_PI_2, 0.3).0, [0.0, 0.3f64.cos(), 0.3f64.sin()]);
+    assert_eq!(
+        Direction::new(std::f64::consts::FRAC_PI_2, 0.3).0,
+        [0.0, 0.3f64.cos(), 0.3f64.sin()]
+    );
 }
 
 #[test]
@@ -81,44 +113,74 @@ fn a_lidar_that_flies_sees_its_own_speed() {
         let stop = Stop {
             time_s: Some(row("time_s")),
             pulses: Some(1),
-            ..Stop::new(SweepMode::Pointing, [row("azimuth_rad"), row("elevation_rad")])
+            ..Stop::new(
+                SweepMode::Pointing,
+                [row("azimuth_rad"), row("elevation_rad")],
+            )
         };
-        let scan = Schedule::new(&[stop], &pace(400.0, 1, f64::INFINITY, f64::INFINITY), mount).unwrap();
+        let scan = Schedule::new(
+            &[stop],
+            &pace(400.0, 1, f64::INFINITY, f64::INFINITY),
+            mount,
+        )
+        .unwrap();
         let beam = scan.beam_of_pulse(0, 0);
         near(beam.position_m[0], -1500.0 + 70.0 * row("time_s"));
         let mut v = [[0.0; 3]];
-        wind.velocity_into(&[beam.at_range_m(row("range_m"))], beam.time_s, &mut v).unwrap();
-        near(beam.direction.radial_velocity_m_s(v[0], [0.0; 3]), row("radial_wind_m_s"));
-        near(beam.direction.radial_velocity_m_s(v[0], beam.velocity_m_s), row("radial_velocity_seen_m_s"));
+        wind.velocity_into(&[beam.at_range_m(row("range_m"))], beam.time_s, &mut v)
+            .unwrap();
+        near(
+            beam.direction.radial_velocity_m_s(v[0], [0.0; 3]),
+            row("radial_wind_m_s"),
+        );
+        near(
+            beam.direction.radial_velocity_m_s(v[0], beam.velocity_m_s),
+            row("radial_velocity_seen_m_s"),
+        );
     }
 }
 
 #[test]
 fn the_head_takes_the_time_of_the_table() {
     for row in rows("head_motion") {
-        let head = Head { rate_rad_s: row("speed_rad_s"), acceleration_rad_s2: row("acceleration_rad_s2") };
+        let head = Head {
+            rate_rad_s: row("speed_rad_s"),
+            acceleration_rad_s2: row("acceleration_rad_s2"),
+        };
         near(head.time_s(row("angle_rad")), row("time_s"));
     }
-    let jumps = Head { rate_rad_s: f64::INFINITY, acceleration_rad_s2: f64::INFINITY };
+    let jumps = Head {
+        rate_rad_s: f64::INFINITY,
+        acceleration_rad_s2: f64::INFINITY,
+    };
     assert_eq!((jumps.time_s(1.0), jumps.turn_round_s()), (0.0, 0.0));
 }
 
 /// The stops of sweeps one after the other.
 fn numbered<const N: usize>(sweeps: [Vec<Stop>; N]) -> Vec<Stop> {
     let sweeps = sweeps.into_iter().enumerate();
-    sweeps.flat_map(|(sweep, stops)| stops.into_iter().map(move |stop| Stop { sweep, ..stop })).collect()
+    sweeps
+        .flat_map(|(sweep, stops)| stops.into_iter().map(move |stop| Stop { sweep, ..stop }))
+        .collect()
 }
 
 #[test]
 fn sweeps_back_and_forth_have_the_pulses_of_the_table() {
     for row in rows("back_and_forth") {
-        let pace = pace(row("prf_hz"), row("pulses_per_line") as usize, row("rate_rad_s"), row("acceleration_rad_s2"));
+        let pace = pace(
+            row("prf_hz"),
+            row("pulses_per_line") as usize,
+            row("rate_rad_s"),
+            row("acceleration_rad_s2"),
+        );
         let up = path::rhi(1.0, row("low_rad"), row("high_rad"), 1.0, true);
         let mut down = up.clone();
         path::reverse(&mut down);
         let scan = Schedule::new(&numbered([up.clone(), down, up]), &pace, HERE).unwrap();
         let sweep = row("sweep") as usize;
-        let lines: Vec<usize> = (0..scan.lines.len()).filter(|line| scan.lines[*line].sweep == sweep).collect();
+        let lines: Vec<usize> = (0..scan.lines.len())
+            .filter(|line| scan.lines[*line].sweep == sweep)
+            .collect();
         assert_eq!(lines.len() as f64, row("lines_per_sweep"));
         let line = lines[row("line") as usize];
         let beam = scan.beam_of_pulse(line, (row("pulse") - scan.lines[line].tick) as usize);
@@ -140,32 +202,50 @@ fn smeared(
     let speed = rate[0].abs().max(rate[1].abs());
     let long = 2.0 * pulses as f64 / prf_hz;
     let to: Angles = std::array::from_fn(|d| from[d] + rate[d] * long);
-    let sweep = Stop { to_rad: Some(to), ..Stop::new(SweepMode::Sector, from) };
+    let sweep = Stop {
+        to_rad: Some(to),
+        ..Stop::new(SweepMode::Sector, from)
+    };
     let scan = Schedule::new(&[sweep], &pace(prf_hz, pulses, speed, f64::INFINITY), mount).unwrap();
     let seen: Vec<f64> = (0..pulses)
         .map(|pulse| {
             let beam = scan.beam_of_pulse(0, pulse);
             let mut v = [[0.0; 3]];
-            wind.velocity_into(&[beam.at_range_m(range_m)], 0.0, &mut v).unwrap();
+            wind.velocity_into(&[beam.at_range_m(range_m)], 0.0, &mut v)
+                .unwrap();
             beam.direction.radial_velocity_m_s(v[0], beam.velocity_m_s)
         })
         .collect();
     let mean = seen.iter().sum::<f64>() / pulses as f64;
-    (mean, (seen.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / pulses as f64).sqrt())
+    (
+        mean,
+        (seen.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / pulses as f64).sqrt(),
+    )
 }
 
 #[test]
 fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
     for row in rows("smear_uniform") {
         let wind = Linear::uniform([row("wind_x_m_s"), 0.0, 0.0]).unwrap();
-        let angles = [[row("centre_azimuth_rad"), row("elevation_rad")], [row("azimuth_rate_rad_s"), 0.0]];
-        let (mean, spread) = smeared(&wind, angles, (row("pulses") as usize, row("prf_hz")), (HERE, 100.0));
+        let angles = [
+            [row("centre_azimuth_rad"), row("elevation_rad")],
+            [row("azimuth_rate_rad_s"), 0.0],
+        ];
+        let (mean, spread) = smeared(
+            &wind,
+            angles,
+            (row("pulses") as usize, row("prf_hz")),
+            (HERE, 100.0),
+        );
         near(mean, row("mean_m_s"));
         near(spread, row("spread_m_s"));
     }
     let winds = rows("vad_harmonics");
     for row in rows("smear_linear") {
-        let of = winds.iter().find(|wind| wind("case") == row("case")).unwrap();
+        let of = winds
+            .iter()
+            .find(|wind| wind("case") == row("case"))
+            .unwrap();
         let triple = |names: [&str; 3]| names.map(of);
         let wind = Linear {
             velocity_m_s: triple(["u0_m_s", "v0_m_s", "w0_m_s"]),
@@ -176,7 +256,10 @@ fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
             ],
             acceleration_m_s2: [0.0; 3],
         };
-        let angles = [[std::f64::consts::FRAC_PI_2, row("centre_elevation_rad")], [0.0, row("elevation_rate_rad_s")]];
+        let angles = [
+            [std::f64::consts::FRAC_PI_2, row("centre_elevation_rad")],
+            [0.0, row("elevation_rate_rad_s")],
+        ];
         let timing = (row("pulses") as usize, row("prf_hz"));
         let (mean, spread) = smeared(&wind, angles, timing, (HERE, row("range_m")));
         near(mean, row("mean_m_s"));
@@ -191,11 +274,17 @@ fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
             axial_deficit_m_s: 0.0,
         };
         let (middle_m, half_m, height_m) = (row("y0_m"), 0.5 * row("b0_m"), row("z0_m"));
-        let lines = vec![vortices(middle_m - half_m, -1.0, height_m), vortices(middle_m + half_m, 1.0, height_m)];
+        let lines = vec![
+            vortices(middle_m - half_m, -1.0, height_m),
+            vortices(middle_m + half_m, 1.0, height_m),
+        ];
         let wind = wakescope_les::winds::VortexLines::new(lines, Ground::Image).unwrap();
         let (pulses, prf_hz) = (row("pulses") as usize, 400.0);
         let rate = row("width_rad") / pulses as f64 * prf_hz;
-        let angles = [[std::f64::consts::FRAC_PI_2, row("elevation_rad")], [0.0, rate]];
+        let angles = [
+            [std::f64::consts::FRAC_PI_2, row("elevation_rad")],
+            [0.0, rate],
+        ];
         let (mean, _) = smeared(&wind, angles, (pulses, prf_hz), (HERE, row("range_m")));
         near(mean, row("mean_of_pulses_m_s"));
         let (point, _) = smeared(&wind, angles, (1, prf_hz), (HERE, row("range_m")));
@@ -207,18 +296,38 @@ fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
 fn jitter_has_its_mean_and_spread_within_three_standard_errors() {
     const PULSES: usize = 40_000;
     for row in rows("jitter") {
-        let mount = Mount { jitter_rad: [row("azimuth_sd_rad"), row("elevation_sd_rad")], ..HERE };
+        let mount = Mount {
+            jitter_rad: [row("azimuth_sd_rad"), row("elevation_sd_rad")],
+            ..HERE
+        };
         let stare = path::stare(row("azimuth_rad"), row("elevation_rad"), 1);
-        let scan = Schedule::new(&stare, &pace(1e4, PULSES, f64::INFINITY, f64::INFINITY), mount).unwrap();
+        let scan = Schedule::new(
+            &stare,
+            &pace(1e4, PULSES, f64::INFINITY, f64::INFINITY),
+            mount,
+        )
+        .unwrap();
         let wind = [row("wind_x_m_s"), 0.0, 0.0];
         let seen: Vec<f64> = (0..PULSES)
-            .map(|pulse| scan.beam_of_pulse(0, pulse).direction.radial_velocity_m_s(wind, [0.0; 3]))
+            .map(|pulse| {
+                scan.beam_of_pulse(0, pulse)
+                    .direction
+                    .radial_velocity_m_s(wind, [0.0; 3])
+            })
             .collect();
         let mean = seen.iter().sum::<f64>() / PULSES as f64;
         let sd = (seen.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / PULSES as f64).sqrt();
         let error = row("sd_m_s") / (PULSES as f64).sqrt();
-        assert!((mean - row("mean_m_s")).abs() < 3.0 * error, "{mean} {}", row("mean_m_s"));
-        assert!((sd - row("sd_m_s")).abs() < 3.0 * error / 2f64.sqrt() * 1.2, "{sd} {}", row("sd_m_s"));
+        assert!(
+            (mean - row("mean_m_s")).abs() < 3.0 * error,
+            "{mean} {}",
+            row("mean_m_s")
+        );
+        assert!(
+            (sd - row("sd_m_s")).abs() < 3.0 * error / 2f64.sqrt() * 1.2,
+            "{sd} {}",
+            row("sd_m_s")
+        );
         let again = scan.beam_of_pulse(0, 5);
         assert_eq!(again, scan.beam_of_pulse(0, 5));
     }
@@ -226,21 +335,42 @@ fn jitter_has_its_mean_and_spread_within_three_standard_errors() {
 
 #[test]
 fn each_kind_of_scan_has_its_lines_in_order() {
-    let ppi = path::ppi(0.1, 0.0, std::f64::consts::TAU, std::f64::consts::TAU / 8.0, false);
-    assert_eq!((ppi.len(), ppi[0].mode), (8, SweepMode::AzimuthSurveillance), "no line twice");
+    let ppi = path::ppi(
+        0.1,
+        0.0,
+        std::f64::consts::TAU,
+        std::f64::consts::TAU / 8.0,
+        false,
+    );
+    assert_eq!(
+        (ppi.len(), ppi[0].mode),
+        (8, SweepMode::AzimuthSurveillance),
+        "no line twice"
+    );
     let sector = path::ppi(0.1, 0.2, 0.6, 0.1, false);
-    assert_eq!((sector.len(), sector[0].mode, sector[0].angles_rad), (5, SweepMode::Sector, [0.2, 0.1]));
+    assert_eq!(
+        (sector.len(), sector[0].mode, sector[0].angles_rad),
+        (5, SweepMode::Sector, [0.2, 0.1])
+    );
     let rows = path::raster(1.0, &[0.0, 0.1], [-0.1, 0.1, 0.1], false);
     let ends = |sweep: &[Stop]| (sweep[0].angles_rad[0], sweep[2].angles_rad[0]);
     let (first, second) = (ends(&rows[0]), ends(&rows[1]));
-    assert!(first.0 < first.1 && second.0 > second.1, "{first:?} {second:?}");
+    assert!(
+        first.0 < first.1 && second.0 > second.1,
+        "{first:?} {second:?}"
+    );
     let cycles = numbered([path::dbs(1.0), path::dbs(1.0)]);
     let dbs = Schedule::new(&cycles, &pace(1000.0, 100, 1.0, f64::INFINITY), HERE).unwrap();
     assert_eq!(dbs.lines.len(), 10);
     // A quarter turn at 1 rad/s between slanted beams: 1571 periods after the 100 pulses of the first.
     assert_eq!(dbs.lines[1].tick, 1671.0);
-    assert_eq!(dbs.middle(1).direction.0[0], 0.0, "east is across the flight, to the bit");
-    let groups: std::collections::HashSet<usize> = dbs.lines.iter().map(|line| line.group).collect();
+    assert_eq!(
+        dbs.middle(1).direction.0[0],
+        0.0,
+        "east is across the flight, to the bit"
+    );
+    let groups: std::collections::HashSet<usize> =
+        dbs.lines.iter().map(|line| line.group).collect();
     assert_eq!(groups.len(), 10, "beams apart share no air");
     assert!(dbs.revisit_s().unwrap() > 6.0 && !dbs.is_plane());
 }
@@ -253,9 +383,18 @@ fn stops_that_the_head_cannot_reach_are_named() {
     };
     let pace = pace(100.0, 50, 1.0, f64::INFINITY);
     let scan = |stops: &[Stop]| Schedule::new(stops, &pace, HERE);
-    assert_eq!(scan(&[stop(0.0, 0.0), stop(1.0, 0.5)]).unwrap().lines[1].tick, 100.0);
+    assert_eq!(
+        scan(&[stop(0.0, 0.0), stop(1.0, 0.5)]).unwrap().lines[1].tick,
+        100.0
+    );
     let (row, reason) = scan(&[stop(0.0, 0.0), stop(0.2, 0.0)]).unwrap_err();
-    assert!(row == 1 && reason.contains("the end of the line before"), "{reason}");
+    assert!(
+        row == 1 && reason.contains("the end of the line before"),
+        "{reason}"
+    );
     let (row, reason) = scan(&[stop(0.0, 0.0), stop(0.8, 0.5)]).unwrap_err();
-    assert!(row == 1 && reason.contains("the head needs 0.500 s"), "{reason}");
+    assert!(
+        row == 1 && reason.contains("the head needs 0.500 s"),
+        "{reason}"
+    );
 }

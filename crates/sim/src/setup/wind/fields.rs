@@ -34,7 +34,12 @@ impl Placed {
 }
 
 impl Wind for Placed {
-    fn velocity_into(&self, points_m: &[[f64; 3]], time_s: f64, out_m_s: &mut [[f64; 3]]) -> Result<(), LesError> {
+    fn velocity_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out_m_s: &mut [[f64; 3]],
+    ) -> Result<(), LesError> {
         let (sin, cos) = (self.sin, self.cos);
         let mut turned = Vec::with_capacity(BATCH);
         for (points, outs) in points_m.chunks(BATCH).zip(out_m_s.chunks_mut(BATCH)) {
@@ -54,7 +59,12 @@ impl Wind for Placed {
         self.wind.max_gradient_per_s(time_s)
     }
 
-    fn scalar_into(&self, points_m: &[[f64; 3]], time_s: f64, out: &mut [f64]) -> Result<(), LesError> {
+    fn scalar_into(
+        &self,
+        points_m: &[[f64; 3]],
+        time_s: f64,
+        out: &mut [f64],
+    ) -> Result<(), LesError> {
         let own: Vec<_> = points_m.iter().map(|point_m| self.own_m(point_m)).collect();
         self.wind.scalar_into(&own, time_s, out)
     }
@@ -63,65 +73,116 @@ impl Wind for Placed {
 /// A field in metres and seconds.
 fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Error> {
     let scaled = |c: VolumeComponent, unit: f64| VolumeComponent {
-        nodes_m: c.nodes_m.map(|nodes| nodes.into_iter().map(|x| x * flow.length_unit_m).collect()),
+        nodes_m: c
+            .nodes_m
+            .map(|nodes| nodes.into_iter().map(|x| x * flow.length_unit_m).collect()),
         values: c.values.into_iter().map(|v| v * unit).collect(),
     };
     let (components, stated_m) = read(field, &flow.names)?;
     let components = components.map(|c| scaled(c, flow.velocity_unit_m_s));
-    let refuse = |reason: String| Error::Input { path: field.path.clone(), reason };
+    let refuse = |reason: String| Error::Input {
+        path: field.path.clone(),
+        reason,
+    };
     // The period that the file states, or of evenly spaced nodes; faces and centres have the same.
     let along = |direction: usize, periodic: bool| -> Result<Edges, Error> {
         let nodes_m = &components[direction].nodes_m[direction];
-        let (Some(first), Some(second), Some(last)) = (nodes_m.first(), nodes_m.get(1), nodes_m.last()) else {
+        let (Some(first), Some(second), Some(last)) =
+            (nodes_m.first(), nodes_m.get(1), nodes_m.last())
+        else {
             return Err(refuse("a coordinate without values".into()));
         };
         if !periodic {
-            return Ok(Edges::Bounded { low: Side::Open, high: Side::Open });
+            return Ok(Edges::Bounded {
+                low: Side::Open,
+                high: Side::Open,
+            });
         }
         if let Some(period_m) = stated_m[direction] {
-            return Ok(Edges::Periodic { period_m: period_m * flow.length_unit_m });
+            return Ok(Edges::Periodic {
+                period_m: period_m * flow.length_unit_m,
+            });
         }
         let step_m = second - first;
-        if nodes_m.windows(2).any(|pair| (pair[1] - pair[0] - step_m).abs() > 1e-6 * step_m) {
-            let needed =
-                "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\"";
+        if nodes_m
+            .windows(2)
+            .any(|pair| (pair[1] - pair[0] - step_m).abs() > 1e-6 * step_m)
+        {
+            let needed = "a periodic direction needs nodes at equal distances, or an attribute edges = \"periodic LENGTH\"";
             return Err(refuse(needed.into()));
         }
-        Ok(Edges::Periodic { period_m: last - first + step_m })
+        Ok(Edges::Periodic {
+            period_m: last - first + step_m,
+        })
     };
     let low = match flow.ground {
         FieldGround::Open => Side::Open,
-        FieldGround::NoSlip => Side::NoSlipWall { position_m: 0.0, velocity_m_s: [0.0; 3] },
+        FieldGround::NoSlip => Side::NoSlipWall {
+            position_m: 0.0,
+            velocity_m_s: [0.0; 3],
+        },
         FieldGround::Slip => Side::SlipWall { position_m: 0.0 },
     };
-    let edges = [along(0, flow.periodic_x)?, along(1, flow.periodic_y)?, Edges::Bounded { low, high: Side::Open }];
+    let edges = [
+        along(0, flow.periodic_x)?,
+        along(1, flow.periodic_y)?,
+        Edges::Bounded {
+            low,
+            high: Side::Open,
+        },
+    ];
     let snapshot = VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))?;
-    let Some(backscatter) = &flow.backscatter else { return Ok(snapshot) };
-    let scalar = scaled(read_scalar(field, &backscatter.name)?, backscatter.unit_per_m_sr);
-    snapshot.with_scalar(&scalar, edges).map_err(|e| refuse(e.to_string()))
+    let Some(backscatter) = &flow.backscatter else {
+        return Ok(snapshot);
+    };
+    let scalar = scaled(
+        read_scalar(field, &backscatter.name)?,
+        backscatter.unit_per_m_sr,
+    );
+    snapshot
+        .with_scalar(&scalar, edges)
+        .map_err(|e| refuse(e.to_string()))
 }
 
 /// Reads fields: their times, and once each for its gradient; the rest when it is needed.
 pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Error> {
     let path = file.folder().join(&flow.files);
     let of_key = Error::of_key("flow.files");
-    let refuse = |reason: String| Error::Input { path: path.clone(), reason };
+    let refuse = |reason: String| Error::Input {
+        path: path.clone(),
+        reason,
+    };
     let mut all = Vec::new();
     for path in files(&path).map_err(of_key)? {
         all.extend(places(&path, &flow.names[0]).map_err(of_key)?);
     }
-    let times_s: Vec<f64> = all.iter().map(|f| f.time_s * flow.length_unit_m / flow.velocity_unit_m_s).collect();
+    let times_s: Vec<f64> = all
+        .iter()
+        .map(|f| f.time_s * flow.length_unit_m / flow.velocity_unit_m_s)
+        .collect();
     let (Some(&first_s), Some(&last_s)) = (times_s.first(), times_s.last()) else {
         return Err(refuse("no field at all".into()));
     };
     let start_s = flow.time_s.unwrap_or(first_s);
     if !(first_s..=last_s).contains(&start_s) {
-        return Err(refuse(format!("flow.time_s = {start_s:?}: the fields are from {first_s:?} to {last_s:?} s")));
+        return Err(refuse(format!(
+            "flow.time_s = {start_s:?}: the fields are from {first_s:?} to {last_s:?} s"
+        )));
     }
     let (mut steepest_per_s, mut fastest_m_s) = (0.0_f64, 0.0_f64);
-    let ends_s = [start_s, if flow.motion == SimulatedMotion::Frozen { start_s } else { last_s }];
+    let ends_s = [
+        start_s,
+        if flow.motion == SimulatedMotion::Frozen {
+            start_s
+        } else {
+            last_s
+        },
+    ];
     let used = |i: usize| {
-        let (before, after) = (times_s.get(i + 1), i.checked_sub(1).and_then(|i| times_s.get(i)));
+        let (before, after) = (
+            times_s.get(i + 1),
+            i.checked_sub(1).and_then(|i| times_s.get(i)),
+        );
         before.is_none_or(|t| *t > ends_s[0]) && after.is_none_or(|t| *t < ends_s[1])
     };
     for (_, field) in all.iter().enumerate().filter(|(i, _)| used(*i)) {
@@ -129,11 +190,18 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         steepest_per_s = steepest_per_s.max(snapshot.max_gradient_per_s(0.0));
         fastest_m_s = fastest_m_s.max(snapshot.max_speed_m_s());
     }
-    let source = format!("{} fields of {first_s:.4} to {last_s:.4} s from {}", all.len(), path.display());
+    let source = format!(
+        "{} fields of {first_s:.4} to {last_s:.4} s from {}",
+        all.len(),
+        path.display()
+    );
     let own = flow.clone();
     let reader = move |i: usize| {
-        let field =
-            all.get(i).ok_or(LesError::OutOfRange { field: "field", value: i as f64, allowed: "in the series" })?;
+        let field = all.get(i).ok_or(LesError::OutOfRange {
+            field: "field",
+            value: i as f64,
+            allowed: "in the series",
+        })?;
         let unreadable = |e: Error| LesError::File {
             action: "read",
             path: field.path.clone(),
@@ -148,11 +216,27 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
     let (sin, cos) = sin_cos_of_turn(flow.rotation_rad);
     let side = if flow.mirror_y { -1.0 } else { 1.0 };
     let plain = flow.origin_m == [0.0; 3] && (sin, cos) == (0.0, 1.0) && !flow.mirror_y;
-    let placed = |wind| Box::new(Placed { wind, origin_m: flow.origin_m, sin, cos, side }) as Box<dyn Wind>;
+    let placed = |wind| {
+        Box::new(Placed {
+            wind,
+            origin_m: flow.origin_m,
+            sin,
+            cos,
+            side,
+        }) as Box<dyn Wind>
+    };
     Ok(SceneWind {
-        wind: if plain { found.wind } else { placed(found.wind) },
+        wind: if plain {
+            found.wind
+        } else {
+            placed(found.wind)
+        },
         max_speed_m_s: fastest_m_s,
-        field_times_s: if found.end_s.is_finite() { times_s } else { Vec::new() },
+        field_times_s: if found.end_s.is_finite() {
+            times_s
+        } else {
+            Vec::new()
+        },
         carries_backscatter: flow.backscatter.is_some(),
         ..found
     })

@@ -12,7 +12,9 @@ fn between(n: usize, low: Wall, high: Wall, mapping: Mapping) -> Direction {
 
 /// Meshes of every kind of end, stretching and thickness.
 fn meshes() -> Vec<[Direction; 3]> {
-    let moving = Wall::NoSlip { velocity_m_s: [0.7, -0.4, 0.0] };
+    let moving = Wall::NoSlip {
+        velocity_m_s: [0.7, -0.4, 0.0],
+    };
     let tanh = Spread::TanhBoth.by(1.5);
     let low = Spread::TanhLow.by(1.0);
     vec![
@@ -27,8 +29,16 @@ fn meshes() -> Vec<[Direction; 3]> {
             between(13, Wall::AT_REST, Wall::Slip, low.clone()),
             between(12, Wall::Slip, Wall::AT_REST, Spread::TanhHigh.by(1.0)),
         ],
-        [sine(4, 0.0), Direction::thin(0.2), between(16, Wall::AT_REST, Wall::AT_REST, tanh.clone())],
-        [Direction::thin(0.3), between(14, Wall::Slip, Wall::AT_REST, low), sine(12, 0.2)],
+        [
+            sine(4, 0.0),
+            Direction::thin(0.2),
+            between(16, Wall::AT_REST, Wall::AT_REST, tanh.clone()),
+        ],
+        [
+            Direction::thin(0.3),
+            between(14, Wall::Slip, Wall::AT_REST, low),
+            sine(12, 0.2),
+        ],
         [
             sine(13, 0.2),
             between(16, Wall::AT_REST, Wall::AT_REST, tanh),
@@ -42,7 +52,11 @@ fn mass(layout: &Layout, index: [usize; 3], at_faces: &[usize]) -> f64 {
     (0..3)
         .map(|axis| {
             let line = &layout.line[axis];
-            if at_faces.contains(&axis) { line.face_mass_m[index[axis]] } else { line.cell_mass_m[index[axis]] }
+            if at_faces.contains(&axis) {
+                line.face_mass_m[index[axis]]
+            } else {
+                line.cell_mass_m[index[axis]]
+            }
         })
         .product()
 }
@@ -56,7 +70,11 @@ fn work_and_contraction(flow: &Modelled, probe: &[Vec<f64>; 3]) -> (f64, f64) {
             work += mass(layout, flow.index(place), &[component]) * force * probe[component][place];
         }
     }
-    for (([a, b], stress), strain) in PAIRS.into_iter().zip(flow.plain_stress()).zip(strain(layout, probe)) {
+    for (([a, b], stress), strain) in PAIRS
+        .into_iter()
+        .zip(flow.plain_stress())
+        .zip(strain(layout, probe))
+    {
         for (place, (stress, strain)) in stress.iter().zip(&strain).enumerate() {
             let at_faces = if a == b { vec![] } else { vec![a, b] };
             let twice = if a == b { 1.0 } else { 2.0 };
@@ -75,7 +93,10 @@ fn the_work_of_the_stress_on_any_flow_is_minus_its_contraction_with_the_strain_o
             let flow = Modelled::new(directions.clone(), model, waves(0.3, 4.0));
             let probe = faces(&flow.mesh, &flow.layout, waves(1.7, 3.0));
             let (work, contraction) = work_and_contraction(&flow, &probe);
-            assert!((work - contraction).abs() < 1e-14, "{model:?}, {directions:?}: {work} against {contraction}");
+            assert!(
+                (work - contraction).abs() < 1e-14,
+                "{model:?}, {directions:?}: {work} against {contraction}"
+            );
             // A lost factor would show only if there is something to lose.
             assert!(contraction.abs() > 1e-4, "{contraction}");
         }
@@ -84,7 +105,10 @@ fn the_work_of_the_stress_on_any_flow_is_minus_its_contraction_with_the_strain_o
 
 #[test]
 fn on_the_whole_every_model_takes_energy_from_the_flow() {
-    let multiscale = |order| SubgridModel::MultiscaleWale { constant: 0.8, order };
+    let multiscale = |order| SubgridModel::MultiscaleWale {
+        constant: 0.8,
+        order,
+    };
     for seed in 0..3 {
         for directions in meshes() {
             for model in MODELS.into_iter().chain((1..=4).map(multiscale)) {
@@ -98,13 +122,26 @@ fn on_the_whole_every_model_takes_energy_from_the_flow() {
 
 #[test]
 fn the_stress_has_the_same_bits_with_one_two_and_seven_threads() {
-    let directions = || [sine(10, 0.5), sine(11, 0.4), between(16, Wall::AT_REST, Wall::Slip, Mapping::default())];
+    let directions = || {
+        [
+            sine(10, 0.5),
+            sine(11, 0.4),
+            between(16, Wall::AT_REST, Wall::Slip, Mapping::default()),
+        ]
+    };
     for model in MODELS {
         let run = |threads| {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .unwrap();
             pool.install(|| {
                 let flow = Modelled::new(directions(), model, waves(0.9, 4.0));
-                (flow.acceleration(), flow.model.viscosity_m2_s.to_vec(), flow.model.largest[0])
+                (
+                    flow.acceleration(),
+                    flow.model.viscosity_m2_s.to_vec(),
+                    flow.model.largest[0],
+                )
             })
         };
         let expected = run(1);
@@ -124,7 +161,12 @@ fn a_flow_that_does_not_vary_in_a_direction_has_the_same_bits_with_one_cell_ther
                 let mut velocity_m_s = [0.3, -0.7, 0.5];
                 velocity_m_s[across] = 0.0;
                 let mut directions = [sine(9, 0.4), sine(8, 0.0), sine(10, 0.2)];
-                directions[across] = between(17, Wall::AT_REST, Wall::NoSlip { velocity_m_s }, tanh.clone());
+                directions[across] = between(
+                    17,
+                    Wall::AT_REST,
+                    Wall::NoSlip { velocity_m_s },
+                    tanh.clone(),
+                );
                 directions[axis] = Direction::periodic(cells, 0.0, 0.125 * cells as f64);
                 let waves = waves(0.4, 4.0);
                 let flow = Modelled::new(directions, model, |mut at_m| {
@@ -132,10 +174,19 @@ fn a_flow_that_does_not_vary_in_a_direction_has_the_same_bits_with_one_cell_ther
                     waves(at_m)
                 });
                 let acceleration = flow.acceleration();
-                let first: Vec<usize> =
-                    (0..flow.layout.shape.len()).filter(|&place| flow.index(place)[axis] == 0).collect();
-                let of = |field: &[f64]| first.iter().map(|&place| field[place]).collect::<Vec<f64>>();
-                (acceleration.map(|field| of(&field)), of(&flow.model.viscosity_m2_s))
+                let first: Vec<usize> = (0..flow.layout.shape.len())
+                    .filter(|&place| flow.index(place)[axis] == 0)
+                    .collect();
+                let of = |field: &[f64]| {
+                    first
+                        .iter()
+                        .map(|&place| field[place])
+                        .collect::<Vec<f64>>()
+                };
+                (
+                    acceleration.map(|field| of(&field)),
+                    of(&flow.model.viscosity_m2_s),
+                )
             };
             assert_eq!(run(1), run(4), "{model:?}, axis {axis}");
             assert!(run(1).1.iter().any(|nu| *nu > 0.0));
