@@ -6,7 +6,6 @@
 mod circulation;
 mod curves;
 mod extremes;
-mod guided;
 mod point_target;
 mod power;
 mod scan_errors;

@@ -44,26 +44,6 @@ fn map(criterion: &mut Criterion) {
     group.bench_function("means and velocities, rho = 2 m", |b| {
         b.iter(|| scan.map(&points, &radius, None, &plan.estimator).unwrap());
     });
-    let found = scan.map(&points, &radius, None, &plan.estimator).unwrap();
-    let map = Array2::from_shape_vec(
-        (200, 200),
-        found.iter().map(|p| p.estimate.velocity_m_s).collect(),
-    )
-    .unwrap();
-    let (noise, guess) = (map.mapv(|v| 0.1 * v), Array2::zeros(map.dim()));
-    let options = ShrinkageOptions::for_map(0.5, 0.6, 2.0, 15.0).unwrap();
-    group.bench_function("shrinkage to a guess", |b| {
-        b.iter(|| {
-            shrink_to_guess(
-                map.view(),
-                noise.view(),
-                guess.view(),
-                guess.view(),
-                &options,
-            )
-            .unwrap()
-        });
-    });
     group.finish();
 }
 

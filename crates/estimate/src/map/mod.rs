@@ -1,11 +1,10 @@
-//! From a scan to a map: regions, accumulation, errors against the truth, a map drawn towards a guess.
+//! From a scan to a map: regions, accumulation, errors against the truth.
 
 pub(crate) mod accumulate;
 pub(crate) mod auto_radius;
 pub(crate) mod error_map;
 pub(crate) mod mixture;
 pub(crate) mod region;
-pub(crate) mod shrinkage;
 
 pub use accumulate::{MapPoint, Radius, Scan, ScanSums};
 pub use error_map::{ErrorMap, ErrorStatistics};
@@ -13,4 +12,3 @@ pub use mixture::{GoodAndBad, good_and_bad};
 pub use region::{
     Chord, PolarPoint, ScanGeometry, WindowCorrelation, WindowCovariance, polar_points,
 };
-pub use shrinkage::{ShrinkageOptions, ShrunkMap, shrink_to_guess};
