@@ -391,16 +391,6 @@ def f19a():
     return [f"{max(ratios, key=lambda ratio: abs(ratio - 1.0)):.3f}"]
 
 
-def f20a():
-    row = rows("fig20")[0]
-    return [f"{side}: {words((row[f'gamma_{side}_m2_s'], row[f'gamma_{side}_std_m2_s']))} m²/s" for side in ("left", "right")]
-
-
-def f21(scan, method):
-    row = next(r for r in rows("fig21") if r["scan"] == scan and r["method"] == method)
-    return [words((row["gamma_m2_s"], row["gamma_std_m2_s"] / math.sqrt(row["scans"] - row["failures"])))]
-
-
 CLAIMS = {
     "T1": t1, "F1b": f1b, "F4a": f4a, "F4b": f4b, "F4c": f4c, "F4d": f4d, "F6a": f6a, "F6b": f6b, "F7d": f7d, "F7e": f7e, "F8": f8,
     "F9b": f9b, "F10": f10, "F12a": f12a, "F12b": f12b, "F12c": f12c, "F13": f13, "F14a": f14a, "F14b": f14b,
@@ -408,8 +398,7 @@ CLAIMS = {
     "F17g": lambda: retrieved("analytic pair", "fit"), "F17h": lambda: retrieved("simulated wake, tau = 1", "fit"),
     "F17i": lambda: retrieved("simulated wake, tau = 2.5", "fit"), "F17j": lambda: retrieved("simulated wake, tau = 4", "fit"),
     "F18a": lambda: over_bound(0.0, 15.0), "F18b": lambda: over_bound(-5.0, 20.0), "F18c": lambda: bad(20), "F18d": lambda: bad(60),
-    "F16b": f16b, "F19a": f19a, "F20a": f20a, "F21b": lambda: f21("rhi", "fit"), "F21c": lambda: f21("axial", "means"),
-    "F21d": lambda: f21("rhi", "means"), "F21e": lambda: f21("ppi", "means"),
+    "F16b": f16b, "F19a": f19a,
     "CP1": cp1, "CP2": cp2, "CP3": cp3, "CP4": cp4, "CP5": cp5, "CP6": cp6,
 }  # fmt: skip
 MEASURED = {row["id"]: row["measured"] for row in rows("claims")}

@@ -21,8 +21,6 @@ mod fig17;
 pub(crate) mod fig17_flows;
 mod fig18;
 mod fig19;
-mod fig20;
-mod fig21;
 mod fig25;
 mod profiles;
 mod study;
@@ -111,7 +109,7 @@ const fn figure(id: &'static str, number: u32, title: &'static str, make: Make) 
 }
 
 /// All figures, in the order of the report.
-pub(crate) const ALL: [Figure; 23] = [
+pub(crate) const ALL: [Figure; 21] = [
     figure(
         "fig01",
         1,
@@ -182,18 +180,6 @@ pub(crate) const ALL: [Figure; 23] = [
         fig18::make,
     ),
     figure("fig19", 19, "Detection of wakes", fig19::make),
-    figure(
-        "fig20",
-        20,
-        "Map, model and residual of one scan",
-        fig20::make,
-    ),
-    figure(
-        "fig21",
-        21,
-        "One wake across, round and along the flight",
-        fig21::make,
-    ),
     figure(
         "fig25",
         25,

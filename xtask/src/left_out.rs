@@ -65,7 +65,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
         let mut scene = whole.clone();
         keys.iter()
             .try_for_each(|(key, value)| set(&mut scene, key, value))?;
-        let run = run_scene(&program, folder, &toml::to_string(&scene)?, &["run"])?;
+        let run = run_scene(&program, folder, &toml::to_string(&scene)?)?;
         let sizes = std::fs::read_dir(folder.join("out"))?.map(|file| Ok(file?.metadata()?.len()));
         let bytes = sizes.sum::<std::io::Result<u64>>()? as f64;
         let name = if keys.is_empty() {

@@ -12,8 +12,6 @@ mod claim;
 mod cost;
 mod figures;
 mod fit_trials;
-mod forecast;
-mod fuzz_scenes;
 mod histories;
 mod left_out;
 mod process;
@@ -69,10 +67,6 @@ enum Task {
     FitTrials(fit_trials::Options),
     /// Run the flows with known answers and draw them beside their references.
     Validate(validate::Options),
-    /// Hold the forecasts of time and memory against what ten diverse scenes take.
-    Forecast(forecast::Options),
-    /// Change the default scene at random: what `check` passes must run, and nothing may abort or hang.
-    FuzzScenes(fuzz_scenes::Options),
     /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
     Stability(stability::Options),
     /// Hold every number that the program writes or prints against its definition, on random scenes and cases.
@@ -96,8 +90,6 @@ fn main() -> std::process::ExitCode {
         Task::LeftOut(options) => left_out::run(&options),
         Task::FitTrials(options) => fit_trials::run(&options),
         Task::Validate(options) => validate::run(&options),
-        Task::Forecast(options) => forecast::run(&options),
-        Task::FuzzScenes(options) => fuzz_scenes::run(&options),
         Task::Stability(options) => stability::run(&options),
         Task::Audit(options) => audit::run(&options),
         Task::Book => book::run(),

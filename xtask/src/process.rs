@@ -1,32 +1,34 @@
-//! Other programs as processes: called, or watched, with their time, their memory, their end.
+//! Other programs as processes: called for their output, or watched for their time and memory.
 //!
-//! Watching is of Linux only: the figures come from /proc.
+//! Watching works on Linux only: the numbers come from /proc.
 
 use crate::workspace::{built, root};
 use fixtures::failure::Failure;
+use std::fs::File;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What became of a process.
+/// How a watched process ended and what it used.
 pub(crate) struct Watched {
-    /// Exit code; `None` after a signal.
+    /// Exit code; `None` after a signal, also that of its end because it took too long.
     pub(crate) code: Option<i32>,
-    /// It was stopped because it took too long.
-    pub(crate) hung: bool,
-    /// Processor time, s.
+    /// Processor time \[s\].
     pub(crate) cpu_s: f64,
-    /// Largest resident set that was seen, bytes.
+    /// Largest resident set that was observed \[bytes\].
     pub(crate) peak_bytes: f64,
-    pub(crate) stdout: String,
     pub(crate) stderr: String,
 }
 
-/// Runs a command in the root of the workspace, unless it has another folder, to its good end; what it prints where that is piped.
+/// Processor time after which [`run_scene`] stops a run \[s\].
+const LONGEST_SCENE_S: f64 = 600.0;
+
+/// Runs a command in the root of the workspace, unless it has another folder, and returns what it
+/// prints where that is piped.
 ///
 /// # Errors
-/// A program that is not there, one that fails.
+/// Fails if the program is not installed or does not succeed.
 pub(crate) fn call(command: &mut Command) -> Result<String, Failure> {
     if command.get_current_dir().is_none() {
         command.current_dir(root());
@@ -46,17 +48,15 @@ pub(crate) fn call(command: &mut Command) -> Result<String, Failure> {
     }
 }
 
-/// The same for what it prints.
+/// Runs a command as [`call`] does and returns what it prints.
 ///
 /// # Errors
 /// As [`call`].
 pub(crate) fn output(command: &mut Command) -> Result<String, Failure> {
-    call(
-        command
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped()),
-    )
+    command.stdin(Stdio::null());
+    command.stdout(Stdio::piped());
+    command.stderr(Stdio::piped());
+    call(command)
 }
 
 /// The program to run: the given one, or the release build, made anew.
@@ -74,118 +74,115 @@ pub(crate) fn program(given: Option<&Path>) -> Result<PathBuf, Failure> {
     Ok(built().join("release/wakescope"))
 }
 
-/// Runs a scene anew in `folder`, in one thread and for at most ten minutes of processor: a command, and what it is told besides.
+/// Runs a scene anew in `folder`, in one thread and for at most ten minutes of processor time.
 ///
 /// # Errors
-/// A scene that does not run to its end.
-pub(crate) fn run_scene(
-    program: &Path,
-    folder: &Path,
-    scene: &str,
-    words: &[&str],
-) -> Result<Watched, Failure> {
-    std::fs::write(folder.join("scene.toml"), scene)?;
-    if folder.join("out").exists() {
-        std::fs::remove_dir_all(folder.join("out"))?;
+/// Fails if the run does.
+pub(crate) fn run_scene(program: &Path, folder: &Path, scene: &str) -> Result<Watched, Failure> {
+    let file = folder.join("scene.toml");
+    let out = folder.join("out");
+    std::fs::write(file, scene)?;
+    if out.exists() {
+        std::fs::remove_dir_all(out)?;
     }
-    let (command, more) = words.split_at(1);
-    let words = [
-        command,
-        &["scene.toml", "--out", "out", "--quiet", "--threads", "1"],
-        more,
-    ]
-    .concat();
-    let run = watch(program, &words, folder, 600.0)?;
-    match run.code {
-        Some(0) => Ok(run),
-        code => Err(Failure::new(format!(
-            "{} of\n{scene}ended with {code:?}: {}",
-            words[0], run.stderr
-        ))),
+    let arguments = [
+        "run",
+        "scene.toml",
+        "--out",
+        "out",
+        "--quiet",
+        "--threads",
+        "1",
+    ];
+    let run = watch(program, &arguments, folder, LONGEST_SCENE_S)?;
+    if run.code == Some(0) {
+        return Ok(run);
     }
+    Err(Failure::new(format!(
+        "run of\n{scene}ended with {:?}: {}",
+        run.code, run.stderr
+    )))
 }
 
-/// Runs `program` with `words` in `folder` for at most `seconds` of processor or six times as much of the clock.
+/// Runs `program` in `folder` for at most `longest_s` of processor time or six times as much of the clock.
 pub(crate) fn watch(
     program: &Path,
-    words: &[&str],
+    arguments: &[&str],
     folder: &Path,
-    seconds: f64,
+    longest_s: f64,
 ) -> Result<Watched, Failure> {
-    // Output to files: a pipe that nobody reads would stop the process.
-    let (out, err) = (folder.join("stdout"), folder.join("stderr"));
-    let to = |path: &Path| std::fs::File::create(path).map(Stdio::from);
+    // Output goes to files: a pipe that nobody reads would stop the process.
+    let stdout = folder.join("stdout");
+    let stderr = folder.join("stderr");
     let mut child = Command::new(program)
-        .args(words)
+        .args(arguments)
         .current_dir(folder)
         .stdin(Stdio::null())
-        .stdout(to(&out)?)
-        .stderr(to(&err)?)
+        .stdout(File::create(stdout)?)
+        .stderr(File::create(&stderr)?)
         .spawn()
         .map_err(|e| Failure::new(format!("cannot run {}: {e}", program.display())))?;
-    let begun = Instant::now();
-    let (mut cpu_s, mut peak_bytes, mut hung) = (0.0, 0.0_f64, false);
+    let start = Instant::now();
+    let mut watched = Watched {
+        code: None,
+        cpu_s: 0.0,
+        peak_bytes: 0.0,
+        stderr: String::new(),
+    };
     // A process that has ended keeps its times until it is waited for.
-    while !hung && !sample(&child, &mut cpu_s, &mut peak_bytes) {
-        hung = cpu_s > seconds || begun.elapsed().as_secs_f64() > 6.0 * seconds;
+    while !watched.sample(&child) {
+        if watched.cpu_s > longest_s || start.elapsed().as_secs_f64() > 6.0 * longest_s {
+            child.kill()?;
+            break;
+        }
         std::thread::sleep(Duration::from_millis(1));
     }
-    if hung {
-        child.kill()?;
+    watched.code = child.wait()?.code();
+    watched.stderr = String::from_utf8_lossy(&std::fs::read(stderr)?).into_owned();
+    Ok(watched)
+}
+
+impl Watched {
+    /// Brings time and memory up to date; returns whether the process has ended.
+    fn sample(&mut self, child: &Child) -> bool {
+        let process = child.id().to_string();
+        self.peak_bytes = self.peak_bytes.max(resident_peak_bytes(&process));
+        let stat = std::fs::read_to_string(format!("/proc/{process}/stat")).unwrap_or_default();
+        let user_s = ticks_s(&stat, 11);
+        let system_s = ticks_s(&stat, 12);
+        self.cpu_s = self.cpu_s.max(user_s + system_s);
+        matches!(field(&stat, 0), None | Some("Z" | "X"))
     }
-    let code = child.wait()?.code();
-    let [stdout, stderr] = [std::fs::read(out)?, std::fs::read(err)?]
-        .map(|text| String::from_utf8_lossy(&text).into());
-    Ok(Watched {
-        code,
-        hung,
-        cpu_s,
-        peak_bytes,
-        stdout,
-        stderr,
-    })
 }
 
-/// Brings time and memory up to date; whether the process has ended.
-fn sample(child: &Child, cpu_s: &mut f64, peak_bytes: &mut f64) -> bool {
-    *peak_bytes = peak_bytes.max(resident_peak_bytes(&child.id().to_string()));
-    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap_or_default();
-    // utime and stime.
-    *cpu_s = cpu_s.max(ticks_s(&stat, 11) + ticks_s(&stat, 12));
-    let state = stat
-        .rsplit(')')
-        .next()
-        .and_then(|fields| fields.split_whitespace().next());
-    matches!(state, None | Some("Z" | "X"))
-}
-
-/// Processor time of the processes that this one has waited for, and theirs, s; zero where the system does not tell.
+/// Processor time of the processes that this one has waited for, theirs included \[s\]; zero where the system does not
+/// report it.
 pub(crate) fn children_cpu_s() -> f64 {
     let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
     ticks_s(&stat, 13) + ticks_s(&stat, 14)
 }
 
-/// The time at a place behind the name in `/proc/PID/stat`, where the state stands at place 0, s; zero where there is none.
-pub(crate) fn ticks_s(stat: &str, place: usize) -> f64 {
-    let field = stat
-        .rsplit(')')
-        .next()
-        .and_then(|fields| fields.split_whitespace().nth(place));
-    field
-        .and_then(|ticks| ticks.parse::<f64>().ok())
-        .unwrap_or(0.0)
-        / 100.0
+/// Field of `/proc/PID/stat` by its index behind the name of the process; the state has index 0.
+fn field(stat: &str, index: usize) -> Option<&str> {
+    let fields = stat.rsplit(')').next()?;
+    fields.split_whitespace().nth(index)
 }
 
-/// Largest resident memory of a process so far, bytes; NaN where the system does not tell.
+/// Time in a field of `/proc/PID/stat` \[s\]; zero where there is none.
+fn ticks_s(stat: &str, index: usize) -> f64 {
+    let ticks: Option<f64> = field(stat, index).and_then(|ticks| ticks.parse().ok());
+    ticks.unwrap_or(0.0) / 100.0
+}
+
+/// Largest resident memory of a process so far \[bytes\]; NaN where the system does not report it.
 pub(crate) fn resident_peak_bytes(process: &str) -> f64 {
     let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
-    let peak = status.lines().find_map(|l| {
-        l.strip_prefix("VmHWM:")?
-            .trim()
-            .strip_suffix(" kB")?
-            .parse::<f64>()
-            .ok()
-    });
-    peak.map_or(f64::NAN, |kb| 1024.0 * kb)
+    for line in status.lines() {
+        let Some(peak) = line.strip_prefix("VmHWM:") else {
+            continue;
+        };
+        let kilobytes = peak.trim().trim_end_matches(" kB");
+        return kilobytes.parse().map_or(f64::NAN, |kb: f64| 1024.0 * kb);
+    }
+    f64::NAN
 }

@@ -1,7 +1,7 @@
 //! The files of a run: what they take to be made, one after the other, in memory until all are there.
 //!
 //! Each format has its numbers in it as it writes them: a float of a table has some 15 letters, and the encoder of NetCDF holds
-//! its data and two plans of the file, each with a copy. `cargo xtask forecast` compares the sums with what whole runs take.
+//! its data and two plans of the file, each with a copy.
 
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};
 use super::stage::{PlannedStage, Target, run};

@@ -1,7 +1,7 @@
 //! From a scene to a plan: which stages run, which are left out and why, what each will cost.
 //!
 //! Nothing is computed but sizes; the planes of a simulated flow are read. What a run would refuse, the plan refuses. The
-//! forecasts are products of counts with unit costs; `cargo xtask forecast` holds them against what runs take.
+//! forecasts are products of counts with unit costs.
 
 use crate::Error;
 use crate::scene::SceneFile;

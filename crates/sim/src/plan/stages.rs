@@ -1,6 +1,4 @@
 //! The stages of a run but the optics and the files: what each does, and the numbers that it holds.
-//!
-//! Check: `cargo xtask forecast` compares the memory with what whole runs take.
 
 use super::files::files;
 use super::sizes::{MAP_FIELDS, Sizes, is_calm};

@@ -1,6 +1,4 @@
 //! Time of a run on one core: what takes nearly all of it, counted and multiplied by unit costs. Good to a factor of two.
-//!
-//! Check: `cargo xtask forecast` compares it with what whole runs take.
 
 use super::sizes::Sizes;
 use super::stage::Target;
