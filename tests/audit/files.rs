@@ -7,7 +7,7 @@ use super::power::Pulse;
 use super::program::{Bench, Csv};
 use super::scene::{C_M_S, Scene};
 
-/// signals.nc beside its scene and signals.csv; a plain RHI of which the first realisation is kept.
+/// signals.nc beside its scene; a plain RHI of which the first realisation is kept.
 pub(crate) fn hold_signals(
     ledger: &mut Ledger,
     bench: &Bench,
@@ -15,10 +15,7 @@ pub(crate) fn hold_signals(
     scan: &Scan,
     start_s: f64,
 ) {
-    let (mut nc, csv) = (
-        bench.netcdf(ledger, "o/signals.nc"),
-        bench.csv(ledger, "o/signals.csv"),
-    );
+    let mut nc = bench.netcdf(ledger, "o/signals.nc");
     let is_baseband = s.s("detector.signal") == "baseband";
     let fc = if is_baseband {
         0.0
@@ -112,30 +109,18 @@ pub(crate) fn hold_signals(
             );
         }
     }
-    // The table holds the first pulse of each line.
-    for (column, name) in [("current_a", "current_a"), ("quadrature_a", "quadrature_a")] {
-        let (long, whole) = (csv.f(column), nc.f(name));
-        for row in (0..csv.len())
-            .step_by(1 + csv.len() / 50)
-            .filter(|_| csv.has(column))
-        {
-            let (line, k) = (row / samples, row % samples);
-            let at = line * scan.pulses * samples + k;
-            ledger.equal(&format!("signals.csv: {column}"), long[row], whole[at], 0.0);
-            ledger.equal(
-                &format!("signals.nc: {name}, as signals.csv"),
-                whole[at],
-                long[row],
-                0.0,
-            );
-            ledger.equal(
-                "signals.csv: ray",
-                csv.f("ray")[row],
-                (line * scan.pulses) as f64,
-                0.0,
-            );
-            ledger.equal("signals.csv: time_s", csv.f("time_s")[row], time[k], 0.0);
-        }
+    let values = scan.elevation_rad.len() * scan.pulses * samples;
+    for (name, count) in [
+        ("current_a", values),
+        ("quadrature_a", if is_baseband { values } else { 0 }),
+    ] {
+        let found = nc.f(name).len();
+        ledger.equal(
+            &format!("signals.nc: {name}, values"),
+            found as f64,
+            count as f64,
+            0.0,
+        );
     }
 }
 

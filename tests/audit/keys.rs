@@ -617,25 +617,33 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
             ),
         );
     }
-    for command in ["map", "signal"] {
-        let out = |seed: &str| {
-            bench.write("k.toml", &small().text());
+    hold_seed(bench, ledger);
+}
+
+/// The seed of the command line draws other samples, and the file states it.
+fn hold_seed(bench: &Bench, ledger: &mut Ledger) {
+    let mut s = small();
+    s.set("outputs.netcdf", true);
+    bench.write("k.toml", &s.text());
+    for (command, file, variable) in [
+        ("map", "map.nc", "radial_velocity"),
+        ("signal", "signals.nc", "current_a"),
+    ] {
+        let values = ["7", "8"].map(|seed| {
             let folder = format!("{command}{seed}");
-            let ended = bench.run(&[command, "k.toml", "--seed", seed, "--out", &folder]);
-            let file = if command == "map" {
-                "map.csv"
-            } else {
-                "signals.csv"
-            };
-            (
-                ended.is_good,
-                std::fs::read_to_string(bench.folder.join(folder).join(file)).unwrap_or_default(),
-            )
-        };
-        let [(first, a), (_, b)] = [out("7"), out("8")];
+            let words = [command, "k.toml", "--seed", seed, "--out", &folder];
+            bench.must(ledger, &words)?;
+            let mut nc = bench.netcdf(ledger, &format!("{folder}/{file}"));
+            ledger.holds(
+                "the seed of the command line",
+                nc.text_of_file("seed") == seed,
+                command,
+            );
+            Some(nc.f(variable))
+        });
         ledger.holds(
             "the seed of the command line",
-            first && a != b && a.contains("# seed: 7\n"),
+            values[0] != values[1],
             command,
         );
     }

@@ -184,6 +184,14 @@ impl Netcdf {
             .unwrap_or_default()
     }
 
+    /// A text of the whole file.
+    pub(crate) fn text_of_file(&self, attribute: &str) -> String {
+        self.0
+            .data_set()
+            .get_global_attr_as_string(attribute)
+            .unwrap_or_default()
+    }
+
     pub(crate) fn names(&self) -> Vec<String> {
         self.0.data_set().get_var_names()
     }

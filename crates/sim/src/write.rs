@@ -78,7 +78,6 @@ pub(crate) fn list(plan: &Plan, result: &RunResult, files: &mut Outputs) -> Resu
     }
     if plan.kept_realisations() > 0 {
         let signals = raw_signals(plan, result);
-        files.table("signals", signals.as_ref(), |signals| Ok(signals.table()?))?;
         files.netcdf("signals", signals.as_ref(), |signals, origin| {
             Ok(crate::io::cf_signals::cf_signals_bytes(signals, origin)?)
         })?;

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 /// Words of `wakescope estimate`.
 #[derive(Debug, Args)]
 pub(super) struct EstimateWords {
-    /// The signals: signals.nc or another NetCDF file, NPY, NPZ, text (.csv, .txt), or a binary file with --format.
+    /// The signals: signals.nc or another NetCDF file, NPY, NPZ, or a binary file with --format.
     data: PathBuf,
     /// The scene whose instrument recorded them and whose estimator they go through.
     #[arg(long, value_name = "SCENE.toml")]

@@ -12,7 +12,7 @@
 //! | [`own`] | which files this program wrote, so that no other is replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
-//! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ, tables and binary files | - |
+//! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ and binary files | - |
 //! | [`scans`] | (readers) scans of radial velocity: CfRadial, `.hpl`, tables | - |
 //! | [`scan_list`] | (reader) lines of sight of a scan | - |
 //! | [`tables`] | a map or planes as a table | - |

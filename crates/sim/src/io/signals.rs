@@ -1,7 +1,6 @@
-//! Raw signals at the border to files, and their table.
-//! Check: the tests compare the table with the array.
+//! Raw signals at the border to files.
+//! Check: signals whose lengths do not match are refused.
 
-use super::csv::Table;
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use ndarray::ArrayView2;
 
@@ -121,30 +120,6 @@ impl RawSignals<'_> {
     pub fn realisations(&self) -> usize {
         self.current_a.nrows() / self.elevation_rad.len().max(1)
     }
-
-    /// The first pulse of each line of the first realisation as a long table; the NetCDF file holds all pulses.
-    ///
-    /// # Errors
-    /// As [`RawSignals::check`].
-    pub fn table(&self) -> OutputResult<Table> {
-        self.check()?;
-        let rays = &self.first_pulse;
-        let samples = self.time_s.len();
-        let cells = || (0..rays.len() * samples).map(|cell| (rays[cell / samples], cell % samples));
-        let table = Table::new()
-            .int("ray", cells().map(|(ray, _)| ray as i64))
-            .float("time_s", cells().map(|(_, k)| self.time_s[k]))
-            .float(
-                "current_a",
-                cells().map(|(ray, k)| self.current_a[[ray, k]]),
-            );
-        Ok(match &self.quadrature_a {
-            Some(quadrature) => {
-                table.float("quadrature_a", cells().map(|(ray, k)| quadrature[[ray, k]]))
-            }
-            None => table,
-        })
-    }
 }
 
 /// Two realisations of two lines of two pulses.
@@ -187,14 +162,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_table_holds_the_first_pulse_of_each_line() {
+    fn lengths_that_do_not_match_are_refused() {
         let signals = example();
-        let table = signals.table().unwrap();
-        let current = &table.columns()[2].1;
-        assert_eq!(
-            *current,
-            crate::io::csv::Column::Float(vec![0.0, 1.0, 2.0, 20.0, 21.0, 22.0])
-        );
+        signals.check().unwrap();
         assert_eq!(signals.realisations(), 2);
         assert!(
             RawSignals {

@@ -170,7 +170,7 @@ mod tests {
                 (true, SignalsOf::All, false);
             s.scan.realisations = 100;
         });
-        assert_eq!(without, "", "tables have no such limit");
+        assert_eq!(without, "", "no file, no limit");
     }
 
     #[test]

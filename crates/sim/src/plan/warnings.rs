@@ -31,6 +31,12 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
         let meant = "this estimator.method is meant for windows without weighting: estimator.weighting = \"rectangular\"";
         out.push(meant.into());
     }
+    if scene.outputs.signals && !scene.outputs.netcdf {
+        out.push(
+            "outputs.netcdf = false: no file holds the signals that outputs.signals requests"
+                .into(),
+        );
+    }
     if scene.scan.realisations < 2 {
         out.push("one realisation: no standard deviation can be given".into());
     }
@@ -229,6 +235,19 @@ mod tests {
         );
         assert!(!warnings(1.02 * rate_hz).is_empty());
         assert!(warnings(Scene::default().laser.pulse_repetition_hz).is_empty());
+    }
+
+    #[test]
+    fn signals_without_a_file_are_warned_of() {
+        let warnings = |netcdf: bool| {
+            plan(|s| (s.outputs.signals, s.outputs.netcdf) = (true, netcdf)).warnings
+        };
+        assert!(warnings(true).is_empty());
+        let found = warnings(false);
+        assert!(
+            found.len() == 1 && found[0].contains("outputs.netcdf = false"),
+            "{found:?}"
+        );
     }
 
     #[test]

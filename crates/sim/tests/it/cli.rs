@@ -279,9 +279,9 @@ fn check_draws_the_set_up() {
 fn each_stage_can_be_asked_for_alone() {
     let temp = tempfile::tempdir().unwrap();
     std::fs::write(temp.path().join("s.toml"), SMALL).unwrap();
-    for (stage, csv) in [
+    for (stage, file) in [
         ("efficiency", "profile.csv"),
-        ("signal", "signals.csv"),
+        ("signal", "signals.nc"),
         ("map", "map.csv"),
     ] {
         let out = wakescope(temp.path(), &[stage, "s.toml", "--out", stage, "--quiet"]);
@@ -292,9 +292,18 @@ fn each_stage_can_be_asked_for_alone() {
         );
         assert!(out.stderr.is_empty(), "--quiet");
         let files = names(&temp.path().join(stage));
-        assert!(files.contains(&csv.to_owned()), "{files:?}");
-        let tables = files.iter().filter(|f| f.ends_with(".csv")).count();
-        assert_eq!(tables, 1, "{stage} gives nothing else: {files:?}");
+        let stems: std::collections::BTreeSet<&str> = files
+            .iter()
+            .filter(|name| *name != "scene.toml")
+            .filter_map(|name| name.split('.').next())
+            .collect();
+        let stem = file.split('.').next().unwrap();
+        assert!(files.contains(&file.to_owned()), "{files:?}");
+        assert_eq!(
+            stems,
+            [stem].into(),
+            "{stage} gives nothing else: {files:?}"
+        );
     }
 }
 

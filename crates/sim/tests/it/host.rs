@@ -90,23 +90,10 @@ fn signals_of_an_array_give_the_map_of_those_of_a_file() {
     let temp = tempfile::tempdir().unwrap();
     let out = temp.path().to_str().unwrap();
     run(&["run", "scene", "--out", out], SCENE, None, false).unwrap();
-    let table = std::fs::read_to_string(temp.path().join("signals.csv")).unwrap();
-    let rows: Vec<Vec<&str>> = table
-        .lines()
-        .filter(|line| !line.starts_with('#'))
-        .map(|line| line.split(',').collect())
-        .collect();
-    let column = |name: &str| rows[0].iter().position(|cell| *cell == name).unwrap();
-    let of_column = |name: &str| -> Vec<f64> {
-        let place = column(name);
-        rows[1..]
-            .iter()
-            .map(|row| row[place].parse().unwrap())
-            .collect()
-    };
-    let current_a = of_column("current_a");
-    let records = 1 + of_column("ray").into_iter().fold(0.0, f64::max) as usize;
-    let samples = current_a.len() / records;
+    let mut file = netcdf3::FileReader::open(temp.path().join("signals.nc")).unwrap();
+    let samples = file.data_set().dim_size("time").unwrap();
+    let current_a = file.read_var_f64("current_a").unwrap();
+    let records = current_a.len() / samples;
     let npy = temp.path().join("signals.npy");
     let head =
         format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({records}, {samples}), }}");

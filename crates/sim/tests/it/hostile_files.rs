@@ -188,19 +188,6 @@ fn headers_of_arrays_may_hold_any_byte_and_integers_of_eight() {
     }
 }
 
-#[cfg(target_os = "linux")]
-#[test]
-fn a_text_without_an_end_of_its_line_is_refused() {
-    let temp = tempfile::tempdir().unwrap();
-    let path = temp.path().join("x.txt");
-    fs::File::create(&path).unwrap().set_len(1 << 33).unwrap();
-    assert!(
-        opened(&path)
-            .unwrap_err()
-            .contains("line 1 is longer than 64 MiB")
-    );
-}
-
 #[cfg(unix)]
 #[test]
 fn names_that_are_no_text_are_no_obstacle() {

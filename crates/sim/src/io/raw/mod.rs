@@ -5,7 +5,6 @@
 //! |---|---|---|
 //! | NetCDF, classic or NetCDF-4 | its first bytes | shape, kind of number; `signals.nc` also angles, times and how it was recorded |
 //! | NPY, NPZ | its first bytes | shape, kind of number, byte order; NPZ also `elevation_rad` and `time_s` |
-//! | text | the name ends with `.csv` or `.txt` | shape |
 //! | binary | [`RawFormat::number`] is stated | nothing |
 //!
 //! Check: the same records come from every format.
@@ -13,7 +12,6 @@
 mod array;
 mod netcdf;
 mod numpy;
-mod text;
 
 pub use array::Order;
 
@@ -26,7 +24,6 @@ use num_complex::Complex;
 use numpy::StoredArray;
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::io::Seek as _;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use wakescope_estimate::window::MissingSamples;
@@ -132,7 +129,7 @@ pub struct RawRecords {
 }
 
 impl RawRecords {
-    /// Opens a file; nothing but its header is read, or a whole text.
+    /// Opens a file; only its header is read.
     ///
     /// # Errors
     /// A file that cannot be read, is damaged, has another shape than its header says or needs words that `format` lacks.
@@ -142,30 +139,26 @@ impl RawRecords {
             reason,
         };
         let (mut file, length, magic) = text_file::begin(path)?;
-        let extension = path
-            .extension()
-            .and_then(|e| e.to_str())
-            .unwrap_or_default()
-            .to_ascii_lowercase();
         let numbers = Numbers {
             path,
             format,
             shape,
         };
         let found = match &magic[..] {
-            _ if format.number.is_some() => numbers.binary(length).and_then(|array| numbers.records(file, array)),
-            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => Ok(netcdf::read(path, format)?),
-            [0x93, b'N', b'U', b'M', ..] => {
-                StoredArray::read(&mut file, 0, length).and_then(|array| numbers.records(file, array))
+            _ if format.number.is_some() => numbers
+                .binary(length)
+                .and_then(|array| numbers.records(file, array)),
+            [b'C', b'D', b'F', ..] | [0x89, b'H', b'D', b'F', ..] => {
+                Ok(netcdf::read(path, format)?)
             }
+            [0x93, b'N', b'U', b'M', ..] => StoredArray::read(&mut file, 0, length)
+                .and_then(|array| numbers.records(file, array)),
             [b'P', b'K', 3, 4, ..] => numbers.of_archive(file, length),
-            _ if ["csv", "txt"].contains(&extension.as_str()) => {
-                file.rewind().map_err(Error::io("read", path))?;
-                text::read(path, file, length, format.complex)
-            }
-            _ => Err("it is neither NetCDF, NPY, NPZ nor a text whose name ends with .csv or .txt: of a binary file, --format \
-                      states the numbers, e.g. --format i16 --byte-order little"
-                .into()),
+            _ => Err(
+                "it is neither NetCDF, NPY nor NPZ; --format names the numbers of a binary file, \
+                 e.g. --format i16 --byte-order little"
+                    .into(),
+            ),
         };
         found.map_err(refuse)?.not_empty()
     }
