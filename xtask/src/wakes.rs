@@ -19,6 +19,7 @@ use wakescope_sim::Silent;
 use wakescope_sim::flow::{
     self, Begin, CaseFile, CaseKind, FileFormat, FinishedWake, FlowCase, Subgrid, WakePreset,
 };
+use wakescope_sim::scene::Content as _;
 
 /// Ages of the cross-planes that are kept, for pictures that move.
 const SERIES_EVERY: f64 = 0.1;
@@ -131,7 +132,7 @@ pub(crate) fn bless() -> Outcome {
 
 /// A wake from the cache, or run.
 pub(crate) fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<FinishedWake, Failure> {
-    let file = CaseFile::parse(&toml::to_string(case)?, Path::new("wake"))?;
+    let file = CaseFile::parse(&case.to_toml(), Path::new("wake"))?;
     let folder = stages.join(format!(
         "wake-{}",
         cause(&root(), &[&file.hash], &COMPUTED_BY)?
@@ -167,8 +168,7 @@ mod tests {
     #[test]
     fn what_is_stored_is_of_the_case_that_is_run_and_has_its_ages() {
         let stored_case = FinishedWake::read(&root().join(STORED)).unwrap().file.toml;
-        let case =
-            CaseFile::parse(&toml::to_string(&stored()).unwrap(), Path::new("wake")).unwrap();
+        let case = CaseFile::parse(&stored().to_toml(), Path::new("wake")).unwrap();
         assert_eq!(stored_case, case.toml);
     }
 }

@@ -26,11 +26,6 @@ const UNEVEN: f64 = 1e-2;
 
 /// How an envelope is continued between its samples.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum Resampling {
     /// The cubic spline through the samples, at any times. Error of order `(step/scale)^4`: 3e-6 of the peak for a
     /// Gaussian with five samples in `sigma`.

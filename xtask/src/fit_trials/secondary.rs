@@ -30,10 +30,19 @@ const MIDDLE_M: f64 = 400.0;
 /// Standard deviation of the weight of gates that do not show cores \[m\], as `retrieve` has it.
 const LONG_GATE_M: f64 = 3.0;
 
+/// The names of profiles in the list of kinds.
+#[derive(Deserialize)]
+#[serde(remote = "CoreProfile", rename_all = "snake_case")]
+enum ProfileName {
+    Algebraic,
+    LambOseen,
+}
+
 /// Wakes of one kind, and how they are scanned.
 #[derive(Deserialize)]
 struct Kind {
     name: String,
+    #[serde(with = "ProfileName")]
     profile: CoreProfile,
     shown: bool,
     /// Of the vortices, and of their spacing \[m\]: the least and the most.

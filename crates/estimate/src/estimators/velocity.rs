@@ -131,11 +131,6 @@ impl GateVelocity {
 /// How the peak is placed between the frequencies of the grid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 #[non_exhaustive]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum Refinement {
     /// Parabola through the logarithm of the highest bin and its neighbours.
     #[default]

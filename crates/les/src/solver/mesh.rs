@@ -287,11 +287,6 @@ pub type MappingFn = Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>;
 
 /// A formula that spreads the cells of a direction: it maps `s` in `[0, 1]` to the fraction of the length, with a strength `a`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum Spread {
     /// Equal cells.
     #[default]

@@ -14,11 +14,6 @@ pub(super) const ROUND_OFF: f64 = 1e-12;
 
 /// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum TimeScheme {
     /// Second-order Adams-Bashforth, (22): one pressure solve per step; the first step, which has no history, is one of
     /// Runge-Kutta.

@@ -26,11 +26,6 @@ pub trait Spectrum: Debug + Send + Sync {
 
 /// How the outer scale L0 gives the wave number kappa_0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum OuterScaleConvention {
     /// kappa_0 = 1/L0, as (17) has it.
     Inverse,

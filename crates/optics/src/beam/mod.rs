@@ -12,11 +12,6 @@ use std::f64::consts::{PI, SQRT_2};
 
 /// What `beam_radius_m` means: the radius at which one quantity has fallen to 1/e of its value on the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum RadiusDefinition {
     /// Irradiance: |E|^2 ~ exp(-r^2/s^2). The chapter's Table 2 is read this way.
     Intensity,

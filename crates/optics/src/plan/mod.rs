@@ -44,11 +44,6 @@ pub enum Model {
 
 /// Which paths the two beams take.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum Receiver {
     /// Both beams through the same turbulence.
     Monostatic,

@@ -38,15 +38,9 @@ pub enum PlanckConvention {
 
 /// Which noise is added to the signal.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum NoiseModel {
     /// Flat in the detector band, nothing outside; variance (13).
     #[default]
-    #[cfg_attr(feature = "serde", serde(rename = "band"))]
     BandLimited,
     /// The same density from zero to half the sampling rate: the variance is (13) times `(F_s/2)/B`.
     White,

@@ -3,10 +3,10 @@
 //! Check: the search, which makes scenes of them.
 
 use crate::Error;
-use crate::keys::value_at;
+use crate::keys::{from_table, to_table, value_at};
 use crate::scene::{Scene, SceneFile};
 use crate::sweep::set;
-use toml::{Table, Value};
+use toml::Value;
 
 /// Samples between windows.
 pub const WINDOW_STEP: &str = "estimator.window_step_samples";
@@ -27,8 +27,8 @@ pub const REALISATIONS: &str = "scan.realisations";
 
 /// The number that a key has in a scene; NaN where it has none.
 pub(super) fn value(scene: &Scene, key: &str) -> f64 {
-    let whole = Value::try_from(scene).ok();
-    match whole.as_ref().and_then(|whole| value_at(whole, key)) {
+    let whole = Value::Table(to_table(scene));
+    match value_at(&whole, key) {
         Some(Value::Integer(number)) => *number as f64,
         Some(Value::Float(number)) => *number,
         _ => f64::NAN,
@@ -43,7 +43,7 @@ pub fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFil
     let mut scene = file.content.clone();
     for &(key, number) in values {
         let whole = |number: f64| Value::Integer(number.round() as i64);
-        let mut table = Table::try_from(&scene).unwrap_or_default();
+        let mut table = to_table(&scene);
         if key == GRID_SPACING {
             let width_m = value(&scene, GRID_POINTS) * value(&scene, GRID_SPACING);
             set(&mut table, GRID_POINTS, whole(width_m / number));
@@ -57,11 +57,10 @@ pub fn with(file: &SceneFile, values: &[(&'static str, f64)]) -> Result<SceneFil
                 whole(number)
             },
         );
-        let refused = |e: toml::de::Error| Error::Key {
+        scene = from_table(table).ok_or_else(|| Error::Key {
             key,
-            reason: e.message().into(),
-        };
-        scene = Value::Table(table).try_into().map_err(refused)?;
+            reason: format!("a value other than {number}"),
+        })?;
     }
     Ok(file.with(scene)?)
 }

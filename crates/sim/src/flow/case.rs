@@ -15,8 +15,8 @@ use wakescope_les::solver::PressureMethod;
 pub const FORMAT: u32 = 1;
 
 crate::keys::foreign_choices! {
-    TimeScheme: "adams_bashforth2" | "runge_kutta3",
-    PressureMethod: "auto" | "direct" | "multigrid",
+    TimeScheme { AdamsBashforth2 = "adams_bashforth2", RungeKutta3 = "runge_kutta3" }
+    PressureMethod { Auto = "auto", Direct = "direct", Multigrid = "multigrid" }
 }
 
 /// Most output times of a run.

@@ -10,8 +10,10 @@ use super::case::{FileFormat, FlowCase, Subgrid};
 use super::files::{FileForecast, Files};
 use super::setup::Setup;
 use super::{CaseFile, CaseKind, InitialName, WakeOutput};
+use crate::keys::Declared as _;
 use crate::plan::units::{bytes, rounded, seconds};
 use crate::{Error, machine};
+use serde::Serialize as _;
 use std::fmt;
 use wakescope_les::solver::{RunPlan, Stability};
 use wakescope_les::{TimeScheme, TimeStep};
@@ -24,6 +26,7 @@ pub struct FlowForecast {
     /// Cells along x, y, z.
     pub cells: [usize; 3],
     /// Time integration.
+    #[serde(serialize_with = "name_of_scheme")]
     pub scheme: TimeScheme,
     /// Why, where it is not that of the case.
     pub scheme_reason: Option<String>,
@@ -53,6 +56,11 @@ pub struct FlowForecast {
     pub rank_bytes: f64,
     /// Files, by kind.
     pub files: Vec<FileForecast>,
+}
+
+/// Writes a scheme by the name that case files have for it.
+fn name_of_scheme<S: serde::Serializer>(scheme: &TimeScheme, to: S) -> Result<S::Ok, S::Error> {
+    scheme.to_value().serialize(to)
 }
 
 impl FlowForecast {

@@ -12,7 +12,15 @@ use wakescope_les::{
 };
 
 crate::keys::foreign_choices! {
-    Spread: "uniform" | "sine" | "tanh_low" | "tanh_high" | "tanh_both" | "sinh_middle" | "cluster",
+    Spread {
+        Uniform = "uniform",
+        Sine = "sine",
+        TanhLow = "tanh_low",
+        TanhHigh = "tanh_high",
+        TanhBoth = "tanh_both",
+        SinhMiddle = "sinh_middle",
+        Cluster = "cluster",
+    }
 }
 
 keys! {

@@ -40,7 +40,7 @@ pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};
 
 use crate::Error;
-use crate::keys::{Content, Document, Problem, SceneError};
+use crate::keys::{Content, Document, Problem, SceneError, to_table};
 use std::path::{Path, PathBuf};
 use wakescope_les::solver::Stepping;
 
@@ -53,7 +53,8 @@ impl Content for FlowCase {
     }
 
     fn to_toml(&self) -> String {
-        toml::to_string(self).unwrap_or_else(|e| unreachable!("a case is plain data: {e}"))
+        toml::to_string(&to_table(self))
+            .unwrap_or_else(|e| unreachable!("a case is plain data: {e}"))
     }
 
     fn seed(&self) -> u64 {

@@ -2,8 +2,7 @@
 
 use super::case::FlowCase;
 use super::kind::CaseKind;
-use crate::keys::{Format, Key, SceneError, Text, keys_of};
-use serde::Deserialize;
+use crate::keys::{Format, Key, SceneError, Text, from_table, keys_of, to_table};
 use std::path::Path;
 use std::sync::LazyLock;
 use toml::Table;
@@ -51,7 +50,7 @@ pub(super) fn read(
     let document = Text::parse(text, path)?;
     let kind = document.value("case.kind").and_then(|kind| kind.as_str());
     let defaults = match (base, kind) {
-        (Some(base), _) => table_of(base),
+        (Some(base), _) => to_table(base),
         (None, Some(kind)) => defaults_of(kind),
         (None, None) => Table::new(),
     };
@@ -90,13 +89,9 @@ fn examples_of(kind: Option<&str>) -> Vec<&'static str> {
 fn defaults_of(kind: &str) -> Table {
     let case = Table::from_iter([("kind".to_owned(), toml::Value::from(kind))]);
     let whole = Table::from_iter([("case".to_owned(), toml::Value::Table(case))]);
-    FlowCase::deserialize(whole)
-        .map(|case| table_of(&case))
+    from_table::<FlowCase>(whole)
+        .map(|case| to_table(&case))
         .unwrap_or_default()
-}
-
-fn table_of(case: &FlowCase) -> Table {
-    Table::try_from(case).unwrap_or_default()
 }
 
 /// The keys of `over` in place of those of `base`; a table of another kind replaces the whole table.

@@ -5,16 +5,25 @@
 
 use super::key::{Key, Kind};
 use super::limit::Checker;
+use toml::{Table, Value};
 
-/// What a type reads, and the limits of what it holds.
-pub(crate) trait Declared {
-    /// Whether a key may be left out where its table has no default for it.
-    const IS_OPTIONAL: bool = false;
-
+/// A type of keys: what it may hold, how it is read and written, and the limits of what it holds.
+pub(crate) trait Declared: Sized {
     /// What a key of this type may hold.
     fn kind() -> Kind;
 
-    /// Holds the keys below the one at `at` against their limits.
+    /// The value of a key that a table without defaults does not state; `None` if it must state it.
+    fn absent() -> Option<Self> {
+        None
+    }
+
+    /// Reads a value of the [`Self::kind`]; `None` for any other value.
+    fn from_value(value: &Value) -> Option<Self>;
+
+    /// The value that is written; `None` if the key is not written.
+    fn to_value(&self) -> Option<Value>;
+
+    /// Checks the keys below the one at `at` against their limits.
     fn check_limits(&self, _at: &str, _c: &mut Checker<'_>) {}
 }
 
@@ -24,8 +33,40 @@ impl Key {
         Self {
             name,
             kind: T::kind(),
-            is_required: !has_default && !T::IS_OPTIONAL,
+            is_required: !has_default && T::absent().is_none(),
         }
+    }
+}
+
+/// Reads a table whose keys all fit their kinds (see [`super::vet`]); `None` if one does not.
+pub(crate) fn from_table<T: Declared>(table: Table) -> Option<T> {
+    T::from_value(&Value::Table(table))
+}
+
+/// A scene, a case or a part of one as a table, with every default.
+pub(crate) fn to_table<T: Declared>(part: &T) -> Table {
+    match part.to_value() {
+        Some(Value::Table(table)) => table,
+        _ => Table::new(),
+    }
+}
+
+/// Reads the key `name` of a table; `default` is its value where the table does not state it.
+pub(crate) fn read_key<T: Declared>(
+    table: &Value,
+    name: &str,
+    default: impl FnOnce() -> Option<T>,
+) -> Option<T> {
+    match table.get(name) {
+        Some(value) => T::from_value(value),
+        None => default(),
+    }
+}
+
+/// Adds the key `name` to a table, unless its value is not written.
+pub(crate) fn write_key<T: Declared>(table: &mut Table, name: &str, part: &T) {
+    if let Some(value) = part.to_value() {
+        table.insert(name.to_owned(), value);
     }
 }
 
@@ -44,14 +85,14 @@ macro_rules! keys {
     };
 }
 
-/// A table of keys: name, type, default and, after each `=>`, what the value must be.
+/// A table of keys: name, type, default and, after each `=>`, what the value must be. A key `as omitted` is not written
+/// where it has its default.
 macro_rules! table {
     ($(#[$doc:meta])* $name:ident {
-        $($(#[$fdoc:meta])* $field:ident: $ty:ty = $default:expr $(=> $limit:expr)*,)*
+        $($(#[$fdoc:meta])* $field:ident: $ty:ty $(as $omitted:ident)? = $default:expr $(=> $limit:expr)*,)*
     }) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(default, deny_unknown_fields)]
+        #[derive(Debug, Clone, PartialEq)]
         pub struct $name { $($(#[$fdoc])* pub $field: $ty,)* }
         impl Default for $name {
             fn default() -> Self { Self { $($field: $default,)* } }
@@ -59,6 +100,15 @@ macro_rules! table {
         impl $crate::keys::Declared for $name {
             fn kind() -> $crate::keys::Kind {
                 $crate::keys::Kind::Table(vec![$($crate::keys::Key::of::<$ty>(stringify!($field), true),)*])
+            }
+            fn from_value(value: &toml::Value) -> Option<Self> {
+                let default = Self::default();
+                Some(Self { $($field: $crate::keys::read_key(value, stringify!($field), || Some(default.$field))?,)* })
+            }
+            fn to_value(&self) -> Option<toml::Value> {
+                let mut table = toml::Table::new();
+                $($crate::keys::written!(table, stringify!($field), self.$field, $default $(, $omitted)?);)*
+                Some(toml::Value::Table(table))
             }
             fn check_limits(&self, at: &str, c: &mut $crate::keys::Checker<'_>) {
                 $($crate::keys::held!(c, at, $field, &self.$field $(, $limit)*);)*
@@ -75,10 +125,9 @@ macro_rules! kinds {
         })?,)*
     }) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
-        #[serde(tag = $tag, deny_unknown_fields)]
+        #[derive(Debug, Clone, PartialEq)]
         pub enum $name {
-            $($(#[$vdoc])* #[serde(rename = $word)] $variant $(($inner))? $({ $($(#[$fdoc])* $field: $ty),* })?,)*
+            $($(#[$vdoc])* $variant $(($inner))? $({ $($(#[$fdoc])* $field: $ty),* })?,)*
         }
         impl $name {
             /// The kind as files write it.
@@ -93,6 +142,26 @@ macro_rules! kinds {
                     vec![$($($crate::keys::Key::of::<$ty>(stringify!($field), false),)*)?]
                         $(.into_iter().chain($crate::keys::keys_of::<$inner>()).collect())?,
                 ),)*] }
+            }
+            fn from_value(value: &toml::Value) -> Option<Self> {
+                match value.get($tag)?.as_str()? {
+                    $($word => Some(Self::$variant
+                        $((<$inner as $crate::keys::Declared>::from_value(value)?))?
+                        $({ $($field: $crate::keys::read_key(value, stringify!($field), <$ty as $crate::keys::Declared>::absent)?),* })?
+                    ),)*
+                    _ => None,
+                }
+            }
+            fn to_value(&self) -> Option<toml::Value> {
+                #[allow(unused_mut)]
+                let mut table = toml::Table::from_iter([($tag.to_owned(), toml::Value::from(self.name()))]);
+                match self { $(
+                    Self::$variant $(($crate::keys::second!($inner, inner)))? $({ $($field),* })? => {
+                        $(table.extend($crate::keys::to_table::<$inner>(inner));)?
+                        $($($crate::keys::write_key(&mut table, stringify!($field), $field);)*)?
+                    }
+                )* }
+                Some(toml::Value::Table(table))
             }
             #[allow(unused_variables)]
             fn check_limits(&self, at: &str, c: &mut $crate::keys::Checker<'_>) {
@@ -111,8 +180,8 @@ macro_rules! kinds {
 macro_rules! choice {
     ($(#[$doc:meta])* $name:ident { $($(#[$vdoc:meta])* $variant:ident = $word:literal,)* }) => {
         $(#[$doc])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-        pub enum $name { $($(#[$vdoc])* #[serde(rename = $word)] $variant,)* }
+        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+        pub enum $name { $($(#[$vdoc])* $variant,)* }
         impl $name {
             /// The name in files.
             pub fn name(self) -> &'static str {
@@ -121,7 +190,28 @@ macro_rules! choice {
         }
         impl $crate::keys::Declared for $name {
             fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(vec![$($word),*]) }
+            fn from_value(value: &toml::Value) -> Option<Self> {
+                match value.as_str()? {
+                    $($word => Some(Self::$variant),)*
+                    _ => None,
+                }
+            }
+            fn to_value(&self) -> Option<toml::Value> {
+                Some(toml::Value::from(self.name()))
+            }
         }
+    };
+}
+
+/// Writes a key of a table; one that is omitted only where it does not have its default.
+macro_rules! written {
+    ($table:ident, $name:expr, $value:expr, $default:expr, omitted) => {
+        if $value != $default {
+            $crate::keys::write_key(&mut $table, $name, &$value);
+        }
+    };
+    ($table:ident, $name:expr, $value:expr, $default:expr) => {
+        $crate::keys::write_key(&mut $table, $name, &$value);
     };
 }
 
@@ -145,39 +235,113 @@ macro_rules! second {
 
 /// Choices of another crate, by the names that they have in files.
 macro_rules! foreign_choices {
-    ($($ty:ty: $($word:literal)|*,)*) => {
+    ($($ty:ident { $($variant:ident = $word:literal),* $(,)? })*) => {
         $(impl $crate::keys::Declared for $ty {
             fn kind() -> $crate::keys::Kind { $crate::keys::Kind::Choice(vec![$($word),*]) }
+            fn from_value(value: &toml::Value) -> Option<Self> {
+                match value.as_str()? {
+                    $($word => Some(Self::$variant),)*
+                    _ => None,
+                }
+            }
+            fn to_value(&self) -> Option<toml::Value> {
+                $(if *self == Self::$variant {
+                    return Some(toml::Value::from($word));
+                })*
+                None
+            }
         })*
     };
 }
 
-pub(crate) use {choice, foreign_choices, held, keys, kinds, second, table};
+pub(crate) use {choice, foreign_choices, held, keys, kinds, second, table, written};
 
-/// Plain values.
-macro_rules! plain {
-    ($($ty:ty => $kind:expr,)*) => {
+impl Declared for f64 {
+    fn kind() -> Kind {
+        Kind::Number
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        match value {
+            Value::Float(number) => Some(*number),
+            Value::Integer(number) => Some(*number as f64),
+            _ => None,
+        }
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Float(*self))
+    }
+}
+
+/// Whole numbers; those of TOML end at the largest of `i64`.
+macro_rules! whole_numbers {
+    ($($ty:ty => $largest:expr,)*) => {
         $(impl Declared for $ty {
-            fn kind() -> Kind { $kind }
+            fn kind() -> Kind {
+                Kind::Whole { largest: $largest }
+            }
+
+            fn from_value(value: &Value) -> Option<Self> {
+                Self::try_from(value.as_integer()?).ok()
+            }
+
+            fn to_value(&self) -> Option<Value> {
+                Some(Value::Integer(i64::try_from(*self).unwrap_or(i64::MAX)))
+            }
         })*
     };
 }
 
-plain! {
-    f64 => Kind::Number,
-    u32 => Kind::Whole { largest: u32::MAX.into() },
-    // The whole numbers of TOML end here.
-    u64 => Kind::Whole { largest: i64::MAX as u64 },
-    usize => Kind::Whole { largest: i64::MAX as u64 },
-    bool => Kind::Switch,
-    String => Kind::Text,
+whole_numbers! {
+    u32 => u32::MAX.into(),
+    u64 => i64::MAX as u64,
+    usize => i64::MAX as u64,
+}
+
+impl Declared for bool {
+    fn kind() -> Kind {
+        Kind::Switch
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_bool()
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::Boolean(*self))
+    }
+}
+
+impl Declared for String {
+    fn kind() -> Kind {
+        Kind::Text
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_str().map(str::to_owned)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        Some(Value::String(self.clone()))
+    }
 }
 
 impl<T: Declared> Declared for Option<T> {
-    const IS_OPTIONAL: bool = true;
-
     fn kind() -> Kind {
         T::kind()
+    }
+
+    fn absent() -> Option<Self> {
+        Some(None)
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        T::from_value(value).map(Some)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        self.as_ref().and_then(T::to_value)
     }
 
     fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
@@ -188,6 +352,14 @@ impl<T: Declared> Declared for Option<T> {
 impl<T: Declared> Declared for Box<T> {
     fn kind() -> Kind {
         T::kind()
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        T::from_value(value).map(Self::new)
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        (**self).to_value()
     }
 
     fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
@@ -203,6 +375,15 @@ impl<T: Declared> Declared for Vec<T> {
         }
     }
 
+    fn from_value(value: &Value) -> Option<Self> {
+        value.as_array()?.iter().map(T::from_value).collect()
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        let values: Option<Vec<Value>> = self.iter().map(T::to_value).collect();
+        values.map(Value::Array)
+    }
+
     fn check_limits(&self, at: &str, c: &mut Checker<'_>) {
         self.iter()
             .enumerate()
@@ -216,6 +397,15 @@ impl<T: Declared, const N: usize> Declared for [T; N] {
             of: Box::new(T::kind()),
             len: Some(N),
         }
+    }
+
+    fn from_value(value: &Value) -> Option<Self> {
+        Vec::from_value(value)?.try_into().ok()
+    }
+
+    fn to_value(&self) -> Option<Value> {
+        let values: Option<Vec<Value>> = self.iter().map(T::to_value).collect();
+        values.map(Value::Array)
     }
 }
 
@@ -293,7 +483,7 @@ mod tests {
     /// A text with every key of a kind is read back: what is declared is what serde reads and writes.
     #[test]
     fn names_of_kinds_and_choices_are_those_that_are_written() {
-        let scene = toml::Table::try_from(Scene::default()).unwrap();
+        let scene = to_table(&Scene::default());
         fn look(keys: &[Key], table: &toml::Table) {
             for (name, value) in table {
                 let Some(key) = keys.iter().find(|key| key.name == name) else {

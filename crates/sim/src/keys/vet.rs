@@ -1,10 +1,10 @@
 //! A text beside the description of its keys: what does not fit, the table that it stands for, and the lines of problems that are found
 //! later.
 
+use super::declare::{Declared, from_table};
 use super::key::{Key, Kind, join};
 use super::problem::{Located, Problem, SceneError};
 use super::words::{near, one_of, quote, table_with, wanted};
-use serde::de::DeserializeOwned;
 use std::ops::Range;
 use std::path::Path;
 use toml::Spanned;
@@ -143,12 +143,12 @@ impl<'a> Text<'a> {
     /// A table whose keys all fit as what it stands for.
     ///
     /// # Errors
-    /// What the type says that refuses it nevertheless.
-    pub(crate) fn read<T: DeserializeOwned>(&self, table: toml::Table) -> Result<T, SceneError> {
-        T::deserialize(table).map_err(|e| SceneError::Malformed {
+    /// A key that does not fit; a table from [`Self::vet`] has none.
+    pub(crate) fn read<T: Declared>(&self, table: toml::Table) -> Result<T, SceneError> {
+        from_table(table).ok_or_else(|| SceneError::Malformed {
             path: self.path.to_owned(),
             line: 1,
-            message: e.to_string(),
+            message: "a value does not fit its key".into(),
         })
     }
 

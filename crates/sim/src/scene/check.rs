@@ -648,7 +648,7 @@ mod tests {
     /// A default beside a changed key is not what the user wrote: nobody looks for it in the file.
     #[test]
     fn no_single_change_of_a_number_is_blamed_on_a_default() {
-        let defaults = toml::Table::try_from(Scene::default()).unwrap();
+        let defaults = crate::keys::to_table(&Scene::default());
         let mut texts = Vec::new();
         for (section, keys) in defaults
             .iter()

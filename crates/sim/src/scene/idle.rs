@@ -9,7 +9,8 @@ use super::{
 };
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{Refinement, RegionRadius, SignalsOf};
-use crate::keys::{Text, lines_with_keys, value_at};
+use crate::keys::{Text, lines_with_keys, to_table, value_at};
+use toml::Value;
 
 /// Keys of a scene without use: what each is for, and what the scene has instead.
 fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
@@ -187,8 +188,8 @@ impl Scene {
     ///
     /// Equal scenes give equal text; the hash of it names the scene.
     pub fn to_toml(&self) -> String {
-        let whole =
-            toml::to_string(self).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
+        let whole = toml::to_string(&to_table(self))
+            .unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"));
         let idle = idle(self);
         let kept =
             lines_with_keys(&whole).filter(|(key, _)| !idle.iter().any(|(idle, _)| idle == key));
@@ -206,10 +207,8 @@ pub(super) fn problems(scene: &Scene, document: &Text<'_>) -> Vec<Problem> {
     let mut usual = Scene::default();
     usual.detector.front_end = Some(FrontEnd::default());
     usual.atmosphere.turbulence = Turbulence::Refractive(RefractiveTurbulence::default());
-    let table = |scene: &Scene| {
-        toml::Value::try_from(scene).unwrap_or_else(|e| unreachable!("a scene is plain data: {e}"))
-    };
-    let (own, usual) = (table(scene), table(&usual));
+    let own = Value::Table(to_table(scene));
+    let usual = Value::Table(to_table(&usual));
     idle.retain(|(key, _)| value_at(&own, key) != value_at(&usual, key));
     let problem = |(key, purpose): (&str, String)| {
         let value = value_at(&own, key)

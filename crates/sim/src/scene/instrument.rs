@@ -3,7 +3,6 @@
 //! Check: impossible values and keys without effect are named; what is off is not written.
 
 use super::Scene;
-use super::pattern::is_default;
 use crate::keys::{ABOVE_ZERO_OR_INF, Checker, NothingOr, Number, ZERO_OR_MORE, keys, side};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
@@ -18,8 +17,7 @@ keys! {
         /// Pulse repetition frequency, Hz.
         pulse_repetition_hz: f64 = 400.0 => 1e-3..=1e6,
         /// Full width at half maximum of the Lorentzian line, Hz; 0 for none.
-        #[serde(skip_serializing_if = "is_default")]
-        linewidth_hz: f64 = 0.0 => 0.0..=1e12,
+        linewidth_hz: f64 as omitted = 0.0 => 0.0..=1e12,
         /// What sets the energy of the pulses, in place of `pulse.energy_j`.
         amplifier: Option<LaserAmplifier> = None,
         /// The fibre of the power amplifier, for a warning of Brillouin scattering.
@@ -153,17 +151,13 @@ keys! {
         /// Whether transmitted and received light cross the same turbulence.
         receiver: ReceiverPath = ReceiverPath::Monostatic,
         /// Loss of the optics, out and back together, dB.
-        #[serde(skip_serializing_if = "is_default")]
-        optics_loss_db: f64 = 0.0 => 0.0..=200.0,
+        optics_loss_db: f64 as omitted = 0.0 => 0.0..=200.0,
         /// Loss of light whose polarisation does not beat, dB.
-        #[serde(skip_serializing_if = "is_default")]
-        polarisation_loss_db: f64 = 0.0 => 0.0..=200.0,
+        polarisation_loss_db: f64 as omitted = 0.0 => 0.0..=200.0,
         /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
-        #[serde(skip_serializing_if = "is_nothing_db")]
-        reflection_db: f64 = f64::NEG_INFINITY => NothingOr(-300.0..=0.0),
+        reflection_db: f64 as omitted = f64::NEG_INFINITY => NothingOr(-300.0..=0.0),
         /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
-        #[serde(skip_serializing_if = "is_default")]
-        blind_range_m: f64 = 0.0 => 0.0..=1e6,
+        blind_range_m: f64 as omitted = 0.0 => 0.0..=1e6,
     }
 
     /// What the receiver has beyond shot noise.
@@ -248,10 +242,6 @@ impl GaussianShape {
             PulseDefinition::OneOverEHalfWidth => PulseDuration::OneOverEHalfWidth(self.duration_s),
         }
     }
-}
-
-fn is_nothing_db(value: &f64) -> bool {
-    *value == f64::NEG_INFINITY
 }
 
 impl AmplifierFibre {

@@ -182,11 +182,6 @@ impl WindOfPulses {
     }
 }
 
-/// Whether a value is the one of a scene that does not state it.
-pub(super) fn is_default<T: Default + PartialEq>(table: &T) -> bool {
-    *table == T::default()
-}
-
 /// Lines of a scan, at most.
 const MOST_LINES: f64 = 1e5;
 

@@ -2,7 +2,7 @@
 
 use super::{Problem, SCENE_EXAMPLES, Scene, SceneError, TABLE2_TOML, idle};
 use crate::Error;
-use crate::keys::{Content, Document, Format, Key, Text, keys_of, value_at};
+use crate::keys::{Content, Document, Format, Key, Text, keys_of, to_table, value_at};
 use std::path::Path;
 use std::sync::LazyLock;
 
@@ -90,11 +90,8 @@ impl SceneFile {
         let Error::Key { key, reason } = error else {
             return error;
         };
-        let whole = toml::Value::try_from(&self.content).ok();
-        let value = whole
-            .as_ref()
-            .and_then(|whole| value_at(whole, key))
-            .filter(|value| !value.is_table());
+        let whole = toml::Value::Table(to_table(&self.content));
+        let value = value_at(&whole, key).filter(|value| !value.is_table());
         let value = value.map(|value| value.to_string()).unwrap_or_default();
         self.located(vec![Problem {
             key: key.into(),
@@ -107,12 +104,8 @@ impl SceneFile {
 
 /// What a scene may say.
 fn scene_format() -> Format<'static> {
-    static MAY_SAY: LazyLock<(Vec<Key>, toml::Table)> = LazyLock::new(|| {
-        (
-            keys_of::<Scene>(),
-            toml::Table::try_from(Scene::default()).unwrap_or_default(),
-        )
-    });
+    static MAY_SAY: LazyLock<(Vec<Key>, toml::Table)> =
+        LazyLock::new(|| (keys_of::<Scene>(), to_table(&Scene::default())));
     Format {
         keys: &MAY_SAY.0,
         defaults: &MAY_SAY.1,

@@ -8,7 +8,7 @@ use super::key_path::{Holds, SceneKey, VaryingKey, resolve};
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use crate::io::{Provenance, csv::float_text};
-use crate::keys::{Located, Problem, SceneError, value_at};
+use crate::keys::{Located, Problem, SceneError, to_table, value_at};
 use crate::scene::{Scene, SceneFile, hash_of};
 use crate::setup::streams::stream;
 use rand_xoshiro::rand_core::Rng;
@@ -369,7 +369,7 @@ impl<'a> Grid<'a> {
     /// A table with all defaults.
     fn whole(&self, table: &Table) -> Result<Value, Error> {
         let scene = SceneFile::without_limits(&text_of(table), self.path)?;
-        Ok(Value::Table(Table::try_from(scene).unwrap_or_default()))
+        Ok(Value::Table(to_table(&scene)))
     }
 
     fn origin(&self, keys: &[VaryingKey], cases: &[Case]) -> Provenance {

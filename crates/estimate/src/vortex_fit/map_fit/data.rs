@@ -150,11 +150,6 @@ impl Loss {
 /// residuals far better than chance, and stand where such vortices do.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum Secondary {
     /// Where the map shows them.
     #[default]

@@ -215,11 +215,6 @@ impl Wake {
 /// Circulation of a vortex as a function of the distance from its centre.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum CoreProfile {
     /// Gamma r^2 / (r^2 + r_c^2), equation (3).
     #[default]

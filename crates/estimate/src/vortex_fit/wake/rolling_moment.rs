@@ -16,11 +16,6 @@ use crate::vortex_fit::{Wake, WakeModel};
 
 /// Slope of the lift of a wing of finite span; the literature has both.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum LiftSlope {
     /// 2 pi A / (A + 2).
     Span,

@@ -21,11 +21,6 @@ use rayon::prelude::*;
 /// How the pressure equation is solved.
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(rename_all = "snake_case")
-)]
 pub enum PressureMethod {
     /// The faster one for the mesh.
     #[default]

@@ -247,7 +247,7 @@ mod tests {
             output.planes_tau = Some(vec![0.0, 0.04]);
         }
         let file = |case: &FlowCase| {
-            CaseFile::parse(&toml::to_string(case).unwrap(), Path::new("case.toml")).unwrap()
+            CaseFile::parse(&crate::keys::Content::to_toml(case), Path::new("case.toml")).unwrap()
         };
         let folder = tempfile::tempdir().unwrap();
         case.time.pause_after_steps = Some(1);
@@ -292,8 +292,11 @@ mod tests {
             output.fields_tau = Some(vec![0.02]);
             output.planes_tau = Some(vec![0.0, 0.02]);
         }
-        let file =
-            CaseFile::parse(&toml::to_string(&case).unwrap(), Path::new("case.toml")).unwrap();
+        let file = CaseFile::parse(
+            &crate::keys::Content::to_toml(&case),
+            Path::new("case.toml"),
+        )
+        .unwrap();
         let folder = tempfile::tempdir().unwrap();
         let outcome = run(&file, folder.path(), Begin::New, &Silent).unwrap();
         let path = folder.path().join("fields_0001.nc");
