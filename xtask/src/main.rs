@@ -63,8 +63,8 @@ enum Task {
     WorkPrecision(work_precision::Options),
     /// What a scene and a crate do not pay for: runs with and without, crates compiled.
     LeftOut(left_out::Options),
-    /// Fit many scans of a vortex pair: bias, scatter, stated error, bound, competing tops.
-    FitTrials(fit_trials::Options),
+    /// Fit many scans of a vortex pair: bias, scatter, reported error, bound.
+    FitTrials(fit_trials::FitTrialsArgs),
     /// Run the flows with known answers and draw them beside their references.
     Validate(validate::Options),
     /// Run every stiff and extreme case of the crates: what it must come to, what it came to.

@@ -83,7 +83,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
 
 /// The fits of one scan, of its signals too or of its map alone.
 fn fit(pair: &PairScan, scan: usize, signals: bool) -> Result<Vec<Found>, Failure> {
-    let trial = FitTrial::new(pair, scan, RADIUS_M)?;
+    let trial = FitTrial::new(pair, scan)?;
     let from_map = |core_radius: Sharing| -> Found {
         let fit = trial
             .map(

@@ -1,9 +1,10 @@
 //! Which scans show secondary vortices, and how far fits of a pair and of all four are then from the truth.
 //!
-//! Maps of means over gates with white errors, each with its own pair, with secondary vortices and without; scans of such a pair and of a
-//! simulated wake through the whole chain, whose velocities are peaks of spectra. No rule was chosen on these draws.
+//! Maps of means over gates with white errors, each with its own pair, with secondary vortices and
+//! without; scans of a pair and of a simulated wake through the whole chain, whose velocities are
+//! peaks of spectra. No rule was chosen on these draws.
 
-use super::Options;
+use super::FitTrialsArgs;
 use crate::figures::fig17_flows::{retrieved, scene};
 use crate::statistics::{Estimate, mean};
 use crate::workspace::root;
@@ -22,15 +23,19 @@ use wakescope_estimate::retrieval::{
 use wakescope_estimate::vortex_fit::{CorePrior, CoreProfile, Secondary, Vortex, Wake};
 use wakescope_sim::retrieve::{self, RetrievalRow};
 use wakescope_sim::scene::{
-    Flow, Outside, Retrieval, Scene, SimulatedFlow, SimulatedMotion, VortexLines, VortexPair,
+    Flow, Outside, Retrieval, Scene, SimulatedFlow, SimulatedMotion, VortexPair,
 };
 
 /// The middle of the wakes \[m\].
 const MIDDLE_M: f64 = 400.0;
-/// Standard deviation of the weight of gates that do not show cores \[m\], as `retrieve` has it.
+/// Ranges and the middle of the wakes are no farther apart than this \[m\].
+const REACH_M: f64 = 110.0;
+/// Lines of the maps.
+const LINES: usize = 60;
+/// Standard deviation of the weight of gates that do not resolve cores \[m\], as `retrieve` has it.
 const LONG_GATE_M: f64 = 3.0;
 
-/// The names of profiles in the list of kinds.
+/// Names of profiles in the list of kinds.
 #[derive(Deserialize)]
 #[serde(remote = "CoreProfile", rename_all = "snake_case")]
 enum ProfileName {
@@ -38,64 +43,125 @@ enum ProfileName {
     LambOseen,
 }
 
-/// Wakes of one kind, and how they are scanned.
+/// Pairs of vortices and their secondary vortices.
 #[derive(Deserialize)]
-struct Kind {
-    name: String,
+struct WakeKind {
     #[serde(with = "ProfileName")]
     profile: CoreProfile,
-    shown: bool,
-    /// Of the vortices, and of their spacing \[m\]: the least and the most.
+    /// Least and largest height of the vortices \[m\].
     height_m: [f64; 2],
+    /// Least and largest spacing of the vortices \[m\].
     spacing_m: [f64; 2],
-    /// Standard deviation of the weight of gates, and their distance \[m\]; scenes have gates, noise and times of their own.
-    #[serde(default)]
-    gate_m: (f64, f64),
+}
+
+/// Maps of means over gates.
+#[derive(Deserialize)]
+struct MapKind {
+    name: String,
+    #[serde(flatten)]
+    wake: WakeKind,
+    /// Whether the wakes have secondary vortices.
+    secondary: bool,
+    /// Standard deviation of the weight of gates; 0 for points \[m\].
+    gate_std_m: f64,
+    gate_step_m: f64,
     /// Standard deviation of the velocities \[m/s\].
-    #[serde(default)]
     noise_m_s: f64,
-    /// How long a scan takes \[s\].
-    #[serde(default)]
-    lasts_s: f64,
+    /// Duration of a scan \[s\].
+    duration_s: f64,
+}
+
+/// Scans of a scene, which has gates, noise and times of its own.
+#[derive(Deserialize)]
+struct SceneKind {
+    name: String,
+    #[serde(flatten)]
+    wake: WakeKind,
 }
 
 /// Kinds whose maps are drawn, and whose scenes are run.
 #[derive(Deserialize)]
 struct Kinds {
-    map: Vec<Kind>,
-    scene: Vec<Kind>,
+    map: Vec<MapKind>,
+    scene: Vec<SceneKind>,
 }
 
-/// What is told of one vortex: errors of the mean circulation \[%\] and in deviations, and of the lateral place \[m\].
+/// Errors of one fitted vortex.
 #[derive(Clone, Copy)]
 struct Errors {
-    circulation: f64,
-    deviations: f64,
+    /// Of the circulation within 5 to 15 m \[%\].
+    circulation_percent: f64,
+    /// Of the same, in reported standard deviations.
+    circulation_deviations: f64,
+    /// Of the lateral position \[m\].
     lateral_m: f64,
 }
 
 impl Errors {
-    fn of(circulation_m2_s: Measured, true_m2_s: f64, lateral_m: f64) -> Self {
-        let away_m2_s = circulation_m2_s.value - true_m2_s;
+    fn new(circulation_m2_s: Measured, true_m2_s: f64, lateral_m: f64) -> Self {
+        let error_m2_s = circulation_m2_s.value - true_m2_s;
         Self {
-            circulation: 100.0 * away_m2_s / true_m2_s,
-            deviations: away_m2_s / circulation_m2_s.std,
+            circulation_percent: 100.0 * error_m2_s / true_m2_s,
+            circulation_deviations: error_m2_s / circulation_m2_s.std,
             lateral_m,
         }
     }
 }
 
-/// Both vortices of one scan, fitted as a pair, and as the program does with so many.
-struct Scan {
-    shown: bool,
-    /// Fitted as a pair and with secondary vortices, whether the scan shows them or not; empty where a vortex was not found.
-    fits: [Vec<Errors>; 2],
+/// Both vortices of one scan, fitted as a pair alone and with secondary vortices.
+struct ScanErrors {
+    /// Whether the scan shows secondary vortices.
+    shows_secondary: bool,
+    pair: Vec<Errors>,
+    four: Vec<Errors>,
 }
 
-/// Numbers that are the same for one seed.
+impl ScanErrors {
+    /// Whether both fits have errors to report: each found both vortices.
+    fn is_complete(&self) -> bool {
+        !self.pair.is_empty() && !self.four.is_empty()
+    }
+}
+
+/// Which fit of a scan is evaluated.
+#[derive(Clone, Copy)]
+enum Rule {
+    /// That of the pair.
+    Pair,
+    /// That with secondary vortices if the scan shows them.
+    Observed,
+    /// That with secondary vortices.
+    Four,
+}
+
+impl Rule {
+    const ALL: [Self; 3] = [Self::Pair, Self::Observed, Self::Four];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Pair => "a pair alone",
+            Self::Observed => "by the rule",
+            Self::Four => "always four",
+        }
+    }
+
+    fn errors(self, scan: &ScanErrors) -> &[Errors] {
+        match self {
+            Self::Pair => &scan.pair,
+            Self::Observed if !scan.shows_secondary => &scan.pair,
+            Self::Observed | Self::Four => &scan.four,
+        }
+    }
+}
+
+/// Random numbers that are the same for one seed.
 struct Draw(Xoshiro256PlusPlus);
 
 impl Draw {
+    fn new(seed: u64) -> Self {
+        Self(Xoshiro256PlusPlus::seed_from_u64(seed))
+    }
+
     fn within(&mut self, [least, most]: [f64; 2]) -> f64 {
         least + (most - least) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
     }
@@ -105,175 +171,201 @@ impl Draw {
         radius * (TAU * self.within([0.0, 1.0])).cos()
     }
 
-    /// A pair, and the secondary vortices that belong to it: outside and above, as the ground makes them.
-    fn air(&mut self, kind: &Kind) -> (Wake, [Vortex; 2]) {
-        let (circulation_m2_s, spacing_m) =
-            (self.within([250.0, 550.0]), self.within(kind.spacing_m));
-        let (height_m, core_radius_m) = (self.within(kind.height_m), self.within([2.0, 4.5]));
-        let mut sides = [-1.0, 1.0].map(|side| {
-            let own = Vortex {
+    /// A pair, and the secondary vortices that belong to it.
+    fn wake(&mut self, kind: &WakeKind) -> (Wake, [Vortex; 2]) {
+        let circulation_m2_s = self.within([250.0, 550.0]);
+        let spacing_m = self.within(kind.spacing_m);
+        let height_m = self.within(kind.height_m);
+        let core_radius_m = self.within([2.0, 4.5]);
+        let sides = [-1.0, 1.0].map(|side| {
+            let primary = Vortex {
                 circulation_m2_s: circulation_m2_s * self.within([0.9, 1.1]),
                 lateral_position_m: MIDDLE_M + 0.5 * side * spacing_m,
                 height_m: height_m * self.within([0.9, 1.1]),
                 core_radius_m,
             };
-            let (away_m, angle) = (
-                own.height_m * self.within([0.5, 1.1]),
-                self.within([0.0, 0.4 * PI]),
-            );
-            let secondary = Vortex {
-                circulation_m2_s: -own.circulation_m2_s * self.within([0.25, 0.45]),
-                lateral_position_m: own.lateral_position_m + side * away_m * angle.cos(),
-                height_m: own.height_m + away_m * angle.sin(),
-                core_radius_m: own.height_m * self.within([0.08, 0.16]),
-            };
-            (own, secondary)
+            let secondary = self.secondary(&primary, side);
+            (primary, secondary)
         });
-        let [(left, a), (right, b)] = &mut sides;
-        let (lateral_wind_m_s, wind_shear_per_s) =
-            (self.within([-4.0, 4.0]), self.within([-0.02, 0.02]));
-        (
-            Wake {
-                left: *left,
-                right: *right,
-                lateral_wind_m_s,
-                wind_shear_per_s,
-            },
-            [*a, *b],
-        )
+        let [(left, left_secondary), (right, right_secondary)] = sides;
+        let wake = Wake {
+            left,
+            right,
+            lateral_wind_m_s: self.within([-4.0, 4.0]),
+            wind_shear_per_s: self.within([-0.02, 0.02]),
+        };
+        (wake, [left_secondary, right_secondary])
+    }
+
+    /// The secondary vortex of a vortex: outside and above, as the ground makes it.
+    fn secondary(&mut self, primary: &Vortex, side: f64) -> Vortex {
+        let distance_m = primary.height_m * self.within([0.5, 1.1]);
+        let angle = self.within([0.0, 0.4 * PI]);
+        Vortex {
+            circulation_m2_s: -primary.circulation_m2_s * self.within([0.25, 0.45]),
+            lateral_position_m: primary.lateral_position_m + side * distance_m * angle.cos(),
+            height_m: primary.height_m + distance_m * angle.sin(),
+            core_radius_m: primary.height_m * self.within([0.08, 0.16]),
+        }
     }
 }
 
-/// One map, fitted as `retrieve` fits that of any instrument. Nothing where it does not show a pair.
-fn of_map(kind: &Kind, seed: u64) -> Result<Option<Scan>, Failure> {
-    let mut draw = Draw(Xoshiro256PlusPlus::seed_from_u64(seed));
-    let (truth, secondary) = draw.air(kind);
-    let elevation_rad: Vec<f64> = (0..60).map(|i| 0.01 + 0.003 * f64::from(i)).collect();
-    let range_m: Vec<f64> = (0..)
-        .map(|i| MIDDLE_M - 110.0 + kind.gate_m.1 * f64::from(i))
-        .take_while(|r| *r < MIDDLE_M + 110.0)
-        .collect();
-    let size = (elevation_rad.len(), range_m.len());
-    let mut map = ScanMap {
-        time_s: (0..size.0)
-            .map(|i| kind.lasts_s * i as f64 / (size.0 - 1) as f64)
-            .collect(),
-        elevation_rad,
-        range_m,
-        velocity_m_s: Array2::zeros(size),
-        sigma_m_s: Some(Array2::from_elem(size, kind.noise_m_s)),
-        fold_m_s: None,
-    };
-    let gate = if kind.gate_m.0 > 0.0 {
+/// What a retrieval knows of the maps of a kind.
+fn options_of(kind: &MapKind) -> RetrievalOptions {
+    let gate = if kind.gate_std_m > 0.0 {
         Gate::Gaussian {
-            std_m: kind.gate_m.0,
+            std_m: kind.gate_std_m,
         }
     } else {
         Gate::Point
     };
-    let core_prior = (kind.gate_m.0 > LONG_GATE_M).then_some(CorePrior::TYPICAL);
-    let options = RetrievalOptions {
+    RetrievalOptions {
         gate,
-        core_prior,
+        core_prior: (kind.gate_std_m > LONG_GATE_M).then_some(CorePrior::TYPICAL),
         ..RetrievalOptions::default()
-    };
-    let mut air = options.clone();
-    air.model.profile = kind.profile;
-    air.model.secondary = kind.shown.then_some(secondary);
-    map.velocity_m_s = expected_velocities(&map, &air, &truth, kind.lasts_s > 0.0)?;
+    }
+}
+
+/// The lines and ranges of a map without velocities.
+fn empty_map(kind: &MapKind) -> ScanMap {
+    let mut elevation_rad = Vec::new();
+    let mut time_s = Vec::new();
+    for line in 0..LINES {
+        elevation_rad.push(0.01 + 0.003 * line as f64);
+        time_s.push(kind.duration_s * line as f64 / (LINES - 1) as f64);
+    }
+    let mut range_m = Vec::new();
+    for gate in 0.. {
+        let range = MIDDLE_M - REACH_M + kind.gate_step_m * f64::from(gate);
+        if range >= MIDDLE_M + REACH_M {
+            break;
+        }
+        range_m.push(range);
+    }
+    let shape = (LINES, range_m.len());
+    ScanMap {
+        time_s,
+        elevation_rad,
+        range_m,
+        velocity_m_s: Array2::zeros(shape),
+        sigma_m_s: Some(Array2::from_elem(shape, kind.noise_m_s)),
+        fold_m_s: None,
+    }
+}
+
+/// One map, fitted as `retrieve` fits that of any instrument. Nothing where it does not show a pair.
+fn map_errors(kind: &MapKind, seed: u64) -> Result<Option<ScanErrors>, Failure> {
+    let mut draw = Draw::new(seed);
+    let (truth, secondary) = draw.wake(&kind.wake);
+    let options = options_of(kind);
+    let mut true_options = options.clone();
+    true_options.model.profile = kind.wake.profile;
+    true_options.model.secondary = kind.secondary.then_some(secondary);
+    let mut map = empty_map(kind);
+    map.velocity_m_s = expected_velocities(&map, &true_options, &truth, kind.duration_s > 0.0)?;
     map.velocity_m_s
         .mapv_inplace(|v| v + kind.noise_m_s * draw.normal());
     let pair = fit_scan(&map, &options)?;
-    let with = |secondary| {
-        with_secondary_vortices(
-            &map,
-            &RetrievalOptions {
-                secondary,
-                ..options.clone()
-            },
-            &pair,
-        )
+    let with_secondary = |secondary| {
+        let options = RetrievalOptions {
+            secondary,
+            ..options.clone()
+        };
+        with_secondary_vortices(&map, &options, &pair)
     };
-    let shown = with(Secondary::Never)?.is_some();
-    let four = with(Secondary::Always)?.map_or_else(|| pair.clone(), |(four, _)| four);
-    let errors = |found: &ScanResult| -> Vec<Errors> {
-        let Some(wake) = found.wake.filter(|_| found.vortices.len() == 2) else {
+    let shows_secondary = with_secondary(Secondary::Never)?.is_some();
+    let four = with_secondary(Secondary::Always)?;
+    let four = four.as_ref().map_or(&pair, |(four, _)| four);
+    let scan = ScanErrors {
+        shows_secondary,
+        pair: result_errors(&pair, &truth, kind.wake.profile),
+        four: result_errors(four, &truth, kind.wake.profile),
+    };
+    Ok(scan.is_complete().then_some(scan))
+}
+
+/// Errors of both vortices of a fit; none unless it found both.
+fn result_errors(found: &ScanResult, truth: &Wake, profile: CoreProfile) -> Vec<Errors> {
+    let Some(wake) = found.wake else {
+        return Vec::new();
+    };
+    let [left, right] = found.vortices.as_slice() else {
+        return Vec::new();
+    };
+    let sides = [
+        (left, &wake.left, &truth.left),
+        (right, &wake.right, &truth.right),
+    ];
+    let mut errors = Vec::new();
+    for (vortex, fitted, truth) in sides {
+        let true_m2_s = truth.circulation_m2_s * profile.mean_5_15(truth.core_radius_m).0;
+        let lateral_m = fitted.lateral_position_m - truth.lateral_position_m;
+        errors.push(Errors::new(
+            vortex.circulation_5_15_m2_s,
+            true_m2_s,
+            lateral_m,
+        ));
+    }
+    errors
+}
+
+/// Errors of the scans of a scene.
+fn scene_errors(
+    flow: &Flow,
+    folder: &Path,
+    args: &FitTrialsArgs,
+) -> Result<Vec<ScanErrors>, Failure> {
+    let mut scene = Scene {
+        seed: args.seed,
+        flow: flow.clone(),
+        ..scene()?
+    };
+    scene.scan.realisations = args.scans as usize;
+    scene.scan.outside_flow = Outside::Mask {};
+    let rows_with = |secondary| {
+        let retrieval = Retrieval {
+            secondary,
+            ..Retrieval::default()
+        };
+        retrieved(&scene, retrieval, folder)
+    };
+    let pairs = rows_with(Secondary::Never)?;
+    let fours = rows_with(Secondary::Always)?;
+    let flag = retrieve::name(Flag::SecondaryVortices);
+    let mut scans = Vec::new();
+    for (pair, four) in pairs.chunks(2).zip(fours.chunks(2)) {
+        let scan = ScanErrors {
+            shows_secondary: pair[0].flags.split(' ').any(|word| word == flag),
+            pair: row_errors(pair),
+            four: row_errors(four),
+        };
+        if scan.is_complete() {
+            scans.push(scan);
+        }
+    }
+    Ok(scans)
+}
+
+/// Errors of both vortices of a scan; none unless both were found.
+fn row_errors(rows: &[RetrievalRow]) -> Vec<Errors> {
+    let mut errors = Vec::new();
+    for row in rows {
+        let Some(found) = &row.found else {
             return Vec::new();
         };
-        let sides = [(&wake.left, &truth.left), (&wake.right, &truth.right)];
-        let of = |(vortex, (fitted, truth)): (
-            &wakescope_estimate::retrieval::VortexResult,
-            (&Vortex, &Vortex),
-        )| {
-            let true_m2_s = truth.circulation_m2_s * kind.profile.mean_5_15(truth.core_radius_m).0;
-            let lateral_m = fitted.lateral_position_m - truth.lateral_position_m;
-            Errors::of(vortex.circulation_5_15_m2_s, true_m2_s, lateral_m)
-        };
-        found.vortices.iter().zip(sides).map(of).collect()
-    };
-    let fits = [errors(&pair), errors(&four)];
-    Ok(fits
-        .iter()
-        .all(|errors| !errors.is_empty())
-        .then_some(Scan { shown, fits }))
+        errors.push(Errors::new(
+            found.circulation_5_15_m2_s,
+            row.truth.circulation_5_15_m2_s.value,
+            found.lateral_position_m.value - row.truth.lateral_position_m.value,
+        ));
+    }
+    errors
 }
 
-/// Scans of a scene.
-fn of_scene(
-    flow: Flow,
-    added_flows: Vec<Flow>,
-    folder: &Path,
-    options: &Options,
-) -> Result<Vec<Scan>, Failure> {
-    let by = |secondary| {
-        let air = (flow.clone(), added_flows.clone());
-        let mut scene = Scene {
-            seed: options.seed,
-            flow: air.0,
-            added_flows: air.1,
-            ..scene()?
-        };
-        (scene.scan.realisations, scene.scan.outside_flow) =
-            (options.scans as usize, Outside::Mask {});
-        retrieved(
-            &scene,
-            Retrieval {
-                secondary,
-                ..Retrieval::default()
-            },
-            folder,
-        )
-    };
-    let (pair, four) = (by(Secondary::Never)?, by(Secondary::Always)?);
-    let errors = |rows: &[RetrievalRow]| -> Vec<Errors> {
-        let of = |row: &RetrievalRow| {
-            let (found, truth) = (row.found?, row.truth);
-            let lateral_m = found.lateral_position_m.value - truth.lateral_position_m.value;
-            Some(Errors::of(
-                found.circulation_5_15_m2_s,
-                truth.circulation_5_15_m2_s.value,
-                lateral_m,
-            ))
-        };
-        rows.iter()
-            .map(of)
-            .collect::<Option<_>>()
-            .unwrap_or_default()
-    };
-    let name = retrieve::name(Flag::SecondaryVortices);
-    let scans = pair.chunks(2).zip(four.chunks(2)).map(|(pair, four)| Scan {
-        shown: pair[0].flags.split(' ').any(|flag| flag == name),
-        fits: [errors(pair), errors(four)],
-    });
-    Ok(scans
-        .filter(|scan| scan.fits.iter().all(|errors| !errors.is_empty()))
-        .collect())
-}
-
-/// A pair of a scene with secondary vortices, or without.
-fn pair_of_scene(kind: &Kind, seed: u64) -> (Flow, Vec<Flow>) {
-    let (wake, secondary) = Draw(Xoshiro256PlusPlus::seed_from_u64(seed)).air(kind);
-    let pair = VortexPair {
+/// A pair of a scene.
+fn pair_of_scene(kind: &WakeKind, seed: u64) -> Flow {
+    let (wake, _) = Draw::new(seed).wake(kind);
+    Flow::VortexPair(VortexPair {
         circulation_m2_s: wake.left.circulation_m2_s,
         spacing_m: wake.spacing_m(),
         core_radius_m: wake.left.core_radius_m,
@@ -281,99 +373,77 @@ fn pair_of_scene(kind: &Kind, seed: u64) -> (Flow, Vec<Flow>) {
         profile: kind.profile,
         cross_wind_m_s: wake.lateral_wind_m_s,
         ..VortexPair::default()
-    };
-    // a positive line towards +x turns y towards z, as a right vortex does
-    let lines = VortexLines {
-        nodes_m: secondary
-            .iter()
-            .map(|v| {
-                [-1.0, 1.0]
-                    .map(|x| [x, v.lateral_position_m, v.height_m])
-                    .to_vec()
-            })
-            .collect(),
-        circulation_m2_s: vec![
-            -secondary[0].circulation_m2_s,
-            secondary[1].circulation_m2_s,
-        ],
-        core_radius_m: secondary[0].core_radius_m,
-        ..VortexLines::default()
-    };
-    (
-        Flow::VortexPair(pair),
-        if kind.shown {
-            vec![Flow::VortexLines(lines)]
-        } else {
-            Vec::new()
-        },
-    )
+    })
 }
 
-/// How often secondary vortices are shown, and how far a pair alone, the rule and four vortices are from the truth.
-fn show(name: &str, scans: &[Scan]) {
-    let shown = scans.iter().filter(|scan| scan.shown).count();
-    println!("{name}: shown by {shown} of {} scans", scans.len());
+/// Mean over the vortices of each scan of a number of their errors.
+fn means(scans: &[ScanErrors], rule: Rule, number: fn(&Errors) -> f64) -> Vec<f64> {
+    let mut means = Vec::new();
+    for scan in scans {
+        let numbers: Vec<f64> = rule.errors(scan).iter().map(number).collect();
+        means.push(mean(&numbers, None));
+    }
+    means
+}
+
+/// Prints how often secondary vortices are observed, and the errors of the fits by each rule.
+fn print(name: &str, scans: &[ScanErrors]) {
+    let observed = scans.iter().filter(|scan| scan.shows_secondary).count();
+    println!("{name}: observed in {observed} of {} scans", scans.len());
     if scans.len() < 2 {
         return;
     }
-    // By which fit a scan is told that does not show such vortices, and one that does.
-    for (what, fits) in [
-        ("a pair alone", [0, 0]),
-        ("by the rule", [0, 1]),
-        ("always four", [1, 1]),
-    ] {
-        let each = |get: fn(&Errors) -> f64| -> Vec<f64> {
-            let of = scans
-                .iter()
-                .map(|scan| &scan.fits[fits[usize::from(scan.shown)]]);
-            of.map(|errors| mean(&errors.iter().map(get).collect::<Vec<_>>(), None))
-                .collect()
-        };
-        let bias = Estimate::mean(&each(|e| e.circulation));
-        let root = |get: fn(&Errors) -> f64| mean(&each(get), None).sqrt();
+    for rule in Rule::ALL {
+        let bias = Estimate::mean(&means(scans, rule, |e| e.circulation_percent));
+        let squares = means(scans, rule, |e| e.circulation_percent.powi(2));
+        let deviations = means(scans, rule, |e| e.circulation_deviations.powi(2));
+        let lateral = means(scans, rule, |e| e.lateral_m.powi(2));
         println!(
-            "  {what}: Gamma_5-15 {:6.1} +- {:.1} %, root mean square {:5.1} %, {:4.1} deviations; {:4.1} m aside",
+            "  {}: Gamma_5-15 {:6.1} +- {:.1} %, root mean square {:5.1} %, {:4.1} standard deviations; lateral {:4.1} m",
+            rule.name(),
             bias.value,
             bias.standard_error,
-            root(|e| e.circulation * e.circulation),
-            root(|e| e.deviations * e.deviations),
-            root(|e| e.lateral_m * e.lateral_m)
+            mean(&squares, None).sqrt(),
+            mean(&deviations, None).sqrt(),
+            mean(&lateral, None).sqrt()
         );
     }
 }
 
-pub(super) fn run(options: &Options) -> Outcome {
-    if options.wake.is_none() {
-        let Kinds { map, scene } = toml::from_str(include_str!("secondary.toml"))?;
-        for kind in &map {
-            let of = |scan| of_map(kind, options.seed.wrapping_mul(1 << 20) + u64::from(scan));
-            let scans = (0..options.scans)
-                .into_par_iter()
-                .map(of)
-                .collect::<Result<Vec<_>, Failure>>()?;
-            show(&kind.name, &scans.into_iter().flatten().collect::<Vec<_>>());
-        }
-        for kind in &scene {
-            let (flow, added) = pair_of_scene(kind, options.seed);
-            show(&kind.name, &of_scene(flow, added, &root(), options)?);
-        }
+/// Draws and scans synthetic pairs.
+fn run_pairs(args: &FitTrialsArgs) -> Outcome {
+    let kinds: Kinds = toml::from_str(include_str!("secondary.toml"))?;
+    let first_seed = args.seed.wrapping_mul(1 << 20);
+    for kind in &kinds.map {
+        let scans: Vec<Option<ScanErrors>> = (0..args.scans)
+            .into_par_iter()
+            .map(|scan| map_errors(kind, first_seed + u64::from(scan)))
+            .collect::<Result<_, Failure>>()?;
+        let scans: Vec<ScanErrors> = scans.into_iter().flatten().collect();
+        print(&kind.name, &scans);
     }
-    let folder = options
-        .wake
-        .clone()
-        .unwrap_or_else(|| root().join("tests/reference/wake"));
-    for &tau in &options.tau {
-        let (planes, motion) = ("plane1".into(), SimulatedMotion::Frozen);
+    for kind in &kinds.scene {
+        let flow = pair_of_scene(&kind.wake, args.seed);
+        print(&kind.name, &scene_errors(&flow, &root(), args)?);
+    }
+    Ok(())
+}
+
+pub(super) fn run(args: &FitTrialsArgs) -> Outcome {
+    if args.wake.is_none() {
+        run_pairs(args)?;
+    }
+    let stored = root().join("tests/reference/wake");
+    let folder = args.wake.as_ref().unwrap_or(&stored);
+    for &tau in &args.tau {
         let flow = Flow::Simulated(SimulatedFlow {
-            planes,
-            motion,
+            planes: "plane1".into(),
+            motion: SimulatedMotion::Frozen,
             age_tau: Some(tau),
             ..SimulatedFlow::default()
         });
-        show(
-            &format!("simulated wake, tau = {tau}"),
-            &of_scene(flow, Vec::new(), &folder, options)?,
-        );
+        let scans = scene_errors(&flow, folder, args)?;
+        print(&format!("simulated wake, tau = {tau}"), &scans);
     }
     Ok(())
 }

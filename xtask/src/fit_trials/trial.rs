@@ -1,14 +1,12 @@
 //! Fits to scans of a pair: to the map of the likelihood with tapers, and to all raw signals.
 
-use super::posterior::posterior_deviation;
 use fixtures::WINDOW;
 use fixtures::failure::Failure;
 use fixtures::pair::PairScan;
 use ndarray::Array2;
 use wakescope_estimate::vortex_fit::{
-    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanModel, ScanSetup,
-    ScanSignals, SignalFit, SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator,
-    fit_signals,
+    CorePrior, EstimatorResponse, FreeParameters, MapFit, MapFitOptions, ScanSetup, SignalFit,
+    SignalFitOptions, Starts, VelocityMap, Wake, fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
     Correlogram, Error, Refinement, SignalKind, SpectralPeak,
@@ -24,8 +22,6 @@ pub(crate) const RADIUS_M: f64 = 2.0;
 pub(crate) struct FitTrial<'a> {
     pair: &'a PairScan,
     setup: ScanSetup,
-    /// Radius of the regions of its map \[m\].
-    radius_m: f64,
     records: Array2<f64>,
     tapered: Correlogram<f64>,
     peak: SpectralPeak,
@@ -33,7 +29,7 @@ pub(crate) struct FitTrial<'a> {
 }
 
 impl<'a> FitTrial<'a> {
-    pub(crate) fn new(pair: &'a PairScan, scan: usize, radius_m: f64) -> Result<Self, Failure> {
+    pub(crate) fn new(pair: &'a PairScan, scan: usize) -> Result<Self, Failure> {
         let records = pair.records(scan)?;
         let window =
             WindowModel::gaussian_pulse(&pair.sampling, WINDOW, pair.sigma_s(), Noise::White)?;
@@ -45,18 +41,13 @@ impl<'a> FitTrial<'a> {
             1024,
             Refinement::Parabola,
         )?;
-        let velocities = pair.velocities(
-            &pair.statistics(&records, &tapered)?,
-            &pair.points,
-            radius_m,
-            &peak,
-        )?;
-        let velocity_m_s =
-            Array2::from_shape_vec((pair.elevation_rad.len(), pair.range_m.len()), velocities)?;
+        let statistics = pair.statistics(&records, &tapered)?;
+        let velocities = pair.velocities(&statistics, &pair.points, RADIUS_M, &peak)?;
+        let shape = (pair.elevation_rad.len(), pair.range_m.len());
+        let velocity_m_s = Array2::from_shape_vec(shape, velocities)?;
         Ok(Self {
             pair,
             setup: pair.setup()?,
-            radius_m,
             records,
             tapered,
             peak,
@@ -70,44 +61,28 @@ impl<'a> FitTrial<'a> {
         free: FreeParameters,
         core_prior: Option<CorePrior>,
     ) -> Result<MapFit, Error> {
-        let Self { pair, setup, .. } = self;
+        let setup = &self.setup;
         let map = VelocityMap {
-            elevation_rad: &pair.elevation_rad,
-            range_m: &pair.range_m,
+            elevation_rad: &self.pair.elevation_rad,
+            range_m: &self.pair.range_m,
             velocity_m_s: self.velocity_m_s.view(),
             standard_deviation_m_s: None,
         };
-        let noise = (setup.noise, pair.snr);
-        let shown = EstimatorResponse::new(
+        let noise = (setup.noise, self.pair.snr);
+        let response = EstimatorResponse::new(
             &self.tapered,
             &self.peak,
             &setup.sampling,
             &setup.pulse,
             noise,
-            self.radius_m,
+            RADIUS_M,
         )?;
         let options = MapFitOptions {
             free,
             core_prior,
             ..Default::default()
         };
-        fit_map_of_estimator(&map, &setup.wake, &shown, &options)
-    }
-
-    /// How wide the likelihood of the signals is about a fit in one parameter, in its unit; see [`posterior_deviation`].
-    pub(super) fn width(
-        &self,
-        model: &ScanModel,
-        fit: &SignalFit,
-        place: usize,
-        bound: (&Array2<f64>, &[Vec<usize>]),
-    ) -> Result<Option<f64>, Failure> {
-        let signals = ScanSignals::new(model, self.records.view(), self.pair.noise_power_a2())?;
-        let likelihood = |wake: &Wake| {
-            let value = model.log_likelihood(&signals, wake, fit.powers)?;
-            Some((value.log_likelihood, value.by_wake))
-        };
-        Ok(posterior_deviation(&fit.wake, place, bound, likelihood))
+        fit_map_of_estimator(&map, &setup.wake, &response, &options)
     }
 
     /// The fit of all signals from a guess on.
@@ -122,12 +97,11 @@ impl<'a> FitTrial<'a> {
             starts,
             ..Default::default()
         };
-        let (records, noise_a2) = (self.records.view(), self.pair.noise_power_a2());
         fit_signals(
             &self.setup,
             |_, _| self.pair.snr,
-            records,
-            noise_a2,
+            self.records.view(),
+            self.pair.noise_power_a2(),
             guess,
             &options,
         )

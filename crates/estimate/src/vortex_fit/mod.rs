@@ -20,9 +20,7 @@
 //! - fit of the signals: bias -0.2 +- 0.8 m^2/s and standard deviation 7.8 +- 0.6 with the core known, -0.5 +- 1.0 and
 //!   9.7 +- 0.7 with one core radius fitted: 1.14 +- 0.08 and 1.17 +- 0.08 times the bound (100 scans);
 //! - fit of a map: 19.3 +- 1.4 m^2/s with a core of 4.5 % of the spacing, 24.7 +- 1.8 with one core radius fitted freely. What
-//!   an estimator shows of a core is not its mean: taken for one, peaks of periodograms mislead by more than 10 %. No weighting
-//!   of the velocities of such a map scatters less than 16.8 with the core known and 20.6 with it free (`cargo xtask fit-trials
-//!   --case figures --map-bound`), to first order in the fluctuations of its spectra.
+//!   an estimator shows of a core is not its mean: taken for one, peaks of periodograms mislead by more than 10 %.
 //!
 //! `cargo xtask reproduce-figs --profile standard --only 17` measures them again.
 //!
