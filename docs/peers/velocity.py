@@ -75,17 +75,6 @@ def mean_correlation(x):
     return spectrum.arma2psd(a, NFFT=PADDED)[: PADDED // 2 + 1]
 
 
-def burg(x):
-    models = (spectrum.arburg(w, 16) for w in x)
-    return sum(spectrum.arma2psd(a, rho=e, NFFT=PADDED)[: PADDED // 2 + 1] for a, e, _ in models)
-
-
-def capon(x):
-    steering = np.exp(2j * np.pi * np.arange(PADDED // 2 + 1)[:, None] * np.arange(16) / PADDED)
-    r = np.array([(x[:, : N - k] * x[:, k:]).sum() / (WINDOWS * N) for k in range(16)])
-    return 1 / np.real(np.sum(steering.conj() * np.linalg.solve(toeplitz(r), steering.T).T, axis=1))
-
-
 tried = np.linspace(-17, 17, 341)
 covariances = [covariance(v) + 1e-6 * np.eye(N) for v in tried]
 inverses = np.array([np.linalg.inv(c).ravel() for c in covariances]).T.copy()
@@ -107,10 +96,8 @@ for name, package, value, estimate, count in (
     ("numpy, PA in batches", "numpy", 128, batches(periodograms(128)), TRIALS),
     ("numpy, PA in batches", "numpy", 1024, batches(periodograms(1024)), TRIALS),
     ("scipy, welch", "scipy", 1024, each(welch("boxcar")), TRIALS),
-    ("numpy, Capon", "numpy", 16, each(capon), 1000),
     ("numpy, likelihood on a grid", "numpy", 341, batches(likelihood), TRIALS),
     ("spectrum, AR of mean correlation", "spectrum", 16, each(mean_correlation), 1000),
-    ("spectrum, Burg", "spectrum", 16, each(burg), 300),
 ):
     pick = np.linspace(0, TRIALS - 1, count).astype(int)
     seconds = np.inf

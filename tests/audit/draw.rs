@@ -269,9 +269,6 @@ fn estimator(r: &mut Random, s: &mut Scene) {
         "periodogram_accumulation",
         "periodogram",
         "autoregressive",
-        "autoregressive_pole",
-        "capon",
-        "lag_window",
         "pulse_pair",
         "first_moment",
         "likelihood",
@@ -295,7 +292,7 @@ fn estimator(r: &mut Random, s: &mut Scene) {
     );
     s.word("estimator.method.kind", method)
         .number("estimator.false_alarm", r.pick(&[0.01, 0.0, 0.1]));
-    if ["autoregressive", "autoregressive_pole", "capon"].contains(&method) {
+    if method == "autoregressive" {
         s.set("estimator.method.order", r.whole(2, 15));
     }
     if method == "pulse_pair" {

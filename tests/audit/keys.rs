@@ -33,7 +33,7 @@ const BISTATIC: [(&str, &str); 3] = [
 const FRONT: [(&str, &str); 1] = [("detector.front_end.half_power_hz", "1e8")];
 const PPI: [(&str, &str); 1] = [("scan.lidar_height_m", "20.0")];
 
-const KEYS: [Key; 78] = [
+const KEYS: [Key; 75] = [
     ("seed", &[], ["1", "2"], "map", "v_mean_m_s"),
     (
         "laser.wavelength_m",
@@ -502,23 +502,6 @@ const KEYS: [Key; 78] = [
         "v_mean_m_s",
     ),
     (
-        "estimator.correlogram",
-        &[
-            ("estimator.method.kind", "\"lag_window\""),
-            ("estimator.weighting", "\"rectangular\""),
-        ],
-        ["\"biased\"", "\"unbiased\""],
-        "map",
-        "v_mean_m_s",
-    ),
-    (
-        "estimator.follow_wind",
-        &[FIXED],
-        ["false", "true"],
-        "map",
-        "v_mean_m_s",
-    ),
-    (
         "estimator.false_alarm",
         &[],
         ["0.0", "0.1"],
@@ -527,15 +510,8 @@ const KEYS: [Key; 78] = [
     ),
     (
         "estimator.method.order",
-        &[("estimator.method.kind", "\"capon\"")],
+        &[("estimator.method.kind", "\"autoregressive\"")],
         ["4", "8"],
-        "map",
-        "v_mean_m_s",
-    ),
-    (
-        "estimator.method.lag_window_lags",
-        &[("estimator.method.kind", "\"lag_window\"")],
-        ["8", "16"],
         "map",
         "v_mean_m_s",
     ),

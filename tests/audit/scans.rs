@@ -168,8 +168,8 @@ pub(crate) fn hold_false_alarms(r: &mut Random, bench: &Bench, ledger: &mut Ledg
         "estimator.method.kind",
         r.pick(&[
             "periodogram_accumulation",
-            "lag_window",
-            "capon",
+            "autoregressive",
+            "first_moment",
             "likelihood",
         ]),
     );
@@ -260,8 +260,7 @@ pub(crate) fn hold_words(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
     s.number("scan.elevation_step_rad", 2e-2)
         .set("scan.pulses_per_line", 1)
         .set("estimator.gate_step_samples", 50);
-    s.word("detector.signal", "baseband")
-        .set("estimator.follow_wind", true);
+    s.word("detector.signal", "baseband");
     bench.write("s.toml", &s.text());
     if bench
         .must(

@@ -24,8 +24,8 @@ scan.pattern = { kind = "rhi" }
 scan.head = { motion = "stepped", sweeps = 1, direction = "same", rate_rad_s = inf, acceleration_rad_s2 = inf, dead_time_s = 0.0 }
 scan.lidar = { x_m = 0.0, y_m = 0.0, velocity_m_s = [0.0, 0.0, 0.0] }
 scan.wind_of_pulses = { kind = "line" }
-estimator = { window_samples = 64, weighting = "gaussian", window_step_samples = 1, gate_step_samples = 5, padded_samples = 1024, refinement = "parabola", radius_m = 2.0, correlogram = "biased", follow_wind = false, false_alarm = 0.01 }
-estimator.method = { kind = "periodogram_accumulation", order = 16, lag_window_lags = 16, moment_reach = 3.5 }
+estimator = { window_samples = 64, weighting = "gaussian", window_step_samples = 1, gate_step_samples = 5, padded_samples = 1024, refinement = "parabola", radius_m = 2.0, false_alarm = 0.01 }
+estimator.method = { kind = "periodogram_accumulation", order = 16, moment_reach = 3.5 }
 estimator.radius = { kind = "fixed" }
 outputs = { signals = false, signals_of = "first", flow = true, profile_range_min_m = 100.0, profile_range_max_m = 3000.0, profile_points = 59 }
 site = { latitude_deg = 0.0, longitude_deg = 0.0, altitude_m = 0.0 }

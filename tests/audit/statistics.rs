@@ -557,12 +557,11 @@ pub(crate) fn hold_spectra(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
     let is_right = average(&finite(&map.f("bias_m_s"))).abs() < 0.03 * band_m_s;
     if ratio.is_finite() && average(&map.f("flagged")) < 0.1 && is_right {
         // The velocity of models of few lags is wrong more often, if not on average.
-        let own_db =
-            if ["autoregressive_pole", "autoregressive", "pulse_pair"].contains(&method.as_str()) {
-                0.2
-            } else {
-                0.05
-            };
+        let own_db = if ["autoregressive", "pulse_pair"].contains(&method.as_str()) {
+            0.2
+        } else {
+            0.05
+        };
         ledger.equal(
             "map.csv: snr_db",
             db(ratio),
@@ -571,7 +570,7 @@ pub(crate) fn hold_spectra(ledger: &mut Ledger, s: &Scene, scan: &Scan, map: &Cs
         );
     }
     let (width, error) = of_lines("width_m_s", &|v| v);
-    if ["autoregressive", "autoregressive_pole", "capon"].contains(&method.as_str()) {
+    if method == "autoregressive" {
         ledger.equal("map.csv: width_m_s, of models", width, f64::NAN, 0.0);
         return;
     }

@@ -10,9 +10,9 @@ use wakescope_estimate::vortex_fit::{
     fit_map_of_estimator, fit_signals,
 };
 use wakescope_estimate::{
-    Correlogram, Estimator, Radius, Refinement, Scan, SignalKind, SpectralPeak, Weighting,
+    Correlogram, Radius, Refinement, Scan, SignalKind, SpectralPeak,
     bound::{Noise, WindowModel},
-    estimators::{LagWindowPeak, likelihood_tapers},
+    estimators::likelihood_tapers,
     polar_points,
     spectrum::unweighted_lags,
 };
@@ -69,50 +69,22 @@ fn taken(seed: u64, snr_db: f64, change: impl Fn(&mut Scene)) -> Taken {
     }
 }
 
-/// How a map is made.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Velocities {
-    /// Peak of the spectrum with the tapers of the likelihood.
-    Likelihood,
-    /// Peak of the spectrum with a lag window of 16 lags.
-    LagWindow,
-}
-
-/// Accumulated map with regions of 2 m, and the fit to it without prior knowledge.
-fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> MapFit {
+/// Accumulated map of the likelihood with regions of 2 m, and the fit to it without prior knowledge.
+fn map_fit(taken: &Taken, options: &MapFitOptions) -> MapFit {
     let (sampling, kind) = (taken.setup.sampling, SignalKind::Real);
     let gates = estimators::gates(&taken.plan.scene.content).unwrap();
     let pulse = &taken.plan.instrument.pulse;
     let window = WindowModel::gaussian_pulse(&sampling, 64, pulse.sigma_s(), Noise::White).unwrap();
-    let (statistic, estimator): (Correlogram<f64>, Box<dyn Estimator>) = match velocities {
-        Velocities::Likelihood => (
-            Correlogram::with_tapers(likelihood_tapers(&window, taken.snr).unwrap()).unwrap(),
-            Box::new(
-                SpectralPeak::new(
-                    &sampling,
-                    kind,
-                    &unweighted_lags(64),
-                    1024,
-                    Refinement::Parabola,
-                )
-                .unwrap(),
-            ),
-        ),
-        Velocities::LagWindow => (
-            Correlogram::new(Weighting::default(), 64).unwrap(),
-            Box::new(
-                LagWindowPeak::new(
-                    &sampling,
-                    kind,
-                    &unweighted_lags(64),
-                    16,
-                    1024,
-                    Refinement::Parabola,
-                )
-                .unwrap(),
-            ),
-        ),
-    };
+    let tapers = likelihood_tapers(&window, taken.snr).unwrap();
+    let statistic = Correlogram::<f64>::with_tapers(tapers).unwrap();
+    let estimator = SpectralPeak::new(
+        &sampling,
+        kind,
+        &unweighted_lags(64),
+        1024,
+        Refinement::Parabola,
+    )
+    .unwrap();
     let scan = Scan::new(
         &statistic,
         &sampling,
@@ -134,7 +106,7 @@ fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> Ma
             &points,
             &Radius::Fixed { radius_m: RADIUS_M },
             None,
-            estimator.as_ref(),
+            &estimator,
         )
         .unwrap();
     let velocity = found.iter().map(|p| p.estimate.velocity_m_s).collect();
@@ -150,7 +122,7 @@ fn map_fit(taken: &Taken, velocities: Velocities, options: &MapFitOptions) -> Ma
     let noise = (setup.noise, taken.snr);
     let shown = EstimatorResponse::new(
         &statistic,
-        estimator.as_ref(),
+        &estimator,
         &sampling,
         &setup.pulse,
         noise,
@@ -243,18 +215,17 @@ fn fits_of_maps_at_0_db_are_within_two_standard_errors_of_the_circulation_on_ave
         ..Default::default()
     };
     let scans = 3;
-    for (velocities, options, scatter) in [
-        (Velocities::Likelihood, typical_core(), 19.0),
-        (Velocities::Likelihood, one_core, 25.0),
-        (Velocities::LagWindow, typical_core(), 25.0),
+    for (core, options, scatter) in [
+        ("typical core", typical_core(), 19.0),
+        ("one core", one_core, 25.0),
     ] {
         let mut mean = 0.0;
         for seed in 1..=scans {
-            let found = map_fit(&taken(seed, 0.0, |_| {}), velocities, &options).wake;
+            let found = map_fit(&taken(seed, 0.0, |_| {}), &options).wake;
             let circulation_m2_s = found.left.circulation_m2_s;
             assert!(
                 (circulation_m2_s - CIRCULATION_M2_S).abs() < 3.0 * scatter,
-                "{velocities:?} {seed}: {found:?}"
+                "{core} {seed}: {found:?}"
             );
             assert!(
                 (found.left.lateral_position_m - 376.5).abs() < 4.0
@@ -265,7 +236,7 @@ fn fits_of_maps_at_0_db_are_within_two_standard_errors_of_the_circulation_on_ave
         let allowed = 2.0 * scatter / (scans as f64).sqrt();
         assert!(
             (mean - CIRCULATION_M2_S).abs() < allowed,
-            "{velocities:?}: {mean} m^2/s, {allowed} allowed"
+            "{core}: {mean} m^2/s, {allowed} allowed"
         );
     }
 }
@@ -274,12 +245,7 @@ fn fits_of_maps_at_0_db_are_within_two_standard_errors_of_the_circulation_on_ave
 fn likelihood_fit_after_the_map_is_within_its_error_of_the_truth() {
     // half of the lines: the bound is that of the model for them
     let taken = taken(2, 0.0, |scene| scene.scan.elevation_step_rad = 2.5e-3);
-    let fit = signal_fit(
-        &taken,
-        &map_fit(&taken, Velocities::Likelihood, &typical_core()),
-        known_core(),
-    )
-    .unwrap();
+    let fit = signal_fit(&taken, &map_fit(&taken, &typical_core()), known_core()).unwrap();
     for parameter in [
         Parameter::LeftCirculation,
         Parameter::LeftLateral,
@@ -381,7 +347,7 @@ fn circulation_over_many_scans() {
     let (mut maps, mut fits) = (vec![], vec![]);
     for seed in number("FIRST", 1.0) as u64..=scans {
         let taken = taken(seed, snr_db, |_| {});
-        let map = map_fit(&taken, Velocities::Likelihood, &typical_core());
+        let map = map_fit(&taken, &typical_core());
         let fit = match signal_fit(&taken, &map, free) {
             Ok(fit) => fit,
             Err(error) => {
@@ -416,7 +382,7 @@ fn circulation_over_many_scans() {
     }
 }
 
-/// Mean circulation of the pair from fits of maps over scans, for each way to make a map. `SCANS` and `SNR_DB` as above.
+/// Mean circulation of the pair from fits of maps over scans, with several options. `SCANS` and `SNR_DB` as above.
 ///
 /// `cargo test --release -p wakescope-tests --test it -- --ignored --nocapture circulation_from_many_maps`
 #[test]
@@ -443,11 +409,9 @@ fn circulation_from_many_maps() {
     for seed in 1..=scans {
         let taken = taken(seed, snr_db, |_| {});
         let mut row = vec![];
-        for velocities in [Velocities::Likelihood, Velocities::LagWindow] {
-            for options in &all {
-                let wake = map_fit(&taken, velocities, options).wake;
-                row.push(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s));
-            }
+        for options in &all {
+            let wake = map_fit(&taken, options).wake;
+            row.push(0.5 * (wake.left.circulation_m2_s + wake.right.circulation_m2_s));
         }
         println!("{seed}: {row:.1?}");
         found.push(row);
@@ -461,10 +425,9 @@ fn circulation_from_many_maps() {
             .sum::<f64>()
             / (n - 1.0))
             .sqrt();
-        let velocities = ["likelihood", "lag window"][column / 3];
-        let fit = ["typical core", "one core", "typical core, squares"][column % 3];
+        let fit = ["typical core", "one core", "typical core, squares"][column];
         println!(
-            "{velocities}, {fit}: {mean:.1} +- {:.1}, std {std:.1} m^2/s",
+            "{fit}: {mean:.1} +- {:.1}, std {std:.1} m^2/s",
             std / n.sqrt()
         );
     }

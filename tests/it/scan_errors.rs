@@ -47,8 +47,8 @@ fn errors(scene: &PairScan, scans: &[Scan], estimator: &dyn Estimator) -> Errors
     }
 }
 
-/// PA, CA, CA-BT and the first moment on the scan, rho = 2 m, one pulse per line.
-fn all_errors(snr_db: f64) -> [Errors; 4] {
+/// PA, CA and the first moment on the scan, rho = 2 m, one pulse per line.
+fn all_errors(snr_db: f64) -> [Errors; 3] {
     let scene = PairScan::new(NoiseModel::BandLimited, 200e-9, snr_db, 3, 1).unwrap();
     let statistic = Correlogram::<f64>::new(Weighting::Rectangular, WINDOW).unwrap();
     let (sampling, kind, refinement) = (&scene.sampling, SignalKind::Real, Refinement::Parabola);
@@ -59,33 +59,11 @@ fn all_errors(snr_db: f64) -> [Errors; 4] {
                 .unwrap()
         })
         .collect();
-    let estimators: [Box<dyn Estimator>; 4] = [
+    let estimators: [Box<dyn Estimator>; 3] = [
         Box::new(
             SpectralPeak::new(sampling, kind, &unweighted_lags(WINDOW), 1024, refinement).unwrap(),
         ),
-        Box::new(
-            ModelPeak::new(
-                ModelReading::Spectrum,
-                sampling,
-                kind,
-                WINDOW,
-                16,
-                2048,
-                refinement,
-            )
-            .unwrap(),
-        ),
-        Box::new(
-            LagWindowPeak::new(
-                sampling,
-                kind,
-                &unweighted_lags(WINDOW),
-                16,
-                1024,
-                refinement,
-            )
-            .unwrap(),
-        ),
+        Box::new(ModelPeak::new(sampling, kind, WINDOW, 16, 2048, refinement).unwrap()),
         Box::new(FirstMoment::new(sampling, kind, &unweighted_lags(WINDOW), 512, 3.5).unwrap()),
     ];
     estimators.map(|estimator| errors(&scene, &scans, estimator.as_ref()))
@@ -93,7 +71,7 @@ fn all_errors(snr_db: f64) -> [Errors; 4] {
 
 #[test]
 fn errors_on_the_vortex_pair_at_0_db_are_those_of_an_independent_study() {
-    let [pa, ca, hann, _] = all_errors(0.0);
+    let [pa, ca, _] = all_errors(0.0);
     // 3.2 and 0.49 m/s for PA, 3.1 and 0.38 m/s for CA; the rms of some 45 independent places inside is known to 5 %
     for (found_m_s, study_m_s) in [
         (pa.inside_m_s, 3.2),
@@ -112,21 +90,13 @@ fn errors_on_the_vortex_pair_at_0_db_are_those_of_an_independent_study() {
         "{ca:?} {pa:?}"
     );
     assert!(ca.outside_m_s < 0.85 * pa.outside_m_s, "{ca:?} {pa:?}");
-    assert!(
-        hann.inside_m_s < 0.75 * pa.inside_m_s && hann.outside_m_s < pa.outside_m_s,
-        "{hann:?} {pa:?}"
-    );
 }
 
 #[test]
-fn at_20_db_only_the_lag_window_and_the_moment_stay_below_the_periodogram() {
-    let [pa, ca, hann, moment] = all_errors(20.0);
+fn at_20_db_only_the_moment_stays_below_the_periodogram() {
+    let [pa, ca, moment] = all_errors(20.0);
     // the model of order 16 takes the highest peak all the more: the claim "CA below PA" turns round
     assert!(ca.inside_m_s > pa.inside_m_s, "{ca:?} {pa:?}");
-    assert!(
-        hann.inside_m_s < 0.7 * pa.inside_m_s && hann.outside_m_s < 0.7 * pa.outside_m_s,
-        "{hann:?} {pa:?}"
-    );
     assert!(
         moment.inside_m_s < 1.3 && moment.outside_m_s < ca.outside_m_s,
         "{moment:?} {ca:?}"

@@ -37,14 +37,6 @@ fn windows(criterion: &mut Criterion) {
     criterion.bench_function("spectrum of 1024 points and peak", |b| {
         b.iter(|| plan.estimator.estimate(black_box(&lags), &mut scratch));
     });
-    let exact = PeriodogramOptions {
-        refinement: Refinement::Exact,
-        ..PeriodogramOptions::default()
-    };
-    let exact = PeriodogramPlan::<f64>::new(&sampling, 64, &exact).unwrap();
-    criterion.bench_function("the same with exact refinement", |b| {
-        b.iter(|| exact.estimator.estimate(black_box(&lags), &mut scratch));
-    });
     let (mut model, mut work) = (Autoregression::default(), Vec::new());
     criterion.bench_function("Levinson recursion of order 16", |b| {
         b.iter(|| {
@@ -72,7 +64,6 @@ fn windows(criterion: &mut Criterion) {
         });
     });
     let ca = ModelPeak::new(
-        ModelReading::Spectrum,
         &sampling,
         SignalKind::Real,
         64,
@@ -83,18 +74,6 @@ fn windows(criterion: &mut Criterion) {
     .unwrap();
     criterion.bench_function("AR(16), spectrum of 2048 points and peak", |b| {
         b.iter(|| ca.estimate(black_box(&lags), &mut scratch));
-    });
-    let lag_window = LagWindowPeak::new(
-        &sampling,
-        SignalKind::Real,
-        &unweighted_lags(64),
-        16,
-        1024,
-        Refinement::Parabola,
-    )
-    .unwrap();
-    criterion.bench_function("Hann lag window, spectrum of 1024 points and peak", |b| {
-        b.iter(|| lag_window.estimate(black_box(&lags), &mut scratch));
     });
     let model = WindowModel::gaussian_pulse(&sampling, 64, 120e-9, Noise::White).unwrap();
     let mut tapers = likelihood_tapers(&model, 10.0).unwrap();
@@ -109,19 +88,6 @@ fn windows(criterion: &mut Criterion) {
             });
         },
     );
-    let capon = ModelPeak::new(
-        ModelReading::Capon,
-        &sampling,
-        SignalKind::Real,
-        64,
-        16,
-        1024,
-        Refinement::Parabola,
-    )
-    .unwrap();
-    criterion.bench_function("Capon of 17 samples, 1024 points and peak", |b| {
-        b.iter(|| capon.estimate(black_box(&lags), &mut scratch));
-    });
 }
 
 criterion_group!(benches, windows);

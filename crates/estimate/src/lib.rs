@@ -31,11 +31,11 @@
 //! | module | content |
 //! |---|---|
 //! | [`window`] | frequencies and velocities, windows and ranges, real and complex samples, missing ones, weightings |
-//! | [`spectrum`] | biased correlogram, also slid along a record; its power density on a whole grid and at chosen frequencies |
-//! | [`models`] | autoregressive models (31), their spectrum (32), order and poles |
-//! | [`estimators`] | periodogram (29), (30), lag window, pulse pair, autoregressive and Capon peaks, likelihood with tapers, with a gradient; their traits; when a peak is noise |
+//! | [`spectrum`] | biased correlogram, also slid along a record; its power density on a whole grid |
+//! | [`models`] | autoregressive models (31), their spectrum (32) |
+//! | [`estimators`] | periodogram (29), (30), pulse pair, autoregressive peak, first moment, likelihood with tapers; their traits; when a peak is noise |
 //! | [`map`] | regions, accumulation (Table 3) and n_eff, the radius that a variance needs; errors against the truth, (33); good estimates told from bad ones |
-//! | [`bound`] | Cramer-Rao bound on the velocity, and on velocity and gradient |
+//! | [`bound`] | Cramer-Rao bound on the velocity |
 //! | [`vortex_fit`] | circulation, position and core of a vortex pair from a velocity map or from all raw signals |
 //! | [`wake_detection`] | whether a scan holds a wake: threshold for a rate of false alarms, smallest circulation that is found |
 //! | [`retrieval`] | from one scan of any instrument to its vortices, or none; tracks |

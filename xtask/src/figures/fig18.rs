@@ -13,14 +13,12 @@ const NOISES: [(NoiseModel, &str); 2] = [
     (NoiseModel::BandLimited, "band"),
 ];
 /// Estimators that are drawn; the table has all.
-const DRAWN: [&str; 7] = [
+const DRAWN: [&str; 5] = [
     "PA",
     "CA, AR(16)",
-    "CA-BT, 16 lags",
     "first moment",
     "pulse pair",
     "likelihood",
-    "likelihood with gradient",
 ];
 /// Pulses of the picture.
 const DRAWN_PULSES: usize = 20;

@@ -8,7 +8,7 @@ use wakescope_sim::io::csv::Column;
 use wakescope_sim::measure::cell_average::CellAverage;
 use wakescope_sim::measure::map::VelocityEstimates;
 use wakescope_sim::scene::{
-    Flow, Method, ModelOrder, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion,
+    Autoregressive, Flow, Method, Outside, RefractiveTurbulence, SimulatedFlow, SimulatedMotion,
     Turbulence, VortexMotion, VortexPair, Weighting,
 };
 use wakescope_sim::setup::wind;
@@ -47,7 +47,7 @@ pub(super) const METHODS: [&str; 3] = ["PA", "PA, Gaussian", "CA"];
 /// The scene with one of the [`METHODS`].
 pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
     scene.estimator.method = match method {
-        "CA" => Method::Autoregressive(ModelOrder::default()),
+        "CA" => Method::Autoregressive(Autoregressive::default()),
         _ => Method::PeriodogramAccumulation {},
     };
     scene.estimator.weighting = if method == METHODS[1] {

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
 use std::ops::ControlFlow;
 use wakescope_estimate::bound::Noise;
-use wakescope_estimate::estimators::{ModelPeak, ModelReading};
+use wakescope_estimate::estimators::ModelPeak;
 use wakescope_estimate::map::good_and_bad;
 use wakescope_estimate::spectrum::unweighted_lags;
 use wakescope_estimate::vortex_fit::{
@@ -218,13 +218,11 @@ pub(super) fn orders() -> Result<Vec<Panel>, Failure> {
             format!("{snr_db} dB"),
             &[1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 48.0, (WINDOW - 1) as f64],
             |order| {
-                let (reading, order) = (ModelReading::Spectrum, order as usize);
                 let model = ModelPeak::new(
-                    reading,
                     &s,
                     SignalKind::Real,
                     WINDOW,
-                    order,
+                    order as usize,
                     2048,
                     Refinement::Parabola,
                 )?;

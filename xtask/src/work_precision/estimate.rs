@@ -11,8 +11,8 @@ use fixtures::uniform::{Air, BAND_M_S};
 use fixtures::{WINDOW, sampling};
 use wakescope_estimate::{
     Correlogram, Estimator, Refinement, Scratch, SignalKind, SpectralPeak, Statistic, Weighting,
-    bound::{GradientModel, Noise, WindowModel},
-    estimators::{GradientLikelihood, LagWindowPeak, ModelPeak, ModelReading},
+    bound::{Noise, WindowModel},
+    estimators::ModelPeak,
     map::good_and_bad,
     spectrum::unweighted_lags,
 };
@@ -132,14 +132,14 @@ impl Uniform {
     }
 
     fn rows(&self, case: &'static str, quick: bool) -> Result<Vec<Row>, Failure> {
-        let all = Methods::all(&self.known, &[WINDOWS])?;
+        let all = Methods::all(&self.known)?;
         let of = all.methods.iter().map(|method| {
             let statistic = all.statistics[method.statistic].as_ref();
             self.row(
                 [case, method.name, "none"],
                 0.0,
                 statistic,
-                method.estimators[0].as_ref(),
+                method.estimator.as_ref(),
             )
         });
         let mut rows = of.collect::<Result<Vec<_>, _>>()?;
@@ -165,44 +165,8 @@ impl Uniform {
         }
         for order in [4, 8, 16, 32] {
             let value = order as f64;
-            let ca = ModelPeak::new(
-                ModelReading::Spectrum,
-                &s,
-                kind,
-                WINDOW,
-                order,
-                2048,
-                Refinement::Parabola,
-            )?;
-            let capon = ModelPeak::new(
-                ModelReading::Capon,
-                &s,
-                kind,
-                WINDOW,
-                order,
-                2048,
-                Refinement::Parabola,
-            )?;
-            let lags = LagWindowPeak::new(
-                &s,
-                kind,
-                &unweighted_lags(WINDOW),
-                order,
-                1024,
-                Refinement::Parabola,
-            )?;
+            let ca = ModelPeak::new(&s, kind, WINDOW, order, 2048, Refinement::Parabola)?;
             rows.push(self.row([case, "CA by order", "order"], value, &plain, &ca)?);
-            rows.push(self.row([case, "Capon by order", "order"], value, &plain, &capon)?);
-            rows.push(self.row([case, "CA-BT by lags", "lags"], value, &plain, &lags)?);
-        }
-        let wind = GradientModel::new(&s, WINDOW, self.known.sigma_s, self.known.estimate_noise())?;
-        for gradients in [1, 3, 5, 9] {
-            let list: Vec<f64> = (0..gradients)
-                .map(|k| 0.1 * (k as f64 - 0.5 * (gradients - 1) as f64))
-                .collect();
-            let plan = GradientLikelihood::<f64>::new(&wind, self.known.snr, &list, 1024)?;
-            let of = [case, "likelihood by gradients", "gradients"];
-            rows.push(self.row(of, gradients as f64, &plan.statistic, &plan.estimator)?);
         }
         Ok(rows)
     }

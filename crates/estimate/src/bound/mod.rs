@@ -1,10 +1,8 @@
 //! The Cramer-Rao bound: covariances of windows and the information in them.
 
 mod extended;
-pub(crate) mod gradient;
 mod record;
 pub(crate) mod window_model;
 
-pub use gradient::{GradientBound, GradientModel};
 pub use record::RecordModel;
 pub use window_model::{Noise, WindowModel, bound_m_s};

@@ -5,8 +5,6 @@
 //! 1993). n independent windows lower it by sqrt(n). Check: a stored curve for a 200 ns pulse over -40 to
 //! 60 dB; a point target of known closed form; any difference quotient of the covariance.
 
-use std::ops::Mul;
-
 use ndarray::Array2;
 use ndarray_linalg::{Lapack, Scalar};
 use num_complex::Complex;
@@ -30,30 +28,20 @@ pub fn bound_m_s(
     derivative: &Array2<Complex<f64>>,
     windows: f64,
 ) -> Result<f64, Error> {
-    from_information(
-        information(kind, covariance, std::slice::from_ref(derivative))?[[0, 0]],
-        windows,
-    )
+    from_information(information(kind, covariance, derivative)?, windows)
 }
 
-/// Fisher information of one window on any parameters, \[i, j\]: tr(R^-1 dR_i R^-1 dR_j) if circular complex, half of that if real.
-///
-/// `derivatives` are those of the covariance \[n, n\] with respect to each parameter. The inverse of the sum over all
-/// windows bounds the covariance of any unbiased estimates.
-pub(crate) fn information(
+/// Fisher information of one window on a parameter: tr(R^-1 dR R^-1 dR) if circular complex, half of that if real.
+fn information(
     kind: SignalKind,
     covariance: &Array2<Complex<f64>>,
-    derivatives: &[Array2<Complex<f64>>],
-) -> Result<Array2<f64>, Error> {
+    derivative: &Array2<Complex<f64>>,
+) -> Result<f64, Error> {
     if kind == SignalKind::Complex {
-        return traces(covariance, derivatives);
+        return trace(covariance, derivative);
     }
     let real = |matrix: &Array2<Complex<f64>>| matrix.mapv(|value| value.re);
-    Ok(kind.one_sided_share()
-        * traces(
-            &real(covariance),
-            &derivatives.iter().map(real).collect::<Vec<_>>(),
-        )?)
+    Ok(kind.one_sided_share() * trace(&real(covariance), &real(derivative))?)
 }
 
 /// Least reciprocal condition of a covariance that is inverted, per unit of its order.
@@ -63,11 +51,11 @@ pub(crate) fn information(
 /// loses all meaning.
 pub(super) const LEAST_CONDITION: f64 = 32.0 * f64::EPSILON;
 
-/// tr(R^-1 dR_i R^-1 dR_j), unless R is no covariance or too near a singular matrix.
-fn traces<T: Scalar<Real = f64> + Lapack>(
+/// tr(R^-1 dR R^-1 dR), unless R is no covariance or too near a singular matrix.
+fn trace<T: Scalar<Real = f64> + Lapack>(
     covariance: &Array2<T>,
-    derivatives: &[Array2<T>],
-) -> Result<Array2<f64>, Error> {
+    derivative: &Array2<T>,
+) -> Result<f64, Error> {
     let (what, order) = ("covariance", covariance.nrows());
     length(what, order, covariance.ncols())?;
     let difference =
@@ -100,33 +88,24 @@ fn traces<T: Scalar<Real = f64> + Lapack>(
     if reciprocal_condition < least {
         return Err(refused(reciprocal_condition));
     }
+    length("derivative", order, derivative.nrows())?;
+    length("derivative", order, derivative.ncols())?;
     let adjoint = vectors.t().mapv(|value| value.conj());
-    let turned = |derivative: &Array2<T>| {
-        length("derivative", order, derivative.nrows())?;
-        length("derivative", order, derivative.ncols())?;
-        Ok(adjoint.dot(derivative).dot(&vectors))
+    let turned = adjoint.dot(derivative).dot(&vectors);
+    let of_pair = |((n, m), value): ((usize, usize), &T)| {
+        (*value * turned[[m, n]]).re() / (values[n] * values[m])
     };
-    let x = derivatives
-        .iter()
-        .map(turned)
-        .collect::<Result<Vec<_>, Error>>()?;
-    let trace = |(i, j): (usize, usize)| {
-        let of_pair = |((n, m), value): ((usize, usize), &T)| {
-            (*value * x[j][[m, n]]).re() / (values[n] * values[m])
-        };
-        x[i].indexed_iter().map(of_pair).sum()
-    };
-    Ok(Array2::from_shape_fn((x.len(), x.len()), trace))
+    Ok(turned.indexed_iter().map(of_pair).sum())
 }
 
 /// `bound` with the noise as it is; where its floor makes the covariance singular, says which floor would do.
 ///
 /// The smallest eigenvalue of the covariance is the floor's, so that the condition is proportional to it.
-pub(crate) fn with_floor_named<B>(
+fn with_floor_named(
     noise: Noise,
     window_samples: usize,
-    bound: impl Fn(Noise) -> Result<B, Error>,
-) -> Result<B, Error> {
+    bound: impl Fn(Noise) -> Result<f64, Error>,
+) -> Result<f64, Error> {
     let found = bound(noise);
     let (
         Noise::Band { floor },
@@ -266,7 +245,7 @@ pub(crate) fn turned(cycles: f64, lag: f64) -> f64 {
 }
 
 /// Carrier of a velocity and noise at the lags of a window: what makes the covariance of its samples from the envelope of the signal.
-pub(crate) struct Carrier {
+struct Carrier {
     window_samples: usize,
     /// Carrier and noise of the lags from -(N - 1) to N - 1.
     lags: Vec<[Complex<f64>; 2]>,
@@ -278,7 +257,7 @@ impl Carrier {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if `snr` is not above 0 or the velocity not finite; [`Error::Band`] for an impossible band.
-    pub(crate) fn new(
+    fn new(
         (sampling, noise): (&Sampling, Noise),
         window_samples: usize,
         velocity_m_s: f64,
@@ -312,15 +291,12 @@ impl Carrier {
     }
 
     /// Signal of that envelope on the carrier.
-    pub(crate) fn signal<E: Copy>(&self, envelope: &Array2<E>) -> Array2<Complex<f64>>
-    where
-        Complex<f64>: Mul<E, Output = Complex<f64>>,
-    {
+    fn signal(&self, envelope: &Array2<f64>) -> Array2<Complex<f64>> {
         Array2::from_shape_fn(envelope.dim(), |place| self.at(place)[0] * envelope[place])
     }
 
     /// Covariance of signal and noise.
-    pub(crate) fn covariance(&self, mut signal: Array2<Complex<f64>>) -> Array2<Complex<f64>> {
+    fn covariance(&self, mut signal: Array2<Complex<f64>>) -> Array2<Complex<f64>> {
         signal
             .indexed_iter_mut()
             .for_each(|(place, value)| *value += self.at(place)[1]);
@@ -328,7 +304,7 @@ impl Carrier {
     }
 
     /// Derivative of that with respect to velocity \[per m/s\].
-    pub(crate) fn by_velocity(&self, signal: &Array2<Complex<f64>>) -> Array2<Complex<f64>> {
+    fn by_velocity(&self, signal: &Array2<Complex<f64>>) -> Array2<Complex<f64>> {
         let turn =
             |(n, m): (usize, usize)| Complex::new(0.0, self.phase_slope * (n as f64 - m as f64));
         Array2::from_shape_fn(signal.dim(), |place| signal[place] * turn(place))

@@ -99,27 +99,15 @@ impl NoiseTest {
         padded_samples: usize,
         noise: Noise,
     ) -> Result<Self, Error> {
-        let complex = |taper: &Taper| {
+        let scaled = |taper: &Taper| {
             let root = taper.factor.abs().sqrt();
             taper
                 .weights
                 .iter()
                 .map(|h| Complex::from(h * root))
-                .collect::<Vec<_>>()
+                .collect()
         };
-        let tapers: Vec<_> = tapers.iter().map(complex).collect();
-        Self::of_complex(sampling, gates, &tapers, lag_weights, padded_samples, noise)
-    }
-
-    /// The same for tapers that are complex and hold the root of their factor.
-    pub(crate) fn of_complex(
-        sampling: &Sampling,
-        gates: &Gates,
-        tapers: &[Vec<C64>],
-        lag_weights: Option<&[f64]>,
-        padded_samples: usize,
-        noise: Noise,
-    ) -> Result<Self, Error> {
+        let tapers: Vec<Vec<C64>> = tapers.iter().map(scaled).collect();
         let samples = tapers.first().map_or(0, Vec::len);
         gates.validate()?;
         not_empty("tapers", samples)?;
@@ -137,7 +125,7 @@ impl NoiseTest {
         } else {
             bins.bins.saturating_sub(2) as f64 / padded
         };
-        let form = Form::new(sampling, tapers, lag_weights, noise)?;
+        let form = Form::new(sampling, &tapers, lag_weights, noise)?;
         let (mean, deviation) = form.seen(0.0);
         positive("power of the weights of the lags", deviation)?;
         let part = |part: usize| {

@@ -12,8 +12,9 @@
 
 use crate::error::{Error, positive};
 use crate::estimators::{
-    Estimator, GateVelocity, LagWindowPeak, Quality, Refinement, SpectralPeak, search,
+    Estimator, GateVelocity, Quality, Refinement, SpectralPeak, model_lag_weights, search,
 };
+use crate::models::autoregressive::check_order;
 use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Iterations of the window about the centroid.
@@ -22,7 +23,9 @@ const ITERATIONS: usize = 6;
 /// First moment of the spectrum about its main peak.
 #[derive(Clone)]
 pub struct FirstMoment {
-    start: LagWindowPeak,
+    /// Hann window of lags (Blackman and Tukey 1958), and the search in the spectrum that it smooths.
+    lag_window: Vec<f64>,
+    smooth: SpectralPeak,
     spectrum: SpectralPeak,
     /// Half of the window in standard deviations of the density in it.
     reach: f64,
@@ -36,7 +39,7 @@ impl FirstMoment {
     /// `reach` is the half width of the window about the centroid in standard deviations of the density in it, 1.5 to 3.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] with less than 4 lags or a reach that is not above 0; [`Error::Band`] for an impossible band.
+    /// [`Error::OutOfRange`] with less than 2 lags or a reach that is not above 0; [`Error::Band`] for an impossible band.
     pub fn new(
         sampling: &Sampling,
         kind: SignalKind,
@@ -45,16 +48,19 @@ impl FirstMoment {
         reach: f64,
     ) -> Result<Self, Error> {
         positive("reach", reach)?;
-        let (refinement, lags) = (Refinement::Parabola, lag_weights.len());
+        let refinement = Refinement::Parabola;
+        let lags = lag_weights.len();
+        let reach_lags = (lags / 4).max(1);
+        check_order(reach_lags, lags)?;
+        let lag_window = model_lag_weights(reach_lags - 1);
+        let weights: Vec<f64> = lag_window
+            .iter()
+            .zip(lag_weights)
+            .map(|(window, own)| window * own)
+            .collect();
         Ok(Self {
-            start: LagWindowPeak::new(
-                sampling,
-                kind,
-                lag_weights,
-                (lags / 4).max(1),
-                padded_samples,
-                refinement,
-            )?,
+            smooth: SpectralPeak::new(sampling, kind, &weights, padded_samples, refinement)?,
+            lag_window,
             spectrum: SpectralPeak::new(sampling, kind, lag_weights, padded_samples, refinement)?,
             reach,
             // the main lobe of the window
@@ -69,7 +75,12 @@ impl Estimator for FirstMoment {
     }
 
     fn estimate(&self, mean: &[f64], scratch: &mut Scratch) -> GateVelocity {
-        let smooth = self.start.smooth(mean, scratch);
+        let kind = self.smooth.search.kind;
+        let mut numbers = std::mem::take(&mut scratch.numbers);
+        numbers.clear();
+        numbers.extend(kind.weighted_lags(mean, &self.lag_window));
+        let smooth = self.smooth.estimate(&numbers, scratch);
+        scratch.numbers = numbers;
         let peak = self.spectrum.estimate(mean, scratch);
         if peak.flag != Quality::Good || smooth.flag != Quality::Good {
             return peak;

@@ -1,34 +1,27 @@
 //! From an accumulated correlogram to a velocity with width, SNR and flags; the traits for estimators of one's own.
 
 pub(crate) mod cell_test;
-pub(crate) mod correlogram_estimators;
 pub(crate) mod detection;
 pub(crate) mod first_moment;
-pub(crate) mod gradient_likelihood;
-pub(crate) mod gradient_tapers;
 pub(crate) mod likelihood;
-pub(crate) mod model_peaks;
+pub(crate) mod model_peak;
 pub(crate) mod noise_floor;
 pub(crate) mod peak;
 pub(crate) mod periodogram;
+pub(crate) mod pulse_pair;
 pub(crate) mod search;
 pub(crate) mod statistic;
 pub(crate) mod tails;
-pub(crate) mod unbiased;
 pub(crate) mod velocity;
 
 pub use cell_test::CellTest;
-pub use correlogram_estimators::{LagWindowPeak, PulsePair};
 pub use detection::{NoiseTest, RegionNoise};
 pub use first_moment::FirstMoment;
-pub use gradient_likelihood::{
-    GradientLikelihood, GradientPeak, GradientStatistic, GradientVelocity,
-};
 pub use likelihood::likelihood_tapers;
-pub use model_peaks::{ModelPeak, ModelReading, model_lag_weights};
+pub use model_peak::{ModelPeak, model_lag_weights};
 pub use noise_floor::noise_floor;
 pub use peak::SpectralPeak;
 pub use periodogram::{PeriodogramOptions, PeriodogramPlan};
+pub use pulse_pair::PulsePair;
 pub use statistic::{Estimator, Statistic, estimate_window};
-pub use unbiased::Unbiased;
 pub use velocity::{GateVelocity, Quality, Refinement, RunnerUp};

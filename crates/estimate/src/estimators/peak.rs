@@ -7,7 +7,6 @@
 use crate::error::Error;
 use crate::estimators::search::{PeakSearch, unusable};
 use crate::estimators::{Estimator, GateVelocity, Quality, Refinement};
-use crate::spectrum::density_at;
 use crate::window::{Sampling, Scratch, SignalKind};
 
 /// Highest peak of the spectrum of an accumulated correlogram inside the detector band.
@@ -32,12 +31,7 @@ impl SpectralPeak {
         padded_samples: usize,
         refinement: Refinement,
     ) -> Result<Self, Error> {
-        let search = PeakSearch::new(
-            sampling,
-            kind,
-            (padded_samples, padded_samples),
-            lag_weights,
-        )?;
+        let search = PeakSearch::new(sampling, kind, padded_samples, lag_weights)?;
         Ok(Self { search, refinement })
     }
 
@@ -69,40 +63,6 @@ impl SpectralPeak {
             .density_into(correlogram, &mut scratch.band)?;
         Ok(&scratch.band[1..=self.search.band.bins])
     }
-
-    /// Frequency \[Hz\] of the maximum of the exact spectrum within one bin of `top`.
-    fn exact(&self, correlogram: &[f64], top: i64, start: f64) -> f64 {
-        let padded = self.search.padded as f64;
-        let at = |bin: f64| {
-            let frequency_hz = self.search.band.frequency_hz(bin);
-            density_at(
-                correlogram,
-                self.search.kind,
-                frequency_hz,
-                &self.search.sampling,
-            )
-        };
-        // d(angle)/d(bin) turns the derivatives into those per bin
-        let per_bin = std::f64::consts::TAU / padded;
-        let (mut low, mut high) = (top as f64 - 1.0, top as f64 + 1.0);
-        let mut bin = start;
-        for _ in 0..60 {
-            let [_, slope, curvature] = at(bin);
-            (low, high) = if slope > 0.0 { (bin, high) } else { (low, bin) };
-            let newton = bin - slope / (curvature * per_bin);
-            let next = if curvature < 0.0 && newton > low && newton < high {
-                newton
-            } else {
-                0.5 * (low + high)
-            };
-            let moved = (next - bin).abs();
-            bin = next;
-            if moved < 1e-12 * padded {
-                break;
-            }
-        }
-        self.search.band.frequency_hz(bin)
-    }
 }
 
 impl Estimator for SpectralPeak {
@@ -114,13 +74,9 @@ impl Estimator for SpectralPeak {
         if let Some(flag) = unusable(mean) {
             return GateVelocity::none(flag);
         }
-        let Some(found) = self.search.find(mean, self.refinement, false, scratch) else {
-            return GateVelocity::none(Quality::Invalid);
-        };
-        let frequency_hz = match (self.refinement, found.flag) {
-            (Refinement::Exact, Quality::Good) => self.exact(mean, found.top, found.bin),
-            _ => self.search.band.frequency_hz(found.bin),
-        };
-        self.search.velocity(&found, frequency_hz)
+        match self.search.find(mean, self.refinement, scratch) {
+            Some(found) => self.search.velocity(&found),
+            None => GateVelocity::none(Quality::Invalid),
+        }
     }
 }

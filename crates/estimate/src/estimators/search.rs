@@ -56,7 +56,7 @@ pub(crate) struct PeakSearch {
     pub(crate) sampling: Sampling,
     pub(crate) band: Band,
     pub(crate) kind: SignalKind,
-    pub(crate) padded: usize,
+    padded: usize,
     /// Spectrum at the frequencies of the band and one neighbour on each side, and on a whole grid.
     pub(crate) zoom: ZoomSpectrum,
     whole: LagSpectrum,
@@ -71,7 +71,6 @@ pub(crate) struct PeakSearch {
 
 /// What the search found.
 pub(crate) struct Located {
-    pub(crate) top: i64,
     /// Fractional bin of the peak in the band.
     pub(crate) bin: f64,
     pub(crate) peak: f64,
@@ -91,16 +90,15 @@ struct Lobe {
 }
 
 impl PeakSearch {
-    /// For the spectrum of correlograms whose lags have those weights, sought among `padded` frequencies over 0 .. F_s; lines outside the
-    /// band are seen among `whole` ones.
+    /// For the spectrum of correlograms whose lags have those weights, sought among `padded` frequencies over 0 .. F_s.
     pub(crate) fn new(
         sampling: &Sampling,
         kind: SignalKind,
-        (padded, whole): (usize, usize),
+        padded: usize,
         lag_weights: &[f64],
     ) -> Result<Self, Error> {
         let lags = lag_weights.len();
-        let whole = LagSpectrum::new(kind, lags, whole)?;
+        let whole = LagSpectrum::new(kind, lags, padded)?;
         let band = Band::new(sampling, kind, padded)?;
         let zoom = ZoomSpectrum::new(kind, lags, sampling, &band.with_neighbours_hz())?;
         let line = LagSpectrum::new(SignalKind::Real, lags, padded.max(8 * lags))?;
@@ -132,13 +130,11 @@ impl PeakSearch {
         self.whole.numbers()
     }
 
-    /// The peak of the spectrum of a correlogram. With `mirrored` the complex lags are those of real samples, whose image may be the
-    /// higher line. `None` for another number of lags.
+    /// The peak of the spectrum of a correlogram; `None` for another number of lags.
     pub(crate) fn find(
         &self,
         lags: &[f64],
         refinement: Refinement,
-        mirrored: bool,
         scratch: &mut Scratch,
     ) -> Option<Located> {
         let mut band = std::mem::take(&mut scratch.band);
@@ -147,14 +143,7 @@ impl PeakSearch {
             let density = self.whole.density(lags, scratch).ok()?;
             let (place, highest) = highest(density);
             let place = place as f64 / density.len() as f64;
-            Some((
-                highest,
-                if mirrored {
-                    place.min(1.0 - place)
-                } else {
-                    place
-                },
-            ))
+            Some((highest, place))
         });
         scratch.band = band;
         Some(found)
@@ -190,7 +179,6 @@ impl PeakSearch {
             if is_doubtful { anywhere() } else { None },
         );
         Located {
-            top: top as i64,
             bin,
             peak,
             sum,
@@ -199,8 +187,8 @@ impl PeakSearch {
         }
     }
 
-    /// The estimate for a peak placed at `frequency_hz`.
-    pub(crate) fn velocity(&self, found: &Located, frequency_hz: f64) -> GateVelocity {
+    /// The estimate for a peak that was found.
+    pub(crate) fn velocity(&self, found: &Located) -> GateVelocity {
         let power = self.power(found.sum);
         if found.flag == Quality::NoSignal {
             return GateVelocity {
@@ -214,7 +202,9 @@ impl PeakSearch {
             0.5 * self.sampling.wavelength_m * self.sampling.sample_rate_hz / self.padded as f64;
         let square_m2_s2 = bin_m_s * bin_m_s;
         GateVelocity {
-            velocity_m_s: self.sampling.velocity_m_s(frequency_hz),
+            velocity_m_s: self
+                .sampling
+                .velocity_m_s(self.band.frequency_hz(found.bin)),
             power,
             quality: found.peak * bins / found.sum,
             detection: found.peak,

@@ -17,8 +17,6 @@ pub enum Quality {
     /// The peak sits on an edge of the band, or what the band holds can be sidelobes of a line
     /// outside. The velocity is that of the highest density in the band and should not be used.
     OutOfBand,
-    /// The pole of a model lies where its spectrum has no peak.
-    Ambiguous,
     /// Samples or spectrum are not finite. Velocity is NaN.
     Invalid,
     /// No valid window in the region. Velocity is NaN.
@@ -57,8 +55,8 @@ pub struct GateVelocity {
     /// against noise; NaN where unknown.
     ///
     /// It is the peak itself, but for models, which take that of their lags under a Hann window
-    /// ([`model_lag_weights`](crate::estimators::model_lag_weights)), and for the likelihood with gradient, which takes that of the
-    /// gradient nearest to 0. [`NoiseTest`](crate::estimators::NoiseTest) tells what noise alone reaches.
+    /// ([`model_lag_weights`](crate::estimators::model_lag_weights)). [`NoiseTest`](crate::estimators::NoiseTest) has the level that noise
+    /// alone reaches.
     pub detection: f64,
     /// Variance of the velocities that the main peak stands for \[m^2/s^2\]: that of the Gaussian spectrum whose peak is as wide at half
     /// height above the floor, through the weights that the method gives its lags. Below 0 where the peak is narrower than that of a line,
@@ -135,8 +133,6 @@ pub enum Refinement {
     /// Parabola through the logarithm of the highest bin and its neighbours.
     #[default]
     Parabola,
-    /// Maximum of the exact spectrum, by Newton steps from the parabola, to round-off.
-    Exact,
     /// Not at all: the frequency of the highest bin, as (30) is printed.
     None,
 }

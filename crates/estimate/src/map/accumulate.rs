@@ -7,18 +7,16 @@
 //! are left out and leave every bit of the other regions.
 
 use std::collections::BTreeMap;
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use ndarray::ArrayView2;
-use num_complex::Complex;
 
 use crate::error::{Error, length, not_negative};
 use crate::estimators::{Estimator, GateVelocity, Quality, Statistic};
 use crate::map::region::effective;
 use crate::map::{Chord, PolarPoint, ScanGeometry, WindowCorrelation};
 use crate::parallel::map_indexed;
-use crate::window::{Gates, MissingSamples, Sample, Sampling, Scratch, SignalKind};
+use crate::window::{Gates, MissingSamples, Sample, Sampling, Scratch};
 
 mod streamed;
 
@@ -187,36 +185,12 @@ impl Scan {
         correlation: Option<&WindowCorrelation>,
         estimator: &(impl Estimator + ?Sized),
     ) -> Result<Vec<MapPoint>, Error> {
-        let n_eff = |point, radius_m| {
-            correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma))
-        };
-        self.velocities(
-            (points, radius),
-            self.numbers,
-            |point, radius_m, mean| {
-                Ok((
-                    self.region_mean(point, radius_m, mean)?,
-                    n_eff(point, radius_m),
-                ))
-            },
-            estimator,
-        )
-    }
-
-    /// Velocities at points from means of so many numbers that `region` writes, giving the number of windows and n_eff.
-    fn velocities(
-        &self,
-        (points, radius): (&[PolarPoint], &Radius),
-        numbers: usize,
-        region: impl Fn(PolarPoint, f64, &mut [f64]) -> Result<(usize, f64), Error> + Sync + Send,
-        estimator: &(impl Estimator + ?Sized),
-    ) -> Result<Vec<MapPoint>, Error> {
-        length("statistic", estimator.statistic_len(), numbers)?;
-        let state = || (Scratch::new(), vec![0.0; numbers]);
+        length("statistic", estimator.statistic_len(), self.numbers)?;
+        let state = || (Scratch::new(), vec![0.0; self.numbers]);
         let found = map_indexed(points.len(), state, |(scratch, mean), index| {
             let point = points[index];
             let radius_m = radius.at_m(point.range_m)?;
-            let (level, n_eff) = region(point, radius_m, mean)?;
+            let level = self.region_mean(point, radius_m, mean)?;
             let mut estimate = GateVelocity::none(Quality::Empty);
             if level > 0 {
                 estimate = estimator.estimate(mean, scratch);
@@ -228,96 +202,10 @@ impl Scan {
                 estimate,
                 level,
                 left_out: windows - level,
-                n_eff,
+                n_eff: correlation.map_or(f64::NAN, |gamma| self.n_eff(point, radius_m, gamma)),
             })
         });
         found.into_iter().collect()
-    }
-
-    /// Mean correlogram of the valid windows within `radius_m` of `point`, each line of sight shifted to the velocity
-    /// of the point first.
-    ///
-    /// `relative_m_s` tells by how much the wind at a place of the region is faster than at the point: the difference
-    /// of a first map, or a model. What differs between the lines then adds up in place instead of blurring the
-    /// spectrum. The statistic must be a correlogram of the given kind; `mean` is always complex (two numbers per
-    /// lag), for an estimator planned for [`SignalKind::Complex`]. The mirror image of real samples moves along and
-    /// stays outside the band. Returns the number of windows.
-    ///
-    /// # Errors
-    /// [`Error::Length`] if `mean` has not two places per lag.
-    fn region_mean_following(
-        &self,
-        (point, radius_m): (PolarPoint, f64),
-        (kind, sampling): (SignalKind, &Sampling),
-        relative_m_s: &dyn Fn(PolarPoint) -> f64,
-        mean: &mut [f64],
-    ) -> Result<usize, Error> {
-        let lags = self.numbers / kind.lag_numbers(1);
-        length("mean", 2 * lags, mean.len())?;
-        mean.fill(0.0);
-        let mut sum = vec![0.0; self.numbers];
-        let mut level = 0;
-        for chord in self.chords(point, radius_m) {
-            level += self.valid(chord);
-            sum.fill(0.0);
-            self.add_chord(chord, &mut sum);
-            let place = self.geometry.middle(chord);
-            let shift_m_s = relative_m_s(place);
-            let shift_m_s = if shift_m_s.is_finite() {
-                shift_m_s
-            } else {
-                0.0
-            };
-            // a faster wind has the lower frequency: turn it up
-            let step = Complex::from_polar(
-                1.0,
-                2.0 * TAU * shift_m_s / (sampling.wavelength_m * sampling.sample_rate_hz),
-            );
-            let mut turn = Complex::new(1.0, 0.0);
-            for (m, pair) in mean.as_chunks_mut::<2>().0.iter_mut().enumerate() {
-                let lag = kind.lag(&sum, m) * turn;
-                pair[0] += lag.re;
-                pair[1] += lag.im;
-                turn *= step;
-            }
-        }
-        if level > 0 {
-            mean.iter_mut().for_each(|value| *value /= level as f64);
-        }
-        Ok(level)
-    }
-
-    /// Velocities at `points` by `Scan::region_mean_following`; `guess_m_s` gives the wind of a first estimate
-    /// anywhere, NaN where it has none.
-    ///
-    /// # Errors
-    /// As [`Scan::map`]; the estimator takes complex correlograms with as many lags as this scan has.
-    pub fn map_following(
-        &self,
-        points: &[PolarPoint],
-        radius: &Radius,
-        kind: SignalKind,
-        sampling: &Sampling,
-        guess_m_s: &(dyn Fn(PolarPoint) -> f64 + Sync),
-        estimator: &(impl Estimator + ?Sized),
-    ) -> Result<Vec<MapPoint>, Error> {
-        let numbers = 2 * self.numbers / kind.lag_numbers(1);
-        self.velocities(
-            (points, radius),
-            numbers,
-            |point, radius_m, mean| {
-                let here_m_s = guess_m_s(point);
-                let relative = |place: PolarPoint| guess_m_s(place) - here_m_s;
-                let level = self.region_mean_following(
-                    (point, radius_m),
-                    (kind, sampling),
-                    &relative,
-                    mean,
-                )?;
-                Ok((level, f64::NAN))
-            },
-            estimator,
-        )
     }
 
     /// Effective number of independent windows of a region, (sum n)^2 / sum of gamma^2 over pairs of one pulse.

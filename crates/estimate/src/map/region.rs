@@ -285,15 +285,6 @@ impl ScanGeometry {
         start..(place(high_m).ceil().max(0.0) as usize + 1).clamp(start + 1, self.gates)
     }
 
-    /// The middle of a chord.
-    pub(crate) fn middle(&self, chord: Chord) -> PolarPoint {
-        let gate = 0.5 * (chord.first + chord.last) as f64;
-        PolarPoint {
-            range_m: self.first_range_m + gate * self.spacing_m,
-            elevation_rad: self.lines[chord.line],
-        }
-    }
-
     /// Chords of the disc of radius `radius_m` \[m\] about `point`, by increasing elevation.
     ///
     /// A window on the circle counts as inside (up to a millionth of the gate spacing).

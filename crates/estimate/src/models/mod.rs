@@ -1,7 +1,6 @@
-//! Autoregressive models of a correlogram: the recursion, the order, the poles.
+//! Autoregressive models of a correlogram.
 
 pub(crate) mod autoregressive;
 pub(crate) mod levinson;
-pub(crate) mod poles;
 
-pub use autoregressive::{Autoregression, OrderChoice};
+pub use autoregressive::Autoregression;

@@ -7,6 +7,6 @@ pub(crate) mod transform;
 pub(crate) mod zoom;
 
 pub use correlogram::{Correlogram, Taper, unweighted_lags};
-pub use lag_spectrum::{LagSpectrum, density_at};
+pub use lag_spectrum::LagSpectrum;
 pub use sliding::ShortCorrelogram;
 pub use zoom::ZoomSpectrum;

@@ -25,8 +25,6 @@ pub struct Scratch {
     pub(crate) transform: Vec<Complex<f64>>,
     /// Correlogram on its way into a transform.
     pub(crate) numbers: Vec<f64>,
-    /// Correlogram on its way into an estimator of unbiased ones.
-    pub(crate) unbiased: Vec<f64>,
     /// Autoregressive model.
     pub(crate) model: Autoregression,
     /// Power spectrum of one window.

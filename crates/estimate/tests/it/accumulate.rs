@@ -310,16 +310,7 @@ fn maps<S: Sample>(records: &Array2<S>) -> Vec<MapPoint> {
     };
     let whole = PeriodogramPlan::<S>::new(&sampling, 64, &PeriodogramOptions::default()).unwrap();
     let short = ShortCorrelogram::<S>::new(64, 17).unwrap();
-    let model = ModelPeak::new(
-        ModelReading::Spectrum,
-        &sampling,
-        S::KIND,
-        17,
-        16,
-        512,
-        Refinement::Parabola,
-    )
-    .unwrap();
+    let model = ModelPeak::new(&sampling, S::KIND, 17, 16, 512, Refinement::Parabola).unwrap();
     let scans: [(Scan, &dyn Estimator); 2] = [
         (
             Scan::new(

@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::{
     Sampling, SignalKind,
-    bound::{GradientModel, Noise, WindowModel},
+    bound::{Noise, WindowModel},
     window::Sample,
 };
 
@@ -93,7 +93,7 @@ impl<S: Draw> Windows<S> {
     }
 }
 
-/// Real or complex windows of wind with any velocity: signal of unit power and a constant gradient, white or band noise.
+/// Real windows of wind with any velocity: signal of unit power, white or band noise.
 pub(crate) struct Wind {
     signal: Windows<Complex<f64>>,
     noise: Windows<f64>,
@@ -101,47 +101,23 @@ pub(crate) struct Wind {
 }
 
 impl Wind {
-    /// The 200 ns pulse in windows of 64 samples; `noise` is that of real windows, complex ones get white noise.
-    pub(crate) fn new(sampling: &Sampling, gradient_per_s: f64, snr: f64, noise: Noise) -> Self {
+    /// The 200 ns pulse in windows of 64 samples.
+    pub(crate) fn new(sampling: &Sampling, snr: f64, noise: Noise) -> Self {
         let rest = Sampling {
             intermediate_frequency_hz: 0.0,
             band_hz: (-25e6, 25e6),
             ..*sampling
         };
-        let model = GradientModel::new(&rest, 64, sigma_s(200e-9), Noise::White).unwrap();
-        let [signal, ..] = model
-            .covariance(0.0, gradient_per_s, 1e12, SignalKind::Complex)
-            .unwrap();
+        let model = WindowModel::gaussian_pulse(&rest, 64, sigma_s(200e-9), Noise::White).unwrap();
+        let [signal, _] = model.covariance(0.0, 1e12, SignalKind::Complex).unwrap();
         let real = WindowModel::gaussian_pulse(sampling, 64, sigma_s(200e-9), noise).unwrap();
-        let kind = if sampling.band_hz.0 < 0.0 {
-            SignalKind::Complex
-        } else {
-            SignalKind::Real
-        };
-        let at = |snr: f64| real.covariance(0.0, snr, kind).unwrap()[0].clone();
+        let at = |snr: f64| real.covariance(0.0, snr, SignalKind::Real).unwrap()[0].clone();
         let noise = (at(snr) - at(1e15)).mapv(|value| Complex::from(value.re));
         Self {
             signal: Windows::new(&signal),
             noise: Windows::new(&noise),
             sampling: *sampling,
         }
-    }
-
-    pub(crate) fn complex(
-        &self,
-        velocity_m_s: f64,
-        rng: &mut Xoshiro256PlusPlus,
-    ) -> Vec<Complex<f64>> {
-        let turn = std::f64::consts::TAU
-            * self.sampling.frequency_hz(velocity_m_s)
-            * self.sampling.period_s();
-        let mut window = self.signal.draw(rng);
-        let (re, im) = (self.noise.draw(rng), self.noise.draw(rng));
-        for (n, value) in window.iter_mut().enumerate() {
-            *value = *value * Complex::from_polar(1.0, turn * n as f64)
-                + Complex::new(re[n], im[n]) * 0.5_f64.sqrt();
-        }
-        window
     }
 
     pub(crate) fn real(&self, velocity_m_s: f64, rng: &mut Xoshiro256PlusPlus) -> Vec<f64> {

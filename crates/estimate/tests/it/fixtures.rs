@@ -1,5 +1,6 @@
 //! Table 2 of the chapter, noise and tones; the correlogram written out.
 
+use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -39,6 +40,23 @@ pub(crate) fn tone(velocity_m_s: f64, phase_rad: f64) -> Vec<f64> {
         .collect()
 }
 
+/// Density of a correlogram at one frequency: the sum over all its lags.
+pub(crate) fn density_at(
+    lags: &[f64],
+    kind: SignalKind,
+    frequency_hz: f64,
+    sampling: &Sampling,
+) -> f64 {
+    let turn = std::f64::consts::TAU * frequency_hz / sampling.sample_rate_hz;
+    let mut sum = 0.0;
+    for (m, lag) in lags.chunks(kind.lag_numbers(1)).enumerate() {
+        let lag = Complex::new(lag[0], lag.get(1).copied().unwrap_or(0.0));
+        let weight = if m == 0 { 1.0 } else { 2.0 };
+        sum += weight * (lag * Complex::from_polar(1.0, -turn * m as f64)).re;
+    }
+    sum
+}
+
 /// The biased correlogram written out as a double sum.
 pub(crate) fn correlogram_by_sum<S: Sample>(window: &[S], weights: &[f64]) -> Vec<f64> {
     let energy: f64 = weights.iter().map(|h| h * h).sum();
@@ -52,7 +70,7 @@ pub(crate) fn correlogram_by_sum<S: Sample>(window: &[S], weights: &[f64]) -> Ve
             .iter()
             .zip(&weighted)
             .map(|(ahead, behind)| ahead * behind.conj());
-        let lag = products.sum::<num_complex::Complex<f64>>() / energy;
+        let lag = products.sum::<Complex<f64>>() / energy;
         [lag.re, lag.im]
             .into_iter()
             .take(if S::KIND == SignalKind::Real { 1 } else { 2 })

@@ -1,6 +1,6 @@
 //! The tapered likelihood against the quadratic form, and its estimates against the Cramer-Rao bound.
 
-use crate::fixtures::{baseband, sigma_s};
+use crate::fixtures::{baseband, density_at, sigma_s};
 use approx::assert_relative_eq;
 use ndarray::Array1;
 use num_complex::Complex;
@@ -80,7 +80,7 @@ fn weighted_tapered_periodograms_are_the_quadratic_form_of_the_likelihood() {
             SignalKind::Complex,
             baseband().frequency_hz(v_m_s),
             &baseband(),
-        )[0]
+        )
     };
     // independent: x^H R^-1 x by conjugate gradients on the full covariance
     let x = Array1::from(window);
@@ -133,7 +133,7 @@ fn likelihood_estimates_reach_the_bound_of_twenty_windows() {
             SignalKind::Complex,
             &unweighted_lags(64),
             1024,
-            Refinement::Exact,
+            Refinement::Parabola,
         )
         .unwrap();
         let (mut scratch, mut one) = (Scratch::new(), vec![0.0; 128]);

@@ -176,32 +176,23 @@ fn noise_free_tones_keep_their_velocity_within_the_leakage() {
         ..PeriodogramOptions::default()
     };
     for (options, bar_m_s) in [(rectangular, 0.09), (PeriodogramOptions::default(), 0.04)] {
-        for refinement in [Refinement::Parabola, Refinement::Exact] {
-            let options = PeriodogramOptions {
-                refinement,
-                ..options
-            };
-            let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
-            let mut worst_m_s = 0.0_f64;
-            for step in 0..60 {
-                let velocity_m_s = -18.0 + 0.61 * step as f64;
-                let window = tone(velocity_m_s, step as f64);
-                let found = plan.velocity(&window, &mut scratch).unwrap();
-                assert_eq!(found.flag, Quality::Good);
-                worst_m_s = worst_m_s.max((found.velocity_m_s - velocity_m_s).abs());
-            }
-            assert!(worst_m_s < bar_m_s, "{options:?}: {worst_m_s}");
+        let plan = PeriodogramPlan::<f64>::new(&table_2(), 64, &options).unwrap();
+        let mut worst_m_s = 0.0_f64;
+        for step in 0..60 {
+            let velocity_m_s = -18.0 + 0.61 * step as f64;
+            let window = tone(velocity_m_s, step as f64);
+            let found = plan.velocity(&window, &mut scratch).unwrap();
+            assert_eq!(found.flag, Quality::Good);
+            worst_m_s = worst_m_s.max((found.velocity_m_s - velocity_m_s).abs());
         }
+        assert!(worst_m_s < bar_m_s, "{options:?}: {worst_m_s}");
     }
 }
 
 #[test]
-fn complex_tones_have_no_image_and_come_out_exactly() {
+fn complex_tones_have_no_image_and_keep_their_velocity() {
     let sampling = Sampling::baseband(250e6, 1.55e-6, 50e6).unwrap();
-    let options = PeriodogramOptions {
-        refinement: Refinement::Exact,
-        ..PeriodogramOptions::default()
-    };
+    let options = PeriodogramOptions::default();
     let plan = PeriodogramPlan::<Complex<f64>>::new(&sampling, 64, &options).unwrap();
     for velocity_m_s in [-18.3, -3.7, 0.0, 0.001, 7.77] {
         let turn = std::f64::consts::TAU * sampling.frequency_hz(velocity_m_s) / 250e6;
@@ -209,7 +200,7 @@ fn complex_tones_have_no_image_and_come_out_exactly() {
             .map(|n| Complex::from_polar(2.0, turn * n as f64))
             .collect();
         let found = plan.velocity(&window, &mut Scratch::new()).unwrap();
-        assert_abs_diff_eq!(found.velocity_m_s, velocity_m_s, epsilon = 1e-9);
+        assert_abs_diff_eq!(found.velocity_m_s, velocity_m_s, epsilon = 1e-4);
         // the power is the square of the amplitude, all in the band unless its edge is near
         if velocity_m_s > -10.0 {
             assert_relative_eq!(found.power, 4.0, max_relative = 1e-3);

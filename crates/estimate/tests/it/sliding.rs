@@ -125,7 +125,6 @@ fn a_scan_of_short_correlograms_maps_like_one_of_all_lags() {
     );
     let ca = |lags| {
         ModelPeak::new(
-            ModelReading::Spectrum,
             &sampling,
             SignalKind::Real,
             lags,

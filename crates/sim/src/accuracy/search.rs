@@ -355,10 +355,7 @@ impl Search<'_> {
             .next_power_of_two()
             .min(1 << 20)
             .max(scene.estimator.padded_samples) as f64;
-        let has_spectrum = !matches!(
-            scene.estimator.method,
-            Method::PulsePair {} | Method::AutoregressivePole(_)
-        );
+        let has_spectrum = scene.estimator.method != (Method::PulsePair {});
         self.fine = with(&self.fine, &[(WINDOW_STEP, 1.0)])?;
         if has_spectrum {
             self.fine = with(&self.fine, &[(PADDED, most)])?;

@@ -7,10 +7,9 @@ use crate::Error;
 use crate::measure::gate_estimates::GateEstimate;
 use crate::measure::scan::median_snr;
 use crate::plan::Plan;
-use crate::setup::estimators::{self, Toolkit, WindowStatistics};
+use crate::setup::estimators::{self, Toolkit};
 use crate::setup::ray_information::RayInformation;
-use crate::setup::region::{interpolated, region_radius};
-use ndarray::Array2;
+use crate::setup::region::region_radius;
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -59,24 +58,11 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         layer_snr: &[(f64, f64)],
         places: &ScanGeometry,
     ) -> Result<Self, Error> {
-        let (scene, g) = (&plan.scene.content, &plan.geometry);
+        let scene = &plan.scene.content;
         let covariance = estimators::window_covariance(scene, &plan.instrument.pulse)?;
         let of_rays = RayInformation::new(plan, layer_snr)?;
         let radius = region_radius(&of_rays, places)?;
-        let lines = places.line_elevation_rad();
-        let middle = PolarPoint {
-            range_m: g.gate_range_m[g.gate_range_m.len() / 2],
-            elevation_rad: lines[lines.len() / 2],
-        };
-        let correlation = covariance.correlation(of_rays.of_windows(&[middle.range_m])?[0])?;
-        let n_eff = places
-            .level(middle, radius.at_m(middle.range_m)?, &correlation)
-            .1;
-        let known = WindowStatistics {
-            snr: median_snr(layer_snr),
-            n_eff,
-        };
-        let tools = Toolkit::new(scene, &plan.instrument, &known)?;
+        let tools = Toolkit::new(scene, &plan.instrument, median_snr(layer_snr))?;
         Ok(Self {
             plan,
             tools,
@@ -109,32 +95,12 @@ impl<'p, S: Sample> MapEstimator<'p, S> {
         points: &[PolarPoint],
         noise: &NoiseAtPoints,
     ) -> Result<Vec<GateEstimate>, Error> {
-        let Toolkit {
-            estimator,
-            following,
-            ..
-        } = &self.tools;
-        let mut found = scan.map(points, &self.radius, None, &**estimator)?;
+        let found = scan.map(points, &self.radius, None, &*self.tools.estimator)?;
         let gates = points
             .iter()
             .take_while(|p| p.elevation_rad == points[0].elevation_rad)
             .count()
             .max(1);
-        if let Some(following) = following {
-            let shape = (points.len() / gates, gates);
-            let velocity_m_s =
-                Array2::from_shape_fn(shape, |(i, j)| found[i * gates + j].estimate.velocity_m_s);
-            let guess = interpolated(points, velocity_m_s);
-            let sampling = estimators::sampling(&self.plan.scene.content)?;
-            found = scan.map_following(
-                points,
-                &self.radius,
-                S::KIND,
-                &sampling,
-                &guess,
-                &**following,
-            )?;
-        }
         // Speckle and noise share out the spectrum of a gate as its own signal-to-noise ratio says.
         let range_m: Vec<f64> = points
             .iter()

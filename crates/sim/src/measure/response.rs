@@ -73,8 +73,7 @@ impl SceneResponse {
         nearest.map_or(0.0, |(_, snr)| *snr)
     }
 
-    /// What the estimator shows of a wake about a range; nothing for complex signals, for the likelihood of gradients, and for lines
-    /// that are shifted.
+    /// What the estimator shows of a wake about a range; nothing for complex signals.
     pub(crate) fn shown(&self, range_m: f64) -> Option<EstimatorResponse<'_>> {
         let (correlogram, estimator) = self.response.as_ref()?;
         let noise = (self.noise, self.snr_at(range_m));

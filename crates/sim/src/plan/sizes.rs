@@ -3,7 +3,7 @@
 //! All are floating-point numbers: products of what a scene may say go far beyond what an integer holds.
 
 use super::stage::Target;
-use crate::scene::{DetectorSignal, Flow, Method, Scene, SignalsOf};
+use crate::scene::{DetectorSignal, Flow, Scene, SignalsOf};
 use crate::setup::efficiency_model::drawn_turbulence;
 use crate::setup::geometry::Geometry;
 
@@ -92,10 +92,7 @@ impl Sizes {
             window,
             chord: (window + 2.0 * radius_m / g.sample_spacing_m).min(samples_kept.max(256.0)),
             windows: ((g.samples - e.window_samples) / e.window_step_samples + 1) as f64,
-            numbers: match e.method {
-                Method::GradientLikelihood(g) => 2.0 * g.gradients as f64 * window + 1.0,
-                _ => parts * e.few_lags().map_or(window, |lags| lags as f64),
-            },
+            numbers: parts * e.few_lags().map_or(window, |lags| lags as f64),
             cells: lines * g.gate_range_m.len() as f64,
             frequencies: e.padded_samples as f64 * d.bandwidth_hz / d.sampling_hz,
             chords: (2.0 * half_rad / step_rad(scene, g) + 1.0).min(lines),

@@ -168,12 +168,10 @@ fn estimates(scene: &Scene, g: &Geometry, n: &Sizes) -> PlannedStage {
     // Of each point: sums over the realisations, their errors, truth and thresholds; then the velocities of one realisation.
     let scans_bytes = n.cells * n.realisations * SCAN_POINT_BYTES;
     let points_bytes = n.cells * MAPPER_POINT_BYTES + scans_bytes;
-    let maps = if e.follow_wind { 2.0 } else { 1.0 };
     // While windows are added there is a piece of records, while velocities are sought there are sums over blocks of windows.
     let air = air_bytes(n);
     let adding = scan_bytes(g, n) + sums_bytes;
-    let seeking =
-        air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES * maps;
+    let seeking = air + sums_bytes * 1.125 + n.lines * n.windows * 8.0 + n.cells * MAP_POINT_BYTES;
     let at_work = adding.max(seeking) + points_bytes + planned_bytes;
     let working = at_work.max(air + planning_bytes);
     run(
@@ -196,9 +194,6 @@ fn planning(scene: &Scene, n: &Sizes) -> (f64, f64) {
     let matrix_bytes = n.window.powi(2) * 8.0;
     let (kept_matrices, matrices) = match scene.estimator.method {
         Method::Likelihood(_) => (1.0, 8.0),
-        Method::GradientLikelihood(g) => {
-            (2.0 * g.gradients as f64, 2.0 * g.gradients as f64 + 24.0)
-        }
         _ => (0.0, 0.0),
     };
     let has_bound = matches!(scene.estimator.radius, RegionRadius::Target { .. });

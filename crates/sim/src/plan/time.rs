@@ -71,27 +71,14 @@ fn maps_s(scene: &Scene, n: &Sizes) -> f64 {
     let spectrum_s = n.frequencies * (6e-9 + n.numbers.min(n.window) * 6e-11);
     // Of a window and of a point, and covariances that are decomposed.
     let (window_s, point_s, covariances) = match e.method {
-        Method::GradientLikelihood(own) => {
-            let gradients = own.gradients as f64;
-            (
-                n.numbers * n.window * 3.5e-10,
-                2.0 * gradients * spectrum_s,
-                7.0 * gradients,
-            )
-        }
         Method::Likelihood(_) => {
             // As many tapers as a window has independent parts, about.
             let parts = n.window / (scene.detector.sampling_hz * scene.pulse_sigma_s()).max(1.0);
             (numbers_s * (2.0 + 0.5 * parts), spectrum_s, 1.0)
         }
-        Method::AutoregressivePole(model) => {
-            (numbers_s, (model.order as f64).powi(2) * 7.5e-8, 0.0)
-        }
         _ => (numbers_s, spectrum_s, 0.0),
     };
-    // A first map, and the shifts that follow it.
-    let maps = n.realisations * if e.follow_wind { 2.5 } else { 1.0 };
-    let points_s = n.cells * maps * (n.chords * n.numbers * 5e-9 + point_s);
+    let points_s = n.cells * n.realisations * (n.chords * n.numbers * 5e-9 + point_s);
     let bounded = if matches!(e.radius, RegionRadius::Target { .. }) {
         n.chord.powi(3)
     } else {

@@ -585,7 +585,7 @@ mod tests {
                 "outputs.profile_range_min_m = 4000 is not allowed: below",
             ),
             (
-                "[estimator]\nmethod.kind = \"capon\"\nwindow_samples = 10\n",
+                "[estimator]\nmethod.kind = \"autoregressive\"\nwindow_samples = 10\n",
                 "estimator.window_samples = 10 is not allowed: above estimator.method.order, 16",
             ),
         ] {

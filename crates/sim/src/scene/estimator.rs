@@ -23,10 +23,6 @@ keys! {
         refinement: Refinement = Refinement::Parabola,
         /// Radius of the circular region of accumulation, m.
         radius_m: f64 = 2.0 => 0.0..=1e5,
-        /// Which correlogram the estimator is given.
-        correlogram: CorrelogramForm = CorrelogramForm::Biased,
-        /// Whether the lines of a region are shifted to the velocity of its centre before they are added, by a first map.
-        follow_wind: bool = false,
         /// Probability that noise alone passes for a signal at a gate; estimates whose peak is not above what noise reaches
         /// that often are flagged. 0: no test.
         false_alarm: f64 = 0.01 => Number(
@@ -47,37 +43,20 @@ keys! {
         /// PA: mean periodogram of all windows of the region (Table 3).
         "periodogram_accumulation" => PeriodogramAccumulation {},
         /// CA: peak of the autoregressive spectrum of the mean correlogram (Table 3).
-        "autoregressive" => Autoregressive(ModelOrder),
-        /// Pole of the same model that is nearest to the unit circle.
-        "autoregressive_pole" => AutoregressivePole(ModelOrder),
-        /// Peak of Capon's spectrum of the mean correlogram.
-        "capon" => Capon(ModelOrder),
-        /// Peak of the transform of the mean correlogram times a Hann window of lags.
-        "lag_window" => LagWindow(LagWindow),
+        "autoregressive" => Autoregressive(Autoregressive),
         /// Phase of the first lag.
         "pulse_pair" => PulsePair {},
         /// Mean of the main peak of the spectrum.
         "first_moment" => FirstMoment(FirstMoment),
         /// Maximum likelihood of the velocity for the known pulse, by tapers.
         "likelihood" => Likelihood(Likelihood),
-        /// Maximum likelihood of velocity and gradient along the line of sight.
-        "gradient_likelihood" => GradientLikelihood(GradientLikelihood),
     }
 
-    /// The order of autoregressive models and of Capon's filter.
+    /// The autoregressive model.
     #[derive(Copy)]
-    table ModelOrder {
-        /// The order; the largest one if it is chosen.
+    table Autoregressive {
+        /// Order of the model.
         order: usize = 16 => 1..=65_535,
-        /// How the order is found.
-        order_choice: OrderChoice = OrderChoice::Fixed,
-    }
-
-    /// The window of lags.
-    #[derive(Copy)]
-    table LagWindow {
-        /// Lag at which it falls to 0.
-        lag_window_lags: usize = 16 => 1..=65_535,
     }
 
     /// The first moment of a peak.
@@ -92,35 +71,6 @@ keys! {
     table Likelihood {
         /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
         likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
-    }
-
-    /// The likelihood of velocity and gradient.
-    #[derive(Copy)]
-    table GradientLikelihood {
-        /// Signal-to-noise ratio for which it is planned, dB; the scene's own if absent.
-        likelihood_snr_db: Option<f64> = None => -100.0..=100.0,
-        /// Gradients reach from minus to plus this, 1/s.
-        gradient_max_per_s: f64 = 0.6 => 1e-6..=1e3,
-        /// How many there are; odd, so that 0 is among them.
-        gradients: usize = 7 => 1..=999 => Is(|n: &usize| n % 2 == 1, "an odd number, so that 0 is among them"),
-    }
-
-    /// How the order of a model is found.
-    choice OrderChoice {
-        /// It is `order`.
-        Fixed = "fixed",
-        /// Akaike's criterion.
-        Aic = "aic",
-        /// Rissanen's minimum description length.
-        Mdl = "mdl",
-    }
-
-    /// Which correlogram.
-    choice CorrelogramForm {
-        /// Divided by the number of samples: positive semi-definite.
-        Biased = "biased",
-        /// Divided by the number of products; often no model of it exists.
-        Unbiased = "unbiased",
     }
 
     /// How the radius of the region depends on range.
@@ -194,22 +144,20 @@ impl Estimator {
         self.method
             .order()
             .filter(|_| self.weighting == Weighting::Rectangular)
-            .map(|model| model.order + 1)
+            .map(|order| order + 1)
     }
 }
 
 impl Method {
     /// Whether tapers of its own take the place of the weighting of the windows.
     pub(crate) fn has_own_tapers(&self) -> bool {
-        matches!(self, Self::Likelihood(_) | Self::GradientLikelihood(_))
+        matches!(self, Self::Likelihood(_))
     }
 
     /// The order of the model that the method fits, if it fits one.
-    pub fn order(&self) -> Option<ModelOrder> {
+    pub fn order(&self) -> Option<usize> {
         match self {
-            Self::Autoregressive(model) | Self::AutoregressivePole(model) | Self::Capon(model) => {
-                Some(*model)
-            }
+            Self::Autoregressive(model) => Some(model.order),
             _ => None,
         }
     }
@@ -217,10 +165,7 @@ impl Method {
     /// Signal-to-noise ratio for which a likelihood is planned, dB, if the scene states one.
     pub fn likelihood_snr_db(&self) -> Option<f64> {
         match self {
-            Self::Likelihood(Likelihood { likelihood_snr_db })
-            | Self::GradientLikelihood(GradientLikelihood {
-                likelihood_snr_db, ..
-            }) => *likelihood_snr_db,
+            Self::Likelihood(own) => own.likelihood_snr_db,
             _ => None,
         }
     }
@@ -237,15 +182,8 @@ pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
         )
     };
     beside_window("estimator.padded_samples", e.padded_samples, "at least");
-    if let Method::LagWindow(own) = e.method {
-        beside_window(
-            "estimator.method.lag_window_lags",
-            own.lag_window_lags,
-            "below",
-        );
-    }
-    if let Some(model) = e.method.order() {
-        beside_window("estimator.method.order", model.order, "below");
+    if let Some(order) = e.method.order() {
+        beside_window("estimator.method.order", order, "below");
     }
     if let RegionRadius::OfRange { range_m, radius_m } = &e.radius {
         let fits =
@@ -260,34 +198,6 @@ pub(super) fn check_estimator(scene: &Scene, c: &mut Checker<'_>) {
         is_fixed || !without_region,
         "estimator.method.kind",
         "periodogram",
-        allowed,
-    );
-    // Methods that exclude a knob.
-    let is_biased_alone = e.method.has_own_tapers() || matches!(e.method, Method::FirstMoment(_));
-    let allowed =
-        "\"biased\" with first_moment and the likelihoods, whose statistic has no unbiased form";
-    let is_biased = e.correlogram == CorrelogramForm::Biased;
-    c.require(
-        is_biased || !is_biased_alone,
-        "estimator.correlogram",
-        "unbiased",
-        allowed,
-    );
-    let has_gradient = matches!(e.method, Method::GradientLikelihood(_));
-    let allowed = "false with gradient_likelihood, which has the gradient itself, and with periodogram, which has no region";
-    let may_follow = !(has_gradient || without_region);
-    c.require(
-        may_follow || !e.follow_wind,
-        "estimator.follow_wind",
-        e.follow_wind,
-        allowed,
-    );
-    let allowed = "another one for a pulse that is sampled or has a chirp: its covariance is that of a Gaussian pulse";
-    let is_known = scene.pulse.is_gaussian();
-    c.require(
-        is_known || !has_gradient,
-        "estimator.method.kind",
-        "gradient_likelihood",
         allowed,
     );
 }
@@ -305,17 +215,10 @@ mod tests {
     #[test]
     fn knobs_of_the_estimators_are_held_to_their_limits() {
         let own = |method| keys(|e| e.method = method);
-        let order = ModelOrder {
-            order: 64,
-            ..ModelOrder::default()
-        };
-        assert_eq!(own(Method::Capon(order)), ["estimator.method.order"]);
-        let lags = LagWindow {
-            lag_window_lags: 64,
-        };
+        let order = Autoregressive { order: 64 };
         assert_eq!(
-            own(Method::LagWindow(lags)),
-            ["estimator.method.lag_window_lags"]
+            own(Method::Autoregressive(order)),
+            ["estimator.method.order"]
         );
         let reach = FirstMoment {
             moment_reach: f64::NAN,
@@ -331,31 +234,13 @@ mod tests {
             own(Method::Likelihood(strong)),
             ["estimator.method.likelihood_snr_db"]
         );
-        let even = GradientLikelihood {
-            gradients: 4,
-            ..GradientLikelihood::default()
-        };
-        assert_eq!(
-            own(Method::GradientLikelihood(even)),
-            ["estimator.method.gradients"]
-        );
         let with = |method, change: fn(&mut Estimator)| {
             keys(|e| {
                 e.method = method;
                 change(e);
             })
         };
-        let gradient = Method::GradientLikelihood(GradientLikelihood::default());
-        assert_eq!(
-            with(gradient, |e| e.follow_wind = true),
-            ["estimator.follow_wind"]
-        );
-        let moment = Method::FirstMoment(FirstMoment::default());
-        assert_eq!(
-            with(moment, |e| e.correlogram = CorrelogramForm::Unbiased),
-            ["estimator.correlogram"]
-        );
-        let model = Method::Autoregressive(ModelOrder::default());
+        let model = Method::Autoregressive(Autoregressive::default());
         assert_eq!(
             with(model, |e| e.false_alarm = 1.0),
             ["estimator.false_alarm"]

@@ -8,7 +8,7 @@ use super::{
     RefractiveTurbulence,
 };
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
-use super::{Refinement, RegionRadius, SignalsOf};
+use super::{RegionRadius, SignalsOf};
 use crate::keys::{Text, lines_with_keys, to_table, value_at};
 use toml::Value;
 
@@ -28,9 +28,6 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         &["estimator.refinement"],
         format!("{kind} refines no peak"),
     );
-    let no_exact = method.order().is_some() && scene.estimator.refinement == Refinement::Exact;
-    let purpose = format!("{kind} has no exact refinement, \"parabola\" is what it takes");
-    unused(no_exact, &["estimator.refinement"], purpose);
     let none = !scene.outputs.signals && scene.outputs.signals_of == SignalsOf::All;
     unused(
         none,
@@ -237,7 +234,7 @@ mod tests {
         assert_eq!(
             parse("[estimator.method]\nkind = \"periodogram\"\norder = 8\n").unwrap_err(),
             "s.toml:3: estimator.method.order = 8 is not allowed: this key is for estimator.method.kind = \
-             \"autoregressive\" or \"autoregressive_pole\" or \"capon\", and estimator.method.kind is \"periodogram\""
+             \"autoregressive\", and estimator.method.kind is \"periodogram\""
         );
         for (text, key) in [
             (
@@ -245,7 +242,7 @@ mod tests {
                 "estimator.method.order = 16",
             ),
             (
-                "[estimator.method]\nkind = \"capon\"\nmoment_reach = 2.0\n",
+                "[estimator.method]\nkind = \"autoregressive\"\nmoment_reach = 2.0\n",
                 "estimator.method.moment_reach = 2.0",
             ),
             (
@@ -268,10 +265,6 @@ mod tests {
                 "[atmosphere]\nextinction_per_m = 1e-3\nprofile = { range_m = [0.0], backscatter_per_m_sr = [1e-7], \
                  extinction_per_m = [1e-4] }\n",
                 "atmosphere.extinction_per_m = 1e-3",
-            ),
-            (
-                "[estimator]\nmethod.kind = \"autoregressive\"\nrefinement = \"exact\"\n",
-                "estimator.refinement = \"exact\"",
             ),
             (
                 "[outputs]\nsignals_of = \"all\"\n",
@@ -302,9 +295,9 @@ mod tests {
             let file = parse(&text).unwrap();
             assert_eq!(parse(&file.toml).unwrap().toml, file.toml);
         }
-        let fitted = parse("[estimator.method]\nkind = \"capon\"\norder = 8\n").unwrap();
+        let fitted = parse("[estimator.method]\nkind = \"autoregressive\"\norder = 8\n").unwrap();
         assert!(
-            fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("gradients"),
+            fitted.toml.contains("\norder = 8\n") && !fitted.toml.contains("moment_reach"),
             "{}",
             fitted.toml
         );

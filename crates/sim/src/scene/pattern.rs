@@ -333,18 +333,5 @@ impl Scene {
             side("scan.pulses_per_line", s.pulses_per_line as f64, long()),
         ];
         c.between(!few || lasts_s <= MAX_TIME_S, &sides);
-        let apart = s.head.sweeps > 1 || *s.pattern.name() != *"rhi";
-        let word = if self.estimator.follow_wind {
-            "true"
-        } else {
-            "false"
-        };
-        let allowed = "false: only a single RHI has lines on both sides of each other";
-        c.require(
-            !(apart && self.estimator.follow_wind),
-            "estimator.follow_wind",
-            word,
-            allowed,
-        );
     }
 }

@@ -1,18 +1,14 @@
 //! The estimator of a scene in the words of `estimate`: statistic of the windows, estimator of their mean, models of both.
 
 use crate::Error;
-use crate::scene::{
-    CorrelogramForm, DetectorSignal, GradientLikelihood, Method, ModelOrder, NoiseModel,
-    OrderChoice, PulseShape, Scene, Weighting,
-};
+use crate::scene::{DetectorSignal, Method, NoiseModel, PulseShape, Scene, Weighting};
 use crate::setup::instrument::Instrument;
 use crate::setup::table::{of_table, spaced};
 use ndarray::Array2;
 use num_complex::Complex;
-use wakescope_estimate::bound::{GradientModel, Noise, RecordModel, WindowModel};
+use wakescope_estimate::bound::{Noise, RecordModel, WindowModel};
 use wakescope_estimate::estimators::{
-    FirstMoment, LagWindowPeak, ModelPeak, ModelReading, NoiseTest, PulsePair, Unbiased,
-    likelihood_tapers, model_lag_weights,
+    FirstMoment, ModelPeak, NoiseTest, PulsePair, likelihood_tapers, model_lag_weights,
 };
 use wakescope_estimate::spectrum::{ShortCorrelogram, Taper};
 use wakescope_estimate::{
@@ -145,7 +141,7 @@ fn correlogram<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Corr
 /// A statistic, with the weights that its windows give the lags and their tapers.
 type Weighted<S> = (Box<dyn Statistic<S>>, Vec<f64>, Vec<Taper>);
 
-/// The statistic of a scene whose method knows correlograms: models of windows without weighting need few lags.
+/// The statistic of a scene: models of windows without weighting need few lags.
 fn statistic<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Weighted<S>, Error> {
     let e = &scene.estimator;
     if let Some(lags) = e.few_lags() {
@@ -156,12 +152,6 @@ fn statistic<S: Sample>(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Weight
     let all = correlogram::<S>(scene, pulse, snr)?;
     let (weights, tapers) = (all.lag_weights(), all.tapers().to_vec());
     Ok((Box::new(all), weights, tapers))
-}
-
-/// Whether the velocity comes from the mean correlogram of lines as they are: not by the likelihood of gradients, which knows none, and
-/// not of lines that are shifted.
-fn is_of_correlogram(scene: &Scene) -> bool {
-    !scene.estimator.follow_wind && !matches!(scene.estimator.method, Method::GradientLikelihood(_))
 }
 
 /// Signal-to-noise ratio for which a likelihood is planned: as the scene states it, else as it is.
@@ -242,24 +232,13 @@ pub fn window_covariance(scene: &Scene, pulse: &Pulse) -> Result<WindowCovarianc
     )?)
 }
 
-/// What is known of the windows before any is seen, for estimators that are planned for it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WindowStatistics {
-    /// Signal-to-noise ratio in the detector band, a power ratio.
-    pub snr: f64,
-    /// Independent windows of a region in the middle of the scan.
-    pub n_eff: f64,
-}
-
 /// Statistic and estimator of a scene.
 pub struct Toolkit<S> {
     /// Numbers of each window.
     pub statistic: Box<dyn Statistic<S>>,
     /// Velocity of their mean.
     pub estimator: Box<dyn Estimator>,
-    /// The same for the complex mean of lines that were shifted, if the scene follows the wind.
-    pub following: Option<Box<dyn Estimator>>,
-    /// The test against noise, if the scene has noise and the method one.
+    /// The test against noise, if the scene has noise.
     pub test: Option<NoiseTest>,
     /// What the estimator finds in the mean statistic of the scene's noise.
     pub noise: NoiseSeen,
@@ -283,7 +262,7 @@ impl NoiseSeen {
         scene: &Scene,
         instrument: &Instrument,
         estimator: &dyn Estimator,
-        seen: impl Fn(Vec<f64>) -> Result<Vec<f64>, Error>,
+        seen: impl Fn(Vec<f64>) -> Vec<f64>,
     ) -> Result<Self, Error> {
         let (Some(noise), sampling, kind) =
             (noise_kind(scene), sampling(scene)?, signal_kind(scene))
@@ -295,9 +274,8 @@ impl NoiseSeen {
             });
         };
         let n = scene.estimator.window_samples;
-        let found =
-            |lags: Vec<f64>| Ok::<_, Error>(estimator.estimate(&seen(lags)?, &mut Scratch::new()));
-        let of_noise = found(noise.expected_correlogram(&sampling, kind, 1.0, &vec![1.0; n])?)?;
+        let found = |lags: Vec<f64>| estimator.estimate(&seen(lags), &mut Scratch::new());
+        let of_noise = found(noise.expected_correlogram(&sampling, kind, 1.0, &vec![1.0; n])?);
         let pulse = pulse_correlation(scene, &instrument.pulse);
         let (low_m_s, high_m_s) = sampling.velocity_limits_m_s();
         let cells = n as f64 * scene.detector.bandwidth_hz / scene.detector.sampling_hz;
@@ -313,12 +291,9 @@ impl NoiseSeen {
                 *velocity_m_s,
                 pulse.iter().copied().take(n),
             );
-            Ok(of_noise.power / found(lags)?.power)
+            of_noise.power / found(lags).power
         };
-        let gain = velocity_m_s
-            .iter()
-            .map(gain)
-            .collect::<Result<Vec<f64>, Error>>()?;
+        let gain = velocity_m_s.iter().map(gain).collect();
         let unit_a2 = instrument.receiver.noise_variance_a2();
         let (power_a2, density_a2) = (of_noise.power * unit_a2, of_noise.detection * unit_a2);
         Ok(Self {
@@ -340,93 +315,30 @@ impl NoiseSeen {
 }
 
 impl<S: Sample> Toolkit<S> {
-    /// Plans the estimator of a scene for samples of its kind.
+    /// Plans the estimator of a scene for samples of its kind and windows of that signal-to-noise ratio, a power ratio.
     ///
     /// # Errors
     /// What the estimators refuse, such as a covariance that cannot be diagonalised.
-    pub fn new(
-        scene: &Scene,
-        instrument: &Instrument,
-        known: &WindowStatistics,
-    ) -> Result<Self, Error> {
-        let snr = planned_snr(scene, known.snr);
-        if let Method::GradientLikelihood(own) = scene.estimator.method {
-            return Self::of_gradients(scene, instrument, &own, snr);
-        }
+    pub fn new(scene: &Scene, instrument: &Instrument, snr: f64) -> Result<Self, Error> {
+        let snr = planned_snr(scene, snr);
         let (statistic, lag_weights, tapers) = statistic::<S>(scene, &instrument.pulse, snr)?;
-        let estimator = of_correlogram(scene, S::KIND, &lag_weights, known)?;
-        let follows = scene.estimator.follow_wind;
-        let complex = || of_correlogram(scene, SignalKind::Complex, &lag_weights, known);
-        let following = follows.then(complex).transpose()?;
+        let estimator = of_correlogram(scene, S::KIND, &lag_weights)?;
         let per_lag = S::KIND.lag_numbers(1);
-        // Lines that are shifted have complex lags, whatever the samples.
-        let parts = if follows { 2 } else { per_lag };
         let seen = |lags: Vec<f64>| {
-            let weighted = lags.chunks(per_lag).zip(&lag_weights).map(|(lag, weight)| {
-                [lag[0] * weight, lag.get(1).copied().unwrap_or(0.0) * weight]
-            });
-            Ok(weighted
-                .flat_map(|lag| lag.into_iter().take(parts))
-                .collect())
+            let mut weighted = lags;
+            for (lag, weight) in weighted.chunks_mut(per_lag).zip(&lag_weights) {
+                for number in lag {
+                    *number *= weight;
+                }
+            }
+            weighted.truncate(per_lag * lag_weights.len());
+            weighted
         };
-        let noise = NoiseSeen::new(
-            scene,
-            instrument,
-            following.as_deref().unwrap_or(&*estimator),
-            seen,
-        )?;
+        let noise = NoiseSeen::new(scene, instrument, &*estimator, seen)?;
         let test = noise_test(scene, &tapers, &lag_weights)?;
         Ok(Self {
             statistic,
             estimator,
-            following,
-            test,
-            noise,
-        })
-    }
-
-    fn of_gradients(
-        scene: &Scene,
-        instrument: &Instrument,
-        own: &GradientLikelihood,
-        snr: f64,
-    ) -> Result<Self, Error> {
-        let e = &scene.estimator;
-        let noise = noise_kind(scene).unwrap_or(Noise::Band { floor: 0.0 });
-        let sampling = sampling(scene)?;
-        let model = GradientModel::new(
-            &sampling,
-            e.window_samples,
-            instrument.pulse.sigma_s(),
-            noise,
-        )?;
-        let half = (own.gradients / 2) as f64;
-        let gradient = |k: usize| {
-            if half > 0.0 {
-                own.gradient_max_per_s * (k as f64 - half) / half
-            } else {
-                0.0
-            }
-        };
-        let gradients: Vec<f64> = (0..own.gradients).map(gradient).collect();
-        let plan = estimate::estimators::GradientLikelihood::<S>::new(
-            &model,
-            snr,
-            &gradients,
-            e.padded_samples,
-        )?;
-        let gates = gates(scene)?;
-        let test = noise_kind(scene)
-            .map(|noise| plan.noise_test(&gates, noise))
-            .transpose()?;
-        let noise = NoiseSeen::new(scene, instrument, &plan.estimator, |lags| {
-            Ok(plan.mean_statistic(&lags)?)
-        })?;
-        let (statistic, estimator) = (Box::new(plan.statistic), Box::new(plan.estimator));
-        Ok(Self {
-            statistic,
-            estimator,
-            following: None,
             test,
             noise,
         })
@@ -444,23 +356,18 @@ pub(crate) struct ExpectedBias {
 }
 
 impl ExpectedBias {
-    /// For windows of which so much is known; nothing without noise, for the likelihood of gradients, which knows no correlogram, and
-    /// for lines that are shifted.
+    /// For windows whose signal is as strong as the noise, where the scene plans its estimator for no other ratio; nothing without noise.
     ///
     /// # Errors
     /// What the estimators refuse; a checked scene gives none.
-    pub(crate) fn new(
-        scene: &Scene,
-        instrument: &Instrument,
-        known: &WindowStatistics,
-    ) -> Result<Option<Self>, Error> {
+    pub(crate) fn new(scene: &Scene, instrument: &Instrument) -> Result<Option<Self>, Error> {
         let (kind, sampling, pulse) = (signal_kind(scene), sampling(scene)?, &instrument.pulse);
-        let Some(noise) = noise_kind(scene).filter(|_| is_of_correlogram(scene)) else {
+        let Some(noise) = noise_kind(scene) else {
             return Ok(None);
         };
         // Real and complex samples have the same weights of lags.
-        let (_, lag_weights, _) = statistic::<f64>(scene, pulse, planned_snr(scene, known.snr))?;
-        let estimator = of_correlogram(scene, kind, &lag_weights, known)?;
+        let (_, lag_weights, _) = statistic::<f64>(scene, pulse, planned_snr(scene, 1.0))?;
+        let estimator = of_correlogram(scene, kind, &lag_weights)?;
         let noise = noise.expected_correlogram(&sampling, kind, 1.0, &lag_weights)?;
         let lags = lag_weights.iter().zip(pulse_correlation(scene, pulse));
         let signal = lags.map(|(weight, lag)| weight * lag).collect();
@@ -516,18 +423,16 @@ pub(crate) fn grid_step_and_bias_m_s(scene: &Scene) -> Result<(f64, f64), Error>
 /// Correlogram of all lags and the scene's estimator of it, for what a mean of very many pulses would show.
 pub(crate) type Response = (Correlogram<f64>, Box<dyn Estimator>);
 
-/// The response of a scene at a signal-to-noise ratio `snr`; none for complex signals, for the likelihood of gradients, which
-/// knows no correlogram, and for lines that are shifted.
+/// The response of a scene at a signal-to-noise ratio `snr`; none for complex signals.
 ///
 /// # Errors
 /// What the estimators refuse; a checked scene gives none.
 pub(crate) fn response(scene: &Scene, pulse: &Pulse, snr: f64) -> Result<Option<Response>, Error> {
-    if signal_kind(scene) == SignalKind::Complex || !is_of_correlogram(scene) {
+    if signal_kind(scene) == SignalKind::Complex {
         return Ok(None);
     }
     let correlogram = correlogram(scene, pulse, planned_snr(scene, snr))?;
-    let known = WindowStatistics { snr, n_eff: 1.0 };
-    let estimator = of_correlogram(scene, SignalKind::Real, &correlogram.lag_weights(), &known)?;
+    let estimator = of_correlogram(scene, SignalKind::Real, &correlogram.lag_weights())?;
     Ok(Some((correlogram, estimator)))
 }
 
@@ -540,8 +445,7 @@ pub(crate) fn noise_kind(scene: &Scene) -> Option<Noise> {
     }
 }
 
-/// The test against noise of an estimator of correlograms; none without noise, and none of the spectrum of an unbiased
-/// correlogram with all its lags, which need not be positive.
+/// The test against noise; none without noise.
 fn noise_test(
     scene: &Scene,
     tapers: &[Taper],
@@ -551,16 +455,7 @@ fn noise_test(
     let Some(noise) = noise_kind(scene) else {
         return Ok(None);
     };
-    let window = match e.method {
-        Method::LagWindow(window) => Some(model_lag_weights(window.lag_window_lags - 1)),
-        method => method.order().map(|model| model_lag_weights(model.order)),
-    };
-    let unbiased = e.correlogram == CorrelogramForm::Unbiased;
-    if unbiased && window.is_none() {
-        return Ok(None);
-    }
-    let seen = |(at, gain): (&f64, &f64)| if unbiased { at / gain } else { *at };
-    let window = window.map(|at| at.iter().zip(lag_weights).map(seen).collect::<Vec<f64>>());
+    let window = e.method.order().map(model_lag_weights);
     let padded = if e.method == (Method::PulsePair {}) {
         4 * lag_weights.len()
     } else {
@@ -582,56 +477,34 @@ fn of_correlogram(
     scene: &Scene,
     kind: SignalKind,
     lag_weights: &[f64],
-    known: &WindowStatistics,
 ) -> Result<Box<dyn Estimator>, Error> {
     let (e, sampling) = (&scene.estimator, sampling(scene)?);
-    let refine = e.refinement;
-    let (lags, padded) = (lag_weights.len(), e.padded_samples);
-    // Divided by their weights, all lags count alike.
-    let alike = vec![1.0; lags];
-    let seen = if e.correlogram == CorrelogramForm::Unbiased {
-        &alike
-    } else {
-        lag_weights
-    };
-    let samples = e.window_samples as f64 * known.n_eff.max(1.0);
-    let model = |reading, model: ModelOrder| {
-        let peak = ModelPeak::new(reading, &sampling, kind, lags, model.order, padded, refine)?;
-        Ok::<_, Error>(Box::new(peak.choosing(match model.order_choice {
-            OrderChoice::Fixed => estimate::models::OrderChoice::Fixed,
-            OrderChoice::Aic => estimate::models::OrderChoice::Akaike { samples },
-            OrderChoice::Mdl => estimate::models::OrderChoice::DescriptionLength { samples },
-        })))
-    };
-    let estimator: Box<dyn Estimator> = match e.method {
-        Method::Periodogram {}
-        | Method::PeriodogramAccumulation {}
-        | Method::Likelihood(_)
-        | Method::GradientLikelihood(_) => {
-            Box::new(SpectralPeak::new(&sampling, kind, seen, padded, refine)?)
+    let (padded, refinement) = (e.padded_samples, e.refinement);
+    Ok(match e.method {
+        Method::Periodogram {} | Method::PeriodogramAccumulation {} | Method::Likelihood(_) => {
+            Box::new(SpectralPeak::new(
+                &sampling,
+                kind,
+                lag_weights,
+                padded,
+                refinement,
+            )?)
         }
-        Method::Autoregressive(own) => model(ModelReading::Spectrum, own)?,
-        Method::AutoregressivePole(own) => model(ModelReading::Pole, own)?,
-        Method::Capon(own) => model(ModelReading::Capon, own)?,
-        Method::LagWindow(window) => Box::new(LagWindowPeak::new(
+        Method::Autoregressive(own) => Box::new(ModelPeak::new(
             &sampling,
             kind,
-            seen,
-            window.lag_window_lags,
+            lag_weights.len(),
+            own.order,
             padded,
-            refine,
+            refinement,
         )?),
-        Method::PulsePair {} => Box::new(PulsePair::new(&sampling, kind, seen)?),
+        Method::PulsePair {} => Box::new(PulsePair::new(&sampling, kind, lag_weights)?),
         Method::FirstMoment(own) => Box::new(FirstMoment::new(
             &sampling,
             kind,
-            seen,
+            lag_weights,
             padded,
             own.moment_reach,
         )?),
-    };
-    Ok(match e.correlogram {
-        CorrelogramForm::Biased => estimator,
-        CorrelogramForm::Unbiased => Box::new(Unbiased::new(estimator, kind, lag_weights)?),
     })
 }

@@ -295,20 +295,20 @@ mod tests {
             Value::Integer(32)
         );
         assert_eq!(
-            value("estimator.follow_wind", "true").unwrap(),
+            value("outputs.signals", "true").unwrap(),
             Value::Boolean(true)
         );
         assert_eq!(
-            value("estimator.method.kind", "\"capon\"").unwrap(),
-            Value::String("capon".into())
+            value("estimator.method.kind", "\"pulse_pair\"").unwrap(),
+            Value::String("pulse_pair".into())
         );
         for (key, text) in [
             ("scan.pulses_per_line", "1.5"),
             ("scan.pulses_per_line", "-1"),
             ("pulse.energy_j", "much"),
             ("pulse.energy_j", ""),
-            ("estimator.method.kind", "carpon"),
-            ("estimator.follow_wind", "1"),
+            ("estimator.method.kind", "pulse_par"),
+            ("outputs.signals", "1"),
         ] {
             let problem = value(key, text).unwrap_err();
             assert!(
@@ -317,10 +317,10 @@ mod tests {
             );
         }
         assert!(
-            value("estimator.method.kind", "carpon")
+            value("estimator.method.kind", "pulse_par")
                 .unwrap_err()
                 .allowed
-                .contains("did you mean \"capon\"?")
+                .contains("did you mean \"pulse_pair\"?")
         );
     }
 }

@@ -12,7 +12,7 @@ use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
 use crate::plan::Plan;
 use crate::run::ScanMiddle;
-use crate::scene::{Flow, Method, NoiseModel};
+use crate::scene::{Flow, NoiseModel};
 use crate::setup::estimators;
 use crate::setup::progress::Observer;
 use crate::setup::ray_information::range_filter;
@@ -171,9 +171,7 @@ impl<'p> Collected<'p> {
             ScanMiddle::of(plan, None, Some(scanner)).ok_or(wakescope_estimate::Error::Empty {
                 field: "layers of a line",
             })?;
-        // The bound of velocity alone is none on a velocity beside a gradient.
-        let has_bound = scene.detector.noise != NoiseModel::None
-            && !matches!(scene.estimator.method, Method::GradientLikelihood(_));
+        let has_bound = scene.detector.noise != NoiseModel::None;
         let bound_m_s = if has_bound {
             bound_in_the_middle(plan, scanner)?.region_m_s
         } else {

@@ -516,7 +516,7 @@ fn conditions_and_lists_choose_the_cases() {
     let list = temp.path().join("cases.csv");
     std::fs::write(
         &list,
-        "# mine\nestimator.method.kind,estimator.radius_m\ncapon,1\nlag_window,2\n",
+        "# mine\nestimator.method.kind,estimator.radius_m\npulse_pair,1\nfirst_moment,2\n",
     )
     .unwrap();
     let request = Request {
@@ -529,12 +529,13 @@ fn conditions_and_lists_choose_the_cases() {
         .into_iter()
         .map(|case| case.values)
         .collect();
-    assert_eq!(values[1], ["capon", "1.0", "2"]);
-    assert_eq!(values[2], ["lag_window", "2.0", "1"]);
-    std::fs::write(&list, "estimator.method.kind\ncarpon\n").unwrap();
+    assert_eq!(values[1], ["pulse_pair", "1.0", "2"]);
+    assert_eq!(values[2], ["first_moment", "2.0", "1"]);
+    std::fs::write(&list, "estimator.method.kind\npulse_par\n").unwrap();
     let message = sweep("", &request).unwrap_err().to_string();
     assert!(
-        message.contains("cases.csv: estimator.method.kind = carpon") && message.contains("capon"),
+        message.contains("cases.csv: estimator.method.kind = pulse_par")
+            && message.contains("pulse_pair"),
         "{message}"
     );
 }

@@ -343,7 +343,7 @@ fn arrays_that_numpy_wrote_are_read_by_name() {
 #[test]
 fn tiles_of_lines_and_gates_change_no_bit() {
     for words in [
-        "follow_wind = true",
+        "",
         "method = { kind = \"autoregressive\" }\nweighting = \"rectangular\"",
     ] {
         tiles_change_no_bit(&format!("[estimator]\nradius_m = 6.0\n{words}\n"));

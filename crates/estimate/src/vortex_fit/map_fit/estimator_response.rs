@@ -443,7 +443,7 @@ fn add_seen(lags: &mut [f64], weights: &[f64], phasors: &[f64], share: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::estimators::{LagWindowPeak, PulsePair, Refinement, SpectralPeak};
+    use crate::estimators::{FirstMoment, PulsePair, Refinement, SpectralPeak};
     use crate::spectrum::unweighted_lags;
     use crate::window::Weighting;
 
@@ -532,15 +532,8 @@ mod tests {
     fn velocities_are_those_of_the_mean_correlogram_of_thin_layers() {
         let (model, sampling) = (WakeModel::default(), sampling());
         let statistic = Correlogram::<f64>::new(Weighting::default(), 64).unwrap();
-        let lags = LagWindowPeak::new(
-            &sampling,
-            SignalKind::Real,
-            &unweighted_lags(64),
-            16,
-            1024,
-            Refinement::Parabola,
-        )
-        .unwrap();
+        let moment =
+            FirstMoment::new(&sampling, SignalKind::Real, &unweighted_lags(64), 1024, 3.5).unwrap();
         let peak = SpectralPeak::new(
             &sampling,
             SignalKind::Real,
@@ -583,7 +576,7 @@ mod tests {
             }
             sum
         };
-        for (name, estimator) in [("lag window", &lags as &dyn Estimator), ("peak", &peak)] {
+        for (name, estimator) in [("first moment", &moment as &dyn Estimator), ("peak", &peak)] {
             let shown = response(&statistic, estimator, (Noise::White, snr), radius_m)
                 .map(&model, &wake(), &LINES_RAD, &RANGES_M)
                 .unwrap();

@@ -155,20 +155,16 @@ impl<S: FromParts> Blocks<'_, S> {
         }
         let scan = sums.finish();
         // The estimator takes lines by increasing elevation.
-        let (guessed, gates) = &tile.guessed;
-        let order = upward(guessed.clone(), &lines.elevation_rad);
+        let gates = &tile.gates;
+        let order = upward(tile.lines.clone(), &lines.elevation_rad);
         let angles: Vec<f64> = order
             .iter()
             .map(|line| lines.elevation_rad[*line])
             .collect();
         let points = polar_points(&angles, &plan.geometry.gate_range_m[gates.clone()]);
         let found = estimator.gates(&scan, &points, &estimator.noise(&self.places, &points)?)?;
-        for (row, line) in order
-            .into_iter()
-            .enumerate()
-            .filter(|(_, line)| tile.lines.contains(line))
-        {
-            for gate in tile.gates.clone() {
+        for (row, line) in order.into_iter().enumerate() {
+            for gate in gates.clone() {
                 let at = row * gates.len() + gate - gates.start;
                 cells.gates[[line, gate]] = found[at];
                 if let (Some(spectra), Some(of_gate)) = (&mut cells.spectra, self.spectra) {

@@ -8,7 +8,7 @@ use crate::io::Table;
 use crate::measure::map::VelocityEstimates;
 use crate::plan::Plan;
 use crate::scene::NoiseModel;
-use crate::setup::estimators::{ExpectedBias, WindowStatistics};
+use crate::setup::estimators::ExpectedBias;
 use crate::setup::ray_information::RayInformation;
 use crate::setup::region::places;
 use crate::setup::table::of_table;
@@ -28,13 +28,8 @@ pub(super) struct PredictedError {
 }
 
 impl PredictedError {
-    /// For regions of a scan of a scene that have at most the radius `largest_m` and about `n_eff` independent windows.
-    pub(super) fn new(
-        plan: &Plan,
-        places: ScanGeometry,
-        largest_m: f64,
-        n_eff: f64,
-    ) -> Result<Self, Error> {
+    /// For regions of a scan of a scene that have at most the radius `largest_m`.
+    pub(super) fn new(plan: &Plan, places: ScanGeometry, largest_m: f64) -> Result<Self, Error> {
         let is_noisy = plan.scene.content.detector.noise != NoiseModel::None;
         let (of_rays, count) = (
             RayInformation::new(plan, &[])?,
@@ -47,11 +42,7 @@ impl PredictedError {
             .iter()
             .map(|db| of_snr(*db))
             .collect::<Result<_, Error>>()?;
-        let bias = ExpectedBias::new(
-            &plan.scene.content,
-            &plan.instrument,
-            &WindowStatistics { snr: 1.0, n_eff },
-        )?;
+        let bias = ExpectedBias::new(&plan.scene.content, &plan.instrument)?;
         Ok(Self {
             bias,
             places,
@@ -107,11 +98,8 @@ pub fn predicted_table(plan: &Plan, map: &VelocityEstimates) -> Result<Table, Er
     let places = places(&plan.scene.content, &plan.geometry)?;
     let points = polar_points(places.line_elevation_rad(), &map.range_m);
     let largest_m = map.radius_m.iter().copied().fold(0.0, f64::max);
-    let n_eff = map.n_eff.mean().unwrap_or(1.0);
-    let (predicted, gates) = (
-        PredictedError::new(plan, places, largest_m, n_eff)?,
-        map.range_m.len(),
-    );
+    let predicted = PredictedError::new(plan, places, largest_m)?;
+    let gates = map.range_m.len();
     let of = |(at, ((snr_db, level), velocity_m_s)): (usize, ((&f64, &f64), &f64))| {
         let deviation_m_s =
             predicted.deviation_m_s(points[at], map.radius_m[at % gates], *level, *snr_db);
@@ -167,12 +155,6 @@ mod tests {
                 0.03,
             ),
             (
-                "",
-                "method = { kind = \"capon\", order = 12 }\nweighting = \"rectangular\"\n",
-                0.0,
-            ),
-            ("", "method.kind = \"lag_window\"\n", 0.0),
-            (
                 "signal = \"baseband\"",
                 "method.kind = \"pulse_pair\"\n",
                 0.2,
@@ -186,7 +168,7 @@ mod tests {
             let plan = plan(detector, method);
             let map = run(&plan, &Silent).unwrap().map.unwrap();
             let places = places(&plan.scene.content, &plan.geometry).unwrap();
-            let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
+            let predicted = PredictedError::new(&plan, places, 3.0).unwrap();
             let count = map.bias_m_s.len() as f64;
             let (mut found_m_s, mut stated_m_s) = (0.0, 0.0);
             for (bias_m_s, truth_m_s) in map.bias_m_s.iter().zip(&map.v_pulse_m_s) {
@@ -210,7 +192,7 @@ mod tests {
             let found = bound(&plan, &Silent).unwrap().by_range[3];
             let places = places(&plan.scene.content, &plan.geometry).unwrap();
             let elevation_rad = places.line_elevation_rad()[2];
-            let predicted = PredictedError::new(&plan, places, 3.0, 20.0).unwrap();
+            let predicted = PredictedError::new(&plan, places, 3.0).unwrap();
             let point = PolarPoint {
                 range_m: found.range_m,
                 elevation_rad,

@@ -60,18 +60,8 @@ pub(super) fn measured(
         regions: (places, radius_m),
         ..
     } = scan;
-    let n_eff: Vec<f64> = gates
-        .iter()
-        .map(|gate| gate.found.n_eff)
-        .filter(|n_eff| n_eff.is_finite())
-        .collect();
-    let n_eff = n_eff.iter().sum::<f64>() / n_eff.len().max(1) as f64;
-    let predicted = PredictedError::new(
-        plan,
-        places,
-        radius_m.iter().copied().fold(0.0, f64::max),
-        n_eff,
-    )?;
+    let largest_m = radius_m.iter().copied().fold(0.0, f64::max);
+    let predicted = PredictedError::new(plan, places, largest_m)?;
     let velocity_m_s = gates.map(|gate| gate.found.estimate.velocity_m_s);
     let sums = gates.map(|gate| {
         let mut sums = GateSums::default();

@@ -7,7 +7,6 @@ use crate::Error;
 use crate::io::OutputError;
 use crate::measure::map_estimator::{MapEstimator, places_of};
 use crate::plan::Plan;
-use crate::scene::Method;
 use crate::setup::estimators;
 use ndarray::ArrayView2;
 use wakescope_estimate::map::PolarPoint;
@@ -105,9 +104,9 @@ impl GateSpectra {
     /// A method whose numbers are no correlogram of the whole window.
     pub(super) fn new(plan: &Plan, kind: SignalKind) -> Result<Self, Error> {
         let scene = &plan.scene.content;
-        // Gradients are no correlogram, and models of windows without weighting take the first lags alone.
+        // Models of windows without weighting take the first lags alone.
         let e = &scene.estimator;
-        if matches!(e.method, Method::GradientLikelihood(_)) || e.few_lags().is_some() {
+        if e.few_lags().is_some() {
             let reason =
                 "--spectra needs the correlogram of the whole window, which this estimator.method does not make".into();
             return Err(Error::Key {

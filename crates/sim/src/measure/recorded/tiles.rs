@@ -14,29 +14,24 @@ use wakescope_estimate::window::Sample;
 pub(super) struct Tile {
     pub(super) lines: Range<usize>,
     pub(super) gates: Range<usize>,
-    /// Lines and gates of the map whose first estimates guide these; none but their own if they do not follow the wind.
-    pub(super) guessed: (Range<usize>, Range<usize>),
     /// Lines whose records are read, and the windows in them.
     pub(super) windows: (Range<usize>, Range<usize>),
 }
 
-/// How far a gate of the map reaches: to angles from its line, rad, and to gates of the map and windows.
+/// How far a gate of the map reaches: to angles from its line, rad, and to windows.
 #[derive(Debug, Clone, PartialEq)]
 struct Reach {
-    guessed_rad: f64,
-    guessed: Range<usize>,
     windows_rad: f64,
     windows: Range<usize>,
 }
 
 impl Reach {
     fn and(&self, other: &Self) -> Self {
-        let hull = |a: &Range<usize>, b: &Range<usize>| a.start.min(b.start)..a.end.max(b.end);
+        let start = self.windows.start.min(other.windows.start);
+        let end = self.windows.end.max(other.windows.end);
         Self {
-            guessed_rad: self.guessed_rad.max(other.guessed_rad),
-            guessed: hull(&self.guessed, &other.guessed),
             windows_rad: self.windows_rad.max(other.windows_rad),
-            windows: hull(&self.windows, &other.windows),
+            windows: start..end,
         }
     }
 }
@@ -47,7 +42,7 @@ fn reaches<S: Sample>(
     places: &ScanGeometry,
     range_m: &[f64],
 ) -> Result<Vec<Reach>, Error> {
-    let own = range_m.iter().enumerate().map(|(gate, range_m)| {
+    let own = range_m.iter().map(|range_m| {
         let radius_m = estimator.radius.at_m(*range_m)?;
         let windows = places.gates_between(range_m - radius_m, range_m + radius_m);
         let windows_rad = if radius_m < *range_m {
@@ -56,36 +51,11 @@ fn reaches<S: Sample>(
             std::f64::consts::PI
         };
         Ok(Reach {
-            guessed_rad: 0.0,
-            guessed: gate..gate + 1,
             windows_rad,
             windows,
         })
     });
-    let reach = own.collect::<Result<Vec<Reach>, Error>>()?;
-    if estimator.tools.following.is_none() {
-        return Ok(reach);
-    }
-    let followed = reach.iter().zip(range_m).map(|(own, at_m)| {
-        // The gates between which the wind is interpolated.
-        let radius_m = estimator.radius.at_m(*at_m)?;
-        let start = range_m
-            .partition_point(|range_m| *range_m <= at_m - radius_m)
-            .saturating_sub(1);
-        let end = range_m.partition_point(|range_m| *range_m < at_m + radius_m) + 1;
-        let guessed = start..end.min(range_m.len());
-        let others = reach[guessed.clone()]
-            .iter()
-            .fold(own.clone(), |all, one| all.and(one));
-        let windows_rad = own.windows_rad + others.windows_rad;
-        Ok(Reach {
-            guessed_rad: own.windows_rad,
-            guessed,
-            windows_rad,
-            windows: others.windows,
-        })
-    });
-    followed.collect()
+    own.collect()
 }
 
 /// The tiles of a scan with lines at some elevations, rad, and gates at `range_m`: gates by increasing range and for each the lines
@@ -132,10 +102,6 @@ pub(super) fn tiles<S: Sample>(
             tiles.push(Tile {
                 lines: some.clone(),
                 gates: gates.clone(),
-                guessed: (
-                    within(elevation_rad, &some, reach.guessed_rad),
-                    reach.guessed.clone(),
-                ),
                 windows: (
                     within(elevation_rad, &some, reach.windows_rad),
                     reach.windows.clone(),
@@ -184,11 +150,7 @@ mod tests {
 
     #[test]
     fn tiles_hold_each_gate_once_with_all_that_it_reaches_and_do_not_grow_with_the_record() {
-        for (samples, words) in [
-            (5_000, ""),
-            (5_000, "follow_wind = true"),
-            (250_000, "gate_step_samples = 100"),
-        ] {
+        for (samples, words) in [(5_000, ""), (250_000, "gate_step_samples = 100")] {
             let plan = scene(samples, words);
             let elevation_rad = plan.geometry.elevation_rad.clone();
             let places = places_of(&plan, &elevation_rad).unwrap();
@@ -215,10 +177,9 @@ mod tests {
                         .clone()
                         .for_each(|gate| held[line * range_m.len() + gate] += 1);
                 }
-                // What the estimates at the corners depend on: their own windows, and those of the first estimates.
-                let (guessed, guesses) = &tile.guessed;
-                for line in [guessed.start, guessed.end - 1] {
-                    for gate in [guesses.start, guesses.end - 1] {
+                // What the estimates at the corners depend on: their windows.
+                for line in [tile.lines.start, tile.lines.end - 1] {
+                    for gate in [tile.gates.start, tile.gates.end - 1] {
                         let point = PolarPoint {
                             range_m: range_m[gate],
                             elevation_rad: elevation_rad[line],
@@ -232,15 +193,6 @@ mod tests {
                         }
                     }
                 }
-                let own = PolarPoint {
-                    range_m: range_m[tile.gates.start],
-                    elevation_rad: elevation_rad[tile.lines.start],
-                };
-                let reached = places.chords(own, 5.0).map(|chord| chord.line);
-                assert!(
-                    estimator.tools.following.is_none()
-                        || reached.into_iter().all(|line| guessed.contains(&line))
-                );
             }
             assert!(held.iter().all(|count| *count == 1), "{samples} samples");
         }
