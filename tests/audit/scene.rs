@@ -16,7 +16,7 @@ detector.snr = { reference = "physical" }
 detector.front_end = { amplifier_noise_a_rthz = 0.0, load_ohm = inf, load_temperature_k = 290.0, dark_current_a = 0.0, intensity_noise_db_hz = -inf, rejection_db = 0.0, saturation_w = inf, half_power_hz = inf, poles = 1 }
 telescope = { aperture_radius_m = 0.05, obscuration_radius_m = 0.0, beam_radius_m = 0.03, beam_radius_definition = "intensity", focus_m = inf, receiver = "monostatic", optics_loss_db = 0.0, polarisation_loss_db = 0.0, reflection_db = -inf, blind_range_m = 0.0 }
 atmosphere = { backscatter_per_m_sr = 1e-7, extinction_per_m = 7e-5 }
-atmosphere.turbulence = { kind = "none", cn2_m_m23 = 1e-15, spectrum = "von_karman", inner_scale_m = 0.01, outer_scale_m = 1.0, outer_scale_wavenumber = "inverse", realisations = 400 }
+atmosphere.turbulence = { kind = "none", cn2_m_m23 = 1e-15, spectrum = "von_karman", inner_scale_m = 0.01, outer_scale_m = 1.0, realisations = 400 }
 flow = { kind = "vortex_pair", circulation_m2_s = 500.0, spacing_m = 47.0, core_radius_m = 2.35, lateral_position_m = 400.0, height_m = 47.0, profile = "algebraic", motion = "frozen", age_tau = 0.0, cross_wind_m_s = 0.0 }
 scan = { lidar_height_m = 0.0, azimuth_rad = 1.5707963267948966, elevation_min_rad = 0.0, elevation_max_rad = 0.2304, elevation_step_rad = 1.25e-3, range_min_m = 280.0, range_max_m = 520.0, pulses_per_line = 16, realisations = 4 }
 scan.below_ground = { policy = "error" }

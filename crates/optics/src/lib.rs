@@ -31,7 +31,7 @@
 //! |---|---|
 //! | [`beam`] | telescope, focus, obscuration, misalignment of the two beams; the field at the telescope |
 //! | [`air`] | spectrum, Cn2 along the path, structure function, Rytov variance, coherence radius |
-//! | [`theory`] | efficiency without random numbers: free space by two methods, bistatic at any strength, weak turbulence |
+//! | [`theory`] | efficiency without random numbers: free space, bistatic at any strength |
 //! | [`efficiency`] | efficiency profile with scatter and error |
 //! | `screens` | transverse grid, phase screens, split step, inner loops |
 //! | `monte_carlo` | layers of the path; efficiency by Monte Carlo |

@@ -4,8 +4,6 @@
 //! closed forms to its tolerance.
 
 use crate::Error;
-use std::iter::Sum;
-use std::ops::Mul;
 
 /// Gauss-Legendre rule on \[-1, 1\].
 #[derive(Debug, Clone)]
@@ -160,7 +158,8 @@ pub(crate) fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
 }
 
 /// Cubic interpolation at `t` between the four neighbours in a table of values at 0, 1, 2, ...
-pub(crate) fn cubic<T: Copy + Mul<f64, Output = T> + Sum>(t: f64, table: &[T]) -> T {
+#[cfg(feature = "screens")]
+pub(crate) fn cubic(t: f64, table: &[f64]) -> f64 {
     let at = (t as usize).clamp(1, table.len() - 3);
     let u = t - at as f64;
     let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
@@ -173,7 +172,7 @@ pub(crate) fn cubic<T: Copy + Mul<f64, Output = T> + Sum>(t: f64, table: &[T]) -
     weight
         .iter()
         .zip(&table[at - 1..])
-        .map(|(w, v)| *v * *w)
+        .map(|(w, v)| v * w)
         .sum()
 }
 

@@ -24,24 +24,13 @@ pub trait Spectrum: Debug + Send + Sync {
     fn inner_wavenumber_rad_m(&self) -> f64;
 }
 
-/// How the outer scale L0 gives the wave number kappa_0.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum OuterScaleConvention {
-    /// kappa_0 = 1/L0, as (17) has it.
-    Inverse,
-    /// kappa_0 = 2 pi/L0, as most codes have it.
-    TwoPiOver,
-}
-
 /// Outer and inner scale of a spectrum.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Scales {
-    /// Outer scale L0 \[m\]; infinity for none.
+    /// Outer scale L0 \[m\], with kappa_0 = 1/L0 as in (17); infinity for none.
     pub outer_scale_m: f64,
     /// Inner scale l0 \[m\]; 0 for none.
     pub inner_scale_m: f64,
-    /// How L0 gives kappa_0.
-    pub convention: OuterScaleConvention,
 }
 
 impl Scales {
@@ -50,7 +39,6 @@ impl Scales {
         let Self {
             outer_scale_m,
             inner_scale_m,
-            convention,
         } = self;
         within(
             "outer_scale_m",
@@ -59,10 +47,7 @@ impl Scales {
             "a number above 0, infinity for none",
         )?;
         not_negative("inner_scale_m", inner_scale_m)?;
-        let outer_rad_m = match convention {
-            OuterScaleConvention::Inverse => 1.0 / outer_scale_m,
-            OuterScaleConvention::TwoPiOver => 2.0 * std::f64::consts::PI / outer_scale_m,
-        };
+        let outer_rad_m = 1.0 / outer_scale_m;
         let inner_rad_m = cut / inner_scale_m;
         let apart = outer_rad_m < inner_rad_m && outer_scale_m > inner_scale_m;
         within(
@@ -77,7 +62,7 @@ impl Scales {
 
 /// (17): constant exp(-kappa^2/kappa_m^2) / (kappa^2 + kappa_0^2)^(11/6), kappa_m = 5.92/l0.
 ///
-/// Kolmogorov, von Karman and Tatarskii spectra are its limits without one or both scales.
+/// Kolmogorov's spectrum is its limit without scales.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VonKarman {
     constant: f64,
@@ -116,22 +101,6 @@ impl VonKarman {
             outer_rad_m: 0.0,
             inner_rad_m: f64::INFINITY,
         }
-    }
-
-    /// Tatarskii's spectrum: inner scale only, exact constant.
-    ///
-    /// # Errors
-    /// As [`VonKarman::new`].
-    pub fn tatarskii(inner_scale_m: f64) -> Result<Self, Error> {
-        let convention = OuterScaleConvention::Inverse;
-        Self::new(
-            Scales {
-                outer_scale_m: f64::INFINITY,
-                inner_scale_m,
-                convention,
-            },
-            EXACT_CONSTANT,
-        )
     }
 }
 
@@ -195,7 +164,6 @@ mod tests {
         Scales {
             outer_scale_m,
             inner_scale_m,
-            convention: OuterScaleConvention::Inverse,
         }
     }
 
@@ -213,8 +181,8 @@ mod tests {
         assert!((kolmogorov / (EXACT_CONSTANT * k.powf(-11.0 / 3.0)) - 1.0).abs() < 1e-12);
         let hill = HillAndrews::new(scales(f64::INFINITY, 1e-6)).unwrap();
         assert!((hill.density_per_cn2(k) / kolmogorov - 1.0).abs() < 1e-4);
-        let tatarskii = VonKarman::tatarskii(1e-6).unwrap();
-        assert!((tatarskii.density_per_cn2(k) / kolmogorov - 1.0).abs() < 1e-9);
+        let without_outer = VonKarman::new(scales(f64::INFINITY, 1e-6), EXACT_CONSTANT).unwrap();
+        assert!((without_outer.density_per_cn2(k) / kolmogorov - 1.0).abs() < 1e-9);
     }
 
     #[test]

@@ -144,7 +144,7 @@ impl StructureTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::air::spectrum::{EXACT_CONSTANT, OuterScaleConvention, Scales, VonKarman};
+    use crate::air::spectrum::{EXACT_CONSTANT, Scales, VonKarman};
 
     #[test]
     fn kolmogorov_gives_the_five_thirds_law() {
@@ -162,9 +162,8 @@ mod tests {
     #[test]
     fn table_follows_the_quadrature() {
         let scales = Scales {
-            outer_scale_m: 0.3,
+            outer_scale_m: 0.05,
             inner_scale_m: 0.004,
-            convention: OuterScaleConvention::TwoPiOver,
         };
         for spectrum in [
             VonKarman::table2(),

@@ -146,11 +146,6 @@ impl Telescope {
             1.0 / (PI * s * s)
         }
     }
-
-    /// exp(-r^2/s^2), without regard to the aperture.
-    pub(crate) fn relative_irradiance(&self, radius_m: f64) -> f64 {
-        (-(radius_m / self.intensity_radius_m()).powi(2)).exp()
-    }
 }
 
 /// Displacement of the BPLO against the transmitted beam: an offset of parallel axes, and an angle between them.
@@ -213,7 +208,8 @@ mod tests {
                     obscuration_radius_m,
                     ..Telescope::table2()
                 };
-                let irradiance = |r: f64| t.peak_irradiance_per_m2() * t.relative_irradiance(r);
+                let s = t.intensity_radius_m();
+                let irradiance = |r: f64| t.peak_irradiance_per_m2() * (-(r / s).powi(2)).exp();
                 let power = rule.composite(obscuration_radius_m, 0.05, 20, |r| {
                     2.0 * PI * r * irradiance(r)
                 });

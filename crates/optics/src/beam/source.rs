@@ -18,6 +18,11 @@ use std::f64::consts::PI;
 /// light just below Nyquist does: 0 leaves the chapter's efficiency 0.2 % too small at 100 m, 1 makes it 0.3 % too large.
 const RESTORED: f64 = 0.4;
 
+/// exp(-r^2/s^2), without regard to the aperture.
+fn relative_irradiance(telescope: &Telescope, radius_m: f64) -> f64 {
+    (-(radius_m / telescope.intensity_radius_m()).powi(2)).exp()
+}
+
 /// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr \[m\], by a table of steps of 1/50 of its finest
 /// structure.
 fn transform(telescope: &Telescope, largest_rad_m: f64) -> impl Fn(f64) -> f64 {
@@ -26,7 +31,8 @@ fn transform(telescope: &Telescope, largest_rad_m: f64) -> impl Fn(f64) -> f64 {
     let step_rad_m = 0.02 / a;
     let panels = 2 + (largest_rad_m * (a - b) / 8.0) as usize;
     let peak = telescope.peak_irradiance_per_m2().sqrt();
-    let weight = |r: f64, w: f64| 2.0 * PI * w * r * peak * telescope.relative_irradiance(r).sqrt();
+    let weight =
+        |r: f64, w: f64| 2.0 * PI * w * r * peak * relative_irradiance(telescope, r).sqrt();
     let nodes: Vec<_> = GaussLegendre::new(16)
         .on_panels(b, a, panels)
         .map(|(r, w)| (r, weight(r, w)))

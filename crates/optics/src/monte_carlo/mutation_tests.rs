@@ -3,7 +3,7 @@
 //! With the wrong sign a frequency kappa_m - s carries the amplitude that belongs to kappa_m + s. Screens look right and the
 //! monostatic efficiency hardly changes; the bistatic efficiency falls by several standard errors.
 
-use crate::air::{OuterScaleConvention, Scales, StructureTable};
+use crate::air::{Scales, StructureTable};
 use crate::monte_carlo::EfficiencyEstimate;
 use crate::{Error, Grid, Layers, Misalignment, MonteCarlo, Stop, VonKarman, theory};
 use std::ops::ControlFlow;
@@ -41,7 +41,6 @@ fn bistatic_test_passes_and_finds_a_wrong_sign_of_the_frequency_shift() {
     let scales = Scales {
         outer_scale_m: f64::INFINITY,
         inner_scale_m: 0.01,
-        convention: OuterScaleConvention::Inverse,
     };
     run.turbulence.spectrum =
         std::sync::Arc::new(VonKarman::new(scales, 0.033).expect("a valid set-up"));

@@ -7,7 +7,7 @@
 //!
 //! exactly, at any strength of turbulence (Markov approximation); D = 0 is free space. Both integrals have finite
 //! support (|rho| < 2a) and need no grid. Check: M(0) is the transmitted fraction, and an independent Fresnel-Hankel
-//! quadrature gives the same efficiency.
+//! quadrature (an oracle of the tests) gives the same efficiency.
 
 use crate::beam::Telescope;
 use crate::quadrature::{GaussLegendre, adaptive};

@@ -5,6 +5,7 @@ mod free_space;
 mod literal;
 #[cfg(feature = "screens")]
 mod monte_carlo;
+mod oracle;
 #[cfg(feature = "screens")]
 mod plan;
 #[cfg(feature = "screens")]

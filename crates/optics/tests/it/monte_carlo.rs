@@ -1,12 +1,11 @@
 //! Monte-Carlo efficiency against exact theory, and its behaviour in extreme cases.
 
+use crate::oracle::weak::{LARGEST_RYTOV, weak_turbulence_efficiency};
 use std::ops::ControlFlow;
-use wakescope_optics::air::{OuterScaleConvention, Scales, StructureTable};
+use wakescope_optics::air::{Scales, StructureTable};
 use wakescope_optics::monte_carlo::{EfficiencyEstimate, Progress, Sampling};
 use wakescope_optics::screens::Real;
-use wakescope_optics::theory::{
-    bistatic_efficiency_screens, free_space_efficiency, weak_turbulence_efficiency,
-};
+use wakescope_optics::theory::{bistatic_efficiency_screens, free_space_efficiency};
 use wakescope_optics::{
     Cn2Path, Error, Focus, Grid, Layers, Misalignment, MonteCarlo, Stop, Telescope, Turbulence,
     VonKarman,
@@ -124,12 +123,10 @@ fn free_space_on_the_chapters_grid_is_within_1e_3_raw_and_exact_when_corrected()
 #[test]
 fn infinite_outer_scale_agrees_with_exact_theory() {
     let mut run = coarse(1e-14, 12);
-    let convention = OuterScaleConvention::Inverse;
     let spectrum = VonKarman::new(
         Scales {
             outer_scale_m: f64::INFINITY,
             inner_scale_m: 0.01,
-            convention,
         },
         0.033,
     );
@@ -492,9 +489,9 @@ fn weak_z(run: &MonteCarlo, realisations: usize) -> Vec<f64> {
         .run_in::<f32>(Stop::after(realisations), go)
         .expect("run");
     let of = |(i, &range_m): (usize, &f64)| {
-        let weak =
-            weak_turbulence_efficiency(&run.telescope, &run.turbulence, range_m).expect("theory");
-        assert!(weak.valid && weak.monostatic > weak.bistatic, "{weak:?}");
+        let weak = weak_turbulence_efficiency(&run.telescope, &run.turbulence, range_m);
+        assert!(weak.rytov_variance < LARGEST_RYTOV, "{weak:?}");
+        assert!(weak.monostatic > weak.bistatic, "{weak:?}");
         (estimate.monostatic.mean[i] - weak.monostatic) / estimate.monostatic.standard_error[i]
     };
     run.range_m.iter().enumerate().map(of).collect()
@@ -527,10 +524,7 @@ fn monostatic_enhancement_of_weak_turbulence_is_that_of_first_order_theory() {
 fn weak_turbulence_meets_the_chapters_monostatic_efficiency_at_1250_m() {
     // 512 x 512 points of 2 mm gave 0.0903 +- 0.0017 at 1e-14 where the spherical wave's factor 0.4 gave 0.0764.
     let turbulence = Turbulence::table2(1e-14).expect("turbulence");
-    let weak =
-        weak_turbulence_efficiency(&Telescope::table2(), &turbulence, 1250.0).expect("theory");
-    assert!(
-        weak.valid && (weak.monostatic - 0.0903).abs() < 2.0 * 0.0017,
-        "{weak:?}"
-    );
+    let weak = weak_turbulence_efficiency(&Telescope::table2(), &turbulence, 1250.0);
+    assert!(weak.rytov_variance < LARGEST_RYTOV, "{weak:?}");
+    assert!((weak.monostatic - 0.0903).abs() < 2.0 * 0.0017, "{weak:?}");
 }

@@ -1,7 +1,7 @@
 //! Structure functions of the screens: expected ones against quadrature, measured ones against the expected.
 
 use std::sync::Arc;
-use wakescope_optics::air::{HillAndrews, OuterScaleConvention, Scales, structure_function_m53};
+use wakescope_optics::air::{HillAndrews, Scales, structure_function_m53};
 use wakescope_optics::screens::{ScreenGenerator, stream};
 use wakescope_optics::{Grid, Spectrum, VonKarman};
 
@@ -35,7 +35,6 @@ fn expected_structure_function_is_within_0_1_percent_of_theory() {
                 Scales {
                     outer_scale_m,
                     inner_scale_m,
-                    convention: OuterScaleConvention::Inverse,
                 },
                 0.033,
             );
@@ -59,9 +58,8 @@ fn expected_structure_function_holds_on_rectangular_and_prime_grids_and_for_othe
     let worst = worst_error(rectangular, Arc::new(VonKarman::table2()));
     assert!(worst < 1e-3, "{worst}");
     let hill = HillAndrews::new(Scales {
-        outer_scale_m: 5.0,
+        outer_scale_m: 0.8,
         inner_scale_m: 0.02,
-        convention: OuterScaleConvention::TwoPiOver,
     })
     .expect("spectrum");
     let worst = worst_error(Grid::square(128, 4e-3).expect("grid"), Arc::new(hill));

@@ -2,22 +2,19 @@
 
 use crate::reference::reference;
 use wakescope_optics::VonKarman;
-use wakescope_optics::air::{OuterScaleConvention, Scales, structure_function_m53};
+use wakescope_optics::air::{Scales, structure_function_m53};
 
 #[test]
 fn quadrature_reproduces_the_stored_structure_function() {
     let rows = reference("structure_function_vonkarman.csv");
     assert!(rows.len() > 100);
     for v in rows {
-        for (column, convention) in [
-            (1, OuterScaleConvention::Inverse),
-            (2, OuterScaleConvention::TwoPiOver),
-        ] {
+        // The second column has kappa_0 = 2 pi rad/m.
+        for (column, outer_scale_m) in [(1, 1.0), (2, 0.5 / std::f64::consts::PI)] {
             let spectrum = VonKarman::new(
                 Scales {
-                    outer_scale_m: 1.0,
+                    outer_scale_m,
                     inner_scale_m: 0.01,
-                    convention,
                 },
                 0.033,
             )

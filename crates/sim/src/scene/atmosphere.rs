@@ -1,7 +1,6 @@
 //! Aerosol and refractive turbulence of a scene.
 
 use crate::keys::{ABOVE_ZERO_OR_INF, keys};
-use wakescope_optics::air::OuterScaleConvention;
 
 keys! {
     /// Aerosol and refractive turbulence.
@@ -52,10 +51,8 @@ keys! {
         spectrum: SpectrumKind = SpectrumKind::VonKarman,
         /// Inner scale l0, m; 0 for none.
         inner_scale_m: f64 = 0.01 => 0.0..=1.0,
-        /// Outer scale L0, m; `inf` for none.
+        /// Outer scale L0, of wave number 1/L0, m; `inf` for none.
         outer_scale_m: f64 = 1.0 => ABOVE_ZERO_OR_INF,
-        /// Wave number of the outer scale.
-        outer_scale_wavenumber: OuterScaleConvention = OuterScaleConvention::Inverse,
         /// Who chooses grid and layers of the phase screens.
         sampling: ScreenSampling = ScreenSampling::Explicit,
         /// Points along each side of the phase screens; not used with `sampling = "derived"`.
@@ -84,8 +81,6 @@ keys! {
         VonKarman = "von_karman",
         /// Kolmogorov: neither scale.
         Kolmogorov = "kolmogorov",
-        /// Tatarskii: the inner scale only.
-        Tatarskii = "tatarskii",
         /// Hill's bump near the inner scale, in Andrews' form.
         HillAndrews = "hill_andrews",
     }

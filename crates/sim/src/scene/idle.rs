@@ -3,10 +3,7 @@
 //! They are refused, so that nobody turns a knob that turns nothing. Keys that stand in the file of `wakescope init` may stay
 //! there with their default.
 
-use super::{
-    Estimator, FrontEnd, HeadMotion, Method, NoiseModel, OuterScaleConvention, Pattern,
-    RefractiveTurbulence,
-};
+use super::{Estimator, FrontEnd, HeadMotion, Method, NoiseModel, Pattern, RefractiveTurbulence};
 use super::{Problem, Scene, ScreenSampling, SnrReference, SpectrumKind, Turbulence};
 use super::{RegionRadius, SignalsOf};
 use crate::keys::{Text, lines_with_keys, to_table, value_at};
@@ -144,9 +141,9 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
             "atmosphere.turbulence.grid_spacing_m",
             "atmosphere.turbulence.layers",
         ];
-        const OUTER: [&str; 2] = [
+        const SCALES: [&str; 2] = [
+            "atmosphere.turbulence.inner_scale_m",
             "atmosphere.turbulence.outer_scale_m",
-            "atmosphere.turbulence.outer_scale_wavenumber",
         ];
         let derived = turbulence.sampling == ScreenSampling::Derived;
         unused(
@@ -154,27 +151,10 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
             &SCREENS,
             "this key is for atmosphere.turbulence.sampling = \"explicit\"".into(),
         );
-        let without_inner = turbulence.spectrum == SpectrumKind::Kolmogorov;
-        let without_outer = without_inner || turbulence.spectrum == SpectrumKind::Tatarskii;
-        let purpose = |scale| {
-            format!(
-                "atmosphere.turbulence.spectrum = \"{}\" has no {scale} scale",
-                turbulence.spectrum.name()
-            )
-        };
         unused(
-            without_inner,
-            &["atmosphere.turbulence.inner_scale_m"],
-            purpose("inner"),
-        );
-        unused(without_outer, &OUTER, purpose("outer"));
-        // A spectrum without outer scale has no wave number of it.
-        let endless = !without_outer && turbulence.outer_scale_m == f64::INFINITY;
-        let unset = turbulence.outer_scale_wavenumber == OuterScaleConvention::Inverse;
-        unused(
-            endless && !unset,
-            &OUTER[1..],
-            "atmosphere.turbulence.outer_scale_m = inf is no outer scale".into(),
+            turbulence.spectrum == SpectrumKind::Kolmogorov,
+            &SCALES,
+            "atmosphere.turbulence.spectrum = \"kolmogorov\" has neither scale".into(),
         );
     }
     found

@@ -28,9 +28,7 @@ pub use read::SceneFile;
 pub use retrieval::*;
 pub use wakescope_estimate::Refinement;
 pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope, Secondary};
-pub use wakescope_optics::{
-    RadiusDefinition, air::OuterScaleConvention, plan::Receiver as ReceiverPath,
-};
+pub use wakescope_optics::{RadiusDefinition, plan::Receiver as ReceiverPath};
 pub use wakescope_signal::{NoiseModel, sampled::Resampling};
 
 use crate::io::UtcTime;
@@ -41,7 +39,6 @@ crate::keys::foreign_choices! {
     CoreProfile { Algebraic = "algebraic", LambOseen = "lamb_oseen" }
     LiftSlope { Span = "span", Semispan = "semispan" }
     NoiseModel { BandLimited = "band", White = "white", None = "none" }
-    OuterScaleConvention { Inverse = "inverse", TwoPiOver = "two_pi_over" }
     RadiusDefinition { Intensity = "intensity", Field = "field" }
     ReceiverPath { Monostatic = "monostatic", Bistatic = "bistatic" }
     Refinement { Parabola = "parabola", None = "none" }
@@ -226,7 +223,6 @@ mod tests {
         check::<CoreProfile>(2);
         check::<LiftSlope>(2);
         check::<NoiseModel>(3);
-        check::<OuterScaleConvention>(2);
         check::<RadiusDefinition>(2);
         check::<ReceiverPath>(2);
         check::<Refinement>(2);

@@ -194,7 +194,6 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
     let scales = optics::air::Scales {
         outer_scale_m: t.outer_scale_m,
         inner_scale_m: t.inner_scale_m,
-        convention: t.outer_scale_wavenumber,
     };
     let spectrum: Arc<dyn optics::Spectrum> = match t.spectrum {
         SpectrumKind::VonKarman => Arc::new(optics::VonKarman::new(
@@ -202,7 +201,6 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
             optics::air::CHAPTER_CONSTANT,
         )?),
         SpectrumKind::Kolmogorov => Arc::new(optics::VonKarman::kolmogorov()),
-        SpectrumKind::Tatarskii => Arc::new(optics::VonKarman::tatarskii(t.inner_scale_m)?),
         SpectrumKind::HillAndrews => Arc::new(optics::air::HillAndrews::new(scales)?),
     };
     Ok(optics::Turbulence {

@@ -1,35 +1,34 @@
-//! Weak turbulence: the monostatic efficiency to first order in Cn2 for the very beam.
+//! Weak turbulence: the monostatic efficiency to first order in Cn2 for the actual beam.
 //!
-//! Both beams of a monostatic lidar cross the same air, so that eta = (C/..) <integral of j^2> exceeds the bistatic value by
-//! the variance of the irradiance j. A phase wave of wave vector kappa at distance z tilts a copy of the beam: at the target
-//! it arrives displaced by s = kappa (R - z)/k and late by kappa^2 (R - z)/(2k). To first order in Cn2 therefore
+//! Both beams of a monostatic lidar cross the same air, so that eta = (C/..) <integral of j^2> exceeds
+//! the bistatic value by the variance of the irradiance j. A phase wave of wave vector kappa at
+//! distance z tilts a copy of the beam: at the target it arrives displaced by s = kappa (R - z)/k and
+//! late by kappa^2 (R - z)/(2k). To first order in Cn2 therefore
 //!
-//! integral of var(j) = integral dz 2 pi k^2 Cn2(z) integral d^2 kappa Phi_n 2 \[Q(s) - Re exp(-j kappa^2 (R - z) z/(k R)) X(s)\],
-//! Q(s) = integral of |U(w)|^2 |U(w - s)|^2 d^2 w, X(s) = integral of U*(w)^2 U(w - s) U(w + s) d^2 w,
+//! integral of var(j) = integral dz 2 pi k^2 Cn2(z) integral d^2 kappa Phi_n
+//!     2 \[Q(s) - Re exp(-j kappa^2 (R - z) z/(k R)) X(s)\],
+//! Q(s) = integral of |U(w)|^2 |U(w - s)|^2 d^2 w,
+//! X(s) = integral of U*(w)^2 U(w - s) U(w + s) d^2 w,
 //!
-//! with U the free-space field at the target without its spherical phase (Born approximation; Ishimaru 1978, chapter 17). Truncation,
-//! obscuration, focus and spectrum enter as they are. Check: Q and X of a Gaussian beam in closed form; the variance of a plane
-//! wave for a wide beam; the Monte Carlo (`monostatic_enhancement_of_weak_turbulence_is_that_of_first_order_theory`).
+//! with U the free-space field at the target without its spherical phase (Born approximation;
+//! Ishimaru 1978, chapter 17). Truncation, obscuration, focus and spectrum enter as they are.
 
-use crate::Error;
-use crate::air::spectrum::Spectrum;
-use crate::air::turbulence::{Turbulence, path_rytov_variance};
-use crate::beam::{Misalignment, Telescope};
-use crate::quadrature::{GaussLegendre, cubic, lagrange};
-use crate::theory::exact::bistatic_efficiency;
-use crate::theory::hankel::field_per_m;
-use crate::theory::overlap::fresnel_number;
+use super::hankel::field_per_m;
+use super::quadrature::GaussLegendre;
 use num_complex::Complex;
 use std::f64::consts::PI;
+use wakescope_optics::air::path_rytov_variance;
+use wakescope_optics::theory::{bistatic_efficiency, fresnel_number};
+use wakescope_optics::{Misalignment, Spectrum, Telescope, Turbulence};
 
 /// Largest Fresnel number for which the overlaps Q and X are tabulated.
 const LARGEST_FRESNEL: f64 = 40.0;
-/// Largest Rytov variance of the path at which the first order is called valid.
-const LARGEST_RYTOV: f64 = 0.3;
+/// Largest Rytov variance of the path at which the first order holds.
+pub(crate) const LARGEST_RYTOV: f64 = 0.3;
 
 /// Efficiencies (19) in weak turbulence.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WeakTurbulence {
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct WeakTurbulence {
     /// Bistatic efficiency, exact.
     pub bistatic: f64,
     /// Monostatic over bistatic efficiency less one, to first order in Cn2.
@@ -38,42 +37,32 @@ pub struct WeakTurbulence {
     pub monostatic: f64,
     /// Rytov variance of a plane wave over the path.
     pub rytov_variance: f64,
-    /// Whether the Rytov variance is below 0.3, up to where the first order was found to hold.
-    pub valid: bool,
 }
 
-/// Both efficiencies of a matched, aligned pair at `range_m` in weak turbulence, without random numbers.
-///
-/// # Errors
-/// [`Error::OutOfRange`] for arguments that are not allowed, [`Error::FresnelNumber`] above 40.
-pub fn weak_turbulence_efficiency(
+/// Both efficiencies of a matched, aligned pair at `range_m` in weak turbulence of constant Cn2.
+pub(crate) fn weak_turbulence_efficiency(
     telescope: &Telescope,
     turbulence: &Turbulence,
     range_m: f64,
-) -> Result<WeakTurbulence, Error> {
-    let telescope = telescope.validated()?;
-    let bistatic = bistatic_efficiency(&telescope, &Misalignment::NONE, turbulence, range_m)?;
-    let found = fresnel_number(&telescope, range_m);
-    if found > LARGEST_FRESNEL {
-        return Err(Error::FresnelNumber {
-            range_m,
-            found,
-            largest: LARGEST_FRESNEL,
-        });
-    }
-    let rytov_variance = path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, range_m)?;
-    let overlaps = DisplacedOverlaps::new(&telescope, range_m);
+) -> WeakTurbulence {
+    let bistatic =
+        bistatic_efficiency(telescope, &Misalignment::NONE, turbulence, range_m).expect("theory");
+    let fresnel = fresnel_number(telescope, range_m);
+    assert!(fresnel < LARGEST_FRESNEL, "{fresnel}");
+    let rytov_variance =
+        path_rytov_variance(&turbulence.cn2, telescope.wavelength_m, range_m).expect("path");
+    let overlaps = DisplacedOverlaps::new(telescope, range_m);
     let mut enhancement = 0.0;
-    for (z, cn2_dz) in turbulence.cn2.quadrature(range_m)? {
+    for (z, dz) in GaussLegendre::new(16).on_panels(0.0, range_m, 1) {
+        let cn2_dz = turbulence.cn2.at(z).expect("path") * dz;
         enhancement += cn2_dz * overlaps.variance_of_layer(&*turbulence.spectrum, z);
     }
-    Ok(WeakTurbulence {
+    WeakTurbulence {
         bistatic,
         enhancement,
         monostatic: bistatic * (1.0 + enhancement),
         rytov_variance,
-        valid: rytov_variance < LARGEST_RYTOV,
-    })
+    }
 }
 
 /// Overlaps Q(s) and X(s) of the beam at the target with displaced copies of itself, over their common value at s = 0.
@@ -182,7 +171,7 @@ impl DisplacedOverlaps {
         let mut sum = 0.0;
         let mut high = quadratic;
         for _ in 0..60 {
-            sum += rule.integrate(0.5 * high, high, |kappa| {
+            sum += rule.composite(0.5 * high, high, 1, |kappa| {
                 density(kappa) * curvature * kappa * kappa
             });
             high *= 0.5;
@@ -193,11 +182,13 @@ impl DisplacedOverlaps {
             let next = (1.26 * low).min((low * low + 4.0 / late).sqrt()).min(end);
             // So late that the delay has averaged X away.
             sum += if low * low * late > 1000.0 {
-                rule.integrate(low, end, |kappa| {
+                rule.composite(low, end, 1, |kappa| {
                     density(kappa) * self.at(kappa * rest / k)[0]
                 })
             } else {
-                rule.integrate(low, next, |kappa| density(kappa) * self.bracket(kappa, z))
+                rule.composite(low, next, 1, |kappa| {
+                    density(kappa) * self.bracket(kappa, z)
+                })
             };
             low = if low * low * late > 1000.0 { end } else { next };
         }
@@ -218,12 +209,29 @@ fn lattice(telescope: &Telescope, range_m: f64, step_m: f64, reach: usize) -> Ve
     steps.map(|steps| cubic(FINER * steps, &radial)).collect()
 }
 
-#[cfg(test)]
+/// Value at `x` of the polynomial that is 1 at `node[j]` and 0 at the other nodes.
+fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
+    let mut product = 1.0;
+    for (i, z) in node.iter().enumerate() {
+        if i != j {
+            product *= (x - z) / (node[j] - z);
+        }
+    }
+    product
+}
+
+/// Cubic interpolation at `t` between the four neighbours in a table of values at 0, 1, 2, ...
+fn cubic(t: f64, table: &[Complex<f64>]) -> Complex<f64> {
+    let at = (t as usize).clamp(1, table.len() - 3);
+    let nodes = [-1.0, 0.0, 1.0, 2.0];
+    let near = table[at - 1..at + 3].iter().enumerate();
+    near.map(|(j, v)| *v * lagrange(&nodes, j, t - at as f64))
+        .sum()
+}
+
 mod tests {
     use super::*;
-    use crate::Focus;
-    use crate::air::cn2::Cn2Path;
-    use crate::air::spectrum::VonKarman;
+    use wakescope_optics::{Cn2Path, Focus, VonKarman};
 
     #[test]
     fn overlaps_of_a_gaussian_beam_are_gaussians() {
@@ -269,8 +277,7 @@ mod tests {
             beam_radius_m: 0.08,
             ..Telescope::table2()
         };
-        let weak =
-            weak_turbulence_efficiency(&t, &turbulence(VonKarman::kolmogorov()), 1500.0).unwrap();
+        let weak = weak_turbulence_efficiency(&t, &turbulence(VonKarman::kolmogorov()), 1500.0);
         assert!(
             (weak.enhancement / weak.rytov_variance - 1.0).abs() < 0.03,
             "{weak:?}"
@@ -280,35 +287,7 @@ mod tests {
             focus: Focus::At(1500.0),
             ..t
         };
-        let weak =
-            weak_turbulence_efficiency(&focused, &turbulence(VonKarman::table2()), 1500.0).unwrap();
+        let weak = weak_turbulence_efficiency(&focused, &turbulence(VonKarman::table2()), 1500.0);
         assert!(weak.enhancement > 3.0 * weak.rytov_variance, "{weak:?}");
-    }
-
-    #[test]
-    fn validity_ends_where_the_first_order_does() {
-        let weak = |cn2| {
-            weak_turbulence_efficiency(
-                &Telescope::table2(),
-                &Turbulence::table2(cn2).unwrap(),
-                1000.0,
-            )
-        };
-        let (calm, weaker, strong) = (
-            weak(0.0).unwrap(),
-            weak(1e-16).unwrap(),
-            weak(1e-13).unwrap(),
-        );
-        assert_eq!((calm.enhancement, calm.valid), (0.0, true));
-        assert!(weaker.valid && !strong.valid);
-        assert!((strong.enhancement / weaker.enhancement / 1000.0 - 1.0).abs() < 1e-9);
-        assert!(matches!(
-            weak_turbulence_efficiency(
-                &Telescope::table2(),
-                &Turbulence::table2(1e-14).unwrap(),
-                20.0
-            ),
-            Err(Error::FresnelNumber { .. })
-        ));
     }
 }
