@@ -22,9 +22,8 @@ fn record_information(s: &Scene, pulse: &Pulse, n: usize, snr: impl Fn(f64) -> f
     );
     let is_baseband = s.s("detector.signal") == "baseband";
     let is_band = s.s("detector.noise") == "band";
-    // c(l) of the signal, of unit power, chirp included.
-    let spread = 1.0 + (2.0 * PI * pulse.chirp_hz_s * pulse.sigma_s.powi(2)).powi(2);
-    let c = |l: f64| (-spread * (l * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
+    // c(l) of the signal, of unit power.
+    let c = |l: f64| (-(l * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
     let sinc = |x: f64| {
         if x == 0.0 {
             1.0
@@ -85,9 +84,8 @@ fn correlation2(s: &Scene, pulse: &Pulse, apart: usize, snr: f64) -> f64 {
         (_, 0) => 1.0 / snr,
         (_, l) => (PI * b * l as f64).sin() / (PI * b * l as f64) / snr,
     };
-    let spread = 1.0 + (2.0 * PI * pulse.chirp_hz_s * pulse.sigma_s.powi(2)).powi(2);
     let c = |l: i64| {
-        let of_signal = (-spread * (l as f64 * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
+        let of_signal = (-(l as f64 * ts / (2.0 * pulse.sigma_s)).powi(2)).exp();
         of_signal + noise(l)
     };
     let sum = |shift: i64| {
@@ -225,9 +223,6 @@ pub(crate) fn hold(ledger: &mut Ledger, s: &Scene, scan: &Scan, json: &Value) {
             .unwrap_or(n);
         if f("snr_db") > 30.0 || longest > 200 {
             continue;
-        }
-        if is_of_range && pulse.chirp_hz_s != 0.0 {
-            continue; // the middle between two samples is turned by the chirp
         }
         let begin = (scan.gate_m[gate] - scan.sample_m[0]) / scan.sample_step_m() - 0.5 * n as f64;
         let seen =

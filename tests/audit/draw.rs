@@ -45,8 +45,7 @@ pub(crate) fn instrument(r: &mut Random, s: &mut Scene) {
         s.number("telescope.focus_m", -r.log(500.0, 3000.0));
     }
     if r.chance(0.3) {
-        s.number("telescope.optics_loss_db", r.between(0.0, 6.0))
-            .number("telescope.polarisation_loss_db", r.between(0.0, 1.0));
+        s.number("telescope.optics_loss_db", r.between(0.0, 6.0));
     }
 }
 
@@ -56,9 +55,6 @@ fn pulse(r: &mut Random, s: &mut Scene) {
         "pulse.shape.definition",
         r.pick(&["fwhm", "one_over_e_half_width"]),
     );
-    if r.chance(0.1) {
-        s.number("pulse.chirp_hz_s", r.log(1e12, 2e13));
-    }
 }
 
 pub(crate) fn detector(r: &mut Random, s: &mut Scene) {
@@ -90,8 +86,7 @@ pub(crate) fn detector(r: &mut Random, s: &mut Scene) {
         }
     };
     if s.s("detector.snr.reference") == "fixed" {
-        s.unset("telescope.optics_loss_db")
-            .unset("telescope.polarisation_loss_db");
+        s.unset("telescope.optics_loss_db");
     } else if r.chance(0.15) && s.s("detector.signal") != "baseband" {
         s.word("detector.digitiser.kind", "quantised")
             .set("detector.digitiser.bits", r.whole(6, 14));
@@ -107,8 +102,7 @@ pub(crate) fn fixed_ratio(s: &mut Scene, snr_db: f64) {
     s.unset("detector.front_end")
         .unset("detector.digitiser")
         .unset("detector.snr");
-    s.unset("telescope.optics_loss_db")
-        .unset("telescope.polarisation_loss_db");
+    s.unset("telescope.optics_loss_db");
     s.word("detector.snr.reference", "fixed")
         .number("detector.snr.snr_db", snr_db);
 }

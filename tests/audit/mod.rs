@@ -217,15 +217,16 @@ fn power_of(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         }
         if r.chance(0.3) {
             let (rise, top) = (r.log(2e-8, 8e-8), r.log(1e-7, 4e-7));
-            s.unset("pulse.shape")
-                .unset("pulse.chirp_hz_s")
-                .word("pulse.shape.kind", "sampled");
-            s.set(
-                "pulse.shape.time_s",
-                format!("[0.0, {rise:?}, {:?}, {:?}]", rise + top, 2.0 * rise + top),
-            );
-            s.set("pulse.shape.power", "[0.0, 1.0, 1.0, 0.0]")
-                .word("pulse.shape.resampling", "linear");
+            let end_s = 2.0 * rise + top;
+            let time_s: Vec<f64> = (0..=200).map(|i| f64::from(i) * end_s / 200.0).collect();
+            let power: Vec<f64> = time_s
+                .iter()
+                .map(|t| (t.min(end_s - t) / rise).min(1.0))
+                .map(|part| (0.5 * std::f64::consts::PI * part).sin().powi(4))
+                .collect();
+            s.unset("pulse.shape").word("pulse.shape.kind", "sampled");
+            s.set("pulse.shape.time_s", format!("{time_s:?}"))
+                .set("pulse.shape.power", format!("{power:?}"));
         }
         s
     };
@@ -306,8 +307,7 @@ fn spectra(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
         s.set("scan.pulses_per_line", 10)
             .set("scan.realisations", 20)
             .set("estimator.gate_step_samples", 20);
-        s.unset("pulse.chirp_hz_s")
-            .number("estimator.false_alarm", 0.0);
+        s.number("estimator.false_alarm", 0.0);
         s
     };
     let Some(s) = good_scene(r, bench, ledger, draw) else {

@@ -1,4 +1,4 @@
-//! Efficiency, signal-to-noise ratio, power budget and the power of the signals: (O1) to (O10), (S1) to (S10), (R1) to (R12).
+//! Efficiency, signal-to-noise ratio, power budget and the power of the signals: (O1) to (O10), (S1) to (S10), (R1) to (R10).
 
 use super::geometry::Scan;
 use super::ledger::Ledger;
@@ -8,11 +8,10 @@ use super::scene::{C_M_S, E_C, H_J_S, K_J_K, Scene};
 use serde_json::Value;
 use std::f64::consts::{LN_2, PI};
 
-/// A Gaussian pulse (S1), with chirp.
+/// A Gaussian pulse (S1).
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Pulse {
     pub(crate) sigma_s: f64,
-    pub(crate) chirp_hz_s: f64,
 }
 
 impl Pulse {
@@ -23,10 +22,7 @@ impl Pulse {
             "fwhm" => duration_s / (2.0 * LN_2.sqrt()),
             _ => duration_s,
         };
-        (s.s("pulse.shape.kind") == "gaussian").then(|| Self {
-            sigma_s,
-            chirp_hz_s: s.f("pulse.chirp_hz_s"),
-        })
+        (s.s("pulse.shape.kind") == "gaussian").then_some(Self { sigma_s })
     }
 
     /// |f(t)|^2, 1/s (S1).
@@ -49,10 +45,9 @@ impl Pulse {
         2.0 * LN_2.sqrt() * self.sigma_s
     }
 
-    /// Standard deviation of the power spectrum, Hz; a chirp widens it.
+    /// Standard deviation of the power spectrum, Hz.
     pub(crate) fn spectral_deviation_hz(&self) -> f64 {
-        let x = 2.0 * PI * self.chirp_hz_s * self.sigma_s.powi(2);
-        (1.0 + x * x).sqrt() / (2.0 * PI * 2_f64.sqrt() * self.sigma_s)
+        1.0 / (2.0 * PI * 2_f64.sqrt() * self.sigma_s)
     }
 }
 
@@ -266,7 +261,7 @@ impl Receiver {
 
 /// Losses of the telescope besides efficiency.
 fn losses(s: &Scene) -> f64 {
-    10_f64.powf(-0.1 * (s.f("telescope.optics_loss_db") + s.f("telescope.polarisation_loss_db")))
+    10_f64.powf(-0.1 * s.f("telescope.optics_loss_db"))
 }
 
 /// Photons that a detector counts of a whole pulse, over the bandwidth, s.
@@ -466,7 +461,6 @@ pub(crate) fn hold_budget(ledger: &mut Ledger, s: &Scene, json: &Value) {
                 "truncation, two beams" => 2.0 * db(beam.transmission()),
                 "antenna efficiency" => db(efficiency() / beam.transmission().powi(2)),
                 "optics" => -s.f("telescope.optics_loss_db"),
-                "polarisation" => -s.f("telescope.polarisation_loss_db"),
                 "quantum efficiency" => db(s.f("detector.quantum_efficiency")),
                 "hbar for h" => db(2.0 * PI),
                 "= shot-noise limit" => db(snr(s, r, efficiency()) / receiver.gain()),
@@ -505,11 +499,9 @@ pub(crate) fn spectral_fwhm_hz(s: &Scene) -> Option<f64> {
     if let Some(pulse) = Pulse::gaussian(s) {
         return Some(2.0 * (2.0 * LN_2).sqrt() * pulse.spectral_deviation_hz());
     }
-    // A sampled pulse whose amplitude has straight lines, without phase: |F|^2 by quadrature, the first frequency where it is a half.
-    if s.s("pulse.shape.resampling") != "linear"
-        || s.has("pulse.shape.phase_rad")
-        || s.f("pulse.chirp_hz_s") != 0.0
-    {
+    // A sampled pulse without phase, of samples so close that straight lines join its amplitudes: |F|^2 by quadrature, the first
+    // frequency where it is a half.
+    if s.has("pulse.shape.phase_rad") {
         return None;
     }
     let (t, power) = (s.list("pulse.shape.time_s"), s.list("pulse.shape.power"));

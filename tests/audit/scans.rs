@@ -161,9 +161,7 @@ pub(crate) fn hold_false_alarms(r: &mut Random, bench: &Bench, ledger: &mut Ledg
         .unset("added_flows")
         .word("flow.kind", "calm")
         .number("estimator.false_alarm", ASKED);
-    s.unset("pulse.chirp_hz_s")
-        .unset("estimator.radius")
-        .unset("estimator.method");
+    s.unset("estimator.radius").unset("estimator.method");
     s.word(
         "estimator.method.kind",
         r.pick(&[

@@ -8,13 +8,13 @@ use toml::{Table, Value};
 const DEFAULTS: &str = r#"
 seed = 1
 laser = { wavelength_m = 1.55e-6, pulse_repetition_hz = 400.0, linewidth_hz = 0.0 }
-pulse = { energy_j = 150e-6, chirp_hz_s = 0.0 }
-pulse.shape = { kind = "gaussian", duration_s = 200e-9, definition = "fwhm", resampling = "cubic_spline", centred = true }
+pulse = { energy_j = 150e-6 }
+pulse.shape = { kind = "gaussian", duration_s = 200e-9, definition = "fwhm", centred = true }
 detector = { bandwidth_hz = 50e6, intermediate_frequency_hz = 80e6, sampling_hz = 250e6, quantum_efficiency = 1.0, local_oscillator_w = 1e-3, noise = "band", signal = "intermediate_frequency" }
 detector.digitiser = { kind = "none" }
 detector.snr = { reference = "physical" }
 detector.front_end = { amplifier_noise_a_rthz = 0.0, load_ohm = inf, load_temperature_k = 290.0, dark_current_a = 0.0, intensity_noise_db_hz = -inf, rejection_db = 0.0, saturation_w = inf, half_power_hz = inf, poles = 1 }
-telescope = { aperture_radius_m = 0.05, obscuration_radius_m = 0.0, beam_radius_m = 0.03, beam_radius_definition = "intensity", focus_m = inf, receiver = "monostatic", optics_loss_db = 0.0, polarisation_loss_db = 0.0, reflection_db = -inf, blind_range_m = 0.0 }
+telescope = { aperture_radius_m = 0.05, obscuration_radius_m = 0.0, beam_radius_m = 0.03, beam_radius_definition = "intensity", focus_m = inf, receiver = "monostatic", optics_loss_db = 0.0, reflection_db = -inf, blind_range_m = 0.0 }
 atmosphere = { backscatter_per_m_sr = 1e-7, extinction_per_m = 7e-5 }
 atmosphere.turbulence = { kind = "none", cn2_m_m23 = 1e-15, spectrum = "von_karman", inner_scale_m = 0.01, outer_scale_m = 1.0, realisations = 400 }
 flow = { kind = "vortex_pair", circulation_m2_s = 500.0, spacing_m = 47.0, core_radius_m = 2.35, lateral_position_m = 400.0, height_m = 47.0, profile = "algebraic", motion = "frozen", age_tau = 0.0, cross_wind_m_s = 0.0 }

@@ -25,7 +25,7 @@ const SPEED_OF_LIGHT_M_S: f64 = 299_792_458.0;
 fn of_14(plan: &Plan, range_m: f64, efficiency: f64) -> f64 {
     let (scene, air) = (&plan.scene.content, &plan.scene.content.atmosphere);
     let photon_j = 6.626_070_15e-34 * SPEED_OF_LIGHT_M_S / scene.laser.wavelength_m;
-    let photons = scene.detector.quantum_efficiency * scene.pulse_energy_j() / photon_j;
+    let photons = scene.detector.quantum_efficiency * scene.pulse.energy_j / photon_j;
     let area_m2 = std::f64::consts::PI * scene.telescope.aperture_radius_m.powi(2);
     let seen =
         (-2.0 * air.extinction_per_m * range_m).exp() * area_m2 / (range_m * range_m) * efficiency;

@@ -1,6 +1,6 @@
-//! A scan past a vortex with a measured pulse, chirped, through hazy turbulent air into a converter of 8 bits; streamed.
+//! A scan past a vortex with a measured pulse through hazy turbulent air into a converter of 8 bits; streamed.
 //!
-//! The pulse is a table of power against time, as an oscilloscope writes it; each pulse meets a turbulence of its own;
+//! The pulse is a table of power and phase against time, as an oscilloscope writes it; each pulse meets a turbulence of its own;
 //! the phase of the complex baseband after 20 ns, averaged over the pulses of a line, shows the wind.
 //!
 //! `cargo run --release -p wakescope-signal --example scan`
@@ -12,7 +12,7 @@ use std::f64::consts::PI;
 use num_complex::Complex;
 use wakescope_signal::digitise::Digitiser;
 use wakescope_signal::efficiency::LayerEfficiency;
-use wakescope_signal::sampled::{Resampling, SampledPulse};
+use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
     Error, LayerLimits, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record,
@@ -31,15 +31,20 @@ const RECEIVER: Receiver = Receiver {
     ..Receiver::table2()
 };
 
-/// Power of a pulse with a fast rise and a slow fall, every 4 ns, in any unit.
+/// A pulse with a fast rise and a slow fall, every 4 ns, in any unit; its frequency rises by 20 kHz/ns.
 fn measured_pulse() -> Result<Pulse, Error> {
     let time_s: Vec<f64> = (0..200).map(|i| f64::from(i) * 4e-9).collect();
-    let power: Vec<f64> = time_s
+    let centroid_s = 1.8e-7;
+    let amplitude: Vec<Complex<f64>> = time_s
         .iter()
-        .map(|t| (t / 6e-8).powi(2) * (-t / 6e-8).exp())
+        .map(|t| {
+            let modulus = t / 6e-8 * (-0.5 * t / 6e-8).exp();
+            Complex::from_polar(modulus, PI * 2e13 * (t - centroid_s).powi(2))
+        })
         .collect();
-    let pulse = SampledPulse::from_power(&time_s, &power, Resampling::CubicSpline, 300e-6)?;
-    Pulse::from(pulse.centred()).with_chirp(2e13)
+    Ok(SampledPulse::new(&time_s, &amplitude, 300e-6)?
+        .centred()
+        .into())
 }
 
 /// Radial velocity past a vortex of 450 m^2/s at 400 m, on a line that passes its axis at `distance_m`.
@@ -135,7 +140,7 @@ fn main() -> Result<(), Error> {
         "Velocities at {range_m:.1} m [m/s], {PULSES} pulses per line. Near air returns more, and at any moment it returns"
     );
     println!(
-        "light that was sent later: the chirp lowers what is measured below what the gate sees."
+        "light that was sent later: its rising frequency lowers what is measured below what the gate sees."
     );
     println!("distance [m]  v_gate  expected of pulse pair  pulse pair");
     for ((distance_m, lag), line) in distances_m.iter().zip(lags).zip(&lines) {

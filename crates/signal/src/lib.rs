@@ -26,8 +26,8 @@
 //!
 //! | module | what is in it |
 //! |---|---|
-//! | `pulse` | [`Pulse`]: [`GaussianPulse`] (7) or sampled, with chirp; its moments and range weight, and the layers it needs |
-//! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, and how it is resampled |
+//! | `pulse` | [`Pulse`]: [`GaussianPulse`] (7) or sampled; its moments and range weight, and the layers it needs |
+//! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, joined by a spline |
 //! | `piecewise` | the cubic pieces that a sampled envelope is kept in |
 //! | `medium` | [`Medium`]: backscatter and extinction by range |
 //! | [`efficiency`] | [`LayerEfficiency`](efficiency::LayerEfficiency): heterodyne efficiency, one curve or one realisation per pulse |
@@ -35,7 +35,6 @@
 //! | `line` | [`LineOfSight`]; how thin a layer must be, [`LayerLimits`] |
 //! | `shot` | [`Shot`]: what one pulse meets |
 //! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14); what a real receiver adds |
-//! | [`transmitter`] | energy against repetition rate, Brillouin threshold |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
 //! | `record` | [`Record`]: when the receiver samples; carrier and noise of the samples |
 //! | `sample` | [`Sample`]: the current, or both quadratures of the baseband |
@@ -74,7 +73,6 @@ pub mod sampled;
 pub mod scan;
 mod shot;
 mod table;
-pub mod transmitter;
 mod window;
 
 pub use constants::SPEED_OF_LIGHT_M_S;

@@ -31,8 +31,6 @@ pub(crate) struct Moments {
     pub(crate) mean_hz: f64,
     /// Mean square frequency.
     pub(crate) square_hz2: f64,
-    /// Mean of time and instantaneous frequency, dimensionless.
-    pub(crate) cross: f64,
 }
 
 /// Cubic pieces `c0 + c1 u + c2 u^2 + c3 u^3`, `u` from 0 to 1 in each interval.
@@ -44,20 +42,7 @@ pub(crate) struct Piecewise {
 }
 
 impl Piecewise {
-    /// Straight lines between the values. The knots increase; there are as many values, two or more.
-    pub(crate) fn linear(knots_s: Vec<f64>, values: &[Complex<f64>]) -> Self {
-        let pieces = values
-            .windows(2)
-            .map(|v| [v[0], v[1] - v[0], Complex::ZERO, Complex::ZERO])
-            .collect();
-        Self {
-            even: is_even(&knots_s),
-            knots_s,
-            pieces,
-        }
-    }
-
-    /// The cubic spline through the values, without curvature at both ends.
+    /// The cubic spline through the values, without curvature at both ends. The knots increase; there are as many values, two or more.
     pub(crate) fn spline(knots_s: Vec<f64>, values: &[Complex<f64>]) -> Self {
         let curvature = natural_curvature(&knots_s, values);
         let pieces = (0..values.len() - 1)
@@ -153,7 +138,7 @@ impl Piecewise {
     /// The integrals of the function; the means are not numbers if it has no energy.
     pub(crate) fn moments(&self) -> Moments {
         let (mut energy, mut mean_s, mut square_s2) = (0.0, 0.0, 0.0);
-        let (mut mean_hz, mut square_hz2, mut cross) = (0.0, 0.0, 0.0);
+        let (mut mean_hz, mut square_hz2) = (0.0, 0.0);
         for (piece, knots) in self.pieces.iter().zip(self.knots_s.windows(2)) {
             let step_s = knots[1] - knots[0];
             let [_, c1, c2, c3] = *piece;
@@ -167,7 +152,6 @@ impl Piecewise {
                 square_s2 += power * time_s * time_s;
                 mean_hz += turning;
                 square_hz2 += weight * slope.norm_sqr();
-                cross += turning * time_s;
             }
         }
         Moments {
@@ -176,7 +160,6 @@ impl Piecewise {
             square_s2: square_s2 / energy,
             mean_hz: mean_hz / energy,
             square_hz2: square_hz2 / energy,
-            cross: cross / energy,
         }
     }
 }
@@ -278,11 +261,6 @@ mod tests {
         assert_relative_eq!(
             moments.square_hz2,
             spread + offset * offset,
-            max_relative = 1e-6
-        );
-        assert_relative_eq!(
-            moments.cross,
-            chirp * variance + offset * delay,
             max_relative = 1e-6
         );
     }

@@ -1,15 +1,15 @@
-//! The transmitted pulse of any shape: Gaussian, (7), or sampled, with or without chirp; its energy, and the weight that it
+//! The transmitted pulse of any shape: Gaussian, (7), or sampled; its energy, and the weight that it
 //! gives to each range, (28), corrected.
 //!
-//! Check: `|f|^2` integrates to 1 over time, falls to one half at half the full width at half maximum, and the range
-//! weight integrates to 1 over range; a chirp leaves the power alone and spreads the spectrum as its closed form says; the
-//! advised layers hold the energy of each shape.
+//! Check: `|f|^2` integrates to 1 over time, falls to one half at half the full width at half maximum,
+//! and the range weight integrates to 1 over range; a sampled phase spreads the spectrum as the closed
+//! form of a chirp says; the advised layers hold the energy of each shape.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex;
 
-use crate::error::{check, check_positive};
+use crate::error::check_positive;
 use crate::piecewise::{Moments, Piecewise};
 use crate::sampled::SampledPulse;
 use crate::{Error, LayerLimits, SPEED_OF_LIGHT_M_S};
@@ -111,10 +111,10 @@ pub struct Pulse {
     real: bool,
     moments: Moments,
     support_s: (f64, f64),
-    /// Thickest layer of a record, and of good ones, in time `2 DeltaR/c` \[s\], without regard to the chirp.
+    /// Thickest layer of a record, in time `2 DeltaR/c` \[s\], without regard to the phase.
     allowed_s: f64,
+    /// Thickest layer of a good record, in time \[s\].
     advised_s: f64,
-    chirp_hz_s: f64,
 }
 
 #[derive(Debug, Clone, PartialEq)]
@@ -132,7 +132,6 @@ impl From<GaussianPulse> for Pulse {
             square_s2: 0.5 * sigma_s * sigma_s,
             mean_hz: 0.0,
             square_hz2: 1.0 / (8.0 * PI * PI * sigma_s * sigma_s),
-            cross: 0.0,
         };
         // The sum over a Gaussian in steps d is wrong by 2 exp(-(pi sigma/d)^2): 1e-4 at d = sigma.
         let allowed_s = PI * sigma_s / (2.0 / ALLOWED_ENERGY_ERROR).ln().sqrt();
@@ -146,7 +145,6 @@ impl From<GaussianPulse> for Pulse {
             support_s,
             allowed_s,
             advised_s,
-            chirp_hz_s: 0.0,
         }
     }
 }
@@ -173,7 +171,6 @@ impl From<SampledPulse> for Pulse {
             support_s,
             allowed_s,
             advised_s,
-            chirp_hz_s: 0.0,
         }
     }
 }
@@ -185,18 +182,6 @@ impl From<&Self> for Pulse {
 }
 
 impl Pulse {
-    /// The same pulse with a linear chirp: the envelope times `exp(j pi chirp t^2)`, so that the frequency rises by
-    /// `chirp_hz_s` hertz per second (and so does the intermediate frequency), crossing its nominal value at `t = 0`.
-    /// Replaces a chirp given before. A chirp of another form is part of a [`SampledPulse`].
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] if the rate is not finite.
-    pub fn with_chirp(mut self, chirp_hz_s: f64) -> Result<Self, Error> {
-        check("chirp_hz_s", chirp_hz_s, "finite", |_| true)?;
-        self.chirp_hz_s = chirp_hz_s;
-        Ok(self)
-    }
-
     /// Energy of the pulse, `E_t` \[J\].
     pub fn energy_j(&self) -> f64 {
         self.energy_j
@@ -204,14 +189,10 @@ impl Pulse {
 
     /// Complex envelope `f(t)`, (7) for a Gaussian \[s^-1/2\]; `|f|^2` integrates to 1, (8).
     pub fn envelope_per_sqrt_s(&self, time_s: f64) -> Complex<f64> {
-        let shape = match &self.shape {
+        match &self.shape {
             Shape::Gaussian(pulse) => Complex::new(pulse.envelope_per_sqrt_s(time_s), 0.0),
             Shape::Sampled(envelope) => envelope.value(time_s),
-        };
-        if self.chirp_hz_s == 0.0 {
-            return shape;
         }
-        shape * Complex::cis(PI * self.chirp_hz_s * time_s * time_s)
     }
 
     /// Power `|f(t)|^2` for unit energy \[1/s\].
@@ -260,19 +241,19 @@ impl Pulse {
     /// Mean frequency of the envelope \[Hz\]: an estimator that knows nothing of it reads the velocity
     /// `-lambda/2` times this in still air.
     pub fn mean_frequency_hz(&self) -> f64 {
-        self.moments.mean_hz + self.chirp_hz_s * self.moments.mean_s
+        self.moments.mean_hz
     }
 
-    /// Standard deviation of the spectrum `|F(nu)|^2` of the envelope, chirp included \[Hz\]: `1/(2 sqrt2 pi sigma)` for a
-    /// Gaussian without chirp.
+    /// Standard deviation of the spectrum `|F(nu)|^2` of the envelope \[Hz\]: `1/(2 sqrt2 pi sigma)`
+    /// for a Gaussian.
     pub fn spectral_width_hz(&self) -> f64 {
-        let (m, chirp) = (&self.moments, self.chirp_hz_s);
-        let square = m.square_hz2 + 2.0 * chirp * m.cross + chirp * chirp * m.square_s2;
-        (square - self.mean_frequency_hz().powi(2)).max(0.0).sqrt()
+        (self.moments.square_hz2 - self.mean_frequency_hz().powi(2))
+            .max(0.0)
+            .sqrt()
     }
 
-    /// Full width at half maximum of the spectrum `|F(nu)|^2` of the envelope, chirp included \[Hz\]: between its outermost points
-    /// at half of its largest value.
+    /// Full width at half maximum of the spectrum `|F(nu)|^2` of the envelope \[Hz\]: between its
+    /// outermost points at half of its largest value.
     pub fn spectral_full_width_half_maximum_hz(&self) -> f64 {
         if let Shape::Gaussian(_) = self.shape {
             return 2.0 * (2.0 * std::f64::consts::LN_2).sqrt() * self.spectral_width_hz();
@@ -312,14 +293,14 @@ impl Pulse {
     }
 
     /// Thickness of the layers \[m\] for this pulse: the largest that divides the range step of a sample, `c/(2 F_s)`, and is
-    /// at most `lambda/(16 sigma g_max)` and `c sigma/2`, holds the energy of the pulse within 5e-4, and resolves its chirp
+    /// at most `lambda/(16 sigma g_max)` and `c sigma/2`, holds the energy of the pulse within 5e-4, and resolves its phase
     /// (`2 DeltaR/c` at most an eighth of the inverse spectral width).
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if a limit is not positive (the gradient may be zero).
     pub fn layer_thickness_m(&self, limits: LayerLimits) -> Result<f64, Error> {
         let by_gradient_m = limits.thickness_m(self.sigma_s())?;
-        if matches!(self.shape, Shape::Gaussian(_)) && self.chirp_hz_s == 0.0 {
+        if matches!(self.shape, Shape::Gaussian(_)) {
             return Ok(by_gradient_m);
         }
         let step_m = SPEED_OF_LIGHT_M_S / (2.0 * limits.sample_rate_hz);
@@ -331,7 +312,7 @@ impl Pulse {
         Ok(step_m / parts)
     }
 
-    /// Thickest layer that a record accepts \[m\]: the energy in a sum over layers is then within 5e-3, and the chirp is
+    /// Thickest layer that a record accepts \[m\]: the energy in a sum over layers is then within 5e-3, and the phase is
     /// sampled.
     pub fn max_layer_thickness_m(&self) -> f64 {
         0.5 * SPEED_OF_LIGHT_M_S * self.allowed_s.min(0.25 / self.spectral_width_hz())
@@ -339,7 +320,7 @@ impl Pulse {
 
     /// Whether the envelope has no imaginary part.
     pub(crate) fn is_real(&self) -> bool {
-        self.chirp_hz_s == 0.0 && self.real
+        self.real
     }
 
     /// Offsets \[m\] beyond a range between which the weight (28) is not negligible.
@@ -387,7 +368,6 @@ fn thickest_layer_s(envelope: &Piecewise, limit: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sampled::Resampling;
     use approx::assert_relative_eq;
 
     fn limits(max_gradient_per_s: f64) -> LayerLimits {
@@ -409,9 +389,34 @@ mod tests {
             .iter()
             .map(|t| (1.0 - (-(t / 4e-8).powi(2)).exp()) * (-(t / 2.5e-7).powi(3)).exp())
             .collect();
-        SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4)
+        SampledPulse::from_power(&times, &power, 1e-4)
             .unwrap()
             .centred()
+    }
+
+    /// Table 2's pulse, sampled, with a frequency that rises by `chirp_hz_s`.
+    fn chirped(chirp_hz_s: f64) -> Pulse {
+        let times: Vec<f64> = (-800..=800).map(|i| f64::from(i) * 1e-9).collect();
+        let amplitude: Vec<_> = times
+            .iter()
+            .map(|t| {
+                let modulus = gaussian().envelope_per_sqrt_s(*t);
+                Complex::from_polar(modulus, PI * chirp_hz_s * t * t)
+            })
+            .collect();
+        SampledPulse::new(&times, &amplitude, 1e-4).unwrap().into()
+    }
+
+    /// A flat pulse that rises and falls within one step of its samples.
+    fn rectangle(duration_s: f64, step_s: f64) -> SampledPulse {
+        let half = (0.5 * duration_s / step_s).round() as i32;
+        let times: Vec<f64> = (-half - 1..=half)
+            .map(|i| (f64::from(i) + 0.5) * step_s)
+            .collect();
+        let mut power = vec![1.0; times.len()];
+        power[0] = 0.0;
+        power[times.len() - 1] = 0.0;
+        SampledPulse::from_power(&times, &power, 1e-4).unwrap()
     }
 
     #[test]
@@ -484,19 +489,20 @@ mod tests {
 
     #[test]
     fn a_chirp_leaves_the_power_alone_and_spreads_the_spectrum() {
-        let (plain, chirp_hz_s) = (Pulse::from(gaussian()), 2e14);
-        let chirped = plain.clone().with_chirp(chirp_hz_s).unwrap();
+        let plain = Pulse::from(gaussian());
+        let chirp_hz_s = 2e14;
+        let chirped = chirped(chirp_hz_s);
         let sigma_s = gaussian().sigma_s();
+        assert!(plain.is_real() && !chirped.is_real());
         for time_s in [-1e-7, 0.0, 3e-8] {
-            let expected = gaussian().envelope_per_sqrt_s(time_s);
-            assert_relative_eq!(
-                chirped.envelope_per_sqrt_s(time_s).norm(),
-                expected,
-                max_relative = 1e-14
-            );
+            let modulus = gaussian().envelope_per_sqrt_s(time_s);
+            let expected = Complex::from_polar(modulus, PI * chirp_hz_s * time_s * time_s);
+            let error = (chirped.envelope_per_sqrt_s(time_s) - expected).norm();
+            assert!(error < 1e-6 * plain.envelope_per_sqrt_s(0.0).norm());
             assert_relative_eq!(
                 chirped.intensity_per_s(time_s),
-                plain.intensity_per_s(time_s)
+                plain.intensity_per_s(time_s),
+                max_relative = 1e-6
             );
         }
         let unchirped_hz = 1.0 / (8.0_f64.sqrt() * PI * sigma_s);
@@ -506,43 +512,25 @@ mod tests {
             max_relative = 1e-14
         );
         let expected = unchirped_hz.hypot(chirp_hz_s * sigma_s / 2f64.sqrt());
-        assert_relative_eq!(chirped.spectral_width_hz(), expected, max_relative = 1e-14);
-        assert!(matches!(
-            plain.with_chirp(f64::INFINITY),
-            Err(Error::OutOfRange {
-                field: "chirp_hz_s",
-                ..
-            })
-        ));
+        assert_relative_eq!(chirped.spectral_width_hz(), expected, max_relative = 1e-4);
     }
 
     #[test]
     fn the_spectrum_of_samples_is_as_wide_as_that_of_what_they_were_taken_of() {
-        let times: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 2.5e-9).collect();
-        let power: Vec<f64> = times
-            .iter()
-            .map(|t| gaussian().intensity_per_s(*t))
-            .collect();
-        let sampled = Pulse::from(
-            SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap(),
-        );
         for chirp_hz_s in [0.0, 3e13, -1e14] {
-            let [closed, found] = [Pulse::from(gaussian()), sampled.clone()].map(|p| {
-                p.with_chirp(chirp_hz_s)
-                    .unwrap()
-                    .spectral_full_width_half_maximum_hz()
-            });
+            let sigma_s = gaussian().sigma_s();
+            let width_hz = (8.0_f64.sqrt() * PI * sigma_s).recip();
+            let closed_hz = (8.0 * std::f64::consts::LN_2).sqrt()
+                * width_hz.hypot(chirp_hz_s * sigma_s / 2f64.sqrt());
             // What the samples leave out of the energy, 1e-4, has the widest frequencies.
-            assert_relative_eq!(found, closed, max_relative = 1e-3);
+            assert_relative_eq!(
+                chirped(chirp_hz_s).spectral_full_width_half_maximum_hz(),
+                closed_hz,
+                max_relative = 1e-3
+            );
         }
         // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is half at 0.4429/T.
-        let (times, power) = (
-            [-1.0005e-7, -0.9995e-7, 0.9995e-7, 1.0005e-7],
-            [0.0, 1.0, 1.0, 0.0],
-        );
-        let flat = Pulse::from(
-            SampledPulse::from_power(&times, &power, Resampling::Linear, 1e-4).unwrap(),
-        );
+        let flat = Pulse::from(rectangle(200e-9, 0.2e-9));
         // What is left out of the energy at both ends shortens it.
         assert_relative_eq!(
             flat.spectral_full_width_half_maximum_hz(),
@@ -553,56 +541,24 @@ mod tests {
     }
 
     #[test]
-    fn a_chirp_raises_the_mean_frequency_of_a_late_pulse() {
-        let times: Vec<f64> = (-200..=200).map(|i| 5e-8 + f64::from(i) * 4e-9).collect();
-        let power: Vec<f64> = times
-            .iter()
-            .map(|t| gaussian().intensity_per_s(t - 5e-8))
-            .collect();
-        let late = SampledPulse::from_power(&times, &power, Resampling::CubicSpline, 1e-4).unwrap();
-        let chirped = Pulse::from(late.clone()).with_chirp(1e14).unwrap();
-        assert_relative_eq!(
-            chirped.mean_frequency_hz(),
-            1e14 * 5e-8,
-            max_relative = 1e-6
-        );
-        let centred = Pulse::from(late.centred()).with_chirp(1e14).unwrap();
-        assert!(centred.mean_frequency_hz().abs() < 1.0);
-    }
-
-    #[test]
-    fn a_sampled_chirp_is_the_chirp() {
-        let chirp_hz_s = -1.5e14;
-        let whole = Pulse::from(gaussian()).with_chirp(chirp_hz_s).unwrap();
-        let times: Vec<f64> = (-400..=400).map(|i| f64::from(i) * 2e-9).collect();
+    fn a_late_pulse_with_a_chirp_has_a_raised_mean_frequency() {
+        let times: Vec<f64> = (-200..=200).map(|i| f64::from(i) * 4e-9).collect();
         let amplitude: Vec<_> = times
             .iter()
-            .map(|t| whole.envelope_per_sqrt_s(*t))
+            .map(|t| {
+                let modulus = gaussian().envelope_per_sqrt_s(t - 5e-8);
+                Complex::from_polar(modulus, PI * 1e14 * t * t)
+            })
             .collect();
-        let sampled = Pulse::from(
-            SampledPulse::new(&times, &amplitude, Resampling::BandLimited, 1e-4).unwrap(),
-        );
-        assert!(!sampled.is_real() && !whole.is_real());
-        for time_s in [-2.3e-7, 1.1e-9, 1.77e-7] {
-            let (a, b) = (
-                sampled.envelope_per_sqrt_s(time_s),
-                whole.envelope_per_sqrt_s(time_s),
-            );
-            assert!((a - b).norm() < 1e-5 * whole.envelope_per_sqrt_s(0.0).norm());
-        }
-        assert_relative_eq!(
-            sampled.spectral_width_hz(),
-            whole.spectral_width_hz(),
-            max_relative = 1e-4
-        );
+        let late = SampledPulse::new(&times, &amplitude, 1e-4).unwrap();
+        let found_hz = Pulse::from(late).mean_frequency_hz();
+        assert_relative_eq!(found_hz, 1e14 * 5e-8, max_relative = 1e-4);
+        assert!(chirped(1e14).mean_frequency_hz().abs() < 1.0);
     }
 
     #[test]
     fn advised_layers_hold_the_energy_of_every_shape() {
-        let corners = [-1.01e-7, -1e-7, 1e-7, 1.01e-7];
-        let box_shaped =
-            SampledPulse::from_power(&corners, &[0.0, 1.0, 1.0, 0.0], Resampling::Linear, 1e-4)
-                .unwrap();
+        let box_shaped = rectangle(200e-9, 1e-9);
         let short = GaussianPulse::new(PulseDuration::FullWidthHalfMaximum(2e-9), 1e-4).unwrap();
         for pulse in [
             gaussian().into(),
@@ -633,7 +589,7 @@ mod tests {
             plain.layer_thickness_m(limits(3.6)),
             limits(3.6).thickness_m(gaussian().sigma_s())
         );
-        let chirped = plain.with_chirp(8e14).unwrap();
+        let chirped = chirped(8e14);
         let thickness_m = chirped.layer_thickness_m(limits(0.0)).unwrap();
         assert!(2.0 * thickness_m / SPEED_OF_LIGHT_M_S <= 0.125 / chirped.spectral_width_hz());
         assert!(thickness_m <= chirped.max_layer_thickness_m());

@@ -1,11 +1,12 @@
 //! A pulse whose envelope was measured or computed at sample times, of any shape, real or complex.
 //!
-//! The samples are resampled to any time, scaled to unit energy, and cut where less than 1e-7 of the energy is lost.
+//! A cubic spline joins the samples, at any times: its error is of order `(step/scale)^4`, 3e-6 of the peak
+//! for a Gaussian with five samples in `sigma`. It is scaled to unit energy, and cut where less than 1e-7
+//! of the energy is lost.
 //!
 //! Check: a sampled Gaussian is the Gaussian, from fine and coarse samples, evenly spaced or not.
 
 use num_complex::Complex;
-use rustfft::FftPlanner;
 
 use crate::Error;
 use crate::error::{check, check_amounts, check_increasing, check_length, check_positive};
@@ -13,30 +14,6 @@ use crate::piecewise::{Moments, Piecewise};
 
 /// Energy cut off at each end, as a part of the whole.
 const CUT_ENERGY: f64 = 0.5e-7;
-
-/// Points per sample at which band-limited samples are computed before a spline joins them: the spline is then within 3e-6
-/// of the interpolant even at half the sampling rate.
-const OVERSAMPLING: usize = 16;
-
-/// Most samples of an envelope for band-limited resampling, a bound on memory (32 MiB).
-const MAX_BAND_LIMITED: usize = 8192;
-
-/// Times may deviate from even spacing by this part of a step in band-limited resampling.
-const UNEVEN: f64 = 1e-2;
-
-/// How an envelope is continued between its samples.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Resampling {
-    /// The cubic spline through the samples, at any times. Error of order `(step/scale)^4`: 3e-6 of the peak for a
-    /// Gaussian with five samples in `sigma`.
-    #[default]
-    CubicSpline,
-    /// The one function without frequencies beyond half the sampling rate that passes through the samples; evenly spaced
-    /// times only. Exact for coarse samples of a smooth pulse that begins and ends at zero; rings at a jump.
-    BandLimited,
-    /// Straight lines between the samples, at any times: for shapes with corners.
-    Linear,
-}
 
 /// A transmitted pulse of any sampled shape.
 #[derive(Debug, Clone, PartialEq)]
@@ -56,24 +33,15 @@ impl SampledPulse {
     /// frequency of the envelope, `exp(+j 2 pi nu t)`, raises the intermediate frequency.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for fewer than two samples (more than 8192 if band-limited) or an energy that is not
-    /// positive; [`Error::LengthMismatch`]; [`Error::ElementOutOfRange`] for a value that is not finite, times that do
-    /// not increase (or are not even, if band-limited), or an amplitude that is zero everywhere.
-    pub fn new(
-        time_s: &[f64],
-        amplitude: &[Complex<f64>],
-        resampling: Resampling,
-        energy_j: f64,
-    ) -> Result<Self, Error> {
+    /// [`Error::OutOfRange`] for fewer than two samples or an energy that is not positive;
+    /// [`Error::LengthMismatch`]; [`Error::ElementOutOfRange`] for a value that is not finite, times that
+    /// do not increase, or an amplitude that is zero everywhere.
+    pub fn new(time_s: &[f64], amplitude: &[Complex<f64>], energy_j: f64) -> Result<Self, Error> {
         check_positive("energy_j", energy_j)?;
         let largest = check_samples(time_s, amplitude)?;
         // Scaled before squaring, so that amplitudes of any size have an energy.
         let values: Vec<_> = amplitude.iter().map(|a| a / largest).collect();
-        let mut envelope = match resampling {
-            Resampling::CubicSpline => Piecewise::spline(time_s.to_vec(), &values),
-            Resampling::Linear => Piecewise::linear(time_s.to_vec(), &values),
-            Resampling::BandLimited => band_limited(time_s, &values)?,
-        };
+        let mut envelope = Piecewise::spline(time_s.to_vec(), &values);
         envelope.trim(CUT_ENERGY);
         let energy = envelope.moments().energy;
         check(
@@ -96,15 +64,10 @@ impl SampledPulse {
     ///
     /// # Errors
     /// As [`SampledPulse::new`]; [`Error::ElementOutOfRange`] for a negative power.
-    pub fn from_power(
-        time_s: &[f64],
-        power: &[f64],
-        resampling: Resampling,
-        energy_j: f64,
-    ) -> Result<Self, Error> {
+    pub fn from_power(time_s: &[f64], power: &[f64], energy_j: f64) -> Result<Self, Error> {
         check_amounts("power", power)?;
         let amplitude: Vec<_> = power.iter().map(|p| Complex::new(p.sqrt(), 0.0)).collect();
-        Self::new(time_s, &amplitude, resampling, energy_j)
+        Self::new(time_s, &amplitude, energy_j)
     }
 
     /// The same pulse, moved in time so that the centroid of its power is at time 0: ranges then count from its middle,
@@ -149,50 +112,6 @@ fn check_samples(time_s: &[f64], amplitude: &[Complex<f64>]) -> Result<f64, Erro
     Ok(largest)
 }
 
-/// Evenly spaced samples, padded with half as many zeros on each side, continued with the spectrum cut at half the sampling
-/// rate.
-fn band_limited(time_s: &[f64], values: &[Complex<f64>]) -> Result<Piecewise, Error> {
-    let count = values.len();
-    check(
-        "samples of the envelope",
-        count as f64,
-        "at most 8192 for band-limited resampling",
-        |n| n <= MAX_BAND_LIMITED as f64,
-    )?;
-    let step_s = (time_s[count - 1] - time_s[0]) / (count - 1) as f64;
-    let off = |(i, t): (usize, &f64)| (t - time_s[0] - i as f64 * step_s).abs() > UNEVEN * step_s;
-    if let Some(index) = time_s.iter().enumerate().position(off) {
-        let allowed = "evenly spaced within 1 % of a step for band-limited resampling";
-        return Err(Error::ElementOutOfRange {
-            field: "time_s",
-            index,
-            value: time_s[index],
-            allowed,
-        });
-    }
-    let side = (count / 2).max(16);
-    // An odd length has no frequency that is its own mirror.
-    let padded = (count + 2 * side) | 1;
-    let mut spectrum = vec![Complex::ZERO; padded];
-    spectrum[side..side + count].copy_from_slice(values);
-    let mut planner = FftPlanner::new();
-    planner.plan_fft_forward(padded).process(&mut spectrum);
-    let fine = padded * OVERSAMPLING;
-    let mut samples = vec![Complex::ZERO; fine];
-    let positive = padded.div_ceil(2);
-    samples[..positive].copy_from_slice(&spectrum[..positive]);
-    samples[fine - (padded - positive)..].copy_from_slice(&spectrum[positive..]);
-    planner.plan_fft_inverse(fine).process(&mut samples);
-    samples.iter_mut().for_each(|v| *v /= padded as f64);
-    // What follows the last padded sample is the way back to the first.
-    samples.truncate((padded - 1) * OVERSAMPLING + 1);
-    let first_s = time_s[0] - side as f64 * step_s;
-    let knots_s = (0..samples.len())
-        .map(|i| first_s + i as f64 * step_s / OVERSAMPLING as f64)
-        .collect();
-    Ok(Piecewise::spline(knots_s, &samples))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -203,13 +122,13 @@ mod tests {
         GaussianPulse::table2()
     }
 
-    /// Largest difference from the Gaussian, in parts of its peak, of one sampled at `times` and resampled.
-    fn error_of(times: &[f64], resampling: Resampling) -> f64 {
+    /// Largest difference from the Gaussian, in parts of its peak, of the spline through its samples at `times`.
+    fn error_of(times: &[f64]) -> f64 {
         let amplitude: Vec<_> = times
             .iter()
             .map(|t| Complex::new(3e4 * gaussian().envelope_per_sqrt_s(*t), 0.0))
             .collect();
-        let pulse = SampledPulse::new(times, &amplitude, resampling, 150e-6).unwrap();
+        let pulse = SampledPulse::new(times, &amplitude, 150e-6).unwrap();
         let peak = gaussian().envelope_per_sqrt_s(0.0);
         (0..2000)
             .map(|i| (f64::from(i) - 1000.3) * 0.4e-9)
@@ -224,17 +143,13 @@ mod tests {
 
     #[test]
     fn a_sampled_gaussian_is_the_gaussian_at_any_sampling() {
-        assert!(error_of(&even(1e-9), Resampling::CubicSpline) < 1e-7);
-        assert!(error_of(&even(24e-9), Resampling::CubicSpline) < 2e-5);
-        // Two samples in sigma: beyond a spline, exact for a band-limited interpolant.
-        assert!(error_of(&even(60e-9), Resampling::CubicSpline) > 1e-4);
-        assert!(error_of(&even(60e-9), Resampling::BandLimited) < 2e-6);
-        assert!(error_of(&even(2e-9), Resampling::Linear) < 1e-4);
+        assert!(error_of(&even(1e-9)) < 1e-7);
+        assert!(error_of(&even(24e-9)) < 2e-5);
         let uneven: Vec<f64> = even(10e-9)
             .iter()
             .map(|t| t + 4e-9 * (t * 3e7).sin())
             .collect();
-        assert!(error_of(&uneven, Resampling::CubicSpline) < 2e-5);
+        assert!(error_of(&uneven) < 2e-5);
     }
 
     #[test]
@@ -245,7 +160,7 @@ mod tests {
             .map(|t| gaussian().intensity_per_s(*t))
             .collect();
         let late: Vec<f64> = times.iter().map(|t| t + 3e-6).collect();
-        let pulse = SampledPulse::from_power(&late, &power, Resampling::CubicSpline, 1e-4).unwrap();
+        let pulse = SampledPulse::from_power(&late, &power, 1e-4).unwrap();
         assert_relative_eq!(pulse.moments.mean_s, 3e-6, max_relative = 1e-9);
         let centred = pulse.centred();
         assert!(centred.moments.mean_s.abs() < 1e-15);
@@ -267,7 +182,7 @@ mod tests {
                 .iter()
                 .map(|t| Complex::new(size * (-0.5 * (t / 1e-7).powi(2)).exp(), 0.0))
                 .collect();
-            SampledPulse::new(&times, &amplitude, Resampling::CubicSpline, 1e-4).unwrap()
+            SampledPulse::new(&times, &amplitude, 1e-4).unwrap()
         };
         for size in [1e-200, 1e200] {
             let (found, expected) = (
@@ -281,25 +196,24 @@ mod tests {
     #[test]
     fn samples_that_are_no_pulse_are_refused() {
         let one = Complex::new(1.0, 0.0);
-        let make = |times: &[f64], values: &[Complex<f64>], resampling| {
-            SampledPulse::new(times, values, resampling, 1e-4).map(|_| ())
+        let make = |times: &[f64], values: &[Complex<f64>]| {
+            SampledPulse::new(times, values, 1e-4).map(|_| ())
         };
-        let spline = Resampling::CubicSpline;
         assert!(matches!(
-            make(&[0.0], &[one], spline),
+            make(&[0.0], &[one]),
             Err(Error::OutOfRange { .. })
         ));
         assert!(matches!(
-            make(&[0.0, 1e-8], &[one], spline),
+            make(&[0.0, 1e-8], &[one]),
             Err(Error::LengthMismatch { .. })
         ));
         for (times, index) in [([0.0, 1e-8, 1e-8], 2), ([0.0, f64::NAN, 1.0], 1)] {
-            let error = make(&times, &[one; 3], spline);
+            let error = make(&times, &[one; 3]);
             assert!(
                 matches!(error, Err(Error::ElementOutOfRange { field: "time_s", index: i, .. }) if i == index)
             );
         }
-        let silent = make(&[0.0, 1e-8], &[Complex::ZERO; 2], spline);
+        let silent = make(&[0.0, 1e-8], &[Complex::ZERO; 2]);
         assert!(matches!(
             silent,
             Err(Error::ElementOutOfRange {
@@ -307,7 +221,7 @@ mod tests {
                 ..
             })
         ));
-        let broken = make(&[0.0, 1e-8], &[one, Complex::new(0.0, f64::NAN)], spline);
+        let broken = make(&[0.0, 1e-8], &[one, Complex::new(0.0, f64::NAN)]);
         assert!(matches!(
             broken,
             Err(Error::ElementOutOfRange {
@@ -316,15 +230,7 @@ mod tests {
                 ..
             })
         ));
-        let uneven = make(&[0.0, 1e-8, 3e-8], &[one; 3], Resampling::BandLimited);
-        assert!(matches!(
-            uneven,
-            Err(Error::ElementOutOfRange {
-                field: "time_s",
-                ..
-            })
-        ));
-        let negative = SampledPulse::from_power(&[0.0, 1e-8], &[1.0, -1.0], spline, 1e-4);
+        let negative = SampledPulse::from_power(&[0.0, 1e-8], &[1.0, -1.0], 1e-4);
         assert!(matches!(
             negative,
             Err(Error::ElementOutOfRange {

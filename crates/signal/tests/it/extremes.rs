@@ -6,12 +6,13 @@ use approx::assert_relative_eq;
 use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wakescope_signal::sampled::{Resampling, SampledPulse};
 use wakescope_signal::{
     Error, LineOfSight, NoiseModel, Pulse, RangeFilter, Receiver, Record, Scratch, Shot, Simulator,
 };
 
-use crate::setup::{C, STEP_M, WAVELENGTH_M, gaussian, limits, line, receiver, simulator};
+use crate::setup::{
+    C, STEP_M, WAVELENGTH_M, chirped, gaussian, limits, line, receiver, rectangle, simulator,
+};
 
 fn current(simulator: &Simulator, line: &LineOfSight, seed: u64) -> Result<Vec<f64>, Error> {
     let mut out = vec![0.0; simulator.record().samples];
@@ -66,11 +67,9 @@ fn layers_too_thick_for_the_pulse_are_refused_with_the_thickness() {
     let too_thick = |error: Error| matches!(error, Error::OutOfRange { field: "layer_thickness_m", value, .. } if value == STEP_M);
     let refused = |simulator: &Simulator| too_thick(current(simulator, &thick, 1).unwrap_err());
     assert!(refused(&short) && too_thick(short.covariance_a2(&thick).unwrap_err()));
-    let chirped = Pulse::from(gaussian(200e-9)).with_chirp(2e15).unwrap();
+    let chirped = chirped(200e-9, 2e15);
     assert!(refused(&simulator(chirped, NoiseModel::None, 400.0, 16)));
-    let corners = [0.0, 1e-10, 2e-7, 2.001e-7];
-    let steep = SampledPulse::from_power(&corners, &[0.0, 1.0, 1.0, 0.0], Resampling::Linear, 1e-4)
-        .unwrap();
+    let steep = rectangle(200e-9, 1e-10);
     assert!(refused(&simulator(
         steep.clone(),
         NoiseModel::None,

@@ -10,7 +10,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::digitise::Digitiser;
 use wakescope_signal::receiver::phase_noise::mean_frequency_sd_m_s;
 use wakescope_signal::receiver::{Butterworth, Converter, FrontEnd};
-use wakescope_signal::sampled::{Resampling, SampledPulse};
+use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::{
     LineOfSight, NoiseModel, Pulse, Receiver, Record, Scratch, Shot, Simulator,
 };
@@ -177,7 +177,7 @@ fn flat() -> Pulse {
         .iter()
         .map(|t| f64::from(u8::from(t.abs() < 0.61e-6)))
         .collect();
-    SampledPulse::from_power(&times, &power, Resampling::Linear, 150e-6)
+    SampledPulse::from_power(&times, &power, 150e-6)
         .unwrap()
         .into()
 }

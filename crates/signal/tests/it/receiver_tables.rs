@@ -1,12 +1,9 @@
-//! A receiver beyond shot noise, and what a laser can send: closed forms against stored tables of independent origin.
-
-use std::f64::consts::{LN_2, PI};
+//! A receiver beyond shot noise: closed forms against stored tables of independent origin.
 
 use approx::assert_relative_eq;
 use wakescope_signal::receiver::echoes::ambiguous_range_m;
 use wakescope_signal::receiver::phase_noise::{mean_frequency_sd_m_s, peak_variance_factor};
 use wakescope_signal::receiver::{Butterworth, Clipping, Converter, FrontEnd};
-use wakescope_signal::transmitter::{Amplifier, Fibre, pulse_spectrum_hz};
 use wakescope_signal::{Error, GaussianPulse, Pulse, PulseDuration, Receiver, SPEED_OF_LIGHT_M_S};
 
 /// The rows of a stored table.
@@ -311,59 +308,6 @@ fn the_reflex_and_the_pulse_before_are_the_stored_ones() {
         close(ambiguous_range_m(rate_hz), ambiguous_m);
         close(range_m + ambiguous_range_m(rate_hz), second_m);
     }
-}
-
-#[test]
-fn amplifiers_give_the_stored_energy_and_fibres_bear_it() {
-    for [
-        mean_power_w,
-        storage_time_s,
-        largest_energy_j,
-        rate_hz,
-        energy_j,
-        power_w,
-    ] in rows::<6>("amplifier_energy")
-    {
-        let found_j = Amplifier {
-            mean_power_w,
-            storage_time_s,
-            largest_energy_j,
-        }
-        .energy_j(rate_hz);
-        close(found_j, energy_j);
-        close(found_j * rate_hz, power_w);
-    }
-    for [
-        effective_area_m2,
-        brillouin_gain_m_w,
-        length_m,
-        gain_db,
-        fwhm_s,
-        brillouin_width_hz,
-        expected @ ..,
-    ] in rows::<10>("brillouin")
-    {
-        let of_glass = Fibre::silica(effective_area_m2, length_m, gain_db);
-        let fibre = Fibre {
-            brillouin_gain_m_w,
-            brillouin_width_hz,
-            ..of_glass
-        };
-        let found = [
-            fibre.effective_length_m(fwhm_s),
-            pulse_spectrum_hz(fwhm_s),
-            fibre.brillouin_threshold_w(fwhm_s),
-            // Peak power times the width over the energy of a Gaussian pulse is 2 sqrt(ln 2/pi).
-            fibre.brillouin_threshold_w(fwhm_s) * fwhm_s / (2.0 * (LN_2 / PI).sqrt()),
-        ];
-        found
-            .iter()
-            .zip(expected)
-            .for_each(|(found, expected)| close(*found, expected));
-    }
-    // A short pulse meets only the part of a long fibre that it is in at once.
-    let long = Fibre::silica(3e-10, 100.0, 0.0).effective_length_m(20e-9);
-    assert_relative_eq!(long, SPEED_OF_LIGHT_M_S * 20e-9 / 2.9, max_relative = 1e-12);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use num_complex::Complex;
 use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wakescope_signal::sampled::{Resampling, SampledPulse};
+use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::{
     GaussianPulse, LayerLimits, LineOfSight, NoiseModel, Pulse, PulseDuration, Receiver, Record,
     Scratch, Simulator,
@@ -49,9 +49,39 @@ pub(crate) fn skewed() -> SampledPulse {
             )
         })
         .collect();
-    SampledPulse::new(&times, &amplitude, Resampling::CubicSpline, 150e-6)
+    SampledPulse::new(&times, &amplitude, 150e-6)
         .unwrap()
         .centred()
+}
+
+/// A Gaussian pulse whose frequency rises by `chirp_hz_s`.
+pub(crate) fn chirped(width_s: f64, chirp_hz_s: f64) -> Pulse {
+    let shape = gaussian(width_s);
+    let step_s = 5e-10;
+    let half = (5.0 * shape.sigma_s() / step_s) as i32;
+    let times: Vec<f64> = (-half..=half).map(|i| f64::from(i) * step_s).collect();
+    let amplitude: Vec<Complex<f64>> = times
+        .iter()
+        .map(|t| {
+            let phase = std::f64::consts::PI * chirp_hz_s * t * t;
+            Complex::from_polar(shape.envelope_per_sqrt_s(*t), phase)
+        })
+        .collect();
+    SampledPulse::new(&times, &amplitude, shape.energy_j())
+        .unwrap()
+        .into()
+}
+
+/// A flat pulse about time 0 that rises and falls within one step of its samples.
+pub(crate) fn rectangle(duration_s: f64, step_s: f64) -> SampledPulse {
+    let half = (0.5 * duration_s / step_s).round() as i32;
+    let times: Vec<f64> = (-half - 1..=half)
+        .map(|i| (f64::from(i) + 0.5) * step_s)
+        .collect();
+    let mut power = vec![1.0; times.len()];
+    power[0] = 0.0;
+    power[times.len() - 1] = 0.0;
+    SampledPulse::from_power(&times, &power, 150e-6).unwrap()
 }
 
 /// Records that begin when the light sent at time 0 comes back from `first_m`.

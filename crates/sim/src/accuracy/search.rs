@@ -202,7 +202,7 @@ impl Search<'_> {
                 sum_s += plan.times.optics_s + PLANNING_S * plan.screens.len() as f64;
                 crossed.push(air.clone());
             }
-            let signals = Some((air, scene.pulse_energy_j()));
+            let signals = Some((air, scene.pulse.energy_j));
             sum_s += share * plan.times.maps_s
                 + if before == signals {
                     0.0
@@ -416,13 +416,7 @@ impl Search<'_> {
             return Ok(());
         }
         let mut scene = self.fine.content.clone();
-        match &mut scene.laser.amplifier {
-            Some(amplifier) => {
-                amplifier.mean_power_w *= 1.0 + RAISED;
-                amplifier.largest_energy_j *= 1.0 + RAISED;
-            }
-            None => scene.pulse.energy_j *= 1.0 + RAISED,
-        }
+        scene.pulse.energy_j *= 1.0 + RAISED;
         let found = self.measure(&[self.fine.clone(), self.fine.with(scene)?], 0, LEAST, 0.0)?;
         if found.is_none() {
             self.out

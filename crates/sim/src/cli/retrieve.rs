@@ -386,9 +386,7 @@ fn of_signals(
                 }
             }
             (None, Method::Signals | Method::Envelope) => {
-                let reason =
-                    "this method needs noise and a Gaussian pulse without chirp in the scene"
-                        .into();
+                let reason = "this method needs noise and a Gaussian pulse in the scene".into();
                 return Err(records.refuse(reason));
             }
             _ => {}

@@ -27,7 +27,7 @@ pub struct SceneResponse {
 }
 
 impl SceneResponse {
-    /// That of a scene in still air, so that no flow is opened; nothing without noise, or where the pulse is no Gaussian without chirp.
+    /// That of a scene in still air, so that no flow is opened; nothing without noise, or where the pulse is no Gaussian.
     ///
     /// # Errors
     /// What the efficiency refuses; a checked scene gives none.
@@ -36,7 +36,7 @@ impl SceneResponse {
         Self::new(&plan, Scanner::expected_layer_snr(&plan, observer)?)
     }
 
-    /// Nothing where there is no noise, or the pulse is no Gaussian without chirp. `layer_snr` holds range, m, and expected
+    /// Nothing where there is no noise, or the pulse is no Gaussian. `layer_snr` holds range, m, and expected
     /// signal-to-noise ratio of the layers of a line.
     ///
     /// # Errors

@@ -303,7 +303,7 @@ fn layer_snr(scene: &Scene, instrument: &Instrument, line: &LineOfSight) -> Vec<
     let snr = |&weight_per_m: &f64| {
         instrument
             .receiver
-            .slowly_varying_snr(scene.pulse_energy_j(), weight_per_m)
+            .slowly_varying_snr(scene.pulse.energy_j, weight_per_m)
     };
     line.weight_per_m
         .iter()
@@ -359,7 +359,7 @@ fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument
             .receiver
-            .slowly_varying_snr(scene.pulse_energy_j(), 1.0);
+            .slowly_varying_snr(scene.pulse.energy_j, 1.0);
         let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
         return Ok(Returns {
             weight_per_m,

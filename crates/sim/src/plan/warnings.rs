@@ -40,7 +40,6 @@ pub(super) fn of_scene(setup: &Setup, fastest_m_s: f64) -> Result<Vec<String>, E
         out.push("one realisation: no standard deviation can be given".into());
     }
     out.extend(of_ambiguous_ranges(setup));
-    out.extend(of_scattering(setup));
     let (first_m, blind_m) = (scene.scan.range_min_m, scene.telescope.blind_range_m);
     if first_m < blind_m {
         out.push(format!("scan.range_min_m = {first_m}: nothing is seen up to telescope.blind_range_m, {blind_m} m"));
@@ -85,22 +84,6 @@ fn of_ambiguous_ranges(setup: &Setup) -> Option<String> {
              {farthest_m:.0} m (scan.range_max_m and the pulse): returns of several pulses overlap in a real record, which \
              the simulated one leaves out, but for one with scan.second_trip; up to {:.0} Hz they do not",
             (most_hz / digit).floor() * digit
-        )
-    })
-}
-
-/// Brillouin scattering in the fibre of the amplifier.
-fn of_scattering(setup: &Setup) -> Option<String> {
-    let (fibre, instrument) = (setup.scene.content.laser.fibre?, &setup.instrument);
-    let threshold_w = fibre
-        .of_silica()
-        .brillouin_threshold_w(instrument.gaussian_fwhm_s());
-    let peak_w = instrument.peak_power_w();
-    (peak_w > threshold_w).then(|| {
-        format!(
-            "the peak power, {peak_w:.0} W, is {:.1} times the Brillouin threshold of laser.fibre, {threshold_w:.0} W (good to a \
-             factor of 2 to 3)",
-            peak_w / threshold_w
         )
     })
 }
@@ -158,7 +141,7 @@ pub(super) fn of_empty_gates(setup: &Setup) -> Result<Option<String>, Error> {
 #[cfg(test)]
 mod tests {
     use crate::plan::{Plan, Target};
-    use crate::scene::{AmplifierFibre, Scene, SceneFile};
+    use crate::scene::{Scene, SceneFile};
     use wakescope_estimate::map::ScanGeometry;
 
     fn plan(change: impl FnOnce(&mut Scene)) -> Plan {
@@ -250,20 +233,8 @@ mod tests {
     }
 
     #[test]
-    fn fibres_that_scatter_and_ranges_that_are_blind_are_warned_of() {
+    fn ranges_that_are_blind_are_warned_of() {
         let warnings = |change: fn(&mut Scene)| plan(change).warnings;
-        let found = warnings(|s| s.laser.fibre = Some(AmplifierFibre::default()));
-        assert!(
-            found.len() == 1 && found[0].contains("5.4 times") && found[0].contains("132 W"),
-            "{found:?}"
-        );
-        let wide = |s: &mut Scene| {
-            s.laser.fibre = Some(AmplifierFibre {
-                effective_area_m2: 3e-9,
-                ..AmplifierFibre::default()
-            });
-        };
-        assert!(warnings(wide).is_empty());
         let found = warnings(|s| s.telescope.blind_range_m = 350.0);
         assert!(found.len() == 1 && found[0].contains("350 m"), "{found:?}");
         assert!(warnings(|s| s.telescope.blind_range_m = 280.0).is_empty());

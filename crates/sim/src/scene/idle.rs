@@ -70,16 +70,7 @@ fn idle(scene: &Scene) -> Vec<(&'static str, String)> {
         &air,
         "atmosphere.profile takes its place".into(),
     );
-    unused(
-        scene.laser.amplifier.is_some(),
-        &["pulse.energy_j"],
-        "laser.amplifier takes its place".into(),
-    );
-    let losses = [
-        "telescope.optics_loss_db",
-        "telescope.polarisation_loss_db",
-        "telescope.blind_range_m",
-    ];
+    let losses = ["telescope.optics_loss_db", "telescope.blind_range_m"];
     let fixed = matches!(scene.detector.snr, SnrReference::Fixed { .. });
     unused(
         fixed,

@@ -3,11 +3,10 @@
 //! Check: impossible values and keys without effect are named; what is off is not written.
 
 use super::Scene;
-use crate::keys::{ABOVE_ZERO_OR_INF, Checker, NothingOr, Number, ZERO_OR_MORE, keys, side};
+use crate::keys::{ABOVE_ZERO_OR_INF, Checker, NothingOr, Number, ZERO_OR_MORE, keys};
 use wakescope_optics::RadiusDefinition;
 use wakescope_optics::plan::Receiver as ReceiverPath;
-use wakescope_signal::sampled::Resampling;
-use wakescope_signal::{NoiseModel, PulseDuration, transmitter};
+use wakescope_signal::{NoiseModel, PulseDuration};
 
 keys! {
     /// The laser source.
@@ -18,18 +17,12 @@ keys! {
         pulse_repetition_hz: f64 = 400.0 => 1e-3..=1e6,
         /// Full width at half maximum of the Lorentzian line, Hz; 0 for none.
         linewidth_hz: f64 as omitted = 0.0 => 0.0..=1e12,
-        /// What sets the energy of the pulses, in place of `pulse.energy_j`.
-        amplifier: Option<LaserAmplifier> = None,
-        /// The fibre of the power amplifier, for a warning of Brillouin scattering.
-        fibre: Option<AmplifierFibre> = None,
     }
 
     /// The transmitted pulse, (6)-(8).
     table Pulse {
         /// Pulse energy at the telescope, before its aperture truncates the beam, J.
         energy_j: f64 = 150e-6 => 1e-12..=1e3,
-        /// Rate of the linear chirp, Hz/s: the frequency rises by it.
-        chirp_hz_s: f64 = 0.0 => -1e18..=1e18,
         /// Shape of |f|^2, with its duration.
         shape: PulseShape = PulseShape::Gaussian(GaussianShape::default()),
     }
@@ -59,8 +52,6 @@ keys! {
         power: Vec<f64> = Vec::new() => ZERO_OR_MORE,
         /// Phase of f at these times, rad; empty for none.
         phase_rad: Vec<f64> = Vec::new(),
-        /// How the envelope is continued between the samples.
-        resampling: Resampling = Resampling::CubicSpline,
         /// Whether ranges count from the centroid of the power instead of from time 0.
         centred: bool = true,
     }
@@ -150,10 +141,8 @@ keys! {
         ),
         /// Whether transmitted and received light cross the same turbulence.
         receiver: ReceiverPath = ReceiverPath::Monostatic,
-        /// Loss of the optics, out and back together, dB.
+        /// Loss of the optics, out and back together, with the light whose polarisation does not beat, dB.
         optics_loss_db: f64 as omitted = 0.0 => 0.0..=200.0,
-        /// Loss of light whose polarisation does not beat, dB.
-        polarisation_loss_db: f64 as omitted = 0.0 => 0.0..=200.0,
         /// Part of the pulse that the telescope sends straight to the detector, dB; `-inf` for none.
         reflection_db: f64 as omitted = f64::NEG_INFINITY => NothingOr(-300.0..=0.0),
         /// Range up to which nothing is seen, because the detector recovers from the reflection, m; 0 for none.
@@ -183,32 +172,6 @@ keys! {
         poles: u32 = 1 => 1..=20,
     }
 
-    /// An amplifier that a steady pump fills between the pulses.
-    #[derive(Copy)]
-    table LaserAmplifier {
-        /// Mean power at high repetition rates, W.
-        mean_power_w: f64 = 1.0 => 1e-9..=1e6,
-        /// Time over which the medium keeps its energy, s.
-        storage_time_s: f64 = 2e-4 => 1e-9..=1e3,
-        /// Largest energy of a pulse, J; `inf` for none.
-        largest_energy_j: f64 = f64::INFINITY => ABOVE_ZERO_OR_INF,
-    }
-
-    /// The fibre of the power amplifier.
-    #[derive(Copy)]
-    table AmplifierFibre {
-        /// Effective area of the mode, m^2.
-        effective_area_m2: f64 = 3e-10 => 1e-14..=1.0,
-        /// Length, m.
-        length_m: f64 = 2.0 => 1e-6..=1e6,
-        /// Gain from end to end, dB.
-        gain_db: f64 = 0.0 => 0.0..=200.0,
-        /// Gain coefficient of the Brillouin scattering, m/W.
-        brillouin_gain_m_w: f64 = 2.5e-11 => 1e-15..=1e-6,
-        /// Its width, Hz.
-        brillouin_width_hz: f64 = 50e6 => 1e3..=1e12,
-    }
-
     /// The echo of the pulse before, from c/(2 PRF) farther away.
     #[derive(Copy)]
     table SecondTrip {
@@ -218,9 +181,9 @@ keys! {
 }
 
 impl Pulse {
-    /// Whether it is a Gaussian without chirp.
+    /// Whether it is a Gaussian.
     pub(crate) fn is_gaussian(&self) -> bool {
-        matches!(self.shape, PulseShape::Gaussian(_)) && self.chirp_hz_s == 0.0
+        matches!(self.shape, PulseShape::Gaussian(_))
     }
 }
 
@@ -244,51 +207,8 @@ impl GaussianShape {
     }
 }
 
-impl AmplifierFibre {
-    /// The fibre in the words of the simulation of signals.
-    pub fn of_silica(&self) -> transmitter::Fibre {
-        transmitter::Fibre {
-            brillouin_gain_m_w: self.brillouin_gain_m_w,
-            brillouin_width_hz: self.brillouin_width_hz,
-            ..transmitter::Fibre::silica(self.effective_area_m2, self.length_m, self.gain_db)
-        }
-    }
-}
-
 impl Scene {
-    /// Energy of a pulse, J: that of the laser's amplifier at this repetition rate if the scene has one.
-    pub fn pulse_energy_j(&self) -> f64 {
-        let Some(LaserAmplifier {
-            mean_power_w,
-            storage_time_s,
-            largest_energy_j,
-        }) = self.laser.amplifier
-        else {
-            return self.pulse.energy_j;
-        };
-        transmitter::Amplifier {
-            mean_power_w,
-            storage_time_s,
-            largest_energy_j,
-        }
-        .energy_j(self.laser.pulse_repetition_hz)
-    }
-
     pub(super) fn check_receiver(&self, c: &mut Checker<'_>) {
-        if let Some(a) = &self.laser.amplifier {
-            let energy_j = self.pulse_energy_j();
-            let allowed = format!(
-                "one that gives pulses of 1e-12 to 1e3 J at this repetition rate, not of {energy_j:e} J"
-            );
-            let values = [
-                ("laser.amplifier.mean_power_w", a.mean_power_w),
-                ("laser.amplifier.largest_energy_j", a.largest_energy_j),
-                ("laser.amplifier.storage_time_s", a.storage_time_s),
-                ("laser.pulse_repetition_hz", self.laser.pulse_repetition_hz),
-            ];
-            let sides = values.map(|(key, value)| side(key, value, allowed.clone()));
-            c.between(!c.is_good() || (1e-12..=1e3).contains(&energy_j), &sides);
-        }
         if matches!(self.detector.snr, SnrReference::Fixed { .. }) {
             let absent = "absent with detector.snr.reference = \"fixed\", which states the ratio of the last pulse's echo to all noises";
             c.require(
@@ -326,8 +246,6 @@ mod tests {
             "reflection",
             "blind",
             "second_trip",
-            "amplifier",
-            "fibre",
         ] {
             assert!(!plain.contains(key), "{key}");
         }
@@ -338,15 +256,11 @@ mod tests {
             plain
         );
         let real = parse(
-            "[laser]\namplifier = { mean_power_w = 0.06 }\nfibre = {}\n[detector.front_end]\nload_ohm = 50.0\n[scan]\nsecond_trip = {}\n",
+            "[laser]\nlinewidth_hz = 1e3\n[detector.front_end]\nload_ohm = 50.0\n[scan]\nsecond_trip = {}\n",
         )
         .unwrap();
         assert_eq!(parse(&real.toml).unwrap().content.to_toml(), real.toml);
-        assert!(
-            !real.toml.contains("rejection_db") && !real.toml.contains("\nenergy_j = "),
-            "{}",
-            real.toml
-        );
+        assert!(!real.toml.contains("rejection_db"), "{}", real.toml);
     }
 
     #[test]
@@ -371,14 +285,6 @@ mod tests {
             (
                 "[detector.front_end]\nintensity_noise_db_hz = 3.0\n",
                 "detector.front_end.intensity_noise_db_hz = 3.0",
-            ),
-            (
-                "[laser]\namplifier = { mean_power_w = 1e-9 }\npulse_repetition_hz = 1e6\n",
-                "laser.amplifier.mean_power_w",
-            ),
-            (
-                "[laser]\namplifier = {}\n[pulse]\nenergy_j = 1e-4\n",
-                "pulse.energy_j",
             ),
             (
                 "[telescope]\nreflection_db = 3.0\n",

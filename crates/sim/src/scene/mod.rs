@@ -29,7 +29,7 @@ pub use retrieval::*;
 pub use wakescope_estimate::Refinement;
 pub use wakescope_estimate::vortex_fit::{CoreProfile, LiftSlope, Secondary};
 pub use wakescope_optics::{RadiusDefinition, plan::Receiver as ReceiverPath};
-pub use wakescope_signal::{NoiseModel, sampled::Resampling};
+pub use wakescope_signal::NoiseModel;
 
 use crate::io::UtcTime;
 use crate::keys::{Is, keys};
@@ -42,7 +42,6 @@ crate::keys::foreign_choices! {
     RadiusDefinition { Intensity = "intensity", Field = "field" }
     ReceiverPath { Monostatic = "monostatic", Bistatic = "bistatic" }
     Refinement { Parabola = "parabola", None = "none" }
-    Resampling { CubicSpline = "cubic_spline", BandLimited = "band_limited", Linear = "linear" }
     Secondary { Auto = "auto", Never = "never", Always = "always" }
 }
 
@@ -187,9 +186,8 @@ mod tests {
     use std::path::Path;
 
     /// Keys that `wakescope init` does not write.
-    const RARE_KEYS: [&str; 13] = [
+    const RARE_KEYS: [&str; 12] = [
         "altitude_m",
-        "chirp_hz_s",
         "hpl",
         "kind",
         "kind",
@@ -226,7 +224,6 @@ mod tests {
         check::<RadiusDefinition>(2);
         check::<ReceiverPath>(2);
         check::<Refinement>(2);
-        check::<Resampling>(3);
         check::<Secondary>(3);
     }
 

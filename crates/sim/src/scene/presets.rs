@@ -107,7 +107,7 @@ mod tests {
             let scene = file.content.clone();
             let found = [
                 scene.laser.wavelength_m,
-                scene.pulse_energy_j(),
+                scene.pulse.energy_j,
                 scene.laser.pulse_repetition_hz,
                 scene.pulse_width_s(),
                 scene.telescope.aperture_radius_m,

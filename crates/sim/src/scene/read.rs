@@ -145,7 +145,7 @@ mod tests {
         assert_eq!(
             message("[laser]\nwavelength_m = 1.5e-6\nwavelenght_m = 1.5e-6\n"),
             "s.toml:3: laser.wavelenght_m = 1.5e-6 is not allowed: there is no such key; did you mean wavelength_m? Known \
-             here: wavelength_m, pulse_repetition_hz, linewidth_hz, amplifier, fibre"
+             here: wavelength_m, pulse_repetition_hz, linewidth_hz"
         );
         let elsewhere = message("wavelength_m = 1.5e-6\n");
         assert!(

@@ -108,7 +108,7 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let allowed =
         "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";
     c.require(has_vortices, "retrieval", "a table", allowed);
-    let allowed = "another method where detector.noise = \"none\" or the pulse is sampled or has a chirp: their signals have no likelihood here";
+    let allowed = "another method where detector.noise = \"none\" or the pulse is sampled: their signals have no likelihood here";
     for method in [RetrievalMethod::Signals, RetrievalMethod::Envelope] {
         let is_likely = scene.pulse.is_gaussian() && scene.detector.noise != NoiseModel::None;
         c.require(lacks(method) || is_likely, key, method.name(), allowed);

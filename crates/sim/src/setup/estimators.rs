@@ -75,13 +75,11 @@ pub fn weighting(scene: &Scene) -> estimate::Weighting {
 
 /// Real part of the autocorrelation of the pulse at a lag of its samples, its mean frequency taken out; 1 at lag 0.
 ///
-/// `exp(-(1 + (2 pi chi sigma^2)^2) tau^2/(4 sigma^2))` for a Gaussian with a chirp of chi hertz per second.
+/// `exp(-tau^2/(4 sigma^2))` for a Gaussian.
 fn pulse_correlation(scene: &Scene, pulse: &Pulse) -> Vec<f64> {
     let (count, period_s) = (scene.samples_per_record(), 1.0 / scene.detector.sampling_hz);
     if matches!(scene.pulse.shape, PulseShape::Gaussian(_)) {
-        let broader =
-            (std::f64::consts::TAU * scene.pulse.chirp_hz_s * pulse.sigma_s().powi(2)).hypot(1.0);
-        let lag = |m: usize| broader * m as f64 * period_s / pulse.sigma_s();
+        let lag = |m: usize| m as f64 * period_s / pulse.sigma_s();
         return (0..count).map(|m| (-0.25 * lag(m).powi(2)).exp()).collect();
     }
     // Fine enough for the spectrum of the pulse; the sum over a smooth pulse that ends at 0 converges fast.

@@ -26,7 +26,7 @@ pub struct Instrument {
     pub turbulence: Option<optics::Turbulence>,
     /// The air.
     pub air: signal::Medium,
-    /// Part of the return that is left by optics and polarisation, out and back together.
+    /// Fraction of the return that the optics transmit, out and back together.
     pub transmission: f64,
     /// Range up to which nothing is seen, m.
     pub blind_range_m: f64,
@@ -52,17 +52,12 @@ impl Instrument {
         let turbulence = turbulence_of(scene).map(|t| turbulence(&t)).transpose()?;
         Ok(Self {
             telescope,
-            pulse: pulse(&Pulse {
-                energy_j: scene.pulse_energy_j(),
-                ..scene.pulse.clone()
-            })?,
+            pulse: pulse(&scene.pulse)?,
             receiver,
             digitiser,
             turbulence,
             air: medium(&scene.atmosphere)?,
-            transmission: 10f64.powf(
-                -0.1 * (scene.telescope.optics_loss_db + scene.telescope.polarisation_loss_db),
-            ),
+            transmission: 10f64.powf(-0.1 * scene.telescope.optics_loss_db),
             blind_range_m: scene.telescope.blind_range_m,
         })
     }
@@ -217,19 +212,13 @@ fn turbulence(t: &RefractiveTurbulence) -> Result<optics::Turbulence, optics::Er
 /// # Errors
 /// What the signal simulation refuses, such as samples that are no pulse.
 pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
-    let pulse = match &p.shape {
+    match &p.shape {
         PulseShape::Gaussian(shape) => {
-            signal::Pulse::from(signal::GaussianPulse::new(shape.duration(), p.energy_j)?)
+            Ok(signal::GaussianPulse::new(shape.duration(), p.energy_j)?.into())
         }
         PulseShape::Sampled(shape) => {
-            let resampling = shape.resampling;
             let sampled = if shape.phase_rad.is_empty() {
-                signal::sampled::SampledPulse::from_power(
-                    &shape.time_s,
-                    &shape.power,
-                    resampling,
-                    p.energy_j,
-                )?
+                signal::sampled::SampledPulse::from_power(&shape.time_s, &shape.power, p.energy_j)?
             } else {
                 let polar =
                     |(power, phase): (&f64, &f64)| Complex::from_polar(power.sqrt(), *phase);
@@ -239,21 +228,15 @@ pub(crate) fn pulse(p: &Pulse) -> Result<signal::Pulse, Error> {
                     .zip(&shape.phase_rad)
                     .map(polar)
                     .collect();
-                signal::sampled::SampledPulse::new(
-                    &shape.time_s,
-                    &envelope,
-                    resampling,
-                    p.energy_j,
-                )?
+                signal::sampled::SampledPulse::new(&shape.time_s, &envelope, p.energy_j)?
             };
-            signal::Pulse::from(if shape.centred {
-                sampled.centred()
+            Ok(if shape.centred {
+                sampled.centred().into()
             } else {
-                sampled
+                sampled.into()
             })
         }
-    };
-    Ok(pulse.with_chirp(p.chirp_hz_s)?)
+    }
 }
 
 /// The air of a scene that changes with range; none where it is uniform.

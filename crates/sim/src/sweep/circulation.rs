@@ -25,7 +25,7 @@ pub(crate) struct Retrieval<'p> {
 
 impl<'p> Retrieval<'p> {
     /// For a case; nothing where the flow is no pair that turns, or one behind its aircraft, the lines are not one still sweep across
-    /// the flight, or the pulse is no Gaussian without chirp.
+    /// the flight, or the pulse is no Gaussian.
     pub(crate) fn new(plan: &'p Plan, scanner: &Scanner<'_>) -> Option<Self> {
         let scene = &plan.scene.content;
         let Flow::VortexPair(pair) = scene.flow else {
@@ -226,7 +226,13 @@ mod tests {
         for change in [
             (|scene| scene.flow = Flow::Calm {}) as fn(&mut Scene),
             |scene| scene.detector.noise = NoiseModel::None,
-            |scene| scene.pulse.chirp_hz_s = 1e12,
+            |scene| {
+                scene.pulse.shape = crate::scene::PulseShape::Sampled(crate::scene::SampledShape {
+                    time_s: vec![0.0, 1e-7, 2e-7],
+                    power: vec![0.0, 1.0, 0.0],
+                    ..Default::default()
+                });
+            },
             |scene| scene.scan.pattern = crate::scene::Pattern::Ppi(crate::scene::Ppi::default()),
             |scene| scene.scan.head.sweeps = 2,
         ] {

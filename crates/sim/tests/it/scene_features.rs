@@ -514,17 +514,16 @@ fn the_ratio_that_a_map_shows_is_unbiased_or_missing() {
 }
 
 #[test]
-fn a_sampled_gaussian_is_the_gaussian_and_a_chirp_widens_the_spectrum() {
+fn a_sampled_gaussian_is_the_gaussian_and_its_phase_widens_the_spectrum() {
     let sigma_s = 200e-9 / (2.0 * 2f64.ln().sqrt());
     let times: Vec<f64> = (-60..=60).map(|i| f64::from(i) * 8e-9).collect();
     let power: Vec<f64> = times
         .iter()
         .map(|t| (-(t / sigma_s).powi(2)).exp())
         .collect();
-    let pulse =
-        format!("shape = {{ kind = \"sampled\", time_s = {times:?}, power = {power:?} }}\n");
+    let shape = format!("kind = \"sampled\", time_s = {times:?}, power = {power:?}");
     let sampled = map(Words {
-        pulse: pulse.leak(),
+        pulse: format!("shape = {{ {shape} }}\n").leak(),
         ..PLAIN
     });
     let plain = map(PLAIN);
@@ -535,9 +534,13 @@ fn a_sampled_gaussian_is_the_gaussian_and_a_chirp_widens_the_spectrum() {
             .all(|d| d.abs() < 0.01),
         "the windows correlate alike"
     );
-    // Chirp times sigma/sqrt 2 is its part of the width: 3 MHz, 2.3 m/s.
+    // A chirp of 35 kHz/ns, times sigma/sqrt 2, is its part of the width: 3 MHz, 2.3 m/s.
+    let phase_rad: Vec<f64> = times
+        .iter()
+        .map(|t| std::f64::consts::PI * 3.5e13 * t * t)
+        .collect();
     let chirped = map(Words {
-        pulse: "chirp_hz_s = 3.5e13\n",
+        pulse: format!("shape = {{ {shape}, phase_rad = {phase_rad:?} }}\n").leak(),
         ..PLAIN
     });
     assert!(

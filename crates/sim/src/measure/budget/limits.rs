@@ -1,6 +1,6 @@
 //! What bounds an instrument beside its signal-to-noise ratio: power, ranges, velocities, phase noise, local oscillator, resolution.
 
-use super::digits::{digits, si};
+use super::digits::si;
 use crate::plan::Plan;
 use crate::scene::Weighting;
 use crate::setup::described::sampled_velocities_m_s;
@@ -36,27 +36,12 @@ impl Limits {
             values: Vec::new(),
             lines: Vec::new(),
         };
-        let mean_w = scene.pulse_energy_j() * scene.laser.pulse_repetition_hz;
+        let mean_w = scene.pulse.energy_j * scene.laser.pulse_repetition_hz;
         let peak_w = instrument.peak_power_w();
-        let mut power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
+        let power = format!("mean power {}, peak {}", si(mean_w, "W"), si(peak_w, "W"));
         found
             .values
             .extend([("mean_power_w", mean_w), ("peak_power_w", peak_w)]);
-        if let Some(fibre) = &scene.laser.fibre {
-            let threshold_w = fibre
-                .of_silica()
-                .brillouin_threshold_w(instrument.gaussian_fwhm_s());
-            found.values.push(("brillouin_threshold_w", threshold_w));
-            power += &format!(
-                "; Brillouin threshold of {} um^2 x {}: {}",
-                digits(fibre.effective_area_m2 * 1e12),
-                si(fibre.length_m, "m"),
-                si(threshold_w, "W")
-            );
-            if peak_w > threshold_w {
-                power += &format!(" -> WARNING {:.1} times above", peak_w / threshold_w);
-            }
-        }
         found.lines.push(power);
         let apart_m = ambiguous_range_m(scene.laser.pulse_repetition_hz);
         let blind_m = 0.5 * SPEED_OF_LIGHT_M_S * receiver.blind_time_s(pulse, HARMLESS_SNR);
