@@ -422,13 +422,6 @@ const KEYS: &[Key] = &[
         "map",
         "elevation_rad",
     ),
-    (
-        "scan.head.pointing_jitter_rad",
-        &[("scan.wind_of_pulses.kind", "\"pulse\"")],
-        ["[0.0, 0.0]", "[1e-3, 1e-3]"],
-        "map",
-        "v_pulse_m_s",
-    ),
     ("scan.lidar.y_m", &[], ["0.0", "30.0"], "map", "v_exact_m_s"),
     (
         "scan.lidar.velocity_m_s",

@@ -89,7 +89,7 @@ const WITHOUT: &[(&str, &str)] = &[
     ),
     (
         "map.csv: v_spread_m_s",
-        "of beams that jitter at random: held by tests of the jitter and of winds of pulses",
+        "of pulses with airs of their own: held by tests of winds of pulses",
     ),
     (
         "map.csv: v_mean_m_s",

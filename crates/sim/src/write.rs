@@ -21,6 +21,7 @@ use crate::outputs::Outputs;
 use crate::plan::{Plan, Stage, Target};
 use crate::run::RunResult;
 use crate::scene::{DetectorSignal, NoiseModel, Pattern};
+use crate::setup::beams::Beam;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -298,26 +299,25 @@ pub fn profile_table(profile: &RangeProfile) -> Table {
 /// The raw signals of a run, with what makes them readable.
 fn raw_signals<'a>(plan: &Plan, result: &'a RunResult) -> Option<RawSignals<'a>> {
     let (scene, g) = (&plan.scene.content, &plan.geometry);
-    let all = || (0..g.schedule.pulses()).map(|pulse| (g.schedule.line_of(pulse), pulse));
-    let beam = |(line, pulse): (usize, usize)| {
-        g.schedule
-            .beam_of_pulse(line, pulse - g.schedule.lines[line].first)
-    };
+    let beams: Vec<Beam> = (0..g.schedule.pulses())
+        .map(|pulse| g.schedule.beam_of_pulse(pulse))
+        .collect();
     let first_s = 2.0 * scene.scan.range_min_m / crate::SPEED_OF_LIGHT_M_S;
     Some(RawSignals {
         recording: recording(plan),
         range_m: g.layer_range_m().collect(),
         radial_velocity_m_s: result.line_velocity_m_s.as_ref()?.view(),
-        pulse_time_s: all()
-            .map(|at| plan.wind.start_s + beam(at).time_s)
+        pulse_time_s: beams
+            .iter()
+            .map(|beam| plan.wind.start_s + beam.time_s)
             .collect(),
         current_a: result.signals_a.as_ref()?.view(),
         quadrature_a: result.quadrature_a.as_ref().map(|values| values.view()),
-        elevation_rad: all().map(|at| beam(at).elevation_rad).collect(),
+        elevation_rad: beams.iter().map(|beam| beam.elevation_rad).collect(),
         azimuth_rad: if g.schedule.is_plane() {
             Vec::new()
         } else {
-            all().map(|at| beam(at).azimuth_rad).collect()
+            beams.iter().map(|beam| beam.azimuth_rad).collect()
         },
         time_s: (0..g.samples)
             .map(|k| first_s + k as f64 / scene.detector.sampling_hz)

@@ -4,8 +4,8 @@ use crate::Error;
 use crate::measure::profile::{Efficiencies, LineOptics, efficiency_by_theory};
 use crate::plan::{Plan, Stage};
 use crate::scene::{DetectorSignal, Scene, SecondTrip, SnrReference};
-use crate::setup::air::{Air, air_along, air_of_line, beam_of_air, known_velocity_m_s};
-use crate::setup::beams::{Beam, Line};
+use crate::setup::air::{Air, air_along, air_of_line, known_velocity_m_s};
+use crate::setup::beams::Beam;
 use crate::setup::efficiency_model::{drawn_turbulence, stretches};
 use crate::setup::geometry::Geometry;
 use crate::setup::instrument::Instrument;
@@ -206,7 +206,7 @@ impl<'a> Scanner<'a> {
         let schedule = &self.plan.geometry.schedule;
         let index =
             |key: PulseKey| (self.first + realisation) * self.pulses() + pulses.start + key.pulse;
-        let (airs, air_of) = self.airs_of_pulses(&pulses)?;
+        let airs = self.airs_of_pulses(&pulses)?;
         let scan = Scan {
             simulator: &self.simulator,
             // One line after the other, which the simulation of signals need not know.
@@ -222,9 +222,8 @@ impl<'a> Scanner<'a> {
                 let previous = self.previous.as_ref().map(|lines| &lines[line]);
                 let impairment_seed =
                     stream(self.plan.scene.content.seed, "asides", index(key) as u64).next_u64();
-                let air = air_of.get(key.pulse).and_then(|air| airs.get(*air));
                 Shot {
-                    line: air.unwrap_or(&self.lines[line]),
+                    line: airs.get(key.pulse).unwrap_or(&self.lines[line]),
                     efficiency,
                     previous,
                     impairment_seed,
@@ -236,45 +235,23 @@ impl<'a> Scanner<'a> {
         Ok(scan.collect()?)
     }
 
-    /// The airs of some pulses, and which one each of them meets; none where lines have one air.
-    fn airs_of_pulses(
-        &self,
-        pulses: &Range<usize>,
-    ) -> Result<(Vec<LineOfSight>, Vec<usize>), Error> {
+    /// The air that each of some pulses meets; none where the pulses of a line share one.
+    fn airs_of_pulses(&self, pulses: &Range<usize>) -> Result<Vec<LineOfSight>, Error> {
         if self.spread_m_s.is_none() {
-            return Ok((Vec::new(), Vec::new()));
+            return Ok(Vec::new());
         }
-        let (schedule, of) = (
-            &self.plan.geometry.schedule,
-            self.plan.scene.content.scan.wind_of_pulses,
-        );
-        let mut wanted: Vec<(usize, usize)> = Vec::new();
-        let air_of = pulses
-            .clone()
-            .map(|pulse| {
-                let line = schedule.line_of(pulse);
-                let Line { first, pulses, .. } = schedule.lines[line];
-                let air = (line, (pulse - first) * of.of_line(pulses) / pulses);
-                if wanted.last() != Some(&air) {
-                    wanted.push(air);
-                }
-                wanted.len() - 1
-            })
-            .collect();
+        let schedule = &self.plan.geometry.schedule;
         let ranges_m: Vec<f64> = self.plan.geometry.layer_range_m().collect();
-        let beams: Vec<Beam> = wanted
-            .iter()
-            .map(|&(line, air)| beam_of_air(self.plan, line, air))
+        let beams: Vec<Beam> = pulses
+            .clone()
+            .map(|pulse| schedule.beam_of_pulse(pulse))
             .collect();
         let along = |beam: &Beam| {
             Ok(self
                 .returns
                 .line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry))
         };
-        Ok((
-            in_time_order(self.plan, &beams, |beam| beam.time_s, along)?,
-            air_of,
-        ))
+        in_time_order(self.plan, &beams, |beam| beam.time_s, along)
     }
 }
 

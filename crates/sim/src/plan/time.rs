@@ -2,7 +2,7 @@
 
 use super::sizes::Sizes;
 use super::stage::Target;
-use crate::scene::{Flow, Method, RegionRadius, RetrievalMethod, Scene};
+use crate::scene::{Flow, Method, RegionRadius, RetrievalMethod, Scene, WindOfPulses};
 
 /// Time of a run by what takes it, s.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,11 +37,11 @@ pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> 
         .chain(&scene.added_flows)
         .map(wind_of)
         .sum::<f64>();
-    let airs = n.lines
-        * scene
-            .scan
-            .wind_of_pulses
-            .of_line(scene.scan.pulses_per_line) as f64;
+    let airs_per_line = match scene.scan.wind_of_pulses {
+        WindOfPulses::Line {} => 1,
+        WindOfPulses::Pulse {} => scene.scan.pulses_per_line,
+    };
+    let airs = n.lines * airs_per_line as f64;
     let record_s = n.layers * 5.4e-8 + n.samples * (n.layers_per_sample * 1.2e-10 + 5e-8);
     let kept_s = n.kept * n.records * n.samples * n.parts * 4e-8;
     let signals_s = n.realisations * (n.records * record_s + airs * n.layers * wind_s) + kept_s;

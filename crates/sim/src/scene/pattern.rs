@@ -124,11 +124,6 @@ keys! {
         acceleration_rad_s2: f64 = f64::INFINITY => Number(|rate| rate > 0.0, "a number above 0 in rad/s^2, or inf"),
         /// Time that each line takes beside its pulses, s.
         dead_time_s: f64 = 0.0 => 0.0..=1e5,
-        /// Standard deviations of azimuth and elevation of each pulse, rad.
-        pointing_jitter_rad: [f64; 2] = [0.0; 2] => Is(
-            |jitter: &[f64; 2]| jitter.iter().all(|sd| (0.0..=0.5).contains(sd)),
-            "two standard deviations from 0 to 0.5 rad",
-        ),
     }
 
     /// Where the lidar is beside its height, and where north is.
@@ -151,11 +146,6 @@ keys! {
         "line" => Line {},
         /// Each its own.
         "pulse" => Pulse {},
-        /// So many: each that of the middle of its part of the line.
-        "groups" => Groups {
-            /// How many.
-            groups: usize => 1..=1_000_000,
-        },
     }
 }
 
@@ -168,17 +158,6 @@ impl Default for Pattern {
 impl Default for WindOfPulses {
     fn default() -> Self {
         Self::Line {}
-    }
-}
-
-impl WindOfPulses {
-    /// Airs of a line of so many pulses.
-    pub fn of_line(self, pulses: usize) -> usize {
-        match self {
-            Self::Line {} => 1,
-            Self::Pulse {} => pulses,
-            Self::Groups { groups } => groups.min(pulses),
-        }
     }
 }
 
@@ -229,16 +208,6 @@ impl Scene {
             "scan.head.sweeps",
             sweeps,
             "1 with scan.pattern.kind = \"list\"",
-        );
-        let jitter = self.scan.head.pointing_jitter_rad;
-        let each =
-            self.scan.wind_of_pulses == WindOfPulses::Pulse {} || self.scan.pulses_per_line == 1;
-        let allowed = "[0.0, 0.0] unless scan.wind_of_pulses.kind = \"pulse\": pulses that share their air share their direction";
-        c.require(
-            each || jitter == [0.0; 2],
-            "scan.head.pointing_jitter_rad",
-            jitter,
-            allowed,
         );
     }
 

@@ -52,19 +52,6 @@ pub(crate) fn seen_m_s(
         .collect())
 }
 
-/// The beam in the middle of the pulses that share an air of a line.
-pub(crate) fn beam_of_air(setup: &Setup, line: usize, air: usize) -> Beam {
-    let schedule = &setup.geometry.schedule;
-    let pulses = schedule.lines[line].pulses;
-    let airs = setup.scene.content.scan.wind_of_pulses.of_line(pulses);
-    if airs == pulses {
-        return schedule.beam_of_pulse(line, air);
-    }
-    // Pulse p meets air p airs/pulses, rounded down.
-    let first = |air: usize| (air * pulses).div_ceil(airs);
-    schedule.beam(line, 0.5 * (first(air) + first(air + 1) - 1) as f64)
-}
-
 /// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
 pub(crate) fn air_of_line(
     setup: &Setup,
@@ -75,19 +62,16 @@ pub(crate) fn air_of_line(
     let g = &setup.geometry;
     let schedule = &g.schedule;
     let pulses = schedule.lines[line].pulses;
-    let of = setup.scene.content.scan.wind_of_pulses;
-    if of == WindOfPulses::default() {
+    if setup.scene.content.scan.wind_of_pulses == WindOfPulses::default() {
         return air_along(setup, &schedule.middle(line), range_m);
     }
-    let airs = of.of_line(pulses);
     let mut sums_m_s = vec![0.0; range_m.len()];
     let mut backscatter: Option<Vec<f64>> = None;
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
     let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
-    for air in 0..airs {
-        let share = (((air + 1) * pulses).div_ceil(airs) - (air * pulses).div_ceil(airs)) as f64
-            / pulses as f64;
-        let here = air_along(setup, &beam_of_air(setup, line, air), range_m)?;
+    let share = 1.0 / pulses as f64;
+    for pulse in 0..pulses {
+        let here = air_along(setup, &schedule.beam(line, pulse as f64), range_m)?;
         let here_seen_m_s = seen_m_s(
             filter,
             g,
@@ -95,7 +79,7 @@ pub(crate) fn air_of_line(
             here.backscatter_per_m_sr.as_deref(),
         )?;
         // About the first air, so that the mean of equal airs is that air.
-        if air == 0 {
+        if pulse == 0 {
             (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
             backscatter = here
                 .backscatter_per_m_sr

@@ -60,8 +60,6 @@ fn mount(scene: &Scene) -> Mount {
         position_m: [l.x_m, l.y_m, s.lidar_height_m],
         velocity_m_s: l.velocity_m_s,
         reference_rad,
-        jitter_rad: s.head.pointing_jitter_rad,
-        seed: scene.seed,
     }
 }
 

@@ -117,7 +117,7 @@ fn signals_of_any_pattern_give_the_bytes_of_the_run() {
     let back = format!("{RHI}head = {{ sweeps = 3, direction = \"alternate\" }}\n");
     for scan in [
         "pattern = { kind = \"ppi\", azimuth_min_rad = 1.3, azimuth_max_rad = 1.5 }\nwind_of_pulses.kind = \"pulse\"\n\
-         head = { motion = \"continuous\", rate_rad_s = 3.0, pointing_jitter_rad = [1e-3, 1e-3] }\n",
+         head = { motion = \"continuous\", rate_rad_s = 3.0 }\n",
         "pattern = { kind = \"vad\", beams = 6 }\n",
         "pattern = { kind = \"list\", file = \"lines.csv\" }\n",
         &back,

@@ -137,18 +137,14 @@ fn an_rhi_has_the_same_bytes_however_it_is_said_and_with_any_number_of_threads()
     )
     .unwrap();
     assert!(spread.iter().all(|s| *s == 0.0));
-    same(
-        &plain,
-        &of("wind_of_pulses = { kind = \"groups\", groups = 3 }"),
-    );
 }
 
 const PPI: &str = "pattern = { kind = \"ppi\", elevations_rad = [0.05, 0.08], azimuth_min_rad = 1.3, azimuth_max_rad = 1.5 }\n\
-                   head = { motion = \"continuous\", rate_rad_s = 1.5, direction = \"alternate\", pointing_jitter_rad = [1e-3, 1e-3] }\n\
+                   head = { motion = \"continuous\", rate_rad_s = 1.5, direction = \"alternate\" }\n\
                    wind_of_pulses.kind = \"pulse\"\n";
 
 #[test]
-fn a_moving_scan_with_jitter_has_the_same_bytes_with_any_number_of_threads() {
+fn a_moving_scan_with_winds_of_pulses_has_the_same_bytes_with_any_number_of_threads() {
     let files_of = files(PPI, 1);
     assert!(files_of == files(PPI, 2));
     let names: Vec<&str> = files_of.iter().map(|(name, _)| name.as_str()).collect();
@@ -210,7 +206,7 @@ fn the_truth_of_a_line_is_the_mean_over_its_pulses_with_their_spread() {
         let seen: Vec<f64> = (0..8)
             .map(|pulse| {
                 schedule
-                    .beam_of_pulse(line, pulse)
+                    .beam(line, f64::from(pulse))
                     .direction
                     .radial_velocity_m_s([-8.0, 3.0, 0.5], [0.0; 3])
             })
@@ -459,10 +455,6 @@ fn what_a_scan_cannot_be_is_refused_with_key_and_what_is_allowed() {
             "rhi, ppi and axial may be continuous",
         ),
         ("head.motion = \"continuous\"", "scan.head.rate_rad_s = inf"),
-        (
-            "head.pointing_jitter_rad = [1e-3, 0.0]",
-            "wind_of_pulses.kind = \"pulse\"",
-        ),
         (
             "pattern.kind = \"stare\"\nelevation_max_rad = 0.2",
             "scan.elevation_max_rad = 0.2 is not allowed: scan.pattern.kind",

@@ -9,7 +9,7 @@
 //! | [`direction`] | unit vectors from azimuth and elevation; the radial velocity that a moving lidar sees |
 //! | [`head`] | how long the head takes from angle to angle |
 //! | [`path`] | sweeps: the stops of the head, or its ways, of each kind of scan |
-//! | [`schedule`] | the lines of a scan on the clock of the pulses; their beams, jitter included |
+//! | [`schedule`] | the lines of a scan on the clock of the pulses; their beams |
 
 pub mod direction;
 pub mod head;

@@ -1,14 +1,11 @@
 //! The lines of a scan on the clock of the pulses, and the beam of each pulse.
 //!
 //! A sweep begins with the next pulse of the laser's clock once the head is there; between lines and between sweeps the head
-//! moves, and pulses that leave meanwhile belong to no line. Check: sweeps back and forth against a table, pulse by pulse;
-//! jitter against its closed form.
+//! moves, and pulses that leave meanwhile belong to no line. Check: sweeps back and forth against a table, pulse by pulse.
 
 use super::direction::Direction;
 use super::head::Head;
 use super::path::{Angles, Stop, SweepMode};
-use crate::setup::streams::stream;
-use rand_xoshiro::rand_core::Rng;
 use std::f64::consts::TAU;
 
 /// Where the lidar stands and how it points.
@@ -20,10 +17,6 @@ pub struct Mount {
     pub velocity_m_s: [f64; 3],
     /// An azimuth, rad, and the angle from +x that it stands for.
     pub reference_rad: (f64, f64),
-    /// Standard deviations of azimuth and elevation about where the head points, rad.
-    pub jitter_rad: Angles,
-    /// Seed of the jitter.
-    pub seed: u64,
 }
 
 /// What paces a scan.
@@ -218,43 +211,24 @@ impl Schedule {
             .saturating_sub(1)
     }
 
-    /// The beam without jitter at a place among the pulses of a line, which may lie between two.
+    /// The beam of a pulse of the scan.
+    ///
+    /// # Panics
+    /// If there is no such pulse.
+    pub fn beam_of_pulse(&self, pulse: usize) -> Beam {
+        let line = self.line_of(pulse);
+        self.beam(line, (pulse - self.lines[line].first) as f64)
+    }
+
+    /// The beam at a place among the pulses of a line, which may lie between two.
     ///
     /// # Panics
     /// If there is no such line.
     pub fn beam(&self, line: usize, pulse: f64) -> Beam {
-        self.beam_beside(&self.lines[line], pulse, [0.0; 2])
-    }
-
-    /// The beam of a pulse with its jitter; each realisation of the scan has the same.
-    ///
-    /// # Panics
-    /// If there is no such line.
-    pub fn beam_of_pulse(&self, line: usize, pulse: usize) -> Beam {
         let line = &self.lines[line];
-        let jitter = self.mount.jitter_rad;
-        if jitter == [0.0; 2] {
-            return self.beam_beside(line, pulse as f64, jitter);
-        }
-        let mut random = stream(self.mount.seed, "pointing", (line.first + pulse) as u64);
-        let mut part = || (random.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
-        // Box and Muller (1958): two normal numbers.
-        let (radius, (sin, cos)) = (
-            (-2.0 * (1.0 - part()).ln()).sqrt(),
-            (TAU * part()).sin_cos(),
-        );
-        self.beam_beside(
-            line,
-            pulse as f64,
-            [jitter[0] * radius * cos, jitter[1] * radius * sin],
-        )
-    }
-
-    fn beam_beside(&self, line: &Line, pulse: f64, beside_rad: Angles) -> Beam {
         let after_s = pulse * self.prt_s;
-        let [azimuth_rad, elevation_rad] = std::array::from_fn(|d| {
-            line.angles_rad[d] + line.rate_rad_s[d] * after_s + beside_rad[d]
-        });
+        let [azimuth_rad, elevation_rad] =
+            std::array::from_fn(|d| line.angles_rad[d] + line.rate_rad_s[d] * after_s);
         let (zero_rad, from_x_rad) = self.mount.reference_rad;
         Beam {
             time_s: (line.tick + pulse) * self.prt_s,
