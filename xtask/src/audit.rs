@@ -1,15 +1,16 @@
 //! `cargo xtask audit`: every number that the program writes or prints beside its definition, on random scenes and cases.
 //!
-//! The definitions and the draws are in `tests/audit`; the table says where each number is defined and how far it is off.
+//! The definitions and the draws are in `tests/audit`; the table says where each number is defined
+//! and how far it deviates.
 
 use crate::process::program;
-use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use std::path::PathBuf;
+use wakescope_tests::audit::{Report, audit};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+pub(crate) struct AuditArgs {
     /// How many scenes and cases.
     #[arg(long, default_value_t = 100)]
     scenes: usize,
@@ -25,41 +26,61 @@ pub(crate) struct Options {
     /// Folder in which scenes and outputs stay, a folder for each draw.
     #[arg(long, value_name = "DIR")]
     keep: Option<PathBuf>,
-    /// Store the table for the book.
-    #[arg(long)]
-    store: bool,
 }
 
-/// Where the book reads the table.
-const STORED: &str = "docs/src/audit-table.md";
+impl Default for AuditArgs {
+    /// The draws of continuous integration.
+    fn default() -> Self {
+        Self {
+            scenes: 100,
+            first: 0,
+            seed: 1,
+            program: None,
+            keep: None,
+        }
+    }
+}
 
-pub(crate) fn run(options: &Options) -> Outcome {
-    let program = program(options.program.as_deref())?;
+/// Runs the draws and prints the table.
+///
+/// # Errors
+/// Fails if a number is wrong or has no definition.
+pub(crate) fn run(args: &AuditArgs) -> Outcome {
+    checked_report(args).map(drop)
+}
+
+/// Runs the draws of continuous integration, prints the table and returns it for the page of the book.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn page() -> Result<String, Failure> {
+    let args = AuditArgs::default();
+    let report = checked_report(&args)?;
+    let last = args.first + args.scenes - 1;
+    Ok(format!(
+        "Draws {} to {last} of seed {}: {}",
+        args.first, args.seed, report.page
+    ))
+}
+
+fn checked_report(args: &AuditArgs) -> Result<Report, Failure> {
+    let program = program(args.program.as_deref())?;
     let threads = std::thread::available_parallelism()?.get();
-    let Options {
-        seed,
-        first,
-        scenes,
-        ..
-    } = *options;
-    let keep = options.keep.as_ref().map(std::path::absolute).transpose()?;
-    let report =
-        wakescope_tests::audit::audit(&program, seed, first, scenes, threads, keep.as_deref());
+    let keep = args.keep.as_ref().map(std::path::absolute).transpose()?;
+    let report = audit(
+        &program,
+        args.seed,
+        args.first,
+        args.scenes,
+        threads,
+        keep.as_deref(),
+    );
     print!("{}", report.text);
-    if options.store {
-        let page = format!(
-            "Draws {first} to {} of seed {seed}: {}",
-            first + scenes - 1,
-            report.page
-        );
-        wakescope_sim::io::write_atomic(&root().join(STORED), page.as_bytes())?;
-        println!("stored {STORED}");
+    if report.faults.is_empty() {
+        return Ok(report);
     }
-    match report.faults.is_empty() {
-        true => Ok(()),
-        false => Err(Failure::new(format!(
-            "{} numbers are wrong or have no definition",
-            report.faults.len()
-        ))),
-    }
+    Err(Failure::new(format!(
+        "{} numbers are wrong or have no definition",
+        report.faults.len()
+    )))
 }

@@ -1,32 +1,104 @@
-//! `cargo xtask book`: the book as pages that a server of files can give, with the documentation of the crates in its folder `api`.
+//! `cargo xtask book`: the book as a static site, with the documentation of the crates in its folder `api`.
+//!
+//! Tables that a command makes are not stored: the commands run here, and a copy of the pages gets
+//! their results.
 
 use crate::process::call;
-use crate::workspace::built;
+use crate::workspace::{built, root};
+use crate::{audit, left_out, work_precision};
 use fixtures::failure::Outcome;
+use std::path::Path;
 use std::process::Command;
+use walkdir::WalkDir;
 
-/// Packages that nobody takes: tasks and tests.
-const NOT_FOR_OTHERS: [&str; 3] = ["xtask", "fixtures", "wakescope-tests"];
+/// Packages without documentation for users: tasks and tests.
+const PRIVATE_PACKAGES: [&str; 3] = ["xtask", "fixtures", "wakescope-tests"];
+
+/// Files beside the pages that this task makes.
+pub(crate) const RESULTS: [&str; 5] = [
+    AUDIT,
+    LEFT_OUT,
+    WORK_PRECISION,
+    WORK_PRECISION_CSV,
+    WORK_PRECISION_SVG,
+];
+const AUDIT: &str = "audit-results.md";
+const LEFT_OUT: &str = "left-out-results.md";
+const WORK_PRECISION: &str = "work-precision-results.md";
+const WORK_PRECISION_CSV: &str = "images/work_precision.csv";
+const WORK_PRECISION_SVG: &str = "images/work_precision.svg";
 
 /// Builds both into `target/book`.
 ///
 /// # Errors
-/// Where mdBook is not installed, where one of the two cannot be built, and where files cannot be copied.
+/// Fails if mdBook is not installed, a command of a page fails, or one of the two cannot be built.
 pub(crate) fn run() -> Outcome {
-    // First, for it empties the folder.
-    call(Command::new("mdbook").args(["build", "docs"]))?;
-    let without = NOT_FOR_OTHERS.iter().flat_map(|name| ["--exclude", *name]);
-    call(
-        Command::new(env!("CARGO"))
-            .args(["doc", "--workspace", "--no-deps"])
-            .args(without),
-    )?;
-    call(
-        Command::new("cp")
-            .arg("-r")
-            .arg(built().join("doc"))
-            .arg("target/book/api"),
-    )?;
+    let book = root().join("target/book");
+    let copy = root().join("target/book-pages");
+    copy_folder(&root().join("docs"), &copy)?;
+    write_results(&copy.join("src"))?;
+    // First, since mdBook empties the folder.
+    let mut mdbook = Command::new("mdbook");
+    mdbook.arg("build").arg(&copy).arg("--dest-dir").arg(&book);
+    call(&mut mdbook)?;
+    let mut doc = Command::new(env!("CARGO"));
+    doc.args(["doc", "--workspace", "--no-deps"]);
+    for package in PRIVATE_PACKAGES {
+        doc.args(["--exclude", package]);
+    }
+    call(&mut doc)?;
+    copy_folder(&built().join("doc"), &book.join("api"))?;
     println!("target/book/index.html");
     Ok(())
+}
+
+/// Runs the commands whose results pages include.
+fn write_results(pages: &Path) -> Outcome {
+    std::fs::write(pages.join(AUDIT), audit::page()?)?;
+    std::fs::write(pages.join(LEFT_OUT), left_out::page()?)?;
+    let measured = work_precision::page()?;
+    std::fs::write(pages.join(WORK_PRECISION), measured.text)?;
+    std::fs::write(pages.join(WORK_PRECISION_CSV), measured.csv)?;
+    std::fs::write(pages.join(WORK_PRECISION_SVG), measured.svg)?;
+    Ok(())
+}
+
+/// Copies a folder with all that it holds; the copy has nothing else.
+fn copy_folder(from: &Path, to: &Path) -> Outcome {
+    if to.exists() {
+        std::fs::remove_dir_all(to)?;
+    }
+    for entry in WalkDir::new(from) {
+        let entry = entry?;
+        let path = entry.path();
+        let copy = to.join(path.strip_prefix(from)?);
+        if entry.file_type().is_dir() {
+            std::fs::create_dir_all(copy)?;
+        } else {
+            std::fs::copy(path, copy)?;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_copied_folder_has_the_files_of_the_original_and_no_others() {
+        let temp = tempfile::tempdir().unwrap();
+        let from = temp.path().join("from");
+        let to = temp.path().join("to");
+        std::fs::create_dir_all(from.join("inner")).unwrap();
+        std::fs::write(from.join("inner/a.md"), "text").unwrap();
+        std::fs::create_dir_all(&to).unwrap();
+        std::fs::write(to.join("old.md"), "old").unwrap();
+        copy_folder(&from, &to).unwrap();
+        assert_eq!(
+            std::fs::read_to_string(to.join("inner/a.md")).unwrap(),
+            "text"
+        );
+        assert!(!to.join("old.md").exists());
+    }
 }

@@ -1,30 +1,26 @@
 //! `cargo xtask left-out`: what a scene does not pay for, and what a crate does not pull in.
 //!
-//! A scene that has everything is run whole and without one thing at a time, each run a process of its own with one thread; the crates behind
-//! each of ours, alone and with its features, are counted by cargo and, if asked, compiled from nothing.
+//! A scene that has everything is run whole and without one thing at a time, each run a process of
+//! its own with one thread; the crates behind each of ours, alone and with its features, are counted
+//! by cargo and, if requested, compiled from nothing.
 
 use crate::process::{call, children_cpu_s, output, program, run_scene};
-use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use serde::Deserialize;
 use std::collections::BTreeSet;
-use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use toml::{Table, Value};
 
 /// Options of the task.
-#[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+#[derive(Debug, Default, clap::Args)]
+pub(crate) struct LeftOutArgs {
     /// The program to run, instead of the release build.
     #[arg(long, value_name = "FILE")]
     program: Option<PathBuf>,
-    /// Compile each crate with its features from nothing, too, which takes long.
+    /// Also compile each crate with its features from nothing, which is slow.
     #[arg(long)]
     compile: bool,
-    /// Store both tables in the book.
-    #[arg(long)]
-    store: bool,
 }
 
 /// The scene that has everything, and what is taken out.
@@ -35,11 +31,22 @@ struct Scenes {
     package: Vec<Package>,
 }
 
-/// What is taken out of the scene, and by which keys: a word with dots and its value; the text "absent" takes the key out.
+/// What is taken out of the scene, and by which keys: their names with dots and their values; the text "absent" removes the key.
 #[derive(Deserialize)]
 struct Without {
     name: String,
     keys: Table,
+}
+
+impl Without {
+    /// The scene without it.
+    fn scene(&self, whole: &Table) -> Result<Table, Failure> {
+        let mut scene = whole.clone();
+        for (key, value) in &self.keys {
+            set(&mut scene, key, value)?;
+        }
+        Ok(scene)
+    }
 }
 
 /// A crate with some of its features and without the default ones.
@@ -50,146 +57,173 @@ struct Package {
     gives: String,
 }
 
-pub(crate) fn run(options: &Options) -> Outcome {
-    let Scenes {
-        whole,
-        without,
-        package,
-    } = toml::from_str(include_str!("left_out.toml"))?;
-    let (program, folder) = (program(options.program.as_deref())?, tempfile::tempdir()?);
-    let folder = folder.path();
-    let mut text = String::from(
-        "| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n",
-    );
-    for Without { name, keys } in &without {
-        let mut scene = whole.clone();
-        keys.iter()
-            .try_for_each(|(key, value)| set(&mut scene, key, value))?;
-        let run = run_scene(&program, folder, &toml::to_string(&scene)?)?;
-        let sizes = std::fs::read_dir(folder.join("out"))?.map(|file| Ok(file?.metadata()?.len()));
-        let bytes = sizes.sum::<std::io::Result<u64>>()? as f64;
-        let name = if keys.is_empty() {
-            name.clone()
-        } else {
-            format!("without {name}")
-        };
-        let _ = writeln!(
-            text,
-            "| {name} | {:.2} | {:.1} | {:.2} |",
-            run.cpu_s,
-            run.peak_bytes / 1e6,
-            bytes / 1e6
-        );
-    }
-    let heads = if options.compile {
-        " processor time of compiling [s] | program [MB] |"
-    } else {
-        ""
-    };
-    let lines = if options.compile { "---|---|" } else { "" };
-    let _ = writeln!(
-        text,
-        "\n| crate | features | gives | crates compiled |{heads}\n|---|---|---|---|{lines}"
-    );
-    for Package {
-        name,
-        features,
-        gives,
-    } in &package
-    {
-        let named = if features.is_empty() {
-            "none"
-        } else {
-            features
-        };
-        let _ = write!(
-            text,
-            "| `{name}` | {named} | {gives} | {} |",
-            crates(name, features)?
-        );
-        if options.compile {
-            let (seconds, bytes) = compiled(name, features, &folder.join("target"))?;
-            let size = bytes.map_or("none".into(), |bytes| format!("{:.1}", bytes / 1e6));
-            let _ = write!(text, " {seconds:.0} | {size} |");
-        }
-        text.push('\n');
-    }
-    print!("{text}");
-    if options.store {
-        wakescope_sim::io::write_atomic(
-            &root().join("docs/src/left-out-results.md"),
-            text.as_bytes(),
-        )?;
-    }
+/// What compiling a crate from nothing costs.
+struct Compiled {
+    /// Processor time \[s\].
+    cpu_s: f64,
+    /// Size of the program \[bytes\]; none of a library.
+    program_bytes: Option<f64>,
+}
+
+/// Prints both tables.
+///
+/// # Errors
+/// Fails if a scene does not run or a crate does not compile.
+pub(crate) fn run(args: &LeftOutArgs) -> Outcome {
+    print!("{}", tables(args)?);
     Ok(())
 }
 
-/// Sets a key by its word with dots, or takes it out.
+/// Both tables for the page of the book, with the costs of compiling.
+///
+/// # Errors
+/// As [`run`].
+pub(crate) fn page() -> Result<String, Failure> {
+    tables(&LeftOutArgs {
+        compile: true,
+        ..LeftOutArgs::default()
+    })
+}
+
+fn tables(args: &LeftOutArgs) -> Result<String, Failure> {
+    let scenes: Scenes = toml::from_str(include_str!("left_out.toml"))?;
+    let program = program(args.program.as_deref())?;
+    let folder = tempfile::tempdir()?;
+    let mut text = scene_table(&scenes, &program, folder.path())?;
+    text.push('\n');
+    if args.compile {
+        text += &compile_table(&scenes.package, &folder.path().join("target"))?;
+    } else {
+        text += &package_table(&scenes.package)?;
+    }
+    Ok(text)
+}
+
+/// What each scene costs.
+fn scene_table(scenes: &Scenes, program: &Path, folder: &Path) -> Result<String, Failure> {
+    let mut text = String::from(
+        "| the scene | processor time [s] | memory [MB] | files [MB] |\n|---|---|---|---|\n",
+    );
+    for without in &scenes.without {
+        let scene = without.scene(&scenes.whole)?;
+        let run = run_scene(program, folder, &toml::to_string(&scene)?)?;
+        let mut bytes = 0;
+        for file in std::fs::read_dir(folder.join("out"))? {
+            bytes += file?.metadata()?.len();
+        }
+        let prefix = if without.keys.is_empty() {
+            ""
+        } else {
+            "without "
+        };
+        text += &format!(
+            "| {prefix}{} | {:.2} | {:.1} | {:.2} |\n",
+            without.name,
+            run.cpu_s,
+            run.peak_bytes / 1e6,
+            bytes as f64 / 1e6
+        );
+    }
+    Ok(text)
+}
+
+/// How many crates are behind each package.
+fn package_table(packages: &[Package]) -> Result<String, Failure> {
+    let mut text =
+        String::from("| crate | features | gives | crates compiled |\n|---|---|---|---|\n");
+    for package in packages {
+        text += &format!("{}\n", package.row()?);
+    }
+    Ok(text)
+}
+
+/// The same with what compiling costs.
+fn compile_table(packages: &[Package], target: &Path) -> Result<String, Failure> {
+    let mut text = String::from(
+        "| crate | features | gives | crates compiled | processor time of compiling [s] | program [MB] |\n|---|---|---|---|---|---|\n",
+    );
+    for package in packages {
+        let compiled = package.compile(target)?;
+        let size = compiled
+            .program_bytes
+            .map_or("none".into(), |bytes| format!("{:.1}", bytes / 1e6));
+        text += &format!("{} {:.0} | {size} |\n", package.row()?, compiled.cpu_s);
+    }
+    Ok(text)
+}
+
+impl Package {
+    /// The row of the table that needs no compiling.
+    fn row(&self) -> Result<String, Failure> {
+        let features = if self.features.is_empty() {
+            "none"
+        } else {
+            &self.features
+        };
+        Ok(format!(
+            "| `{}` | {features} | {} | {} |",
+            self.name,
+            self.gives,
+            self.crates()?
+        ))
+    }
+
+    /// Compiles the crate and all that it needs from nothing.
+    fn compile(&self, target: &Path) -> Result<Compiled, Failure> {
+        if target.exists() {
+            std::fs::remove_dir_all(target)?;
+        }
+        let before_s = children_cpu_s();
+        let mut build = Command::new(env!("CARGO"));
+        build.args(["build", "--release", "--quiet", "--no-default-features"]);
+        build.args(["--package", &self.name, "--features", &self.features]);
+        call(build.env("CARGO_TARGET_DIR", target))?;
+        let program = std::fs::metadata(target.join("release/wakescope")).ok();
+        Ok(Compiled {
+            cpu_s: children_cpu_s() - before_s,
+            program_bytes: program.map(|file| file.len() as f64),
+        })
+    }
+
+    /// How many crates cargo compiles for the library, itself among them, without those that only build it.
+    fn crates(&self) -> Result<usize, Failure> {
+        let mut tree = Command::new(env!("CARGO"));
+        tree.args([
+            "tree",
+            "--edges=normal",
+            "--prefix=none",
+            "--no-default-features",
+        ]);
+        tree.args(["--package", &self.name, "--features", &self.features]);
+        let text = output(&mut tree)?;
+        let mut names = BTreeSet::new();
+        for line in text.lines() {
+            let name = line.split(" (").next().unwrap_or(line);
+            if !name.is_empty() {
+                names.insert(name);
+            }
+        }
+        Ok(names.len())
+    }
+}
+
+/// Sets a key by its name with dots, or removes it.
 fn set(scene: &mut Table, key: &str, value: &Value) -> Outcome {
     let Some((table, rest)) = key.split_once('.') else {
-        match value.as_str() {
-            Some("absent") => scene.remove(key),
-            _ => scene.insert(key.into(), value.clone()),
-        };
+        if value.as_str() == Some("absent") {
+            scene.remove(key);
+        } else {
+            scene.insert(key.into(), value.clone());
+        }
         return Ok(());
     };
     let inner = scene
         .entry(table)
         .or_insert_with(|| Value::Table(Table::new()));
-    set(
-        inner
-            .as_table_mut()
-            .ok_or_else(|| Failure::new(format!("{table} is no table")))?,
-        rest,
-        value,
-    )
-}
-
-/// Processor time of compiling a crate and all that it needs from nothing, s, and the size of its program, bytes.
-fn compiled(package: &str, features: &str, target: &Path) -> Result<(f64, Option<f64>), Failure> {
-    if target.exists() {
-        std::fs::remove_dir_all(target)?;
-    }
-    let before_s = children_cpu_s();
-    let words = [
-        "build",
-        "--release",
-        "--quiet",
-        "--package",
-        package,
-        "--no-default-features",
-        "--features",
-        features,
-    ];
-    call(
-        Command::new(env!("CARGO"))
-            .args(words)
-            .env("CARGO_TARGET_DIR", target),
-    )?;
-    let program = std::fs::metadata(target.join("release/wakescope")).ok();
-    Ok((
-        children_cpu_s() - before_s,
-        program.map(|file| file.len() as f64),
-    ))
-}
-
-/// How many crates cargo compiles for a library, itself among them, without those that only build it.
-fn crates(package: &str, features: &str) -> Result<usize, Failure> {
-    let of = [
-        "tree",
-        "--edges=normal",
-        "--prefix=none",
-        "--no-default-features",
-        "--package",
-        package,
-        "--features",
-    ];
-    let text = output(Command::new(env!("CARGO")).args(of).arg(features))?;
-    let names: BTreeSet<&str> = text
-        .lines()
-        .filter_map(|line| line.split(" (").next())
-        .collect();
-    Ok(names.iter().filter(|name| !name.is_empty()).count())
+    let inner = inner
+        .as_table_mut()
+        .ok_or_else(|| Failure::new(format!("{table} is no table")))?;
+    set(inner, rest, value)
 }
 
 #[cfg(test)]
@@ -200,16 +234,13 @@ mod tests {
 
     #[test]
     fn every_scene_of_the_list_passes_the_check() {
-        let Scenes { whole, without, .. } = toml::from_str(include_str!("left_out.toml")).unwrap();
-        for Without { name, keys } in &without {
-            let mut scene = whole.clone();
-            keys.iter()
-                .try_for_each(|(key, value)| set(&mut scene, key, value))
-                .unwrap();
+        let scenes: Scenes = toml::from_str(include_str!("left_out.toml")).unwrap();
+        for without in &scenes.without {
+            let scene = without.scene(&scenes.whole).unwrap();
             let text = toml::to_string(&scene).unwrap();
             let read = SceneFile::parse(&text, Path::new("scene.toml")).unwrap();
             let plan = Plan::new(read, Target::Run);
-            assert!(plan.is_ok(), "{name}: {:?}", plan.err());
+            assert!(plan.is_ok(), "{}: {:?}", without.name, plan.err());
         }
     }
 }

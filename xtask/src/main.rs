@@ -60,9 +60,9 @@ enum Task {
     /// Write stored reference curves from what the crates compute now.
     Bless(bless::Options),
     /// Measure error against run time.
-    WorkPrecision(work_precision::Options),
+    WorkPrecision(work_precision::WorkPrecisionArgs),
     /// What a scene and a crate do not pay for: runs with and without, crates compiled.
-    LeftOut(left_out::Options),
+    LeftOut(left_out::LeftOutArgs),
     /// Fit many scans of a vortex pair: bias, scatter, reported error, bound.
     FitTrials(fit_trials::FitTrialsArgs),
     /// Run the flows with known answers and draw them beside their references.
@@ -70,7 +70,7 @@ enum Task {
     /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
     Stability(stability::Options),
     /// Hold every number that the program writes or prints against its definition, on random scenes and cases.
-    Audit(audit::Options),
+    Audit(audit::AuditArgs),
     /// Build the book as a static site, with the documentation of the crates beside it.
     Book,
     /// Check the rules of the house.
