@@ -39,16 +39,6 @@ pub fn free_space_efficiency_misaligned(
     efficiency_with(telescope, misalignment, range_m, &|_| 0.0)
 }
 
-/// Antenna efficiency eta_a = eta_s / T^2 in free space: both beams with unit power AFTER truncation. To be used only
-/// with the energy that leaves the telescope.
-///
-/// # Errors
-/// As [`free_space_efficiency`].
-pub fn free_space_antenna_efficiency(telescope: &Telescope, range_m: f64) -> Result<f64, Error> {
-    let eta = free_space_efficiency(telescope, range_m)?;
-    Ok(eta / telescope.transmitted_fraction().powi(2))
-}
-
 /// Closed form without truncation: eta = lambda^2 R^2 / (2 pi A_R sigma_R^2),
 /// sigma_R^2 = s^2 (1 - R/F)^2 + (R/(k s))^2. The aperture only sets A_R.
 ///

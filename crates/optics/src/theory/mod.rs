@@ -9,7 +9,6 @@ pub(crate) mod overlap;
 pub use encircled::mean_power_beyond;
 pub use exact::{
     ScreenStrength, bistatic_efficiency, bistatic_efficiency_screens, bistatic_efficiency_with,
-    free_space_antenna_efficiency, free_space_efficiency, free_space_efficiency_misaligned,
-    untruncated_efficiency,
+    free_space_efficiency, free_space_efficiency_misaligned, untruncated_efficiency,
 };
 pub use overlap::{LARGEST_FRESNEL_NUMBER, fresnel_number, quadrature_cost_s};
