@@ -43,7 +43,7 @@ mod _wakescope {
         py.detach(|| wakescope_sim::cli::main(words))
     }
 
-    /// Writes files to a folder, all or none, and returns their paths; files of others are replaced only with `overwrite`.
+    /// Writes files to a folder, all or none, and returns their paths; existing files are replaced only with `overwrite`.
     #[pyfunction]
     fn write(
         files: Vec<(String, Bound<'_, PyBytes>)>,

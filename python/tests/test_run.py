@@ -28,7 +28,7 @@ def test_a_run_has_the_values_and_the_bytes_of_the_program(program, tmp_path):
     assert result.answer["results"]["v_max_m_s"] == pytest.approx(float(numpy.nanmax(result.map.radial_velocity)))
 
 
-def test_files_of_others_are_not_replaced(tmp_path):
+def test_existing_files_are_not_replaced(tmp_path):
     result = wakescope.run(small())
     (tmp_path / "map.csv").write_text("mine")
     with pytest.raises(OSError, match="map.csv"):

@@ -507,7 +507,7 @@ pub(crate) fn hold(r: &mut Random, bench: &Bench, ledger: &mut Ledger) {
             }
             bench.write("k.toml", &s.text());
             let words: &[&str] = match command {
-                "map" | "efficiency" => &[command, "k.toml", "--out", "k"],
+                "map" | "efficiency" => &[command, "k.toml", "--out", "k", "--overwrite"],
                 _ => &[command, "k.toml"],
             };
             let ended = bench.run(words);

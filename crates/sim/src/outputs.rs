@@ -5,7 +5,6 @@
 use crate::Error;
 use crate::io::atomic::{Stage, in_folder};
 use crate::io::lock::FolderLock;
-use crate::io::own::refuse_foreign;
 use crate::io::{Existing, FileGroup, Provenance, Table};
 #[cfg(feature = "plots")]
 use crate::plot::Figure;
@@ -164,11 +163,7 @@ pub fn write_contents(
         .then(|| FolderLock::take(folder))
         .transpose()?;
     // Again: a file may have come while the run computed.
-    refuse_foreign(
-        folder,
-        files.iter().map(|(name, _)| name.as_str()),
-        existing,
-    )?;
+    existing.check(folder, files.iter().map(|(name, _)| name.as_str()))?;
     let mut group = FileGroup::new(folder);
     files
         .into_iter()
@@ -183,14 +178,14 @@ pub fn write_contents(
 ///
 /// # Errors
 /// The folder cannot be made, is a file, cannot be written to, or another run writes to it; a folder is in the way of a file,
-/// or a file that this program did not write and may not replace.
+/// or a file exists that may not be replaced.
 pub(crate) fn prepare(
     folder: &Path,
     names: &[String],
     existing: Existing,
     alone: bool,
 ) -> Result<(), Error> {
-    refuse_foreign(folder, names.iter().map(String::as_str), existing)?;
+    existing.check(folder, names.iter().map(String::as_str))?;
     in_folder(folder, false, || {
         drop(Stage::make(folder)?);
         Ok(alone

@@ -8,10 +8,6 @@ mod pictures;
 pub use map::velocity_map;
 
 use crate::Error;
-#[cfg(feature = "plots")]
-use crate::io::OutputError;
-#[cfg(feature = "plots")]
-use crate::io::own::refuse_foreign;
 use crate::io::signals::{RawSignals, Recording};
 use crate::io::{Existing, Table, VelocityMap, hpl, tables};
 use crate::measure::beam_winds;
@@ -240,9 +236,9 @@ fn list_map(plan: &Plan, map: Option<&VelocityMap>, files: &mut Outputs) -> Resu
 /// Writes a picture of the set-up: lidar, lines of sight, ground, vortices. The ending of the path says whether SVG or PNG.
 ///
 /// # Errors
-/// [`Error::Input`] for another ending; a file in the way that this program did not write, or what the system says.
+/// [`Error::Input`] for another ending; an existing file that may not be replaced, or what the system says.
 #[cfg(feature = "plots")]
-pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
+pub fn write_set_up(plan: &Plan, path: &Path, existing: Existing) -> Result<(), Error> {
     let (figure, origin) = (pictures::scan(plan), plan.scene.provenance());
     let bytes = match path.extension().and_then(|ending| ending.to_str()) {
         Some("svg") => figure.svg(&origin)?.into_bytes(),
@@ -260,15 +256,7 @@ pub fn write_set_up(plan: &Plan, path: &Path) -> Result<(), Error> {
         .filter(|folder| !folder.as_os_str().is_empty())
         .unwrap_or(Path::new("."));
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    refuse_foreign(folder, [name.as_ref()], Existing::Own).map_err(|error| match error {
-        OutputError::Foreign { path } => {
-            let reason =
-                "it was not written by this program, or was changed since: name another file"
-                    .into();
-            Error::Input { path, reason }
-        }
-        other => other.into(),
-    })?;
+    existing.check(folder, [name.as_ref()])?;
     Ok(crate::io::write_atomic(path, bytes)?)
 }
 

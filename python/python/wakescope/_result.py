@@ -49,7 +49,7 @@ class Result:
         return content.read_bytes() if isinstance(content, Path) else content
 
     def write(self, folder: str | os.PathLike[str], overwrite: bool = False) -> list[Path]:
-        """Writes all files to a folder, all or none; returns their paths. Files of others are replaced only with `overwrite`."""
+        """Writes all files to a folder, all or none; returns their paths. Existing files are replaced only with `overwrite`."""
         files = [(name, self.read(name)) for name in self.files]
         return [Path(path) for path in _wakescope.write(files, folder, overwrite)]
 

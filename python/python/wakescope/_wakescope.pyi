@@ -43,5 +43,5 @@ def table(text: str) -> "dict[str, object]":
 
 def write(files: SupportsGetItem[int, tuple[str, bytes]], folder: str | PathLike[str], overwrite: bool) -> list[Path]:
     """
-    Writes files to a folder, all or none, and returns their paths; files of others are replaced only with `overwrite`.
+    Writes files to a folder, all or none, and returns their paths; existing files are replaced only with `overwrite`.
     """

@@ -1,16 +1,14 @@
 //! Error against run time: which of the measured settings are worth their time, and which of them reaches an error for the least.
 
 use super::Found;
-use wakescope_sim::sweep::pareto::{Objective, Place, front};
+use wakescope_sim::sweep::front::front;
 
 /// Whether no other setting is at least as good in error and in time and better in one of them; equal settings stay together,
 /// and one that failed is never on the front.
 pub(super) fn on_front(settings: &[&Found]) -> Vec<bool> {
-    let column = |of: fn(&Found) -> f64| {
-        Objective::small(settings.iter().map(|s| of(s)).collect(), Vec::new())
-    };
-    let places = front(&[column(|s| s.error), column(|s| s.cost.cpu_s)]);
-    places.iter().map(|place| *place != Place::Off).collect()
+    let errors = settings.iter().map(|s| s.error).collect();
+    let times_s = settings.iter().map(|s| s.cost.cpu_s).collect();
+    front(&[errors, times_s])
 }
 
 /// Place of the setting of least time whose error and two standard errors are at most `target`; none if no setting is so good.

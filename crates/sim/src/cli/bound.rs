@@ -56,7 +56,7 @@ pub(super) struct BudgetWords {
     /// Folder for the table, budget.csv; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Replace the table although this program did not write it, or it was changed since.
+    /// Replace an existing table.
     #[arg(long)]
     overwrite: bool,
 }

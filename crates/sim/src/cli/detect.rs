@@ -65,12 +65,12 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         .transpose()?;
     let (mut scans, mut notes) = (Vec::new(), Vec::new());
     for path in &words.data {
-        let read = words.scans.read(path, stated.as_ref(), false)?;
+        let read = words.scans.read(path, stated.as_ref(), false, &*observer)?;
         scans.extend(read.maps);
         notes.extend(read.left_out);
     }
     let scene = match (stated, scans.first()) {
-        (None, Some(scan)) => scene_of(scan)?,
+        (None, Some(scan)) => scene_of(scan, &*observer)?,
         (stated, _) => stated,
     };
     let still = scene.as_ref().map(SceneFile::in_still_air).transpose()?;

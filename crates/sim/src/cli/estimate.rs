@@ -47,7 +47,8 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
     };
     records.scale = words.scale;
     let rays = words.rays.as_deref().map(RayTable::read).transpose()?;
-    let (plan, is_own) = recorded::plan(scene, &records)?;
+    let observer = cli.observer();
+    let (plan, is_own) = recorded::plan(scene, &records, &*observer)?;
     words
         .folder
         .prepare_names(cli, &write::recorded_names(&plan)?)?;
@@ -57,7 +58,7 @@ pub(super) fn estimate(words: &EstimateWords, cli: &Cli) -> Result<(), Error> {
         spectra: words.spectra,
         block_bytes: None,
     };
-    let found = recorded::estimate((&plan, is_own), &mut records, &options, &*cli.observer())?;
+    let found = recorded::estimate((&plan, is_own), &mut records, &options, &*observer)?;
     let (text, results) = told(&plan, &found, records.records);
     let of = (plan.scene.content.outputs, plan.scene.provenance());
     let object = json!({ "scene_hash": plan.scene.hash, "data": words.data.to_string_lossy(), "results": results });

@@ -53,7 +53,7 @@ pub(super) struct RunWords {
     /// Continue from the checkpoint in the folder.
     #[arg(long, conflicts_with = "overwrite")]
     restart: bool,
-    /// Begin anew although the folder holds a checkpoint.
+    /// Begin anew and replace existing files, the checkpoint included.
     #[arg(long)]
     overwrite: bool,
     /// Print what the run would take and check it; nothing is computed or written.

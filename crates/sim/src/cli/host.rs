@@ -8,7 +8,6 @@ use super::progress::{Bars, Quiet};
 use super::{Cli, dispatch, with_threads};
 use crate::Error;
 use crate::flow::{CaseFile, WakePreset};
-use crate::io::own::refuse_foreign;
 use crate::io::raw::RawRecords;
 use crate::io::{Existing, Provenance, text_file, write_atomic};
 use crate::keys::{Located, Problem, SceneError};
@@ -243,11 +242,7 @@ impl Cli {
             .file_name()
             .and_then(|name| name.to_str())
             .filter(|_| self.keeper().is_none());
-        Ok(refuse_foreign(
-            path.parent().unwrap_or(Path::new("")),
-            name,
-            existing,
-        )?)
+        Ok(existing.check(path.parent().unwrap_or(Path::new("")), name)?)
     }
 
     /// Writes a file, or keeps it.

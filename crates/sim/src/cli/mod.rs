@@ -96,8 +96,6 @@ enum Command {
     Sweep(sweep::SweepWords),
     /// How accurate the numbers of a scene or of a flow are, and the cheapest keys for an accuracy that is asked for.
     Accuracy(accuracy::AccuracyWords),
-    /// The rows of a table that no other one beats.
-    Pareto(sweep::ParetoWords),
     /// Simulate a flow: a case file goes in, fields and checkpoints come out.
     Flow(flow::FlowWords),
     /// Simulate the wake of an aircraft near the ground: a preset or a case file goes in; histories, fields, planes come out.
@@ -130,6 +128,9 @@ struct CheckWords {
     #[cfg(feature = "plots")]
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Replace the picture, and accept existing files in the folder.
+    #[arg(long)]
+    overwrite: bool,
 }
 
 /// Runs the program with the words of its command line, of which the first is its name; returns its exit code.
@@ -168,7 +169,6 @@ fn dispatch(cli: &Cli) -> Result<u8, Error> {
         Command::Budget(words) => bound::budget(words, cli),
         Command::Detect(words) => detect::detect(words, cli),
         Command::Sweep(words) => sweep::sweep(words, cli),
-        Command::Pareto(words) => sweep::pareto(words, cli),
         Command::Flow(words) => flow::ranked(cli, |ranks| flow::flow(words, cli, ranks)),
         Command::Wake(words) => flow::ranked(cli, |ranks| flow::wake(words, cli, ranks)),
     }?;
@@ -204,13 +204,14 @@ const AS_ON_INDEPENDENT_PATHS: &str = "; turbulence as on independent paths: one
 
 fn check(words: &CheckWords, cli: &Cli) -> Result<(), Error> {
     let plan = planned(&words.scene, Target::Run, words.allow_large, cli)?;
+    let existing = Existing::with_overwrite(words.overwrite);
     if let Some(folder) = &words.out {
         // What is in the way of a run is in the way of it here, too.
-        cli.prepare(folder, &write::names(&plan)?, Existing::Own)?;
+        cli.prepare(folder, &write::names(&plan)?, existing)?;
     }
     #[cfg(feature = "plots")]
     if let Some(path) = &words.picture {
-        write::write_set_up(&plan, path)?;
+        write::write_set_up(&plan, path, existing)?;
     }
     if cli.quiet && !cli.json {
         return Ok(());

@@ -179,21 +179,18 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
                 reason,
             });
         }
+        let keeps_spectra = words.method == Method::Envelope;
         let read = words
             .scans
-            .read(path, stated.as_ref(), words.method == Method::Envelope)?;
-        let known = read
-            .signals
-            .as_ref()
-            .map(|signals| &signals.plan.scene)
-            .or(stated.as_ref());
-        for scan in &read.maps {
-            scenes.push(
-                known
-                    .cloned()
-                    .map_or_else(|| retrieve::scene_of(scan), |scene| Ok(Some(scene)))?,
-            );
-        }
+            .read(path, stated.as_ref(), keeps_spectra, &*observer)?;
+        let known = read.signals.as_ref().map(|signals| &signals.plan.scene);
+        // The scans of a file have one scene.
+        let scene = match (known.or(stated.as_ref()), read.maps.first()) {
+            (Some(scene), _) => Some(scene.clone()),
+            (None, Some(scan)) => retrieve::scene_of(scan, &*observer)?,
+            (None, None) => None,
+        };
+        scenes.extend(read.maps.iter().map(|_| scene.clone()));
         read.left_out
             .iter()
             .for_each(|text| observer.warn(&format!("{}: {text}: left out", path.display())));

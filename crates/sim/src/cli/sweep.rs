@@ -1,10 +1,7 @@
-//! `wakescope sweep` and `wakescope pareto`: design studies.
+//! `wakescope sweep`: design studies.
 
-use super::words::TableWords;
 use super::{Cli, paths};
 use crate::io::Existing;
-use crate::io::csv_input::TextTable;
-use crate::sweep::pareto::{FrontTable, Wanted};
 use crate::sweep::{Request, Settings, merge, run};
 use crate::{Error, sweep};
 use clap::Args;
@@ -68,29 +65,4 @@ pub(super) fn sweep(words: &SweepWords, cli: &Cli) -> Result<(), Error> {
         "flows": flows, "efficiencies": efficiencies, "signals": signals, "files": paths(&files),
     });
     cli.say(&object, &text)
-}
-
-/// Words of `wakescope pareto`.
-#[derive(Debug, Args)]
-pub(super) struct ParetoWords {
-    /// The table, such as results.csv of a sweep.
-    table: PathBuf,
-    #[command(flatten)]
-    wanted: Wanted,
-    #[command(flatten)]
-    front: TableWords,
-}
-
-pub(super) fn pareto(words: &ParetoWords, cli: &Cli) -> Result<(), Error> {
-    words.front.prepare(cli)?;
-    let refuse = |reason| Error::Input {
-        path: words.table.clone(),
-        reason,
-    };
-    let found = FrontTable::new(TextTable::read(&words.table)?, &words.wanted).map_err(refuse)?;
-    let mut text = found.text();
-    words
-        .front
-        .write(cli, &found.rows(), &found.origin(), &mut text)?;
-    cli.say(&found.json(), &text)
 }

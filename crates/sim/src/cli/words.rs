@@ -12,7 +12,7 @@ use crate::measure::recorded::{
 use crate::outputs::{List, Outputs};
 use crate::plan::Plan;
 use crate::scene::SceneFile;
-use crate::setup::progress::Silent;
+use crate::setup::progress::{Observer, Silent};
 use crate::{Error, retrieve, scene};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args};
@@ -27,7 +27,7 @@ pub(super) struct FolderWords {
     /// Folder to write to; made if it does not exist.
     #[arg(long, value_name = "DIR")]
     pub(super) out: PathBuf,
-    /// Replace files in the folder that this program did not write, or that were changed since.
+    /// Replace existing files in the folder.
     #[arg(long)]
     overwrite: bool,
 }
@@ -74,7 +74,7 @@ pub(super) struct TableWords {
     /// File for the whole table, as CSV.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Replace the file although this program did not write it, or it was changed since.
+    /// Replace an existing file.
     #[arg(long)]
     overwrite: bool,
 }
@@ -160,9 +160,10 @@ impl ScanWords {
         path: &Path,
         scene: Option<&SceneFile>,
         spectra: bool,
+        observer: &dyn Observer,
     ) -> Result<Scans, Error> {
         if is_signals(path) {
-            return self.signals(path, scene, spectra);
+            return self.signals(path, scene, spectra, observer);
         }
         let format = ScanFormat {
             field: self.field.clone(),
@@ -182,6 +183,7 @@ impl ScanWords {
         path: &Path,
         scene: Option<&SceneFile>,
         spectra: bool,
+        observer: &dyn Observer,
     ) -> Result<Scans, Error> {
         let Some(scene) = scene else {
             let reason = "it holds raw signals: --scene says which instrument recorded them".into();
@@ -193,7 +195,7 @@ impl ScanWords {
         let mut records =
             RawRecords::open(path, &RawFormat::default(), record_shape(&scene.content))?;
         records.scale = self.scale.unwrap_or(1.0);
-        let (plan, is_own) = recorded::plan(scene.clone(), &records)?;
+        let (plan, is_own) = recorded::plan(scene.clone(), &records, observer)?;
         let noise = if is_own || self.scale.is_some() {
             NoiseLevel::OfScene
         } else {

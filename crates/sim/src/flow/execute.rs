@@ -106,7 +106,7 @@ pub fn run_on(
     let (mut setup, plan, files, forecast) = agree(ranks, prepared)?;
     let mut warnings = forecast.notes.clone();
     let opened = is_first.then(|| {
-        files.refuse_foreign(options.begin)?;
+        files.refuse_existing(options.begin)?;
         observer.forecast(&forecast.to_string());
         open(folder, options.begin, &mut warnings)
     });
@@ -232,7 +232,7 @@ fn refuse_folder(folder: &Path, begin: Begin) -> Result<(), Error> {
     {
         return Err(Error::CheckpointInTheWay { path });
     }
-    crate::outputs::prepare(folder, &[], Existing::Own, true)
+    crate::outputs::prepare(folder, &[], Existing::Refuse, true)
 }
 
 /// The setup and the plan of a case, with all that can be refused before the computing.

@@ -9,7 +9,6 @@ use super::Begin;
 use super::case::{FileFormat, Output};
 use super::wake::{self, Due, Schedule};
 use crate::Error;
-use crate::io::own::refuse_foreign;
 #[cfg(feature = "vtk")]
 use crate::io::vtr;
 use crate::io::{
@@ -210,21 +209,10 @@ impl Files {
         out
     }
 
-    /// Refuses a folder with files in the way that this program did not write. On a restart the case may have been edited: its
-    /// end and its outputs may change.
-    pub(super) fn refuse_foreign(&self, begin: Begin) -> Result<(), Error> {
-        let existing = if begin == Begin::Overwrite {
-            Existing::Any
-        } else {
-            Existing::Own
-        };
-        let mut names = self.names();
-        names.retain(|name| begin != Begin::Restart || name != CASE);
-        Ok(refuse_foreign(
-            &self.folder,
-            names.iter().map(String::as_str),
-            existing,
-        )?)
+    /// Refuses a folder that holds files of the names of this run, unless the run continues there or begins anew.
+    pub(super) fn refuse_existing(&self, begin: Begin) -> Result<(), Error> {
+        let existing = Existing::with_overwrite(begin != Begin::New);
+        Ok(existing.check(&self.folder, self.names().iter().map(String::as_str))?)
     }
 
     /// Writes all files that are due, or none of them; returns their paths, on rank 0 alone. Of fields each rank writes what it

@@ -63,12 +63,9 @@ pub enum OutputError {
         /// The system's answer.
         source: std::io::Error,
     },
-    /// A file in the way that this program did not write.
-    #[error(
-        "{} was not written by this program, or was changed since: --overwrite replaces it, or choose another --out",
-        path.display()
-    )]
-    Foreign {
+    /// A file of the name of an output.
+    #[error("{} exists: --overwrite replaces it, or choose another --out", path.display())]
+    Exists {
         /// The file.
         path: PathBuf,
     },

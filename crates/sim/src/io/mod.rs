@@ -9,7 +9,7 @@
 //! | [`fields`] | (data) [`VelocityField`] | - |
 //! | [`provenance`] | (data) where a file comes from | - |
 //! | [`utc`] | (data) dates of a measurement | - |
-//! | [`own`] | which files this program wrote, so that no other is replaced | - |
+//! | [`Existing`] | existing files of the names of outputs: refused or replaced | - |
 //! | [`csv`] | any table | - |
 //! | [`csv_input`] | (reader) tables of texts | - |
 //! | [`raw`], [`number`] | (readers) raw signals in NetCDF, NPY, NPZ and binary files | - |
@@ -42,13 +42,13 @@ pub mod csv;
 pub mod csv_input;
 pub(crate) mod edges;
 mod error;
+mod existing;
 pub mod fields;
 pub mod hpl;
 pub(crate) mod lock;
 pub mod map;
 pub(crate) mod netcdf;
 pub mod number;
-pub mod own;
 pub mod parts;
 pub mod provenance;
 pub mod raw;
@@ -65,9 +65,9 @@ pub use csv::Table;
 pub use error::{OutputError, OutputResult};
 #[cfg(feature = "plots")]
 pub(crate) use error::{increasing, same_length};
+pub use existing::Existing;
 pub use fields::VelocityField;
 pub use map::{CrossPlanes, Field, OPEN_EDGES, PulseInfo, Ray, Sweep, Unit, VelocityMap};
-pub use own::Existing;
 pub use parts::{FileParts, Share};
 pub use provenance::{Provenance, hash_of};
 pub(crate) use utc::MAX_TIME_S;

@@ -119,10 +119,30 @@ impl<'a> Text<'a> {
     /// # Errors
     /// Every key that is not known, has a value of the wrong kind or is missing, in the order of the lines.
     pub(crate) fn vet(&self, format: &Format<'_>) -> Result<toml::Table, SceneError> {
+        self.walk(format, None).map(|(table, _)| table)
+    }
+
+    /// As [`Self::vet`], but keys that are not known are skipped; returns their paths, too.
+    ///
+    /// # Errors
+    /// Every key that has a value of the wrong kind or is missing, in the order of the lines.
+    pub(crate) fn vet_known(
+        &self,
+        format: &Format<'_>,
+    ) -> Result<(toml::Table, Vec<String>), SceneError> {
+        self.walk(format, Some(Vec::new()))
+    }
+
+    fn walk(
+        &self,
+        format: &Format<'_>,
+        skipped: Option<Vec<String>>,
+    ) -> Result<(toml::Table, Vec<String>), SceneError> {
         let mut walk = Walk {
             document: self,
             format,
             found: Vec::new(),
+            skipped,
         };
         let table = walk.table(
             format.keys,
@@ -135,7 +155,7 @@ impl<'a> Text<'a> {
             None,
         );
         if walk.found.is_empty() {
-            return Ok(table);
+            return Ok((table, walk.skipped.unwrap_or_default()));
         }
         Err(self.invalid(walk.found))
     }
@@ -244,6 +264,8 @@ struct Walk<'w> {
     document: &'w Text<'w>,
     format: &'w Format<'w>,
     found: Vec<Located>,
+    /// Paths of keys that are not known, where these are skipped.
+    skipped: Option<Vec<String>>,
 }
 
 impl Walk<'_> {
@@ -306,8 +328,13 @@ impl Walk<'_> {
                 }
                 None if kinds.is_some_and(|(tag, ..)| tag == here) => {}
                 None => {
+                    let key = join(path, &quote(here));
+                    if let Some(skipped) = &mut self.skipped {
+                        skipped.push(key);
+                        continue;
+                    }
                     let allowed = self.unknown(keys, here, path, kinds);
-                    self.refuse(join(path, &quote(here)), self.shown(value), allowed, line);
+                    self.refuse(key, self.shown(value), allowed, line);
                 }
             }
         }

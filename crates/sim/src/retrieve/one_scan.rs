@@ -12,6 +12,7 @@ use crate::measure::response::SceneResponse;
 use crate::scene::{Flow, RetrievalMethod as Method, Scene, SceneFile};
 use crate::setup::estimators;
 use crate::setup::instrument::Instrument;
+use crate::setup::progress::Observer;
 use crate::{Error, SPEED_OF_LIGHT_M_S};
 use ndarray::Array2;
 use wakescope_estimate::retrieval::{
@@ -78,22 +79,22 @@ fn of_scene(scene: &Scene) -> Result<Gate, Error> {
     )?))
 }
 
-/// The scene that a file of this program has in it.
+/// The scene that a file of this program has in it; the observer is warned of keys that are skipped.
 ///
 /// # Errors
 /// A scene that this program does not read, with the key and the remedy.
-pub fn scene_of(scan: &ReadScan) -> Result<Option<SceneFile>, Error> {
+pub fn scene_of(scan: &ReadScan, observer: &dyn Observer) -> Result<Option<SceneFile>, Error> {
     let Some(toml) = &scan.scene_toml else {
         return Ok(None);
     };
-    SceneFile::parse(toml, &scan.path)
-        .map(Some)
-        .map_err(|error| Error::Input {
-            path: scan.path.clone(),
-            reason: format!(
-                "the scene in it is none that this program reads: {error}; --scene states another"
-            ),
-        })
+    let (scene, warning) = SceneFile::embedded(toml, &scan.path).map_err(|error| Error::Input {
+        path: scan.path.clone(),
+        reason: format!(
+            "the scene in it is none that this program reads: {error}; --scene states another"
+        ),
+    })?;
+    warning.iter().for_each(|text| observer.warn(text));
+    Ok(Some(scene))
 }
 
 /// How scans are retrieved: with the ground, the profile and the secondary vortices of the scene, if it is known; cores are fitted

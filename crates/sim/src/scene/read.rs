@@ -12,14 +12,7 @@ pub type SceneFile = Document<Scene>;
 impl Content for Scene {
     fn parse(text: &str, path: &Path) -> Result<Self, SceneError> {
         let read = Text::parse(text, path)?;
-        let scene: Self = read.read(read.vet(&scene_format())?)?;
-        let mut problems = scene.problems_where(&|key| read.line(key).is_some());
-        problems.extend(idle::problems(&scene, &read));
-        if problems.is_empty() {
-            Ok(scene)
-        } else {
-            Err(read.located(problems))
-        }
+        checked(&read, read.vet(&scene_format())?)
     }
 
     fn to_toml(&self) -> String {
@@ -32,7 +25,38 @@ impl Content for Scene {
     }
 }
 
+/// The scene of a table whose keys are known, if its values are allowed.
+fn checked(text: &Text<'_>, table: toml::Table) -> Result<Scene, SceneError> {
+    let scene: Scene = text.read(table)?;
+    let mut problems = scene.problems_where(&|key| text.line(key).is_some());
+    problems.extend(idle::problems(&scene, text));
+    if problems.is_empty() {
+        Ok(scene)
+    } else {
+        Err(text.located(problems))
+    }
+}
+
 impl SceneFile {
+    /// The scene that the data file `path` carries, which another version may have written: keys that this program does not
+    /// know are skipped, and a warning names them.
+    ///
+    /// # Errors
+    /// As [`SceneFile::parse`], but for these keys.
+    pub(crate) fn embedded(text: &str, path: &Path) -> Result<(Self, Option<String>), SceneError> {
+        let read = Text::parse(text, path)?;
+        let (table, skipped) = read.vet_known(&scene_format())?;
+        let scene = checked(&read, table)?;
+        let warning = (!skipped.is_empty()).then(|| {
+            format!(
+                "{}: this program does not know all keys of the scene in it; skipped: {}",
+                path.display(),
+                skipped.join(", ")
+            )
+        });
+        Ok((Self::of(scene, path, text), warning))
+    }
+
     /// The keys that a scene may state.
     pub(crate) fn keys() -> &'static [Key] {
         scene_format().keys
@@ -153,6 +177,40 @@ mod tests {
             "{elsewhere}"
         );
         assert!(elsewhere.contains("it is a key of [laser]"), "{elsewhere}");
+    }
+
+    #[test]
+    fn unknown_keys_of_an_embedded_scene_are_skipped_at_any_depth_and_the_rest_is_checked() {
+        let embedded = |text: &str| SceneFile::embedded(text, Path::new("map.nc"));
+        let text = "colour = 1\n[flow]\nkind = \"uniform\"\nlateral_m_s = 1\nvertical_m_s = 0\nspacing_m = 40.0\n\
+                    [pulse.shape]\nchirp.rate = 2\n[[added_flows]]\nkind = \"calm\"\nwaves = [{ a = 1 }]\n\
+                    [laser.colours]\nkind = \"red\"\n";
+        let (file, warning) = embedded(text).unwrap();
+        assert_eq!(
+            warning.unwrap(),
+            "map.nc: this program does not know all keys of the scene in it; skipped: added_flows[0].waves, colour, \
+             flow.spacing_m, laser.colours, pulse.shape.chirp"
+        );
+        let known = "[flow]\nkind = \"uniform\"\nlateral_m_s = 1\nvertical_m_s = 0\n[[added_flows]]\nkind = \"calm\"\n";
+        assert_eq!(
+            embedded(known).unwrap(),
+            (SceneFile::parse(known, Path::new("map.nc")).unwrap(), None)
+        );
+        assert_eq!(file.toml, embedded(known).unwrap().0.toml);
+        for (wrong, wanted) in [
+            ("colour = 1\nseed = -1\n", "map.nc:2: seed = -1"),
+            (
+                "[flow]\nkind = \"waves\"\nheight_m = 1\n",
+                "flow.kind = \"waves\"",
+            ),
+            ("[scan]\nrealisations = 0\n", "scan.realisations = 0"),
+        ] {
+            let message = embedded(wrong).unwrap_err().to_string();
+            assert!(
+                message.contains(wanted) && message.lines().count() == 1,
+                "{message}"
+            );
+        }
     }
 
     #[test]

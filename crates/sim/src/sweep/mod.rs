@@ -8,13 +8,13 @@
 //! | `results`, `circulation` | cases of the same signals measured together; their numbers |
 //! | `stored` | a folder for each case |
 //! | `tables`, `pictures` | tables and pictures of all, from one folder or those of shards |
-//! | [`pareto`] | set-ups that no other one beats; the rows of a table that are such |
+//! | [`front`](mod@front) | set-ups that no other one dominates |
 
 mod cases;
 mod circulation;
 mod expression;
+pub mod front;
 mod key_path;
-pub mod pareto;
 #[cfg(feature = "plots")]
 mod pictures;
 mod results;

@@ -3,9 +3,9 @@
 //! Check: by eye; a test of the program compares the names of the files.
 
 use super::key_path::Holds;
-use super::pareto::{Objective, Place, front};
-use super::results::{results, standard_error_of};
+use super::results::results;
 use super::stored::{Definition, Row};
+use super::tables::on_front;
 use crate::Error;
 use crate::outputs::Outputs;
 use crate::plot::{Axis, CurvePlot, Figure, Series, Style};
@@ -78,7 +78,7 @@ pub(super) fn list(
             },
         )?;
     }
-    files.figure("front", rows, |rows| Ok(Figure::stacked([of_front(rows)])))
+    files.figure("front", rows, |rows| Ok(Figure::stacked([front(rows)])))
 }
 
 /// A panel of a result against a key; none where no case has any.
@@ -149,6 +149,16 @@ fn against(
     any.then_some(plot)
 }
 
+/// Name of the column that has the standard error of a column: `std_m_s` has `std_standard_error_m_s`.
+fn standard_error_of<'a>(
+    name: &str,
+    mut columns: impl Iterator<Item = &'a str>,
+) -> Option<&'a str> {
+    columns.find(|column| {
+        column.contains("_standard_error") && column.replacen("_standard_error", "", 1) == name
+    })
+}
+
 /// Cases that differ in one key alone belong to one curve; all to one without a name where there are too many.
 fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(String, Vec<&'r Row>)> {
     let mut curves: Vec<(String, Vec<&Row>)> = Vec::new();
@@ -175,28 +185,14 @@ fn curves<'r>(definition: &Definition, rows: &'r [Row], key: &str) -> Vec<(Strin
 }
 
 /// Precision against resolution, with the front.
-fn of_front(rows: &[Row]) -> CurvePlot {
-    let column = |name: &str| rows.iter().map(|row| row.result(name)).collect::<Vec<_>>();
-    let (resolution_m, std_m_s, error_m_s) = (
-        column("resolution_m"),
-        column("std_m_s"),
-        column("std_standard_error_m_s"),
-    );
-    let precision = Objective::small(std_m_s.clone(), error_m_s.clone());
-    let places = front(&[
-        Objective::small(resolution_m.clone(), Vec::new()),
-        precision,
-    ]);
-    let all = || resolution_m.iter().copied().zip(std_m_s.iter().copied());
-    let mut best: Vec<(f64, f64)> = all()
-        .zip(&places)
-        .filter(|(_, p)| **p != Place::Off)
-        .map(|(xy, _)| xy)
-        .collect();
+fn front(rows: &[Row]) -> CurvePlot {
+    let point = |row: &Row| (row.result("resolution_m"), row.result("std_m_s"));
+    let mut best: Vec<(f64, f64)> = on_front(rows).into_iter().map(point).collect();
     best.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let bars: Vec<f64> = error_m_s
+    let bars: Vec<f64> = rows
         .iter()
-        .map(|error| if error.is_finite() { *error } else { 0.0 })
+        .map(|row| row.result("std_standard_error_m_s"))
+        .map(|error| if error.is_finite() { error } else { 0.0 })
         .collect();
     let x = Axis::linear("full width at half maximum in range [m]");
     CurvePlot::new(
@@ -205,5 +201,5 @@ fn of_front(rows: &[Row]) -> CurvePlot {
         Axis::log("standard deviation [m/s]"),
     )
     .with(Series::new("front", Style::Line, best))
-    .with(Series::new("cases", Style::Markers, all()).with_band(&bars))
+    .with(Series::new("cases", Style::Markers, rows.iter().map(point)).with_band(&bars))
 }

@@ -37,16 +37,6 @@ pub(super) fn results() -> impl Iterator<Item = (&'static str, &'static str, &'s
     include_str!("results.csv").lines().filter_map(of_line)
 }
 
-/// Name of the column that has the standard error of a column: `std_m_s` has `std_standard_error_m_s`.
-pub(crate) fn standard_error_of<'a>(
-    name: &str,
-    mut columns: impl Iterator<Item = &'a str>,
-) -> Option<&'a str> {
-    columns.find(|column| {
-        column.contains("_standard_error") && column.replacen("_standard_error", "", 1) == name
-    })
-}
-
 /// What is collected of the maps of a case.
 struct Collected<'p> {
     plan: &'p Plan,

@@ -4,9 +4,9 @@
 
 use super::cases::{Case, Sweep};
 use super::results::rows;
-use super::stored::{Definition, SWEEP};
+use super::stored::{Definition, case_files};
 use super::tables;
-use crate::io::{Existing, Table};
+use crate::io::{Existing, OutputError, Table};
 use crate::measure::map::{self, VelocityEstimates};
 use crate::measure::profile::Efficiencies;
 use crate::measure::scan::Scanner;
@@ -71,7 +71,7 @@ pub struct Settings {
     /// Run even if the forecast of the memory of a case is more than the machine has.
     #[cfg_attr(feature = "cli", arg(long))]
     pub allow_large: bool,
-    /// Replace another sweep, or files that this program did not write.
+    /// Replace existing files, also those of another sweep.
     #[cfg_attr(feature = "cli", arg(long))]
     pub overwrite: bool,
 }
@@ -103,28 +103,41 @@ pub fn run<'s>(
     settings: Settings,
     observer: &dyn Observer,
 ) -> Result<Summary, Error> {
-    let (definition, existing) = (
-        Definition::of(sweep, !settings.no_circulation),
-        Existing::with_overwrite(settings.overwrite),
-    );
+    let definition = Definition::of(sweep, !settings.no_circulation);
+    let continues = settings.resume && definition.is_in(out);
+    let existing = Existing::with_overwrite(settings.overwrite || continues);
+    if !settings.overwrite {
+        definition.refuse_other(out)?;
+    }
     let common = Common::default();
     let core_s = check(sweep, &common, settings.allow_large)?;
     let times = settings.shard.map_or("times.csv".into(), |s| {
         format!("times-{}-of-{}.csv", s.number, s.of)
     });
-    let mut names = vec![SWEEP.to_owned(), times.clone()];
-    if settings.shard.is_none() {
-        let list = |files: &mut outputs::Outputs| tables::list(&definition, None, files);
-        names.extend(outputs::Outputs::names(Outputs::default(), list)?);
-    }
-    // Shards may begin at the same time, in one folder: each writes files of its own.
-    outputs::prepare(out, &names, existing, false)?;
-    definition.write(out, existing)?;
     let mine: Vec<&Case> = sweep
         .cases
         .iter()
         .filter(|c| settings.shard.is_none_or(|s| s.has(c.index)))
         .collect();
+    let mut names = vec![times.clone()];
+    names.extend(mine.iter().flat_map(|case| case_files(case.index)));
+    if settings.shard.is_none() {
+        let list = |files: &mut outputs::Outputs| tables::list(&definition, None, files);
+        names.extend(outputs::Outputs::names(Outputs::default(), list)?);
+    }
+    // Shards may begin at the same time, in one folder: each writes files of its own.
+    outputs::prepare(out, &names, existing, false).map_err(|error| match error {
+        Error::Export(OutputError::Exists { path }) if definition.is_in(out) => {
+            let reason = "it is of an earlier run of this sweep: --resume runs the cases without a result, \
+                          --overwrite runs all anew";
+            Error::Input {
+                path,
+                reason: reason.into(),
+            }
+        }
+        other => other,
+    })?;
+    definition.write(out)?;
     let is_due = |case: &&Case| !(settings.resume && definition.stored(out, case.index).is_some());
     let due: Vec<&Case> = mine.iter().copied().filter(is_due).collect();
     observer.begin(Stage::Cases, due.len() as u64);

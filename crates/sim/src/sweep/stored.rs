@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 /// Name of the file that says what a sweep is.
 pub(super) const SWEEP: &str = "sweep.json";
 const RESULT: &str = "result.json";
+const SCENE: &str = "scene.toml";
 
 /// The result of a case, each value as the text of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -99,29 +100,36 @@ impl Definition {
         self.keys.iter().filter(|key| !key.tied)
     }
 
+    /// Refuses a folder of another sweep.
+    ///
+    /// # Errors
+    /// Its file, and what is to be done.
+    pub(super) fn refuse_other(&self, folder: &Path) -> Result<(), Error> {
+        let path = folder.join(SWEEP);
+        if !path.exists() || self.is_in(folder) {
+            return Ok(());
+        }
+        let reason = "it is of another sweep, of another version of the program or not all with or without \
+                      --no-circulation: take another folder, or replace it with --overwrite";
+        Err(Error::Input {
+            path,
+            reason: reason.into(),
+        })
+    }
+
     /// Writes it into a folder, unless it is there: shards may begin at the same time.
     ///
     /// # Errors
-    /// Another sweep that is there and may not be replaced; what the system says.
-    pub(super) fn write(&self, folder: &Path, existing: Existing) -> Result<(), Error> {
-        let path = folder.join(SWEEP);
-        std::fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
-        if path.exists() {
-            let there = Self::read(folder).ok();
-            if there.as_ref() == Some(self) {
-                return Ok(());
-            }
-            let is_same = there.is_some_and(|there| self.is_same(&there));
-            if existing == Existing::Own && !is_same {
-                let reason = "it is of another sweep, of another version of the program or not all with or without \
-                              --no-circulation: take another folder, or replace it with --overwrite";
-                return Err(Error::Input {
-                    path,
-                    reason: reason.into(),
-                });
-            }
+    /// What the system says.
+    pub(super) fn write(&self, folder: &Path) -> Result<(), Error> {
+        if self.is_in(folder) {
+            return Ok(());
         }
-        Ok(write_atomic(&path, format!("{:#}\n", json!(self)))?)
+        std::fs::create_dir_all(folder).map_err(Error::io("make the folder", folder))?;
+        Ok(write_atomic(
+            &folder.join(SWEEP),
+            format!("{:#}\n", json!(self)),
+        )?)
     }
 
     pub(super) fn read(folder: &Path) -> Result<Self, Error> {
@@ -139,10 +147,15 @@ impl Definition {
             && (&self.scene_hashes, self.circulation) == (&other.scene_hashes, other.circulation)
     }
 
+    /// Whether a folder holds this sweep.
+    pub(super) fn is_in(&self, folder: &Path) -> bool {
+        Self::read(folder).is_ok_and(|there| self.is_same(&there))
+    }
+
     /// Puts the result of a case into its folder, all of it or nothing.
     ///
     /// # Errors
-    /// What the system says; a file of somebody else in the way.
+    /// What the system says; an existing file that may not be replaced.
     pub(super) fn store(
         &self,
         folder: &Path,
@@ -168,11 +181,7 @@ impl Definition {
         };
         let of = (Outputs::default(), case.scene.provenance());
         outputs::Outputs::write(&folder_of(folder, case.index), existing, of, |files| {
-            files.add(
-                "scene.toml",
-                Some(case),
-                |_, origin| Ok(origin.scene_file()),
-            )?;
+            files.add(SCENE, Some(case), |_, origin| Ok(origin.scene_file()))?;
             files.add(RESULT, Some(&row), |row, _| {
                 Ok(format!("{:#}\n", json!(row)))
             })
@@ -190,6 +199,13 @@ impl Definition {
             && columns().all(|(name, ..)| row.results.contains_key(name));
         is_this.then_some(row)
     }
+}
+
+/// Names of the files of a case in the folder of its sweep.
+pub(super) fn case_files(case: usize) -> impl Iterator<Item = String> {
+    [SCENE, RESULT]
+        .into_iter()
+        .map(move |name| format!("cases/{case:05}/{name}"))
 }
 
 /// The folder of a case.

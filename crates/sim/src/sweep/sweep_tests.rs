@@ -1,6 +1,6 @@
 //! The parts of a sweep against stored tables, and what cases share.
 
-use super::pareto::{Objective, Place, front};
+use super::front::front;
 use super::*;
 use crate::plan::Stage;
 use crate::scene::{Scene, SceneFile, Weighting};
@@ -146,28 +146,19 @@ fn resolution_is_the_stored_one() {
 
 #[test]
 fn fronts_are_the_stored_ones() {
-    let table = reference("pareto");
+    let table = reference("front");
     let sets: std::collections::BTreeSet<&String> = table.rows.iter().map(|row| &row[0]).collect();
     for set in sets {
         let rows: Vec<&Vec<String>> = table.rows.iter().filter(|row| row[0] == *set).collect();
         let senses: Vec<&str> = rows[0][3].split(' ').collect();
-        let objective = |(i, sense): (usize, &&str)| {
-            let values = rows.iter().map(|row| row[4 + i].parse().unwrap()).collect();
-            let of = if *sense == "max" {
-                Objective::large
-            } else {
-                Objective::small
-            };
-            of(values, Vec::new())
+        let cost = |(i, sense): (usize, &&str)| {
+            let sign = if *sense == "max" { -1.0 } else { 1.0 };
+            let value = |row: &&Vec<String>| sign * row[4 + i].parse::<f64>().unwrap();
+            rows.iter().map(value).collect()
         };
-        let objectives: Vec<Objective> = senses.iter().enumerate().map(objective).collect();
-        for (row, place) in rows.iter().zip(front(&objectives)) {
-            let expected = if row[7] == "true" {
-                Place::On
-            } else {
-                Place::Off
-            };
-            assert_eq!(place, expected, "{row:?}");
+        let costs: Vec<Vec<f64>> = senses.iter().enumerate().map(cost).collect();
+        for (row, is_on) in rows.iter().zip(front(&costs)) {
+            assert_eq!(is_on, row[7] == "true", "{row:?}");
         }
     }
 }
@@ -181,52 +172,17 @@ fn the_front_of_1000_random_points_is_that_of_every_pair() {
         n => n as f64,
     };
     let points: Vec<[f64; 3]> = (0..1000).map(|_| [number(), number(), number()]).collect();
-    let column = |k: usize| points.iter().map(|p| p[k]).collect();
-    let places = front(&[
-        Objective::small(column(0), Vec::new()),
-        Objective::large(column(1), Vec::new()),
-        Objective::small(column(2), Vec::new()),
-    ]);
-    // As costs, of which less is better.
-    let cost = |p: &[f64; 3]| [p[0], -p[1], p[2]];
+    let on_front = front(&[0, 1, 2].map(|k| points.iter().map(|p| p[k]).collect()));
     let mut on = 0;
-    for (i, point) in points.iter().enumerate() {
-        let mine = cost(point);
-        let beaten = points.iter().enumerate().any(|(j, other)| {
-            let theirs = cost(other);
+    for (i, mine) in points.iter().enumerate() {
+        let is_dominated = points.iter().enumerate().any(|(j, theirs)| {
             i != j && (0..3).all(|k| theirs[k] <= mine[k]) && (0..3).any(|k| theirs[k] < mine[k])
         });
-        let expected = !beaten && mine.iter().all(|v| v.is_finite());
-        assert_eq!(places[i] == Place::On, expected, "{point:?}");
+        let expected = !is_dominated && mine.iter().all(|v| v.is_finite());
+        assert_eq!(on_front[i], expected, "{mine:?}");
         on += usize::from(expected);
     }
     assert!((5..200).contains(&on), "{on}");
-}
-
-#[test]
-fn members_within_two_standard_errors_of_being_beaten_are_doubtful() {
-    let with = |errors: [f64; 3]| {
-        let precision = Objective::small(vec![1.0, 1.2, 2.0], errors.to_vec());
-        front(&[
-            Objective::small(vec![20.0, 10.0, 30.0], Vec::new()),
-            precision,
-        ])
-    };
-    assert_eq!(with([0.0; 3]), [Place::On, Place::On, Place::Off]);
-    // 0.2 apart: 2 sqrt(2) 0.08 is more, 2 sqrt(2) 0.07 less.
-    assert_eq!(
-        with([0.08, 0.08, 0.0]),
-        [Place::Doubtful, Place::On, Place::Off]
-    );
-    assert_eq!(
-        with([0.07, 0.07, f64::NAN]),
-        [Place::On, Place::On, Place::Off]
-    );
-    // An error that is not known is not small.
-    assert_eq!(
-        with([f64::NAN; 3]),
-        [Place::Doubtful, Place::On, Place::Off]
-    );
 }
 
 /// Counts what is computed.

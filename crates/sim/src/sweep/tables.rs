@@ -1,8 +1,9 @@
-//! The results of all cases as tables, from the folders of a run or of its shards: CSV, NetCDF, and the pictures of them.
+//! The results of all cases as tables, from the folders of a run or of its shards: CSV, NetCDF, the front, and the pictures.
 //!
 //! Check: the same rows give the same bytes; the NetCDF file is read back by an independent reader.
 
 use super::cases::Sweep;
+use super::front::front;
 use super::key_path::{Holds, VaryingKey};
 use super::results::results;
 use super::stored::{Definition, Row, SWEEP};
@@ -96,13 +97,25 @@ pub(super) fn list(
     files: &mut Outputs,
 ) -> Result<(), Error> {
     files.table("results", rows, |rows| Ok(table(definition, rows)))?;
+    files.table("front", rows, |rows| Ok(table(definition, on_front(rows))))?;
     files.netcdf("results", rows, |rows, _| netcdf(definition, rows))?;
     #[cfg(feature = "plots")]
     super::pictures::list(definition, rows, files)?;
     Ok(())
 }
 
-fn table(definition: &Definition, rows: &[Row]) -> Table {
+/// The rows on the front of precision and resolution, in their order.
+pub(super) fn on_front(rows: &[Row]) -> Vec<&Row> {
+    let column = |name: &str| rows.iter().map(|row| row.result(name)).collect();
+    let on_front = front(&[column("resolution_m"), column("std_m_s")]);
+    rows.iter()
+        .zip(on_front)
+        .filter_map(|(row, is_on)| is_on.then_some(row))
+        .collect()
+}
+
+fn table<'r>(definition: &Definition, rows: impl IntoIterator<Item = &'r Row>) -> Table {
+    let rows: Vec<&Row> = rows.into_iter().collect();
     let mut table = Table::new().int("case", rows.iter().map(|row| row.case as i64));
     for VaryingKey { name, holds, .. } in &definition.keys {
         table = match holds {

@@ -218,7 +218,6 @@ fn options_that_pages_name_exist() {
         "retrieve",
         "detect",
         "sweep",
-        "pareto",
         "bound",
         "budget",
         "flow",

@@ -58,7 +58,7 @@ fn kept_files_are_those_that_are_written() {
     let again = write_contents(
         &temp.path().join("again"),
         kept.files.clone(),
-        Existing::Own,
+        Existing::Refuse,
     )
     .unwrap();
     assert_eq!(again.len(), kept.files.len());

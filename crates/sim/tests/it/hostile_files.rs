@@ -197,7 +197,7 @@ fn names_that_are_no_text_are_no_obstacle() {
     let folder = std::ffi::OsStr::from_bytes(b"o\xff");
     for words in [
         &["efficiency", "s.toml"][..],
-        &["efficiency", "s.toml", "--json"],
+        &["efficiency", "s.toml", "--json", "--overwrite"],
     ] {
         let out = std::process::Command::new(env!("CARGO_BIN_EXE_wakescope"))
             .args(words)

@@ -131,7 +131,14 @@ fn a_full_disk_is_an_error_and_a_closed_pipe_is_none() {
         &["check", "s.toml", "--json"],
         &["wake", "--print"],
         &["flow", "--example", "dipole"],
-        &["efficiency", "s.toml", "--out", "o", "--quiet"],
+        &[
+            "efficiency",
+            "s.toml",
+            "--out",
+            "o",
+            "--quiet",
+            "--overwrite",
+        ],
         &["--help"],
         &["--version"],
     ] {
@@ -149,7 +156,14 @@ fn a_full_disk_is_an_error_and_a_closed_pipe_is_none() {
         assert_eq!(to(words, writer.into()).status.code(), Some(0), "{words:?}");
     }
     let full = to(
-        &["efficiency", "s.toml", "--out", "o", "--quiet"],
+        &[
+            "efficiency",
+            "s.toml",
+            "--out",
+            "o",
+            "--quiet",
+            "--overwrite",
+        ],
         fs::OpenOptions::new()
             .write(true)
             .open("/dev/full")

@@ -285,6 +285,69 @@ fn a_map_of_a_run_is_retrieved_within_its_deviations_from_every_file_and_from_it
     );
 }
 
+/// Bytes with every occurrence of a text replaced by one of the same length.
+fn with_text(mut bytes: Vec<u8>, old: &str, new: &str) -> Vec<u8> {
+    assert_eq!(old.len(), new.len());
+    let places: Vec<usize> = (0..bytes.len())
+        .filter(|&at| bytes[at..].starts_with(old.as_bytes()))
+        .collect();
+    assert!(!places.is_empty(), "{old}");
+    for at in places {
+        bytes[at..][..new.len()].copy_from_slice(new.as_bytes());
+    }
+    bytes
+}
+
+#[test]
+fn unknown_keys_of_the_scene_in_a_data_file_are_skipped_with_one_warning() {
+    let temp = tempfile::tempdir().unwrap();
+    let folder = temp.path();
+    fs::write(folder.join("s.toml"), SCENE).unwrap();
+    let run = wakescope(folder, &["run", "s.toml", "--out", "o", "--quiet"]);
+    assert!(run.status.success(), "{run:?}");
+    // Keys that state their default, under names that no version has.
+    let older = |bytes: Vec<u8>| {
+        let bytes = with_text(bytes, "altitude_m = 0.0", "altitudo_m = 0.0");
+        with_text(bytes, "false_alarm = 0.0", "false_olarm = 0.0")
+    };
+    for file in ["map.nc", "map.csv", "signals.nc", "scene.toml"] {
+        let bytes = fs::read(folder.join("o").join(file)).unwrap();
+        fs::write(folder.join(file), older(bytes)).unwrap();
+    }
+    let warned = |words: &[&str]| {
+        let out = wakescope(
+            folder,
+            &[words, &["--out", "e", "--quiet", "--overwrite"]].concat(),
+        );
+        let message = String::from_utf8(out.stderr).unwrap();
+        assert!(out.status.success(), "{words:?}: {message}");
+        assert!(
+            message.lines().count() == 1
+                && message.starts_with("warning: ")
+                && message.contains("site.altitudo_m")
+                && message.contains("estimator.false_olarm"),
+            "{words:?}: {message}"
+        );
+    };
+    let known = retrieved(folder, "o/map.nc");
+    for file in ["map.nc", "map.csv"] {
+        warned(&["retrieve", file]);
+        let found = TextTable::read(&folder.join("e/retrieval.csv")).unwrap();
+        let (a, b) = (
+            number(&found, 0, "gamma_m2_s"),
+            number(&known, 0, "gamma_m2_s"),
+        );
+        assert!((a / b - 1.0).abs() < 1e-5, "{file}: {a} {b}");
+    }
+    warned(&["estimate", "signals.nc", "--scene", "s.toml"]);
+    let map = |folder: &Path| fs::read(folder.join("map.csv")).unwrap();
+    assert_eq!(map(&folder.join("e")), map(&folder.join("o")));
+    let refused = wakescope(folder, &["check", "scene.toml"]);
+    let message = String::from_utf8(refused.stderr).unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    assert!(message.contains("there is no such key"), "{message}");
+}
+
 /// A scan with gates that touch, as HALO files have them.
 const TOUCHING: &str = "seed = 5\n[pulse]\nenergy_j = 5e-3\n[scan]\nelevation_step_rad = 5e-3\nrealisations = 1\nrange_min_m = 268.614\n\
     [estimator]\ngate_step_samples = 64\n[outputs]\nhpl = true\nflow = false\nsvg = false\npng = false\nprofile_points = 2\n";

@@ -103,21 +103,26 @@ pub fn record_shape(scene: &Scene) -> RecordShape {
 }
 
 /// The plan for the records of a file: that of the scene with as many repetitions as the file has, and whether the truth of the
-/// scene is that of the records.
+/// scene is that of the records. The observer is warned of keys of the file's scene that are skipped.
 ///
 /// # Errors
 /// As [`Plan::new`]; records of another shape or kind than the scene's, recorded otherwise than it says; signals of the same
 /// scene that were drawn with another seed, or of another number of realisations.
-pub fn plan(scene: SceneFile, records: &RawRecords) -> Result<(Plan, bool), Error> {
+pub fn plan(
+    scene: SceneFile,
+    records: &RawRecords,
+    observer: &dyn Observer,
+) -> Result<(Plan, bool), Error> {
     fits(&scene.content, records)?;
     let whole = scan_lines::schedule(&scene)?.pulses();
     let own = records
         .about
         .scene_toml
         .as_deref()
-        .and_then(|toml| SceneFile::parse(toml, "scene".as_ref()).ok());
-    let own = own.filter(|own| signals_of(&own.content) == signals_of(&scene.content));
-    if let Some(own) = &own {
+        .and_then(|toml| SceneFile::embedded(toml, &records.path).ok())
+        .filter(|(own, _)| signals_of(&own.content) == signals_of(&scene.content));
+    if let Some((own, warning)) = &own {
+        warning.iter().for_each(|text| observer.warn(text));
         let drawn = |s: &Scene| {
             [
                 ("seed", s.seed),
