@@ -92,6 +92,8 @@ pub(crate) fn run(options: &Options) -> Outcome {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::process::output;
+    use std::collections::BTreeSet;
 
     #[test]
     fn the_test_command_is_the_readmes() {
@@ -101,5 +103,31 @@ mod tests {
             "cargo test --workspace"
         );
         assert!(readme_test_command("nothing").is_err());
+    }
+
+    /// Lines of `cargo tree`: the crates that a package needs, each with its features.
+    fn features_of(package: &str) -> BTreeSet<String> {
+        let arguments = [
+            "tree",
+            "--edges=normal,build",
+            "--prefix=none",
+            "--format={p} [{f}]",
+            "--package",
+            package,
+        ];
+        let text = output(Command::new(env!("CARGO")).args(arguments)).unwrap();
+        text.lines()
+            .map(|line| line.trim_end_matches(" (*)").to_owned())
+            .collect()
+    }
+
+    #[test]
+    fn the_program_needs_no_crate_with_other_features_than_xtask() {
+        let xtask = features_of("xtask");
+        let missing: Vec<String> = features_of("wakescope-sim")
+            .into_iter()
+            .filter(|line| !xtask.contains(line))
+            .collect();
+        assert!(missing.is_empty(), "{missing:#?}");
     }
 }

@@ -46,7 +46,6 @@
 
 pub mod accuracy;
 pub mod detection;
-#[cfg(feature = "flow")]
 pub mod flow;
 pub mod io;
 mod keys;

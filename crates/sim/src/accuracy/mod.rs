@@ -12,7 +12,6 @@
 //! | `report`, `pictures` | the answer as text, table and scene; drawn |
 
 pub mod figures;
-#[cfg(feature = "flow")]
 mod flows;
 pub mod keys;
 pub mod ladder;

@@ -194,7 +194,6 @@ impl Table {
     ///
     /// # Errors
     /// As [`Self::to_csv`].
-    #[cfg(feature = "flow")]
     pub(crate) fn rows(&self) -> OutputResult<String> {
         self.with_rows(String::new())
     }

@@ -1,6 +1,5 @@
 //! A scene or a case that was checked, with what names it and where its lines stand.
 
-#[cfg(feature = "flow")]
 use super::problem::Located;
 use super::problem::{Problem, SceneError};
 use super::vet::Text;
@@ -81,7 +80,6 @@ impl<T: Content> Document<T> {
     }
 
     /// The file that it was read from.
-    #[cfg(feature = "flow")]
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
@@ -105,7 +103,6 @@ impl<T: Content> Document<T> {
     }
 
     /// Problems of what was asked for beside the file.
-    #[cfg(feature = "flow")]
     pub(crate) fn refused(&self, problems: Vec<Problem>) -> SceneError {
         let problems = problems
             .into_iter()

@@ -30,7 +30,6 @@ pub(crate) struct NothingOr(pub(crate) RangeInclusive<f64>);
 pub(crate) const ABOVE_ZERO_OR_INF: Number =
     Number(|value| value > 0.0, "above 0 {}, or inf for none");
 /// Above 0.
-#[cfg(feature = "flow")]
 pub(crate) const ABOVE_ZERO: Number = Number(
     |value| value.is_finite() && value > 0.0,
     "a finite number above 0",
@@ -41,7 +40,6 @@ pub(crate) const ZERO_OR_MORE: Number = Number(
     "a finite number, 0 or more",
 );
 /// Neither infinite nor no number.
-#[cfg(feature = "flow")]
 pub(crate) const FINITE: Number = Number(f64::is_finite, "finite");
 
 impl Limit<String> for Named {

@@ -21,7 +21,6 @@ pub(crate) use declare::{
 };
 pub use document::{Content, Document};
 pub(crate) use key::{Key, Kind, join};
-#[cfg(feature = "flow")]
 pub(crate) use limit::{ABOVE_ZERO, FINITE};
 pub(crate) use limit::{
     ABOVE_ZERO_OR_INF, Checker, Is, Limit, Named, NothingOr, Number, ZERO_OR_MORE, side,

@@ -27,7 +27,6 @@ mod scan_fields;
 #[cfg(feature = "plots")]
 mod scans;
 mod scene_features;
-#[cfg(feature = "flow")]
 mod simulated_flow;
 #[cfg(all(feature = "cli", feature = "plots"))]
 mod sweep;
