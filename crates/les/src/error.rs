@@ -38,7 +38,8 @@ pub struct EnergyGrowth {
     pub cause: String,
 }
 
-/// Why a wind could not be built or sampled, or a flow not simulated. Every variant carries the values and what is allowed.
+/// Why a wind could not be built or sampled, or a flow not simulated. Every variant carries the
+/// values and what is allowed.
 #[non_exhaustive]
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {
@@ -60,7 +61,8 @@ pub enum Error {
         /// Length of the output slice.
         out: usize,
     },
-    /// A direction of a mesh that cannot be interpolated, or that the schemes of a flow cannot take.
+    /// A direction of a mesh that cannot be interpolated, or that the schemes of a flow cannot
+    /// take.
     #[error("{axis} direction: {what} = {value:?}: must be {allowed}")]
     BadDirection {
         /// `"x"`, `"y"` or `"z"`.
@@ -108,7 +110,8 @@ pub enum Error {
         /// Where a component is fastest.
         place: Place,
     },
-    /// A flow has more kinetic energy than it started with and force or moving walls can have given it.
+    /// A flow has more kinetic energy than it started with and force or moving walls can have given
+    /// it.
     #[error("{0}")]
     EnergyGrew(Box<EnergyGrowth>),
     /// The time step feeds a flow with more energy than viscosity and subgrid model take.
@@ -143,7 +146,8 @@ pub enum Error {
         /// The file.
         path: PathBuf,
     },
-    /// The checkpoint was written by another version of this program, in a form that this one does not know.
+    /// The checkpoint was written by another version of this program, in a form that this one does
+    /// not know.
     #[error("{} is a checkpoint of version {found}: this program reads version {supported}", path.display())]
     CheckpointVersion {
         /// The file.
@@ -258,8 +262,8 @@ pub enum Error {
 #[non_exhaustive]
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum PressureFailure {
-    /// The last digit of the solution leaves as much: waves much longer than the cells are high make it large against its
-    /// differences.
+    /// The last digit of the solution leaves as much: waves much longer than the cells are high
+    /// make it large against its differences.
     #[error(
         "round-off of so large a solution leaves about {attainable:.0e}, so ask for a tolerance above that, or for a \
          mesh that is shorter in units of its finest cell"

@@ -1,9 +1,10 @@
 //! Winds seen by a lidar: analytic aircraft wakes and sampled flows behind one trait.
 //!
-//! The crate computes the velocity of the air at any point and time: aircraft wake vortices over the ground
-//! (equations (1)-(5) of the chapter this project follows), uniform winds, sums, and fields given on a mesh, which are
-//! interpolated by the M'4 kernel (26), (27). Axes: x along the flight direction, y across it, z up; ground at z = 0.
-//! SI units, `f64`; a unit is the suffix of each name.
+//! The crate computes the velocity of the air at any point and time: aircraft wake vortices over
+//! the ground (equations (1)-(5) of the chapter this project follows), uniform winds, sums, and
+//! fields given on a mesh, which are interpolated by the M'4 kernel (26), (27). Axes: x along the
+//! flight direction, y across it, z up; ground at z = 0. SI units, `f64`; a unit is the suffix of
+//! each name.
 //!
 //! ```
 //! use wakescope_les::{CirculationProfile, Ground, Motion, VortexPair, Wind};
@@ -24,7 +25,7 @@
 //! # Ok::<(), wakescope_les::Error>(())
 //! ```
 //!
-//! What a first program needs stands here; the rest is in its module.
+//! What a first program needs is exported here; the rest is in its module.
 //!
 //! | module | what is in it |
 //! |---|---|
@@ -34,7 +35,10 @@
 //! | [`cases`] | flows with known solutions, and the wake above ground |
 //! | [`analysis`] | what is measured in a wind or a flow: circulations, cross-planes, the state of a wake |
 //!
-//! Feature `solver` (default): the large-eddy simulation, see [`Flow`]. Without it neither threads nor transforms are compiled.
+//! Feature `solver` (default): the large-eddy simulation, see [`Flow`]. Without it neither threads
+//! nor transforms are compiled.
+
+#![warn(clippy::too_many_lines, clippy::type_complexity)]
 
 #[cfg(all(doctest, feature = "solver"))]
 #[doc = include_str!("../README.md")]

@@ -1,21 +1,24 @@
 //! Circulation of any wind on circles, equation (1), and its average from 5 to 15 m.
 //!
-//! Check: a single vortex gives its profile; a uniform wind gives zero; the average of the algebraic profile agrees
-//! with its closed form.
+//! Check: a single vortex gives its profile; a uniform wind gives zero; the average of the
+//! algebraic profile agrees with its closed form.
 
 use std::f64::consts::PI;
 
 use crate::error::{Error, check};
 use crate::winds::Wind;
 
-/// Circulation \[m^2/s\] of `wind` on the circle of `radius_m` about `centre_m` = `(y, z)` in the plane x = 0, by the
-/// trapezoidal rule on `samples` points, equation (1). Positive if anticlockwise (y to the right, z up).
+/// Circulation \[m^2/s\] of `wind` on the circle of `radius_m` about `centre_m` = `(y, z)` in the
+/// plane x = 0, by the trapezoidal rule on `samples` points, equation (1). Positive if
+/// anticlockwise (y to the right, z up).
 ///
-/// The rule converges faster than any power for an analytic wind: 64 points give round-off while no core is within
-/// half a radius of the circle. For a field on a mesh take a few points per cell crossed.
+/// The rule converges faster than any power for an analytic wind: 64 points give round-off while no
+/// core is within half a radius of the circle. For a field on a mesh take a few points per cell
+/// crossed.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for a radius that is not positive or fewer than 3 samples; what the wind returns.
+/// [`Error::OutOfRange`] for a radius that is not positive or fewer than 3 samples; what the wind
+/// returns.
 pub fn circulation_m2_s(
     wind: &dyn Wind,
     centre_m: [f64; 2],
@@ -25,19 +28,15 @@ pub fn circulation_m2_s(
 ) -> Result<f64, Error> {
     check("radius_m", radius_m, "positive", |v| v > 0.0)?;
     check("samples", samples as f64, "3 or more", |v| v >= 3.0)?;
-    let directions: Vec<(f64, f64)> = (0..samples)
-        .map(|i| (2.0 * PI * i as f64 / samples as f64).sin_cos())
-        .collect();
-    let points_m: Vec<[f64; 3]> = directions
-        .iter()
-        .map(|&(sin, cos)| {
-            [
-                0.0,
-                centre_m[0] + radius_m * cos,
-                centre_m[1] + radius_m * sin,
-            ]
-        })
-        .collect();
+    let mut directions = Vec::with_capacity(samples);
+    let mut points_m = Vec::with_capacity(samples);
+    for i in 0..samples {
+        let (sin, cos) = (2.0 * PI * i as f64 / samples as f64).sin_cos();
+        directions.push((sin, cos));
+        let y_m = centre_m[0] + radius_m * cos;
+        let z_m = centre_m[1] + radius_m * sin;
+        points_m.push([0.0, y_m, z_m]);
+    }
     let mut velocity_m_s = vec![[0.0; 3]; samples];
     wind.velocity_into(&points_m, time_s, &mut velocity_m_s)?;
     let sum: f64 = directions
@@ -60,8 +59,8 @@ const GAUSS_16: [(f64, f64); 8] = [
     (0.989_400_934_991_649_9, 0.027_152_459_411_754_094),
 ];
 
-/// `Gamma_5-15` of any wind \[m^2/s\]: the circulation on circles about `centre_m` = `(y, z)` averaged over radii from 5
-/// to 15 m, with its sign (anticlockwise positive).
+/// `Gamma_5-15` of any wind \[m^2/s\]: the circulation on circles about `centre_m` = `(y, z)`
+/// averaged over radii from 5 to 15 m, with its sign (anticlockwise positive).
 ///
 /// 16 radii (Gauss-Legendre) of `samples` points each.
 ///

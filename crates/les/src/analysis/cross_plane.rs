@@ -1,10 +1,11 @@
 //! A simulated flow as a wind: the velocity of a cross-plane at any position along the flight.
 //!
-//! Velocities are brought to the centres of the cells with fourth order, then interpolated along x by the M'4 kernel (27), so
-//! that planes between the cells have the third order of the kernel in all directions. Walls and periods of the mesh become
-//! those of the snapshot.
+//! Velocities are brought to the centres of the cells with fourth order, then interpolated along x
+//! by the M'4 kernel (27), so that planes between the cells have the third order of the kernel in
+//! all directions. Walls and periods of the mesh become those of the snapshot.
 //!
-//! Check: an analytic field on a stretched mesh with the kernel's order, walls, one-cell directions.
+//! Check: an analytic field on a stretched mesh with the kernel's order, walls, one-cell
+//! directions.
 
 use crate::Error;
 use crate::solver::flow::Flow;
@@ -34,13 +35,12 @@ pub struct CrossPlane {
 }
 
 impl CrossPlane {
-    fn at(x_m: f64, mesh: &Mesh, velocity_m_s: Vec<[f64; 3]>) -> Self {
-        let (y_m, z_m) = (mesh.centre_m(1), mesh.centre_m(2));
+    fn new(x_m: f64, mesh: &Mesh, velocity_m_s: Vec<[f64; 3]>) -> Self {
         let [_, y, z] = mesh.directions();
         Self {
             x_m,
-            y_m,
-            z_m,
+            y_m: mesh.centre_m(1),
+            z_m: mesh.centre_m(2),
             velocity_m_s,
             y_edges: edges(y),
             z_edges: edges(z),
@@ -52,44 +52,50 @@ impl Flow {
     /// Velocity at the centres of the cells of the cross-plane at `x_m` \[m\].
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a position outside the mesh, if x is not periodic, or not finite; [`Error::RankLost`].
+    /// [`Error::OutOfRange`] for a position outside the mesh, if x is not periodic, or not finite;
+    /// [`Error::RankLost`].
     pub fn cross_plane(&self, x_m: f64) -> Result<CrossPlane, Error> {
         let mesh = self.mesh();
-        let along = &mesh.directions()[0];
         let [nx, ny, _] = mesh.cells();
-        let refused = || Error::OutOfRange {
+        let taps = self.taps_along_flight(x_m)?;
+        let mut own = vec![[0.0; 3]; ny * self.own_planes().len()];
+        for component in 0..3 {
+            let centred = self.own_centre_velocity_m_s(component)?;
+            for (velocity_m_s, row) in own.iter_mut().zip(centred.chunks(nx)) {
+                for (source, weight) in taps {
+                    velocity_m_s[component] +=
+                        weight * ghost_value(source, 0, component, |i| row[i]);
+                }
+            }
+        }
+        Ok(CrossPlane::new(x_m, mesh, self.layout.slabs.planes(own)?))
+    }
+
+    /// Sources and weights of the interpolation to `x_m` \[m\].
+    fn taps_along_flight(&self, x_m: f64) -> Result<[(Ghost, f64); 4], Error> {
+        let mesh = self.mesh();
+        let along = &mesh.directions()[0];
+        let refused = Error::OutOfRange {
             field: "x_m",
             value: x_m,
             allowed: "finite, within the mesh",
         };
-        let taps;
-        if nx > 1 {
-            let axis = Axis::new(AXIS_NAMES[0], &mesh.centre_m(0), edges(along))?;
-            let (first, weights) = axis.stencil(x_m).ok_or_else(refused)?;
-            taps = std::array::from_fn(|i| (source(&axis, first + i), weights[i]));
-        } else if x_m.is_finite() {
-            taps = [1.0, 0.0, 0.0, 0.0].map(|weight| (Ghost::Copy(0), weight));
-        } else {
-            return Err(refused());
+        if along.cells == 1 {
+            return if x_m.is_finite() {
+                Ok([1.0, 0.0, 0.0, 0.0].map(|weight| (Ghost::Copy(0), weight)))
+            } else {
+                Err(refused)
+            };
         }
-        let centred = |component| self.own_centre_velocity_m_s(component);
-        let centred = [centred(0)?, centred(1)?, centred(2)?];
-        let own: Vec<[f64; 3]> = (0..ny * self.own_planes().len())
-            .map(|row| {
-                let node = |i: usize| centred.each_ref().map(|field| field[row * nx + i]);
-                let mut sum = [0.0; 3];
-                for (source, weight) in taps {
-                    for (c, sum) in sum.iter_mut().enumerate() {
-                        *sum += weight * ghost_value(source, 0, c, |i| node(i)[c]);
-                    }
-                }
-                sum
-            })
-            .collect();
-        Ok(CrossPlane::at(x_m, mesh, self.layout.slabs.planes(own)?))
+        let axis = Axis::new(AXIS_NAMES[0], &mesh.centre_m(0), edges(along))?;
+        let (first, weights) = axis.stencil(x_m).ok_or(refused)?;
+        Ok(std::array::from_fn(|i| {
+            (source(&axis, first + i), weights[i])
+        }))
     }
 
-    /// The velocity at the faces averaged along the flight, at the centres of the cells; its `x_m` is the middle of the mesh.
+    /// The velocity at the faces averaged along the flight, at the centres of the cells; its `x_m`
+    /// is the middle of the mesh.
     pub(super) fn mean_plane_of(&self, faces: &Faces) -> Result<CrossPlane, Error> {
         let mesh = self.mesh();
         let along = &mesh.directions()[0];
@@ -99,15 +105,12 @@ impl Flow {
         for component in 0..3 {
             let centred = self.centred(component, &faces.field[component]);
             for (mean, row) in own.iter_mut().zip(centred.chunks(nx)) {
-                let sum: f64 = row
-                    .iter()
-                    .zip(&length_m)
-                    .map(|(value, length_m)| value * length_m)
-                    .sum();
+                let terms = row.iter().zip(&length_m);
+                let sum: f64 = terms.map(|(value, length_m)| value * length_m).sum();
                 mean[component] = sum / along.length_m();
             }
         }
-        Ok(CrossPlane::at(
+        Ok(CrossPlane::new(
             0.5 * (along.low_m + along.high_m),
             mesh,
             self.layout.slabs.planes(own)?,
@@ -121,20 +124,22 @@ impl Flow {
         outside: OutsidePolicy,
     ) -> Result<GridSnapshot, Error> {
         let [_, y, z] = self.mesh().directions();
-        let (y_m, z_m) = (nodes(y, &plane.y_m), nodes(z, &plane.z_m));
         let mesh = PlaneMesh {
+            y_m: nodes(y, &plane.y_m),
+            z_m: nodes(z, &plane.z_m),
             y_edges: plane.y_edges,
             z_edges: plane.z_edges,
             outside,
-            y_m,
-            z_m,
         };
-        let pick = |thin: bool, i: usize| if thin { 0 } else { i };
-        let [_, ny, nz] = self.mesh().cells();
-        let velocity_m_s: Vec<[f64; 3]> = (0..mesh.z_m.len())
-            .flat_map(|k| (0..mesh.y_m.len()).map(move |j| (j, k)))
-            .map(|(j, k)| plane.velocity_m_s[pick(nz == 1, k) * ny + pick(ny == 1, j)])
-            .collect();
+        let mut velocity_m_s = Vec::with_capacity(mesh.y_m.len() * mesh.z_m.len());
+        for k in 0..mesh.z_m.len() {
+            // All nodes of a direction of one cell have its value.
+            let k = if z.cells == 1 { 0 } else { k };
+            for j in 0..mesh.y_m.len() {
+                let j = if y.cells == 1 { 0 } else { j };
+                velocity_m_s.push(plane.velocity_m_s[k * y.cells + j]);
+            }
+        }
         GridSnapshot::new(&mesh, &velocity_m_s)
     }
 }
@@ -147,13 +152,6 @@ fn source(axis: &Axis, padded: usize) -> Ghost {
 
 /// Walls and periods of a direction of the mesh as those of a snapshot.
 fn edges(direction: &Direction) -> Edges {
-    let side = |wall: Wall, position_m: f64| match wall {
-        Wall::Slip => Side::SlipWall { position_m },
-        Wall::NoSlip { velocity_m_s } => Side::NoSlipWall {
-            position_m,
-            velocity_m_s,
-        },
-    };
     match direction.ends {
         Ends::Periodic => Edges::Periodic {
             period_m: direction.length_m(),
@@ -161,6 +159,17 @@ fn edges(direction: &Direction) -> Edges {
         Ends::Walls { low, high } => Edges::Bounded {
             low: side(low, direction.low_m),
             high: side(high, direction.high_m),
+        },
+    }
+}
+
+/// A wall of the mesh as the side of a snapshot.
+fn side(wall: Wall, position_m: f64) -> Side {
+    match wall {
+        Wall::Slip => Side::SlipWall { position_m },
+        Wall::NoSlip { velocity_m_s } => Side::NoSlipWall {
+            position_m,
+            velocity_m_s,
         },
     }
 }
@@ -184,7 +193,8 @@ mod tests {
     use crate::winds::Wind;
     use std::f64::consts::TAU;
 
-    /// The flow of Arnold, Beltrami and Childress, free of divergence and different in all directions.
+    /// The flow of Arnold, Beltrami and Childress, free of divergence and different in all
+    /// directions.
     fn beltrami([x, y, z]: [f64; 3]) -> [f64; 3] {
         [
             0.7 * z.sin() + 0.4 * y.cos(),

@@ -1,10 +1,10 @@
-//! What the history of a wake tells: when its fast decay begins, how fast its waves grow.
+//! Results from the history of a wake: when its fast decay begins, how fast its waves grow.
 //!
-//! A history is a list of points (tau, value) of increasing tau; between them a quantity is a straight line.
-//! Check: a broken line has its knee and its onset where it breaks.
+//! A history is a list of points (tau, value) of increasing tau; between them a quantity is a
+//! straight line. Check: a broken line has its knee and its onset where it breaks.
 
-/// Value at `tau` on the straight line through the two points about it, beyond the ends on that of the last two; NaN for
-/// fewer than two points.
+/// Value at `tau` on the straight line through the two points about it, beyond the ends on that of
+/// the last two; NaN for fewer than two points.
 #[must_use]
 pub fn value_at(points: &[(f64, f64)], tau: f64) -> f64 {
     let i = points
@@ -16,37 +16,50 @@ pub fn value_at(points: &[(f64, f64)], tau: f64) -> f64 {
     a.1 + (b.1 - a.1) * (tau - a.0) / (b.0 - a.0)
 }
 
-/// When the fast decay begins: where the loss of the circulation's ratio to its start, per tau, first exceeds three times
-/// its mean over 0.5 to 1.5.
+/// When the fast decay begins: where the loss of the circulation's ratio to its start, per tau,
+/// first exceeds three times its mean over 0.5 to 1.5.
 #[must_use]
 pub fn onset(gamma: &[(f64, f64)]) -> Option<f64> {
-    let at = |tau: f64| value_at(gamma, tau);
-    let early = at(0.5) - at(1.5);
-    let last = gamma.last()?.0;
-    let slope = |tau: f64| (at(tau - 0.05) - at(tau + 0.05)) / 0.1;
-    (0..)
-        .map(|i| 1.5 + 0.02 * f64::from(i))
-        .take_while(|tau| tau + 0.05 <= last)
-        .find(|tau| slope(*tau) > 3.0 * early)
+    let early_loss = loss(gamma, 0.5, 1.5);
+    let last_tau = gamma.last()?.0;
+    let taus = (0..).map(|i| 1.5 + 0.02 * f64::from(i));
+    for tau in taus.take_while(|tau| tau + 0.05 <= last_tau) {
+        if loss(gamma, tau - 0.05, tau + 0.05) / 0.1 > 3.0 * early_loss {
+            return Some(tau);
+        }
+    }
+    None
 }
 
-/// Where the line through the ratio at 0.5 and 1.5 meets the steepest line over 0.8: a beginning of the fast decay that
-/// does not depend on how slow the decay before it is; none if the steepest line is less than twice as steep.
+/// Loss of the ratio from one time to another.
+fn loss(gamma: &[(f64, f64)], from: f64, to: f64) -> f64 {
+    value_at(gamma, from) - value_at(gamma, to)
+}
+
+/// Where the line through the ratio at 0.5 and 1.5 meets the steepest line over 0.8: a beginning of
+/// the fast decay that does not depend on how slow the decay before it is; none if the steepest
+/// line is less than twice as steep.
 #[must_use]
 pub fn knee(gamma: &[(f64, f64)]) -> Option<f64> {
-    let at = |tau: f64| value_at(gamma, tau);
-    let last = gamma.last()?.0;
-    let early = at(1.5) - at(0.5);
-    let starts = (0..)
-        .map(|i| 1.5 + 0.02 * f64::from(i))
-        .take_while(|tau| tau + 0.8 <= last);
-    let from = starts.min_by(|a, b| (at(a + 0.8) - at(*a)).total_cmp(&(at(b + 0.8) - at(*b))))?;
-    let steep = (at(from + 0.8) - at(from)) / 0.8;
-    (steep < 2.0 * early)
-        .then(|| (at(from) - steep * from - at(0.5) + 0.5 * early) / (early - steep))
+    let last_tau = gamma.last()?.0;
+    let early = value_at(gamma, 1.5) - value_at(gamma, 0.5);
+    // The steepest line: its start, and the change over 0.8.
+    let mut steepest: Option<(f64, f64)> = None;
+    let starts = (0..).map(|i| 1.5 + 0.02 * f64::from(i));
+    for from in starts.take_while(|from| from + 0.8 <= last_tau) {
+        let change = value_at(gamma, from + 0.8) - value_at(gamma, from);
+        if steepest.is_none_or(|(_, most)| change.total_cmp(&most).is_lt()) {
+            steepest = Some((from, change));
+        }
+    }
+    let (from, change) = steepest?;
+    let steep = change / 0.8;
+    let offset = value_at(gamma, from) - steep * from - value_at(gamma, 0.5) + 0.5 * early;
+    (steep < 2.0 * early).then(|| offset / (early - steep))
 }
 
-/// Growth rate per tau of the amplitude of a mode whose energy is given: half the slope of the logarithm from `from` to `to`.
+/// Growth rate per tau of the amplitude of a mode whose energy is given: half the slope of the
+/// logarithm from `from` to `to`.
 #[must_use]
 pub fn amplitude_growth(energy: &[(f64, f64)], from: f64, to: f64) -> f64 {
     0.5 * (value_at(energy, to) / value_at(energy, from)).ln() / (to - from)

@@ -1,10 +1,12 @@
-//! The ranks that share a flow: processes of one machine or of many, each with a slab of the mesh and threads of its own.
+//! The ranks that share a flow: processes of one machine or of many, each with a slab of the mesh
+//! and threads of its own.
 //!
-//! All that the solver exchanges is one operation, [`Ranks::all_to_all`]: halos, lines that cross slabs, numbers of all planes.
-//! Sums are made from the numbers of single planes in the order of the mesh, so that results have the same bits for any
-//! number of ranks.
+//! All that the solver exchanges is one operation, [`Ranks::all_to_all`]: halos, lines that cross
+//! slabs, numbers of all planes. Sums are made from the numbers of single planes in the order of
+//! the mesh, so that results have the same bits for any number of ranks.
 //!
-//! Check: the solver on ranks against one process, bit for bit (`solver::slabs_tests`); a rank that is lost.
+//! Check: the solver on ranks against one process, bit for bit (`solver::slabs_tests`); a rank that
+//! is lost.
 
 #[cfg(test)]
 mod threads;
@@ -27,8 +29,8 @@ pub trait Ranks: Debug + Send + Sync {
     /// How many there are.
     fn count(&self) -> usize;
 
-    /// All-to-all: of `send` the first `to[0]` values go to rank 0, the next `to[1]` to rank 1; `receive` gets `from[0]`
-    /// values of rank 0, then `from[1]` of rank 1.
+    /// All-to-all: of `send` the first `to[0]` values go to rank 0, the next `to[1]` to rank 1;
+    /// `receive` gets `from[0]` values of rank 0, then `from[1]` of rank 1.
     ///
     /// # Errors
     /// [`Error::RankLost`] if a rank has ended that was to send something.
@@ -68,12 +70,12 @@ impl Ranks for Single {
 
 /// Ranks, and how long their exchanges take, waiting for others included.
 #[derive(Debug)]
-pub(crate) struct Timed {
+pub(crate) struct TimedRanks {
     ranks: Arc<dyn Ranks>,
     spent_ns: AtomicU64,
 }
 
-impl Timed {
+impl TimedRanks {
     pub(crate) fn new(ranks: Arc<dyn Ranks>) -> Self {
         Self {
             ranks,
@@ -87,7 +89,7 @@ impl Timed {
     }
 }
 
-impl Ranks for Timed {
+impl Ranks for TimedRanks {
     fn rank(&self) -> usize {
         self.ranks.rank()
     }
@@ -103,11 +105,11 @@ impl Ranks for Timed {
         receive: &mut [f64],
         from: &[usize],
     ) -> Result<(), Error> {
-        let begun = Instant::now();
-        let sent = self.ranks.all_to_all(send, to, receive, from);
+        let started = Instant::now();
+        let result = self.ranks.all_to_all(send, to, receive, from);
         self.spent_ns
-            .fetch_add(begun.elapsed().as_nanos() as u64, Ordering::Relaxed);
-        sent
+            .fetch_add(started.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        result
     }
 }
 
@@ -120,19 +122,21 @@ pub fn all_gather(ranks: &dyn Ranks, own: Vec<f64>) -> Result<Vec<f64>, Error> {
     if count == 1 {
         return Ok(own);
     }
-    let share = |own: &[f64], from: &[usize]| {
-        let mut all = vec![0.0; from.iter().sum()];
-        ranks
-            .all_to_all(&own.repeat(count), &vec![own.len(); count], &mut all, from)
-            .map(|()| all)
-    };
-    let lengths = share(&[own.len() as f64], &vec![1; count])?;
+    let lengths = send_to_all(ranks, &[own.len() as f64], &vec![1; count])?;
     let lengths: Vec<usize> = lengths.into_iter().map(|length| length as usize).collect();
-    share(&own, &lengths)
+    send_to_all(ranks, &own, &lengths)
 }
 
-/// An error of one rank is the error of all, that of the lowest if there are several; `other` makes it from
-/// [`Error::OtherRank`], which has its words, where it did not happen.
+/// Sends `own` to every rank; returns the values of all ranks, the number of which is `from`.
+fn send_to_all(ranks: &dyn Ranks, own: &[f64], from: &[usize]) -> Result<Vec<f64>, Error> {
+    let count = ranks.count();
+    let mut all = vec![0.0; from.iter().sum()];
+    ranks.all_to_all(&own.repeat(count), &vec![own.len(); count], &mut all, from)?;
+    Ok(all)
+}
+
+/// An error of one rank is the error of all, that of the lowest if there are several; `other` makes
+/// it from [`Error::OtherRank`], which has its words, where it did not happen.
 ///
 /// # Errors
 /// It; those of [`Ranks::all_to_all`].
@@ -149,11 +153,11 @@ pub fn all_agree<T, E: Display>(
     let Some(rank) = failed.iter().position(|failed| *failed > 0.0) else {
         return result;
     };
-    let told = own
-        .as_deref()
-        .filter(|_| ranks.rank() == rank)
-        .unwrap_or_default();
-    let bytes = all_gather(ranks, told.bytes().map(f64::from).collect()).map_err(&other)?;
+    let sent: Vec<f64> = match &own {
+        Some(message) if ranks.rank() == rank => message.bytes().map(f64::from).collect(),
+        _ => Vec::new(),
+    };
+    let bytes = all_gather(ranks, sent).map_err(&other)?;
     let bytes: Vec<u8> = bytes.iter().map(|byte| *byte as u8).collect();
     let message = String::from_utf8_lossy(&bytes).into_owned();
     match result {

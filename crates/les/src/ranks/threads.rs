@@ -1,4 +1,5 @@
-//! Threads as ranks, for the tests of this crate and of those that include the file: what runs on many machines, on one without MPI.
+//! Threads as ranks, for the tests of this crate and of those that include the file: what runs on
+//! many machines, on one without MPI.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
@@ -53,15 +54,18 @@ impl ThreadRanks {
     }
 }
 
-/// Runs `work` on `count` threads as ranks and returns what each of them did, or `None` for one that panicked.
+/// Runs `work` on `count` threads as ranks and returns what each of them did, or `None` for one
+/// that panicked.
 pub(crate) fn on_threads<T: Send>(
     count: usize,
     work: impl Fn(Arc<dyn Ranks>) -> T + Sync,
 ) -> Vec<Option<T>> {
     std::thread::scope(|scope| {
         let work = &work;
-        let spawn = |rank| scope.spawn(move || work(Arc::new(rank)));
-        let threads: Vec<_> = ThreadRanks::new(count).into_iter().map(spawn).collect();
+        let threads: Vec<_> = ThreadRanks::new(count)
+            .into_iter()
+            .map(|rank| scope.spawn(move || work(Arc::new(rank))))
+            .collect();
         threads
             .into_iter()
             .map(|thread| thread.join().ok())
@@ -85,7 +89,8 @@ impl Ranks for ThreadRanks {
         receive: &mut [f64],
         from: &[usize],
     ) -> Result<(), Error> {
-        let (mut send, mut receive) = (send, receive);
+        let mut send = send;
+        let mut receive = receive;
         let mut mail = self.mail();
         for (rank, &length) in to.iter().enumerate() {
             let (message, rest) = send.split_at(length);

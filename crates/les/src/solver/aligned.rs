@@ -1,7 +1,8 @@
 //! Numbers that begin on a line of the cache.
 //!
-//! A vector of eight numbers that lies across two lines costs two accesses. Rows of a field whose length is a multiple of eight begin
-//! on a line where the field does, and allocators promise no more than two numbers.
+//! A vector of eight numbers that lies across two lines costs two accesses. Rows of a field whose
+//! length is a multiple of eight begin on a line where the field does, and allocators promise no
+//! more than two numbers.
 //!
 //! Check: where the numbers begin, also of a copy.
 
@@ -9,7 +10,8 @@ use std::ops::{Deref, DerefMut};
 
 /// Bytes of a line of the cache, which is also the widest vector of the processors in use.
 const LINE_BYTES: usize = 64;
-/// Numbers that are allocated beyond those that are wanted, so that some place before the first of them begins a line.
+/// Numbers that are allocated beyond those that are wanted, so that some place before the first of
+/// them begins a line.
 const SPARE: usize = LINE_BYTES / size_of::<f64>() - 1;
 
 /// A list of numbers of fixed length, the first of which begins a line of the cache.
@@ -20,13 +22,14 @@ pub(crate) struct Aligned {
 }
 
 impl Aligned {
-    /// As many zeros.
+    /// `count` zeros.
     pub(crate) fn zeros(count: usize) -> Self {
         if count == 0 {
             return Self::default();
         }
         let mut memory = vec![0.0; count + SPARE];
-        // More than the spare numbers would mean that nothing is known of the address: any place is right, if slower.
+        // More than the spare numbers would mean that nothing is known of the address: any place is
+        // right, if slower.
         let first = memory.as_ptr().align_offset(LINE_BYTES).min(SPARE);
         memory.truncate(first + count);
         Self { memory, first }

@@ -5,10 +5,23 @@ use super::settings::TimeStep;
 use super::stiffness::Stiffness;
 use crate::error::{Error, Place};
 
-/// Largest share of the explicit viscous limit that a variable time step may use.
-const EXPLICIT_SHARE: f64 = 0.5;
+/// Largest fraction of the explicit viscous limit that a variable time step may use.
+const EXPLICIT_FRACTION: f64 = 0.5;
 /// Largest growth of the time step from one step to the next.
 const LARGEST_GROWTH: f64 = 1.1;
+
+/// What [`larger`] begins with; values are `[value, axis, place]`.
+const NO_VALUE: [f64; 3] = [0.0, f64::INFINITY, 0.0];
+
+/// The larger of two values `[value, axis, place]`; of equal ones the one that comes first.
+fn larger(best: [f64; 3], next: [f64; 3]) -> [f64; 3] {
+    let is_before = next[0] == best[0] && next[1..] < best[1..];
+    if next[0] > best[0] || is_before {
+        next
+    } else {
+        best
+    }
+}
 
 impl Flow {
     /// How stiff viscosity is along the implicit axes.
@@ -24,7 +37,7 @@ impl Flow {
         }
         let explicit = self.explicit_viscous_rate_per_s();
         if explicit > 0.0 {
-            step_s = step_s.min(EXPLICIT_SHARE / explicit);
+            step_s = step_s.min(EXPLICIT_FRACTION / explicit);
         }
         step_s = step_s.min(self.stiffness().longest_s());
         if self.state.last_step_s > 0.0 {
@@ -40,9 +53,9 @@ impl Flow {
             .sum()
     }
 
-    pub(super) fn refuse_courant(&self, courant: f64, step_s: f64) -> Result<(), Error> {
+    pub(super) fn check_courant(&self, courant: f64, step_s: f64) -> Result<(), Error> {
         let explicit = step_s * self.explicit_viscous_rate_per_s();
-        if courant <= self.settings.scheme.default_courant() && explicit <= EXPLICIT_SHARE {
+        if courant <= self.settings.scheme.default_courant() && explicit <= EXPLICIT_FRACTION {
             return Ok(());
         }
         let stability = self.stability()?;
@@ -61,38 +74,30 @@ impl Flow {
         })
     }
 
-    /// The largest positive value at the places that the ranks own, with memory axis of the component and place in the whole
-    /// field of the first that has it.
+    /// The largest positive value at the places that the ranks own, with the memory axis of the
+    /// component and the place in the whole field of the first that has it.
     pub(super) fn first_largest(
         &self,
-        of: impl Fn(usize, usize) -> f64,
+        value_at: impl Fn(usize, usize) -> f64,
     ) -> Result<(f64, usize, usize), Error> {
         let shape = self.layout.shape;
-        let (own, first) = (shape.own_places(), shape.own().start * shape.plane());
-        let larger = |best: [f64; 3], next: [f64; 3]| {
-            let is_before = next[0] == best[0] && next[1..] < best[1..];
-            if next[0] > best[0] || is_before {
-                next
-            } else {
-                best
+        let own = shape.own_range();
+        // Place in the whole field of the first value that is owned.
+        let first = shape.own().start * shape.plane();
+        let mut own_largest = NO_VALUE;
+        for axis in 0..3 {
+            for place in own.clone() {
+                let whole_place = place - own.start + first;
+                let next = [value_at(axis, place), axis as f64, whole_place as f64];
+                own_largest = larger(own_largest, next);
             }
-        };
-        let none = [0.0, f64::INFINITY, 0.0];
-        let of = |axis: usize, place: usize| {
-            [
-                of(axis, place),
-                axis as f64,
-                (place - own.start + first) as f64,
-            ]
-        };
-        let all = (0..3).flat_map(|axis| own.clone().map(move |place| (axis, place)));
-        let best = all.fold(none, |best, (axis, place)| larger(best, of(axis, place)));
-        let ranks = self.layout.slabs.all_gather(best.to_vec())?;
-        let [value, axis, place] = ranks
-            .as_chunks::<3>()
-            .0
-            .iter()
-            .fold(none, |best, next| larger(best, *next));
+        }
+        let of_ranks = self.layout.slabs.all_gather(own_largest.to_vec())?;
+        let mut largest = NO_VALUE;
+        for next in of_ranks.as_chunks::<3>().0 {
+            largest = larger(largest, *next);
+        }
+        let [value, axis, place] = largest;
         Ok(if value > 0.0 {
             (value, axis as usize, place as usize)
         } else {
@@ -102,11 +107,10 @@ impl Flow {
 
     /// Whether a velocity is not finite, and the first such place.
     pub(super) fn first_not_finite(&self) -> Result<(bool, usize, usize), Error> {
-        let not_finite = |axis: usize, place: usize| {
+        let (found, axis, place) = self.first_largest(|axis, place| {
             f64::from(u8::from(!self.state.velocity[axis][place].is_finite()))
-        };
-        self.first_largest(not_finite)
-            .map(|(found, axis, place)| (found > 0.0, axis, place))
+        })?;
+        Ok((found > 0.0, axis, place))
     }
 
     pub(super) fn diverged(&self, axis: usize, place: usize, field: &'static str) -> Error {

@@ -1,10 +1,11 @@
-//! Convection of one row of a velocity component: what `literal` does point by point, the formulas of which stand there.
+//! Convection of one row of a velocity component: what `literal` does point by point, the formulas
+//! of which are given there.
 //!
 //! Check: the literal form on every kind of mesh.
 
 use multiversion::multiversion;
 
-use super::momentum::{FluxCache, Momentum, SLOTS, Scratch};
+use super::component_operators::{ComponentOperators, FluxCache, SLOTS, Scratch};
 use super::rows::{
     HALO, add_product, add_transport, cut_rows, even_mean, from_places, pad, round, rows_from,
 };
@@ -12,15 +13,22 @@ use super::transport::{MEAN, Transport};
 
 /// The row that is computed: indices `j` and `k` along the axes 1 and 2.
 struct Row<'a> {
-    ops: &'a Momentum,
+    ops: &'a ComponentOperators,
     velocity: [&'a [f64]; 3],
     j: usize,
     k: usize,
 }
 
 impl Scratch {
-    /// Convection of one row into `self.convection`. A scratch belongs to one component of one velocity field.
-    pub(crate) fn convection(&mut self, ops: &Momentum, velocity: [&[f64]; 3], j: usize, k: usize) {
+    /// Convection of one row into `self.convection`. A scratch belongs to one component of one
+    /// velocity field.
+    pub(crate) fn convection(
+        &mut self,
+        ops: &ComponentOperators,
+        velocity: [&[f64]; 3],
+        j: usize,
+        k: usize,
+    ) {
         self.fluxes.fit(ops.shape.n);
         convection_row(
             &Row {
@@ -34,7 +42,8 @@ impl Scratch {
     }
 }
 
-/// Convection of row `(j, k)`, `(u . grad) u_a`, with its sign as on the left of the momentum equation \[m/s^2\].
+/// Convection of row `(j, k)`, `(u . grad) u_a`, with its sign as on the left of the momentum
+/// equation \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn convection_row(
     row: &Row<'_>,
@@ -53,7 +62,7 @@ fn convection_row(
     }
     for axis in 1..3 {
         if !ops.thin[axis] {
-            across_rows(row, axis, out, padded, (&mut flux[0], cache));
+            across_rows(row, axis, out, padded, &mut flux[0], cache);
         }
     }
     match ops.axis {
@@ -85,72 +94,97 @@ fn along_row(
         j,
         k,
     } = target;
-    let n = out.len();
-    let periodic = ops.periodic[0];
-    let start = ops.shape.place([0, j, k]);
+    let own = &velocity[ops.axis][ops.shape.place([0, j, k])..][..out.len()];
     let [values, fluxes] = padded;
-    pad(values, &velocity[ops.axis][start..start + n], periodic);
-    let transport = &ops.transport[0];
+    pad(values, own, ops.periodic[0]);
     if ops.axis == 0 {
-        // Mean fluxes of the cells -2 to n + 1, at which the padded places 2 to n + 5 hold them.
-        for c in 2..n + 6 {
-            fluxes[c] = (MEAN[0] * values[c - 1] + MEAN[1] * values[c])
-                + (MEAN[2] * values[c + 1] + MEAN[3] * values[c + 2]);
-        }
-        let at = |offset: usize| &fluxes[HALO + offset - 3..];
-        let q = |offset: usize| &values[HALO + offset - 3..];
-        let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
-        add_transport(
-            out,
-            1.0,
-            transport.stencil,
-            &[at(1), at(2), at(3), at(4)],
-            &values,
-        );
-        if !periodic {
-            // Columns to which the formula of the interior does not apply are replaced.
-            let values = &velocity[0][start..start + n];
-            for i in irregular(transport, n) {
-                out[i] = transport.rows[i]
-                    .iter()
-                    .map(|&(face, cell, c)| c * values[face] * values[cell])
-                    .sum();
-            }
-        }
+        own_flux_along(ops, own, out, values, fluxes);
     } else {
         flux_row(target, 0, 0, &mut flux[0], fluxes);
-        pad(fluxes, &flux[0], periodic);
-        let at = |offset: usize| &fluxes[HALO + offset - 1..];
-        let q = |offset: usize| &values[HALO + offset - 3..];
-        let line = &mut flux[1];
-        line.fill(0.0);
-        let values = [q(0), q(1), q(2), q(3), q(4), q(5), q(6)];
-        add_transport(
-            line,
-            1.0,
-            transport.stencil,
-            &[at(0), at(1), at(2), at(3)],
-            &values,
-        );
-        let inverse = &ops.inverse_cell_mass[0];
-        for ((out, line), inverse) in out.iter_mut().zip(line.iter()).zip(inverse) {
-            *out += inverse * line;
-        }
-        if !periodic {
-            // The regular formula was added to every column; the others are computed anew.
-            let (done, fresh) = (&flux[1], &flux[0]);
-            let values = &velocity[ops.axis][start..start + n];
-            for i in irregular(transport, n) {
-                let sum: f64 = transport.rows[i]
-                    .iter()
-                    .map(|&(face, cell, c)| c * fresh[face] * values[cell])
-                    .sum();
-                out[i] += inverse[i] * (sum - done[i]);
-            }
+        weighted_flux_along(ops, own, out, values, fluxes, flux);
+    }
+}
+
+/// Convection along axis 0 of the velocity along that axis by itself.
+#[inline(always)]
+fn own_flux_along(
+    ops: &ComponentOperators,
+    own: &[f64],
+    out: &mut [f64],
+    values: &[f64],
+    fluxes: &mut [f64],
+) {
+    let n = out.len();
+    let transport = &ops.transport[0];
+    // Mean fluxes of the cells -2 to n + 1, at which the padded places 2 to n + 5 hold them.
+    for c in 2..n + 6 {
+        fluxes[c] = (MEAN[0] * values[c - 1] + MEAN[1] * values[c])
+            + (MEAN[2] * values[c + 1] + MEAN[3] * values[c + 2]);
+    }
+    let flux = from_places!(fluxes, HALO - 2, HALO - 1, HALO, HALO + 1);
+    add_transport(out, 1.0, transport.stencil, &flux, &stencil_values(values));
+    if !ops.periodic[0] {
+        // Columns to which the formula of the interior does not apply are replaced.
+        for i in irregular(transport, n) {
+            out[i] = transport.rows[i]
+                .iter()
+                .map(|&(face, cell, c)| c * own[face] * own[cell])
+                .sum();
         }
     }
 }
 
+/// Convection along axis 0 of another component by the weighted fluxes, the first row of `flux`;
+/// the second is a work row.
+#[inline(always)]
+fn weighted_flux_along(
+    ops: &ComponentOperators,
+    own: &[f64],
+    out: &mut [f64],
+    values: &[f64],
+    fluxes: &mut [f64],
+    flux: &mut [Vec<f64>; 2],
+) {
+    let n = out.len();
+    let transport = &ops.transport[0];
+    let [at_faces, line] = flux;
+    pad(fluxes, at_faces, ops.periodic[0]);
+    line.fill(0.0);
+    let padded_flux = from_places!(fluxes, HALO - 1, HALO, HALO + 1, HALO + 2);
+    let values = stencil_values(values);
+    add_transport(line, 1.0, transport.stencil, &padded_flux, &values);
+    let inverse = &ops.inverse_cell_mass[0];
+    for ((out, line), inverse) in out.iter_mut().zip(line.iter()).zip(inverse) {
+        *out += inverse * line;
+    }
+    if !ops.periodic[0] {
+        // The regular formula was added to every column; the others are computed anew.
+        for i in irregular(transport, n) {
+            let sum: f64 = transport.rows[i]
+                .iter()
+                .map(|&(face, cell, c)| c * at_faces[face] * own[cell])
+                .sum();
+            out[i] += inverse[i] * (sum - line[i]);
+        }
+    }
+}
+
+/// The values at -3 to 3 of a padded row.
+#[inline(always)]
+fn stencil_values(padded: &[f64]) -> [&[f64]; 7] {
+    from_places!(
+        padded,
+        HALO - 3,
+        HALO - 2,
+        HALO - 1,
+        HALO,
+        HALO + 1,
+        HALO + 2,
+        HALO + 3
+    )
+}
+
+/// Columns to which the formula of the interior does not apply.
 fn irregular(transport: &Transport, n: usize) -> impl Iterator<Item = usize> + use<> {
     let regular = transport.regular.clone();
     (0..n).filter(move |i| !regular.contains(i))
@@ -163,7 +197,8 @@ fn across_rows(
     axis: usize,
     out: &mut [f64],
     padded: &mut [Vec<f64>; 2],
-    (fresh, cache): (&mut [f64], &mut FluxCache),
+    fresh_flux: &mut [f64],
+    cache: &mut FluxCache,
 ) {
     let &Row {
         ops,
@@ -173,55 +208,77 @@ fn across_rows(
     } = target;
     let length = out.len();
     let index = if axis == 1 { j } else { k };
-    let count = ops.shape.n[axis];
     let transport = &ops.transport[axis];
     let scale = if axis == ops.axis {
         1.0
     } else {
         ops.inverse_cell_mass[axis][index]
     };
+    if ops.periodic[axis] || transport.regular.contains(&index) {
+        across_regular_rows(target, axis, index, scale, out, &mut padded[0], cache);
+        return;
+    }
     let values = velocity[ops.axis];
     let rows = ops.shape.row_offsets(axis, [j, k]);
-    if ops.periodic[axis] || transport.regular.contains(&index) {
-        // The row itself is the fourth; a regular row of a bounded direction never wraps.
-        let first = index + count - 3;
-        let q = rows_from::<7>(values, length, rows, first, count);
-        let (values, offsets) = (&mut cache.values[axis - 1], &mut cache.offsets[axis - 1]);
-        // The flux at offset 2 to 5 from the row has the same place for all four rows on which it acts.
-        let (across, j_of) = if axis == 1 {
-            (1, 0)
+    for &(face, cell, c) in &transport.rows[index] {
+        let value = &values[rows.start(cell)..][..length];
+        if axis == ops.axis {
+            let flux = &values[rows.start(face)..][..length];
+            add_product(out, scale * c, flux, value);
         } else {
-            (ops.shape.n[1], j)
-        };
-        let mut places = [0; SLOTS];
-        for slot in 0..SLOTS {
-            let place = (first + slot + 2) % SLOTS * across + j_of;
-            let face = round(first + slot + 2, count);
-            let start = rows.of(face);
-            places[slot] = place * length;
-            if offsets[place] != start {
-                offsets[place] = start;
-                let flux = &mut values[place * length..][..length];
-                if axis == ops.axis {
-                    mean_row(flux, [q[slot], q[slot + 1], q[slot + 2], q[slot + 3]]);
-                } else {
-                    flux_row(target, axis, face, flux, &mut padded[0]);
-                }
-            }
+            flux_row(target, axis, face, fresh_flux, &mut padded[0]);
+            add_product(out, scale * c, fresh_flux, value);
         }
-        let flux = from_places!(values, places[0], places[1], places[2], places[3]);
-        add_transport(out, scale, transport.stencil, &flux, &q);
-    } else {
-        for &(face, cell, c) in &transport.rows[index] {
-            let value = &values[rows.of(cell)..][..length];
+    }
+}
+
+/// Convection along axis 1 or 2 by the formula of the interior; fluxes that other rows have
+/// computed come from the cache.
+#[inline(always)]
+fn across_regular_rows(
+    target: &Row<'_>,
+    axis: usize,
+    index: usize,
+    scale: f64,
+    out: &mut [f64],
+    padded: &mut [f64],
+    cache: &mut FluxCache,
+) {
+    let &Row {
+        ops,
+        ref velocity,
+        j,
+        k,
+    } = target;
+    let length = out.len();
+    let count = ops.shape.n[axis];
+    let rows = ops.shape.row_offsets(axis, [j, k]);
+    // The row itself is the fourth; a regular row of a bounded direction never wraps.
+    let first = index + count - 3;
+    let q = rows_from::<7>(velocity[ops.axis], length, rows, first, count);
+    let values = &mut cache.values[axis - 1];
+    let offsets = &mut cache.offsets[axis - 1];
+    // The flux at offset 2 to 5 from the row has the same place for all four rows on which it acts.
+    let places_per_slot = if axis == 1 { 1 } else { ops.shape.n[1] };
+    let place_in_slot = if axis == 1 { 0 } else { j };
+    let mut places = [0; SLOTS];
+    for slot in 0..SLOTS {
+        let place = (first + slot + 2) % SLOTS * places_per_slot + place_in_slot;
+        let face = round(first + slot + 2, count);
+        let start = rows.start(face);
+        places[slot] = place * length;
+        if offsets[place] != start {
+            offsets[place] = start;
+            let flux = &mut values[place * length..][..length];
             if axis == ops.axis {
-                add_product(out, scale * c, &values[rows.of(face)..][..length], value);
+                mean_row(flux, [q[slot], q[slot + 1], q[slot + 2], q[slot + 3]]);
             } else {
-                flux_row(target, axis, face, fresh, &mut padded[0]);
-                add_product(out, scale * c, fresh, value);
+                flux_row(target, axis, face, flux, padded);
             }
         }
     }
+    let flux = from_places!(values, places[0], places[1], places[2], places[3]);
+    add_transport(out, scale, ops.transport[axis].stencil, &flux, &q);
 }
 
 /// Mean flux of a cell from the fluxes at the four faces about it.
@@ -234,7 +291,8 @@ fn mean_row(out: &mut [f64], rows: [&[f64]; 4]) {
     }
 }
 
-/// The flux along `along` through its face `face`, weighted along the component's axis and brought to its faces.
+/// The flux along `along` through its face `face`, weighted along the component's axis and brought
+/// to its faces.
 #[inline(always)]
 fn flux_row(target: &Row<'_>, along: usize, face: usize, out: &mut [f64], padded: &mut [f64]) {
     let &Row {

@@ -1,9 +1,11 @@
 //! Fields of a flow as plain arrays in the order `[z][y][x]`, whatever their order in memory.
 //!
-//! Of a flow on several ranks all must ask together. All get the whole field, which each must have room for, and whose values
-//! are not finite where a rank is lost, which the next step says; or each gets its own planes across z.
+//! Of a flow on several ranks all must ask together. All get the whole field, which each must have
+//! room for, and whose values are not finite where a rank is lost, which the next step says; or
+//! each gets its own planes across z.
 //!
-//! Check: round trip, interpolation exact for cubics, values against the closed form they were set from.
+//! Check: round trip, interpolation exact for cubics, values against the closed form they were set
+//! from.
 
 use std::ops::Range;
 
@@ -47,7 +49,8 @@ impl Flow {
         self.state.energy
     }
 
-    /// Largest divergence over the largest `sum |u_i|/h_i`: what the flow fails to conserve of its own volume.
+    /// Largest divergence over the largest `sum |u_i|/h_i`: what the flow fails to conserve of its
+    /// own volume.
     pub fn relative_divergence(&self) -> f64 {
         self.measure_divergence().unwrap_or(f64::NAN)
     }
@@ -65,23 +68,24 @@ impl Flow {
         })
     }
 
-    /// The planes across z that this rank has to show, which the readers that begin with `own` give: all of them in one process.
+    /// The planes across z that this rank has to show, which the readers that begin with `own`
+    /// give: all of them in one process.
     pub fn own_planes(&self) -> Range<usize> {
-        self.shown().own()
+        self.output_shape().own()
     }
 
-    /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells of [`Self::own_planes`] \[m/s\],
-    /// `[z][y][x]`.
+    /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells of
+    /// [`Self::own_planes`] \[m/s\], `[z][y][x]`.
     ///
     /// # Errors
     /// [`Error::RankLost`].
     pub fn own_face_velocity_m_s(&self, direction: usize) -> Result<Vec<f64>, Error> {
         self.face(direction)
-            .map(|faces| without_halos(self.shown(), faces))
+            .map(|faces| without_halos(self.output_shape(), faces))
     }
 
-    /// Velocity along `direction` at the centres of the cells of [`Self::own_planes`], interpolated with fourth order \[m/s\],
-    /// `[z][y][x]`.
+    /// Velocity along `direction` at the centres of the cells of [`Self::own_planes`], interpolated
+    /// with fourth order \[m/s\], `[z][y][x]`.
     ///
     /// # Errors
     /// [`Error::RankLost`].
@@ -90,13 +94,14 @@ impl Flow {
             .map(|faces| self.centred(direction, &faces))
     }
 
-    /// Kinematic pressure at the centres of the cells of [`Self::own_planes`] \[m^2/s^2\], `[z][y][x]`, up to a constant.
+    /// Kinematic pressure at the centres of the cells of [`Self::own_planes`] \[m^2/s^2\],
+    /// `[z][y][x]`, up to a constant.
     ///
     /// # Errors
     /// [`Error::RankLost`].
     pub fn own_pressure_m2_s2(&self) -> Result<Vec<f64>, Error> {
         self.in_planes(&self.state.pressure)
-            .map(|pressure| without_halos(self.shown(), pressure))
+            .map(|pressure| without_halos(self.output_shape(), pressure))
     }
 
     /// From the planes of all ranks to the whole field.
@@ -105,58 +110,50 @@ impl Flow {
         whole.unwrap_or_else(|_| vec![f64::NAN; Shape::whole(self.layout.shape.n).len()])
     }
 
-    /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells \[m/s\], `[z][y][x]`.
+    /// Velocity along `direction` (0, 1, 2 for x, y, z) at the low faces of the cells \[m/s\],
+    /// `[z][y][x]`.
     pub fn face_velocity_m_s(&self, direction: usize) -> Vec<f64> {
         self.whole(self.own_face_velocity_m_s(direction))
     }
 
-    /// Largest difference of a component, at the faces where it lies, from `exact(position_m, time_s) -> velocity_m_s` at the present time
-    /// \[m/s\]; not finite where a rank is lost.
+    /// Largest difference of a component, at the faces where it lies, from
+    /// `exact(position_m, time_s) -> velocity_m_s` at the present time \[m/s\]; not finite where a
+    /// rank is lost.
     pub fn largest_error_m_s(&self, exact: impl Fn([f64; 3], f64) -> [f64; 3]) -> f64 {
         let at_m = [0, 1, 2].map(|axis| self.face_position_m(axis));
-        let error = |axis: usize, place: usize| {
-            let velocity_m_s = exact(
-                at_m[axis](self.layout.shape.index_held(place)),
-                self.state.time_s,
-            );
+        let largest = self.first_largest(|axis, place| {
+            let position_m = at_m[axis](self.layout.shape.index_held(place));
+            let velocity_m_s = exact(position_m, self.state.time_s);
             (self.state.velocity[axis][place] - velocity_m_s[self.layout.direction[axis]]).abs()
-        };
-        self.first_largest(error)
-            .map_or(f64::NAN, |(largest, ..)| largest)
+        });
+        largest.map_or(f64::NAN, |(largest_m_s, ..)| largest_m_s)
     }
 
-    /// From the faces of the planes that are shown to the centres of those that are owned.
+    /// From the faces of the planes of the output to the centres of those that are owned.
     pub(crate) fn centred(&self, direction: usize, faces: &[f64]) -> Vec<f64> {
-        let shown = self.shown();
-        let (nx, n) = (shown.n[0], shown.n[direction]);
+        let output = self.output_shape();
+        let nx = output.n[0];
+        let n = output.n[direction];
         let is_periodic = self.mesh.directions()[direction].ends == Ends::Periodic;
-        let mut centred = vec![0.0; shown.own_places().len()];
+        let mut centred = vec![0.0; output.own_range().len()];
         centred
-            .par_chunks_mut(shown.plane())
-            .zip(shown.own())
+            .par_chunks_mut(output.plane())
+            .zip(output.own())
             .for_each(|(plane, k)| {
                 for (place, value) in plane.iter_mut().enumerate() {
-                    let mut at = [place % nx, place / nx, k];
-                    let index = at[direction];
-                    // A bounded direction does not store its high wall, where the normal velocity is zero.
-                    let mut face = |i: usize| {
-                        at[direction] = i;
-                        if i < n { faces[shown.place(at)] } else { 0.0 }
-                    };
-                    *value = if n == 1 {
-                        // One cell: nothing varies, or nothing flows through it.
-                        face(0)
-                    } else if is_periodic {
-                        (0..4)
-                            .map(|t| MEAN[t] * face((index + n + t - 1) % n))
-                            .sum()
-                    } else if index == 0 {
-                        (0..4).map(|t| AT_WALL[t] * face(t)).sum()
-                    } else if index + 1 == n {
-                        (0..4).map(|t| AT_WALL[t] * face(n - t)).sum()
-                    } else {
-                        (0..4).map(|t| MEAN[t] * face(index + t - 1)).sum()
-                    };
+                    let cell = [place % nx, place / nx, k];
+                    if n == 1 {
+                        // Nothing varies, or nothing flows through the one cell.
+                        *value = face_value(faces, output, cell, direction, 0);
+                        continue;
+                    }
+                    let (faces_read, weights) = centre_stencil(n, cell[direction], is_periodic);
+                    let terms = faces_read.iter().zip(weights);
+                    *value = terms
+                        .map(|(&face, weight)| {
+                            weight * face_value(faces, output, cell, direction, face)
+                        })
+                        .sum();
                 }
             });
         centred
@@ -175,11 +172,12 @@ impl Flow {
         self,
         velocity_m_s: &[Vec<f64>; 3],
     ) -> Result<(Self, StartReport), Error> {
-        let ([nx, ny, nz], direction) = (self.mesh.cells(), self.layout.direction);
+        let [nx, ny, nz] = self.mesh.cells();
+        let direction = self.layout.direction;
         for values in velocity_m_s {
             check_lengths(nx * ny * nz, values.len())?;
         }
-        self.started(|axis, index| {
+        self.with_face_velocity(|axis, index| {
             let mut at = [0; 3];
             (0..3).for_each(|b| at[direction[b]] = index[b]);
             velocity_m_s[direction[axis]][(at[2] * ny + at[1]) * nx + at[0]]
@@ -187,15 +185,45 @@ impl Flow {
     }
 }
 
+/// Faces and weights of the interpolation to the centre `index` of `n` cells along a direction.
+fn centre_stencil(n: usize, index: usize, is_periodic: bool) -> ([usize; 4], [f64; 4]) {
+    if is_periodic {
+        ([0, 1, 2, 3].map(|t| (index + n + t - 1) % n), MEAN)
+    } else if index == 0 {
+        ([0, 1, 2, 3], AT_WALL)
+    } else if index + 1 == n {
+        ([n, n - 1, n - 2, n - 3], AT_WALL)
+    } else {
+        ([index - 1, index, index + 1, index + 2], MEAN)
+    }
+}
+
+/// Velocity at a face of the line along `direction` through a cell. A bounded direction does not
+/// store its high wall, where the normal velocity is zero.
+fn face_value(
+    faces: &[f64],
+    output: Shape,
+    cell: [usize; 3],
+    direction: usize,
+    face: usize,
+) -> f64 {
+    if face >= output.n[direction] {
+        return 0.0;
+    }
+    let mut at = cell;
+    at[direction] = face;
+    faces[output.place(at)]
+}
+
 #[cfg(test)]
 impl Flow {
-    /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step started from; `None` without a
-    /// subgrid model.
+    /// Eddy viscosity at the centres \[m^2/s\], `[z][y][x]`, of the field that the last step
+    /// started from; `None` without a subgrid model.
     pub(crate) fn subgrid_viscosity_m2_s(&self) -> Option<Vec<f64>> {
         let model = self.model.as_ref()?;
         let own = self
             .in_planes(&model.viscosity_m2_s)
-            .map(|planes| without_halos(self.shown(), planes));
+            .map(|planes| without_halos(self.output_shape(), planes));
         Some(self.whole(own))
     }
 }

@@ -1,22 +1,25 @@
 //! The simulation: state, time step, what a step reports.
 //!
 //! One stage of a step is (22)-(24) in delta form,
-//! `(1 - nu dt/2 L)(u* - u) = dt [c N + c' N' - grad p + nu L u]`, `div grad phi = div u*/dt`, `u = u* - dt grad phi`, `p += phi`,
-//! with `N` the convection, the subgrid stress, the force and the explicit viscosity, and `N'` those of the stage before, the
-//! only history that is kept. The boundary values of `u*` are those of the walls; the slip that `grad phi` leaves is of second
+//! `(1 - nu dt/2 L)(u* - u) = dt [c N + c' N' - grad p + nu L u]`, `div grad phi = div u*/dt`,
+//! `u = u* - dt grad phi`, `p += phi`, with `N` the convection, the subgrid stress, the force and
+//! the explicit viscosity, and `N'` those of the stage before, the only history that is kept. The
+//! boundary values of `u*` are those of the walls; the slip that `grad phi` leaves is of second
 //! order in the time step and is not reset, which would bring divergence back.
 //!
-//! Check: energy and momentum without viscosity, orders in space and time, exact solutions, bits against threads and restart.
+//! Check: energy and momentum without viscosity, orders in space and time, exact solutions, bits
+//! against threads and restart.
 
 use rayon::prelude::*;
 
 mod project;
 
+use super::component_operators::{ComponentOperators, Scratch, add_laplacian_row};
 use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
-use super::momentum::{Momentum, Scratch, add_laplacian_row};
-use super::pressure::{PressureSolver, Solved, unless_stalled};
+use super::momentum_rhs::{PredictedField, Prediction};
+use super::pressure::{PressureSolver, Solved, accept_round_off};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{Powers, StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
@@ -32,7 +35,7 @@ pub struct Flow {
     pub(super) mesh: Mesh,
     pub(super) settings: FlowSettings,
     pub(crate) layout: Layout,
-    pub(super) ops: [Momentum; 3],
+    pub(super) ops: [ComponentOperators; 3],
     pub(super) divergence: Divergence,
     pressure_solver: PressureSolver,
     pub(super) model: Option<Subgrid>,
@@ -62,40 +65,41 @@ pub(crate) struct State {
 }
 
 impl Flow {
-    /// A simulation on `mesh` that starts from `initial(position_m) -> velocity_m_s`. The field is evaluated at the
-    /// faces, projected onto divergence-free fields, and the pressure that belongs to it is computed.
+    /// A simulation on `mesh` that starts from `initial(position_m) -> velocity_m_s`. The field is
+    /// evaluated at the faces, projected onto divergence-free fields, and the pressure that belongs
+    /// to it is computed.
     ///
     /// # Errors
-    /// Settings out of range, a mesh that the pressure solver cannot take, an initial field that is not finite.
+    /// Settings out of range, a mesh that the pressure solver cannot take, an initial field that is
+    /// not finite.
     pub fn new(
         mesh: Mesh,
         settings: FlowSettings,
         initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
     ) -> Result<(Self, StartReport), Error> {
-        Self::at_rest(mesh, settings)?.filled(initial)
+        Self::at_rest(mesh, settings)?.with_field(initial)
     }
 
-    /// Starts from `initial`.
-    pub(super) fn filled(
+    /// Starts from `initial(position_m) -> velocity_m_s`.
+    pub(super) fn with_field(
         self,
         initial: impl Fn([f64; 3]) -> [f64; 3] + Sync,
     ) -> Result<(Self, StartReport), Error> {
-        let (direction, at_m) = (
-            self.layout.direction,
-            [0, 1, 2].map(|axis| self.face_position_m(axis)),
-        );
-        self.started(|axis, index| initial(at_m[axis](index))[direction[axis]])
+        let direction = self.layout.direction;
+        let at_m = [0, 1, 2].map(|axis| self.face_position_m(axis));
+        self.with_face_velocity(|axis, index| initial(at_m[axis](index))[direction[axis]])
     }
 
-    /// Starts from the velocity along each memory axis at the indices of its faces; nothing flows through walls.
-    pub(super) fn started(
+    /// Starts from the velocity along each memory axis at the indices of its faces; nothing flows
+    /// through walls.
+    pub(super) fn with_face_velocity(
         mut self,
         velocity_m_s: impl Fn(usize, [usize; 3]) -> f64 + Sync,
     ) -> Result<(Self, StartReport), Error> {
         let shape = self.layout.shape;
         for axis in 0..3 {
             let first = self.layout.line[axis].first_face();
-            let own = &mut self.state.velocity[axis][shape.own_places()];
+            let own = &mut self.state.velocity[axis][shape.own_range()];
             own.par_chunks_mut(shape.plane())
                 .zip(shape.own())
                 .for_each(|(plane, k)| {
@@ -136,11 +140,11 @@ impl Flow {
     /// All arrays zero; nothing projected yet.
     pub(crate) fn at_rest(mesh: Mesh, settings: FlowSettings) -> Result<Self, Error> {
         let layout = Layout::new(&mesh).shared(settings.ranks.clone())?;
-        Self::laid_out(mesh, settings, layout)
+        Self::with_layout(mesh, settings, layout)
     }
 
-    /// The same with the memory axes of a layout.
-    pub(super) fn laid_out(
+    /// All arrays zero, with the memory axes of a layout; nothing projected yet.
+    pub(super) fn with_layout(
         mesh: Mesh,
         settings: FlowSettings,
         layout: Layout,
@@ -148,12 +152,11 @@ impl Flow {
         settings.check()?;
         refuse_sticking_without_viscosity(&mesh, settings.viscosity_m2_s)?;
         let n = layout.shape.len();
-        let field = || Aligned::zeros(n);
-        let fields = || [field(), field(), field()];
+        let viscous_per_s = viscous_rates_per_s(&mesh, settings.viscosity_m2_s);
         let state = State {
-            velocity: fields(),
-            previous_terms: fields(),
-            pressure: field(),
+            velocity: zero_fields(n),
+            previous_terms: zero_fields(n),
+            pressure: Aligned::zeros(n),
             time_s: 0.0,
             step: 0,
             last_step_s: 0.0,
@@ -162,16 +165,14 @@ impl Flow {
             implicit: [false; 3],
         };
         Ok(Self {
-            ops: std::array::from_fn(|axis| Momentum::new(&layout, axis)),
+            ops: std::array::from_fn(|axis| ComponentOperators::new(&layout, axis)),
             divergence: Divergence::new(&layout),
             pressure_solver: PressureSolver::new(&layout, settings.pressure),
             model: Subgrid::new(&layout, settings.subgrid)?,
             line_solvers: LineSolvers::default(),
-            viscous_per_s: layout
-                .direction
-                .map(|d| viscous_rates_per_s(&mesh, settings.viscosity_m2_s)[d]),
-            predicted: fields(),
-            phi: field(),
+            viscous_per_s: layout.direction.map(|d| viscous_per_s[d]),
+            predicted: zero_fields(n),
+            phi: Aligned::zeros(n),
             mesh,
             settings,
             layout,
@@ -179,8 +180,8 @@ impl Flow {
         })
     }
 
-    /// Projects the initial field, decides which directions are implicit, finds the pressure that keeps the field's acceleration free of
-    /// divergence.
+    /// Projects the initial field, decides which directions are implicit, finds the pressure that
+    /// keeps the field's acceleration free of divergence.
     pub(crate) fn start(&mut self) -> Result<StartReport, Error> {
         if let (true, axis, place) = self.first_not_finite()? {
             return Err(self.diverged(axis, place, "initial velocity"));
@@ -188,30 +189,29 @@ impl Flow {
         let [given] = self.layout.slabs.sums(self.kinetic_energy())?;
         std::mem::swap(&mut self.state.velocity, &mut self.predicted);
         self.project(1.0)?;
-        self.repeat(1.0, 0.0)?;
+        self.reproject(1.0, 0.0)?;
         let implicit = implicit_axes(&self.mesh, &self.settings, self.state.courant_per_s);
         self.state.implicit = self.layout.direction.map(|d| implicit[d]);
-        // The pressure of the initial field belongs to the whole stress: there is no step yet that could be too long. The terms are no history.
+        // The pressure of the initial field belongs to the whole stress: there is no step yet that
+        // could be too long. The terms are no history.
         self.update_model(1.0, 0.0)?;
-        self.predict(
-            Stage {
+        self.predict(Prediction {
+            stage: Stage {
                 fraction: 1.0,
                 new: 1.0,
                 old: 0.0,
             },
-            1.0,
-            false,
-            false,
-        )?;
-        self.state
-            .previous_terms
-            .iter_mut()
-            .for_each(|terms| terms.fill(0.0));
-        self.take_divergence(1.0)?;
-        unless_stalled(
-            self.pressure_solver
-                .solve(&mut self.phi, self.settings.pressure_tolerance),
-        )?;
+            stage_s: 1.0,
+            field: PredictedField::Increment,
+            measures_powers: false,
+        })?;
+        for terms in &mut self.state.previous_terms {
+            terms.fill(0.0);
+        }
+        self.set_poisson_source(1.0)?;
+        let tolerance = self.settings.pressure_tolerance;
+        let solved = self.pressure_solver.solve(&mut self.phi, tolerance);
+        accept_round_off(solved)?;
         self.state.pressure.copy_from_slice(&self.phi);
         Ok(StartReport {
             given_energy_m5_s2: given,
@@ -222,8 +222,9 @@ impl Flow {
     /// Makes one time step of the length that the settings give.
     ///
     /// # Errors
-    /// [`Error::Diverged`] and [`Error::CourantTooLarge`] name the step, the component and the place; the pressure solver
-    /// may fail to converge. The state is then that of a failed step: go back to a checkpoint.
+    /// [`Error::Diverged`] and [`Error::CourantTooLarge`] name the step, the component and the
+    /// place; the pressure solver may fail to converge. The state is then that of a failed step: go
+    /// back to a checkpoint.
     pub fn step(&mut self) -> Result<StepReport, Error> {
         let step_s = self.next_step_s();
         self.step_by(step_s)
@@ -240,16 +241,21 @@ impl Flow {
         Ok(())
     }
 
-    /// Makes one time step, shortened if it would pass `end_s`; steps are evened out so that no sliver is left.
+    /// Makes one time step, shortened if it would pass `end_s`; steps are evened out so that no
+    /// sliver is left.
     ///
     /// # Errors
     /// As [`Self::step`].
     pub fn step_towards(&mut self, end_s: f64) -> Result<StepReport, Error> {
-        let left_s = end_s - self.state.time_s;
-        let step_s = self.next_step_s();
-        let steps = (left_s / step_s - 1e-6).ceil().max(1.0);
+        let remaining_s = end_s - self.state.time_s;
+        let full_step_s = self.next_step_s();
+        let steps = (remaining_s / full_step_s - 1e-6).ceil().max(1.0);
         // Far from the end the full step is taken.
-        let step_s = if steps > 8.0 { step_s } else { left_s / steps };
+        let step_s = if steps > 8.0 {
+            full_step_s
+        } else {
+            remaining_s / steps
+        };
         let mut report = self.step_by(step_s)?;
         if steps == 1.0 {
             self.state.time_s = end_s;
@@ -260,9 +266,9 @@ impl Flow {
 
     fn step_by(&mut self, step_s: f64) -> Result<StepReport, Error> {
         let courant = step_s * self.state.courant_per_s;
-        self.refuse_courant(courant, step_s)?;
-        let ([viscous_power_m5_s3, subgrid_power_m5_s3, force_power_m5_s3], solved) =
-            self.advance(step_s)?;
+        self.check_courant(courant, step_s)?;
+        let (powers, solved) = self.advance(step_s)?;
+        let [viscous_power_m5_s3, subgrid_power_m5_s3, force_power_m5_s3] = powers;
         self.state.step += 1;
         self.state.time_s += step_s;
         self.state.last_step_s = step_s;
@@ -292,35 +298,53 @@ impl Flow {
         })
     }
 
-    /// The stages of a step: each predicts the velocity, solves for implicit viscosity, projects, and adds the pressure. Returns the
-    /// powers of the field that it began with, and the last solution of the pressure.
+    /// The stages of a step: each predicts the velocity, solves for implicit viscosity, projects,
+    /// and adds the pressure. Returns the powers of the field that the step started from, and the
+    /// last solution of the pressure.
     fn advance(&mut self, step_s: f64) -> Result<(Powers, Option<Solved>), Error> {
-        let ratio = (self.state.last_step_s > 0.0).then(|| step_s / self.state.last_step_s);
+        let has_history = self.state.last_step_s > 0.0;
+        let ratio = has_history.then(|| step_s / self.state.last_step_s);
         let is_damped = self.state.step < self.settings.damped_steps;
-        let keeps = is_damped || self.state.implicit == [false; 3];
-        // Adams-Bashforth begins with a step of Runge-Kutta and then wants the terms of the initial field.
-        let begins = self.settings.scheme == TimeScheme::AdamsBashforth2 && ratio.is_none();
-        let (mut begun, mut solved) = (None, None);
-        for stage in self.settings.scheme.stages(ratio) {
+        let field = if is_damped || self.state.implicit == [false; 3] {
+            PredictedField::Velocity
+        } else {
+            PredictedField::Increment
+        };
+        // The first step of Adams-Bashforth is one of Runge-Kutta, after which the history is the
+        // terms of the initial field.
+        let takes_first_terms = self.settings.scheme == TimeScheme::AdamsBashforth2 && !has_history;
+        let mut powers = Powers::default();
+        let mut first_terms = None;
+        let mut solved = None;
+        for (number, stage) in self.settings.scheme.stages(ratio).into_iter().enumerate() {
+            let is_first = number == 0;
             let stage_s = stage.fraction * step_s;
             self.update_model(stage.fraction, stage_s)?;
-            let powers = self.predict(stage, stage_s, keeps, begun.is_none())?;
-            begun
-                .get_or_insert_with(|| (powers, begins.then(|| self.state.previous_terms.clone())));
+            let stage_powers = self.predict(Prediction {
+                stage,
+                stage_s,
+                field,
+                measures_powers: is_first,
+            })?;
+            if is_first {
+                powers = stage_powers;
+                first_terms = takes_first_terms.then(|| self.state.previous_terms.clone());
+            }
             self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
             solved = Some(self.project(stage_s)?);
             // (25).
             add(&mut self.state.pressure, &self.phi, self.layout.shape);
         }
-        let (powers, first_terms) = begun.unwrap_or_default();
-        self.state.previous_terms =
-            first_terms.unwrap_or_else(|| std::mem::take(&mut self.state.previous_terms));
+        if let Some(first_terms) = first_terms {
+            self.state.previous_terms = first_terms;
+        }
         Ok((powers, solved))
     }
 
-    /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the increments by Crank-Nicolson and adds the
-    /// velocity, or by backward Euler along one axis after the other. The factored increments of backward Euler would leave waves
-    /// that are stiff along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
+    /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the
+    /// increments by Crank-Nicolson and adds the velocity, or by backward Euler along one axis
+    /// after the other. The factored increments of backward Euler would leave waves that are stiff
+    /// along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
     /// `1/((1 + d1) (1 + d2))`.
     fn solve_viscous(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
         let Self {
@@ -335,15 +359,16 @@ impl Flow {
             return Ok(());
         }
         let a_m2 = if is_damped { nu_s_m2 } else { 0.5 * nu_s_m2 };
-        let own = layout.shape.own_places();
-        for solver in self.line_solvers.of(ops, state.implicit, a_m2) {
+        let own = layout.shape.own_range();
+        for solver in self.line_solvers.for_stage(ops, state.implicit, a_m2) {
             let predicted = &mut predicted[solver.component];
             if is_damped {
                 layout.slabs.halos(&mut [predicted], WHOLE)?;
                 viscous_increment(
                     layout,
                     &ops[solver.component],
-                    (solver.axis, a_m2),
+                    solver.axis,
+                    a_m2,
                     predicted,
                     phi,
                 );
@@ -368,30 +393,43 @@ impl Flow {
     /// Kinetic energy of each plane that is owned.
     fn kinetic_energy(&self) -> Vec<[f64; 1]> {
         let shape = self.layout.shape;
-        let of_row = |component: usize, j: usize, k: usize| {
-            let row = &self.state.velocity[component][shape.row(j, k)];
-            let (across, along) = self.ops[component].row_mass(j, k);
-            0.5 * across * weighted_dot(row, row, along)
-        };
-        let of_plane = |k| {
-            [(0..3)
-                .map(|a| (0..shape.n[1]).map(|j| of_row(a, j, k)).sum::<f64>())
-                .sum::<f64>()]
-        };
-        shape.own().map(of_plane).collect()
+        let mut planes = Vec::with_capacity(shape.own().len());
+        for k in shape.own() {
+            let mut energy = 0.0;
+            for component in 0..3 {
+                let rows = 0..shape.n[1];
+                energy += rows.map(|j| self.row_energy(component, j, k)).sum::<f64>();
+            }
+            planes.push([energy]);
+        }
+        planes
     }
+
+    /// Kinetic energy of one row of a component.
+    fn row_energy(&self, component: usize, j: usize, k: usize) -> f64 {
+        let row = &self.state.velocity[component][self.layout.shape.row(j, k)];
+        let (across, along) = self.ops[component].row_mass(j, k);
+        0.5 * across * weighted_dot(row, row, along)
+    }
+}
+
+/// Three fields of zeros.
+fn zero_fields(length: usize) -> [Aligned; 3] {
+    std::array::from_fn(|_| Aligned::zeros(length))
 }
 
 /// `a L field` along one axis for one component into `out`; zero on walls.
 fn viscous_increment(
     layout: &Layout,
-    ops: &Momentum,
-    (axis, a_m2): (usize, f64),
+    ops: &ComponentOperators,
+    axis: usize,
+    a_m2: f64,
     field: &[f64],
     out: &mut [f64],
 ) {
-    let (shape, n) = (layout.shape, layout.shape.n[0]);
-    let planes = out[shape.own_places()]
+    let shape = layout.shape;
+    let n = shape.n[0];
+    let planes = out[shape.own_range()]
         .par_chunks_mut(shape.plane())
         .zip(shape.own());
     planes.for_each_init(

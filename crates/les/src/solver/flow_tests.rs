@@ -19,7 +19,8 @@ fn rough(at_m: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-/// Convection of every component of the present field, and what it makes of energy and momentum over sums of moduli.
+/// Convection of every component of the present field, and what it makes of energy and momentum
+/// over sums of moduli.
 fn production(flow: &Flow) -> (f64, [f64; 3]) {
     let shape = flow.layout.shape;
     let velocity = flow.state.velocity.each_ref().map(|field| &field[..]);
@@ -90,7 +91,7 @@ fn convection_makes_no_energy_and_no_momentum_on_stretched_meshes_with_and_witho
         let (energy, momentum) = production(&flow);
         assert!(energy.abs() < 1e-14, "energy {energy}");
         for axis in 0..3 {
-            // Momentum along a direction between walls is not conserved: the walls push.
+            // ComponentOperators along a direction between walls is not conserved: the walls push.
             if periodic[flow.layout.direction[axis]] {
                 assert!(momentum[axis].abs() < 1e-14, "momentum {momentum:?}");
             }

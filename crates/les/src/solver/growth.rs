@@ -1,13 +1,17 @@
 //! Waves of the mesh that a time scheme lets grow, and where a flow's shortest waves are strongest.
 //!
-//! A wave of `theta` per cell that a stream carries turns by `C s(theta)` in a step (`C = dt sum |u_i|/h_i` the Courant number,
-//! `s` the symbol of the transport, at most 1.586, or 1.167 on meshes with no-slip walls), and viscosity takes
-//! `nu dt kappa(theta)^2/h^2` of it. Whether it grows follows from the amplification of the scheme, with viscosity explicit or by
-//! Crank-Nicolson along the direction of the stream. Runge-Kutta lets none grow up to `C = 1.0921` (1.4846 with walls), more with
-//! viscosity. Adams-Bashforth lets every wave grow that viscosity does not damp: all decay where the Reynolds number of the cell,
-//! `h^2 S/nu` with `S = sum |u_i|/h_i`, is below a limit that falls about with the cube of `C`: 30 at 0.35, 82 with walls.
+//! A wave of `theta` per cell that a stream carries turns by `C s(theta)` in a step
+//! (`C = dt sum |u_i|/h_i` the Courant number, `s` the symbol of the transport, at most 1.586, or
+//! 1.167 on meshes with no-slip walls), and viscosity takes `nu dt kappa(theta)^2/h^2` of it.
+//! Whether it grows follows from the amplification of the scheme, with viscosity explicit or by
+//! Crank-Nicolson along the direction of the stream. Runge-Kutta lets none grow up to `C = 1.0921`
+//! (1.4846 with walls), more with viscosity. Adams-Bashforth lets every wave grow that viscosity
+//! does not damp: all decay where the Reynolds number of the cell, `h^2 S/nu` with
+//! `S = sum |u_i|/h_i`, is below a limit that falls about with the cube of `C`: 30 at 0.35, 82 with
+//! walls.
 //!
-//! The air is taken to stream on: where it turns, waves grow less. What a subgrid model takes is not counted; a run measures it.
+//! The air is taken to stream on: where it turns, waves grow less. What a subgrid model takes is
+//! not counted; a run measures it.
 //!
 //! Check: waves carried by a uniform stream grow above these limits and decay below them.
 
@@ -22,8 +26,8 @@ use super::settings::{FlowSettings, ROUND_OFF, TimeScheme, TimeStep};
 use super::stiffness::{Stiffness, explicit_up_to_s, implicit_axes, metrics, viscous_rates_per_s};
 use crate::Error;
 
-/// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes without no-slip walls and of
-/// those with them.
+/// Transport by a uniform stream per cell and Courant number, `sum_m c_m sin(m theta)`, of boxes
+/// without no-slip walls and of those with them.
 const TRANSPORT: [[f64; 3]; 2] = [[1.5, -0.3, 1.0 / 30.0], [9.0 / 8.0, 0.0, -1.0 / 24.0]];
 /// Waves that are tried, from two cells to infinity.
 const WAVES: usize = 90;
@@ -39,12 +43,13 @@ const MOST_COURANT: f64 = 4.0;
      {cell_reynolds:.3e} at Courant number {courant:.2}; all decay below {damped_courant:.2})"
 )]
 pub struct UndampedGrowth {
-    /// `h^2 sum |u_i|/h_i/nu` of the cell whose waves grow most, `h` its length along the largest term; infinite without viscosity.
+    /// `h^2 sum |u_i|/h_i/nu` of the cell whose waves grow most, `h` its length along the largest
+    /// term; infinite without viscosity.
     pub cell_reynolds: f64,
     /// Largest Courant number of the steps.
     pub courant: f64,
-    /// Largest Courant number at which every wave decays, steps being shorter for the same flow; zero without viscosity under
-    /// Adams-Bashforth.
+    /// Largest Courant number at which every wave decays, steps being shorter for the same flow;
+    /// zero without viscosity under Adams-Bashforth.
     pub damped_courant: f64,
     /// Rate at which the amplitude of the worst wave grows \[1/s\].
     pub rate_per_s: f64,
@@ -57,8 +62,9 @@ pub struct Stability {
     time_step: TimeStep,
     transport: [f64; 3],
     viscosity_m2_s: f64,
-    cells: Vec<Carrying>,
-    /// Whether viscosity is implicit along x, y, z, and up to which steps it is explicit \[s\] in a flow that starts with them.
+    cells: Vec<FastestCell>,
+    /// Whether viscosity is implicit along x, y, z, and up to which steps it is explicit \[s\] in a
+    /// flow that starts with them.
     implicit: [bool; 3],
     explicit_up_to_s: [f64; 3],
     stiffness: Stiffness,
@@ -66,7 +72,7 @@ pub struct Stability {
 
 /// The fastest of the cells that are equally long along the direction that carries most.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Carrying {
+struct FastestCell {
     /// `S = sum |u_i|/h_i` \[1/s\].
     rate_per_s: f64,
     length_m: f64,
@@ -75,7 +81,8 @@ struct Carrying {
 }
 
 impl Stability {
-    /// Of a flow of `settings` on `mesh`, whose velocity in the cell of the indices along x, y, z is `velocity_m_s`.
+    /// Of a flow of `settings` on `mesh`, whose velocity in the cell of the indices along x, y, z
+    /// is `velocity_m_s`.
     pub fn of(
         mesh: &Mesh,
         settings: &FlowSettings,
@@ -101,7 +108,7 @@ impl Stability {
             .directions()
             .iter()
             .any(|d| d.ends.no_slip() != [false; 2]);
-        let mut cells: Vec<Carrying> = Vec::new();
+        let mut cells: Vec<FastestCell> = Vec::new();
         for (axis, (rates, lengths_m)) in rates.iter().zip(metrics(mesh)).enumerate() {
             for (&rate_per_s, length_m) in
                 rates.iter().zip(lengths_m).filter(|(rate, _)| **rate > 0.0)
@@ -111,7 +118,7 @@ impl Stability {
                     .find(|c| c.length_m == length_m && c.axis == axis)
                 {
                     Some(same) => same.rate_per_s = same.rate_per_s.max(rate_per_s),
-                    None => cells.push(Carrying {
+                    None => cells.push(FastestCell {
                         rate_per_s,
                         length_m,
                         axis,
@@ -162,32 +169,39 @@ impl Stability {
             .fold(0.0, |most, cell| most.max(cell.rate_per_s))
     }
 
-    /// Growth of the worst wave in a step of `step_s`, `ln |G|`, and its cell, where viscosity is `implicit` along these axes.
-    fn worst(&self, step_s: f64, implicit: [bool; 3]) -> (f64, Option<Carrying>) {
-        let growth = |cell: &Carrying| {
-            let viscous = self.viscosity_m2_s * step_s / cell.length_m.powi(2);
-            largest_growth(
+    /// Growth of the worst wave in a step of `step_s`, `ln |G|`, and its cell, where viscosity is
+    /// `implicit` along these axes.
+    fn worst(&self, step_s: f64, implicit: [bool; 3]) -> (f64, Option<FastestCell>) {
+        let mut largest = f64::NEG_INFINITY;
+        let mut worst = None;
+        for cell in &self.cells {
+            let growth = largest_growth(
                 self.scheme,
                 self.transport,
                 step_s * cell.rate_per_s,
-                viscous,
+                self.viscosity_m2_s * step_s / cell.length_m.powi(2),
                 implicit[cell.axis],
-            )
-        };
-        let all = self.cells.iter().map(|cell| (growth(cell), Some(*cell)));
-        all.fold((f64::NEG_INFINITY, None), |worst, next| {
-            if next.0 > worst.0 { next } else { worst }
-        })
+            );
+            if growth > largest {
+                largest = growth;
+                worst = Some(*cell);
+            }
+        }
+        (largest, worst)
     }
 
-    /// Largest Courant number at which every wave decays, as it does at all smaller ones; infinite in a flow that carries none. Shorter
-    /// steps make viscosity explicit along more directions.
+    /// Whether every wave decays in a step of `step_s`.
+    fn all_decay(&self, step_s: f64, implicit: [bool; 3]) -> bool {
+        self.worst(step_s, implicit).0 <= ROUND_OFF
+    }
+
+    /// Largest Courant number at which every wave decays, as it does at all smaller ones; infinite
+    /// in a flow that carries none. Shorter steps make viscosity explicit along more directions.
     pub fn damped_courant(&self) -> f64 {
         let longest_s = MOST_COURANT / self.courant_per_s();
         if longest_s.is_infinite() {
             return f64::INFINITY;
         }
-        let decays = |step_s: f64, implicit| self.worst(step_s, implicit).0 <= ROUND_OFF;
         let mut ends_s = self
             .explicit_up_to_s
             .map(|step_s| step_s.min(longest_s))
@@ -197,9 +211,9 @@ impl Stability {
         let mut start_s = 0.0;
         for end_s in ends_s {
             let implicit = self.explicit_up_to_s.map(|step_s| step_s < end_s);
-            if !decays(end_s, implicit) {
-                return self.courant_per_s()
-                    * halve(start_s, end_s, |step_s| decays(step_s, implicit));
+            if !self.all_decay(end_s, implicit) {
+                let limit_s = bisect(start_s, end_s, |step_s| self.all_decay(step_s, implicit));
+                return self.courant_per_s() * limit_s;
             }
             start_s = end_s;
         }
@@ -221,57 +235,85 @@ impl Stability {
 
     /// The largest Courant number of such a step, if one of `step_s` is refused.
     pub fn refused(&self, step_s: f64) -> Option<f64> {
-        let allowed = self.scheme.allowed_growth();
-        let grows = |step_s: f64| self.worst(step_s, self.implicit).0 > allowed;
-        grows(step_s).then(|| self.courant_per_s() * halve(0.0, step_s, |step_s| !grows(step_s)))
+        if !self.grows_too_fast(step_s) {
+            return None;
+        }
+        let limit_s = bisect(0.0, step_s, |step_s| !self.grows_too_fast(step_s));
+        Some(self.courant_per_s() * limit_s)
+    }
+
+    /// Whether a wave grows by more than the scheme allows in a step of `step_s`.
+    fn grows_too_fast(&self, step_s: f64) -> bool {
+        self.worst(step_s, self.implicit).0 > self.scheme.allowed_growth()
     }
 }
 
-/// Largest `sum |u_i|/h_i` \[1/s\] of all cells whose largest term is that of a direction, by their index along it, and of the
-/// smallest cells beside walls that move: the fluid may come to their speed.
+/// Largest `sum |u_i|/h_i` \[1/s\] of all cells whose largest term is that of a direction, by their
+/// index along it, and of the smallest cells beside walls that move: the fluid may come to their
+/// speed.
 fn largest_rates(
     mesh: &Mesh,
     velocity_m_s: impl Fn([usize; 3]) -> [f64; 3] + Sync,
 ) -> [Vec<f64>; 3] {
-    let (metric_m, [nx, ny, nz]) = (metrics(mesh), mesh.cells());
-    let none = || metric_m.each_ref().map(|m| vec![0.0_f64; m.len()]);
-    let add = |rates: &mut [Vec<f64>; 3], cell: [usize; 3], velocity_m_s: [f64; 3]| {
-        let term = |d: usize| {
-            if metric_m[d].len() == 1 {
-                0.0
-            } else {
-                velocity_m_s[d].abs() / metric_m[d][cell[d]]
+    let metric_m = metrics(mesh);
+    let [nx, ny, nz] = mesh.cells();
+    let of_planes = (0..nz).into_par_iter().fold(
+        || no_rates(&metric_m),
+        |mut rates, k| {
+            for j in 0..ny {
+                for i in 0..nx {
+                    let cell = [i, j, k];
+                    add_rate(&mut rates, &metric_m, cell, velocity_m_s(cell));
+                }
             }
-        };
-        let terms = [term(0), term(1), term(2)];
-        let most = (1..3).fold(0, |most, d| if terms[d] > terms[most] { d } else { most });
-        let rate = &mut rates[most][cell[most]];
-        *rate = rate.max(terms.iter().sum());
-    };
-    let with_plane = |mut rates: [Vec<f64>; 3], k: usize| {
-        (0..nx * ny)
-            .map(|at| [at % nx, at / nx, k])
-            .for_each(|cell| add(&mut rates, cell, velocity_m_s(cell)));
-        rates
-    };
-    let mut rates = (0..nz)
-        .into_par_iter()
-        .fold(none, with_plane)
-        .reduce(none, |mut a, b| {
+            rates
+        },
+    );
+    let mut rates = of_planes.reduce(
+        || no_rates(&metric_m),
+        |mut a, b| {
             larger(&mut a, &b.concat());
             a
-        });
-    let smallest = metric_m.each_ref().map(|m| {
-        (0..m.len())
-            .min_by(|&a, &b| m[a].total_cmp(&m[b]))
-            .unwrap_or(0)
-    });
+        },
+    );
+    let smallest = metric_m.each_ref().map(|metric_m| smallest_cell(metric_m));
     for wall in mesh.directions().iter().flat_map(|d| d.ends.walls()) {
         if let Wall::NoSlip { velocity_m_s } = wall {
-            add(&mut rates, smallest, velocity_m_s);
+            add_rate(&mut rates, &metric_m, smallest, velocity_m_s);
         }
     }
     rates
+}
+
+/// A rate of zero for each cell of each direction.
+fn no_rates(metric_m: &[Vec<f64>; 3]) -> [Vec<f64>; 3] {
+    metric_m.each_ref().map(|m| vec![0.0; m.len()])
+}
+
+/// Index of the smallest cell of a direction, of the first if there are several.
+fn smallest_cell(metric_m: &[f64]) -> usize {
+    (0..metric_m.len())
+        .min_by(|&a, &b| metric_m[a].total_cmp(&metric_m[b]))
+        .unwrap_or(0)
+}
+
+/// Takes the rate `sum |u_i|/h_i` of a cell into that of its index along the direction of its
+/// largest term.
+fn add_rate(
+    rates: &mut [Vec<f64>; 3],
+    metric_m: &[Vec<f64>; 3],
+    cell: [usize; 3],
+    velocity_m_s: [f64; 3],
+) {
+    let mut terms = [0.0; 3];
+    for d in 0..3 {
+        if metric_m[d].len() > 1 {
+            terms[d] = velocity_m_s[d].abs() / metric_m[d][cell[d]];
+        }
+    }
+    let most = (1..3).fold(0, |most, d| if terms[d] > terms[most] { d } else { most });
+    let rate = &mut rates[most][cell[most]];
+    *rate = rate.max(terms.iter().sum());
 }
 
 /// Takes the larger of these rates and those of `others`, one direction after the other.
@@ -284,7 +326,7 @@ fn larger(rates: &mut [Vec<f64>; 3], others: &[f64]) {
 }
 
 /// The end of the low part of an interval, in which `holds`.
-fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
         if holds(middle) {
@@ -304,7 +346,8 @@ fn largest_growth(
     viscous: f64,
     is_implicit: bool,
 ) -> f64 {
-    let growth = |wave: usize| {
+    let mut largest = f64::NEG_INFINITY;
+    for wave in 1..=WAVES {
         let theta = PI * wave as f64 / WAVES as f64;
         let symbol = (1..=3)
             .map(|m| transport[m - 1] * (m as f64 * theta).sin())
@@ -316,22 +359,25 @@ fn largest_growth(
         } else {
             [decay, 0.0]
         };
-        amplification(scheme, Complex::new(-explicit, courant * symbol), implicit).ln()
-    };
-    (1..=WAVES).map(growth).fold(f64::NEG_INFINITY, f64::max)
+        let rate = Complex::new(-explicit, courant * symbol);
+        largest = largest.max(amplification(scheme, rate, implicit).ln());
+    }
+    largest
 }
 
-/// `|G|` of a step of `du/dt = (z u - d u)/dt` with `d` by Crank-Nicolson: the larger root of Adams-Bashforth, the product of the
-/// stages of Runge-Kutta.
+/// `|G|` of a step of `du/dt = (z u - d u)/dt` with `d` by Crank-Nicolson: the larger root of
+/// Adams-Bashforth, the product of the stages of Runge-Kutta.
 fn amplification(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
     if scheme == TimeScheme::AdamsBashforth2 {
         // G^2 - (a + 3/2 z) G + z/2 = 0.
-        let (a, z) = ((1.0 - 0.5 * d) / (1.0 + 0.5 * d), z / (1.0 + 0.5 * d));
+        let a = (1.0 - 0.5 * d) / (1.0 + 0.5 * d);
+        let z = z / (1.0 + 0.5 * d);
         let b = a + 1.5 * z;
         let root = (b * b - 2.0 * z).sqrt();
         return (0.5 * (b + root)).norm().max((0.5 * (b - root)).norm());
     }
-    let (mut u, mut before) = (Complex::from(1.0), Complex::from(0.0));
+    let mut u = Complex::from(1.0);
+    let mut before = Complex::from(0.0);
     for stage in scheme.stages(None) {
         let term = z * u;
         u += stage.fraction * (stage.new * term + stage.old * before - d * u)
@@ -342,8 +388,8 @@ fn amplification(scheme: TimeScheme, z: Complex<f64>, d: f64) -> f64 {
 }
 
 impl Flow {
-    /// The step at which `stability`, whose metric is that of the cells, has the Courant number of a step of `step_s`, whose metric is
-    /// that of the faces.
+    /// The step at which `stability`, whose metric is that of the cells, has the Courant number of
+    /// a step of `step_s`, whose metric is that of the faces.
     pub(super) fn judged_step_s(&self, stability: &Stability, step_s: f64) -> f64 {
         self.state.courant_per_s * step_s / stability.courant_per_s()
     }
@@ -352,19 +398,21 @@ impl Flow {
     pub fn stability(&self) -> Result<Stability, Error> {
         let shape = self.layout.shape;
         let axis = [0, 1, 2].map(|d| self.layout.axis_of(d));
-        let (own, direction, velocity) = (shape.own(), self.layout.direction, &self.state.velocity);
+        let own = shape.own();
         let mut rates = largest_rates(&self.mesh, |cell| {
-            let index = direction.map(|d| cell[d]);
+            let index = self.layout.direction.map(|d| cell[d]);
             // What others own is at rest here and does not count.
-            let place = own.contains(&index[2]).then(|| shape.place(index));
-            place.map_or([0.0; 3], |place| axis.map(|a| velocity[a][place]))
+            if !own.contains(&index[2]) {
+                return [0.0; 3];
+            }
+            let place = shape.place(index);
+            axis.map(|a| self.state.velocity[a][place])
         });
-        let (own, count) = (rates.concat(), rates.iter().map(Vec::len).sum());
-        self.layout
-            .slabs
-            .all_gather(own)?
-            .chunks(count)
-            .for_each(|others| larger(&mut rates, others));
+        let count = rates.iter().map(Vec::len).sum();
+        let of_ranks = self.layout.slabs.all_gather(rates.concat())?;
+        for others in of_ranks.chunks(count) {
+            larger(&mut rates, others);
+        }
         let implicit = axis.map(|a| self.state.implicit[a]);
         Ok(Stability::at_rates(
             &self.mesh,
@@ -374,28 +422,31 @@ impl Flow {
         ))
     }
 
-    /// Memory axis and place of the component whose waves of two cells are strongest: where numerical growth shows most.
+    /// Memory axis and place of the component whose waves of two cells are strongest: where
+    /// numerical growth shows most.
     pub(super) fn strongest_short_wave(&self) -> Result<(usize, usize), Error> {
-        let shape = self.layout.shape;
-        let n = shape.n;
         let (_, component, place) = self.first_largest(|component, place| {
-            let index = shape.index_held(place);
-            let field = &self.state.velocity[component];
-            let of = |axis: usize| {
-                let at_end = index[axis] == 0 || index[axis] + 1 == n[axis];
-                if n[axis] <= 2 || (at_end && !self.layout.line[axis].is_periodic()) {
-                    return 0.0;
-                }
-                let at = |offset: usize| {
-                    let mut other = index;
-                    other[axis] = (index[axis] + n[axis] + offset - 1) % n[axis];
-                    field[shape.place(other)]
-                };
-                (at(0) - 2.0 * at(1) + at(2)).abs()
-            };
-            of(0).max(of(1)).max(of(2))
+            let [a, b, c] = [0, 1, 2].map(|axis| self.short_wave(component, place, axis));
+            a.max(b).max(c)
         })?;
         Ok((component, place))
+    }
+
+    /// Modulus of the second difference of a component along an axis; zero beside a wall.
+    fn short_wave(&self, component: usize, place: usize, axis: usize) -> f64 {
+        let shape = self.layout.shape;
+        let index = shape.index_held(place);
+        let n = shape.n[axis];
+        let at_end = index[axis] == 0 || index[axis] + 1 == n;
+        if n <= 2 || (at_end && !self.layout.line[axis].is_periodic()) {
+            return 0.0;
+        }
+        let [below, own, above] = [0, 1, 2].map(|offset| {
+            let mut other = index;
+            other[axis] = (index[axis] + n + offset - 1) % n;
+            self.state.velocity[component][shape.place(other)]
+        });
+        (below - 2.0 * own + above).abs()
     }
 }
 
@@ -465,13 +516,13 @@ mod tests {
                 is_implicit,
             ) < 0.0
         };
-        10.0_f64.powf(halve(-2.0, 12.0, decays))
+        10.0_f64.powf(bisect(-2.0, 12.0, decays))
     }
 
     /// Largest Courant number at which every wave decays.
     fn limit(scheme: TimeScheme, sticks: bool, viscous: f64, is_implicit: bool) -> f64 {
         let transport = TRANSPORT[usize::from(sticks)];
-        halve(0.0, 2.0, |courant| {
+        bisect(0.0, 2.0, |courant| {
             largest_growth(scheme, transport, courant, viscous, is_implicit) <= ROUND_OFF
         })
     }
@@ -510,7 +561,8 @@ mod tests {
             );
         }
         assert!((largest_reynolds(TRANSPORT[1], 0.35, true) / 82.0 - 1.0).abs() < 0.01);
-        // Without viscosity; the rate of the amplitude is half that of the energy, and the worst wave has 3.2 cells.
+        // Without viscosity; the rate of the amplitude is half that of the energy, and the worst
+        // wave has 3.2 cells.
         let (grown, found) = measured_per_s(3.2, 0.0, 0.35);
         let found = found.unwrap();
         assert!(
@@ -523,62 +575,26 @@ mod tests {
         );
     }
 
+    /// Limits `(viscous, courant)` of a scheme with viscosity implicit or explicit, measured with
+    /// fixed steps on lines of 48 and 64 cells, white noise or the worst wave.
+    #[rustfmt::skip]
+    const MEASURED_LIMITS: [(TimeScheme, bool, &[(f64, f64)]); 4] = [
+        (RK3, true, &[(0.0, 1.0921), (0.001, 1.099), (0.01, 1.147), (0.1, 1.364), (0.3, 1.546), (0.4, 1.589)]),
+        (RK3, false, &[(0.001, 1.101), (0.01, 1.162), (0.1, 1.413), (0.3, 1.453), (0.4, 1.095)]),
+        (AB2, true, &[(0.001, 0.204), (0.01, 0.339), (0.03, 0.4195), (0.1, 0.516), (0.15, 0.552)]),
+        (AB2, false, &[(0.001, 0.206), (0.01, 0.351), (0.03, 0.438), (0.1, 0.5075), (0.15, 0.478)]),
+    ];
+
     #[test]
     fn limits_are_the_measured_ones_of_both_schemes_with_viscosity_explicit_and_implicit() {
-        // Measured with fixed steps on lines of 48 and 64 cells, white noise or the worst wave.
-        let of = |scheme, is_implicit, viscous| limit(scheme, false, viscous, is_implicit);
-        for (viscous, measured) in [
-            (0.0, 1.0921),
-            (0.001, 1.099),
-            (0.01, 1.147),
-            (0.1, 1.364),
-            (0.3, 1.546),
-            (0.4, 1.589),
-        ] {
-            assert!(
-                (of(RK3, true, viscous) / measured - 1.0).abs() < 0.01,
-                "{viscous}: {}",
-                of(RK3, true, viscous)
-            );
-        }
-        for (viscous, measured) in [
-            (0.001, 1.101),
-            (0.01, 1.162),
-            (0.1, 1.413),
-            (0.3, 1.453),
-            (0.4, 1.095),
-        ] {
-            assert!(
-                (of(RK3, false, viscous) / measured - 1.0).abs() < 0.01,
-                "{viscous}: {}",
-                of(RK3, false, viscous)
-            );
-        }
-        for (viscous, measured) in [
-            (0.001, 0.204),
-            (0.01, 0.339),
-            (0.03, 0.4195),
-            (0.1, 0.516),
-            (0.15, 0.552),
-        ] {
-            assert!(
-                (of(AB2, true, viscous) / measured - 1.0).abs() < 0.01,
-                "{viscous}: {}",
-                of(AB2, true, viscous)
-            );
-        }
-        for (viscous, measured) in [
-            (0.001, 0.206),
-            (0.01, 0.351),
-            (0.03, 0.438),
-            (0.1, 0.5075),
-            (0.15, 0.478),
-        ] {
-            assert!(
-                (of(AB2, false, viscous) / measured - 1.0).abs() < 0.01,
-                "{viscous}: {}",
-                of(AB2, false, viscous)
-            );
+        for (scheme, is_implicit, table) in MEASURED_LIMITS {
+            for &(viscous, measured) in table {
+                let found = limit(scheme, false, viscous, is_implicit);
+                assert!(
+                    (found / measured - 1.0).abs() < 0.01,
+                    "{scheme:?}, {viscous}: {found}"
+                );
+            }
         }
         assert!(
             (limit(RK3, true, 0.0, true) / 1.4846 - 1.0).abs() < 0.001,
@@ -597,7 +613,7 @@ mod tests {
         for (viscosity_m2_s, implicit) in [(0.0, true), (0.05, true), (0.05, false), (0.2, false)] {
             let step = |courant: f64| wave(3.6, viscosity_m2_s, courant, RK3, implicit);
             // nu dt/h^2 changes with the step.
-            let limit = halve(0.0, 2.0, |c| {
+            let limit = bisect(0.0, 2.0, |c| {
                 largest_growth(RK3, TRANSPORT[0], c, viscosity_m2_s * c, implicit) <= ROUND_OFF
             });
             let mut flow = step(0.999 * limit);

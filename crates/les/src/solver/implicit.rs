@@ -1,15 +1,16 @@
 //! Line solves of the implicit viscosity, `(1 - a L) x = r` along one axis.
 //!
-//! With the masses as weights the matrix is symmetric and positive definite, so it is factored once per time step length as
-//! `L D L^T` without pivoting. Its envelope is seven bands wide; walls and periods add a few entries outside, which are kept
-//! as further taps of their rows. Lines are solved side by side, so that the elimination runs over contiguous values.
+//! With the masses as weights the matrix is symmetric and positive definite, so it is factored once
+//! per time step length as `L D L^T` without pivoting. Its envelope is seven bands wide; walls and
+//! periods add a few entries outside, which are kept as further taps of their rows. Lines are
+//! solved side by side, so that the elimination runs over contiguous values.
 //!
 //! Check: residuals against the explicit operator, every kind of end.
 
 use rayon::prelude::*;
 
+use super::component_operators::ComponentOperators;
 use super::layout::Shape;
-use super::momentum::Momentum;
 use super::operators_1d::Taps;
 use super::pressure::{Pencil, pencils};
 use super::rows::RowOffsets;
@@ -34,10 +35,11 @@ pub(crate) struct LineSolver {
 pub(crate) struct LineSolvers(Vec<(f64, Vec<LineSolver>)>);
 
 impl LineSolvers {
-    /// Those of all components along the implicit axes, `a_m2` being viscosity times the implicit part of a stage \[m^2\].
-    pub(crate) fn of(
+    /// The factors of all components along the implicit axes, `a_m2` being viscosity times the
+    /// implicit part of a stage \[m^2\].
+    pub(crate) fn for_stage(
         &mut self,
-        ops: &[Momentum; 3],
+        ops: &[ComponentOperators; 3],
         implicit: [bool; 3],
         a_m2: f64,
     ) -> &[LineSolver] {
@@ -46,7 +48,8 @@ impl LineSolvers {
             .iter()
             .position(|(a, _)| *a == a_m2)
             .unwrap_or_else(|| {
-                // A fixed step has at most three stages of different length; a variable one always needs new factors.
+                // A fixed step has at most three stages of different length; a variable one always
+                // needs new factors.
                 self.0.truncate(2);
                 let axes = (0..3).filter(|&axis| implicit[axis]);
                 let solvers = ops.iter().flat_map(|ops| {
@@ -66,8 +69,9 @@ const TILE: usize = 16;
 const COLUMNS: usize = 64;
 
 impl LineSolver {
-    /// Factors `1 - a L` of component `ops` along `axis`, `a_s_m2` being half the time step times the viscosity \[m^2\].
-    pub(crate) fn new(ops: &Momentum, axis: usize, a_m2: f64) -> Self {
+    /// Factors `1 - a L` of component `ops` along `axis`, `a_s_m2` being half the time step times
+    /// the viscosity \[m^2\].
+    pub(crate) fn new(ops: &ComponentOperators, axis: usize, a_m2: f64) -> Self {
         let mass = ops.mass[axis].clone();
         let n = mass.len();
         let [mut lower, mut upper] = [vec![Taps::new(); n], vec![Taps::new(); n]];
@@ -152,8 +156,8 @@ impl LineSolver {
         }
     }
 
-    /// Lines along axis 2: some neighbours are gathered from all planes, for rows of the same place in all planes get in each other's
-    /// way in the caches.
+    /// Lines along axis 2: some neighbours are gathered from all planes, for rows of the same place
+    /// in all planes get in each other's way in the caches.
     fn solve_across_planes(&self, shape: Shape, field: &mut [f64]) {
         pencils(field, shape, 2, COLUMNS)
             .par_iter_mut()
@@ -200,10 +204,8 @@ fn add_taps(row: &mut [f64], other: &[f64], taps: &[(usize, f64)], first: usize)
     let n = row.len();
     for taps in taps.chunks(4) {
         if let [a, b, c] = *taps {
-            let (x, y) = (
-                &other[(a.0 - first) * n..][..n],
-                &other[(b.0 - first) * n..][..n],
-            );
+            let x = &other[(a.0 - first) * n..][..n];
+            let y = &other[(b.0 - first) * n..][..n];
             let z = &other[(c.0 - first) * n..][..n];
             for i in 0..n {
                 row[i] += (a.1 * x[i] + b.1 * y[i]) + c.1 * z[i];
@@ -235,7 +237,7 @@ mod tests {
             let shape = layout.shape;
             let [nx, ny, _] = shape.n;
             for component in 0..3 {
-                let ops = Momentum::new(&layout, component);
+                let ops = ComponentOperators::new(&layout, component);
                 for axis in 0..3 {
                     let right: Vec<f64> =
                         (0..shape.len()).map(|i| ((i * i) as f64).sin()).collect();

@@ -1,9 +1,10 @@
 //! How fields lie in memory, and the operators in that order.
 //!
-//! Memory axis 0 is contiguous. It is x, unless another direction gives the kernels longer rows to work on: y if it is longer and
-//! its cells are equal and periodic, so that the pressure solver has a Fourier transform there, too; in a plane flow the direction
-//! with many cells. Every array of the solver has one value per cell, `[axis 2][axis
-//! 1][axis 0]`: values at the centres, or at the low face of each cell in the component's own direction.
+//! Memory axis 0 is contiguous. It is x, unless another direction gives the kernels longer rows to
+//! work on: y if it is longer and its cells are equal and periodic, so that the pressure solver has
+//! a Fourier transform there, too; in a plane flow the direction with many cells. Every array of
+//! the solver has one value per cell, `[axis 2][axis 1][axis 0]`: values at the centres, or at the
+//! low face of each cell in the component's own direction.
 //!
 //! Check: the order of plane and spatial flows.
 
@@ -14,7 +15,7 @@ use super::operators_1d::Operators1d;
 pub(crate) use super::shape::Shape;
 use super::slabs::Slabs;
 use crate::Error;
-use crate::ranks::{Ranks, Single, Timed};
+use crate::ranks::{Ranks, Single, TimedRanks};
 
 /// The operators of the three memory axes.
 #[derive(Debug, Clone)]
@@ -44,7 +45,7 @@ impl Layout {
             direction,
             shape,
             slabs: Slabs {
-                ranks: Arc::new(Timed::new(Arc::new(Single))),
+                ranks: Arc::new(TimedRanks::new(Arc::new(Single))),
                 shape,
             },
         }
@@ -71,8 +72,8 @@ impl Layout {
             .unwrap_or(d)
     }
 
-    /// Velocity along memory axis `component` of the walls at the low and the high end of memory axis `axis` \[m/s\]; zero
-    /// where there is no no-slip wall.
+    /// Velocity along memory axis `component` of the walls at the low and the high end of memory
+    /// axis `axis` \[m/s\]; zero where there is no no-slip wall.
     pub(crate) fn wall_velocity_m_s(&self, axis: usize, component: usize) -> [f64; 2] {
         match self.line[axis].ends {
             Ends::Periodic => [0.0; 2],
@@ -83,8 +84,8 @@ impl Layout {
         }
     }
 
-    /// What the velocity of the walls of memory axis `axis` adds to an operator along it on a component, from the operator's coefficients of
-    /// the two walls.
+    /// What the velocity of the walls of memory axis `axis` adds to an operator along it on a
+    /// component, from the operator's coefficients of the two walls.
     pub(crate) fn wall_source(
         &self,
         axis: usize,

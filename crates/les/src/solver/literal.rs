@@ -1,21 +1,22 @@
-//! Convection as it is written, point by point from the tables of `transport`: to be read first, and the oracle of the fast form.
+//! Convection as it is written, point by point from the tables of `transport`: to be read first,
+//! and the oracle of the fast form.
 //!
-//! Check: `convection` gives the same on every kind of mesh; what the tables meet is checked in `transport`.
+//! Check: `convection` gives the same on every kind of mesh; what the tables meet is checked in
+//! `transport`.
 
 use super::layout::Layout;
 use super::transport::Stencil;
 
-/// `(u . grad) u_a` \[m/s^2\] at the faces of memory axis `a`, as on the left of the momentum equation: the sum over the directions
-/// `b` of `(f_a m_b)^-1 sum_n G_n S^n u_a`, where `m` are the masses of the cells and `f` those of the faces.
+/// `(u . grad) u_a` \[m/s^2\] at the faces of memory axis `a`, as on the left of the momentum
+/// equation: the sum over the directions `b` of `(f_a m_b)^-1 sum_n G_n S^n u_a`, where `m` are the
+/// masses of the cells and `f` those of the faces.
 ///
-/// `G_n` is the flux `u_b` through face `n` of direction `b`, weighted with the cells along `a` and brought to the faces of `a`.
-/// For `b = a` the flux is `u_a` itself, whose mean the tables hold, and `m_b` is not there. Walls have no row: zero.
+/// `G_n` is the flux `u_b` through face `n` of direction `b`, weighted with the cells along `a` and
+/// brought to the faces of `a`. For `b = a` the flux is `u_a` itself, whose mean the tables hold,
+/// and `m_b` is not there. Walls have no row: zero.
 pub(crate) fn literal_convection(layout: &Layout, velocity: [&[f64]; 3], a: usize) -> Vec<f64> {
     let shape = layout.shape;
-    let moved = |at: [usize; 3], axis: usize, index: usize| -> [usize; 3] {
-        std::array::from_fn(|d| if d == axis { index } else { at[d] })
-    };
-    let stencil = Stencil::of(&layout.line);
+    let stencil = Stencil::for_lines(&layout.line);
     let mean = layout.line[a].flux_mean();
     let tables: [_; 3] = std::array::from_fn(|b| {
         let line = &layout.line[b];
@@ -25,45 +26,49 @@ pub(crate) fn literal_convection(layout: &Layout, velocity: [&[f64]; 3], a: usiz
             line.transport_of_cells(stencil).rows
         }
     });
-    let convection = |at: [usize; 3]| -> f64 {
+    let mut convection = vec![0.0; shape.len()];
+    for (place, convection) in convection.iter_mut().enumerate() {
+        let at = shape.index(place);
+        if at[a] < layout.line[a].first_face() {
+            continue;
+        }
         let mut sum = 0.0;
         for b in 0..3 {
             for &(face, value, coefficient) in &tables[b][at[b]] {
                 let through = moved(at, b, face);
-                let flux: f64 = if b == a {
-                    velocity[a][shape.place(through)]
+                let carried = velocity[a][shape.place(moved(at, b, value))];
+                if b == a {
+                    let flux = velocity[a][shape.place(through)];
+                    sum += coefficient * flux * carried;
                 } else {
-                    let weighted = |&(cell, weight): &(usize, f64)| {
-                        weight * velocity[b][shape.place(moved(through, a, cell))]
-                    };
-                    mean[at[a]].iter().map(weighted).sum()
-                };
-                let mass_m = if b == a {
-                    1.0
-                } else {
-                    layout.line[b].cell_mass_m[at[b]]
-                };
-                sum += coefficient * flux * velocity[a][shape.place(moved(at, b, value))] / mass_m;
+                    let flux: f64 = mean[at[a]]
+                        .iter()
+                        .map(|tap| tap.1 * velocity[b][shape.place(moved(through, a, tap.0))])
+                        .sum();
+                    sum += coefficient * flux * carried / layout.line[b].cell_mass_m[at[b]];
+                }
             }
         }
-        if at[a] < layout.line[a].first_face() {
-            0.0
-        } else {
-            sum / layout.line[a].face_mass_m[at[a]]
-        }
-    };
-    (0..shape.len())
-        .map(|place| convection(shape.index(place)))
-        .collect()
+        *convection = sum / layout.line[a].face_mass_m[at[a]];
+    }
+    convection
+}
+
+/// The indices `at` with that along `axis` replaced.
+fn moved(at: [usize; 3], axis: usize, index: usize) -> [usize; 3] {
+    let mut moved = at;
+    moved[axis] = index;
+    moved
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::component_operators::{ComponentOperators, Scratch};
     use super::super::mesh::{Direction, Mesh, Spread, Wall};
-    use super::super::momentum::{Momentum, Scratch};
     use super::*;
 
-    /// Meshes of all kinds: periodic and bounded, equal and stretched, thin, in both orders of memory.
+    /// Meshes of all kinds: periodic and bounded, equal and stretched, thin, in both orders of
+    /// memory.
     fn layouts() -> Vec<Layout> {
         let waves = |n| Direction::periodic(n, 0.0, 1.3);
         let sine = |n| waves(n).stretched(Spread::Sine.by(0.25));
@@ -105,7 +110,7 @@ mod tests {
                 let largest = literal
                     .iter()
                     .fold(0.0_f64, |most, value| most.max(value.abs()));
-                let (ops, mut scratch) = (Momentum::new(&layout, a), Scratch::new(n0));
+                let (ops, mut scratch) = (ComponentOperators::new(&layout, a), Scratch::new(n0));
                 for (j, k) in (0..n2).flat_map(|k| (0..n1).map(move |j| (j, k))) {
                     scratch.convection(&ops, velocity, j, k);
                     let mut fresh = Scratch::new(n0);

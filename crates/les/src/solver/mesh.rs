@@ -1,11 +1,13 @@
-//! The staggered mesh: three directions, each uniform or stretched by a mapping with analytic metrics.
+//! The staggered mesh: three directions, each uniform or stretched by a mapping with analytic
+//! metrics.
 //!
-//! A direction of `n` cells maps the index coordinate `xi` in `[0, n]` to the position; faces lie at whole `xi`, centres at
-//! halves. Its metric `h = dx/dxi` is taken from the formula of the mapping, at faces and at centres, never from
-//! differences of positions: the schemes are of fourth order in `xi`, and so they are in space.
+//! A direction of `n` cells maps the index coordinate `xi` in `[0, n]` to the position; faces lie
+//! at whole `xi`, centres at halves. Its metric `h = dx/dxi` is taken from the formula of the
+//! mapping, at faces and at centres, never from differences of positions: the schemes are of fourth
+//! order in `xi`, and so they are in space.
 //!
-//! Check: each mapping spans its direction, metrics against finite differences of the positions; refusal of folds and of jumps between
-//! neighbouring cells.
+//! Check: each mapping spans its direction, metrics against finite differences of the positions;
+//! refusal of folds and of jumps between neighbouring cells.
 
 use crate::Error;
 pub(crate) use crate::winds::axis::AXIS_NAMES;
@@ -69,7 +71,8 @@ impl Ends {
 /// One direction of the mesh.
 #[derive(Debug, Clone)]
 pub struct Direction {
-    /// Number of cells: 1 (the flow does not vary), or at least 4; at least 16 between two no-slip walls, 12 with one.
+    /// Number of cells: 1 (the flow does not vary), or at least 4; at least 16 between two no-slip
+    /// walls, 12 with one.
     pub cells: usize,
     /// Position of the low end \[m\].
     pub low_m: f64,
@@ -104,7 +107,8 @@ impl Direction {
         }
     }
 
-    /// One cell of the given length \[m\] in which nothing varies: the third direction of a plane flow.
+    /// One cell of the given length \[m\] in which nothing varies: the third direction of a plane
+    /// flow.
     pub fn thin(length_m: f64) -> Self {
         Self::periodic(1, 0.0, length_m)
     }
@@ -130,10 +134,24 @@ impl Direction {
 
     /// Refuses what the schemes cannot take: too few cells, folds, jumps, walls that blow.
     pub(crate) fn check(&self, axis: usize) -> Result<(), Error> {
-        let bad = |what, value, allowed| Err(refused(axis, what, value, allowed));
-        if !(self.low_m.is_finite() && self.high_m.is_finite() && self.length_m() > 0.0) {
-            return bad("high_m - low_m", self.length_m(), "finite and positive");
+        let length_m = self.length_m();
+        if !(self.low_m.is_finite() && self.high_m.is_finite() && length_m > 0.0) {
+            let allowed = "finite and positive";
+            return Err(refused(axis, "high_m - low_m", length_m, allowed));
         }
+        self.check_mapping(axis)?;
+        self.check_cells(axis)?;
+        self.check_spacing(axis)?;
+        if self.ends == Ends::Periodic && !self.mapping.is_periodic() {
+            let what = "metric dx/dxi at its high end over that at its low end";
+            let ratio = self.at(self.cells as f64).1 / self.at(0.0).1;
+            let allowed = "1, with the same growth on both sides: a periodic direction takes equal cells, a sine or a cluster";
+            return Err(refused(axis, what, ratio, allowed));
+        }
+        Ok(())
+    }
+
+    fn check_mapping(&self, axis: usize) -> Result<(), Error> {
         let Mapping {
             spread,
             strength,
@@ -141,29 +159,19 @@ impl Direction {
             ..
         } = self.mapping;
         match spread {
-            Spread::Uniform => {}
-            Spread::Sine if strength.abs() < 1.0 => {}
-            Spread::Sine => return bad("amplitude", strength, "between -1 and 1"),
+            Spread::Uniform => Ok(()),
+            Spread::Sine if strength.abs() < 1.0 => Ok(()),
+            Spread::Sine => Err(refused(axis, "amplitude", strength, "between -1 and 1")),
             _ if !(strength > 0.0 && strength <= 20.0) => {
-                return bad("strength", strength, "above 0 and at most 20");
+                let allowed = "above 0 and at most 20";
+                Err(refused(axis, "strength", strength, allowed))
             }
             Spread::Cluster if !(0.0..=1.0).contains(&place) => {
-                return bad("place", place, "a fraction of the length, 0 to 1");
+                let allowed = "a fraction of the length, 0 to 1";
+                Err(refused(axis, "place", place, allowed))
             }
-            _ => {}
+            _ => Ok(()),
         }
-        self.check_cells(axis)?;
-        self.check_spacing(axis)?;
-        if self.ends == Ends::Periodic && !self.mapping.is_periodic() {
-            let ratio = self.at(self.cells as f64).1 / self.at(0.0).1;
-            let allowed = "1, with the same growth on both sides: a periodic direction takes equal cells, a sine or a cluster";
-            return bad(
-                "metric dx/dxi at its high end over that at its low end",
-                ratio,
-                allowed,
-            );
-        }
-        Ok(())
     }
 
     fn check_cells(&self, axis: usize) -> Result<(), Error> {
@@ -209,19 +217,23 @@ impl Direction {
             let allowed = "finite and positive in every cell: the mapping must not fold";
             return Err(refused(axis, "metric dx/dxi", *folded, allowed));
         }
-        let centres: Vec<f64> = metric.iter().skip(1).step_by(2).copied().collect();
-        let ratio = |i: usize| (centres[i + 1] / centres[i]).max(centres[i] / centres[i + 1]);
-        let worst =
-            (0..centres.len().saturating_sub(1)).max_by(|&a, &b| ratio(a).total_cmp(&ratio(b)));
-        let Some(index) = worst.filter(|&index| ratio(index) > MAX_NEIGHBOUR_RATIO.0) else {
-            return Ok(());
-        };
-        Err(refused(
-            axis,
-            jump_at(index),
-            ratio(index),
-            MAX_NEIGHBOUR_RATIO.1,
-        ))
+        // The largest ratio of neighbouring cells, whose metrics at the centres have odd places;
+        // of equal ones the last.
+        let mut largest = 0.0;
+        let mut index = 0;
+        for i in 0..self.cells.saturating_sub(1) {
+            let below = metric[2 * i + 1];
+            let above = metric[2 * i + 3];
+            let ratio = (above / below).max(below / above);
+            if ratio >= largest {
+                largest = ratio;
+                index = i;
+            }
+        }
+        if largest > MAX_NEIGHBOUR_RATIO {
+            return Err(refused(axis, jump_at(index), largest, "at most 1.5"));
+        }
+        Ok(())
     }
 }
 
@@ -236,7 +248,7 @@ pub(crate) fn refused(
 }
 
 /// Largest ratio of neighbouring cells.
-const MAX_NEIGHBOUR_RATIO: (f64, &str) = (1.5, "at most 1.5");
+const MAX_NEIGHBOUR_RATIO: f64 = 1.5;
 
 /// A mesh of three directions: x along the flight, y across it, z up.
 #[derive(Debug, Clone)]
@@ -245,6 +257,8 @@ pub struct Mesh {
 }
 
 impl Mesh {
+    /// The mesh of three directions.
+    ///
     /// # Errors
     /// [`Error::BadDirection`] for a direction that the schemes cannot take.
     pub fn new(x: Direction, y: Direction, z: Direction) -> Result<Self, Error> {
@@ -282,17 +296,19 @@ impl Mesh {
     }
 }
 
-/// Position and its derivative, both for a direction scaled to length 1: `s -> (x, dx/ds)` with `x(0) = 0`, `x(1) = 1`.
+/// Position and its derivative, both for a direction scaled to length 1: `s -> (x, dx/ds)` with
+/// `x(0) = 0`, `x(1) = 1`.
 pub type MappingFn = Arc<dyn Fn(f64) -> (f64, f64) + Send + Sync>;
 
-/// A formula that spreads the cells of a direction: it maps `s` in `[0, 1]` to the fraction of the length, with a strength `a`.
+/// A formula that spreads the cells of a direction: it maps `s` in `[0, 1]` to the fraction of the
+/// length, with a strength `a`.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Spread {
     /// Equal cells.
     #[default]
     Uniform,
-    /// `x = s + a sin(2 pi s)/(2 pi)`, for periodic directions; `|a| < 1`: cells vary between `1 - |a|` and `1 + |a|` times the
-    /// mean.
+    /// `x = s + a sin(2 pi s)/(2 pi)`, for periodic directions; `|a| < 1`: cells vary between
+    /// `1 - |a|` and `1 + |a|` times the mean.
     Sine,
     /// Fine cells at the low end: `x = 1 + tanh(a (s - 1))/tanh(a)`, `a > 0`.
     TanhLow,
@@ -302,8 +318,9 @@ pub enum Spread {
     TanhBoth,
     /// Fine cells in the middle: `x = (1 + sinh(a (2 s - 1))/sinh(a))/2`, `a > 0`.
     SinhMiddle,
-    /// Fine cells about a place of a periodic direction: `tan(pi (x - place)) = exp(-a) tan(pi (s - s_place))`, `a > 0`. The finest
-    /// cell is `exp(-a)` times the mean, the widest, half a period away, `exp(a)` times.
+    /// Fine cells about a place of a periodic direction:
+    /// `tan(pi (x - place)) = exp(-a) tan(pi (s - s_place))`, `a > 0`. The finest cell is `exp(-a)`
+    /// times the mean, the widest, half a period away, `exp(a)` times.
     Cluster,
 }
 
@@ -353,7 +370,6 @@ impl Mapping {
     /// Position and derivative at `s`, both as fractions of the length.
     pub(super) fn at(&self, s: f64) -> (f64, f64) {
         use std::f64::consts::TAU;
-        let sech2 = |t: f64| 1.0 / t.cosh().powi(2);
         if let Some(map) = &self.custom {
             return map(s);
         }
@@ -393,7 +409,13 @@ impl Mapping {
     }
 }
 
-/// `tan(pi x) = exp(-a) tan(pi t)`, continued over all periods, and its derivative; `-a` gives the inverse.
+/// Square of the hyperbolic secant.
+fn sech2(t: f64) -> f64 {
+    1.0 / t.cosh().powi(2)
+}
+
+/// `tan(pi x) = exp(-a) tan(pi t)`, continued over all periods, and its derivative; `-a` gives the
+/// inverse.
 fn cluster(a: f64, t: f64) -> (f64, f64) {
     use std::f64::consts::PI;
     let beta = (-a).exp();

@@ -1,11 +1,13 @@
 //! Incompressible large-eddy simulation.
 
-// Indices stand for directions and places of stencils; kernels take their rows one by one, so that they vectorise.
+// Indices stand for directions and places of stencils; kernels take their rows one by one, so that
+// they vectorise.
 #![allow(clippy::needless_range_loop, clippy::too_many_arguments)]
 
 mod aligned;
 pub mod cases;
 mod checkpoint;
+mod component_operators;
 mod control;
 mod convection;
 mod fields;
@@ -16,7 +18,7 @@ pub(crate) mod layout;
 #[cfg(test)]
 mod literal;
 pub(crate) mod mesh;
-mod momentum;
+mod momentum_rhs;
 mod operators_1d;
 pub(crate) mod planes;
 mod pressure;
@@ -30,7 +32,6 @@ pub(crate) mod shape;
 mod slabs;
 #[cfg(test)]
 mod slabs_tests;
-mod stage;
 mod stiffness;
 mod subgrid;
 mod transport;

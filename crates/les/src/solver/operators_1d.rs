@@ -1,12 +1,14 @@
 //! The operators of one direction: masses, weighted divergence, and what follows from them.
 //!
-//! Fourth order in the index coordinate (Vasilyev 2000), closed at no-slip walls by a summation-by-parts pair: with the
-//! masses `m` of the cells and `f` of the faces and the weighted divergence `Dw`, the divergence is `m^-1 Dw` and the gradient
-//! `-f^-1 Dw^T`, so that the pressure does no work on a divergence-free flow and every Laplacian is symmetric. `Dw` is exact
-//! for parabolas in the three cells at a wall. At slip walls the field is continued by its mirror image.
+//! Fourth order in the index coordinate (Vasilyev 2000), closed at no-slip walls by a
+//! summation-by-parts pair: with the masses `m` of the cells and `f` of the faces and the weighted
+//! divergence `Dw`, the divergence is `m^-1 Dw` and the gradient `-f^-1 Dw^T`, so that the pressure
+//! does no work on a divergence-free flow and every Laplacian is symmetric. `Dw` is exact for
+//! parabolas in the three cells at a wall. At slip walls the field is continued by its mirror
+//! image.
 //!
-//! Faces are counted from 0 to `n`; a bounded direction stores faces 0 to `n - 1` (face 0 is the wall, where the normal
-//! velocity is zero, and so is face `n`).
+//! Faces are counted from 0 to `n`; a bounded direction stores faces 0 to `n - 1` (face 0 is the
+//! wall, where the normal velocity is zero, and so is face `n`).
 //!
 //! Check: column sums, adjointness, exactness for polynomials, order on stretched meshes.
 
@@ -45,7 +47,8 @@ pub(crate) struct Operators1d {
     pub(crate) cell_mass_m: Vec<f64>,
     /// Mass of each face 0 to `n` \[m\]; in a periodic direction face `n` is face 0.
     pub(crate) face_mass_m: Vec<f64>,
-    /// Weighted divergence: for each cell the faces (0 to `n` in a bounded direction) and their coefficients.
+    /// Weighted divergence: for each cell the faces (0 to `n` in a bounded direction) and their
+    /// coefficients.
     pub(crate) divergence: Vec<Taps>,
 }
 
@@ -58,16 +61,16 @@ impl Operators1d {
         let mut face_mass_m = face_metric_m.clone();
         let sticks = direction.ends.no_slip();
         for (side, sticks) in sticks.into_iter().enumerate() {
-            let inward = |i: usize, last: usize| if side == 0 { i } else { last - i };
+            let is_low = side == 0;
             if sticks {
                 for (i, weight) in WALL_CELL_WEIGHT.iter().enumerate() {
-                    cell_mass_m[inward(i, n - 1)] *= weight;
+                    cell_mass_m[if is_low { i } else { n - 1 - i }] *= weight;
                 }
                 for (i, weight) in WALL_FACE_WEIGHT.iter().enumerate() {
-                    face_mass_m[inward(i, n)] *= weight;
+                    face_mass_m[if is_low { i } else { n - i }] *= weight;
                 }
             } else if direction.ends != Ends::Periodic {
-                face_mass_m[inward(0, n)] *= 0.5;
+                face_mass_m[if is_low { 0 } else { n }] *= 0.5;
             }
         }
         let divergence = (0..n)
@@ -109,14 +112,17 @@ impl Operators1d {
 
     /// The weighted divergence over the stored faces that carry a velocity.
     pub(crate) fn stored_divergence(&self) -> Vec<Taps> {
-        let carries = |face: usize| self.is_periodic() || (face > 0 && face < self.cells);
-        self.divergence
-            .iter()
-            .map(|row| row.iter().copied().filter(|tap| carries(tap.0)).collect())
-            .collect()
+        let mut rows = self.divergence.clone();
+        if !self.is_periodic() {
+            for row in &mut rows {
+                row.retain(|&(face, _)| face > 0 && face < self.cells);
+            }
+        }
+        rows
     }
 
-    /// Transposed rows of the weighted divergence: for each face 0 to `n` the cells and their coefficients.
+    /// Transposed rows of the weighted divergence: for each face 0 to `n` the cells and their
+    /// coefficients.
     pub(crate) fn adjoint(&self) -> Vec<Taps> {
         let mut rows = vec![Taps::new(); self.cells + 1];
         for (cell, row) in self.divergence.iter().enumerate() {
@@ -127,7 +133,8 @@ impl Operators1d {
         rows
     }
 
-    /// Rows of the gradient `-f^-1 Dw^T` of a field at the centres, for the stored faces; empty at a wall.
+    /// Rows of the gradient `-f^-1 Dw^T` of a field at the centres, for the stored faces; empty at
+    /// a wall.
     pub(crate) fn gradient(&self) -> Vec<Taps> {
         let mut rows = self.adjoint();
         rows.truncate(self.cells);
@@ -142,42 +149,48 @@ impl Operators1d {
         rows
     }
 
-    /// Laplacian of a field at the centres that sticks to the no-slip walls: rows over the cells, and for each row the
-    /// coefficients of the velocities of the low and of the high wall.
+    /// Laplacian of a field at the centres that sticks to the no-slip walls: rows over the cells,
+    /// and for each row the coefficients of the velocities of the low and of the high wall.
     pub(crate) fn laplacian_at_cells(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
-        let scaled = |(row, mass): (&Taps, &f64)| {
-            row.iter()
-                .map(|&(face, c)| (face, c / (mass * self.face_mass_m[face])))
-                .collect::<Taps>()
-        };
-        self.sums_of_gradients(self.divergence.iter().zip(&self.cell_mass_m).map(scaled))
-    }
-
-    /// Half the mean of the gradients at the two faces of each cell of such a field, in the same form. At a slip wall the gradient of
-    /// what flows along it is zero.
-    pub(crate) fn half_mean_gradient(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
-        let face = |face: usize| {
-            if self.is_periodic() {
-                face % self.cells
-            } else {
-                face
+        let mut faces = self.divergence.clone();
+        for (row, mass) in faces.iter_mut().zip(&self.cell_mass_m) {
+            for (face, c) in row {
+                *c /= mass * self.face_mass_m[*face];
             }
-        };
-        let both = |cell: usize| {
-            [cell, cell + 1]
-                .map(face)
-                .map(|face| (face, 0.25 / self.face_mass_m[face]))
-                .to_vec()
-        };
-        self.sums_of_gradients((0..self.cells).map(both))
+        }
+        self.sums_of_gradients(&faces)
     }
 
-    /// For each cell the sum of factors times the weighted gradients at faces.
-    fn sums_of_gradients(&self, faces: impl Iterator<Item = Taps>) -> (Vec<Taps>, Vec<[f64; 2]>) {
-        let (adjoint, sticks, last) = (self.adjoint(), self.ends.no_slip(), self.cells);
-        let of_cell = |faces: Taps| {
-            let (mut sums, mut walls) = (vec![0.0; self.cells], [0.0; 2]);
-            for (face, factor) in faces {
+    /// Half the mean of the gradients at the two faces of each cell of such a field, in the same
+    /// form. At a slip wall the gradient of what flows along it is zero.
+    pub(crate) fn half_mean_gradient(&self) -> (Vec<Taps>, Vec<[f64; 2]>) {
+        let mut faces = Vec::with_capacity(self.cells);
+        for cell in 0..self.cells {
+            let high = if self.is_periodic() {
+                (cell + 1) % self.cells
+            } else {
+                cell + 1
+            };
+            faces.push(vec![
+                (cell, 0.25 / self.face_mass_m[cell]),
+                (high, 0.25 / self.face_mass_m[high]),
+            ]);
+        }
+        self.sums_of_gradients(&faces)
+    }
+
+    /// For each cell the sum of factors times the weighted gradients at faces: rows over the
+    /// cells, and the coefficients of the velocities of the two walls.
+    fn sums_of_gradients(&self, faces_of_cells: &[Taps]) -> (Vec<Taps>, Vec<[f64; 2]>) {
+        let adjoint = self.adjoint();
+        let sticks = self.ends.no_slip();
+        let last = self.cells;
+        let mut rows = Vec::with_capacity(self.cells);
+        let mut wall_coefficients = Vec::with_capacity(self.cells);
+        for faces in faces_of_cells {
+            let mut sums = vec![0.0; self.cells];
+            let mut walls = [0.0; 2];
+            for &(face, factor) in faces {
                 let side = usize::from(face == last);
                 let at_wall = !self.is_periodic() && (face == 0 || face == last);
                 if at_wall && !sticks[side] {
@@ -187,13 +200,15 @@ impl Operators1d {
                     sums[other] -= factor * weight;
                 }
                 if at_wall {
-                    // The gradient at the wall sees the wall's velocity with weight -1 at the low and +1 at the high end.
+                    // The gradient at the wall has the wall's velocity with weight -1 at the low
+                    // and +1 at the high end.
                     walls[side] += factor * if side == 0 { -1.0 } else { 1.0 };
                 }
             }
-            (nonzero(&sums), walls)
-        };
-        faces.map(of_cell).unzip()
+            rows.push(nonzero(&sums));
+            wall_coefficients.push(walls);
+        }
+        (rows, wall_coefficients)
     }
 
     /// Laplacian of the normal velocity at the stored faces, zero at the walls.
@@ -216,12 +231,14 @@ impl Operators1d {
 }
 
 /// The entries of a dense row that are not zero.
-fn nonzero(sums: &[f64]) -> Taps {
-    sums.iter()
-        .enumerate()
-        .filter(|(_, c)| **c != 0.0)
-        .map(|(i, c)| (i, *c))
-        .collect()
+pub(crate) fn nonzero(sums: &[f64]) -> Taps {
+    let mut taps = Taps::new();
+    for (i, &c) in sums.iter().enumerate() {
+        if c != 0.0 {
+            taps.push((i, c));
+        }
+    }
+    taps
 }
 
 /// One row of the weighted divergence.
@@ -251,7 +268,7 @@ fn divergence_row(n: usize, ends: Ends, sticks: [bool; 2], k: usize) -> Taps {
     nonzero(&row)
 }
 
-/// The face that stands for face `index` beyond the ends, and the sign of its normal velocity.
+/// The stored face whose normal velocity, times the sign, is that of face `index` beyond the ends.
 pub(crate) fn resolve_face(n: usize, ends: Ends, index: isize) -> (usize, f64) {
     let last = n as isize;
     if ends == Ends::Periodic {
@@ -265,7 +282,7 @@ pub(crate) fn resolve_face(n: usize, ends: Ends, index: isize) -> (usize, f64) {
     }
 }
 
-/// The cell that stands for cell `index` beyond the ends: its copy or its mirror image.
+/// The cell of which cell `index` beyond the ends is a copy or the mirror image.
 pub(crate) fn resolve_cell(n: usize, ends: Ends, index: isize) -> usize {
     let count = n as isize;
     if ends == Ends::Periodic {
@@ -385,7 +402,8 @@ mod tests {
         }
     }
 
-    /// Largest errors of the Laplacians of `cos` at the centres and `sin` at the faces, interior and all.
+    /// Largest errors of the Laplacians of `cos` at the centres and `sin` at the faces, interior
+    /// and all.
     fn errors(direction: &Direction) -> [f64; 2] {
         let line = Operators1d::new(direction);
         let wave = std::f64::consts::PI;

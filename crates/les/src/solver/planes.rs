@@ -1,9 +1,12 @@
-//! Fields as they are measured and written: planes across z in the order `[z][y][x]`, whatever their order in memory.
+//! Fields as they are measured and written: planes across z in the order `[z][y][x]`, whatever
+//! their order in memory.
 //!
-//! Of a flow on several ranks each has some of these planes, with halos about them. Where z is the last direction in memory
-//! they are those that it owns, and nothing is exchanged; otherwise, which is so in plane flows, all give all what they own.
+//! Of a flow on several ranks each has some of these planes, with halos about them. Where z is the
+//! last direction in memory they are those that it owns, and nothing is exchanged; otherwise, which
+//! is so in plane flows, all give all what they own.
 //!
-//! Check: fields on ranks against those of one process, every order in memory, fewer planes across z than ranks.
+//! Check: fields on ranks against those of one process, every order in memory, fewer planes across
+//! z than ranks.
 
 use rayon::prelude::*;
 
@@ -13,7 +16,8 @@ use super::slabs::Slabs;
 use crate::Error;
 use crate::ranks::Ranks;
 
-/// Velocity at the low faces of the cells \[m/s\] in the planes across z that a rank measures, halos included.
+/// Velocity at the low faces of the cells \[m/s\] in the planes across z that a rank measures,
+/// halos included.
 #[derive(Debug, Clone)]
 pub(crate) struct Faces {
     pub(crate) shape: Shape,
@@ -24,7 +28,7 @@ pub(crate) struct Faces {
 
 impl Flow {
     /// The planes across z that this rank measures and writes; all of them in one process.
-    pub(crate) fn shown(&self) -> Shape {
+    pub(crate) fn output_shape(&self) -> Shape {
         let ranks = &self.layout.slabs.ranks;
         Shape::slab(self.mesh.cells(), ranks.rank(), ranks.count())
     }
@@ -36,7 +40,7 @@ impl Flow {
     pub(crate) fn faces(&self) -> Result<Faces, Error> {
         let field = [self.face(0)?, self.face(1)?, self.face(2)?];
         Ok(Faces {
-            shape: self.shown(),
+            shape: self.output_shape(),
             field,
             slabs: self.layout.slabs.clone(),
         })
@@ -50,41 +54,46 @@ impl Flow {
         self.in_planes(&self.state.velocity[self.layout.axis_of(direction)])
     }
 
-    /// A field of this rank, whose halos are up to date, in the planes that it shows, halos included.
+    /// A field of this rank, whose halos are up to date, in the planes that it shows, halos
+    /// included.
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
     pub(crate) fn in_planes(&self, field: &[f64]) -> Result<Vec<f64>, Error> {
-        let (layout, shown) = (&self.layout, self.shown());
-        let [nx, ny, _] = shown.n;
-        let gathered;
-        let (shape, field) = if layout.direction[2] == 2 || layout.slabs.is_alone() {
-            (layout.shape, field)
-        } else {
-            gathered = layout
-                .slabs
-                .all_gather(field[layout.shape.own_places()].to_vec())?;
-            (Shape::whole(layout.shape.n), &gathered[..])
-        };
-        let place = |at: [usize; 3]| shape.place(layout.direction.map(|d| at[d]));
-        let mut out = vec![0.0; shown.len()];
-        let held: Vec<usize> = shown.held().collect();
+        let layout = &self.layout;
+        if layout.direction[2] == 2 || layout.slabs.is_alone() {
+            return Ok(self.reordered(field, layout.shape));
+        }
+        let own = field[layout.shape.own_range()].to_vec();
+        let whole = layout.slabs.all_gather(own)?;
+        Ok(self.reordered(&whole, Shape::whole(layout.shape.n)))
+    }
+
+    /// The planes that this rank outputs, `[z][y][x]`, from a field of `shape` in the order of
+    /// memory.
+    fn reordered(&self, field: &[f64], shape: Shape) -> Vec<f64> {
+        let direction = self.layout.direction;
+        let output = self.output_shape();
+        let [nx, ny, _] = output.n;
+        let mut out = vec![0.0; output.len()];
+        let held: Vec<usize> = output.held().collect();
         out.par_chunks_mut(nx * ny)
             .zip(held)
             .for_each(|(plane, k)| {
                 for (j, row) in plane.chunks_mut(nx).enumerate() {
-                    row.iter_mut()
-                        .enumerate()
-                        .for_each(|(i, value)| *value = field[place([i, j, k])]);
+                    for (i, value) in row.iter_mut().enumerate() {
+                        let at = [i, j, k];
+                        *value = field[shape.place(direction.map(|d| at[d]))];
+                    }
                 }
             });
-        Ok(out)
+        out
     }
 }
 
-/// The planes of `shown` without its halos.
-pub(crate) fn without_halos(shown: Shape, mut planes: Vec<f64>) -> Vec<f64> {
-    let own = shown.own_places();
+/// The planes of `shape` without its halos.
+pub(crate) fn without_halos(shape: Shape, mut planes: Vec<f64>) -> Vec<f64> {
+    let own = shape.own_range();
     planes.truncate(own.end);
     planes.drain(..own.start);
     planes
@@ -95,7 +104,27 @@ mod tests {
     use super::super::cases::{Initial, taylor_green_3d};
     use super::super::mesh::{Direction, Mesh};
     use super::super::settings::{FlowSettings, TimeStep};
-    use crate::ranks::on_threads;
+    use crate::ranks::{Ranks, Single, on_threads};
+    use crate::solver::Flow;
+    use std::sync::Arc;
+
+    /// A flow that differs in all directions.
+    fn start(mesh: &Mesh, ranks: Arc<dyn Ranks>, order: [usize; 3]) -> Flow {
+        let field = |[x, y, z]: [f64; 3]| {
+            [
+                (7.0 * x + z).sin(),
+                (5.0 * y - x).cos(),
+                (3.0 * z + 2.0 * y).sin(),
+            ]
+        };
+        let settings = FlowSettings {
+            ranks,
+            ..FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 })
+        };
+        Initial::Field(Box::new(field))
+            .start_in_order(order, mesh.clone(), settings)
+            .unwrap()
+    }
 
     #[test]
     fn planes_and_their_halos_are_those_of_one_process_in_every_order_in_memory() {
@@ -108,30 +137,14 @@ mod tests {
         .unwrap();
         let orders = [[0, 1, 2], [1, 0, 2], [0, 2, 1], [2, 0, 1], [1, 2, 0]];
         for (mesh, orders) in [(case.mesh, &orders[..]), (flat, &orders[2..])] {
-            let field = |[x, y, z]: [f64; 3]| {
-                [
-                    (7.0 * x + z).sin(),
-                    (5.0 * y - x).cos(),
-                    (3.0 * z + 2.0 * y).sin(),
-                ]
-            };
-            let start = |ranks, order| {
-                let settings = FlowSettings::new(0.0, TimeStep::Fixed { step_s: 1e-3 });
-                let settings = FlowSettings { ranks, ..settings };
-                Initial::Field(Box::new(field))
-                    .start_in_order(order, mesh.clone(), settings)
-                    .unwrap()
-            };
             for &order in orders {
-                let alone = start(std::sync::Arc::new(crate::ranks::Single), order);
-                let (whole, centred) = (
-                    alone.faces().unwrap(),
-                    alone.own_centre_velocity_m_s(2).unwrap(),
-                );
+                let alone = start(&mesh, Arc::new(Single), order);
+                let whole = alone.faces().unwrap();
+                let centred = alone.own_centre_velocity_m_s(2).unwrap();
                 assert!(whole.field.iter().flatten().any(|value| *value != 0.0));
                 for count in [2, 3, 4] {
                     let found = on_threads(count, |ranks| {
-                        let flow = start(ranks, order);
+                        let flow = start(&mesh, ranks, order);
                         let faces = flow.faces().unwrap();
                         for (d, field) in faces.field.iter().enumerate() {
                             for k in faces.shape.held() {

@@ -1,14 +1,15 @@
-//! The projection onto divergence-free fields: the weighted divergence, and the correction by the gradient of the pressure.
+//! The projection onto divergence-free fields: the weighted divergence, and the correction by the
+//! gradient of the pressure.
 //!
 //! Check: adjointness with the gradient, divergence after a projection (tests of `flow`).
 
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+use super::component_operators::{ComponentOperators, Scratch};
 use super::layout::{Layout, Shape};
-use super::momentum::{Momentum, Scratch};
 use super::row_operator::RowOperator;
-use super::rows::{HALO, add_across, cut_rows, wrap};
+use super::rows::{HALO, add_across, wrap};
 
 /// The weighted divergence `sum_b (prod_{d != b} m_d) Dw_b u_b` \[m^3/s\].
 #[derive(Debug, Clone)]
@@ -36,7 +37,7 @@ impl Divergence {
     /// Writes `scale` times the weighted divergence of `velocity` to `out`.
     pub(crate) fn apply(&self, velocity: [&[f64]; 3], scale: f64, out: &mut [f64]) {
         let n = self.shape.n[0];
-        let planes = out[self.shape.own_places()]
+        let planes = out[self.shape.own_range()]
             .par_chunks_mut(self.shape.plane())
             .zip(self.shape.own());
         planes.for_each_init(
@@ -81,7 +82,8 @@ fn divergence_row(
     padded: &mut [f64],
 ) {
     let n = out.len();
-    let (mass_1, mass_2) = (scale * ops.cell_mass[1][j], scale * ops.cell_mass[2][k]);
+    let mass_1 = scale * ops.cell_mass[1][j];
+    let mass_2 = scale * ops.cell_mass[2][k];
     out.fill(0.0);
     add_across(
         out,
@@ -112,10 +114,10 @@ fn divergence_row(
     ops.along[0].columns.add(out, padded);
 }
 
-/// `velocity = predicted - scale grad(phi)`; returns of each plane `1/2 sum mass u^2` \[m^5/s^2\] and the largest `sum_a |u_a|/h_a`
-/// \[1/s\].
+/// `velocity = predicted - scale grad(phi)`; returns of each plane `1/2 sum mass u^2` \[m^5/s^2\]
+/// and the largest `sum_a |u_a|/h_a` \[1/s\].
 pub(crate) fn correct(
-    ops: &[Momentum; 3],
+    ops: &[ComponentOperators; 3],
     predicted: [&[f64]; 3],
     phi: &[f64],
     scale: f64,
@@ -125,34 +127,36 @@ pub(crate) fn correct(
     let n = shape.n[0];
     let [u, v, w] = velocity
         .each_mut()
-        .map(|field| field[shape.own_places()].par_chunks_mut(shape.plane()));
+        .map(|field| field[shape.own_range()].par_chunks_mut(shape.plane()));
     (u, v, w, shape.own())
         .into_par_iter()
         .map_init(
             || (Scratch::new(n), vec![0.0; n], vec![0.0; n]),
             |(scratch, rate, across_metric), (u, v, w, k)| {
                 let mut planes = [u, v, w];
-                let (mut energy, mut courant_per_s) = (0.0, 0.0);
+                let mut energy = 0.0;
+                let mut courant_per_s = 0.0;
                 for j in 0..shape.n[1] {
                     rate.fill(0.0);
                     for ((a, ops), plane) in ops.iter().enumerate().zip(&mut planes) {
                         scratch.gradient(ops, phi, j, k);
                         let (across, mass) = ops.row_mass(j, k);
-                        let metric = if a == 0 {
+                        let inverse_metric = if a == 0 {
                             &ops.inverse_metric
                         } else {
                             across_metric.fill(ops.inverse_metric[[j, k][a - 1]]);
                             &*across_metric
                         };
-                        let read = [
+                        let squares = correct_row(
+                            &mut plane[j * n..(j + 1) * n],
                             &predicted[a][shape.row(j, k)],
                             &scratch.pressure,
                             mass,
-                            metric,
-                        ];
-                        energy += 0.5
-                            * across
-                            * correct_row(&mut plane[j * n..(j + 1) * n], read, scale, rate);
+                            inverse_metric,
+                            scale,
+                            rate,
+                        );
+                        energy += 0.5 * across * squares;
                     }
                     for &value in rate.iter() {
                         if value > courant_per_s {
@@ -168,10 +172,21 @@ pub(crate) fn correct(
 
 /// Corrects one row, adds its part of the Courant rate, and returns `sum mass u^2`.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
-fn correct_row(row: &mut [f64], read: [&[f64]; 4], scale: f64, rate: &mut [f64]) -> f64 {
+fn correct_row(
+    row: &mut [f64],
+    predicted: &[f64],
+    gradient: &[f64],
+    mass: &[f64],
+    inverse_metric: &[f64],
+    scale: f64,
+    rate: &mut [f64],
+) -> f64 {
     let n = row.len();
-    let ([predicted, gradient, mass, inverse_metric], rate) =
-        (cut_rows!(read, n, 0 1 2 3), &mut rate[..n]);
+    let predicted = &predicted[..n];
+    let gradient = &gradient[..n];
+    let mass = &mass[..n];
+    let inverse_metric = &inverse_metric[..n];
+    let rate = &mut rate[..n];
     for i in 0..n {
         row[i] = predicted[i] - scale * gradient[i];
         rate[i] += row[i].abs() * inverse_metric[i];
@@ -179,26 +194,21 @@ fn correct_row(row: &mut [f64], read: [&[f64]; 4], scale: f64, rate: &mut [f64])
     weighted_dot(row, row, mass)
 }
 
-/// `sum mass x y` with fixed lanes, so that the sum vectorises and does not depend on the instruction set.
+/// `sum mass x y` with fixed lanes, so that the sum vectorises and does not depend on the
+/// instruction set.
 #[inline(always)]
 pub(crate) fn weighted_dot(x: &[f64], y: &[f64], mass: &[f64]) -> f64 {
     const LANES: usize = 8;
     let mut sums = [0.0; LANES];
-    let ((x, x_rest), (y, y_rest), (m, m_rest)) = (
-        x.as_chunks::<LANES>(),
-        y.as_chunks::<LANES>(),
-        mass.as_chunks::<LANES>(),
-    );
+    let (x, x_rest) = x.as_chunks::<LANES>();
+    let (y, y_rest) = y.as_chunks::<LANES>();
+    let (m, m_rest) = mass.as_chunks::<LANES>();
     for ((x, y), m) in x.iter().zip(y).zip(m) {
         for i in 0..LANES {
             sums[i] += m[i] * (x[i] * y[i]);
         }
     }
-    let rest: f64 = x_rest
-        .iter()
-        .zip(y_rest)
-        .zip(m_rest)
-        .map(|((x, y), m)| m * (x * y))
-        .sum();
+    let products = x_rest.iter().zip(y_rest);
+    let rest: f64 = products.zip(m_rest).map(|((x, y), m)| m * (x * y)).sum();
     sums.iter().sum::<f64>() + rest
 }

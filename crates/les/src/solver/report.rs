@@ -16,7 +16,8 @@ pub struct StepReport {
     pub courant: f64,
     /// Kinetic energy after the step, integral of `u^2/2` \[m^5/s^2\].
     pub kinetic_energy_m5_s2: f64,
-    /// Power of the viscous term at the start of the step, negative where it dissipates \[m^5/s^3\].
+    /// Power of the viscous term at the start of the step, negative where it dissipates
+    /// \[m^5/s^3\].
     pub viscous_power_m5_s3: f64,
     /// Power of the subgrid stress at the start of the step \[m^5/s^3\].
     pub subgrid_power_m5_s3: f64,
@@ -24,8 +25,9 @@ pub struct StepReport {
     pub force_power_m5_s3: f64,
     /// Largest subgrid viscosity \[m^2/s\].
     pub subgrid_viscosity_m2_s: f64,
-    /// Step times the largest decay rate of the shortest waves by the subgrid viscosity; where it is above 0.8 (2.0 with
-    /// Runge-Kutta, less what explicit viscosity takes) the subgrid viscosity was cut.
+    /// Step times the largest decay rate of the shortest waves by the subgrid viscosity; where it
+    /// is above 0.8 (2.0 with Runge-Kutta, less what explicit viscosity takes) the subgrid
+    /// viscosity was cut.
     pub subgrid_decay: f64,
     /// Iterations of the last pressure solve; 0 of the direct solver.
     pub pressure_iterations: usize,

@@ -14,7 +14,8 @@ pub(crate) struct RowOperator {
     /// For each target the places and their coefficients.
     pub(super) rows: Vec<Taps>,
     pub(super) columns: Columns,
-    /// Coefficients of the pairs at the distances 1, 2 and 3, the same in all rows, of a second difference on equal periodic cells.
+    /// Coefficients of the pairs at the distances 1, 2 and 3, the same in all rows, of a second
+    /// difference on equal periodic cells.
     pub(super) even: Option<[f64; 3]>,
 }
 
@@ -37,7 +38,8 @@ impl RowOperator {
         }
     }
 
-    /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes 1 and 2).
+    /// `out +=` the operator on `field` at the targets of the row `at` (its indices along the axes
+    /// 1 and 2).
     #[inline(always)]
     pub(crate) fn add(&self, out: &mut [f64], field: &[f64], at: [usize; 2], padded: &mut [f64]) {
         if self.axis == 0 {
@@ -50,7 +52,8 @@ impl RowOperator {
     /// `out +=` an operator of axis 1 or 2 on `field` at the targets of the row `at`.
     #[inline(always)]
     pub(crate) fn add_across(&self, out: &mut [f64], field: &[f64], at: [usize; 2]) {
-        let (index, starts) = (at[self.axis - 1], self.shape.row_offsets(self.axis, at));
+        let index = at[self.axis - 1];
+        let starts = self.shape.row_offsets(self.axis, at);
         if let Some(pairs) = self.even {
             let count = self.shape.n[self.axis];
             add_even(

@@ -1,13 +1,13 @@
-//! Kernels on rows of memory axis 0. They are inlined into functions that are compiled for several instruction sets;
-//! products and sums are kept apart, so that each version gives the same bits.
+//! Kernels on rows of memory axis 0. They are inlined into functions that are compiled for several
+//! instruction sets; products and sums are kept apart, so that each version gives the same bits.
 //!
 //! Check: the places of a shape (tests of `shape`).
 
 use super::operators_1d::Taps;
 use super::transport::{MEAN, Stencil};
 
-/// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in functions that are compiled for
-/// several instruction sets.
+/// Some rows of an array, cut to `n` values. Closures given to `map` or `from_fn` stay calls in
+/// functions that are compiled for several instruction sets.
 macro_rules! cut_rows {
     ($rows:expr, $n:expr, $($place:literal)+) => { [$(&$rows[$place][..$n]),+] };
 }
@@ -29,7 +29,8 @@ pub(crate) struct Columns {
 }
 
 impl Columns {
-    /// The operator with the rows `rows`, whose taps are at most [`HALO`] away, in the periodic sense if `periodic`.
+    /// The operator with the rows `rows`, whose taps are at most [`HALO`] away, in the periodic
+    /// sense if `periodic`.
     pub(crate) fn new(rows: &[Taps], periodic: bool) -> Self {
         let n = rows.len();
         let mut bands = vec![vec![0.0; n]; 2 * HALO + 1];
@@ -46,13 +47,13 @@ impl Columns {
                 }
             }
         }
-        let used = bands
-            .into_iter()
-            .enumerate()
-            .filter(|(_, band)| band.iter().any(|c| *c != 0.0));
-        Self {
-            bands: used.collect(),
+        let mut used = Vec::new();
+        for (offset, band) in bands.into_iter().enumerate() {
+            if band.iter().any(|c| *c != 0.0) {
+                used.push((offset, band));
+            }
         }
+        Self { bands: used }
     }
 
     /// `out += self padded`.
@@ -77,13 +78,15 @@ impl Columns {
 
     /// Sums of squares of the `n` rows.
     pub(crate) fn squares(&self, n: usize) -> Vec<f64> {
-        (0..n)
-            .map(|i| self.bands.iter().map(|band| band.1[i] * band.1[i]).sum())
-            .collect()
+        let mut squares = Vec::with_capacity(n);
+        for i in 0..n {
+            squares.push(self.bands.iter().map(|band| band.1[i] * band.1[i]).sum());
+        }
+        squares
     }
 
-    /// `out -= mass self (padded - own)`, `own` being the middle of `padded`: nothing at all for a constant if the rows sum to
-    /// zero. The operations are fused, on every machine.
+    /// `out -= mass self (padded - own)`, `own` being the middle of `padded`: nothing at all for a
+    /// constant if the rows sum to zero. The operations are fused, on every machine.
     #[inline(always)]
     pub(crate) fn subtract_differences(
         &self,
@@ -95,7 +98,8 @@ impl Columns {
         let n = out.len();
         let own = &own[..n];
         for (offset, coefficient) in self.bands.iter().filter(|band| band.0 != HALO) {
-            let (c, x) = (&coefficient[..n], &padded[*offset..offset + n]);
+            let c = &coefficient[..n];
+            let x = &padded[*offset..offset + n];
             for i in 0..n {
                 out[i] = (-mass * c[i]).mul_add(x[i] - own[i], out[i]);
             }
@@ -150,8 +154,10 @@ pub(crate) fn add_across(
 ) {
     let n = out.len();
     while let [a, b, c, d, rest @ ..] = taps {
-        let (x0, x1) = (&field[starts.of(a.0)..][..n], &field[starts.of(b.0)..][..n]);
-        let (x2, x3) = (&field[starts.of(c.0)..][..n], &field[starts.of(d.0)..][..n]);
+        let x0 = &field[starts.start(a.0)..][..n];
+        let x1 = &field[starts.start(b.0)..][..n];
+        let x2 = &field[starts.start(c.0)..][..n];
+        let x3 = &field[starts.start(d.0)..][..n];
         let [a, b, c, d] = [scale * a.1, scale * b.1, scale * c.1, scale * d.1];
         for i in 0..n {
             out[i] += (a * x0[i] + b * x1[i]) + (c * x2[i] + d * x3[i]);
@@ -160,7 +166,7 @@ pub(crate) fn add_across(
     }
     for tap in taps {
         let c = scale * tap.1;
-        for (out, x) in out.iter_mut().zip(&field[starts.of(tap.0)..][..n]) {
+        for (out, x) in out.iter_mut().zip(&field[starts.start(tap.0)..][..n]) {
             *out += c * x;
         }
     }
@@ -177,7 +183,7 @@ pub(crate) fn rows_from<const N: usize>(
 ) -> [&[f64]; N] {
     let mut rows: [&[f64]; N] = [&[]; N];
     for (offset, row) in rows.iter_mut().enumerate() {
-        *row = &field[starts.of(round(first + offset, count))..][..n];
+        *row = &field[starts.start(round(first + offset, count))..][..n];
     }
     rows
 }
@@ -191,7 +197,8 @@ pub(crate) fn round(mut index: usize, count: usize) -> usize {
     index
 }
 
-/// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values `q` at -3 to 3.
+/// `out += scale transport`, by the formula of the interior: fluxes `g` at -1, 0, 1, 2 and values
+/// `q` at -3 to 3.
 #[inline(always)]
 pub(crate) fn add_transport(
     out: &mut [f64],
@@ -203,15 +210,12 @@ pub(crate) fn add_transport(
     let n = out.len();
     let [g0, g1, g2, g3] = cut_rows!(g, n, 0 1 2 3);
     let [q0, q1, q2, q4, q5, q6] = cut_rows!(q, n, 0 1 2 4 5 6);
-    let ([a, b, c], [d, e, f]) = (stencil.near, stencil.far);
-    let [a, b, c, d, e, f] = [
-        scale * a,
-        scale * b,
-        scale * c,
-        scale * d,
-        scale * e,
-        scale * f,
-    ];
+    let a = scale * stencil.near[0];
+    let b = scale * stencil.near[1];
+    let c = scale * stencil.near[2];
+    let d = scale * stencil.far[0];
+    let e = scale * stencil.far[1];
+    let f = scale * stencil.far[2];
     if stencil.is_plain() {
         for i in 0..n {
             out[i] += b * (g2[i] * q4[i] - g1[i] * q2[i]) + f * (g3[i] * q6[i] - g0[i] * q0[i]);
@@ -238,9 +242,10 @@ pub(crate) fn add_even(out: &mut [f64], c: [f64; 3], q: &[&[f64]; 7]) {
     let [q0, q1, q2, q3, q4, q5, q6] = cut_rows!(q, n, 0 1 2 3 4 5 6);
     for i in 0..n {
         let own = q3[i];
-        let pair = |low: f64, high: f64| (low - own) + (high - own);
-        out[i] +=
-            c[0] * pair(q2[i], q4[i]) + (c[1] * pair(q1[i], q5[i]) + c[2] * pair(q0[i], q6[i]));
+        let near = (q2[i] - own) + (q4[i] - own);
+        let middle = (q1[i] - own) + (q5[i] - own);
+        let far = (q0[i] - own) + (q6[i] - own);
+        out[i] += c[0] * near + (c[1] * middle + c[2] * far);
     }
 }
 
@@ -251,7 +256,8 @@ pub(crate) fn even_mean(out: &mut [f64], scale: f64, q: &[&[f64]; 4]) {
     let [q0, q1, q2, q3] = cut_rows!(q, n, 0 1 2 3);
     let far = -MEAN[0];
     for i in 0..n {
-        let (low, high) = (q1[i], q2[i]);
+        let low = q1[i];
+        let high = q2[i];
         out[i] = scale * (0.5 * (low + high) + far * ((low - q0[i]) + (high - q3[i])));
     }
 }
@@ -264,8 +270,8 @@ pub(crate) fn add_product(out: &mut [f64], scale: f64, g: &[f64], q: &[f64]) {
     }
 }
 
-/// Where the rows of some index begin in an array: numbers that are copied, not closures, which would stay calls in functions that are
-/// compiled for several instruction sets.
+/// Where the rows of some index begin in an array: numbers that are copied, not closures, which
+/// would stay calls in functions that are compiled for several instruction sets.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowOffsets {
     /// That of index 0 in an array that goes on downwards.
@@ -288,9 +294,9 @@ impl RowOffsets {
         }
     }
 
-    /// That of index `i`.
+    /// Where the row of index `i` begins.
     #[inline(always)]
-    pub(crate) fn of(self, i: usize) -> usize {
+    pub(crate) fn start(self, i: usize) -> usize {
         let start = self.first.wrapping_add(i * self.step);
         if i < self.lowest {
             start.wrapping_add(self.round)

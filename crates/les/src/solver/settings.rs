@@ -1,4 +1,4 @@
-//! What a simulation is told beside its mesh and its initial field.
+//! Settings of a simulation besides its mesh and its initial field.
 
 use std::sync::Arc;
 
@@ -12,21 +12,23 @@ use crate::ranks::{Ranks, Single};
 /// Growth in a step that is round-off.
 pub(super) const ROUND_OFF: f64 = 1e-12;
 
-/// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit axes in both.
+/// Time integration of convection and subgrid stresses; viscosity is Crank-Nicolson along implicit
+/// axes in both.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum TimeScheme {
-    /// Second-order Adams-Bashforth, (22): one pressure solve per step; the first step, which has no history, is one of
-    /// Runge-Kutta.
+    /// Second-order Adams-Bashforth, (22): one pressure solve per step; the first step, which has
+    /// no history, is one of Runge-Kutta.
     #[default]
     AdamsBashforth2,
-    /// The low-storage Runge-Kutta scheme of three stages of Wray (Spalart, Moser and Rogers 1991): three pressure solves per
-    /// step, about four times the step.
+    /// The low-storage Runge-Kutta scheme of three stages of Wray (Spalart, Moser and Rogers 1991):
+    /// three pressure solves per step, about four times the step.
     RungeKutta3,
 }
 
 impl TimeScheme {
-    /// Fraction of the time step and the weights of the new and of the old terms, stage by stage; `ratio` is the step over
-    /// the one before, `None` where no old terms exist: then a step of Runge-Kutta needs none.
+    /// Fraction of the time step and the weights of the new and of the old terms, stage by stage;
+    /// `ratio` is the step over the one before, `None` where no old terms exist: then a step of
+    /// Runge-Kutta needs none.
     pub(crate) fn stages(self, ratio: Option<f64>) -> Vec<Stage> {
         match (self, ratio) {
             (Self::AdamsBashforth2, Some(r)) => vec![Stage {
@@ -35,23 +37,18 @@ impl TimeScheme {
                 old: -0.5 * r,
             }],
             (Self::AdamsBashforth2, None) | (Self::RungeKutta3, _) => {
-                let gamma = [8.0 / 15.0, 5.0 / 12.0, 3.0 / 4.0];
-                let zeta = [0.0, -17.0 / 60.0, -5.0 / 12.0];
-                let stage = |i: usize| {
-                    let fraction = gamma[i] + zeta[i];
-                    Stage {
-                        fraction,
-                        new: gamma[i] / fraction,
-                        old: zeta[i] / fraction,
-                    }
-                };
-                vec![stage(0), stage(1), stage(2)]
+                vec![
+                    Stage::from_weights(8.0 / 15.0, 0.0),
+                    Stage::from_weights(5.0 / 12.0, -17.0 / 60.0),
+                    Stage::from_weights(3.0 / 4.0, -5.0 / 12.0),
+                ]
             }
         }
     }
 
-    /// Courant number that the scheme runs at by default. Runge-Kutta lets no wave grow there; Adams-Bashforth lets all grow that
-    /// viscosity does not damp ([`Stability`](super::Stability)): short runs or a smaller number without it.
+    /// Courant number that the scheme runs at by default. Runge-Kutta lets no wave grow there;
+    /// Adams-Bashforth lets all grow that viscosity does not damp
+    /// ([`Stability`](super::Stability)): short runs or a smaller number without it.
     pub fn default_courant(self) -> f64 {
         match self {
             Self::AdamsBashforth2 => 0.35,
@@ -59,8 +56,8 @@ impl TimeScheme {
         }
     }
 
-    /// Largest product of step and decay rate at which terms integrated like convection are stable: the reach of the stability
-    /// region along the real axis.
+    /// Largest product of step and decay rate at which terms integrated like convection are stable:
+    /// the reach of the stability region along the real axis.
     pub(crate) fn largest_decay(self) -> f64 {
         match self {
             Self::AdamsBashforth2 => 1.0,
@@ -68,8 +65,9 @@ impl TimeScheme {
         }
     }
 
-    /// Growth of a wave of the mesh in a step, `ln |G|`, beyond which the step is refused. Under Adams-Bashforth some wave grows at
-    /// any step without viscosity: what shows after hundreds of steps is noted, what spoils a flow in ten is refused.
+    /// Growth of a wave of the mesh in a step, `ln |G|`, beyond which the step is refused. Under
+    /// Adams-Bashforth some wave grows at any step without viscosity: what shows after hundreds of
+    /// steps is noted, what spoils a flow in ten is refused.
     pub(crate) fn allowed_growth(self) -> f64 {
         match self {
             Self::AdamsBashforth2 => 0.1,
@@ -86,6 +84,19 @@ pub(crate) struct Stage {
     pub(crate) old: f64,
 }
 
+impl Stage {
+    /// The stage in which the new terms count for the fraction `gamma` of the step and the old
+    /// ones for `zeta`.
+    fn from_weights(gamma: f64, zeta: f64) -> Self {
+        let fraction = gamma + zeta;
+        Self {
+            fraction,
+            new: gamma / fraction,
+            old: zeta / fraction,
+        }
+    }
+}
+
 /// How long a time step is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeStep {
@@ -94,7 +105,8 @@ pub enum TimeStep {
         /// Time step \[s\].
         step_s: f64,
     },
-    /// As long as a Courant number `dt max sum |u_i|/h_i` and a longest step allow; it grows by at most a tenth per step.
+    /// As long as a Courant number `dt max sum |u_i|/h_i` and a longest step allow; it grows by at
+    /// most a tenth per step.
     Courant {
         /// Courant number.
         courant: f64,
@@ -113,8 +125,9 @@ impl TimeStep {
     }
 }
 
-/// The physical and numerical settings of a [`Flow`](super::Flow). Viscosity is implicit (Crank-Nicolson with line solves) along the
-/// directions in which the first time step exceeds a tenth of the explicit limit, and integrated as convection is along the others.
+/// The physical and numerical settings of a [`Flow`](super::Flow). Viscosity is implicit
+/// (Crank-Nicolson with line solves) along the directions in which the first time step exceeds a
+/// tenth of the explicit limit, and integrated as convection is along the others.
 #[derive(Debug, Clone)]
 pub struct FlowSettings {
     /// Kinematic viscosity \[m^2/s\]; zero is allowed between slip walls.
@@ -125,9 +138,9 @@ pub struct FlowSettings {
     pub scheme: TimeScheme,
     /// Length of the time step.
     pub time_step: TimeStep,
-    /// Number of first steps in which viscosity is backward Euler instead of Crank-Nicolson (Rannacher 1984). Crank-Nicolson
-    /// keeps the wiggles of an impulsive start at a wall for many steps when `nu dt/h^2` is large; four damped steps remove
-    /// them and leave the order at two.
+    /// Number of first steps in which viscosity is backward Euler instead of Crank-Nicolson
+    /// (Rannacher 1984). Crank-Nicolson keeps the wiggles of an impulsive start at a wall for many
+    /// steps when `nu dt/h^2` is large; four damped steps remove them and leave the order at two.
     pub damped_steps: u64,
     /// Which pressure solver.
     pub pressure: PressureMethod,
@@ -135,8 +148,9 @@ pub struct FlowSettings {
     pub pressure_tolerance: f64,
     /// Subgrid model.
     pub subgrid: SubgridModel,
-    /// The ranks that share the flow; one process unless told otherwise. They change nothing of a result. All ranks must have
-    /// the same settings but for their own number, and make the same calls.
+    /// The ranks that share the flow; one process by default. They change nothing of a
+    /// result. All ranks must have the same settings but for their own number, and make the same
+    /// calls.
     pub ranks: Arc<dyn Ranks>,
 }
 
@@ -159,7 +173,8 @@ impl FlowSettings {
     /// Refuses what a flow on `mesh` would refuse, before anything is allocated.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without viscosity, [`Error::TooManyRanks`].
+    /// [`Error::OutOfRange`] for a setting, [`Error::BadDirection`] for no-slip walls without
+    /// viscosity, [`Error::TooManyRanks`].
     pub fn validate(&self, mesh: &Mesh) -> Result<(), Error> {
         self.check()?;
         subgrid::formula_and_order(self.subgrid)?;

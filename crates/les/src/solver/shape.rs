@@ -1,7 +1,9 @@
-//! Number of values of a field, and which of them a rank holds: the planes of memory axis 2 that it owns, and halos.
+//! Number of values of a field, and which of them a rank holds: the planes of memory axis 2 that it
+//! owns, and halos.
 //!
-//! Kernels name planes by their number in the whole mesh. A slab lies in memory from [`HALO`] planes below the first that is
-//! owned, in the periodic sense; with one rank every plane has its own place, and nothing is moved.
+//! Kernels name planes by their number in the whole mesh. A slab lies in memory from [`HALO`]
+//! planes below the first that is owned, in the periodic sense; with one rank every plane has its
+//! own place, and nothing is moved.
 //!
 //! Check: every plane has one owner; places of owned planes and halos.
 
@@ -66,7 +68,7 @@ impl Shape {
     }
 
     /// Where they lie in memory.
-    pub(crate) fn own_places(self) -> Range<usize> {
+    pub(crate) fn own_range(self) -> Range<usize> {
         let start = self.place([0, 0, self.own[0]]);
         start..start + self.own().len() * self.plane()
     }
@@ -96,7 +98,8 @@ impl Shape {
         [i, j, (self.lowest + k) % self.n[2]]
     }
 
-    /// Place in memory of indices along the axes. That of a plane that is not held lies beyond the end.
+    /// Place in memory of indices along the axes. That of a plane that is not held lies beyond the
+    /// end.
     #[inline(always)]
     pub(crate) fn place(self, [i, j, k]: [usize; 3]) -> usize {
         let k = if k >= self.lowest {
@@ -118,9 +121,9 @@ impl Shape {
                 round: 0,
             };
         }
-        let (step, first) = (self.plane(), j * self.n[0]);
+        let step = self.plane();
         RowOffsets {
-            first: first.wrapping_sub(self.lowest * step),
+            first: (j * self.n[0]).wrapping_sub(self.lowest * step),
             step,
             lowest: self.lowest,
             round: self.n[2] * step,
@@ -146,20 +149,17 @@ mod tests {
             let mut owners = vec![0; planes];
             for rank in 0..count {
                 let shape = Shape::slab(n, rank, count);
-                assert!(shape.own().len() >= HALO && shape.own_places().end <= shape.len());
+                assert!(shape.own().len() >= HALO && shape.own_range().end <= shape.len());
                 shape.own().for_each(|k| owners[k] += 1);
                 for (at, k) in shape.own().enumerate() {
                     assert_eq!(
                         [
-                            shape.row_offsets(1, [0, k]).of(1),
-                            shape.row_offsets(2, [1, 0]).of(k)
+                            shape.row_offsets(1, [0, k]).start(1),
+                            shape.row_offsets(2, [1, 0]).start(k)
                         ],
                         [shape.place([0, 1, k]); 2]
                     );
-                    assert_eq!(
-                        shape.place([1, 1, k]),
-                        shape.own_places().start + 6 * at + 4
-                    );
+                    assert_eq!(shape.place([1, 1, k]), shape.own_range().start + 6 * at + 4);
                 }
                 let held = (0..planes)
                     .filter(|&k| shape.row(1, k).end <= shape.len())

@@ -13,7 +13,7 @@ use super::operators_1d::Taps;
 use super::rows::HALO;
 use super::shape::Shape;
 use crate::Error;
-use crate::ranks::{self, Ranks, Timed};
+use crate::ranks::{self, Ranks, TimedRanks};
 
 /// All planes of a halo, for fields that are read by operators of several kinds.
 pub(crate) const WHOLE: [usize; 2] = [HALO; 2];
@@ -21,7 +21,7 @@ pub(crate) const WHOLE: [usize; 2] = [HALO; 2];
 /// The ranks and what this one holds.
 #[derive(Debug, Clone)]
 pub(crate) struct Slabs {
-    pub(crate) ranks: Arc<Timed>,
+    pub(crate) ranks: Arc<TimedRanks>,
     pub(crate) shape: Shape,
 }
 
@@ -31,17 +31,18 @@ impl Slabs {
     /// # Errors
     /// [`Error::TooManyRanks`] if one would own fewer planes than a halo has.
     pub(crate) fn new(ranks: Arc<dyn Ranks>, n: [usize; 3]) -> Result<Self, Error> {
-        let (ranks_found, most) = (ranks.count(), (n[2] / HALO).max(1));
-        if ranks_found > most {
+        let count = ranks.count();
+        let most = (n[2] / HALO).max(1);
+        if count > most {
             return Err(Error::TooManyRanks {
-                ranks: ranks_found,
+                ranks: count,
                 planes: n[2],
                 most,
             });
         }
-        let shape = Shape::slab(n, ranks.rank(), ranks.count());
+        let shape = Shape::slab(n, ranks.rank(), count);
         Ok(Self {
-            ranks: Arc::new(Timed::new(ranks)),
+            ranks: Arc::new(TimedRanks::new(ranks)),
             shape,
         })
     }
@@ -56,73 +57,80 @@ impl Slabs {
         self.ranks.rank() == 0
     }
 
-    /// How many planes below and above its own a slab needs of a field that is read by an operator along axis 2 with the rows `rows`; the
-    /// most over all slabs, so that the ranks agree.
+    /// How many planes below and above its own a slab needs of a field that is read by an operator
+    /// along axis 2 with the rows `rows`; the most over all slabs, so that the ranks agree.
     pub(crate) fn reach(&self, rows: &[Taps]) -> [usize; 2] {
-        let (n2, count) = (self.shape.n[2], self.ranks.count());
-        let mut reach = [0; 2];
-        for own in (0..count).map(|rank| self.shape.planes_of(rank, count)) {
-            for place in rows[own.clone()]
-                .iter()
-                .flatten()
-                .map(|tap| tap.0)
-                .filter(|place| !own.contains(place))
-            {
-                let below = (own.start + n2 - place) % n2;
-                let above = (place + n2 - own.end) % n2 + 1;
-                let (side, planes) = if below <= above {
-                    (0, below)
+        let n2 = self.shape.n[2];
+        let count = self.ranks.count();
+        let [mut reach_below, mut reach_above] = [0; 2];
+        for rank in 0..count {
+            let own = self.shape.planes_of(rank, count);
+            for &(plane, _) in rows[own.clone()].iter().flatten() {
+                if own.contains(&plane) {
+                    continue;
+                }
+                let below = (own.start + n2 - plane) % n2;
+                let above = (plane + n2 - own.end) % n2 + 1;
+                if below <= above {
+                    reach_below = reach_below.max(below);
                 } else {
-                    (1, above)
-                };
-                reach[side] = reach[side].max(planes);
+                    reach_above = reach_above.max(above);
+                }
             }
         }
-        reach
+        [reach_below, reach_above]
+    }
+
+    /// Planes of the halos of rank `to` that rank `from` owns, in the order in which they are sent.
+    fn halo_planes(&self, from: usize, to: usize, [below, above]: [usize; 2]) -> Vec<usize> {
+        let n2 = self.shape.n[2];
+        let count = self.ranks.count();
+        let owned = self.shape.planes_of(from, count);
+        let Range { start, end } = self.shape.planes_of(to, count);
+        let halos = (start + n2 - below..start + n2).chain(end..end + above);
+        halos
+            .map(|k| k % n2)
+            .filter(|k| owned.contains(k))
+            .collect()
     }
 
     /// Brings `below` and `above` planes of the halos of fields up to date, at most [`HALO`] each.
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
-    pub(crate) fn halos(
-        &self,
-        fields: &mut [&mut [f64]],
-        [below, above]: [usize; 2],
-    ) -> Result<(), Error> {
+    pub(crate) fn halos(&self, fields: &mut [&mut [f64]], reach: [usize; 2]) -> Result<(), Error> {
         if self.is_alone() {
             return Ok(());
         }
-        let (shape, count, own_rank) = (self.shape, self.ranks.count(), self.ranks.rank());
-        let (plane, n2) = (shape.plane(), shape.n[2]);
-        // Planes of the halos of one rank that another owns, in the order in which they are sent.
-        let sent = |from: usize, to: usize| {
-            let (owned, Range { start, end }) =
-                (shape.planes_of(from, count), shape.planes_of(to, count));
-            let halos = (start + n2 - below..start + n2)
-                .chain(end..end + above)
-                .map(move |k| k % n2);
-            halos.filter(move |k| owned.contains(k))
-        };
-        let values = |from: usize, to: usize| sent(from, to).count() * plane * fields.len();
-        let to: Vec<usize> = (0..count).map(|rank| values(own_rank, rank)).collect();
-        let from: Vec<usize> = (0..count).map(|rank| values(rank, own_rank)).collect();
-        let mut send = Vec::with_capacity(to.iter().sum());
+        let shape = self.shape;
+        let count = self.ranks.count();
+        let own_rank = self.ranks.rank();
+        let plane = shape.plane();
+        let mut to = Vec::with_capacity(count);
+        let mut send = Vec::new();
         for rank in 0..count {
-            for (field, k) in fields
-                .iter()
-                .flat_map(|field| sent(own_rank, rank).map(move |k| (field, k)))
-            {
-                send.extend_from_slice(&field[shape.place([0, 0, k])..][..plane]);
+            let planes = self.halo_planes(own_rank, rank, reach);
+            to.push(planes.len() * plane * fields.len());
+            for field in fields.iter() {
+                for &k in &planes {
+                    send.extend_from_slice(&field[shape.place([0, 0, k])..][..plane]);
+                }
             }
         }
+        let incoming: Vec<Vec<usize>> = (0..count)
+            .map(|rank| self.halo_planes(rank, own_rank, reach))
+            .collect();
+        let from: Vec<usize> = incoming
+            .iter()
+            .map(|planes| planes.len() * plane * fields.len())
+            .collect();
         let mut receive = vec![0.0; from.iter().sum()];
         self.ranks.all_to_all(&send, &to, &mut receive, &from)?;
-        let mut came = receive.chunks(plane);
-        for rank in 0..count {
+        let mut received = receive.chunks(plane);
+        for planes in &incoming {
             for field in fields.iter_mut() {
-                for (k, plane) in sent(rank, own_rank).zip(&mut came) {
-                    field[shape.place([0, 0, k])..][..plane.len()].copy_from_slice(plane);
+                for (&k, values) in planes.iter().zip(&mut received) {
+                    field[shape.place([0, 0, k])..][..plane].copy_from_slice(values);
                 }
             }
         }
@@ -137,8 +145,8 @@ impl Slabs {
         ranks::all_gather(&*self.ranks, own)
     }
 
-    /// The numbers of all planes, from those of the planes that are owned: what is summed in their order does not depend on
-    /// the ranks.
+    /// The numbers of all planes, from those of the planes that are owned: what is summed in their
+    /// order does not depend on the ranks.
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
@@ -177,9 +185,9 @@ impl Slabs {
             .fold(own, |a, b| std::array::from_fn(|i| a[i].max(b[i]))))
     }
 
-    /// Lets `work` act on the planes that are owned while they lie so that lines along the axes 1 and 2 are whole: each rank
-    /// has some places of axis 0, in groups of `step`. `work` is told the shape that it sees and the first place; a rank
-    /// without places does nothing.
+    /// Lets `work` act on the planes that are owned while they lie so that lines along the axes 1
+    /// and 2 are whole: each rank has some places of axis 0, in groups of `step`. The arguments of
+    /// `work` are the field, its shape and its first place; a rank without places does nothing.
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
@@ -192,27 +200,26 @@ impl Slabs {
         if self.is_alone() {
             return Ok(work(own, self.shape, 0));
         }
-        let (shape, count) = (self.shape, self.ranks.count());
+        let shape = self.shape;
+        let count = self.ranks.count();
         let [n0, n1, n2] = shape.n;
         let groups = n0.div_ceil(step);
-        let columns = |r: usize| {
-            (groups * r / count * step).min(n0)..(groups * (r + 1) / count * step).min(n0)
-        };
-        let mine = columns(self.ranks.rank());
-        let to: Vec<usize> = (0..count)
-            .map(|r| shape.own().len() * n1 * columns(r).len())
+        // Places of axis 0 that each rank gets.
+        let columns: Vec<Range<usize>> = (0..count)
+            .map(|r| (groups * r / count * step).min(n0)..(groups * (r + 1) / count * step).min(n0))
+            .collect();
+        let mine = columns[self.ranks.rank()].clone();
+        let to: Vec<usize> = columns
+            .iter()
+            .map(|columns| shape.own().len() * n1 * columns.len())
             .collect();
         let from: Vec<usize> = (0..count)
             .map(|r| shape.planes_of(r, count).len() * n1 * mine.len())
             .collect();
         let mut pieces = vec![0.0; own.len()];
-        pack(
-            own,
-            &mut pieces,
-            shape,
-            (0..count).map(columns),
-            |row, piece| piece.copy_from_slice(row),
-        );
+        pack(own, &mut pieces, shape, &columns, |row, piece| {
+            piece.copy_from_slice(row)
+        });
         // In the order of the ranks the planes follow one another.
         let mut turned = vec![0.0; mine.len() * n1 * n2];
         self.ranks.all_to_all(&pieces, &to, &mut turned, &from)?;
@@ -222,18 +229,14 @@ impl Slabs {
             work(&mut turned, Shape::whole([mine.len(), n1, n2]), mine.start)
         };
         self.ranks.all_to_all(&turned, &from, &mut pieces, &to)?;
-        pack(
-            own,
-            &mut pieces,
-            shape,
-            (0..count).map(columns),
-            |row, piece| row.copy_from_slice(piece),
-        );
+        pack(own, &mut pieces, shape, &columns, |row, piece| {
+            row.copy_from_slice(piece)
+        });
         Ok(found)
     }
 
-    /// What rank 0 has of some numbers, on all: what decides what all do next must be the same to the last bit, also where
-    /// the machines differ.
+    /// What rank 0 has of some numbers, on all: what decides what all do next must be the same to
+    /// the last bit, also where the machines differ.
     ///
     /// # Errors
     /// Those of [`Ranks::all_to_all`].
@@ -254,17 +257,18 @@ impl Slabs {
     }
 }
 
-/// Goes through the pieces of all rows of `own`: those of the first columns, plane after plane, then those of the next.
+/// Goes through the pieces of all rows of `own`: those of the first columns, plane after plane,
+/// then those of the next.
 fn pack(
     own: &mut [f64],
     pieces: &mut [f64],
     shape: Shape,
-    columns: impl Iterator<Item = Range<usize>>,
+    columns: &[Range<usize>],
     each: impl Fn(&mut [f64], &mut [f64]) + Sync,
 ) {
     let [n0, n1, _] = shape.n;
     let mut rest = pieces;
-    for columns in columns.filter(|columns| !columns.is_empty()) {
+    for columns in columns.iter().filter(|columns| !columns.is_empty()) {
         let (part, after) = rest.split_at_mut(shape.own().len() * n1 * columns.len());
         let planes = own
             .par_chunks_mut(shape.plane())

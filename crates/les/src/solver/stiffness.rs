@@ -1,4 +1,5 @@
-//! How fast viscosity damps the shortest waves along each direction, along which it is taken implicitly, and how long steps may then be.
+//! How fast viscosity damps the shortest waves along each direction, along which it is taken
+//! implicitly, and how long steps may then be.
 
 use super::mesh::Mesh;
 use super::operators_1d::LAPLACIAN_SYMBOL;
@@ -6,12 +7,15 @@ use super::settings::FlowSettings;
 
 /// Share of the explicit viscous limit beyond which a direction is taken implicitly.
 const IMPLICIT_SHARE: f64 = 0.1;
-/// Largest product of a variable step and the second of the decay rates of implicit axes. The factored increments take
-/// `(d1 + d2)/((1 + d1/2) (1 + d2/2))` of a wave that is stiff along two axes: a ninth here, less and less beyond.
+/// Largest product of a variable step and the second of the decay rates of implicit axes. The
+/// factored increments take `(d1 + d2)/((1 + d1/2) (1 + d2/2))` of a wave that is stiff along two
+/// axes: a ninth here, less and less beyond.
 const STIFF_DECAY: f64 = 64.0;
-/// Product of the step and the largest decay rate beyond which Crank-Nicolson turns the sign of the shortest waves for hundreds of steps.
+/// Product of the step and the largest decay rate beyond which Crank-Nicolson turns the sign of the
+/// shortest waves for hundreds of steps.
 const RINGING_DECAY: f64 = 400.0;
-/// The same beyond which the mean of the viscous powers at both ends of a step is not that of the step.
+/// The same beyond which the mean of the viscous powers at both ends of a step is not that of the
+/// step.
 const RESOLVED_DECAY: f64 = 4.0;
 
 /// Lengths of the cells along each direction \[m\].
@@ -21,7 +25,8 @@ pub(super) fn metrics(mesh: &Mesh) -> [Vec<f64>; 3] {
         .map(|d| (0..d.cells).map(|i| d.at(i as f64 + 0.5).1).collect())
 }
 
-/// Largest decay rate of the viscous term along x, y, z \[1/s\]; zero along a direction of one cell.
+/// Largest decay rate of the viscous term along x, y, z \[1/s\]; zero along a direction of one
+/// cell.
 pub(super) fn viscous_rates_per_s(mesh: &Mesh, viscosity_m2_s: f64) -> [f64; 3] {
     metrics(mesh).map(|metric_m| {
         let least_m = metric_m.iter().copied().fold(f64::INFINITY, f64::min);
@@ -39,7 +44,8 @@ pub(super) fn explicit_up_to_s(mesh: &Mesh, settings: &FlowSettings) -> [f64; 3]
     viscous_rates_per_s(mesh, settings.viscosity_m2_s).map(|rate_per_s| most / rate_per_s)
 }
 
-/// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is `courant_per_s` at first.
+/// Along which of x, y, z viscosity is implicit in a flow whose largest `sum |u_i|/h_i` is
+/// `courant_per_s` at first.
 pub(super) fn implicit_axes(mesh: &Mesh, settings: &FlowSettings, courant_per_s: f64) -> [bool; 3] {
     let step_s = settings.time_step.step_s(courant_per_s);
     explicit_up_to_s(mesh, settings).map(|longest_s| step_s > longest_s)
@@ -63,7 +69,8 @@ impl Stiffness {
         STIFF_DECAY / self.0[1]
     }
 
-    /// Whether the viscous powers at both ends of a step of `step_s` tell what viscosity does in it.
+    /// Whether the mean of the viscous powers at both ends of a step of `step_s` is that of the
+    /// step.
     pub(super) fn is_resolved(self, step_s: f64) -> bool {
         step_s * self.0[0] <= RESOLVED_DECAY
     }

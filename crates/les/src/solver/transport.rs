@@ -1,21 +1,27 @@
-//! Convection along one direction, in skew-symmetric form: it makes no energy, and no momentum where the flow is
-//! divergence-free, stretched meshes and walls included.
+//! Convection along one direction, in skew-symmetric form: it makes no energy, and no momentum
+//! where the flow is divergence-free, stretched meshes and walls included.
 //!
-//! The weighted convection of `q` by the fluxes `F_n` through the faces `n` is `sum_n F_n S^n q` with skew matrices `S^n`. With
-//! `d^n` the weighted divergence that a unit flux through face `n` makes at the points of `q`, the rows satisfy `S^n 1 = d^n/2`:
-//! then the divergence form `S^n + diag(d^n)/2` and this one agree for divergence-free fluxes, constants are convected
-//! exactly, and energy is conserved whatever the divergence. Inside the flow this is the scheme of Vasilyev (2000).
+//! The weighted convection of `q` by the fluxes `F_n` through the faces `n` is `sum_n F_n S^n q`
+//! with skew matrices `S^n`. With `d^n` the weighted divergence that a unit flux through face `n`
+//! makes at the points of `q`, the rows satisfy `S^n 1 = d^n/2`: then the divergence form
+//! `S^n + diag(d^n)/2` and this one agree for divergence-free fluxes, constants are convected
+//! exactly, and energy is conserved whatever the divergence. Inside the flow this is the scheme of
+//! Vasilyev (2000).
 //!
-//! - `q` at the centres (velocities along the wall): pairs `(n-1, n)` with 9/16 and `(n-2, n+1)` with -1/48.
-//! - `q` at the faces (velocity normal to the wall): pairs of faces about each cell, times the fourth-order mean of the flux.
+//! - `q` at the centres (velocities along the wall): pairs `(n-1, n)` with 9/16 and `(n-2, n+1)`
+//!   with -1/48.
+//! - `q` at the faces (velocity normal to the wall): pairs of faces about each cell, times the
+//!   fourth-order mean of the flux.
 //!
-//! These pairs carry waves of four cells a quarter too slowly. Any skew matrix whose row sums vanish may be added to `S^n`
-//! without touching energy or momentum; on the four cells about a face there is one that keeps the order, and its share
-//! is chosen such that a uniform flux carries waves with the error of the sixth-order central difference. It is left out along
-//! all directions if one of them has a no-slip wall, whose closure belongs to the pairs: a vortex that turns is to meet the
-//! same errors in all directions.
+//! These pairs carry waves of four cells a quarter too slowly. Any skew matrix whose row sums
+//! vanish may be added to `S^n` without touching energy or momentum; on the four cells about a face
+//! there is one that keeps the order, and its weight is chosen such that a uniform flux carries
+//! waves with the error of the sixth-order central difference. It is left out along all directions
+//! if one of them has a no-slip wall, whose closure belongs to the pairs: a vortex that turns is to
+//! meet the same errors in all directions.
 //!
-//! Check: the tables are the solution of their conditions (`wall_closure_tests`); skewness, row sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
+//! Check: the tables are the solution of their conditions (`wall_closure_tests`); skewness, row
+//! sums, speed of waves, exactness for parabolas, mirror symmetry of the two walls.
 
 // The tables are written as they were derived, with all digits.
 #![allow(clippy::excessive_precision)]
@@ -24,8 +30,9 @@ use super::operators_1d::{Operators1d, Taps, resolve_cell, resolve_face};
 
 /// Weights of the pairs at distance 1 and 3 that Vasilyev's scheme has.
 pub(crate) const PAIR: [f64; 2] = [9.0 / 16.0, -1.0 / 48.0];
-/// Share of the skew matrix of vanishing row sums, `s t^T - t s^T` with the second differences `s` and `t` of the cells before
-/// and after the face, that makes the transport by a uniform flux one of sixth order.
+/// Share of the skew matrix of vanishing row sums, `s t^T - t s^T` with the second differences `s`
+/// and `t` of the cells before and after the face, that makes the transport by a uniform flux one
+/// of sixth order.
 const SIXTH: f64 = 3.0 / 80.0;
 /// Fourth-order mean of four neighbours.
 pub(crate) const MEAN: [f64; 4] = [-1.0 / 16.0, 9.0 / 16.0, 9.0 / 16.0, -1.0 / 16.0];
@@ -36,16 +43,19 @@ pub(crate) type Product = (usize, usize, f64);
 /// Transport of the values of one kind along one direction.
 #[derive(Debug, Clone)]
 pub(crate) struct Transport {
-    /// For each row the products; rows inside `regular` may be computed by the formula of the interior.
+    /// For each row the products; rows inside `regular` may be computed by the formula of the
+    /// interior.
     pub(crate) rows: Vec<Vec<Product>>,
-    /// Rows to which the interior's formula applies within the stored values, without wrapping or mirroring.
+    /// Rows to which the interior's formula applies within the stored values, without wrapping or
+    /// mirroring.
     pub(crate) regular: std::ops::Range<usize>,
     /// The interior's formula.
     pub(crate) stencil: Stencil,
 }
 
-/// Coefficients of the interior for the point 0: the fluxes at -1, 0, 1, 2 (the point lies between those at 0 and 1) with the
-/// values at -3 to 3. The fluxes at 0 and -1 have the mirrored coefficients with the other sign.
+/// Coefficients of the interior for the point 0: the fluxes at -1, 0, 1, 2 (the point lies between
+/// those at 0 and 1) with the values at -3 to 3. The fluxes at 0 and -1 have the mirrored
+/// coefficients with the other sign.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Stencil {
     /// Flux at 1 with the values at -1, 1, 2.
@@ -56,12 +66,12 @@ pub(crate) struct Stencil {
 
 impl Stencil {
     /// Pairs alone.
-    pub(crate) const PLAIN: Self = Self::with(0.0);
+    pub(crate) const PLAIN: Self = Self::with_sixth_order(0.0);
     /// Sixth order in a uniform flux.
-    pub(crate) const WIDE: Self = Self::with(SIXTH);
+    pub(crate) const WIDE: Self = Self::with_sixth_order(SIXTH);
 
-    /// That of a mesh with these directions.
-    pub(crate) fn of(lines: &[Operators1d]) -> Self {
+    /// The stencil of a mesh with these directions.
+    pub(crate) fn for_lines(lines: &[Operators1d]) -> Self {
         if lines.iter().all(|line| line.ends.no_slip() == [false; 2]) {
             Self::WIDE
         } else {
@@ -69,10 +79,10 @@ impl Stencil {
         }
     }
 
-    const fn with(share: f64) -> Self {
+    const fn with_sixth_order(weight: f64) -> Self {
         Self {
-            near: [-share, PAIR[0] + 3.0 * share, -2.0 * share],
-            far: [share, -2.0 * share, PAIR[1] + share],
+            near: [-weight, PAIR[0] + 3.0 * weight, -2.0 * weight],
+            far: [weight, -2.0 * weight, PAIR[1] + weight],
         }
     }
 
@@ -105,10 +115,12 @@ const WALL_ROWS: usize = 7;
 /// An entry of a skew matrix: row, column, value.
 type SkewEntry = (usize, usize, f64);
 
-/// Extra products of flux 3 on the cells 0, 1, 2 at a no-slip wall (the upper triangle; the lower is its negative).
+/// Extra products of flux 3 on the cells 0, 1, 2 at a no-slip wall (the upper triangle; the lower
+/// is its negative).
 const WALL_PAIRS: [SkewEntry; 3] = [(0, 1, -1.0 / 48.0), (0, 2, 1.0 / 36.0), (1, 2, -1.0 / 24.0)];
 
-/// Mean of the weighted fluxes along the wall at the faces 1 to 4: coefficients of the cells 0 to 5.
+/// Mean of the weighted fluxes along the wall at the faces 1 to 4: coefficients of the cells 0
+/// to 5.
 #[rustfmt::skip]
 const WALL_MEAN: [[f64; 6]; 4] = [
     [0.551_682_692_307_692_4, 0.5625, 0.03375, 0.0, 0.0, 0.0],
@@ -134,8 +146,8 @@ const WALL_SKEW: [&[SkewEntry]; 4] = [
 ];
 
 impl Operators1d {
-    /// Mean of the weighted fluxes along a wall at the stored faces: cells and coefficients, the masses of the cells included.
-    /// The rows of wall faces are empty.
+    /// Mean of the weighted fluxes along a wall at the stored faces: cells and coefficients, the
+    /// masses of the cells included. The rows of wall faces are empty.
     pub(crate) fn flux_mean(&self) -> Vec<Taps> {
         let n = self.cells;
         let sticks = self.ends.no_slip();
@@ -166,7 +178,8 @@ impl Operators1d {
             .collect()
     }
 
-    /// Transport of values at the centres by the fluxes through the faces; pairs alone at a no-slip wall.
+    /// Transport of values at the centres by the fluxes through the faces; pairs alone at a no-slip
+    /// wall.
     pub(crate) fn transport_of_cells(&self, stencil: Stencil) -> Transport {
         let n = self.cells;
         let mut rows = vec![Vec::new(); n];
@@ -180,7 +193,8 @@ impl Operators1d {
         let sticks = self.ends.no_slip();
         for (k, row) in rows.iter_mut().enumerate() {
             for (face, cell, c) in stencil.products() {
-                let (face, cell) = (k as isize + face, k as isize + cell);
+                let face = k as isize + face;
+                let cell = k as isize + cell;
                 // No ghosts behind a no-slip wall.
                 if (sticks[0] && cell < 0) || (sticks[1] && cell >= n as isize) {
                     continue;
@@ -213,14 +227,14 @@ impl Operators1d {
             };
         }
         let sticks = self.ends.no_slip();
-        let from_table = |face: usize| (sticks[0] && face <= 4) || (sticks[1] && face + 4 >= n);
         for (m, row) in rows.iter_mut().enumerate().skip(self.first_face()) {
             for (face, value, c) in interior_products(stencil, m as isize) {
                 let (face, face_sign) = resolve_face(n, self.ends, face);
                 let (value, value_sign) = resolve_face(n, self.ends, value);
                 let walls =
                     !self.is_periodic() && (face == 0 || face == n || value == 0 || value == n);
-                if !walls && !from_table(face) {
+                let from_table = (sticks[0] && face <= 4) || (sticks[1] && face + 4 >= n);
+                if !walls && !from_table {
                     row.push((face, value, face_sign * value_sign * c));
                 }
             }
@@ -230,17 +244,17 @@ impl Operators1d {
                 add_closure(&mut rows, sticks, [n, n], i + 1, *entry);
             }
         }
-        let margin = |sticks: bool| if sticks { WALL_ROWS + 1 } else { 3 };
+        let [low, high] = sticks.map(|sticks| if sticks { WALL_ROWS + 1 } else { 3 });
         Transport {
             rows,
-            regular: margin(sticks[0])..n.saturating_sub(margin(sticks[1])),
+            regular: low..n.saturating_sub(high),
             stencil,
         }
     }
 }
 
-/// Adds the skew entry `(a, b, c)` of the flux through `face` at each end that sticks, places counted from there; the last face and the
-/// last place of a value are `last`.
+/// Adds the skew entry `(a, b, c)` of the flux through `face` at each end that sticks, places
+/// counted from there; the last face and the last place of a value are `last`.
 fn add_closure(
     rows: &mut [Vec<Product>],
     sticks: [bool; 2],
@@ -259,7 +273,8 @@ fn add_closure(
     }
 }
 
-/// Products of row `m` of the normal velocity away from walls: pairs of faces times the mean flux of the cell between.
+/// Products of row `m` of the normal velocity away from walls: pairs of faces times the mean flux
+/// of the cell between.
 fn interior_products(stencil: Stencil, m: isize) -> impl Iterator<Item = (isize, isize, f64)> {
     stencil.products().flat_map(move |(flux, value, c)| {
         // The flux at 1 is that of the cell between the faces m and m + 1.
@@ -372,7 +387,8 @@ mod tests {
                 for &(a, b, c) in WALL_SKEW[face - 1] {
                     sum += if a == row { c } else { 0.0 } - if b == row { c } else { 0.0 };
                 }
-                // The mean of the weighted divergence; the cells' masses belong to the fluxes along the wall alone.
+                // The mean of the weighted divergence; the cells' masses belong to the fluxes along
+                // the wall alone.
                 let made: f64 = mean[row]
                     .iter()
                     .map(|&(cell, c)| {
@@ -427,7 +443,8 @@ mod tests {
             Wall::AT_REST,
         ));
         let transport = line.transport_of_cells(Stencil::PLAIN);
-        // q = 1, F = z^2: the skew form gives half the derivative of F, and the same for F = z, q = z is exact to z^2.
+        // q = 1, F = z^2: the skew form gives half the derivative of F, and the same for F = z, q =
+        // z is exact to z^2.
         for (k, row) in transport.rows.iter().take(6).enumerate() {
             let z = k as f64 + 0.5;
             let sum: f64 = row.iter().map(|&(f, _, c)| c * (f as f64).powi(2)).sum();
@@ -474,11 +491,11 @@ mod tests {
         let around = || Operators1d::new(&Direction::periodic(20, 0.0, 1.0));
         let between = |wall| Operators1d::new(&Direction::between(20, 0.0, 1.0, wall, Wall::Slip));
         assert_eq!(
-            Stencil::of(&[around(), around(), between(Wall::Slip)]),
+            Stencil::for_lines(&[around(), around(), between(Wall::Slip)]),
             Stencil::WIDE
         );
         assert_eq!(
-            Stencil::of(&[around(), around(), between(Wall::AT_REST)]),
+            Stencil::for_lines(&[around(), around(), between(Wall::AT_REST)]),
             Stencil::PLAIN
         );
     }

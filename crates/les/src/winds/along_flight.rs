@@ -1,4 +1,5 @@
-//! A pair whose age grows behind the aircraft: at each place along the flight it is as old as the time since the aircraft passed.
+//! A pair whose age grows behind the aircraft: at each place along the flight it is as old as the
+//! time since the aircraft passed.
 //!
 //! Check: a table of ages; before the aircraft the air is at rest.
 
@@ -58,7 +59,8 @@ impl Wind for AlongFlight {
         Ok(())
     }
 
-    /// That of the pair when it is released and at the time that is asked for: the older one is nearer to the ground.
+    /// That of the pair when it is released and at the time that is asked for: the older one is
+    /// nearer to the ground.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.pair.max_gradient_per_s(0.0).max(
             self.pair

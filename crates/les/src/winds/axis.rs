@@ -1,30 +1,36 @@
-//! One direction of a mesh: its nodes, what lies at its two ends, and the index coordinate of a position.
+//! One direction of a mesh: its nodes, what lies at its two ends, and the index coordinate of a
+//! position.
 //!
-//! On a stretched mesh the kernel (27) acts in the index coordinate `xi`, in which the nodes are one apart. Between nodes
-//! the position is taken as the M'4 interpolant of the node positions, and `xi` is its inverse (Newton's method on one
-//! cubic). So a linear function of the position is reproduced exactly, and on a smoothly stretched mesh the
-//! interpolation keeps its third order; the fraction `(x - x_i)/(x_{i+1} - x_i)` would give second order.
+//! On a stretched mesh the kernel (27) acts in the index coordinate `xi`, in which the nodes are
+//! one apart. Between nodes the position is taken as the M'4 interpolant of the node positions, and
+//! `xi` is its inverse (Newton's method on one cubic). So a linear function of the position is
+//! reproduced exactly, and on a smoothly stretched mesh the interpolation keeps its third order;
+//! the fraction `(x - x_i)/(x_{i+1} - x_i)` would give second order.
 //!
-//! M'4 (Monaghan 1985) is the cubic convolution kernel of Keys (1981) with a = -1/2: third order, once differentiable.
+//! M'4 (Monaghan 1985) is the cubic convolution kernel of Keys (1981) with a = -1/2: third order,
+//! once differentiable.
 //!
-//! Check: linear functions to round-off on a strongly stretched mesh; order 3 of a sampled vortex; the weights of the kernel sum to 1,
-//! give back 1, x and x^2 exactly, and x^3 with the residual `s (1 - s)(1 - 2 s)`.
+//! Check: linear functions to round-off on a strongly stretched mesh; order 3 of a sampled vortex;
+//! the weights of the kernel sum to 1, give back 1, x and x^2 exactly, and x^3 with the residual
+//! `s (1 - s)(1 - 2 s)`.
 
 use crate::Error;
 
 /// What lies beyond one end of a direction.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Side {
-    /// Nothing is known: the mesh ends at its last node. The stencil of the last cell is completed by the parabola
-    /// through the last three nodes (Keys 1981), which keeps third order.
+    /// Nothing is known: the mesh ends at its last node. The stencil of the last cell is completed
+    /// by the parabola through the last three nodes (Keys 1981), which keeps third order.
     #[default]
     Open,
-    /// A frictionless wall: the image has the opposite velocity across the wall and the same along it.
+    /// A frictionless wall: the image has the opposite velocity across the wall and the same along
+    /// it.
     SlipWall {
         /// Position of the wall \[m\], at the last node or beyond it by less than a cell.
         position_m: f64,
     },
-    /// A wall at rest or moving along itself, to which the air sticks: all components are odd about the wall's velocity.
+    /// A wall at rest or moving along itself, to which the air sticks: all components are odd about
+    /// the wall's velocity.
     NoSlipWall {
         /// Position of the wall \[m\], at the last node or beyond it by less than a cell.
         position_m: f64,
@@ -38,7 +44,8 @@ pub enum Side {
 pub enum Edges {
     /// The flow repeats itself; the mesh then holds every point.
     Periodic {
-        /// Length after which it does \[m\], longer than the distance from the first to the last node.
+        /// Length after which it does \[m\], longer than the distance from the first to the last
+        /// node.
         period_m: f64,
     },
     /// Two ends of their own.
@@ -56,12 +63,13 @@ pub(crate) const AXIS_NAMES: [&str; 3] = ["x", "y", "z"];
 /// Nodes beyond each end that the stencil may need.
 pub(crate) const GHOSTS: usize = 2;
 
-/// Largest ratio of neighbouring cells: up to 5 the slopes at the nodes are at most 3 times that of the cell, which makes
-/// the interpolated position monotone (Fritsch and Carlson 1980).
-const MAX_CELL_RATIO: (f64, &str) = (5.0, "at most 5");
+/// Largest ratio of neighbouring cells: up to 5 the slopes at the nodes are at most 3 times that of
+/// the cell, which makes the interpolated position monotone (Fritsch and Carlson 1980).
+const MAX_CELL_RATIO: f64 = 5.0;
 
-/// Largest ratio of the second cell to the first at an open end: from 3 on the slope of the parabola turns round.
-const MAX_OPEN_RATIO: (f64, &str) = (2.5, "at most 2.5 towards an open end");
+/// Largest ratio of the second cell to the first at an open end: from 3 on the slope of the
+/// parabola turns round.
+const MAX_OPEN_RATIO: f64 = 2.5;
 
 /// Where the value of a ghost node comes from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -95,93 +103,90 @@ impl Axis {
         if nodes < 4 {
             return Err(refused(name, "number of nodes", nodes as f64, "at least 4"));
         }
-        for (index, &value_m) in node_m.iter().enumerate() {
-            if !value_m.is_finite() || (index > 0 && value_m <= node_m[index - 1]) {
-                let what = format!("position of node {index}");
-                return Err(refused(
-                    name,
-                    what,
-                    value_m,
-                    "finite and above that of the node before",
-                ));
-            }
-        }
-        let high_is_open = matches!(
-            edges,
-            Edges::Bounded {
-                high: Side::Open,
-                ..
-            }
-        );
-        let (ghosts, below, above, span_m, period_m) = match edges {
-            Edges::Periodic { period_m } => {
-                if !(period_m.is_finite() && period_m > node_m[nodes - 1] - node_m[0]) {
-                    return Err(refused(
-                        name,
-                        "period",
-                        period_m,
-                        "longer than the mesh from first to last node",
-                    ));
-                }
-                let ghosts = [
-                    [Ghost::Copy(nodes - 1), Ghost::Copy(nodes - 2)],
-                    [Ghost::Copy(0), Ghost::Copy(1)],
-                ];
-                let below = [node_m[nodes - 1] - period_m, node_m[nodes - 2] - period_m];
-                let above = [node_m[0] + period_m, node_m[1] + period_m];
-                (ghosts, below, above, None, Some(period_m))
-            }
-            Edges::Bounded { low, high } => {
-                let (low, below, low_m) = end(name, node_m, low, false)?;
-                let (high, above, high_m) = end(name, node_m, high, true)?;
-                ([low, high], below, above, Some((low_m, high_m)), None)
-            }
-        };
-        let mut position_m = vec![below[1], below[0]];
-        position_m.extend_from_slice(node_m);
-        position_m.extend_from_slice(&above);
-        let last_cell = nodes + usize::from(!high_is_open);
-        let axis = Self {
-            name,
-            position_m,
-            span_m,
-            period_m,
-            last_cell,
-            ghosts,
+        check_increasing(name, node_m)?;
+        let axis = match edges {
+            Edges::Periodic { period_m } => Self::periodic(name, node_m, period_m)?,
+            Edges::Bounded { low, high } => Self::bounded(name, node_m, low, high)?,
         };
         axis.check_stretch(edges)?;
         Ok(axis)
     }
 
-    /// Neighbouring cells differ by no more than the inversion of the index coordinate allows.
+    fn periodic(name: &'static str, node_m: &[f64], period_m: f64) -> Result<Self, Error> {
+        let nodes = node_m.len();
+        if !(period_m.is_finite() && period_m > node_m[nodes - 1] - node_m[0]) {
+            let allowed = "longer than the mesh from first to last node";
+            return Err(refused(name, "period", period_m, allowed));
+        }
+        let below = [node_m[nodes - 1] - period_m, node_m[nodes - 2] - period_m];
+        let above = [node_m[0] + period_m, node_m[1] + period_m];
+        Ok(Self {
+            name,
+            position_m: padded_positions_m(below, node_m, above),
+            span_m: None,
+            period_m: Some(period_m),
+            last_cell: nodes + 1,
+            ghosts: [
+                [Ghost::Copy(nodes - 1), Ghost::Copy(nodes - 2)],
+                [Ghost::Copy(0), Ghost::Copy(1)],
+            ],
+        })
+    }
+
+    fn bounded(name: &'static str, node_m: &[f64], low: Side, high: Side) -> Result<Self, Error> {
+        let low_end = AxisEnd::new(name, node_m, low, false)?;
+        let high_end = AxisEnd::new(name, node_m, high, true)?;
+        Ok(Self {
+            name,
+            position_m: padded_positions_m(low_end.ghost_m, node_m, high_end.ghost_m),
+            span_m: Some((low_end.edge_m, high_end.edge_m)),
+            period_m: None,
+            last_cell: node_m.len() + usize::from(high != Side::Open),
+            ghosts: [low_end.ghosts, high_end.ghosts],
+        })
+    }
+
+    /// Fails if neighbouring cells differ by more than the inversion of the index coordinate
+    /// allows.
     fn check_stretch(&self, edges: Edges) -> Result<(), Error> {
-        let cell_m = |i: usize| self.position_m[i + 1] - self.position_m[i];
-        let refuse = |node: usize, ratio: f64, allowed: &'static str| {
-            let index = node.saturating_sub(GHOSTS).min(self.nodes() - 1);
-            Err(refused(self.name, jump_at(index), ratio, allowed))
-        };
         let (low_is_open, high_is_open) = match edges {
             Edges::Periodic { .. } => (false, false),
             Edges::Bounded { low, high } => (low == Side::Open, high == Side::Open),
         };
         let first = if low_is_open { GHOSTS } else { 1 };
         for i in first..self.last_cell {
-            let ratio = cell_m(i).max(cell_m(i + 1)) / cell_m(i).min(cell_m(i + 1));
-            if ratio > MAX_CELL_RATIO.0 {
-                return refuse(i + 1, ratio, MAX_CELL_RATIO.1);
+            let below_m = self.cell_m(i);
+            let above_m = self.cell_m(i + 1);
+            let ratio = below_m.max(above_m) / below_m.min(above_m);
+            if ratio > MAX_CELL_RATIO {
+                return Err(self.ratio_refused(i + 1, ratio, "at most 5"));
             }
         }
-        let ends = [
-            (low_is_open, GHOSTS, GHOSTS + 1),
-            (high_is_open, self.last_cell, self.last_cell - 1),
-        ];
-        for (_, end, inner) in ends.into_iter().filter(|end| end.0) {
-            let ratio = cell_m(inner) / cell_m(end);
-            if ratio > MAX_OPEN_RATIO.0 {
-                return refuse(end.max(inner), ratio, MAX_OPEN_RATIO.1);
+        let allowed = "at most 2.5 towards an open end";
+        if low_is_open {
+            let ratio = self.cell_m(GHOSTS + 1) / self.cell_m(GHOSTS);
+            if ratio > MAX_OPEN_RATIO {
+                return Err(self.ratio_refused(GHOSTS + 1, ratio, allowed));
+            }
+        }
+        if high_is_open {
+            let ratio = self.cell_m(self.last_cell - 1) / self.cell_m(self.last_cell);
+            if ratio > MAX_OPEN_RATIO {
+                return Err(self.ratio_refused(self.last_cell, ratio, allowed));
             }
         }
         Ok(())
+    }
+
+    /// Width of the cell above a padded node \[m\].
+    fn cell_m(&self, padded_node: usize) -> f64 {
+        self.position_m[padded_node + 1] - self.position_m[padded_node]
+    }
+
+    /// The error for the ratio of the cells beside a padded node.
+    fn ratio_refused(&self, padded_node: usize, ratio: f64, allowed: &'static str) -> Error {
+        let index = padded_node.saturating_sub(GHOSTS).min(self.nodes() - 1);
+        refused(self.name, jump_at(index), ratio, allowed)
     }
 
     /// Number of nodes without ghosts.
@@ -194,8 +199,8 @@ impl Axis {
         GHOSTS..GHOSTS + self.nodes() - usize::from(self.period_m.is_none())
     }
 
-    /// Index (in the padded nodes) of the first node of the four-point stencil of `x_m`, and the four weights; `None`
-    /// outside the mesh or for NaN.
+    /// Index (in the padded nodes) of the first node of the four-point stencil of `x_m`, and the
+    /// four weights; `None` outside the mesh or for NaN.
     pub(crate) fn stencil(&self, x_m: f64) -> Option<(usize, [f64; 4])> {
         let node_m = &self.position_m[GHOSTS..GHOSTS + self.nodes()];
         let x_m = match (self.span_m, self.period_m) {
@@ -211,16 +216,18 @@ impl Axis {
     }
 }
 
-/// Fraction `s` in the index coordinate of the point `x_m` between the two middle nodes: the root of the M'4 interpolant
-/// of the four positions, by Newton's method kept within the bracket.
+/// Fraction `s` in the index coordinate of the point `x_m` between the two middle nodes: the root
+/// of the M'4 interpolant of the four positions, by Newton's method within the bracket.
 fn fraction(nodes_m: [f64; 4], x_m: f64) -> f64 {
     let width_m = nodes_m[2] - nodes_m[1];
     let target = (x_m - nodes_m[1]) / width_m;
     // In units of the cell: the position is s (m0 + s (c2 + s c3)) with end slopes m0 and m1.
     let m0 = 0.5 * (nodes_m[2] - nodes_m[0]) / width_m;
     let m1 = 0.5 * (nodes_m[3] - nodes_m[1]) / width_m;
-    let (c2, c3) = (3.0 - 2.0 * m0 - m1, m0 + m1 - 2.0);
-    let (mut low, mut high) = (0.0, 1.0);
+    let c2 = 3.0 - 2.0 * m0 - m1;
+    let c3 = m0 + m1 - 2.0;
+    let mut low = 0.0;
+    let mut high = 1.0;
     let mut s = target.clamp(0.0, 1.0);
     for _ in 0..60 {
         let excess = s * (m0 + s * (c2 + s * c3)) - target;
@@ -244,6 +251,26 @@ fn fraction(nodes_m: [f64; 4], x_m: f64) -> f64 {
     s
 }
 
+/// Fails unless the positions are finite and strictly increasing.
+fn check_increasing(axis: &'static str, node_m: &[f64]) -> Result<(), Error> {
+    for (index, &value_m) in node_m.iter().enumerate() {
+        if !value_m.is_finite() || (index > 0 && value_m <= node_m[index - 1]) {
+            let what = format!("position of node {index}");
+            let allowed = "finite and above that of the node before";
+            return Err(refused(axis, what, value_m, allowed));
+        }
+    }
+    Ok(())
+}
+
+/// Positions of all nodes in increasing order; the ghosts are given nearest first.
+fn padded_positions_m(below_m: [f64; GHOSTS], node_m: &[f64], above_m: [f64; GHOSTS]) -> Vec<f64> {
+    let mut position_m = vec![below_m[1], below_m[0]];
+    position_m.extend_from_slice(node_m);
+    position_m.extend_from_slice(&above_m);
+    position_m
+}
+
 /// What a jump from one cell to the next is called.
 pub(crate) fn jump_at(index: usize) -> String {
     format!("cells beside node {index} differ by a factor")
@@ -264,47 +291,57 @@ pub(crate) fn refused(
     }
 }
 
-/// The ghosts of one bounded end and their positions, nearest first, and where the mesh ends.
-fn end(
-    axis: &'static str,
-    node_m: &[f64],
-    side: Side,
-    is_high: bool,
-) -> Result<([Ghost; GHOSTS], [f64; GHOSTS], f64), Error> {
-    // Node counted from this end.
-    let inner = |i: usize| if is_high { node_m.len() - 1 - i } else { i };
-    let at = |i: usize| node_m[inner(i)];
-    let wall_m = match side {
-        Side::Open => {
-            // Beyond the last node only the cell next to it is completed, by its first ghost.
-            let first = 3.0 * at(0) - 3.0 * at(1) + at(2);
-            let ghost = Ghost::Parabola([inner(0), inner(1), inner(2)]);
-            return Ok(([ghost; 2], [first, 2.0 * first - at(0)], at(0)));
+/// One bounded end of a direction.
+struct AxisEnd {
+    /// Sources of the ghosts, nearest first.
+    ghosts: [Ghost; GHOSTS],
+    /// Positions of the ghosts, nearest first \[m\].
+    ghost_m: [f64; GHOSTS],
+    /// Position at which the mesh ends: the wall, or the last node \[m\].
+    edge_m: f64,
+}
+
+impl AxisEnd {
+    fn new(axis: &'static str, node_m: &[f64], side: Side, is_high: bool) -> Result<Self, Error> {
+        // The three nodes nearest to this end, nearest first.
+        let last = node_m.len() - 1;
+        let near = if is_high {
+            [last, last - 1, last - 2]
+        } else {
+            [0, 1, 2]
+        };
+        let near_m = near.map(|node| node_m[node]);
+        let wall_m = match side {
+            Side::Open => {
+                // Beyond the last node only the cell next to it is completed, by its first ghost.
+                let first_m = 3.0 * near_m[0] - 3.0 * near_m[1] + near_m[2];
+                return Ok(Self {
+                    ghosts: [Ghost::Parabola(near); GHOSTS],
+                    ghost_m: [first_m, 2.0 * first_m - near_m[0]],
+                    edge_m: near_m[0],
+                });
+            }
+            Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
+        };
+        let gap_m = if is_high {
+            wall_m - near_m[0]
+        } else {
+            near_m[0] - wall_m
+        };
+        let cell_m = (near_m[1] - near_m[0]).abs();
+        if !(0.0..cell_m).contains(&gap_m) {
+            let wall = if is_high { "high wall" } else { "low wall" };
+            let allowed = "at the last node or less than a cell beyond it";
+            return Err(refused(axis, wall, wall_m, allowed));
         }
-        Side::SlipWall { position_m } | Side::NoSlipWall { position_m, .. } => position_m,
-    };
-    let gap_m = if is_high {
-        wall_m - at(0)
-    } else {
-        at(0) - wall_m
-    };
-    let cell_m = (at(1) - at(0)).abs();
-    if !(0.0..cell_m).contains(&gap_m) {
-        let wall = if is_high { "high wall" } else { "low wall" };
-        return Err(refused(
-            axis,
-            wall,
-            wall_m,
-            "at the last node or less than a cell beyond it",
-        ));
+        // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
+        let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
+        Ok(Self {
+            ghosts: mirrored.map(|i| Ghost::Image(near[i], side)),
+            ghost_m: mirrored.map(|i| 2.0 * wall_m - near_m[i]),
+            edge_m: wall_m,
+        })
     }
-    // A wall on the last node mirrors the next ones; a wall beyond it mirrors that node too.
-    let mirrored = if gap_m == 0.0 { [1, 2] } else { [0, 1] };
-    Ok((
-        mirrored.map(|i| Ghost::Image(inner(i), side)),
-        mirrored.map(|i| 2.0 * wall_m - at(i)),
-        wall_m,
-    ))
 }
 
 /// The kernel `W` of (27) at `x` cells from its node; zero beyond two cells.
@@ -324,7 +361,8 @@ pub fn m4_prime(x: f64) -> f64 {
     }
 }
 
-/// Weights of the nodes -1, 0, 1, 2 for a point at the fraction `s` (0 to 1) between nodes 0 and 1, from (27).
+/// Weights of the nodes -1, 0, 1, 2 for a point at the fraction `s` (0 to 1) between nodes 0 and 1,
+/// from (27).
 pub fn m4_prime_weights(s: f64) -> [f64; 4] {
     let t = 1.0 - s;
     [

@@ -1,11 +1,12 @@
 //! A velocity field given at the nodes of a plane mesh, interpolated by the M'4 kernel, (26), (27).
 //!
-//! The plane is y-z: the field does not depend on x. The interpolation is the tensor product of four weights in y and
-//! four in z, taken in the index coordinates of the mesh, so nodes may be stretched. A stencil that reaches beyond the
-//! mesh uses the boundary condition of the flow; it is never cut.
+//! The plane is y-z: the field does not depend on x. The interpolation is the tensor product of
+//! four weights in y and four in z, taken in the index coordinates of the mesh, so nodes may be
+//! stretched. A stencil that reaches beyond the mesh uses the boundary condition of the flow; it is
+//! never cut.
 //!
-//! Check: linear functions are exact, the error of a sampled vortex falls with the third power of the cell, no air
-//! crosses a wall.
+//! Check: linear functions are exact, the error of a sampled vortex falls with the third power of
+//! the cell, no air crosses a wall.
 
 use super::axis::{Axis, Edges, GHOSTS, Ghost, Side};
 use super::wind::Wind;
@@ -38,7 +39,8 @@ pub struct PlaneMesh {
     pub outside: OutsidePolicy,
 }
 
-/// A velocity field at one instant on a [`PlaneMesh`]; the time it is asked for makes no difference.
+/// A velocity field at one instant on a [`PlaneMesh`]; the time it is asked for makes no
+/// difference.
 #[derive(Debug, Clone)]
 pub struct GridSnapshot {
     y: Axis,
@@ -53,8 +55,8 @@ impl GridSnapshot {
     /// A field with the velocity `velocity_m_s[i_z * y_m.len() + i_y]` = `(u, v, w)` at each node.
     ///
     /// # Errors
-    /// [`Error::BadDirection`] for a mesh that cannot be interpolated; [`Error::OutOfRange`] for a velocity that is not finite and
-    /// for a number of them that is not that of the nodes.
+    /// [`Error::BadDirection`] for a mesh that cannot be interpolated; [`Error::OutOfRange`] for a
+    /// velocity that is not finite and for a number of them that is not that of the nodes.
     pub fn new(mesh: &PlaneMesh, velocity_m_s: &[[f64; 3]]) -> Result<Self, Error> {
         let y = Axis::new("y", &mesh.y_m, mesh.y_edges)?;
         let z = Axis::new("z", &mesh.z_m, mesh.z_edges)?;
@@ -99,7 +101,8 @@ impl GridSnapshot {
 }
 
 impl Wind for GridSnapshot {
-    /// As the trait says; outside the mesh as [`OutsidePolicy`] says. A coordinate that is NaN is outside; x is not read.
+    /// As the trait says; outside the mesh as [`OutsidePolicy`] says. A coordinate that is NaN is
+    /// outside; x is not read.
     fn velocity_into(
         &self,
         points_m: &[[f64; 3]],
@@ -118,16 +121,19 @@ impl Wind for GridSnapshot {
         Ok(())
     }
 
-    /// The largest strain rate in the middle of a cell, from differences of its four corners: second-order accurate, so
-    /// some percent low where the mesh has fewer than about ten cells across a core.
+    /// The largest strain rate in the middle of a cell, from differences of its four corners:
+    /// second-order accurate, so some percent low where the mesh has fewer than about ten cells
+    /// across a core.
     fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
         self.max_gradient_per_s
     }
 }
 
-/// The nodes with their ghosts: first beyond the ends in y, then, for the widened rows, beyond the ends in z.
+/// The nodes with their ghosts: first beyond the ends in y, then, for the widened rows, beyond the
+/// ends in z.
 fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
-    let (width, nodes_y) = (y.position_m.len(), y.nodes());
+    let width = y.position_m.len();
+    let nodes_y = y.nodes();
     let mut padded = vec![[0.0; 3]; width * z.position_m.len()];
     for (i_z, row) in velocity_m_s.chunks_exact(nodes_y).enumerate() {
         let start = (i_z + GHOSTS) * width;
@@ -139,9 +145,11 @@ fn with_ghosts(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> Vec<[f64; 3]> {
     }
     for (i, ghost) in ghost_places(z) {
         for column in 0..width {
-            let at = |node: usize| padded[(node + GHOSTS) * width + column];
-            padded[i * width + column] =
-                std::array::from_fn(|c| ghost_value(ghost, 2, c, |node| at(node)[c]));
+            padded[i * width + column] = std::array::from_fn(|c| {
+                ghost_value(ghost, 2, c, |node| {
+                    padded[(node + GHOSTS) * width + column][c]
+                })
+            });
         }
     }
     padded
@@ -160,7 +168,8 @@ pub(crate) fn ghost_places(axis: &Axis) -> impl Iterator<Item = (usize, Ghost)> 
     .into_iter()
 }
 
-/// Component `component` of the velocity of a ghost beyond an end across direction `across`, from those at the nodes.
+/// Component `component` of the velocity of a ghost beyond an end across direction `across`, from
+/// those at the nodes.
 pub(crate) fn ghost_value(
     ghost: Ghost,
     across: usize,
@@ -186,25 +195,28 @@ pub(crate) fn ghost_value(
     }
 }
 
-/// The largest strain rate over the middles of the cells between nodes: the largest eigenvalue of its in-plane part,
-/// plus the shear of the axial velocity.
+/// The largest strain rate over the middles of the cells between nodes: the largest eigenvalue of
+/// its in-plane part, plus the shear of the axial velocity.
 fn largest_strain_per_s(y: &Axis, z: &Axis, velocity_m_s: &[[f64; 3]]) -> f64 {
     let width = y.position_m.len();
-    let (y_m, z_m) = (&y.position_m, &z.position_m);
     let mut largest = 0.0_f64;
     for j in z.cells() {
         for i in y.cells() {
-            let corner = |di: usize, dj: usize| velocity_m_s[(j + dj) * width + i + di];
-            let [a, b, c, d] = [corner(0, 0), corner(1, 0), corner(0, 1), corner(1, 1)];
-            let per_y = 0.5 / (y_m[i + 1] - y_m[i]);
-            let per_z = 0.5 / (z_m[j + 1] - z_m[j]);
-            let along_y = |k: usize| (b[k] - a[k] + d[k] - c[k]) * per_y;
-            let along_z = |k: usize| (c[k] - a[k] + d[k] - b[k]) * per_z;
-            let (stretch_y, stretch_z) = (along_y(1), along_z(2));
-            let shear = 0.5 * (along_z(1) + along_y(2));
+            let low = j * width + i;
+            let high = low + width;
+            let [a, b] = [velocity_m_s[low], velocity_m_s[low + 1]];
+            let [c, d] = [velocity_m_s[high], velocity_m_s[high + 1]];
+            let per_y = 0.5 / (y.position_m[i + 1] - y.position_m[i]);
+            let per_z = 0.5 / (z.position_m[j + 1] - z.position_m[j]);
+            // Derivatives of u, v, w along y and z.
+            let by_y: [f64; 3] = std::array::from_fn(|k| (b[k] - a[k] + d[k] - c[k]) * per_y);
+            let by_z: [f64; 3] = std::array::from_fn(|k| (c[k] - a[k] + d[k] - b[k]) * per_z);
+            let stretch_y = by_y[1];
+            let stretch_z = by_z[2];
+            let shear = 0.5 * (by_z[1] + by_y[2]);
             let in_plane =
                 0.5 * (stretch_y + stretch_z).abs() + (0.5 * (stretch_y - stretch_z)).hypot(shear);
-            largest = largest.max(in_plane + 0.5 * along_y(0).hypot(along_z(0)));
+            largest = largest.max(in_plane + 0.5 * by_y[0].hypot(by_z[0]));
         }
     }
     largest

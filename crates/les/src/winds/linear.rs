@@ -1,6 +1,7 @@
 //! A wind that is linear in place and in time: what lidars assume of the air between their beams.
 //!
-//! Check: a table of velocities; the largest line gradient is the largest eigenvalue of the strain rate.
+//! Check: a table of velocities; the largest line gradient is the largest eigenvalue of the strain
+//! rate.
 
 use super::strain::largest_strain_per_s;
 use super::wind::Wind;

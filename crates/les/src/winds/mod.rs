@@ -1,4 +1,5 @@
-//! Winds that a lidar may see: analytic wakes, uniform winds, sums, and fields sampled on meshes, behind the trait [`Wind`].
+//! Winds that a lidar may see: analytic wakes, uniform winds, sums, and fields sampled on meshes,
+//! behind the trait [`Wind`].
 //!
 //! | file | what is in it |
 //! |---|---|

@@ -1,42 +1,49 @@
-//! The circulation of one vortex as a function of the distance from its centre, equations (3) and (4).
+//! The circulation of one vortex as a function of the distance from its centre, equations (3) and
+//! (4).
 //!
-//! The two-scale profile of a rolled-up wake has a viscous core inside a broad distribution of circulation:
-//! `Gamma(r) = Gamma0 [1 - exp(-q)]`, `q = beta_i (r/b)^2/{1 + [(beta_i/beta_o) (r/b)^(5/4)]^3}^(1/3)` with the wing span `b` and
-//! `beta_o` = 10 (Winckelmans; Gerz, Holzaepfel and Darracq 2002). Near the centre it is a Lamb-Oseen core, far away
-//! `q = beta_o (r/b)^(3/4)`: a fifth of the circulation lies further out than a twelfth of the span, a third
-//! further out than an eighteenth.
+//! The two-scale profile of a rolled-up wake has a viscous core inside a broad distribution of
+//! circulation: `Gamma(r) = Gamma0 [1 - exp(-q)]`,
+//! `q = beta_i (r/b)^2/{1 + [(beta_i/beta_o) (r/b)^(5/4)]^3}^(1/3)` with the wing span `b` and
+//! `beta_o` = 10 (Winckelmans; Gerz, Holzaepfel and Darracq 2002). Near the centre it is a
+//! Lamb-Oseen core, far away `q = beta_o (r/b)^(3/4)`: a fifth of the circulation lies further out
+//! than a twelfth of the span, a third further out than an eighteenth.
 //!
-//! Check: the tangential velocity is largest at the core radius, and `Gamma0/(4 pi r_c)` there for the algebraic
-//! profile; the largest line gradient agrees with a search over radius and direction; both limits of `q`.
+//! Check: the tangential velocity is largest at the core radius, and `Gamma0/(4 pi r_c)` there for
+//! the algebraic profile; the largest line gradient agrees with a search over radius and direction;
+//! both limits of `q`.
 
 use crate::error::{Error, check};
 use std::f64::consts::PI;
 
-/// Root of `2 s + 1 = exp(s)`: makes `r_c` the radius of the largest tangential velocity of a Lamb-Oseen vortex.
+/// Root of `2 s + 1 = exp(s)`: makes `r_c` the radius of the largest tangential velocity of a
+/// Lamb-Oseen vortex.
 const LAMB_OSEEN_BETA: f64 = 1.256_431_208_626_169_6;
 
-/// Root of `1 + s + s^2 = exp(s)`, `s = beta r^2/r_c^2`: where the strain of a Lamb-Oseen vortex is largest.
+/// Root of `1 + s + s^2 = exp(s)`, `s = beta r^2/r_c^2`: where the strain of a Lamb-Oseen vortex is
+/// largest.
 const LAMB_OSEEN_STRAIN_ROOT: f64 = 1.793_282_132_900_760_4;
 
 /// How the circulation grows with the distance from the centre of a vortex.
 ///
-/// All profiles tend to the full circulation far away and have their largest tangential velocity at `core_radius_m`.
+/// All profiles tend to the full circulation far away and have their largest tangential velocity at
+/// `core_radius_m`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum CirculationProfile {
-    /// `Gamma0 r^2/(r^2 + r_c^2)`, equation (3); Burnham and Hallock (1982). Its largest velocity is half that of a
-    /// point vortex at the same radius.
+    /// `Gamma0 r^2/(r^2 + r_c^2)`, equation (3); Burnham and Hallock (1982). Its largest velocity
+    /// is half that of a point vortex at the same radius.
     #[default]
     Algebraic,
-    /// `Gamma0 (1 - exp(-1.2564 r^2/r_c^2))`: the vortex of Lamb and Oseen, a solution of the Navier-Stokes equations
-    /// (Lamb 1932, section 334a).
+    /// `Gamma0 (1 - exp(-1.2564 r^2/r_c^2))`: the vortex of Lamb and Oseen, a solution of the
+    /// Navier-Stokes equations (Lamb 1932, section 334a).
     LambOseen,
-    /// A viscous core inside a broad distribution of circulation, as after the roll-up of a wing's vortex sheet.
+    /// A viscous core inside a broad distribution of circulation, as after the roll-up of a wing's
+    /// vortex sheet.
     TwoScale(TwoScale),
 }
 
 impl CirculationProfile {
-    /// Circulation \[m^2/s\] on the circle of `radius_m` about an isolated vortex, equation (3) or its Lamb-Oseen
-    /// counterpart.
+    /// Circulation \[m^2/s\] on the circle of `radius_m` about an isolated vortex, equation (3) or
+    /// its Lamb-Oseen counterpart.
     pub fn circulation_m2_s(self, circulation_m2_s: f64, core_radius_m: f64, radius_m: f64) -> f64 {
         let r2 = radius_m * radius_m;
         2.0 * PI * r2 * self.angular_velocity_rad_s(circulation_m2_s, core_radius_m, r2)
@@ -52,11 +59,11 @@ impl CirculationProfile {
         radius_m * self.angular_velocity_rad_s(circulation_m2_s, core_radius_m, radius_m * radius_m)
     }
 
-    /// Largest gradient of the velocity component along any straight line through an isolated vortex \[1/s\]: the
-    /// largest strain rate, `|r d(u_theta/r)/dr|/2`.
+    /// Largest gradient of the velocity component along any straight line through an isolated
+    /// vortex \[1/s\]: the largest strain rate, `|r d(u_theta/r)/dr|/2`.
     ///
-    /// For the algebraic profile exactly `Gamma0/(8 pi r_c^2)` = 0.0398 `Gamma0/r_c^2`, found at the core radius along
-    /// lines at 45 degrees to it; 0.0597 `Gamma0/r_c^2` for Lamb-Oseen.
+    /// For the algebraic profile exactly `Gamma0/(8 pi r_c^2)` = 0.0398 `Gamma0/r_c^2`, found at
+    /// the core radius along lines at 45 degrees to it; 0.0597 `Gamma0/r_c^2` for Lamb-Oseen.
     pub fn max_line_gradient_per_s(self, circulation_m2_s: f64, core_radius_m: f64) -> f64 {
         let scale = circulation_m2_s / (2.0 * PI * core_radius_m * core_radius_m);
         match self {
@@ -65,27 +72,33 @@ impl CirculationProfile {
                 let s = LAMB_OSEEN_STRAIN_ROOT;
                 scale * LAMB_OSEEN_BETA * (-(-s).exp_m1() / s - (-s).exp())
             }
-            Self::TwoScale(_) => {
-                // The strain has one maximum, beyond the core radius.
-                let strain = |s: f64| {
-                    self.strain_rate_per_s(circulation_m2_s, core_radius_m, s * core_radius_m)
-                };
-                let (mut low, mut high) = (0.0, 4.0);
-                for _ in 0..100 {
-                    let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-                    if strain(a) < strain(b) {
-                        low = a;
-                    } else {
-                        high = b;
-                    }
-                }
-                strain(low)
-            }
+            Self::TwoScale(_) => self.max_strain_rate_per_s(circulation_m2_s, core_radius_m),
         }
     }
 
-    /// Angular velocity `u_theta/r` \[rad/s\] from the squared distance: what the velocity of a point needs, without a
-    /// division by zero at the centre.
+    /// The largest strain rate \[1/s\] by a search in thirds: it has one maximum, beyond the core
+    /// radius.
+    fn max_strain_rate_per_s(self, circulation_m2_s: f64, core_radius_m: f64) -> f64 {
+        // The interval in core radii.
+        let mut low = 0.0;
+        let mut high = 4.0;
+        for _ in 0..100 {
+            let third = (high - low) / 3.0;
+            let [left, right] = [low + third, high - third];
+            let [left_per_s, right_per_s] = [left, right].map(|radius| {
+                self.strain_rate_per_s(circulation_m2_s, core_radius_m, radius * core_radius_m)
+            });
+            if left_per_s < right_per_s {
+                low = left;
+            } else {
+                high = right;
+            }
+        }
+        self.strain_rate_per_s(circulation_m2_s, core_radius_m, low * core_radius_m)
+    }
+
+    /// Angular velocity `u_theta/r` \[rad/s\] from the squared distance: what the velocity of a
+    /// point needs, without a division by zero at the centre.
     pub(crate) fn angular_velocity_rad_s(
         self,
         circulation_m2_s: f64,
@@ -112,7 +125,8 @@ impl CirculationProfile {
         }
     }
 
-    /// Strain rate \[1/s\] of an isolated vortex at `radius_m`, an upper bound of the line gradient there.
+    /// Strain rate \[1/s\] of an isolated vortex at `radius_m`, an upper bound of the line gradient
+    /// there.
     pub(crate) fn strain_rate_per_s(
         self,
         circulation_m2_s: f64,
@@ -168,22 +182,28 @@ impl TwoScale {
         check("span_over_core", span_over_core, "from 5 to 1000", |r| {
             (5.0..=1000.0).contains(&r)
         })?;
-        let of = |inner: f64| Self {
-            inner,
-            joint: inner * span_over_core.powi(2) / OUTER * span_over_core.powf(-1.25),
-        };
-        // The velocity grows with r at the core radius while r q' > exp(q) - 1; the stronger the core, the less.
-        let (mut low, mut high) = (1e-6_f64, 1e3_f64);
+        // The velocity grows with r at the core radius while r q' > exp(q) - 1; the stronger the
+        // core, the less.
+        let mut low = 1e-6_f64;
+        let mut high = 1e3_f64;
         for _ in 0..200 {
             let middle = (low * high).sqrt();
-            let (q, slope) = of(middle).exponent(1.0);
+            let (q, slope) = Self::with_inner(middle, span_over_core).exponent(1.0);
             if slope > q.exp_m1() {
                 low = middle;
             } else {
                 high = middle;
             }
         }
-        Ok(of(low))
+        Ok(Self::with_inner(low, span_over_core))
+    }
+
+    /// The profile with the inner parameter `beta_i (r_c/b)^2`.
+    fn with_inner(inner: f64, span_over_core: f64) -> Self {
+        Self {
+            inner,
+            joint: inner * span_over_core.powi(2) / OUTER * span_over_core.powf(-1.25),
+        }
     }
 
     /// `q` and `r dq/dr` at the squared distance `s2` in core radii.

@@ -1,12 +1,13 @@
-//! A velocity field that moves: fields at several times, and linear interpolation between the two about the asked time.
+//! A velocity field that moves: fields at several times, and linear interpolation between the two
+//! about the requested time.
 //!
-//! The error of the interpolation is at most an eighth of the square of the time between fields times the second
-//! derivative of the velocity in time. A vortex of core `r_c` that drifts with `V` is smeared when the fields are further
-//! apart than some tenth of `r_c/V`. Fields may be read when they are needed: at most the two about the time that was asked for
-//! last are kept.
+//! The error of the interpolation is at most an eighth of the square of the time between fields
+//! times the second derivative of the velocity in time. A vortex of core `r_c` that drifts with `V`
+//! is smeared when the fields are further apart than some tenth of `r_c/V`. Fields may be read when
+//! they are needed: at most the two about the time that was asked for last are kept.
 //!
-//! Check: fields linear in time are exact, the error of a curved one falls with the square of the time between fields; many times in
-//! order read each field once and keep two.
+//! Check: fields linear in time are exact, the error of a curved one falls with the square of the
+//! time between fields; many times in order read each field once and keep two.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -31,7 +32,8 @@ impl Series {
     /// A series of at least one snapshot in a plane, each with its time \[s\].
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for an empty series, and for times that are not finite or do not increase.
+    /// [`Error::OutOfRange`] for an empty series, and for times that are not finite or do not
+    /// increase.
     pub fn new(snapshots: impl IntoIterator<Item = (f64, GridSnapshot)>) -> Result<Self, Error> {
         let (time_s, fields): (Vec<f64>, Vec<GridSnapshot>) = snapshots.into_iter().unzip();
         let gradients_per_s = fields
@@ -42,14 +44,15 @@ impl Series {
             .into_iter()
             .map(|field| Arc::new(field) as Arc<dyn Wind>)
             .collect();
-        Self::of(
+        Self::from_reader(
             time_s,
             gradients_per_s,
             Box::new(move |i| Ok(fields[i].clone())),
         )
     }
 
-    /// A series with the times \[s\] of its fields, the largest gradient of all \[1/s\], and what reads field number `i`.
+    /// A series with the times \[s\] of its fields, the largest gradient of all \[1/s\], and what
+    /// reads field number `i`.
     ///
     /// # Errors
     /// As [`Series::new`].
@@ -59,14 +62,14 @@ impl Series {
         read: impl Fn(usize) -> Result<VolumeSnapshot, Error> + Send + Sync + 'static,
     ) -> Result<Self, Error> {
         let gradients_per_s = vec![max_gradient_per_s; time_s.len()];
-        Self::of(
+        Self::from_reader(
             time_s,
             gradients_per_s,
             Box::new(move |i| Ok(Arc::new(read(i)?))),
         )
     }
 
-    fn of(
+    fn from_reader(
         time_s: Vec<f64>,
         max_gradient_per_s: Vec<f64>,
         read: Box<Reader>,
@@ -94,7 +97,8 @@ impl Series {
 
     /// The last field that is not after `time_s`, and the weight of the next one if it counts.
     fn about(&self, time_s: f64) -> Result<(usize, Option<f64>), Error> {
-        let (times_s, last) = (&self.time_s, self.time_s.len() - 1);
+        let times_s = &self.time_s;
+        let last = times_s.len() - 1;
         check(
             "time_s",
             time_s,
@@ -161,7 +165,8 @@ impl Wind for Series {
         Ok(())
     }
 
-    /// The larger of those of the two fields about the time; of a time outside the series, the largest of all.
+    /// The larger of those of the two fields about the time; of a time outside the series, the
+    /// largest of all.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         let about = self
             .about(time_s)

@@ -4,8 +4,8 @@
 
 use std::f64::consts::PI;
 
-/// The eigenvalue of largest magnitude of the strain rate of a velocity gradient `[component][direction]` \[1/s\], by the cosines
-/// of the cubic (Smith 1961).
+/// The eigenvalue of largest magnitude of the strain rate of a velocity gradient
+/// `[component][direction]` \[1/s\], by the cosines of the cubic (Smith 1961).
 pub(crate) fn largest_strain_per_s(gradient_per_s: &[[f64; 3]; 3]) -> f64 {
     let g = gradient_per_s;
     let [xx, yy, zz] = [g[0][0], g[1][1], g[2][2]];
@@ -25,8 +25,9 @@ pub(crate) fn largest_strain_per_s(gradient_per_s: &[[f64; 3]; 3]) -> f64 {
         .clamp(-1.0, 1.0)
         .acos()
         / 3.0;
-    let value = |turn: f64| (mean + 2.0 * spread * (angle + turn).cos()).abs();
-    value(0.0).max(value(2.0 * PI / 3.0))
+    let first = (mean + 2.0 * spread * angle.cos()).abs();
+    let last = (mean + 2.0 * spread * (angle + 2.0 * PI / 3.0).cos()).abs();
+    first.max(last)
 }
 
 #[cfg(test)]

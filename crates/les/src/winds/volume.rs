@@ -1,8 +1,10 @@
-//! A velocity field in three dimensions at one instant, each component at nodes of its own, interpolated by (26), (27).
+//! A velocity field in three dimensions at one instant, each component at nodes of its own,
+//! interpolated by (26), (27).
 //!
-//! The interpolation is the tensor product of four weights in each direction, taken in the index coordinates of the mesh, as in
-//! a plane. Where the mesh ends at open sides nothing is known beyond: NaN. Check: linear fields are exact on staggered and
-//! stretched meshes, the error of a sampled vortex falls with the third power of the cell.
+//! The interpolation is the tensor product of four weights in each direction, taken in the index
+//! coordinates of the mesh, as in a plane. Where the mesh ends at open sides nothing is known
+//! beyond: NaN. Check: linear fields are exact on staggered and stretched meshes, the error of a
+//! sampled vortex falls with the third power of the cell.
 
 use super::axis::{AXIS_NAMES, Axis, Edges, GHOSTS, Side};
 use super::grid_wind::{ghost_places, ghost_value};
@@ -40,17 +42,13 @@ impl VolumeSnapshot {
     /// The field of the components u, v, w with the ends of the mesh along x, y, z.
     ///
     /// # Errors
-    /// What [`super::GridSnapshot::new`] refuses of a mesh; [`Error::OutOfRange`] for a velocity that is not finite and for a
-    /// number of values that is not that of the nodes.
+    /// What [`super::GridSnapshot::new`] refuses of a mesh; [`Error::OutOfRange`] for a velocity
+    /// that is not finite and for a number of values that is not that of the nodes.
     pub fn new(components: &[VolumeComponent; 3], edges: [Edges; 3]) -> Result<Self, Error> {
         let [u, v, w] = std::array::from_fn(|c| Padded::new(&components[c], edges, |_| c));
         let components = [u?, v?, w?];
-        let largest = |p: &Padded| p.values.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
-        let max_speed_m_s = components
-            .iter()
-            .map(|p| largest(p).powi(2))
-            .sum::<f64>()
-            .sqrt();
+        let squared: f64 = components.iter().map(|p| p.largest().powi(2)).sum();
+        let max_speed_m_s = squared.sqrt();
         let mut field = Self {
             components,
             scalar: None,
@@ -61,7 +59,8 @@ impl VolumeSnapshot {
         Ok(field)
     }
 
-    /// The same air with a scalar that it carries, at nodes of its own; it does not change across walls.
+    /// The same air with a scalar that it carries, at nodes of its own; it does not change across
+    /// walls.
     ///
     /// # Errors
     /// As [`VolumeSnapshot::new`].
@@ -92,45 +91,46 @@ impl VolumeSnapshot {
         });
         let [xs, ys, zs] = nodes_m;
         let nx = xs.len();
-        let plane = |z_m: f64| -> Result<Vec<[f64; 3]>, Error> {
-            let points: Vec<[f64; 3]> = ys
-                .iter()
-                .flat_map(|&y_m| xs.iter().map(move |&x_m| [x_m, y_m, z_m]))
-                .collect();
-            let mut velocity = vec![[0.0; 3]; points.len()];
-            self.velocity_into(&points, 0.0, &mut velocity)?;
-            Ok(velocity)
-        };
         let mut largest = 0.0_f64;
-        let mut below = plane(zs[0])?;
+        let mut below = self.plane_m_s(xs, ys, zs[0])?;
         for k in 1..zs.len() {
-            let above = plane(zs[k])?;
-            for (j, i) in (1..ys.len()).flat_map(|j| (1..nx).map(move |i| (j, i))) {
-                let widths_m = [xs[i] - xs[i - 1], ys[j] - ys[j - 1], zs[k] - zs[k - 1]];
-                // Corner by its three steps.
-                let corner = |dx: usize, dy: usize, dz: usize| {
-                    let at = (j - 1 + dy) * nx + i - 1 + dx;
-                    if dz == 1 { above[at] } else { below[at] }
-                };
-                let gradient = std::array::from_fn(|c| {
-                    std::array::from_fn(|d| {
-                        let across = [(0, 0), (0, 1), (1, 0), (1, 1)].map(|(a, b)| {
-                            let step = |s: usize| match d {
-                                0 => corner(s, a, b)[c],
-                                1 => corner(a, s, b)[c],
-                                _ => corner(a, b, s)[c],
-                            };
-                            step(1) - step(0)
-                        });
-                        0.25 * across.iter().sum::<f64>() / widths_m[d]
-                    })
-                });
-                // A corner outside the mesh of another component makes it no number, which max leaves out.
-                largest = largest.max(largest_strain_per_s(&gradient));
+            let above = self.plane_m_s(xs, ys, zs[k])?;
+            for j in 1..ys.len() {
+                for i in 1..nx {
+                    let widths_m = [xs[i] - xs[i - 1], ys[j] - ys[j - 1], zs[k] - zs[k - 1]];
+                    let low = (j - 1) * nx + i - 1;
+                    let [near, far] = [low, low + nx];
+                    // Corners with the index x + 2 y + 4 z.
+                    let corners_m_s = [
+                        below[near],
+                        below[near + 1],
+                        below[far],
+                        below[far + 1],
+                        above[near],
+                        above[near + 1],
+                        above[far],
+                        above[far + 1],
+                    ];
+                    let gradient = corner_gradient_per_s(&corners_m_s, widths_m);
+                    // A corner outside the mesh of another component makes it NaN, which max
+                    // ignores.
+                    largest = largest.max(largest_strain_per_s(&gradient));
+                }
             }
             below = above;
         }
         Ok(largest)
+    }
+
+    /// Velocities \[m/s\] at the crossings of the lines `xs_m` and `ys_m` at one height, x fastest.
+    fn plane_m_s(&self, xs_m: &[f64], ys_m: &[f64], z_m: f64) -> Result<Vec<[f64; 3]>, Error> {
+        let mut points_m = Vec::with_capacity(xs_m.len() * ys_m.len());
+        for &y_m in ys_m {
+            points_m.extend(xs_m.iter().map(|&x_m| [x_m, y_m, z_m]));
+        }
+        let mut velocity_m_s = vec![[0.0; 3]; points_m.len()];
+        self.velocity_into(&points_m, 0.0, &mut velocity_m_s)?;
+        Ok(velocity_m_s)
     }
 
     /// A speed that no node exceeds \[m/s\]: of the largest values of the components.
@@ -156,8 +156,8 @@ impl Wind for VolumeSnapshot {
         Ok(())
     }
 
-    /// The largest strain rate in the middle of a cell: second-order accurate, so some percent low where the mesh has fewer than
-    /// about ten cells across a core.
+    /// The largest strain rate in the middle of a cell: second-order accurate, so some percent low
+    /// where the mesh has fewer than about ten cells across a core.
     fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
         self.max_gradient_per_s
     }
@@ -180,6 +180,20 @@ impl Wind for VolumeSnapshot {
             .for_each(|(out, point_m)| *out = at(point_m));
         Ok(())
     }
+}
+
+/// Velocity gradient `[component][direction]` in the middle of a cell \[1/s\]: the mean difference
+/// of its corners, which have the index x + 2 y + 4 z.
+fn corner_gradient_per_s(corners_m_s: &[[f64; 3]; 8], widths_m: [f64; 3]) -> [[f64; 3]; 3] {
+    // Index step along each direction, and the four corners at its low side.
+    const STEP: [usize; 3] = [1, 2, 4];
+    const LOW: [[usize; 4]; 3] = [[0, 4, 2, 6], [0, 4, 1, 5], [0, 2, 1, 3]];
+    std::array::from_fn(|c| {
+        std::array::from_fn(|d| {
+            let across = LOW[d].map(|low| corners_m_s[low + STEP[d]][c] - corners_m_s[low][c]);
+            0.25 * across.iter().sum::<f64>() / widths_m[d]
+        })
+    })
 }
 
 impl Padded {
@@ -207,17 +221,22 @@ impl Padded {
             let start = ((row / ny + GHOSTS) * py + row % ny + GHOSTS) * px + GHOSTS;
             padded[start..start + nx].copy_from_slice(from);
         }
-        // Ghosts direction by direction; what is made of places that are not there yet, a later direction replaces.
+        // Ghosts direction by direction; what is made of places that are not there yet, a later
+        // direction replaces.
         let strides = [1, px, px * py];
         for d in 0..3 {
-            let count: [usize; 3] =
-                std::array::from_fn(|along| if along == d { 1 } else { [px, py, pz][along] });
+            let mut count = [px, py, pz];
+            count[d] = 1;
             for (ghost_at, ghost) in ghost_places(&axes[d]) {
-                for (k, j) in (0..count[2]).flat_map(|k| (0..count[1]).map(move |j| (k, j))) {
-                    for i in 0..count[0] {
-                        let base = i + j * strides[1] + k * strides[2];
-                        let at = |node: usize| padded[base + (node + GHOSTS) * strides[d]];
-                        padded[base + ghost_at * strides[d]] = ghost_value(ghost, d, number(d), at);
+                for k in 0..count[2] {
+                    for j in 0..count[1] {
+                        for i in 0..count[0] {
+                            let base = i + j * strides[1] + k * strides[2];
+                            padded[base + ghost_at * strides[d]] =
+                                ghost_value(ghost, d, number(d), |node| {
+                                    padded[base + (node + GHOSTS) * strides[d]]
+                                });
+                        }
                     }
                 }
             }
@@ -228,12 +247,18 @@ impl Padded {
         })
     }
 
+    /// Largest magnitude of the values.
+    fn largest(&self) -> f64 {
+        self.values.iter().fold(0.0, |most, v| most.max(v.abs()))
+    }
+
     /// The value at a place, (26); none outside.
     fn at(&self, point_m: &[f64; 3]) -> Option<f64> {
         let (i, across_x) = self.axes[0].stencil(point_m[0])?;
         let (j, across_y) = self.axes[1].stencil(point_m[1])?;
         let (k, across_z) = self.axes[2].stencil(point_m[2])?;
-        let (px, py) = (self.axes[0].position_m.len(), self.axes[1].position_m.len());
+        let px = self.axes[0].position_m.len();
+        let py = self.axes[1].position_m.len();
         let mut sum = 0.0;
         for (dk, weight_z) in across_z.iter().enumerate() {
             for (dj, weight_y) in across_y.iter().enumerate() {

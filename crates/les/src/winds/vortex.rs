@@ -1,11 +1,13 @@
-//! The wake of an aircraft as an analytic flow: two counter-rotating vortices over a plane, equations (1)-(5).
+//! The wake of an aircraft as an analytic flow: two counter-rotating vortices over a plane,
+//! equations (1)-(5).
 //!
-//! The flow is two-dimensional: nothing depends on x and the axial velocity is zero. The vortex at smaller y turns
-//! clockwise, the one at larger y anticlockwise (y to the right, z up), so that the air between them, and the pair
-//! itself, moves down. Images of opposite sign below the ground make it a streamline.
+//! The flow is two-dimensional: nothing depends on x and the axial velocity is zero. The vortex at
+//! smaller y turns clockwise, the one at larger y anticlockwise (y to the right, z up), so that the
+//! air between them, and the pair itself, moves down. Images of opposite sign below the ground make
+//! it a streamline.
 //!
-//! Check: the vertical velocity at z = 0 is exactly zero, the divergence vanishes, the pair descends at
-//! `Gamma0/(2 pi b0)`, and its path keeps `1/y^2 + 1/z^2`.
+//! Check: the vertical velocity at z = 0 is exactly zero, the divergence vanishes, the pair
+//! descends at `Gamma0/(2 pi b0)`, and its path keeps `1/y^2 + 1/z^2`.
 
 use std::f64::consts::PI;
 
@@ -32,8 +34,8 @@ pub enum Motion {
     /// The pair stays where it is.
     #[default]
     Frozen,
-    /// Each vortex is carried by the others (and by the images) as if all were point vortices: straight down at
-    /// `V0` without a ground, along a hyperbola-like path over one.
+    /// Each vortex is carried by the others (and by the images) as if all were point vortices:
+    /// straight down at `V0` without a ground, along a hyperbola-like path over one.
     Inviscid,
 }
 
@@ -121,11 +123,12 @@ impl VortexPair {
         reduced_time * self.spacing_m / self.descent_speed_m_s()
     }
 
-    /// `Gamma_5-15`: the circulation of one vortex averaged over radii from 5 to 15 m \[m^2/s\], without the other
-    /// vortices.
+    /// `Gamma_5-15`: the circulation of one vortex averaged over radii from 5 to 15 m \[m^2/s\],
+    /// without the other vortices.
     ///
-    /// In closed form for the algebraic profile, `Gamma0 [1 - (r_c/10)(atan(15/r_c) - atan(5/r_c))]`; by Simpson's
-    /// rule, to round-off, for the others.
+    /// In closed form for the algebraic profile,
+    /// `Gamma0 [1 - (r_c/10)(atan(15/r_c) - atan(5/r_c))]`; by Simpson's rule, to round-off, for
+    /// the others.
     pub fn circulation_5_15_m2_s(&self) -> f64 {
         let core = self.core_radius_m;
         match self.profile {
@@ -157,9 +160,10 @@ impl VortexPair {
 
     /// The two centres at `time_s`.
     ///
-    /// With [`Motion::Inviscid`] over a ground the path of the point vortices and their images is used in closed form:
-    /// with `1/y^2 + 1/z^2 = C` (y the half distance) and `tan(theta) = y/z`, `cot(2 theta)` falls linearly in time,
-    /// at the rate `C Gamma0/(8 pi)`. Valid for negative times too.
+    /// With [`Motion::Inviscid`] over a ground the path of the point vortices and their images is
+    /// used in closed form: with `1/y^2 + 1/z^2 = C` (y the half distance) and `tan(theta) = y/z`,
+    /// `cot(2 theta)` falls linearly in time, at the rate `C Gamma0/(8 pi)`. Valid for negative
+    /// times too.
     pub fn centres(&self, time_s: f64) -> Centres {
         let half_m = 0.5 * self.spacing_m;
         let (half_m, height_m) = match (self.motion, self.ground) {
@@ -176,8 +180,8 @@ impl VortexPair {
         }
     }
 
-    /// Velocity `(v, w)` of one vortex of circulation `sign * Gamma0`, anticlockwise if positive, seen at `(dy, dz)`
-    /// from its centre.
+    /// Velocity `(v, w)` of one vortex of circulation `sign * Gamma0`, anticlockwise if positive,
+    /// seen at `(dy, dz)` from its centre.
     fn vortex_velocity(&self, sign: f64, dy_m: f64, dz_m: f64) -> [f64; 2] {
         let square_m2 = dy_m * dy_m + dz_m * dz_m;
         let omega = sign
@@ -227,7 +231,8 @@ impl Wind for VortexPair {
                 let dy_m = y_m - centre_y_m;
                 let mut velocity = self.vortex_velocity(sign, dy_m, z_m - centres.height_m);
                 if self.ground == Ground::Image {
-                    // Added to its own vortex first, so that the two vertical velocities cancel to the bit at z = 0.
+                    // Added to its own vortex first, so that the two vertical velocities cancel to
+                    // the bit at z = 0.
                     let image = self.vortex_velocity(-sign, dy_m, z_m + centres.height_m);
                     velocity[0] += image[0];
                     velocity[1] += image[1];
@@ -240,8 +245,9 @@ impl Wind for VortexPair {
         Ok(())
     }
 
-    /// The strain of one vortex at its own core radius ([`CirculationProfile::max_line_gradient_per_s`]) plus what the
-    /// others can add where that one is the nearest. Never too small; 4 % too large for cores of 5 % of the spacing.
+    /// The strain of one vortex at its own core radius
+    /// ([`CirculationProfile::max_line_gradient_per_s`]) plus what the others can add where that
+    /// one is the nearest. Never too small; 4 % too large for cores of 5 % of the spacing.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         let centres = self.centres(time_s);
         let spacing_m = centres.right_y_m - centres.left_y_m;
@@ -255,8 +261,8 @@ impl Wind for VortexPair {
         let own = self
             .profile
             .max_line_gradient_per_s(self.circulation_m2_s, self.core_radius_m);
-        // A point is nearest to one vortex, so each other one is at least half their distance away; beyond the peak of
-        // the strain, which lies within 1.2 core radii, the strain only falls.
+        // A point is nearest to one vortex, so each other one is at least half their distance away;
+        // beyond the peak of the strain, which lies within 1.2 core radii, the strain only falls.
         let added: f64 = others_m
             .iter()
             .map(|&distance_m| {
@@ -275,7 +281,8 @@ impl Wind for VortexPair {
     }
 }
 
-/// An aircraft as far as its wake is concerned, equation (5): `M g = rho U b0 Gamma0`, `b0 = pi b/4`.
+/// An aircraft as far as its wake is concerned, equation (5): `M g = rho U b0 Gamma0`,
+/// `b0 = pi b/4`.
 ///
 /// The spacing is that of an elliptically loaded wing (Prandtl's lifting line).
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,24 +1,25 @@
-//! A wind: the velocity of the air at any point and time, asked for in batches.
+//! A wind: the velocity of the air at any point and time, computed in batches.
 //!
 //! Axes: x along the flight direction, y across it (to the right), z up; the ground is z = 0.
 //!
-//! Check: a sum of winds is the sum of the velocities and carries what the first of them knows, and wrong lengths are refused by
-//! every wind.
+//! Check: a sum of winds is the sum of the velocities and carries what the first of them knows, and
+//! wrong lengths are refused by every wind.
 
 use crate::error::{Error, check_lengths};
 
 /// The velocity field of the air.
 ///
-/// Object safe, so that a scene may hold any wind as `Box<dyn Wind>`; batched, so that one virtual call serves
-/// a whole line of sight. Analytic flows and sampled simulations implement it alike.
+/// Object safe, so that a scene may hold any wind as `Box<dyn Wind>`; batched, so that one virtual
+/// call serves a whole line of sight. Analytic flows and sampled simulations implement it alike.
 ///
 /// A point with a coordinate that is not a number gives a velocity that is not a number.
 pub trait Wind: Send + Sync {
-    /// Writes the velocity `(u, v, w)` \[m/s\] at each of `points_m` = `(x, y, z)` \[m\] into `out_m_s`.
+    /// Writes the velocity `(u, v, w)` \[m/s\] at each of `points_m` = `(x, y, z)` \[m\] into
+    /// `out_m_s`.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] if the slices differ in length; what else depends on the wind, such as
-    /// [`Error::OutsideMesh`].
+    /// [`Error::LengthMismatch`] if the slices differ in length; what else depends on the wind,
+    /// such as [`Error::OutsideMesh`].
     fn velocity_into(
         &self,
         points_m: &[[f64; 3]],
@@ -26,13 +27,14 @@ pub trait Wind: Send + Sync {
         out_m_s: &mut [[f64; 3]],
     ) -> Result<(), Error>;
 
-    /// Upper bound of the gradient of the radial velocity along any straight line, `|e . grad(u) . e|` for unit
-    /// `e` \[1/s\]: the largest eigenvalue of the strain rate. It sets how thin the layers of a lidar signal must
-    /// be. Each wind says how sharp its bound is.
+    /// Upper bound of the gradient of the radial velocity along any straight line,
+    /// `|e . grad(u) . e|` for unit `e` \[1/s\]: the largest eigenvalue of the strain rate. It sets
+    /// how thin the layers of a lidar signal must be. Each wind says how sharp its bound is.
     fn max_gradient_per_s(&self, time_s: f64) -> f64;
 
-    /// Writes how much of a scalar the air carries at each of `points_m`, in the unit of the wind's source (for a lidar:
-    /// backscatter, 1/(m sr)); NaN where the wind does not know it, which by default is everywhere.
+    /// Writes how much of a scalar the air carries at each of `points_m`, in the unit of the wind's
+    /// source (for a lidar: backscatter, 1/(m sr)); NaN where the wind does not know it, which by
+    /// default is everywhere.
     ///
     /// # Errors
     /// As [`Wind::velocity_into`].

@@ -1,14 +1,18 @@
-//! Vortices in the axial vorticity of a cross-plane: centroids about a guess, strongest places, sums over sides.
+//! Vortices in the axial vorticity of a cross-plane: centroids about a guess, strongest places,
+//! sums over sides.
 //!
-//! The centroid is that of the vorticity of one sign within a circle about itself, found by iteration. The rim of the circle
-//! counts with the share of the cell that it covers, so that the centroid moves smoothly over the mesh.
+//! The centroid is that of the vorticity of one sign within a circle about itself, found by
+//! iteration. The rim of the circle counts with the share of the cell that it covers, so that the
+//! centroid moves smoothly over the mesh.
 //!
-//! Check: a Gaussian vortex off the nodes of a stretched mesh, across the period, beside another one.
+//! Check: a Gaussian vortex off the nodes of a stretched mesh, across the period, beside another
+//! one.
 
-/// Iterations of a centroid at most; each gains a digit or more where the vortex is smaller than the circle.
+/// Iterations of a centroid at most; each gains a digit or more where the vortex is smaller than
+/// the circle.
 const ITERATIONS: usize = 60;
 
-/// The edges along x, as a cross-plane sees them.
+/// The edges along x, seen in a cross-plane: their positions and the lengths about them.
 #[derive(Debug, Clone)]
 pub(super) struct EdgeGrid {
     /// Positions of the faces along y and z \[m\].
@@ -66,8 +70,11 @@ impl EdgePlane<'_> {
 
     /// Centroid and circulation within the circle about `centre_m`.
     fn moments(&self, centre_m: [f64; 2], sign: f64, radius_m: f64) -> Option<Core> {
-        let (grid, ny) = (self.grid, self.grid.y_m.len());
-        let (mut sum, mut y_sum, mut z_sum) = (0.0, 0.0, 0.0);
+        let grid = self.grid;
+        let ny = grid.y_m.len();
+        let mut sum = 0.0;
+        let mut y_sum = 0.0;
+        let mut z_sum = 0.0;
         for (k, (z_m, z_length_m)) in grid.z_m.iter().zip(&grid.z_length_m).enumerate() {
             let dz_m = z_m - centre_m[1];
             if dz_m.abs() > radius_m + z_length_m {
@@ -86,10 +93,10 @@ impl EdgePlane<'_> {
                 let area_m2 = y_length_m * z_length_m;
                 let covered =
                     ((radius_m - dy_m.hypot(dz_m)) / area_m2.sqrt() + 0.5).clamp(0.0, 1.0);
-                let part = covered * area_m2 * value;
-                sum += part;
-                y_sum += part * dy_m;
-                z_sum += part * dz_m;
+                let weight = covered * area_m2 * value;
+                sum += weight;
+                y_sum += weight * dy_m;
+                z_sum += weight * dz_m;
             }
         }
         (sum > 0.0).then(|| Core {
@@ -123,18 +130,15 @@ impl EdgePlane<'_> {
 
     /// Position, vorticity and area of all edges.
     fn edges(&self) -> impl Iterator<Item = ([f64; 2], f64, f64)> + '_ {
-        let (grid, ny) = (self.grid, self.grid.y_m.len());
-        self.vorticity_per_s
-            .iter()
-            .enumerate()
-            .map(move |(place, value)| {
-                let (j, k) = (place % ny, place / ny);
-                (
-                    [grid.y_m[j], grid.z_m[k]],
-                    *value,
-                    grid.y_length_m[j] * grid.z_length_m[k],
-                )
-            })
+        let grid = self.grid;
+        let ny = grid.y_m.len();
+        let places = self.vorticity_per_s.iter().enumerate();
+        places.map(move |(place, value)| {
+            let j = place % ny;
+            let k = place / ny;
+            let area_m2 = grid.y_length_m[j] * grid.z_length_m[k];
+            ([grid.y_m[j], grid.z_m[k]], *value, area_m2)
+        })
     }
 }
 

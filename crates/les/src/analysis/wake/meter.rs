@@ -1,6 +1,7 @@
 //! The meter: follows the two vortices of a wake from record to record.
 //!
-//! Check: an analytic pair with its images on a mesh: centres, circulation against radius, secondary vortices, spread.
+//! Check: an analytic pair with its images on a mesh: centres, circulation against radius,
+//! secondary vortices, spread.
 
 use rayon::prelude::*;
 
@@ -20,12 +21,14 @@ use crate::winds::{GridSnapshot, OutsidePolicy};
 const CORE_RADIUS: f64 = 0.15;
 /// Height above which vorticity counts as that of secondary vortices, in `b0`.
 const ABOVE_LAYER: f64 = 0.15;
-/// A secondary vortex has at least this share of `Gamma0` in its circle.
+/// A secondary vortex has at least this fraction of `Gamma0` in its circle.
 const LEAST_SECONDARY: f64 = 0.01;
 /// Radii that are averaged for `Gamma_5-15`.
 const WINDOW_RADII: usize = 21;
-/// Radii of the profile, and their spacing in `b0`.
-const PROFILE: (usize, f64) = (24, 0.025);
+/// Radii of the profile.
+const PROFILE_RADII: usize = 24;
+/// Spacing of the radii of the profile, in `b0`.
+const PROFILE_SPACING: f64 = 0.025;
 /// Points on a circle.
 const POINTS: usize = 96;
 /// 5 and 15 m of a spacing of 47 m.
@@ -42,14 +45,15 @@ pub struct WakeMeter {
     viscosity_m2_s: f64,
     first_height_m: f64,
     /// The last two times and centres of the left, then of the right vortex.
-    track: [[Fix; 2]; 2],
+    track: [[TrackPoint; 2]; 2],
 }
 
 /// Where a vortex was: time, y, z.
-type Fix = [f64; 3];
+type TrackPoint = [f64; 3];
 
 impl WakeMeter {
-    /// A meter for flows on `mesh` whose vortices are at `centres_m`, left then right, as (y, z), when it is first used.
+    /// A meter for flows on `mesh` whose vortices are at `centres_m`, left then right, as (y, z),
+    /// when it is first used.
     ///
     /// # Errors
     /// [`Error::BadDirection`] unless x is periodic and z bounded; scales out of range.
@@ -83,7 +87,8 @@ impl WakeMeter {
         })
     }
 
-    /// The same with another window of radii, in `b0`, for `Gamma_5-15`; by default that of 5 to 15 m at `b0` = 47 m.
+    /// The same with another window of radii, in `b0`, for `Gamma_5-15`; by default that of 5 to 15
+    /// m at `b0` = 47 m.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] unless the radii are positive and increase.
@@ -95,8 +100,8 @@ impl WakeMeter {
         Ok(Self { window, ..self })
     }
 
-    /// The same with another radius, in `b0`, of the circle of a centroid, 0.15 by default. A small one finds the place of the
-    /// strongest vorticity.
+    /// The same with another radius, in `b0`, of the circle of a centroid, 0.15 by default. A small
+    /// one finds the place of the strongest vorticity.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a radius that is not positive.
@@ -108,8 +113,8 @@ impl WakeMeter {
         })
     }
 
-    /// The same, told how the two vortices move at first, `(v, w)` \[m/s\]: needed where they move by more than a core radius
-    /// between the first two records.
+    /// The same meter with the initial velocities of the two vortices, `(v, w)` \[m/s\]: needed
+    /// where they move by more than a core radius between the first two records.
     pub fn moving_with(mut self, velocity_m_s: [[f64; 2]; 2]) -> Self {
         for (track, velocity_m_s) in self.track.iter_mut().zip(velocity_m_s) {
             let unit_s = self.scales.time_unit_s();
@@ -126,12 +131,12 @@ impl WakeMeter {
 
     /// Radii of the circulation profile \[m\].
     pub fn radii_m(&self) -> Vec<f64> {
-        (1..=PROFILE.0)
-            .map(|i| i as f64 * PROFILE.1 * self.scales.spacing_m)
+        (1..=PROFILE_RADII)
+            .map(|i| i as f64 * PROFILE_SPACING * self.scales.spacing_m)
             .collect()
     }
 
-    /// What the meter remembers, to be kept in a checkpoint.
+    /// The last positions of the vortices, to be stored in a checkpoint.
     pub fn state(&self) -> [f64; 12] {
         std::array::from_fn(|i| self.track.as_flattened().as_flattened()[i])
     }
@@ -144,179 +149,172 @@ impl WakeMeter {
             .copy_from_slice(&state);
     }
 
-    /// Measures the flow, which is on the mesh of the meter and not earlier than the one before. Of a flow on several ranks all
-    /// must measure together, and all get the record.
+    /// Measures the flow, which is on the mesh of the meter and not earlier than the one before. Of
+    /// a flow on several ranks all must measure together, and all get the record.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] for a flow on a mesh of other size; what the interpolation refuses; [`Error::RankLost`].
+    /// [`Error::LengthMismatch`] for a flow on a mesh of other size; what the interpolation
+    /// refuses; [`Error::RankLost`].
     pub fn measure(&mut self, flow: &Flow) -> Result<WakeRecord, Error> {
         let cells: usize = self.curl.cell_m.iter().map(Vec::len).product();
         crate::error::check_lengths(cells, flow.mesh().cells().iter().product())?;
-        let seen = flow.faces()?;
-        let plane = self.mean_vorticity(&seen)?;
-        let wind = flow.plane_snapshot(&flow.mean_plane_of(&seen)?, OutsidePolicy::Mask)?;
-        let radius_m = self.core_radius * self.scales.spacing_m;
+        let faces = flow.faces()?;
+        let plane = self.mean_vorticity(&faces)?;
+        let wind = flow.plane_snapshot(&flow.mean_plane_of(&faces)?, OutsidePolicy::Mask)?;
         let time_s = flow.time_s();
-        let core =
-            |v: usize| seen.core(|| plane.core(guess(&self.track[v], time_s), SIGN[v], radius_m));
-        let cores = [core(0)?, core(1)?];
+        let radius_m = self.core_radius * self.scales.spacing_m;
+        let mut cores = [None; 2];
+        for (v, core) in cores.iter_mut().enumerate() {
+            let guess_m = guess(&self.track[v], time_s);
+            *core = faces.core(|| plane.core(guess_m, SIGN[v], radius_m))?;
+        }
         let mut tracks = self.track;
         for (track, core) in tracks.iter_mut().zip(&cores) {
-            let [y_m, z_m] = core.map_or([f64::NAN; 2], |core| core.centre_m);
-            // A second record at the same time corrects the first.
-            if core.is_some() && track[1][0] == time_s {
-                track[1] = [time_s, y_m, z_m];
-            } else if core.is_some() {
-                *track = [track[1], [time_s, y_m, z_m]];
-            }
+            follow(track, *core, time_s);
         }
         let centres_m = tracks.map(|track| [track[1][1], track[1][2]]);
-        let (shear, wall_shear_per_s) = self.wall_shear(&seen)?;
-        let vortex = |own: usize| {
-            let (is_found, floor_m) = (cores[own].is_some(), ABOVE_LAYER * self.scales.spacing_m);
-            let side = Side {
-                plane: &plane,
-                centres_m,
-                own,
-                is_found,
-                floor_m,
-            };
-            let mut record = self.vortex(&seen, &side, &wind)?;
-            let faces = self
-                .grid
-                .y_m
-                .iter()
-                .zip(&shear)
-                .filter(|(y_m, _)| side.has(**y_m));
-            record.outward_shear_per_s = faces
-                .map(|(_, shear)| SIGN[own] * shear)
-                .fold(f64::NAN, f64::min);
-            Ok::<_, Error>(record)
-        };
+        let (shear_per_s, wall_shear_per_s) = self.wall_shear(&faces)?;
+        let [left, right] = [0, 1].map(|own| Side {
+            plane: &plane,
+            centres_m,
+            own,
+            is_found: cores[own].is_some(),
+            floor_m: ABOVE_LAYER * self.scales.spacing_m,
+        });
         let length_m: f64 = self.curl.cell_m[0].iter().sum();
-        let friction_m_s = (self.viscosity_m2_s * wall_shear_per_s).sqrt();
-        let wall_units = if friction_m_s > 0.0 {
-            self.first_height_m * friction_m_s / self.viscosity_m2_s
-        } else {
-            0.0
-        };
         let record = WakeRecord {
             time_s,
-            left: vortex(0)?,
-            right: vortex(1)?,
+            left: self.vortex(&faces, &left, &wind, &shear_per_s)?,
+            right: self.vortex(&faces, &right, &wind, &shear_per_s)?,
             energy_m4_s2: flow.kinetic_energy_m5_s2() / length_m,
-            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &seen)?,
-            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&seen)?,
+            mode_energy_m4_s2: mode_energies_m4_s2(&self.curl, &faces)?,
+            enstrophy_m2_s2: self.curl.enstrophy_m2_s2(&faces)?,
             wall_shear_per_s,
-            wall_units,
+            wall_units: self.wall_units(wall_shear_per_s),
         };
         self.track = tracks;
         Ok(record)
     }
 
+    /// Height of the first centre in wall units of a shear; 0 without friction.
+    fn wall_units(&self, wall_shear_per_s: f64) -> f64 {
+        let friction_m_s = (self.viscosity_m2_s * wall_shear_per_s).sqrt();
+        if friction_m_s > 0.0 {
+            self.first_height_m * friction_m_s / self.viscosity_m2_s
+        } else {
+            0.0
+        }
+    }
+
     /// Axial vorticity averaged over x.
-    fn mean_vorticity(&self, seen: &Faces) -> Result<EdgePlane<'_>, Error> {
-        let (ny, x_m) = (self.grid.y_m.len(), &self.curl.cell_m[0]);
+    fn mean_vorticity(&self, faces: &Faces) -> Result<EdgePlane<'_>, Error> {
+        let ny = self.grid.y_m.len();
+        let x_m = &self.curl.cell_m[0];
         let length_m: f64 = x_m.iter().sum();
-        let own = self.curl.own_faces(seen.shape.own());
+        let own = self.curl.own_faces(faces.shape.own());
         let mut mean = vec![0.0; ny * own.len()];
         mean.par_chunks_mut(ny).zip(own).for_each(|(out, k)| {
             let mut row = vec![0.0; x_m.len()];
             for (j, out) in out.iter_mut().enumerate() {
-                self.curl.row(seen, 0, j, k, &mut row);
+                self.curl.row(faces, 0, j, k, &mut row);
                 *out = row.iter().zip(x_m).map(|(w, x_m)| w * x_m).sum::<f64>() / length_m;
             }
         });
-        let vorticity_per_s = seen.slabs.all_gather(mean)?;
+        let vorticity_per_s = faces.slabs.all_gather(mean)?;
         Ok(EdgePlane {
             grid: &self.grid,
             vorticity_per_s,
         })
     }
 
-    /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank seeks it in some of the planes.
+    /// The core in each cross-plane about the one of the mean; NaN where there is none. Each rank
+    /// seeks it in some of the planes.
     fn slices(
         &self,
-        seen: &Faces,
-        about: Core,
+        faces: &Faces,
+        mean: Core,
         sign: f64,
         floor_m: f64,
     ) -> Result<Vec<[f64; 2]>, Error> {
         let radius_m = self.core_radius * self.scales.spacing_m;
-        let (ny, nz, nx) = (
-            self.grid.y_m.len(),
-            self.grid.z_m.len(),
-            self.curl.cell_m[0].len(),
-        );
-        let near = |k: &usize| {
-            let z_m = self.grid.z_m[*k];
-            z_m > floor_m && (z_m - about.centre_m[1]).abs() < 2.0 * radius_m
-        };
-        let lateral_m = |j: usize| self.grid.lateral_m(about.centre_m[0], self.grid.y_m[j]);
-        let beside: Vec<usize> = (0..ny)
-            .filter(|j| lateral_m(*j).abs() < 2.0 * radius_m)
+        let grid = &self.grid;
+        let ny = grid.y_m.len();
+        let nz = grid.z_m.len();
+        let nx = self.curl.cell_m[0].len();
+        let near_z: Vec<usize> = (0..nz)
+            .filter(|&k| {
+                let dz_m = grid.z_m[k] - mean.centre_m[1];
+                grid.z_m[k] > floor_m && dz_m.abs() < 2.0 * radius_m
+            })
             .collect();
-        // Each rank gives the vorticity of its planes across z to all, and seeks in some planes across x.
-        let own = self.curl.own_faces(seen.shape.own()).filter(near);
-        let rows: Vec<[usize; 2]> = own
-            .flat_map(|k| beside.iter().map(move |j| [*j, k]))
+        let near_y: Vec<usize> = (0..ny)
+            .filter(|&j| grid.lateral_m(mean.centre_m[0], grid.y_m[j]).abs() < 2.0 * radius_m)
             .collect();
-        let mut values = vec![0.0; rows.len() * nx];
+        // Each rank gives the vorticity of its planes across z to all, and seeks in some planes
+        // across x.
+        let own_z = self.curl.own_faces(faces.shape.own());
+        let mut own_rows = Vec::new();
+        let mut places = Vec::with_capacity(near_z.len() * near_y.len());
+        for &k in &near_z {
+            for &j in &near_y {
+                places.push(k * ny + j);
+                if own_z.contains(&k) {
+                    own_rows.push([j, k]);
+                }
+            }
+        }
+        let mut values = vec![0.0; own_rows.len() * nx];
         values
             .par_chunks_mut(nx)
-            .zip(&rows)
-            .for_each(|(row, [j, k])| self.curl.row(seen, 0, *j, *k, row));
-        let values = seen.slabs.all_gather(values)?;
-        let places: Vec<usize> = (0..nz)
-            .filter(near)
-            .flat_map(|k| beside.iter().map(move |j| k * ny + j))
-            .collect();
-        let (rank, count) = (seen.slabs.ranks.rank(), seen.slabs.ranks.count());
+            .zip(&own_rows)
+            .for_each(|(row, [j, k])| self.curl.row(faces, 0, *j, *k, row));
+        let values = faces.slabs.all_gather(values)?;
+        let rank = faces.slabs.ranks.rank();
+        let count = faces.slabs.ranks.count();
         let own: Vec<[f64; 2]> = (nx * rank / count..nx * (rank + 1) / count)
             .into_par_iter()
             .map(|i| {
-                let mut plane = vec![0.0; ny * nz];
-                let column = values.iter().skip(i).step_by(nx);
-                places
-                    .iter()
-                    .zip(column)
-                    .for_each(|(place, value)| plane[*place] = *value);
-                let core = EdgePlane {
-                    grid: &self.grid,
-                    vorticity_per_s: plane,
+                let mut vorticity_per_s = vec![0.0; ny * nz];
+                for (place, row) in places.iter().zip(values.chunks(nx)) {
+                    vorticity_per_s[*place] = row[i];
                 }
-                .core(about.centre_m, sign, radius_m);
+                let plane = EdgePlane {
+                    grid,
+                    vorticity_per_s,
+                };
+                let core = plane.core(mean.centre_m, sign, radius_m);
                 core.map_or([f64::NAN; 2], |core| core.centre_m)
             })
             .collect();
-        seen.slabs.planes(own)
+        faces.slabs.planes(own)
     }
 
+    /// The record of the vortex of a side; `shear_per_s` is the lateral shear at the ground.
     fn vortex(
         &self,
-        seen: &Faces,
+        faces: &Faces,
         side: &Side<'_>,
         wind: &GridSnapshot,
+        shear_per_s: &[f64],
     ) -> Result<VortexRecord, Error> {
-        let (sign, centre_m) = (SIGN[side.own], side.centres_m[side.own]);
+        let sign = SIGN[side.own];
+        let centre_m = side.centres_m[side.own];
         let spacing_m = self.scales.spacing_m;
-        let circulation = |radius_m: f64| circulation_m2_s(wind, centre_m, radius_m, 0.0, POINTS);
         let [from, to] = self.window.map(|r| r * spacing_m);
         let step_m = (to - from) / (WINDOW_RADII - 1) as f64;
         let mut mean = 0.0;
         for i in 0..WINDOW_RADII {
-            mean += circulation(from + i as f64 * step_m)? / WINDOW_RADII as f64;
+            let radius_m = from + i as f64 * step_m;
+            let gamma_m2_s = circulation_m2_s(wind, centre_m, radius_m, 0.0, POINTS)?;
+            mean += gamma_m2_s / WINDOW_RADII as f64;
         }
-        let gamma_m2_s = self
-            .radii_m()
-            .into_iter()
-            .map(circulation)
-            .collect::<Result<_, _>>()?;
-        let slices_m = match seen.core(|| {
-            side.plane
-                .core(centre_m, sign, self.core_radius * spacing_m)
-        })? {
-            Some(core) if side.is_found => self.slices(seen, core, sign, f64::NEG_INFINITY)?,
+        let mut gamma_m2_s = Vec::with_capacity(PROFILE_RADII);
+        for radius_m in self.radii_m() {
+            gamma_m2_s.push(circulation_m2_s(wind, centre_m, radius_m, 0.0, POINTS)?);
+        }
+        let radius_m = self.core_radius * spacing_m;
+        let slices_m = match faces.core(|| side.plane.core(centre_m, sign, radius_m))? {
+            Some(core) if side.is_found => self.slices(faces, core, sign, f64::NEG_INFINITY)?,
             _ => vec![[f64::NAN; 2]; self.curl.cell_m[0].len()],
         };
         let [y_spread_m, z_spread_m] = spread(&slices_m);
@@ -332,86 +330,88 @@ impl WakeMeter {
             gamma_opposite_m2_s: side
                 .plane
                 .circulation_m2_s(-sign, |y_m, z_m| side.has_above(y_m, z_m)),
-            secondary: self.secondary(seen, side)?,
-            outward_shear_per_s: f64::NAN,
+            secondary: self.secondary(faces, side)?,
+            outward_shear_per_s: self.outward_shear_per_s(side, shear_per_s),
         })
     }
 
-    fn secondary(&self, seen: &Faces, side: &Side<'_>) -> Result<SecondaryRecord, Error> {
+    /// Least outward shear at the ground of a side.
+    fn outward_shear_per_s(&self, side: &Side<'_>, shear_per_s: &[f64]) -> f64 {
+        let mut least = f64::NAN;
+        for (y_m, shear_per_s) in self.grid.y_m.iter().zip(shear_per_s) {
+            if side.has(*y_m) {
+                least = least.min(SIGN[side.own] * shear_per_s);
+            }
+        }
+        least
+    }
+
+    fn secondary(&self, faces: &Faces, side: &Side<'_>) -> Result<SecondaryRecord, Error> {
+        let found = faces.core(|| self.secondary_core(side))?;
+        let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
+        let Some(core) = found.filter(|core| core.circulation_m2_s.abs() >= least_m2_s) else {
+            return Ok(SecondaryRecord::NONE);
+        };
+        let slices_m = self.slices(faces, core, -SIGN[side.own], side.floor_m)?;
+        let [y_spread_m, z_spread_m] = spread(&slices_m);
+        // Beside its own vortex, whose y may lie beyond the ends of a periodic box.
+        let own_y_m = side.centres_m[side.own][0];
+        let [y_m, z_m] = core.centre_m;
+        Ok(SecondaryRecord {
+            y_m: own_y_m + self.grid.lateral_m(own_y_m, y_m),
+            z_m,
+            y_spread_m,
+            z_spread_m,
+            gamma_m2_s: core.circulation_m2_s,
+        })
+    }
+
+    /// The strongest secondary vortex of a side: about the strongest vorticity of the other sign,
+    /// or, as that may be in the sheet which the layer sends up, about the strongest one apart from
+    /// it.
+    fn secondary_core(&self, side: &Side<'_>) -> Option<Core> {
         let sign = -SIGN[side.own];
+        let radius_m = self.core_radius * self.scales.spacing_m;
         // The layer at the ground has vorticity of the same sign and would draw the centroid down.
         let mut upper = side.plane.clone();
-        let below = self.grid.z_m.partition_point(|z_m| *z_m <= side.floor_m) * self.grid.y_m.len();
-        upper.vorticity_per_s[..below].fill(0.0);
-        let radius_m = self.core_radius * self.scales.spacing_m;
-        // The first vortex of the other side has the same sign: a search that slides over to it has found nothing.
-        let core_at = |guess_m: [f64; 2]| {
-            upper
-                .core(guess_m, sign, radius_m)
-                .filter(|core| side.has(core.centre_m[0]))
-        };
-        let above = |y_m: f64, z_m: f64| side.has_above(y_m, z_m);
-        let first = || side.plane.strongest_m(sign, above).and_then(core_at);
-        // The strongest vorticity may be that of the sheet which the layer sends up: the vortex is then a second maximum.
-        let apart = |y_m: f64, z_m: f64, core: &Core| {
-            side.plane
-                .grid
-                .lateral_m(core.centre_m[0], y_m)
-                .hypot(z_m - core.centre_m[1])
-                > 2.0 * radius_m
-        };
-        let second = |core: Core| {
-            side.plane
-                .strongest_m(sign, |y_m, z_m| above(y_m, z_m) && apart(y_m, z_m, &core))
-                .and_then(core_at)
-        };
-        let size = |core: &Core| core.circulation_m2_s.abs();
-        let found = seen.core(|| {
-            let first = first();
-            first
-                .into_iter()
-                .chain(first.and_then(second))
-                .max_by(|a, b| size(a).total_cmp(&size(b)))
-        })?;
-        let least_m2_s = LEAST_SECONDARY * self.scales.circulation_m2_s;
-        Ok(match found {
-            Some(core) if core.circulation_m2_s.abs() >= least_m2_s => {
-                let [y_spread_m, z_spread_m] =
-                    spread(&self.slices(seen, core, sign, side.floor_m)?);
-                let ([y_m, z_m], gamma_m2_s) = (core.centre_m, core.circulation_m2_s);
-                // Beside its own vortex, which is counted on over the sides.
-                let own_y_m = side.centres_m[side.own][0];
-                let y_m = own_y_m + side.plane.grid.lateral_m(own_y_m, y_m);
-                SecondaryRecord {
-                    y_m,
-                    z_m,
-                    y_spread_m,
-                    z_spread_m,
-                    gamma_m2_s,
-                }
+        let rows_below = self.grid.z_m.partition_point(|z_m| *z_m <= side.floor_m);
+        upper.vorticity_per_s[..rows_below * self.grid.y_m.len()].fill(0.0);
+        let plane = side.plane;
+        let first_guess_m = plane.strongest_m(sign, |y_m, z_m| side.has_above(y_m, z_m))?;
+        let first = side.core_in(&upper, first_guess_m, radius_m)?;
+        let second_guess_m = plane.strongest_m(sign, |y_m, z_m| {
+            let dy_m = self.grid.lateral_m(first.centre_m[0], y_m);
+            let dz_m = z_m - first.centre_m[1];
+            side.has_above(y_m, z_m) && dy_m.hypot(dz_m) > 2.0 * radius_m
+        });
+        let second = second_guess_m.and_then(|guess_m| side.core_in(&upper, guess_m, radius_m));
+        match second {
+            Some(second) if second.circulation_m2_s.abs() >= first.circulation_m2_s.abs() => {
+                Some(second)
             }
-            _ => SecondaryRecord::NONE,
-        })
+            _ => Some(first),
+        }
     }
 
-    /// Lateral shear at the ground averaged over x, at the faces of y, and the largest magnitude of the shear anywhere.
-    fn wall_shear(&self, seen: &Faces) -> Result<(Vec<f64>, f64), Error> {
-        let (nx, ny) = (self.curl.cell_m[0].len(), self.curl.cell_m[1].len());
+    /// Lateral shear at the ground averaged over x, at the faces of y, and the largest magnitude of
+    /// the shear anywhere.
+    fn wall_shear(&self, faces: &Faces) -> Result<(Vec<f64>, f64), Error> {
+        let nx = self.curl.cell_m[0].len();
+        let ny = self.curl.cell_m[1].len();
         // The first rank has the lowest planes.
-        let mut found = seen.slabs.broadcast(|| {
-            let (mut along, mut across) = (vec![0.0; nx], vec![0.0; nx]);
+        let mut found = faces.slabs.broadcast(|| {
+            let mut along = vec![0.0; nx];
+            let mut across = vec![0.0; nx];
             let mut found = Vec::with_capacity(ny + 1);
             let mut largest = 0.0_f64;
             for j in 0..ny {
                 // At the ground w does not vary, so that the vorticity is the shear.
-                self.curl.row(seen, 0, j, 0, &mut across);
-                self.curl.row(seen, 1, j, 0, &mut along);
+                self.curl.row(faces, 0, j, 0, &mut across);
+                self.curl.row(faces, 1, j, 0, &mut along);
                 found.push(-across.iter().sum::<f64>() / nx as f64);
-                largest = across
-                    .iter()
-                    .zip(&along)
-                    .map(|(a, b)| a.hypot(*b))
-                    .fold(largest, f64::max);
+                for (a, b) in across.iter().zip(&along) {
+                    largest = largest.max(a.hypot(*b));
+                }
             }
             found.push(largest);
             found
@@ -422,17 +422,19 @@ impl WakeMeter {
 }
 
 impl Faces {
-    /// The core that rank 0 finds: which planes are looked at depends on it.
+    /// The core that rank 0 finds: which planes are searched depends on it.
     fn core(&self, find: impl FnOnce() -> Option<Core>) -> Result<Option<Core>, Error> {
-        let numbers = |core: Core| vec![core.centre_m[0], core.centre_m[1], core.circulation_m2_s];
-        let found = self
-            .slabs
-            .broadcast(|| find().map_or_else(Vec::new, numbers))?;
-        let core = |&[y_m, z_m, circulation_m2_s]: &[f64; 3]| Core {
+        let found = self.slabs.broadcast(|| match find() {
+            Some(core) => vec![core.centre_m[0], core.centre_m[1], core.circulation_m2_s],
+            None => Vec::new(),
+        })?;
+        let [y_m, z_m, circulation_m2_s] = found[..] else {
+            return Ok(None);
+        };
+        Ok(Some(Core {
             centre_m: [y_m, z_m],
             circulation_m2_s,
-        };
-        Ok(found.first_chunk().map(core))
+        }))
     }
 }
 
@@ -452,35 +454,56 @@ struct Side<'a> {
 
 impl Side<'_> {
     fn has(&self, y_m: f64) -> bool {
-        let distance = |v: usize| self.plane.grid.lateral_m(self.centres_m[v][0], y_m).abs();
-        distance(self.own) <= distance(1 - self.own)
+        let grid = self.plane.grid;
+        let distances_m = self
+            .centres_m
+            .map(|[centre_y_m, _]| grid.lateral_m(centre_y_m, y_m).abs());
+        distances_m[self.own] <= distances_m[1 - self.own]
     }
 
     fn has_above(&self, y_m: f64, z_m: f64) -> bool {
         z_m > self.floor_m && self.has(y_m)
     }
+
+    /// The secondary vortex about a guess. The first vortex of the other side has the same sign: a
+    /// search that slides over to it has found nothing.
+    fn core_in(&self, upper: &EdgePlane<'_>, guess_m: [f64; 2], radius_m: f64) -> Option<Core> {
+        let core = upper.core(guess_m, -SIGN[self.own], radius_m)?;
+        self.has(core.centre_m[0]).then_some(core)
+    }
+}
+
+/// Adds the position of a core at a time to a track; a second record at the same time corrects the
+/// first.
+fn follow(track: &mut [TrackPoint; 2], core: Option<Core>, time_s: f64) {
+    let Some(core) = core else { return };
+    let point = [time_s, core.centre_m[0], core.centre_m[1]];
+    if track[1][0] == time_s {
+        track[1] = point;
+    } else {
+        *track = [track[1], point];
+    }
 }
 
 /// Where a vortex should be, from its last two places.
-fn guess(track: &[Fix; 2], time_s: f64) -> [f64; 2] {
+fn guess(track: &[TrackPoint; 2], time_s: f64) -> [f64; 2] {
     let [before, last] = *track;
-    let share = (time_s - last[0]) / (last[0] - before[0]);
-    if !share.is_finite() {
+    let fraction = (time_s - last[0]) / (last[0] - before[0]);
+    if !fraction.is_finite() {
         return [last[1], last[2]];
     }
-    [1, 2].map(|c| last[c] + share * (last[c] - before[c]))
+    [1, 2].map(|c| last[c] + fraction * (last[c] - before[c]))
 }
 
 /// Standard deviations over the slices that have a centre.
 fn spread(slices_m: &[[f64; 2]]) -> [f64; 2] {
     [0, 1].map(|c| {
-        let values: Vec<f64> = slices_m
-            .iter()
-            .map(|s| s[c])
-            .filter(|x| x.is_finite())
-            .collect();
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        (values.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / values.len() as f64).sqrt()
+        let values = slices_m.iter().map(|s| s[c]);
+        let values: Vec<f64> = values.filter(|x| x.is_finite()).collect();
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|x| (x - mean).powi(2)).sum();
+        (squares / count).sqrt()
     })
 }
 

@@ -18,7 +18,8 @@ fn close(found: f64, expected: f64, within: f64, what: &str) {
     );
 }
 
-/// Vortices (circulation, y, z, core radius) with their images below the ground, moved along y by `bend(x)`.
+/// Vortices (circulation, y, z, core radius) with their images below the ground, moved along y by
+/// `bend(x)`.
 fn vortices(
     list: &'static [(f64, f64, f64, f64)],
     bend: impl Fn(f64) -> f64 + Sync,
@@ -113,7 +114,8 @@ fn an_analytic_pair_has_its_centres_and_its_circulation_profile() {
         1e-3 * record.energy_m4_s2,
         "energy of the plane part",
     );
-    // Beneath the pair the air moves outward at up to V0 / ...; the wall is not slipped over, so the shear is strong.
+    // Beneath the pair the air moves outward at up to V0 / ...; the wall is not slipped over, so
+    // the shear is strong.
     assert!(
         record.left.outward_shear_per_s > 0.0 && record.wall_shear_per_s > 50.0,
         "{record:?}"
@@ -184,7 +186,8 @@ fn a_bent_pair_has_its_spread_and_secondary_vortices_belong_to_their_side() {
 
 #[test]
 fn the_secondary_vortex_is_neither_the_sharpest_sheet_nor_the_first_vortex_of_the_other_side() {
-    // On the right a weak spot of higher vorticity than the secondary; over the middle the tail of a wide right vortex.
+    // On the right a weak spot of higher vorticity than the secondary; over the middle the tail of
+    // a wide right vortex.
     const LIST: &[(f64, f64, f64, f64)] = &[
         (-TAU, -0.5, 0.8, 0.1),
         (2.0 * TAU, 0.5, 0.8, 0.3),

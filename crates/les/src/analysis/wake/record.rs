@@ -1,5 +1,5 @@
-//! What a [`WakeMeter`](super::WakeMeter) finds at one instant, and the units of a vortex pair: lengths in `b0`, velocities in
-//! `V0 = Gamma0/(2 pi b0)`, times in `b0/V0`.
+//! What a [`WakeMeter`](super::WakeMeter) finds at one instant, and the units of a vortex pair:
+//! lengths in `b0`, velocities in `V0 = Gamma0/(2 pi b0)`, times in `b0/V0`.
 //!
 //! Check: scaling there and back; the units against the analytic pair.
 
@@ -18,9 +18,11 @@ pub struct WakeRecord {
     pub right: VortexRecord,
     /// Kinetic energy, half the integral of the squared speed over the cross-section \[m^4/s^2\].
     pub energy_m4_s2: f64,
-    /// That of each axial mode `m = 0, 1, ...`, wavelength `L_x/m`; `m = 0` is the plane part \[m^4/s^2\].
+    /// That of each axial mode `m = 0, 1, ...`, wavelength `L_x/m`; `m = 0` is the plane part
+    /// \[m^4/s^2\].
     pub mode_energy_m4_s2: Vec<f64>,
-    /// Half the integral of the squared vorticity over the cross-section, ground included \[m^2/s^2\].
+    /// Half the integral of the squared vorticity over the cross-section, ground included
+    /// \[m^2/s^2\].
     pub enstrophy_m2_s2: f64,
     /// Largest shear at the ground \[1/s\].
     pub wall_shear_per_s: f64,
@@ -31,7 +33,8 @@ pub struct WakeRecord {
 /// One vortex and the secondary vortices on its side. Missing values are NaN.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VortexRecord {
-    /// Centre `y`: centroid of the vorticity averaged over x, of the vortex's own sign, within 0.15 `b0` of itself \[m\].
+    /// Centre `y`: centroid of the vorticity averaged over x, of the vortex's own sign, within 0.15
+    /// `b0` of itself \[m\].
     pub y_m: f64,
     /// Height of the centre \[m\].
     pub z_m: f64,
@@ -41,7 +44,8 @@ pub struct VortexRecord {
     pub y_spread_m: f64,
     /// Standard deviation of their z \[m\].
     pub z_spread_m: f64,
-    /// Circulation averaged over 21 radii of the window, with its sign, of the flow averaged over x \[m^2/s\].
+    /// Circulation averaged over 21 radii of the window, with its sign, of the flow averaged over x
+    /// \[m^2/s\].
     pub gamma_5_15_m2_s: f64,
     /// Circulation at [`WakeMeter::radii_m`](super::WakeMeter::radii_m) \[m^2/s\].
     pub gamma_m2_s: Vec<f64>,
@@ -49,12 +53,13 @@ pub struct VortexRecord {
     pub gamma_opposite_m2_s: f64,
     /// The strongest secondary vortex of this side.
     pub secondary: SecondaryRecord,
-    /// Least shear of the outward velocity at the ground, averaged over x: negative where the boundary layer has separated
-    /// \[1/s\].
+    /// Least shear of the outward velocity at the ground, averaged over x: negative where the
+    /// boundary layer has separated \[1/s\].
     pub outward_shear_per_s: f64,
 }
 
-/// A secondary vortex: about the strongest vorticity of the other sign above 0.15 `b0`. NaN before there is one.
+/// A secondary vortex: about the strongest vorticity of the other sign above 0.15 `b0`. NaN before
+/// there is one.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SecondaryRecord {
     /// Centroid `y` \[m\].
@@ -114,6 +119,8 @@ impl WakeScales {
         })
     }
 
+    /// Checks both scales.
+    ///
     /// # Errors
     /// [`Error::OutOfRange`] for a scale that is not positive.
     pub fn validate(&self) -> Result<(), Error> {

@@ -3,13 +3,14 @@
 //! Check: a field of known modes.
 
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
+use realfft::{RealFftPlanner, RealToComplex};
 
 use super::vorticity::Curl;
 use crate::Error;
 use crate::solver::planes::Faces;
 
-/// Energy per length of x \[m^4/s^2\] of each axial mode `m = 0..=n/2`, wavelength `L_x/m`, all velocity components together.
+/// Energy per length of x \[m^4/s^2\] of each axial mode `m = 0..=n/2`, wavelength `L_x/m`, all
+/// velocity components together.
 ///
 /// # Errors
 /// Those of the exchange between ranks.
@@ -19,51 +20,51 @@ pub(super) fn mode_energies_m4_s2(curl: &Curl, velocity: &Faces) -> Result<Vec<f
     let modes = nx / 2 + 1;
     let mut energies = vec![0.0; modes];
     for (component, field) in velocity.field.iter().enumerate() {
-        let length_m = |d: usize| {
+        let [y_m, z_m] = [1, 2].map(|d| {
             if component == d {
                 &curl.face_m[d]
             } else {
                 &curl.cell_m[d]
             }
-        };
-        let (y_m, z_m) = (length_m(1), length_m(2));
-        let plane = |plane: &[f64]| {
-            let (mut row, mut scratch) = (vec![0.0; nx], transform.make_scratch_vec());
-            let mut spectrum = transform.make_output_vec();
-            let mut sums = vec![0.0; modes];
-            for (values, y_m) in plane.chunks(nx).zip(y_m) {
-                row.copy_from_slice(values);
-                // The buffers were made by the plan: their lengths are right.
-                if transform
-                    .process_with_scratch(&mut row, &mut spectrum, &mut scratch)
-                    .is_ok()
-                {
-                    for (sum, value) in sums.iter_mut().zip(&spectrum) {
-                        *sum += y_m * value.norm_sqr();
-                    }
-                }
-            }
-            sums
-        };
-        let own = field[velocity.shape.own_places()].par_chunks(velocity.shape.plane());
-        let own: Vec<Vec<f64>> = own.map(plane).collect();
-        for (sums, z_m) in velocity
-            .slabs
-            .all_gather(own.concat())?
-            .chunks(modes)
-            .zip(z_m)
-        {
+        });
+        let own = field[velocity.shape.own_range()].par_chunks(velocity.shape.plane());
+        let own: Vec<Vec<f64>> = own
+            .map(|plane| plane_spectrum(&*transform, plane, y_m))
+            .collect();
+        let planes = velocity.slabs.all_gather(own.concat())?;
+        for (sums, z_m) in planes.chunks(modes).zip(z_m) {
             for (energy, sum) in energies.iter_mut().zip(sums) {
                 *energy += 0.5 * z_m * sum;
             }
         }
     }
     for (m, energy) in energies.iter_mut().enumerate() {
-        // All but the mean and the shortest wave of an even count stand for themselves and their conjugate.
+        // All but the mean and the shortest wave of an even count stand for themselves and their
+        // conjugate.
         let pair = if m == 0 || 2 * m == nx { 1.0 } else { 2.0 };
         *energy *= pair / (nx * nx) as f64;
     }
     Ok(energies)
+}
+
+/// Squared moduli of the spectra of the rows of a plane, weighted with their lengths and summed.
+fn plane_spectrum(transform: &dyn RealToComplex<f64>, plane: &[f64], y_m: &[f64]) -> Vec<f64> {
+    let nx = transform.len();
+    let mut row = vec![0.0; nx];
+    let mut scratch = transform.make_scratch_vec();
+    let mut spectrum = transform.make_output_vec();
+    let mut sums = vec![0.0; spectrum.len()];
+    for (values, y_m) in plane.chunks(nx).zip(y_m) {
+        row.copy_from_slice(values);
+        let transformed = transform.process_with_scratch(&mut row, &mut spectrum, &mut scratch);
+        // The buffers were made by the plan: their lengths are right.
+        if transformed.is_ok() {
+            for (sum, value) in sums.iter_mut().zip(&spectrum) {
+                *sum += y_m * value.norm_sqr();
+            }
+        }
+    }
+    sums
 }
 
 #[cfg(test)]

@@ -1,13 +1,15 @@
 //! The vorticity of a flow at the edges of its cells, and what is summed from it.
 //!
-//! Component `c` lies at the edges along `c`: at centres in its own direction, at faces in the two others. Differences are
-//! of fourth order ([`Slope`]); the sums are trapezoidal, that of the enstrophy with an end correction at the ground.
+//! Component `c` lies at the edges along `c`: at centres in its own direction, at faces in the two
+//! others. Differences are of fourth order ([`Slope`]); the sums are trapezoidal, that of the
+//! enstrophy with an end correction at the ground.
 //!
-//! Differences take four values about each face, weighted so that cubics of the position are exact. At a frictionless plane the field
-//! is continued by its mirror image, at a no-slip wall the value at the wall is one of the four.
+//! Differences take four values about each face, weighted so that cubics of the position are exact.
+//! At a frictionless plane the field is continued by its mirror image, at a no-slip wall the value
+//! at the wall is one of the four.
 //!
-//! Check: solid rotation and sheared columns; enstrophy against the dissipation of a decaying exact flow; cubics, mirror images,
-//! periods.
+//! Check: solid rotation and sheared columns; enstrophy against the dissipation of a decaying exact
+//! flow; cubics, mirror images, periods.
 
 use crate::Error;
 use crate::solver::flow::Flow;
@@ -31,7 +33,8 @@ pub(super) struct Curl {
     pub(super) cell_m: [Vec<f64>; 3],
     /// Lengths about the faces, from centre to centre, half a cell at the ends \[m\].
     pub(super) face_m: [Vec<f64>; 3],
-    /// The same along z with Gregory's end correction at the ground: the squared vorticity falls steeply there.
+    /// The same along z with Gregory's end correction at the ground: the squared vorticity falls
+    /// steeply there.
     corrected_m: Vec<f64>,
 }
 
@@ -39,55 +42,37 @@ impl Curl {
     /// # Errors
     /// [`Error::BadDirection`] if x is bounded or z periodic: that is no wake above ground.
     pub(super) fn new(mesh: &Mesh) -> Result<Self, Error> {
-        let ends = |axis: usize| mesh.directions()[axis].ends;
-        if ends(0) != Ends::Periodic {
-            return Err(refused(
-                0,
-                "period",
-                0.0,
-                "there: a wake repeats itself along the flight",
-            ));
+        let directions = mesh.directions();
+        if directions[0].ends != Ends::Periodic {
+            let allowed = "there: a wake repeats itself along the flight";
+            return Err(refused(0, "period", 0.0, allowed));
         }
-        if ends(2) == Ends::Periodic {
+        if directions[2].ends == Ends::Periodic {
             return Err(refused(2, "ground", 0.0, "there: z must be bounded"));
         }
-        let directions = mesh.directions();
-        let periodic: [bool; 3] = [0, 1, 2].map(|d| ends(d) == Ends::Periodic);
-        let cells = mesh.cells();
-        let lengths = |d: usize| {
-            let (centre_m, face_m) = (mesh.centre_m(d), mesh.face_m(d));
-            let cell: Vec<f64> = face_m.windows(2).map(|w| w[1] - w[0]).collect();
-            let mut about: Vec<f64> = vec![centre_m[0] - face_m[0]];
-            about.extend(centre_m.windows(2).map(|w| w[1] - w[0]));
-            let last = face_m[cells[d]] - centre_m[cells[d] - 1];
-            if periodic[d] {
-                about[0] += last;
-            } else {
-                about.push(last);
-            }
-            (cell, about)
-        };
-        let lengths = [0, 1, 2].map(lengths);
-        let mut corrected_m = lengths[2].1.clone();
+        let face_m = [0, 1, 2].map(|d| lengths_about_faces_m(mesh, d));
+        let mut corrected_m = face_m[2].clone();
         for (length_m, factor) in corrected_m.iter_mut().zip(GREGORY) {
             *length_m *= factor;
         }
         Ok(Self {
             corrected_m,
-            cells,
-            faces: std::array::from_fn(|d| cells[d] + usize::from(!periodic[d])),
+            cells: mesh.cells(),
+            faces: face_m.each_ref().map(Vec::len),
             slope: std::array::from_fn(|along| {
                 std::array::from_fn(|c| Slope::new(&directions[along], c))
             }),
-            cell_m: lengths.each_ref().map(|l| l.0.clone()),
-            face_m: lengths.each_ref().map(|l| l.1.clone()),
+            cell_m: [0, 1, 2].map(|d| cell_lengths_m(mesh, d)),
+            face_m,
         })
     }
 
-    /// Vorticity component `c` in the row along x at the places `j`, `k` (of faces or centres as `c` has it) \[1/s\].
+    /// Vorticity component `c` in the row along x at the places `j`, `k` (of faces or centres as
+    /// `c` has it) \[1/s\].
     pub(super) fn row(&self, velocity: &Faces, c: usize, j: usize, k: usize, out: &mut [f64]) {
         // curl_c = d_a u_b - d_b u_a with (c, a, b) cyclic.
-        let (a, b) = ((c + 1) % 3, (c + 2) % 3);
+        let a = (c + 1) % 3;
+        let b = (c + 2) % 3;
         out.fill(0.0);
         self.add_slope(velocity, a, b, 1.0, [j, k], out);
         self.add_slope(velocity, b, a, -1.0, [j, k], out);
@@ -104,32 +89,22 @@ impl Curl {
         out: &mut [f64],
     ) {
         let slope = &self.slope[along][component];
-        let field = &velocity.field[component];
-        let [_, ny, nz] = self.cells;
-        let row = |j: usize, k: usize| {
-            // Walls at the high ends are not stored; nothing flows through them.
-            let is_wall = (component == 1 && j == ny) || (component == 2 && k == nz);
-            (!is_wall).then(|| &field[velocity.shape.row(j, k)])
-        };
         if along == 0 {
-            let Some(values) = row(j, k) else { return };
+            let values = self.stored_row(velocity, component, j, k);
+            if values.is_empty() {
+                return;
+            }
             for (out, taps) in out.iter_mut().zip(&slope.taps) {
-                *out += sign
-                    * taps
-                        .iter()
-                        .map(|(i, weight)| weight * values[*i])
-                        .sum::<f64>();
+                let sum: f64 = taps.iter().map(|(i, weight)| weight * values[*i]).sum();
+                *out += sign * sum;
             }
             return;
         }
         let place = if along == 1 { j } else { k };
         for &(cell, weight) in &slope.taps[place] {
-            let values = if along == 1 {
-                row(cell, k)
-            } else {
-                row(j, cell)
-            };
-            for (out, value) in out.iter_mut().zip(values.unwrap_or_default()) {
+            let [j, k] = if along == 1 { [cell, k] } else { [j, cell] };
+            let values = self.stored_row(velocity, component, j, k);
+            for (out, value) in out.iter_mut().zip(values) {
                 *out += sign * weight * value;
             }
         }
@@ -139,7 +114,24 @@ impl Curl {
         }
     }
 
-    /// The faces across z of the cells in the planes that are owned; the highest one is with the last cells.
+    /// A row of a component; empty at the high walls, which are not stored and through which
+    /// nothing flows.
+    fn stored_row<'a>(
+        &self,
+        velocity: &'a Faces,
+        component: usize,
+        j: usize,
+        k: usize,
+    ) -> &'a [f64] {
+        let [_, ny, nz] = self.cells;
+        if (component == 1 && j == ny) || (component == 2 && k == nz) {
+            return &[];
+        }
+        &velocity.field[component][velocity.shape.row(j, k)]
+    }
+
+    /// The faces across z of the cells in the planes that are owned; the highest one is with the
+    /// last cells.
     pub(super) fn own_faces(&self, own: Range<usize>) -> Range<usize> {
         if own.end == self.cells[2] {
             own.start..self.faces[2]
@@ -153,97 +145,126 @@ impl Curl {
     /// # Errors
     /// Those of the exchange between ranks.
     pub(super) fn enstrophy_m2_s2(&self, velocity: &Faces) -> Result<f64, Error> {
-        let nx = self.cells[0];
-        let component = |c: usize| {
-            let weight = |d: usize| {
-                if c == d {
-                    &self.cell_m[d]
-                } else {
-                    &self.face_m[d]
-                }
-            };
-            let (x_m, y_m) = (weight(0), weight(1));
-            let z_m = if c == 2 {
-                &self.cell_m[2]
-            } else {
-                &self.corrected_m
-            };
-            let plane = |k: usize| {
-                let mut row = vec![0.0; nx];
-                let mut sum = 0.0;
-                for (j, y_m) in y_m.iter().enumerate() {
-                    self.row(velocity, c, j, k, &mut row);
-                    sum += y_m * row.iter().zip(x_m).map(|(w, x_m)| x_m * w * w).sum::<f64>();
-                }
-                sum
-            };
-            let own = velocity.shape.own();
-            let own = if c == 2 { own } else { self.own_faces(own) };
-            // Collected first, so that the order of the sum is that of the planes.
-            let planes = velocity
-                .slabs
-                .all_gather(own.into_par_iter().map(plane).collect())?;
-            Ok(0.5
-                * planes
-                    .iter()
-                    .zip(z_m)
-                    .map(|(sum, z_m)| sum * z_m)
-                    .sum::<f64>())
-        };
-        let components = [component(0)?, component(1)?, component(2)?];
+        let components = [
+            self.component_enstrophy(velocity, 0)?,
+            self.component_enstrophy(velocity, 1)?,
+            self.component_enstrophy(velocity, 2)?,
+        ];
         Ok(components.iter().sum::<f64>() / self.cell_m[0].iter().sum::<f64>())
     }
 
-    /// Magnitude of the vorticity at the centres in the planes that are owned \[1/s\], `[z][y][x]`: each component is the mean of
-    /// the four edges about the centre.
+    /// Half the integral of the square of one component over the box \[m^3/s^2\].
+    fn component_enstrophy(&self, velocity: &Faces, c: usize) -> Result<f64, Error> {
+        let own = velocity.shape.own();
+        let own = if c == 2 { own } else { self.own_faces(own) };
+        let z_m = if c == 2 {
+            &self.cell_m[2]
+        } else {
+            &self.corrected_m
+        };
+        // Collected first, so that the order of the sum is that of the planes.
+        let own: Vec<f64> = own
+            .into_par_iter()
+            .map(|k| self.plane_square(velocity, c, k))
+            .collect();
+        let planes = velocity.slabs.all_gather(own)?;
+        let terms = planes.iter().zip(z_m).map(|(square, z_m)| square * z_m);
+        Ok(0.5 * terms.sum::<f64>())
+    }
+
+    /// Integral of the square of one component over a plane across z \[m^2/s^2\].
+    fn plane_square(&self, velocity: &Faces, c: usize, k: usize) -> f64 {
+        let [x_m, y_m] = [0, 1].map(|d| {
+            if c == d {
+                &self.cell_m[d]
+            } else {
+                &self.face_m[d]
+            }
+        });
+        let mut row = vec![0.0; self.cells[0]];
+        let mut sum = 0.0;
+        for (j, y_m) in y_m.iter().enumerate() {
+            self.row(velocity, c, j, k, &mut row);
+            sum += y_m * row.iter().zip(x_m).map(|(w, x_m)| x_m * w * w).sum::<f64>();
+        }
+        sum
+    }
+
+    /// Magnitude of the vorticity at the centres in the planes that are owned \[1/s\], `[z][y][x]`:
+    /// each component is the mean of the four edges about the centre.
     fn magnitude_per_s(&self, velocity: &Faces) -> Vec<f64> {
-        let (shape, nx) = (velocity.shape, self.cells[0]);
-        let next = |d: usize, i: usize| (i + 1) % self.faces[d];
-        let mut out = vec![0.0; shape.own_places().len()];
+        let shape = velocity.shape;
+        let nx = self.cells[0];
+        let mut out = vec![0.0; shape.own_range().len()];
         out.par_chunks_mut(shape.plane())
             .zip(shape.own())
             .for_each(|(plane, k)| {
-                let mut edges = vec![0.0; nx];
                 for (j, out) in plane.chunks_mut(nx).enumerate() {
-                    let (j_high, k_high) = (next(1, j), next(2, k));
                     for c in 0..3 {
-                        let mut mean = vec![0.0; nx];
-                        let (ys, zs): (&[usize], &[usize]) = match c {
-                            0 => (&[j, j_high], &[k, k_high]),
-                            1 => (&[j], &[k, k_high]),
-                            _ => (&[j, j_high], &[k]),
-                        };
-                        for &(j, k) in ys
-                            .iter()
-                            .flat_map(|j| zs.iter().map(move |k| (*j, *k)))
-                            .collect::<Vec<_>>()
-                            .iter()
-                        {
-                            self.row(velocity, c, j, k, &mut edges);
-                            for i in 0..nx {
-                                // Components 1 and 2 lie at the faces of x.
-                                mean[i] += if c == 0 {
-                                    edges[i]
-                                } else {
-                                    0.5 * (edges[i] + edges[next(0, i)])
-                                };
-                            }
+                        let mean = self.row_at_centres(velocity, c, j, k);
+                        for (out, mean) in out.iter_mut().zip(mean) {
+                            *out += mean.powi(2);
                         }
-                        let count = (ys.len() * zs.len()) as f64;
-                        out.iter_mut()
-                            .zip(&mean)
-                            .for_each(|(out, mean)| *out += (mean / count).powi(2));
                     }
                     out.iter_mut().for_each(|out| *out = out.sqrt());
                 }
             });
         out
     }
+
+    /// Vorticity component `c` at the centres of a row of cells: the mean of its edges about them.
+    fn row_at_centres(&self, velocity: &Faces, c: usize, j: usize, k: usize) -> Vec<f64> {
+        let nx = self.cells[0];
+        let j_high = (j + 1) % self.faces[1];
+        let k_high = (k + 1) % self.faces[2];
+        let rows: &[[usize; 2]] = match c {
+            0 => &[[j, k], [j, k_high], [j_high, k], [j_high, k_high]],
+            1 => &[[j, k], [j, k_high]],
+            _ => &[[j, k], [j_high, k]],
+        };
+        let mut edges = vec![0.0; nx];
+        let mut mean = vec![0.0; nx];
+        for &[j, k] in rows {
+            self.row(velocity, c, j, k, &mut edges);
+            for i in 0..nx {
+                // Components 1 and 2 lie at the faces of x.
+                mean[i] += if c == 0 {
+                    edges[i]
+                } else {
+                    0.5 * (edges[i] + edges[(i + 1) % self.faces[0]])
+                };
+            }
+        }
+        let count = rows.len() as f64;
+        mean.iter_mut().for_each(|mean| *mean /= count);
+        mean
+    }
+}
+
+/// Lengths of the cells of a direction \[m\].
+fn cell_lengths_m(mesh: &Mesh, d: usize) -> Vec<f64> {
+    mesh.face_m(d).windows(2).map(|w| w[1] - w[0]).collect()
+}
+
+/// Lengths about the faces of a direction, from centre to centre, half a cell at the ends \[m\].
+fn lengths_about_faces_m(mesh: &Mesh, d: usize) -> Vec<f64> {
+    let centre_m = mesh.centre_m(d);
+    let face_m = mesh.face_m(d);
+    let cells = centre_m.len();
+    let mut lengths_m = vec![centre_m[0] - face_m[0]];
+    lengths_m.extend(centre_m.windows(2).map(|w| w[1] - w[0]));
+    let last_m = face_m[cells] - centre_m[cells - 1];
+    if mesh.directions()[d].ends == Ends::Periodic {
+        lengths_m[0] += last_m;
+    } else {
+        lengths_m.push(last_m);
+    }
+    lengths_m
 }
 
 impl Flow {
-    /// Magnitude of the vorticity at the centres of the cells in the planes of [`Self::own_planes`] \[1/s\], `[z][y][x]`, for flows that
-    /// are periodic in x and bounded in z.
+    /// Magnitude of the vorticity at the centres of the cells in the planes of [`Self::own_planes`]
+    /// \[1/s\], `[z][y][x]`, for flows that are periodic in x and bounded in z.
     ///
     /// # Errors
     /// [`Error::BadDirection`] for other flows, [`Error::RankLost`].
@@ -273,7 +294,8 @@ pub(super) struct Slope {
 }
 
 impl Slope {
-    /// The operator for the component `component` (0, 1, 2 for x, y, z), at the faces 0 to `n` (0 to `n - 1` if periodic).
+    /// The operator for the component `component` (0, 1, 2 for x, y, z), at the faces 0 to `n` (0
+    /// to `n - 1` if periodic).
     pub(super) fn new(direction: &Direction, component: usize) -> Self {
         let n = direction.cells;
         let periodic = direction.ends == Ends::Periodic;
@@ -285,7 +307,11 @@ impl Slope {
             };
         }
         let nodes = extended(direction, component);
-        let at_face = |face: usize| {
+        let mut slope = Self {
+            taps: Vec::with_capacity(faces),
+            from_walls: Vec::with_capacity(faces),
+        };
+        for face in 0..faces {
             let at_m = direction.at(face as f64).0;
             let below = nodes.partition_point(|(x_m, _)| *x_m < at_m);
             let first = below.saturating_sub(TAPS / 2).min(nodes.len() - TAPS);
@@ -302,38 +328,41 @@ impl Slope {
                     },
                 }
             }
-            (taps, from_walls)
-        };
-        let (taps, from_walls) = (0..faces).map(at_face).unzip();
-        Self { taps, from_walls }
+            slope.taps.push(taps);
+            slope.from_walls.push(from_walls);
+        }
+        slope
     }
 }
 
 /// The centres with what continues them at both ends, in increasing order.
 fn extended(direction: &Direction, component: usize) -> Vec<(f64, Node)> {
     let n = direction.cells;
-    let centre = |i: usize| direction.at(i as f64 + 0.5).0;
-    let mut nodes: Vec<(f64, Node)> = (0..n).map(|i| (centre(i), Node::Cell(i))).collect();
+    let centre_m: Vec<f64> = (0..n).map(|i| direction.at(i as f64 + 0.5).0).collect();
+    let mut nodes: Vec<(f64, Node)> = Vec::with_capacity(n + TAPS);
+    for (cell, &centre_m) in centre_m.iter().enumerate() {
+        nodes.push((centre_m, Node::Cell(cell)));
+    }
     match direction.ends {
         Ends::Periodic => {
             let length_m = direction.length_m();
-            for i in 0..TAPS / 2 {
-                nodes.push((centre(i) + length_m, Node::Cell(i)));
-                nodes.push((centre(n - 1 - i) - length_m, Node::Cell(n - 1 - i)));
+            for low in 0..TAPS / 2 {
+                let high = n - 1 - low;
+                nodes.push((centre_m[low] + length_m, Node::Cell(low)));
+                nodes.push((centre_m[high] - length_m, Node::Cell(high)));
             }
         }
         Ends::Walls { low, high } => {
-            for (wall, at_m, cell) in [(low, direction.low_m, 0), (high, direction.high_m, n - 1)] {
+            for (wall, at_m, cells) in [
+                (low, direction.low_m, [0, 1]),
+                (high, direction.high_m, [n - 1, n - 2]),
+            ] {
                 match wall {
                     Wall::NoSlip { velocity_m_s } => {
                         nodes.push((at_m, Node::Wall(velocity_m_s[component])))
                     }
-                    Wall::Slip => {
-                        for i in 0..TAPS / 2 {
-                            let cell = if cell == 0 { i } else { cell - i };
-                            nodes.push((2.0 * at_m - centre(cell), Node::Cell(cell)));
-                        }
-                    }
+                    Wall::Slip => nodes
+                        .extend(cells.map(|cell| (2.0 * at_m - centre_m[cell], Node::Cell(cell)))),
                 }
             }
         }
@@ -345,16 +374,13 @@ fn extended(direction: &Direction, component: usize) -> Vec<(f64, Node)> {
 /// Weights of the derivative at `at_m` of the cubic through four positions.
 fn derivative_weights(position_m: [f64; TAPS], at_m: f64) -> [f64; TAPS] {
     std::array::from_fn(|i| {
-        let others = || (0..TAPS).filter(move |j| *j != i);
-        let scale: f64 = others().map(|j| position_m[i] - position_m[j]).product();
-        let sum: f64 = others()
-            .map(|left_out| {
-                others()
-                    .filter(|j| *j != left_out)
-                    .map(|j| at_m - position_m[j])
-                    .product::<f64>()
-            })
-            .sum();
+        let mut scale = 1.0;
+        let mut sum = 0.0;
+        for omitted in (0..TAPS).filter(|j| *j != i) {
+            scale *= position_m[i] - position_m[omitted];
+            let factors = (0..TAPS).filter(|j| *j != i && *j != omitted);
+            sum += factors.map(|j| at_m - position_m[j]).product::<f64>();
+        }
         sum / scale
     })
 }

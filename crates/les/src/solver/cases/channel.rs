@@ -1,11 +1,13 @@
-//! Flows between two plates at z = -1 and z = 1: Poiseuille's, Couette's, Rayleigh's layer, and turbulent flow.
+//! Flows between two plates at z = -1 and z = 1: Poiseuille's, Couette's, Rayleigh's layer, and
+//! turbulent flow.
 
 use super::super::mesh::{Direction, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::{Case, Initial, stretched};
 use crate::Error;
 
-/// The plates at z = -1 and 1 with the velocities of the walls along x, `strength` 0 giving equal cells.
+/// The plates at z = -1 and 1 with the velocities of the walls along x, `strength` 0 giving equal
+/// cells.
 pub(super) fn between_plates(cells: usize, strength: f64, velocity_m_s: [f64; 2]) -> Direction {
     let [low, high] = velocity_m_s.map(|u| Wall::NoSlip {
         velocity_m_s: [u, 0.0, 0.0],
@@ -30,7 +32,8 @@ pub struct Plates {
 }
 
 impl Plates {
-    /// Poiseuille's flow: a force `2 nu` drives `u = 1 - z^2`; it starts from rest plus `share` of that profile.
+    /// Poiseuille's flow: a force `2 nu` drives `u = 1 - z^2`; it starts from rest plus `share` of
+    /// that profile.
     ///
     /// # Errors
     /// Cells, stretching or viscosity out of range.
@@ -40,7 +43,8 @@ impl Plates {
         Ok(case)
     }
 
-    /// Couette's flow: plates at speeds -1 and 1 drag `u = z`; it starts from `share` of that profile.
+    /// Couette's flow: plates at speeds -1 and 1 drag `u = z`; it starts from `share` of that
+    /// profile.
     ///
     /// # Errors
     /// As [`Self::poiseuille`].
@@ -48,7 +52,8 @@ impl Plates {
         self.case([-1.0, 1.0], 10.0, move |z| share * z)
     }
 
-    /// Slowest decaying mode between plates at rest, `u = cos(pi z/2) exp(-nu pi^2 t/4)`, a Stokes layer without forcing.
+    /// Slowest decaying mode between plates at rest, `u = cos(pi z/2) exp(-nu pi^2 t/4)`, a Stokes
+    /// layer without forcing.
     ///
     /// # Errors
     /// As [`Self::poiseuille`].
@@ -56,7 +61,8 @@ impl Plates {
         self.case([0.0; 2], 1.0, |z| (0.5 * std::f64::consts::PI * z).cos())
     }
 
-    /// Rayleigh's problem: the low plate starts with speed 1 under a fluid at rest; the high plate is far away.
+    /// Rayleigh's problem: the low plate starts with speed 1 under a fluid at rest; the high plate
+    /// is far away.
     ///
     /// # Errors
     /// As [`Self::poiseuille`].
@@ -89,9 +95,10 @@ impl Plates {
     }
 }
 
-/// Turbulent channel flow in a box of `2 pi x pi x 2`, driven by the force that balances the friction of
-/// `reynolds_tau`; lengths in half heights, velocities in friction velocities. It starts from a mean profile with
-/// long streaks and vortices, which trip within a few units of time.
+/// Turbulent channel flow in a box of `2 pi x pi x 2`, driven by the force that balances the
+/// friction of `reynolds_tau`; lengths in half heights, velocities in friction velocities. It
+/// starts from a mean profile with long streaks and vortices, which trip within a few units of
+/// time.
 ///
 /// # Errors
 /// Cells, stretching or Reynolds number out of range.
@@ -110,24 +117,25 @@ pub fn channel(cells: [usize; 3], strength: f64, reynolds_tau: f64) -> Result<Ca
         },
     );
     settings.force_m_s2 = [1.0, 0.0, 0.0];
-    let initial = move |at_m: [f64; 3]| {
-        let [x, y, z] = at_m;
-        let wall = 1.0 - z.abs();
-        let plus = wall * reynolds_tau;
-        // Reichardt's law of the wall.
-        let mean = (1.0 + 0.41 * plus).ln() / 0.41
-            + 7.8 * (1.0 - (-plus / 11.0).exp() - plus / 11.0 * (-plus / 3.0).exp());
-        let shape = (1.0 - z * z).powi(2);
-        let streaks = 4.0 * (8.0 * y).cos() * shape * (1.0 + 0.3 * (2.0 * x).sin());
-        let v = 1.5 * (4.0 * y + x).sin() * (-4.0 * z * (1.0 - z * z)) / 4.0
-            + 0.5 * (3.0 * x).sin() * shape;
-        let w = -1.5 * (4.0 * y + x).cos() * shape;
-        [mean + streaks, v, w]
-    };
     Ok(Case {
         mesh,
         settings,
-        initial: Initial::Field(Box::new(initial)),
+        initial: Initial::Field(Box::new(move |at_m| initial_channel(at_m, reynolds_tau))),
         end_s: 20.0,
     })
+}
+
+/// Mean profile of a channel flow with long streaks and vortices.
+fn initial_channel([x, y, z]: [f64; 3], reynolds_tau: f64) -> [f64; 3] {
+    let wall = 1.0 - z.abs();
+    let plus = wall * reynolds_tau;
+    // Reichardt's law of the wall.
+    let mean = (1.0 + 0.41 * plus).ln() / 0.41
+        + 7.8 * (1.0 - (-plus / 11.0).exp() - plus / 11.0 * (-plus / 3.0).exp());
+    let shape = (1.0 - z * z).powi(2);
+    let streaks = 4.0 * (8.0 * y).cos() * shape * (1.0 + 0.3 * (2.0 * x).sin());
+    let v = 1.5 * (4.0 * y + x).sin() * (-4.0 * z * (1.0 - z * z)) / 4.0
+        + 0.5 * (3.0 * x).sin() * shape;
+    let w = -1.5 * (4.0 * y + x).cos() * shape;
+    [mean + streaks, v, w]
 }

@@ -57,9 +57,9 @@ impl Initial {
     ) -> Result<Flow, Error> {
         let layout =
             super::layout::Layout::in_order(&mesh, direction).shared(settings.ranks.clone())?;
-        let flow = Flow::laid_out(mesh, settings, layout)?;
+        let flow = Flow::with_layout(mesh, settings, layout)?;
         let started = match self {
-            Self::Field(field) => flow.filled(field),
+            Self::Field(field) => flow.with_field(field),
             Self::Faces(faces) => flow.with_faces(faces),
         };
         started.map(|(flow, _)| flow)

@@ -1,8 +1,9 @@
 //! Waves of Tollmien and Schlichting on Poiseuille's flow, from the equation of Orr and Sommerfeld.
 //!
 //! The mode `w = W(z) exp(i(alpha x - omega t))` satisfies
-//! `(U - c)(D^2 - alpha^2) W - U'' W = (D^2 - alpha^2)^2 W/(i alpha Re)`, `c = omega/alpha`, `W = W' = 0` at the plates. It is
-//! discretised by Chebyshev collocation; the mode is followed from the known one at Re 7500, alpha 1 by inverse iteration.
+//! `(U - c)(D^2 - alpha^2) W - U'' W = (D^2 - alpha^2)^2 W/(i alpha Re)`, `c = omega/alpha`,
+//! `W = W' = 0` at the plates. It is discretised by Chebyshev collocation; the mode is followed
+//! from the known one at Re 7500, alpha 1 by inverse iteration.
 //!
 //! Check: `omega` at Re 7500 and 3000 and at the neutral point against tabulated values.
 
@@ -18,8 +19,12 @@ type C64 = Complex<f64>;
 
 /// Collocation points less one.
 const ORDER: usize = 80;
-/// Frequency of the least stable mode at Re 7500, alpha 1.
-const KNOWN: (f64, f64, C64) = (7500.0, 1.0, C64::new(0.249_891_536, 0.002_234_977));
+/// Reynolds number of the mode from which others are followed.
+const KNOWN_REYNOLDS: f64 = 7500.0;
+/// Its wave number.
+const KNOWN_ALPHA: f64 = 1.0;
+/// Its frequency, that of the least stable mode.
+const KNOWN_OMEGA: C64 = C64::new(0.249_891_536, 0.002_234_977);
 
 /// The least stable mode of plane Poiseuille flow.
 #[derive(Debug, Clone)]
@@ -47,34 +52,38 @@ impl TollmienSchlichting {
         check("alpha", alpha, "between 0.3 and 2", |a| {
             (0.3..=2.0).contains(&a)
         })?;
-        let (mut re, mut al, mut c) = (KNOWN.0, KNOWN.1, KNOWN.2 / KNOWN.1);
-        let ratio = (reynolds / re)
-            .ln()
-            .abs()
-            .max((alpha / al).ln().abs() * 4.0);
-        let steps = (ratio / 0.05).ceil().max(1.0) as i32;
-        let (by_re, by_al) = (
-            (reynolds / re).powf(1.0 / f64::from(steps)),
-            (alpha / al).powf(1.0 / f64::from(steps)),
-        );
+        // The mode is followed in small steps of both parameters.
+        let reynolds_ratio = reynolds / KNOWN_REYNOLDS;
+        let alpha_ratio = alpha / KNOWN_ALPHA;
+        let distance = reynolds_ratio.ln().abs().max(alpha_ratio.ln().abs() * 4.0);
+        let steps = (distance / 0.05).ceil().max(1.0) as i32;
+        let reynolds_factor = reynolds_ratio.powf(1.0 / f64::from(steps));
+        let alpha_factor = alpha_ratio.powf(1.0 / f64::from(steps));
+        let mut step_reynolds = KNOWN_REYNOLDS;
+        let mut step_alpha = KNOWN_ALPHA;
+        let mut c = KNOWN_OMEGA / KNOWN_ALPHA;
         let mut w = Vec::new();
         for step in 1..=steps {
-            (re, al) = if step == steps {
-                (reynolds, alpha)
+            if step == steps {
+                step_reynolds = reynolds;
+                step_alpha = alpha;
             } else {
-                (re * by_re, al * by_al)
-            };
-            (c, w) = inverse_iteration(re, al, c)?;
+                step_reynolds *= reynolds_factor;
+                step_alpha *= alpha_factor;
+            }
+            (c, w) = inverse_iteration(step_reynolds, step_alpha, c)?;
         }
-        let u = streamwise(&w, alpha);
+        let mut u = streamwise(&w, alpha);
         let largest = u.iter().map(|u| u.norm()).fold(0.0, f64::max);
-        let scale = |x: Vec<C64>| x.into_iter().map(|x| x / largest).collect();
+        for value in w.iter_mut().chain(&mut u) {
+            *value /= largest;
+        }
         Ok(Self {
             reynolds,
             alpha,
             omega: c * alpha,
-            w: scale(w),
-            u: scale(u),
+            w,
+            u,
         })
     }
 
@@ -87,7 +96,8 @@ impl TollmienSchlichting {
         )
     }
 
-    /// The wave with amplitude `amplitude` on Poiseuille's flow, one wave length long, held up by a force.
+    /// The wave with amplitude `amplitude` on Poiseuille's flow, one wave length long, held up by a
+    /// force.
     ///
     /// # Errors
     /// Cells, stretching or step out of range.
@@ -107,14 +117,13 @@ impl TollmienSchlichting {
         )?;
         let mut settings = FlowSettings::new(1.0 / self.reynolds, TimeStep::Fixed { step_s });
         settings.force_m_s2 = [2.0 / self.reynolds, 0.0, 0.0];
-        let initial = move |at_m: [f64; 3]| {
-            let (u, w) = self.velocity(at_m[0], at_m[2]);
-            [1.0 - at_m[2].powi(2) + amplitude * u, 0.0, amplitude * w]
-        };
         Ok(Case {
             mesh,
             settings,
-            initial: Initial::Field(Box::new(initial)),
+            initial: Initial::Field(Box::new(move |[x, _, z]| {
+                let (u, w) = self.velocity(x, z);
+                [1.0 - z.powi(2) + amplitude * u, 0.0, amplitude * w]
+            })),
             end_s: 60.0,
         })
     }
@@ -126,7 +135,12 @@ fn chebyshev() -> (Vec<f64>, Vec<Vec<f64>>) {
     let z: Vec<f64> = (0..=n)
         .map(|j| (std::f64::consts::PI * j as f64 / n as f64).cos())
         .collect();
-    let weight = |j: usize| if j == 0 || j == n { 2.0 } else { 1.0 } * if j.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let mut weight = vec![1.0; n + 1];
+    weight[0] = 2.0;
+    weight[n] = 2.0;
+    for odd in weight.iter_mut().skip(1).step_by(2) {
+        *odd = -*odd;
+    }
     let mut d = vec![vec![0.0; n + 1]; n + 1];
     for i in 0..=n {
         for j in 0..=n {
@@ -135,7 +149,7 @@ fn chebyshev() -> (Vec<f64>, Vec<Vec<f64>>) {
                 let half = 0.5 * std::f64::consts::PI / n as f64;
                 let difference =
                     -2.0 * (half * (i + j) as f64).sin() * (half * (i as f64 - j as f64)).sin();
-                d[i][j] = weight(i) / weight(j) / difference;
+                d[i][j] = weight[i] / weight[j] / difference;
             }
         }
         d[i][i] = -d[i].iter().sum::<f64>();
@@ -164,17 +178,17 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
     let n = z.len();
     let a2 = alpha * alpha;
     let viscous = C64::new(0.0, -1.0 / (alpha * reynolds));
-    // Rows 0, 1, n - 2, n - 1 hold W = W' = 0 at the plates.
-    let boundary = |i: usize| i < 2 || i + 2 >= n;
     let mut b = vec![vec![C64::ZERO; n]; n];
     let mut shifted = b.clone();
     for i in 0..n {
         for j in 0..n {
             let one = f64::from(u8::from(i == j));
-            let a = if boundary(i) {
+            // Rows 0, 1, n - 2, n - 1 hold W = W' = 0 at the plates.
+            let is_boundary = i < 2 || i + 2 >= n;
+            let a = if is_boundary {
                 let wall = if i < 2 { 0 } else { n - 1 };
-                let derivative = i == 1 || i + 2 == n;
-                C64::from(if derivative {
+                let is_derivative = i == 1 || i + 2 == n;
+                C64::from(if is_derivative {
                     d[wall][j]
                 } else {
                     f64::from(u8::from(j == wall))
@@ -193,10 +207,10 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
     let mut w: Vec<C64> = z.iter().map(|z| C64::from((1.0 - z * z).powi(2))).collect();
     let mut c = guess;
     for _ in 0..60 {
-        let right: Vec<C64> = b
-            .iter()
-            .map(|row| row.iter().zip(&w).map(|(b, w)| b * w).sum())
-            .collect();
+        let mut right = Vec::with_capacity(n);
+        for row in &b {
+            right.push(row.iter().zip(&w).map(|(b, w)| b * w).sum());
+        }
         let next = solved(&factors, &order, &right);
         let norm: C64 = next.iter().zip(&w).map(|(x, w)| x * w.conj()).sum();
         let square: f64 = w.iter().map(|w| w.norm_sqr()).sum();
@@ -219,15 +233,19 @@ fn inverse_iteration(reynolds: f64, alpha: f64, guess: C64) -> Result<(C64, Vec<
 fn streamwise(w: &[C64], alpha: f64) -> Vec<C64> {
     let (_, d) = chebyshev();
     let factor = C64::new(0.0, 1.0 / alpha);
-    d.iter()
-        .map(|row| factor * row.iter().zip(w).map(|(d, w)| w * *d).sum::<C64>())
-        .collect()
+    let mut u = Vec::with_capacity(w.len());
+    for row in d {
+        let derivative: C64 = row.iter().zip(w).map(|(d, w)| w * *d).sum();
+        u.push(factor * derivative);
+    }
+    u
 }
 
 /// Barycentric interpolation from the Chebyshev points.
 fn interpolate(values: &[C64], z: f64) -> C64 {
     let n = values.len() - 1;
-    let (mut above, mut below) = (C64::ZERO, 0.0);
+    let mut above = C64::ZERO;
+    let mut below = 0.0;
     for (j, value) in values.iter().enumerate() {
         let node = (std::f64::consts::PI * j as f64 / n as f64).cos();
         if (z - node).abs() < 1e-15 {
@@ -290,7 +308,8 @@ mod tests {
 
     #[test]
     fn frequencies_agree_with_tabulated_ones() {
-        // Malik, Zang and Hussaini (1985); Orszag (1971): the neutral point; an independent collocation code, good to 1e-7.
+        // Malik, Zang and Hussaini (1985); Orszag (1971): the neutral point; an independent
+        // collocation code, good to 1e-7.
         for (reynolds, alpha, re, im, within) in [
             (7500.0, 1.0, 0.249_891_536, 0.002_234_977, 5e-9),
             (5772.22, 1.02056, 0.269_429_611, 0.0, 5e-9),

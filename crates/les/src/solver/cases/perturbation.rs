@@ -1,8 +1,10 @@
-//! Smooth disturbances: the curl of a potential that is a sum of waves under an envelope, so free of divergence.
+//! Smooth disturbances: the curl of a potential that is a sum of waves under an envelope, so free
+//! of divergence.
 //!
-//! `u' = C curl A`, `A_c = g(y, z) sum_n a_n cos(k_n . x + phase_nc)/|k_n|`. The waves of the wake's noise come from a closed
-//! formula, the same in any code and on any mesh, or from the hash of a seed; those of background turbulence always from a
-//! seed. All are summed by axial wave number first, so that a mesh costs a few waves for each of its rows.
+//! `u' = C curl A`, `A_c = g(y, z) sum_n a_n cos(k_n . x + phase_nc)/|k_n|`. The waves of the
+//! wake's noise come from a closed formula, the same in any code and on any mesh, or from the hash
+//! of a seed; those of background turbulence always from a seed. All are summed by axial wave
+//! number first, so that a mesh costs a few waves for each of its rows.
 //!
 //! Check: divergence, the stated level, sums by row against sums by point.
 
@@ -27,19 +29,13 @@ enum Envelope {
 impl Envelope {
     /// `g` and its slopes along y and z.
     fn at(self, y: f64, z: f64) -> [f64; 3] {
-        let rise = |d: f64| {
-            (
-                1.0 - (-(d / 0.2).powi(2)).exp(),
-                2.0 * d / 0.04 * (-(d / 0.2).powi(2)).exp(),
-            )
-        };
         let (near, near_slope) = rise(z);
         match self {
             Self::Wake => {
                 let far = (-(z / 1.6).powi(8) - (y / 1.6).powi(8)).exp();
                 let g = near * far;
-                let fall = |x: f64| -8.0 * x.powi(7) / 1.6_f64.powi(8) * g;
-                [g, fall(y), near_slope * far + fall(z)]
+                let [by_y, by_z] = [y, z].map(|x| -8.0 * x.powi(7) / 1.6_f64.powi(8) * g);
+                [g, by_y, near_slope * far + by_z]
             }
             Self::Box(height) => {
                 let (top, top_slope) = rise(height - z);
@@ -47,6 +43,12 @@ impl Envelope {
             }
         }
     }
+}
+
+/// The rise of an envelope from a plane at the distance `d`, and its slope.
+fn rise(d: f64) -> (f64, f64) {
+    let gaussian = (-(d / 0.2).powi(2)).exp();
+    (1.0 - gaussian, 2.0 * d / 0.04 * gaussian)
 }
 
 #[derive(Debug, Clone)]
@@ -67,90 +69,69 @@ pub(super) struct Perturbation {
 }
 
 impl Perturbation {
-    /// Noise about the vortices at `(+-1/2, height)` of the given root mean square of each component within 0.3 of them, in a
-    /// box of the given length.
+    /// Noise about the vortices at `(+-1/2, height)` of the given root mean square of each
+    /// component within 0.3 of them, in a box of the given length.
     pub(super) fn noise(length: f64, height: f64, rms: f64, seed: Option<u64>) -> Self {
-        let irrationals = [
-            0.618_033_988_749_894_9,
-            2.0_f64.sqrt(),
-            7.0_f64.sqrt(),
-            11.0_f64.sqrt(),
-            13.0_f64.sqrt(),
-        ];
-        let fraction = |n: usize, which: usize| match seed {
-            None => (n as f64 * irrationals[which]).fract(),
-            Some(seed) => hashed(seed, (5 * n + which) as u64),
-        };
-        let wave = |n: usize| {
+        let mut waves = Vec::with_capacity(NOISE_WAVES);
+        for n in 0..NOISE_WAVES {
+            let [across, angle, phases @ ..] = noise_fractions(n, seed);
             let axial = 1 + n % AXIAL;
-            let across = TAU * (0.5 + 3.5 * fraction(n, 0));
-            let angle = TAU * fraction(n, 1);
+            let across = TAU * (0.5 + 3.5 * across);
+            let angle = TAU * angle;
             let along = TAU * axial as f64 / length;
-            Wave {
+            waves.push(Wave {
                 axial,
                 vector: [along, across * angle.cos(), across * angle.sin()],
                 amplitude: 1.0 / along.hypot(across),
-                phase: [2, 3, 4].map(|which| TAU * fraction(n, which)),
+                phase: phases.map(|fraction| TAU * fraction),
+            });
+        }
+        // Points of the discs about both vortices.
+        let mut points = Vec::new();
+        for j in -12..=12 {
+            for k in -12..=12 {
+                let y = 0.025 * f64::from(j);
+                let z = 0.025 * f64::from(k);
+                if y.hypot(z) < 0.3 {
+                    points.extend([[y - 0.5, height + z], [y + 0.5, height + z]]);
+                }
             }
-        };
+        }
         let raw = Self {
             envelope: Envelope::Wake,
-            waves: (0..NOISE_WAVES).map(wave).collect(),
+            waves,
         };
-        let steps = -12..=12;
-        let disc = steps.clone().flat_map(|j| {
-            steps
-                .clone()
-                .map(move |k| [0.025 * f64::from(j), 0.025 * f64::from(k)])
-        });
-        let points = disc.filter(|[y, z]| y.hypot(*z) < 0.3);
-        raw.scaled_to(
-            rms,
-            points.flat_map(|[y, z]| [[y - 0.5, height + z], [y + 0.5, height + z]]),
-        )
+        raw.scaled_to(rms, &points)
     }
 
-    /// Turbulence that fills the periodic box of the given size, of wave lengths from 2 to 1/4 whose energy falls with the
-    /// power -5/3, and of the given root mean square of each component over the box.
+    /// Turbulence that fills the periodic box of the given size, of wave lengths from 2 to 1/4
+    /// whose energy falls with the power -5/3, and of the given root mean square of each component
+    /// over the box.
     pub(super) fn background(size: [f64; 3], rms: f64, seed: u64) -> Self {
-        let [length, width, height] = size;
-        let wave = |n: usize| {
-            let fraction = |which: u64| hashed(!seed, 8 * n as u64 + which);
-            let total = TAU * 0.5 * 8.0_f64.powf(fraction(0));
-            let (rise, azimuth_rad) = (2.0 * fraction(1) - 1.0, TAU * fraction(2));
-            let flat = total * (1.0 - rise * rise).sqrt();
-            // Whole waves in the box.
-            let axial = (flat * azimuth_rad.cos().abs() * length / TAU).round();
-            let lateral = (flat * azimuth_rad.sin() * width / TAU).round();
-            let vector = [TAU * axial / length, TAU * lateral / width, total * rise];
-            let length = vector
-                .iter()
-                .map(|k| k * k)
-                .sum::<f64>()
-                .sqrt()
-                .max(TAU * 0.1);
-            Wave {
-                axial: axial as usize,
-                vector,
-                amplitude: length.powf(-4.0 / 3.0),
-                phase: [3, 4, 5].map(|which| TAU * fraction(which)),
-            }
-        };
+        let [_, width, height] = size;
         let raw = Self {
             envelope: Envelope::Box(height),
-            waves: (0..BACKGROUND_WAVES).map(wave).collect(),
+            waves: (0..BACKGROUND_WAVES)
+                .map(|n| background_wave(n, size, seed))
+                .collect(),
         };
-        let cell = |n: u32, j: u32| (f64::from(j) + 0.5) / f64::from(n);
-        let points = (0..40).flat_map(|j| {
-            (0..40).map(move |k| [(cell(40, j) - 0.5) * width, cell(40, k) * height])
-        });
-        raw.scaled_to(rms, points)
+        let mut points = Vec::with_capacity(40 * 40);
+        for j in 0..40 {
+            for k in 0..40 {
+                let y = ((f64::from(j) + 0.5) / 40.0 - 0.5) * width;
+                let z = (f64::from(k) + 0.5) / 40.0 * height;
+                points.push([y, z]);
+            }
+        }
+        raw.scaled_to(rms, &points)
     }
 
-    /// The same with the given root mean square of each component over the points `(y, z)` and all x.
-    fn scaled_to(mut self, rms: f64, points: impl Iterator<Item = [f64; 2]>) -> Self {
-        let (mut sum, mut count) = (0.0, 0.0);
-        for [y, z] in points {
+    /// The same with the given root mean square of each component over the points `(y, z)` and all
+    /// x.
+    fn scaled_to(mut self, rms: f64, points: &[[f64; 2]]) -> Self {
+        let mut sum = 0.0;
+        let mut count = 0.0;
+        for &[y, z] in points {
             for component in 0..3 {
                 for (m, [cos, sin]) in self.row(component, y, z).into_iter().enumerate() {
                     sum += if m == 0 {
@@ -169,12 +150,14 @@ impl Perturbation {
         self
     }
 
-    /// Coefficients of `cos(2 pi m x/L)` and `sin(2 pi m x/L)`, m = 0, 1, ..., of a velocity component at `(y, z)`.
+    /// Coefficients of `cos(2 pi m x/L)` and `sin(2 pi m x/L)`, m = 0, 1, ..., of a velocity
+    /// component at `(y, z)`.
     pub(super) fn row(&self, component: usize, y: f64, z: f64) -> Vec<[f64; 2]> {
         let [g, by_y, by_z] = self.envelope.at(y, z);
         let slope = [0.0, by_y, by_z];
         // u_c = d_a A_b - d_b A_a with (c, a, b) cyclic.
-        let (a, b) = ((component + 1) % 3, (component + 2) % 3);
+        let a = (component + 1) % 3;
+        let b = (component + 2) % 3;
         let highest = self.waves.iter().map(|wave| wave.axial).max().unwrap_or(0);
         let mut row = vec![[0.0; 2]; highest + 1];
         for wave in &self.waves {
@@ -184,7 +167,8 @@ impl Perturbation {
                 let (sin, cos) = (angle + wave.phase[potential]).sin_cos();
                 let scale = sign * wave.amplitude;
                 // d/d(along) of g cos(.) is P cos(.) + Q sin(.).
-                let (p, q) = (scale * slope[along], -scale * g * wave.vector[along]);
+                let p = scale * slope[along];
+                let q = -scale * g * wave.vector[along];
                 *cos_sum += p * cos + q * sin;
                 *sin_sum += q * cos - p * sin;
             }
@@ -193,17 +177,57 @@ impl Perturbation {
     }
 }
 
-/// A number in [0, 1) from a seed and an index: two rounds of the finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+/// A number in [0, 1) from a seed and an index: two rounds of the finaliser of SplitMix64 (Steele,
+/// Lea and Flood 2014).
 fn hashed(seed: u64, index: u64) -> f64 {
-    let mix = |mut x: u64| {
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    };
-    let bits =
-        mix(mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15))
-            ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+    let mixed_seed = mix(seed.wrapping_add(0x9e37_79b9_7f4a_7c15));
+    let bits = mix(mixed_seed ^ index.wrapping_mul(0x9e37_79b9_7f4a_7c15));
     (bits >> 11) as f64 * (0.5_f64).powi(53)
+}
+
+/// The finaliser of SplitMix64.
+fn mix(mut x: u64) -> u64 {
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
+}
+
+/// Fractions of wave `n` of the noise: length across the flight, angle, and three phases; those of
+/// the closed formula without a seed.
+fn noise_fractions(n: usize, seed: Option<u64>) -> [f64; 5] {
+    let irrationals = [
+        0.618_033_988_749_894_9,
+        2.0_f64.sqrt(),
+        7.0_f64.sqrt(),
+        11.0_f64.sqrt(),
+        13.0_f64.sqrt(),
+    ];
+    std::array::from_fn(|which| match seed {
+        None => (n as f64 * irrationals[which]).fract(),
+        Some(seed) => hashed(seed, (5 * n + which) as u64),
+    })
+}
+
+/// Wave `n` of turbulence in a periodic box.
+fn background_wave(n: usize, [length, width, _]: [f64; 3], seed: u64) -> Wave {
+    let fractions: [f64; 6] =
+        std::array::from_fn(|which| hashed(!seed, 8 * n as u64 + which as u64));
+    let total = TAU * 0.5 * 8.0_f64.powf(fractions[0]);
+    let rise = 2.0 * fractions[1] - 1.0;
+    let azimuth_rad = TAU * fractions[2];
+    let flat = total * (1.0 - rise * rise).sqrt();
+    // Whole waves in the box.
+    let axial = (flat * azimuth_rad.cos().abs() * length / TAU).round();
+    let lateral = (flat * azimuth_rad.sin() * width / TAU).round();
+    let vector = [TAU * axial / length, TAU * lateral / width, total * rise];
+    let square: f64 = vector.iter().map(|k| k * k).sum();
+    let magnitude = square.sqrt().max(TAU * 0.1);
+    Wave {
+        axial: axial as usize,
+        vector,
+        amplitude: magnitude.powf(-4.0 / 3.0),
+        phase: [3, 4, 5].map(|which| TAU * fractions[which]),
+    }
 }
 
 #[cfg(test)]

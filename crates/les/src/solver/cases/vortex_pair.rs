@@ -1,11 +1,12 @@
-//! A wake-vortex pair that sinks towards the ground, in the units of the pair: `b0 = V0 = 1`, so that time is `tau` and
-//! `Gamma0 = 2 pi`; [`VortexPairCase::scaled`] gives it any size.
+//! A wake-vortex pair that sinks towards the ground, in the units of the pair: `b0 = V0 = 1`, so
+//! that time is `tau` and `Gamma0 = 2 pi`; [`VortexPairCase::scaled`] gives it any size.
 //!
-//! The field is the sum of the two vortices, their images below the ground and periodic copies of all; the projection makes
-//! it divergence-free and lets nothing through ground and top. Noise makes it three-dimensional, a cross wind carries it.
+//! The field is the sum of the two vortices, their images below the ground and periodic copies of
+//! all; the projection makes it divergence-free and lets nothing through ground and top. Noise
+//! makes it three-dimensional, a cross wind carries it.
 //!
-//! Check: symmetry of the plane flow to round-off, drift with the wind, scales; the flow against independent codes
-//! (`cargo xtask validate --only wake`).
+//! Check: symmetry of the plane flow to round-off, drift with the wind, scales; the flow against
+//! independent codes (`cargo xtask validate --only wake`).
 
 use std::f64::consts::TAU;
 
@@ -33,7 +34,8 @@ pub struct VortexPairCase {
     pub size: [f64; 3],
     /// Refinement of the mesh towards the ground, `a` of [`Spread::TanhLow`]; 0 for equal cells.
     pub ground_stretch: f64,
-    /// Refinement of the mesh towards y = 0: its cells are `1 - a` of the mean there and `1 + a` at the sides.
+    /// Refinement of the mesh towards y = 0: its cells are `1 - a` of the mean there and `1 + a` at
+    /// the sides.
     pub lateral_stretch: f64,
     /// Height of both vortices.
     pub height: f64,
@@ -45,32 +47,36 @@ pub struct VortexPairCase {
     pub reynolds: f64,
     /// The ground: no-slip if true, else a frictionless plane.
     pub sticky_ground: bool,
-    /// Whether the sides at minus and plus half the width are frictionless planes instead of periodic.
+    /// Whether the sides at minus and plus half the width are frictionless planes instead of
+    /// periodic.
     pub slip_sides: bool,
     /// Root-mean-square of each component of the noise within 0.3 of the vortices; 0 for none.
     pub perturbation: f64,
-    /// Seed of the noise and of the background turbulence; without one the noise is the closed formula of the reference.
+    /// Seed of the noise and of the background turbulence; without one the noise is the closed
+    /// formula of the reference.
     pub seed: Option<u64>,
-    /// Root-mean-square of each component of turbulence that fills the box; 0 for none. Needs periodic sides.
+    /// Root-mean-square of each component of turbulence that fills the box; 0 for none. Needs
+    /// periodic sides.
     pub background: f64,
     /// Cross wind along y at the height of the vortices. Needs periodic sides.
     pub cross_wind: f64,
-    /// Roughness length of a logarithmic wind, `ln(1 + z/z0)`; 0 for the same wind at all heights, which a sticky ground
-    /// stops in the first step.
+    /// Roughness length of a logarithmic wind, `ln(1 + z/z0)`; 0 for the same wind at all heights,
+    /// which a sticky ground stops in the first step.
     pub wind_roughness: f64,
     /// Subgrid model.
     pub subgrid: SubgridModel,
 }
 
 impl VortexPairCase {
-    /// How the pair is stepped: over as many revolutions of the cores as a wake lives Adams-Bashforth, at the same cost, feeds
-    /// energy to the shortest waves.
+    /// How the pair is stepped: over as many revolutions of the cores as a wake lives
+    /// Adams-Bashforth, at the same cost, feeds energy to the shortest waves.
     pub const SCHEME: TimeScheme = TimeScheme::RungeKutta3;
-    /// Courant number of [`VortexPairCase::steps`]: at it the scheme itself dissipates less than half a percent of what
-    /// viscosity does, turbulence on the coarse mesh included.
+    /// Courant number of [`VortexPairCase::steps`]: at it the scheme itself dissipates less than
+    /// half a percent of what viscosity does, turbulence on the coarse mesh included.
     pub const COURANT: f64 = 0.65;
 
-    /// The coarse case of the independent reference: 24 x 128 x 80 cells, `Re_Gamma` 5000, `r_c` 0.1, noise 0.01, no model.
+    /// The coarse case of the independent reference: 24 x 128 x 80 cells, `Re_Gamma` 5000, `r_c`
+    /// 0.1, noise 0.01, no model.
     pub fn coarse() -> Self {
         Self {
             cells: [24, 128, 80],
@@ -92,7 +98,8 @@ impl VortexPairCase {
         }
     }
 
-    /// The profile of two scales whose span is that of an elliptically loaded wing, `b = 4 b0/pi`, and core that of the case.
+    /// The profile of two scales whose span is that of an elliptically loaded wing, `b = 4 b0/pi`,
+    /// and core that of the case.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a core too large for its span.
@@ -118,7 +125,8 @@ impl VortexPairCase {
         self.scaled(&WakeScales::REDUCED, time_step)
     }
 
-    /// The case in SI units: the pair has the given spacing and circulation, and `time_step` is in seconds.
+    /// The case in SI units: the pair has the given spacing and circulation, and `time_step` is in
+    /// seconds.
     ///
     /// # Errors
     /// Values out of range.
@@ -129,7 +137,8 @@ impl VortexPairCase {
         let mut settings = FlowSettings::new(viscosity_m2_s, time_step);
         settings.scheme = Self::SCHEME;
         settings.subgrid = self.subgrid;
-        // The start is made in the units of the pair and scaled, so that it does not depend on its size.
+        // The start is made in the units of the pair and scaled, so that it does not depend on its
+        // size.
         let mesh = self.mesh(1.0)?;
         let mut faces = self.faces(&mesh);
         let speed_m_s = scales.descent_speed_m_s();
@@ -156,8 +165,10 @@ impl VortexPairCase {
             *scales,
             centres_m,
         )?;
-        // Point vortices over a plane: dy/dtau = y^2/[2 z (y^2 + z^2)], dz/dtau = -z^2/[2 y (y^2 + z^2)].
-        let (y, z) = (0.5, self.height);
+        // Point vortices over a plane: dy/dtau = y^2/[2 z (y^2 + z^2)], dz/dtau = -z^2/[2 y (y^2 +
+        // z^2)].
+        let y = 0.5;
+        let z = self.height;
         let scale = scales.descent_speed_m_s() / (2.0 * (y * y + z * z));
         let drift_m_s = self.cross_wind * scales.descent_speed_m_s();
         let [out_m_s, down_m_s] = [scale * y * y / z, -scale * z * z / y];
@@ -233,18 +244,16 @@ impl VortexPairCase {
         let disturbances: Vec<Perturbation> = noise.into_iter().chain(background).collect();
         let [nx, ny, _] = self.cells;
         std::array::from_fn(|component| {
-            let at = |d: usize| {
+            let [x, y, z] = [0, 1, 2].map(|d| {
                 if d == component {
                     mesh.face_m(d)
                 } else {
                     mesh.centre_m(d)
                 }
-            };
-            let (x, y, z) = (at(0), at(1), at(2));
-            // On the line where the box meets its copy the mean of both sides, so that left and right are alike.
+            });
+            // On the line where the box meets its copy the mean of both sides, so that left and
+            // right are equal.
             let seam = (component == 1 && !self.slip_sides).then_some(y[0]);
-            let at_seam =
-                |z: f64| 0.5 * (self.pair(y[0], z)[1] + self.pair(y[0] + self.size[1], z)[1]);
             let mut field = vec![0.0; self.cells.iter().product()];
             field
                 .par_chunks_mut(nx * ny)
@@ -252,7 +261,7 @@ impl VortexPairCase {
                 .for_each(|(plane, &z)| {
                     for (row, &y) in plane.chunks_mut(nx).zip(&y) {
                         row.fill(if seam == Some(y) {
-                            at_seam(z)
+                            0.5 * (self.pair(y, z)[1] + self.pair(y + self.size[1], z)[1])
                         } else {
                             self.pair(y, z)[component]
                         });
@@ -270,19 +279,15 @@ impl VortexPairCase {
 
     /// Velocity of the vortices with their images and copies, and of the wind.
     fn pair(&self, y: f64, z: f64) -> [f64; 3] {
-        let shear = |z: f64| {
-            if self.wind_roughness > 0.0 {
-                (1.0 + z / self.wind_roughness).ln()
-            } else {
-                1.0
-            }
-        };
-        let mut velocity = [0.0, self.cross_wind * shear(z) / shear(self.height), 0.0];
-        // Planes mirror the pair, which is its own copy one width further; so copies serve both kinds of sides.
+        let wind = self.cross_wind * self.wind_profile(z) / self.wind_profile(self.height);
+        let mut velocity = [0.0, wind, 0.0];
+        // Planes mirror the pair, which is its own copy one width further; so copies serve both
+        // kinds of sides.
         for (y0, sign) in [(-0.5, -1.0), (0.5, 1.0)] {
             for (z0, sign) in [(self.height, sign), (-self.height, -sign)] {
                 for copy in -NEAR_COPIES..=NEAR_COPIES {
-                    let (dy, dz) = (y - y0 - f64::from(copy) * self.size[1], z - z0);
+                    let dy = y - y0 - f64::from(copy) * self.size[1];
+                    let dz = z - z0;
                     let r2 = dy * dy + dz * dz;
                     let rotation_per_s = sign
                         * self
@@ -298,6 +303,15 @@ impl VortexPairCase {
         }
         velocity
     }
+
+    /// Cross wind against height, up to a factor.
+    fn wind_profile(&self, z: f64) -> f64 {
+        if self.wind_roughness > 0.0 {
+            (1.0 + z / self.wind_roughness).ln()
+        } else {
+            1.0
+        }
+    }
 }
 
 /// Copies on each side that have a core.
@@ -305,19 +319,22 @@ const NEAR_COPIES: i32 = 2;
 /// Copies on each side that are summed one by one; the rest is an integral.
 const FAR_COPIES: i32 = 40;
 
-/// `w + i v` of the point vortices of circulation 2 pi at `n` times `width` to both sides, `n` above [`NEAR_COPIES`], seen from
-/// `at = dy + i dz`: the sum of `1/(at - n width)`.
+/// `w + i v` of the point vortices of circulation 2 pi at `n` times `width` to both sides, `n`
+/// above [`NEAR_COPIES`], seen from `at = dy + i dz`: the sum of `1/(at - n width)`.
 fn far_copies(at: Complex<f64>, width: f64) -> Complex<f64> {
     let square = at * at;
-    let pair = |n: i32| 2.0 * at / (square - (f64::from(n) * width).powi(2));
-    let sum: Complex<f64> = (NEAR_COPIES + 1..=FAR_COPIES).map(pair).sum();
+    let mut sum = Complex::from(0.0);
+    for n in NEAR_COPIES + 1..=FAR_COPIES {
+        sum += 2.0 * at / (square - (f64::from(n) * width).powi(2));
+    }
     sum - 2.0 * at / (width * width * (f64::from(FAR_COPIES) + 0.5))
 }
 
 /// The sum of waves at the angle of the first, by rotation from one to the next.
 fn sum_of_waves(waves: &[[f64; 2]], angle: f64) -> f64 {
     let (step_sin, step_cos) = angle.sin_cos();
-    let (mut sin, mut cos) = (0.0, 1.0);
+    let mut sin = 0.0;
+    let mut cos = 1.0;
     let mut sum = 0.0;
     for [a, b] in waves {
         sum += a * cos + b * sin;

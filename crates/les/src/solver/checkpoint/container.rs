@@ -1,12 +1,15 @@
-//! A file of tagged sections and of planes, with a version and checksums, put in place in one piece.
+//! A file of tagged sections and of planes, with a version and checksums, put in place in one
+//! piece.
 //!
-//! Layout, all numbers little-endian: 16 bytes of magic, version (`u32`), number of sections (`u32`), bytes of all sections, number
-//! of planes, bytes of each (`u64`); each section an eight-byte tag, its length in bytes (`u64`) and its content; the SHA-256 of
-//! all before. Then the planes, each followed by the SHA-256 of that checksum, its number and its content: whoever has planes
-//! writes and checks them alone. The magic holds bytes that a transfer as text would change. A file is written beside its place,
-//! synced, then renamed.
+//! Layout, all numbers little-endian: 16 bytes of magic, version (`u32`), number of sections
+//! (`u32`), bytes of all sections, number of planes, bytes of each (`u64`); each section an
+//! eight-byte tag, its length in bytes (`u64`) and its content; the SHA-256 of all before. Then the
+//! planes, each followed by the SHA-256 of that checksum, its number and its content: whoever has
+//! planes writes and checks them alone. The magic holds bytes that a transfer as text would change.
+//! A file is written beside its place, synced, then renamed.
 //!
-//! Check: every truncation and every flipped byte of a small file is refused; planes of another file.
+//! Check: every truncation and every flipped byte of a small file is refused; planes of another
+//! file.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufReader, BufWriter, Read, Seek, SeekFrom, Write};
@@ -57,13 +60,13 @@ pub(super) fn begin(
         bytes.extend((content.len() as u64).to_le_bytes());
         bytes.extend(content);
     }
-    let numbers = [bytes.len() as u64, planes, plane_bytes]
-        .into_iter()
-        .flat_map(u64::to_le_bytes);
-    let counts = [version, sections.len() as u32]
-        .into_iter()
-        .flat_map(u32::to_le_bytes);
-    let mut head: Vec<u8> = MAGIC.into_iter().chain(counts).chain(numbers).collect();
+    let mut head = MAGIC.to_vec();
+    for count in [version, sections.len() as u32] {
+        head.extend(count.to_le_bytes());
+    }
+    for number in [bytes.len() as u64, planes, plane_bytes] {
+        head.extend(number.to_le_bytes());
+    }
     head.extend(bytes);
     let checksum: Checksum = Sha256::digest(&head).into();
     head.extend(checksum);
@@ -77,7 +80,8 @@ pub(super) fn begin(
     Ok(Planes { start, checksum })
 }
 
-/// Writes planes from number `first` on to a file that was begun; `next` fills in the bytes of each.
+/// Writes planes from number `first` on to a file that was begun; `next` fills in the bytes of
+/// each.
 pub(super) fn write_planes(
     path: &Path,
     planes: Planes,
@@ -85,24 +89,30 @@ pub(super) fn write_planes(
     plane_bytes: u64,
     next: impl Fn(usize, &mut Vec<u8>),
 ) -> Result<(), Error> {
-    let write = || -> io::Result<()> {
-        let mut file = OpenOptions::new().write(true).open(beside(path))?;
-        file.seek(SeekFrom::Start(
-            planes.start + numbers.start as u64 * (plane_bytes + CHECKSUM_BYTES),
-        ))?;
-        let mut out = BufWriter::with_capacity(1 << 18, file);
-        let mut bytes = Vec::with_capacity(plane_bytes as usize);
-        for number in numbers.clone() {
-            bytes.clear();
-            next(number, &mut bytes);
-            out.write_all(&bytes)?;
-            out.write_all(&checksum_of(&planes.checksum, number, &bytes))?;
-        }
-        out.into_inner()
-            .map_err(io::IntoInnerError::into_error)?
-            .sync_all()
-    };
-    write().map_err(|error| refused("write", path, &error))
+    try_write_planes(path, planes, numbers, plane_bytes, next)
+        .map_err(|error| refused("write", path, &error))
+}
+
+fn try_write_planes(
+    path: &Path,
+    planes: Planes,
+    numbers: std::ops::Range<usize>,
+    plane_bytes: u64,
+    next: impl Fn(usize, &mut Vec<u8>),
+) -> io::Result<()> {
+    let mut file = OpenOptions::new().write(true).open(beside(path))?;
+    let start = planes.start + numbers.start as u64 * (plane_bytes + CHECKSUM_BYTES);
+    file.seek(SeekFrom::Start(start))?;
+    let mut out = BufWriter::with_capacity(1 << 18, file);
+    let mut bytes = Vec::with_capacity(plane_bytes as usize);
+    for number in numbers {
+        bytes.clear();
+        next(number, &mut bytes);
+        out.write_all(&bytes)?;
+        out.write_all(&checksum_of(&planes.checksum, number, &bytes))?;
+    }
+    let file = out.into_inner().map_err(io::IntoInnerError::into_error)?;
+    file.sync_all()
 }
 
 /// Checksum of a plane of the file whose head has the checksum `head`.
@@ -115,15 +125,12 @@ fn checksum_of(head: &Checksum, number: usize, bytes: &[u8]) -> Checksum {
 
 /// Puts a whole file in place; an older one of that name is replaced, or renamed to `previous`.
 pub(super) fn finish(path: &Path, previous: Option<&Path>) -> Result<(), Error> {
-    let rename = || {
-        if let Some(previous) = previous
-            && path.exists()
-        {
-            fs::rename(path, previous)?;
-        }
-        fs::rename(beside(path), path)
-    };
-    rename().map_err(|error| refused("write", path, &error))?;
+    if let Some(previous) = previous
+        && path.exists()
+    {
+        fs::rename(path, previous).map_err(|error| refused("write", path, &error))?;
+    }
+    fs::rename(beside(path), path).map_err(|error| refused("write", path, &error))?;
     // Makes the renaming last through a power failure where the system can do so.
     let folder = path
         .parent()
@@ -146,6 +153,67 @@ fn beside(path: &Path) -> PathBuf {
     path.with_file_name(name)
 }
 
+/// [`Error::CheckpointDamaged`] of a file.
+fn damaged(path: &Path, what: &'static str) -> Error {
+    Error::CheckpointDamaged {
+        path: path.to_owned(),
+        what,
+    }
+}
+
+/// A file that is open for reading, and its length in bytes.
+fn open_with_length(path: &Path) -> io::Result<(File, u64)> {
+    let file = File::open(path)?;
+    let length = file.metadata()?.len();
+    Ok((file, length))
+}
+
+/// The numbers before the first section.
+#[derive(Debug)]
+struct Head {
+    /// Bytes of all sections.
+    section_bytes: u64,
+    planes: u64,
+    plane_bytes: u64,
+}
+
+impl Head {
+    /// Checks the magic and the version.
+    fn parse(path: &Path, head: &[u8], supported: u32) -> Result<Self, Error> {
+        let magic = head.len().min(MAGIC.len());
+        if head.is_empty() || head[..magic] != MAGIC[..magic] {
+            return Err(Error::NotACheckpoint {
+                path: path.to_owned(),
+            });
+        }
+        let words = head[magic..].as_chunks::<8>().0;
+        let &[version_and_sections, section_bytes, planes, plane_bytes] = words else {
+            return Err(damaged(path, "it ends within its first bytes"));
+        };
+        let version = u64::from_le_bytes(version_and_sections) as u32;
+        if version != supported {
+            return Err(Error::CheckpointVersion {
+                path: path.to_owned(),
+                found: version,
+                supported,
+            });
+        }
+        Ok(Self {
+            section_bytes: u64::from_le_bytes(section_bytes),
+            planes: u64::from_le_bytes(planes),
+            plane_bytes: u64::from_le_bytes(plane_bytes),
+        })
+    }
+
+    /// Where the first plane begins, if a file of `length` bytes is as long as it should be.
+    fn first_plane(&self, length: u64) -> Option<u64> {
+        let start = (HEAD_BYTES + CHECKSUM_BYTES).checked_add(self.section_bytes)?;
+        let each = self.plane_bytes.checked_add(CHECKSUM_BYTES)?;
+        let end = start.checked_add(self.planes.checked_mul(each)?)?;
+        (end == length).then_some(start)
+    }
+}
+
 /// A file whose sections are whole, and whose planes are read one by one.
 #[derive(Debug)]
 pub(super) struct Reader {
@@ -160,50 +228,16 @@ pub(super) struct Reader {
 impl Reader {
     /// Opens a file and checks its magic, version, length and the checksum of its sections.
     pub(super) fn open(path: &Path, supported: u32) -> Result<Self, Error> {
-        let io = |error: &io::Error| refused("read", path, error);
-        let mut file = File::open(path).map_err(|e| io(&e))?;
-        let length = file.metadata().map_err(|e| io(&e))?.len();
+        let (mut file, length) =
+            open_with_length(path).map_err(|error| refused("read", path, &error))?;
         let mut head = Vec::new();
-        (&mut file)
-            .take(HEAD_BYTES)
+        let mut first_bytes = (&mut file).take(HEAD_BYTES);
+        first_bytes
             .read_to_end(&mut head)
-            .map_err(|e| io(&e))?;
-        let magic = head.len().min(MAGIC.len());
-        if head.is_empty() || head[..magic] != MAGIC[..magic] {
-            return Err(Error::NotACheckpoint {
-                path: path.to_owned(),
-            });
-        }
-        let damaged = |what| Error::CheckpointDamaged {
-            path: path.to_owned(),
-            what,
-        };
-        let words: Vec<u64> = head[magic..]
-            .as_chunks()
-            .0
-            .iter()
-            .map(|word| u64::from_le_bytes(*word))
-            .collect();
-        let [counts, sections, planes, plane_bytes] = words[..] else {
-            return Err(damaged("it ends within its first bytes"));
-        };
-        let version = counts as u32;
-        if version != supported {
-            return Err(Error::CheckpointVersion {
-                path: path.to_owned(),
-                found: version,
-                supported,
-            });
-        }
-        let start = (HEAD_BYTES + CHECKSUM_BYTES).checked_add(sections);
-        let all = plane_bytes
-            .checked_add(CHECKSUM_BYTES)
-            .and_then(|each| planes.checked_mul(each));
-        let whole = start
-            .zip(all)
-            .and_then(|(start, all)| start.checked_add(all));
-        let (Some(start), true) = (start, whole == Some(length)) else {
-            return Err(damaged("it has not the length that it should have"));
+            .map_err(|error| refused("read", path, &error))?;
+        let parsed = Head::parse(path, &head, supported)?;
+        let Some(start) = parsed.first_plane(length) else {
+            return Err(damaged(path, "it has not the length that it should have"));
         };
         let mut reader = Self {
             path: path.to_owned(),
@@ -213,23 +247,21 @@ impl Reader {
                 start,
                 checksum: [0; CHECKSUM_BYTES as usize],
             },
-            counts: [planes, plane_bytes],
+            counts: [parsed.planes, parsed.plane_bytes],
         };
-        let (mut content, mut stored) = (vec![0; sections as usize], reader.planes.checksum);
+        let mut content = vec![0; parsed.section_bytes as usize];
+        let mut stored = reader.planes.checksum;
         reader.fill(&mut content)?;
         reader.fill(&mut stored)?;
-        reader.planes.checksum = Sha256::new()
-            .chain_update(head)
-            .chain_update(&content)
-            .finalize()
-            .into();
+        let hash = Sha256::new().chain_update(head).chain_update(&content);
+        reader.planes.checksum = hash.finalize().into();
         if reader.planes.checksum != stored {
-            return Err(damaged(
-                "its checksum is wrong, so it was cut off or altered",
-            ));
+            return Err(reader.damaged("its checksum is wrong, so it was cut off or altered"));
         }
-        reader.sections =
-            sections_of(&content).ok_or_else(|| damaged("a section is not where it should be"))?;
+        let Some(sections) = sections_of(&content) else {
+            return Err(reader.damaged("a section is not where it should be"));
+        };
+        reader.sections = sections;
         Ok(reader)
     }
 
@@ -252,10 +284,7 @@ impl Reader {
     }
 
     pub(super) fn damaged(&self, what: &'static str) -> Error {
-        Error::CheckpointDamaged {
-            path: self.path.clone(),
-            what,
-        }
+        damaged(&self.path, what)
     }
 
     fn fill(&mut self, buffer: &mut [u8]) -> Result<(), Error> {

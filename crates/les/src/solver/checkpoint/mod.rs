@@ -1,12 +1,14 @@
-//! Checkpoints: the whole state of a simulation in one file, from which it continues with the same bits.
+//! Checkpoints: the whole state of a simulation in one file, from which it continues with the same
+//! bits.
 //!
-//! A file holds the state (velocity, the terms of the step before, pressure, time, step lengths, implicit directions), what
-//! mesh and settings it belongs to, and bytes of the caller. It is versioned, has a checksum for each plane and is put in place by
-//! renaming. Each rank writes and reads its own planes.
-//! Mesh, walls, viscosity, force, scheme, subgrid model and memory order must
+//! A file holds the state (velocity, the terms of the step before, pressure, time, step lengths,
+//! implicit directions), what mesh and settings it belongs to, and bytes of the caller. It is
+//! versioned, has a checksum for each plane and is put in place by renaming. Each rank writes and
+//! reads its own planes. Mesh, walls, viscosity, force, scheme, subgrid model and memory order must
 //! be the same to continue; time step, pressure method and tolerance may be changed.
 //!
-//! Check: restarts of every scheme against uninterrupted runs bit for bit; damaged, foreign and unfitting files.
+//! Check: restarts of every scheme against uninterrupted runs bit for bit; damaged, foreign and
+//! unfitting files.
 
 mod container;
 
@@ -20,8 +22,8 @@ use crate::Error;
 use crate::solver::slabs::WHOLE;
 use container::{Planes, Reader, Tag};
 
-/// Version of the content. Raise it with every change of the sections, of the texts in [`identity`], or of what a run keeps
-/// beside the flow.
+/// Version of the content. Raise it with every change of the sections, of the texts in
+/// [`identity`], or of what a run keeps beside the flow.
 const VERSION: u32 = 4;
 
 const IDENTITY: &Tag = b"IDENTITY";
@@ -31,12 +33,13 @@ const USER: &Tag = b"USERDATA";
 /// Fields of which each plane has its values: velocity, terms of the step before, pressure.
 const FIELDS: usize = 7;
 
-/// Positions and metrics of another machine may differ in their last digits; a different mapping differs more.
+/// Positions and metrics of another machine may differ in their last digits; a different mapping
+/// differs more.
 const METRIC_TOLERANCE: f64 = 1e-11;
 
 impl Flow {
-    /// Writes a checkpoint; `user_data` comes back from [`Self::restore`]. An older file of that name is replaced only when
-    /// the new one is safe on disk, so there is always a whole one.
+    /// Writes a checkpoint; `user_data` comes back from [`Self::restore`]. An older file of that
+    /// name is replaced only when the new one is safe on disk, so there is always a whole one.
     ///
     /// # Errors
     /// [`Error::File`] if the system refuses; nothing is changed then.
@@ -44,9 +47,23 @@ impl Flow {
         self.save_and_keep(path.as_ref(), None, user_data)
     }
 
-    /// As [`Self::save`], with the older file renamed to `previous`. Of several ranks the first begins and ends the file, and each
-    /// writes its planes.
+    /// As [`Self::save`], with the older file renamed to `previous`. Of several ranks the first
+    /// begins and ends the file, and each writes its planes.
     pub(crate) fn save_and_keep(
+        &self,
+        path: &Path,
+        previous: Option<&Path>,
+        user_data: &[u8],
+    ) -> Result<(), Error> {
+        let result = self.try_save(path, previous, user_data);
+        if result.is_err() && self.layout.slabs.is_first() {
+            container::abandon(path);
+        }
+        result
+    }
+
+    /// Writes a checkpoint; a file that was begun stays if it fails.
+    fn try_save(
         &self,
         path: &Path,
         previous: Option<&Path>,
@@ -58,21 +75,13 @@ impl Flow {
         } else {
             Ok(None)
         };
-        let written = slabs
-            .all_agree(begun)
-            .and_then(|begun| slabs.all_agree(self.write_planes(path, begun)));
-        let put = |()| {
-            slabs.all_agree(if slabs.is_first() {
-                container::finish(path, previous)
-            } else {
-                Ok(())
-            })
-        };
-        let result = written.and_then(put);
-        if result.is_err() && slabs.is_first() {
-            container::abandon(path);
-        }
-        result
+        let begun = slabs.all_agree(begun)?;
+        slabs.all_agree(self.write_planes(path, begun))?;
+        slabs.all_agree(if slabs.is_first() {
+            container::finish(path, previous)
+        } else {
+            Ok(())
+        })
     }
 
     /// Bytes of the fields in a plane.
@@ -82,19 +91,16 @@ impl Flow {
 
     /// Begins the file.
     fn begin(&self, path: &Path, user_data: &[u8]) -> Result<Planes, Error> {
-        let text: String = identity(self.mesh(), self.settings(), &self.layout)
+        let identity = identity(self.mesh(), self.settings(), &self.layout);
+        let text: String = identity
             .iter()
-            .map(|(k, v)| format!("{k}\t{v}\n"))
+            .map(|(name, value)| format!("{name}\t{value}\n"))
             .collect();
-        let metrics = self.mesh().directions().each_ref().map(metrics);
         let mut sections = vec![(*IDENTITY, text.into_bytes())];
-        let bytes = |values: &Vec<f64>| values.iter().flat_map(|v| v.to_le_bytes()).collect();
-        sections.extend(
-            METRICS
-                .iter()
-                .zip(&metrics)
-                .map(|(tag, metrics)| (**tag, bytes(metrics))),
-        );
+        for (tag, direction) in METRICS.iter().zip(self.mesh().directions()) {
+            let bytes = metrics(direction).into_iter().flat_map(f64::to_le_bytes);
+            sections.push((**tag, bytes.collect()));
+        }
         sections.push((*SCALARS, scalars(&self.state)));
         sections.push((*USER, user_data.to_vec()));
         container::begin(
@@ -105,21 +111,22 @@ impl Flow {
         )
     }
 
-    /// Writes the planes that this rank owns to the file that the first rank has begun, and tells of to the others.
+    /// Writes the planes that this rank owns to the file that the first rank, which alone has
+    /// `begun`, has begun.
     fn write_planes(&self, path: &Path, begun: Option<Planes>) -> Result<(), Error> {
-        let told = begun.map_or_else(Vec::new, |planes| {
-            [planes.start as f64]
-                .into_iter()
-                .chain(planes.checksum.map(f64::from))
-                .collect::<Vec<f64>>()
-        });
-        let told = self.layout.slabs.all_gather(told)?;
-        let checksum = std::array::from_fn(|i| told.get(i + 1).map_or(0, |byte| *byte as u8));
+        let mut sent = Vec::new();
+        if let Some(planes) = begun {
+            sent.push(planes.start as f64);
+            sent.extend(planes.checksum.map(f64::from));
+        }
+        let received = self.layout.slabs.all_gather(sent)?;
+        let checksum = std::array::from_fn(|i| received.get(i + 1).map_or(0, |byte| *byte as u8));
         let planes = Planes {
-            start: told.first().map_or(0, |start| *start as u64),
+            start: received.first().map_or(0, |start| *start as u64),
             checksum,
         };
-        let (shape, state) = (self.layout.shape, &self.state);
+        let shape = self.layout.shape;
+        let state = &self.state;
         container::write_planes(path, planes, shape.own(), self.plane_bytes(), |k, bytes| {
             let start = shape.place([0, 0, k]);
             for field in state
@@ -137,12 +144,13 @@ impl Flow {
         })
     }
 
-    /// The simulation of a checkpoint, with the caller's bytes. With equal settings it continues bit for bit as if it had
-    /// not been interrupted, on any number of threads.
+    /// The simulation of a checkpoint, with the caller's bytes. With equal settings it continues
+    /// bit for bit as if it had not been interrupted, on any number of threads.
     ///
     /// # Errors
-    /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`]; what
-    /// [`Flow::new`] refuses; [`Error::CheckpointMismatch`] names what differs between the checkpoint and `mesh` or `settings`.
+    /// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`],
+    /// [`Error::CheckpointDamaged`]; what [`Flow::new`] refuses; [`Error::CheckpointMismatch`]
+    /// names what differs between the checkpoint and `mesh` or `settings`.
     pub fn restore(
         path: impl AsRef<Path>,
         mesh: Mesh,
@@ -211,10 +219,12 @@ impl Flow {
     }
 }
 
-/// Whether a file is a whole checkpoint that this program can read; whether it fits a mesh, [`Flow::restore`] says.
+/// Whether a file is a whole checkpoint that this program can read; whether it fits a mesh,
+/// [`Flow::restore`] says.
 ///
 /// # Errors
-/// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`], [`Error::CheckpointDamaged`].
+/// [`Error::File`], [`Error::NotACheckpoint`], [`Error::CheckpointVersion`],
+/// [`Error::CheckpointDamaged`].
 pub fn check_checkpoint(path: impl AsRef<Path>) -> Result<(), Error> {
     let mut file = Reader::open(path.as_ref(), VERSION)?;
     let [planes, _] = file.counts;
@@ -225,46 +235,49 @@ pub fn check_checkpoint(path: impl AsRef<Path>) -> Result<(), Error> {
 fn identity(mesh: &Mesh, settings: &FlowSettings, layout: &Layout) -> Vec<(String, String)> {
     let mut list = Vec::new();
     for (axis, d) in AXIS_NAMES.iter().zip(mesh.directions()) {
-        list.push((
-            format!("the number of cells along {axis}"),
-            d.cells.to_string(),
-        ));
-        list.push((format!("the low end of {axis}"), format!("{:?} m", d.low_m)));
-        list.push((
-            format!("the high end of {axis}"),
-            format!("{:?} m", d.high_m),
-        ));
-        list.push((format!("the mapping of {axis}"), format!("{:?}", d.mapping)));
-        list.push((format!("what bounds {axis}"), format!("{:?}", d.ends)));
+        list.extend([
+            (
+                format!("the number of cells along {axis}"),
+                d.cells.to_string(),
+            ),
+            (format!("the low end of {axis}"), format!("{:?} m", d.low_m)),
+            (
+                format!("the high end of {axis}"),
+                format!("{:?} m", d.high_m),
+            ),
+            (format!("the mapping of {axis}"), format!("{:?}", d.mapping)),
+            (format!("what bounds {axis}"), format!("{:?}", d.ends)),
+        ]);
     }
-    let mut add = |name: &str, value: String| list.push((name.to_owned(), value));
-    add("viscosity_m2_s", format!("{:?}", settings.viscosity_m2_s));
-    add("force_m_s2", format!("{:?}", settings.force_m_s2));
-    add("the time scheme", format!("{:?}", settings.scheme));
-    add("the subgrid model", format!("{:?}", settings.subgrid));
-    add(
-        "the order of the directions in memory",
-        format!("{:?}", layout.direction),
-    );
+    let settings = [
+        ("viscosity_m2_s", format!("{:?}", settings.viscosity_m2_s)),
+        ("force_m_s2", format!("{:?}", settings.force_m_s2)),
+        ("the time scheme", format!("{:?}", settings.scheme)),
+        ("the subgrid model", format!("{:?}", settings.subgrid)),
+        (
+            "the order of the directions in memory",
+            format!("{:?}", layout.direction),
+        ),
+    ];
+    list.extend(settings.map(|(name, value)| (name.to_owned(), value)));
     list
 }
 
 fn compare_identity(path: &Path, stored: &str, wanted: &[(String, String)]) -> Result<(), Error> {
-    let mismatch = |what: &str, stored: &str, wanted: &str| Error::CheckpointMismatch {
-        path: path.to_owned(),
-        what: what.to_owned(),
-        stored: stored.to_owned(),
-        wanted: wanted.to_owned(),
-    };
-    let found: Vec<(&str, &str)> = stored
+    let stored: Vec<(&str, &str)> = stored
         .lines()
         .filter_map(|line| line.split_once('\t'))
         .collect();
     for (what, value) in wanted {
-        match found.iter().find(|(name, _)| name == what) {
-            Some((_, stored)) if stored == value => {}
-            Some((_, stored)) => return Err(mismatch(what, stored, value)),
-            None => return Err(mismatch(what, "absent", value)),
+        let found = stored.iter().find(|(name, _)| name == what);
+        let found = found.map_or("absent", |(_, value)| value);
+        if found != value {
+            return Err(Error::CheckpointMismatch {
+                path: path.to_owned(),
+                what: what.clone(),
+                stored: found.to_owned(),
+                wanted: value.clone(),
+            });
         }
     }
     Ok(())
@@ -279,20 +292,11 @@ fn metrics(direction: &Direction) -> Vec<f64> {
 
 /// Tells custom mappings apart, which have no name.
 fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> Result<(), Error> {
-    let length_m = wanted[wanted.len() - 2] - wanted[0];
-    let scale_m = [length_m, wanted[0].abs() + length_m];
-    // Positions against the length, metrics against themselves.
-    let differs = |(i, (a, b)): (usize, (&f64, &f64))| {
-        let scale_m = if i % 2 == 0 { scale_m[1] } else { b.abs() };
-        (a - b).abs() > METRIC_TOLERANCE * scale_m
+    let Some(i) = first_difference(stored, wanted) else {
+        return Ok(());
     };
-    let place = if stored.len() == wanted.len() {
-        stored.iter().zip(wanted).enumerate().position(differs)
-    } else {
-        Some(0)
-    };
-    let Some(i) = place else { return Ok(()) };
-    let (kind, xi) = (["position [m]", "metric [m]"][i % 2], 0.5 * (i / 2) as f64);
+    let kind = ["position [m]", "metric [m]"][i % 2];
+    let xi = 0.5 * (i / 2) as f64;
     Err(Error::CheckpointMismatch {
         path: path.to_owned(),
         what: format!(
@@ -304,34 +308,48 @@ fn compare_metrics(path: &Path, axis: usize, stored: &[f64], wanted: &[f64]) -> 
     })
 }
 
+/// Index of the first position that differs against the length, or metric against itself.
+fn first_difference(stored: &[f64], wanted: &[f64]) -> Option<usize> {
+    if stored.len() != wanted.len() {
+        return Some(0);
+    }
+    let length_m = wanted[wanted.len() - 2] - wanted[0];
+    let position_scale_m = wanted[0].abs() + length_m;
+    for (i, (a, b)) in stored.iter().zip(wanted).enumerate() {
+        let scale_m = if i % 2 == 0 {
+            position_scale_m
+        } else {
+            b.abs()
+        };
+        if (a - b).abs() > METRIC_TOLERANCE * scale_m {
+            return Some(i);
+        }
+    }
+    None
+}
+
 /// The numbers of the state, eight bytes each.
 fn scalars(state: &State) -> Vec<u8> {
-    let [last_step, courant, energy] =
-        [state.last_step_s, state.courant_per_s, state.energy].map(f64::to_bits);
+    let [implicit_0, implicit_1, implicit_2] = state.implicit.map(u64::from);
     let numbers = [
         state.time_s.to_bits(),
         state.step,
-        last_step,
-        courant,
-        energy,
+        state.last_step_s.to_bits(),
+        state.courant_per_s.to_bits(),
+        state.energy.to_bits(),
+        implicit_0,
+        implicit_1,
+        implicit_2,
     ];
-    numbers
-        .into_iter()
-        .chain(state.implicit.map(u64::from))
-        .flat_map(u64::to_le_bytes)
-        .collect()
+    numbers.into_iter().flat_map(u64::to_le_bytes).collect()
 }
 
 fn read_scalars(bytes: &[u8], state: &mut State) -> Option<()> {
     let (numbers, []) = bytes.as_chunks::<8>() else {
         return None;
     };
-    let numbers: [u64; 8] = numbers
-        .iter()
-        .map(|w| u64::from_le_bytes(*w))
-        .collect::<Vec<_>>()
-        .try_into()
-        .ok()?;
+    let numbers: &[[u8; 8]; 8] = numbers.try_into().ok()?;
+    let numbers = numbers.map(u64::from_le_bytes);
     let [time, step, last_step, courant, energy, implicit @ ..] = numbers;
     state.time_s = f64::from_bits(time);
     state.step = step;

@@ -106,7 +106,8 @@ fn a_restart_after_any_step_continues_with_the_same_bits_on_other_threads() {
 
 #[test]
 fn the_terms_of_the_step_before_matter() {
-    // What this crate's array of previous terms is for: without it the restart would be an Euler step.
+    // What this crate's array of previous terms is for: without it the restart would be an Euler
+    // step.
     let mut flow = start(settings());
     for _ in 0..3 {
         flow.step().unwrap();

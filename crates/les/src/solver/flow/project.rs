@@ -1,16 +1,18 @@
-//! The projection of a stage, repeated on the velocity where the pressure alone cannot hold the correction.
+//! The projection of a stage, repeated on the velocity where the pressure alone cannot hold the
+//! correction.
 //!
-//! The pressure of a wave of `k` cells is `k^2` times as large as that of a single cell, so that its last digit leaves
-//! divergence through the gradient: 1e-16 times the square of length over finest cell, relative to the right side. A velocity
-//! that was corrected once has hardly any divergence left, and the last digit of the pressure that takes out the rest is
-//! nothing.
+//! The pressure of a wave of `k` cells is `k^2` times as large as that of a single cell, so that
+//! its last digit leaves divergence through the gradient: 1e-16 times the square of length over
+//! finest cell, relative to the right side. A velocity that was corrected once has hardly any
+//! divergence left, and the last digit of the pressure that takes out the rest is nothing.
 //!
-//! Check: divergence right after the start on strongly stretched meshes and flat cells; steps in a long domain.
+//! Check: divergence right after the start on strongly stretched meshes and flat cells; steps in a
+//! long domain.
 
 use super::{Flow, Solved, add, correct};
 use crate::error::{Error, PressureFailure};
 use crate::solver::aligned::Aligned;
-use crate::solver::pressure::{norm, unless_stalled};
+use crate::solver::pressure::{accept_round_off, norm};
 use crate::solver::slabs::WHOLE;
 
 /// Most repetitions.
@@ -24,10 +26,11 @@ impl Flow {
     /// Projects `predicted` to the new velocity; `phi` is left in the work array.
     ///
     /// # Errors
-    /// If the residual of the pressure equation, which is the divergence of the new velocity, does not reach the tolerance,
-    /// neither relative to what was to be corrected nor to the velocity over the cell.
+    /// If the residual of the pressure equation, which is the divergence of the new velocity, does
+    /// not reach the tolerance, neither relative to what was to be corrected nor to the velocity
+    /// over the cell.
     pub(super) fn project(&mut self, stage_s: f64) -> Result<Solved, Error> {
-        self.take_divergence(stage_s)?;
+        self.set_poisson_source(stage_s)?;
         let tolerance = self.settings.pressure_tolerance;
         let solved = self.pressure_solver.solve(&mut self.phi, tolerance);
         let phi = std::mem::take(&mut self.phi);
@@ -52,14 +55,14 @@ impl Flow {
                     &mut right,
                 );
                 let size = norm(&self.layout.slabs, &right)?;
-                let left = self.repeat(stage_s, tolerance * size)?;
-                // A step that hardly changes the flow has so little to correct that round-off of the velocity is more than the
-                // tolerance's share of it.
-                if left > tolerance * size && self.measure_divergence()? > tolerance {
+                let remaining = self.reproject(stage_s, tolerance * size)?;
+                // A step that hardly changes the flow has so little to correct that round-off of
+                // the velocity exceeds that fraction of it.
+                if remaining > tolerance * size && self.measure_divergence()? > tolerance {
                     return solved;
                 }
                 Ok(Solved {
-                    residual: left / size,
+                    residual: remaining / size,
                     iterations: (*iterations).max(history.len()),
                     factor: None,
                 })
@@ -74,8 +77,9 @@ impl Flow {
         }
     }
 
-    /// The weighted divergence of `predicted` over `stage_s` into `phi`.
-    pub(super) fn take_divergence(&mut self, stage_s: f64) -> Result<(), Error> {
+    /// Writes the source of the Poisson equation, the weighted divergence of `predicted` over
+    /// `stage_s`, to `phi`.
+    pub(super) fn set_poisson_source(&mut self, stage_s: f64) -> Result<(), Error> {
         self.layout
             .slabs
             .halos(&mut [&mut self.predicted[2]], self.divergence.reach)?;
@@ -85,29 +89,32 @@ impl Flow {
         Ok(())
     }
 
-    /// Projects the velocity again till the norm of its weighted divergence over `stage_s` is at most `enough`, or falls no
-    /// more; returns that norm. What the pressure adds goes to `phi`.
-    pub(super) fn repeat(&mut self, stage_s: f64, enough: f64) -> Result<f64, Error> {
-        let mut rest = Aligned::zeros(self.layout.shape.len());
-        let mut last = f64::INFINITY;
+    /// Projects the velocity again until the norm of its weighted divergence over `stage_s` is at
+    /// most `target`, or falls no more; returns that norm. The corrections of the pressure are
+    /// added to `phi`.
+    pub(super) fn reproject(&mut self, stage_s: f64, target: f64) -> Result<f64, Error> {
+        let mut divergence = Aligned::zeros(self.layout.shape.len());
+        let mut last_norm = f64::INFINITY;
         for _ in 0..=MAX_REPETITIONS {
             self.divergence.apply(
                 self.state.velocity.each_ref().map(|field| &field[..]),
                 1.0 / stage_s,
-                &mut rest,
+                &mut divergence,
             );
-            let size = norm(&self.layout.slabs, &rest)?;
-            if size <= enough || size > GAIN * last {
-                return Ok(size);
+            let current_norm = norm(&self.layout.slabs, &divergence)?;
+            if current_norm <= target || current_norm > GAIN * last_norm {
+                return Ok(current_norm);
             }
-            last = size;
+            last_norm = current_norm;
             let tolerance = self.settings.pressure_tolerance.max(REPETITION_TOLERANCE);
-            unless_stalled(self.pressure_solver.solve(&mut rest, tolerance))?;
+            accept_round_off(self.pressure_solver.solve(&mut divergence, tolerance))?;
+            // The solver has replaced the divergence by the pressure.
+            let phi = &divergence;
             std::mem::swap(&mut self.predicted, &mut self.state.velocity);
-            self.correct(stage_s, &rest)?;
-            add(&mut self.phi, &rest, self.layout.shape);
+            self.correct(stage_s, phi)?;
+            add(&mut self.phi, phi, self.layout.shape);
         }
-        Ok(last)
+        Ok(last_norm)
     }
 
     /// `velocity = predicted - stage_s grad(phi)`.
@@ -117,12 +124,14 @@ impl Flow {
         let planes = correct(&self.ops, predicted, phi, stage_s, &mut velocity);
         self.layout.slabs.halos(&mut velocity, WHOLE)?;
         let planes = self.layout.slabs.planes(planes)?;
-        self.state.energy = planes.iter().fold(0.0, |sum, plane| sum + plane[0]);
-        self.state.courant_per_s =
-            planes.iter().fold(
-                0.0,
-                |most, plane| if plane[1] > most { plane[1] } else { most },
-            );
+        self.state.energy = 0.0;
+        self.state.courant_per_s = 0.0;
+        for [energy, courant_per_s] in planes {
+            self.state.energy += energy;
+            if courant_per_s > self.state.courant_per_s {
+                self.state.courant_per_s = courant_per_s;
+            }
+        }
         Ok(())
     }
 }

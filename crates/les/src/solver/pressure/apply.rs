@@ -8,7 +8,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 use super::super::layout::Layout;
-use super::super::operators_1d::{Operators1d, Taps};
+use super::super::operators_1d::{Operators1d, Taps, nonzero};
 use super::super::rows::{Columns, HALO, cut_rows, from_places, pad};
 use super::super::slabs::Slabs;
 use super::kernel;
@@ -16,7 +16,8 @@ use crate::Error;
 
 /// `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T`.
 ///
-/// Every row is applied to the differences from its own cell: a constant leaves exactly nothing, however large it is.
+/// Every row is applied to the differences from its own cell: a constant leaves exactly nothing,
+/// however large it is.
 #[derive(Debug)]
 pub(crate) struct Operator {
     /// Shape of its fields, and what the ranks exchange of them.
@@ -36,25 +37,21 @@ impl Operator {
     pub(crate) fn new(layout: &Layout) -> Self {
         let rows: [Vec<Taps>; 3] = std::array::from_fn(|b| stiffness(&layout.line[b]));
         let periodic = layout.line[0].is_periodic();
-        let neighbours = |rows: &[Taps]| -> Vec<Taps> {
-            let others =
-                |(i, row): (usize, &Taps)| row.iter().copied().filter(|tap| tap.0 != i).collect();
-            rows.iter().enumerate().map(others).collect()
-        };
         Self {
             slabs: layout.slabs.clone(),
             mass_m: std::array::from_fn(|b| layout.line[b].cell_mass_m.clone()),
             along: Columns::new(&rows[0], periodic),
             even: even(&layout.line[0], &rows[0]),
             periodic,
-            across: [neighbours(&rows[1]), neighbours(&rows[2])],
+            across: [off_diagonal(&rows[1]), off_diagonal(&rows[2])],
         }
     }
 
     /// Places in `residual` what `phi` leaves of the right side, `-g - A phi`.
     pub(crate) fn residual(&self, g: &[f64], phi: &[f64], residual: &mut [f64]) {
-        let (shape, n0) = (self.slabs.shape, self.slabs.shape.n[0]);
-        let planes = residual[shape.own_places()]
+        let shape = self.slabs.shape;
+        let n0 = shape.n[0];
+        let planes = residual[shape.own_range()]
             .par_chunks_mut(shape.plane())
             .zip(shape.own());
         planes.for_each_init(
@@ -87,8 +84,8 @@ impl Operator {
             .map(|[squares]| squares.sqrt())
     }
 
-    /// Copies the right side `from` to `to`; returns its 2-norm. If its sum, which no pressure can balance, is more than `share` of
-    /// the norm, it is taken out of the copy.
+    /// Copies the right side `from` to `to`; returns its 2-norm. If its sum, which no pressure can
+    /// balance, is more than `share` of the norm, it is taken out of the copy.
     ///
     /// # Errors
     /// Those of the exchange between ranks.
@@ -98,7 +95,8 @@ impl Operator {
         to: &mut [f64],
         share: f64,
     ) -> Result<f64, Error> {
-        let (plane, own) = (self.slabs.shape.plane(), self.slabs.shape.own_places());
+        let plane = self.slabs.shape.plane();
+        let own = self.slabs.shape.own_range();
         let planes = to[own.clone()]
             .par_chunks_mut(plane)
             .zip(from[own].par_chunks(plane));
@@ -107,7 +105,8 @@ impl Operator {
             [kernel::sum(to), kernel::dot(to, to)]
         });
         let [sum, squares] = self.slabs.sums(parts.collect())?;
-        let (mut volume, mut mass) = (1.0, 1.0);
+        let mut volume = 1.0;
+        let mut mass = 1.0;
         for axis in &self.mass_m {
             volume *= axis.iter().sum::<f64>();
             mass *= kernel::dot(axis, axis).sqrt();
@@ -124,35 +123,33 @@ impl Operator {
     /// # Errors
     /// Those of the exchange between ranks.
     pub(crate) fn round_off(&self, phi: &[f64]) -> Result<f64, Error> {
-        let (n0, shape) = (self.slabs.shape.n[0], self.slabs.shape);
-        let sum = |taps: &Taps| {
-            taps.iter().map(|tap| tap.1 * tap.1).sum::<f64>()
-                + taps.iter().map(|tap| tap.1).sum::<f64>().powi(2)
-        };
-        let own: [Vec<f64>; 3] = [
-            self.along.squares(n0),
-            self.across[0].iter().map(sum).collect(),
-            self.across[1].iter().map(sum).collect(),
-        ];
-        let squares = phi[shape.own_places()]
+        let shape = self.slabs.shape;
+        let n0 = shape.n[0];
+        let squares_0 = self.along.squares(n0);
+        let [squares_1, squares_2] = self
+            .across
+            .each_ref()
+            .map(|rows| rows.iter().map(sum_of_squares).collect::<Vec<f64>>());
+        let planes = phi[shape.own_range()]
             .par_chunks(shape.plane())
-            .zip(shape.own())
-            .map(|(plane, k)| {
-                let mass = |b: usize, i: usize| self.mass_m[b][i];
-                let terms = plane.iter().enumerate().map(|(place, phi)| {
-                    let (i, j) = (place % n0, place / n0);
-                    let [a, b, c] = [
-                        mass(1, j) * mass(2, k),
-                        mass(0, i) * mass(2, k),
-                        mass(0, i) * mass(1, j),
-                    ];
-                    (a * a * own[0][i] + b * b * own[1][j] + c * c * own[2][k]) * phi * phi
-                });
-                [terms.sum::<f64>()]
+            .zip(shape.own());
+        let of_planes = planes.map(|(plane, k)| {
+            let mass_2 = self.mass_m[2][k];
+            let terms = plane.iter().enumerate().map(|(place, phi)| {
+                let i = place % n0;
+                let j = place / n0;
+                let mass_0 = self.mass_m[0][i];
+                let mass_1 = self.mass_m[1][j];
+                let a = mass_1 * mass_2;
+                let b = mass_0 * mass_2;
+                let c = mass_0 * mass_1;
+                let squares = a * a * squares_0[i] + b * b * squares_1[j] + c * c * squares_2[k];
+                squares * phi * phi
             });
-        self.slabs
-            .sums(squares.collect())
-            .map(|[squares]| 0.5 * f64::EPSILON * squares.sqrt())
+            [terms.sum::<f64>()]
+        });
+        let [squares] = self.slabs.sums(of_planes.collect())?;
+        Ok(0.5 * f64::EPSILON * squares.sqrt())
     }
 
     /// Gives each value that is owned, with `scale` times the mass of its cell, to `act`.
@@ -162,8 +159,9 @@ impl Operator {
         scale: f64,
         act: impl Fn(&mut f64, f64) + Sync,
     ) {
-        let (n0, shape) = (self.slabs.shape.n[0], self.slabs.shape);
-        field[shape.own_places()]
+        let shape = self.slabs.shape;
+        let n0 = shape.n[0];
+        field[shape.own_range()]
             .par_chunks_mut(shape.plane())
             .zip(shape.own())
             .for_each(|(plane, k)| {
@@ -188,29 +186,31 @@ fn residual_row(
 ) -> f64 {
     let at = op.slabs.shape.row(j, k);
     let own = &phi[at.clone()];
-    let (m1, m2) = (op.mass_m[1][j], op.mass_m[2][k]);
-    // Places that are not needed see the row itself.
+    let m1 = op.mass_m[1][j];
+    let m2 = op.mass_m[2][k];
+    // Places that are not needed have the row itself with the coefficient zero.
     let mut taps = [(at.start, 0.0); MOST_TAPS];
-    let below = op.across[0][j]
+    let along_1 = op.across[0][j]
         .iter()
         .map(|&(i, c)| (op.slabs.shape.row(i, k).start, c * m2));
-    let aside = op.across[1][k]
+    let along_2 = op.across[1][k]
         .iter()
         .map(|&(i, c)| (op.slabs.shape.row(j, i).start, c * m1));
-    for (tap, new) in taps.iter_mut().zip(below.chain(aside)) {
+    for (tap, new) in taps.iter_mut().zip(along_1.chain(along_2)) {
         *tap = new;
     }
     let (first, rest) = taps.split_at(INNER_TAPS);
     pad(padded, own, op.periodic);
-    let along = op.even.map_or([0.0; 3], |even| even.map(|c| c * m1 * m2));
-    row_differences(out, g, phi, at, first, (&op.mass_m[0], along), padded);
+    let even = op.even.map_or([0.0; 3], |even| even.map(|c| c * m1 * m2));
+    row_differences(out, g, phi, at, first, &op.mass_m[0], even, padded);
     if op.even.is_none() || rest.iter().any(|tap| tap.1 != 0.0) {
         other_differences(op, out, own, phi, rest, m1 * m2, padded);
     }
     kernel::dot(out, out)
 }
 
-/// `out = -g - sum c mass (row - own)` over twelve rows, less the even differences along the row itself.
+/// `out = -g - sum c mass (row - own)` over twelve rows, less the even differences along the row
+/// itself.
 #[multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512vl+fma",
     "x86_64+avx2+fma",
@@ -222,18 +222,22 @@ fn row_differences(
     phi: &[f64],
     at: Range<usize>,
     taps: &[(usize, f64)],
-    (mass, along): (&[f64], [f64; 3]),
+    mass: &[f64],
+    even: [f64; 3],
     padded: &[f64],
 ) {
     let n = out.len();
     let mut c = [0.0; INNER_TAPS];
-    for (c, tap) in c.iter_mut().zip(taps) {
-        *c = tap.1;
+    let mut rows: [&[f64]; INNER_TAPS] = [&[]; INNER_TAPS];
+    for (t, &(start, coefficient)) in taps.iter().enumerate().take(INNER_TAPS) {
+        c[t] = coefficient;
+        rows[t] = &phi[start..start + n];
     }
-    let row = |t: usize| &phi[taps[t].0..taps[t].0 + n];
-    let [x0, x1, x2, x3, x4, x5] = [row(0), row(1), row(2), row(3), row(4), row(5)];
-    let [x6, x7, x8, x9, x10, x11] = [row(6), row(7), row(8), row(9), row(10), row(11)];
-    let (own, g, mass) = (&phi[at.clone()][..n], &g[at][..n], &mass[..n]);
+    let [x0, x1, x2, x3, x4, x5] = cut_rows!(rows, n, 0 1 2 3 4 5);
+    let [x6, x7, x8, x9, x10, x11] = cut_rows!(rows, n, 6 7 8 9 10 11);
+    let own = &phi[at.clone()][..n];
+    let g = &g[at][..n];
+    let mass = &mass[..n];
     let [p3, p2, p1, q1, q2, q3] = from_places!(padded, 1, 2, 3, 5, 6, 7);
     let [p3, p2, p1, q1, q2, q3] = cut_rows!([p3, p2, p1, q1, q2, q3], n, 0 1 2 3 4 5);
     for i in 0..n {
@@ -248,14 +252,15 @@ fn row_differences(
             x9[i] - o,
             c[10].mul_add(x10[i] - o, c[11].mul_add(x11[i] - o, b)),
         );
-        let e = along[0].mul_add((p1[i] - o) + (q1[i] - o), g[i]);
-        let e = along[1].mul_add((p2[i] - o) + (q2[i] - o), e);
-        let e = along[2].mul_add((p3[i] - o) + (q3[i] - o), e);
+        let e = even[0].mul_add((p1[i] - o) + (q1[i] - o), g[i]);
+        let e = even[1].mul_add((p2[i] - o) + (q2[i] - o), e);
+        let e = even[2].mul_add((p3[i] - o) + (q3[i] - o), e);
         out[i] = -mass[i].mul_add(a + b, e);
     }
 }
 
-/// Subtracts the rows that only cells at walls see, and the differences along a row whose cells are not all equal.
+/// Subtracts the rows that only cells at walls see, and the differences along a row whose cells are
+/// not all equal.
 #[multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512vl+fma",
     "x86_64+avx2+fma",
@@ -293,32 +298,46 @@ const MOST_TAPS: usize = 16;
 
 /// Coefficients of the pairs of neighbours at 1, 2 and 3 where all rows are equal and even.
 fn even(line: &Operators1d, rows: &[Taps]) -> Option<[f64; 3]> {
+    if !line.is_fourier() || line.cells < 8 {
+        return None;
+    }
     let middle = line.cells / 2;
-    let at = |offset: usize| {
-        rows[middle]
-            .iter()
-            .find(|tap| tap.0 == middle + offset)
-            .map_or(0.0, |tap| tap.1)
-    };
-    (line.is_fourier() && line.cells >= 8).then(|| [at(1), at(2), at(3)])
+    Some([1, 2, 3].map(|offset| {
+        let tap = rows[middle].iter().find(|tap| tap.0 == middle + offset);
+        tap.map_or(0.0, |tap| tap.1)
+    }))
+}
+
+/// The rows of an operator without their diagonals.
+pub(super) fn off_diagonal(rows: &[Taps]) -> Vec<Taps> {
+    let mut others = rows.to_vec();
+    for (i, row) in others.iter_mut().enumerate() {
+        row.retain(|tap| tap.0 != i);
+    }
+    others
+}
+
+/// Sum of the squares of a row, its diagonal being the negative sum of the other entries.
+fn sum_of_squares(others: &Taps) -> f64 {
+    let squares = others.iter().map(|tap| tap.1 * tap.1).sum::<f64>();
+    let diagonal = others.iter().map(|tap| tap.1).sum::<f64>();
+    squares + diagonal.powi(2)
 }
 
 /// Rows of `Dw F^-1 Dw^T`.
 pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
     let faces = line.adjoint();
-    let row = |taps: &Taps| {
+    let mut rows = Vec::with_capacity(line.cells);
+    for taps in line.stored_divergence() {
         let mut sums = vec![0.0; line.cells];
-        for &(face, c) in taps {
+        for (face, c) in taps {
             for &(cell, other) in &faces[face] {
                 sums[cell] += c * other / line.face_mass_m[face];
             }
         }
-        sums.into_iter()
-            .enumerate()
-            .filter(|(_, c)| *c != 0.0)
-            .collect()
-    };
-    line.stored_divergence().iter().map(row).collect()
+        rows.push(nonzero(&sums));
+    }
+    rows
 }
 
 /// 2-norm of a field: the sums of the planes are added in their order.
@@ -326,7 +345,7 @@ pub(crate) fn stiffness(line: &Operators1d) -> Vec<Taps> {
 /// # Errors
 /// Those of the exchange between ranks.
 pub(crate) fn norm(slabs: &Slabs, field: &[f64]) -> Result<f64, Error> {
-    let planes = field[slabs.shape.own_places()].par_chunks(slabs.shape.plane());
+    let planes = field[slabs.shape.own_range()].par_chunks(slabs.shape.plane());
     slabs
         .sums(planes.map(|plane| [kernel::dot(plane, plane)]).collect())
         .map(|[squares]| squares.sqrt())

@@ -1,8 +1,9 @@
 //! Direct solution along one bounded axis: `(K + s M) x = r` for many shifts `s` side by side.
 //!
-//! `K = Dw F^-1 Dw^T` has seven bands, and where a no-slip wall closes it an entry between cells 0 and 4 (counted from the
-//! wall): the factorisation `L D L^T` fills only the fourth entry of those two columns. The factors are formed anew for each
-//! line, 16 lines at a time: that costs less than reading them from memory.
+//! `K = Dw F^-1 Dw^T` has seven bands, and where a no-slip wall closes it an entry between cells 0
+//! and 4 (counted from the wall): the factorisation `L D L^T` fills only the fourth entry of those
+//! two columns. The factors are formed anew for each line, 16 lines at a time: that costs less than
+//! reading them from memory.
 //!
 //! Check: against the dense operator; both walls' corner entries; the singular line.
 
@@ -71,9 +72,9 @@ impl BandedCholesky {
         Some(Self { columns })
     }
 
-    /// Replaces `rows` (one for each cell, one value for each line) by the solution, times `scale`, for the shifts
-    /// `shift + shifts[line]`. For a shift of exactly zero the solution has zero weighted mean, and what is left of the
-    /// right side's mean is ignored.
+    /// Replaces `rows` (one for each cell, one value for each line) by the solution, times `scale`,
+    /// for the shifts `shift + shifts[line]`. For a shift of exactly zero the solution has zero
+    /// weighted mean, and what is left of the right side's mean is ignored.
     pub(crate) fn solve(
         &self,
         rows: &mut [&mut [f64]],
@@ -118,7 +119,8 @@ impl BandedCholesky {
         }
     }
 
-    /// Subtracts from line `l` the multiple of `shape` that makes its sum, weighted so that `shape` is a constant, zero.
+    /// Subtracts from line `l` the multiple of `shape` that makes its sum, weighted so that `shape`
+    /// is a constant, zero.
     fn remove_mean(&self, rows: &mut [&mut [f64]], l: usize, shape: impl Fn(&Column) -> f64) {
         let length: f64 = self.columns.iter().map(|column| column.mass).sum();
         let weighted = rows
@@ -134,10 +136,32 @@ impl BandedCholesky {
 
 /// A column that reaches four places down, while it does.
 struct Reach {
-    left: usize,
+    /// Places that it still reaches down.
+    remaining: usize,
     entry: Lanes,
     factor: Factor,
     value: Lanes,
+}
+
+/// A column less the columns before it.
+#[derive(Clone, Copy)]
+struct Reduced {
+    diagonal: Lanes,
+    /// Entries 1, 2 and 3 below the diagonal, before division by the pivot.
+    undivided: [Lanes; 3],
+    /// The same after it.
+    divided: [Lanes; 3],
+    /// Value of the right side.
+    value: Lanes,
+}
+
+impl Reduced {
+    const ZERO: Self = Self {
+        diagonal: ZERO,
+        undivided: [ZERO; 3],
+        divided: [ZERO; 3],
+        value: ZERO,
+    };
 }
 
 /// Factorises and eliminates downwards; leaves the right side divided by the pivots.
@@ -148,51 +172,17 @@ struct Reach {
 ))]
 fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratch) {
     let last = columns.len() - 1;
-    // Of the three columns before, in the place of each modulo 3: entries before and after division by the pivot, and values of
-    // the right side.
-    let (mut u1, mut u2, mut u3) = ([ZERO; 3], [ZERO; 3], [ZERO; 3]);
-    let (mut l1, mut l2, mut l3) = ([ZERO; 3], [ZERO; 3], [ZERO; 3]);
-    let mut y = [ZERO; 3];
+    // The last three columns, each in the place of its number modulo 3.
+    let mut before = [Reduced::ZERO; 3];
     let mut reach: Option<Reach> = None;
     for (k, column) in columns.iter().enumerate() {
         let right = &mut scratch.right[k];
-        let (one, two, three) = ((k + 2) % 3, (k + 1) % 3, k % 3);
-        let (mut d, mut e1, mut e2, mut e3) = (ZERO, ZERO, ZERO, ZERO);
-        let mut r = ZERO;
-        for l in 0..LANES {
-            let a = shift[l].mul_add(column.mass, column.diagonal);
-            let a = (-u3[three][l]).mul_add(l3[three][l], a);
-            let a = (-u2[two][l]).mul_add(l2[two][l], a);
-            d[l] = (-u1[one][l]).mul_add(l1[one][l], a);
-            let b = (-u3[two][l]).mul_add(l2[two][l], column.below[0]);
-            e1[l] = (-u2[one][l]).mul_add(l1[one][l], b);
-            e2[l] = (-u3[one][l]).mul_add(l1[one][l], column.below[1]);
-            e3[l] = column.below[2];
-            let b = (-l3[three][l]).mul_add(y[three][l], right[l] * scale);
-            let b = (-l2[two][l]).mul_add(y[two][l], b);
-            r[l] = (-l1[one][l]).mul_add(y[one][l], b);
-        }
+        let mut current = Reduced::ZERO;
+        subtract_columns(&mut current, column, shift, right, scale, &before, k);
         if let Some(reach) = &mut reach {
-            reach.left -= 1;
-            let into = match reach.left {
-                3 => &mut e3,
-                2 => &mut e2,
-                1 => &mut e1,
-                _ => &mut d,
-            };
-            let by = if reach.left == 0 {
-                &reach.factor.corner
-            } else {
-                &reach.factor.below[3 - reach.left]
-            };
-            for l in 0..LANES {
-                into[l] -= reach.entry[l] * by[l];
-                if reach.left == 0 {
-                    r[l] -= reach.factor.corner[l] * reach.value[l];
-                }
-            }
+            subtract_reach(&mut current, reach);
         }
-        reach = reach.filter(|reach| reach.left > 0);
+        reach = reach.filter(|reach| reach.remaining > 0);
         let mut factor = Factor {
             below: [ZERO; 3],
             corner: ZERO,
@@ -202,26 +192,73 @@ fn eliminate(columns: &[Column], shift: &Lanes, scale: f64, scratch: &mut Scratc
             let inverse = if k == last && shift[l] == 0.0 {
                 0.0
             } else {
-                1.0 / d[l]
+                1.0 / current.diagonal[l]
             };
-            factor.below[0][l] = e1[l] * inverse;
-            factor.below[1][l] = e2[l] * inverse;
-            factor.below[2][l] = e3[l] * inverse;
+            factor.below[0][l] = current.undivided[0][l] * inverse;
+            factor.below[1][l] = current.undivided[1][l] * inverse;
+            factor.below[2][l] = current.undivided[2][l] * inverse;
             factor.corner[l] = column.corner * inverse;
-            right[l] = r[l] * inverse;
+            right[l] = current.value[l] * inverse;
         }
         if column.corner != 0.0 {
             reach = Some(Reach {
-                left: 4,
+                remaining: 4,
                 entry: [column.corner; LANES],
                 factor,
-                value: r,
+                value: current.value,
             });
         }
-        (u1[three], u2[three], u3[three]) = (e1, e2, e3);
-        [l1[three], l2[three], l3[three]] = factor.below;
-        y[three] = r;
+        current.divided = factor.below;
+        before[k % 3] = current;
         scratch.factors[k] = factor;
+    }
+}
+
+/// Column `k` less the three columns before it.
+#[inline(always)]
+fn subtract_columns(
+    current: &mut Reduced,
+    column: &Column,
+    shift: &Lanes,
+    right: &Lanes,
+    scale: f64,
+    before: &[Reduced; 3],
+    k: usize,
+) {
+    let one = &before[(k + 2) % 3];
+    let two = &before[(k + 1) % 3];
+    let three = &before[k % 3];
+    for l in 0..LANES {
+        let a = shift[l].mul_add(column.mass, column.diagonal);
+        let a = (-three.undivided[2][l]).mul_add(three.divided[2][l], a);
+        let a = (-two.undivided[1][l]).mul_add(two.divided[1][l], a);
+        current.diagonal[l] = (-one.undivided[0][l]).mul_add(one.divided[0][l], a);
+        let b = (-two.undivided[2][l]).mul_add(two.divided[1][l], column.below[0]);
+        current.undivided[0][l] = (-one.undivided[1][l]).mul_add(one.divided[0][l], b);
+        current.undivided[1][l] =
+            (-one.undivided[2][l]).mul_add(one.divided[0][l], column.below[1]);
+        current.undivided[2][l] = column.below[2];
+        let c = (-three.divided[2][l]).mul_add(three.value[l], right[l] * scale);
+        let c = (-two.divided[1][l]).mul_add(two.value[l], c);
+        current.value[l] = (-one.divided[0][l]).mul_add(one.value[l], c);
+    }
+}
+
+/// The current column less the one that reaches down to it.
+#[inline(always)]
+fn subtract_reach(current: &mut Reduced, reach: &mut Reach) {
+    reach.remaining -= 1;
+    if reach.remaining == 0 {
+        for l in 0..LANES {
+            current.diagonal[l] -= reach.entry[l] * reach.factor.corner[l];
+            current.value[l] -= reach.factor.corner[l] * reach.value[l];
+        }
+        return;
+    }
+    let entry = &mut current.undivided[reach.remaining - 1];
+    let factor = &reach.factor.below[3 - reach.remaining];
+    for l in 0..LANES {
+        entry[l] -= reach.entry[l] * factor[l];
     }
 }
 
@@ -252,7 +289,8 @@ mod tests {
 
     #[test]
     fn the_factors_invert_the_operator_with_walls_at_either_end() {
-        let (rest, slip) = (Wall::AT_REST, Wall::Slip);
+        let rest = Wall::AT_REST;
+        let slip = Wall::Slip;
         for (n, low, high) in [
             (4, slip, slip),
             (12, rest, slip),

@@ -1,18 +1,21 @@
 //! Direct solution of the pressure equation.
 //!
-//! The fourth-order operator is a sum of products of the directions' operators, so the eigenvectors of one direction reduce
-//! it to a family of problems of one dimension less, exactly. Axis 0 and one of the other two are transformed; what remains
-//! along the third is solved by a banded factorisation, or divided where that axis is periodic and transformed as well. Of
-//! two bounded axes the longer is factorised, because a transform costs work in proportion to its length.
+//! The fourth-order operator is a sum of products of the directions' operators, so the eigenvectors
+//! of one direction reduce it to a family of problems of one dimension less, exactly. Axis 0 and
+//! one of the other two are transformed; what remains along the third is solved by a banded
+//! factorisation, or divided where that axis is periodic and transformed as well. Of two bounded
+//! axes the longer is factorised, because a transform costs work in proportion to its length.
 //!
-//! Every step treats planes or lines one by one and no sum crosses them: the result has the same bits for any number of
-//! threads. The field is transformed in place.
+//! Every step treats planes or lines one by one and no sum crosses them: the result has the same
+//! bits for any number of threads. The field is transformed in place.
 //!
-//! The residual is round-off times the condition of the mesh: about 1e-13 for rough right sides on most meshes, but 1e-16 times
-//! the square of the ratio of length and finest cell for long waves. Every solve measures its own, and solves again for what it
-//! leaves while that is above the tolerance.
+//! The residual is round-off times the condition of the mesh: about 1e-13 for rough right sides on
+//! most meshes, but 1e-16 times the square of the ratio of length and finest cell for long waves.
+//! Every solve measures its own, and solves again for what it leaves while that is above the
+//! tolerance.
 //!
-//! Check: residuals on all kinds of meshes, null space, refinement, equal bits for any number of threads.
+//! Check: residuals on all kinds of meshes, null space, refinement, equal bits for any number of
+//! threads.
 
 use rayon::prelude::*;
 
@@ -21,7 +24,7 @@ use super::banded_cholesky::{BandedCholesky, Scratch};
 use super::kernel;
 use super::lines::pencils;
 use super::method::Method;
-use super::transform::{LineTransform, RowTransform, Way, Work};
+use super::transform::{LineTransform, RowTransform, TransformDirection, Work};
 use crate::Error;
 use crate::solver::slabs::Slabs;
 
@@ -32,6 +35,20 @@ enum Along {
     Factorised(BandedCholesky),
 }
 
+impl Along {
+    /// What is done along `axis`, and its eigenvalues, none if it is factorised.
+    fn new(layout: &Layout, axis: usize) -> (Self, Vec<f64>) {
+        let line = &layout.line[axis];
+        if banded_axis(layout) == Some(axis)
+            && let Some(band) = BandedCholesky::new(line)
+        {
+            return (Self::Factorised(band), Vec::new());
+        }
+        let (transform, values) = LineTransform::new(line);
+        (Self::Transformed(transform), values)
+    }
+}
+
 /// The direct solver of one mesh.
 #[derive(Debug)]
 pub(crate) struct Direct {
@@ -40,7 +57,7 @@ pub(crate) struct Direct {
     along: [Along; 2],
     /// Eigenvalues of the three axes; empty for the factorised one.
     value: [Vec<f64>; 3],
-    /// Factor that the transforms leave out, with the sign of the right side.
+    /// Factor of the transforms, with the sign of the right side.
     scale: f64,
 }
 
@@ -51,23 +68,13 @@ impl Direct {
     /// Factorises the mesh.
     pub(crate) fn new(layout: &Layout) -> Self {
         let (rows, values, factor) = RowTransform::new(&layout.line[0]);
-        let mut value = [values, Vec::new(), Vec::new()];
-        let banded = banded_axis(layout);
-        let mut along = |axis: usize| {
-            let line = &layout.line[axis];
-            if let Some(band) = BandedCholesky::new(line).filter(|_| banded == Some(axis)) {
-                return Along::Factorised(band);
-            }
-            let (transform, values) = LineTransform::new(line);
-            value[axis] = values;
-            Along::Transformed(transform)
-        };
-        let along = [along(1), along(2)];
+        let (along_1, values_1) = Along::new(layout, 1);
+        let (along_2, values_2) = Along::new(layout, 2);
         Self {
             slabs: layout.slabs.clone(),
             rows,
-            along,
-            value,
+            along: [along_1, along_2],
+            value: [values, values_1, values_2],
             scale: -factor,
         }
     }
@@ -75,19 +82,19 @@ impl Direct {
     /// What is done along the axes 1 and 2 of the places from `first` on of axis 0.
     fn lines_once(&self, field: &mut [f64], shape: Shape, first: usize) {
         if !self.by_planes() {
-            self.lines(Way::There, 0, field, shape);
+            self.lines(TransformDirection::Forward, 0, field, shape);
         }
         match &self.along {
             [Along::Factorised(band), _] => {
-                self.lines(Way::There, 1, field, shape);
+                self.lines(TransformDirection::Forward, 1, field, shape);
                 self.banded(1, band, field, shape, first);
-                self.lines(Way::Back, 1, field, shape);
+                self.lines(TransformDirection::Inverse, 1, field, shape);
             }
             [_, Along::Factorised(band)] => self.banded(2, band, field, shape, first),
             [_, Along::Transformed(transform)] => self.divide(transform, field, shape, first),
         }
         if !self.by_planes() {
-            self.lines(Way::Back, 0, field, shape);
+            self.lines(TransformDirection::Inverse, 0, field, shape);
         }
     }
 
@@ -97,7 +104,7 @@ impl Direct {
     }
 
     /// Transforms along axis 0, and along axis 1 where that is done plane by plane.
-    fn rows(&self, way: Way, field: &mut [f64]) {
+    fn rows(&self, direction: TransformDirection, field: &mut [f64]) {
         let [n0, n1, n2] = self.slabs.shape.n;
         let rows = if self.by_planes() {
             n1
@@ -107,28 +114,28 @@ impl Direct {
         field
             .par_chunks_mut(n0 * rows)
             .for_each_init(Work::default, |work, slab| {
-                if way == Way::There {
-                    self.rows.apply(way, slab, work);
+                if direction == TransformDirection::Forward {
+                    self.rows.apply(direction, slab, work);
                 }
                 if let (true, Along::Transformed(axis)) = (self.by_planes(), &self.along[0]) {
                     let mut rows: Vec<&mut [f64]> = slab.chunks_mut(n0).collect();
-                    axis.apply(way, &mut rows, work);
+                    axis.apply(direction, &mut rows, work);
                 }
-                if way == Way::Back {
-                    self.rows.apply(way, slab, work);
+                if direction == TransformDirection::Inverse {
+                    self.rows.apply(direction, slab, work);
                 }
             });
     }
 
     /// Transforms along axis `which + 1` if it is transformed.
-    fn lines(&self, way: Way, which: usize, field: &mut [f64], shape: Shape) {
+    fn lines(&self, direction: TransformDirection, which: usize, field: &mut [f64], shape: Shape) {
         let Along::Transformed(transform) = &self.along[which] else {
             return;
         };
         let mut pencils = pencils(field, shape, which + 1, usize::MAX);
         let each = pencils.par_iter_mut();
         each.for_each_init(Work::default, |work, pencil| {
-            transform.apply(way, &mut pencil.rows, work)
+            transform.apply(direction, &mut pencil.rows, work)
         });
     }
 
@@ -158,18 +165,19 @@ impl Direct {
             });
     }
 
-    /// Divides the coefficients of the eigenvectors of all axes by their values, pencil by pencil between the transforms along axis 2.
+    /// Divides the coefficients of the eigenvectors of all axes by their values, pencil by pencil
+    /// between the transforms along axis 2.
     fn divide(&self, transform: &LineTransform, field: &mut [f64], shape: Shape, first: usize) {
         let value = &self.value;
         pencils(field, shape, 2, usize::MAX)
             .par_iter_mut()
             .for_each_init(Work::default, |work, pencil| {
                 let along = &value[0][first + pencil.start..];
-                transform.apply(Way::There, &mut pencil.rows, work);
+                transform.apply(TransformDirection::Forward, &mut pencil.rows, work);
                 for (row, own) in pencil.rows.iter_mut().zip(&value[2]) {
                     kernel::divide(row, value[1][pencil.other] + own, along, self.scale);
                 }
-                transform.apply(Way::Back, &mut pencil.rows, work);
+                transform.apply(TransformDirection::Inverse, &mut pencil.rows, work);
             });
     }
 }
@@ -180,11 +188,11 @@ impl Method for Direct {
     }
 
     fn solve(&self, own: &mut [f64], _: f64, _: f64) -> Result<usize, Error> {
-        self.rows(Way::There, own);
+        self.rows(TransformDirection::Forward, own);
         self.slabs.transposed(own, 1, |field, shape, first| {
             self.lines_once(field, shape, first)
         })?;
-        self.rows(Way::Back, own);
+        self.rows(TransformDirection::Inverse, own);
         Ok(0)
     }
 }
@@ -200,8 +208,9 @@ pub(crate) fn dense_axes(layout: &Layout) -> Vec<usize> {
 
 /// The axis that is factorised: the longer of the bounded ones, axis 2 if they are about equal.
 fn banded_axis(layout: &Layout) -> Option<usize> {
-    let bounded = |axis: usize| !layout.line[axis].is_periodic() && !layout.line[axis].is_thin();
-    match (bounded(1), bounded(2)) {
+    let [bounded_1, bounded_2] =
+        [1, 2].map(|axis| !layout.line[axis].is_periodic() && !layout.line[axis].is_thin());
+    match (bounded_1, bounded_2) {
         (true, true) if 3 * layout.shape.n[1] > 4 * layout.shape.n[2] => Some(1),
         (_, true) => Some(2),
         (true, false) => Some(1),

@@ -1,14 +1,17 @@
-//! Eigenvectors of the pressure operator of one direction: `K v = lambda M v` with `K = Dw F^-1 Dw^T`.
+//! Eigenvectors of the pressure operator of one direction: `K v = lambda M v` with
+//! `K = Dw F^-1 Dw^T`.
 //!
 //! - Periodic, equal cells: waves, with the exact symbol.
 //! - Slip planes, equal cells: cosines, with the same symbol.
-//! - Everything else: `K` is never formed. The columns of `M^-1/2 Dw F^-1/2` are rotated in pairs until they are orthogonal
-//!   (one-sided Jacobi, Hestenes 1958); they are then `sqrt(lambda) M^1/2 v`. This keeps the small eigenvalues of strongly
-//!   stretched meshes accurate, which the eigenvalues of a formed `K` are not.
+//! - Everything else: `K` is never formed. The columns of `M^-1/2 Dw F^-1/2` are rotated in pairs
+//!   until they are orthogonal (one-sided Jacobi, Hestenes 1958); they are then
+//!   `sqrt(lambda) M^1/2 v`. This keeps the small eigenvalues of strongly stretched meshes
+//!   accurate, which the eigenvalues of a formed `K` are not.
 //!
 //! The vectors satisfy `V^T M V = 1`; the first is the constant with the eigenvalue 0, exactly.
 //!
-//! Check: orthogonality, `K V = M V lambda`, all kinds of ends; the closed forms against the rotations.
+//! Check: orthogonality, `K V = M V lambda`, all kinds of ends; the closed forms against the
+//! rotations.
 
 use std::f64::consts::PI;
 
@@ -66,28 +69,29 @@ impl Basis {
         let n = line.cells;
         let h = line.cell_mass_m[0];
         let length = n as f64 * h;
-        let entry = |i: usize, m: usize| {
-            let wave = m.div_ceil(2);
-            let angle = 2.0 * PI * ((i * wave) % n) as f64 / n as f64;
-            let single = m == 0 || 2 * wave == n;
-            let norm = if single {
-                1.0 / length.sqrt()
-            } else {
-                (2.0 / length).sqrt()
-            };
-            norm * if m % 2 == 1 || m == 0 {
-                angle.cos()
-            } else {
-                -angle.sin()
+        let mut vector = Vec::with_capacity(n * n);
+        for i in 0..n {
+            for m in 0..n {
+                let wave = m.div_ceil(2);
+                let angle = 2.0 * PI * ((i * wave) % n) as f64 / n as f64;
+                let is_single = m == 0 || 2 * wave == n;
+                let norm = if is_single {
+                    1.0 / length.sqrt()
+                } else {
+                    (2.0 / length).sqrt()
+                };
+                let is_cosine = m % 2 == 1 || m == 0;
+                vector.push(norm * if is_cosine { angle.cos() } else { -angle.sin() });
             }
-        };
+        }
         Self {
             value: Self::wave_values(n, h),
-            vector: (0..n * n).map(|p| entry(p / n, p % n)).collect(),
+            vector,
         }
     }
 
-    /// Eigenvalues \[1/m^2\] of `n` periodic cells of width `h` \[m\]: the constant, then the waves, in pairs.
+    /// Eigenvalues \[1/m^2\] of `n` periodic cells of width `h` \[m\]: the constant, then the
+    /// waves, in pairs.
     pub(crate) fn wave_values(n: usize, h: f64) -> Vec<f64> {
         (0..n)
             .map(|m| symbol(2.0 * PI * m.div_ceil(2) as f64 / n as f64, h))
@@ -98,19 +102,19 @@ impl Basis {
         let n = line.cells;
         let h = line.cell_mass_m[0];
         let length = n as f64 * h;
-        let entry = |i: usize, m: usize| {
-            let angle = PI * (((2 * i + 1) * m) % (4 * n)) as f64 / (2 * n) as f64;
-            if m == 0 {
-                1.0 / length.sqrt()
-            } else {
-                (2.0 / length).sqrt() * angle.cos()
+        let mut vector = Vec::with_capacity(n * n);
+        for i in 0..n {
+            vector.push(1.0 / length.sqrt());
+            for m in 1..n {
+                let angle = PI * (((2 * i + 1) * m) % (4 * n)) as f64 / (2 * n) as f64;
+                vector.push((2.0 / length).sqrt() * angle.cos());
             }
-        };
+        }
         Self {
             value: (0..n)
                 .map(|m| symbol(PI * m as f64 / n as f64, h))
                 .collect(),
-            vector: (0..n * n).map(|p| entry(p / n, p % n)).collect(),
+            vector,
         }
     }
 
@@ -136,8 +140,9 @@ impl Basis {
                 .zip(mass)
                 .map(|(w, mass)| w / (lambda * mass).sqrt())
                 .collect();
-            // Round-off along the constant would see the pressure's free level.
-            let mean = v.iter().zip(mass).map(|(v, mass)| v * mass).sum::<f64>() / length;
+            // Round-off along the constant would couple to the free level of the pressure.
+            let weighted = v.iter().zip(mass).map(|(v, mass)| v * mass);
+            let mean = weighted.sum::<f64>() / length;
             v.iter_mut().for_each(|v| *v -= mean);
             for (cell, v) in v.into_iter().enumerate() {
                 vector[cell * n + m + 1] = v;

@@ -1,8 +1,9 @@
 //! Products of a small dense matrix with many rows or columns of a field, in place.
 //!
-//! One tile of the result, 6 rows by 32 columns, stays in registers while the inner index runs over its whole length; the
-//! operands are packed so that each step reads 6 and 32 neighbouring numbers. The order of operations of one element never
-//! depends on the tile it falls into or on the number of threads. Every multiply-add is fused, on every machine.
+//! One tile of the result, 6 rows by 32 columns, stays in registers while the inner index runs over
+//! its whole length; the operands are packed so that each step reads 6 and 32 neighbouring numbers.
+//! The order of operations of one element never depends on the tile it falls into or on the number
+//! of threads. Every multiply-add is fused, on every machine.
 //!
 //! Check: against the sum written out, for all remainders of the tile.
 
@@ -21,11 +22,13 @@ type TileRow = [f64; COLUMNS];
 /// Six rows of a matrix, column by column.
 type Group = Vec<[f64; ROWS]>;
 
-/// A square matrix packed for products from the left, `A f`: of each of its blocks groups of 6 rows, column by column.
+/// A square matrix packed for products from the left, `A f`: of each of its blocks groups of 6
+/// rows, column by column.
 #[derive(Debug)]
-pub(crate) struct Left {
+pub(crate) struct PackedMatrix {
     n: usize,
-    /// Rows that are replaced by their sum and their difference before the product, one pair after the other.
+    /// Rows that are replaced by their sum and their difference before the product, one pair after
+    /// the other.
     before: Vec<[usize; 2]>,
     /// First row of each block on the diagonal, rows, and groups.
     blocks: Vec<(usize, usize, Vec<Group>)>,
@@ -35,65 +38,45 @@ pub(crate) struct Left {
 
 /// Space for one packed operand.
 #[derive(Debug, Default)]
-pub(crate) struct Packed {
+pub(crate) struct Panels {
     columns: Vec<TileRow>,
     product: Vec<TileRow>,
 }
 
-impl Left {
+impl PackedMatrix {
     /// The transpose of a matrix with the columns in the order of `fold`.
     pub(crate) fn transpose(fold: &Fold) -> Self {
-        Self::new([&fold.pairs, &[]], fold, |block, i, k| block[i][k])
+        Self {
+            n: fold.columns.len(),
+            before: fold.pairs.clone(),
+            blocks: packed_blocks(fold, |block, i, k| block[i][k]),
+            after: Vec::new(),
+        }
     }
 
     /// A matrix with the columns in the order of `fold`.
     pub(crate) fn same(fold: &Fold) -> Self {
-        Self::new([&[], &fold.pairs], fold, |block, i, k| block[k][i])
-    }
-
-    fn new(
-        pairs: [&[[usize; 2]]; 2],
-        fold: &Fold,
-        at: impl Fn(&[Vec<f64>], usize, usize) -> f64,
-    ) -> Self {
-        let pack = |(start, block): &(usize, Vec<Vec<f64>>)| {
-            let n = block.len();
-            let group = |first: usize| -> Group {
-                let entry = |i: usize, k: usize| {
-                    if first + i < n {
-                        at(block, first + i, k)
-                    } else {
-                        0.0
-                    }
-                };
-                (0..n)
-                    .map(|k| std::array::from_fn(|i| entry(i, k)))
-                    .collect()
-            };
-            (*start, n, (0..n).step_by(ROWS).map(group).collect())
-        };
-        let n = fold.columns.len();
-        let [before, after] = pairs.map(<[_]>::to_vec);
         Self {
-            n,
-            before,
-            blocks: fold.blocks.iter().map(pack).collect(),
-            after,
+            n: fold.columns.len(),
+            before: Vec::new(),
+            blocks: packed_blocks(fold, |block, i, k| block[k][i]),
+            after: fold.pairs.clone(),
         }
     }
 
     /// Replaces the `n` rows `f` of equal length by `A f`.
-    pub(crate) fn apply(&self, f: &mut [&mut [f64]], packed: &mut Packed) {
+    pub(crate) fn apply(&self, f: &mut [&mut [f64]], packed: &mut Panels) {
         let (panel, product) = packed.panels(self.n);
         for columns in panels(f) {
-            take(&self.before, f, columns, panel);
+            load_panel(&self.before, f, columns, panel);
             self.multiply(panel, columns, product);
-            give(&self.after, product, f, columns);
+            store_panel(&self.after, product, f, columns);
         }
     }
 
-    /// Replaces each row `f` of `n` values, all of which follow one another, by `A f`; of a matrix without symmetries.
-    pub(crate) fn apply_to_rows(&self, f: &mut [f64], packed: &mut Packed) {
+    /// Replaces each row `f` of `n` values, all of which follow one another, by `A f`; of a matrix
+    /// without symmetries.
+    pub(crate) fn apply_to_rows(&self, f: &mut [f64], packed: &mut Panels) {
         let (panel, product) = packed.panels(self.n);
         for rows in f.chunks_mut(COLUMNS * self.n) {
             for (i, row) in rows.chunks(self.n).enumerate() {
@@ -125,7 +108,31 @@ impl Left {
     }
 }
 
-impl Packed {
+/// The blocks of a fold in groups of rows, `value_at` giving the entry of a row and a column of a
+/// block; the last group is filled up with zeros.
+fn packed_blocks(
+    fold: &Fold,
+    value_at: impl Fn(&[Vec<f64>], usize, usize) -> f64,
+) -> Vec<(usize, usize, Vec<Group>)> {
+    let mut blocks = Vec::with_capacity(fold.blocks.len());
+    for (start, block) in &fold.blocks {
+        let n = block.len();
+        let mut groups = Vec::with_capacity(n.div_ceil(ROWS));
+        for first in (0..n).step_by(ROWS) {
+            let mut group: Group = vec![[0.0; ROWS]; n];
+            for (k, column) in group.iter_mut().enumerate() {
+                for i in 0..ROWS.min(n - first) {
+                    column[i] = value_at(block, first + i, k);
+                }
+            }
+            groups.push(group);
+        }
+        blocks.push((*start, n, groups));
+    }
+    blocks
+}
+
+impl Panels {
     /// Two panels of `n` rows.
     fn panels(&mut self, n: usize) -> (&mut [TileRow], &mut [TileRow]) {
         self.columns.resize(n, [0.0; COLUMNS]);
@@ -144,7 +151,12 @@ fn panels(f: &[&mut [f64]]) -> impl Iterator<Item = [usize; 2]> + use<> {
 
 /// Copies some columns of `f` and puts sums and differences of pairs of rows in their places.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn take(pairs: &[[usize; 2]], f: &[&mut [f64]], [start, end]: [usize; 2], panel: &mut [TileRow]) {
+fn load_panel(
+    pairs: &[[usize; 2]],
+    f: &[&mut [f64]],
+    [start, end]: [usize; 2],
+    panel: &mut [TileRow],
+) {
     for (row, packed) in f.iter().zip(&mut *panel) {
         copy(&row[start..end], packed);
     }
@@ -155,7 +167,7 @@ fn take(pairs: &[[usize; 2]], f: &[&mut [f64]], [start, end]: [usize; 2], panel:
 
 /// The other way round.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn give(
+fn store_panel(
     pairs: &[[usize; 2]],
     product: &mut [TileRow],
     f: &mut [&mut [f64]],
@@ -252,10 +264,10 @@ mod tests {
             let mut left = f.clone();
             let mut rows: Vec<&mut [f64]> = left.chunks_mut(width).collect();
             let matrix: Vec<f64> = (0..n * n).map(|p| entry(p / n, p % n)).collect();
-            Left::same(&Fold::new(n, &matrix)).apply(&mut rows, &mut Packed::default());
+            PackedMatrix::same(&Fold::new(n, &matrix)).apply(&mut rows, &mut Panels::default());
             let mut right = f.clone();
-            Left::transpose(&Fold::none(n, &matrix))
-                .apply_to_rows(&mut right, &mut Packed::default());
+            PackedMatrix::transpose(&Fold::none(n, &matrix))
+                .apply_to_rows(&mut right, &mut Panels::default());
             for r in 0..n {
                 for c in 0..width {
                     let sum: f64 = (0..n).map(|k| entry(r, k) * f[k * width + c]).sum();

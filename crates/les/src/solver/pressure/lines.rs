@@ -13,7 +13,8 @@ pub(crate) struct Pencil<'a> {
     pub(crate) rows: Vec<&'a mut [f64]>,
 }
 
-/// Cuts `field` into pencils of at most `widest` lines along `axis` (1 or 2), in an order and with widths that depend on the shape alone.
+/// Cuts `field` into pencils of at most `widest` lines along `axis` (1 or 2), in an order and with
+/// widths that depend on the shape alone.
 pub(crate) fn pencils(
     field: &mut [f64],
     shape: Shape,
@@ -44,7 +45,8 @@ pub(crate) fn pencils(
     pencils
 }
 
-/// Cuts `field` into groups of `width` places of axis 0: one piece for each row, in the order of the rows.
+/// Cuts `field` into groups of `width` places of axis 0: one piece for each row, in the order of
+/// the rows.
 pub(crate) fn columns(field: &mut [f64], shape: Shape, width: usize) -> Vec<Vec<&mut [f64]>> {
     let n0 = shape.n[0];
     let mut groups: Vec<Vec<&mut [f64]>> = Vec::new();

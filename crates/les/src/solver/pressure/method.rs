@@ -7,8 +7,8 @@ pub(super) trait Method: Send + Sync + std::fmt::Debug {
     /// Its name in errors.
     fn name(&self) -> &'static str;
 
-    /// Replaces the right side in the planes that are owned, of norm `size` over all, by a solution of about the relative residual
-    /// `tolerance`; returns the iterations, 0 of a direct method.
+    /// Replaces the right side in the planes that are owned, of norm `size` over all, by a solution
+    /// of about the relative residual `tolerance`; returns the iterations, 0 of a direct method.
     ///
     /// # Errors
     /// Those of the exchange between ranks.

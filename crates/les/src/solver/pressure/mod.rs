@@ -1,7 +1,8 @@
-//! The pressure equation, `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T phi = -g`, by two independent methods.
+//! The pressure equation, `sum_b (prod_{d != b} m_d) Dw_b f_b^-1 Dw_b^T phi = -g`, by two
+//! independent methods.
 //!
-//! `g` is the weighted divergence; the operator is the product of the very divergence and gradient of the projection, so that
-//! the residual of the solution is the divergence left in the flow.
+//! `g` is the weighted divergence; the operator is the product of the very divergence and gradient
+//! of the projection, so that the residual of the solution is the divergence left in the flow.
 
 mod apply;
 mod banded_cholesky;
@@ -25,4 +26,4 @@ mod tests;
 pub(crate) use apply::norm;
 pub(crate) use lines::{Pencil, pencils};
 pub use solver::PressureMethod;
-pub(crate) use solver::{PressureSolver, Solved, unless_stalled};
+pub(crate) use solver::{PressureSolver, Solved, accept_round_off};

@@ -1,5 +1,6 @@
-//! The solver of the pressure equation of one mesh: a method, called again for what it leaves till the residual of the field is
-//! what was asked for. The residual is computed anew from the field, so that it holds the round-off of everything.
+//! The solver of the pressure equation of one mesh: a method, called again for what it leaves till
+//! the residual of the field is what was asked for. The residual is computed anew from the field,
+//! so that it holds the round-off of everything.
 //!
 //! Which method a mesh gets, and what it needs, is known before one is built.
 //!
@@ -27,7 +28,8 @@ pub enum PressureMethod {
     Auto,
     /// Transforms and a banded factorisation: the residual is round-off.
     Direct,
-    /// A transform along one direction, and for each of its modes conjugate gradients with multigrid in the other two.
+    /// A transform along one direction, and for each of its modes conjugate gradients with
+    /// multigrid in the other two.
     Multigrid,
 }
 
@@ -35,8 +37,9 @@ pub enum PressureMethod {
 const DENSE_LIMIT: usize = 3000;
 
 impl PressureMethod {
-    /// Cells of the directions that this method transforms by products with a dense matrix on `mesh`: a matrix of `n` x `n` takes
-    /// the time of `n^3` to find, and its products that of `n` per cell and solve.
+    /// Cells of the directions that this method transforms by products with a dense matrix on
+    /// `mesh`: a matrix of `n` x `n` takes the time of `n^3` to find, and its products that of `n`
+    /// per cell and solve.
     pub fn dense_directions(self, mesh: &Mesh) -> Vec<usize> {
         let layout = Layout::new(mesh);
         let mut dense = if self.takes_multigrid(&layout) {
@@ -74,9 +77,10 @@ impl PressureMethod {
 const MAX_SOLVES: usize = 8;
 /// A solve that leaves more than this has stalled.
 const STALLED: f64 = 0.5;
-/// Part of the tolerance asked of a solve: the residual it sees is not exactly the field's.
+/// Fraction of the tolerance that a solve has to reach: its residual is not exactly the field's.
 const SAFETY: f64 = 0.999;
-/// A solution that improves no more is held up by round-off if it leaves at most this multiple of the last digit's share.
+/// A solution that improves no more is held up by round-off if it leaves at most this multiple of
+/// the last digit's share.
 const ROUND_OFF: f64 = 4.0;
 /// Part of the tolerance that an imbalance may add to the residual.
 const BALANCED: f64 = 0.01;
@@ -84,7 +88,8 @@ const BALANCED: f64 = 0.01;
 /// What a solve did.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Solved {
-    /// 2-norm of the residual over that of the right side less what no pressure can balance, measured on the solution.
+    /// 2-norm of the residual over that of the right side less what no pressure can balance,
+    /// measured on the solution.
     pub(crate) residual: f64,
     /// Iterations, 0 for a direct solve.
     pub(crate) iterations: usize,
@@ -98,8 +103,8 @@ pub(crate) struct PressureSolver {
     pub(super) operator: Operator,
     method: Box<dyn Method>,
     right: Aligned,
-    /// What the solution leaves, once it is solved for.
-    left: Aligned,
+    /// Residual of the solution, then the correction that is added to it; empty until needed.
+    correction: Aligned,
 }
 
 impl PressureSolver {
@@ -115,27 +120,24 @@ impl PressureSolver {
             operator: Operator::new(layout),
             method,
             right,
-            left: Aligned::default(),
+            correction: Aligned::default(),
         }
     }
 
-    /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos included.
+    /// Replaces the weighted divergence `g` in `field` by `phi`, of zero weighted mean, halos
+    /// included.
     ///
     /// # Errors
-    /// [`Error::PressureNotSolved`] if the residual does not reach `tolerance` (2-norm, relative to the right side); the field is then
-    /// the last solution found.
+    /// [`Error::PressureNotSolved`] if the residual does not reach `tolerance` (2-norm, relative to
+    /// the right side); the field is then the last solution found.
     pub(crate) fn solve(&mut self, field: &mut [f64], tolerance: f64) -> Result<Solved, Error> {
-        let Self {
-            operator,
-            method,
-            right,
-            left,
-        } = self;
         check("tolerance", tolerance, "above 0 and below 1", |t| {
             t > 0.0 && t < 1.0
         })?;
-        // The methods ignore what no pressure can balance; only the residual must not hold it against them.
-        let size = operator.copy_balanced(field, right, BALANCED * tolerance)?;
+        // The methods ignore what no pressure can balance; the residual must not contain it.
+        let size = self
+            .operator
+            .copy_balanced(field, &mut self.right, BALANCED * tolerance)?;
         if size == 0.0 {
             field.fill(0.0);
             return Ok(Solved {
@@ -144,29 +146,19 @@ impl PressureSolver {
                 factor: None,
             });
         }
-        let own = operator.slabs.shape.own_places();
-        let (mut iterations, mut history, mut last, mut attainable) = (0, Vec::new(), 1.0, 0.0);
+        let mut iterations = 0;
+        let mut history = Vec::new();
+        let mut last = 1.0;
+        let mut attainable = 0.0;
         let reason = loop {
-            // Of a later solve the right side is what the field so far leaves.
-            let refines = !history.is_empty();
-            let unknown = if refines {
-                &mut left[own.clone()]
+            let target = f64::max(SAFETY * tolerance, 0.25 * attainable) / last;
+            iterations += if history.is_empty() {
+                self.first_solve(field, size, target)?
             } else {
-                &mut field[own.clone()]
+                self.refine(field, last * size, target)?
             };
-            iterations += method.solve(
-                unknown,
-                last * size,
-                f64::max(SAFETY * tolerance, 0.25 * attainable) / last,
-            )?;
-            if refines {
-                field
-                    .par_iter_mut()
-                    .zip(&left[..])
-                    .for_each(|(phi, more)| *phi += more);
-            }
-            operator.slabs.halos(&mut [field], WHOLE)?;
-            let residual = operator.residual_norm(right, field)? / size;
+            self.operator.slabs.halos(&mut [field], WHOLE)?;
+            let residual = self.operator.residual_norm(&self.right, field)? / size;
             history.push(residual);
             if residual <= tolerance {
                 let factor = (iterations > 0).then(|| residual.powf(1.0 / iterations as f64));
@@ -179,38 +171,63 @@ impl PressureSolver {
             if residual.is_nan() {
                 break PressureFailure::NotFinite;
             }
-            attainable = operator.round_off(field)? / size;
+            attainable = self.operator.round_off(field)? / size;
             if residual > STALLED * last || history.len() == MAX_SOLVES {
-                let at_round_off = residual.min(last) <= ROUND_OFF * attainable;
-                break if at_round_off {
-                    PressureFailure::RoundOff { attainable }
-                } else {
-                    PressureFailure::Stalled
-                };
+                break stalled_or_round_off(residual.min(last), attainable);
             }
             last = residual;
-            if left.is_empty() {
-                *left = Aligned::zeros(field.len());
-            }
-            operator.residual(right, field, left);
-            // The methods take the negative of their right side.
-            left.par_iter_mut().for_each(|value| *value = -*value);
         };
         Err(Error::PressureNotSolved {
-            method: method.name(),
+            method: self.method.name(),
             tolerance,
             reason,
             iterations,
             history,
         })
     }
+
+    /// Replaces the right side in `field` by a solution; returns the iterations.
+    fn first_solve(&self, field: &mut [f64], size: f64, target: f64) -> Result<usize, Error> {
+        let own = self.operator.slabs.shape.own_range();
+        self.method.solve(&mut field[own], size, target)
+    }
+
+    /// Adds to `field` a solution for its residual of norm `size`; returns the iterations.
+    fn refine(&mut self, field: &mut [f64], size: f64, target: f64) -> Result<usize, Error> {
+        if self.correction.is_empty() {
+            self.correction = Aligned::zeros(field.len());
+        }
+        self.operator
+            .residual(&self.right, field, &mut self.correction);
+        // The methods take the negative of their right side.
+        self.correction
+            .par_iter_mut()
+            .for_each(|value| *value = -*value);
+        let own = self.operator.slabs.shape.own_range();
+        let iterations = self.method.solve(&mut self.correction[own], size, target)?;
+        field
+            .par_iter_mut()
+            .zip(&self.correction[..])
+            .for_each(|(phi, correction)| *phi += correction);
+        Ok(iterations)
+    }
 }
 
-/// Takes what a solve reached whose residual round-off holds up, and what is not finite, which a step finds.
+/// Why a residual falls no more, if round-off leaves about `attainable`.
+fn stalled_or_round_off(residual: f64, attainable: f64) -> PressureFailure {
+    if residual <= ROUND_OFF * attainable {
+        PressureFailure::RoundOff { attainable }
+    } else {
+        PressureFailure::Stalled
+    }
+}
+
+/// Accepts a solution whose residual is limited by round-off, and one that is not finite, which
+/// the step reports.
 ///
 /// # Errors
 /// Those of a solve that stalled, or of the exchange between ranks.
-pub(crate) fn unless_stalled(solved: Result<Solved, Error>) -> Result<(), Error> {
+pub(crate) fn accept_round_off(solved: Result<Solved, Error>) -> Result<(), Error> {
     match solved {
         Err(Error::PressureNotSolved {
             reason: PressureFailure::Stalled,

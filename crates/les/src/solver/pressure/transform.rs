@@ -1,8 +1,8 @@
 //! Change of basis along one axis to the eigenvectors of its pressure operator, and back, in place.
 //!
-//! Axis 0: real Fourier transform where the cells are equal, the direction periodic and their number has small factors;
-//! otherwise a product with the matrix of eigenvectors. Axes 1 and 2: the matrix product, folded by the
-//! symmetries of the eigenvectors.
+//! Axis 0: real Fourier transform where the cells are equal, the direction periodic and their
+//! number has small factors; otherwise a product with the matrix of eigenvectors. Axes 1 and 2: the
+//! matrix product, folded by the symmetries of the eigenvectors.
 //!
 //! Check: there and back; the two forms of the Fourier transform against each other.
 
@@ -15,37 +15,38 @@ use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use super::super::operators_1d::Operators1d;
 use super::eigen::Basis;
 use super::fold::Fold;
-use super::gemm::{Left, Packed};
+use super::gemm::{PackedMatrix, Panels};
 
 /// Space that a thread needs for transforms.
 #[derive(Debug, Default)]
 pub(crate) struct Work {
-    packed: Packed,
+    packed: Panels,
     spectrum: Vec<Complex<f64>>,
     scratch: Vec<Complex<f64>>,
 }
 
-/// Which way a transform goes.
+/// Direction of a transform.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Way {
+pub(crate) enum TransformDirection {
     /// To the modes.
-    There,
+    Forward,
     /// To the values.
-    Back,
+    Inverse,
 }
 
 /// Transform of the rows along axis 0.
 pub(crate) enum RowTransform {
     /// One cell: nothing to do.
     Thin,
-    /// Fourier transform; the modes are stored as real and imaginary parts in the places of the row.
+    /// Fourier transform; the modes are stored as real and imaginary parts in the places of the
+    /// row.
     Fourier {
         cells: usize,
         forward: Arc<dyn RealToComplex<f64>>,
         inverse: Arc<dyn ComplexToReal<f64>>,
     },
     /// Products with the transpose of the eigenvectors, and with them.
-    Dense(Box<[Left; 2]>),
+    Dense(Box<[PackedMatrix; 2]>),
 }
 
 impl fmt::Debug for RowTransform {
@@ -60,7 +61,8 @@ impl fmt::Debug for RowTransform {
 
 /// Largest prime factor for which the Fourier transform is fast.
 const SMOOTH: usize = 11;
-/// Cells up to which the matrix product is faster than a Fourier transform of a number with large factors.
+/// Cells up to which the matrix product is faster than a Fourier transform of a number with large
+/// factors.
 const SMALL: usize = 150;
 /// Cells up to which the matrix product is faster than any Fourier transform.
 const TINY: usize = 12;
@@ -69,23 +71,24 @@ impl RowTransform {
     /// Whether a direction is transformed by products with a matrix.
     pub(crate) fn is_dense(line: &Operators1d) -> bool {
         let n = line.cells;
-        // Powers of two add equal values exactly: a flow that does not vary stays as it is, whatever the number of cells.
+        // Powers of two add equal values exactly: a flow that does not vary stays as it is,
+        // whatever the number of cells.
         let fast = n.is_power_of_two() || n > TINY && (n > SMALL || largest_factor(n) <= SMOOTH);
         !(line.is_thin() || line.is_fourier() && fast)
     }
 
-    /// The transform, the eigenvalues by place, and the factor that both ways together leave out.
+    /// The transform, the eigenvalues in the order of its modes, and the factor by which forward
+    /// and inverse transform together must be multiplied.
     pub(crate) fn new(line: &Operators1d) -> (Self, Vec<f64>, f64) {
         let n = line.cells;
         if line.is_thin() {
             (Self::Thin, vec![0.0], 1.0 / line.cell_mass_m[0])
         } else if !Self::is_dense(line) {
             let mut planner = RealFftPlanner::new();
-            let (forward, inverse) = (planner.plan_fft_forward(n), planner.plan_fft_inverse(n));
             let transform = Self::Fourier {
                 cells: n,
-                forward,
-                inverse,
+                forward: planner.plan_fft_forward(n),
+                inverse: planner.plan_fft_inverse(n),
             };
             let h = line.cell_mass_m[0];
             (transform, Basis::wave_values(n, h), 1.0 / (n as f64 * h))
@@ -93,7 +96,10 @@ impl RowTransform {
             let Basis { value, vector } = Basis::new(line);
             let vectors = Fold::none(n, &vector);
             (
-                Self::Dense(Box::new([Left::transpose(&vectors), Left::same(&vectors)])),
+                Self::Dense(Box::new([
+                    PackedMatrix::transpose(&vectors),
+                    PackedMatrix::same(&vectors),
+                ])),
                 value,
                 1.0,
             )
@@ -101,18 +107,18 @@ impl RowTransform {
     }
 
     /// Rows to modes, or back.
-    pub(crate) fn apply(&self, way: Way, rows: &mut [f64], work: &mut Work) {
+    pub(crate) fn apply(&self, direction: TransformDirection, rows: &mut [f64], work: &mut Work) {
         match self {
             Self::Thin => {}
-            Self::Dense(ways) => ways[way as usize].apply_to_rows(rows, &mut work.packed),
-            Self::Fourier { cells, forward, .. } if way == Way::There => {
+            Self::Dense(ways) => ways[direction as usize].apply_to_rows(rows, &mut work.packed),
+            Self::Fourier { cells, forward, .. } if direction == TransformDirection::Forward => {
                 let (spectrum, scratch) = work.fourier(*cells, forward.get_scratch_len());
                 for row in rows.chunks_mut(*cells) {
                     if forward
                         .process_with_scratch(row, spectrum, scratch)
                         .is_err()
                     {
-                        spoil(row);
+                        invalidate(row);
                     }
                     row[0] = spectrum[0].re;
                     let (pairs, last) = row[1..].as_chunks_mut::<2>();
@@ -139,15 +145,15 @@ impl RowTransform {
                         .process_with_scratch(spectrum, row, scratch)
                         .is_err()
                     {
-                        spoil(row);
+                        invalidate(row);
                     }
                 }
             }
         }
     }
 
-    /// Square of the norm of a right side that consists of mode `m`, over that of the mode, for cells of mass `mass_m`. Of a
-    /// stretched direction only the mean is known.
+    /// Square of the norm of a right side that consists of mode `m`, over that of the mode, for
+    /// cells of mass `mass_m`. Of a stretched direction only the mean is known.
     pub(crate) fn weight(&self, m: usize, mass_m: f64) -> f64 {
         match self {
             Self::Fourier { cells, .. } => {
@@ -164,8 +170,9 @@ impl RowTransform {
     }
 }
 
-/// A length that does not fit the plan cannot occur; if it did, it must not go unseen.
-fn spoil(row: &mut [f64]) {
+/// Marks a row as invalid. A length that does not fit the plan cannot occur; if it did, the
+/// solution would not be finite.
+fn invalidate(row: &mut [f64]) {
     row.fill(f64::NAN);
 }
 
@@ -189,7 +196,7 @@ pub(crate) enum LineTransform {
     /// One cell: its scale alone.
     Thin(f64),
     /// Products with the transpose of the eigenvectors, and with them.
-    Dense(Box<[Left; 2]>),
+    Dense(Box<[PackedMatrix; 2]>),
 }
 
 impl LineTransform {
@@ -202,16 +209,24 @@ impl LineTransform {
         let fold = Fold::new(line.cells, &vector);
         let value = fold.columns.iter().map(|&m| value[m]).collect();
         (
-            Self::Dense(Box::new([Left::transpose(&fold), Left::same(&fold)])),
+            Self::Dense(Box::new([
+                PackedMatrix::transpose(&fold),
+                PackedMatrix::same(&fold),
+            ])),
             value,
         )
     }
 
     /// Lines to modes, or back.
-    pub(crate) fn apply(&self, way: Way, rows: &mut [&mut [f64]], work: &mut Work) {
+    pub(crate) fn apply(
+        &self,
+        direction: TransformDirection,
+        rows: &mut [&mut [f64]],
+        work: &mut Work,
+    ) {
         match self {
             Self::Thin(scale) => scale_rows(rows, *scale),
-            Self::Dense(ways) => ways[way as usize].apply(rows, &mut work.packed),
+            Self::Dense(ways) => ways[direction as usize].apply(rows, &mut work.packed),
         }
     }
 }
@@ -224,7 +239,8 @@ fn scale_rows(rows: &mut [&mut [f64]], scale: f64) {
 
 /// Largest prime factor.
 fn largest_factor(n: usize) -> usize {
-    let (mut rest, mut factor) = (n, 2);
+    let mut rest = n;
+    let mut factor = 2;
     while factor * factor <= rest {
         if rest.is_multiple_of(factor) {
             rest /= factor;
@@ -250,10 +266,15 @@ mod tests {
             assert_eq!(value, basis.value);
             let row: Vec<f64> = (0..n).map(|i| (1.0 + i as f64).sqrt().sin()).collect();
             let mut modes = row.clone();
-            transform.apply(Way::There, &mut modes, &mut Work::default());
+            transform.apply(
+                TransformDirection::Forward,
+                &mut modes,
+                &mut Work::default(),
+            );
             for (m, mode) in modes.iter().enumerate() {
                 let product: f64 = (0..n).map(|i| basis.vector[i * n + m] * row[i]).sum();
-                // The Fourier transform has no norm; waves in pairs have twice the norm of single ones.
+                // The Fourier transform has no norm; waves in pairs have twice the norm of single
+                // ones.
                 let single = m == 0 || m == n - 1 && n % 2 == 0;
                 let norm = if single { 1.0 } else { 0.5_f64.sqrt() } * factor.sqrt();
                 let scaled = mode * norm * if single { 1.0 } else { 2.0 };
@@ -262,7 +283,11 @@ mod tests {
                     "{n}, mode {m}: {product} against {scaled}"
                 );
             }
-            transform.apply(Way::Back, &mut modes, &mut Work::default());
+            transform.apply(
+                TransformDirection::Inverse,
+                &mut modes,
+                &mut Work::default(),
+            );
             for (a, b) in modes.iter().zip(&row) {
                 assert!((a / n as f64 - b).abs() < 1e-14);
             }
@@ -280,7 +305,8 @@ mod tests {
             (Direction::periodic(12, 0.0, 3.0), 1),
             (slip(32), 3),
             (slip(33), 2),
-            // Of stretched cells two vectors with nearly the same eigenvalue are found in any mixture.
+            // Of stretched cells two vectors with nearly the same eigenvalue are found in any
+            // mixture.
             (slip(40).stretched(Spread::TanhBoth.by(1.2)), 1),
             (slip(40).stretched(low), 1),
             (Direction::periodic(20, 0.0, 3.0).stretched(sine), 1),
@@ -294,7 +320,7 @@ mod tests {
             let field: Vec<f64> = (0..n * width).map(|i| (0.7 * i as f64).sin()).collect();
             let mut modes = field.clone();
             let mut rows: Vec<&mut [f64]> = modes.chunks_mut(width).collect();
-            transform.apply(Way::There, &mut rows, &mut Work::default());
+            transform.apply(TransformDirection::Forward, &mut rows, &mut Work::default());
             for (at, &m) in fold.columns.iter().enumerate() {
                 assert_eq!(values[at], value[m]);
                 for l in 0..width {
@@ -309,7 +335,7 @@ mod tests {
                 }
             }
             let mut rows: Vec<&mut [f64]> = modes.chunks_mut(width).collect();
-            transform.apply(Way::Back, &mut rows, &mut Work::default());
+            transform.apply(TransformDirection::Inverse, &mut rows, &mut Work::default());
             for (place, (back, given)) in modes.iter().zip(&field).enumerate() {
                 let back = back * line.cell_mass_m[place / width];
                 assert!(

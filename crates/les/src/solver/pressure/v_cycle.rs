@@ -1,10 +1,12 @@
-//! One cycle of multigrid in two dimensions, 16 modes side by side: line relaxation in both directions, from fine to coarse and back.
+//! One cycle of multigrid in two dimensions, 16 modes side by side: line relaxation in both
+//! directions, from fine to coarse and back.
 //!
 //! Check: symmetry of the cycle, interpolation, colours, relaxed lines.
 
 use multiversion::multiversion;
 
 use super::super::operators_1d::{Operators1d, Taps};
+use super::apply::off_diagonal;
 
 /// Modes that are solved side by side.
 pub(super) const LANES: usize = 16;
@@ -13,16 +15,19 @@ pub(super) type Lanes = [f32; LANES];
 
 /// Lines that are solved together, to hide the delay of a division.
 const TOGETHER: usize = 4;
-/// Factor of the links along a line on the finest mesh: the fourth-order operator exceeds the second-order one by up to 1.37.
+/// Factor of the links along a line on the finest mesh: the fourth-order operator exceeds the
+/// second-order one by up to 1.37.
 const RAISED: f32 = 1.15;
-/// Relaxations of both directions before and after the coarser mesh, on the finest and on the others.
+/// Relaxations of both directions before and after the coarser mesh, on the finest and on the
+/// others.
 const SWEEPS: [usize; 2] = [1, 2];
 
 /// One mesh: axis 1 is contiguous.
 #[derive(Debug)]
 pub(super) struct Level {
     pub(super) axes: [Axis; 2],
-    /// Interpolation from the next mesh: for each cell along an axis two coarse cells and their weights.
+    /// Interpolation from the next mesh: for each cell along an axis two coarse cells and their
+    /// weights.
     weights: [Vec<[(usize, f32); 2]>; 2],
     sweeps: usize,
 }
@@ -34,8 +39,8 @@ pub(super) struct Axis {
     centre: Vec<f64>,
     /// Distance after which the positions repeat.
     period: Option<f64>,
-    /// The tridiagonal problems of lines along it: inverse distance of cell `i` to cell `i + 1`; the last is the link to cell 0 of a
-    /// periodic direction, or zero.
+    /// The tridiagonal problems of lines along it: inverse distance of cell `i` to cell `i + 1`;
+    /// the last is the link to cell 0 of a periodic direction, or zero.
     link: Vec<f32>,
     /// Cells that each cell is coupled to, and the couplings.
     taps: Vec<Vec<(usize, f32)>>,
@@ -69,7 +74,7 @@ const NO_CELL: Cell = Cell {
 
 impl Lines {
     /// Those of the finest mesh, which are the longest.
-    pub(super) fn of(finest: &Level) -> Self {
+    pub(super) fn new(finest: &Level) -> Self {
         let [first, second] = finest.axes.each_ref().map(Axis::len);
         Self {
             line: vec![[NO_CELL; TOGETHER]; first.max(second)],
@@ -79,37 +84,34 @@ impl Lines {
 }
 
 impl Axis {
-    /// That of the finest mesh, in units of `unit_m` \[m\], with the rows `stiffness` of the fourth-order operator.
+    /// That of the finest mesh, in units of `unit_m` \[m\], with the rows `stiffness` of the
+    /// fourth-order operator.
     pub(super) fn finest(line: &Operators1d, unit_m: f64, stiffness: &[Taps]) -> Self {
-        let distance = line.face_mass_m[1..].iter().map(|f| f / unit_m);
-        let mut centre = vec![0.0];
-        centre.extend(distance.scan(0.0, |x, distance| {
-            *x += distance;
-            Some(*x)
-        }));
-        let period = centre
-            .pop()
-            .filter(|_| line.is_periodic() && line.cells > 1);
-        let axis = Self::new(
-            line.cell_mass_m.iter().map(|mass| mass / unit_m).collect(),
-            centre,
-            period,
-        );
+        // The centres follow each other at the distances about the faces; after the last of them a
+        // periodic direction repeats itself.
+        let mut centre = Vec::with_capacity(line.cells);
+        let mut end = 0.0;
+        for face_mass_m in &line.face_mass_m[1..] {
+            centre.push(end);
+            end += face_mass_m / unit_m;
+        }
+        let repeats = line.is_periodic() && line.cells > 1;
+        let mass = line.cell_mass_m.iter().map(|mass| mass / unit_m).collect();
+        let axis = Self::new(mass, centre, repeats.then_some(end));
         let link = axis.link.iter().map(|c| RAISED * c).collect();
-        let others = |(i, row): (usize, &Taps)| {
-            row.iter()
-                .filter(|tap| tap.0 != i)
-                .map(|&(j, c)| (j, -c))
-                .collect()
-        };
+        let mut couplings = off_diagonal(stiffness);
+        for (_, c) in couplings.iter_mut().flatten() {
+            *c = -*c;
+        }
         Self {
             link,
-            ..axis.coupled(&stiffness.iter().enumerate().map(others).collect::<Vec<_>>())
+            ..axis.coupled(&couplings)
         }
     }
 
-    /// Cells of these masses and positions with couplings of second order: the masses of the fourth-order operator make its
-    /// eigenvectors of long wavelength the same, and the eigenvalues within a factor 1.37 everywhere.
+    /// Cells of these masses and positions with couplings of second order: the masses of the
+    /// fourth-order operator make its eigenvectors of long wavelength the same, and the eigenvalues
+    /// within a factor 1.37 everywhere.
     fn new(mass: Vec<f64>, centre: Vec<f64>, period: Option<f64>) -> Self {
         let n = mass.len();
         let mut link: Vec<f64> = centre.windows(2).map(|x| 1.0 / (x[1] - x[0])).collect();
@@ -119,46 +121,44 @@ impl Axis {
             link[0] += wrap;
         }
         link.push(if n > 2 { wrap } else { 0.0 });
-        let coupling = |i: usize| -> Taps {
-            let both = [
-                ((i + n - 1) % n, link[(i + n - 1) % n]),
-                ((i + 1) % n, link[i]),
-            ];
-            both.into_iter().filter(|tap| tap.1 != 0.0).collect()
-        };
-        let taps: Vec<Taps> = (0..n).map(coupling).collect();
+        let mut couplings = vec![Taps::new(); n];
+        for (i, couplings) in couplings.iter_mut().enumerate() {
+            let before = (i + n - 1) % n;
+            for (other, link) in [(before, link[before]), ((i + 1) % n, link[i])] {
+                if link != 0.0 {
+                    couplings.push((other, link));
+                }
+            }
+        }
         // The last of an odd number of periodic lines touches the first.
         let end = n - usize::from(link[n - 1] != 0.0 && n % 2 == 1);
-        let colours: [Vec<usize>; 3] = [
-            (0..end).step_by(2).collect(),
-            (1..end).step_by(2).collect(),
-            (end..n).collect(),
-        ];
-        let lines = colours
-            .iter()
-            .flat_map(|colour| colour.chunks(TOGETHER).map(<[usize]>::to_vec))
-            .collect();
-        let link = link.into_iter().map(|c| c as f32).collect();
-        Self {
+        let even: Vec<usize> = (0..end).step_by(2).collect();
+        let odd: Vec<usize> = (1..end).step_by(2).collect();
+        let last: Vec<usize> = (end..n).collect();
+        let mut lines = Vec::new();
+        for colour in [even, odd, last] {
+            lines.extend(colour.chunks(TOGETHER).map(<[usize]>::to_vec));
+        }
+        let axis = Self {
             mass,
             centre,
             period,
-            link,
+            link: link.into_iter().map(|c| c as f32).collect(),
             taps: Vec::new(),
             diagonal: Vec::new(),
             lines,
-        }
-        .coupled(&taps)
+        };
+        axis.coupled(&couplings)
     }
 
-    fn coupled(self, taps: &[Taps]) -> Self {
-        let sum =
-            |(row, mass): (&Taps, &f64)| (row.iter().map(|tap| tap.1).sum::<f64>() / mass) as f32;
-        let diagonal = taps.iter().zip(&self.mass).map(sum).collect();
-        let taps = taps
-            .iter()
-            .map(|row| row.iter().map(|&(j, c)| (j, c as f32)).collect())
-            .collect();
+    /// The same cells with other couplings.
+    fn coupled(self, couplings: &[Taps]) -> Self {
+        let mut taps = Vec::with_capacity(couplings.len());
+        let mut diagonal = Vec::with_capacity(couplings.len());
+        for (row, mass) in couplings.iter().zip(&self.mass) {
+            taps.push(row.iter().map(|&(j, c)| (j, c as f32)).collect());
+            diagonal.push((row.iter().map(|tap| tap.1).sum::<f64>() / mass) as f32);
+        }
         Self {
             taps,
             diagonal,
@@ -172,36 +172,38 @@ impl Axis {
 
     /// The mesh of pairs, of which the last of an odd number stays alone.
     fn coarsened(&self) -> Self {
-        let mass = self.mass.chunks(2).map(|pair| pair.iter().sum()).collect();
-        let centre = self
-            .centre
-            .chunks(2)
-            .map(|pair| pair.iter().sum::<f64>() / pair.len() as f64)
-            .collect();
+        let mut mass = Vec::with_capacity(self.len().div_ceil(2));
+        let mut centre = Vec::with_capacity(self.len().div_ceil(2));
+        for (masses, centres) in self.mass.chunks(2).zip(self.centre.chunks(2)) {
+            mass.push(masses.iter().sum());
+            centre.push(centres.iter().sum::<f64>() / centres.len() as f64);
+        }
         Self::new(mass, centre, self.period)
     }
 
     /// Linear interpolation from the cells of `coarse`; constant beyond the outermost of them.
     fn weights_from(&self, coarse: &Self) -> Vec<[(usize, f32); 2]> {
-        let (centre, last) = (&coarse.centre, coarse.len() - 1);
-        let period = self.period.unwrap_or(0.0);
-        let of = |(i, x): (usize, &f64)| {
+        let centre = &coarse.centre;
+        let last = coarse.len() - 1;
+        let mut weights = Vec::with_capacity(self.len());
+        for (i, &x) in self.centre.iter().enumerate() {
             let own = i / 2;
-            let (other, position) = match (*x >= centre[own], self.period) {
-                (true, _) if own < last => (own + 1, centre[own + 1]),
-                (true, Some(_)) => (0, centre[0] + period),
-                (false, _) if own > 0 => (own - 1, centre[own - 1]),
-                (false, Some(_)) => (last, centre[last] - period),
-                (_, None) => (own, x + 1.0),
+            let is_above = x >= centre[own];
+            let (other, position) = match self.period {
+                _ if is_above && own < last => (own + 1, centre[own + 1]),
+                _ if !is_above && own > 0 => (own - 1, centre[own - 1]),
+                Some(period) if is_above => (0, centre[0] + period),
+                Some(period) => (last, centre[last] - period),
+                None => (own, x + 1.0),
             };
-            let share = if other == own {
+            let fraction = if other == own {
                 0.0
             } else {
                 (x - centre[own]) / (position - centre[own])
             };
-            [(own, (1.0 - share) as f32), (other, share as f32)]
-        };
-        self.centre.iter().enumerate().map(of).collect()
+            weights.push([(own, (1.0 - fraction) as f32), (other, fraction as f32)]);
+        }
+        weights
     }
 }
 
@@ -261,13 +263,16 @@ pub(super) fn v_cycle(
     }
 }
 
-/// What `u` leaves of `f` in the cell with the indices `at`: differences between neighbours, so that single precision suffices on
-/// cells of any aspect ratio.
+/// What `u` leaves of `f` in the cell with the indices `at`: differences between neighbours, so
+/// that single precision suffices on cells of any aspect ratio.
 #[inline(always)]
 fn residual_at(level: &Level, [j, k]: [usize; 2], mode: &Lanes, u: &[Lanes], f: &[Lanes]) -> Lanes {
     let [first, second] = &level.axes;
-    let (n, m1, m2) = (first.len(), first.mass[j] as f32, second.mass[k] as f32);
-    let (own, right) = (u[k * n + j], f[k * n + j]);
+    let n = first.len();
+    let m1 = first.mass[j] as f32;
+    let m2 = second.mass[k] as f32;
+    let own = u[k * n + j];
+    let right = f[k * n + j];
     let mut left = [0.0; LANES];
     for l in 0..LANES {
         left[l] = mode[l].mul_add(-m1 * m2 * own[l], right[l]);
@@ -289,12 +294,15 @@ fn add_difference(sum: &mut Lanes, c: f32, other: &Lanes, own: &Lanes) {
     }
 }
 
-/// Corrects all lines along axis `a` for what they leave, group after group, in reverse order if `back`: by the solution of a tridiagonal
-/// problem with the diagonal of the level's operator across the line and the links along it.
+/// Corrects all lines along axis `a` for what they leave, group after group, in reverse order if
+/// `in_reverse`: by the solution of a tridiagonal problem with the diagonal of the level's operator
+/// across the line and the links along it.
 ///
-/// The elimination works with the excess of the pivot over the link ahead, `e_k = s m_k + e_(k-1) c_(k-1)/(c_(k-1) + e_(k-1))`, a sum of
-/// positive terms. A line that is singular (no neighbours, and a mode that is constant) has an excess of exactly zero at its end and
-/// keeps its level. A periodic line is cut before its last cell, which is solved for at the end.
+/// The elimination works with the excess of the pivot over the link ahead,
+/// `e_k = s m_k + e_(k-1) c_(k-1)/(c_(k-1) + e_(k-1))`, a sum of positive terms. A line that is
+/// singular (no neighbours, and a mode that is constant) has an excess of exactly zero at its end
+/// and keeps its level. A periodic line is cut before its last cell, which is solved for at the
+/// end.
 #[multiversion(targets(
     "x86_64+avx512f+avx512dq+avx512vl+fma",
     "x86_64+avx2+fma",
@@ -306,87 +314,165 @@ fn relax(
     mode: &Lanes,
     u: &mut [Lanes],
     f: &[Lanes],
-    back: bool,
+    in_reverse: bool,
     line: &mut [[Cell; TOGETHER]],
 ) {
-    let (along, across) = (&level.axes[a], &level.axes[1 - a]);
-    let (n, groups) = (along.len(), across.lines.len());
+    let along = &level.axes[a];
+    let across = &level.axes[1 - a];
+    let n = along.len();
     let wrap = along.link[n - 1];
-    let inner = if wrap == 0.0 { n } else { n - 1 };
-    let cell = |line: usize, k: usize| if a == 0 { [k, line] } else { [line, k] };
+    let relaxed = LinesAlong {
+        level,
+        axis: a,
+        mode,
+        wrap,
+        inner: if wrap == 0.0 { n } else { n - 1 },
+    };
+    let groups = across.lines.len();
     for group in 0..groups {
-        let lines = &across.lines[if back { groups - 1 - group } else { group }];
-        let mut excess = [[0.0; LANES]; TOGETHER];
-        for k in 0..n {
-            let mass = along.mass[k] as f32;
-            let first = if k == 0 { wrap } else { 0.0 };
-            let behind = if k == 0 { 0.0 } else { along.link[k - 1] };
-            let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
-            for (g, &across_at) in lines.iter().enumerate() {
-                let left = residual_at(level, cell(across_at, k), mode, u, f);
-                let inverse_mass = 1.0 / across.mass[across_at] as f32;
-                let before = if k == 0 || k == inner {
-                    NO_CELL
-                } else {
-                    line[k - 1][g]
-                };
-                let (now, excess) = (&mut line[k][g], &mut excess[g]);
-                for l in 0..LANES {
-                    let ratio = behind * before.inverse[l];
-                    let shift = mode[l] + across.diagonal[across_at];
-                    excess[l] = mass.mul_add(shift, ratio.mul_add(excess[l], first));
-                    let pivot = ahead + excess[l];
-                    now.inverse[l] = if pivot == 0.0 { 0.0 } else { 1.0 / pivot };
-                    now.right[l] = ratio.mul_add(before.right[l], left[l] * inverse_mass);
-                    now.border[l] = ratio.mul_add(before.border[l], first);
-                }
-            }
-        }
-        // Mass of the line, weighted with the response to the value at the cut.
-        let mut weighted = [[0.0; LANES]; TOGETHER];
-        let mut next = [NO_CELL; TOGETHER];
-        for k in (0..inner).rev() {
-            let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
-            let to_cut = if k + 1 == inner { ahead } else { 0.0 };
-            for g in 0..lines.len() {
-                let (now, next) = (&mut line[k][g], &mut next[g]);
-                for l in 0..LANES {
-                    now.right[l] = now.inverse[l] * ahead.mul_add(next.right[l], now.right[l]);
-                    now.border[l] =
-                        now.inverse[l] * ahead.mul_add(next.border[l], now.border[l] + to_cut);
-                    weighted[g][l] = (along.mass[k] as f32).mul_add(now.border[l], weighted[g][l]);
-                }
-                *next = *now;
-            }
-        }
-        for (g, &across_at) in lines.iter().enumerate() {
+        let number = if in_reverse {
+            groups - 1 - group
+        } else {
+            group
+        };
+        let lines = &across.lines[number];
+        relaxed.eliminate(lines, u, f, line);
+        let weighted = relaxed.substitute(lines.len(), line);
+        for (g, &position) in lines.iter().enumerate() {
             let mut cut = [0.0; LANES];
-            if inner < n {
-                let (first, last, right) = (
-                    &line[0][g].right,
-                    &line[inner - 1][g].right,
-                    &line[inner][g].right,
-                );
-                for l in 0..LANES {
-                    let pivot = (mode[l] + across.diagonal[across_at])
-                        * (along.mass[inner] as f32 + weighted[g][l]);
-                    let right =
-                        wrap.mul_add(first[l], along.link[inner - 1].mul_add(last[l], right[l]));
-                    cut[l] = if pivot == 0.0 { 0.0 } else { right / pivot };
-                }
-                line[inner][g] = Cell {
-                    right: cut,
-                    ..NO_CELL
-                };
+            if relaxed.inner < n {
+                cut = relaxed.value_at_cut(position, g, &weighted[g], line);
             }
             for (k, line) in line[..n].iter().enumerate() {
-                let [j, k] = cell(across_at, k);
+                let [j, k] = relaxed.cell(position, k);
                 let out = &mut u[k * level.axes[0].len() + j];
                 for l in 0..LANES {
                     out[l] += line[g].border[l].mul_add(cut[l], line[g].right[l]);
                 }
             }
         }
+    }
+}
+
+/// The lines along one axis of a level, which are relaxed.
+struct LinesAlong<'a> {
+    level: &'a Level,
+    axis: usize,
+    mode: &'a Lanes,
+    /// Link of the last cell to the first; zero unless the direction is periodic.
+    wrap: f32,
+    /// Cells before the cut.
+    inner: usize,
+}
+
+impl LinesAlong<'_> {
+    /// Indices of cell `k` of the line at a position across the lines.
+    #[inline(always)]
+    fn cell(&self, position: usize, k: usize) -> [usize; 2] {
+        if self.axis == 0 {
+            [k, position]
+        } else {
+            [position, k]
+        }
+    }
+
+    /// Eliminates a group of lines from the first cell to the last.
+    #[inline(always)]
+    fn eliminate(
+        &self,
+        positions: &[usize],
+        u: &[Lanes],
+        f: &[Lanes],
+        line: &mut [[Cell; TOGETHER]],
+    ) {
+        let along = &self.level.axes[self.axis];
+        let across = &self.level.axes[1 - self.axis];
+        let n = along.len();
+        let mut excess = [[0.0; LANES]; TOGETHER];
+        for k in 0..n {
+            let mass = along.mass[k] as f32;
+            let first = if k == 0 { self.wrap } else { 0.0 };
+            let behind = if k == 0 { 0.0 } else { along.link[k - 1] };
+            let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
+            for (g, &position) in positions.iter().enumerate() {
+                let left = residual_at(self.level, self.cell(position, k), self.mode, u, f);
+                let inverse_mass = 1.0 / across.mass[position] as f32;
+                let before = if k == 0 || k == self.inner {
+                    NO_CELL
+                } else {
+                    line[k - 1][g]
+                };
+                let current = &mut line[k][g];
+                let excess = &mut excess[g];
+                for l in 0..LANES {
+                    let ratio = behind * before.inverse[l];
+                    let shift = self.mode[l] + across.diagonal[position];
+                    excess[l] = mass.mul_add(shift, ratio.mul_add(excess[l], first));
+                    let pivot = ahead + excess[l];
+                    current.inverse[l] = if pivot == 0.0 { 0.0 } else { 1.0 / pivot };
+                    current.right[l] = ratio.mul_add(before.right[l], left[l] * inverse_mass);
+                    current.border[l] = ratio.mul_add(before.border[l], first);
+                }
+            }
+        }
+    }
+
+    /// Substitutes a group of `count` lines from the cut to the first cell; returns the masses of
+    /// the lines weighted with the response to the value at the cut.
+    #[inline(always)]
+    fn substitute(&self, count: usize, line: &mut [[Cell; TOGETHER]]) -> [Lanes; TOGETHER] {
+        let along = &self.level.axes[self.axis];
+        let n = along.len();
+        let mut weighted = [[0.0; LANES]; TOGETHER];
+        let mut next = [NO_CELL; TOGETHER];
+        for k in (0..self.inner).rev() {
+            let ahead = if k + 1 < n { along.link[k] } else { 0.0 };
+            let to_cut = if k + 1 == self.inner { ahead } else { 0.0 };
+            for g in 0..count {
+                let current = &mut line[k][g];
+                let next = &mut next[g];
+                for l in 0..LANES {
+                    current.right[l] =
+                        current.inverse[l] * ahead.mul_add(next.right[l], current.right[l]);
+                    current.border[l] = current.inverse[l]
+                        * ahead.mul_add(next.border[l], current.border[l] + to_cut);
+                    weighted[g][l] =
+                        (along.mass[k] as f32).mul_add(current.border[l], weighted[g][l]);
+                }
+                *next = *current;
+            }
+        }
+        weighted
+    }
+
+    /// Solves for the cell behind the cut of line `g` of a group, which becomes its value there.
+    #[inline(always)]
+    fn value_at_cut(
+        &self,
+        position: usize,
+        g: usize,
+        weighted: &Lanes,
+        line: &mut [[Cell; TOGETHER]],
+    ) -> Lanes {
+        let along = &self.level.axes[self.axis];
+        let across = &self.level.axes[1 - self.axis];
+        let inner = self.inner;
+        let first = &line[0][g].right;
+        let last = &line[inner - 1][g].right;
+        let right = &line[inner][g].right;
+        let mut cut = [0.0; LANES];
+        for l in 0..LANES {
+            let pivot = (self.mode[l] + across.diagonal[position])
+                * (along.mass[inner] as f32 + weighted[l]);
+            let links = along.link[inner - 1].mul_add(last[l], right[l]);
+            let right = self.wrap.mul_add(first[l], links);
+            cut[l] = if pivot == 0.0 { 0.0 } else { right / pivot };
+        }
+        line[inner][g] = Cell {
+            right: cut,
+            ..NO_CELL
+        };
+        cut
     }
 }
 

@@ -1,18 +1,23 @@
-//! What a run does to the energy of its flow: how much that may have, and what the steps themselves feed or take.
+//! What a run does to the energy of its flow: how much that may have, and what the steps themselves
+//! feed or take.
 //!
-//! Nothing but a force or a moving wall can give a flow any energy. Pressure, convection and boundaries at rest do no work, viscosity
-//! and subgrid stresses take energy away. So the energy may
-//! not exceed the lowest that it had, but for what a force did since: by Cauchy and Schwarz `d sqrt(E)/dt <= |f| sqrt(M/2)`, with
-//! `M` the volume. Walls of speed `U` can bring the fluid to that speed on top of its own, `sqrt(M/2) U` more in `sqrt(E)`. What
-//! is beyond comes from the numbers: the state is not to be kept.
+//! Nothing but a force or a moving wall can give a flow any energy. Pressure, convection and
+//! boundaries at rest do no work, viscosity and subgrid stresses take energy away. So the energy
+//! may not exceed the lowest that it had, but for what a force did since: by Cauchy and Schwarz
+//! `d sqrt(E)/dt <= |f| sqrt(M/2)`, with `M` the volume. Walls of speed `U` can bring the fluid to
+//! that speed on top of its own, `sqrt(M/2) U` more in `sqrt(E)`. What is beyond comes from the
+//! numbers: the state is not to be kept.
 //!
-//! Over some hundred steps what the time step does to the energy stands beside what viscosity and the subgrid model take.
-//! The residual of a step's budget is the change of the energy less the mean of the powers at both ends. That mean is uncertain by
-//! half the difference of the two, which is large where a flow starts with slip at a wall; only what is beyond counts. Where walls
-//! move, which drive a flow through its viscous power, or viscosity is stiff, the powers do not tell what is taken, and nothing is said.
+//! Over a hundred steps what the time step does to the energy is compared with what viscosity and
+//! the subgrid model take. The residual of a step's budget is the change of the energy less the
+//! mean of the powers at both ends. That mean is uncertain by half the difference of the two, which
+//! is large where a flow starts with slip at a wall; only what is beyond counts. Where walls move,
+//! which drive a flow through its viscous power, or viscosity is stiff, the powers do not tell what
+//! is taken, and nothing is said.
 //!
-//! Check: growing flows are stopped; forced, dragged and decaying ones are not; a flow that Adams-Bashforth feeds, one that
-//! Runge-Kutta damps more than viscosity does, and flows that are left alone.
+//! Check: growing flows are stopped; forced, dragged and decaying ones are not; a flow that
+//! Adams-Bashforth feeds, one that Runge-Kutta damps more than viscosity does, and flows that are
+//! left alone.
 
 use super::super::flow::Flow;
 use super::super::mesh::Wall;
@@ -20,10 +25,10 @@ use super::super::settings::TimeScheme;
 use crate::error::{EnergyGrowth, Error};
 use crate::solver::report::StepReport;
 
-/// Share of the energy by which a flow may exceed what it may have. A stable step errs by much less; where errors of the time
-/// step have added this much the solution is theirs.
+/// Share of the energy by which a flow may exceed what it may have. A stable step errs by much
+/// less; where errors of the time step have added this much the solution is theirs.
 pub(super) const SHARE: f64 = 0.01;
-/// Below this share of the largest energy of the run the energy is round-off.
+/// Below this fraction of the largest energy of the run the energy is round-off.
 const ROUND_OFF: f64 = 1e-24;
 /// A pressure tolerance above this may itself feed energy.
 pub(super) const LOOSE: f64 = 1e-6;
@@ -71,19 +76,22 @@ impl EnergyBound {
 
 /// What the force adds to `sqrt(E)` in a second, and what walls that move add once.
 fn sources(flow: &Flow) -> [f64; 2] {
-    let volume_m3: f64 = flow
-        .layout
-        .line
-        .iter()
+    let lines = flow.layout.line.iter();
+    let volume_m3: f64 = lines
         .map(|line| line.cell_mass_m.iter().sum::<f64>())
         .product();
-    let length = |v: [f64; 3]| v.iter().map(|c| c * c).sum::<f64>().sqrt();
-    let walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
-    let fastest_m_s = walls.fold(0.0, |fastest: f64, wall| match wall {
-        Wall::Slip => fastest,
-        Wall::NoSlip { velocity_m_s } => fastest.max(length(velocity_m_s)),
-    });
-    [length(flow.settings().force_m_s2), fastest_m_s].map(|v| v * (0.5 * volume_m3).sqrt())
+    let mut fastest_m_s = 0.0_f64;
+    for wall in flow.mesh().directions().iter().flat_map(|d| d.ends.walls()) {
+        if let Wall::NoSlip { velocity_m_s } = wall {
+            fastest_m_s = fastest_m_s.max(magnitude(velocity_m_s));
+        }
+    }
+    let force_m_s2 = magnitude(flow.settings().force_m_s2);
+    [force_m_s2, fastest_m_s].map(|v| v * (0.5 * volume_m3).sqrt())
+}
+
+fn magnitude(v: [f64; 3]) -> f64 {
+    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 fn grew(flow: &Flow, allowed_m5_s2: f64, rate_per_s: f64) -> Result<Error, Error> {
@@ -133,9 +141,9 @@ fn cause(flow: &Flow) -> Result<String, Error> {
 
 /// Steps over which is summed.
 pub(super) const STEPS: u64 = 100;
-/// Share of what viscosity and model take that is told of.
-const NOTED: f64 = 0.1;
-/// Less than this share of the energy in so many steps is nothing.
+/// Fraction of what viscosity and model take from which on a step is reported.
+const REPORTED: f64 = 0.1;
+/// Less than this fraction of the energy over [`STEPS`] steps is negligible.
 const NEGLIGIBLE: f64 = 1e-5;
 /// The same where neither viscosity nor a model takes any.
 const UNDAMPED_NEGLIGIBLE: f64 = 1e-3;
@@ -152,7 +160,8 @@ pub struct EnergyBudget {
 }
 
 impl EnergyBudget {
-    /// What the powers do not explain: the error of the time step, and of the pressure solve \[m^5/s^3\].
+    /// What the powers do not explain: the error of the time step, and of the pressure solve
+    /// \[m^5/s^3\].
     pub fn residual_m5_s3(&self) -> f64 {
         self.rate_m5_s3 - self.power_m5_s3
     }
@@ -161,8 +170,8 @@ impl EnergyBudget {
 /// What the time step itself did to the energy.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepEnergy {
-    /// Sum of the residuals over what viscosity and subgrid model took: positive where the step feeds the flow; infinite where
-    /// there is neither.
+    /// Sum of the residuals over what viscosity and subgrid model took: positive where the step
+    /// feeds the flow; infinite where there is neither.
     pub share: f64,
     /// Courant number of the steps.
     pub courant: f64,
@@ -173,14 +182,14 @@ pub struct StepEnergy {
 }
 
 impl StepEnergy {
-    /// Courant number at which the share is well below a tenth: what waves that grow feed falls with the square at least, what Runge-Kutta
-    /// takes about with the cube.
+    /// Courant number at which the share is well below a tenth: what waves that grow feed falls
+    /// with the square at least, what Runge-Kutta takes about with the cube.
     pub fn suited_courant(&self) -> f64 {
-        let part = 0.5 * NOTED / self.share.abs();
+        let ratio = 0.5 * REPORTED / self.share.abs();
         let factor = if self.share > 0.0 {
-            part.sqrt()
+            ratio.sqrt()
         } else {
-            part.cbrt()
+            ratio.cbrt()
         };
         (100.0 * self.courant * factor).floor() / 100.0
     }
@@ -239,7 +248,8 @@ pub(super) struct Window {
 }
 
 impl Window {
-    /// Takes the budget that `report` closed, open with the power at its start and the mean of both ends.
+    /// Takes the budget that `report` closed, open with the power at its start and the mean of both
+    /// ends.
     pub(super) fn add(&mut self, open: EnergyBudget, closed: EnergyBudget, report: &StepReport) {
         let residual = closed.residual_m5_s3();
         let uncertain = (closed.power_m5_s3 - open.power_m5_s3).abs();
@@ -247,7 +257,8 @@ impl Window {
         self.taken_m5_s3 += report.viscous_power_m5_s3.abs() + report.subgrid_power_m5_s3.abs();
     }
 
-    /// What it adds up to after its last step, if that is more than a tenth of what viscosity and model took; then it is empty.
+    /// What it adds up to after its last step, if that is more than a tenth of what viscosity and
+    /// model took; then it is empty.
     pub(super) fn close(&mut self, flow: &Flow, report: &StepReport) -> Option<StepEnergy> {
         if !report.step.is_multiple_of(STEPS) {
             return None;
@@ -264,9 +275,9 @@ impl Window {
             pressure_tolerance: settings.pressure_tolerance,
         };
         let mut walls = flow.mesh().directions().iter().flat_map(|d| d.ends.walls());
-        let moves =
-            |wall| matches!(wall, Wall::NoSlip { velocity_m_s } if velocity_m_s != [0.0; 3]);
-        if walls.any(moves) || !flow.stiffness().is_resolved(report.step_s) {
+        let is_driven = walls
+            .any(|wall| matches!(wall, Wall::NoSlip { velocity_m_s } if velocity_m_s != [0.0; 3]));
+        if is_driven || !flow.stiffness().is_resolved(report.step_s) {
             return None;
         }
         let negligible = if taken_m5_s3 > 0.0 {
@@ -274,7 +285,8 @@ impl Window {
         } else {
             UNDAMPED_NEGLIGIBLE
         };
-        let is_seen = fed_m5_s3.abs() * report.step_s > negligible * report.kinetic_energy_m5_s2;
-        (is_seen && energy.share.abs() > NOTED).then_some(energy)
+        let is_significant =
+            fed_m5_s3.abs() * report.step_s > negligible * report.kinetic_energy_m5_s2;
+        (is_significant && energy.share.abs() > REPORTED).then_some(energy)
     }
 }

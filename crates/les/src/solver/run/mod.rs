@@ -1,13 +1,16 @@
-//! The driver of a simulation: to an end time, with outputs at exact times, a record of every step, and checkpoints.
+//! The driver of a simulation: to an end time, with outputs at exact times, a record of every step,
+//! and checkpoints.
 //!
-//! It prints nothing and writes nothing but checkpoints; who watches a run is told of everything through [`RunObserver`].
-//! Every decision follows from the state and the plan, so that a run resumed from a checkpoint makes the same steps, records
-//! and outputs, bit for bit, as one that was not interrupted.
+//! It prints nothing and writes nothing but checkpoints; who watches a run is told of everything
+//! through [`RunObserver`]. Every decision follows from the state and the plan, so that a run
+//! resumed from a checkpoint makes the same steps, records and outputs, bit for bit, as one that
+//! was not interrupted.
 //!
-//! A state whose energy is more than the flow can have ends the run before anything is written of it.
+//! A state whose energy is more than the flow can have ends the run before anything is written of
+//! it.
 //!
-//! Check: resumed against uninterrupted runs, times hit, the energy budget against a flow with known decay, runs that blow
-//! up, observers that fail.
+//! Check: resumed against uninterrupted runs, times hit, the energy budget against a flow with
+//! known decay, runs that blow up, observers that fail.
 
 mod energy;
 
@@ -24,21 +27,21 @@ use crate::error::{Error, check};
 use energy::{EnergyBound, Window};
 pub use energy::{EnergyBudget, StepEnergy};
 
-/// A step shorter than this share of the time of the run does not lead to its end.
-const SHORTEST_SHARE: f64 = 1e-10;
-/// Times closer than this share of the time of the run are the same.
+/// A step shorter than this fraction of the time of the run does not lead to its end.
+const SHORTEST_FRACTION: f64 = 1e-10;
+/// Times closer than this fraction of the time of the run are the same.
 const SAME_TIME: f64 = 1e-12;
 /// Steps between checks for waves that grow.
 const STEPS_PER_CHECK: u64 = 64;
 /// Growth of the worst wave over the rest of the run, as an exponent, that is warned of.
 pub const NOTICED_GROWTH: f64 = 0.1;
 
-/// How often.
+/// Time between checkpoints.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Interval {
-    /// After so many steps.
+    /// A number of steps.
     Steps(u64),
-    /// After so much simulated time \[s\].
+    /// A simulated time \[s\].
     Time {
         /// The time between \[s\].
         time_s: f64,
@@ -48,7 +51,7 @@ pub enum Interval {
 /// Where and how often checkpoints are written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckpointPlan {
-    /// The file. The one before it is kept beside it, with `.previous` at the end of its name.
+    /// The file. The one before it stays beside it, with `.previous` at the end of its name.
     pub path: PathBuf,
     /// How often; one is written at the end as well.
     pub every: Interval,
@@ -67,21 +70,23 @@ pub struct RunPlan {
     pub pause_after_steps: Option<u64>,
 }
 
-/// One step as the observer sees it.
+/// One step as it is reported to the observer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepRecord {
     /// What the flow reported.
     pub report: StepReport,
     /// Largest divergence over the largest `sum |u_i|/h_i`.
     pub relative_divergence: f64,
-    /// The energy budget of the step before: the powers at its end are known only now. None in the first step.
+    /// The energy budget of the step before: the powers at its end are known only now. None in the
+    /// first step.
     pub budget_before: Option<EnergyBudget>,
 }
 
-/// What deserves attention but does not stop a run; each kind is told once.
+/// What deserves attention but does not stop a run; each kind is reported once.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RunWarning {
-    /// The time step feeds the flow, or takes from it, more than a tenth of what viscosity and model take.
+    /// The time step feeds the flow, or takes from it, more than a tenth of what viscosity and
+    /// model take.
     StepEnergy {
         /// Number of the last of the steps over which this was summed.
         step: u64,
@@ -97,9 +102,10 @@ pub enum RunWarning {
     },
 }
 
-/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays. Of a run on several ranks the observers of all
-/// are asked, for readers of the flow must be called by all; one that fails alone must do so after them. Warnings go to that
-/// of rank 0, which says what checkpoints keep.
+/// Who watches a run. An `Err` with a reason stops it; the last checkpoint stays. Of a run on
+/// several ranks the observers of all are asked, for readers of the flow must be called by all; one
+/// that fails alone must do so after them. Warnings go to that of rank 0, which says what
+/// checkpoints keep.
 pub trait RunObserver {
     /// After every step.
     ///
@@ -146,7 +152,7 @@ pub struct Stepping {
 pub struct Run {
     flow: Flow,
     plan: RunPlan,
-    kept: Kept,
+    state: RunState,
     has_warned_of_energy: bool,
     has_warned_of_growth: bool,
     is_fresh: bool,
@@ -155,7 +161,7 @@ pub struct Run {
 
 /// What a run remembers of its steps, and keeps in its checkpoints beside the flow.
 #[derive(Debug, Clone, Copy)]
-struct Kept {
+struct RunState {
     /// The budget of the last step, which waits for the powers at its end: those at its start.
     open: Option<EnergyBudget>,
     energy: EnergyBound,
@@ -166,18 +172,20 @@ impl Run {
     /// A run that begins with the present state of `flow`.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
+    /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty
+    /// intervals.
     pub fn new(flow: Flow, plan: RunPlan) -> Result<Self, Error> {
         plan.check(flow.time_s())?;
-        let kept = Kept {
+        let state = RunState {
             open: None,
             energy: EnergyBound::new(&flow),
             window: Window::default(),
         };
-        Ok(Self::with(flow, plan, kept, true))
+        Ok(Self::from_parts(flow, plan, state, true))
     }
 
-    /// A run that continues from a checkpoint written by a run, with the bytes that the observer had given.
+    /// A run that continues from a checkpoint written by a run, with the bytes that the observer
+    /// had given.
     ///
     /// # Errors
     /// As [`Flow::restore`] and [`Run::new`].
@@ -190,26 +198,28 @@ impl Run {
         let path = path.as_ref();
         let (flow, bytes) = Flow::restore(path, mesh, settings)?;
         let what = "it was written by another kind of program";
-        let Some((kept, user_data)) = Kept::read(&bytes) else {
+        let Some((state, user_data)) = RunState::read(&bytes) else {
             return Err(Error::CheckpointDamaged {
                 path: path.to_owned(),
                 what,
             });
         };
         plan.check(f64::NEG_INFINITY)?;
-        Ok((Self::with(flow, plan, kept, false), user_data.to_vec()))
+        Ok((
+            Self::from_parts(flow, plan, state, false),
+            user_data.to_vec(),
+        ))
     }
 
-    fn with(flow: Flow, plan: RunPlan, kept: Kept, is_fresh: bool) -> Self {
-        let (has_warned_of_energy, has_warned_of_growth, stepping) = Default::default();
+    fn from_parts(flow: Flow, plan: RunPlan, state: RunState, is_fresh: bool) -> Self {
         Self {
             flow,
             plan,
-            kept,
-            has_warned_of_energy,
-            has_warned_of_growth,
+            state,
+            has_warned_of_energy: false,
+            has_warned_of_growth: false,
             is_fresh,
-            stepping,
+            stepping: Stepping::default(),
         }
     }
 
@@ -231,60 +241,37 @@ impl Run {
     /// Runs to the end, or to the pause; returns whether it is the end.
     ///
     /// # Errors
-    /// What [`Flow::step`] refuses, [`Error::EnergyGrew`], [`Error::StepTooShort`], [`Error::Stopped`] by the observer,
-    /// [`Error::File`] for a checkpoint. The last good checkpoint stays as it was.
+    /// What [`Flow::step`] refuses, [`Error::EnergyGrew`], [`Error::StepTooShort`],
+    /// [`Error::Stopped`] by the observer, [`Error::File`] for a checkpoint. The last good
+    /// checkpoint stays as it was.
     pub fn to_end(&mut self, observer: &mut dyn RunObserver) -> Result<bool, Error> {
-        let (start_s, end_s) = (self.flow.time_s(), self.plan.end_s);
-        // A fresh run gives the output of its start; a resumed one gave it before its checkpoint.
-        let (was_fresh, begun_at) = (self.is_fresh, self.flow.steps());
-        let given = |&t: &f64| {
-            if self.is_fresh {
-                t < start_s
-            } else {
-                self.is_reached(t)
-            }
-        };
-        let mut next_output = self
-            .plan
-            .output_times_s
-            .iter()
-            .take_while(|t| given(t))
-            .count();
+        let start_s = self.flow.time_s();
+        let end_s = self.plan.end_s;
+        let was_fresh = self.is_fresh;
+        let first_step = self.flow.steps();
+        let mut next_output = self.first_output();
         self.is_fresh = false;
         self.give_outputs(&mut next_output, observer)?;
-        while !self.is_reached(end_s) {
-            if self
-                .plan
-                .pause_after_steps
-                .is_some_and(|steps| self.flow.steps() >= steps)
-            {
-                break;
-            }
-            let target_s = self
-                .plan
-                .output_times_s
-                .get(next_output)
-                .map_or(end_s, |t| t.min(end_s));
+        while !self.is_reached(end_s) && !self.is_paused() {
+            let output_s = self.plan.output_times_s.get(next_output);
+            let target_s = output_s.map_or(end_s, |t| t.min(end_s));
             let before_s = self.flow.time_s();
             let energy = self.flow.kinetic_energy_m5_s2();
-            self.look_for_growth(observer);
-            let (begun, exchanged_s) = (Instant::now(), self.flow.layout.slabs.ranks.spent_s());
-            let report = self.flow.step_towards(target_s)?;
-            self.stepping.wall_s += begun.elapsed().as_secs_f64();
-            self.stepping.exchange_s += self.flow.layout.slabs.ranks.spent_s() - exchanged_s;
-            if report.step_s < SHORTEST_SHARE * (end_s - start_s) && !self.is_reached(target_s) {
-                let (step, step_s) = (report.step, report.step_s);
+            self.check_growth(observer);
+            let report = self.timed_step(target_s)?;
+            let is_too_short = report.step_s < SHORTEST_FRACTION * (end_s - start_s);
+            if is_too_short && !self.is_reached(target_s) {
                 return Err(Error::StepTooShort {
-                    step,
+                    step: report.step,
                     time_s: report.time_s,
-                    step_s,
+                    step_s: report.step_s,
                     end_s,
                 });
             }
             let record = self.record(report, energy)?;
             self.all_agree(observer.step(&self.flow, &record))?;
-            self.kept.energy.pass(&self.flow, energy, report.step_s)?;
-            self.watch(&report, observer)?;
+            self.state.energy.pass(&self.flow, energy, report.step_s)?;
+            self.check_step_energy(&report, observer)?;
             self.give_outputs(&mut next_output, observer)?;
             if self.checkpoint_is_due(before_s, &report) {
                 self.write_checkpoint(observer)?;
@@ -292,10 +279,44 @@ impl Run {
         }
         let is_complete = self.is_reached(end_s);
         // What a run resumed from is not written again.
-        if was_fresh || self.flow.steps() > begun_at {
+        if was_fresh || self.flow.steps() > first_step {
             self.write_checkpoint(observer)?;
         }
         Ok(is_complete)
+    }
+
+    /// Number of the first output that is still to be given. A fresh run gives the output of its
+    /// start; a resumed one gave it before its checkpoint.
+    fn first_output(&self) -> usize {
+        let start_s = self.flow.time_s();
+        let mut given = 0;
+        for &time_s in &self.plan.output_times_s {
+            let is_given = if self.is_fresh {
+                time_s < start_s
+            } else {
+                self.is_reached(time_s)
+            };
+            if !is_given {
+                break;
+            }
+            given += 1;
+        }
+        given
+    }
+
+    fn is_paused(&self) -> bool {
+        let pause = self.plan.pause_after_steps;
+        pause.is_some_and(|steps| self.flow.steps() >= steps)
+    }
+
+    /// Makes a step towards `target_s` and adds its wall time.
+    fn timed_step(&mut self, target_s: f64) -> Result<StepReport, Error> {
+        let started = Instant::now();
+        let exchanged_s = self.flow.layout.slabs.ranks.spent_s();
+        let report = self.flow.step_towards(target_s)?;
+        self.stepping.wall_s += started.elapsed().as_secs_f64();
+        self.stepping.exchange_s += self.flow.layout.slabs.ranks.spent_s() - exchanged_s;
+        Ok(report)
     }
 
     fn is_reached(&self, time_s: f64) -> bool {
@@ -320,26 +341,31 @@ impl Run {
     }
 
     /// What stops one rank stops all.
-    fn all_agree(&self, seen: Result<(), String>) -> Result<(), Error> {
+    fn all_agree(&self, result: Result<(), String>) -> Result<(), Error> {
         let flow = &self.flow;
-        let stopped = |reason| Error::Stopped {
+        let result = result.map_err(|reason| Error::Stopped {
             step: flow.steps(),
             time_s: flow.time_s(),
             reason,
-        };
-        flow.layout.slabs.all_agree(seen.map_err(stopped))
+        });
+        flow.layout.slabs.all_agree(result)
     }
 
-    /// Tells who watches, once for all ranks.
-    fn tell(&self, observer: &mut dyn RunObserver, warning: &RunWarning) {
+    /// Reports a warning to the observer of rank 0.
+    fn warn(&self, observer: &mut dyn RunObserver, warning: &RunWarning) {
         if self.flow.layout.slabs.is_first() {
             observer.warning(warning);
         }
     }
 
-    /// Tells of energy that the steps themselves feed or take, and refuses more than viscosity and model take.
-    fn watch(&mut self, report: &StepReport, observer: &mut dyn RunObserver) -> Result<(), Error> {
-        let Some(energy) = self.kept.window.close(&self.flow, report) else {
+    /// Tells of energy that the steps themselves feed or take, and refuses more than viscosity and
+    /// model take.
+    fn check_step_energy(
+        &mut self,
+        report: &StepReport,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), Error> {
+        let Some(energy) = self.state.window.close(&self.flow, report) else {
             return Ok(());
         };
         if energy.share > 1.0 && energy.share.is_finite() {
@@ -353,7 +379,7 @@ impl Run {
         }
         if !self.has_warned_of_energy {
             self.has_warned_of_energy = true;
-            self.tell(
+            self.warn(
                 observer,
                 &RunWarning::StepEnergy {
                     step: report.step,
@@ -364,40 +390,40 @@ impl Run {
         Ok(())
     }
 
-    fn look_for_growth(&mut self, observer: &mut dyn RunObserver) {
+    fn check_growth(&mut self, observer: &mut dyn RunObserver) {
         let step = self.flow.steps();
-        // What a model takes from the waves, the energy of the steps tells.
+        // With a model, which damps the waves as well, the energy of the steps is checked instead.
         let is_modelled = self.flow.settings().subgrid != SubgridModel::None;
         if self.has_warned_of_growth || is_modelled || !step.is_multiple_of(STEPS_PER_CHECK) {
             return;
         }
-        let left_s = self.plan.end_s - self.flow.time_s();
+        let remaining_s = self.plan.end_s - self.flow.time_s();
         let step_s = self.flow.next_step_s();
         // If a rank is lost, the next step says so.
-        let growth = self
-            .flow
-            .stability()
-            .ok()
-            .and_then(|s| s.undamped(self.flow.judged_step_s(&s, step_s)));
-        if let Some(growth) = growth.filter(|g| g.rate_per_s * left_s > NOTICED_GROWTH) {
+        let Ok(stability) = self.flow.stability() else {
+            return;
+        };
+        let judged_step_s = self.flow.judged_step_s(&stability, step_s);
+        if let Some(growth) = stability.undamped(judged_step_s)
+            && growth.rate_per_s * remaining_s > NOTICED_GROWTH
+        {
             self.has_warned_of_growth = true;
-            self.tell(observer, &RunWarning::UndampedGrowth { step, growth });
+            self.warn(observer, &RunWarning::UndampedGrowth { step, growth });
         }
     }
 
     fn record(&mut self, report: StepReport, energy_before: f64) -> Result<StepRecord, Error> {
         let power_m5_s3 =
             report.viscous_power_m5_s3 + report.subgrid_power_m5_s3 + report.force_power_m5_s3;
-        let mean = |open: EnergyBudget| EnergyBudget {
+        let budget_before = self.state.open.map(|open| EnergyBudget {
             power_m5_s3: 0.5 * (open.power_m5_s3 + power_m5_s3),
             ..open
-        };
-        let budget_before = self.kept.open.map(mean);
-        if let (Some(open), Some(closed)) = (self.kept.open, budget_before) {
-            self.kept.window.add(open, closed, &report);
+        });
+        if let (Some(open), Some(closed)) = (self.state.open, budget_before) {
+            self.state.window.add(open, closed, &report);
         }
         let rate_m5_s3 = (report.kinetic_energy_m5_s2 - energy_before) / report.step_s;
-        self.kept.open = Some(EnergyBudget {
+        self.state.open = Some(EnergyBudget {
             step: report.step,
             rate_m5_s3,
             power_m5_s3,
@@ -419,7 +445,7 @@ impl Run {
         }
         // One whose next step would be refused is not worth keeping.
         let courant = self.flow.state.courant_per_s * report.step_s;
-        self.flow.refuse_courant(courant, report.step_s).is_ok()
+        self.flow.check_courant(courant, report.step_s).is_ok()
             && match plan.every {
                 Interval::Steps(steps) => report.step.is_multiple_of(steps),
                 Interval::Time { time_s } => {
@@ -434,7 +460,7 @@ impl Run {
         };
         let mut previous = plan.path.clone().into_os_string();
         previous.push(".previous");
-        let bytes = [self.kept.bytes(), observer.user_data()].concat();
+        let bytes = [self.state.bytes(), observer.user_data()].concat();
         self.flow
             .save_and_keep(&plan.path, Some(Path::new(&previous)), &bytes)
     }
@@ -444,7 +470,8 @@ impl RunPlan {
     /// Refuses what a run that starts at `start_s` would refuse.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty intervals.
+    /// [`Error::OutOfRange`] for times that do not increase or lie outside the run, and empty
+    /// intervals.
     pub fn check(&self, start_s: f64) -> Result<(), Error> {
         check(
             "end_s",
@@ -478,51 +505,56 @@ impl RunPlan {
     }
 }
 
-impl Kept {
+impl RunState {
     /// The first number is 3 if a budget is open, else 2.
     fn bytes(&self) -> Vec<u8> {
-        let open = self.open.map_or([2, 0, 0, 0], |b| {
+        let [kind, step, rate, power] = self.open.map_or([2, 0, 0, 0], |b| {
             [3, b.step, b.rate_m5_s3.to_bits(), b.power_m5_s3.to_bits()]
         });
-        let Self { energy, window, .. } = self;
         let numbers = [
-            energy.bound_m5_s2,
-            energy.largest_m5_s2,
-            window.fed_m5_s3,
-            window.taken_m5_s3,
+            kind,
+            step,
+            rate,
+            power,
+            self.energy.bound_m5_s2.to_bits(),
+            self.energy.largest_m5_s2.to_bits(),
+            self.window.fed_m5_s3.to_bits(),
+            self.window.taken_m5_s3.to_bits(),
         ];
-        open.into_iter()
-            .chain(numbers.map(f64::to_bits))
-            .flat_map(u64::to_le_bytes)
-            .collect()
+        numbers.into_iter().flat_map(u64::to_le_bytes).collect()
     }
 
     fn read(bytes: &[u8]) -> Option<(Self, &[u8])> {
-        let number = |at: usize| Some(u64::from_le_bytes(*bytes.get(8 * at..)?.first_chunk()?));
-        let float = |at: usize| number(at).map(f64::from_bits);
-        let is_open = number(0).filter(|kind| matches!(kind, 2 | 3))? == 3;
-        let (rate_m5_s3, power_m5_s3) = (float(2)?, float(3)?);
-        let open = is_open.then_some(EnergyBudget {
-            step: number(1)?,
+        let (numbers, user_data) = bytes.split_first_chunk::<64>()?;
+        let numbers = numbers.as_chunks::<8>().0;
+        let [kind, step, ..] = *numbers else {
+            return None;
+        };
+        let floats: Vec<f64> = numbers.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let [_, _, rate_m5_s3, power_m5_s3, bound, largest, fed, taken] = floats[..] else {
+            return None;
+        };
+        let open = EnergyBudget {
+            step: u64::from_le_bytes(step),
             rate_m5_s3,
             power_m5_s3,
-        });
-        let energy = EnergyBound {
-            bound_m5_s2: float(4)?,
-            largest_m5_s2: float(5)?,
         };
-        let window = Window {
-            fed_m5_s3: float(6)?,
-            taken_m5_s3: float(7)?,
-        };
-        Some((
-            Self {
-                open,
-                energy,
-                window,
+        let state = Self {
+            open: match u64::from_le_bytes(kind) {
+                2 => None,
+                3 => Some(open),
+                _ => return None,
             },
-            bytes.get(64..)?,
-        ))
+            energy: EnergyBound {
+                bound_m5_s2: bound,
+                largest_m5_s2: largest,
+            },
+            window: Window {
+                fed_m5_s3: fed,
+                taken_m5_s3: taken,
+            },
+        };
+        Some((state, user_data))
     }
 }
 

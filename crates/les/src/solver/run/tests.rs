@@ -249,6 +249,28 @@ fn inviscid(time_step: TimeStep, scheme: TimeScheme) -> Flow {
     case.start().unwrap().0
 }
 
+/// Checks that the energy, at first `start`, was refused at its first percent, not after many
+/// orders of magnitude; returns the step.
+fn check_growth_error(error: &Error, start: f64) -> u64 {
+    let text = error.to_string();
+    let Error::EnergyGrew(growth) = error else {
+        panic!("{error}")
+    };
+    let EnergyGrowth {
+        energy_m5_s2: energy,
+        allowed_m5_s2: allowed,
+        rate_per_s,
+        cause,
+        ..
+    } = &**growth;
+    assert!(*allowed <= start * (1.0 + 1e-9), "{text}");
+    assert!(*energy > 1.01 * allowed, "{text}");
+    assert!(*energy < 1.5 * start && *rate_per_s > 0.0, "{text}");
+    assert!(cause.contains("Runge-Kutta"), "{text}");
+    assert!(text.contains("near cell") && text.contains("1/s"), "{text}");
+    growth.step
+}
+
 #[test]
 fn energy_that_nothing_gave_stops_the_run_and_no_checkpoint_holds_it() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,38 +284,13 @@ fn energy_that_nothing_gave_stops_the_run_and_no_checkpoint_holds_it() {
         ..plan(1000.0, &[])
     };
     let flow = inviscid(courant(0.4), TimeScheme::AdamsBashforth2);
-    let (mesh, settings, start) = (
-        flow.mesh().clone(),
-        flow.settings().clone(),
-        flow.kinetic_energy_m5_s2(),
-    );
+    let mesh = flow.mesh().clone();
+    let settings = flow.settings().clone();
+    let start = flow.kinetic_energy_m5_s2();
     let mut witness = Witness::default();
-    let error = Run::new(flow, plan.clone())
-        .unwrap()
-        .to_end(&mut witness)
-        .unwrap_err();
-    let text = error.to_string();
-    let Error::EnergyGrew(growth) = error else {
-        panic!("{error}")
-    };
-    let EnergyGrowth {
-        step,
-        energy_m5_s2,
-        allowed_m5_s2,
-        rate_per_s,
-        cause,
-        ..
-    } = *growth;
-    // At its first percent, not after many orders of magnitude.
-    assert!(
-        allowed_m5_s2 <= start * (1.0 + 1e-9) && energy_m5_s2 > 1.01 * allowed_m5_s2,
-        "{text}"
-    );
-    assert!(energy_m5_s2 < 1.5 * start && rate_per_s > 0.0, "{text}");
-    assert!(
-        cause.contains("Runge-Kutta") && text.contains("near cell") && text.contains("1/s"),
-        "{text}"
-    );
+    let mut run = Run::new(flow, plan.clone()).unwrap();
+    let error = run.to_end(&mut witness).unwrap_err();
+    let step = check_growth_error(&error, start);
     assert_eq!(
         step,
         witness.records.len() as u64,

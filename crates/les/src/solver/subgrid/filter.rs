@@ -1,9 +1,11 @@
-//! The small-scale field of the multiscale model, `u - prod_j [1 - (-delta_j^2/4)^n] u`, with `delta^2 q_i = q_(i+1) - 2 q_i +
-//! q_(i-1)` in the index space of each direction (Jeanmart and Winckelmans 2007).
+//! The small-scale field of the multiscale model, `u - prod_j [1 - (-delta_j^2/4)^n] u`, with
+//! `delta^2 q_i = q_(i+1) - 2 q_i + q_(i-1)` in the index space of each direction (Jeanmart and
+//! Winckelmans 2007).
 //!
-//! The filter removes `sin^(2n)(theta/2)` of a wave of phase `theta` per cell. Walls are not crossed: behind a no-slip wall
-//! the velocity relative to the wall is continued oddly, so that a linear shear has no small scales; behind a slip wall what
-//! flows along it is even and what flows through it odd. Differences vanish exactly where the field does not vary.
+//! The filter removes `sin^(2n)(theta/2)` of a wave of phase `theta` per cell. Walls are not
+//! crossed: behind a no-slip wall the velocity relative to the wall is continued oddly, so that a
+//! linear shear has no small scales; behind a slip wall what flows along it is even and what flows
+//! through it odd. Differences vanish exactly where the field does not vary.
 //!
 //! Check: transfer function, constants and linear fields, bounds of the weights.
 
@@ -17,7 +19,8 @@ use super::super::rows::{HALO, cut_rows};
 /// Highest order: the stencil must fit the halo of a padded row.
 pub(super) const HIGHEST_ORDER: usize = HALO;
 
-/// What stands for the value at an index, which may lie beyond the end of an axis: `sign * value[index] + offset`.
+/// Source of the value at an index, which may lie beyond the end of an axis:
+/// `sign * value[index] + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Ghost {
     index: usize,
@@ -32,9 +35,16 @@ impl Ghost {
         sign: 1.0,
         offset: 0.0,
     };
+
+    /// Its value in the row of values that are stored.
+    #[inline(always)]
+    fn value_in(self, row: &[f64]) -> f64 {
+        self.sign * row[self.index] + self.offset
+    }
 }
 
-/// For each place along an axis what stands for the values at distances 1, 2, ... below and above; empty along a thin axis.
+/// For each place along an axis what stands for the values at distances 1, 2, ... below and above;
+/// empty along a thin axis.
 type Neighbours = Vec<Vec<[Ghost; 2]>>;
 
 /// The filter of all components.
@@ -77,38 +87,47 @@ impl Filter {
     /// Writes the small scales of `velocity` to `small`.
     pub(super) fn small_scales(&self, velocity: [&[f64]; 3], small: &mut [&mut [f64]; 3]) {
         let shape = self.shape;
-        let scratch = || Scratch {
-            plane: vec![0.0; shape.plane()],
-            row: vec![0.0; shape.n[0]],
-            padded: vec![0.0; shape.n[0] + 2 * HALO],
-        };
         for (axes, (field, small)) in self.axes.iter().zip(velocity.into_iter().zip(small)) {
-            let planes = small[shape.own_places()]
+            let planes = small[shape.own_range()]
                 .par_chunks_mut(shape.plane())
                 .zip(shape.own());
-            planes.for_each_init(scratch, |scratch, (out, k)| {
-                small_plane(self, axes, field, k, out, scratch)
-            });
+            planes.for_each_init(
+                || Scratch::new(shape),
+                |scratch, (out, k)| small_plane(self, axes, field, k, out, scratch),
+            );
         }
     }
 }
 
-/// The neighbours of the places along an axis; `ghost` tells what stands for the value at any index, also beyond the ends.
-fn neighbours(line: &Operators1d, order: usize, ghost: impl Fn(isize) -> Ghost) -> Neighbours {
-    let at = |place: isize| {
-        (1..=order as isize)
-            .map(|d| [-d, d].map(|d| ghost(place + d)))
-            .collect()
-    };
-    let places = if line.is_thin() {
-        0
-    } else {
-        line.cells as isize
-    };
-    (0..places).map(at).collect()
+impl Scratch {
+    fn new(shape: Shape) -> Self {
+        Self {
+            plane: vec![0.0; shape.plane()],
+            row: vec![0.0; shape.n[0]],
+            padded: vec![0.0; shape.n[0] + 2 * HALO],
+        }
+    }
 }
 
-/// What stands for the normal velocity at face `index`, which may lie beyond the ends.
+/// The neighbours of the places along an axis; `ghost` gives what stands for the value at any
+/// index, also beyond the ends.
+fn neighbours(line: &Operators1d, order: usize, ghost: impl Fn(isize) -> Ghost) -> Neighbours {
+    if line.is_thin() {
+        return Neighbours::new();
+    }
+    let mut neighbours = Neighbours::with_capacity(line.cells);
+    for place in 0..line.cells as isize {
+        let distances = 1..=order as isize;
+        neighbours.push(
+            distances
+                .map(|d| [ghost(place - d), ghost(place + d)])
+                .collect(),
+        );
+    }
+    neighbours
+}
+
+/// Source of the normal velocity at face `index`, which may lie beyond the ends.
 fn face_ghost(line: &Operators1d, index: isize) -> Ghost {
     let (face, sign) = resolve_face(line.cells, line.ends, index);
     // The face on the high wall is not stored, and nothing flows through it.
@@ -120,7 +139,7 @@ fn face_ghost(line: &Operators1d, index: isize) -> Ghost {
     }
 }
 
-/// What stands for the velocity along the walls at cell `index`, which may lie beyond the ends.
+/// Source of the velocity along the walls at cell `index`, which may lie beyond the ends.
 fn cell_ghost(line: &Operators1d, wall_m_s: [f64; 2], index: isize) -> Ghost {
     let n = line.cells;
     let side = usize::from(index >= 0);
@@ -133,18 +152,20 @@ fn cell_ghost(line: &Operators1d, wall_m_s: [f64; 2], index: isize) -> Ghost {
     }
 }
 
-/// Weights of the pairs of neighbours in `1 - (-delta^2/4)^order`, to be applied to `(q_m - q_0) + (q_-m - q_0)`.
+/// Weights of the pairs of neighbours in `1 - (-delta^2/4)^order`, to be applied to
+/// `(q_m - q_0) + (q_-m - q_0)`.
 fn weights(order: usize) -> Vec<f64> {
     // The coefficient of q_m in (-delta^2/4)^n is (-1)^m C(2n, n + m)/4^n.
     let mut binomial = (0..order).fold(1.0, |product, i| {
         product * ((2 * order - i) as f64 / (i + 1) as f64)
     });
-    let weight = |m: usize| {
+    let mut weights = Vec::with_capacity(order);
+    for m in 1..=order {
         binomial *= (order + 1 - m) as f64 / (order + m) as f64;
         let sign = if m.is_multiple_of(2) { 1.0 } else { -1.0 };
-        -sign * binomial / 4.0_f64.powi(order as i32)
-    };
-    (1..=order).map(weight).collect()
+        weights.push(-sign * binomial / 4.0_f64.powi(order as i32));
+    }
+    weights
 }
 
 /// The small scales of plane `k` of the component whose neighbours along the axes are `axes`.
@@ -157,7 +178,8 @@ fn small_plane(
     out: &mut [f64],
     scratch: &mut Scratch,
 ) {
-    let (shape, n) = (filter.shape, filter.shape.n[0]);
+    let shape = filter.shape;
+    let n = shape.n[0];
     let Scratch { plane, row, padded } = scratch;
     for (j, low) in plane.chunks_mut(n).enumerate() {
         smooth(low, &filter.weights, &over[..], k, |index| {
@@ -208,9 +230,11 @@ fn smooth<'a>(
 #[inline(always)]
 fn add_pair(out: &mut [f64], own: &[f64], weight: f64, rows: [&[f64]; 2], [low, high]: [Ghost; 2]) {
     let n = out.len();
-    let (own, [x, y]) = (&own[..n], cut_rows!(rows, n, 0 1));
+    let own = &own[..n];
+    let [x, y] = cut_rows!(rows, n, 0 1);
     for i in 0..n {
-        let (below, above) = (low.sign * x[i] + low.offset, high.sign * y[i] + high.offset);
+        let below = low.sign * x[i] + low.offset;
+        let above = high.sign * y[i] + high.offset;
         out[i] += weight * ((above - own[i]) + (below - own[i]));
     }
 }
@@ -220,10 +244,9 @@ fn add_pair(out: &mut [f64], own: &[f64], weight: f64, rows: [&[f64]; 2], [low, 
 fn pad_with_ghosts(padded: &mut [f64], row: &[f64], first: &[[Ghost; 2]], last: &[[Ghost; 2]]) {
     let n = row.len();
     padded[HALO..HALO + n].copy_from_slice(row);
-    let value = |ghost: Ghost| ghost.sign * row[ghost.index] + ghost.offset;
     for (m, (first, last)) in first.iter().zip(last).enumerate() {
-        padded[HALO - 1 - m] = value(first[0]);
-        padded[HALO + n + m] = value(last[1]);
+        padded[HALO - 1 - m] = first[0].value_in(row);
+        padded[HALO + n + m] = last[1].value_in(row);
     }
 }
 

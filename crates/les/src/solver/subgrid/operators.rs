@@ -1,6 +1,8 @@
-//! Derivatives of the subgrid model along each memory axis, in the form that the kernels on rows take.
+//! Derivatives of the subgrid model along each memory axis, in the form that the kernels on rows
+//! take.
 //!
-//! Check: adjointness through the energy identity, linear and wall-bounded profiles (tests of the model).
+//! Check: adjointness through the energy identity, linear and wall-bounded profiles (tests of the
+//! model).
 
 use super::super::layout::{Layout, Shape};
 use super::super::operators_1d::{LAPLACIAN_SYMBOL, Operators1d, Taps};
@@ -21,9 +23,11 @@ pub(super) struct Operators {
     pub(super) wall_source: [[Vec<f64>; 3]; 3],
     /// `h^(2/3)` of the cells of each axis: their product is the square of the filter width.
     pub(super) width: [Vec<f64>; 3],
-    /// What viscosity, strained velocity and stress need of their halos: planes below and above a slab.
+    /// What viscosity, strained velocity and stress need of their halos: planes below and above a
+    /// slab.
     pub(super) reach: [usize; 2],
-    /// Largest decay rate by a unit viscosity along each axis, `49/9 h^-2`; zero along a thin one \[1/m^2\].
+    /// Largest decay rate by a unit viscosity along each axis, `49/9 h^-2`; zero along a thin one
+    /// \[1/m^2\].
     pub(super) decay: [Vec<f64>; 3],
 }
 
@@ -36,44 +40,35 @@ pub(super) struct Row<'a> {
 
 impl Operators {
     pub(super) fn new(layout: &Layout) -> Self {
-        let operator = |axis: usize, rows| RowOperator::new(layout, axis, rows);
-        let to_cells = std::array::from_fn(|axis| operator(axis, divergence(&layout.line[axis])));
-        let to_faces = std::array::from_fn(|axis| operator(axis, layout.line[axis].gradient()));
-        // of the viscosity the plane below
-        let [[a, b], [c, d]] =
-            [&to_cells, &to_faces].map(|of: &[RowOperator; 3]| layout.slabs.reach(&of[2].rows));
+        let line = &layout.line;
+        let to_cells: [RowOperator; 3] =
+            std::array::from_fn(|axis| RowOperator::new(layout, axis, divergence(&line[axis])));
+        let to_faces: [RowOperator; 3] =
+            std::array::from_fn(|axis| RowOperator::new(layout, axis, line[axis].gradient()));
+        let [cells_below, cells_above] = layout.slabs.reach(&to_cells[2].rows);
+        let [faces_below, faces_above] = layout.slabs.reach(&to_faces[2].rows);
         Self {
             shape: layout.shape,
-            reach: [a.max(c).max(1), b.max(d)],
-            periodic: std::array::from_fn(|axis| layout.line[axis].is_periodic()),
+            // Of the viscosity the plane below is needed.
+            reach: [
+                cells_below.max(faces_below).max(1),
+                cells_above.max(faces_above),
+            ],
+            periodic: std::array::from_fn(|axis| line[axis].is_periodic()),
             to_cells,
             to_faces,
             half_mean_gradient: std::array::from_fn(|axis| {
-                operator(axis, layout.line[axis].half_mean_gradient().0)
+                RowOperator::new(layout, axis, line[axis].half_mean_gradient().0)
             }),
             wall_source: std::array::from_fn(|axis| {
-                let walls = layout.line[axis].half_mean_gradient().1;
+                let walls = line[axis].half_mean_gradient().1;
                 std::array::from_fn(|component| layout.wall_source(axis, component, &walls))
             }),
             width: std::array::from_fn(|axis| {
-                layout.line[axis]
-                    .cell_metric_m
-                    .iter()
-                    .map(|h| h.powf(2.0 / 3.0))
-                    .collect()
+                let metric_m = line[axis].cell_metric_m.iter();
+                metric_m.map(|h| h.powf(2.0 / 3.0)).collect()
             }),
-            decay: std::array::from_fn(|axis| {
-                let line = &layout.line[axis];
-                let symbol = if line.is_thin() {
-                    0.0
-                } else {
-                    LAPLACIAN_SYMBOL
-                };
-                line.cell_metric_m
-                    .iter()
-                    .map(|h| symbol / (h * h))
-                    .collect()
-            }),
+            decay: std::array::from_fn(|axis| decay_by_unit_viscosity(&line[axis])),
         }
     }
 
@@ -86,7 +81,8 @@ impl Operators {
         }
     }
 
-    /// The index of the centre before `index`. On a wall, where there is none and no stress, it is `index`.
+    /// The index of the centre before `index`. On a wall, where there is none and no stress, it is
+    /// `index`.
     pub(super) fn before(&self, axis: usize, index: usize) -> usize {
         if index > 0 {
             index - 1
@@ -96,6 +92,18 @@ impl Operators {
             0
         }
     }
+}
+
+/// Largest decay rate by a unit viscosity along a direction, `49/9 h^-2`; zero along a thin one
+/// \[1/m^2\].
+fn decay_by_unit_viscosity(line: &Operators1d) -> Vec<f64> {
+    let symbol = if line.is_thin() {
+        0.0
+    } else {
+        LAPLACIAN_SYMBOL
+    };
+    let metric_m = line.cell_metric_m.iter();
+    metric_m.map(|h| symbol / (h * h)).collect()
 }
 
 /// Rows of `m^-1 Dw` over the stored faces.

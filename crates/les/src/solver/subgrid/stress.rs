@@ -1,12 +1,13 @@
 //! The subgrid stress `2 nu S` and its divergence.
 //!
-//! Diagonal strains live at the centres, `m^-1 Dw u`; the others at the edges, half the sum of the two gradients, with the
-//! mean viscosity of the four centres about the edge. The divergence is built from the transposed operators, so that the
-//! work that it does on the flow is `-sum weights tau:S`, for any viscosity, mesh and wall. Edges on walls carry no stress:
-//! an eddy viscosity vanishes at a no-slip wall, and so does the strain at a slip wall.
+//! Diagonal strains live at the centres, `m^-1 Dw u`; the others at the edges, half the sum of the
+//! two gradients, with the mean viscosity of the four centres about the edge. The divergence is
+//! built from the transposed operators, so that the work that it does on the flow is
+//! `-sum weights tau:S`, for any viscosity, mesh and wall. Edges on walls carry no stress: an eddy
+//! viscosity vanishes at a no-slip wall, and so does the strain at a slip wall.
 //!
-//! Of the divergence, what comes from the stresses in a plane of axis 2 goes to fields that the flow lends; for the rest the three
-//! stresses that act across that axis are kept.
+//! Of the divergence, what comes from the stresses in a plane of axis 2 goes to fields that the
+//! flow lends; for the rest the three stresses that act across that axis are kept.
 //!
 //! Check: the energy identity to round-off.
 
@@ -29,9 +30,9 @@ struct Scratch {
     padded: Vec<f64>,
 }
 
-/// The stress by the viscosity at the centres and the strain of `velocity`: `across` gets `tau_02`, `tau_12` at the edges and `tau_22`
-/// at the centres \[m^2/s^2\], `in_plane` the acceleration of each component by the stresses whose divergence is taken along the axes
-/// 0 and 1 \[m/s^2\].
+/// The stress by the viscosity at the centres and the strain of `velocity`: `across` gets `tau_02`,
+/// `tau_12` at the edges and `tau_22` at the centres \[m^2/s^2\], `in_plane` the acceleration of
+/// each component by the stresses whose divergence is taken along the axes 0 and 1 \[m/s^2\].
 pub(super) fn update_stress(
     operators: &Operators,
     viscosity: &[f64],
@@ -40,13 +41,14 @@ pub(super) fn update_stress(
     in_plane: &mut [Aligned; 3],
 ) {
     let shape = operators.shape;
-    let (n, plane) = (shape.n[0], shape.plane());
+    let n = shape.n[0];
+    let plane = shape.plane();
     let [a0, a1, a2] = in_plane
         .each_mut()
-        .map(|field| field[shape.own_places()].par_chunks_mut(plane));
+        .map(|field| field[shape.own_range()].par_chunks_mut(plane));
     let [t0, t1, t2] = across
         .each_mut()
-        .map(|field| field[shape.own_places()].par_chunks_mut(plane));
+        .map(|field| field[shape.own_range()].par_chunks_mut(plane));
     (a0, a1, a2, t0, t1, t2, shape.own())
         .into_par_iter()
         .for_each_init(
@@ -60,7 +62,8 @@ pub(super) fn update_stress(
             |scratch, (a0, a1, a2, t0, t1, t2, k)| {
                 stress_plane(
                     operators,
-                    (viscosity, velocity),
+                    viscosity,
+                    velocity,
                     k,
                     [a0, a1, a2],
                     [t0, t1, t2],
@@ -70,7 +73,8 @@ pub(super) fn update_stress(
         );
 }
 
-/// Adds the divergence of the stresses `across` the planes to the acceleration of the row `at` of a component \[m/s^2\].
+/// Adds the divergence of the stresses `across` the planes to the acceleration of the row `at` of a
+/// component \[m/s^2\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(super) fn add_divergence_row(
     operator: &RowOperator,
@@ -85,7 +89,8 @@ pub(super) fn add_divergence_row(
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn stress_plane(
     operators: &Operators,
-    (viscosity, velocity): (&[f64], [&[f64]; 3]),
+    viscosity: &[f64],
+    velocity: [&[f64]; 3],
     k: usize,
     [in_0, in_1, in_2]: [&mut [f64]; 3],
     [across_0, across_1, across_2]: [&mut [f64]; 3],
@@ -100,41 +105,32 @@ fn stress_plane(
     let shape = operators.shape;
     let n = shape.n[0];
     for j in 0..shape.n[1] {
-        let (row, place) = (
-            Row {
-                operators,
-                velocity,
-                at: [j, k],
-            },
-            j * n..(j + 1) * n,
-        );
-        let (before_j, before_k) = (operators.before(1, j), operators.before(2, k));
-        let nu = |j: usize, k: usize| &viscosity[shape.row(j, k)];
-
-        row.diagonal(nu(j, k), 0, diagonal, padded);
+        let row = Row {
+            operators,
+            velocity,
+            at: [j, k],
+        };
+        let place = j * n..(j + 1) * n;
+        let before_j = operators.before(1, j);
+        let before_k = operators.before(2, k);
+        // Viscosities of the row itself and of those before it along the axes 1, 2 and both.
+        let nu = &viscosity[shape.row(j, k)];
+        let nu_before_1 = &viscosity[shape.row(before_j, k)];
+        let nu_before_2 = &viscosity[shape.row(j, before_k)];
+        let nu_before_both = &viscosity[shape.row(before_j, before_k)];
+        row.diagonal(nu, 0, diagonal, padded);
         operators.to_faces[0].along(&mut in_0[place.clone()], diagonal, padded);
-        row.diagonal(nu(j, k), 1, &mut normal[place.clone()], padded);
-        row.diagonal(nu(j, k), 2, &mut across_2[place.clone()], padded);
-
-        sum_of_two(sum, nu(before_j, k), nu(j, k));
+        row.diagonal(nu, 1, &mut normal[place.clone()], padded);
+        row.diagonal(nu, 2, &mut across_2[place.clone()], padded);
+        sum_of_two(sum, nu_before_1, nu);
         row.edge_along(sum, 1, &mut shear[place.clone()], padded);
         operators.to_cells[0].along(&mut in_1[place.clone()], &shear[place.clone()], padded);
-
-        sum_of_two(sum, nu(j, before_k), nu(j, k));
+        sum_of_two(sum, nu_before_2, nu);
         row.edge_along(sum, 2, &mut across_0[place.clone()], padded);
         operators.to_cells[0].along(&mut in_2[place.clone()], &across_0[place.clone()], padded);
-
         let across_1 = &mut across_1[place];
         row.shear_strain([1, 2], across_1, padded);
-        scale_by_mean(
-            across_1,
-            [
-                nu(before_j, before_k),
-                nu(j, before_k),
-                nu(before_j, k),
-                nu(j, k),
-            ],
-        );
+        scale_by_mean(across_1, [nu_before_both, nu_before_2, nu_before_1, nu]);
     }
     for j in 0..shape.n[1] {
         let place = j * n..(j + 1) * n;
@@ -163,13 +159,15 @@ impl Row<'_> {
         self.operators.to_faces[a].add(out, self.velocity[b], self.at, padded);
     }
 
-    /// `tau_0b` at the edges from the viscosity summed over the two centres beside each face of axis `b`.
+    /// `tau_0b` at the edges from the viscosity summed over the two centres beside each face of
+    /// axis `b`.
     #[inline(always)]
     fn edge_along(&self, viscosity: &[f64], b: usize, out: &mut [f64], padded: &mut [f64]) {
         let n = out.len();
         self.shear_strain([0, b], out, padded);
         pad(padded, viscosity, self.operators.periodic[0]);
-        let (low, high) = (&padded[HALO - 1..][..n], &padded[HALO..][..n]);
+        let low = &padded[HALO - 1..][..n];
+        let high = &padded[HALO..][..n];
         for i in 0..n {
             out[i] *= 0.25 * (low[i] + high[i]);
         }

@@ -1,7 +1,8 @@
 //! The eddy viscosity at the centres, from the gradient tensor there.
 //!
-//! Derivatives of a component along its own axis are the terms of the divergence; the others are the means of the gradients
-//! at the four edges about a centre, edges on a wall included with the gradient at the wall.
+//! Derivatives of a component along its own axis are the terms of the divergence; the others are
+//! the means of the gradients at the four edges about a centre, edges on a wall included with the
+//! gradient at the wall.
 //!
 //! Check: closed forms for uniform gradients, zero in shear flows, cubic growth from a wall.
 
@@ -29,8 +30,9 @@ struct Scratch {
     padded: Vec<f64>,
 }
 
-/// Writes the eddy viscosity \[m^2/s\] of `velocity`, at most as large as lets no wave decay faster than `limit_per_s`, and
-/// returns the largest viscosity and the largest decay rate that it would have had without this limit.
+/// Writes the eddy viscosity \[m^2/s\] of `velocity`, at most as large as lets no wave decay faster
+/// than `limit_per_s`, and returns the largest viscosity and the largest decay rate that it would
+/// have had without this limit.
 pub(super) fn eddy_viscosity(
     operators: &Operators,
     formula: Formula,
@@ -40,21 +42,30 @@ pub(super) fn eddy_viscosity(
 ) -> Largest {
     let shape = operators.shape;
     let n = shape.n[0];
-    let scratch = || Scratch {
-        gradient: [0; 3].map(|_| [0; 3].map(|_| vec![0.0; n])),
-        row: vec![0.0; n + 1],
-        padded: vec![0.0; n + 2 * HALO],
-    };
-    let planes = viscosity[shape.own_places()]
+    let planes = viscosity[shape.own_range()]
         .par_chunks_mut(shape.plane())
         .zip(shape.own());
-    let largest = planes.map_init(scratch, |scratch, (plane, k)| {
-        viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
-    });
+    let largest = planes.map_init(
+        || Scratch::new(n),
+        |scratch, (plane, k)| {
+            viscosity_plane(operators, formula, velocity, limit_per_s, k, plane, scratch)
+        },
+    );
     largest.reduce(Largest::default, larger)
 }
 
-/// The largest eddy viscosity \[m^2/s\], and the largest decay rate of the shortest waves, before the limit \[1/s\].
+impl Scratch {
+    fn new(n: usize) -> Self {
+        Self {
+            gradient: [0; 3].map(|_| [0; 3].map(|_| vec![0.0; n])),
+            row: vec![0.0; n + 1],
+            padded: vec![0.0; n + 2 * HALO],
+        }
+    }
+}
+
+/// The largest eddy viscosity \[m^2/s\], and the largest decay rate of the shortest waves, before
+/// the limit \[1/s\].
 pub(crate) type Largest = [f64; 2];
 
 fn larger(a: Largest, b: Largest) -> Largest {
@@ -81,7 +92,8 @@ fn viscosity_plane(
         }
         .gradient(scratch);
         let across = operators.width[1][j] * operators.width[2][k];
-        let (gradient, width) = (&scratch.gradient, &operators.width[0]);
+        let gradient = &scratch.gradient;
+        let width = &operators.width[0];
         match formula {
             Formula::Smagorinsky { square } => {
                 apply(row, gradient, square * across, width, smagorinsky)
@@ -147,22 +159,26 @@ impl Row<'_> {
         }
     }
 
-    /// Derivative along `axis` of the component along axis 0: taken at the faces, then averaged over those of each cell.
+    /// Derivative along `axis` of the component along axis 0: taken at the faces, then averaged
+    /// over those of each cell.
     #[inline(always)]
     fn mean_along(&self, axis: usize, out: &mut [f64], row: &mut [f64], padded: &mut [f64]) {
-        let (n, operators) = (out.len(), self.operators);
+        let n = out.len();
+        let operators = self.operators;
         row.fill(operators.wall_source[axis][0][self.at[axis - 1]]);
         operators.half_mean_gradient[axis].add(&mut row[..n], self.velocity[0], self.at, padded);
         if operators.periodic[0] {
             row[n] = row[0];
         }
-        let (low, high) = (&row[..n], &row[1..n + 1]);
+        let low = &row[..n];
+        let high = &row[1..n + 1];
         for i in 0..n {
             out[i] = low[i] + high[i];
         }
     }
 
-    /// Derivative along `axis` of a component along axis 1 or 2, averaged over the two faces of each cell of the row.
+    /// Derivative along `axis` of a component along axis 1 or 2, averaged over the two faces of
+    /// each cell of the row.
     #[inline(always)]
     fn mean_across(
         &self,
@@ -171,7 +187,9 @@ impl Row<'_> {
         row: &mut [f64],
         padded: &mut [f64],
     ) {
-        let (operators, field, at) = (self.operators, self.velocity[component], self.at);
+        let operators = self.operators;
+        let field = self.velocity[component];
+        let at = self.at;
         let gradient = &operators.half_mean_gradient[axis];
         let source = &operators.wall_source[axis][component];
         let next = operators.after(component, at[component - 1]).map(|index| {
@@ -212,16 +230,20 @@ fn strain_square(g: [[f64; 3]; 3]) -> f64 {
 /// `Sd:Sd`, `Sd` the deviator of the symmetric part of `g g`.
 #[inline(always)]
 fn squared_gradient_square(g: [[f64; 3]; 3]) -> f64 {
-    let product = |a: usize, b: usize| g[a][0] * g[0][b] + g[a][1] * g[1][b] + g[a][2] * g[2][b];
-    let (xx, yy, zz) = (product(0, 0), product(1, 1), product(2, 2));
-    let (xy, xz, yz) = (
-        product(0, 1) + product(1, 0),
-        product(0, 2) + product(2, 0),
-        product(1, 2) + product(2, 1),
-    );
-    let third = (xx + yy + zz) * (1.0 / 3.0);
-    let (xx, yy, zz) = (xx - third, yy - third, zz - third);
+    let mean = (squared(g, 0, 0) + squared(g, 1, 1) + squared(g, 2, 2)) * (1.0 / 3.0);
+    let xx = squared(g, 0, 0) - mean;
+    let yy = squared(g, 1, 1) - mean;
+    let zz = squared(g, 2, 2) - mean;
+    let xy = squared(g, 0, 1) + squared(g, 1, 0);
+    let xz = squared(g, 0, 2) + squared(g, 2, 0);
+    let yz = squared(g, 1, 2) + squared(g, 2, 1);
     (xx * xx + yy * yy + zz * zz) + 0.5 * (xy * xy + xz * xz + yz * yz)
+}
+
+/// Entry `(a, b)` of `g g`.
+#[inline(always)]
+fn squared(g: [[f64; 3]; 3], a: usize, b: usize) -> f64 {
+    g[a][0] * g[0][b] + g[a][1] * g[1][b] + g[a][2] * g[2][b]
 }
 
 /// Replaces each value by `scale width` times what `formula` makes of the gradient there.
@@ -236,7 +258,8 @@ fn apply(
     let n = out.len();
     let width = &width[..n];
     let [x, y, z] = gradient;
-    let ([xx, xy, xz], [yx, yy, yz]) = (cut_rows!(x, n, 0 1 2), cut_rows!(y, n, 0 1 2));
+    let [xx, xy, xz] = cut_rows!(x, n, 0 1 2);
+    let [yx, yy, yz] = cut_rows!(y, n, 0 1 2);
     let [zx, zy, zz] = cut_rows!(z, n, 0 1 2);
     for i in 0..n {
         let g = [
@@ -255,7 +278,8 @@ fn smagorinsky(g: [[f64; 3]; 3]) -> f64 {
 
 #[inline(always)]
 fn wale(g: [[f64; 3]; 3]) -> f64 {
-    let (s, d) = (strain_square(g), squared_gradient_square(g));
+    let s = strain_square(g);
+    let d = squared_gradient_square(g);
     let root = d.sqrt();
     // The smallest number only keeps a fluid at rest from dividing by zero.
     let rate = s * s * s.sqrt() + d * root.sqrt() + f64::MIN_POSITIVE;

@@ -1,4 +1,5 @@
-//! The closures of transport at a no-slip wall, found again from the conditions that were imposed on them.
+//! The closures of transport at a no-slip wall, found again from the conditions that were imposed
+//! on them.
 //!
 //! Check: the linear systems have one solution each, and it is the tables'.
 
@@ -116,7 +117,8 @@ fn made(line: &Operators1d, cell: usize, face: usize) -> f64 {
         .sum()
 }
 
-/// Entries of `P` that differ from the plain mean; row 0, which is never evaluated, belongs to the conditions.
+/// Entries of `P` that differ from the plain mean; row 0, which is never evaluated, belongs to the
+/// conditions.
 const OPEN_MEANS: [(usize, &[usize]); 5] = [
     (0, &[0, 2]),
     (1, &[0, 2]),

@@ -61,7 +61,8 @@ fn mass(layout: &Layout, index: [usize; 3], at_faces: &[usize]) -> f64 {
         .product()
 }
 
-/// Work of the stress on the flow `probe` and minus its contraction with the strain of `probe`, both over the sum of moduli.
+/// Work of the stress on the flow `probe` and minus its contraction with the strain of `probe`,
+/// both over the sum of moduli.
 fn work_and_contraction(flow: &Modelled, probe: &[Vec<f64>; 3]) -> (f64, f64) {
     let layout = &flow.layout;
     let (mut work, mut contraction, mut moduli) = (0.0, 0.0, 0.0);

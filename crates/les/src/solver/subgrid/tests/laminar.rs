@@ -43,8 +43,8 @@ fn the_eddy_viscosity_of_a_uniform_gradient_is_the_closed_form() {
             2.0 * a,
             a * (2.0_f64 / 3.0).powf(1.5) / (2.0_f64.powf(2.5) + (2.0_f64 / 3.0).powf(1.25)),
         ),
-        // Rotation about x and shear across it: g = [[0, a, 0], [0, 0, -w], [0, w, 0]], g g = [[0, 0, -a w], [0, -w^2, 0],
-        // [0, 0, -w^2]], Sd:Sd = 2/3 w^4 + (a w)^2/2, S:S = a^2/2.
+        // Rotation about x and shear across it: g = [[0, a, 0], [0, 0, -w], [0, w, 0]], g g = [[0,
+        // 0, -a w], [0, -w^2, 0], [0, 0, -w^2]], Sd:Sd = 2/3 w^4 + (a w)^2/2, S:S = a^2/2.
         ([[0.0, a, 0.0], [0.0, 0.0, -w], [0.0, w, 0.0]], a, {
             let (d, s) = (2.0 / 3.0 * w.powi(4) + 0.5 * (a * w).powi(2), 0.5 * a * a);
             d.powf(1.5) / (s.powf(2.5) + d.powf(1.25))
@@ -186,7 +186,8 @@ fn laminar_shear_has_no_small_scales_right_up_to_the_walls() {
         };
         let couette = small(&|[_, _, z]| [2.0 * z, -z, 0.0]);
         assert!(couette.iter().all(|u| *u < 1e-15), "{couette:?}");
-        // The parabola has none where the stencil does not meet a wall, but for the first order, which sees its curvature.
+        // The parabola has none where the stencil does not meet a wall, but for the first order,
+        // which sees its curvature.
         let poiseuille = small(&|[_, _, z]| [2.0 * z + z * (1.0 - z), -z, 0.0]);
         for (k, u) in poiseuille.iter().enumerate().take(24 - order).skip(order) {
             let curvature = if order == 1 {

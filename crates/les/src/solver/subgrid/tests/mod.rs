@@ -1,4 +1,5 @@
-//! What the tests of the subgrid models share: fields from closed forms, meshes, one plain evaluation of the stress.
+//! What the tests of the subgrid models share: fields from closed forms, meshes, one plain
+//! evaluation of the stress.
 
 mod budget;
 mod laminar;
@@ -98,7 +99,8 @@ impl Modelled {
             .fold(0.0, |most, (_, t)| most.max(t.abs()))
     }
 
-    /// Stress `tau_00, tau_11, tau_22, tau_01, tau_02, tau_12`, place by place from the rows of the operators.
+    /// Stress `tau_00, tau_11, tau_22, tau_01, tau_02, tau_12`, place by place from the rows of the
+    /// operators.
     fn plain_stress(&self) -> [Vec<f64>; 6] {
         let small = self.small();
         let mut strain = strain(&self.layout, small.as_ref().unwrap_or(&self.velocity));

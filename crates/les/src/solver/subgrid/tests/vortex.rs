@@ -68,7 +68,8 @@ fn in_the_core_of_a_vortex_the_multiscale_stress_is_a_tenth_of_that_of_wale_or_l
     }
 }
 
-/// Root mean square of the velocity along the axis of a tight vortex with a little noise, after `steps` steps over before.
+/// Root mean square of the velocity along the axis of a tight vortex with a little noise, after
+/// `steps` steps over before.
 fn noise_along_a_vortex(steps: usize) -> f64 {
     let wide = || Direction::between(32, -16.0, 16.0, Wall::Slip, Wall::Slip);
     let mesh = Mesh::new(Direction::periodic(8, 0.0, 8.0), wide(), wide()).unwrap();
@@ -128,7 +129,8 @@ fn constants_of_the_multiscale_model_give_the_dissipation_of_wale_in_a_minus_fiv
     for order in 1..=4_usize {
         let kept = |phase: f64| 1.0 - (0.5 * phase).sin().powi(2 * order as i32);
         let (mut small, mut all) = (0.0, 0.0);
-        // Midpoint rule over the octant of the sphere |k| < pi: k^2 E(k) = k^(1/3), uniform in direction.
+        // Midpoint rule over the octant of the sphere |k| < pi: k^2 E(k) = k^(1/3), uniform in
+        // direction.
         for (i, j, l) in
             (0..STEPS * STEPS * STEPS).map(|p| (p / (STEPS * STEPS), p / STEPS % STEPS, p % STEPS))
         {

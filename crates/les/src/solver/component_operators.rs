@@ -1,10 +1,13 @@
-//! The momentum equation of one velocity component, row by row: convection, viscosity, pressure gradient.
+//! The momentum equation of one velocity component, row by row: convection, viscosity, pressure
+//! gradient.
 //!
-//! Convection of component `a` along direction `b` is `(f_a m_b)^-1 sum_n G_n S^n u_a`, where `G_n` is the flux through face `n`
-//! of `b`, weighted with the mass of the cells along `a` and brought to the faces of `a` (`b = a`: the flux itself over `f_a`).
-//! Weighting before interpolating is what conserves mass, momentum and energy on a stretched mesh (Vasilyev 2000).
+//! Convection of component `a` along direction `b` is `(f_a m_b)^-1 sum_n G_n S^n u_a`, where `G_n`
+//! is the flux through face `n` of `b`, weighted with the mass of the cells along `a` and brought
+//! to the faces of `a` (`b = a`: the flux itself over `f_a`). Weighting before interpolating is
+//! what conserves mass, momentum and energy on a stretched mesh (Vasilyev 2000).
 //!
-//! Check: energy and momentum made by the discrete convection, order on stretched meshes (tests of `flow`).
+//! Check: energy and momentum made by the discrete convection, order on stretched meshes (tests of
+//! `flow`).
 
 use super::layout::{Layout, Shape};
 use super::operators_1d::DIFFERENCE;
@@ -15,7 +18,7 @@ use multiversion::multiversion;
 
 /// The operators of one component.
 #[derive(Debug, Clone)]
-pub(crate) struct Momentum {
+pub(crate) struct ComponentOperators {
     /// Memory axis of the component.
     pub(super) axis: usize,
     pub(super) shape: Shape,
@@ -34,7 +37,8 @@ pub(crate) struct Momentum {
     pub(super) inverse_metric: Vec<f64>,
     /// Mass of the control volume of this component along each axis.
     pub(super) mass: [Vec<f64>; 3],
-    /// Laplacian along each axis, and the source from moving walls; none along an axis of equal periodic cells.
+    /// Laplacian along each axis, and the source from moving walls; none along an axis of equal
+    /// periodic cells.
     pub(super) laplacian: [RowOperator; 3],
     wall_source: [Vec<f64>; 3],
     gradient: RowOperator,
@@ -62,59 +66,31 @@ pub(crate) struct Scratch {
 
 impl Scratch {
     pub(crate) fn new(n: usize) -> Self {
-        let row = || vec![0.0; n];
-        let padded = || vec![0.0; n + 2 * HALO];
         Self {
-            padded: [padded(), padded()],
-            flux: [row(), row()],
+            padded: std::array::from_fn(|_| vec![0.0; n + 2 * HALO]),
+            flux: std::array::from_fn(|_| vec![0.0; n]),
             fluxes: FluxCache::default(),
-            convection: row(),
-            explicit: row(),
-            implicit: row(),
-            model: row(),
-            pressure: row(),
+            convection: vec![0.0; n],
+            explicit: vec![0.0; n],
+            implicit: vec![0.0; n],
+            model: vec![0.0; n],
+            pressure: vec![0.0; n],
         }
     }
 }
 
-impl Momentum {
+impl ComponentOperators {
     pub(crate) fn new(layout: &Layout, axis: usize) -> Self {
         let line = &layout.line;
-        let n = layout.shape.n;
+        let faces = layout.shape.n[axis];
         let own = &line[axis];
-        let inverse = |x: &f64| 1.0 / x;
-        let inverse_face_mass = (0..n[axis])
-            .map(|face| {
-                if face < own.first_face() {
-                    0.0
-                } else {
-                    1.0 / own.face_mass_m[face]
-                }
-            })
-            .collect();
-        let laplacian = std::array::from_fn(|b| {
-            let per_h2 = line[b].cell_mass_m[0].powi(-2);
-            let rows = if b == axis {
-                line[b].laplacian_at_faces()
-            } else {
-                line[b].laplacian_at_cells().0
-            };
-            let mut along = RowOperator::new(layout, b, rows);
-            along.even = line[b]
-                .is_fourier()
-                .then(|| SECOND_DIFFERENCE.map(|c| c * per_h2));
-            along
-        });
-        let wall_source = std::array::from_fn(|b| {
-            if line[b].is_fourier() {
-                Vec::new()
-            } else if b == axis {
-                vec![0.0; n[b]]
-            } else {
-                layout.wall_source(b, axis, &line[b].laplacian_at_cells().1)
-            }
-        });
-        let stencil = Stencil::of(line);
+        let mut inverse_face_mass = inverses(&own.face_mass_m[..faces]);
+        inverse_face_mass[..own.first_face()].fill(0.0);
+        let inverse_metric = if own.is_thin() {
+            vec![0.0]
+        } else {
+            inverses(&own.face_metric_m[..faces])
+        };
         Self {
             axis,
             shape: layout.shape,
@@ -122,36 +98,25 @@ impl Momentum {
             thin: std::array::from_fn(|b| line[b].is_thin()),
             flux_mean: RowOperator::new(layout, axis, own.flux_mean()),
             equal_mass: own.is_fourier().then(|| own.cell_mass_m[0]),
-            transport: std::array::from_fn(|b| {
-                if b == axis {
-                    line[b].transport_of_faces(stencil)
-                } else {
-                    line[b].transport_of_cells(stencil)
-                }
-            }),
-            inverse_cell_mass: std::array::from_fn(|b| {
-                line[b].cell_mass_m.iter().map(inverse).collect()
-            }),
+            transport: std::array::from_fn(|b| transport_along(layout, axis, b)),
+            inverse_cell_mass: std::array::from_fn(|b| inverses(&line[b].cell_mass_m)),
             inverse_face_mass,
-            inverse_metric: if own.is_thin() {
-                vec![0.0]
-            } else {
-                own.face_metric_m[..n[axis]].iter().map(inverse).collect()
-            },
+            inverse_metric,
             mass: std::array::from_fn(|b| {
                 if b == axis {
-                    own.face_mass_m[..n[b]].to_vec()
+                    own.face_mass_m[..faces].to_vec()
                 } else {
                     line[b].cell_mass_m.clone()
                 }
             }),
-            laplacian,
-            wall_source,
+            laplacian: std::array::from_fn(|b| laplacian_along(layout, axis, b)),
+            wall_source: std::array::from_fn(|b| wall_source_along(layout, axis, b)),
             gradient: RowOperator::new(layout, axis, own.gradient()),
         }
     }
 
-    /// Mass of the control volumes of row `(j, k)` as a factor common to the row and the factors along axis 0.
+    /// Mass of the control volumes of row `(j, k)` as a factor common to the row and the factors
+    /// along axis 0.
     pub(crate) fn row_mass(&self, j: usize, k: usize) -> (f64, &[f64]) {
         (self.mass[1][j] * self.mass[2][k], &self.mass[0])
     }
@@ -173,10 +138,52 @@ impl Momentum {
     }
 }
 
+fn inverses(values: &[f64]) -> Vec<f64> {
+    values.iter().map(|value| 1.0 / value).collect()
+}
+
+/// Transport of the component along `component` by the fluxes along `axis`.
+fn transport_along(layout: &Layout, component: usize, axis: usize) -> Transport {
+    let stencil = Stencil::for_lines(&layout.line);
+    if axis == component {
+        layout.line[axis].transport_of_faces(stencil)
+    } else {
+        layout.line[axis].transport_of_cells(stencil)
+    }
+}
+
+/// Laplacian of the component along `component` along `axis`.
+fn laplacian_along(layout: &Layout, component: usize, axis: usize) -> RowOperator {
+    let line = &layout.line[axis];
+    let rows = if axis == component {
+        line.laplacian_at_faces()
+    } else {
+        line.laplacian_at_cells().0
+    };
+    let mut laplacian = RowOperator::new(layout, axis, rows);
+    if line.is_fourier() {
+        let per_h2 = line.cell_mass_m[0].powi(-2);
+        laplacian.even = Some(SECOND_DIFFERENCE.map(|c| c * per_h2));
+    }
+    laplacian
+}
+
+/// What moving walls add to this Laplacian; empty along an axis of equal periodic cells.
+fn wall_source_along(layout: &Layout, component: usize, axis: usize) -> Vec<f64> {
+    let line = &layout.line[axis];
+    if line.is_fourier() {
+        Vec::new()
+    } else if axis == component {
+        vec![0.0; layout.shape.n[axis]]
+    } else {
+        layout.wall_source(axis, component, &line.laplacian_at_cells().1)
+    }
+}
+
 /// Adds the Laplacian of the component along `axis` to the row `at` \[1/(m s)\].
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn add_laplacian_row(
-    ops: &Momentum,
+    ops: &ComponentOperators,
     field: &[f64],
     axis: usize,
     at: [usize; 2],
@@ -199,7 +206,7 @@ pub(crate) fn add_laplacian_row(
 /// Gradient of a field at the centres for row `(j, k)` of the component.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn gradient_row(
-    ops: &Momentum,
+    ops: &ComponentOperators,
     field: &[f64],
     j: usize,
     k: usize,
@@ -211,10 +218,11 @@ fn gradient_row(
 }
 
 impl Scratch {
-    /// Laplacians of one row: those along the implicit axes into `self.implicit`, the others into `self.explicit`.
+    /// Laplacians of one row: those along the implicit axes into `self.implicit`, the others into
+    /// `self.explicit`.
     pub(crate) fn laplacians(
         &mut self,
-        ops: &Momentum,
+        ops: &ComponentOperators,
         field: &[f64],
         implicit: [bool; 3],
         j: usize,
@@ -235,7 +243,7 @@ impl Scratch {
     }
 
     /// Gradient of one row into `self.pressure`.
-    pub(crate) fn gradient(&mut self, ops: &Momentum, field: &[f64], j: usize, k: usize) {
+    pub(crate) fn gradient(&mut self, ops: &ComponentOperators, field: &[f64], j: usize, k: usize) {
         gradient_row(ops, field, j, k, &mut self.pressure, &mut self.padded[0]);
     }
 }
@@ -243,8 +251,8 @@ impl Scratch {
 /// Fluxes along one axis that act on one row.
 pub(super) const SLOTS: usize = 4;
 
-/// Fluxes along the axes 1 and 2 of one component of one velocity field: each acts on four rows and is computed once, as long as rows
-/// are asked for in the order of memory.
+/// Fluxes along the axes 1 and 2 of one component of one velocity field: each acts on four rows and
+/// is computed once, as long as rows are asked for in the order of memory.
 #[derive(Debug, Default)]
 pub(super) struct FluxCache {
     /// For each axis the last four rows of each place across it.
