@@ -24,7 +24,44 @@ pub(crate) struct Claim {
 }
 
 /// A part of a statement: its name, what was found in a unit, and where it must lie.
-pub(crate) type Part = (String, Estimate, &'static str, Bar);
+#[derive(Debug, Clone)]
+pub(crate) struct Part {
+    name: String,
+    pub(crate) found: Estimate,
+    unit: &'static str,
+    pub(crate) bar: Bar,
+}
+
+impl Part {
+    pub(crate) fn new(
+        name: impl Into<String>,
+        found: Estimate,
+        unit: &'static str,
+        bar: Bar,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            found,
+            unit,
+            bar,
+        }
+    }
+
+    /// The name and the number without a mark between them.
+    pub(crate) fn words(&self) -> String {
+        format!("{} {}{}", self.name, self.found.words(), self.unit)
+    }
+}
+
+/// The name, if there is one, and the number.
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.name.is_empty() {
+            write!(f, "{}: ", self.name)?;
+        }
+        write!(f, "{}{}", self.found.words(), self.unit)
+    }
+}
 
 /// Which of the three lists a claim is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -109,46 +146,41 @@ impl Claim {
 
     /// A claim of the list whose parts must all hold by the rule of statistics; those that do not are told first.
     pub(crate) fn judged(id: &str, parts: &[Part]) -> Self {
-        let verdict = |part: &&Part| part.3.verdict_among(&part.1, parts.len());
-        let mut told: Vec<&Part> = parts.iter().collect();
-        told.sort_by_key(|part| std::cmp::Reverse(verdict(part)));
-        let words = told.iter().map(|(name, found, unit, _)| {
-            let name = if name.is_empty() {
-                String::new()
-            } else {
-                format!("{name}: ")
-            };
-            format!("{name}{}{unit}", found.words())
-        });
-        let open = parts.iter().filter(|part| verdict(part) == Verdict::Open);
-        // Of nothing, no sample tells anything.
-        let least = if parts.is_empty() { f64::INFINITY } else { 0.0 };
-        let times = open
-            .map(|part| part.3.times_the_data(&part.1))
-            .fold(least, f64::max);
+        let mut judged = Vec::new();
+        let mut standard_error = 0.0_f64;
+        // Of nothing, no sample decides anything.
+        let mut times = if parts.is_empty() { f64::INFINITY } else { 0.0 };
+        for part in parts {
+            let verdict = part.bar.verdict_among(&part.found, parts.len());
+            if verdict == Verdict::Open {
+                times = times.max(part.bar.times_the_data(&part.found));
+            }
+            standard_error = standard_error.max(part.found.standard_error);
+            judged.push((verdict, part.to_string()));
+        }
+        judged.sort_by_key(|(verdict, _)| std::cmp::Reverse(*verdict));
+        let verdict = judged
+            .first()
+            .map_or(Verdict::Open, |(verdict, _)| *verdict);
+        let measured: Vec<String> = judged.into_iter().map(|(_, words)| words).collect();
         let claim = Self {
-            verdict: told.first().map_or(Verdict::Open, verdict),
-            standard_error: parts
-                .iter()
-                .map(|part| part.1.standard_error)
-                .fold(0.0, f64::max),
-            ..Self::exact(id, words.collect::<Vec<_>>().join("; "), false)
+            verdict,
+            standard_error,
+            ..Self::exact(id, measured.join("; "), false)
         };
-        let more = if times < 100.0 {
-            format!("about {times:.1} times the data")
+        if verdict != Verdict::Open {
+            return claim;
+        }
+        if times < 100.0 {
+            claim.open(&format!("about {times:.1} times the data"))
         } else {
-            "no sample in reach".into()
-        };
-        if claim.verdict == Verdict::Open {
-            claim.open(&more)
-        } else {
-            claim
+            claim.open("no sample in reach")
         }
     }
 
     /// The same of one part, which needs no name.
     pub(crate) fn judged_alone(id: &str, found: Estimate, unit: &'static str, bar: Bar) -> Self {
-        Self::judged(id, &[(String::new(), found, unit, bar)])
+        Self::judged(id, &[Part::new("", found, unit, bar)])
     }
 
     /// The claim, which fails if a fit failed, with their number beside it.
@@ -304,12 +336,7 @@ mod tests {
     #[test]
     fn a_claim_of_parts_holds_if_all_do_and_tells_first_what_does_not() {
         let part = |name: &str, value: f64| {
-            (
-                name.into(),
-                Estimate::stated(value, 0.1),
-                " m/s",
-                Bar::Below(1.0),
-            )
+            Part::new(name, Estimate::stated(value, 0.1), " m/s", Bar::Below(1.0))
         };
         let of = |values: &[f64]| {
             Claim::judged(

@@ -22,65 +22,43 @@ struct Curve {
     snr_db: Vec<f64>,
 }
 
-pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let realisations = context.profile.choose(48, 400, 400);
-    // A range in the middle and at the end of each layer of the chapter's path.
-    let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
-    // weak turbulence scatters a tenth of the other
-    let realisations_weak = realisations / 4;
-    let weak = monte_carlo(WEAK_M_M23, &range_m, realisations_weak, context.seed)?;
-    let medium = monte_carlo(MEDIUM_M_M23, &range_m, realisations, context.seed)?;
-    let telescope = Telescope::table2();
-    let free =
-        EfficiencyProfile::from_theory(&range_m, |r| theory::free_space_efficiency(&telescope, r))?;
-    let turbulence = Turbulence::table2(MEDIUM_M_M23)?;
-    let exact = EfficiencyProfile::from_theory(&range_m, |r| {
-        theory::bistatic_efficiency(&telescope, &Misalignment::NONE, &turbulence, r)
-    })?;
-    let bistatic = medium
-        .bistatic
-        .clone()
-        .ok_or_else(|| Failure::new("one realisation has no pairs".into()))?;
-    let curve = |name, label, style, profile: EfficiencyProfile| {
-        let snr_db = decibels(&profile)?;
-        Ok::<_, Failure>(Curve {
+impl Curve {
+    fn new(
+        name: &'static str,
+        label: &'static str,
+        style: Style,
+        profile: EfficiencyProfile,
+    ) -> Result<Self, Failure> {
+        Ok(Self {
             name,
             label,
             style,
+            snr_db: decibels(&profile)?,
             profile,
-            snr_db,
         })
-    };
-    let curves = [
-        curve("free_space", "free space", Style::Line, free)?,
-        curve(
-            "monostatic_1e-15",
-            "monostatic, 10^{−15}",
-            Style::Dash,
-            weak.monostatic,
-        )?,
-        curve(
-            "bistatic_1e-13",
-            "bistatic, 10^{−13}",
-            Style::Markers,
-            bistatic,
-        )?,
-        curve(
-            "monostatic_1e-13",
-            "monostatic, 10^{−13}",
-            Style::DashDot,
-            medium.monostatic,
-        )?,
-        curve(
-            "bistatic_1e-13_exact",
-            "bistatic, 10^{−13}, exact",
-            Style::Dot,
-            exact,
-        )?,
-    ];
+    }
+}
 
+/// How many realisations there are of the weak turbulence and of the other.
+struct Realisations {
+    weak: usize,
+    medium: usize,
+}
+
+pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
+    let medium = context.profile.choose(48, 400, 400);
+    let realisations = Realisations {
+        // Weak turbulence scatters a tenth of the other.
+        weak: medium / 4,
+        medium,
+    };
+    // A range in the middle and at the end of each layer of the chapter's path.
+    let range_m: Vec<f64> = (1..=20).map(|i| 150.0 * f64::from(i)).collect();
+    let turbulence = Turbulence::table2(MEDIUM_M_M23)?;
+    let curves = curves(&range_m, &realisations, &turbulence, context.seed)?;
     let parameters = format!(
-        "set_up = \"chapter: 512 x 512 points of 2 mm, 10 layers\"\nrealisations = {realisations}\nrealisations_weak = {realisations_weak}\n"
+        "set_up = \"chapter: 512 x 512 points of 2 mm, 10 layers\"\nrealisations = {}\nrealisations_weak = {}\n",
+        realisations.medium, realisations.weak
     );
     let origin = context.provenance_of_formula(&parameters);
     let figure = Figure::side_by_side([
@@ -90,13 +68,60 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         }),
     ]);
     let mut out = Rendered::new(&table(&curves), &figure, &origin)?;
-    out.values = vec![realisations.to_string(), realisations_weak.to_string()];
-    out.claims = claims(
-        &curves,
-        &exact_for_screens(&range_m, &turbulence)?,
-        [realisations_weak, realisations],
-    )?;
+    out.values = vec![
+        realisations.medium.to_string(),
+        realisations.weak.to_string(),
+    ];
+    let screens = exact_for_screens(&range_m, &turbulence)?;
+    out.claims = claims(&curves, &screens, &realisations)?;
     Ok(out)
+}
+
+/// Free space, weak turbulence, then the medium one with independent paths, with the same path and by exact theory.
+fn curves(
+    range_m: &[f64],
+    realisations: &Realisations,
+    turbulence: &Turbulence,
+    seed: u64,
+) -> Result<[Curve; 5], Failure> {
+    let weak = monte_carlo(WEAK_M_M23, range_m, realisations.weak, seed)?;
+    let medium = monte_carlo(MEDIUM_M_M23, range_m, realisations.medium, seed)?;
+    let telescope = Telescope::table2();
+    let free =
+        EfficiencyProfile::from_theory(range_m, |r| theory::free_space_efficiency(&telescope, r))?;
+    let exact = EfficiencyProfile::from_theory(range_m, |r| {
+        theory::bistatic_efficiency(&telescope, &Misalignment::NONE, turbulence, r)
+    })?;
+    let bistatic = medium
+        .bistatic
+        .ok_or_else(|| Failure::new("one realisation has no pairs".into()))?;
+    Ok([
+        Curve::new("free_space", "free space", Style::Line, free)?,
+        Curve::new(
+            "monostatic_1e-15",
+            "monostatic, 10^{−15}",
+            Style::Dash,
+            weak.monostatic,
+        )?,
+        Curve::new(
+            "bistatic_1e-13",
+            "bistatic, 10^{−13}",
+            Style::Markers,
+            bistatic,
+        )?,
+        Curve::new(
+            "monostatic_1e-13",
+            "monostatic, 10^{−13}",
+            Style::DashDot,
+            medium.monostatic,
+        )?,
+        Curve::new(
+            "bistatic_1e-13_exact",
+            "bistatic, 10^{−13}, exact",
+            Style::Dot,
+            exact,
+        )?,
+    ])
 }
 
 fn monte_carlo(
@@ -127,70 +152,62 @@ fn exact_for_screens(
 }
 
 fn decibels(profile: &EfficiencyProfile) -> Result<Vec<f64>, Failure> {
-    let (air, area_m2) = (Medium::table2(), Telescope::table2().aperture_area_m2());
-    let of_range = |(&range_m, &efficiency): (&f64, &f64)| {
-        let weight_per_m = air.return_per_m(range_m, area_m2)? * efficiency;
-        let energy_j = GaussianPulse::table2().energy_j();
-        Ok(10.0
-            * Receiver::table2()
-                .slowly_varying_snr(energy_j, weight_per_m)
-                .log10())
-    };
-    profile
-        .range_m
-        .iter()
-        .zip(&profile.mean)
-        .map(of_range)
-        .collect()
+    let medium = Medium::table2();
+    let receiver = Receiver::table2();
+    let area_m2 = Telescope::table2().aperture_area_m2();
+    let energy_j = GaussianPulse::table2().energy_j();
+    let mut snr_db = Vec::new();
+    for (&range_m, &efficiency) in profile.range_m.iter().zip(&profile.mean) {
+        let weight_per_m = medium.return_per_m(range_m, area_m2)? * efficiency;
+        snr_db.push(10.0 * receiver.slowly_varying_snr(energy_j, weight_per_m).log10());
+    }
+    Ok(snr_db)
+}
+
+/// A column of all curves, one after the other.
+fn column(curves: &[Curve], values: fn(&Curve) -> &Vec<f64>) -> Vec<f64> {
+    curves.iter().flat_map(values).copied().collect()
 }
 
 fn table(curves: &[Curve]) -> Table {
-    let column =
-        |get: fn(&Curve) -> &Vec<f64>| curves.iter().flat_map(move |c| get(c).iter().copied());
+    let names = curves
+        .iter()
+        .flat_map(|c| std::iter::repeat_n(c.name, c.profile.range_m.len()));
     Table::new()
-        .text(
-            "configuration",
-            curves
-                .iter()
-                .flat_map(|c| std::iter::repeat_n(c.name, c.profile.range_m.len())),
-        )
-        .float("range_m", column(|c| &c.profile.range_m))
-        .float("efficiency", column(|c| &c.profile.mean))
+        .text("configuration", names)
+        .float("range_m", column(curves, |c| &c.profile.range_m))
+        .float("efficiency", column(curves, |c| &c.profile.mean))
         .float(
             "efficiency_standard_deviation",
-            column(|c| &c.profile.standard_deviation),
+            column(curves, |c| &c.profile.standard_deviation),
         )
         .float(
             "efficiency_standard_error",
-            column(|c| &c.profile.standard_error),
+            column(curves, |c| &c.profile.standard_error),
         )
-        .float("snr_db", column(|c| &c.snr_db))
+        .float("snr_db", column(curves, |c| &c.snr_db))
 }
 
-fn plot(title: &str, label: &str, curves: &[Curve], value: fn(&Curve) -> &Vec<f64>) -> CurvePlot {
+fn plot(title: &str, label: &str, curves: &[Curve], values: fn(&Curve) -> &Vec<f64>) -> CurvePlot {
     let mut plot = CurvePlot::new(title, Axis::linear("range [m]"), Axis::linear(label));
     plot.shape = 0.8;
     for curve in curves {
-        let p = &curve.profile;
-        let y = value(curve);
-        let mut series = Series::new(
-            curve.label,
-            curve.style,
-            p.range_m.iter().copied().zip(y.iter().copied()),
-        );
-        if p.standard_error.iter().any(|&e| e > 0.0) {
+        let profile = &curve.profile;
+        let mut points = Vec::new();
+        let mut half_widths = Vec::new();
+        for (i, &value) in values(curve).iter().enumerate() {
+            points.push((profile.range_m[i], value));
             // The same relative error in the scale that is drawn.
-            let slope = |i: usize| {
-                if label.ends_with("[dB]") {
-                    10.0 / std::f64::consts::LN_10 / p.mean[i]
-                } else {
-                    1.0
-                }
+            let slope = if label.ends_with("[dB]") {
+                10.0 / std::f64::consts::LN_10 / profile.mean[i]
+            } else {
+                1.0
             };
-            let half: Vec<f64> = (0..y.len())
-                .map(|i| slope(i) * p.standard_error[i])
-                .collect();
-            series = series.with_band(&half);
+            half_widths.push(slope * profile.standard_error[i]);
+        }
+        let mut series = Series::new(curve.label, curve.style, points);
+        if profile.standard_error.iter().any(|&error| error > 0.0) {
+            series = series.with_band(&half_widths);
         }
         plot = plot.with(series);
     }
@@ -199,72 +216,106 @@ fn plot(title: &str, label: &str, curves: &[Curve], value: fn(&Curve) -> &Vec<f6
 
 /// Difference of two profiles at each range, from the fewer realisations.
 fn differences(a: &EfficiencyProfile, b: &EfficiencyProfile, realisations: usize) -> Vec<Estimate> {
-    let at = |i: usize| Estimate {
-        value: a.mean[i] - b.mean[i],
-        standard_error: a.standard_error[i].hypot(b.standard_error[i]),
-        freedom: realisations as f64 - 1.0,
-    };
-    (0..a.mean.len()).map(at).collect()
+    let mut differences = Vec::new();
+    for i in 0..a.mean.len() {
+        differences.push(Estimate {
+            value: a.mean[i] - b.mean[i],
+            standard_error: a.standard_error[i].hypot(b.standard_error[i]),
+            freedom: realisations as f64 - 1.0,
+        });
+    }
+    differences
 }
 
-/// Claims on curves with so many realisations, of the weak turbulence and of the other.
+/// Claims on the curves.
 fn claims(
     curves: &[Curve; 5],
     screens: &EfficiencyProfile,
-    [few, many]: [usize; 2],
+    realisations: &Realisations,
 ) -> Result<Vec<Claim>, Failure> {
-    let [free, weak, bistatic, medium, exact] = [0, 1, 2, 3, 4].map(|i| &curves[i].profile);
-    let range_m = &free.range_m;
-    let places = range_m.len();
+    let [free, weak, bistatic, medium, exact] = curves.each_ref().map(|curve| &curve.profile);
+    let from_screens = differences(bistatic, screens, realisations.medium);
+    let gains = differences(medium, bistatic, realisations.medium);
+    let excess = differences(medium, weak, realisations.weak);
+    let largest = (0..excess.len())
+        .max_by(|&a, &b| excess[a].value.total_cmp(&excess[b].value))
+        .unwrap_or(0);
+    Ok(vec![
+        falling_claim(exact, free, &from_screens),
+        gain_claim(&free.range_m, &gains),
+        excess_claim(medium, weak, &excess, largest),
+        crossover_claim(&free.range_m, &excess, largest),
+        free_space_claim()?,
+    ])
+}
 
-    let ratio: Vec<f64> = exact
-        .mean
-        .iter()
-        .zip(&free.mean)
-        .map(|(e, f)| e / f)
-        .collect();
-    let off = differences(bistatic, screens, many);
-    let worst = off
-        .iter()
-        .map(|d| d.value.abs() / d.half_width_of(places))
-        .fold(0.0, f64::max);
-    let f4a = Claim::exact(
+/// The bistatic efficiency over that of free space falls, and the Monte Carlo agrees with the theory of its screens.
+fn falling_claim(
+    exact: &EfficiencyProfile,
+    free: &EfficiencyProfile,
+    from_screens: &[Estimate],
+) -> Claim {
+    let mut ratio = Vec::new();
+    for (exact, free) in exact.mean.iter().zip(&free.mean) {
+        ratio.push(exact / free);
+    }
+    let mut worst = 0.0_f64;
+    for difference in from_screens {
+        let interval = difference.half_width_of(from_screens.len());
+        worst = worst.max(difference.value.abs() / interval);
+    }
+    let falls = ratio.windows(2).all(|w| w[1] < w[0]);
+    Claim::exact(
         "F4a",
         format!(
             "{:.3} to {:.3}; largest distance {worst:.2} of the interval",
             ratio[0],
             ratio[ratio.len() - 1]
         ),
-        ratio.windows(2).all(|w| w[1] < w[0]) && worst < 1.0,
-    );
+        falls && worst < 1.0,
+    )
+}
 
-    let gains = differences(medium, bistatic, many);
+/// One path for both ways gains against two, at every range beyond the near field.
+fn gain_claim(range_m: &[f64], gains: &[Estimate]) -> Claim {
     let beyond = range_m
         .iter()
-        .zip(&gains)
+        .zip(gains)
         .filter(|(r, _)| **r >= NEAR_FIELD_M);
-    let least = beyond.min_by(|a, b| {
-        (a.1.value / a.1.standard_error).total_cmp(&(b.1.value / b.1.standard_error))
+    let least = beyond.min_by(|(_, a), (_, b)| {
+        (a.value / a.standard_error).total_cmp(&(b.value / b.standard_error))
     });
-    let least: Vec<Part> = least
+    let parts: Vec<Part> = least
         .into_iter()
-        .map(|(r, d)| (format!("least sure at {r} m"), *d, "", Bar::Above(0.0)))
+        .map(|(r, gain)| Part::new(format!("least sure at {r} m"), *gain, "", Bar::Above(0.0)))
         .collect();
-    let f4b = Claim::judged("F4b", &least);
+    Claim::judged("F4b", &parts)
+}
 
-    // Some place of many: all their intervals must hold together.
-    let excess = differences(medium, weak, few);
-    let sure = |i: &usize| excess[*i].value.abs() > excess[*i].half_width_of(places);
-    let above: Vec<usize> = (0..places)
-        .filter(|i| sure(i) && excess[*i].value > 0.0)
+/// Whether a difference is beyond its interval; of many ranges all intervals must hold together.
+fn is_sure(difference: &Estimate, ranges: usize) -> bool {
+    difference.value.abs() > difference.half_width_of(ranges)
+}
+
+/// Medium turbulence exceeds weak turbulence over some interval of range.
+fn excess_claim(
+    medium: &EfficiencyProfile,
+    weak: &EfficiencyProfile,
+    excess: &[Estimate],
+    largest: usize,
+) -> Claim {
+    let range_m = &medium.range_m;
+    let above: Vec<usize> = (0..excess.len())
+        .filter(|&i| is_sure(&excess[i], excess.len()) && excess[i].value > 0.0)
         .collect();
-    let best = (0..places)
-        .max_by(|&a, &b| excess[a].value.total_cmp(&excess[b].value))
-        .unwrap_or(0);
-    let most = format!("most at {} m: {}", range_m[best], excess[best].words());
-    let told = match (above.first(), above.last()) {
+    let most = format!(
+        "most at {} m: {}",
+        range_m[largest],
+        excess[largest].words()
+    );
+    let measured = match (above.first(), above.last()) {
         (Some(&first), Some(&last)) => {
-            let db = 10.0 * (medium.mean[best] / weak.mean[best]).log10();
+            let db = 10.0 * (medium.mean[largest] / weak.mean[largest]).log10();
             format!(
                 "from {} to {} m; {most}, {db:.1} dB",
                 range_m[first], range_m[last]
@@ -272,23 +323,28 @@ fn claims(
         }
         _ => format!("nowhere; {most}"),
     };
-    let f4c = Claim {
-        standard_error: excess[best].standard_error,
-        ..Claim::exact("F4c", told, !above.is_empty())
-    };
-    let after = (best..places).find(|&i| excess[i].value < 0.0);
-    let told = match after {
+    Claim {
+        standard_error: excess[largest].standard_error,
+        ..Claim::exact("F4c", measured, !above.is_empty())
+    }
+}
+
+/// Beyond some range medium turbulence is below weak turbulence.
+fn crossover_claim(range_m: &[f64], excess: &[Estimate], largest: usize) -> Claim {
+    let ranges = excess.len();
+    let after = (largest..ranges).find(|&i| excess[i].value < 0.0);
+    let measured = match after {
         Some(i) => format!("between {} and {} m", range_m[i.max(1) - 1], range_m[i]),
-        None => format!("none out to {} m", range_m[places - 1]),
+        None => format!("none out to {} m", range_m[ranges - 1]),
     };
-    let f4d = Claim::exact("F4d", told, after.is_some());
-    let ends = after.is_none() || (best..places).any(|i| sure(&i) && excess[i].value < 0.0);
-    let f4d = if ends {
-        f4d
+    let claim = Claim::exact("F4d", measured, after.is_some());
+    let is_decided = after.is_none()
+        || (largest..ranges).any(|i| is_sure(&excess[i], ranges) && excess[i].value < 0.0);
+    if is_decided {
+        claim
     } else {
-        f4d.open("profile standard: eight times the realisations")
-    };
-    Ok(vec![f4a, f4b, f4c, f4d, free_space_claim()?])
+        claim.open("profile standard: eight times the realisations")
+    }
 }
 
 /// The crate's quadrature against the stored curve of independent origin.

@@ -13,12 +13,17 @@ const REACH: f64 = 0.5;
 /// Ranges and highest elevation of the smallest sector from the ground up about the boxes that reach `reach_m` beyond the centres of
 /// vortices, (y, z).
 fn sector(cores: &[(f64, f64)], reach_m: f64) -> ([f64; 2], f64) {
-    let extreme = |of: fn(&(f64, f64)) -> f64, pick: fn(f64, f64) -> f64| {
-        cores.iter().map(of).fold(f64::NAN, pick)
-    };
-    let near_m = extreme(|core| core.0, f64::min) - reach_m;
-    let far_m = extreme(|core| core.0, f64::max) + reach_m;
-    let top_m = extreme(|core| core.1, f64::max) + reach_m;
+    let mut nearest_m = f64::NAN;
+    let mut farthest_m = f64::NAN;
+    let mut highest_m = f64::NAN;
+    for (y_m, z_m) in cores {
+        nearest_m = nearest_m.min(*y_m);
+        farthest_m = farthest_m.max(*y_m);
+        highest_m = highest_m.max(*z_m);
+    }
+    let near_m = nearest_m - reach_m;
+    let far_m = farthest_m + reach_m;
+    let top_m = highest_m + reach_m;
     // The far upper corner is a range away, not a distance along the ground.
     ([near_m, far_m.hypot(top_m)], top_m.atan2(near_m))
 }
@@ -34,7 +39,8 @@ fn scene(context: &Context, (range_m, elevation_max_rad): ([f64; 2], f64)) -> Sc
     scene.scan.range_min_m = range_m[0] - half_window_m;
     scene.scan.range_max_m = range_m[1] + half_window_m;
     scene.scan.elevation_max_rad = elevation_max_rad;
-    (scene.scan.pulses_per_line, scene.scan.realisations) = (1, context.profile.choose(4, 32, 128));
+    scene.scan.pulses_per_line = 1;
+    scene.scan.realisations = context.profile.choose(4, 32, 128);
     scene.detector.snr = SnrReference::Fixed { snr_db: 0.0 };
     scene.estimator.gate_step_samples = context.profile.choose(5, 2, 1);
     scene
@@ -42,22 +48,15 @@ fn scene(context: &Context, (range_m, elevation_max_rad): ([f64; 2], f64)) -> Sc
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let wake = wakes::of(context)?;
-    let (words, reach_m) = (wake.words(), REACH * wake.scales.spacing_m);
-    let (early, late) = (
-        Sight::of_wake(&wake, EARLY_TAU)?,
-        Sight::of_wake(&wake, LATE_TAU)?,
-    );
-    let scene = scene(
-        context,
-        sector(&[&early.cores[..], &late.cores[..]].concat(), reach_m),
-    );
-    let one = |sight: &Sight| {
-        Ok::<_, Failure>(Study::runs(context, sight, vec![scene.clone()])?.remove(0))
-    };
-    let studies = [one(&early)?, one(&late)?];
-    let [early, late] = studies
-        .each_ref()
-        .map(|study| write::velocity_map(&study.plan, &study.map));
+    let reach_m = REACH * wake.scales.spacing_m;
+    let early_sight = Sight::of_wake(&wake, EARLY_TAU)?;
+    let late_sight = Sight::of_wake(&wake, LATE_TAU)?;
+    let cores = [&early_sight.cores[..], &late_sight.cores[..]].concat();
+    let scene = scene(context, sector(&cores, reach_m));
+    let early_study = Study::runs(context, &early_sight, vec![scene.clone()])?.remove(0);
+    let late_study = Study::runs(context, &late_sight, vec![scene.clone()])?.remove(0);
+    let early = write::velocity_map(&early_study.plan, &early_study.map);
+    let late = write::velocity_map(&late_study.plan, &late_study.map);
     let colours = MapPlot::new(&early, 0, "v_exact")?.colours;
     let mut panels = Vec::new();
     for (map, tau) in [(&early, EARLY_TAU), (&late, LATE_TAU)] {
@@ -75,10 +74,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         "Radial velocity, positive away from the lidar; estimated: mean of {realisations} realisations"
     );
     let mut figure = Figure::stacked(panels).titled(&title);
-    (figure.columns, figure.width) = (2, 1300.0);
+    figure.columns = 2;
+    figure.width = 1300.0;
     let table = Table::stack([map_table(&early)?, map_table(&late)?])?;
-    let mut out = Rendered::new(&table, &figure, &studies[1].plan.scene.provenance())?;
-    out.values = vec![words];
+    let mut out = Rendered::new(&table, &figure, &late_study.plan.scene.provenance())?;
+    out.values = vec![wake.words()];
     out.claims.push(Claim::exact(
         "F8",
         format!(

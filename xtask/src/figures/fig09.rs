@@ -8,6 +8,69 @@ const RADII_M: [f64; 3] = [1.0, 2.0, 4.0];
 /// Where the chapter gives the levels.
 const CHAPTER_RANGE_M: f64 = 400.0;
 
+/// Level and effective samples of an estimate.
+struct Level {
+    radius_m: f64,
+    range_m: f64,
+    windows: usize,
+    n_eff: f64,
+}
+
+/// The middle line of a scan and how windows accumulate on it.
+struct Accumulation {
+    geometry: ScanGeometry,
+    correlation: WindowCorrelation,
+    elevation_rad: f64,
+}
+
+impl Accumulation {
+    fn new(plan: &Plan) -> Result<Self, Failure> {
+        let scene = &plan.scene.content;
+        let elevation_rad = &plan.geometry.elevation_rad;
+        let gates = estimators::gates(scene)?;
+        let sampling = estimators::sampling(scene)?;
+        let samples = scene.samples_per_record();
+        let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
+        Ok(Self {
+            geometry: ScanGeometry::new(&sampling, &gates, elevation_rad, samples)?,
+            // n_eff as the speckle has it: independent of the noise within a few per cent.
+            correlation: WindowCorrelation::gaussian_pulse(
+                &window,
+                &gates,
+                samples,
+                scene.detector.sampling_hz,
+                scene.pulse_sigma_s(),
+                0.0,
+            )?,
+            elevation_rad: elevation_rad[elevation_rad.len() / 2],
+        })
+    }
+
+    fn level(&self, range_m: f64, radius_m: f64) -> Level {
+        let point = PolarPoint {
+            range_m,
+            elevation_rad: self.elevation_rad,
+        };
+        let (windows, n_eff) = self.geometry.level(point, radius_m, &self.correlation);
+        Level {
+            radius_m,
+            range_m,
+            windows,
+            n_eff,
+        }
+    }
+
+    /// Every eighth gate, and the range of the chapter, in their order.
+    fn ranges_m(&self) -> Vec<f64> {
+        let mut gates_m = self.geometry.gate_ranges_m();
+        gates_m.retain(|r| (200.0..=600.0).contains(r));
+        let mut ranges_m: Vec<f64> = gates_m.into_iter().step_by(8).collect();
+        ranges_m.push(CHAPTER_RANGE_M);
+        ranges_m.sort_by(f64::total_cmp);
+        ranges_m
+    }
+}
+
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let mut scene = Scene::default();
     scene.scan.pulses_per_line = 1;
@@ -16,111 +79,65 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     scene.scan.range_min_m = CHAPTER_RANGE_M - (400.0 + half_window) * scene.sample_spacing_m();
     scene.scan.range_max_m = 650.0;
     let plan = Plan::new(context.scene_file(scene)?, Target::Map)?;
-    let (scene, elevation_rad) = (&plan.scene.content, &plan.geometry.elevation_rad);
-    let gates = estimators::gates(scene)?;
-    let samples = scene.samples_per_record();
-    let geometry = ScanGeometry::new(
-        &estimators::sampling(scene)?,
-        &gates,
-        elevation_rad,
-        samples,
-    )?;
-    let window = estimators::weighting(scene).weights(scene.estimator.window_samples)?;
-    // n_eff as the speckle has it: independent of the noise within a few per cent.
-    let correlation = WindowCorrelation::gaussian_pulse(
-        &window,
-        &gates,
-        samples,
-        scene.detector.sampling_hz,
-        scene.pulse_sigma_s(),
-        0.0,
-    )?;
-    let gates_m = geometry
-        .gate_ranges_m()
-        .into_iter()
-        .filter(|r| (200.0..=600.0).contains(r))
-        .step_by(8);
-    let mut ranges_m: Vec<f64> = gates_m.chain([CHAPTER_RANGE_M]).collect();
-    ranges_m.sort_by(f64::total_cmp);
-    let middle_rad = elevation_rad[elevation_rad.len() / 2];
-    let at = |range_m: f64, radius_m: f64| {
-        geometry.level(
-            PolarPoint {
-                range_m,
-                elevation_rad: middle_rad,
-            },
-            radius_m,
-            &correlation,
-        )
-    };
-
-    let mut rows: Vec<(f64, f64, usize, f64)> = Vec::new();
+    let accumulation = Accumulation::new(&plan)?;
+    let ranges_m = accumulation.ranges_m();
+    let styles = [Style::Dot, Style::DashDot, Style::Line];
+    let mut levels = Vec::new();
     let mut series = Vec::new();
-    for (radius_m, style) in RADII_M
-        .into_iter()
-        .zip([Style::Dot, Style::DashDot, Style::Line])
-    {
-        let curve: Vec<_> = ranges_m
-            .iter()
-            .map(|&r| (radius_m, r, at(r, radius_m).0, at(r, radius_m).1))
-            .collect();
-        let points: Vec<_> = curve.iter().map(|c| (c.1, c.2 as f64)).collect();
+    for (radius_m, style) in RADII_M.into_iter().zip(styles) {
+        let mut points = Vec::new();
+        for &range_m in &ranges_m {
+            let level = accumulation.level(range_m, radius_m);
+            points.push((range_m, level.windows as f64));
+            levels.push(level);
+        }
         series.push(Series::new(&format!("rho = {radius_m} m"), style, points));
-        rows.extend(curve);
     }
     let table = Table::new()
-        .float("rho_m", rows.iter().map(|r| r.0))
-        .float("range_m", rows.iter().map(|r| r.1))
-        .int("level", rows.iter().map(|r| r.2 as i64))
-        .float("n_eff", rows.iter().map(|r| r.3));
-    let origin = plan.scene.provenance();
-    let (x, y) = (Axis::linear("range [m]"), Axis::log("windows accumulated"));
+        .float("rho_m", levels.iter().map(|l| l.radius_m))
+        .float("range_m", levels.iter().map(|l| l.range_m))
+        .int("level", levels.iter().map(|l| l.windows as i64))
+        .float("n_eff", levels.iter().map(|l| l.n_eff));
+    let x = Axis::linear("range [m]");
+    let y = Axis::log("windows accumulated");
     let plot = CurvePlot {
         series,
         ..CurvePlot::new("Accumulation level", x, y)
     };
+    let origin = plan.scene.provenance();
     let mut out = Rendered::new(&table, &Figure::stacked([plot]), &origin)?;
-    let here: Vec<(usize, f64)> = RADII_M
-        .iter()
-        .map(|&rho| at(CHAPTER_RANGE_M, rho))
-        .collect();
-    out.claims = claims(&rows, &here);
+    let at_chapter = RADII_M.map(|radius_m| accumulation.level(CHAPTER_RANGE_M, radius_m));
+    out.claims = vec![falling_claim(&levels), chapter_claim(&at_chapter)];
     Ok(out)
 }
 
-fn claims(rows: &[(f64, f64, usize, f64)], here: &[(usize, f64)]) -> Vec<Claim> {
-    // Counts of grid points jump by a few; the means over quarters of the range do not.
+/// Counts of grid points jump by a few; the means over quarters of the range do not.
+fn falling_claim(levels: &[Level]) -> Claim {
     let mut falls = true;
-    let mut shown = Vec::new();
+    let mut measured = Vec::new();
     for radius_m in RADII_M {
-        let levels: Vec<f64> = rows
-            .iter()
-            .filter(|r| r.0 == radius_m)
-            .map(|r| r.2 as f64)
-            .collect();
-        let means: Vec<f64> = levels
-            .chunks(levels.len().div_ceil(4))
-            .map(|c| c.iter().sum::<f64>() / c.len() as f64)
-            .collect();
-        falls &= means.windows(2).all(|w| w[1] <= w[0]) && means[means.len() - 1] < means[0];
-        shown.push(format!(
-            "{radius_m} m: {:.1} to {:.1}",
-            means[0],
-            means[means.len() - 1]
-        ));
+        let of_radius = levels.iter().filter(|level| level.radius_m == radius_m);
+        let windows: Vec<f64> = of_radius.map(|level| level.windows as f64).collect();
+        let mut means = Vec::new();
+        for quarter in windows.chunks(windows.len().div_ceil(4)) {
+            means.push(quarter.iter().sum::<f64>() / quarter.len() as f64);
+        }
+        let first = means[0];
+        let last = means[means.len() - 1];
+        falls &= means.windows(2).all(|w| w[1] <= w[0]) && last < first;
+        measured.push(format!("{radius_m} m: {first:.1} to {last:.1}"));
     }
-    let levels: Vec<String> = here.iter().map(|h| h.0.to_string()).collect();
-    let n_eff: Vec<String> = here.iter().map(|h| format!("{:.1}", h.1)).collect();
-    let agrees = here
-        .iter()
-        .zip([20.0, 60.0, 120.0])
-        .all(|(h, chapter)| (h.0 as f64 / chapter - 1.0).abs() < 0.1);
-    vec![
-        Claim::exact("F9a", shown.join("; "), falls),
-        Claim::exact(
-            "F9b",
-            format!("{} (n_eff {})", levels.join(", "), n_eff.join(", ")),
-            agrees,
-        ),
-    ]
+    Claim::exact("F9a", measured.join("; "), falls)
+}
+
+/// The levels of the chapter at its range.
+fn chapter_claim(levels: &[Level; 3]) -> Claim {
+    let mut agrees = true;
+    for (level, chapter) in levels.iter().zip([20.0, 60.0, 120.0]) {
+        agrees &= (level.windows as f64 / chapter - 1.0).abs() < 0.1;
+    }
+    let windows = levels.each_ref().map(|level| level.windows.to_string());
+    let n_eff = levels.each_ref().map(|level| format!("{:.1}", level.n_eff));
+    let measured = format!("{} (n_eff {})", windows.join(", "), n_eff.join(", "));
+    Claim::exact("F9b", measured, agrees)
 }

@@ -10,7 +10,10 @@ use wakescope_sim::write;
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let realisations = context.profile.choose(16, 128, 400);
     let sight = Sight::of(context, EARLY_TAU)?;
-    let (mut tables, mut panels, mut found) = (Vec::new(), Vec::new(), Vec::new());
+    let mut tables = Vec::new();
+    let mut panels = Vec::new();
+    let mut beside = Vec::new();
+    let mut claims = Vec::new();
     let scene = with_method(early_scene(realisations), METHODS[0]);
     let studies = Study::at_references(context, &sight, &scene)?;
     for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
@@ -30,19 +33,17 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 .labelled("std [m/s]"),
         );
         let gradient = gradient_per_s(study);
-        let of_rms = |without| {
-            let rms = |cell| {
-                study
-                    .over_scans(cell, without, |error| error * error)
-                    .sqrt()
-            };
-            correlation(&Array2::from_shape_fn(gradient.dim(), rms), &gradient)
-        };
-        found.push((
-            name,
-            Estimate::of(BATCHES, of_rms),
-            correlation(&study.map.std_m_s, &gradient),
+        let of_rms = Estimate::of(BATCHES, |without| {
+            correlation(&rms_m_s(study, without), &gradient)
+        });
+        let of_std = correlation(&study.map.std_m_s, &gradient);
+        beside.push(format!(
+            "{name}: {}, of the standard deviation {of_std:.2}",
+            of_rms.words()
         ));
+        if name == "chapter" {
+            claims.push(Claim::judged_alone("F10", of_rms, "", Bar::Above(0.0)));
+        }
     }
     let origin = studies[0].plan.scene.provenance();
     let mut out = Rendered::new(
@@ -52,23 +53,25 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     )?;
     out.marks = vec![sight.mark];
     out.values = vec![realisations.to_string(), sight.words];
-    let beside = found.iter().map(|(name, rms, std)| {
-        format!(
-            "{name}: {}, of the standard deviation {std:.2}",
-            rms.words()
-        )
-    });
-    let beside = beside.collect::<Vec<_>>().join("; ");
-    let chapter = found.iter().filter(|of| of.0 == "chapter");
-    out.claims = chapter
-        .map(|of| Claim::judged_alone("F10", of.1, "", Bar::Above(0.0)).beside(&beside))
-        .collect();
+    let beside = beside.join("; ");
+    for claim in claims {
+        out.claims.push(claim.beside(&beside));
+    }
     Ok(out)
+}
+
+/// Root mean square error of each cell, without one batch.
+fn rms_m_s(study: &Study, without: Option<usize>) -> Array2<f64> {
+    Array2::from_shape_fn(study.map.std_m_s.dim(), |cell| {
+        let square = study.over_scans(cell, without, |error| error * error);
+        square.sqrt()
+    })
 }
 
 /// Modulus of the gradient of the exact velocity along the line, 1/s; NaN at the ends.
 fn gradient_per_s(study: &Study) -> Array2<f64> {
-    let (v, r) = (&study.map.v_exact_m_s, &study.map.range_m);
+    let v = &study.map.v_exact_m_s;
+    let r = &study.map.range_m;
     Array2::from_shape_fn(v.dim(), |(i, j)| match j {
         0 => f64::NAN,
         j if j + 1 == r.len() => f64::NAN,
@@ -78,23 +81,30 @@ fn gradient_per_s(study: &Study) -> Array2<f64> {
 
 /// Pearson's correlation over the cells where both are numbers.
 fn correlation(a: &Array2<f64>, b: &Array2<f64>) -> f64 {
-    let pairs: Vec<(f64, f64)> = a
-        .iter()
-        .copied()
-        .zip(b.iter().copied())
-        .filter(|(a, b)| (a + b).is_finite())
-        .collect();
+    let mut pairs = Vec::new();
+    for (a, b) in a.iter().zip(b) {
+        if (a + b).is_finite() {
+            pairs.push((*a, *b));
+        }
+    }
     let n = pairs.len() as f64;
-    let mean = pairs
-        .iter()
-        .fold((0.0, 0.0), |m, p| (m.0 + p.0 / n, m.1 + p.1 / n));
-    let sums = pairs
-        .iter()
-        .map(|p| (p.0 - mean.0, p.1 - mean.1))
-        .fold([0.0; 3], |s, (x, y)| {
-            [s[0] + x * x, s[1] + y * y, s[2] + x * y]
-        });
-    sums[2] / (sums[0] * sums[1]).sqrt()
+    let mut mean_a = 0.0;
+    let mut mean_b = 0.0;
+    for (a, b) in &pairs {
+        mean_a += a / n;
+        mean_b += b / n;
+    }
+    let mut variance_a = 0.0;
+    let mut variance_b = 0.0;
+    let mut covariance = 0.0;
+    for (a, b) in &pairs {
+        let x = a - mean_a;
+        let y = b - mean_b;
+        variance_a += x * x;
+        variance_b += y * y;
+        covariance += x * y;
+    }
+    covariance / (variance_a * variance_b).sqrt()
 }
 
 #[cfg(test)]

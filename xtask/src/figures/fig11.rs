@@ -15,23 +15,28 @@ fn scene(context: &Context, sight: &Sight) -> Scene {
     let mut scene = with_method(early_scene(context.profile.choose(8, 24, 104)), METHODS[0]);
     // An inviscid pair has spread far over the ground by then.
     let cores = &sight.cores;
-    let (near_m, far_m) = cores.iter().fold((f64::INFINITY, 0.0_f64), |(a, b), c| {
-        (a.min(c.0), b.max(c.0))
-    });
-    let highest_rad = cores
-        .iter()
-        .map(|c| (c.1 + NEAR_M).atan2(c.0))
-        .fold(0.0, f64::max);
-    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.0, highest_rad);
-    (scene.scan.range_min_m, scene.scan.range_max_m) = ((near_m - 45.0).max(140.0), far_m + 45.0);
+    let mut near_m = f64::INFINITY;
+    let mut far_m = 0.0_f64;
+    let mut highest_rad = 0.0_f64;
+    for (y_m, z_m) in cores {
+        near_m = near_m.min(*y_m);
+        far_m = far_m.max(*y_m);
+        highest_rad = highest_rad.max((z_m + NEAR_M).atan2(*y_m));
+    }
+    scene.scan.elevation_min_rad = 0.0;
+    scene.scan.elevation_max_rad = highest_rad;
+    scene.scan.range_min_m = (near_m - 45.0).max(140.0);
+    scene.scan.range_max_m = far_m + 45.0;
     scene.estimator.gate_step_samples = context.profile.choose(8, 5, 1);
     scene.pulse.shape = PulseShape::gaussian(400e-9);
     with_turbulence(context, scene, 1e-15)
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
-    let (mut tables, mut panels, mut told, mut parts) =
-        (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+    let mut tables = Vec::new();
+    let mut panels = Vec::new();
+    let mut beside = Vec::new();
+    let mut parts = Vec::new();
     let sight = Sight::of(context, LATE_TAU)?;
     let studies = Study::at_references(context, &sight, &scene(context, &sight))?;
     for ((name, _), study) in REFERENCES.into_iter().zip(&studies) {
@@ -57,7 +62,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 .labelled("rms [m/s]"),
         );
         let (words, of_map) = measure(study);
-        told.push(format!("{name}: {words}"));
+        beside.push(format!("{name}: {words}"));
         // At the physical ratio of one pulse the map is mostly noise; the chapter's own figure has the printed ratio.
         if name == "chapter" {
             parts = of_map;
@@ -72,48 +77,79 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     out.marks = vec![sight.mark];
     out.values = vec![studies[0].map.scans.len().to_string(), sight.words];
     out.claims
-        .push(Claim::judged("F11", &parts).beside(&told.join("; ")));
+        .push(Claim::judged("F11", &parts).beside(&beside.join("; ")));
     Ok(out)
+}
+
+/// The cells about the vortices of a map.
+struct Near<'s> {
+    study: &'s Study,
+    cells: Vec<(usize, usize)>,
+}
+
+impl<'s> Near<'s> {
+    fn new(study: &'s Study) -> Self {
+        let mut cells = study.cells(|d, _| d < NEAR_M);
+        cells.retain(|cell| study.map.v_mean_m_s[*cell].is_finite());
+        Self { study, cells }
+    }
+
+    /// Mean estimate of a cell without one batch.
+    fn mean_m_s(&self, cell: (usize, usize), without: Option<usize>) -> f64 {
+        let error_m_s = self.study.over_scans(cell, without, |error| error);
+        self.study.map.v_pulse_m_s[cell] + error_m_s
+    }
+
+    /// Largest absolute value of a field.
+    fn extreme_m_s(&self, field: &Array2<f64>) -> f64 {
+        let values = self.cells.iter().map(|cell| field[*cell].abs());
+        values.fold(0.0, f64::max)
+    }
+
+    /// Largest absolute value of the mean estimates.
+    fn extreme_estimate_m_s(&self, without: Option<usize>) -> f64 {
+        let values = self
+            .cells
+            .iter()
+            .map(|cell| self.mean_m_s(*cell, without).abs());
+        values.fold(0.0, f64::max)
+    }
+
+    /// Root mean square difference of the mean estimates and a field.
+    fn distance_m_s(&self, field: &Array2<f64>, without: Option<usize>) -> f64 {
+        let squares = self
+            .cells
+            .iter()
+            .map(|cell| (self.mean_m_s(*cell, without) - field[*cell]).powi(2));
+        (squares.sum::<f64>() / self.cells.len() as f64).sqrt()
+    }
 }
 
 /// Of a map, how far its largest estimate is from the largest exact velocity, and how much nearer its estimates are to the pulse-weighted
 /// field than to the exact one: in words, and as parts of the claim.
 fn measure(study: &Study) -> (String, Vec<Part>) {
-    let m = &study.map;
-    let mut near = study.cells(|d, _| d < NEAR_M);
-    near.retain(|cell| m.v_mean_m_s[*cell].is_finite());
-    let extreme = |field: &dyn Fn((usize, usize)) -> f64| {
-        near.iter().map(|c| field(*c).abs()).fold(0.0, f64::max)
-    };
-    let mean = |cell, without| m.v_pulse_m_s[cell] + study.over_scans(cell, without, |error| error);
-    let [pulse, exact] = [&m.v_pulse_m_s, &m.v_exact_m_s];
-    let distance = |field: &Array2<f64>, without| {
-        (near
-            .iter()
-            .map(|c| (mean(*c, without) - field[*c]).powi(2))
-            .sum::<f64>()
-            / near.len() as f64)
-            .sqrt()
-    };
-    let [most_pulse, most_exact] = [pulse, exact].map(|field| extreme(&|cell| field[cell]));
+    let pulse = &study.map.v_pulse_m_s;
+    let exact = &study.map.v_exact_m_s;
+    let near = Near::new(study);
+    let most_pulse = near.extreme_m_s(pulse);
+    let most_exact = near.extreme_m_s(exact);
     let weaker = Estimate::of(BATCHES, |without| {
-        extreme(&|cell| mean(cell, without)) - most_exact
+        near.extreme_estimate_m_s(without) - most_exact
     });
     let closer = Estimate::of(BATCHES, |without| {
-        distance(pulse, without) - distance(exact, without)
+        near.distance_m_s(pulse, without) - near.distance_m_s(exact, without)
     });
-    let told = format!(
+    let words = format!(
         "extremes {} m/s beyond {most_exact:.2} exact, {most_pulse:.2} pulse-weighted; distances differ by {} m/s",
         weaker.words(),
         closer.words()
     );
-    let part = |name: &str, of| (name.into(), of, " m/s", Bar::Below(0.0));
+    let below = Bar::Below(0.0);
+    let extremes = "largest estimate less the largest exact velocity";
+    let distances = "distance to the pulse-weighted field less that to the exact one";
     let parts = vec![
-        part("largest estimate less the largest exact velocity", weaker),
-        part(
-            "distance to the pulse-weighted field less that to the exact one",
-            closer,
-        ),
+        Part::new(extremes, weaker, " m/s", below),
+        Part::new(distances, closer, " m/s", below),
     ];
-    (told, parts)
+    (words, parts)
 }

@@ -2,8 +2,8 @@
 
 use super::context::*;
 use super::study::{
-    EARLY_TAU, INSIDE_M, METHODS, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches, early_scene,
-    with_method, with_turbulence,
+    EARLY_TAU, INSIDE_M, METHODS, NamedZone, OUTSIDE_M, REFERENCES, Sight, Study, Zone, batches,
+    early_scene, with_method, with_turbulence,
 };
 use crate::statistics::NO_DIFFERENCE;
 
@@ -34,35 +34,74 @@ fn scene(context: &Context, scans: usize) -> Scene {
     with_turbulence(context, with_method(early_scene(scans), METHODS[2]), 1e-13)
 }
 
-fn curve(study: &Study, reference: &'static str, energy_j: f64) -> Curve {
-    let gates = study.map.range_m.len();
-    let all_lines = |gate| {
-        (0..study.map.elevation_rad.len())
+/// What is simulated for one curve.
+struct Case {
+    reference: &'static str,
+    snr: SnrReference,
+    scans: usize,
+    energy_j: f64,
+    /// Backscatter over that of the scene.
+    air: f64,
+}
+
+impl Case {
+    fn scene(&self, context: &Context) -> Scene {
+        let mut scene = scene(context, self.scans);
+        scene.detector.snr = self.snr;
+        scene.pulse.energy_j = self.energy_j;
+        scene.atmosphere.backscatter_per_m_sr *= self.air;
+        scene
+    }
+}
+
+/// All energies at both references, in so many scans at each, then the thin air.
+fn cases(scans: [usize; 2]) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for ((reference, snr), scans) in REFERENCES.into_iter().zip(scans) {
+        for energy_j in ENERGIES_J {
+            cases.push(Case {
+                reference,
+                snr,
+                scans,
+                energy_j,
+                air: 1.0,
+            });
+        }
+    }
+    cases.push(Case {
+        reference: THIN,
+        snr: REFERENCES[0].1,
+        scans: scans[0],
+        energy_j: 2.0 * AS_THIN_J,
+        air: 0.5,
+    });
+    cases
+}
+
+fn curve(study: &Study, case: &Case) -> Curve {
+    let map = &study.map;
+    let gates = map.range_m.len();
+    let mut over_lines = Vec::new();
+    let mut mean_of_lines_m_s = Vec::new();
+    for gate in 0..gates {
+        let cells: Vec<(usize, usize)> = (0..map.elevation_rad.len())
             .map(|line| (line, gate))
-            .collect::<Vec<_>>()
-    };
-    let lines = |gate: usize| {
-        study
-            .map
-            .rms_m_s
-            .column(gate)
-            .iter()
-            .copied()
-            .filter(|rms| rms.is_finite())
-            .collect::<Vec<_>>()
-    };
-    let mean = |of: Vec<f64>| of.iter().sum::<f64>() / of.len() as f64;
+            .collect();
+        over_lines.push(study.zone(&cells));
+        let mut errors_m_s = map.rms_m_s.column(gate).to_vec();
+        errors_m_s.retain(|error| error.is_finite());
+        mean_of_lines_m_s.push(errors_m_s.iter().sum::<f64>() / errors_m_s.len() as f64);
+    }
+    let near = study.cells(|d, j| d > OUTSIDE_M && j < gates / 2);
+    let far = study.cells(|d, j| d > OUTSIDE_M && j >= gates / 2);
     Curve {
-        reference,
-        energy_j,
-        over_lines: (0..gates)
-            .map(|gate| study.zone(&all_lines(gate)))
-            .collect(),
-        mean_of_lines_m_s: (0..gates).map(|gate| mean(lines(gate))).collect(),
+        reference: case.reference,
+        energy_j: case.energy_j,
+        over_lines,
+        mean_of_lines_m_s,
         inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
         outside: study.zone(&study.cells(|d, _| d > OUTSIDE_M)),
-        halves: [false, true]
-            .map(|far| study.zone(&study.cells(|d, j| d > OUTSIDE_M && (j >= gates / 2) == far))),
+        halves: [study.zone(&near), study.zone(&far)],
     }
 }
 
@@ -70,54 +109,18 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let sight = Sight::of(context, EARLY_TAU)?;
     // Claims are judged at the chapter's reference.
     let scans = context.profile.choose([8, 48], [24, 96], [104, 104]);
-    let of_reference =
-        |((name, snr), scans)| ENERGIES_J.map(|energy_j| (name, snr, scans, energy_j, 1.0));
-    let mut cases: Vec<_> = REFERENCES
-        .into_iter()
-        .zip(scans)
-        .flat_map(of_reference)
-        .collect();
-    cases.push((THIN, REFERENCES[0].1, scans[0], 2.0 * AS_THIN_J, 0.5));
-    let scenes = cases
-        .iter()
-        .map(|&(_, snr, scans, energy_j, share_of_air)| {
-            let mut scene = scene(context, scans);
-            (scene.detector.snr, scene.pulse.energy_j) = (snr, energy_j);
-            scene.atmosphere.backscatter_per_m_sr *= share_of_air;
-            scene
-        });
-    let studies = Study::runs(context, &sight, scenes.collect())?;
-    let all: Vec<Curve> = studies
-        .iter()
-        .zip(&cases)
-        .map(|(study, (name, .., energy_j, _))| curve(study, name, *energy_j))
-        .collect();
+    let cases = cases(scans);
+    let scenes = cases.iter().map(|case| case.scene(context)).collect();
+    let studies = Study::runs(context, &sight, scenes)?;
+    let mut all = Vec::new();
+    for (study, case) in studies.iter().zip(&cases) {
+        all.push(curve(study, case));
+    }
     let (curves, thin) = all.split_at(all.len() - 1);
-    let origin =
-        context.provenance_of_formula(&sight.scene(context, scene(context, scans[1])).to_toml());
-    let styles = [Style::Dash, Style::Dot, Style::DashDot, Style::Line];
-    let panel = |reference: &str| {
-        let title = format!("Correlogram accumulation, {reference} signal-to-noise ratio");
-        let mut plot = CurvePlot::new(
-            &title,
-            Axis::linear("range [m]"),
-            Axis::linear("error [m/s]"),
-        );
-        let chosen = curves.iter().filter(|c| c.reference == reference);
-        plot.series = chosen
-            .zip(styles)
-            .map(|(c, style)| {
-                let points = c.over_lines.iter().map(|zone| (zone.range_m, zone.rms()));
-                banded(&format!("{:.0} \u{b5}J", 1e6 * c.energy_j), style, points)
-            })
-            .collect();
-        plot
-    };
-    let mut out = Rendered::new(
-        &table(curves),
-        &Figure::stacked(REFERENCES.map(|(name, _)| panel(name))),
-        &origin,
-    )?;
+    let shown = sight.scene(context, scene(context, scans[1]));
+    let origin = context.provenance_of_formula(&shown.to_toml());
+    let panels = REFERENCES.map(|(reference, _)| panel(curves, reference));
+    let mut out = Rendered::new(&table(curves), &Figure::stacked(panels), &origin)?;
     out.add("batches.csv", &batches_table(&all), &origin)?;
     out.marks = vec![sight.mark];
     let [few, many] = scans;
@@ -130,54 +133,72 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
+/// The errors of all energies against range at one reference.
+fn panel(curves: &[Curve], reference: &str) -> CurvePlot {
+    let title = format!("Correlogram accumulation, {reference} signal-to-noise ratio");
+    let x = Axis::linear("range [m]");
+    let y = Axis::linear("error [m/s]");
+    let mut plot = CurvePlot::new(&title, x, y);
+    let styles = [Style::Dash, Style::Dot, Style::DashDot, Style::Line];
+    let chosen = curves.iter().filter(|c| c.reference == reference);
+    for (curve, style) in chosen.zip(styles) {
+        let label = format!("{:.0} \u{b5}J", 1e6 * curve.energy_j);
+        let zones = curve.over_lines.iter();
+        let points = zones.map(|zone| (zone.range_m, zone.rms()));
+        plot.series.push(banded(&label, style, points));
+    }
+    plot
+}
+
 fn table(curves: &[Curve]) -> Table {
-    let rows: Vec<(&Curve, usize, &Zone)> = curves
-        .iter()
-        .flat_map(|c| {
-            c.over_lines
-                .iter()
-                .enumerate()
-                .map(move |(j, zone)| (c, j, zone))
-        })
-        .collect();
+    let mut rows: Vec<(&Curve, &Zone, f64)> = Vec::new();
+    for curve in curves {
+        for (zone, mean_m_s) in curve.over_lines.iter().zip(&curve.mean_of_lines_m_s) {
+            rows.push((curve, zone, *mean_m_s));
+        }
+    }
     Table::new()
         .float("pulse_energy_j", rows.iter().map(|(c, ..)| c.energy_j))
         .text("snr_reference", rows.iter().map(|(c, ..)| c.reference))
-        .float("range_m", rows.iter().map(|(.., zone)| zone.range_m))
+        .float("range_m", rows.iter().map(|(_, zone, _)| zone.range_m))
         .float(
             "sigma_v_m_s",
-            rows.iter().map(|(.., zone)| zone.rms_m_s(None)),
+            rows.iter().map(|(_, zone, _)| zone.rms_m_s(None)),
         )
         .float(
             "standard_error_m_s",
-            rows.iter().map(|(.., zone)| zone.rms().standard_error),
+            rows.iter().map(|(_, zone, _)| zone.rms().standard_error),
         )
         .float(
             "bias_m_s",
-            rows.iter().map(|(.., zone)| zone.average.bias_m_s),
+            rows.iter().map(|(_, zone, _)| zone.average.bias_m_s),
         )
         .float(
             "std_m_s",
-            rows.iter().map(|(.., zone)| zone.average.std_m_s),
+            rows.iter().map(|(_, zone, _)| zone.average.std_m_s),
         )
         .float(
             "mean_of_lines_m_s",
-            rows.iter().map(|(c, j, _)| c.mean_of_lines_m_s[*j]),
+            rows.iter().map(|(.., mean_m_s)| *mean_m_s),
         )
 }
 
 fn batches_table(curves: &[Curve]) -> Table {
-    batches(curves.iter().flat_map(|c| {
+    let mut zones = Vec::new();
+    for c in curves {
         let case = format!("{}; {:.0} uJ", c.reference, 1e6 * c.energy_j);
         let [near, far] = &c.halves;
-        [
+        let of_curve = [
             ("inside", &c.inside),
             ("outside", &c.outside),
             ("outside, near half", near),
             ("outside, far half", far),
-        ]
-        .map(|(name, zone)| (case.clone(), name, f64::NAN, zone))
-    }))
+        ];
+        for (name, zone) in of_curve {
+            zones.push(NamedZone::new(&case, name, f64::NAN, zone));
+        }
+    }
+    batches(&zones)
 }
 
 /// The energies at the chapter's reference.
@@ -203,51 +224,38 @@ fn outside_claim(curves: &[Curve], study: &Study) -> Claim {
     let s = &study.plan.scene.content;
     // What guesses all over the band err; an energy whose estimates are half of that has no signal.
     let guesses_m_s = 0.5 * s.laser.wavelength_m * s.detector.bandwidth_hz / 12_f64.sqrt();
-    let energies = of_chapter(curves)
-        .into_iter()
-        .filter(|c| c.outside.rms_m_s(None) < 0.5 * guesses_m_s);
-    let energies: Vec<&Curve> = energies.collect();
-    let micro = |c: &Curve| 1e6 * c.energy_j;
-    let falls = energies.windows(2).map(|pair| {
-        (
-            format!("{:.0} to {:.0} \u{b5}J", micro(pair[0]), micro(pair[1])),
-            pair[1].outside.over(&pair[0].outside),
-        )
-    });
-    let grows = energies.iter().map(|c| {
-        (
-            format!("near over far half, {:.0} \u{b5}J", micro(c)),
-            c.halves[0].over(&c.halves[1]),
-        )
-    });
-    let parts = falls.chain(grows).map(|(name, share)| {
-        (
-            name,
-            share.times(100.0),
-            " %",
-            Bar::Less(100.0 * NO_DIFFERENCE),
-        )
-    });
-    Claim::judged("F12a", &parts.collect::<Vec<Part>>()).beside(&levels(curves, |c| &c.outside))
+    let mut energies = of_chapter(curves);
+    energies.retain(|c| c.outside.rms_m_s(None) < 0.5 * guesses_m_s);
+    let bar = Bar::Less(100.0 * NO_DIFFERENCE);
+    let mut parts = Vec::new();
+    for pair in energies.windows(2) {
+        let name = format!(
+            "{:.0} to {:.0} \u{b5}J",
+            1e6 * pair[0].energy_j,
+            1e6 * pair[1].energy_j
+        );
+        let share = pair[1].outside.over(&pair[0].outside);
+        parts.push(Part::new(name, share.times(100.0), " %", bar));
+    }
+    for curve in &energies {
+        let name = format!("near over far half, {:.0} \u{b5}J", 1e6 * curve.energy_j);
+        let share = curve.halves[0].over(&curve.halves[1]);
+        parts.push(Part::new(name, share.times(100.0), " %", bar));
+    }
+    Claim::judged("F12a", &parts).beside(&levels(curves, |c| &c.outside))
 }
 
 fn inside_claim(curves: &[Curve]) -> Claim {
-    let of = of_chapter(curves);
-    let part = |c: &&Curve| {
-        let share = c.inside.over(&of[of.len() - 1].inside).times(100.0);
-        let limit = 100.0 * NO_INFLUENCE;
-        (
-            format!("{:.0} against 600 \u{b5}J", 1e6 * c.energy_j),
-            share,
-            " %",
-            Bar::Between(-limit, limit),
-        )
-    };
-    Claim::judged(
-        "F12b",
-        &of[..of.len() - 1].iter().map(part).collect::<Vec<Part>>(),
-    )
-    .beside(&levels(curves, |c| &c.inside))
+    let limit = 100.0 * NO_INFLUENCE;
+    let mut parts = Vec::new();
+    if let [others @ .., largest] = &of_chapter(curves)[..] {
+        for curve in others {
+            let name = format!("{:.0} against 600 \u{b5}J", 1e6 * curve.energy_j);
+            let share = curve.inside.over(&largest.inside).times(100.0);
+            parts.push(Part::new(name, share, " %", Bar::Between(-limit, limit)));
+        }
+    }
+    Claim::judged("F12b", &parts).beside(&levels(curves, |c| &c.inside))
 }
 
 fn thin_claim(curves: &[Curve], thin: &[Curve]) -> Claim {

@@ -2,7 +2,7 @@
 //! with Cn2 = 1e-15.
 
 use super::context::*;
-use super::profiles::{self, Profiles};
+use super::profiles::{self, Gates, Profiles};
 use super::study::{
     EARLY_TAU, METHODS, REFERENCES, Sight, Study, near_scene, with_method, with_turbulence,
 };
@@ -20,7 +20,7 @@ pub(super) fn make_13(context: &Context) -> Result<Rendered, Failure> {
         [[32; 2], [1280, 320]],
         [[96; 2], [1600, 400]],
     );
-    let (mut out, chapter) = compare(context, (1, scans), |mut scene| {
+    let (mut out, chapter) = compare(context, Panels::OneDuration, scans, |mut scene| {
         scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
         scene
     })?;
@@ -46,7 +46,7 @@ pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
         context
             .profile
             .choose([[8; 2], [168; 2]], [[32; 2], [192; 2]], [[96; 2], [400; 2]]);
-    let (mut out, chapter) = compare(context, (2, scans), |scene| {
+    let (mut out, chapter) = compare(context, Panels::AllDurations, scans, |scene| {
         with_turbulence(context, scene, 1e-15)
     })?;
     let peaks = profiles::parts(&chapter, " m/s", |p, without| {
@@ -66,64 +66,48 @@ pub(super) fn make_14(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-/// PA and CA on the same signals for both references and durations, so many of these in a panel, in so many scans at each reference and
-/// duration, for scenes about the cores that may be changed: the figure, and the profiles at the chapter's reference.
+/// What is simulated for one method.
+struct Case {
+    reference: &'static str,
+    snr: SnrReference,
+    scans: usize,
+    duration_s: f64,
+    method: &'static str,
+}
+
+/// How many pulse durations share a panel.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Panels {
+    OneDuration,
+    AllDurations,
+}
+
+/// PA and CA on the same signals for both references and durations, in so many scans at each, for scenes about the cores that
+/// may be changed: the figure, and the profiles at the chapter's reference.
 fn compare(
     context: &Context,
-    (durations, scans): (usize, [[usize; 2]; 2]),
+    panels: Panels,
+    scans: [[usize; 2]; 2],
     change: impl Fn(Scene) -> Scene,
 ) -> Result<(Rendered, Vec<Profiles>), Failure> {
     let sight = Sight::of(context, EARLY_TAU)?;
-    let mut cases = Vec::new();
-    for ((name, reference), scans) in REFERENCES.into_iter().zip(scans) {
-        for (duration_s, scans) in DURATIONS_S.into_iter().zip(scans) {
-            cases.extend(METHODS.map(|method| (name, reference, scans, duration_s, method)));
-        }
+    let cases = cases(scans);
+    let mut scenes = Vec::new();
+    for case in &cases {
+        let mut scene = with_method(near_scene(case.scans), case.method);
+        scene.detector.snr = case.snr;
+        scene.pulse.shape = PulseShape::gaussian(case.duration_s);
+        scenes.push(change(scene));
     }
-    let scene =
-        |(_, reference, scans, duration_s, method): &(&str, SnrReference, usize, f64, &str)| {
-            let mut scene = with_method(near_scene(*scans), method);
-            scene.detector.snr = *reference;
-            scene.pulse.shape = PulseShape::gaussian(*duration_s);
-            change(scene)
-        };
-    let studies = Study::runs(context, &sight, cases.iter().map(scene).collect())?;
-    let mut all = Vec::new();
-    for (cases, studies) in cases
-        .chunks(METHODS.len())
-        .zip(studies.chunks(METHODS.len()))
-    {
-        let snr_db = profiles::snr_db(&studies[0])?;
-        let of = cases
-            .iter()
-            .zip(studies)
-            .map(|((name, .., method), study)| Profiles::of(method, name, snr_db, study));
-        all.extend(of);
-    }
-    let panels = all.chunks(durations * METHODS.len()).map(|of| {
-        let several = || {
-            format!(
-                "{} signal-to-noise ratio, {:.1} dB",
-                of[0].name, of[0].snr_db
-            )
-        };
-        profiles::plot(
-            &if durations == 1 {
-                of[0].title()
-            } else {
-                several()
-            },
-            of,
-        )
-    });
-    let origin =
-        context.provenance_of_formula(&sight.scene(context, near_scene(scans[1][0])).to_toml());
-    let mut out = Rendered::new(&profiles::table(&all), &Figure::stacked(panels), &origin)?;
-    out.add(
-        "batches.csv",
-        &profiles::batches_table(all.iter().map(|p| (p.title(), p)), true),
-        &origin,
-    )?;
+    let studies = Study::runs(context, &sight, scenes)?;
+    let all = profiles_of(&cases, &studies)?;
+    let shown = sight.scene(context, near_scene(scans[1][0]));
+    let origin = context.provenance_of_formula(&shown.to_toml());
+    let figure = Figure::stacked(plots(panels, &all));
+    let mut out = Rendered::new(&profiles::table(&all), &figure, &origin)?;
+    let named = all.iter().map(|p| (p.title(), p));
+    let batches = profiles::batches_table(named, Gates::Included);
+    out.add("batches.csv", &batches, &origin)?;
     let [[few, _], [short, long]] = scans;
     let many = if short == long {
         short.to_string()
@@ -132,5 +116,58 @@ fn compare(
     };
     out.values = vec![many, few.to_string(), sight.words];
     out.marks = vec![sight.mark];
-    Ok((out, all.into_iter().filter(|p| p.name == CHAPTER).collect()))
+    let chapter = all.into_iter().filter(|p| p.name == CHAPTER).collect();
+    Ok((out, chapter))
+}
+
+/// All methods for both references and durations.
+fn cases(scans: [[usize; 2]; 2]) -> Vec<Case> {
+    let mut cases = Vec::new();
+    for ((reference, snr), scans) in REFERENCES.into_iter().zip(scans) {
+        for (duration_s, scans) in DURATIONS_S.into_iter().zip(scans) {
+            for method in METHODS {
+                cases.push(Case {
+                    reference,
+                    snr,
+                    scans,
+                    duration_s,
+                    method,
+                });
+            }
+        }
+    }
+    cases
+}
+
+/// The errors of each case; methods on the same signals have the same ratio.
+fn profiles_of(cases: &[Case], studies: &[Study]) -> Result<Vec<Profiles>, Failure> {
+    let mut all = Vec::new();
+    let cases = cases.chunks(METHODS.len());
+    for (cases, studies) in cases.zip(studies.chunks(METHODS.len())) {
+        let snr_db = profiles::snr_db(&studies[0])?;
+        for (case, study) in cases.iter().zip(studies) {
+            all.push(Profiles::of(case.method, case.reference, snr_db, study));
+        }
+    }
+    Ok(all)
+}
+
+fn plots(panels: Panels, all: &[Profiles]) -> Vec<CurvePlot> {
+    let durations = match panels {
+        Panels::OneDuration => 1,
+        Panels::AllDurations => DURATIONS_S.len(),
+    };
+    let mut plots = Vec::new();
+    for shown in all.chunks(durations * METHODS.len()) {
+        let first = &shown[0];
+        let title = match panels {
+            Panels::OneDuration => first.title(),
+            Panels::AllDurations => format!(
+                "{} signal-to-noise ratio, {:.1} dB",
+                first.name, first.snr_db
+            ),
+        };
+        plots.push(profiles::plot(&title, shown));
+    }
+    plots
 }

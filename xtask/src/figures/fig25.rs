@@ -1,8 +1,8 @@
 //! Figure 25, beyond the chapter: where correlogram accumulation errs less than periodogram accumulation, and where not.
 
 use super::context::*;
-use super::profiles::{self, Profiles};
-use super::study::{EARLY_TAU, METHODS, Sight, Study, near_scene, with_method};
+use super::profiles::{self, Gates, Profiles};
+use super::study::{EARLY_TAU, METHODS, Sight, Study, Zone, near_scene, with_method};
 use crate::statistics::NO_DIFFERENCE;
 use crate::wakes;
 use wakescope_sim::scene::{NoiseModel, Refinement, VortexPair};
@@ -14,7 +14,7 @@ const STRONG_DB: f64 = 20.0;
 /// The core that the chapter calls typical, and larger ones, in spacings.
 const CORES: [f64; 4] = [0.05, 0.075, 0.1, 0.15];
 
-/// What is looked at.
+/// The flow that is observed.
 #[derive(Clone, Copy, PartialEq)]
 enum Seen {
     Wake,
@@ -42,21 +42,34 @@ const WAKE: Case = Case {
     pulses: 1,
     bins: false,
 };
-/// What is followed along the ratio.
-const WAYS: [Case; 4] = [
+/// Settings whose error is drawn against the ratio.
+const SETTINGS: [Case; 4] = [
     WAKE,
     Case {
         noise: NoiseModel::White,
         ..WAKE
     },
     Case { pulses: 8, ..WAKE },
-    Case {
-        seen: Seen::Pair(CORES[0]),
-        ..WAKE
-    },
+    PAIR,
 ];
 
+/// The analytic pair with the chapter's core.
+const PAIR: Case = pair(CORES[0]);
+
+const fn pair(core: f64) -> Case {
+    Case {
+        seen: Seen::Pair(core),
+        ..WAKE
+    }
+}
+
+/// A setting at another ratio.
+fn at(setting: Case, snr_db: f64) -> Case {
+    Case { snr_db, ..setting }
+}
+
 fn cases(context: &Context) -> Vec<Case> {
+    let is_quick = context.profile == Profile::Quick;
     let levels_db = context.profile.choose(
         vec![WEAK_DB, -5.0, CHAPTER_DB, 10.0, STRONG_DB],
         vec![WEAK_DB, -5.0, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB],
@@ -64,46 +77,52 @@ fn cases(context: &Context) -> Vec<Case> {
             WEAK_DB, -7.5, -5.0, -2.5, CHAPTER_DB, 5.0, 10.0, 15.0, STRONG_DB,
         ],
     );
-    // Eight pulses take eight times as long, and white noise is of weak signals: quick has where claims are, and where they began.
-    let is_short = |way: &Case| {
-        context.profile == Profile::Quick && (way.pulses > 1 || way.noise == NoiseModel::White)
-    };
-    let levels_of = |way: &Case| {
-        if is_short(way) {
-            vec![WEAK_DB, CHAPTER_DB]
-        } else {
-            levels_db.clone()
+    let few_levels_db = [WEAK_DB, CHAPTER_DB];
+    let mut cases = Vec::new();
+    for snr_db in [CHAPTER_DB, STRONG_DB] {
+        cases.push(Case {
+            bins: true,
+            ..at(WAKE, snr_db)
+        });
+    }
+    for setting in SETTINGS {
+        // Eight pulses need eight times the run time, and white noise matters to weak signals: quick has the ratios of claims.
+        let is_short = is_quick && (setting.pulses > 1 || setting.noise == NoiseModel::White);
+        let levels_db: &[f64] = if is_short { &few_levels_db } else { &levels_db };
+        for &snr_db in levels_db {
+            cases.push(at(setting, snr_db));
         }
-    };
-    let along = WAYS.into_iter().flat_map(|way| {
-        levels_of(&way)
-            .into_iter()
-            .map(move |snr_db| Case { snr_db, ..way })
-    });
-    let cores = CORES[1..].iter().map(|core| Case {
-        seen: Seen::Pair(*core),
-        ..WAKE
-    });
-    let bins = [CHAPTER_DB, STRONG_DB].map(|snr_db| Case {
-        snr_db,
-        bins: true,
-        ..WAKE
-    });
+    }
+    for &core in &CORES[1..] {
+        cases.push(pair(core));
+    }
     // The flow that quick has whole is another one.
-    let is_coarse =
-        context.profile == Profile::Quick && context.wake.is_none() && !context.analytic;
-    let coarse = is_coarse.then_some(Case {
-        seen: Seen::Coarse,
-        ..WAKE
-    });
-    bins.into_iter()
-        .chain(along)
-        .chain(cores)
-        .chain(coarse)
-        .collect()
+    if is_quick && context.wake.is_none() && !context.analytic {
+        cases.push(Case {
+            seen: Seen::Coarse,
+            ..WAKE
+        });
+    }
+    cases
 }
 
 impl Case {
+    /// The scene of a method.
+    fn scene(&self, context: &Context, method: &str, scans: usize) -> Scene {
+        let mut scene = with_method(near_scene(scans), method);
+        scene.detector.snr = SnrReference::Fixed {
+            snr_db: self.snr_db,
+        };
+        scene.detector.noise = self.noise;
+        scene.scan.pulses_per_line = self.pulses;
+        scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
+        if self.bins {
+            scene.estimator.refinement = Refinement::None;
+            scene.estimator.padded_samples = scene.estimator.window_samples;
+        }
+        scene
+    }
+
     fn core_b0(&self) -> f64 {
         if let Seen::Pair(core) = self.seen {
             core
@@ -135,34 +154,54 @@ impl Case {
     }
 }
 
-/// A case and what its methods err.
+/// Where errors are compared.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Region {
+    Inside,
+    Outside,
+}
+
+impl Region {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Inside => "inside",
+            Self::Outside => "outside",
+        }
+    }
+
+    fn zone(self, profiles: &Profiles) -> &Zone {
+        match self {
+            Self::Inside => &profiles.inside,
+            Self::Outside => &profiles.outside,
+        }
+    }
+}
+
+/// A case and the errors of its methods.
 struct Measured {
     case: Case,
     of: Vec<Profiles>,
 }
 
 impl Measured {
-    /// CA less PA, without or with the Gaussian weighting, over PA: inside the vortices or outside.
-    fn share(&self, pa: usize, is_inside: bool) -> Estimate {
-        let zone = |p: usize| {
-            if is_inside {
-                &self.of[p].inside
-            } else {
-                &self.of[p].outside
-            }
-        };
-        zone(2).over(zone(pa))
+    /// CA less PA, without or with the Gaussian weighting, over PA.
+    fn share(&self, pa: usize, region: Region) -> Estimate {
+        region.zone(&self.of[2]).over(region.zone(&self.of[pa]))
+    }
+
+    /// The error of CA inside over that of unweighted PA, without one batch.
+    fn ratio(&self, without: Option<usize>) -> f64 {
+        self.of[2].inside.rms_m_s(without) / self.of[0].inside.rms_m_s(without)
     }
 }
 
 pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let scans = context.profile.choose(8, 48, 200);
     let sight = Sight::of(context, EARLY_TAU)?;
-    let cases = cases(context);
     let mut all = Vec::new();
-    // The pair is looked at from where the wake is.
-    for of_flow in cases.chunk_by(|a, b| a.seen == b.seen) {
-        let sight = match of_flow[0].seen {
+    // The pair is observed from the position of the wake.
+    for cases in cases(context).chunk_by(|a, b| a.seen == b.seen) {
+        let sight = match cases[0].seen {
             Seen::Wake => &sight,
             Seen::Coarse => &Sight::of_wake(&wakes::whole(context)?, EARLY_TAU)?,
             Seen::Pair(core) => &Sight::of_pair(VortexPair {
@@ -170,43 +209,19 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
                 ..VortexPair::default()
             }),
         };
-        let scene = |case: &Case, method: &str| {
-            let mut scene = with_method(near_scene(scans), method);
-            scene.detector.snr = SnrReference::Fixed {
-                snr_db: case.snr_db,
-            };
-            scene.detector.noise = case.noise;
-            scene.scan.pulses_per_line = case.pulses;
-            scene.estimator.gate_step_samples = context.profile.choose(10, 5, 5);
-            if case.bins {
-                (scene.estimator.refinement, scene.estimator.padded_samples) =
-                    (Refinement::None, scene.estimator.window_samples);
-            }
-            scene
-        };
-        let scenes = of_flow
-            .iter()
-            .flat_map(|case| METHODS.map(|method| scene(case, method)));
-        let studies = Study::runs(context, sight, scenes.collect())?;
-        for (case, studies) in of_flow.iter().zip(studies.chunks(METHODS.len())) {
-            let of = METHODS.iter().zip(studies);
-            let of = of
-                .map(|(method, study)| Profiles::of(method, "fixed", case.snr_db, study))
-                .collect();
-            all.push(Measured { case: *case, of });
+        all.extend(measured(context, sight, cases, scans)?);
+    }
+    let shown = sight.scene(context, near_scene(scans));
+    let origin = context.provenance_of_formula(&shown.to_toml());
+    let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
+    let mut named = Vec::new();
+    for m in &all {
+        for p in &m.of {
+            named.push((format!("{}; {} dB", m.case.name(), m.case.snr_db), p));
         }
     }
-    let origin = context.provenance_of_formula(&sight.scene(context, near_scene(scans)).to_toml());
-    let mut out = Rendered::new(&table(&all), &picture(&all), &origin)?;
-    let named = all.iter().flat_map(|m| {
-        m.of.iter()
-            .map(|p| (format!("{}; {} dB", m.case.name(), m.case.snr_db), p))
-    });
-    out.add(
-        "batches.csv",
-        &profiles::batches_table(named, false),
-        &origin,
-    )?;
+    let batches = profiles::batches_table(named.into_iter(), Gates::Omitted);
+    out.add("batches.csv", &batches, &origin)?;
     out.values = vec![scans.to_string(), sight.words];
     out.marks = vec![sight.mark, "analytic pair".into()];
     out.words = words(&all)?;
@@ -214,99 +229,132 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     Ok(out)
 }
 
-fn table(all: &[Measured]) -> Table {
-    let rows: Vec<(&Measured, usize, bool)> = all
-        .iter()
-        .flat_map(|m| [(m, 0, true), (m, 1, true), (m, 0, false), (m, 1, false)])
-        .collect();
-    let float = |get: &dyn Fn(&Measured, usize, bool) -> f64| {
-        rows.iter().map(|r| get(r.0, r.1, r.2)).collect::<Vec<_>>()
-    };
-    let rms = |p: &Profiles, is_inside| {
-        if is_inside {
-            p.inside.rms_m_s(None)
-        } else {
-            p.outside.rms_m_s(None)
+/// All methods on the cases of one flow.
+fn measured(
+    context: &Context,
+    sight: &Sight,
+    cases: &[Case],
+    scans: usize,
+) -> Result<Vec<Measured>, Failure> {
+    let mut scenes = Vec::new();
+    for case in cases {
+        for method in METHODS {
+            scenes.push(case.scene(context, method, scans));
         }
-    };
+    }
+    let studies = Study::runs(context, sight, scenes)?;
+    let mut all = Vec::new();
+    for (case, studies) in cases.iter().zip(studies.chunks(METHODS.len())) {
+        let mut of = Vec::new();
+        for (method, study) in METHODS.iter().zip(studies) {
+            of.push(Profiles::of(method, "fixed", case.snr_db, study));
+        }
+        all.push(Measured { case: *case, of });
+    }
+    Ok(all)
+}
+
+/// A row of the table.
+struct Row<'m> {
+    measured: &'m Measured,
+    /// Which PA, as in [`METHODS`].
+    pa: usize,
+    region: Region,
+}
+
+impl Row<'_> {
+    fn rms_m_s(&self, method: usize) -> f64 {
+        self.region.zone(&self.measured.of[method]).rms_m_s(None)
+    }
+
+    fn share(&self) -> Estimate {
+        self.measured.share(self.pa, self.region)
+    }
+}
+
+fn table(all: &[Measured]) -> Table {
+    let mut rows = Vec::new();
+    for measured in all {
+        for region in [Region::Inside, Region::Outside] {
+            for pa in [0, 1] {
+                rows.push(Row {
+                    measured,
+                    pa,
+                    region,
+                });
+            }
+        }
+    }
+    let cases: Vec<&Case> = rows.iter().map(|row| &row.measured.case).collect();
     Table::new()
-        .text("case", rows.iter().map(|r| r.0.case.name()))
-        .float("snr_db", float(&|m, _, _| m.case.snr_db))
-        .float("core_b0", float(&|m, _, _| m.case.core_b0()))
-        .text(
-            "zone",
-            rows.iter().map(|r| if r.2 { "inside" } else { "outside" }),
-        )
-        .text("against", rows.iter().map(|r| METHODS[r.1]))
-        .float("rms_pa_m_s", float(&|m, pa, inside| rms(&m.of[pa], inside)))
-        .float("rms_ca_m_s", float(&|m, _, inside| rms(&m.of[2], inside)))
-        .float("share", float(&|m, pa, inside| m.share(pa, inside).value))
+        .text("case", cases.iter().map(|case| case.name()))
+        .float("snr_db", cases.iter().map(|case| case.snr_db))
+        .float("core_b0", cases.iter().map(|case| case.core_b0()))
+        .text("zone", rows.iter().map(|row| row.region.name()))
+        .text("against", rows.iter().map(|row| METHODS[row.pa]))
+        .float("rms_pa_m_s", rows.iter().map(|row| row.rms_m_s(row.pa)))
+        .float("rms_ca_m_s", rows.iter().map(|row| row.rms_m_s(2)))
+        .float("share", rows.iter().map(|row| row.share().value))
         .float(
             "standard_error",
-            float(&|m, pa, inside| m.share(pa, inside).standard_error),
+            rows.iter().map(|row| row.share().standard_error),
         )
 }
 
+/// A curve of a panel: its name, and its cases.
+type Curve<'m> = (String, Vec<&'m Measured>);
+
 fn picture(all: &[Measured]) -> Figure {
-    let panel = |title: &str,
-                 x: &str,
-                 is_inside: bool,
-                 at: fn(&Case) -> f64,
-                 curves: Vec<(String, Vec<&Measured>)>| {
-        let y = Axis::linear("(CA - PA)/PA").between(-0.8, 1.6);
-        let mut plot = CurvePlot::new(title, Axis::linear(x), y);
-        for (colour, (label, of)) in curves.iter().enumerate() {
-            for (pa, style) in [(0, Style::LineMarkers), (1, Style::Dash)] {
-                let points = of
-                    .iter()
-                    .map(|m| (at(&m.case), m.share(pa, is_inside).value));
-                let band: Vec<f64> = of
-                    .iter()
-                    .map(|m| m.share(pa, is_inside).half_width())
-                    .collect();
-                let label = if pa == 0 { label } else { "" };
-                plot = plot.with(
-                    Series::new(label, style, points)
-                        .with_band(&band)
-                        .in_colour(colour),
-                );
-            }
-        }
-        plot
-    };
-    let along = || {
-        let curves = WAYS.iter().map(|way| {
-            let of = all.iter().filter(|m| {
-                Case {
-                    snr_db: way.snr_db,
-                    ..m.case
-                } == *way
-            });
-            (way.name(), of.collect())
-        });
-        curves.collect()
-    };
+    let mut along = Vec::new();
+    for setting in SETTINGS {
+        let of = all
+            .iter()
+            .filter(|m| at(m.case, setting.snr_db) == setting)
+            .collect();
+        along.push((setting.name(), of));
+    }
     let cores = all
         .iter()
         .filter(|m| matches!(m.case.seen, Seen::Pair(_)) && m.case.snr_db == CHAPTER_DB)
         .collect();
-    Figure::stacked([
-        panel(
-            "Inside the vortices",
-            "SNR [dB]",
-            true,
-            |case| case.snr_db,
-            along(),
-        ),
-        panel("Outside", "SNR [dB]", false, |case| case.snr_db, along()),
-        panel(
-            &format!("Inside the vortices of the pair, {CHAPTER_DB} dB"),
-            "core radius [b₀]",
-            true,
-            |case| case.core_b0(),
-            vec![("pair, band noise, one pulse a line".into(), cores)],
-        ),
-    ])
+    let cores = [("pair, band noise, one pulse a line".into(), cores)];
+    let by_snr = |case: &Case| case.snr_db;
+    let x = "SNR [dB]";
+    let inside = panel("Inside the vortices", x, Region::Inside, by_snr, &along);
+    let outside = panel("Outside", x, Region::Outside, by_snr, &along);
+    let title = format!("Inside the vortices of the pair, {CHAPTER_DB} dB");
+    let x = "core radius [b₀]";
+    let by_core = panel(&title, x, Region::Inside, Case::core_b0, &cores);
+    Figure::stacked([inside, outside, by_core])
+}
+
+/// CA less each PA over the latter, against a number of the cases.
+fn panel(
+    title: &str,
+    label: &str,
+    region: Region,
+    number: fn(&Case) -> f64,
+    curves: &[Curve],
+) -> CurvePlot {
+    let y = Axis::linear("(CA - PA)/PA").between(-0.8, 1.6);
+    let mut plot = CurvePlot::new(title, Axis::linear(label), y);
+    for (colour, (name, of)) in curves.iter().enumerate() {
+        for (pa, style) in [(0, Style::LineMarkers), (1, Style::Dash)] {
+            let mut points = Vec::new();
+            let mut half_widths = Vec::new();
+            for m in of {
+                let share = m.share(pa, region);
+                points.push((number(&m.case), share.value));
+                half_widths.push(share.half_width());
+            }
+            let name = if pa == 0 { name } else { "" };
+            let series = Series::new(name, style, points)
+                .with_band(&half_widths)
+                .in_colour(colour);
+            plot = plot.with(series);
+        }
+    }
+    plot
 }
 
 fn find(all: &[Measured], case: Case) -> Result<&Measured, Failure> {
@@ -315,125 +363,110 @@ fn find(all: &[Measured], case: Case) -> Result<&Measured, Failure> {
         .ok_or_else(|| Failure::new(format!("figure 25 lacks {}", case.name())))
 }
 
+/// How much less CA errs than unweighted PA inside in a case, in per cent.
+fn per_cent(all: &[Measured], case: Case) -> Result<String, Failure> {
+    let share = find(all, case)?.share(0, Region::Inside);
+    Ok(format!("{} %", share.times(100.0).words()))
+}
+
 /// Where it holds and where not, in a sentence.
 fn words(all: &[Measured]) -> Result<String, Failure> {
-    let per_cent = |case| {
-        Ok::<_, Failure>(format!(
-            "{} %",
-            find(all, case)?.share(0, true).times(100.0).words()
-        ))
-    };
     let mut holds = Vec::new();
-    for m in all.iter().filter(|m| {
-        Case {
-            snr_db: CHAPTER_DB,
-            ..m.case
-        } == WAKE
-    }) {
-        let verdict = match Bar::Less(NO_DIFFERENCE).verdict(&m.share(0, true)) {
+    for m in all {
+        if at(m.case, CHAPTER_DB) != WAKE {
+            continue;
+        }
+        let share = m.share(0, Region::Inside);
+        let verdict = match Bar::Less(NO_DIFFERENCE).verdict(&share) {
             Verdict::Pass => "less",
             Verdict::Fail => "not less",
             Verdict::Open => "open",
         };
-        holds.push(format!(
-            "{} dB {verdict} ({})",
-            m.case.snr_db,
-            per_cent(m.case)?
-        ));
+        let share = per_cent(all, m.case)?;
+        holds.push(format!("{} dB {verdict} ({share})", m.case.snr_db));
     }
-    let coarse = find(
-        all,
-        Case {
-            seen: Seen::Coarse,
-            ..WAKE
-        },
-    )
-    .and_then(|m| per_cent(m.case));
-    let coarse = coarse.map_or(String::new(), |share| {
+    let coarse = Case {
+        seen: Seen::Coarse,
+        ..WAKE
+    };
+    let coarse = per_cent(all, coarse).map_or(String::new(), |share| {
         format!(", on a coarse wake with twice the core {share}")
     });
+    let white = Case {
+        noise: NoiseModel::White,
+        ..at(WAKE, WEAK_DB)
+    };
     Ok(format!(
         "Where that reaches (figure 25, error of CA less that of unweighted PA over the latter, inside): on the wake {}; at {WEAK_DB} dB in white noise \
          {}; inside a core of {} b₀ at {CHAPTER_DB} dB {}, of {} b₀ {}{coarse}.",
         holds.join(", "),
-        per_cent(Case {
-            noise: NoiseModel::White,
-            snr_db: WEAK_DB,
-            ..WAKE
-        })?,
+        per_cent(all, white)?,
         CORES[0],
-        per_cent(Case {
-            seen: Seen::Pair(CORES[0]),
-            ..WAKE
-        })?,
+        per_cent(all, PAIR)?,
         CORES[3],
-        per_cent(Case {
-            seen: Seen::Pair(CORES[3]),
-            ..WAKE
-        })?
+        per_cent(all, pair(CORES[3]))?
     ))
 }
 
+/// CA against PA in a case, and where the difference must lie.
+fn part(
+    all: &[Measured],
+    case: Case,
+    pa: usize,
+    region: Region,
+    bar: Bar,
+) -> Result<Part, Failure> {
+    let name = format!("{}, {} dB, {}", case.name(), case.snr_db, METHODS[pa]);
+    let share = find(all, case)?.share(pa, region);
+    Ok(Part::new(name, share, "", bar))
+}
+
+/// Whether CA over PA is smaller in one case than in another.
+fn smaller_ratio(all: &[Measured], smaller: Case, larger: Case) -> Result<[Part; 1], Failure> {
+    let smaller = find(all, smaller)?;
+    let larger = find(all, larger)?;
+    let batches = smaller.of[0].inside.of_batch.len();
+    let found = Estimate::of(batches, |without| {
+        smaller.ratio(without) - larger.ratio(without)
+    });
+    let name = "difference of the ratios";
+    Ok([Part::new(name, found, "", Bar::Below(0.0))])
+}
+
 fn claims(all: &[Measured]) -> Result<Vec<Claim>, Failure> {
-    let part = |case: Case, pa: usize, is_inside: bool, bar: Bar| {
-        let share = find(all, case)?.share(pa, is_inside);
-        Ok::<_, Failure>((
-            format!("{}, {} dB, {}", case.name(), case.snr_db, METHODS[pa]),
-            share,
-            "",
-            bar,
-        ))
-    };
     let less = Bar::Less(NO_DIFFERENCE);
-    let [weak, strong] = [WEAK_DB, STRONG_DB].map(|snr_db| Case { snr_db, ..WAKE });
+    let above = Bar::Above(0.0);
+    let weak = at(WAKE, WEAK_DB);
+    let strong = at(WAKE, STRONG_DB);
+    let strong_pair = at(PAIR, STRONG_DB);
     let white = Case {
         noise: NoiseModel::White,
         ..weak
     };
-    let pair = Case {
-        seen: Seen::Pair(CORES[0]),
-        ..WAKE
-    };
-    let between = |name: &str, a: Case, b: Case| {
-        let [a, b] = [find(all, a)?, find(all, b)?];
-        let share = |m: &Measured, without| {
-            m.of[2].inside.rms_m_s(without) / m.of[0].inside.rms_m_s(without)
-        };
-        let found = Estimate::of(a.of[0].inside.of_batch.len(), |without| {
-            share(a, without) - share(b, without)
-        });
-        Ok::<_, Failure>(vec![(name.into(), found, "", Bar::Below(0.0))])
-    };
-    let turned = [
-        strong,
-        Case {
-            seen: pair.seen,
-            ..strong
-        },
-    ];
-    let outside = [part(WAKE, 0, false, less)?, part(pair, 0, false, less)?];
     let bins = Case { bins: true, ..WAKE };
     let many = Case { pulses: 8, ..weak };
-    let above = |case, pa| part(case, pa, true, Bar::Above(0.0));
+    let turned = [
+        part(all, strong, 0, Region::Inside, above)?,
+        part(all, strong_pair, 0, Region::Inside, above)?,
+    ];
+    let outside = [
+        part(all, WAKE, 0, Region::Outside, less)?,
+        part(all, PAIR, 0, Region::Outside, less)?,
+    ];
+    let raw_bins = [
+        part(all, bins, 0, Region::Inside, less)?,
+        part(all, bins, 1, Region::Inside, less)?,
+    ];
+    let eight_pulses = [
+        part(all, many, 0, Region::Inside, above)?,
+        part(all, many, 1, Region::Inside, above)?,
+    ];
     Ok(vec![
-        Claim::judged("CP1", &between("difference of the ratios", white, weak)?),
-        Claim::judged("CP2", &[above(turned[0], 0)?, above(turned[1], 0)?]),
-        Claim::judged(
-            "CP3",
-            &between(
-                "difference of the ratios",
-                Case {
-                    seen: Seen::Pair(CORES[3]),
-                    ..WAKE
-                },
-                pair,
-            )?,
-        ),
+        Claim::judged("CP1", &smaller_ratio(all, white, weak)?),
+        Claim::judged("CP2", &turned),
+        Claim::judged("CP3", &smaller_ratio(all, pair(CORES[3]), PAIR)?),
         Claim::judged("CP4", &outside),
-        Claim::judged(
-            "CP5",
-            &[part(bins, 0, true, less)?, part(bins, 1, true, less)?],
-        ),
-        Claim::judged("CP6", &[above(many, 0)?, above(many, 1)?]),
+        Claim::judged("CP5", &raw_bins),
+        Claim::judged("CP6", &eight_pulses),
     ])
 }

@@ -5,7 +5,7 @@
 //! estimates, which is taken away.
 
 use super::context::*;
-use super::study::{INSIDE_M, METHODS, OUTSIDE_M, Study, Zone, batches};
+use super::study::{INSIDE_M, METHODS, NamedZone, OUTSIDE_M, Study, Zone, batches};
 use crate::statistics::NO_DIFFERENCE;
 use wakescope_sim::measure::cell_average::CellAverage;
 
@@ -47,19 +47,25 @@ impl Profiles {
                 if inwards_m > (middle_m - core_m).abs() {
                     continue;
                 }
-                let lines = map.elevation_rad.iter().enumerate();
-                let near = lines
-                    .filter(|(_, el)| ((*el - elevation_rad) * core_m).abs() < CORE_M)
-                    .map(|(i, _)| i);
-                let place = ((core_m - map.range_m[0]) / gate_m).round() as i64 + bin;
-                if place >= 0 && (place as usize) < map.range_m.len() {
-                    cells.extend(near.map(|i| (i, place as usize)));
+                let gate = ((core_m - map.range_m[0]) / gate_m).round() as i64 + bin;
+                if gate < 0 || gate as usize >= map.range_m.len() {
+                    continue;
+                }
+                for (line, line_rad) in map.elevation_rad.iter().enumerate() {
+                    if ((line_rad - elevation_rad) * core_m).abs() < CORE_M {
+                        cells.push((line, gate as usize));
+                    }
                 }
             }
             across.push((bin as f64 * gate_m, study.zone(&cells)));
         }
-        let gates =
-            (0..map.range_m.len()).map(|gate| study.cells(|d, j| d > OUTSIDE_M && j == gate));
+        let mut evolution = Vec::new();
+        for gate in 0..map.range_m.len() {
+            let cells = study.cells(|d, j| d > OUTSIDE_M && j == gate);
+            if !cells.is_empty() {
+                evolution.push(study.zone(&cells));
+            }
+        }
         Self {
             method,
             name,
@@ -67,10 +73,7 @@ impl Profiles {
             snr_db,
             inside: study.zone(&study.cells(|d, _| d < INSIDE_M)),
             outside: study.zone(&study.cells(|d, _| d > OUTSIDE_M)),
-            evolution: gates
-                .filter(|cells| !cells.is_empty())
-                .map(|cells| study.zone(&cells))
-                .collect(),
+            evolution,
             across,
         }
     }
@@ -86,12 +89,14 @@ impl Profiles {
 
     /// The error at a mean range less what it is outside there, without one batch, m/s.
     pub(super) fn excess_m_s(&self, zone: &Zone, without: Option<usize>) -> f64 {
-        let gates = self
-            .evolution
-            .iter()
-            .map(|gate| [gate.range_m, gate.rms_m_s(without), gate.sums(without).1]);
-        let outside = gates.filter(|[.., estimates]| *estimates > 0.0);
-        zone.rms_m_s(without) - on_line(outside, zone.range_m)
+        let mut outside = Vec::new();
+        for gate in &self.evolution {
+            let (_, estimates) = gate.sums(without);
+            if estimates > 0.0 {
+                outside.push([gate.range_m, gate.rms_m_s(without), estimates]);
+            }
+        }
+        zone.rms_m_s(without) - on_line(&outside, zone.range_m)
     }
 
     /// The same along the lines that pass a core.
@@ -111,118 +116,114 @@ impl Profiles {
 }
 
 /// Where the straight line of least squares through some points (x, y, weight) is at `x`.
-fn on_line(points: impl Iterator<Item = [f64; 3]> + Clone, x: f64) -> f64 {
-    let sum = |of: &dyn Fn([f64; 3]) -> f64| points.clone().map(|p| p[2] * of(p)).sum::<f64>();
-    let weight = sum(&|_| 1.0);
-    let [mean_x, mean_y] = [0, 1].map(|k| sum(&|p| p[k]) / weight);
-    let slope = sum(&|p| (p[0] - mean_x) * (p[1] - mean_y)) / sum(&|p| (p[0] - mean_x).powi(2));
-    mean_y + slope * (x - mean_x)
+fn on_line(points: &[[f64; 3]], x: f64) -> f64 {
+    let weight = weighted_sum(points, |_| 1.0);
+    let mean_x = weighted_sum(points, |p| p[0]) / weight;
+    let mean_y = weighted_sum(points, |p| p[1]) / weight;
+    let covariance = weighted_sum(points, |p| (p[0] - mean_x) * (p[1] - mean_y));
+    let variance = weighted_sum(points, |p| (p[0] - mean_x).powi(2));
+    mean_y + covariance / variance * (x - mean_x)
+}
+
+/// Sum of a function of points (x, y, weight), each with its weight.
+fn weighted_sum(points: &[[f64; 3]], function: impl Fn(&[f64; 3]) -> f64) -> f64 {
+    points.iter().map(|p| p[2] * function(p)).sum()
 }
 
 /// Mean signal-to-noise ratio of the scene at the vortices, dB; the same for all methods on the same signals.
 pub(super) fn snr_db(study: &Study) -> Result<f64, Failure> {
     let scanner = wakescope_sim::measure::scan::Scanner::new(&study.plan, &Silent)?;
-    let near: Vec<f64> = scanner
-        .layer_snr()
-        .into_iter()
-        .filter(|(r, _)| (350.0..450.0).contains(r))
-        .map(|(_, snr)| snr)
-        .collect();
+    let mut near = Vec::new();
+    for (range_m, snr) in scanner.layer_snr() {
+        if (350.0..450.0).contains(&range_m) {
+            near.push(snr);
+        }
+    }
     Ok(10.0 * (near.iter().sum::<f64>() / near.len() as f64).log10())
 }
 
 /// Place and value of the largest number inside a vortex.
 pub(super) fn peak(across: &[(f64, f64)]) -> (usize, f64) {
-    let inside = across
-        .iter()
-        .enumerate()
-        .filter(|(_, p)| p.0.abs() <= INSIDE_M);
-    inside
-        .map(|(k, p)| (k, p.1))
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .unwrap_or((0, f64::NAN))
+    let mut inside = Vec::new();
+    for (index, (range_m, value)) in across.iter().enumerate() {
+        if range_m.abs() <= INSIDE_M {
+            inside.push((index, *value));
+        }
+    }
+    let largest = inside.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    largest.unwrap_or((0, f64::NAN))
 }
 
 /// Full width at half of the peak, m; straight lines between the gates. NaN where it does not fall that far.
 pub(super) fn width_m(across: &[(f64, f64)]) -> f64 {
     let (top, value) = peak(across);
     let half = 0.5 * value;
-    let crossing = |from: (f64, f64), to: (f64, f64)| {
-        from.0 + (to.0 - from.0) * (from.1 - half) / (from.1 - to.1)
-    };
-    let steps = |mut side: Box<dyn Iterator<Item = &[(f64, f64)]> + '_>, far: usize| {
-        side.find(|pair| pair[far].1 < half)
-            .map_or(f64::NAN, |pair| crossing(pair[1 - far], pair[far]))
-    };
-    steps(Box::new(across[top..].windows(2)), 1)
-        - steps(Box::new(across[..=top].windows(2).rev()), 0)
+    let mut before = across[..=top].to_vec();
+    before.reverse();
+    fall_to(half, &across[top..]) - fall_to(half, &before)
+}
+
+/// Where a curve first falls below a level, on the straight line between its points; NaN if it does not.
+fn fall_to(level: f64, curve: &[(f64, f64)]) -> f64 {
+    for pair in curve.windows(2) {
+        let (from, to) = (pair[0], pair[1]);
+        if to.1 < level {
+            return from.0 + (to.0 - from.0) * (from.1 - level) / (from.1 - to.1);
+        }
+    }
+    f64::NAN
 }
 
 /// CA less each PA in a number of theirs, case by case, in the order of [`METHODS`].
 pub(super) fn parts(
     all: &[Profiles],
     unit: &'static str,
-    of: fn(&Profiles, Option<usize>) -> f64,
+    number: fn(&Profiles, Option<usize>) -> f64,
 ) -> Vec<Part> {
-    let case = |of_case: &[Profiles]| {
-        let [pas @ .., ca] = of_case else {
-            return Vec::new();
+    let mut parts = Vec::new();
+    for case in all.chunks(METHODS.len()) {
+        let [pas @ .., ca] = case else {
+            continue;
         };
-        let part = |pa: &Profiles| {
-            let trifle = NO_DIFFERENCE * of(pa, None).abs();
-            (
-                format!("{}, CA - {}", pa.title(), pa.method),
-                ca.less(pa, of),
-                unit,
-                Bar::Less(trifle),
-            )
-        };
-        pas.iter().map(part).collect()
-    };
-    all.chunks(METHODS.len()).flat_map(case).collect()
+        for pa in pas {
+            let name = format!("{}, CA - {}", pa.title(), pa.method);
+            let bar = Bar::Less(NO_DIFFERENCE * number(pa, None).abs());
+            parts.push(Part::new(name, ca.less(pa, number), unit, bar));
+        }
+    }
+    parts
 }
 
 /// In which readings a difference is below zero, in which it is not, and which are open, with their numbers.
 pub(super) fn told(parts: &[Part]) -> String {
-    let of = |verdict, heading: &str| {
-        let readings = parts
-            .iter()
-            .filter(|part| part.3.verdict(&part.1) == verdict);
-        let readings =
-            readings.map(|(name, found, unit, _)| format!("{name} {}{unit}", found.words()));
-        let readings = readings.collect::<Vec<_>>().join("; ");
-        if readings.is_empty() {
-            readings
-        } else {
-            format!("{heading}: {readings}")
-        }
-    };
-    let all = [
-        of(Verdict::Pass, "yes"),
-        of(Verdict::Fail, "no"),
-        of(Verdict::Open, "open"),
+    let headings = [
+        (Verdict::Pass, "yes"),
+        (Verdict::Fail, "no"),
+        (Verdict::Open, "open"),
     ];
-    all.into_iter()
-        .filter(|told| !told.is_empty())
-        .collect::<Vec<_>>()
-        .join(". ")
+    let mut sentences = Vec::new();
+    for (verdict, heading) in headings {
+        let readings: Vec<String> = parts
+            .iter()
+            .filter(|part| part.bar.verdict(&part.found) == verdict)
+            .map(Part::words)
+            .collect();
+        if !readings.is_empty() {
+            sentences.push(format!("{heading}: {}", readings.join("; ")));
+        }
+    }
+    sentences.join(". ")
 }
 
 /// All profiles as one table.
 pub(super) fn table(all: &[Profiles]) -> Table {
-    let rows: Vec<(&Profiles, f64, &Zone)> = all
-        .iter()
-        .flat_map(|p| {
-            p.across
-                .iter()
-                .map(move |(range_m, zone)| (p, *range_m, zone))
-        })
-        .collect();
-    let of = |get: fn(&CellAverage) -> f64| {
-        rows.iter()
-            .map(move |(_, _, zone)| get(&zone.average))
-            .collect::<Vec<_>>()
-    };
+    let mut rows: Vec<(&Profiles, f64, &Zone)> = Vec::new();
+    for p in all {
+        for (range_m, zone) in &p.across {
+            rows.push((p, *range_m, zone));
+        }
+    }
+    let averages: Vec<&CellAverage> = rows.iter().map(|(.., zone)| &zone.average).collect();
     Table::new()
         .text("method", rows.iter().map(|(p, ..)| p.method))
         .float("pulse_s", rows.iter().map(|(p, ..)| p.pulse_s))
@@ -232,9 +233,9 @@ pub(super) fn table(all: &[Profiles]) -> Table {
             "range_from_centre_m",
             rows.iter().map(|(_, range_m, _)| *range_m),
         )
-        .float("bias_m_s", of(|a| a.bias_m_s))
-        .float("std_m_s", of(|a| a.std_m_s))
-        .float("rms_m_s", of(|a| a.rms_m_s))
+        .float("bias_m_s", averages.iter().map(|a| a.bias_m_s))
+        .float("std_m_s", averages.iter().map(|a| a.std_m_s))
+        .float("rms_m_s", averages.iter().map(|a| a.rms_m_s))
         .float(
             "standard_error_m_s",
             rows.iter().map(|(.., zone)| zone.rms().standard_error),
@@ -245,54 +246,52 @@ pub(super) fn table(all: &[Profiles]) -> Table {
         )
 }
 
+/// Whether a table has the zones gate by gate.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Gates {
+    Included,
+    Omitted,
+}
+
 /// All that the claims need: the zones of named cases in their batches, with those gate by gate or without.
 pub(super) fn batches_table<'p>(
     all: impl Iterator<Item = (String, &'p Profiles)>,
-    with_gates: bool,
+    gates: Gates,
 ) -> Table {
-    batches(all.flat_map(|(case, p)| {
-        let whole = [
-            ("inside", f64::NAN, &p.inside),
-            ("outside", f64::NAN, &p.outside),
-        ];
-        let evolution = p
-            .evolution
-            .iter()
-            .map(|gate| ("evolution", gate.range_m, gate));
-        let across = p
-            .across
-            .iter()
-            .map(|(range_m, zone)| ("across", *range_m, zone));
-        let gates: Vec<_> = if with_gates {
-            evolution.chain(across).collect()
-        } else {
-            Vec::new()
-        };
-        let method = p.method;
-        let named = move |(zone, place, of)| (format!("{method}; {case}"), zone, place, of);
-        whole.into_iter().chain(gates).map(named)
-    }))
+    let mut zones = Vec::new();
+    for (case, p) in all {
+        let case = format!("{}; {case}", p.method);
+        zones.push(NamedZone::new(&case, "inside", f64::NAN, &p.inside));
+        zones.push(NamedZone::new(&case, "outside", f64::NAN, &p.outside));
+        if gates == Gates::Omitted {
+            continue;
+        }
+        for zone in &p.evolution {
+            zones.push(NamedZone::new(&case, "evolution", zone.range_m, zone));
+        }
+        for (range_m, zone) in &p.across {
+            zones.push(NamedZone::new(&case, "across", *range_m, zone));
+        }
+    }
+    batches(&zones)
 }
 
 /// Curves of some profiles, less their evolution with range.
 pub(super) fn plot(title: &str, profiles: &[Profiles]) -> CurvePlot {
-    let [x, y] = [
-        "range from the vortex centre [m]",
-        "rms less its evolution [m/s]",
-    ]
-    .map(Axis::linear);
+    let x = Axis::linear("range from the vortex centre [m]");
+    let y = Axis::linear("rms less its evolution [m/s]");
     let mut plot = CurvePlot::new(title, x, y);
     for (place, p) in profiles.iter().enumerate() {
         let style = [Style::Line, Style::Dash, Style::DashDot][place % METHODS.len()];
-        let excess = |zone: &Zone| Estimate {
-            value: p.excess_m_s(zone, None),
-            ..zone.rms()
-        };
         let label = format!("{}, {:.0} ns", p.method, 1e9 * p.pulse_s);
-        let points = p
-            .across
-            .iter()
-            .map(|(range_m, zone)| (*range_m, excess(zone)));
+        let mut points = Vec::new();
+        for (range_m, zone) in &p.across {
+            let excess = Estimate {
+                value: p.excess_m_s(zone, None),
+                ..zone.rms()
+            };
+            points.push((*range_m, excess));
+        }
         plot = plot.with(banded(&label, style, points).in_colour(place));
     }
     plot
@@ -323,8 +322,9 @@ mod tests {
     #[test]
     fn the_evolution_is_a_straight_line() {
         let points = [[1.0, 3.0, 5.0], [2.0, 5.0, 1.0], [4.0, 9.0, 2.0]];
-        assert!((on_line(points.into_iter(), 3.0) - 7.0).abs() < 1e-12);
+        assert!((on_line(&points, 3.0) - 7.0).abs() < 1e-12);
         // What weighs nothing does not count.
-        assert!((on_line(points.into_iter().chain([[3.0, 100.0, 0.0]]), 3.0) - 7.0).abs() < 1e-12);
+        let weightless = [&points[..], &[[3.0, 100.0, 0.0]]].concat();
+        assert!((on_line(&weightless, 3.0) - 7.0).abs() < 1e-12);
     }
 }

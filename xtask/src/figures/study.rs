@@ -35,9 +35,12 @@ pub(super) fn early_scene(realisations: usize) -> Scene {
         seed: 0,
         ..Scene::default()
     };
-    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.03, 0.2);
-    (scene.scan.range_min_m, scene.scan.range_max_m) = (310.0, 500.0);
-    (scene.scan.pulses_per_line, scene.scan.realisations) = (1, realisations);
+    scene.scan.elevation_min_rad = 0.03;
+    scene.scan.elevation_max_rad = 0.2;
+    scene.scan.range_min_m = 310.0;
+    scene.scan.range_max_m = 500.0;
+    scene.scan.pulses_per_line = 1;
+    scene.scan.realisations = realisations;
     scene
 }
 
@@ -62,8 +65,10 @@ pub(super) fn with_method(mut scene: Scene, method: &str) -> Scene {
 /// The same scan about the cores alone.
 pub(super) fn near_scene(realisations: usize) -> Scene {
     let mut scene = early_scene(realisations);
-    (scene.scan.elevation_min_rad, scene.scan.elevation_max_rad) = (0.065, 0.175);
-    (scene.scan.range_min_m, scene.scan.range_max_m) = (315.0, 485.0);
+    scene.scan.elevation_min_rad = 0.065;
+    scene.scan.elevation_max_rad = 0.175;
+    scene.scan.range_min_m = 315.0;
+    scene.scan.range_max_m = 485.0;
     scene
 }
 
@@ -95,31 +100,35 @@ pub(super) struct Sight {
 impl Sight {
     /// The wake of an age, simulated or analytic: at its start if early, on its inviscid path if late.
     pub(super) fn of(context: &Context, tau: f64) -> Result<Self, Failure> {
-        let (motion, pair) = (VortexMotion::Inviscid, VortexPair::default());
-        match (context.analytic, tau) {
-            (true, EARLY_TAU) => Ok(Self::of_pair(pair)),
-            (true, age_tau) => Ok(Self::of_pair(VortexPair {
-                motion,
-                age_tau,
-                ..pair
-            })),
-            (false, tau) => Self::of_wake(&wakes::of(context)?, tau),
+        if !context.analytic {
+            return Self::of_wake(&wakes::of(context)?, tau);
         }
+        let pair = VortexPair::default();
+        if tau == EARLY_TAU {
+            return Ok(Self::of_pair(pair));
+        }
+        Ok(Self::of_pair(VortexPair {
+            motion: VortexMotion::Inviscid,
+            age_tau: tau,
+            ..pair
+        }))
     }
 
     /// A simulated wake of an age.
     pub(super) fn of_wake(wake: &FinishedWake, tau: f64) -> Result<Self, Failure> {
         let b0_m = wake.scales.spacing_m;
-        let (planes, motion, age_tau) = ("plane1".into(), SimulatedMotion::Frozen, Some(tau));
         let flow = SimulatedFlow {
-            planes,
-            motion,
-            age_tau,
+            planes: "plane1".into(),
+            motion: SimulatedMotion::Frozen,
+            age_tau: Some(tau),
             ..SimulatedFlow::default()
         };
-        let at = |name: &str| Ok::<f64, Failure>(b0_m * value_at(&wake.curve(name)?, tau));
-        let core = |y, z| Ok::<_, Failure>((flow.lateral_position_m + at(y)?, at(z)?));
-        let cores = vec![core("y_left", "z_left")?, core("y_right", "z_right")?];
+        let mut cores = Vec::new();
+        for side in ["left", "right"] {
+            let y_m = b0_m * value_at(&wake.curve(&format!("y_{side}"))?, tau);
+            let z_m = b0_m * value_at(&wake.curve(&format!("z_{side}"))?, tau);
+            cores.push((flow.lateral_position_m + y_m, z_m));
+        }
         let words = format!("tau = {tau}, {}", wake.words());
         Ok(Self {
             flow: Flow::Simulated(flow),
@@ -181,17 +190,14 @@ impl Study {
         sight: &Sight,
         scenes: Vec<Scene>,
     ) -> Result<Vec<Self>, Failure> {
-        let file = |scene| {
-            SceneFile::parse(
-                &sight.scene(context, scene).to_toml(),
-                &sight.folder.join("scene.toml"),
-            )
-        };
-        let files = scenes
-            .into_iter()
-            .map(file)
-            .collect::<Result<Vec<_>, _>>()?;
-        Ok(sweep::maps(&files, &Silent)?
+        let path = sight.folder.join("scene.toml");
+        let mut files = Vec::new();
+        for scene in scenes {
+            let text = sight.scene(context, scene).to_toml();
+            files.push(SceneFile::parse(&text, &path)?);
+        }
+        let maps = sweep::maps(&files, &Silent)?;
+        Ok(maps
             .into_iter()
             .map(|(plan, map)| Self::of(sight, plan, map))
             .collect())
@@ -203,31 +209,29 @@ impl Study {
         sight: &Sight,
         scene: &Scene,
     ) -> Result<Vec<Self>, Failure> {
-        let at = |(_, reference)| {
+        let scenes = REFERENCES.map(|(_, reference)| {
             let mut scene = scene.clone();
             scene.detector.snr = reference;
             scene
-        };
-        Self::runs(context, sight, REFERENCES.map(at).to_vec())
+        });
+        Self::runs(context, sight, scenes.to_vec())
     }
 
     fn of(sight: &Sight, plan: Plan, map: VelocityEstimates) -> Self {
-        let cores = sight.cores.clone();
-        let distance = |(line, gate): (usize, usize)| {
-            let (el, r) = (map.elevation_rad[line], map.range_m[gate]);
-            let (y, z) = (
-                r * el.cos(),
-                plan.scene.content.scan.lidar_height_m + r * el.sin(),
-            );
-            cores
-                .iter()
-                .map(|c| (y - c.0).hypot(z - c.1))
-                .fold(f64::INFINITY, f64::min)
-        };
-        let distance_m =
-            Array2::from_shape_fn((map.elevation_rad.len(), map.range_m.len()), distance);
+        let shape = (map.elevation_rad.len(), map.range_m.len());
+        let distance_m = Array2::from_shape_fn(shape, |(line, gate)| {
+            let elevation_rad = map.elevation_rad[line];
+            let range_m = map.range_m[gate];
+            let y_m = range_m * elevation_rad.cos();
+            let z_m = plan.scene.content.scan.lidar_height_m + range_m * elevation_rad.sin();
+            let mut nearest_m = f64::INFINITY;
+            for core in &sight.cores {
+                nearest_m = nearest_m.min((y_m - core.0).hypot(z_m - core.1));
+            }
+            nearest_m
+        });
         Self {
-            cores,
+            cores: sight.cores.clone(),
             plan,
             map,
             distance_m,
@@ -247,17 +251,20 @@ impl Study {
     /// and gate are accepted: cells of fewer windows err more, wherever they are.
     pub(super) fn cells(&self, accept: impl Fn(f64, usize) -> bool) -> Vec<(usize, usize)> {
         let level = &self.map.level;
-        let most: Vec<f64> = level
-            .columns()
-            .into_iter()
-            .map(|gate| gate.iter().copied().fold(0.0, f64::max))
-            .collect();
-        let is_whole =
-            |(i, j): (usize, usize)| level[[i, j]] >= 0.9 * most[j] && j > 0 && j + 1 < most.len();
-        let all = self.distance_m.indexed_iter();
-        all.filter(|(cell, d)| accept(**d, cell.1) && is_whole(*cell))
-            .map(|(cell, _)| cell)
-            .collect()
+        let gates = level.ncols();
+        let mut largest = Vec::new();
+        for gate in level.columns() {
+            largest.push(gate.iter().copied().fold(0.0, f64::max));
+        }
+        let mut cells = Vec::new();
+        for ((line, gate), distance_m) in self.distance_m.indexed_iter() {
+            let is_whole =
+                level[[line, gate]] >= 0.9 * largest[gate] && gate > 0 && gate + 1 < gates;
+            if is_whole && accept(*distance_m, gate) {
+                cells.push((line, gate));
+            }
+        }
+        cells
     }
 
     /// Mean of a function of the errors of a cell over the scans, without those of one batch.
@@ -265,15 +272,17 @@ impl Study {
         &self,
         cell: (usize, usize),
         without: Option<usize>,
-        of: fn(f64) -> f64,
+        function: fn(f64) -> f64,
     ) -> f64 {
-        let scans = self.map.scans.iter().enumerate();
-        let kept = scans.filter(|(k, _)| Some(k * BATCHES / self.map.scans.len()) != without);
-        let errors: Vec<f64> = kept
-            .map(|(_, scan)| of(scan.error_m_s[cell]))
-            .filter(|e| e.is_finite())
-            .collect();
-        errors.iter().sum::<f64>() / errors.len() as f64
+        let mut values = Vec::new();
+        for (k, scan) in self.map.scans.iter().enumerate() {
+            let batch = k * BATCHES / self.map.scans.len();
+            let value = function(scan.error_m_s[cell]);
+            if Some(batch) != without && value.is_finite() {
+                values.push(value);
+            }
+        }
+        values.iter().sum::<f64>() / values.len() as f64
     }
 
     /// The errors over some cells.
@@ -282,21 +291,17 @@ impl Study {
         let batches = of_batch.len();
         for (k, scan) in self.map.scans.iter().enumerate() {
             let (sum, count) = &mut of_batch[k * batches / self.map.scans.len()];
-            for error in cells
-                .iter()
-                .map(|cell| scan.error_m_s[*cell])
-                .filter(|error| error.is_finite())
-            {
-                (*sum, *count) = (*sum + error * error, *count + 1.0);
+            for cell in cells {
+                let error = scan.error_m_s[*cell];
+                if error.is_finite() {
+                    *sum += error * error;
+                    *count += 1.0;
+                }
             }
         }
-        let range_m = cells
-            .iter()
-            .map(|cell| self.map.range_m[cell.1])
-            .sum::<f64>()
-            / cells.len() as f64;
+        let ranges_m = cells.iter().map(|(_, gate)| self.map.range_m[*gate]);
         Zone {
-            range_m,
+            range_m: ranges_m.sum::<f64>() / cells.len() as f64,
             of_batch,
             average: CellAverage::without_errors(&self.map, cells),
         }
@@ -316,12 +321,15 @@ pub(super) struct Zone {
 impl Zone {
     /// Sum of the squares and number of the estimates without one batch.
     pub(super) fn sums(&self, without: Option<usize>) -> (f64, f64) {
-        let kept = self
-            .of_batch
-            .iter()
-            .enumerate()
-            .filter(|(batch, _)| Some(*batch) != without);
-        kept.fold((0.0, 0.0), |sums, (_, of)| (sums.0 + of.0, sums.1 + of.1))
+        let mut sum = 0.0;
+        let mut estimates = 0.0;
+        for (batch, (sum_of_batch, estimates_of_batch)) in self.of_batch.iter().enumerate() {
+            if Some(batch) != without {
+                sum += sum_of_batch;
+                estimates += estimates_of_batch;
+            }
+        }
+        (sum, estimates)
     }
 
     /// Root mean square error without one batch, m/s.
@@ -342,25 +350,54 @@ impl Zone {
     }
 }
 
-/// All that claims on zones need: case, zone, its place in the figure, the zone.
-pub(super) fn batches<'z>(
-    zones: impl Iterator<Item = (String, &'static str, f64, &'z Zone)>,
-) -> Table {
-    let of_zone = |(case, name, place, zone): (String, &'static str, f64, &'z Zone)| {
-        let batches = zone.of_batch.iter().enumerate();
-        batches
-            .map(move |(batch, sums)| (case.clone(), name, place, zone.range_m, batch, *sums))
-            .collect::<Vec<_>>()
-    };
-    let rows: Vec<_> = zones.flat_map(of_zone).collect();
+/// A zone with what names it.
+pub(super) struct NamedZone<'z> {
+    case: String,
+    name: &'static str,
+    /// Its position in the figure.
+    place: f64,
+    zone: &'z Zone,
+}
+
+impl<'z> NamedZone<'z> {
+    pub(super) fn new(case: &str, name: &'static str, place: f64, zone: &'z Zone) -> Self {
+        Self {
+            case: case.into(),
+            name,
+            place,
+            zone,
+        }
+    }
+}
+
+/// The batches of zones, from which claims on them follow.
+pub(super) fn batches(zones: &[NamedZone]) -> Table {
+    let mut case = Vec::new();
+    let mut name = Vec::new();
+    let mut place = Vec::new();
+    let mut range_m = Vec::new();
+    let mut number = Vec::new();
+    let mut sum_m2_s2 = Vec::new();
+    let mut estimates = Vec::new();
+    for named in zones {
+        for (batch, (sum, count)) in named.zone.of_batch.iter().enumerate() {
+            case.push(named.case.clone());
+            name.push(named.name);
+            place.push(named.place);
+            range_m.push(named.zone.range_m);
+            number.push(batch as i64);
+            sum_m2_s2.push(*sum);
+            estimates.push(*count as i64);
+        }
+    }
     Table::new()
-        .text("case", rows.iter().map(|r| r.0.clone()))
-        .text("zone", rows.iter().map(|r| r.1))
-        .float("place", rows.iter().map(|r| r.2))
-        .float("range_m", rows.iter().map(|r| r.3))
-        .int("batch", rows.iter().map(|r| r.4 as i64))
-        .float("sum_of_squares_m2_s2", rows.iter().map(|r| r.5.0))
-        .int("estimates", rows.iter().map(|r| r.5.1 as i64))
+        .text("case", case)
+        .text("zone", name)
+        .float("place", place)
+        .float("range_m", range_m)
+        .int("batch", number)
+        .float("sum_of_squares_m2_s2", sum_m2_s2)
+        .int("estimates", estimates)
 }
 
 /// Tables of the same columns one below the other, with a last column that tells them apart.
