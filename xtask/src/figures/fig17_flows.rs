@@ -14,13 +14,7 @@ use wakescope_sim::scene::{FirstMoment, Method as Estimator, Retrieval, VortexPa
 const AGES: [Option<f64>; 4] = [None, Some(1.0), Some(2.5), Some(4.0)];
 /// The method that is judged: what `[retrieval]` does unless it is told otherwise.
 const JUDGED: &str = "fit";
-const METHODS: [Method; 5] = [
-    Method::Fit,
-    Method::Rv,
-    Method::Envelope,
-    Method::Integral,
-    Method::Signals,
-];
+const METHODS: [Method; 4] = [Method::Fit, Method::Rv, Method::Envelope, Method::Signals];
 /// The operational method on what it is made for: radial velocities that are means over the gate, which peaks of spectra are not.
 const OF_MEANS: &str = "rv of first moments";
 

@@ -1,6 +1,6 @@
 //! From an accumulated correlogram to a velocity with width, SNR and flags; the traits for estimators of one's own.
 
-pub(crate) mod cell_test;
+pub(crate) mod cell_threshold;
 pub(crate) mod detection;
 pub(crate) mod first_moment;
 pub(crate) mod likelihood;
@@ -14,7 +14,7 @@ pub(crate) mod statistic;
 pub(crate) mod tails;
 pub(crate) mod velocity;
 
-pub use cell_test::CellTest;
+pub use cell_threshold::cell_threshold;
 pub use detection::{NoiseTest, RegionNoise};
 pub use first_moment::FirstMoment;
 pub use likelihood::likelihood_tapers;

@@ -1,8 +1,7 @@
-//! Tails of the gamma and the beta law, also where the numbers leave what the functions of the crate `statrs` take.
+//! Tails of the gamma law, also where the numbers leave what the functions of the crate `statrs` take.
 //!
 //! Check: closed forms of one window; limits.
 
-use statrs::function::beta::checked_beta_reg;
 use statrs::function::erf::erfc;
 use statrs::function::gamma::checked_gamma_ur;
 
@@ -41,11 +40,6 @@ pub(crate) fn bisected(
     [low, high]
 }
 
-/// Probability that a beta variable of shapes `a` and `b` stays below `x`; NaN for shapes that are none.
-pub(crate) fn beta_below(a: f64, b: f64, x: f64) -> f64 {
-    checked_beta_reg(a, b, x).unwrap_or(f64::NAN)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -57,7 +51,6 @@ mod tests {
             [1.0, 0.0]
         );
         assert!((gamma_tail(1.0, 3.0) - (-3.0_f64).exp()).abs() < 1e-15);
-        assert!((beta_below(1.0, 2.0, 0.25) - (1.0 - 0.75_f64.powi(2))).abs() < 1e-14);
         // of one shape on both sides of the limit
         let at = |a: f64| gamma_tail(a, a + 2.0 * a.sqrt());
         assert!(
@@ -67,6 +60,5 @@ mod tests {
         for impossible in [0.0, -1.0, f64::INFINITY, f64::NAN] {
             assert!(gamma_tail(impossible, 1.0).is_nan(), "{impossible}");
         }
-        assert!(beta_below(0.0, 1.0, 0.5).is_nan() && beta_below(1.0, 1.0, 2.0).is_nan());
     }
 }

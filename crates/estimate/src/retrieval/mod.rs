@@ -6,7 +6,7 @@
 //! | `fit`, `hypotheses`, `report` | fits of wind alone, one vortex and two; which it is; deviations and flags |
 //! | `gates`, `whitening` | what a velocity is of the air; correlated velocities |
 //! | `secondary` | the fit again with secondary vortices, if the scan shows them |
-//! | `radial_velocity`, `envelope`, `integral` | the methods of the literature beside it, with their errors |
+//! | `radial_velocity`, `envelope` | the methods of the literature beside it, with their errors |
 //! | `track` | many scans: filter and smoother |
 //!
 //! ```
@@ -29,7 +29,6 @@ mod envelope;
 mod fit;
 mod gates;
 mod hypotheses;
-mod integral;
 mod options;
 mod radial_velocity;
 mod report;
@@ -43,7 +42,6 @@ pub use crate::vortex_fit::Top;
 pub use envelope::{EnvelopeResult, ScanSpectra, SpectralShape, velocity_envelopes};
 pub use fit::fit_scan;
 pub use gates::expected_velocities;
-pub use integral::{ProfilePoint, circulation_profile};
 pub use options::{Covariance, Gate, Movement, RetrievalOptions, Turbulence};
 pub use radial_velocity::radial_velocity_method;
 pub use result::{Flag, Measured, ScanResult, Side, VortexResult};

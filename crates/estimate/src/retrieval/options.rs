@@ -52,7 +52,6 @@ pub struct Turbulence {
 
 /// How the covariance of a fit is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Covariance {
     /// From the residuals and their correlation (sandwich): right for any noise that is much the same over the map.
     Sandwich,

@@ -5,7 +5,7 @@
 
 mod accumulate;
 mod bound;
-mod cell_test;
+mod cell_threshold;
 mod correlogram_estimators;
 mod draw;
 mod extremes;

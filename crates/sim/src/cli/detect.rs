@@ -5,7 +5,7 @@ use super::words::{AirWords, FolderWords, ScanWords, finite, rate, spacing, stri
 use crate::Error;
 use crate::detection::{
     Calibration, DetectionSettings, Power, ScanDetection, SceneNoise, background, detect as test,
-    gate_table, scan_table, share_table, strided,
+    scan_table, share_table, strided,
 };
 use crate::io::Provenance;
 use crate::io::csv::digits;
@@ -13,8 +13,7 @@ use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
 use crate::plan::{Plan, Target};
 use crate::retrieve::{gate_of, scene_of};
-use crate::scene::{NoiseModel, Scene, SceneFile};
-use crate::setup::progress::Observer;
+use crate::scene::{Scene, SceneFile};
 use clap::Args;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -77,13 +76,9 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
     let plan = still
         .map(|scene| Plan::new(scene, Target::Map))
         .transpose()?;
-    // The closed forms of single gates are those of noise.
-    let noisy = plan
-        .as_ref()
-        .filter(|plan| plan.scene.content.detector.noise != NoiseModel::None);
     words
         .folder
-        .prepare(cli, |files| list(words, noisy, None, files))?;
+        .prepare(cli, |files| list(words, None, files))?;
     let of_plan = plan.as_ref().map(|plan| &plan.scene.content);
     let (gate, note) = gate_of(scans.first(), words.air.gate_std, of_plan)?;
     notes.extend(note.map(str::to_owned));
@@ -137,13 +132,8 @@ pub(super) fn detect(words: &DetectWords, cli: &Cli) -> Result<(), Error> {
         "gumbel": power.as_ref().map(|power| [power.gumbel.0, power.gumbel.1]),
         "notes": notes,
     });
-    let tested = Some((
-        &scans[..],
-        &found[..],
-        power.as_ref(),
-        &*observer as &dyn Observer,
-    ));
-    let list = |files: &mut Outputs| list(words, noisy, tested, files);
+    let tested = Some((&scans[..], &found[..], power.as_ref()));
+    let list = |files: &mut Outputs| list(words, tested, files);
     words.folder.finish(
         cli,
         (Default::default(), origin),
@@ -236,27 +226,17 @@ fn told(
     }
 }
 
-/// Scans, what was found in them, how often wakes are found, and who is told of what is computed for the files alone.
-type Tested<'t> = (
-    &'t [ReadScan],
-    &'t [ScanDetection],
-    Option<&'t Power>,
-    &'t dyn Observer,
-);
+/// Scans, what was found in them, how often wakes are found.
+type Tested<'t> = (&'t [ReadScan], &'t [ScanDetection], Option<&'t Power>);
 
-/// The files, whose content is not there before the tests; those of single gates for a plan with noise.
-fn list(
-    words: &DetectWords,
-    noisy: Option<&Plan>,
-    of: Option<Tested<'_>>,
-    files: &mut Outputs,
-) -> Result<(), Error> {
+/// The files, whose content is not there before the tests.
+fn list(words: &DetectWords, of: Option<Tested<'_>>, files: &mut Outputs) -> Result<(), Error> {
     if !words.data.is_empty() {
-        files.table("detection", of.as_ref(), |(scans, found, ..)| {
+        files.table("detection", of.as_ref(), |(scans, found, _)| {
             Ok(scan_table(scans, found))
         })?;
     }
-    let power = of.and_then(|(_, _, power, _)| power);
+    let power = of.and_then(|(_, _, power)| power);
     files.table("detection_power", power, |power| {
         Ok(share_table(power, &power.found, true))
     })?;
@@ -267,11 +247,6 @@ fn list(
     files.figure("detection", power, |power| {
         Ok(crate::detection::picture(power))
     })?;
-    if let Some(plan) = noisy {
-        files.table("detection_gates", of.as_ref(), |(.., observer)| {
-            gate_table(plan, words.false_alarm, *observer)
-        })?;
-    }
     Ok(())
 }
 

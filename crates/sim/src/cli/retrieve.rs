@@ -2,25 +2,23 @@
 
 use super::Cli;
 use super::words::{
-    AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive, switch,
+    AirWords, FolderWords, ScanWords, Scans, Signals, is_signals, not_negative, positive,
 };
 use crate::io::Provenance;
 use crate::io::scans::ReadScan;
 use crate::outputs::Outputs;
 use crate::plan::Stage;
-use crate::plan::time::{FIT_S, SIGNAL_FIT_S};
-use crate::plan::units::seconds;
 use crate::retrieve::{self, Method, RetrievedScan, SceneResponse, Velocities, gate_of};
 use crate::scene::{Estimator, SceneFile};
 use crate::setup::progress::{Observer, Silent};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
-use clap::{ArgAction, Args};
+use clap::Args;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use wakescope_estimate::retrieval::{
-    Covariance, EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track,
+    EnvelopeResult, Flag, Gate, Movement, RetrievalOptions, Track,
 };
-use wakescope_estimate::vortex_fit::{CoreProfile, Loss, Secondary, Wake};
+use wakescope_estimate::vortex_fit::{CoreProfile, Secondary, Wake};
 
 /// Words of `wakescope retrieve`.
 #[derive(Debug, Args)]
@@ -57,12 +55,6 @@ pub(super) struct RetrieveWords {
     /// Whether secondary vortices are fitted beside a pair: where a scan shows them, never, or always; of the scene without it, else auto.
     #[arg(long, value_enum)]
     secondary: Option<Secondary>,
-    /// What residuals cost: cauchy bears outliers, squares does not.
-    #[arg(long = "loss", action = ArgAction::Set, default_value = "cauchy", value_parser = switch(["cauchy", "squares"]))]
-    bears_outliers: bool,
-    /// Where deviations come from: the residuals, or the stated deviations of the velocities.
-    #[arg(long, value_enum, default_value_t = Covariance::Sandwich)]
-    covariance: Covariance,
     /// Whether vortices move while a scan lasts: whichever fits better, yes, or no.
     #[arg(long, value_enum, default_value_t = Movement::Auto)]
     motion: Movement,
@@ -90,18 +82,13 @@ impl RetrieveWords {
         if let Some(profile) = self.profile {
             (options.model.profile, options.other_profile) = (profile, false);
         }
-        if !self.bears_outliers {
-            options.loss = Loss::Squares;
-        }
         options.model.images = self.air.images;
         options.model.lidar_height_m = self.lidar_height.unwrap_or(options.model.lidar_height_m);
         options.secondary = self.secondary.unwrap_or(options.secondary);
-        let (covariance, movement, threshold) = (self.covariance, self.motion, self.threshold);
         RetrievalOptions {
             turbulence: self.air.turbulence,
-            covariance,
-            movement,
-            threshold,
+            movement: self.motion,
+            threshold: self.threshold,
             ..options
         }
     }
@@ -202,16 +189,6 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         .prepare(cli, |files| list(words.method, count, None, files))?;
     let mut found = Found::default();
     observer.begin(Stage::Retrieval, count as u64);
-    if matches!(words.method, Method::Fit | Method::Signals) {
-        let due_s = inputs
-            .iter()
-            .map(|input| forecast_s(words, input, stated.is_some()))
-            .sum();
-        observer.reach(&format!(
-            "forecast: {} of one core, to a factor of three",
-            seconds(due_s)
-        ));
-    }
     for Scans { maps, signals, .. } in inputs {
         if let Some(signals) = signals {
             of_signals(words, maps, signals, &mut found, &*observer)?;
@@ -245,32 +222,6 @@ pub(super) fn retrieve(words: &RetrieveWords, cli: &Cli) -> Result<(), Error> {
         |files| list(words.method, count, Some(&found), files),
         (object, text),
     )
-}
-
-/// Velocities of means that a fit looks at: of more, some.
-const MOST: f64 = 8000.0;
-
-/// Time of the fits to the scans of a file on one core, s. Good to a factor of three: scans without a wake take less.
-fn forecast_s(words: &RetrieveWords, input: &Scans, is_stated: bool) -> f64 {
-    let is_shown = is_stated
-        || words
-            .estimator
-            .as_deref()
-            .is_some_and(|method| method != MEANS);
-    let fitted = input
-        .signals
-        .as_ref()
-        .filter(|_| words.method == Method::Signals);
-    let one = |scan: &ReadScan| {
-        let velocities = scan.map.velocity_m_s.len() as f64;
-        let are_means = !(is_shown || scan.is_own && words.estimator.is_none());
-        let samples = fitted.map_or(0, |signals| {
-            scan.map.elevation_rad.len() * signals.records.samples
-        }) as f64;
-        let of_means_s = 0.25 + 0.5 * (velocities / MOST).min(1.0) + 4e-6 * velocities;
-        of_means_s + if are_means { 0.0 } else { FIT_S * velocities } + SIGNAL_FIT_S * samples
-    };
-    input.maps.iter().map(one).sum()
 }
 
 /// Where the track of the scans so far says that the wake is, to start from beside the blind search.
@@ -442,9 +393,6 @@ fn list(
         files.table("envelopes", found, |found| {
             Ok(retrieve::envelope_table(&found.envelopes))
         })?;
-    }
-    if method == Method::Integral {
-        files.table("profiles", scans, retrieve::profile_table)?;
     }
     let tracked = found.and_then(|found| Some((found.track.as_ref()?, &found.scans)));
     files.table("track", tracked.as_ref(), |(track, _)| {

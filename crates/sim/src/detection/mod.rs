@@ -3,18 +3,15 @@
 //! | module | content |
 //! |---|---|
 //! | `scene_noise` | deviations of a scene's velocities, and how far apart they are independent, from scans of still air |
-//! | `gates` | false alarms of single gates in closed form |
 //! | `tables`, `pictures` | what is written |
 //!
 //! Check: a wake is found and empty scans are not, at their rate; results do not depend on threads.
 
-mod gates;
 #[cfg(feature = "plots")]
 mod pictures;
 mod scene_noise;
 mod tables;
 
-pub use gates::gate_table;
 #[cfg(feature = "plots")]
 pub use pictures::picture;
 pub use scene_noise::SceneNoise;

@@ -94,8 +94,8 @@ fn maps_s(scene: &Scene, n: &Sizes) -> f64 {
 }
 
 /// Of a fit to what an estimator shows, for each velocity of the map; of one to signals, for each sample.
-pub(crate) const FIT_S: f64 = 2e-4;
-pub(crate) const SIGNAL_FIT_S: f64 = 3e-4;
+const FIT_S: f64 = 2e-4;
+const SIGNAL_FIT_S: f64 = 3e-4;
 
 /// Vortices of every realisation, and the test for a wake, if the scene asks for them.
 fn retrieval_s(scene: &Scene, n: &Sizes, record_s: f64) -> f64 {

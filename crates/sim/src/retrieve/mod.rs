@@ -4,15 +4,15 @@
 //! |---|---|
 //! | `own` | maps and signals of a scene that is known: what its estimator makes of a wake |
 //! | `one_scan` | one map, and what a velocity of it is of the air about its range |
-//! | `others` | velocity envelopes, circulation against radius |
+//! | `envelope` | velocity envelopes |
 //! | `realisations`, `truth`, `summary` | all realisations of a scene against the vortices of its flow |
 //! | `table` | what was found in a scan, and the track through several: rows, and everything as JSON |
 //! | `pictures` | velocities, the fitted wake, what is left; tracks |
 //!
 //! Check: maps of runs are retrieved within their stated deviations, from every format.
 
+mod envelope;
 mod one_scan;
-mod others;
 mod own;
 #[cfg(feature = "plots")]
 mod pictures;
@@ -21,8 +21,9 @@ pub(crate) mod summary;
 mod table;
 mod truth;
 
+pub use envelope::{envelope_table, envelopes};
 pub use one_scan::{Velocities, gate_of, options, retrieve_map, scene_of};
-pub use others::{envelope_table, envelopes, profile_table};
+
 pub use own::{retrieve_signals, scan_of_signals};
 #[cfg(feature = "plots")]
 pub use pictures::{figure, track_figure};

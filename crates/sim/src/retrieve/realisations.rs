@@ -2,8 +2,8 @@
 //!
 //! Check: bias and scatter of a pair; a method that fails is counted; the test for a wake keeps its rate.
 
+use super::envelope::envelopes;
 use super::one_scan::{Velocities, gate_of, options, retrieve_map};
-use super::others::envelopes;
 use super::own::scan_of_lines;
 use super::table::{RetrievedScan, flags};
 use super::truth::{true_vortices, true_wake};
@@ -16,14 +16,10 @@ use crate::plan::{Plan, Stage};
 use crate::scene::{FollowingAircraft, RetrievalMethod as Method, Scene};
 use crate::setup::progress::{Observer, Silent};
 use ndarray::{Array2, ArrayView2};
-use wakescope_estimate::retrieval::{
-    Measured, RetrievalOptions, ScanMap, VortexResult, circulation_profile,
-};
+use wakescope_estimate::retrieval::{RetrievalOptions, ScanMap, VortexResult};
 use wakescope_estimate::vortex_fit::{CoreProfile, Follower, Wake, WakeModel};
 use wakescope_estimate::window::Sample;
 
-/// Radii of the circulation from integrals over the map, m.
-const RADII_M: [f64; 11] = [5.0, 6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0, 13.0, 14.0, 15.0];
 /// Empty scans of the test for a wake.
 const EMPTY_SCANS: usize = 10_000;
 
@@ -115,7 +111,7 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
             )
         };
         let by = |method| retrieve_map(scan(), method, options.clone(), velocities).ok();
-        // the fit of the map also starts that of the signals and the integrals
+        // the fit of the map also starts that of the signals
         let of_map = wanted
             .methods
             .iter()
@@ -133,7 +129,6 @@ pub(crate) fn of_realisations<S: Sample + wakescope_signal::Sample>(
                     map,
                     observer,
                 )?,
-                (Method::Integral, Some(map), _) => integral(map).ok(),
                 (_, map, _) => map.filter(|_| method == Method::Fit),
             };
             rows.extend(rows_of(
@@ -211,33 +206,6 @@ fn of_signals<S: Sample + wakescope_signal::Sample>(
     Ok(own
         .of_records(samples, elevation_rad, of_map, observer)
         .ok())
-}
-
-/// The circulation over 5 to 15 m by integrals over the map itself, not corrected.
-fn integral(mut found: RetrievedScan) -> Result<RetrievedScan, Error> {
-    let Some(wake) = found.result.wake else {
-        return Ok(found);
-    };
-    for vortex in &mut found.result.vortices {
-        let profile = circulation_profile(
-            &found.scan.map,
-            &wake,
-            vortex.side,
-            &RADII_M,
-            &found.options,
-        )?;
-        let value =
-            profile.iter().map(|point| point.across_m2_s).sum::<f64>() / profile.len() as f64;
-        vortex.circulation_5_15_m2_s = Measured {
-            value,
-            std: f64::NAN,
-        };
-        vortex.circulation_m2_s = Measured {
-            value: f64::NAN,
-            std: f64::NAN,
-        };
-    }
-    Ok(found)
 }
 
 fn rows_of(

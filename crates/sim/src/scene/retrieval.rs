@@ -19,8 +19,6 @@ keys! {
         Rv = "rv",
         /// Velocity envelopes of the spectra of raw signals about the wake that is fitted to their map.
         Envelope = "envelope",
-        /// Fit to the map, and circulation against radius by integrals over the map beside it.
-        Integral = "integral",
     }
 
     /// Vortices from each realisation, held against the truth of the flow.
@@ -28,7 +26,7 @@ keys! {
         /// How circulations are found, each method beside the others.
         methods: Vec<RetrievalMethod> = vec![RetrievalMethod::Fit] => Is(
             |list: &Vec<RetrievalMethod>| !list.is_empty() && (1..list.len()).all(|i| !list[..i].contains(&list[i])),
-            "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", \"integral\", each once, for example [\"fit\", \"rv\"]",
+            "at least one of \"fit\", \"signals\", \"rv\", \"envelope\", each once, for example [\"fit\", \"rv\"]",
         ),
         /// Core radius that fits keep, m; fitted if absent.
         core_radius_m: Option<f64> = None => 1e-3..=1e3,
@@ -142,7 +140,7 @@ mod tests {
     fn retrievals_are_held_to_their_limits_and_need_vortices() {
         for text in [
             "[retrieval]\nsecondary = \"never\"\n",
-            "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"envelope\", \"integral\"]\nfalse_alarm = 0.01\n",
+            "[retrieval]\nmethods = [\"fit\", \"signals\", \"rv\", \"envelope\"]\nfalse_alarm = 0.01\n",
             "[retrieval]\n[scan]\nazimuth_rad = 1.0\n[scan.head]\nsweeps = 3\ndirection = \"alternate\"\n",
             "[retrieval]\n[scan]\nazimuth_rad = 2.0\n[scan.lidar]\nflight_azimuth_rad = 0.42920367320510344\n",
         ] {

@@ -140,12 +140,7 @@ fn a_run_is_held_against_its_pair_and_its_map_is_found_to_hold_a_wake() {
         .iter()
         .map(|f| f.as_str().unwrap().to_owned())
         .collect();
-    for name in [
-        "detection.csv",
-        "detection_power.csv",
-        "detection_roc.csv",
-        "detection_gates.csv",
-    ] {
+    for name in ["detection.csv", "detection_power.csv", "detection_roc.csv"] {
         assert!(files.iter().any(|file| file.ends_with(name)), "{files:?}");
     }
 }
@@ -192,12 +187,6 @@ fn a_scene_alone_says_what_would_be_found_in_it() {
             .unwrap()
             .contains("0.8 m/s correlated over 25 m")
     );
-    // closed form: 1e-2 for each gate, more where the best of many cells counts
-    let gates = rows(&folder.path().join("white/detection_gates.csv"));
-    let column = |name: &str| gates[0].iter().position(|column| column == name).unwrap();
-    let number = |name: &str| gates[1][column(name)].parse::<f64>().unwrap();
-    assert!(number("false_alarm") == 0.01 && (0.2..0.6).contains(&number("false_alarm_best")));
-    assert!(number("detection") > 0.9 && number("needed_snr_db") < 10.0);
 }
 
 /// Nine scans of still air: a map of nine realisations has a third of the deviation of one, whatever the scene says that is given with it.

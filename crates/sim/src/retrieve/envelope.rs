@@ -1,4 +1,4 @@
-//! Methods beside the fit, shown as they are: velocity envelopes of spectra, and circulation against radius from the map itself.
+//! Velocity envelopes of spectra: circulations beside the fit.
 //!
 //! Check: a pair's envelopes, inverted, have its circulation, and raw ones more, in the tests of the program.
 
@@ -11,17 +11,13 @@ use crate::setup::estimators;
 use ndarray::Array3;
 use std::ops::Range;
 use wakescope_estimate::Weighting;
-use wakescope_estimate::estimators::CellTest;
+use wakescope_estimate::estimators::cell_threshold;
 use wakescope_estimate::retrieval::{
-    EnvelopeResult, Measured, ProfilePoint, ScanSpectra, Side, SpectralShape, circulation_profile,
-    velocity_envelopes,
+    EnvelopeResult, Measured, ScanSpectra, SpectralShape, velocity_envelopes,
 };
 
 /// Rate at which the highest cell of noise is above the threshold of an envelope.
 const FALSE_ALARM: f64 = 1e-2;
-/// Radii of a profile, m.
-const RADII_M: Range<u32> = 2..26;
-
 /// Circulations by velocity envelopes about the wake that the map of a scan has; nothing without one. The circulations over 5 to
 /// 15 m of the scan become the inverted ones.
 ///
@@ -79,7 +75,7 @@ pub fn envelopes(
     let count = 3.0 * band_hz * scene.estimator.window_samples as f64 / scene.detector.sampling_hz;
     let of_cell = -((-FALSE_ALARM).ln_1p() / count).exp_m1();
     let windows = scene.scan.pulses_per_line as f64;
-    let threshold = CellTest::known_noise(windows)?.threshold(of_cell)?;
+    let threshold = cell_threshold(windows, of_cell)?;
     let scan = ScanSpectra {
         elevation_rad: &elevation_rad,
         range_m: &spectra.range_m,
@@ -118,41 +114,4 @@ pub fn envelope_table(all: &[(usize, EnvelopeResult)]) -> Table {
         )
         .int("lines", all.iter().map(|(_, r)| r.lines as i64))
         .int("left_out", all.iter().map(|(_, r)| r.left_out as i64))
-}
-
-/// Circulation against radius of each vortex of each scan, from the map itself and corrected with the fitted wake.
-///
-/// # Errors
-/// What the integrals refuse.
-pub fn profile_table(scans: &[RetrievedScan]) -> Result<Table, Error> {
-    let radii_m: Vec<f64> = RADII_M.map(f64::from).collect();
-    let mut rows: Vec<(usize, Side, ProfilePoint)> = Vec::new();
-    for (number, scan) in scans.iter().enumerate() {
-        let Some(wake) = &scan.result.wake else {
-            continue;
-        };
-        for vortex in &scan.result.vortices {
-            let found =
-                circulation_profile(&scan.scan.map, wake, vortex.side, &radii_m, &scan.options)
-                    .map_err(|error| refused(&scan.scan, &error))?;
-            rows.extend(
-                found
-                    .into_iter()
-                    .map(|point| (number + 1, vortex.side, point)),
-            );
-        }
-    }
-    let column = |get: fn(&ProfilePoint) -> f64| {
-        rows.iter()
-            .map(|(_, _, point)| get(point))
-            .collect::<Vec<f64>>()
-    };
-    Ok(Table::new()
-        .int("scan", rows.iter().map(|(scan, ..)| *scan as i64))
-        .text("side", rows.iter().map(|(_, side, _)| name(*side)))
-        .float("radius_m", column(|p| p.radius_m))
-        .float("across_m2_s", column(|p| p.across_m2_s))
-        .float("across_corrected_m2_s", column(|p| p.across_corrected_m2_s))
-        .float("around_m2_s", column(|p| p.around_m2_s))
-        .float("around_corrected_m2_s", column(|p| p.around_corrected_m2_s)))
 }
