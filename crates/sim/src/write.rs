@@ -130,22 +130,6 @@ pub fn recorded_names(plan: &Plan) -> Result<Vec<String>, Error> {
     Ok(names)
 }
 
-/// Writes what records gave; returns the paths of the files.
-///
-/// # Errors
-/// As [`write()`].
-pub fn write_recorded(
-    plan: &Plan,
-    found: Recorded,
-    folder: &Path,
-    existing: Existing,
-) -> Result<Vec<PathBuf>, Error> {
-    let of = (plan.scene.content.outputs, plan.scene.provenance());
-    Outputs::write(folder, existing, of, |files| {
-        list_recorded(plan, found, files)
-    })
-}
-
 /// The files of what records gave.
 pub(crate) fn list_recorded(
     plan: &Plan,

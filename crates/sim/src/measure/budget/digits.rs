@@ -21,7 +21,7 @@ pub(super) fn si(value: f64, unit: &str) -> String {
 }
 
 /// Three digits of a number from 1 to 1000, without zeros behind the point.
-pub(super) fn digits(value: f64) -> String {
+fn digits(value: f64) -> String {
     let places = if value.abs() >= 99.95 {
         0
     } else {
