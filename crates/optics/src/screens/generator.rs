@@ -109,7 +109,8 @@ impl<T: Real> ScreenGenerator<T> {
         if !self.folds() {
             return 0.0;
         }
-        let (px, py) = (2.0 * PI / self.grid.dx_m, 2.0 * PI / self.grid.dy_m);
+        let px = 2.0 * PI / self.grid.dx_m;
+        let py = 2.0 * PI / self.grid.dy_m;
         let mut sum = 0.0;
         for i in -1..=1 {
             for j in -1..=1 {
@@ -121,6 +122,7 @@ impl<T: Real> ScreenGenerator<T> {
         sum
     }
 
+    /// Computes `amplitude` and `folded`.
     fn plan_amplitudes(&mut self) {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let [dx, dy] = self.delta_rad_m;
@@ -132,8 +134,9 @@ impl<T: Real> ScreenGenerator<T> {
                 let my = Grid::frequency_index(ny, iy);
                 let at = ix * ny + iy;
                 // The spectrum depends on the absolute values alone: one quadrant is enough.
-                let (jx, jy) = (ix.min(nx - ix), iy.min(ny - iy));
-                if (jx, jy) != (ix, iy) {
+                let jx = ix.min(nx - ix);
+                let jy = iy.min(ny - iy);
+                if jx != ix || jy != iy {
                     self.amplitude[at] = self.amplitude[jx * ny + jy];
                     self.folded[at] = self.folded[jx * ny + jy];
                     continue;
@@ -179,7 +182,7 @@ impl<T: Real> ScreenGenerator<T> {
     /// They share the random shift of the frequencies: given that, they are independent.
     ///
     /// # Errors
-    /// [`Error::Length`] when a screen has not the size of the grid.
+    /// [`Error::Length`] if a screen does not have the size of the grid.
     pub fn fill_pair(
         &self,
         rng: &mut impl Rng,
@@ -196,33 +199,46 @@ impl<T: Real> ScreenGenerator<T> {
             whole: field,
             scratch,
         } = work;
-        let (mut radius, mut angle, mut row) = (vec![0; ny], vec![0; ny], vec![T::zero(); ny]);
+        let mut radius = vec![0; ny];
+        let mut angle = vec![0; ny];
+        let mut amplitude = vec![T::zero(); ny];
         Fft2::transposing(&self.fft.inverse_y, field, scratch, |ix, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
                 for (u, v) in radius.iter_mut().zip(&mut angle) {
                     let word = rng.next_u64();
-                    (*u, *v) = ((word >> 32) as u32, word as u32);
+                    *u = (word >> 32) as u32;
+                    *v = word as u32;
                 }
-                self.shifted_row(ix + i, shift, &mut row);
-                kernel::normals(&radius, &angle, &row, line);
+                self.shifted_row(ix + i, shift, &mut amplitude);
+                kernel::normals(&radius, &angle, &amplitude, line);
             }
         });
-        // The shift of the frequencies is a linear phase over the points.
-        let shifted = |n: usize, s: f64, i: usize| {
-            let phase = Complex::cis(self.shift_sign * 2.0 * PI * s * i as f64 / n as f64);
-            Complex::new(T::of(phase.re), T::of(phase.im))
-        };
-        let ramp: Vec<_> = (0..nx).map(|i| shifted(nx, shift[0], i)).collect();
+        let ramp: Vec<Complex<T>> = (0..nx).map(|x| self.shift_phase(shift[0], nx, x)).collect();
         self.fft.inverse_x(field, scratch, |y, block| {
             for (i, line) in block.chunks_exact(nx).enumerate() {
                 let y = y + i;
-                let (phase, low) = ((shifted(ny, shift[1], y), &ramp[..]), self.low.row(&low, y));
+                let factor = self.shift_phase(shift[1], ny, y);
+                let coefficients = self.low.row(&low, y);
                 let span = y * nx..(y + 1) * nx;
-                let screens = [&mut first[span.clone()], &mut second[span]];
-                kernel::finish_screen(line, phase, (&self.low.basis[0], &low), screens);
+                kernel::finish_screen(
+                    line,
+                    factor,
+                    &ramp,
+                    &self.low.basis[0],
+                    &coefficients,
+                    &mut first[span.clone()],
+                    &mut second[span],
+                );
             }
         });
         Ok(())
+    }
+
+    /// Phase factor at point `i` of `n` that a shift of all frequencies by `shift` cells causes.
+    fn shift_phase(&self, shift: f64, n: usize, i: usize) -> Complex<T> {
+        kernel::narrow(Complex::cis(
+            self.shift_sign * 2.0 * PI * shift * i as f64 / n as f64,
+        ))
     }
 
     /// Expected structure function of these screens at a separation of whole grid points (x, y), per unit k^2 Cn2 dz
@@ -263,10 +279,11 @@ impl<T: Real> ScreenGenerator<T> {
         2.0 * sum
     }
 
-    /// Part of the structure function that these screens miss at one grid spacing along x; it hardly depends on the width.
+    /// Fraction of the structure function that these screens miss at one grid spacing along x. It
+    /// depends little on the width of the grid.
     ///
     /// # Errors
-    /// What the quadrature of the spectrum refuses.
+    /// As [`structure_function_m53`](crate::air::structure::structure_function_m53).
     pub fn missing_at_one_spacing(&self) -> Result<f64, Error> {
         let exact = crate::air::structure::structure_function_m53(&*self.spectrum, self.grid.dx_m)?;
         Ok(1.0 - self.expected_structure_m53(1, 0) / exact)
@@ -290,6 +307,7 @@ impl<T: Real> ScreenGenerator<T> {
         sum
     }
 
+    /// As `cell_integral`, with cells that touch the origin halved towards it.
     fn graded_integral(
         &self,
         rule: &GaussLegendre,
@@ -303,7 +321,9 @@ impl<T: Real> ScreenGenerator<T> {
             return self.cell_integral(rule, corner, size, r);
         }
         // Halve towards the origin: three quarters are smooth, the last one is cut again.
-        let (mut corner, mut size, mut sum) = (corner, size, 0.0);
+        let mut corner = corner;
+        let mut size = size;
+        let mut sum = 0.0;
         for _ in 0..30 {
             let half = size.map(|s| 0.5 * s);
             let mut next = corner;
@@ -320,12 +340,14 @@ impl<T: Real> ScreenGenerator<T> {
                     sum += self.cell_integral(rule, sub, half, r);
                 }
             }
-            (corner, size) = (next, half);
+            corner = next;
+            size = half;
         }
         sum + self.cell_integral(rule, corner, size, r)
     }
 }
 
+/// sin(x)/x.
 fn sinc(x: f64) -> f64 {
     if x.abs() < 1e-8 { 1.0 } else { x.sin() / x }
 }

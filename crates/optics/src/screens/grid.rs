@@ -158,19 +158,19 @@ impl<T: Real> Fft2<T> {
             .map(|plan| plan.get_inplace_scratch_len())
             .max()
             .unwrap_or(0);
-        let zeros = |length| vec![Complex::default(); length];
         let scratch = FftScratch {
-            block: zeros(block),
-            spectrum: zeros(block),
-            inner: zeros(inner),
+            block: vec![Complex::default(); block],
+            spectrum: vec![Complex::default(); block],
+            inner: vec![Complex::default(); inner],
         };
         Work {
-            whole: zeros(self.forward_x.len() * self.forward_y.len()),
+            whole: vec![Complex::default(); self.forward_x.len() * self.forward_y.len()],
             scratch,
         }
     }
 
-    /// Rows of the length of `plan`: `fill` makes each block, told the index of its first row; transform, transposed into `out`.
+    /// Transforms rows of the length of `plan` and stores them transposed in `out`. `fill` writes
+    /// each block of rows; its first argument is the index of the first row of the block.
     pub(crate) fn transposing(
         plan: &Arc<dyn Fft<T>>,
         out: &mut [Complex<T>],
@@ -187,8 +187,10 @@ impl<T: Real> Fft2<T> {
         }
     }
 
-    /// Rows `[kx][y]`: forward along y, then for each of the fields `outs`, whose number `middle` is told: `middle` on the spectrum
-    /// `[kx][ky]` of each block, inverse along y, transposed into it, `[y]\[kx\]`.
+    /// Filters one field along y into each of the fields `outs`: rows `[kx][y]` are transformed
+    /// forward along y; `middle` changes the spectrum `[kx][ky]` of each block; the inverse along y
+    /// is stored transposed, `[y]\[kx\]`. The arguments of `middle` are the index of the output, the
+    /// index of the first row of the block, and the block.
     pub(crate) fn filter_y<const N: usize>(
         &self,
         field: &[Complex<T>],
@@ -203,7 +205,8 @@ impl<T: Real> Fft2<T> {
         } = scratch;
         let length = self.forward_y.len();
         for (index, rows) in field.chunks(ROWS * length).enumerate() {
-            let (first, points) = (index * ROWS, ..rows.len());
+            let first = index * ROWS;
+            let points = ..rows.len();
             spectrum[points].copy_from_slice(rows);
             transform(&self.forward_y, &mut spectrum[points], inner);
             for (which, out) in outs.iter_mut().enumerate() {
@@ -221,7 +224,8 @@ impl<T: Real> Fft2<T> {
         }
     }
 
-    /// Rows `[y]\[kx\]`: inverse along x, then `after` on each block with the index of its first row.
+    /// Transforms rows `[y]\[kx\]` by the inverse along x, then calls `after` with the index of the
+    /// first row of each block and the block.
     pub(crate) fn inverse_x(
         &self,
         field: &mut [Complex<T>],
@@ -242,7 +246,8 @@ fn store_transposed<T: Real>(
     first: usize,
     block: &[Complex<T>],
 ) {
-    let (count, height) = (out.len() / length, block.len() / length);
+    let count = out.len() / length;
+    let height = block.len() / length;
     for (i, column) in out.chunks_exact_mut(count).enumerate() {
         for (b, value) in column[first..first + height].iter_mut().enumerate() {
             *value = block[b * length + i];

@@ -75,11 +75,9 @@ pub(crate) fn normals<T: Real>(
 ) {
     let mut a = [T::zero(); BLOCK];
     let mut b = [T::zero(); BLOCK];
-    let chunks = radius
-        .chunks(BLOCK)
-        .zip(angle.chunks(BLOCK))
-        .zip(amplitude.chunks(BLOCK));
-    for (((radius, angle), amplitude), out) in chunks.zip(out.chunks_mut(BLOCK)) {
+    let words = radius.chunks(BLOCK).zip(angle.chunks(BLOCK));
+    let outs = amplitude.chunks(BLOCK).zip(out.chunks_mut(BLOCK));
+    for ((radius, angle), (amplitude, out)) in words.zip(outs) {
         let words = radius.iter().zip(angle).zip(amplitude);
         for (((&u, &v), &amplitude), (a, b)) in words.zip(a.iter_mut().zip(&mut b)) {
             let unit = (T::of_i32((u >> 1) as i32) + T::of(0.5)) * T::of(1.0 / 2_147_483_648.0);
@@ -146,21 +144,25 @@ pub(crate) fn dot<T: Real>(a: &[T], b: &[T]) -> f64 {
     sum.iter().map(|s| s.wide()).sum()
 }
 
-/// Real and imaginary part of row * factor * ramp + the low-frequency part, into two rows: the phase of the frequency shift is linear, and
-/// `low` are the polynomials, each sampled along the row, with the coefficients of either part.
+/// Writes the real and the imaginary part of row * factor * ramp + low frequencies into two rows.
+/// `factor` and `ramp` are the linear phase of the frequency shift. The low frequencies are the sum
+/// of the polynomials `basis`, each sampled along the row, times the `coefficients` of either part.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn finish_screen<T: Real>(
     row: &[Complex<T>],
-    (factor, ramp): (Complex<T>, &[Complex<T>]),
-    low: (&[Vec<T>], &[[T; 2]; LOW_ORDER]),
-    [first, second]: [&mut [T]; 2],
+    factor: Complex<T>,
+    ramp: &[Complex<T>],
+    basis: &[Vec<T>],
+    coefficients: &[[T; 2]; LOW_ORDER],
+    first: &mut [T],
+    second: &mut [T],
 ) {
     for start in (0..row.len()).step_by(BLOCK) {
         let end = (start + BLOCK).min(row.len());
         let mut re = [T::zero(); BLOCK];
         let mut im = [T::zero(); BLOCK];
-        for (basis, &[cre, cim]) in low.0.iter().zip(low.1) {
-            for ((&p, re), im) in basis[start..end].iter().zip(&mut re).zip(&mut im) {
+        for (polynomial, &[cre, cim]) in basis.iter().zip(coefficients) {
+            for ((&p, re), im) in polynomial[start..end].iter().zip(&mut re).zip(&mut im) {
                 *re = *re + cre * p;
                 *im = *im + cim * p;
             }
@@ -214,11 +216,11 @@ macro_rules! scalar {
             #[inline(always)]
             fn sin_cos_of_quadrant(self, quadrant: u32) -> (Self, Self) {
                 const SIGN: u32 = $bits::BITS - 2;
-                let (t, quadrant) = (self * self, $bits::from(quadrant));
-                let s = self + self * t * polynomial(&$sin, t);
-                let c = 1.0 - 0.5 * t + t * t * polynomial(&$cos, t);
+                let t = self * self;
+                let quadrant = $bits::from(quadrant);
+                let s = (self + self * t * polynomial(&$sin, t)).to_bits();
+                let c = (1.0 - 0.5 * t + t * t * polynomial(&$cos, t)).to_bits();
                 let swap = (quadrant & 1).wrapping_neg();
-                let (s, c) = (s.to_bits(), c.to_bits());
                 let sin = (s & !swap) | (c & swap);
                 let cos = (c & !swap) | (s & swap);
                 (
@@ -253,6 +255,11 @@ macro_rules! scalar {
             }
         }
     };
+}
+
+/// The nearest number of the number type `T`.
+pub(crate) fn narrow<T: Real>(value: Complex<f64>) -> Complex<T> {
+    Complex::new(T::of(value.re), T::of(value.im))
 }
 
 /// Sum of coefficient\[i\] t^i.

@@ -71,7 +71,8 @@ impl<T: Real> LowFrequencies<T> {
             let kappa = [0, 1].map(|a| centre[a] + shift_sign * shift[a]);
             let wave = [0, 1]
                 .map(|a| self.point[a].map(|p| Complex::cis(kappa[a] * (p * self.spacing_m[a]))));
-            // Without an outer scale the slowest waves are huge: what they have in common over the grid is taken off.
+            // Without an outer scale the slowest waves are huge: their value at the centre of the grid
+            // is subtracted.
             let piston =
                 amplitude * Complex::cis(kappa[0] * self.centre_m[0] + kappa[1] * self.centre_m[1]);
             for (row, y) in sum.iter_mut().zip(wave[1]) {
@@ -108,7 +109,8 @@ pub(crate) fn normal_pair(rng: &mut impl Rng) -> Complex<f64> {
     Complex::from_polar(radius, 2.0 * PI * unit(rng))
 }
 
-/// Levels after which what is left inside the last block adds less than 0.1 % to D over the width of the grid.
+/// Number of levels after which the remaining block adds less than 0.1 % to D over the width of the
+/// grid.
 fn levels(spectrum: &dyn Spectrum, delta: [f64; 2], width_m: f64) -> usize {
     const DEEPEST: usize = 20;
     let outer = spectrum.outer_wavenumber_rad_m();
@@ -122,6 +124,7 @@ fn levels(spectrum: &dyn Spectrum, delta: [f64; 2], width_m: f64) -> usize {
         .unwrap_or(DEEPEST)
 }
 
+/// Cells of the central block, cut into `levels` levels.
 fn cells(delta: [f64; 2], levels: usize) -> Vec<Cell> {
     let mut cells = Vec::new();
     for level in 0..levels {
@@ -141,6 +144,7 @@ fn cells(delta: [f64; 2], levels: usize) -> Vec<Cell> {
     cells
 }
 
+/// Chebyshev points on the grid points 0 to `size` - 1.
 fn chebyshev(size: usize) -> [f64; LOW_ORDER] {
     let half = 0.5 * (size - 1) as f64;
     std::array::from_fn(|i| half - half * (PI * (i as f64 + 0.5) / LOW_ORDER as f64).cos())
@@ -148,13 +152,12 @@ fn chebyshev(size: usize) -> [f64; LOW_ORDER] {
 
 /// Lagrange polynomials of the points, sampled at `size` grid points.
 fn sampled_basis<T: Real>(point: &[f64; LOW_ORDER], size: usize) -> Vec<Vec<T>> {
-    (0..LOW_ORDER)
-        .map(|i| {
-            (0..size)
-                .map(|x| T::of(quadrature::lagrange(point, i, x as f64)))
-                .collect()
-        })
-        .collect()
+    let mut basis = Vec::with_capacity(LOW_ORDER);
+    for i in 0..LOW_ORDER {
+        let values = (0..size).map(|x| T::of(quadrature::lagrange(point, i, x as f64)));
+        basis.push(values.collect());
+    }
+    basis
 }
 
 #[cfg(test)]

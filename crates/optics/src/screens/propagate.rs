@@ -74,25 +74,36 @@ impl<T: Real> Propagator<T> {
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
         // The inverse transform of rustfft is not normalised.
         let scale = 1.0 / (nx * ny) as f64;
-        let frequency = |n: usize, d: f64, i: usize| Grid::frequency_index(n, i) / (n as f64 * d);
-        let narrow = |c: Complex<f64>| Complex::new(T::of(c.re), T::of(c.im));
-        let lambda = self.wavelength_m;
-        let paraxial = |f: f64| Complex::cis(-PI * lambda * distance_m * f * f);
         Ok(Transfer {
-            x: (0..nx)
-                .map(|i| narrow(paraxial(frequency(nx, dx_m, i)) * scale))
-                .collect(),
-            y: (0..ny)
-                .map(|i| narrow(paraxial(frequency(ny, dy_m, i))))
-                .collect(),
+            x: self.transfer_along(nx, dx_m, distance_m, scale),
+            y: self.transfer_along(ny, dy_m, distance_m, 1.0),
         })
     }
 
-    /// One step: field `[y][x]` times exp(j scale screen), over the distance of `transfer`, times the absorbing border.
-    /// Returns the power that is left, the integral of |E|^2 over the grid.
+    /// `scale` exp(-j pi lambda dz f^2) at the `n` frequencies f of one axis.
+    fn transfer_along(
+        &self,
+        n: usize,
+        spacing_m: f64,
+        distance_m: f64,
+        scale: f64,
+    ) -> Vec<Complex<T>> {
+        let mut factors = Vec::with_capacity(n);
+        for i in 0..n {
+            let frequency_per_m = Grid::frequency_index(n, i) / (n as f64 * spacing_m);
+            let phase_rad =
+                -PI * self.wavelength_m * distance_m * frequency_per_m * frequency_per_m;
+            factors.push(kernel::narrow(Complex::cis(phase_rad) * scale));
+        }
+        factors
+    }
+
+    /// One step: field `[y][x]` times exp(j scale screen), over the distance of `transfer`, times the
+    /// absorbing border. `screen` is the phase screen and its scale. Returns the remaining power, the
+    /// integral of |E|^2 over the grid.
     ///
     /// # Errors
-    /// [`Error::Length`] when field or screen have not the size of the grid.
+    /// [`Error::Length`] if field or screen do not have the size of the grid.
     pub fn step(
         &self,
         field: &mut [Complex<T>],
@@ -100,8 +111,8 @@ impl<T: Real> Propagator<T> {
         transfer: &Transfer<T>,
         work: &mut Work<T>,
     ) -> Result<f64, Error> {
-        self.forward(field, screen, work)?;
-        let [power] = self.arrive([field], [transfer], work);
+        self.transform_with_screen(field, screen, work)?;
+        let [power] = self.transform_back([field], [transfer], work);
         Ok(power)
     }
 
@@ -119,12 +130,12 @@ impl<T: Real> Propagator<T> {
         work: &mut Work<T>,
     ) -> Result<[f64; 2], Error> {
         check_length("tap", tap.len(), self.grid.points())?;
-        self.forward(field, screen, work)?;
-        Ok(self.arrive([tap, field], transfers, work))
+        self.transform_with_screen(field, screen, work)?;
+        Ok(self.transform_back([tap, field], transfers, work))
     }
 
-    /// Screen and transform along x into the transposed buffer.
-    fn forward(
+    /// Multiplies the field with the screen and transforms it along x into the transposed buffer.
+    fn transform_with_screen(
         &self,
         field: &[Complex<T>],
         screen: Option<(&[T], T)>,
@@ -148,8 +159,9 @@ impl<T: Real> Propagator<T> {
         Ok(())
     }
 
-    /// Transfer functions, transforms back and absorbing border; the powers left.
-    fn arrive<const N: usize>(
+    /// Applies transfer functions, inverse transforms and absorbing border; returns the remaining
+    /// powers.
+    fn transform_back<const N: usize>(
         &self,
         mut fields: [&mut [Complex<T>]; N],
         transfers: [&Transfer<T>; N],
@@ -182,7 +194,7 @@ impl<T: Real> Propagator<T> {
     }
 }
 
-/// Super-Gaussian edge: 1 inside, 0.9 at 0.9 of the half width, nil at the border.
+/// Super-Gaussian window: 1 inside, 0.9 at 0.9 of the half width, 0 at the border.
 fn window<T: Real>(n: usize) -> Vec<T> {
     let half = 0.5 * n as f64;
     (0..n)
