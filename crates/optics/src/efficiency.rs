@@ -7,9 +7,39 @@ use crate::error::{check_length, finite, not_negative, positive};
 use crate::{Error, Telescope};
 use std::f64::consts::SQRT_2;
 
-/// eta_s(R) of (19): what the rest of a simulation needs to know about optics and turbulence.
+/// Efficiency at one range with its scatter and error, in the units of [`EfficiencyProfile`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct EfficiencyPoint {
+    pub(crate) mean: f64,
+    pub(crate) standard_deviation: f64,
+    pub(crate) standard_error: f64,
+}
+
+impl EfficiencyPoint {
+    /// An efficiency without scatter or error.
+    pub(crate) fn exact(mean: f64) -> Self {
+        Self {
+            mean,
+            standard_deviation: 0.0,
+            standard_error: 0.0,
+        }
+    }
+
+    /// The same, times a factor.
+    #[cfg(feature = "screens")]
+    pub(crate) fn times(self, factor: f64) -> Self {
+        Self {
+            mean: factor * self.mean,
+            standard_deviation: factor * self.standard_deviation,
+            standard_error: factor * self.standard_error,
+        }
+    }
+}
+
+/// eta_s(R) of (19): the summary of optics and turbulence that the rest of a simulation needs.
 ///
-/// All four lists have the same length; `range_m` increases strictly. The default has no ranges, which nothing accepts.
+/// All four lists have the same length; `range_m` increases strictly. The default has no ranges,
+/// which [`EfficiencyProfile::validated`] refuses.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EfficiencyProfile {
     /// Ranges \[m\].
@@ -35,21 +65,17 @@ impl EfficiencyProfile {
     ) -> Result<Self, Error> {
         let mut profile = Self::default();
         for &range_m in range_m {
-            profile.push(range_m, [efficiency(range_m)?, 0.0, 0.0]);
+            profile.push(range_m, EfficiencyPoint::exact(efficiency(range_m)?));
         }
         profile.validated()
     }
 
-    /// Adds a range with its mean, standard deviation and standard error.
-    pub(crate) fn push(
-        &mut self,
-        range_m: f64,
-        [mean, standard_deviation, standard_error]: [f64; 3],
-    ) {
+    /// Appends a range.
+    pub(crate) fn push(&mut self, range_m: f64, point: EfficiencyPoint) {
         self.range_m.push(range_m);
-        self.mean.push(mean);
-        self.standard_deviation.push(standard_deviation);
-        self.standard_error.push(standard_error);
+        self.mean.push(point.mean);
+        self.standard_deviation.push(point.standard_deviation);
+        self.standard_error.push(point.standard_error);
     }
 
     /// Range \[m\], mean and standard error, range by range.
@@ -82,7 +108,7 @@ impl EfficiencyProfile {
         for (field, list) in lists {
             check_length(field, list.len(), expected)?;
             for &value in list {
-                // A scatter that nobody knows is no mistake; a mean is always known.
+                // Scatter and error may be unknown (NaN); a mean is always known.
                 if !value.is_nan() || field == "mean" {
                     not_negative(field, value)?;
                 }
@@ -97,7 +123,8 @@ impl EfficiencyProfile {
     /// # Errors
     /// [`Error::Extrapolation`] outside the profile, [`Error::OutOfRange`] for a range that is not a number.
     pub fn interpolated(&self, range_m: f64) -> Result<f64, Error> {
-        let (x, y) = (&self.range_m, &self.mean);
+        let x = &self.range_m;
+        let y = &self.mean;
         if x.is_empty() || y.len() != x.len() {
             return Err(Error::Length {
                 field: "mean",
@@ -106,7 +133,8 @@ impl EfficiencyProfile {
             });
         }
         let at = finite("range_m", range_m)?;
-        let (first_m, last_m) = (x[0], x[x.len() - 1]);
+        let first_m = x[0];
+        let last_m = x[x.len() - 1];
         if !(first_m..=last_m).contains(&at) {
             return Err(Error::Extrapolation {
                 range_m: at,
@@ -120,8 +148,10 @@ impl EfficiencyProfile {
         let i = x.partition_point(|&v| v <= at).clamp(1, x.len() - 1) - 1;
         let h = x[i + 1] - x[i];
         let t = (at - x[i]) / h;
-        let (m0, m1) = (monotone_slope(x, y, i), monotone_slope(x, y, i + 1));
-        let (t2, t3) = (t * t, t * t * t);
+        let m0 = monotone_slope(x, y, i);
+        let m1 = monotone_slope(x, y, i + 1);
+        let t2 = t * t;
+        let t3 = t * t * t;
         Ok((2.0 * t3 - 3.0 * t2 + 1.0) * y[i]
             + (t3 - 2.0 * t2 + t) * h * m0
             + (3.0 * t2 - 2.0 * t3) * y[i + 1]
@@ -129,68 +159,92 @@ impl EfficiencyProfile {
     }
 }
 
-/// Ranges from `first_m` to `last_m` \[m\] that follow the curvature of an efficiency: an eighth of the path apart at most, and closer where
-/// the beam's width changes, about a focus above all; `density` times as many. At a density of 12 monotone cubics between them are
-/// within 1e-3 of the function.
+/// Ranges from `first_m` to `last_m` \[m\] that follow the curvature of an efficiency: at most an
+/// eighth of the path apart, and closer where the beam's width changes, mainly about a focus;
+/// `density` times as many. At a density of 12, monotone cubics between them are within 1e-3 of the
+/// function.
 pub fn curved_ranges_m(telescope: &Telescope, first_m: f64, last_m: f64, density: f64) -> Vec<f64> {
-    let width_m = telescope
-        .intensity_radius_m()
-        .min(telescope.aperture_radius_m / SQRT_2);
-    let rayleigh_m = telescope.wavenumber_rad_m() * width_m * width_m;
-    // The efficiency is a bell of (1/R - 1/F) rayleigh_m, about 1 wide, that falls with its square: even steps in its area sine.
-    let place = |range_m: f64| {
-        let bend = rayleigh_m * (1.0 / range_m - telescope.focus.curvature_per_m());
-        8.0 * range_m / last_m - 3.0 * bend.asinh()
-    };
-    let (start, end) = (place(first_m), place(last_m));
+    let start = range_coordinate(telescope, first_m, last_m);
+    let end = range_coordinate(telescope, last_m, last_m);
     let steps = (density * (end - start)).ceil().max(1.0);
-    let at = |step: f64| {
-        let (mut low_m, mut high_m) = (first_m, last_m);
+    let mut ranges_m = vec![first_m];
+    for step in 1..steps as u32 {
+        let target = start + (end - start) * f64::from(step) / steps;
+        let mut low_m = first_m;
+        let mut high_m = last_m;
         for _ in 0..60 {
             let middle_m = 0.5 * (low_m + high_m);
-            let is_before = place(middle_m) < start + (end - start) * step / steps;
-            if is_before {
-                low_m = middle_m
+            if range_coordinate(telescope, middle_m, last_m) < target {
+                low_m = middle_m;
             } else {
-                high_m = middle_m
+                high_m = middle_m;
             }
         }
-        high_m
-    };
-    let mut ranges_m: Vec<f64> = (1..steps as u32).map(|step| at(f64::from(step))).collect();
-    ranges_m.insert(0, first_m);
+        ranges_m.push(high_m);
+    }
     ranges_m.push(last_m);
     ranges_m.dedup();
     ranges_m
 }
 
-/// Slope at point `i` which keeps monotone data monotone (weighted harmonic mean of the two secants).
+/// A coordinate along the path, increasing, in which the ranges of [`curved_ranges_m`] are evenly
+/// spaced.
+///
+/// The efficiency is a bell of (1/R - 1/F) times the Rayleigh length, about 1 wide, that falls with
+/// its square: even steps in its area sine.
+fn range_coordinate(telescope: &Telescope, range_m: f64, last_m: f64) -> f64 {
+    let width_m = telescope
+        .intensity_radius_m()
+        .min(telescope.aperture_radius_m / SQRT_2);
+    let rayleigh_m = telescope.wavenumber_rad_m() * width_m * width_m;
+    let defocus = rayleigh_m * (1.0 / range_m - telescope.focus.curvature_per_m());
+    8.0 * range_m / last_m - 3.0 * defocus.asinh()
+}
+
+/// Slope at point `i` that preserves monotone data (weighted harmonic mean of the two secants).
 fn monotone_slope(x: &[f64], y: &[f64], i: usize) -> f64 {
-    let width = |j: usize| x[j + 1] - x[j];
-    let secant = |j: usize| (y[j + 1] - y[j]) / width(j);
     let last = x.len() - 1;
     if last == 1 {
-        return secant(0);
+        return secant_slope(x, y, 0);
     }
-    if i == 0 || i == last {
-        let [next, beyond] = if i == 0 { [0, 1] } else { [last - 1, last - 2] };
-        let (near, far, h0, h1) = (secant(next), secant(beyond), width(next), width(beyond));
-        let slope = ((2.0 * h0 + h1) * near - h0 * far) / (h0 + h1);
-        return if slope * near <= 0.0 {
-            0.0
-        } else if near * far < 0.0 && slope.abs() > 3.0 * near.abs() {
-            3.0 * near
-        } else {
-            slope
-        };
+    if i == 0 {
+        return end_slope(x, y, 0, 1);
     }
-    let (left, right) = (secant(i - 1), secant(i));
+    if i == last {
+        return end_slope(x, y, last - 1, last - 2);
+    }
+    let left = secant_slope(x, y, i - 1);
+    let right = secant_slope(x, y, i);
     if left * right <= 0.0 {
         return 0.0;
     }
-    let (h0, h1) = (width(i - 1), width(i));
-    let (w0, w1) = (2.0 * h1 + h0, h1 + 2.0 * h0);
+    let h0 = x[i] - x[i - 1];
+    let h1 = x[i + 1] - x[i];
+    let w0 = 2.0 * h1 + h0;
+    let w1 = h1 + 2.0 * h0;
     (w0 + w1) / (w0 / left + w1 / right)
+}
+
+/// Slope at an end of the data from the secants of interval `next` at the end and of its neighbour
+/// `beyond`, limited so that monotone data stay monotone.
+fn end_slope(x: &[f64], y: &[f64], next: usize, beyond: usize) -> f64 {
+    let near = secant_slope(x, y, next);
+    let far = secant_slope(x, y, beyond);
+    let h0 = x[next + 1] - x[next];
+    let h1 = x[beyond + 1] - x[beyond];
+    let slope = ((2.0 * h0 + h1) * near - h0 * far) / (h0 + h1);
+    if slope * near <= 0.0 {
+        0.0
+    } else if near * far < 0.0 && slope.abs() > 3.0 * near.abs() {
+        3.0 * near
+    } else {
+        slope
+    }
+}
+
+/// Slope of the straight line across interval `j`.
+fn secant_slope(x: &[f64], y: &[f64], j: usize) -> f64 {
+    (y[j + 1] - y[j]) / (x[j + 1] - x[j])
 }
 
 /// Every entry positive and finite, each above the one before.

@@ -62,21 +62,16 @@ pub fn phase_screen(
             normal_pair(rng) * (density * cell[0] * cell[1]).sqrt(),
         ));
     }
-    let psi = |(x_m, y_m): (f64, f64)| {
-        waves
+    let mut phase_rad = Vec::with_capacity(grid.points());
+    for i in 0..grid.points() {
+        let x_m = (i % grid.nx) as f64 * grid.dx_m;
+        let y_m = (i / grid.nx) as f64 * grid.dy_m;
+        let terms = waves
             .iter()
-            .map(|(kappa, c)| (c * Complex::cis(kappa[0] * x_m + kappa[1] * y_m)).re)
-            .sum()
-    };
-    (0..grid.points())
-        .map(|i| {
-            (
-                (i % grid.nx) as f64 * grid.dx_m,
-                (i / grid.nx) as f64 * grid.dy_m,
-            )
-        })
-        .map(psi)
-        .collect()
+            .map(|(kappa, c)| (c * Complex::cis(kappa[0] * x_m + kappa[1] * y_m)).re);
+        phase_rad.push(terms.sum());
+    }
+    phase_rad
 }
 
 /// Irradiance \[1/m^2\] of the telescope's beam at the end of the layers, `[y][x]`, for unit power before truncation: (16),
@@ -89,24 +84,22 @@ pub fn irradiance_per_m2(
     grid: &Grid,
     layers: &[Layer],
 ) -> Result<Vec<f64>, Error> {
-    let (telescope, grid) = (telescope.validated()?, grid.validated()?);
+    let telescope = telescope.validated()?;
+    let grid = grid.validated()?;
     let mut field = aperture_field(&telescope, &Misalignment::NONE, &grid);
-    let (mut here_m, mut start_m) = (0.0, 0.0);
-    for Layer {
-        thickness_m,
-        phase_rad,
-    } in layers
-    {
-        check_length("phase_rad", phase_rad.len(), field.len())?;
-        let middle_m = start_m + 0.5 * thickness_m;
-        field = step(&grid, &field, telescope.wavelength_m, middle_m - here_m);
-        field
-            .iter_mut()
-            .zip(phase_rad)
-            .for_each(|(e, psi)| *e *= Complex::cis(*psi));
-        (here_m, start_m) = (middle_m, start_m + thickness_m);
+    let mut current_m = 0.0;
+    let mut start_m = 0.0;
+    for layer in layers {
+        check_length("phase_rad", layer.phase_rad.len(), field.len())?;
+        let middle_m = start_m + 0.5 * layer.thickness_m;
+        field = step(&grid, &field, telescope.wavelength_m, middle_m - current_m);
+        for (e, psi) in field.iter_mut().zip(&layer.phase_rad) {
+            *e *= Complex::cis(*psi);
+        }
+        current_m = middle_m;
+        start_m += layer.thickness_m;
     }
-    let field = step(&grid, &field, telescope.wavelength_m, start_m - here_m);
+    let field = step(&grid, &field, telescope.wavelength_m, start_m - current_m);
     Ok(field.iter().map(|e| e.norm_sqr()).collect())
 }
 
@@ -136,15 +129,16 @@ fn step(grid: &Grid, field: &Field, wavelength_m: f64, distance_m: f64) -> Field
             + (ny / (grid.ny as f64 * grid.dy_m)).powi(2);
         *value *= Complex::cis(-PI * wavelength_m * distance_m * f2) / grid.points() as f64;
     }
-    let border = |i: usize, n: usize| {
-        (-((2.0 * i as f64 + 1.0 - n as f64).abs() / (0.95 * n as f64)).powi(40)).exp()
-    };
     let mut field = transform(grid, &spectrum, 1.0);
+    for (i, e) in field.iter_mut().enumerate() {
+        *e *= border(i % grid.nx, grid.nx) * border(i / grid.nx, grid.ny);
+    }
     field
-        .iter_mut()
-        .enumerate()
-        .for_each(|(i, e)| *e *= border(i % grid.nx, grid.nx) * border(i / grid.nx, grid.ny));
-    field
+}
+
+/// Factor of the absorbing border at point `i` of `n`.
+fn border(i: usize, n: usize) -> f64 {
+    (-((2.0 * i as f64 + 1.0 - n as f64).abs() / (0.95 * n as f64)).powi(40)).exp()
 }
 
 /// Whole numbers of waves across the grid along x and y of each frequency, in the order of a transform.
@@ -161,19 +155,22 @@ fn frequencies(grid: &Grid) -> impl Iterator<Item = (f64, f64)> {
 /// Fourier sums along x, then along y, with the factors exp(`sign` 2 pi j m i/n).
 fn transform(grid: &Grid, field: &Field, sign: f64) -> Field {
     let Grid { nx, ny, .. } = *grid;
-    let wave = |m: usize, i: usize, n: usize| {
-        Complex::cis(sign * 2.0 * PI * (m * i % n) as f64 / n as f64)
-    };
-    let along_x = |k: usize| {
-        (0..nx)
-            .map(|x| field[k / nx * nx + x] * wave(k % nx, x, nx))
-            .sum()
-    };
-    let rows: Field = (0..nx * ny).map(along_x).collect();
-    let along_y = |k: usize| {
-        (0..ny)
-            .map(|y| rows[y * nx + k % nx] * wave(k / nx, y, ny))
-            .sum()
-    };
-    (0..nx * ny).map(along_y).collect()
+    let mut along_x: Field = vec![Complex::default(); nx * ny];
+    for (k, sum) in along_x.iter_mut().enumerate() {
+        for x in 0..nx {
+            *sum += field[k / nx * nx + x] * wave(sign, k % nx, x, nx);
+        }
+    }
+    let mut along_both: Field = vec![Complex::default(); nx * ny];
+    for (k, sum) in along_both.iter_mut().enumerate() {
+        for y in 0..ny {
+            *sum += along_x[y * nx + k % nx] * wave(sign, k / nx, y, ny);
+        }
+    }
+    along_both
+}
+
+/// Wave of frequency `m` at point `i` of `n`, exp(`sign` 2 pi j m i/n).
+fn wave(sign: f64, m: usize, i: usize, n: usize) -> Complex<f64> {
+    Complex::cis(sign * 2.0 * PI * (m * i % n) as f64 / n as f64)
 }

@@ -37,10 +37,11 @@ impl GaussLegendre {
 
     /// Integral of `f` from `a` to `b` with this rule once.
     pub(crate) fn integrate(&self, a: f64, b: f64, mut f: impl FnMut(f64) -> f64) -> f64 {
-        let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
+        let middle = 0.5 * (a + b);
+        let half = 0.5 * (b - a);
         let mut sum = 0.0;
         for (x, w) in &self.rule {
-            sum += w * f(mid + half * x);
+            sum += w * f(middle + half * x);
         }
         sum * half
     }
@@ -74,24 +75,39 @@ impl GaussLegendre {
 
     /// Nodes and weights mapped to \[a, b\].
     pub(crate) fn mapped(&self, a: f64, b: f64) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let (mid, half) = (0.5 * (a + b), 0.5 * (b - a));
+        let middle = 0.5 * (a + b);
+        let half = 0.5 * (b - a);
         self.rule
             .iter()
-            .map(move |(x, w)| (mid + half * x, half * w))
+            .map(move |(x, w)| (middle + half * x, half * w))
     }
 }
 
 /// Legendre polynomial of degree n, 1 or more, and its derivative.
 fn legendre(n: usize, x: f64) -> (f64, f64) {
-    let (mut p0, mut p1) = (1.0, x);
+    let mut p0 = 1.0;
+    let mut p1 = x;
     for k in 2..=n {
         let k = k as f64;
-        (p0, p1) = (p1, ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k);
+        let p2 = ((2.0 * k - 1.0) * x * p1 - (k - 1.0) * p0) / k;
+        p0 = p1;
+        p1 = p2;
     }
     (p1, n as f64 * (x * p1 - p0) / (x * x - 1.0))
 }
 
-/// Integral of `f` over consecutive intervals between `breaks`, each halved until two halves agree with the whole.
+/// An interval of the adaptive integral.
+struct Panel {
+    start: f64,
+    end: f64,
+    /// Integral by one use of the rule.
+    integral: f64,
+    /// Number of halvings that led to it.
+    depth: u32,
+}
+
+/// Integral of `f` over consecutive intervals between `breaks`, each halved until the sum of two
+/// halves equals the whole within the tolerance.
 ///
 /// The tolerance is relative to the integral of |f| found on the first pass.
 pub(crate) fn adaptive(
@@ -102,39 +118,59 @@ pub(crate) fn adaptive(
     f: &mut dyn FnMut(f64) -> f64,
 ) -> Result<f64, Error> {
     const DEEPEST: u32 = 12;
-    let mut pending: Vec<(f64, f64, f64, u32)> = Vec::new();
+    let mut pending: Vec<Panel> = Vec::new();
     let mut scale = 0.0;
     for pair in breaks.windows(2) {
-        let (a, b) = (pair[0], pair[1]);
-        if b > a {
-            let whole = rule.integrate(a, b, &mut *f);
-            scale += whole.abs();
-            pending.push((a, b, whole, 0));
+        let [start, end] = [pair[0], pair[1]];
+        if end > start {
+            let integral = rule.integrate(start, end, &mut *f);
+            scale += integral.abs();
+            pending.push(Panel {
+                start,
+                end,
+                integral,
+                depth: 0,
+            });
         }
     }
-    let (mut sum, mut missed) = (0.0, 0.0);
-    // A NaN would be halved for ever.
-    while let (true, Some((a, b, whole, depth))) = (scale.is_finite(), pending.pop()) {
-        let mid = 0.5 * (a + b);
-        let left = rule.integrate(a, mid, &mut *f);
-        let right = rule.integrate(mid, b, &mut *f);
+    let mut sum = 0.0;
+    let mut missed = 0.0;
+    while let Some(panel) = pending.pop() {
+        // Halving a panel with a NaN would not end.
+        if !scale.is_finite() {
+            break;
+        }
+        let middle = 0.5 * (panel.start + panel.end);
+        let left = rule.integrate(panel.start, middle, &mut *f);
+        let right = rule.integrate(middle, panel.end, &mut *f);
         let halves = left + right;
-        // A first panel may have stepped over a narrow peak: the scale follows what is found.
+        // The first panel may have missed a narrow peak: the scale grows with what is found.
         scale = if halves.abs() > scale || halves.is_nan() {
             halves.abs()
         } else {
             scale
         };
-        let gap = (halves - whole).abs();
-        if gap <= tolerance * scale || depth >= DEEPEST {
+        let gap = (halves - panel.integral).abs();
+        if gap <= tolerance * scale || panel.depth >= DEEPEST {
             if gap > tolerance * scale {
                 missed += gap;
             }
             sum += halves;
-        } else {
-            pending.push((mid, b, right, depth + 1));
-            pending.push((a, mid, left, depth + 1));
+            continue;
         }
+        let depth = panel.depth + 1;
+        pending.push(Panel {
+            start: middle,
+            end: panel.end,
+            integral: right,
+            depth,
+        });
+        pending.push(Panel {
+            start: panel.start,
+            end: middle,
+            integral: left,
+            depth,
+        });
     }
     // `<=` is false for NaN, so that a NaN integrand is an error and no result.
     if missed <= 100.0 * tolerance * scale && scale.is_finite() {
@@ -150,11 +186,13 @@ pub(crate) fn adaptive(
 
 /// Value at `x` of the polynomial that is 1 at `node[j]` and 0 at the other nodes.
 pub(crate) fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
-    node.iter()
-        .enumerate()
-        .filter(|(i, _)| *i != j)
-        .map(|(_, z)| (x - z) / (node[j] - z))
-        .product()
+    let mut product = 1.0;
+    for (i, z) in node.iter().enumerate() {
+        if i != j {
+            product *= (x - z) / (node[j] - z);
+        }
+    }
+    product
 }
 
 /// Cubic interpolation at `t` between the four neighbours in a table of values at 0, 1, 2, ...
@@ -162,7 +200,9 @@ pub(crate) fn lagrange(node: &[f64], j: usize, x: f64) -> f64 {
 pub(crate) fn cubic(t: f64, table: &[f64]) -> f64 {
     let at = (t as usize).clamp(1, table.len() - 3);
     let u = t - at as f64;
-    let (a, b, c) = (u + 1.0, u - 1.0, u - 2.0);
+    let a = u + 1.0;
+    let b = u - 1.0;
+    let c = u - 2.0;
     let weight = [
         -u * b * c / 6.0,
         a * b * c / 2.0,

@@ -79,17 +79,16 @@ impl Telescope {
         positive("wavelength_m", self.wavelength_m)?;
         positive("aperture_radius_m", self.aperture_radius_m)?;
         not_negative("obscuration_radius_m", self.obscuration_radius_m)?;
-        let (hidden, lit) = (self.obscuration_radius_m, self.beam_radius_m);
         within(
             "obscuration_radius_m",
-            hidden,
-            hidden < self.aperture_radius_m,
+            self.obscuration_radius_m,
+            self.obscuration_radius_m < self.aperture_radius_m,
             "below aperture_radius_m",
         )?;
         within(
             "beam_radius_m",
-            lit,
-            lit > 0.0,
+            self.beam_radius_m,
+            self.beam_radius_m > 0.0,
             "a number above 0, infinity for a uniformly lit aperture",
         )?;
         if let Focus::At(focus_m) = self.focus {
@@ -129,10 +128,8 @@ impl Telescope {
         if s.is_infinite() {
             return 1.0;
         }
-        let (inner, outer) = (
-            (self.obscuration_radius_m / s).powi(2),
-            (self.aperture_radius_m / s).powi(2),
-        );
+        let inner = (self.obscuration_radius_m / s).powi(2);
+        let outer = (self.aperture_radius_m / s).powi(2);
         // exp(-i) - exp(-o) without cancellation for wide beams.
         (-inner).exp() * -(inner - outer).exp_m1()
     }

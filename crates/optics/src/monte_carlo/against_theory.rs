@@ -12,9 +12,10 @@ use crate::theory::{ScreenStrength, bistatic_efficiency_screens};
 
 /// Standard errors by which mean and theory may differ.
 const SIGMAS: f64 = 5.0;
-/// Share of the mean that good screens may miss: single precision, and phases that are not quite normal.
+/// Fraction of the mean that good screens may miss: single precision, and phases that are not quite
+/// normal.
 const OF_SCREENS: f64 = 2e-3;
-/// Share of what (P12) corrects that turbulence may change.
+/// Fraction of the correction (P12) that turbulence may change.
 const OF_CORRECTION: f64 = 0.1;
 
 /// Refuses a bistatic mean that the layers of the run cannot have.
@@ -30,35 +31,29 @@ pub(super) fn check<T: Real>(
         return Ok(());
     };
     let table = StructureTable::new(&*run.turbulence.spectrum);
-    // Of a spectrum that is cut at Nyquist less than this is missing at any separation.
+    // A spectrum that is cut at Nyquist misses less than this fraction at any separation.
     let missing = if screens.folds() {
         0.0
     } else {
         screens.missing_at_one_spacing()?.max(0.0)
     };
     for (i, &range_m) in run.range_m.iter().enumerate() {
-        let layers = run.layers.screens_to(range_m, &run.turbulence.cn2)?;
-        let with = |share: f64| {
-            let weaker = |s: &ScreenStrength| ScreenStrength {
-                cn2_thickness_m13: share * s.cn2_thickness_m13,
-                ..*s
-            };
-            let layers: Vec<ScreenStrength> = layers.iter().map(weaker).collect();
-            bistatic_efficiency_screens(&run.telescope, &run.misalignment, &layers, &table, range_m)
-        };
-        let exact = with(1.0)?;
-        let most = if missing > 0.0 {
-            with(1.0 - missing)?
-        } else {
-            exact
-        };
-        let (mean, standard_error) = (bistatic.mean[i], bistatic.standard_error[i]);
+        let mut layers = run.layers.screens_to(range_m, &run.turbulence.cn2)?;
+        let exact = exact_bistatic(run, &layers, &table, range_m)?;
+        let mut largest = exact;
+        if missing > 0.0 {
+            for layer in &mut layers {
+                layer.cn2_thickness_m13 *= 1.0 - missing;
+            }
+            largest = exact_bistatic(run, &layers, &table, range_m)?;
+        }
+        let mean = bistatic.mean[i];
+        let standard_error = bistatic.standard_error[i];
         let correction = found.exact_free_space[i] / found.grid_free_space[i];
         let of_grid = OF_SCREENS + OF_CORRECTION * (correction - 1.0).abs();
-        let allowed = errors_of(found.independent_samples) * standard_error + of_grid * exact;
-        if mean < exact - allowed - 2.0 * found.lost_power_fraction[i] * exact
-            || mean > most + allowed
-        {
+        let allowed = allowed_errors(found.independent_samples) * standard_error + of_grid * exact;
+        let smallest = exact - allowed - 2.0 * found.lost_power_fraction[i] * exact;
+        if mean < smallest || mean > largest + allowed {
             return Err(Error::AgainstTheory {
                 range_m,
                 mean,
@@ -70,9 +65,19 @@ pub(super) fn check<T: Real>(
     Ok(())
 }
 
-/// As many standard errors of a mean from so many samples as are passed as seldom as [`SIGMAS`] of a known one: Student's
-/// distribution, after Wallace (1959).
-fn errors_of(samples: usize) -> f64 {
+/// Exact bistatic efficiency of a run for these screens.
+fn exact_bistatic(
+    run: &MonteCarlo,
+    screens: &[ScreenStrength],
+    table: &StructureTable,
+    range_m: f64,
+) -> Result<f64, Error> {
+    bistatic_efficiency_screens(&run.telescope, &run.misalignment, screens, table, range_m)
+}
+
+/// Number of standard errors, estimated from `samples` samples, that a mean exceeds as rarely as
+/// [`SIGMAS`] known standard errors: Student's distribution, after Wallace (1959).
+fn allowed_errors(samples: usize) -> f64 {
     let freedom = samples.saturating_sub(1).max(1) as f64;
     let normal = SIGMAS * (8.0 * freedom + 3.0) / (8.0 * freedom + 1.0);
     (freedom * (normal * normal / freedom).exp_m1()).sqrt()
@@ -82,6 +87,7 @@ fn errors_of(samples: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::EfficiencyProfile;
+    use crate::efficiency::EfficiencyPoint;
 
     #[test]
     fn means_beyond_five_errors_of_theory_are_refused_and_others_are_not() {
@@ -104,7 +110,11 @@ mod tests {
         };
         let tried = |spacing_m: f64, off: f64, error: f64, samples: usize, lost: f64| {
             let mut bistatic = EfficiencyProfile::default();
-            bistatic.push(600.0, [(1.0 + off) * exact, 0.0, error * exact]);
+            let point = EfficiencyPoint {
+                standard_error: error * exact,
+                ..EfficiencyPoint::exact((1.0 + off) * exact)
+            };
+            bistatic.push(600.0, point);
             let found = EfficiencyEstimate {
                 monostatic: EfficiencyProfile::default(),
                 bistatic: Some(bistatic),
@@ -144,9 +154,9 @@ mod tests {
         // The quantiles of five normal deviations, 1 - 2.87e-7, by a quadrature of the density.
         for (samples, quantile) in [(11, 11.166), (31, 6.319), (101, 5.344), (100_001, 5.0)] {
             assert!(
-                (errors_of(samples) / quantile - 1.0).abs() < 0.02,
+                (allowed_errors(samples) / quantile - 1.0).abs() < 0.02,
                 "{samples}: {}",
-                errors_of(samples)
+                allowed_errors(samples)
             );
         }
     }

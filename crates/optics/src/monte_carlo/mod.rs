@@ -20,18 +20,18 @@ pub use path::Layers;
 pub use walk::Sampling;
 
 use crate::beam::source::{aperture_field, check_grid};
-use crate::efficiency::EfficiencyProfile;
+use crate::efficiency::{EfficiencyPoint, EfficiencyProfile};
 use crate::error::{positive, within};
 use crate::monte_carlo::path::Path;
 use crate::monte_carlo::statistics::{Folding, bistatic, mean_and_variance};
-use crate::monte_carlo::walk::{AtRange, Prepared, Walker};
+use crate::monte_carlo::walk::{Prepared, RangeResult, Walker};
 use crate::screens::generator::ScreenGenerator;
 use crate::screens::grid::Grid;
 use crate::screens::kernel::Real;
 use crate::screens::propagate::Propagator;
 use crate::{Error, Misalignment, Telescope, Turbulence, theory};
-use rustfft::num_complex::Complex;
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
 /// Realisations of one unit of work; their sums are added in order.
@@ -56,9 +56,22 @@ impl Stop {
             relative_standard_error: None,
         }
     }
+
+    fn validate(&self) -> Result<(), Error> {
+        within(
+            "realisations",
+            self.realisations as f64,
+            self.realisations > 0,
+            "at least 1",
+        )?;
+        if let Some(target) = self.relative_standard_error {
+            positive("relative_standard_error", target)?;
+        }
+        Ok(())
+    }
 }
 
-/// What the progress function is told.
+/// Argument of the progress function.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress {
     /// Realisations done.
@@ -156,7 +169,7 @@ impl MonteCarlo {
         stop: Stop,
         mut progress: impl FnMut(Progress) -> ControlFlow<()> + Send,
     ) -> Result<EfficiencyEstimate, Error> {
-        let set_up = self.in_order();
+        let set_up = self.sorted();
         let prepared = set_up.prepare::<T>()?;
         set_up.run_prepared(&prepared, stop, &mut progress)
     }
@@ -168,15 +181,17 @@ impl MonteCarlo {
     pub fn grid_free_space<T: Real>(&self) -> Result<Vec<f64>, Error> {
         let calm = Self {
             turbulence: Turbulence::none(),
-            ..self.in_order()
+            ..self.sorted()
         };
         let prepared = calm.prepare::<T>()?;
-        let ranges = Walker::new(&prepared, calm.seed, calm.sampling).group(0, 1, &|_| Ok(()))?;
+        let walker = Walker::new(&prepared, calm.seed, calm.sampling);
+        let ranges = walker.run_group(0, 1, &|_| Ok(()))?;
         Ok(ranges.iter().map(|at| at.samples[0].same_path).collect())
     }
 
-    /// The same run with its ranges in increasing order, at which layers end; one that is not a number is refused later, by name.
-    fn in_order(&self) -> Self {
+    /// The same run with its ranges in increasing order, each at the end of a layer; `prepare` refuses
+    /// ranges that are not numbers.
+    fn sorted(&self) -> Self {
         let mut range_m = self.range_m.clone();
         range_m.sort_by(f64::total_cmp);
         range_m.dedup();
@@ -187,6 +202,7 @@ impl MonteCarlo {
         }
     }
 
+    /// Plans everything that all realisations share.
     pub(crate) fn prepare<T: Real>(&self) -> Result<Prepared<T>, Error> {
         let telescope = self.telescope.validated()?;
         let misalignment = self.misalignment.validated()?;
@@ -201,26 +217,30 @@ impl MonteCarlo {
         let lambda = telescope.wavelength_m;
         let path = Path::new(&self.layers, &self.range_m, &cn2, &self.grid, lambda)?;
         let propagator = Propagator::new(self.grid, lambda)?;
-        let generator = || ScreenGenerator::new(self.grid, self.turbulence.spectrum.clone());
-        let displaced = misalignment != Misalignment::NONE;
-        let beams = if displaced {
-            vec![Misalignment::NONE, misalignment]
+        let is_displaced = misalignment != Misalignment::NONE;
+        let mut start = vec![aperture_field::<T>(
+            &telescope,
+            &Misalignment::NONE,
+            &self.grid,
+        )];
+        if is_displaced {
+            start.push(aperture_field(&telescope, &misalignment, &self.grid));
+        }
+        let mut transfers = Vec::with_capacity(path.distance_m.len());
+        for &distance_m in &path.distance_m {
+            transfers.push(propagator.transfer(distance_m)?);
+        }
+        let screens = if path.strength.is_empty() {
+            None
         } else {
-            vec![Misalignment::NONE]
+            let spectrum = self.turbulence.spectrum.clone();
+            Some(ScreenGenerator::new(self.grid, spectrum)?)
         };
-        let start: Vec<Vec<Complex<T>>> = beams
-            .iter()
-            .map(|m| aperture_field(&telescope, m, &self.grid))
-            .collect();
         let pixel = self.grid.dx_m * self.grid.dy_m;
         Ok(Prepared {
-            transfers: path
-                .distance_m
-                .iter()
-                .map(|&d| propagator.transfer(d))
-                .collect::<Result<_, _>>()?,
-            screens: (!path.strength.is_empty()).then(generator).transpose()?,
-            folding: Folding::new(&self.grid, !displaced),
+            transfers,
+            screens,
+            folding: Folding::new(&self.grid, !is_displaced),
             scale: self
                 .range_m
                 .iter()
@@ -233,62 +253,45 @@ impl MonteCarlo {
         })
     }
 
+    /// Runs waves of groups of realisations until `stop`.
     pub(crate) fn run_prepared<T: Real>(
         &self,
         prepared: &Prepared<T>,
         stop: Stop,
-        progress: &mut (dyn FnMut(Progress) -> ControlFlow<()> + Send),
+        progress: &mut ProgressFunction<'_>,
     ) -> Result<EfficiencyEstimate, Error> {
-        within(
-            "realisations",
-            stop.realisations as f64,
-            stop.realisations > 0,
-            "at least 1",
-        )?;
-        stop.relative_standard_error.map_or(Ok(0.0), |target| {
-            positive("relative_standard_error", target)
-        })?;
-        // Without turbulence every realisation is the same.
+        stop.validate()?;
+        // Without turbulence all realisations are the same.
         let total = if prepared.screens.is_some() {
             stop.realisations
         } else {
             1
         };
-        let mut ranges: Vec<AtRange<T>> = Vec::new();
-        let (mut done, mut relative_standard_error) = (0, f64::INFINITY);
-        let carried = Mutex::new((0, progress));
+        let reporter = Reporter {
+            total,
+            done: AtomicUsize::new(0),
+            progress: Mutex::new(progress),
+        };
+        let mut ranges: Vec<RangeResult<T>> = Vec::new();
+        let mut done = 0;
+        let mut relative_standard_error = f64::INFINITY;
         while done < total {
             let firsts: Vec<usize> = (done..total).step_by(GROUP).take(GROUPS_PER_WAVE).collect();
-            let watch = |more| {
-                let (done, progress) = &mut *carried.lock().unwrap_or_else(PoisonError::into_inner);
-                *done += more;
-                match progress(Progress {
-                    done: *done,
-                    total,
-                    relative_standard_error,
-                }) {
-                    ControlFlow::Continue(()) => Ok(()),
-                    ControlFlow::Break(()) => Err(Error::Cancelled {
-                        realisations: *done,
-                    }),
-                }
-            };
-            let group = |&first: &usize| {
-                Walker::new(prepared, self.seed, self.sampling).group(
-                    first,
-                    GROUP.min(total - first),
-                    &watch,
-                )
-            };
-            for group in in_parallel(&firsts, group) {
+            let groups = in_parallel(&firsts, |&first| {
+                let count = GROUP.min(total - first);
+                let walker = Walker::new(prepared, self.seed, self.sampling);
+                walker.run_group(first, count, &|more| {
+                    reporter.report(more, relative_standard_error)
+                })
+            });
+            for group in groups {
                 let group = group?;
                 if ranges.is_empty() {
                     ranges = group;
-                } else {
-                    ranges
-                        .iter_mut()
-                        .zip(group)
-                        .for_each(|(all, more)| all.add(more));
+                    continue;
+                }
+                for (sum, result) in ranges.iter_mut().zip(group) {
+                    sum.add(result);
                 }
             }
             done = (done + GROUPS_PER_WAVE * GROUP).min(total);
@@ -307,16 +310,15 @@ impl MonteCarlo {
     fn estimate<T: Real>(
         &self,
         prepared: &Prepared<T>,
-        ranges: &[AtRange<T>],
+        ranges: &[RangeResult<T>],
         realisations: usize,
     ) -> Result<EfficiencyEstimate, Error> {
         let is_calm = prepared.screens.is_none();
-        let grid_free_space = match is_calm {
-            true => ranges.iter().map(|at| at.samples[0].same_path).collect(),
-            false => self.grid_free_space::<T>()?,
+        let grid_free_space = if is_calm {
+            ranges.iter().map(|at| at.samples[0].same_path).collect()
+        } else {
+            self.grid_free_space::<T>()?
         };
-        let exact =
-            |&r| theory::free_space_efficiency_misaligned(&self.telescope, &self.misalignment, r);
         let mut out = EfficiencyEstimate {
             monostatic: EfficiencyProfile::default(),
             bistatic: None,
@@ -325,7 +327,7 @@ impl MonteCarlo {
             realisations,
             independent_samples: ranges.first().map_or(0, |at| at.samples.len()),
             grid_free_space,
-            exact_free_space: self.range_m.iter().map(exact).collect::<Result<_, _>>()?,
+            exact_free_space: self.exact_free_space()?,
             lost_power_fraction: Vec::new(),
         };
         let mut pairs = EfficiencyProfile::default();
@@ -342,22 +344,16 @@ impl MonteCarlo {
             out.bistatic_realisations
                 .push(at.products.iter().map(|eta| factor * eta).collect());
             if is_calm {
-                out.monostatic
-                    .push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
-                pairs.push(range_m, [factor * out.grid_free_space[i], 0.0, 0.0]);
+                let point = EfficiencyPoint::exact(factor * out.grid_free_space[i]);
+                out.monostatic.push(range_m, point);
+                pairs.push(range_m, point);
                 continue;
             }
             out.monostatic
-                .push(range_m, monostatic(at).map(|v| factor * v));
+                .push(range_m, monostatic_point(at).times(factor));
             if at.samples.len() > 1 {
-                let total = prepared
-                    .folding
-                    .overlap(&at.planes[0], &at.planes[at.planes.len() - 1])
-                    * prepared.scale[i];
-                let (mean, error) =
-                    bistatic(&at.samples, total, &prepared.folding, prepared.scale[i]);
-                let spread = mean_and_variance(at.products.iter().copied()).1.sqrt();
-                pairs.push(range_m, [mean, spread, error].map(|v| factor * v));
+                let point = bistatic_point(at, &prepared.folding, prepared.scale[i]);
+                pairs.push(range_m, point.times(factor));
             }
         }
         out.bistatic = (!pairs.range_m.is_empty()).then_some(pairs);
@@ -366,22 +362,79 @@ impl MonteCarlo {
         }
         Ok(out)
     }
+
+    /// Exact free-space efficiency at each range.
+    fn exact_free_space(&self) -> Result<Vec<f64>, Error> {
+        let mut efficiencies = Vec::with_capacity(self.range_m.len());
+        for &range_m in &self.range_m {
+            efficiencies.push(theory::free_space_efficiency_misaligned(
+                &self.telescope,
+                &self.misalignment,
+                range_m,
+            )?);
+        }
+        Ok(efficiencies)
+    }
 }
 
-/// Mean, standard deviation of one realisation and standard error of the mean, both beams through the same path.
-fn monostatic<T>(at: &AtRange<T>) -> [f64; 3] {
-    let (mean, variance) = mean_and_variance(at.samples.iter().map(|s| s.same_path));
-    let spread = mean_and_variance(at.samples.iter().flat_map(|s| s.single.iter().copied()))
-        .1
-        .sqrt();
-    [mean, spread, (variance / at.samples.len() as f64).sqrt()]
+/// The caller's progress function.
+type ProgressFunction<'a> = dyn FnMut(Progress) -> ControlFlow<()> + Send + 'a;
+
+/// Counts realisations and calls the progress function, from any thread.
+struct Reporter<'a> {
+    total: usize,
+    done: AtomicUsize,
+    progress: Mutex<&'a mut ProgressFunction<'a>>,
+}
+
+impl Reporter<'_> {
+    /// Reports `more` realisations done.
+    fn report(&self, more: usize, relative_standard_error: f64) -> Result<(), Error> {
+        let mut progress = self.progress.lock().unwrap_or_else(PoisonError::into_inner);
+        // Counted under the lock, so that the reported numbers do not decrease.
+        let done = self.done.fetch_add(more, Ordering::Relaxed) + more;
+        let flow = progress(Progress {
+            done,
+            total: self.total,
+            relative_standard_error,
+        });
+        match flow {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(Error::Cancelled { realisations: done }),
+        }
+    }
+}
+
+/// Efficiency of beams through the same path.
+fn monostatic_point<T>(at: &RangeResult<T>) -> EfficiencyPoint {
+    let (mean, variance_of_samples) = mean_and_variance(at.samples.iter().map(|s| s.same_path));
+    let single = at.samples.iter().flat_map(|s| s.single.iter().copied());
+    let (_, variance) = mean_and_variance(single);
+    EfficiencyPoint {
+        mean,
+        standard_deviation: variance.sqrt(),
+        standard_error: (variance_of_samples / at.samples.len() as f64).sqrt(),
+    }
+}
+
+/// Efficiency of beams through independent paths; `scale` as in [`Prepared`].
+fn bistatic_point<T: Real>(at: &RangeResult<T>, folding: &Folding, scale: f64) -> EfficiencyPoint {
+    let last = at.planes.len() - 1;
+    let total = folding.overlap(&at.planes[0], &at.planes[last]) * scale;
+    let (mean, standard_error) = bistatic(&at.samples, total, folding, scale);
+    let (_, variance) = mean_and_variance(at.products.iter().copied());
+    EfficiencyPoint {
+        mean,
+        standard_deviation: variance.sqrt(),
+        standard_error,
+    }
 }
 
 /// Relative standard error of the monostatic mean; infinite while it is not known.
-fn relative_error<T>(at: &AtRange<T>) -> f64 {
-    let [mean, _, error] = monostatic(at);
+fn relative_error<T>(at: &RangeResult<T>) -> f64 {
+    let point = monostatic_point(at);
     if at.samples.len() > 1 {
-        error / mean
+        point.standard_error / point.mean
     } else {
         f64::INFINITY
     }

@@ -53,18 +53,17 @@ impl Layers {
         &self.end_m
     }
 
-    /// The layers of a run to these ranges: one with a range inside ends there, and the next begins.
+    /// The layers of a run to these ranges: a layer with a range inside is cut there.
     #[must_use]
     pub fn split_at(&self, range_m: &[f64]) -> Self {
-        let last = self.end_m[self.end_m.len() - 1];
-        let inside =
-            |r: &&f64| **r > 0.0 && **r < last && !self.end_m.iter().any(|end| same(*end, **r));
-        let mut end_m: Vec<f64> = self
-            .end_m
-            .iter()
-            .chain(range_m.iter().filter(inside))
-            .copied()
-            .collect();
+        let last_m = self.end_m[self.end_m.len() - 1];
+        let mut end_m = self.end_m.clone();
+        for &r in range_m {
+            let is_end = self.end_m.iter().any(|end| same(*end, r));
+            if r > 0.0 && r < last_m && !is_end {
+                end_m.push(r);
+            }
+        }
         end_m.sort_by(f64::total_cmp);
         end_m.dedup_by(|b, a| same(*a, *b));
         Self { end_m }
@@ -72,9 +71,8 @@ impl Layers {
 
     /// Start and end of each layer \[m\].
     pub(crate) fn bounds_m(&self) -> impl Iterator<Item = (f64, f64)> {
-        std::iter::once(0.0)
-            .chain(self.end_m.iter().copied())
-            .zip(self.end_m.iter().copied())
+        let starts = std::iter::once(0.0).chain(self.end_m.iter().copied());
+        starts.zip(self.end_m.iter().copied())
     }
 
     /// The screens that a field arriving at `range_m` has crossed, for the exact bistatic theory of a simulated path.
@@ -106,27 +104,51 @@ fn same(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
 }
 
-/// The way from one place at which something happens to the next, after the screen of a layer, if any.
+/// Propagation from one screen or range to the next, after the screen of a layer, if any.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Leg {
     pub(crate) screen: Option<usize>,
-    /// A range on the way, and the distance to it, where one transform from the same field serves both.
-    pub(crate) tap: Option<(usize, usize)>,
-    /// Distance of a step, and how many lead to the end.
+    /// A range that the leg passes.
+    pub(crate) tap: Option<Tap>,
+    /// Index of the distance of a step.
     pub(crate) distance: usize,
+    /// Number of equal steps.
     pub(crate) times: usize,
     /// Ranges at the end.
     pub(crate) outputs: Range<usize>,
 }
 
+/// A range that a leg passes: one forward transform serves it and the end of the leg.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Tap {
+    pub(crate) range: usize,
+    /// Index of the distance to it.
+    pub(crate) distance: usize,
+}
+
+/// A screen or the ranges at one position along the path.
+struct PathPoint {
+    position_m: f64,
+    screen: Option<usize>,
+    outputs: Range<usize>,
+}
+
 impl Leg {
-    /// Ranges that the leg reaches: index, and whether it is one on the way.
+    /// Ranges that the leg reaches: index, and whether the leg passes it.
     pub(crate) fn ranges(&self) -> impl Iterator<Item = (usize, bool)> {
+        let passed = self.tap.iter().map(|tap| (tap.range, true));
         let at_the_end = self.outputs.clone().map(|output| (output, false));
-        self.tap
-            .iter()
-            .map(|&(output, _)| (output, true))
-            .chain(at_the_end)
+        passed.chain(at_the_end)
+    }
+
+    /// Whether the leg is one step to one range.
+    fn is_step_to_range(&self) -> bool {
+        self.tap.is_none() && self.outputs.len() == 1 && self.times == 1
+    }
+
+    /// Whether the leg is one step in free space.
+    fn is_free_step(&self) -> bool {
+        self.screen.is_none() && self.times == 1
     }
 }
 
@@ -138,7 +160,8 @@ pub(crate) struct Path {
     pub(crate) distance_m: Vec<f64>,
     /// sqrt(k^2 Cn2 dz) of each layer; empty without turbulence.
     pub(crate) strength: Vec<f64>,
-    /// Index of each distance by its logarithm in steps of rounding: paths of thousands of layers and ranges are laid out too.
+    /// Index of each distance by its logarithm in steps of rounding, so that distances are found fast
+    /// on paths of thousands of layers and ranges.
     known: BTreeMap<i64, usize>,
 }
 
@@ -161,81 +184,99 @@ impl Path {
                 "within the layers of the path",
             )?;
         }
-        let (mut path, largest_step_m) = (Self::default(), grid.largest_step_m(wavelength_m));
-        let furthest = range_m.last().copied().unwrap_or_default();
-        // Places with the screen that stands there, or the ranges.
-        let mut stops: Vec<(f64, Option<usize>, Range<usize>)> = Vec::new();
-        let mut reached = 0;
-        for (start, end) in layers
-            .bounds_m()
-            .take_while(|(start, _)| *start < furthest && !same(*start, furthest))
-        {
-            if !cn2.is_none() {
-                let cn2_thickness = cn2.mean(start, end)? * (end - start);
-                stops.push((
-                    0.5 * (start + end),
-                    Some(path.strength.len()),
-                    reached..reached,
-                ));
-                path.strength
-                    .push(2.0 * std::f64::consts::PI / wavelength_m * cn2_thickness.sqrt());
-            }
-            let here = range_m[reached..]
-                .iter()
-                .take_while(|r| **r < end || same(**r, end))
-                .count();
-            if here > 0 {
-                let at_m = if cn2.is_none() { range_m[reached] } else { end };
-                stops.push((at_m, None, reached..reached + here));
-            }
-            reached += here;
-        }
-        let (mut from_m, mut screen, mut legs) = (0.0, None, Vec::new());
-        for (at_m, next_screen, outputs) in stops {
-            let times = ((at_m - from_m) / largest_step_m - 1e-9).ceil().max(1.0);
-            let distance = path.step((at_m - from_m) / times);
+        let mut path = Self::default();
+        let points = path.add_screens(layers, range_m, cn2, wavelength_m)?;
+        let largest_step_m = grid.largest_step_m(wavelength_m);
+        let mut from_m = 0.0;
+        let mut screen = None;
+        let mut legs = Vec::new();
+        for point in points {
+            let length_m = point.position_m - from_m;
+            let times = (length_m / largest_step_m - 1e-9).ceil().max(1.0);
             legs.push(Leg {
                 screen,
                 tap: None,
-                distance,
+                distance: path.index_of_distance(length_m / times),
                 times: times as usize,
-                outputs,
+                outputs: point.outputs,
             });
-            (from_m, screen) = (at_m, next_screen);
+            from_m = point.position_m;
+            screen = point.screen;
         }
         path.join(legs, largest_step_m);
         Ok(path)
     }
 
-    /// Takes the legs over; two become one with a tap where one step reaches past a range.
+    /// Computes the strengths of the screens. Returns the positions of screens and ranges, increasing.
+    fn add_screens(
+        &mut self,
+        layers: &Layers,
+        range_m: &[f64],
+        cn2: &Cn2Path,
+        wavelength_m: f64,
+    ) -> Result<Vec<PathPoint>, Error> {
+        let furthest = range_m.last().copied().unwrap_or_default();
+        let mut points = Vec::new();
+        let mut reached = 0;
+        for (start, end) in layers.bounds_m() {
+            if start >= furthest || same(start, furthest) {
+                break;
+            }
+            if !cn2.is_none() {
+                let cn2_thickness = cn2.mean(start, end)? * (end - start);
+                points.push(PathPoint {
+                    position_m: 0.5 * (start + end),
+                    screen: Some(self.strength.len()),
+                    outputs: reached..reached,
+                });
+                let wavenumber_rad_m = 2.0 * std::f64::consts::PI / wavelength_m;
+                self.strength.push(wavenumber_rad_m * cn2_thickness.sqrt());
+            }
+            let first = reached;
+            while reached < range_m.len() && (range_m[reached] < end || same(range_m[reached], end))
+            {
+                reached += 1;
+            }
+            if reached > first {
+                points.push(PathPoint {
+                    position_m: if cn2.is_none() { range_m[first] } else { end },
+                    screen: None,
+                    outputs: first..reached,
+                });
+            }
+        }
+        Ok(points)
+    }
+
+    /// Appends legs; two become one with a tap where one step reaches past a range.
     fn join(&mut self, legs: Vec<Leg>, largest_step_m: f64) {
         for leg in legs {
-            let whole_m =
-                |before: &Leg| self.distance_m[before.distance] + self.distance_m[leg.distance];
-            let passes = |before: &mut Leg| {
-                (before.tap, before.outputs.len(), before.times) == (None, 1, 1)
-                    && (leg.screen, leg.times) == (None, 1)
-                    && whole_m(before) <= largest_step_m
-            };
-            let joined = self.legs.pop_if(passes).map(|before| {
-                let tap = Some((before.outputs.start, before.distance));
-                (whole_m(&before), before.screen, tap)
+            let distance_m = &self.distance_m;
+            let joined = self.legs.pop_if(|before| {
+                let whole_m = distance_m[before.distance] + distance_m[leg.distance];
+                before.is_step_to_range() && leg.is_free_step() && whole_m <= largest_step_m
             });
-            let leg = match joined {
-                Some((whole_m, screen, tap)) => Leg {
-                    screen,
-                    tap,
-                    distance: self.step(whole_m),
-                    ..leg
-                },
-                None => leg,
+            let Some(before) = joined else {
+                self.legs.push(leg);
+                continue;
             };
-            self.legs.push(leg);
+            let whole_m = self.distance_m[before.distance] + self.distance_m[leg.distance];
+            let tap = Tap {
+                range: before.outputs.start,
+                distance: before.distance,
+            };
+            let distance = self.index_of_distance(whole_m);
+            self.legs.push(Leg {
+                screen: before.screen,
+                tap: Some(tap),
+                distance,
+                ..leg
+            });
         }
     }
 
-    /// Index of the distance of a step, new if need be.
-    fn step(&mut self, distance_m: f64) -> usize {
+    /// Index of a distance, which is appended if it is new.
+    fn index_of_distance(&mut self, distance_m: f64) -> usize {
         let key = (distance_m.ln() * 1e9).round() as i64;
         let near = self
             .known
@@ -251,16 +292,15 @@ impl Path {
 
     /// Fourier transform pairs of one realisation.
     pub(crate) fn transform_pairs(&self) -> f64 {
-        self.legs
-            .iter()
-            .map(|leg| {
-                if leg.tap.is_some() {
-                    1.5
-                } else {
-                    leg.times as f64
-                }
-            })
-            .sum()
+        let mut pairs = 0.0;
+        for leg in &self.legs {
+            pairs += if leg.tap.is_some() {
+                1.5
+            } else {
+                leg.times as f64
+            };
+        }
+        pairs
     }
 }
 
@@ -290,7 +330,11 @@ mod tests {
             let p = path(&layers, &range_m, &cn2);
             let (mut at, mut seen) = (0.0, 0);
             for leg in &p.legs {
-                if let Some((output, distance)) = leg.tap {
+                if let Some(Tap {
+                    range: output,
+                    distance,
+                }) = leg.tap
+                {
                     assert!((at + p.distance_m[distance] - range_m[output]).abs() < 1e-9);
                     seen += 1;
                 }

@@ -43,20 +43,24 @@ impl Folding {
             ring: Vec::new(),
             ring_points: vec![0.0; rings],
         };
-        let place_m = |n, spacing_m, i| {
-            if folded {
-                i as f64 * spacing_m
-            } else {
-                Grid::offset_m(n, spacing_m, i)
+        for y in 0..size[1] {
+            for x in 0..size[0] {
+                let radius_m = this.offset_m(nx, dx_m, x).hypot(this.offset_m(ny, dy_m, y));
+                let ring = ((radius_m / unit) as usize).min(rings - 1);
+                this.ring.push(ring as u16);
+                this.ring_points[ring] += this.multiplicity(x, y);
             }
-        };
-        for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
-            let radius_m = place_m(nx, dx_m, x).hypot(place_m(ny, dy_m, y));
-            let ring = ((radius_m / unit) as usize).min(rings - 1);
-            this.ring.push(ring as u16);
-            this.ring_points[ring] += this.multiplicity(x, y);
         }
         this
+    }
+
+    /// Distance of point `i` of the folded grid, along an axis of `n` points, from the axis \[m\].
+    fn offset_m(&self, n: usize, spacing_m: f64, i: usize) -> f64 {
+        if self.folded {
+            i as f64 * spacing_m
+        } else {
+            Grid::offset_m(n, spacing_m, i)
+        }
     }
 
     pub(crate) fn points(&self) -> usize {
@@ -68,8 +72,7 @@ impl Folding {
         if !self.folded {
             return 1.0;
         }
-        let along = |i: usize, n: usize| if i > 0 && i < n.div_ceil(2) { 2.0 } else { 1.0 };
-        along(x, self.grid.nx) * along(y, self.grid.ny)
+        multiplicity_along(x, self.grid.nx) * multiplicity_along(y, self.grid.ny)
     }
 
     /// Adds row `y` of the full grid to the folded plane.
@@ -99,7 +102,8 @@ impl Folding {
         let mut sum = 0.0;
         for y in 0..self.size[1] {
             let row = y * width..(y + 1) * width;
-            let (a, b) = (&a[row.clone()], &b[row]);
+            let a = &a[row.clone()];
+            let b = &b[row];
             let whole = kernel::dot(a, b);
             if !self.folded {
                 sum += whole;
@@ -124,20 +128,40 @@ impl Folding {
         }
         sums
     }
+
+    /// Overlap of one sample with all others on rings (per point, both ways), from its ring sums and
+    /// those of all samples. `other` is the index of the ring sums of j_B: 0 for aligned beams.
+    fn overlap_with_others(&self, sample: &Sample, sums: &[Vec<f64>; 2], other: usize) -> f64 {
+        let mut overlap = 0.0;
+        for (i, points) in self.ring_points.iter().enumerate() {
+            if *points > 0.0 {
+                let t = f64::from(sample.rings[0][i]);
+                let b = f64::from(sample.rings[other][i]);
+                overlap += (t * (sums[other][i] - b) + b * (sums[0][i] - t)) / points;
+            }
+        }
+        overlap
+    }
 }
 
-/// What one realisation leaves at one output range. Overlaps are in units of the efficiency.
+/// Number of points of the full grid, along an axis of `n` points, that fold onto point `i`.
+fn multiplicity_along(i: usize, n: usize) -> f64 {
+    if i > 0 && i < n.div_ceil(2) { 2.0 } else { 1.0 }
+}
+
+/// An independent sample (a realisation or an antithetic pair) at one range. Overlaps are in units of
+/// the efficiency.
 #[derive(Debug, Clone)]
 pub(crate) struct Sample {
     /// eta of the same path, integral of j_T j_B.
     pub(crate) same_path: f64,
     /// Its values for the single realisations of this sample (two if antithetic).
     pub(crate) single: Vec<f64>,
-    /// The same for the symmetrised planes: what the square of the sum must be freed of.
+    /// The same for the symmetrised planes: subtracted from the square of the sum.
     pub(crate) folded: f64,
     /// Ring sums of j_T and (displaced beams only) j_B.
     pub(crate) rings: [Vec<f32>; 2],
-    /// Fraction of the power that the border took.
+    /// Fraction of the power that the border absorbed.
     pub(crate) lost: f64,
 }
 
@@ -146,14 +170,12 @@ pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
     let squares: f64 = values.map(|v| (v - mean) * (v - mean)).sum();
-    (
-        mean,
-        if n > 1.0 {
-            squares / (n - 1.0)
-        } else {
-            f64::NAN
-        },
-    )
+    let variance = if n > 1.0 {
+        squares / (n - 1.0)
+    } else {
+        f64::NAN
+    };
+    (mean, variance)
 }
 
 /// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer than three samples.
@@ -179,24 +201,15 @@ pub(crate) fn bistatic(
             }
         }
     }
-    // Aligned beams are one.
+    // Aligned beams have the same irradiance.
     let other = usize::from(!samples[0].rings[1].is_empty());
-    let with_others = |s: &Sample| -> f64 {
-        let mut sum = 0.0;
-        for (i, points) in folding.ring_points.iter().enumerate() {
-            if *points > 0.0 {
-                let [t, b] = [0, other].map(|beam| f64::from(s.rings[beam][i]));
-                sum += (t * (sums[other][i] - b) + b * (sums[0][i] - t)) / points;
-            }
-        }
-        sum * scale
-    };
-    // Its overlap with itself, which rings would smooth, is in neither.
-    let left_out: Vec<f64> = samples
-        .iter()
-        .map(|s| (total - own - with_others(s)) / ((n - 1.0) * (n - 2.0)))
-        .collect();
-    let (_, variance) = mean_and_variance(left_out.iter().copied());
+    let mut jackknifed = Vec::with_capacity(samples.len());
+    for sample in samples {
+        // The overlap of a sample with itself, which rings would smooth, is in neither term.
+        let with_others = folding.overlap_with_others(sample, &sums, other) * scale;
+        jackknifed.push((total - own - with_others) / ((n - 1.0) * (n - 2.0)));
+    }
+    let (_, variance) = mean_and_variance(jackknifed.iter().copied());
     // Jackknife: (n - 1)/n sum (theta_i - mean)^2 = (n - 1)^2/n variance.
     (mean, (variance / n).sqrt() * (n - 1.0))
 }

@@ -1,7 +1,8 @@
-//! How many layers are enough: each thin against diffraction, and together as good as the continuous path at every range.
+//! Number of layers of a path: each thin enough for diffraction, and together as accurate as the
+//! continuous path at every range.
 //!
-//! The mean bistatic efficiency is exact both for given screens, (P5), and for the continuous path, (P4). What lies between is
-//! the error of the layers, without random numbers.
+//! The mean bistatic efficiency is exact both for given screens, (P5), and for the continuous path,
+//! (P4). Their difference is the error of the layers, without random numbers.
 
 use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
@@ -14,17 +15,18 @@ use std::f64::consts::PI;
 
 /// Largest Rytov variance (plane wave) of one layer.
 pub const LARGEST_LAYER_RYTOV: f64 = 0.1;
-/// Largest share of the expected standard error that the layers may add.
+/// Largest fraction of the expected standard error that the layers may add.
 pub const LARGEST_GAP_SHARE: f64 = 1.0 / 3.0;
-/// Most layers that a plan proposes.
+/// Largest number of layers that a plan proposes.
 const MOST: usize = 1000;
-/// Most ranges at which the gap is computed, and most terms of all its sums.
+/// Largest number of ranges at which the gap is computed.
 const MOST_RANGES: usize = 64;
+/// Largest number of terms of all its sums.
 const MOST_TERMS: usize = 2_000_000;
-/// A relative gap that nobody minds, however many realisations.
+/// A relative gap that is negligible, however many realisations.
 const NEGLIGIBLE_GAP: f64 = 1e-4;
 
-/// What the layers of a set-up do to the mean bistatic efficiency at one range.
+/// Effect of the layers of a set-up on the mean bistatic efficiency at one range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerGap {
     /// Range \[m\].
@@ -130,10 +132,9 @@ impl<'a> Gaps<'a> {
                 // Two panels at least: strong turbulence leaves a peak at small separations.
                 let middle = pair[0] + 0.25 * (pair[1] - pair[0]);
                 for (low, high) in [(pair[0], middle), (middle, pair[1])] {
-                    node.extend(
-                        rule.mapped(low, high)
-                            .map(|(rho, w)| (rho, w * 2.0 * PI * rho * overlap.at(rho).powi(2))),
-                    );
+                    for (rho, w) in rule.mapped(low, high) {
+                        node.push((rho, w * 2.0 * PI * rho * overlap.at(rho).powi(2)));
+                    }
                 }
             }
             let rytov = path_rytov_variance(cn2, telescope.wavelength_m, range_m)?;
@@ -163,18 +164,15 @@ impl<'a> Gaps<'a> {
             .sum()
     }
 
-    /// The gap of a set of layers at each range; of very many layers, at some of the ranges.
-    pub(super) fn of(&self, layers: &Layers) -> Result<Vec<LayerGap>, Error> {
-        let nodes = self
-            .ranges
-            .iter()
-            .map(|r| r.node.len())
-            .sum::<usize>()
-            .max(1);
-        let fraction = (MOST_TERMS as f64 / (nodes * layers.end_m().len()) as f64).min(1.0);
-        let some = (self.ranges.len() as f64 * fraction).ceil().max(2.0) as usize;
+    /// The gap of a set of layers at each range; with very many layers, at a thinned set of ranges.
+    pub(super) fn of_layers(&self, layers: &Layers) -> Result<Vec<LayerGap>, Error> {
+        let nodes: usize = self.ranges.iter().map(|r| r.node.len()).sum();
+        let terms = nodes.max(1) * layers.end_m().len();
+        let fraction = (MOST_TERMS as f64 / terms as f64).min(1.0);
+        let thinned = (self.ranges.len() as f64 * fraction).ceil().max(2.0) as usize;
+        let ranges: Vec<&AtRange> = self.ranges.iter().collect();
         let mut out = Vec::new();
-        for at in spread_over(&self.ranges.iter().collect::<Vec<_>>(), some) {
+        for at in spread_over(&ranges, thinned) {
             let screens = layers.screens_to(at.range_m, self.cn2)?;
             let places = screens.iter().map(|s| (s.position_m, s.cn2_thickness_m13));
             let relative = self.integral(&at.node, at.range_m, places) / at.path - 1.0;
@@ -187,43 +185,48 @@ impl<'a> Gaps<'a> {
         Ok(out)
     }
 
-    /// `layers`, each cut in halves until no range has a large gap; those whose screens err most are cut first.
+    /// `layers`, halved until no range has a large gap; at each range the layer whose screen has the
+    /// largest error is halved first.
     pub(super) fn refined(&self, mut layers: Layers) -> Result<Layers, Error> {
         loop {
-            let large: Vec<LayerGap> = self
-                .of(&layers)?
-                .into_iter()
-                .filter(LayerGap::is_large)
-                .collect();
+            let mut large = self.of_layers(&layers)?;
+            large.retain(LayerGap::is_large);
             if large.is_empty() || layers.end_m().len() >= MOST {
                 return Ok(layers);
             }
-            let mut cut = vec![false; layers.end_m().len()];
+            let mut is_halved = vec![false; layers.end_m().len()];
             for gap in &large {
                 let errors = self.weight_errors(&layers, gap.range_m)?;
                 let worst = errors.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1));
-                worst.into_iter().for_each(|(layer, _)| cut[layer] = true);
+                if let Some((layer, _)) = worst {
+                    is_halved[layer] = true;
+                }
             }
-            let parts = layers.bounds_m().zip(cut);
-            let ends = parts.flat_map(|((start, end), cut)| {
-                cut.then_some(0.5 * (start + end)).into_iter().chain([end])
-            });
-            layers = Layers::new(ends.collect())?;
+            let mut ends_m = Vec::new();
+            for ((start, end), is_halved) in layers.bounds_m().zip(is_halved) {
+                if is_halved {
+                    ends_m.push(0.5 * (start + end));
+                }
+                ends_m.push(end);
+            }
+            layers = Layers::new(ends_m)?;
         }
     }
 
-    /// By how much the screen of each layer errs in the integral of Cn2 (1 - z/R)^(5/3), seen from `range_m`.
+    /// Error of the screen of each layer in the integral of Cn2 (1 - z/R)^(5/3) for a wave from
+    /// `range_m`.
     fn weight_errors(&self, layers: &Layers, range_m: f64) -> Result<Vec<f64>, Error> {
         let rule = GaussLegendre::new(6);
-        let weight = |z: f64| (1.0 - z / range_m).max(0.0).powf(5.0 / 3.0);
         let mut errors = Vec::new();
         for (start, end) in layers.bounds_m().take_while(|(start, _)| *start < range_m) {
             let end = end.min(range_m);
             let mut exact = 0.0;
             for (z, dz) in rule.mapped(start, end) {
-                exact += self.cn2.at(z)? * weight(z) * dz;
+                exact += self.cn2.at(z)? * spherical_weight(z, range_m) * dz;
             }
-            let screen = self.cn2.mean(start, end)? * (end - start) * weight(0.5 * (start + end));
+            let middle = 0.5 * (start + end);
+            let screen =
+                self.cn2.mean(start, end)? * (end - start) * spherical_weight(middle, range_m);
             errors.push((exact - screen).abs());
         }
         Ok(errors)
@@ -237,17 +240,19 @@ impl<'a> Gaps<'a> {
     ) -> Result<Option<usize>, Error> {
         let mut count = least;
         while count <= MOST {
-            if !self
-                .of(&Layers::equal(count, furthest_m)?)?
-                .iter()
-                .any(LayerGap::is_large)
-            {
+            let gaps = self.of_layers(&Layers::equal(count, furthest_m)?)?;
+            if !gaps.iter().any(LayerGap::is_large) {
                 return Ok(Some(count));
             }
             count += 1 + count / 4;
         }
         Ok(None)
     }
+}
+
+/// (1 - z/R)^(5/3), the weight of Cn2 at `position_m` for a spherical wave from `range_m`.
+fn spherical_weight(position_m: f64, range_m: f64) -> f64 {
+    (1.0 - position_m / range_m).max(0.0).powf(5.0 / 3.0)
 }
 
 /// Forecast of the relative standard error of a mean over realisations, half of them antithetic: the scatter of one grows with
@@ -292,7 +297,7 @@ mod tests {
             let gaps = Gaps::new(&telescope, &cn2, &table, &range_m, 400).unwrap();
             let thin = thin_layers(&cn2, telescope.wavelength_m, furthest_m).unwrap();
             let worst = |layers: &Layers| {
-                gaps.of(layers)
+                gaps.of_layers(layers)
                     .unwrap()
                     .iter()
                     .fold(0f64, |w, g| w.max(g.excess()))
@@ -325,7 +330,7 @@ mod tests {
         )
         .unwrap();
         let layers = Layers::equal(3, 600.0).unwrap();
-        for gap in gaps.of(&layers).unwrap() {
+        for gap in gaps.of_layers(&layers).unwrap() {
             let r = gap.range_m;
             let screens = layers.screens_to(r, &turbulence.cn2).unwrap();
             let of_screens =

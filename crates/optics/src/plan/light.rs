@@ -6,9 +6,10 @@ use crate::air::turbulence::coherence_radius_m;
 use crate::theory::encircled::mean_power_beyond;
 use crate::{Error, Misalignment, Telescope};
 
-/// The border takes what is beyond this share of the half width: its window falls there, and is passed again at every step.
+/// The border absorbs the light beyond this fraction of the half width: its window falls there, and
+/// acts again at every step.
 const BORDER: f64 = 0.85;
-/// Planes along the path at which the tails are looked at.
+/// Planes along the path at which the tails are computed.
 const PLANES: u32 = 6;
 /// Radii at each.
 const RADII: u32 = 64;
@@ -46,11 +47,9 @@ impl Light {
             let shadow_m = lit_m * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
             let spread_m = 2.0 * scatter_rad(telescope, cn2, range_m)? * range_m;
             let lobe_m = range_m / (telescope.wavenumber_rad_m() * lit_m);
-            // From well inside the beam to where only the 1/r of the edge is left.
-            let (first_m, last_m) = (
-                0.3 * (shadow_m + lobe_m),
-                shadow_m + 4.0 * spread_m + 150.0 * lobe_m,
-            );
+            // From well inside the beam to where only the 1/r tail of the edge remains.
+            let first_m = 0.3 * (shadow_m + lobe_m);
+            let last_m = shadow_m + 4.0 * spread_m + 150.0 * lobe_m;
             let step_ln = (last_m / first_m).ln() / f64::from(RADII - 1);
             let radius_m: Vec<f64> = (0..RADII)
                 .map(|j| first_m * (step_ln * f64::from(j)).exp())
@@ -71,20 +70,25 @@ impl Light {
 
     /// Largest mean fraction of the light on a grid of this width and spacing that its border takes.
     pub(super) fn lost(&self, width_m: f64, spacing_m: f64) -> f64 {
-        self.planes.iter().fold(0.0, |worst, plane| {
+        let mut worst = 0f64;
+        for plane in &self.planes {
             let border_m = (0.5 * BORDER * width_m - plane.displaced_m).max(0.0);
-            // Light at angles beyond the band of the grid, a square of the area of this circle, is not on it and cannot be lost.
+            // Light at angles beyond the band of the grid, a square of the area of this circle, is not
+            // on the grid and cannot be lost.
             let nyquist_m =
                 self.wavelength_m * plane.range_m / (spacing_m * std::f64::consts::PI.sqrt());
-            worst.max(plane.beyond(border_m) - plane.beyond(nyquist_m))
-        })
+            worst = worst.max(plane.beyond(border_m) - plane.beyond(nyquist_m));
+        }
+        worst
     }
 
     /// Width \[m\] of a grid whose border takes at most `fraction`.
     pub(super) fn width_m(&self, fraction: f64, spacing_m: f64) -> f64 {
-        let (mut low, mut high) = (0.0, spacing_m);
+        let mut low = 0.0;
+        let mut high = spacing_m;
         while self.lost(high, spacing_m) > fraction {
-            (low, high) = (high, 2.0 * high);
+            low = high;
+            high *= 2.0;
         }
         for _ in 0..40 {
             let middle = 0.5 * (low + high);

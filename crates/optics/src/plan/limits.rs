@@ -1,24 +1,41 @@
-//! The table of the limits of a grid for one telescope and one turbulence: what a set-up violates, and one that does not.
+//! The table of the limits of a grid for one telescope and one turbulence: the violations of a
+//! set-up, and a set-up without any.
 
 use super::Case;
 use super::gaps::{Gaps, thin_layers};
 use super::light::{Light, scatter_rad};
-use super::violation::{Limit, SetUp, Violation, not_above, not_below};
+use super::violation::{Limit, SetUp, Violation, not_above, not_below, violations_of};
 use crate::air::structure::StructureTable;
 use crate::beam::source::{beam_limits_m, slope_rad};
 use crate::screens::grid::Grid;
 use crate::theory::fresnel_number;
 use crate::{Error, Layers, Turbulence};
 
-/// Points along an axis up to which a plan keeps a margin in its spacing, and the most that it proposes.
+/// Largest number of points along an axis with which a plan has a margin in its spacing.
 const COMFORTABLE_POINTS: usize = 4096;
+/// Largest number of points along an axis that a plan proposes.
 const LARGEST_POINTS: usize = 16384;
-/// Share of the light that the border of a derived grid takes at most, by forecast: three quarters of what is doubtful.
+/// Largest forecast fraction of the light that the border of a derived grid absorbs: three quarters
+/// of [`DOUBTFUL_LOSS`](super::DOUBTFUL_LOSS).
 const DERIVED_LOSS: f64 = 0.0075;
-/// Share at which a run ends with an error; a little less, so that the run does not end where the plan went on.
+/// Largest forecast fraction that a plan accepts: a little less than that at which a run ends with an
+/// error.
 const LARGEST_LOSS: f64 = 0.04;
 /// Fresnel number below which the whole path is in the far field of the aperture.
 const FAR_FIELD: f64 = 0.2;
+
+/// Spacings that turbulence and aperture accept, and the largest to plan with \[m\].
+struct Spacings {
+    aperture_m: f64,
+    scatter_m: f64,
+    planned_m: f64,
+}
+
+/// Violations of a grid by a run, and the forecast of the light that its border absorbs.
+pub(super) struct Verdict {
+    pub(super) violations: Vec<Violation>,
+    pub(super) light_lost: f64,
+}
 
 /// A case with what its limits need, computed once.
 pub(super) struct Limits<'a> {
@@ -88,20 +105,22 @@ impl<'a> Limits<'a> {
         ))
     }
 
-    /// The table: what turbulence and the aperture demand of the spacing, beside what the beam demands of any grid
-    /// ([`beam_limits_m`]); the largest that each accepts, and the largest to plan with \[m\].
+    /// Limits of turbulence and aperture on the spacing, beside those of the beam on any grid
+    /// ([`beam_limits_m`]).
     ///
-    /// Where every range is in the far field, the pattern at the target is that of the aperture's few lowest waves, and a sixth
-    /// of the points give the efficiency as well (within 1e-4 in free space). For the angles into which focus, tilt and
-    /// turbulence send the beam the plan keeps a margin of two: what lies within it is left to the monitored border.
-    fn spacings_m(&self, range_m: &[f64]) -> Result<([(Limit, f64); 2], f64), Error> {
+    /// If every range is in the far field, the pattern at the target is that of the aperture's few
+    /// lowest waves, and a sixth of the points give the efficiency as well (within 1e-4 in free
+    /// space). For the angles into which focus, tilt and turbulence send the beam the plan has a
+    /// margin of two; the monitored border covers what lies within it.
+    fn spacings(&self, range_m: &[f64]) -> Result<Spacings, Error> {
         let Case {
             telescope,
             misalignment,
             turbulence,
             ..
         } = self.case;
-        let (a, lambda) = (telescope.aperture_radius_m, telescope.wavelength_m);
+        let a = telescope.aperture_radius_m;
+        let lambda = telescope.wavelength_m;
         let fresnel = range_m
             .iter()
             .fold(0f64, |worst, &r| worst.max(fresnel_number(telescope, r)));
@@ -112,22 +131,15 @@ impl<'a> Limits<'a> {
         };
         let scatter = scatter_rad(telescope, &turbulence.cn2, last(range_m)?)?;
         let slope = (slope_rad(telescope, misalignment) + 2.0 * scatter).max(1e-30);
-        let planned_m = (a / planned).min(0.5 * lambda / slope);
-        Ok((
-            [
-                (Limit::Aperture, a / accepted),
-                (Limit::Scatter, lambda / slope),
-            ],
-            planned_m,
-        ))
+        Ok(Spacings {
+            aperture_m: a / accepted,
+            scatter_m: lambda / slope,
+            planned_m: (a / planned).min(0.5 * lambda / slope),
+        })
     }
 
-    /// What a grid violates for these ranges, and the share of the light that its border takes.
-    pub(super) fn verdict(
-        &self,
-        grid: &Grid,
-        range_m: &[f64],
-    ) -> Result<(Vec<Violation>, f64), Error> {
+    /// Examines a grid for these ranges.
+    pub(super) fn verdict(&self, grid: &Grid, range_m: &[f64]) -> Result<Verdict, Error> {
         let grid = grid.validated()?;
         let Case {
             telescope,
@@ -137,46 +149,55 @@ impl<'a> Limits<'a> {
         } = self.case;
         let mut limits_m = beam_limits_m(telescope, misalignment, last(range_m)?).to_vec();
         if !turbulence.cn2.is_none() {
-            limits_m.extend(self.spacings_m(range_m)?.0);
+            let spacings = self.spacings(range_m)?;
+            limits_m.push((Limit::Aperture, spacings.aperture_m));
+            limits_m.push((Limit::Scatter, spacings.scatter_m));
         }
-        let (light, spacing_m, width_m) = (
-            self.light(range_m)?,
-            grid.largest_spacing_m(),
-            grid.smallest_width_m(),
-        );
-        let light_lost = light.lost(width_m, spacing_m);
+        let light = self.light(range_m)?;
+        let spacing_m = grid.largest_spacing_m();
+        let light_lost = light.lost(grid.smallest_width_m(), spacing_m);
         if light_lost > LARGEST_LOSS {
             limits_m.push((Limit::Light, light.width_m(LARGEST_LOSS, spacing_m)));
         }
-        let violated = |row| Violation::of(row, spacing_m, width_m);
-        Ok((
-            limits_m.into_iter().filter_map(violated).collect(),
+        Ok(Verdict {
+            violations: violations_of(&limits_m, &grid),
             light_lost,
-        ))
+        })
     }
 
-    /// A grid for these ranges: with the spacing to plan with, or else with the largest that is accepted; with the border that takes next
-    /// to nothing, or else with the narrowest that is accepted.
+    /// A grid for these ranges. Its spacing is the one to plan with, or else the largest that is
+    /// accepted; its border absorbs [`DERIVED_LOSS`] at most, or else [`LARGEST_LOSS`].
     pub(super) fn grid(&self, range_m: &[f64]) -> Result<Grid, Error> {
-        let ([(_, aperture_m), (_, scatter_m)], mut planned_m) = self.spacings_m(range_m)?;
-        let (accepted_m, light) = (aperture_m.min(scatter_m), self.light(range_m)?);
+        let Spacings {
+            aperture_m,
+            scatter_m,
+            mut planned_m,
+        } = self.spacings(range_m)?;
+        let accepted_m = aperture_m.min(scatter_m);
+        let light = self.light(range_m)?;
         // Half the inner scale if that costs no more than a factor of two.
         let Turbulence { spectrum, cn2 } = &self.case.turbulence;
         let fine_m = 2.96 / spectrum.inner_wavenumber_rad_m();
         if !cn2.is_none() && fine_m < planned_m && fine_m >= 0.5 * planned_m {
             planned_m = fine_m;
         }
-        let grid = |spacing_m, loss| {
-            self.grid_of(spacing_m, light.width_m(loss, spacing_m), last(range_m)?)
-        };
-        match grid(planned_m, DERIVED_LOSS) {
-            Ok(grid) if grid.nx <= COMFORTABLE_POINTS => Ok(grid),
-            _ => grid(accepted_m, DERIVED_LOSS).or_else(|_| grid(accepted_m, LARGEST_LOSS)),
+        let furthest_m = last(range_m)?;
+        let narrow_m = light.width_m(DERIVED_LOSS, planned_m);
+        match self.smallest_grid(planned_m, narrow_m, furthest_m) {
+            Ok(grid) if grid.nx <= COMFORTABLE_POINTS => return Ok(grid),
+            _ => {}
         }
+        let derived_m = light.width_m(DERIVED_LOSS, accepted_m);
+        if let Ok(grid) = self.smallest_grid(accepted_m, derived_m, furthest_m) {
+            return Ok(grid);
+        }
+        let narrowest_m = light.width_m(LARGEST_LOSS, accepted_m);
+        self.smallest_grid(accepted_m, narrowest_m, furthest_m)
     }
 
-    /// A grid of at most this spacing and at least this width that holds the beam to `furthest_m`.
-    fn grid_of(
+    /// The grid of fewest points with at most this spacing and at least this width that holds the
+    /// beam to `furthest_m`.
+    fn smallest_grid(
         &self,
         mut spacing_m: f64,
         mut width_m: f64,
@@ -185,22 +206,21 @@ impl<'a> Limits<'a> {
         for (limit, limit_m) in
             beam_limits_m(&self.case.telescope, &self.case.misalignment, furthest_m)
         {
-            match limit.is_spacing() {
-                true => spacing_m = spacing_m.min(limit_m),
-                false => width_m = width_m.max(not_below(limit_m)),
+            if limit.is_spacing() {
+                spacing_m = spacing_m.min(limit_m);
+            } else {
+                width_m = width_m.max(not_below(limit_m));
             }
         }
         let spacing_m = not_above(spacing_m);
         let points = good_size((width_m / spacing_m).ceil() as usize).max(128);
         if points > LARGEST_POINTS {
-            let (needed, found) = (points as f64, LARGEST_POINTS as f64);
-            let violations = vec![Violation {
-                limit: Limit::Points,
-                needed,
-                found,
-            }];
             return Err(Error::Sampling {
-                violations,
+                violations: vec![Violation {
+                    limit: Limit::Points,
+                    needed: points as f64,
+                    found: LARGEST_POINTS as f64,
+                }],
                 would_do: None,
             });
         }
@@ -214,24 +234,27 @@ impl<'a> Limits<'a> {
         all.dedup();
         let grid = self.grid(&all).ok()?;
         let layers = self.equal_layers(runs).ok()??;
-        let good = |range_m: &&[f64]| {
-            self.verdict(&grid, range_m)
-                .is_ok_and(|(violations, _)| violations.is_empty())
-        };
-        runs.iter().all(good).then_some(SetUp {
+        for range_m in runs {
+            let verdict = self.verdict(&grid, range_m).ok()?;
+            if !verdict.violations.is_empty() {
+                return None;
+            }
+        }
+        Some(SetUp {
             points: grid.nx,
             spacing_m: grid.dx_m,
             layers,
         })
     }
 
-    /// How many equal layers to its last range are enough for every one of these lists of ranges; none if 1000 are not.
+    /// Number of equal layers to its last range that is enough for each of these lists of ranges; none
+    /// if 1000 are not.
     pub(super) fn equal_layers(&self, runs: &[&[f64]]) -> Result<Option<usize>, Error> {
         let mut count = 1;
         for range_m in runs {
             count = count.max(self.thin_layers(range_m)?.end_m().len());
         }
-        // What is enough for one may leave a gap in another.
+        // A number that is enough for one list may leave a gap in another.
         loop {
             let before = count;
             for range_m in runs {
@@ -256,17 +279,20 @@ pub(super) fn last(range_m: &[f64]) -> Result<f64, Error> {
     })
 }
 
-/// The next size with only the factors 2, 3 and 5, even.
+/// The next even size with only the factors 2, 3 and 5.
 fn good_size(at_least: usize) -> usize {
-    let rest = |n: usize| {
-        [2, 3, 5].into_iter().fold(n, |mut rest, prime| {
-            while rest % prime == 0 {
-                rest /= prime;
-            }
-            rest
-        })
-    };
     (at_least.max(2)..)
-        .find(|&n| n % 2 == 0 && rest(n) == 1)
+        .find(|&n| n % 2 == 0 && is_smooth(n))
         .unwrap_or(at_least)
+}
+
+/// Whether a number has only the factors 2, 3 and 5.
+fn is_smooth(n: usize) -> bool {
+    let mut rest = n;
+    for prime in [2, 3, 5] {
+        while rest.is_multiple_of(prime) {
+            rest /= prime;
+        }
+    }
+    rest == 1
 }

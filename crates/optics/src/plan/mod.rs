@@ -75,16 +75,17 @@ pub struct Plan {
     pub gaps: Vec<LayerGap>,
     /// Memory of a run with eight groups at a time in f32 \[bytes\].
     pub memory_bytes: usize,
-    /// What of it each of the groups has while it runs \[bytes\].
+    /// The part of `memory_bytes` that each group needs while it runs \[bytes\].
     pub group_bytes: usize,
     /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on current machines.
     pub realisation_cpu_s: f64,
-    /// What is allowed but deserves a word.
+    /// Properties that are allowed but cost accuracy.
     pub warnings: Vec<Warning>,
 }
 
 impl Plan {
-    /// Memory of so many realisations with so many threads in f32 \[bytes\]: as many groups run at a time as there are threads.
+    /// Memory of a run with this number of realisations and threads in f32 \[bytes\]. One group per
+    /// thread runs at a time.
     #[must_use]
     pub fn memory_bytes_of(&self, realisations: usize, threads: usize) -> usize {
         let at_once = realisations
@@ -175,8 +176,8 @@ impl Case {
         })
     }
 
-    /// As [`Case::examine`] for several runs on one grid, each with `layers` equal layers to its last range: what one
-    /// refuses is told for all of them at once, and what would do does for all.
+    /// As [`Case::examine`] for several runs on one grid, each with `layers` equal layers to its last
+    /// range: the violations of all runs are reported at once, and a proposed set-up holds for all.
     ///
     /// # Errors
     /// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing: largest) value that works,
@@ -199,12 +200,13 @@ impl Limits<'_> {
     /// A plan for each of the runs on one grid.
     fn plans(&self, grid: &Grid, runs: &[(Layers, &[f64])]) -> Result<Vec<Plan>, Error> {
         let all: Vec<&[f64]> = runs.iter().map(|(_, range_m)| *range_m).collect();
-        let (mut violations, mut light_lost) = (Vec::new(), Vec::new());
+        let mut violations = Vec::new();
+        let mut light_lost = Vec::new();
         for range_m in &all {
             crate::efficiency::check_increasing("range_m", range_m)?;
-            let (violated, lost) = self.verdict(grid, range_m)?;
-            violations.extend(violated);
-            light_lost.push(lost);
+            let verdict = self.verdict(grid, range_m)?;
+            violations.extend(verdict.violations);
+            light_lost.push(verdict.light_lost);
         }
         if !violations.is_empty() {
             return Err(Error::Sampling {
@@ -212,12 +214,14 @@ impl Limits<'_> {
                 would_do: self.set_up(&all),
             });
         }
-        let each = runs.iter().zip(light_lost);
-        each.map(|((layers, range_m), lost)| self.costs(grid, layers, range_m, lost, &all))
-            .collect()
+        let mut plans = Vec::with_capacity(runs.len());
+        for ((layers, range_m), lost) in runs.iter().zip(light_lost) {
+            plans.push(self.costs(grid, layers, range_m, lost, &all)?);
+        }
+        Ok(plans)
     }
 
-    /// Cost and warnings of a set-up whose grid is accepted; layers that would do, do for all `runs`.
+    /// Cost and warnings of a set-up whose grid is accepted; proposed layers hold for all `runs`.
     fn costs(
         &self,
         grid: &Grid,
@@ -249,7 +253,7 @@ impl Limits<'_> {
             layers: layers.clone(),
             layer_rytov_variance: worst_rytov(&turbulence.cn2, lambda, &split, last(range_m)?)?,
             light_lost,
-            gaps: self.gaps(range_m)?.of(&split)?,
+            gaps: self.gaps(range_m)?.of_layers(&split)?,
             memory_bytes: GROUPS_PER_WAVE * group_bytes
                 + shared_bytes(grid, range_m.len(), beams)
                 + transfers,
@@ -261,7 +265,7 @@ impl Limits<'_> {
         Ok(plan)
     }
 
-    /// What is allowed in a plan but deserves a word.
+    /// The warnings about a plan.
     fn warnings(
         &self,
         plan: &Plan,
@@ -316,7 +320,8 @@ impl Limits<'_> {
     }
 }
 
-/// What screens miss at one grid spacing: a part of a large grid shows it.
+/// Fraction of the structure function that the screens miss at one grid spacing. A part of a large
+/// grid gives it.
 fn missing_at_one_spacing(turbulence: &Turbulence, grid: &Grid) -> Result<f64, Error> {
     let part = Grid {
         nx: grid.nx.min(256),

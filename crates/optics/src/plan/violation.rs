@@ -1,5 +1,6 @@
 //! What a transverse grid must hold, in numbers that a user can take over: limits, what violates them, a set-up that does not.
 
+use crate::screens::grid::Grid;
 use std::fmt;
 
 /// A limit on the grid of a Monte Carlo.
@@ -54,21 +55,31 @@ pub struct Violation {
 }
 
 impl Violation {
-    /// What a grid of this spacing and width violates of a limit: a largest spacing, or a least width \[m\].
-    pub(crate) fn of((limit, limit_m): (Limit, f64), spacing_m: f64, width_m: f64) -> Option<Self> {
+    /// The violation of a largest spacing or a smallest width `limit_m` \[m\] by a grid, if it is one.
+    fn by_grid(limit: Limit, limit_m: f64, grid: &Grid) -> Option<Self> {
         if limit.is_spacing() {
+            let spacing_m = grid.largest_spacing_m();
             return (spacing_m > limit_m).then(|| Self {
                 limit,
                 needed: not_above(limit_m),
                 found: spacing_m,
             });
         }
+        let width_m = grid.smallest_width_m();
         (width_m < limit_m).then(|| Self {
             limit,
             needed: not_below(limit_m),
             found: width_m,
         })
     }
+}
+
+/// The limits \[m\], largest spacings and smallest widths, that a grid violates.
+pub(crate) fn violations_of(limits_m: &[(Limit, f64)], grid: &Grid) -> Vec<Violation> {
+    limits_m
+        .iter()
+        .filter_map(|&(limit, limit_m)| Violation::by_grid(limit, limit_m, grid))
+        .collect()
 }
 
 impl fmt::Display for Violation {
@@ -103,7 +114,7 @@ pub struct SetUp {
     pub layers: usize,
 }
 
-/// All violations, and what would do.
+/// Text of all violations and of a set-up without any.
 pub(crate) fn listed(violations: &[Violation], would_do: Option<&SetUp>) -> String {
     let mut items: Vec<String> = violations.iter().map(Violation::to_string).collect();
     if let Some(SetUp {
@@ -121,36 +132,28 @@ pub(crate) fn listed(violations: &[Violation], would_do: Option<&SetUp>) -> Stri
 
 /// The least number of four digits that is not below `value`, above 0.
 pub(crate) fn not_below(value: f64) -> f64 {
-    four_digits(value, 1)
+    four_digits(value, 1).unwrap_or(value)
 }
 
 /// The largest number of four digits that is not above `value`, above 0.
 pub(crate) fn not_above(value: f64) -> f64 {
-    four_digits(value, -1)
+    four_digits(value, -1).unwrap_or(value)
 }
 
-/// `value` to four digits, one unit of the last further in `direction` if that is on the wrong side.
-fn four_digits(value: f64, direction: i32) -> f64 {
+/// `value` to four digits, on its side `direction` (1 above, -1 below); none if it is not finite.
+fn four_digits(value: f64, direction: i32) -> Option<f64> {
     let text = format!("{value:.3e}");
-    let Some((digits, exponent)) = text.split_once('e') else {
-        return value;
-    };
-    let (Ok(rounded), Ok(digits), Ok(exponent)) = (
-        text.parse::<f64>(),
-        digits.parse::<f64>(),
-        exponent.parse::<i32>(),
-    ) else {
-        return value;
-    };
+    let rounded: f64 = text.parse().ok()?;
     if f64::from(direction) * (rounded - value) >= 0.0 {
-        return rounded;
+        return Some(rounded);
     }
+    let (digits, exponent) = text.split_once('e')?;
+    let digits: f64 = digits.parse().ok()?;
+    let exponent: i32 = exponent.parse().ok()?;
     // Below a power of ten the digits are ten times finer.
     let fine = if direction < 0 && digits == 1.0 { 4 } else { 3 };
     let units = (digits * 10f64.powi(fine)).round() + f64::from(direction);
-    format!("{units}e{}", exponent - fine)
-        .parse()
-        .unwrap_or(value)
+    format!("{units}e{}", exponent - fine).parse().ok()
 }
 
 #[cfg(test)]
