@@ -106,6 +106,23 @@ struct Panel {
     depth: u32,
 }
 
+impl Panel {
+    fn new(
+        rule: &GaussLegendre,
+        start: f64,
+        end: f64,
+        depth: u32,
+        f: &mut dyn FnMut(f64) -> f64,
+    ) -> Self {
+        Self {
+            start,
+            end,
+            integral: rule.integrate(start, end, f),
+            depth,
+        }
+    }
+}
+
 /// Integral of `f` over consecutive intervals between `breaks`, each halved until the sum of two
 /// halves equals the whole within the tolerance.
 ///
@@ -123,14 +140,9 @@ pub(crate) fn adaptive(
     for pair in breaks.windows(2) {
         let [start, end] = [pair[0], pair[1]];
         if end > start {
-            let integral = rule.integrate(start, end, &mut *f);
-            scale += integral.abs();
-            pending.push(Panel {
-                start,
-                end,
-                integral,
-                depth: 0,
-            });
+            let panel = Panel::new(rule, start, end, 0, f);
+            scale += panel.integral.abs();
+            pending.push(panel);
         }
     }
     let mut sum = 0.0;
@@ -141,9 +153,9 @@ pub(crate) fn adaptive(
             break;
         }
         let middle = 0.5 * (panel.start + panel.end);
-        let left = rule.integrate(panel.start, middle, &mut *f);
-        let right = rule.integrate(middle, panel.end, &mut *f);
-        let halves = left + right;
+        let left = Panel::new(rule, panel.start, middle, panel.depth + 1, f);
+        let right = Panel::new(rule, middle, panel.end, panel.depth + 1, f);
+        let halves = left.integral + right.integral;
         // The first panel may have missed a narrow peak: the scale grows with what is found.
         scale = if halves.abs() > scale || halves.is_nan() {
             halves.abs()
@@ -158,19 +170,8 @@ pub(crate) fn adaptive(
             sum += halves;
             continue;
         }
-        let depth = panel.depth + 1;
-        pending.push(Panel {
-            start: middle,
-            end: panel.end,
-            integral: right,
-            depth,
-        });
-        pending.push(Panel {
-            start: panel.start,
-            end: middle,
-            integral: left,
-            depth,
-        });
+        pending.push(right);
+        pending.push(left);
     }
     // `<=` is false for NaN, so that a NaN integrand is an error and no result.
     if missed <= 100.0 * tolerance * scale && scale.is_finite() {

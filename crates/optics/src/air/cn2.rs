@@ -102,36 +102,41 @@ impl Cn2Path {
         edges
     }
 
-    /// Places z \[m\] and weights \[m^(1/3)\] by which the integral of Cn2(z) f(z) from 0 to `range_m` is a sum, for any f
-    /// that is smooth along the path or a power of its rest.
+    /// Positions z \[m\] and weights \[m^(1/3)\] of a quadrature of Cn2(z) f(z) from 0 to `range_m`,
+    /// for any f that is smooth along the path or a power of R - z.
     ///
-    /// f is interpolated on panels that halve towards the end; its products with the straight pieces of the profile are
-    /// then exact, so that the number of places does not grow with the number of knots.
+    /// f is interpolated on panels that halve towards the end; its products with the straight pieces
+    /// of the profile are then exact, so that the number of positions does not grow with the number of
+    /// knots.
     ///
     /// # Errors
     /// As [`Cn2Path::at`].
     pub(crate) fn quadrature(&self, range_m: f64) -> Result<Vec<(f64, f64)>, Error> {
         const HALVED: [f64; 5] = [0.0, 0.5, 0.75, 0.875, 1.0];
-        // Between 16 places f is a polynomial of degree 15; times a straight line, 9 nodes integrate it exactly.
-        let (places, exact) = (GaussLegendre::new(16), GaussLegendre::new(9));
+        // Between 16 positions f is a polynomial of degree 15; times a straight line, 9 nodes integrate
+        // it exactly.
+        let positions = GaussLegendre::new(16);
+        let exact = GaussLegendre::new(9);
         let mut out = Vec::new();
         match self {
             Self::None => {}
             Self::Uniform { cn2_m_m23 } => {
-                out.extend(places.mapped(0.0, range_m).map(|(z, w)| (z, cn2_m_m23 * w)))
+                for (z, w) in positions.mapped(0.0, range_m) {
+                    out.push((z, cn2_m_m23 * w));
+                }
             }
             Self::Heights { .. } => {
                 for panel in HALVED.windows(2) {
-                    let (start, end) = (panel[0] * range_m, panel[1] * range_m);
-                    let at: Vec<f64> = places.mapped(start, end).map(|(z, _)| z).collect();
+                    let start = panel[0] * range_m;
+                    let end = panel[1] * range_m;
+                    let at: Vec<f64> = positions.mapped(start, end).map(|(z, _)| z).collect();
                     let mut weight = vec![0.0; at.len()];
                     for piece in self.edges_m(start, end).windows(2) {
                         for (z, dz) in exact.mapped(piece[0], piece[1]) {
                             let cn2_dz = self.at(z)? * dz;
-                            weight
-                                .iter_mut()
-                                .enumerate()
-                                .for_each(|(j, w)| *w += cn2_dz * lagrange(&at, j, z));
+                            for (j, w) in weight.iter_mut().enumerate() {
+                                *w += cn2_dz * lagrange(&at, j, z);
+                            }
                         }
                     }
                     out.extend(at.into_iter().zip(weight));
@@ -166,11 +171,11 @@ impl Cn2Path {
                 telescope_height_m,
                 elevation_rad,
             } => {
-                let (found, expected) = (cn2_m_m23.len(), height_m.len().max(2));
-                if found != expected || height_m.len() < 2 {
+                let expected = height_m.len().max(2);
+                if cn2_m_m23.len() != expected || height_m.len() < 2 {
                     return Err(Error::Length {
                         field: "cn2_m_m23",
-                        found,
+                        found: cn2_m_m23.len(),
                         expected,
                     });
                 }

@@ -22,10 +22,8 @@ pub fn structure_function_m53(spectrum: &dyn Spectrum, separation_m: f64) -> Res
         return Ok(0.0);
     }
     let rule = GaussLegendre::new(16);
-    let (outer, inner) = (
-        spectrum.outer_wavenumber_rad_m(),
-        spectrum.inner_wavenumber_rad_m(),
-    );
+    let outer = spectrum.outer_wavenumber_rad_m();
+    let inner = spectrum.inner_wavenumber_rad_m();
     let end = if inner.is_finite() {
         7.0 * inner
     } else {
@@ -93,13 +91,15 @@ impl StructureTable {
         let step_ln = std::f64::consts::LN_10 / Self::PER_DECADE;
         let first_ln = Self::SMALLEST_M.ln();
         let n = ((Self::LARGEST_M / Self::SMALLEST_M).ln() / step_ln).round() as usize + 1;
-        let ln_value = |r: f64| structure_function_m53(spectrum, r).unwrap_or(f64::NAN).ln();
+        let mut ln_value = Vec::with_capacity(n);
+        for i in 0..n {
+            let r = (first_ln + step_ln * i as f64).exp();
+            ln_value.push(structure_function_m53(spectrum, r).unwrap_or(f64::NAN).ln());
+        }
         Self {
             first_ln,
             step_ln,
-            ln_value: (0..n)
-                .map(|i| ln_value((first_ln + step_ln * i as f64).exp()))
-                .collect(),
+            ln_value,
         }
     }
 

@@ -44,38 +44,42 @@ impl Descent {
         if kappa * (high - low).min(arc.intensity_radius_m) < LEAST_RAD {
             return None;
         }
-        Some((self.end(arc, low, kappa)? - self.end(arc, high, kappa)?).re)
+        let at_low = self.descent_from(arc, low, kappa)?;
+        let at_high = self.descent_from(arc, high, kappa)?;
+        Some((at_low - at_high).re)
     }
 
     /// Integral of f(x) exp(j kappa x) from `at` to `at` + j infinity.
-    fn end(&self, arc: Arc, at: f64, kappa: f64) -> Option<C> {
+    fn descent_from(&self, arc: Arc, at: f64, kappa: f64) -> Option<C> {
         let offset = at - arc.centre_m;
         let to_branch = arc.radius_m - offset.abs();
         let is_branch = to_branch <= 1e-13 * arc.radius_m;
         if !is_branch && kappa * to_branch < LEAST_RAD {
             return None;
         }
-        let mut sum = C::new(0.0, 0.0);
-        for &(node, weight) in if is_branch {
+        let rule = if is_branch {
             &self.branch
         } else {
             &self.regular
-        } {
+        };
+        // h^2 = p^2 - (offset + j t)^2; at a branch p^2 - offset^2 is 0 and h is sqrt(t) times a smooth
+        // function.
+        let on_axis = if is_branch {
+            0.0
+        } else {
+            (arc.radius_m - offset) * (arc.radius_m + offset)
+        };
+        let mut sum = C::new(0.0, 0.0);
+        for &(node, weight) in rule {
             let t = node / kappa;
-            // h^2 = p^2 - (offset + j t)^2; at a branch p^2 - offset^2 is 0 and h is sqrt(t) times a smooth function.
-            let on_axis = if is_branch {
-                0.0
-            } else {
-                (arc.radius_m - offset) * (arc.radius_m + offset)
-            };
             let half = C::new(on_axis + t * t, -2.0 * offset * t).sqrt();
             let value = arc.chord(C::new(at, t), half);
-            sum += value
-                * if is_branch {
-                    weight / node.sqrt()
-                } else {
-                    weight
-                };
+            let weight = if is_branch {
+                weight / node.sqrt()
+            } else {
+                weight
+            };
+            sum += value * weight;
         }
         Some(C::new(0.0, 1.0 / kappa) * C::cis(kappa * at) * sum)
     }
@@ -119,18 +123,6 @@ fn erf(z: C) -> C {
 
 /// Nodes and weights of the Gauss rule with weight t^alpha exp(-t) on 0 to infinity, alpha 0 or 1/2, by Newton's iteration.
 fn laguerre(n: usize, alpha: f64) -> Vec<(f64, f64)> {
-    // L_n and L_(n-1) at x.
-    let polynomials = |x: f64| {
-        let (mut before, mut now) = (0.0, 1.0);
-        for k in 0..n {
-            let k = k as f64;
-            (before, now) = (
-                now,
-                ((2.0 * k + 1.0 + alpha - x) * now - (k + alpha) * before) / (k + 1.0),
-            );
-        }
-        (now, before)
-    };
     let count = n as f64;
     let scale = libm::tgamma(count + alpha) / libm::tgamma(count);
     let mut out: Vec<(f64, f64)> = Vec::with_capacity(n);
@@ -146,7 +138,7 @@ fn laguerre(n: usize, alpha: f64) -> Vec<(f64, f64)> {
         }
         let mut slope = 1.0;
         for _ in 0..50 {
-            let (value, before) = polynomials(x);
+            let (value, before) = laguerre_polynomials(n, alpha, x);
             slope = (count * value - (count + alpha) * before) / x;
             let step = value / slope;
             x -= step;
@@ -154,10 +146,23 @@ fn laguerre(n: usize, alpha: f64) -> Vec<(f64, f64)> {
                 break;
             }
         }
-        let (_, before) = polynomials(x);
+        let (_, before) = laguerre_polynomials(n, alpha, x);
         out.push((x, -scale / (slope * before * count)));
     }
     out
+}
+
+/// Generalised Laguerre polynomials of degrees `n` and `n` - 1 at `x`.
+fn laguerre_polynomials(n: usize, alpha: f64, x: f64) -> (f64, f64) {
+    let mut before = 0.0;
+    let mut current = 1.0;
+    for k in 0..n {
+        let k = k as f64;
+        let next = ((2.0 * k + 1.0 + alpha - x) * current - (k + alpha) * before) / (k + 1.0);
+        before = current;
+        current = next;
+    }
+    (current, before)
 }
 
 #[cfg(test)]

@@ -51,15 +51,16 @@ pub fn mean_power_beyond(
         }
     }
     let whole = telescope.transmitted_fraction();
-    let beyond = |&r: &f64| {
+    let mut beyond = Vec::with_capacity(radius_m.len());
+    for r in radius_m {
         let scale = k * r / range_m;
         let inside: f64 = nodes
             .iter()
             .map(|(rho, w)| w * scale * libm::j1(scale * rho))
             .sum();
-        (1.0 - inside / whole).clamp(0.0, 1.0)
-    };
-    Ok(radius_m.iter().map(beyond).collect())
+        beyond.push((1.0 - inside / whole).clamp(0.0, 1.0));
+    }
+    Ok(beyond)
 }
 
 #[cfg(test)]

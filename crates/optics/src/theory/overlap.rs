@@ -76,10 +76,8 @@ impl Overlap {
 
     /// M(rho), real because the aperture is centro-symmetric.
     pub(crate) fn at(&self, separation_m: f64) -> f64 {
-        let (a, b) = (
-            self.telescope.aperture_radius_m,
-            self.telescope.obscuration_radius_m,
-        );
+        let a = self.telescope.aperture_radius_m;
+        let b = self.telescope.obscuration_radius_m;
         let mut sum = self.lens(a, a, separation_m);
         if b > 0.0 {
             // Annulus = disc minus disc; the two mixed terms are mirror images with equal real parts.
@@ -155,11 +153,9 @@ impl Overlap {
     /// End points of smooth pieces of |M|^2, fine enough for its oscillation.
     pub(crate) fn breaks(&self) -> Vec<f64> {
         let t = &self.telescope;
-        let (a, b, s) = (
-            t.aperture_radius_m,
-            t.obscuration_radius_m,
-            t.intensity_radius_m(),
-        );
+        let a = t.aperture_radius_m;
+        let b = t.obscuration_radius_m;
+        let s = t.intensity_radius_m();
         let end = (2.0 * a).min(2.0 * GAUSSIAN_REACH * s);
         let mut kinks = vec![0.0, 2.0 * b, a - b, a + b, end];
         kinks.retain(|&x| x <= end);
