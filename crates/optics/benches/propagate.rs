@@ -1,4 +1,5 @@
-//! Cost of one layer on 512 x 512 points, beside the bare pair of Fourier transforms: the floor below which no layer can go.
+//! Cost of one layer on 512 x 512 points, beside the bare pair of Fourier transforms: the floor
+//! below which no layer can go.
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use rustfft::FftPlanner;

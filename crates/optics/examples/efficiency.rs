@@ -1,4 +1,5 @@
-//! Efficiency of the chapter's lidar: free space, exact bistatic theory, and Monte Carlo side by side.
+//! Efficiency of the chapter's lidar: free space, exact bistatic theory, and Monte
+//! Carlo side by side.
 //!
 //! `cargo run --release --example efficiency -- [cn2_m_m23] [realisations] [seed]`
 

@@ -1,7 +1,8 @@
 //! The efficiency as a function of range, with its scatter and its statistical error.
 //!
-//! Check: the interpolation passes through the points, keeps monotone data monotone and refuses to extrapolate; between ranges that
-//! follow the curvature it is the function itself, however near the focus.
+//! Check: the interpolation passes through the points, keeps monotone data monotone and refuses
+//! to extrapolate; between ranges that follow the curvature it is the function itself, however
+//! near the focus.
 
 use crate::error::{check_length, finite, not_negative, positive};
 use crate::{Error, Telescope};
@@ -46,11 +47,11 @@ pub struct EfficiencyProfile {
     pub range_m: Vec<f64>,
     /// Mean efficiency at each range.
     pub mean: Vec<f64>,
-    /// Standard deviation of the efficiency of one realisation, `sqrt(<eta^2> - <eta>^2)`; 0 for exact theory, NaN where it is
-    /// not known (one realisation).
+    /// Standard deviation of the efficiency of one realisation, `sqrt(<eta^2> - <eta>^2)`; 0 for
+    /// exact theory, NaN where it is not known (one realisation).
     pub standard_deviation: Vec<f64>,
-    /// Standard error of `mean`; 0 for exact theory, NaN where it is not known: the monostatic mean needs two independent
-    /// samples, the bistatic one three (an antithetic pair is one sample).
+    /// Standard error of `mean`; 0 for exact theory, NaN where it is not known: the monostatic mean
+    /// needs two independent samples, the bistatic one three (an antithetic pair is one sample).
     pub standard_error: Vec<f64>,
 }
 
@@ -118,10 +119,12 @@ impl EfficiencyProfile {
         Ok(self)
     }
 
-    /// Mean efficiency at `range_m` \[m\], by monotone cubic interpolation (Fritsch and Carlson 1980).
+    /// Mean efficiency at `range_m` \[m\], by monotone cubic interpolation (Fritsch
+    /// and Carlson 1980).
     ///
     /// # Errors
-    /// [`Error::Extrapolation`] outside the profile, [`Error::OutOfRange`] for a range that is not a number.
+    /// [`Error::Extrapolation`] outside the profile, [`Error::OutOfRange`] for a range that
+    /// is not a number.
     pub fn interpolated(&self, range_m: f64) -> Result<f64, Error> {
         let x = &self.range_m;
         let y = &self.mean;

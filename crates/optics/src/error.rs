@@ -1,4 +1,5 @@
-//! The one error type of the crate: each variant names the field, the value that was given and what is allowed.
+//! The one error type of the crate: each variant names the field, the value that was given and
+//! what is allowed.
 
 #[cfg(feature = "screens")]
 use crate::plan::violation::{SetUp, Violation, listed};
@@ -52,7 +53,8 @@ pub enum Error {
         /// Last range of the profile \[m\].
         last_m: f64,
     },
-    /// A grid cannot hold what it is asked to hold: every limit that it violates, and a set-up that does not.
+    /// A grid cannot hold what it is asked to hold: every limit that it violates, and a
+    /// set-up that does not.
     #[cfg(feature = "screens")]
     #[error("sampling: {}", listed(violations, would_do.as_ref()))]
     Sampling {

@@ -1,7 +1,9 @@
-//! Heterodyne efficiency of a coherent lidar: exact theory, and phase screens through turbulence of any strength.
+//! Heterodyne efficiency of a coherent lidar: exact theory, and phase screens through turbulence
+//! of any strength.
 //!
-//! The system-antenna efficiency eta_s(R) of (19) is the overlap, at the target, of the transmitted beam and of the
-//! local oscillator propagated backwards through the receiver (BPLO), both normalised to unit power before truncation.
+//! The system-antenna efficiency eta_s(R) of (19) is the overlap, at the target, of the transmitted
+//! beam and of the local oscillator propagated backwards through the receiver (BPLO), both
+//! normalised to unit power before truncation.
 //!
 //! ```
 //! use wakescope_optics::{Telescope, theory};
@@ -14,11 +16,12 @@
 //! # }
 //! ```
 //!
-//! Through turbulence the bistatic mean needs no random numbers ([`theory::bistatic_efficiency`]); the monostatic one is a
-//! Monte Carlo (`MonteCarlo`), which gives both receivers from one set of realisations.
+//! Through turbulence the bistatic mean needs no random numbers
+//! ([`theory::bistatic_efficiency`]); the monostatic one is a Monte Carlo (`MonteCarlo`), which
+//! gives both receivers from one set of realisations.
 //!
-//! **Read first** `literal`: (16) to (19) as they are written, one path in sixty lines. It is what the fast walk of the Monte
-//! Carlo is tested against.
+//! **Read first** `literal`: (16) to (19) as they are written, one path in sixty lines. It is what
+//! the fast walk of the Monte Carlo is tested against.
 //!
 //! | equation | where |
 //! |---|---|
@@ -38,8 +41,10 @@
 //! | `plan` | grid, layers, memory, time; refusals that name the limit and what would do |
 //! | `literal` | (16) to (19) term by term, as oracle |
 //!
-//! Features: `screens` (default) compiles the modules without a link above, with their FFT and random numbers; `rayon`
-//! (default) runs realisations in parallel, with the same bits.
+//! Features: `screens` (default) compiles the modules without a link above, with their FFT and
+//! random numbers; `rayon` (default) runs realisations in parallel, with the same bits.
+
+#![warn(clippy::too_many_lines, clippy::type_complexity)]
 
 pub mod air;
 pub mod beam;

@@ -1,12 +1,14 @@
-//! (16) to (19) as they are written: one path, term by term. Read this first; it is also the oracle of the fast walk.
+//! (16) to (19) as they are written: one path, term by term. Read this first; it is also the oracle
+//! of the fast walk.
 //!
 //! ```text
 //! field at the telescope -> for each layer: half of it in free space, its screen, the other half -> irradiance -> overlap
 //! ```
 //!
-//! Sums are done as printed (no fast transform), so that grids of some 50 points are what this is for. The fast form
-//! ([`MonteCarlo`](crate::MonteCarlo)) does the same with transforms of which one serves several ranges, screens that
-//! hold the eddies wider than the grid, many paths, and errors.
+//! Sums are done as printed (no fast transform), so that grids of some 50 points are what this
+//! is for. The fast form ([`MonteCarlo`](crate::MonteCarlo)) does the same with transforms of
+//! which one serves several ranges, screens that hold the eddies wider than the grid, many
+//! paths, and errors.
 //!
 //! Check: shares the field at the telescope with the fast form, and nothing else
 //! (`fast_walk_is_the_literal_loop_to_round_off`); screens have the structure function of (17)
@@ -32,11 +34,13 @@ pub struct Layer {
     pub phase_rad: Vec<f64>,
 }
 
-/// A phase screen \[rad\], `[y][x]`, (18), corrected: psi(r) = Re sum of c sqrt(Phi_psi(kappa)) dkappa exp(j kappa.r) over the
-/// frequencies of the grid, kappa in RADIANS per metre, Phi_psi = 2 pi k^2 Cn2 Delta R' Phi_n/Cn2 with Phi_n of (17), c
-/// complex normal with unit variance in each part. `cn2_thickness_m13` is Cn2 Delta R' \[m^(1/3)\].
+/// A phase screen \[rad\], `[y][x]`, (18), corrected: psi(r) = Re sum of c sqrt(Phi_psi(kappa))
+/// dkappa exp(j kappa.r) over the frequencies of the grid, kappa in RADIANS per metre, Phi_psi = 2
+/// pi k^2 Cn2 Delta R' Phi_n/Cn2 with Phi_n of (17), c complex normal with unit variance in each
+/// part. `cn2_thickness_m13` is Cn2 Delta R' \[m^(1/3)\].
 ///
-/// Eddies wider than the grid are missing: [`ScreenGenerator`](crate::screens::ScreenGenerator) has them.
+/// Eddies wider than the grid are missing:
+/// [`ScreenGenerator`](crate::screens::ScreenGenerator) has them.
 pub fn phase_screen(
     grid: &Grid,
     spectrum: &dyn Spectrum,
@@ -74,11 +78,12 @@ pub fn phase_screen(
     phase_rad
 }
 
-/// Irradiance \[1/m^2\] of the telescope's beam at the end of the layers, `[y][x]`, for unit power before truncation: (16),
-/// with the screen in the middle of its layer.
+/// Irradiance \[1/m^2\] of the telescope's beam at the end of the layers, `[y][x]`, for unit power
+/// before truncation: (16), with the screen in the middle of its layer.
 ///
 /// # Errors
-/// [`Error`] for a telescope or a grid that is none; [`Error::Length`] for a screen that has not the size of the grid.
+/// [`Error`] for a telescope or a grid that is none; [`Error::Length`] for a screen that has not
+/// the size of the grid.
 pub fn irradiance_per_m2(
     telescope: &Telescope,
     grid: &Grid,
@@ -103,8 +108,9 @@ pub fn irradiance_per_m2(
     Ok(field.iter().map(|e| e.norm_sqr()).collect())
 }
 
-/// Efficiency eta_s of one realisation, (19): lambda^2 R^2/A_R times the integral of j_T j_BPLO, the irradiances at `range_m`
-/// of the transmitted beam and of the local oscillator. Monostatic: both of one path; bistatic: of two different ones.
+/// Efficiency eta_s of one realisation, (19): lambda^2 R^2/A_R times the integral of j_T j_BPLO,
+/// the irradiances at `range_m` of the transmitted beam and of the local oscillator. Monostatic:
+/// both of one path; bistatic: of two different ones.
 pub fn efficiency(
     telescope: &Telescope,
     grid: &Grid,
@@ -120,8 +126,8 @@ pub fn efficiency(
     (telescope.wavelength_m * range_m).powi(2) / telescope.aperture_area_m2() * overlap
 }
 
-/// Free space over `distance_m`, (16): F^-1 { exp(-j pi lambda Delta R' f^2) F \[E\] }, f in CYCLES per metre; then the border
-/// that takes what would come back from the other side of the grid.
+/// Free space over `distance_m`, (16): F^-1 { exp(-j pi lambda Delta R' f^2) F \[E\] }, f in CYCLES
+/// per metre; then the border that takes what would come back from the other side of the grid.
 fn step(grid: &Grid, field: &Field, wavelength_m: f64, distance_m: f64) -> Field {
     let mut spectrum = transform(grid, field, -1.0);
     for (value, (nx, ny)) in spectrum.iter_mut().zip(frequencies(grid)) {
@@ -141,7 +147,8 @@ fn border(i: usize, n: usize) -> f64 {
     (-((2.0 * i as f64 + 1.0 - n as f64).abs() / (0.95 * n as f64)).powi(40)).exp()
 }
 
-/// Whole numbers of waves across the grid along x and y of each frequency, in the order of a transform.
+/// Whole numbers of waves across the grid along x and y of each frequency, in the order
+/// of a transform.
 fn frequencies(grid: &Grid) -> impl Iterator<Item = (f64, f64)> {
     let Grid { nx, ny, .. } = *grid;
     (0..nx * ny).map(move |i| {

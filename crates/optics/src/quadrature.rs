@@ -1,7 +1,7 @@
 //! Gauss-Legendre rules, an adaptive integral built on them, and the interpolation of tables.
 //!
-//! Check: a rule of n nodes integrates polynomials of degree 2n - 1 exactly; the adaptive integral reproduces
-//! closed forms to its tolerance.
+//! Check: a rule of n nodes integrates polynomials of degree 2n - 1 exactly; the adaptive integral
+//! reproduces closed forms to its tolerance.
 
 use crate::Error;
 

@@ -1,7 +1,7 @@
 //! The analogue-to-digital converter: rounding to a number of bits, and saturation.
 //!
-//! Check: the error of rounding has the variance `step^2/12`, a full-scale tone the ratio `6.02 bits + 1.76` dB; what
-//! lies beyond full scale is clipped and counted.
+//! Check: the error of rounding has the variance `step^2/12`, a full-scale tone the ratio
+//! `6.02 bits + 1.76` dB; what lies beyond full scale is clipped and counted.
 
 use crate::error::{check, check_positive};
 use crate::{Error, Sample};
@@ -41,7 +41,8 @@ impl Digitiser {
     /// A converter of `bits` for currents from `-full_scale_a` to `full_scale_a`.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] unless there are 1 to 32 bits and the full scale is finite and positive.
+    /// [`Error::OutOfRange`] unless there are 1 to 32 bits and the full scale is
+    /// finite and positive.
     pub fn new(bits: u32, full_scale_a: f64) -> Result<Self, Error> {
         check("bits", f64::from(bits), "1 to 32", |b| {
             (1.0..=32.0).contains(&b)
@@ -65,8 +66,8 @@ impl Digitiser {
         self.step_a
     }
 
-    /// Replaces each current by that of its code, and counts those beyond full scale. Complex samples have a converter for each
-    /// part.
+    /// Replaces each current by that of its code, and counts those beyond full scale. Complex
+    /// samples have a converter for each part.
     ///
     /// # Errors
     /// [`Error::ElementOutOfRange`] with the first sample that is NaN; then nothing was changed.

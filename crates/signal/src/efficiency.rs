@@ -1,4 +1,5 @@
-//! Heterodyne efficiency by range: one curve for all pulses, or one realisation of the turbulence for each.
+//! Heterodyne efficiency by range: one curve for all pulses, or one realisation of the
+//! turbulence for each.
 //!
 //! Check: straight lines between the points; each pulse gets its realisation.
 
@@ -15,15 +16,17 @@ pub struct LayerEfficiency {
 }
 
 impl LayerEfficiency {
-    /// The efficiency of each layer of a line in `realisations.len()` realisations (one for a mean curve), by straight lines
-    /// between the ranges \[m\] at which each realisation has one efficiency.
+    /// The efficiency of each layer of a line in `realisations.len()` realisations (one for a
+    /// mean curve), by straight lines between the ranges \[m\] at which each realisation has
+    /// one efficiency.
     ///
     /// Memory: one number per realisation and layer. Lines with the same layers share the result.
     ///
     /// # Errors
-    /// [`Error::Empty`] without ranges, realisations or layers; [`Error::ElementOutOfRange`] for ranges that do not increase, or
-    /// an efficiency that is negative or not finite; [`Error::LengthMismatch`] for a realisation of another length;
-    /// [`Error::OutOfRange`] if a layer lies beyond the ranges.
+    /// [`Error::Empty`] without ranges, realisations or layers; [`Error::ElementOutOfRange`] for
+    /// ranges that do not increase, or an efficiency that is negative or not finite;
+    /// [`Error::LengthMismatch`] for a realisation of another length; [`Error::OutOfRange`] if a
+    /// layer lies beyond the ranges.
     pub fn new<E: AsRef<[f64]>>(
         range_m: &[f64],
         realisations: &[E],
@@ -34,28 +37,26 @@ impl LayerEfficiency {
         for realisation in realisations {
             check_values("efficiency", realisation.as_ref(), range_m.len())?;
         }
-        let (field, allowed) = (
-            "range of a layer, m",
-            "within the ranges of the efficiency table",
-        );
-        let place = |layer| {
-            let value = line.range_m(layer);
-            locate(range_m, value).ok_or(Error::OutOfRange {
-                field,
-                value,
-                allowed,
-            })
-        };
-        let places = (0..line.layers())
-            .map(place)
-            .collect::<Result<Vec<_>, _>>()?;
-        check_any("radial_velocity_m_s", places.len())?;
-        let rows = realisations.iter().map(AsRef::as_ref);
-        let efficiency = rows
-            .flat_map(|row| places.iter().map(|&place| value(row, place)))
-            .collect();
+        let mut positions = Vec::with_capacity(line.layers());
+        for layer in 0..line.layers() {
+            let layer_m = line.range_m(layer);
+            let position = locate(range_m, layer_m).ok_or(Error::OutOfRange {
+                field: "range of a layer, m",
+                value: layer_m,
+                allowed: "within the ranges of the efficiency table",
+            })?;
+            positions.push(position);
+        }
+        check_any("radial_velocity_m_s", positions.len())?;
+        let mut efficiency = Vec::with_capacity(realisations.len() * positions.len());
+        for realisation in realisations {
+            let row = realisation.as_ref();
+            for &(index, fraction) in &positions {
+                efficiency.push(value(row, index, fraction));
+            }
+        }
         Ok(Self {
-            layers: places.len(),
+            layers: positions.len(),
             efficiency,
         })
     }
@@ -65,9 +66,10 @@ impl LayerEfficiency {
         self.efficiency.len() / self.layers
     }
 
-    /// The efficiencies of pulse `index`, one per layer, for [`Shot::efficiency`](crate::Shot::efficiency): its own
-    /// realisation. Pulses beyond the last realisation use them again from the first on, so more pulses than realisations
-    /// do not lower the variance that turbulence brings.
+    /// The efficiencies of pulse `index`, one per layer, for
+    /// [`Shot::efficiency`](crate::Shot::efficiency): its own realisation. Pulses beyond the last
+    /// realisation use them again from the first on, so more pulses than realisations do not lower
+    /// the variance that turbulence brings.
     pub fn of_pulse(&self, index: usize) -> &[f64] {
         let first = index % self.realisations() * self.layers;
         &self.efficiency[first..first + self.layers]

@@ -114,7 +114,8 @@ pub(crate) fn check_any(field: &'static str, found: usize) -> Result<(), Error> 
     }
 }
 
-/// Elements that `accept` holds for, or [`Error::ElementOutOfRange`] with the first of which it does not.
+/// Elements that `accept` holds for, or [`Error::ElementOutOfRange`] with the first of
+/// which it does not.
 pub(crate) fn check_each(
     field: &'static str,
     values: &[f64],

@@ -1,7 +1,8 @@
-//! What many pulses average to, without drawing any: mean power, signal-to-noise ratio (14) and covariance of the samples.
+//! What many pulses average to, without drawing any: mean power, signal-to-noise ratio (14) and
+//! covariance of the samples.
 //!
-//! Check: closed forms of the covariance in a uniform wind and a linear gradient; the mean square of the simulator's own
-//! responses to each layer.
+//! Check: closed forms of the covariance in a uniform wind and a linear gradient; the mean square
+//! of the simulator's own responses to each layer.
 
 use ndarray::Array2;
 use num_complex::Complex;
@@ -10,8 +11,8 @@ use crate::error::{check_length, check_overflow};
 use crate::{Error, Scratch, Shot, Simulator};
 
 impl Simulator {
-    /// Writes the mean power `E|s(t_k)|^2` of the discrete sum \[A^2\]: what many pulses average to.
-    /// It is also the mean square of the signal part of [`Simulator::record_into`].
+    /// Writes the mean power `E|s(t_k)|^2` of the discrete sum \[A^2\]: what many pulses average
+    /// to. It is also the mean square of the signal part of [`Simulator::record_into`].
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -30,19 +31,17 @@ impl Simulator {
             let lit = scratch
                 .window
                 .amplitudes_at(self.pulse(), shot.line.layer_thickness_m, k);
-            let layers = lit
+            let powers = lit
                 .amplitudes()
-                .filter(|(layer, _)| !shot.line.is_masked(*layer));
-            *out = gain
-                * layers
-                    .map(|(layer, f)| f.norm_sqr() * shot.weight_per_m(layer))
-                    .sum::<f64>();
+                .filter(|(layer, _)| !shot.line.is_masked(*layer))
+                .map(|(layer, f)| f.norm_sqr() * shot.weight_per_m(layer));
+            *out = gain * powers.sum::<f64>();
         }
         check_overflow("out_a2", out_a2.iter().map(|power| power.is_finite()))
     }
 
-    /// Writes the signal-to-noise ratio of each sample, (14), corrected: mean signal power over the noise power in the
-    /// detector band.
+    /// Writes the signal-to-noise ratio of each sample, (14), corrected: mean signal power over the
+    /// noise power in the detector band.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -54,14 +53,18 @@ impl Simulator {
     ) -> Result<(), Error> {
         self.mean_power_into(shot, scratch, out)?;
         let noise_a2 = self.receiver().snr_noise_a2();
-        out.iter_mut().for_each(|power| *power /= noise_a2);
+        for power in out {
+            *power /= noise_a2;
+        }
         Ok(())
     }
 
-    /// The covariance `E{s(t_m) s*(t_n)}` of the samples of the envelope, without noise \[A^2\]; row m, column n, Hermitian.
+    /// The covariance `E{s(t_m) s*(t_n)}` of the samples of the envelope, without noise \[A^2\];
+    /// row m, column n, Hermitian.
     ///
-    /// With the covariance of the noise it gives the bound of any estimator for any profile of velocity and return along
-    /// the line. Takes about `samples^2/2` times the number of lit layers products.
+    /// With the covariance of the noise it gives the bound of any estimator for any profile of
+    /// velocity and return along the line. Takes about `samples^2/2` times the number of lit
+    /// layers products.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -71,7 +74,8 @@ impl Simulator {
     ) -> Result<Array2<Complex<f64>>, Error> {
         let shot = shot.into();
         shot.validate()?;
-        let (line, samples) = (shot.line, self.record().samples);
+        let line = shot.line;
+        let samples = self.record().samples;
         let mut scratch = Scratch::default();
         self.illuminate(line, &[], &mut scratch)?;
         let gain = self.amplitude_gain_a_sqrt_s(line);
@@ -80,25 +84,27 @@ impl Simulator {
             let lit = scratch
                 .window
                 .amplitudes_at(self.pulse(), line.layer_thickness_m, k);
-            let response = |(layer, envelope): (usize, Complex<f64>)| {
+            let mut response = Vec::with_capacity(lit.re.len());
+            for (layer, envelope) in lit.amplitudes() {
                 if line.is_masked(layer) {
-                    return Complex::ZERO;
+                    response.push(Complex::ZERO);
+                    continue;
                 }
                 let phase_rad =
                     self.phase_rate_rad_s(line.radial_velocity_m_s[layer]) * self.time_s(k);
-                envelope * Complex::cis(phase_rad) * (gain * shot.weight_per_m(layer).sqrt())
-            };
-            responses.push((
-                lit.first,
-                lit.amplitudes().map(response).collect::<Vec<_>>(),
-            ));
+                let amplitude = gain * shot.weight_per_m(layer).sqrt();
+                response.push(envelope * Complex::cis(phase_rad) * amplitude);
+            }
+            responses.push((lit.first, response));
         }
         let mut covariance = Array2::zeros((samples, samples));
         for (m, (first_m, row)) in responses.iter().enumerate() {
             for (n, (first_n, column)) in responses[..=m].iter().enumerate() {
                 let start = (*first_m).max(*first_n);
-                let (row, column) = (row.get(start - first_m..), column.get(start - first_n..));
-                let pairs = row.into_iter().flatten().zip(column.into_iter().flatten());
+                // Empty if no layer is lit at both samples.
+                let row = row.get(start - first_m..).unwrap_or(&[]);
+                let column = column.get(start - first_n..).unwrap_or(&[]);
+                let pairs = row.iter().zip(column);
                 let sum: Complex<f64> = pairs.map(|(a, b)| a * b.conj()).sum();
                 covariance[(m, n)] = sum;
                 covariance[(n, m)] = sum.conj();

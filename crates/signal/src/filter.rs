@@ -1,25 +1,25 @@
-//! The velocity that a pulsed lidar can at best report: the radial velocity weighted by the pulse, (28), corrected, or
-//! by the pulse and the window of the spectral analysis together.
+//! The velocity that a pulsed lidar can at best report: the radial velocity weighted by the pulse,
+//! (28), corrected, or by the pulse and the window of the spectral analysis together.
 //!
-//! `v_pulse(R)` weights the air at range `rho` by `|f(2 (R - rho)/c)|^2 2/c`. A window of N samples sees more: sample n sees
-//! `c t_n/2`, so `v_gate(R)` weights it by the mean of these weights with `h_n^2`. A window is placed by
-//! `R = c (t_p + N T_s/2)/2`, `t_p` the time of its first sample; its samples are then centred half a sample, `c T_s/4`,
-//! before R.
+//! `v_pulse(R)` weights the air at range `rho` by `|f(2 (R - rho)/c)|^2 2/c`. A window of N samples
+//! is longer: the range of sample n is `c t_n/2`, so `v_gate(R)` weights the air by the mean of
+//! these weights with `h_n^2`. The range of a window is `R = c (t_p + N T_s/2)/2`, `t_p` the time
+//! of its first sample; its samples are then centred half a sample, `c T_s/4`, before R.
 //!
-//! Check: a constant is kept to round-off, a linear profile is kept (seen `c T_s/4` before R through a gate), and the
-//! discrete weights agree with a fine quadrature.
+//! Check: a constant is preserved to round-off, and so is a linear profile (at `c T_s/4` before R
+//! for a gate); the discrete weights agree with a fine quadrature.
 
 use crate::error::{check, check_any, check_each, check_length, check_positive};
 use crate::{Error, Pulse, SPEED_OF_LIGHT_M_S};
 
-/// Ranges are placed between layers to this many parts of a layer, so that equal positions share their weights
-/// whatever the rounding of the range.
-const PARTS_OF_LAYER: f64 = (1_u64 << 24) as f64;
+/// Ranges are rounded to this fraction of a layer, so that equal positions between layers share
+/// their weights whatever the rounding of the range.
+const STEPS_PER_LAYER: f64 = (1_u64 << 24) as f64;
 
 /// Halvings of an interval, which exhaust double precision.
 const HALVINGS: usize = 60;
 
-/// Smallest part of the weight that must fall on air with a known velocity.
+/// Smallest fraction of the weight on air with a known velocity.
 const LEAST_KNOWN_WEIGHT: f64 = 0.5;
 
 /// Weights of the air about a range, for profiles on layers of one thickness.
@@ -29,8 +29,16 @@ pub struct RangeFilter {
     layer_thickness_m: f64,
     /// Times of the samples about `2 R/c` \[s\] and their weights, which sum to 1.
     taps: Vec<(f64, f64)>,
-    /// Weights for a range in the middle of a layer: first offset in layers, and one weight per layer.
-    centred: (i64, Vec<f64>),
+    /// Weights for a range at the centre of a layer.
+    centred: LayerWeights,
+}
+
+/// Weights of consecutive layers about a layer; they sum to 1.
+#[derive(Debug, Clone, Default)]
+struct LayerWeights {
+    /// Index of the first layer from the central one.
+    first: i64,
+    weights: Vec<f64>,
 }
 
 impl RangeFilter {
@@ -43,11 +51,13 @@ impl RangeFilter {
         Self::new(pulse.into(), vec![(0.0, 1.0)], layer_thickness_m)
     }
 
-    /// Weights of the pulse and of an analysis window with the coefficients `window`, `h_n`: `v_gate`.
+    /// Weights of the pulse and of an analysis window with the coefficients `window`,
+    /// `h_n`: `v_gate`.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] as [`RangeFilter::pulse`], or for a bad sampling rate; [`Error::Empty`] without
-    /// coefficients; [`Error::ElementOutOfRange`] if one is not finite, or all are zero.
+    /// [`Error::OutOfRange`] as [`RangeFilter::pulse`], or for a bad sampling rate;
+    /// [`Error::Empty`] without coefficients; [`Error::ElementOutOfRange`] if one is not finite,
+    /// or all are zero.
     pub fn gate(
         pulse: impl Into<Pulse>,
         window: &[f64],
@@ -60,9 +70,7 @@ impl RangeFilter {
         let largest = window
             .iter()
             .fold(0.0_f64, |largest, h| largest.max(h.abs()));
-        check_each("window", &window[..1], "not zero in every place", |_| {
-            largest > 0.0
-        })?;
+        check_each("window", &window[..1], "not all zero", |_| largest > 0.0)?;
         let half = 0.5 * window.len() as f64;
         let squares = window.iter().map(|h| (h / largest) * (h / largest));
         let sum: f64 = squares.clone().sum();
@@ -75,10 +83,8 @@ impl RangeFilter {
 
     fn new(pulse: Pulse, taps: Vec<(f64, f64)>, layer_thickness_m: f64) -> Result<Self, Error> {
         check_positive("layer_thickness_m", layer_thickness_m)?;
-        let (length_m, thickest_m) = (
-            pulse.sigma_m(),
-            pulse.sigma_m().min(pulse.max_layer_thickness_m()),
-        );
+        let length_m = pulse.sigma_m();
+        let thickest_m = length_m.min(pulse.max_layer_thickness_m());
         let allowed = "at most c sigma/2 (less for a pulse with steep edges) and above 1e-7 of it";
         check("layer_thickness_m", layer_thickness_m, allowed, |t| {
             t <= thickest_m && t > 1e-7 * length_m
@@ -87,109 +93,131 @@ impl RangeFilter {
             pulse,
             layer_thickness_m,
             taps,
-            centred: (0, Vec::new()),
+            centred: LayerWeights::default(),
         };
-        filter.centred = filter.weights(0.0);
+        filter.centred = filter.layer_weights(0.0);
         Ok(filter)
     }
 
     /// Weight of the air at `offset_m` beyond the range in question \[1/m\]; integrates to 1.
     pub fn weight_per_m(&self, offset_m: f64) -> f64 {
-        let weight = |&(time_s, weight): &(f64, f64)| {
-            let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
-            weight * self.pulse.range_weight_per_m(sample_m - offset_m)
-        };
-        self.taps.iter().map(weight).sum()
+        self.taps
+            .iter()
+            .map(|&(time_s, weight)| {
+                let sample_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
+                weight * self.pulse.range_weight_per_m(sample_m - offset_m)
+            })
+            .sum()
     }
 
-    /// Standard deviation of the weights in range \[m\]: that of the pulse and that of the window, squared and added.
+    /// Standard deviation of the weights in range \[m\]: that of the pulse and that of the window,
+    /// squared and added.
     pub fn standard_deviation_m(&self) -> f64 {
-        let moment = |power: i32| {
-            self.taps
-                .iter()
-                .map(|&(time_s, weight)| weight * time_s.powi(power))
-                .sum::<f64>()
-        };
-        let window_m = 0.5 * SPEED_OF_LIGHT_M_S * (moment(2) - moment(1).powi(2)).max(0.0).sqrt();
+        let variance_s2 = self.mean_power_of_time(2) - self.mean_power_of_time(1).powi(2);
+        let window_m = 0.5 * SPEED_OF_LIGHT_M_S * variance_s2.max(0.0).sqrt();
         window_m.hypot(self.pulse.sigma_m() * std::f64::consts::FRAC_1_SQRT_2)
     }
 
-    /// Full width of the weights at half their maximum \[m\], between the outermost ranges that have half of it: the range
-    /// resolution.
+    /// Mean over the taps of a power of their time.
+    fn mean_power_of_time(&self, power: i32) -> f64 {
+        self.taps
+            .iter()
+            .map(|&(time_s, weight)| weight * time_s.powi(power))
+            .sum()
+    }
+
+    /// Full width of the weights at half their maximum \[m\], between the outermost ranges that
+    /// have half of it: the range resolution.
     pub fn full_width_half_maximum_m(&self) -> f64 {
         let (first_m, last_m) = self.reach_m();
         let length_m = last_m - first_m;
-        // Half a sample at most, so that samples apart are not passed over.
-        let apart_m = sample_m(self.taps.get(1)) - sample_m(self.taps.first());
-        let fine_m = if apart_m > 0.0 {
-            0.5 * apart_m
-        } else {
-            length_m
-        };
-        let step_m = fine_m
-            .min(0.125 * self.pulse.sigma_m())
-            .max(5e-5 * length_m);
-        let at_m = |i: usize| first_m + i as f64 * step_m;
-        let weights: Vec<f64> = (0..=(length_m / step_m).ceil() as usize)
-            .map(|i| self.weight_per_m(at_m(i)))
+        let step_m = self.search_step_m(length_m);
+        let steps = (length_m / step_m).ceil() as usize;
+        let weights: Vec<f64> = (0..=steps)
+            .map(|i| self.weight_per_m(first_m + i as f64 * step_m))
             .collect();
         let top = weights
             .iter()
             .enumerate()
             .max_by(|a, b| a.1.total_cmp(b.1))
             .map_or(0, |(i, _)| i);
-        // The maximum by halving, between the neighbours of the highest point.
-        let (mut low_m, mut high_m) = (at_m(top) - step_m, at_m(top) + step_m);
-        for _ in 0..HALVINGS {
-            let (a_m, b_m) = (
-                low_m + (high_m - low_m) / 3.0,
-                high_m - (high_m - low_m) / 3.0,
-            );
-            if self.weight_per_m(a_m) < self.weight_per_m(b_m) {
-                low_m = a_m
-            } else {
-                high_m = b_m
-            }
-        }
-        let half = 0.5 * self.weight_per_m(0.5 * (low_m + high_m));
-        let crossing_m = |mut outside_m: f64, mut inside_m: f64| {
-            for _ in 0..HALVINGS {
-                let middle_m = 0.5 * (outside_m + inside_m);
-                if self.weight_per_m(middle_m) < half {
-                    outside_m = middle_m
-                } else {
-                    inside_m = middle_m
-                }
-            }
-            inside_m
-        };
+        let top_m = first_m + top as f64 * step_m;
+        let half = 0.5 * self.largest_weight_per_m(top_m - step_m, top_m + step_m);
         let first = weights.iter().position(|w| *w >= half).unwrap_or(top);
         let last = weights.iter().rposition(|w| *w >= half).unwrap_or(top);
-        crossing_m(at_m(last) + step_m, at_m(last)) - crossing_m(at_m(first) - step_m, at_m(first))
+        let near_m = first_m + first as f64 * step_m;
+        let far_m = first_m + last as f64 * step_m;
+        self.crossing_m(half, far_m + step_m, far_m)
+            - self.crossing_m(half, near_m - step_m, near_m)
     }
 
-    /// Filtered velocity \[m/s\] at `range_m` of a profile given by a function of range \[m\], evaluated at the layer
-    /// thickness apart. Where the function is NaN there are no scatterers; see [`RangeFilter::apply_into`].
+    /// Step \[m\] of a search over the weights, which are `length_m` long: at most half a sample,
+    /// so that the peaks of single samples are found.
+    fn search_step_m(&self, length_m: f64) -> f64 {
+        let apart_m = sample_m(self.taps.get(1)) - sample_m(self.taps.first());
+        let fine_m = if apart_m > 0.0 {
+            0.5 * apart_m
+        } else {
+            length_m
+        };
+        fine_m
+            .min(0.125 * self.pulse.sigma_m())
+            .max(5e-5 * length_m)
+    }
+
+    /// Largest weight \[1/m\] between two offsets about one maximum.
+    fn largest_weight_per_m(&self, mut low_m: f64, mut high_m: f64) -> f64 {
+        for _ in 0..HALVINGS {
+            let third_m = (high_m - low_m) / 3.0;
+            let a_m = low_m + third_m;
+            let b_m = high_m - third_m;
+            if self.weight_per_m(a_m) < self.weight_per_m(b_m) {
+                low_m = a_m;
+            } else {
+                high_m = b_m;
+            }
+        }
+        self.weight_per_m(0.5 * (low_m + high_m))
+    }
+
+    /// Offset \[m\] between `outside_m` and `inside_m` at which the weight crosses `level_per_m`.
+    fn crossing_m(&self, level_per_m: f64, mut outside_m: f64, mut inside_m: f64) -> f64 {
+        for _ in 0..HALVINGS {
+            let middle_m = 0.5 * (outside_m + inside_m);
+            if self.weight_per_m(middle_m) < level_per_m {
+                outside_m = middle_m;
+            } else {
+                inside_m = middle_m;
+            }
+        }
+        inside_m
+    }
+
+    /// Filtered velocity \[m/s\] at `range_m` of a profile given by a function of range \[m\],
+    /// evaluated at the layer thickness apart. Where the function is NaN there are no scatterers;
+    /// see [`RangeFilter::apply_into`].
     pub fn at_range(&self, range_m: f64, radial_velocity_m_s: impl Fn(f64) -> f64) -> f64 {
-        let (first, weights) = &self.centred;
-        let offset_m = |i: usize| (first + i as i64) as f64 * self.layer_thickness_m;
-        weighted_mean(
-            weights,
-            (0..weights.len()).map(|i| radial_velocity_m_s(range_m + offset_m(i))),
-        )
+        let LayerWeights { first, weights } = &self.centred;
+        let velocities_m_s = (0..weights.len()).map(|i| {
+            let offset_m = (first + i as i64) as f64 * self.layer_thickness_m;
+            radial_velocity_m_s(range_m + offset_m)
+        });
+        weighted_mean(weights, velocities_m_s)
     }
 
-    /// Writes the filtered velocity at each of `range_m` of a profile on layers whose centres are `first_range_m`,
-    /// `first_range_m + layer_thickness_m` and so on.
+    /// Writes the filtered velocity at each of `range_m` of a profile on layers whose centres are
+    /// `first_range_m`, `first_range_m + layer_thickness_m` and so on.
     ///
-    /// Layers with the velocity NaN (masked), and the air beyond both ends of the profile, return nothing: the weights
-    /// of the others are scaled up to 1. Where less than half of the weight is left, the result is NaN.
+    /// Layers with the velocity NaN (masked), and the air beyond both ends of the profile, return
+    /// nothing: the weights of the others are scaled up to 1. Where less than half of the weight
+    /// remains, the result is NaN.
     ///
-    /// Fastest if the ranges lie on centres of layers, or all at the same place between two.
+    /// Fastest if the ranges lie on centres of layers, or all at the same position between two.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] if `out_m_s` has not one place per range; [`Error::Empty`] for an empty profile;
-    /// [`Error::OutOfRange`] for a first range, [`Error::ElementOutOfRange`] for a range that is not finite.
+    /// [`Error::LengthMismatch`] if `out_m_s` does not have one element per range; [`Error::Empty`]
+    /// for an empty profile; [`Error::OutOfRange`] for a first range, [`Error::ElementOutOfRange`]
+    /// for a range that is not finite.
     pub fn apply_into(
         &self,
         first_range_m: f64,
@@ -200,7 +228,8 @@ impl RangeFilter {
         check("first_range_m", first_range_m, "finite", |_| true)?;
         check_length("out_m_s", out_m_s.len(), range_m.len())?;
         check_any("radial_velocity_m_s", radial_velocity_m_s.len())?;
-        let mut between = (0.0, self.centred.clone());
+        let mut fraction = 0.0;
+        let mut shifted = self.centred.clone();
         for (index, (&range_m, out)) in range_m.iter().zip(out_m_s).enumerate() {
             if !range_m.is_finite() {
                 return Err(Error::ElementOutOfRange {
@@ -212,16 +241,13 @@ impl RangeFilter {
             }
             let position = (range_m - first_range_m) / self.layer_thickness_m;
             let nearest = position.round();
-            let part = ((position - nearest) * PARTS_OF_LAYER).round() / PARTS_OF_LAYER;
-            if part != between.0 {
-                between = (part, self.weights(part));
+            let next_fraction = ((position - nearest) * STEPS_PER_LAYER).round() / STEPS_PER_LAYER;
+            if next_fraction != fraction {
+                fraction = next_fraction;
+                shifted = self.layer_weights(fraction);
             }
-            let (offset, weights) = &between.1;
-            *out = mean_of_profile(
-                weights,
-                (nearest as i64).saturating_add(*offset),
-                radial_velocity_m_s,
-            );
+            let first = (nearest as i64).saturating_add(shifted.first);
+            *out = mean_of_profile(&shifted.weights, first, radial_velocity_m_s);
         }
         Ok(())
     }
@@ -235,27 +261,29 @@ impl RangeFilter {
         )
     }
 
-    /// Weights for a range that lies `part` of a layer beyond the centre of one: offset of the first in layers from that
-    /// one, and one weight per layer; they sum to 1.
-    fn weights(&self, part: f64) -> (i64, Vec<f64>) {
+    /// Weights for a range that lies a fraction of a layer beyond the centre of one.
+    fn layer_weights(&self, fraction: f64) -> LayerWeights {
         let (first_m, last_m) = self.reach_m();
         let first = (first_m / self.layer_thickness_m) as i64 - 1;
         let last = (last_m / self.layer_thickness_m) as i64 + 1;
         let mut weights: Vec<f64> = (first..=last)
-            .map(|l| self.weight_per_m((l as f64 - part) * self.layer_thickness_m))
+            .map(|l| self.weight_per_m((l as f64 - fraction) * self.layer_thickness_m))
             .collect();
         let sum: f64 = weights.iter().sum();
-        weights.iter_mut().for_each(|weight| *weight /= sum);
-        (first, weights)
+        for weight in &mut weights {
+            *weight /= sum;
+        }
+        LayerWeights { first, weights }
     }
 }
 
-/// Offset \[m\] of the range that a sample sees.
+/// Offset \[m\] of the range of a sample.
 fn sample_m(tap: Option<&(f64, f64)>) -> f64 {
     0.5 * SPEED_OF_LIGHT_M_S * tap.map_or(0.0, |&(time_s, _)| time_s)
 }
 
-/// Mean of the part of a profile that the weights cover; the first weight belongs to layer `first`, which may be negative.
+/// Mean of the part of a profile that the weights cover; the first weight belongs to layer `first`,
+/// which may be negative.
 fn mean_of_profile(weights: &[f64], first: i64, radial_velocity_m_s: &[f64]) -> f64 {
     let layers = radial_velocity_m_s.len() as i64;
     let start = first.clamp(0, layers);
@@ -272,7 +300,8 @@ fn mean_of_profile(weights: &[f64], first: i64, radial_velocity_m_s: &[f64]) -> 
 
 /// Weighted mean of the velocities that are numbers; NaN if they carry too little of the weight.
 fn weighted_mean(weights: &[f64], velocities_m_s: impl Iterator<Item = f64>) -> f64 {
-    let (mut sum, mut known) = (0.0, 0.0);
+    let mut sum = 0.0;
+    let mut known = 0.0;
     for (weight, velocity) in weights.iter().zip(velocities_m_s) {
         if !velocity.is_nan() {
             sum += weight * velocity;
@@ -357,7 +386,8 @@ mod tests {
 
     #[test]
     fn a_parabola_rises_by_half_the_squared_length_of_the_pulse() {
-        // The second moment of |f(2 x/c)|^2 2/c is (c sigma/2)^2/2: fails if the Jacobian or a factor 2 were wrong.
+        // The second moment of |f(2 x/c)|^2 2/c is (c sigma/2)^2/2: fails if the Jacobian or a
+        // factor 2 were wrong.
         let filter = RangeFilter::pulse(pulse(), 0.2).unwrap();
         let at_centre = filter.at_range(500.0, |rho| (rho - 500.0).powi(2));
         assert_relative_eq!(

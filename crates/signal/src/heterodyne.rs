@@ -1,15 +1,17 @@
 //! The heterodyne signal of one pulse along one line of sight, equations (6)-(15).
 //!
-//! `s(t_k) = sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR) sum_l f(t_k - 2 R_l/c) b_l exp(-j 4 pi v_l t_k/lambda)`, (15),
-//! corrected: by `sqrt 2`, so that (14) holds; `sqrt(DeltaR)`, since layers are independent; the sum centred on the range
-//! that sample k sees. `b_l` is circular complex normal of variance `weight_per_m`, drawn for each pulse and the same
-//! throughout it. Air moving away lowers the frequency, `f = f_c - 2 v/lambda`.
+//! `s(t_k) = sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR) sum_l f(t_k - 2 R_l/c) b_l exp(-j 4 pi v_l
+//! t_k/lambda)`, (15), corrected: by `sqrt 2`, so that (14) holds; `sqrt(DeltaR)`, since layers are
+//! independent; the sum centred on the range that sample k sees. `b_l` is circular complex normal
+//! of variance `weight_per_m`, drawn for each pulse and the same throughout it. Air moving away
+//! lowers the frequency, `f = f_c - 2 v/lambda`.
 //!
-//! Each layer is a phasor that is rotated once per sample; it is computed afresh when the pulse reaches the layer and
-//! every 1024 samples.
+//! Each layer is a phasor that is rotated once per sample; it is computed afresh when the pulse
+//! reaches the layer and every 1024 samples.
 //!
-//! Check: [`literal_envelope`](crate::literal::literal_envelope) is the sum as written; the mean power is (14), whatever the layer
-//! thickness; the covariance in a uniform wind is `exp(-tau^2/(4 sigma^2)) exp(-j 4 pi v tau/lambda)`.
+//! Check: [`literal_envelope`](crate::literal::literal_envelope) is the sum as written; the mean
+//! power is (14), whatever the layer thickness; the covariance in a uniform wind is
+//! `exp(-tau^2/(4 sigma^2)) exp(-j 4 pi v tau/lambda)`.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 use std::fmt;
@@ -40,7 +42,8 @@ pub struct Scratch {
     noise: NoiseScratch,
 }
 
-/// Makes records: pulse, receiver and sampling times, planned once and used for every line and pulse.
+/// Makes records: pulse, receiver and sampling times, planned once and used for every
+/// line and pulse.
 ///
 /// Shared between threads; each needs its own [`Scratch`] and random generator.
 #[derive(Clone)]
@@ -72,13 +75,15 @@ impl Simulator {
     /// Plans the records of `pulse` and `receiver`.
     ///
     /// # Errors
-    /// As [`Receiver::validate`]; [`Error::OutOfRange`] for a record without samples or a first time that is not finite.
+    /// As [`Receiver::validate`]; [`Error::OutOfRange`] for a record without samples or a first
+    /// time that is not finite.
     pub fn new(pulse: impl Into<Pulse>, receiver: Receiver, record: Record) -> Result<Self, Error> {
         receiver.validate()?;
         Self::for_baseband(pulse, receiver, record)
     }
 
-    /// Plans complex records, those of `Complex<f64>`: the band may be wider than a real current of this rate holds.
+    /// Plans complex records, those of `Complex<f64>`: the band may be wider than a real current of
+    /// this rate holds.
     ///
     /// # Errors
     /// As [`Simulator::new`], with [`Receiver::validate_baseband`].
@@ -96,14 +101,13 @@ impl Simulator {
         )?;
         check("samples", record.samples as f64, "1 or more", |n| n >= 1.0)?;
         let interval_s = 1.0 / receiver.sample_rate_hz;
-        let carrier = (0..record.samples)
-            .map(|k| {
-                let time_s = record.time_of_first_sample_s + k as f64 * interval_s;
-                // Whole cycles are taken off before the multiplication, which keeps the phase exact for late samples.
-                let cycles = receiver.intermediate_frequency_hz * time_s;
-                Complex::cis(2.0 * PI * (cycles - cycles.floor()))
-            })
-            .collect();
+        let mut carrier = Vec::with_capacity(record.samples);
+        for k in 0..record.samples {
+            let time_s = record.time_of_first_sample_s + k as f64 * interval_s;
+            // Without the whole cycles the phase is exact for late samples, too.
+            let cycles = receiver.intermediate_frequency_hz * time_s;
+            carrier.push(Complex::cis(2.0 * PI * (cycles - cycles.floor())));
+        }
         let noise = RealNoise::new(&receiver, record.samples);
         let baseband_noise = BasebandNoise::new(&receiver, record.samples);
         let pulse = pulse.into();
@@ -139,18 +143,19 @@ impl Simulator {
         self.record.time_of_first_sample_s + k as f64 / self.receiver.sample_rate_hz
     }
 
-    /// Writes the samples of one pulse \[A\]: the measured current (12) into `f64`, both quadratures of the baseband into
-    /// `Complex<f64>`; see [`Sample`].
+    /// Writes the samples of one pulse \[A\]: the measured current (12) into `f64`, both
+    /// quadratures of the baseband into `Complex<f64>`; see [`Sample`].
     ///
-    /// Draws, in this order: for each layer of the line, first to last, the real and the imaginary part of its speckle
-    /// (masked and weightless layers too, so that they do not shift the others); then the noise: none for
-    /// [`NoiseModel::None`](crate::NoiseModel::None), one normal number per real number for `White`, two per frequency
-    /// for `BandLimited`.
+    /// Draws, in this order: for each layer of the line, first to last, the real and the imaginary
+    /// part of its speckle (masked and weightless layers too, so that they do not shift the
+    /// others); then the noise: none for [`NoiseModel::None`](crate::NoiseModel::None), one normal
+    /// number per real number for `White`, two per frequency for `BandLimited`.
     ///
     /// # Errors
     /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
-    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use; [`Error::Overflow`];
-    /// [`Error::BandBeyondNyquist`] if the simulator was planned for complex records and a real one does not hold the band.
+    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use;
+    /// [`Error::Overflow`]; [`Error::BandBeyondNyquist`] if the simulator was planned for complex
+    /// records and a real one does not hold the band.
     pub fn record_into<'a, T: Sample, R: Rng + ?Sized>(
         &self,
         shot: impl Into<Shot<'a>>,
@@ -171,7 +176,8 @@ impl Simulator {
         result
     }
 
-    /// The samples of one pulse \[A\], as [`Simulator::record_into`] writes them, in memory of their own.
+    /// The samples of one pulse \[A\], as [`Simulator::record_into`] writes them, in
+    /// memory of their own.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -185,10 +191,12 @@ impl Simulator {
         Ok(samples_a)
     }
 
-    /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise; with the phases of the laser, the
-    /// reflex of the telescope and the echo of the pulse before, if the receiver or the shot has them.
+    /// Writes the complex envelope `s(t_k)` of one pulse, (15), corrected \[A\], without noise;
+    /// with the phases of the laser, the reflex of the telescope and the echo of the pulse before,
+    /// if the receiver or the shot has them.
     ///
-    /// Draws the speckle as [`Simulator::record_into`] does; for the others the shot has a seed of its own.
+    /// Draws the speckle as [`Simulator::record_into`] does; for the others the shot has a
+    /// seed of its own.
     ///
     /// # Errors
     /// As [`Simulator::record_into`].
@@ -204,18 +212,21 @@ impl Simulator {
         check_length("out_a", out_a.len(), self.record.samples)?;
         let mut speckle = std::mem::take(&mut scratch.speckle);
         draw_speckle(shot.line.layers(), rng, &mut speckle);
-        let result = match self.is_plain(&shot) {
-            true => self.sum_into(shot, &speckle, &[], scratch, out_a),
-            false => self.sum_with_impairments_into(shot, &speckle, scratch, out_a),
+        let result = if self.is_plain(&shot) {
+            self.sum_into(shot, &speckle, &[], scratch, out_a)
+        } else {
+            self.sum_with_impairments_into(shot, &speckle, scratch, out_a)
         };
         scratch.speckle = speckle;
         result
     }
 
-    /// Writes the envelope (15) for given speckle amplitudes `g_l` (mean square 1), one per layer \[A\].
+    /// Writes the envelope (15) for given speckle amplitudes `g_l` (mean square 1), one
+    /// per layer \[A\].
     ///
     /// # Errors
-    /// As [`Simulator::record_into`]; [`Error::LengthMismatch`] if there is not one amplitude per layer.
+    /// As [`Simulator::record_into`]; [`Error::LengthMismatch`] if there is not one
+    /// amplitude per layer.
     pub fn envelope_of_speckle_into<'a>(
         &self,
         shot: impl Into<Shot<'a>>,
@@ -230,8 +241,8 @@ impl Simulator {
         self.sum_into(shot, speckle, &[], scratch, out_a)
     }
 
-    /// The sum (15) of a shot that is valid, with one amplitude per layer; `phases` are those of the laser
-    /// over the lit layers, none for a quiet one.
+    /// The sum (15) of a shot that is valid, with one amplitude per layer; `phases` are those of
+    /// the laser over the lit layers, none for a quiet one.
     pub(crate) fn sum_into(
         &self,
         shot: Shot<'_>,
@@ -258,7 +269,8 @@ impl Simulator {
         check_overflow("out_a", out_a.iter().map(|s| s.is_finite()))
     }
 
-    /// `sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR)`: what `f b_l` is multiplied with in (15) \[A s^1/2 m^1/2\].
+    /// `sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR)`: what `f b_l` is multiplied with in (15)
+    /// \[A s^1/2 m^1/2\].
     pub(crate) fn amplitude_gain_a_sqrt_s(&self, line: &LineOfSight) -> f64 {
         let gain = self.receiver.heterodyne_gain_a2_w() * self.pulse.energy_j();
         (gain * line.layer_thickness_m).sqrt()
@@ -269,7 +281,8 @@ impl Simulator {
         -4.0 * PI * radial_velocity_m_s / self.receiver.wavelength_m
     }
 
-    /// Finds which layers of a line the pulse lights at each sample; `phases` as in [`Simulator::sum_into`].
+    /// Finds which layers of a line the pulse lights at each sample; `phases` as in
+    /// [`Simulator::sum_into`].
     pub(crate) fn illuminate(
         &self,
         line: &LineOfSight,
@@ -285,8 +298,8 @@ impl Simulator {
         )
     }
 
-    /// Sets the phasors of all layers that are lit in some samples, each as it is at the first of them that lights it, and their
-    /// rotation per sample; nothing returns from a masked layer.
+    /// Sets the phasors of all layers that are lit in some samples, each as it is at the first of
+    /// them that lights it, and their rotation per sample; nothing returns from a masked layer.
     fn renew(
         &self,
         shot: Shot<'_>,
@@ -306,16 +319,16 @@ impl Simulator {
             for (layer, g) in lit.clone().zip(&speckle[lit]) {
                 let amplitude = gain * shot.weight_per_m(layer).sqrt() * g;
                 let rate_rad_s = self.phase_rate_rad_s(line.radial_velocity_m_s[layer]);
-                let (phasor, rotation) = match rate_rad_s.is_nan() {
-                    true => (Complex::ZERO, Complex::ONE),
-                    false => (
-                        amplitude * Complex::cis(rate_rad_s * time_s),
-                        Complex::cis(rate_rad_s * interval_s),
-                    ),
-                };
-                (phasors.re[layer], phasors.im[layer]) = (phasor.re, phasor.im);
-                (phasors.rotation_re[layer], phasors.rotation_im[layer]) =
-                    (rotation.re, rotation.im);
+                let mut phasor = Complex::ZERO;
+                let mut rotation = Complex::ONE;
+                if !rate_rad_s.is_nan() {
+                    phasor = amplitude * Complex::cis(rate_rad_s * time_s);
+                    rotation = Complex::cis(rate_rad_s * interval_s);
+                }
+                phasors.re[layer] = phasor.re;
+                phasors.im[layer] = phasor.im;
+                phasors.rotation_re[layer] = rotation.re;
+                phasors.rotation_im[layer] = rotation.im;
             }
             next = next.max(end);
         }

@@ -77,8 +77,8 @@ impl Simulator {
         line: &LineOfSight,
         rng: &mut Xoshiro256PlusPlus,
     ) -> Result<Vec<Complex<f64>>, Error> {
-        let mut phases =
-            vec![Complex::ONE; lit_layers(reach(self.pulse(), line.layer_thickness_m)?)];
+        let (near, far) = reach(self.pulse(), line.layer_thickness_m)?;
+        let mut phases = vec![Complex::ONE; lit_layers(near, far)];
         let layer_s = 2.0 * line.layer_thickness_m / SPEED_OF_LIGHT_M_S;
         walk(
             self.receiver().front_end.linewidth_hz,

@@ -1,7 +1,9 @@
-//! The inner loop of the heterodyne sum: one sample from the rotating phasors of all layers that the pulse lights.
+//! The inner loop of the heterodyne sum: one sample from the rotating phasors of all layers that
+//! the pulse lights.
 //!
-//! The loop is compiled for several instruction sets and the best is chosen at run time. Products and sums are kept
-//! apart (no fused operation) and lanes are fixed, so every version gives the same bits.
+//! The loop is compiled for several instruction sets and the best is chosen at run time.
+//! Products and sums are kept apart (no fused operation) and lanes are fixed, so every version
+//! gives the same bits.
 //!
 //! Check: the tests of `heterodyne` against the literal sum.
 
@@ -12,7 +14,8 @@ use crate::window::Lit;
 /// Sums that run side by side: two AVX-512 registers, four AVX2, eight SSE2.
 const LANES: usize = 16;
 
-/// Phasors of the layers, real and imaginary parts apart, and their rotation in one sampling interval.
+/// Phasors of the layers, real and imaginary parts apart, and their rotation in one
+/// sampling interval.
 #[derive(Debug, Default)]
 pub(crate) struct Phasors {
     pub(crate) re: Vec<f64>,
@@ -33,15 +36,16 @@ impl Phasors {
         }
     }
 
-    /// `sum_l envelope[l - first] phasor[l]` over the layers of `envelope`, then rotates these phasors by one sampling
-    /// interval.
+    /// `sum_l envelope[l - first] phasor[l]` over the layers of `envelope`, then rotates these
+    /// phasors by one sampling interval.
     pub(crate) fn sum_and_rotate(&mut self, envelope: Lit<'_>) -> (f64, f64) {
         let window = envelope.first..envelope.first + envelope.re.len();
-        let phasors = (&mut self.re[window.clone()], &mut self.im[window.clone()]);
         sum_and_rotate(
             envelope,
-            phasors,
-            (&self.rotation_re[window.clone()], &self.rotation_im[window]),
+            &mut self.re[window.clone()],
+            &mut self.im[window.clone()],
+            &self.rotation_re[window.clone()],
+            &self.rotation_im[window],
         )
     }
 }
@@ -49,63 +53,75 @@ impl Phasors {
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn sum_and_rotate(
     envelope: Lit<'_>,
-    phasors: (&mut [f64], &mut [f64]),
-    rotation: (&[f64], &[f64]),
+    re: &mut [f64],
+    im: &mut [f64],
+    rotation_re: &[f64],
+    rotation_im: &[f64],
 ) -> (f64, f64) {
-    match envelope.im.is_empty() {
-        true => sum::<false>((envelope.re, envelope.re), phasors, rotation),
-        false => sum::<true>((envelope.re, envelope.im), phasors, rotation),
+    if envelope.im.is_empty() {
+        sum::<false>(envelope.re, envelope.re, re, im, rotation_re, rotation_im)
+    } else {
+        sum::<true>(envelope.re, envelope.im, re, im, rotation_re, rotation_im)
     }
 }
 
-/// The sum for an envelope whose imaginary part counts if it is `COMPLEX`.
+/// The sum for an envelope with the parts `a` and `b`; `b` counts if it is `COMPLEX`.
 #[inline(always)]
 fn sum<const COMPLEX: bool>(
-    envelope: (&[f64], &[f64]),
-    (re, im): (&mut [f64], &mut [f64]),
-    rotation: (&[f64], &[f64]),
+    a: &[f64],
+    b: &[f64],
+    re: &mut [f64],
+    im: &mut [f64],
+    rotation_re: &[f64],
+    rotation_im: &[f64],
 ) -> (f64, f64) {
-    let (a, a_rest) = envelope.0.as_chunks::<LANES>();
-    let (b, b_rest) = envelope.1.as_chunks::<LANES>();
+    let (a, a_rest) = a.as_chunks::<LANES>();
+    let (b, b_rest) = b.as_chunks::<LANES>();
     let (re, re_rest) = re.as_chunks_mut::<LANES>();
     let (im, im_rest) = im.as_chunks_mut::<LANES>();
-    let (rotation_re, rotation_re_rest) = rotation.0.as_chunks::<LANES>();
-    let (rotation_im, rotation_im_rest) = rotation.1.as_chunks::<LANES>();
-    let mut sums = ([0.0; LANES], [0.0; LANES]);
+    let (rotation_re, rotation_re_rest) = rotation_re.as_chunks::<LANES>();
+    let (rotation_im, rotation_im_rest) = rotation_im.as_chunks::<LANES>();
+    let mut sums = [[0.0; LANES]; 2];
     let layers = re
         .iter_mut()
         .zip(im)
         .zip(rotation_re.iter().zip(rotation_im));
     for ((a, b), ((re, im), (rotation_re, rotation_im))) in a.iter().zip(b).zip(layers) {
-        add::<COMPLEX, LANES>((a, b), (re, im), (rotation_re, rotation_im), &mut sums);
+        add::<COMPLEX, LANES>(a, b, re, im, rotation_re, rotation_im, &mut sums);
     }
-    let mut total = ([sums.0.iter().sum::<f64>()], [sums.1.iter().sum::<f64>()]);
+    let mut total = sums.map(|lanes| [lanes.iter().sum::<f64>()]);
     let layers = re_rest
         .iter_mut()
         .zip(im_rest)
         .zip(rotation_re_rest.iter().zip(rotation_im_rest));
     for ((a, b), ((re, im), (rotation_re, rotation_im))) in a_rest.iter().zip(b_rest).zip(layers) {
-        let phasor = (std::array::from_mut(re), std::array::from_mut(im));
         add::<COMPLEX, 1>(
-            (&[*a], &[*b]),
-            phasor,
-            (&[*rotation_re], &[*rotation_im]),
+            &[*a],
+            &[*b],
+            std::array::from_mut(re),
+            std::array::from_mut(im),
+            &[*rotation_re],
+            &[*rotation_im],
             &mut total,
         );
     }
-    (total.0[0], total.1[0])
+    (total[0][0], total[1][0])
 }
 
 /// Adds envelope times phasor of `N` layers, each to a sum of its own, and rotates the phasors.
 #[inline(always)]
 fn add<const COMPLEX: bool, const N: usize>(
-    (a, b): (&[f64; N], &[f64; N]),
-    (re, im): (&mut [f64; N], &mut [f64; N]),
-    (rotation_re, rotation_im): (&[f64; N], &[f64; N]),
-    (sum_re, sum_im): &mut ([f64; N], [f64; N]),
+    a: &[f64; N],
+    b: &[f64; N],
+    re: &mut [f64; N],
+    im: &mut [f64; N],
+    rotation_re: &[f64; N],
+    rotation_im: &[f64; N],
+    [sum_re, sum_im]: &mut [[f64; N]; 2],
 ) {
     for i in 0..N {
-        let (x, y) = (re[i], im[i]);
+        let x = re[i];
+        let y = im[i];
         sum_re[i] += if COMPLEX {
             a[i] * x - b[i] * y
         } else {

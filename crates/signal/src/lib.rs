@@ -1,9 +1,11 @@
-//! The signal of a coherent Doppler lidar: from the air along a line of sight to the sampled detector current.
+//! The signal of a coherent Doppler lidar: from the air along a line of sight to the sampled
+//! detector current.
 //!
-//! Each thin layer of air returns light with a random complex amplitude (speckle), shifted by its radial velocity; the
-//! receiver sees the sum over the layers that the pulse lights, and shot noise: equations (6)-(15) of the chapter this
-//! project follows, with its errors corrected. The crate also computes the velocity that such a measurement can at best
-//! report: the radial velocity weighted by the pulse, (28). SI units, `f64`; a unit is the suffix of each name.
+//! Each thin layer of air returns light with a random complex amplitude (speckle), shifted by its
+//! radial velocity; the receiver sees the sum over the layers that the pulse lights, and shot
+//! noise: equations (6)-(15) of the chapter this project follows, with its errors corrected. The
+//! crate also computes the velocity that such a measurement can at best report: the radial velocity
+//! weighted by the pulse, (28). SI units, `f64`; a unit is the suffix of each name.
 //!
 //! ```
 //! use rand::SeedableRng;
@@ -48,7 +50,8 @@
 //! | `parallel` | loops on the caller's thread pool |
 //! | `filter` | [`RangeFilter`]: velocity profiles weighted by pulse and gate, (28) |
 //!
-//! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the result do not depend on it.
+//! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the
+//! result do not depend on it.
 
 pub mod constants;
 pub mod digitise;

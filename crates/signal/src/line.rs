@@ -1,7 +1,8 @@
-//! What a line of sight shows to the receiver: radial velocity and return of each thin layer of air, and how thin a layer
-//! must be.
+//! What a line of sight shows to the receiver: radial velocity and return of each thin layer of
+//! air, and how thin a layer must be.
 //!
-//! Check: the thickness divides the range step of one sample and obeys the rule of the steepest gradient.
+//! Check: the thickness divides the range step of one sample and obeys the rule of the
+//! steepest gradient.
 
 use crate::error::{check, check_amounts, check_any, check_each, check_length, check_positive};
 use crate::{Error, SPEED_OF_LIGHT_M_S};
@@ -11,12 +12,15 @@ use crate::{Error, SPEED_OF_LIGHT_M_S};
 pub struct LineOfSight {
     /// Range of the centre of the first layer \[m\].
     pub first_range_m: f64,
-    /// Thickness of each layer, `DeltaR` \[m\]; layer `l` is centred on `first_range_m + l layer_thickness_m`.
+    /// Thickness of each layer, `DeltaR` \[m\]; layer `l` is centred on
+    /// `first_range_m + l layer_thickness_m`.
     pub layer_thickness_m: f64,
-    /// Radial velocity of each layer \[m/s\], positive away from the lidar. NaN: no scatterers there (masked).
+    /// Radial velocity of each layer \[m/s\], positive away from the lidar. NaN: no scatterers
+    /// there (masked).
     pub radial_velocity_m_s: Vec<f64>,
-    /// Return of each layer per metre of range, `K^2 beta A_R eta_s/R^2` \[1/m\], (9): `beta` in 1/(m sr) times the solid
-    /// angle `A_R/R^2` in sr, the round-trip transmission and the efficiency. Finite and not negative.
+    /// Return of each layer per metre of range, `K^2 beta A_R eta_s/R^2` \[1/m\], (9): `beta` in
+    /// 1/(m sr) times the solid angle `A_R/R^2` in sr, the round-trip transmission and the
+    /// efficiency. Finite and not negative.
     pub weight_per_m: Vec<f64>,
 }
 
@@ -24,9 +28,9 @@ impl LineOfSight {
     /// Says what is wrong with the line, if anything.
     ///
     /// # Errors
-    /// [`Error::Empty`] without layers; [`Error::LengthMismatch`] if velocities and weights differ in number;
-    /// [`Error::OutOfRange`], [`Error::ElementOutOfRange`] for values that are not allowed (an infinite velocity, a
-    /// weight that is negative or not finite).
+    /// [`Error::Empty`] without layers; [`Error::LengthMismatch`] if velocities and weights differ
+    /// in number; [`Error::OutOfRange`], [`Error::ElementOutOfRange`] for values that are not
+    /// allowed (an infinite velocity, a weight that is negative or not finite).
     pub fn validate(&self) -> Result<(), Error> {
         check("first_range_m", self.first_range_m, "finite", |_| true)?;
         check_positive("layer_thickness_m", self.layer_thickness_m)?;
@@ -74,13 +78,14 @@ pub struct LayerLimits {
 }
 
 impl LayerLimits {
-    /// The largest thickness \[m\] that divides the range step of a sample, `c/(2 F_s)`, and is at most
-    /// `lambda/(16 sigma g_max)` and `c sigma/2`.
+    /// The largest thickness \[m\] that divides the range step of a sample, `c/(2 F_s)`, and is at
+    /// most `lambda/(16 sigma g_max)` and `c sigma/2`.
     ///
-    /// The second limit makes the scatterers of neighbouring layers overlap in frequency: two layers then drift apart by
-    /// less than an eighth of a cycle while the pulse passes. Thicker layers give errors of up to 15 % inside a vortex core.
-    /// With the third, the sum over the layers of a pulse is its integral within 1e-4, however short the pulse.
-    /// The division makes the Gaussian weights repeat from sample to sample, which the fast summation uses.
+    /// The second limit makes the scatterers of neighbouring layers overlap in frequency: two
+    /// layers then drift apart by less than an eighth of a cycle while the pulse passes. Thicker
+    /// layers give errors of up to 15 % inside a vortex core. With the third, the sum over the
+    /// layers of a pulse is its integral within 1e-4, however short the pulse. The division makes
+    /// the Gaussian weights repeat from sample to sample, which the fast summation uses.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if a field or `sigma_s` is not positive (the gradient may be zero).

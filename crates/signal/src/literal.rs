@@ -1,6 +1,7 @@
 //! The heterodyne sum term by term, as (15) is written: the oracle of the fast form.
 //!
-//! Check: nothing here is shared with the fast form but the pulse, the receiver and the rule for `L_c`.
+//! Check: nothing here is shared with the fast form but the pulse, the receiver and the
+//! rule for `L_c`.
 
 use std::f64::consts::PI;
 
@@ -10,8 +11,8 @@ use crate::error::check_length;
 use crate::window::reach;
 use crate::{Error, LineOfSight, SPEED_OF_LIGHT_M_S, Simulator};
 
-/// The complex envelope \[A\] of (15), corrected, by direct evaluation of every term: some 40 times slower than
-/// [`Simulator::envelope_of_speckle_into`], for tests.
+/// The complex envelope \[A\] of (15), corrected, by direct evaluation of every term: some 40 times
+/// slower than [`Simulator::envelope_of_speckle_into`], for tests.
 ///
 /// `speckle` holds the amplitude `g_l` of each layer (mean square 1).
 ///
@@ -24,14 +25,16 @@ pub fn literal_envelope(
 ) -> Result<Vec<Complex<f64>>, Error> {
     line.validate()?;
     check_length("speckle", speckle.len(), line.layers())?;
-    let (pulse, receiver) = (simulator.pulse(), simulator.receiver());
+    let pulse = simulator.pulse();
+    let receiver = simulator.receiver();
     let thickness_m = line.layer_thickness_m;
     let (near, far) = reach(pulse, thickness_m)?;
     let scale = (receiver.heterodyne_gain_a2_w() * pulse.energy_j() * thickness_m).sqrt();
-    let sample = |k: usize| {
+    let mut envelope_a = Vec::with_capacity(simulator.record().samples);
+    for k in 0..simulator.record().samples {
         let time_s = simulator.time_s(k);
-        let seen_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
-        let centre = ((seen_m - line.first_range_m) / thickness_m).round();
+        let range_m = 0.5 * SPEED_OF_LIGHT_M_S * time_s;
+        let centre = ((range_m - line.first_range_m) / thickness_m).round();
         let mut sum = Complex::ZERO;
         for (layer, g) in speckle.iter().enumerate() {
             let velocity_m_s = line.radial_velocity_m_s[layer];
@@ -44,7 +47,7 @@ pub fn literal_envelope(
             let phase_rad = -4.0 * PI * velocity_m_s * time_s / receiver.wavelength_m;
             sum += pulse.envelope_per_sqrt_s(time_s - delay_s) * b * Complex::cis(phase_rad);
         }
-        scale * sum
-    };
-    Ok((0..simulator.record().samples).map(sample).collect())
+        envelope_a.push(scale * sum);
+    }
+    Ok(envelope_a)
 }

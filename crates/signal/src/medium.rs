@@ -1,7 +1,8 @@
-//! The air as the laser sees it: backscatter and extinction by range, and the return (9) that follows.
+//! The air as the laser sees it: backscatter and extinction by range, and the return
+//! (9) that follows.
 //!
-//! Check: uniform air gives the closed form; extinction integrates exactly, so a table of more points with the same values
-//! changes nothing; a cloud darkens what lies behind it.
+//! Check: uniform air gives the closed form; extinction integrates exactly, so a table of more
+//! points with the same values changes nothing; a cloud darkens what lies behind it.
 
 use crate::error::{check_each, check_positive};
 use crate::table::{check_ranges, check_values, locate, value};
@@ -19,12 +20,13 @@ pub struct Medium {
 }
 
 impl Medium {
-    /// Air that changes with range. From the lidar to the first range of the table it is as at the first range; beyond the
-    /// last it is unknown.
+    /// Air that changes with range. From the lidar to the first range of the table it is as at the
+    /// first range; beyond the last it is unknown.
     ///
     /// # Errors
-    /// [`Error::Empty`] without ranges; [`Error::ElementOutOfRange`] for ranges that are negative or do not increase, or a
-    /// value that is negative or not finite; [`Error::LengthMismatch`] unless there is one value per range.
+    /// [`Error::Empty`] without ranges; [`Error::ElementOutOfRange`] for ranges that are negative
+    /// or do not increase, or a value that is negative or not finite; [`Error::LengthMismatch`]
+    /// unless there is one value per range.
     pub fn new(
         range_m: Vec<f64>,
         backscatter_per_m_sr: Vec<f64>,
@@ -65,40 +67,35 @@ impl Medium {
 
     /// The air of the chapter's Table 2: 1e-7 per m and sr, an extinction of 7e-5 per m.
     pub fn table2() -> Self {
-        let (range_m, depth) = (vec![0.0], vec![0.0]);
         Self {
-            range_m,
+            range_m: vec![0.0],
             backscatter_per_m_sr: vec![1e-7],
             extinction_per_m: vec![7e-5],
-            depth,
+            depth: vec![0.0],
             uniform: true,
         }
     }
 
     /// Backscatter `beta` \[1/(m sr)\] and one-way optical depth at a range.
     fn at(&self, range_m: f64) -> Result<(f64, f64), Error> {
-        let first_m = self.range_m[0];
-        let beyond = |allowed| Error::OutOfRange {
-            field: "range_m",
-            value: range_m,
-            allowed,
-        };
-        if !(range_m > 0.0 && range_m.is_finite()) {
-            return Err(beyond("finite and positive"));
-        }
-        if self.uniform || range_m <= first_m {
+        check_positive("range_m", range_m)?;
+        if self.uniform || range_m <= self.range_m[0] {
             return Ok((
                 self.backscatter_per_m_sr[0],
                 range_m * self.extinction_per_m[0],
             ));
         }
-        let Some((index, part)) = locate(&self.range_m, range_m) else {
-            return Err(beyond("within the table of the medium"));
+        let Some((index, fraction)) = locate(&self.range_m, range_m) else {
+            return Err(Error::OutOfRange {
+                field: "range_m",
+                value: range_m,
+                allowed: "within the table of the medium",
+            });
         };
         let start = self.extinction_per_m[index];
-        let end = value(&self.extinction_per_m, (index, part));
+        let end = value(&self.extinction_per_m, index, fraction);
         let depth = self.depth[index] + 0.5 * (start + end) * (range_m - self.range_m[index]);
-        Ok((value(&self.backscatter_per_m_sr, (index, part)), depth))
+        Ok((value(&self.backscatter_per_m_sr, index, fraction), depth))
     }
 
     /// Backscatter `beta` \[1/(m sr)\] at a range.
@@ -117,8 +114,8 @@ impl Medium {
         Ok((-self.at(range_m)?.1).exp())
     }
 
-    /// Return per metre of range `K^2 beta A_R/R^2` \[1/m\], (9) without the heterodyne efficiency, to an aperture of
-    /// `aperture_area_m2`.
+    /// Return per metre of range `K^2 beta A_R/R^2` \[1/m\], (9) without the heterodyne efficiency,
+    /// to an aperture of `aperture_area_m2`.
     ///
     /// # Errors
     /// As [`Medium::transmission`]; [`Error::OutOfRange`] for an aperture that is not positive.
@@ -128,16 +125,17 @@ impl Medium {
         Ok(backscatter_per_m_sr * (-2.0 * depth).exp() * aperture_area_m2 / (range_m * range_m))
     }
 
-    /// Sets the weights of a line's layers to [`Medium::return_per_m`]; each [`Shot`](crate::Shot) brings its efficiency. Layers
-    /// without scatterers (NaN) get their weight too.
+    /// Sets the weights of a line's layers to [`Medium::return_per_m`]; each [`Shot`](crate::Shot)
+    /// brings its efficiency. Layers without scatterers (NaN) get their weight too.
     ///
     /// # Errors
     /// As [`Medium::return_per_m`].
     pub fn weigh(&self, line: &mut LineOfSight, aperture_area_m2: f64) -> Result<(), Error> {
-        let weight_per_m = |layer| self.return_per_m(line.range_m(layer), aperture_area_m2);
-        line.weight_per_m = (0..line.layers())
-            .map(weight_per_m)
-            .collect::<Result<_, _>>()?;
+        let mut weight_per_m = Vec::with_capacity(line.layers());
+        for layer in 0..line.layers() {
+            weight_per_m.push(self.return_per_m(line.range_m(layer), aperture_area_m2)?);
+        }
+        line.weight_per_m = weight_per_m;
         Ok(())
     }
 }

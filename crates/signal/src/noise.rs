@@ -1,9 +1,9 @@
-//! Detector noise: Gaussian numbers with the spectrum of shot noise, (13), real at the intermediate frequency or complex at
-//! baseband.
+//! Detector noise: Gaussian numbers with the spectrum of shot noise, (13), real at the intermediate
+//! frequency or complex at baseband.
 //!
-//! Band-limited noise is made from its spectrum on a circular record of at least twice the length, then cut, so that the
-//! end of the record does not know its beginning. Frequencies that the edge of the band cuts have their share of the
-//! power, so the variance is exact.
+//! Band-limited noise is made from its spectrum on a circular record of at least twice the length,
+//! then cut, so that the end of the record does not know its beginning. Frequencies that the edge
+//! of the band cuts have their share of the power, so the variance is exact.
 //!
 //! Check: variance (13); nothing outside the band; flat inside.
 
@@ -36,7 +36,8 @@ pub(crate) enum Noise<T: ?Sized> {
         transform: Arc<T>,
         /// Index of the first frequency of the band.
         first: usize,
-        /// Standard deviation of the real and of the imaginary part at each frequency from `first` on.
+        /// Standard deviation of the real and of the imaginary part at each frequency
+        /// from `first` on.
         sd_a: Vec<f64>,
     },
 }
@@ -48,12 +49,14 @@ pub(crate) type RealNoise = Noise<dyn ComplexToReal<f64>>;
 pub(crate) type BasebandNoise = Noise<dyn Fft<f64>>;
 
 impl<T: ?Sized> Noise<T> {
-    /// Noise of the detector's width about `centre_hz`: either part at a frequency has the variance `share` times the one-sided
-    /// density. `last` is the last frequency of a record of so many numbers, `plan` its transform.
+    /// Noise in the detector's bandwidth about `centre_hz`: either part at a frequency has the
+    /// variance `fraction` times the one-sided density. `last` is the last frequency of a record of
+    /// the given length, `plan` its transform.
     fn planned(
         receiver: &Receiver,
         samples: usize,
-        (centre_hz, share): (f64, f64),
+        centre_hz: f64,
+        fraction: f64,
         last: fn(usize) -> usize,
         plan: impl FnOnce(usize) -> Arc<T>,
     ) -> Self {
@@ -66,20 +69,21 @@ impl<T: ?Sized> Noise<T> {
             NoiseModel::BandLimited => {
                 let length = smooth_even_length(2 * samples);
                 let cell_hz = receiver.sample_rate_hz / length as f64;
-                let [low_hz, high_hz] =
-                    [-0.5, 0.5].map(|side| centre_hz + side * receiver.bandwidth_hz);
+                let low_hz = centre_hz - 0.5 * receiver.bandwidth_hz;
+                let high_hz = centre_hz + 0.5 * receiver.bandwidth_hz;
                 let first = ((low_hz / cell_hz - 0.5).ceil().max(0.0) as usize).min(last(length));
                 let end = ((high_hz / cell_hz + 0.5).floor() as usize).min(last(length));
-                let sd_a = |cell: usize| {
-                    let [from_hz, to_hz] =
-                        [-0.5, 0.5].map(|side| cell as f64 * cell_hz + side * cell_hz);
-                    (share * density_a2_hz * (to_hz.min(high_hz) - from_hz.max(low_hz)).max(0.0))
-                        .sqrt()
-                };
+                let mut sd_a = Vec::new();
+                for cell in first..=end {
+                    let from_hz = cell as f64 * cell_hz - 0.5 * cell_hz;
+                    let to_hz = cell as f64 * cell_hz + 0.5 * cell_hz;
+                    let width_hz = (to_hz.min(high_hz) - from_hz.max(low_hz)).max(0.0);
+                    sd_a.push((fraction * density_a2_hz * width_hz).sqrt());
+                }
                 Self::Band {
                     transform: plan(length),
                     first,
-                    sd_a: (first..=end).map(sd_a).collect(),
+                    sd_a,
                 }
             }
         }
@@ -89,9 +93,14 @@ impl<T: ?Sized> Noise<T> {
 impl RealNoise {
     /// A frequency and its mirror give 2 Re{X}: variance 4 sd^2.
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
-        let band = (receiver.intermediate_frequency_hz, 0.25);
-        let plan = |length| RealFftPlanner::new().plan_fft_inverse(length);
-        Self::planned(receiver, samples, band, |length| length / 2, plan)
+        Self::planned(
+            receiver,
+            samples,
+            receiver.intermediate_frequency_hz,
+            0.25,
+            |length| length / 2,
+            |length| RealFftPlanner::new().plan_fft_inverse(length),
+        )
     }
 
     /// Adds the noise of one record to `out_a`.
@@ -146,10 +155,17 @@ impl RealNoise {
 }
 
 impl BasebandNoise {
-    /// A complex envelope has its power on both sides of zero, with the one-sided density of the real noise.
+    /// A complex envelope has its power on both sides of zero, with the one-sided density of
+    /// the real noise.
     pub(crate) fn new(receiver: &Receiver, samples: usize) -> Self {
-        let plan = |length| FftPlanner::new().plan_fft_inverse(length);
-        Self::planned(receiver, samples, (0.0, 0.5), |length| length / 2 - 1, plan)
+        Self::planned(
+            receiver,
+            samples,
+            0.0,
+            0.5,
+            |length| length / 2 - 1,
+            |length| FftPlanner::new().plan_fft_inverse(length),
+        )
     }
 
     /// Adds the noise of one record to `out_a`.
@@ -199,19 +215,22 @@ fn normal<R: Rng + ?Sized>(rng: &mut R, sd_a: f64) -> Complex<f64> {
     Complex::new(re, im) * sd_a
 }
 
-/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the band of a short
-/// record is resolved).
+/// Smallest even product of powers of 2, 3 and 5 that is at least `least` (and 512, so that the
+/// band of a short record is resolved).
 fn smooth_even_length(least: usize) -> usize {
-    let is_smooth = |length: &usize| {
-        [2, 3, 5].into_iter().fold(*length, |mut rest, factor| {
-            while rest.is_multiple_of(factor) {
-                rest /= factor;
-            }
-            rest
-        }) == 1
-    };
     (least.max(512).next_multiple_of(2)..)
         .step_by(2)
-        .find(is_smooth)
+        .find(|&length| is_smooth(length))
         .unwrap_or(least)
+}
+
+/// Whether a number is a product of powers of 2, 3 and 5.
+fn is_smooth(number: usize) -> bool {
+    let mut rest = number;
+    for factor in [2, 3, 5] {
+        while rest.is_multiple_of(factor) {
+            rest /= factor;
+        }
+    }
+    rest == 1
 }

@@ -1,7 +1,7 @@
 //! Loops that run on the caller's thread pool with feature `rayon` and one after the other without.
 //!
-//! Every item is computed alone and results stand in the order of the items, so the bits do not depend on the number of
-//! threads.
+//! Every item is computed alone and results stand in the order of the items, so the bits do not
+//! depend on the number of threads.
 
 /// `f(state, index, chunk)` for every chunk of `size` elements; `state` is made once per worker.
 pub(crate) fn map_chunks<T: Send, S, O: Send>(
@@ -13,17 +13,18 @@ pub(crate) fn map_chunks<T: Send, S, O: Send>(
     #[cfg(feature = "rayon")]
     {
         use rayon::prelude::*;
-        let chunks = data.par_chunks_mut(size).enumerate();
-        chunks
+        data.par_chunks_mut(size)
+            .enumerate()
             .map_init(state, |worker, (index, chunk)| f(worker, index, chunk))
             .collect()
     }
     #[cfg(not(feature = "rayon"))]
     {
         let mut worker = state();
-        data.chunks_mut(size)
-            .enumerate()
-            .map(|(index, chunk)| f(&mut worker, index, chunk))
-            .collect()
+        let mut results = Vec::new();
+        for (index, chunk) in data.chunks_mut(size).enumerate() {
+            results.push(f(&mut worker, index, chunk));
+        }
+        results
     }
 }

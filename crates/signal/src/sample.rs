@@ -1,6 +1,7 @@
 //! The two kinds of samples that a receiver delivers: the current, or both its quadratures.
 //!
-//! Check: the tests of `heterodyne`; the real current is the baseband at the intermediate frequency.
+//! Check: the tests of `heterodyne`; the real current is the baseband at the
+//! intermediate frequency.
 
 use num_complex::Complex;
 
@@ -9,11 +10,13 @@ use crate::noise::NoiseScratch;
 use crate::receiver::Receiver;
 use crate::record::Detector;
 
-/// `f64`: the measured current `i(t_k) = sqrt(2) Re{s(t_k) exp(j 2 pi f_c t_k)} + i_N`, (12). `Complex<f64>`: the baseband signal
-/// `s(t_k)` with circular noise of the detector band about zero frequency, as a receiver with two quadratures delivers it.
+/// `f64`: the measured current `i(t_k) = sqrt(2) Re{s(t_k) exp(j 2 pi f_c t_k)} + i_N`, (12).
+/// `Complex<f64>`: the baseband signal `s(t_k)` with circular noise of the detector band about zero
+/// frequency, as a receiver with two quadratures delivers it.
 ///
-/// The real current is `sqrt(2) Re{(s + n) exp(j 2 pi f_c t)}`, so the mean square of the complex noise is (13), and the
-/// signal-to-noise ratio is (14), too. `White` noise fills `-F_s/2` to `F_s/2` with the density of the band.
+/// The real current is `sqrt(2) Re{(s + n) exp(j 2 pi f_c t)}`, so the mean square of the complex
+/// noise is (13), and the signal-to-noise ratio is (14), too. `White` noise fills `-F_s/2` to
+/// `F_s/2` with the density of the band.
 pub trait Sample: sealed::Received {}
 
 impl Sample for f64 {}

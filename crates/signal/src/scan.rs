@@ -1,9 +1,11 @@
-//! The pulses of a whole scan: in parallel, in bounded memory, with one random stream for each pulse.
+//! The pulses of a whole scan: in parallel, in bounded memory, with one random stream
+//! for each pulse.
 //!
-//! Pulses are numbered line after line and made in batches of fixed size; what is done with them happens in their order. So neither
-//! the numbers nor their sums depend on the number of threads.
+//! Pulses are numbered line after line and made in batches of fixed size; what is done with them
+//! happens in their order. So neither the numbers nor their sums depend on the number of threads.
 //!
-//! Check: records of a scan are those made one by one; they have the same bits with 1, 2 and 5 threads.
+//! Check: records of a scan are those made one by one; they have the same bits with 1,
+//! 2 and 5 threads.
 
 use ndarray::Array2;
 use rand::{Rng, SeedableRng};
@@ -25,25 +27,28 @@ pub struct PulseKey {
     pub pulse: usize,
 }
 
-/// A random generator for one pulse: its 256 bits of state are four hashes (SplitMix64) of seed, line and pulse, so that
-/// neighbouring keys and seeds have unrelated streams.
+/// A random generator for one pulse: its 256 bits of state are four hashes (SplitMix64) of seed,
+/// line and pulse, so that neighbouring keys and seeds have unrelated streams.
 pub fn pulse_generator(seed: u64, key: PulseKey) -> Xoshiro256PlusPlus {
-    // Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection in which every bit of the input moves every other.
-    let mix = |mut x: u64| {
-        x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        x ^ (x >> 31)
-    };
     const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
     let mut state = [0; 32];
     for (word, bytes) in (1_u64..).zip(state.chunks_exact_mut(8)) {
-        let keyed = [seed, key.line as u64, key.pulse as u64];
-        let hash = keyed.iter().fold(word.wrapping_mul(GOLDEN), |hash, part| {
-            mix(hash.wrapping_add(GOLDEN) ^ mix(part.wrapping_add(word.wrapping_mul(GOLDEN))))
-        });
+        let salt = word.wrapping_mul(GOLDEN);
+        let mut hash = salt;
+        for input in [seed, key.line as u64, key.pulse as u64] {
+            hash = mix(hash.wrapping_add(GOLDEN) ^ mix(input.wrapping_add(salt)));
+        }
         bytes.copy_from_slice(&hash.to_le_bytes());
     }
     Xoshiro256PlusPlus::from_seed(state)
+}
+
+/// Finaliser of SplitMix64 (Steele, Lea, Flood 2014): a bijection in which every bit of the input
+/// changes every other.
+fn mix(mut x: u64) -> u64 {
+    x = (x ^ (x >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    x = (x ^ (x >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    x ^ (x >> 31)
 }
 
 /// A scan: which pulses there are, what each meets, and its random numbers.
@@ -57,7 +62,8 @@ pub struct Scan<'s, S, G> {
     pub pulses_per_line: usize,
     /// What a pulse meets, `Fn(PulseKey) -> Shot`; called from any thread.
     pub shot: S,
-    /// The random generator of a pulse, `Fn(PulseKey) -> impl Rng`, such as [`pulse_generator`]; called from any thread.
+    /// The random generator of a pulse, `Fn(PulseKey) -> impl Rng`, such as [`pulse_generator`];
+    /// called from any thread.
     pub generator: G,
     /// The converter; `None`: samples are not rounded or clipped.
     pub digitiser: Option<Digitiser>,
@@ -74,8 +80,8 @@ where
         self.lines * self.pulses_per_line
     }
 
-    /// Hands each record \[A\] to `sink`, in the order of lines and pulses; makes them in parallel, some hundred at a time,
-    /// however many there are. Returns how many samples were clipped.
+    /// Hands each record \[A\] to `sink`, in the order of lines and pulses; makes them in parallel,
+    /// some hundred at a time, however many there are. Returns how many samples were clipped.
     ///
     /// # Errors
     /// The first error in the order of the records: of `sink`, or as [`Simulator::record_into`] and
@@ -90,12 +96,8 @@ where
         for first in (0..self.records()).step_by(BATCH) {
             let count = BATCH.min(self.records() - first);
             let rows = &mut batch_a[..count * samples];
-            for ((i, result), row) in self
-                .make(first, rows)
-                .into_iter()
-                .enumerate()
-                .zip(rows.chunks(samples))
-            {
+            let results = self.make(first, rows);
+            for (i, (result, row)) in results.into_iter().zip(rows.chunks(samples)).enumerate() {
                 clipped += result?;
                 sink(self.key(first + i), row)?;
             }
@@ -103,7 +105,8 @@ where
         Ok(clipped)
     }
 
-    /// All records in memory \[record, sample\], A, the pulses of a line together; and how many samples were clipped.
+    /// All records in memory \[record, sample\], A, the pulses of a line together; and how many
+    /// samples were clipped.
     ///
     /// # Errors
     /// As [`Scan::for_each`].

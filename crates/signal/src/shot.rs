@@ -1,4 +1,5 @@
-//! What one pulse meets: a line of sight, and the efficiency of the air's turbulence at that moment.
+//! What one pulse meets: a line of sight, and the efficiency of the air's turbulence
+//! at that moment.
 //!
 //! Check: a factor of one changes nothing; a factor scales the mean power of its layer.
 
@@ -12,14 +13,16 @@ use crate::{Error, LineOfSight};
 pub struct Shot<'a> {
     /// The air; it may be shared by many pulses.
     pub line: &'a LineOfSight,
-    /// What the return of each layer is multiplied with for this pulse, one factor per layer, finite and not negative:
-    /// the heterodyne efficiency of this moment if the line's weights leave it out, or its ratio to the mean if they
-    /// contain the mean. `None`: the line's weights as they are.
+    /// What the return of each layer is multiplied with for this pulse, one factor per layer,
+    /// finite and not negative: the heterodyne efficiency of this moment if the line's weights
+    /// leave it out, or its ratio to the mean if they contain the mean. `None`: the line's
+    /// weights as they are.
     pub efficiency: Option<&'a [f64]>,
-    /// The air that the pulse before lights meanwhile: what lies at `R + c/(2 PRF)` stands at `R`. `None`: it is long gone.
+    /// The air that the pulse before lights meanwhile: what lies at `R + c/(2 PRF)` stands at `R`.
+    /// `None`: it is long gone.
     pub previous: Option<&'a LineOfSight>,
-    /// Seed of what is random beside speckle and noise: phases of the laser and of the telescope's reflex, speckle of
-    /// `previous`. Not used where the receiver has none of them.
+    /// Seed of what is random beside speckle and noise: phases of the laser and of the telescope's
+    /// reflex, speckle of `previous`. Not used where the receiver has none of them.
     pub impairment_seed: u64,
 }
 
@@ -38,8 +41,8 @@ impl Shot<'_> {
     /// Says what is wrong with the shot, if anything.
     ///
     /// # Errors
-    /// As [`LineOfSight::validate`]; [`Error::LengthMismatch`] if there is not one factor per layer;
-    /// [`Error::ElementOutOfRange`] for a factor that is negative or not finite.
+    /// As [`LineOfSight::validate`]; [`Error::LengthMismatch`] if there is not one factor per
+    /// layer; [`Error::ElementOutOfRange`] for a factor that is negative or not finite.
     pub fn validate(&self) -> Result<(), Error> {
         self.line.validate()?;
         self.previous.map_or(Ok(()), LineOfSight::validate)?;

@@ -21,10 +21,12 @@ pub(crate) fn check_values(
     check_amounts(field, values)
 }
 
-/// Interval of a table that holds a range, and the part of it that lies before the range; `None` beyond the table.
+/// Interval of a table that holds a range, and the fraction of it before the range; `None`
+/// beyond the table.
 pub(crate) fn locate(table_m: &[f64], range_m: f64) -> Option<(usize, f64)> {
-    let (first, last) = (table_m.first()?, table_m.last()?);
-    if !(range_m >= *first && range_m <= *last) {
+    let first_m = *table_m.first()?;
+    let last_m = *table_m.last()?;
+    if !(range_m >= first_m && range_m <= last_m) {
         return None;
     }
     let index = table_m
@@ -37,10 +39,10 @@ pub(crate) fn locate(table_m: &[f64], range_m: f64) -> Option<(usize, f64)> {
     }
 }
 
-/// Value of a table in an interval found by [`locate`].
-pub(crate) fn value(values: &[f64], (index, part): (usize, f64)) -> f64 {
+/// Value of a table at a fraction of an interval, as found by [`locate`].
+pub(crate) fn value(values: &[f64], index: usize, fraction: f64) -> f64 {
     match values.get(index + 1) {
-        Some(next) => values[index] + part * (next - values[index]),
+        Some(next) => values[index] + fraction * (next - values[index]),
         None => values[index],
     }
 }

@@ -46,7 +46,8 @@ impl Cn2Path {
             } => {
                 let h = telescope_height_m + range_m * elevation_rad.sin();
                 let last = height_m.len() - 1;
-                // A horizontal path along the lowest or highest point must not fail by a rounding error.
+                // A horizontal path along the lowest or highest point must not fail by a
+                // rounding error.
                 let slack = 1e-9 * (height_m[last] - height_m[0]);
                 let inside = h >= height_m[0] - slack && h <= height_m[last] + slack;
                 within(
@@ -62,7 +63,8 @@ impl Cn2Path {
         }
     }
 
-    /// Mean of Cn2 \[m^(-2/3)\] from `start_m` to `end_m` along the path, exact: the profile is straight between its knots.
+    /// Mean of Cn2 \[m^(-2/3)\] from `start_m` to `end_m` along the path, exact: the profile is
+    /// straight between its knots.
     ///
     /// # Errors
     /// As [`Cn2Path::at`].
@@ -102,19 +104,19 @@ impl Cn2Path {
         edges
     }
 
-    /// Positions z \[m\] and weights \[m^(1/3)\] of a quadrature of Cn2(z) f(z) from 0 to `range_m`,
-    /// for any f that is smooth along the path or a power of R - z.
+    /// Positions z \[m\] and weights \[m^(1/3)\] of a quadrature of Cn2(z) f(z) from 0 to
+    /// `range_m`, for any f that is smooth along the path or a power of R - z.
     ///
-    /// f is interpolated on panels that halve towards the end; its products with the straight pieces
-    /// of the profile are then exact, so that the number of positions does not grow with the number of
-    /// knots.
+    /// f is interpolated on panels that halve towards the end; its products with the straight
+    /// pieces of the profile are then exact, so that the number of positions does not grow with the
+    /// number of knots.
     ///
     /// # Errors
     /// As [`Cn2Path::at`].
     pub(crate) fn quadrature(&self, range_m: f64) -> Result<Vec<(f64, f64)>, Error> {
         const HALVED: [f64; 5] = [0.0, 0.5, 0.75, 0.875, 1.0];
-        // Between 16 positions f is a polynomial of degree 15; times a straight line, 9 nodes integrate
-        // it exactly.
+        // Between 16 positions f is a polynomial of degree 15; times a straight line, 9 nodes
+        // integrate it exactly.
         let positions = GaussLegendre::new(16);
         let exact = GaussLegendre::new(9);
         let mut out = Vec::new();
@@ -244,7 +246,8 @@ mod tests {
     fn mean_of_hufnagel_valley_is_its_integral() {
         let path = hufnagel_valley(20_000.0, 0.0, std::f64::consts::FRAC_PI_2);
         let mean = path.mean(0.0, 20_000.0).unwrap();
-        // Integral from 0 to infinity: 10! x 1000^11 and two exponentials; what lies above 20 km is below 1e-3 of it.
+        // Integral from 0 to infinity: 10! x 1000^11 and two exponentials; what lies above 20 km is
+        // below 1e-3 of it.
         let high = 0.00594 * (21f64 / 27.0).powi(2) * 1e-50 * 3_628_800.0 * 1e33;
         let exact = (high + 2.7e-16 * 1500.0 + 1.7e-14 * 100.0) / 20_000.0;
         assert!((mean / exact - 1.0).abs() < 1e-3, "{mean:e} {exact:e}");

@@ -1,5 +1,5 @@
-//! The air between telescope and target: spectrum of its refractive index (17), Cn2 along the path, structure function of
-//! the phase, and how strong a path is.
+//! The air between telescope and target: spectrum of its refractive index (17), Cn2 along the path,
+//! structure function of the phase, and how strong a path is.
 
 pub(crate) mod cn2;
 pub(crate) mod spectrum;

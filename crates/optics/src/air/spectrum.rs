@@ -1,8 +1,8 @@
 //! Spectra of the refractive index, per unit Cn2.
 //!
-//! Phi_n(kappa) \[m^3\] is the three-dimensional spectrum at the wave number kappa in RADIANS per metre (the propagator's
-//! frequencies are in cycles per metre). Check: structure functions against stored quadratures and against the closed
-//! form of the Kolmogorov spectrum.
+//! Phi_n(kappa) \[m^3\] is the three-dimensional spectrum at the wave number kappa in RADIANS per
+//! metre (the propagator's frequencies are in cycles per metre). Check: structure functions against
+//! stored quadratures and against the closed form of the Kolmogorov spectrum.
 
 use crate::Error;
 use crate::error::{not_negative, positive, within};
@@ -16,11 +16,13 @@ pub const EXACT_CONSTANT: f64 = 0.03300539063636137;
 
 /// An isotropic spectrum of the refractive index. Implement it for a spectrum of your own.
 pub trait Spectrum: Debug + Send + Sync {
-    /// Phi_n(kappa)/Cn2 \[m^(11/3)\] at the wave number \[rad/m\], finite for every argument above 0.
+    /// Phi_n(kappa)/Cn2 \[m^(11/3)\] at the wave number \[rad/m\], finite for every
+    /// argument above 0.
     fn density_per_cn2(&self, wavenumber_rad_m: f64) -> f64;
     /// Wave number below which the spectrum is flat \[rad/m\]; 0 without an outer scale.
     fn outer_wavenumber_rad_m(&self) -> f64;
-    /// Wave number beyond 7 times of which the spectrum is nil \[rad/m\]; infinite without an inner scale.
+    /// Wave number beyond 7 times of which the spectrum is nil \[rad/m\]; infinite without
+    /// an inner scale.
     fn inner_wavenumber_rad_m(&self) -> f64;
 }
 
@@ -71,7 +73,8 @@ pub struct VonKarman {
 }
 
 impl VonKarman {
-    /// Spectrum with these scales; `constant` is 0.033 as printed ([`CHAPTER_CONSTANT`]), or [`EXACT_CONSTANT`].
+    /// Spectrum with these scales; `constant` is 0.033 as printed ([`CHAPTER_CONSTANT`]), or
+    /// [`EXACT_CONSTANT`].
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for L0 <= 0, l0 < 0, not a number, or kappa_0 >= kappa_m.
@@ -118,8 +121,9 @@ impl Spectrum for VonKarman {
     }
 }
 
-/// Andrews' analytic form of Hill's spectrum, with the bump near the inner scale (Andrews 1992):
-/// constant \[1 + 1.802 x - 0.254 x^(7/6)\] exp(-x^2) / (kappa^2 + kappa_0^2)^(11/6), x = kappa l0 / 3.3.
+/// Andrews' analytic form of Hill's spectrum, with the bump near the inner scale (Andrews
+/// 1992): constant \[1 + 1.802 x - 0.254 x^(7/6)\] exp(-x^2) / (kappa^2 + kappa_0^2)^(11/6),
+/// x = kappa l0 / 3.3.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct HillAndrews {
     outer_rad_m: f64,

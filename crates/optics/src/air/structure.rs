@@ -1,7 +1,8 @@
 //! Phase structure function of a thin layer, by quadrature of its spectrum.
 //!
-//! D(r) = k^2 Cn2 dz G(r), G(r) = 8 pi^2 integral of kappa Phi_n/Cn2 (1 - J0(kappa r)) dkappa \[m^(5/3)\].
-//! Check: the stored curve of (17) to 1e-9, and 2.914 r^(5/3) for Kolmogorov's spectrum.
+//! D(r) = k^2 Cn2 dz G(r), G(r) = 8 pi^2 integral of kappa Phi_n/Cn2 (1 - J0(kappa r))
+//! dkappa \[m^(5/3)\]. Check: the stored curve of (17) to 1e-9, and 2.914 r^(5/3) for
+//! Kolmogorov's spectrum.
 
 use crate::Error;
 use crate::air::spectrum::Spectrum;
@@ -29,7 +30,8 @@ pub fn structure_function_m53(spectrum: &dyn Spectrum, separation_m: f64) -> Res
     } else {
         1e12 / r
     };
-    // Without an outer scale the integrand falls as kappa^(-2/3) dkappa towards 0: 1e-39 of the scale is 1e-13 of it.
+    // Without an outer scale the integrand falls as kappa^(-2/3) dkappa towards 0: 1e-39 of the
+    // scale is 1e-13 of it.
     let start = if outer > 0.0 {
         1e-8 * outer.min(1.0 / r).min(end)
     } else {
@@ -71,7 +73,8 @@ pub(crate) fn one_minus_j0(x: f64) -> f64 {
     q * (1.0 - q / 4.0 * (1.0 - q / 9.0 * (1.0 - q / 16.0)))
 }
 
-/// G(r) tabulated once: 6-point interpolation in the logarithms, relative error below 1e-6 (see the test).
+/// G(r) tabulated once: 6-point interpolation in the logarithms, relative error below 1e-6
+/// (see the test).
 #[derive(Debug, Clone)]
 pub struct StructureTable {
     first_ln: f64,
@@ -124,8 +127,9 @@ impl StructureTable {
             .exp()
     }
 
-    /// Structure function D(rho) \[rad^2\] of two spherical waves from `range_m` that are rho apart at the telescope: k^2 times the sum of
-    /// w G(rho (1 - z/R)) over places z \[m\] with weights w = Cn2 dz \[m^(1/3)\].
+    /// Structure function D(rho) \[rad^2\] of two spherical waves from `range_m` that are rho apart
+    /// at the telescope: k^2 times the sum of w G(rho (1 - z/R)) over places z \[m\] with weights
+    /// w = Cn2 dz \[m^(1/3)\].
     pub(crate) fn of_spherical_waves(
         &self,
         wavenumber_rad_m: f64,
@@ -148,7 +152,8 @@ mod tests {
 
     #[test]
     fn kolmogorov_gives_the_five_thirds_law() {
-        // 8 pi^2 C integral of x^(-8/3) (1 - J0(x)) dx = 8 pi^2 C (3/5) Gamma(1/6) / (2^(5/3) Gamma(11/6)) r^(5/3).
+        // 8 pi^2 C integral of x^(-8/3) (1 - J0(x)) dx = 8 pi^2 C (3/5) Gamma(1/6) / (2^(5/3)
+        // Gamma(11/6)) r^(5/3).
         let constant = 8.0 * PI * PI * EXACT_CONSTANT * 0.6 * libm::tgamma(1.0 / 6.0)
             / (2f64.powf(5.0 / 3.0) * libm::tgamma(11.0 / 6.0));
         assert!((constant - 2.914).abs() < 1e-3);

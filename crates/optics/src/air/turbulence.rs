@@ -1,7 +1,8 @@
-//! The turbulence of a path: spectrum and Cn2 together, and the numbers by which its strength is judged.
+//! The turbulence of a path: spectrum and Cn2 together, and the numbers by which its
+//! strength is judged.
 //!
-//! Check: the Rytov variance of the chapter's medium turbulence (1e-13) is 1 at 690 m; integrals along the path give the
-//! printed forms where Cn2 is constant.
+//! Check: the Rytov variance of the chapter's medium turbulence (1e-13) is 1 at 690 m; integrals
+//! along the path give the printed forms where Cn2 is constant.
 
 use crate::Error;
 use crate::air::cn2::Cn2Path;
@@ -49,13 +50,14 @@ pub fn rytov_variance(cn2_m_m23: f64, wavelength_m: f64, range_m: f64) -> Result
     Ok(1.23 * cn2 * k.powf(7.0 / 6.0) * positive("range_m", range_m)?.powf(11.0 / 6.0))
 }
 
-/// Rytov variance of a plane wave along a path of changing strength, 2.25 k^(7/6) integral of Cn2(z) (R - z)^(5/6) dz: that of
-/// [`rytov_variance`] for a constant Cn2.
+/// Rytov variance of a plane wave along a path of changing strength, 2.25 k^(7/6) integral of
+/// Cn2(z) (R - z)^(5/6) dz: that of [`rytov_variance`] for a constant Cn2.
 ///
 /// # Errors
 /// [`Error`] names the argument that is not allowed; as [`Cn2Path::at`].
 pub fn path_rytov_variance(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Result<f64, Error> {
-    // For a constant Cn2 the integral is 6/11 R^(11/6) Cn2; the printed 1.23 is 6/11 of this number.
+    // For a constant Cn2 the integral is 6/11 R^(11/6) Cn2; the printed 1.23 is 6/11
+    // of this number.
     const CONSTANT: f64 = 1.23 * 11.0 / 6.0;
     let k = 2.0 * std::f64::consts::PI / positive("wavelength_m", wavelength_m)?;
     let rest = positive("range_m", range_m)?;
@@ -68,9 +70,10 @@ pub fn path_rytov_variance(cn2: &Cn2Path, wavelength_m: f64, range_m: f64) -> Re
             .sum::<f64>())
 }
 
-/// Coherence radius rho_0 \[m\] at the telescope of a spherical wave from `range_m`: exp(-(rho/rho_0)^(5/3)) is its mutual
-/// coherence, rho_0 = \[1.4572 k^2 integral of Cn2(z) (1 - z/R)^(5/3) dz\]^(-3/5) (Kolmogorov; no factor 2 inside the bracket),
-/// \[1.4572 k^2 Cn2 R 3/8\]^(-3/5) for a constant Cn2. Infinite without turbulence.
+/// Coherence radius rho_0 \[m\] at the telescope of a spherical wave from `range_m`:
+/// exp(-(rho/rho_0)^(5/3)) is its mutual coherence, rho_0 = \[1.4572 k^2 integral of Cn2(z) (1 -
+/// z/R)^(5/3) dz\]^(-3/5) (Kolmogorov; no factor 2 inside the bracket), \[1.4572 k^2 Cn2 R
+/// 3/8\]^(-3/5) for a constant Cn2. Infinite without turbulence.
 ///
 /// # Errors
 /// [`Error`] names the argument that is not allowed; as [`Cn2Path::at`].

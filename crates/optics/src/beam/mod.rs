@@ -1,7 +1,9 @@
-//! The telescope and its beam: a Gaussian cut by a circular aperture, with focus and central obscuration.
+//! The telescope and its beam: a Gaussian cut by a circular aperture, with focus and
+//! central obscuration.
 //!
-//! Irradiances are normalised to unit power BEFORE truncation, so that the losses of both beams are part of the
-//! efficiency (19). Check: the transmitted fraction of the chapter's beam (30 mm, 50 mm aperture) is 0.937823.
+//! Irradiances are normalised to unit power BEFORE truncation, so that the losses of both beams are
+//! part of the efficiency (19). Check: the transmitted fraction of the chapter's beam (30 mm, 50 mm
+//! aperture) is 0.937823.
 
 #[cfg(feature = "screens")]
 pub(crate) mod source;
@@ -10,7 +12,8 @@ use crate::Error;
 use crate::error::{finite, not_negative, positive, within};
 use std::f64::consts::{PI, SQRT_2};
 
-/// What `beam_radius_m` means: the radius at which one quantity has fallen to 1/e of its value on the axis.
+/// What `beam_radius_m` means: the radius at which one quantity has fallen to 1/e of its
+/// value on the axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RadiusDefinition {
     /// Irradiance: |E|^2 ~ exp(-r^2/s^2). The chapter's Table 2 is read this way.
@@ -24,7 +27,8 @@ pub enum RadiusDefinition {
 pub enum Focus {
     /// Plane wave front at the aperture (focus at infinity).
     Collimated,
-    /// Focus at this distance from the aperture \[m\]; negative values are a diverging beam with its virtual focus behind.
+    /// Focus at this distance from the aperture \[m\]; negative values are a diverging beam with
+    /// its virtual focus behind.
     At(f64),
 }
 
@@ -38,9 +42,11 @@ impl Focus {
     }
 }
 
-/// A telescope whose transmitted beam and back-propagated local oscillator (BPLO) are the same truncated Gaussian.
+/// A telescope whose transmitted beam and back-propagated local oscillator (BPLO) are the same
+/// truncated Gaussian.
 ///
-/// The fields are plain data; every function of this crate that takes a telescope calls [`Telescope::validated`].
+/// The fields are plain data; every function of this crate that takes a telescope calls
+/// [`Telescope::validated`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Telescope {
     /// Wavelength \[m\], above 0.
@@ -49,8 +55,8 @@ pub struct Telescope {
     pub aperture_radius_m: f64,
     /// Radius of a central obscuration \[m\], 0 (none) or above, below the aperture radius.
     pub obscuration_radius_m: f64,
-    /// 1/e radius of the beam \[m\], above 0. `f64::INFINITY` is the uniformly lit aperture: the power before
-    /// truncation then has no meaning and unit power is counted on the open aperture.
+    /// 1/e radius of the beam \[m\], above 0. `f64::INFINITY` is the uniformly lit aperture: the
+    /// power before truncation then has no meaning and unit power is counted on the open aperture.
     pub beam_radius_m: f64,
     /// Whether `beam_radius_m` belongs to the irradiance or to the field.
     pub radius_definition: RadiusDefinition,
@@ -59,7 +65,8 @@ pub struct Telescope {
 }
 
 impl Telescope {
-    /// That of the chapter's Table 2: 1.55 um, 1/e irradiance radius 30 mm, aperture radius 50 mm, collimated.
+    /// That of the chapter's Table 2: 1.55 um, 1/e irradiance radius 30 mm, aperture radius 50
+    /// mm, collimated.
     pub fn table2() -> Self {
         Self {
             wavelength_m: 1.55e-6,
@@ -116,13 +123,14 @@ impl Telescope {
         }
     }
 
-    /// Receiver area A_R of (9), (14) and (19) [m^2]: pi a^2, obscured part included (it is the reference area of
-    /// the efficiency, and cancels between (14) and (19)).
+    /// Receiver area A_R of (9), (14) and (19) [m^2]: pi a^2, obscured part included (it is the
+    /// reference area of the efficiency, and cancels between (14) and (19)).
     pub fn aperture_area_m2(&self) -> f64 {
         PI * self.aperture_radius_m.powi(2)
     }
 
-    /// Fraction T of the beam's power that passes the aperture: exp(-b^2/s^2) - exp(-a^2/s^2); 1 for uniform light.
+    /// Fraction T of the beam's power that passes the aperture: exp(-b^2/s^2) - exp(-a^2/s^2); 1
+    /// for uniform light.
     pub fn transmitted_fraction(&self) -> f64 {
         let s = self.intensity_radius_m();
         if s.is_infinite() {
@@ -145,7 +153,8 @@ impl Telescope {
     }
 }
 
-/// Displacement of the BPLO against the transmitted beam: an offset of parallel axes, and an angle between them.
+/// Displacement of the BPLO against the transmitted beam: an offset of parallel axes, and an
+/// angle between them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Misalignment {
     /// Offset of the two axes at the telescope, x and y \[m\].

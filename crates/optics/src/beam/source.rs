@@ -1,9 +1,10 @@
 //! The field at the telescope, sampled on the grid without staircase error at the aperture's edge.
 //!
-//! The spectrum of the truncated Gaussian is known (a Hankel transform); its part below Nyquist is put on the grid
-//! exactly. A fraction of the light that the edge diffracts beyond Nyquist is restored in the corners of the band. Check:
-//! power equals the transmitted fraction to 0.1 % for the chapter, to 1 % for a uniform beam; free-space efficiency
-//! after propagation within 1e-3 of exact theory.
+//! The spectrum of the truncated Gaussian is known (a Hankel transform); its part below Nyquist
+//! is put on the grid exactly. A fraction of the light that the edge diffracts beyond Nyquist is
+//! restored in the corners of the band. Check: power equals the transmitted fraction to 0.1 %
+//! for the chapter, to 1 % for a uniform beam; free-space efficiency after propagation within
+//! 1e-3 of exact theory.
 
 use crate::beam::Telescope;
 use crate::plan::violation::{Limit, violations_of};
@@ -15,8 +16,8 @@ use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 
 /// Fraction of the light beyond Nyquist that is restored. At short range this light still overlaps
-/// the beam, but less so than light just below Nyquist does: 0 leaves the chapter's efficiency 0.2 %
-/// too small at 100 m, 1 makes it 0.3 % too large.
+/// the beam, but less so than light just below Nyquist does: 0 leaves the chapter's efficiency 0.2
+/// % too small at 100 m, 1 makes it 0.3 % too large.
 const RESTORED: f64 = 0.4;
 
 /// exp(-r^2/s^2), without regard to the aperture.
@@ -24,8 +25,8 @@ fn relative_irradiance(telescope: &Telescope, radius_m: f64) -> f64 {
     (-(radius_m / telescope.intensity_radius_m()).powi(2)).exp()
 }
 
-/// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr \[m\], from a table
-/// in steps of 1/50 of its finest structure.
+/// Hankel transform of the aperture field, 2 pi integral of E(r) J0(kappa r) r dr \[m\], from a
+/// table in steps of 1/50 of its finest structure.
 fn hankel_transform(telescope: &Telescope, largest_rad_m: f64) -> impl Fn(f64) -> f64 {
     let inner_m = telescope.obscuration_radius_m;
     let lit_m = (9.0 * telescope.intensity_radius_m()).max(inner_m);
@@ -99,7 +100,8 @@ fn aperture_spectrum(
     ];
     let mut spectrum = vec![Complex::<f64>::default(); grid.points()];
     let mut edge = vec![0.0; grid.points()];
-    // Power in the band: p0 + 2 w p1 + w^2 p2 if the field in its corners is 1 + w edge times larger.
+    // Power in the band: p0 + 2 w p1 + w^2 p2 if the field in its corners is 1 + w
+    // edge times larger.
     let mut p0 = 0.0;
     let mut p1 = 0.0;
     let mut p2 = 0.0;
@@ -137,8 +139,8 @@ fn aperture_spectrum(
 /// **twice** that of the focus.
 ///
 /// The field has waves up to k a/|F|, its irradiance up to twice and the square of that up to four
-/// times as much. The sum over the points is the integral (19) if no wave of the square is aliased to
-/// 0, at 2 pi/dx: dx <= lambda |F|/(4 a).
+/// times as much. The sum over the points is the integral (19) if no wave of the square is aliased
+/// to 0, at 2 pi/dx: dx <= lambda |F|/(4 a).
 pub(crate) fn slope_rad(telescope: &Telescope, misalignment: &Misalignment) -> f64 {
     let reach = telescope
         .aperture_radius_m
@@ -150,8 +152,8 @@ pub(crate) fn slope_rad(telescope: &Telescope, misalignment: &Misalignment) -> f
 /// Checks that the grid holds the telescope and its beam out to `range_m`.
 ///
 /// # Errors
-/// [`Error::Sampling`] names every limit that is violated, with the value that is needed and the one
-/// that the grid has; [`Error::OutOfRange`] for an invalid telescope, misalignment or grid.
+/// [`Error::Sampling`] names every limit that is violated, with the value that is needed and the
+/// one that the grid has; [`Error::OutOfRange`] for an invalid telescope, misalignment or grid.
 pub(crate) fn check_grid(
     telescope: &Telescope,
     misalignment: &Misalignment,

@@ -1,7 +1,8 @@
 //! Whether the phase screens of a run give the bistatic mean that is known exactly for them, (P5).
 //!
-//! Nothing else shows that a grid is too coarse or too narrow for the field: what (P12) corrects does not show in the result.
-//! Check: a grid of twice the spacing that its focus needs is refused, and so is a mistake put in on purpose; good runs are not.
+//! Nothing else shows that a grid is too coarse or too narrow for the field: what (P12) corrects
+//! does not show in the result. Check: a grid of twice the spacing that its focus needs is refused,
+//! and so is a mistake put in on purpose; good runs are not.
 
 use crate::Error;
 use crate::air::StructureTable;

@@ -1,13 +1,15 @@
-//! Efficiency (19) through turbulence by Monte Carlo: both receivers, every range, from one set of realisations.
+//! Efficiency (19) through turbulence by Monte Carlo: both receivers, every range, from one set
+//! of realisations.
 //!
-//! Monostatic: transmitted beam and BPLO cross the same screens; bistatic: independent ones, taken as all pairs of different
-//! realisations. Realisations run in parallel in groups of fixed size, each screen with a random stream of its own, so
-//! that the result has the same bits for any number of threads.
+//! Monostatic: transmitted beam and BPLO cross the same screens; bistatic: independent ones, taken
+//! as all pairs of different realisations. Realisations run in parallel in groups of fixed size,
+//! each screen with a random stream of its own, so that the result has the same bits for any
+//! number of threads.
 //!
 //! Means, scatter and errors are multiplied with the ratio of exact to grid free-space efficiency.
 //!
-//! Check: bistatic against exact theory for the very screens used, as a z-score, in every run; no turbulence gives free space with an
-//! error of exactly 0.
+//! Check: bistatic against exact theory for the very screens used, as a z-score, in every run; no
+//! turbulence gives free space with an error of exactly 0.
 
 mod against_theory;
 #[cfg(test)]
@@ -44,7 +46,8 @@ pub(crate) const GROUPS_PER_WAVE: usize = 8;
 pub struct Stop {
     /// Largest number of realisations.
     pub realisations: usize,
-    /// Ends earlier when the relative standard error of the monostatic mean is at most this at every range.
+    /// Ends earlier when the relative standard error of the monostatic mean is at most this
+    /// at every range.
     pub relative_standard_error: Option<f64>,
 }
 
@@ -78,7 +81,8 @@ pub struct Progress {
     pub done: usize,
     /// Realisations at which it ends at the latest.
     pub total: usize,
-    /// Largest relative standard error of the monostatic mean over the ranges at the last test for the end.
+    /// Largest relative standard error of the monostatic mean over the ranges at the last
+    /// test for the end.
     pub relative_standard_error: f64,
 }
 
@@ -95,8 +99,8 @@ pub struct MonteCarlo {
     pub grid: Grid,
     /// Layers of the path, one screen each; a range inside a layer cuts it ([`Layers::split_at`]).
     pub layers: Layers,
-    /// Ranges at which the efficiency is wanted \[m\], in any order, within the layers; results come in increasing
-    /// order, each range once.
+    /// Ranges at which the efficiency is wanted \[m\], in any order, within the layers; results
+    /// come in increasing order, each range once.
     pub range_m: Vec<f64>,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -111,28 +115,31 @@ pub struct EfficiencyEstimate {
     pub monostatic: EfficiencyProfile,
     /// Beams through independent paths; none from a single realisation, which has no pairs.
     pub bistatic: Option<EfficiencyProfile>,
-    /// Efficiency of each realisation at each range, `[range][realisation]`, both beams through the same path; a realisation
-    /// has the same index at every range. One without turbulence.
+    /// Efficiency of each realisation at each range, `[range][realisation]`, both beams through the
+    /// same path; a realisation has the same index at every range. One without turbulence.
     pub monostatic_realisations: Vec<Vec<f64>>,
-    /// The same for beams through the independent paths of two realisations each; empty without pairs.
+    /// The same for beams through the independent paths of two realisations each;
+    /// empty without pairs.
     pub bistatic_realisations: Vec<Vec<f64>>,
     /// Realisations done (1 without turbulence).
     pub realisations: usize,
-    /// Independent samples among them, from which the errors are taken: an antithetic pair is one. Two are needed for the
-    /// error of the monostatic mean, three for that of the bistatic one; below, these are NaN.
+    /// Independent samples among them, from which the errors are taken: an antithetic pair is one.
+    /// Two are needed for the error of the monostatic mean, three for that of the bistatic one;
+    /// below, these are NaN.
     pub independent_samples: usize,
-    /// Free-space efficiency of the same steps on the same grid; times this over `exact_free_space`, the means are those of
-    /// the grid as it is.
+    /// Free-space efficiency of the same steps on the same grid; times this over
+    /// `exact_free_space`, the means are those of the grid as it is.
     pub grid_free_space: Vec<f64>,
     /// Exact free-space efficiency.
     pub exact_free_space: Vec<f64>,
-    /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the result is doubtful;
-    /// above 0.05 it is refused.
+    /// Mean fraction of the power that the absorbing border took before each range. Above 0.01 the
+    /// result is doubtful; above 0.05 it is refused.
     pub lost_power_fraction: Vec<f64>,
 }
 
 impl MonteCarlo {
-    /// The chapter's set-up: 512 x 512 points of 2 mm, 10 layers out to 3 km with a range at the end of each, Table 2.
+    /// The chapter's set-up: 512 x 512 points of 2 mm, 10 layers out to 3 km with a range at the
+    /// end of each, Table 2.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a Cn2 \[m^(-2/3)\] that is not allowed.
@@ -158,12 +165,15 @@ impl MonteCarlo {
         self.run_in::<f32>(Stop::after(realisations), |_| ControlFlow::Continue(()))
     }
 
-    /// Runs in the number type `T` (f32 is twice as fast; its rounding is far below a Monte-Carlo error).
+    /// Runs in the number type `T` (f32 is twice as fast; its rounding is far below a
+    /// Monte-Carlo error).
     ///
-    /// `progress` is called after each layer of two realisations, by the thread that carried them; `ControlFlow::Break` cancels.
+    /// `progress` is called after each layer of two realisations, by the thread that carried them;
+    /// `ControlFlow::Break` cancels.
     ///
     /// # Errors
-    /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::AgainstTheory`], [`Error::Cancelled`].
+    /// [`Error`] for a set-up that is not allowed, [`Error::PowerLost`], [`Error::AgainstTheory`],
+    /// [`Error::Cancelled`].
     pub fn run_in<T: Real>(
         &self,
         stop: Stop,
@@ -174,7 +184,8 @@ impl MonteCarlo {
         set_up.run_prepared(&prepared, stop, &mut progress)
     }
 
-    /// Mean irradiance overlap without turbulence on this very grid, at each range: the grid's free-space efficiency.
+    /// Mean irradiance overlap without turbulence on this very grid, at each range: the grid's
+    /// free-space efficiency.
     ///
     /// # Errors
     /// As [`MonteCarlo::run_in`].
@@ -189,8 +200,8 @@ impl MonteCarlo {
         Ok(ranges.iter().map(|at| at.samples[0].same_path).collect())
     }
 
-    /// The same run with its ranges in increasing order, each at the end of a layer; `prepare` refuses
-    /// ranges that are not numbers.
+    /// The same run with its ranges in increasing order, each at the end of a layer; `prepare`
+    /// refuses ranges that are not numbers.
     fn sorted(&self) -> Self {
         let mut range_m = self.range_m.clone();
         range_m.sort_by(f64::total_cmp);
@@ -306,7 +317,8 @@ impl MonteCarlo {
         self.estimate(prepared, &ranges, done)
     }
 
-    /// Means, scatter and errors of both receivers at each range, times the ratio of exact to grid free-space efficiency.
+    /// Means, scatter and errors of both receivers at each range, times the ratio of exact to grid
+    /// free-space efficiency.
     fn estimate<T: Real>(
         &self,
         prepared: &Prepared<T>,

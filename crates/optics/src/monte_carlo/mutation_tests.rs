@@ -1,7 +1,9 @@
-//! A mistake put in on purpose: the bistatic test must find a wrong sign of the random frequency shift.
+//! A mistake put in on purpose: the bistatic test must find a wrong sign of the random
+//! frequency shift.
 //!
-//! With the wrong sign a frequency kappa_m - s carries the amplitude that belongs to kappa_m + s. Screens look right and the
-//! monostatic efficiency hardly changes; the bistatic efficiency falls by several standard errors.
+//! With the wrong sign a frequency kappa_m - s carries the amplitude that belongs to kappa_m + s.
+//! Screens look right and the monostatic efficiency hardly changes; the bistatic efficiency falls
+//! by several standard errors.
 
 use crate::air::{Scales, StructureTable};
 use crate::monte_carlo::EfficiencyEstimate;

@@ -1,7 +1,9 @@
-//! The path as layers with one screen each, laid out as legs from screen to screen that serve every range in one pass.
+//! The path as layers with one screen each, laid out as legs from screen to screen that serve every
+//! range in one pass.
 //!
-//! The screen stands in the middle of its layer (half step, screen, half step), and layers end at the ranges.
-//! Check: the legs add up to each range; the screens of a range carry the turbulence of the path up to it.
+//! The screen stands in the middle of its layer (half step, screen, half step), and layers end at
+//! the ranges. Check: the legs add up to each range; the screens of a range carry the turbulence of
+//! the path up to it.
 
 use crate::Error;
 use crate::air::cn2::Cn2Path;
@@ -75,7 +77,8 @@ impl Layers {
         starts.zip(self.end_m.iter().copied())
     }
 
-    /// The screens that a field arriving at `range_m` has crossed, for the exact bistatic theory of a simulated path.
+    /// The screens that a field arriving at `range_m` has crossed, for the exact bistatic theory of
+    /// a simulated path.
     ///
     /// # Errors
     /// What [`Cn2Path::mean`] returns.
@@ -160,13 +163,14 @@ pub(crate) struct Path {
     pub(crate) distance_m: Vec<f64>,
     /// sqrt(k^2 Cn2 dz) of each layer; empty without turbulence.
     pub(crate) strength: Vec<f64>,
-    /// Index of each distance by its logarithm in steps of rounding, so that distances are found fast
-    /// on paths of thousands of layers and ranges.
+    /// Index of each distance by its logarithm in steps of rounding, so that distances are found
+    /// fast on paths of thousands of layers and ranges.
     known: BTreeMap<i64, usize>,
 }
 
 impl Path {
-    /// The path to ranges in increasing order, at which layers end. Without turbulence there are no screens.
+    /// The path to ranges in increasing order, at which layers end. Without turbulence there
+    /// are no screens.
     pub(crate) fn new(
         layers: &Layers,
         range_m: &[f64],
@@ -207,7 +211,8 @@ impl Path {
         Ok(path)
     }
 
-    /// Computes the strengths of the screens. Returns the positions of screens and ranges, increasing.
+    /// Computes the strengths of the screens. Returns the positions of screens and
+    /// ranges, increasing.
     fn add_screens(
         &mut self,
         layers: &Layers,

@@ -1,10 +1,11 @@
-//! Sums from which the efficiencies and their errors follow, for both receivers from one set of realisations.
+//! Sums from which the efficiencies and their errors follow, for both receivers from one set
+//! of realisations.
 //!
 //! Monostatic: mean of q_i = integral of j_i^2. Bistatic: all pairs of different realisations,
-//! \[integral of (sum j)^2 - sum of integral j_i^2\] / (n (n - 1)). The irradiance is folded onto one quadrant, which
-//! is exact for beams symmetric about the axes; its error is the jackknife over realisations, for which
-//! the overlap of one realisation with all others is taken on rings.
-//! Check: against the double sum over pairs and the full jackknife.
+//! \[integral of (sum j)^2 - sum of integral j_i^2\] / (n (n - 1)). The irradiance is folded onto
+//! one quadrant, which is exact for beams symmetric about the axes; its error is the jackknife over
+//! realisations, for which the overlap of one realisation with all others is taken on rings. Check:
+//! against the double sum over pairs and the full jackknife.
 
 use crate::screens::grid::Grid;
 use crate::screens::kernel::{self, Real};
@@ -12,7 +13,8 @@ use crate::screens::kernel::{self, Real};
 /// Width of a ring in grid spacings.
 const RING: f64 = 2.0;
 
-/// Folding of a grid onto the quadrant x, y >= 0 (or no folding for displaced beams), and rings about the axis.
+/// Folding of a grid onto the quadrant x, y >= 0 (or no folding for displaced beams), and rings
+/// about the axis.
 #[derive(Debug)]
 pub(crate) struct Folding {
     grid: Grid,
@@ -26,7 +28,8 @@ pub(crate) struct Folding {
 }
 
 impl Folding {
-    /// Onto the quadrant, for beams symmetric about both axes, or the grid as it is, for displaced beams.
+    /// Onto the quadrant, for beams symmetric about both axes, or the grid as it is, for
+    /// displaced beams.
     pub(crate) fn new(grid: &Grid, folded: bool) -> Self {
         let Grid { nx, ny, dx_m, dy_m } = *grid;
         let size = if folded {
@@ -96,7 +99,8 @@ impl Folding {
         }
     }
 
-    /// Integral over the full grid of the product of two symmetrised planes (in points, without the area).
+    /// Integral over the full grid of the product of two symmetrised planes (in points,
+    /// without the area).
     pub(crate) fn overlap<T: Real>(&self, a: &[T], b: &[T]) -> f64 {
         let width = self.size[0];
         let mut sum = 0.0;
@@ -129,8 +133,8 @@ impl Folding {
         sums
     }
 
-    /// Overlap of one sample with all others on rings (per point, both ways), from its ring sums and
-    /// those of all samples. `other` is the index of the ring sums of j_B: 0 for aligned beams.
+    /// Overlap of one sample with all others on rings (per point, both ways), from its ring sums
+    /// and those of all samples. `other` is the index of the ring sums of j_B: 0 for aligned beams.
     fn overlap_with_others(&self, sample: &Sample, sums: &[Vec<f64>; 2], other: usize) -> f64 {
         let mut overlap = 0.0;
         for (i, points) in self.ring_points.iter().enumerate() {
@@ -149,8 +153,8 @@ fn multiplicity_along(i: usize, n: usize) -> f64 {
     if i > 0 && i < n.div_ceil(2) { 2.0 } else { 1.0 }
 }
 
-/// An independent sample (a realisation or an antithetic pair) at one range. Overlaps are in units of
-/// the efficiency.
+/// An independent sample (a realisation or an antithetic pair) at one range. Overlaps are in units
+/// of the efficiency.
 #[derive(Debug, Clone)]
 pub(crate) struct Sample {
     /// eta of the same path, integral of j_T j_B.
@@ -165,7 +169,8 @@ pub(crate) struct Sample {
     pub(crate) lost: f64,
 }
 
-/// Mean and variance of a list; the variance of fewer than two values is NaN, as nothing is known of it.
+/// Mean and variance of a list; the variance of fewer than two values is NaN, as nothing
+/// is known of it.
 pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;
@@ -178,9 +183,11 @@ pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f
     (mean, variance)
 }
 
-/// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer than three samples.
+/// Bistatic efficiency of all pairs and its jackknife standard error, NaN for fewer
+/// than three samples.
 ///
-/// `total` is the overlap of the two summed planes, `scale` turns a product of ring sums (per point) into an efficiency.
+/// `total` is the overlap of the two summed planes, `scale` turns a product of ring sums (per
+/// point) into an efficiency.
 pub(crate) fn bistatic(
     samples: &[Sample],
     total: f64,
@@ -317,8 +324,8 @@ mod tests {
         assert!((error / exact - 1.0).abs() < 0.02, "{error} {exact}");
     }
 
-    /// A bright speckle meets itself far more than it meets others: taken as it is in one place and on rings in another, this overlap
-    /// cancels the scatter.
+    /// A bright speckle meets itself far more than it meets others: taken as it is in one place and
+    /// on rings in another, this overlap cancels the scatter.
     #[test]
     fn few_realisations_with_bright_speckles_state_their_error() {
         let grid = Grid {

@@ -18,8 +18,9 @@ pub enum Sampling {
     /// Independent realisations.
     #[default]
     Independent,
-    /// Half of the realisations see the screens of another with the opposite sign, an equally probable path: every
-    /// effect odd in the phase cancels in the mean of the two. Means stay unbiased; errors are taken over such pairs.
+    /// Half of the realisations see the screens of another with the opposite sign, an equally
+    /// probable path: every effect odd in the phase cancels in the mean of the two. Means stay
+    /// unbiased; errors are taken over such pairs.
     Antithetic,
 }
 
@@ -45,8 +46,8 @@ pub(crate) struct RangeResult<T> {
     pub(crate) samples: Vec<Sample>,
     /// Single products of two different realisations.
     pub(crate) products: Vec<f64>,
-    /// Results of either realisation of a pair that are not yet joined with those of their antithetic
-    /// partners.
+    /// Results of either realisation of a pair that are not yet joined with those of their
+    /// antithetic partners.
     waiting: [Vec<RealisationResult<T>>; 2],
 }
 
@@ -190,9 +191,9 @@ impl<'a, T: Real> Walker<'a, T> {
         }
     }
 
-    /// Propagates realisations `first` to `first + count`, two side by side, and returns their results
-    /// at each range. After each leg `report` is called with the number of realisations that have
-    /// reached the end of the path; its error ends the walk.
+    /// Propagates realisations `first` to `first + count`, two side by side, and returns their
+    /// results at each range. After each leg `report` is called with the number of realisations
+    /// that have reached the end of the path; its error ends the walk.
     pub(crate) fn run_group(
         mut self,
         first: usize,

@@ -31,7 +31,8 @@ const NEGLIGIBLE_GAP: f64 = 1e-4;
 pub struct LayerGap {
     /// Range \[m\].
     pub range_m: f64,
-    /// Mean bistatic efficiency for the very screens over that for the continuous path, less one. Exact.
+    /// Mean bistatic efficiency for the very screens over that for the continuous path,
+    /// less one. Exact.
     pub relative: f64,
     /// Forecast of the relative standard error of the Monte Carlo.
     pub standard_error: f64,
@@ -185,8 +186,8 @@ impl<'a> Gaps<'a> {
         Ok(out)
     }
 
-    /// `layers`, halved until no range has a large gap; at each range the layer whose screen has the
-    /// largest error is halved first.
+    /// `layers`, halved until no range has a large gap; at each range the layer whose screen has
+    /// the largest error is halved first.
     pub(super) fn refined(&self, mut layers: Layers) -> Result<Layers, Error> {
         loop {
             let mut large = self.of_layers(&layers)?;
@@ -232,7 +233,8 @@ impl<'a> Gaps<'a> {
         Ok(errors)
     }
 
-    /// Number of equal layers to `furthest_m`, `least` or more, without a large gap; none if 1000 have one.
+    /// Number of equal layers to `furthest_m`, `least` or more, without a large gap; none
+    /// if 1000 have one.
     pub(super) fn equal_layers(
         &self,
         least: usize,
@@ -255,8 +257,9 @@ fn spherical_weight(position_m: f64, range_m: f64) -> f64 {
     (1.0 - position_m / range_m).max(0.0).powf(5.0 / 3.0)
 }
 
-/// Forecast of the relative standard error of a mean over realisations, half of them antithetic: the scatter of one grows with
-/// the Rytov variance and levels off (measured: 0.3 times it up to 0.3; 0.35 to 0.5 in strong turbulence).
+/// Forecast of the relative standard error of a mean over realisations, half of them antithetic:
+/// the scatter of one grows with the Rytov variance and levels off (measured: 0.3 times it up to
+/// 0.3; 0.35 to 0.5 in strong turbulence).
 fn forecast_error(rytov_variance: f64, realisations: usize) -> f64 {
     (0.3 * rytov_variance).min(0.35) / (realisations.max(1) as f64).sqrt()
 }

@@ -1,4 +1,5 @@
-//! How much light leaves a grid: the tails of the mean beam beyond the absorbing border, from exact theory.
+//! How much light leaves a grid: the tails of the mean beam beyond the absorbing border,
+//! from exact theory.
 
 use crate::air::cn2::Cn2Path;
 use crate::air::structure::StructureTable;
@@ -68,13 +69,14 @@ impl Light {
         })
     }
 
-    /// Largest mean fraction of the light on a grid of this width and spacing that its border takes.
+    /// Largest mean fraction of the light on a grid of this width and spacing that its border
+    /// takes.
     pub(super) fn lost(&self, width_m: f64, spacing_m: f64) -> f64 {
         let mut worst = 0f64;
         for plane in &self.planes {
             let border_m = (0.5 * BORDER * width_m - plane.displaced_m).max(0.0);
-            // Light at angles beyond the band of the grid, a square of the area of this circle, is not
-            // on the grid and cannot be lost.
+            // Light at angles beyond the band of the grid, a square of the area of this circle, is
+            // not on the grid and cannot be lost.
             let nyquist_m =
                 self.wavelength_m * plane.range_m / (spacing_m * std::f64::consts::PI.sqrt());
             worst = worst.max(plane.beyond(border_m) - plane.beyond(nyquist_m));

@@ -18,8 +18,8 @@ const LARGEST_POINTS: usize = 16384;
 /// Largest forecast fraction of the light that the border of a derived grid absorbs: three quarters
 /// of [`DOUBTFUL_LOSS`](super::DOUBTFUL_LOSS).
 const DERIVED_LOSS: f64 = 0.0075;
-/// Largest forecast fraction that a plan accepts: a little less than that at which a run ends with an
-/// error.
+/// Largest forecast fraction that a plan accepts: a little less than that at which a run
+/// ends with an error.
 const LARGEST_LOSS: f64 = 0.04;
 /// Fresnel number below which the whole path is in the far field of the aperture.
 const FAR_FIELD: f64 = 0.2;
@@ -97,7 +97,8 @@ impl<'a> Limits<'a> {
         )
     }
 
-    /// Width \[m\] at which the border takes three quarters of what is doubtful, at the spacing of a grid.
+    /// Width \[m\] at which the border takes three quarters of what is doubtful, at the
+    /// spacing of a grid.
     pub(super) fn width_for_light_m(&self, grid: &Grid, range_m: &[f64]) -> Result<f64, Error> {
         Ok(not_below(
             self.light(range_m)?
@@ -247,8 +248,8 @@ impl<'a> Limits<'a> {
         })
     }
 
-    /// Number of equal layers to its last range that is enough for each of these lists of ranges; none
-    /// if 1000 are not.
+    /// Number of equal layers to its last range that is enough for each of these lists of ranges;
+    /// none if 1000 are not.
     pub(super) fn equal_layers(&self, runs: &[&[f64]]) -> Result<Option<usize>, Error> {
         let mut count = 1;
         for range_m in runs {

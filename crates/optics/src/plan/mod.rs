@@ -1,10 +1,13 @@
-//! What a run needs: grid, spacing, layers, memory and time, derived from the scene - or a refusal that names the limits.
+//! What a run needs: grid, spacing, layers, memory and time, derived from the scene - or a refusal
+//! that names the limits.
 //!
-//! Rules: at least 25 points across the aperture radius (4 where every range is in the far field); l0 >= 2 dx; coherence radius
-//! at the target resolved; the border takes at most 0.0075 of the mean beam's light, tails of diffraction and turbulence included;
-//! Rytov variance of a layer at most 0.1; the exact mean for the screens within a third of the standard error of that for the
-//! continuous path, at every range. Check: the chapter's set-up passes for Cn2 up to 1e-13 at 1 km, 1e-12 beyond 1 km on 512
-//! points is refused, what the plan proposes passes its own test, and runs of derived set-ups lose less than 0.01 of the light.
+//! Rules: at least 25 points across the aperture radius (4 where every range is in the far field);
+//! l0 >= 2 dx; coherence radius at the target resolved; the border takes at most 0.0075 of the mean
+//! beam's light, tails of diffraction and turbulence included; Rytov variance of a layer at most
+//! 0.1; the exact mean for the screens within a third of the standard error of that for the
+//! continuous path, at every range. Check: the chapter's set-up passes for Cn2 up to 1e-13 at 1 km,
+//! 1e-12 beyond 1 km on 512 points is refused, what the plan proposes passes its own test, and runs
+//! of derived set-ups lose less than 0.01 of the light.
 
 mod gaps;
 mod light;
@@ -24,7 +27,8 @@ use crate::{Error, Misalignment, Telescope, Turbulence};
 use gaps::worst_rytov;
 use limits::{Limits, last};
 
-/// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long. Measured, one core of 2023.
+/// CPU time of one f32 layer per point, transforms included \[s\]; f64 takes twice as long.
+/// Measured, one core of 2023.
 const LAYER_S: f64 = 9e-9;
 /// CPU time of one f32 screen per point \[s\].
 const SCREEN_S: f64 = 9e-9;
@@ -71,13 +75,15 @@ pub struct Plan {
     pub layer_rytov_variance: f64,
     /// Forecast of the largest mean fraction of the light that the border takes.
     pub light_lost: f64,
-    /// What the layers do to the mean at the ranges of the run (at 64 of them at most); empty without turbulence.
+    /// What the layers do to the mean at the ranges of the run (at 64 of them at most); empty
+    /// without turbulence.
     pub gaps: Vec<LayerGap>,
     /// Memory of a run with eight groups at a time in f32 \[bytes\].
     pub memory_bytes: usize,
     /// The part of `memory_bytes` that each group needs while it runs \[bytes\].
     pub group_bytes: usize,
-    /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on current machines.
+    /// CPU time of one realisation in f32 \[s\], an estimate within a factor of two on
+    /// current machines.
     pub realisation_cpu_s: f64,
     /// Properties that are allowed but cost accuracy.
     pub warnings: Vec<Warning>,
@@ -100,7 +106,8 @@ impl Plan {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Warning {
-    /// The inner scale is below two grid spacings: the screens miss this fraction of D at one spacing.
+    /// The inner scale is below two grid spacings: the screens miss this fraction of D
+    /// at one spacing.
     InnerScale {
         /// Fraction of the structure function that is missing at one grid spacing.
         missing: f64,
@@ -126,7 +133,8 @@ pub enum Warning {
         /// Width of a grid that is wide enough \[m\].
         width_m: f64,
     },
-    /// The turbulence is so weak that Monte Carlo differs from free space by less than its own error.
+    /// The turbulence is so weak that Monte Carlo differs from free space by less than its own
+    /// error.
     WeakTurbulence {
         /// Rytov variance of the whole path.
         rytov_variance: f64,
@@ -150,7 +158,8 @@ impl Case {
     /// Derives grid and layers for ranges \[m\], increasing; layers end at the largest.
     ///
     /// # Errors
-    /// [`Error::Sampling`] when more than 16384 points along an axis are needed; [`Error`] for a case that is not allowed.
+    /// [`Error::Sampling`] when more than 16384 points along an axis are needed; [`Error`] for a
+    /// case that is not allowed.
     pub fn plan(&self, range_m: &[f64]) -> Result<Plan, Error> {
         crate::efficiency::check_increasing("range_m", range_m)?;
         let limits = Limits::new(self)?;
@@ -161,7 +170,8 @@ impl Case {
         self.examine(&grid, &layers, range_m)
     }
 
-    /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10 layers for example.
+    /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10
+    /// layers for example.
     ///
     /// # Errors
     /// As [`Case::examine_runs`].
@@ -176,12 +186,13 @@ impl Case {
         })
     }
 
-    /// As [`Case::examine`] for several runs on one grid, each with `layers` equal layers to its last
-    /// range: the violations of all runs are reported at once, and a proposed set-up holds for all.
+    /// As [`Case::examine`] for several runs on one grid, each with `layers` equal layers to
+    /// its last range: the violations of all runs are reported at once, and a proposed
+    /// set-up holds for all.
     ///
     /// # Errors
-    /// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing: largest) value that works,
-    /// and a whole set-up that was tried and works.
+    /// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing:
+    /// largest) value that works, and a whole set-up that was tried and works.
     pub fn examine_runs(
         &self,
         grid: &Grid,
@@ -340,8 +351,8 @@ fn folded_points(grid: &Grid, beams: usize) -> usize {
     }
 }
 
-/// Buffers of a group under way in f32: fields and taps of two realisations, what steps and screens work with, four screens;
-/// planes that wait for their antithetic partners at each range.
+/// Buffers of a group under way in f32: fields and taps of two realisations, what steps and screens
+/// work with, four screens; planes that wait for their antithetic partners at each range.
 fn group_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let complex = 8 * grid.points();
     complex * (4 * beams + 2)
@@ -349,8 +360,8 @@ fn group_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
         + 4 * folded_points(grid, beams) * beams * (2 * ranges + 4)
 }
 
-/// What all groups share, in f32: the sums of a wave of groups and of all before them, the spectrum of the screens, the
-/// field at the telescope, places of the folded points.
+/// What all groups share, in f32: the sums of a wave of groups and of all before them, the spectrum
+/// of the screens, the field at the telescope, places of the folded points.
 fn shared_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let folded = folded_points(grid, beams);
     (GROUPS_PER_WAVE + 1) * 4 * folded * beams * ranges

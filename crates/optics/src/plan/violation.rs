@@ -1,4 +1,5 @@
-//! What a transverse grid must hold, in numbers that a user can take over: limits, what violates them, a set-up that does not.
+//! What a transverse grid must hold, in numbers that a user can take over: limits, what violates
+//! them, a set-up that does not.
 
 use crate::screens::grid::Grid;
 use std::fmt;
@@ -17,14 +18,16 @@ pub enum Limit {
     Border,
     /// Width: the beam at the largest range.
     Beam,
-    /// Width: the tails of the beam, by diffraction at its edge and by turbulence; beyond 0.05 a run ends.
+    /// Width: the tails of the beam, by diffraction at its edge and by turbulence; beyond
+    /// 0.05 a run ends.
     Light,
     /// Points along an axis of a grid that a plan derives.
     Points,
 }
 
 impl Limit {
-    /// Whether it bounds the spacing from above; the others bound the width, or the number of points.
+    /// Whether it bounds the spacing from above; the others bound the width, or the
+    /// number of points.
     pub fn is_spacing(self) -> bool {
         matches!(self, Self::Aperture | Self::WaveFront | Self::Scatter)
     }
@@ -48,14 +51,16 @@ impl Limit {
 pub struct Violation {
     /// Which.
     pub limit: Limit,
-    /// Least width \[m\] (or points), or largest spacing \[m\], that is accepted: rounded to the safe side.
+    /// Least width \[m\] (or points), or largest spacing \[m\], that is accepted: rounded
+    /// to the safe side.
     pub needed: f64,
     /// What the set-up has.
     pub found: f64,
 }
 
 impl Violation {
-    /// The violation of a largest spacing or a smallest width `limit_m` \[m\] by a grid, if it is one.
+    /// The violation of a largest spacing or a smallest width `limit_m` \[m\] by a
+    /// grid, if it is one.
     fn by_grid(limit: Limit, limit_m: f64, grid: &Grid) -> Option<Self> {
         if limit.is_spacing() {
             let spacing_m = grid.largest_spacing_m();

@@ -1,14 +1,15 @@
 //! Phase screens: Fourier synthesis with a random frequency shift and randomised subharmonics.
 //!
-//! psi(r) = Re sum over kappa of c sqrt(Phi_psi(kappa)) dkappa exp(j kappa.r), (18) corrected: Phi_psi = 2 pi k^2 dz Phi_n,
-//! c complex normal with unit variance in each part; the imaginary part is a second screen. All frequencies of a
-//! synthesis are shifted by the same random part s of a cell, kappa = kappa_m + s (Paulson, Wu and Davis 2019), so
-//! that the expected spectrum has no gaps, and the amplitude is that of the SHIFTED frequency.
-//! Frequencies beyond Nyquist are folded back where the spectrum has an inner scale that the grid resolves: D is then
-//! right at every separation between grid points.
+//! psi(r) = Re sum over kappa of c sqrt(Phi_psi(kappa)) dkappa exp(j kappa.r), (18) corrected:
+//! Phi_psi = 2 pi k^2 dz Phi_n, c complex normal with unit variance in each part; the imaginary
+//! part is a second screen. All frequencies of a synthesis are shifted by the same random part s of
+//! a cell, kappa = kappa_m + s (Paulson, Wu and Davis 2019), so that the expected spectrum has no
+//! gaps, and the amplitude is that of the SHIFTED frequency. Frequencies beyond Nyquist are folded
+//! back where the spectrum has an inner scale that the grid resolves: D is then right at every
+//! separation between grid points.
 //!
-//! Check: [`ScreenGenerator::expected_structure_m53`] is the exact ensemble mean of the scheme, from its own discrete spectrum;
-//! it stays within 0.1 % of quadrature of the continuous spectrum.
+//! Check: [`ScreenGenerator::expected_structure_m53`] is the exact ensemble mean of the scheme,
+//! from its own discrete spectrum; it stays within 0.1 % of quadrature of the continuous spectrum.
 
 use crate::Error;
 use crate::air::spectrum::Spectrum;
@@ -24,11 +25,12 @@ use rustfft::num_complex::Complex;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
-/// Frequencies of up to this index take their amplitude at the shifted frequency; beyond, the mean over the cell.
+/// Frequencies of up to this index take their amplitude at the shifted frequency; beyond, the
+/// mean over the cell.
 const EXACT: usize = 24;
 
-/// Generator of phase screens for one grid and spectrum. Screens have unit k^2 Cn2 dz: a layer multiplies them with
-/// sqrt(k^2 Cn2 dz).
+/// Generator of phase screens for one grid and spectrum. Screens have unit k^2 Cn2 dz: a layer
+/// multiplies them with sqrt(k^2 Cn2 dz).
 pub struct ScreenGenerator<T: Real> {
     grid: Grid,
     spectrum: Arc<dyn Spectrum>,
@@ -44,7 +46,8 @@ pub struct ScreenGenerator<T: Real> {
     pub(crate) shift_sign: f64,
 }
 
-/// Random stream of one screen: xoshiro256++ seeded by a hash of the run's seed, the realisation and the screen.
+/// Random stream of one screen: xoshiro256++ seeded by a hash of the run's seed, the realisation
+/// and the screen.
 pub fn stream(seed: u64, realisation: u64, screen: u64) -> Xoshiro256PlusPlus {
     let mut state = seed;
     for word in [realisation, screen] {
@@ -87,8 +90,9 @@ impl<T: Real> ScreenGenerator<T> {
         Ok(generator)
     }
 
-    /// Whether frequencies beyond Nyquist are folded back: the inner scale is at least 2 grid spacings. Otherwise
-    /// the spectrum is cut at Nyquist and the expected structure function is too small at small separations.
+    /// Whether frequencies beyond Nyquist are folded back: the inner scale is at least 2 grid
+    /// spacings. Otherwise the spectrum is cut at Nyquist and the expected structure function is
+    /// too small at small separations.
     pub fn folds(&self) -> bool {
         // kappa_m = 5.92/l0 for (17); kappa_m <= 2.96/dx is l0 >= 2 dx.
         self.spectrum.inner_wavenumber_rad_m() * self.grid.largest_spacing_m() <= 2.97
@@ -241,8 +245,9 @@ impl<T: Real> ScreenGenerator<T> {
         ))
     }
 
-    /// Expected structure function of these screens at a separation of whole grid points (x, y), per unit k^2 Cn2 dz
-    /// [m^(5/3)]: the exact ensemble mean over coefficients and frequencies, no random numbers.
+    /// Expected structure function of these screens at a separation of whole grid points (x, y),
+    /// per unit k^2 Cn2 dz [m^(5/3)]: the exact ensemble mean over coefficients and frequencies, no
+    /// random numbers.
     pub fn expected_structure_m53(&self, steps_x: usize, steps_y: usize) -> f64 {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let [dx, dy] = self.delta_rad_m;
@@ -273,7 +278,8 @@ impl<T: Real> ScreenGenerator<T> {
             }
         }
         for cell in &self.low.cells {
-            // The last cells touch the origin, where the spectrum may be singular: finer towards it.
+            // The last cells touch the origin, where the spectrum may be singular:
+            // finer towards it.
             sum += self.graded_integral(&rule, cell.corner_rad_m, cell.size_rad_m, r);
         }
         2.0 * sum

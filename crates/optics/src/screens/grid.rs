@@ -1,8 +1,9 @@
 //! The transverse grid and its two-dimensional Fourier transform with one transpose.
 //!
-//! Fields are row-major, `[y][x]`; spectra and the transposed fields `[x][y]`. A transform of the rows followed by a
-//! transposed store leaves the other axis contiguous, so that a forward and an inverse transform cost two transposes
-//! together. Check: against the direct sum, for odd and prime sizes too.
+//! Fields are row-major, `[y][x]`; spectra and the transposed fields `[x][y]`. A transform of the
+//! rows followed by a transposed store leaves the other axis contiguous, so that a forward and an
+//! inverse transform cost two transposes together. Check: against the direct sum, for odd and
+//! prime sizes too.
 
 use crate::Error;
 use crate::error::{positive, within};
@@ -55,7 +56,8 @@ impl Grid {
     /// The grid itself when every field is allowed.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for fewer than 16 points along an axis, or a spacing that is not positive.
+    /// [`Error::OutOfRange`] for fewer than 16 points along an axis, or a spacing that
+    /// is not positive.
     pub fn validated(self) -> Result<Self, Error> {
         for (field, n) in [("nx", self.nx), ("ny", self.ny)] {
             within(
@@ -114,7 +116,8 @@ pub struct Work<T> {
     pub(crate) scratch: FftScratch<T>,
 }
 
-/// Buffers of one transform: blocks of rows, which stay in the fastest cache, and the transform's own.
+/// Buffers of one transform: blocks of rows, which stay in the fastest cache, and the
+/// transform's own.
 pub(crate) struct FftScratch<T> {
     block: Vec<Complex<T>>,
     spectrum: Vec<Complex<T>>,
@@ -189,8 +192,8 @@ impl<T: Real> Fft2<T> {
 
     /// Filters one field along y into each of the fields `outs`: rows `[kx][y]` are transformed
     /// forward along y; `middle` changes the spectrum `[kx][ky]` of each block; the inverse along y
-    /// is stored transposed, `[y]\[kx\]`. The arguments of `middle` are the index of the output, the
-    /// index of the first row of the block, and the block.
+    /// is stored transposed, `[y]\[kx\]`. The arguments of `middle` are the index of the output,
+    /// the index of the first row of the block, and the block.
     pub(crate) fn filter_y<const N: usize>(
         &self,
         field: &[Complex<T>],
@@ -239,7 +242,8 @@ impl<T: Real> Fft2<T> {
     }
 }
 
-/// Stores a block of rows of `length` points, of which the first is row `first`, as columns of `out`.
+/// Stores a block of rows of `length` points, of which the first is row `first`, as
+/// columns of `out`.
 fn store_transposed<T: Real>(
     out: &mut [Complex<T>],
     length: usize,

@@ -1,9 +1,10 @@
-//! The inner loops: exp(j psi), normal numbers, transfer function, absorber, intensity - each written once for f32
-//! and f64, vectorised by the compiler for several instruction sets and chosen at run time.
+//! The inner loops: exp(j psi), normal numbers, transfer function, absorber, intensity - each
+//! written once for f32 and f64, vectorised by the compiler for several instruction sets and
+//! chosen at run time.
 //!
-//! No operation is fused or reassociated, so that every instruction set gives the same bits.
-//! Check: sine and cosine against the standard library within two units in the last place of 1; moments and
-//! distribution of the normal numbers.
+//! No operation is fused or reassociated, so that every instruction set gives the same bits. Check:
+//! sine and cosine against the standard library within two units in the last place of 1; moments
+//! and distribution of the normal numbers.
 
 // The constants have the digits they were computed with; f32 rounds some of them.
 #![allow(clippy::excessive_precision)]
@@ -26,8 +27,8 @@ mod sealed {
 
     /// What the inner loops need of a number beside its arithmetic.
     pub trait Scalar: FftNum {
-        /// The forward and the inverse transform of a length; of each type by itself, so that the planner is compiled with this
-        /// crate and not again by each program that names the type.
+        /// The forward and the inverse transform of a length; of each type by itself, so that the
+        /// planner is compiled with this crate and not again by each program that names the type.
         fn transforms(length: usize) -> [Arc<dyn Fft<Self>>; 2];
         /// The nearest number of this type.
         fn of_i32(value: i32) -> Self;
@@ -65,7 +66,8 @@ pub(crate) fn multiply_cis<T: Real>(field: &mut [Complex<T>], phase: &[T], scale
     }
 }
 
-/// out = amplitude (a + j b) with a, b standard normal, from two random 32-bit words each (Box and Muller 1958).
+/// out = amplitude (a + j b) with a, b standard normal, from two random 32-bit words each (Box
+/// and Muller 1958).
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 pub(crate) fn normals<T: Real>(
     radius: &[u32],
@@ -205,7 +207,8 @@ macro_rules! scalar {
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 const PI_HALF: [$real; 3] = $pi_half;
-                /// Adding 1.5 2^mantissa rounds to an integer, which then stands in the lowest bits.
+                /// Adding 1.5 2^mantissa rounds to an integer, which then stands in
+                /// the lowest bits.
                 const ROUND: $real = 1.5 * (1u64 << $mantissa) as $real;
                 let rounded = self * (1.0 / std::$real::consts::FRAC_PI_2) + ROUND;
                 let n = rounded - ROUND;
@@ -232,7 +235,8 @@ macro_rules! scalar {
             #[inline(always)]
             fn minus_two_ln(self) -> Self {
                 const BIAS: $bits = ($one_exp as $bits) << $mantissa;
-                // self = m 2^e with m from sqrt(1/2) to sqrt(2); integers below 2^mantissa turn into numbers by their bits.
+                // self = m 2^e with m from sqrt(1/2) to sqrt(2); integers below 2^mantissa turn
+                // into numbers by their bits.
                 let bits = self.to_bits();
                 let exponent = (bits.wrapping_sub($sqrt_half).wrapping_add(BIAS)) >> $mantissa;
                 let m =
@@ -274,8 +278,9 @@ fn polynomial<T: Real>(coefficient: &[T], t: T) -> T {
     sum
 }
 
-// pi/2 in three parts whose first two are exact in products with the integers that occur; near-minimax polynomials
-// (Chebyshev interpolation in r^2) of (sin r - r)/r^3 and (cos r - 1 + r^2/2)/r^4; series of artanh.
+// pi/2 in three parts whose first two are exact in products with the integers that occur;
+// near-minimax polynomials (Chebyshev interpolation in r^2) of (sin r - r)/r^3 and (cos r - 1 +
+// r^2/2)/r^4; series of artanh.
 scalar!(
     f32,
     u32,

@@ -1,10 +1,11 @@
 //! Low frequencies of a screen: randomised subharmonics, carried by a polynomial.
 //!
-//! The frequencies |kx| <= 1.5 dkx, |ky| <= 1.5 dky are left out of the Fourier synthesis. Level by level the central
-//! block is cut into 6 x 6 cells of half the spacing, of which the innermost 2 x 2 are cut again (three times finer);
-//! the last 2 x 2 stay. Each cell carries one plane wave with a frequency drawn evenly in the cell, so that the expected
-//! spectrum is the exact integral (Lane 1992 with the randomisation of Paulson, Wu and Davis 2019).
-//! At most 1.5 waves cross the grid: a polynomial of degree 15 in each direction carries their sum to 5e-8.
+//! The frequencies |kx| <= 1.5 dkx, |ky| <= 1.5 dky are left out of the Fourier synthesis. Level by
+//! level the central block is cut into 6 x 6 cells of half the spacing, of which the innermost 2 x
+//! 2 are cut again (three times finer); the last 2 x 2 stay. Each cell carries one plane wave with
+//! a frequency drawn evenly in the cell, so that the expected spectrum is the exact integral (Lane
+//! 1992 with the randomisation of Paulson, Wu and Davis 2019). At most 1.5 waves cross the grid: a
+//! polynomial of degree 15 in each direction carries their sum to 5e-8.
 
 use crate::air::spectrum::Spectrum;
 use crate::quadrature;
@@ -52,7 +53,8 @@ impl<T: Real> LowFrequencies<T> {
         }
     }
 
-    /// Draws the waves and sums them at the Chebyshev points, which are the polynomial's coefficients. `[y]\[x\]`.
+    /// Draws the waves and sums them at the Chebyshev points, which are the polynomial's
+    /// coefficients. `[y]\[x\]`.
     pub(crate) fn draw(
         &self,
         spectrum: &dyn Spectrum,
@@ -71,8 +73,8 @@ impl<T: Real> LowFrequencies<T> {
             let kappa = [0, 1].map(|a| centre[a] + shift_sign * shift[a]);
             let wave = [0, 1]
                 .map(|a| self.point[a].map(|p| Complex::cis(kappa[a] * (p * self.spacing_m[a]))));
-            // Without an outer scale the slowest waves are huge: their value at the centre of the grid
-            // is subtracted.
+            // Without an outer scale the slowest waves are huge: their value at the centre of the
+            // grid is subtracted.
             let piston =
                 amplitude * Complex::cis(kappa[0] * self.centre_m[0] + kappa[1] * self.centre_m[1]);
             for (row, y) in sum.iter_mut().zip(wave[1]) {
@@ -118,7 +120,8 @@ fn levels(spectrum: &dyn Spectrum, delta: [f64; 2], width_m: f64) -> usize {
     (1..DEEPEST)
         .find(|&n| {
             let size = largest * 3f64.powi(-(n as i32));
-            // kappa^(-11/3): relative contribution of the rest (kappa r)^(1/3); flat below the outer scale.
+            // kappa^(-11/3): relative contribution of the rest (kappa r)^(1/3); flat below
+            // the outer scale.
             size < 0.3 * outer || (size * width_m).cbrt() < 1e-3
         })
         .unwrap_or(DEEPEST)

@@ -1,4 +1,5 @@
-//! Waves on a transverse grid: phase screens (18) and the steps between them (16), with their transforms and inner loops.
+//! Waves on a transverse grid: phase screens (18) and the steps between them (16), with their
+//! transforms and inner loops.
 
 pub(crate) mod generator;
 pub(crate) mod grid;

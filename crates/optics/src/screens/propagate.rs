@@ -1,8 +1,8 @@
 //! Propagation through one layer (16): screen phase, transfer function, absorbing border.
 //!
-//! E(z + dz) = F^-1 { exp(-j pi lambda dz f^2) F \[E exp(j psi)\] }, f in CYCLES per metre. The transfer function is a product
-//! of one factor per axis and is applied in the transposed layout. Check: width and Gouy phase of a Gaussian beam,
-//! conserved power, a step forth and back.
+//! E(z + dz) = F^-1 { exp(-j pi lambda dz f^2) F \[E exp(j psi)\] }, f in CYCLES per metre. The
+//! transfer function is a product of one factor per axis and is applied in the transposed layout.
+//! Check: width and Gouy phase of a Gaussian beam, conserved power, a step forth and back.
 
 use crate::Error;
 use crate::error::{check_length, finite, positive, within};
@@ -51,7 +51,8 @@ impl<T: Real> Propagator<T> {
         self.fft.work()
     }
 
-    /// Number of equal steps into which `distance_m` must be cut so that each is sampled: N dx^2/lambda at most.
+    /// Number of equal steps into which `distance_m` must be cut so that each is sampled: N
+    /// dx^2/lambda at most.
     pub fn pieces(&self, distance_m: f64) -> usize {
         (distance_m.abs() / self.grid.largest_step_m(self.wavelength_m) - 1e-9)
             .ceil()
@@ -98,9 +99,9 @@ impl<T: Real> Propagator<T> {
         factors
     }
 
-    /// One step: field `[y][x]` times exp(j scale screen), over the distance of `transfer`, times the
-    /// absorbing border. `screen` is the phase screen and its scale. Returns the remaining power, the
-    /// integral of |E|^2 over the grid.
+    /// One step: field `[y][x]` times exp(j scale screen), over the distance of `transfer`, times
+    /// the absorbing border. `screen` is the phase screen and its scale. Returns the remaining
+    /// power, the integral of |E|^2 over the grid.
     ///
     /// # Errors
     /// [`Error::Length`] if field or screen do not have the size of the grid.
@@ -116,8 +117,9 @@ impl<T: Real> Propagator<T> {
         Ok(power)
     }
 
-    /// Two steps of different length from the same field: `tap` gets the field at the distance of `transfers[0]`, `field`
-    /// becomes that at the distance of `transfers[1]`. A quarter cheaper than two steps. Returns both powers.
+    /// Two steps of different length from the same field: `tap` gets the field at the distance of
+    /// `transfers[0]`, `field` becomes that at the distance of `transfers[1]`. A quarter cheaper
+    /// than two steps. Returns both powers.
     ///
     /// # Errors
     /// As [`Propagator::step`].
@@ -218,7 +220,8 @@ mod tests {
         field
     }
 
-    /// Relative error of the field after 600 m against the closed form, phase (Gouy's too) and width included.
+    /// Relative error of the field after 600 m against the closed form, phase (Gouy's too) and
+    /// width included.
     fn gaussian_error(grid: Grid) -> f64 {
         let (lambda, s, z) = (1.55e-6, 0.02, 600.0);
         let propagator = Propagator::<f64>::new(grid, lambda).unwrap();

@@ -1,21 +1,25 @@
-//! Integrals of f(x) cos(kappa x) under an arc of the aperture's edge by steepest descent, for large kappa.
+//! Integrals of f(x) cos(kappa x) under an arc of the aperture's edge by steepest descent,
+//! for large kappa.
 //!
-//! f(x) = exp(-x^2/s^2) integral of exp(-y^2/s^2) from -h(x) to h(x), h^2 = p^2 - (x - centre)^2, is analytic but for the
-//! square roots where the arc meets the axis. Each end of the interval can therefore be left straight into the upper half
-//! plane, where exp(j kappa x) decays: one Gauss-Laguerre rule at each end, however many waves lie between. Check: against
-//! Gauss-Legendre panels where both hold; the complex error function on the real axis and by its symmetry.
+//! f(x) = exp(-x^2/s^2) integral of exp(-y^2/s^2) from -h(x) to h(x), h^2 = p^2 - (x - centre)^2,
+//! is analytic but for the square roots where the arc meets the axis. Each end of the interval can
+//! therefore be left straight into the upper half plane, where exp(j kappa x) decays: one
+//! Gauss-Laguerre rule at each end, however many waves lie between. Check: against Gauss-Legendre
+//! panels where both hold; the complex error function on the real axis and by its symmetry.
 
 use num_complex::Complex;
 use std::f64::consts::PI;
 
 type C = Complex<f64>;
 
-/// Waves (rad) that must lie between the ends of an interval, and within a 1/e radius, for the rules to have converged.
+/// Waves (rad) that must lie between the ends of an interval, and within a 1/e radius, for the
+/// rules to have converged.
 const LEAST_RAD: f64 = 60.0;
 /// Nodes of a rule.
 const NODES: usize = 16;
 
-/// An arc of radius `radius_m` about `centre_m` on the axis, over part of the axis, and the 1/e radius of the light.
+/// An arc of radius `radius_m` about `centre_m` on the axis, over part of the axis, and the 1/e
+/// radius of the light.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Arc {
     pub(crate) centre_m: f64,
@@ -38,7 +42,8 @@ impl Descent {
         }
     }
 
-    /// Integral of f(x) cos(kappa x) from `low` to `high` under the arc; none where kappa is too small for the rules.
+    /// Integral of f(x) cos(kappa x) from `low` to `high` under the arc; none where kappa is too
+    /// small for the rules.
     pub(crate) fn integral(&self, arc: Arc, low: f64, high: f64, kappa: f64) -> Option<f64> {
         let kappa = kappa.abs();
         if kappa * (high - low).min(arc.intensity_radius_m) < LEAST_RAD {
@@ -62,8 +67,8 @@ impl Descent {
         } else {
             &self.regular
         };
-        // h^2 = p^2 - (offset + j t)^2; at a branch p^2 - offset^2 is 0 and h is sqrt(t) times a smooth
-        // function.
+        // h^2 = p^2 - (offset + j t)^2; at a branch p^2 - offset^2 is 0 and h is sqrt(t) times a
+        // smooth function.
         let on_axis = if is_branch {
             0.0
         } else {
@@ -121,7 +126,8 @@ fn erf(z: C) -> C {
     C::new(1.0, 0.0) - (-z2).exp() / (fraction * PI.sqrt())
 }
 
-/// Nodes and weights of the Gauss rule with weight t^alpha exp(-t) on 0 to infinity, alpha 0 or 1/2, by Newton's iteration.
+/// Nodes and weights of the Gauss rule with weight t^alpha exp(-t) on 0 to infinity, alpha 0 or
+/// 1/2, by Newton's iteration.
 fn laguerre(n: usize, alpha: f64) -> Vec<(f64, f64)> {
     let count = n as f64;
     let scale = libm::tgamma(count + alpha) / libm::tgamma(count);

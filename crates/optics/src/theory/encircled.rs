@@ -1,11 +1,14 @@
-//! Mean power of the transmitted beam beyond a distance from its axis, in free space or through turbulence of any strength.
+//! Mean power of the transmitted beam beyond a distance from its axis, in free space or through
+//! turbulence of any strength.
 //!
-//! The mean irradiance is the transform of M(rho) exp(-D(rho)/2), so that the power within r of the axis is
+//! The mean irradiance is the transform of M(rho) exp(-D(rho)/2), so that the power within
+//! r of the axis is
 //!
 //! P(r) = integral from 0 to 2a of M(rho) exp(-D(rho)/2) (k r/R) J1(k r rho/R) drho.
 //!
-//! A hard edge throws light outwards that falls only as 1/r: this is what a grid must hold. Check: the Gaussian beam; the Airy
-//! pattern's 1 - J0^2 - J1^2; all of the transmitted power within a large circle.
+//! A hard edge throws light outwards that falls only as 1/r: this is what a grid must hold.
+//! Check: the Gaussian beam; the Airy pattern's 1 - J0^2 - J1^2; all of the transmitted power
+//! within a large circle.
 
 use crate::Error;
 use crate::air::cn2::Cn2Path;
@@ -15,11 +18,12 @@ use crate::error::{not_negative, positive};
 use crate::quadrature::GaussLegendre;
 use crate::theory::overlap::{Overlap, check_fresnel_number};
 
-/// Fraction of the transmitted power that arrives at `range_m` beyond each `radius_m` of the axis, in the mean over the turbulence
-/// of the path (Markov approximation, any strength).
+/// Fraction of the transmitted power that arrives at `range_m` beyond each `radius_m` of the axis,
+/// in the mean over the turbulence of the path (Markov approximation, any strength).
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for arguments that are not allowed, [`Error::FresnelNumber`] as for the efficiencies.
+/// [`Error::OutOfRange`] for arguments that are not allowed, [`Error::FresnelNumber`] as for
+/// the efficiencies.
 pub fn mean_power_beyond(
     telescope: &Telescope,
     cn2: &Cn2Path,
@@ -110,7 +114,8 @@ mod tests {
 
     #[test]
     fn square_root_of_the_coherence_spreads_the_mean_beam() {
-        // Square law in place of 5/3 within a few per cent: exp(-r^2/w^2) with w^2 + (R/(k s))^2 ... + 2 (2R/(k rho_0'))^2/2.
+        // Square law in place of 5/3 within a few per cent: exp(-r^2/w^2) with w^2 + (R/(k s))^2
+        // ... + 2 (2R/(k rho_0'))^2/2.
         let t = Telescope {
             aperture_radius_m: 0.2,
             beam_radius_m: 0.03,

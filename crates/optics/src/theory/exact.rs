@@ -1,8 +1,10 @@
-//! Efficiency eta_s (19) where theory is exact: free space, and independent (bistatic) paths in turbulence.
+//! Efficiency eta_s (19) where theory is exact: free space, and independent (bistatic)
+//! paths in turbulence.
 //!
-//! Irradiances have unit power before truncation. Check: the stored free-space curve (relative error below 1e-9), the
-//! closed form for the untruncated beam, the Fresnel-Hankel quadrature, and the known optimum 0.401179 at
-//! a/s = 1.76334 of a focused matched pair (Wang 1988; Rye and Frehlich 1992).
+//! Irradiances have unit power before truncation. Check: the stored free-space curve (relative
+//! error below 1e-9), the closed form for the untruncated beam, the Fresnel-Hankel quadrature, and
+//! the known optimum 0.401179 at a/s = 1.76334 of a focused matched pair (Wang 1988; Rye and
+//! Frehlich 1992).
 
 use crate::Error;
 use crate::air::cn2::Cn2Path;
@@ -15,19 +17,22 @@ use std::f64::consts::PI;
 
 /// Free-space efficiency eta_s (19) of a matched, aligned pair at `range_m`, by pupil overlap.
 ///
-/// Relative error below 1e-9. The cost grows with the [`fresnel_number`](crate::theory::fresnel_number);
+/// Relative error below 1e-9. The cost grows with the
+/// [`fresnel_number`](crate::theory::fresnel_number);
 /// [`quadrature_cost_s`](crate::theory::quadrature_cost_s) forecasts it.
 ///
 /// # Errors
-/// [`Error::OutOfRange`] for a telescope or range that is not allowed, [`Error::FresnelNumber`] above
-/// [`LARGEST_FRESNEL_NUMBER`](crate::theory::LARGEST_FRESNEL_NUMBER), [`Error::Convergence`] if the quadrature fails.
+/// [`Error::OutOfRange`] for a telescope or range that is not allowed, [`Error::FresnelNumber`]
+/// above [`LARGEST_FRESNEL_NUMBER`](crate::theory::LARGEST_FRESNEL_NUMBER), [`Error::Convergence`]
+/// if the quadrature fails.
 pub fn free_space_efficiency(telescope: &Telescope, range_m: f64) -> Result<f64, Error> {
     free_space_efficiency_misaligned(telescope, &Misalignment::NONE, range_m)
 }
 
 /// Free-space efficiency (19) when the BPLO is offset and tilted against the transmitted beam.
 ///
-/// For an untruncated Gaussian a displacement d at the target multiplies the efficiency by exp(-d^2/(2 sigma_R^2)).
+/// For an untruncated Gaussian a displacement d at the target multiplies the efficiency by
+/// exp(-d^2/(2 sigma_R^2)).
 ///
 /// # Errors
 /// As [`free_space_efficiency`], and for a misalignment that is not finite.
@@ -70,9 +75,11 @@ pub struct ScreenStrength {
     pub cn2_thickness_m13: f64,
 }
 
-/// Mean bistatic efficiency (19) on independent paths through turbulence: exact at any strength (Markov approximation).
+/// Mean bistatic efficiency (19) on independent paths through turbulence: exact at any strength
+/// (Markov approximation).
 ///
-/// The spherical-wave structure function is D(rho) = k^2 integral of Cn2(z) G(rho (1 - z/R)) dz over the path.
+/// The spherical-wave structure function is D(rho) = k^2 integral of Cn2(z) G(rho (1 - z/R))
+/// dz over the path.
 ///
 /// # Errors
 /// [`Error`] for arguments that are not allowed or a quadrature that fails.
@@ -86,7 +93,8 @@ pub fn bistatic_efficiency(
     bistatic_efficiency_with(telescope, misalignment, &turbulence.cn2, &table, range_m)
 }
 
-/// As [`bistatic_efficiency`], with the structure function tabulated beforehand (a table serves all ranges).
+/// As [`bistatic_efficiency`], with the structure function tabulated beforehand (a table
+/// serves all ranges).
 ///
 /// # Errors
 /// As [`bistatic_efficiency`].
@@ -104,8 +112,8 @@ pub fn bistatic_efficiency_with(
     efficiency_with(telescope, misalignment, range_m, &structure_rad2)
 }
 
-/// Mean bistatic efficiency (19) for the very screens of a simulated path: no modelling gap between this number and a
-/// Monte Carlo with these screens. Screens at or beyond `range_m` do not count.
+/// Mean bistatic efficiency (19) for the very screens of a simulated path: no modelling gap between
+/// this number and a Monte Carlo with these screens. Screens at or beyond `range_m` do not count.
 ///
 /// # Errors
 /// As [`bistatic_efficiency`].
@@ -139,8 +147,9 @@ mod tests {
     use crate::Focus;
     use crate::air::turbulence::coherence_radius_m;
 
-    /// Bistatic efficiency of an untruncated beam for a square-law structure function, l0 = 0, L0 infinite and a constant Cn2
-    /// (Frehlich and Kavaya 1991): sigma_R^2 -> s^2 (1 - R/F)^2 + (R/(k s))^2 + (2 R/(k rho_0))^2.
+    /// Bistatic efficiency of an untruncated beam for a square-law structure function, l0 = 0, L0
+    /// infinite and a constant Cn2 (Frehlich and Kavaya 1991): sigma_R^2 -> s^2 (1 - R/F)^2 + (R/(k
+    /// s))^2 + (2 R/(k rho_0))^2.
     fn square_law_efficiency(telescope: &Telescope, rho_0: f64, range_m: f64) -> f64 {
         let width2 = untruncated_radius2_m2(telescope, range_m);
         let spread = 2.0 * range_m / (telescope.wavenumber_rad_m() * rho_0);
@@ -149,7 +158,8 @@ mod tests {
 
     #[test]
     fn square_law_quadrature_gives_the_closed_form() {
-        // An aperture of ten radii and a quadratic structure function 2 (rho/rho_0)^2 are what the closed form assumes.
+        // An aperture of ten radii and a quadratic structure function 2 (rho/rho_0)^2 are what the
+        // closed form assumes.
         let t = Telescope {
             aperture_radius_m: 0.2,
             beam_radius_m: 0.02,
@@ -202,7 +212,8 @@ mod tests {
                 / exact
                 - 1.0
         };
-        // Mid-layer screens are second order; screens at the start of the layer overweight the turbulence near the lidar.
+        // Mid-layer screens are second order; screens at the start of the layer overweight the
+        // turbulence near the lidar.
         assert!(screens(10, 0.5).abs() < 2e-3, "{}", screens(10, 0.5));
         assert!(screens(40, 0.5).abs() < 2e-4);
         assert!(

@@ -1,13 +1,15 @@
 //! Autocorrelation M(rho) of the aperture field and the efficiency integral built on it.
 //!
-//! The mean irradiance at range R is the Fourier transform of M(rho) exp(-D(rho)/2), so that for independent paths
+//! The mean irradiance at range R is the Fourier transform of M(rho) exp(-D(rho)/2), so that for
+//! independent paths
 //!
 //! eta_s = (1/A_R) integral of |M(rho)|^2 exp(-D(rho)) d^2 rho,
 //! M(rho) = integral of E(u + rho/2) E*(u - rho/2) exp(j k u.rho (1/R - 1/F)) d^2 u,
 //!
-//! exactly, at any strength of turbulence (Markov approximation); D = 0 is free space. Both integrals have finite
-//! support (|rho| < 2a) and need no grid. Check: M(0) is the transmitted fraction, and an independent Fresnel-Hankel
-//! quadrature (an oracle of the tests) gives the same efficiency.
+//! exactly, at any strength of turbulence (Markov approximation); D = 0 is free space. Both
+//! integrals have finite support (|rho| < 2a) and need no grid. Check: M(0) is the transmitted
+//! fraction, and an independent Fresnel-Hankel quadrature (an oracle of the tests) gives the
+//! same efficiency.
 
 use crate::beam::Telescope;
 use crate::quadrature::{GaussLegendre, adaptive};
@@ -21,8 +23,9 @@ const GAUSSIAN_REACH: f64 = 6.2;
 /// Largest Fresnel number at which quadratures are done: a second on one core.
 pub const LARGEST_FRESNEL_NUMBER: f64 = 3000.0;
 
-/// Fresnel number a^2 |1/R - 1/F| / lambda of the lit aperture at `range_m`: the number of half waves by which its edge and its
-/// centre differ. Large values are the geometric near field, far from any focus.
+/// Fresnel number a^2 |1/R - 1/F| / lambda of the lit aperture at `range_m`: the number of half
+/// waves by which its edge and its centre differ. Large values are the geometric near field, far
+/// from any focus.
 pub fn fresnel_number(telescope: &Telescope, range_m: f64) -> f64 {
     let lit_m = telescope
         .aperture_radius_m
@@ -31,11 +34,13 @@ pub fn fresnel_number(telescope: &Telescope, range_m: f64) -> f64 {
         / telescope.wavelength_m
 }
 
-/// Forecast of the time of one quadrature of the efficiency at `range_m` on one core of 2023 \[s\]; `screens` is the number of
-/// phase screens, 0 in free space, 16 for a continuous path of constant strength, 64 for a profile over height.
+/// Forecast of the time of one quadrature of the efficiency at `range_m` on one core of 2023 \[s\];
+/// `screens` is the number of phase screens, 0 in free space, 16 for a continuous path of constant
+/// strength, 64 for a profile over height.
 pub fn quadrature_cost_s(telescope: &Telescope, screens: usize, range_m: f64) -> f64 {
     let fresnel = fresnel_number(telescope, range_m);
-    // Nodes grow with the Fresnel number, and so do those of M(rho) at each until steepest descent takes over.
+    // Nodes grow with the Fresnel number, and so do those of M(rho) at each until steepest
+    // descent takes over.
     let overlaps = 1e-4 + (fresnel * (4e-4 + 1.5e-5 * fresnel)).min(0.03 + 3.2e-4 * fresnel);
     let through = (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64;
     let obscured = telescope.obscuration_radius_m / telescope.aperture_radius_m;
@@ -80,7 +85,8 @@ impl Overlap {
         let b = self.telescope.obscuration_radius_m;
         let mut sum = self.lens(a, a, separation_m);
         if b > 0.0 {
-            // Annulus = disc minus disc; the two mixed terms are mirror images with equal real parts.
+            // Annulus = disc minus disc; the two mixed terms are mirror images with
+            // equal real parts.
             sum += self.lens(b, b, separation_m) - 2.0 * self.lens(a, b, separation_m);
         }
         let s = self.telescope.intensity_radius_m();
@@ -88,8 +94,9 @@ impl Overlap {
         self.telescope.peak_irradiance_per_m2() * envelope * sum
     }
 
-    /// Integral of exp(-(x^2 + y^2)/s^2) cos(kappa x) over the part common to the disc of radius `p` about -rho/2 and
-    /// the disc of radius `q` about +rho/2. The y integral is an error function.
+    /// Integral of exp(-(x^2 + y^2)/s^2) cos(kappa x) over the part common to the disc of
+    /// radius `p` about -rho/2 and the disc of radius `q` about +rho/2. The y integral is an
+    /// error function.
     fn lens(&self, p: f64, q: f64, rho: f64) -> f64 {
         let s = self.telescope.intensity_radius_m();
         let reach = GAUSSIAN_REACH * s;
@@ -130,7 +137,8 @@ impl Overlap {
         if let Some(integral) = self.descent.integral(arc, low, high, kappa) {
             return integral;
         }
-        // 20 nodes carry up to 16 rad (in the middle of the arc), and about two 1/e radii of the Gaussian.
+        // 20 nodes carry up to 16 rad (in the middle of the arc), and about two 1/e radii
+        // of the Gaussian.
         let panels = 1 + (kappa.abs() * half / 5.0) as usize + (half / s) as usize;
         // x = middle + half sin(theta) removes the square-root ends of the half height.
         self.rule.composite(-0.5 * PI, 0.5 * PI, panels, |theta| {
@@ -173,8 +181,8 @@ impl Overlap {
     }
 }
 
-/// Efficiency (19) of independent paths for a phase structure function `structure_rad2(rho)` between two spherical
-/// waves from the target whose ends are `rho` apart at the telescope.
+/// Efficiency (19) of independent paths for a phase structure function `structure_rad2(rho)`
+/// between two spherical waves from the target whose ends are `rho` apart at the telescope.
 ///
 /// The displacement Delta of the two beams at the target enters as J0(k rho Delta / R).
 pub(crate) fn efficiency_with(
@@ -263,8 +271,9 @@ mod tests {
 
     #[test]
     fn shadow_of_geometry_is_the_limit_of_a_large_fresnel_number() {
-        // M(rho) is then the transform of the irradiance: eta = (lambda R)^2/A_R integral of j^2 with j the shadow of the
-        // aperture. What the edge diffracts is of the order of the reciprocal of the Fresnel number.
+        // M(rho) is then the transform of the irradiance: eta = (lambda R)^2/A_R integral of j^2
+        // with j the shadow of the aperture. What the edge diffracts is of the order of the
+        // reciprocal of the Fresnel number.
         let t = Telescope {
             wavelength_m: 1.62e-7,
             ..Telescope::table2()

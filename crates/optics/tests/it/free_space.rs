@@ -42,7 +42,8 @@ fn pupil_overlap_reproduces_the_free_space_curve_to_1e_9() {
     }
 }
 
-/// (O5) knows range and focus by 1/R - 1/F alone, and its sign not at all: the stored curve of a collimated beam is that of any focus.
+/// (O5) knows range and focus by 1/R - 1/F alone, and its sign not at all: the stored curve of a
+/// collimated beam is that of any focus.
 #[test]
 fn any_focus_has_the_stored_curve_at_its_distance_from_the_focus() {
     let mut compared = 0;

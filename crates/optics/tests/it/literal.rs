@@ -1,4 +1,5 @@
-//! The literal form: its screens against quadrature of their spectrum, and the fast walk against its loop.
+//! The literal form: its screens against quadrature of their spectrum, and the fast walk
+//! against its loop.
 
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -35,7 +36,8 @@ fn fast_walk_is_the_literal_loop_to_round_off() {
     let fast = run
         .run_in::<f64>(Stop::after(2), |_| ControlFlow::Continue(()))
         .expect("run");
-    // The numbers of the fast walk are freed of their correction to the exact free-space efficiency.
+    // The numbers of the fast walk are freed of their correction to the exact
+    // free-space efficiency.
     let raw = fast.grid_free_space[0] / fast.exact_free_space[0];
 
     let generator =
@@ -96,7 +98,8 @@ fn literal_loop_without_screens_gives_free_space() {
     assert!((found / exact - 1.0).abs() < 5e-3, "{found} {exact}");
 }
 
-/// The form of (17) with eddies that fit on the grid of the test, and an inner scale that it resolves.
+/// The form of (17) with eddies that fit on the grid of the test, and an inner scale
+/// that it resolves.
 #[derive(Debug)]
 struct SmallEddies;
 

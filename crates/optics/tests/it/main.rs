@@ -1,4 +1,5 @@
-//! The crate as its users see it: against stored curves, exact theory, its own literal form, and in extreme cases.
+//! The crate as its users see it: against stored curves, exact theory, its own literal form, and
+//! in extreme cases.
 
 mod free_space;
 #[cfg(feature = "screens")]

@@ -273,7 +273,8 @@ fn few_realisations_state_the_error_that_they_have() {
     set_up.grid = Grid::square(96, 4e-3).expect("grid");
     set_up.layers = Layers::equal(2, 600.0).expect("layers");
     set_up.range_m = vec![300.0, 600.0];
-    // Student's distribution with 9 and 7 degrees of freedom: one in a hundred runs passes the last number.
+    // Student's distribution with 9 and 7 degrees of freedom: one in a hundred runs passes
+    // the last number.
     for (sampling, realisations, runs, largest) in [
         (Sampling::Antithetic, 20, 40, 5.6),
         (Sampling::Independent, 8, 60, 7.0),
@@ -293,7 +294,8 @@ fn few_realisations_state_the_error_that_they_have() {
             stated.push(bistatic.standard_error[0]);
             means.push(bistatic.mean[0]);
         }
-        // Root of the mean squared stated error over the scatter of the means, which so many runs know to 11 and 9 %.
+        // Root of the mean squared stated error over the scatter of the means, which so many runs
+        // know to 11 and 9 %.
         let count = runs as f64;
         let mean = means.iter().sum::<f64>() / count;
         let scatter =
@@ -304,7 +306,8 @@ fn few_realisations_state_the_error_that_they_have() {
             "{sampling:?}: {}",
             rms / scatter
         );
-        // No run states next to nothing, and errors cover as Student's distribution says: two thirds within one.
+        // No run states next to nothing, and errors cover as Student's distribution says: two
+        // thirds within one.
         let least = stated.iter().fold(f64::INFINITY, |a, b| a.min(*b));
         let worst = z.iter().fold(0f64, |a, b| a.max(b.abs()));
         let within = z.iter().filter(|z| z.abs() < 1.0).count() as f64 / z.len() as f64;
@@ -522,7 +525,8 @@ fn monostatic_enhancement_of_weak_turbulence_is_that_of_first_order_theory() {
 
 #[test]
 fn weak_turbulence_meets_the_chapters_monostatic_efficiency_at_1250_m() {
-    // 512 x 512 points of 2 mm gave 0.0903 +- 0.0017 at 1e-14 where the spherical wave's factor 0.4 gave 0.0764.
+    // 512 x 512 points of 2 mm gave 0.0903 +- 0.0017 at 1e-14 where the spherical wave's factor
+    // 0.4 gave 0.0764.
     let turbulence = Turbulence::table2(1e-14).expect("turbulence");
     let weak = weak_turbulence_efficiency(&Telescope::table2(), &turbulence, 1250.0);
     assert!(weak.rytov_variance < LARGEST_RYTOV, "{weak:?}");

@@ -1,4 +1,5 @@
-//! Plans: derived grids hold the light that was forecast, and what is refused is refused for its reason.
+//! Plans: derived grids hold the light that was forecast, and what is refused is refused
+//! for its reason.
 
 use crate::monte_carlo::{bistatic_z, go};
 use wakescope_optics::monte_carlo::Sampling;
@@ -168,7 +169,8 @@ fn grids_carry_a_focus_from_the_limit_on() {
             at_limit.abs() < if focus_m > 0.0 { 3e-4 } else { 2e-3 },
             "{focus_m}: {at_limit}"
         );
-        // The largest that was accepted before: a third too much in the focus, whatever (P12) makes of it.
+        // The largest that was accepted before: a third too much in the focus, whatever
+        // (P12) makes of it.
         match raw_error(1.99 * limit_m) {
             Err(Error::Sampling { violations, .. }) => {
                 assert_eq!(violations[0].limit, Limit::WaveFront);
@@ -253,7 +255,8 @@ fn derived_grids_give_the_exact_mean_in_and_beside_a_near_focus() {
             "{focus_m}"
         );
         if focus_m == 100.0 {
-            // A quarter of the spacing that was derived before gave 0.3606; that spacing itself 0.2936.
+            // A quarter of the spacing that was derived before gave 0.3606; that
+            // spacing itself 0.2936.
             assert!(
                 (mean - 0.3606).abs() < 3.5 * error && error < 0.01,
                 "{mean} {error}"

@@ -1,5 +1,6 @@
-//! Receiver-plane form of the heterodyne efficiency: light scattered at the target and carried back through the same
-//! screens mixes with the local oscillator at the receiver as the BPLO's field at that point says.
+//! Receiver-plane form of the heterodyne efficiency: light scattered at the target and carried back
+//! through the same screens mixes with the local oscillator at the receiver as the BPLO's field at
+//! that point says.
 
 use rustfft::num_complex::Complex;
 use std::sync::Arc;

@@ -1,11 +1,13 @@
-//! Structure functions of the screens: expected ones against quadrature, measured ones against the expected.
+//! Structure functions of the screens: expected ones against quadrature, measured ones
+//! against the expected.
 
 use std::sync::Arc;
 use wakescope_optics::air::{HillAndrews, Scales, structure_function_m53};
 use wakescope_optics::screens::{ScreenGenerator, stream};
 use wakescope_optics::{Grid, Spectrum, VonKarman};
 
-/// Largest relative error of the expected structure function from 2 dx to half the grid, along axis and diagonal.
+/// Largest relative error of the expected structure function from 2 dx to half the grid, along
+/// axis and diagonal.
 fn worst_error(grid: Grid, spectrum: Arc<dyn Spectrum>) -> f64 {
     let generator = ScreenGenerator::<f64>::new(grid, spectrum.clone()).expect("generator");
     let mut worst = 0f64;

@@ -1,8 +1,8 @@
 //! Free-space irradiance of the truncated beam by a circular-symmetric Fresnel (Hankel) integral.
 //!
 //! U(r) = (k/R) integral of E(r') exp(j k r'^2 (1/R - 1/F)/2) J0(k r r'/R) r' dr' over the open
-//! aperture, and eta_s = (lambda^2 R^2 / A_R) 2 pi integral of |U|^4 r dr, (19) as written. It shares
-//! nothing with the pupil-overlap method of the crate.
+//! aperture, and eta_s = (lambda^2 R^2 / A_R) 2 pi integral of |U|^4 r dr, (19) as written. It
+//! shares nothing with the pupil-overlap method of the crate.
 
 use super::quadrature::GaussLegendre;
 use num_complex::Complex;
@@ -55,8 +55,8 @@ pub(super) fn field_per_m(
     }
 }
 
-/// Free-space efficiency eta_s (19) by the Fresnel-Hankel integral, limited to about 1e-8 by the cut
-/// of its tail.
+/// Free-space efficiency eta_s (19) by the Fresnel-Hankel integral, limited to about 1e-8 by the
+/// cut of its tail.
 pub(crate) fn free_space_efficiency_hankel(telescope: &Telescope, range_m: f64) -> f64 {
     let k = telescope.wavenumber_rad_m();
     let lit_m = lit_radius_m(telescope);

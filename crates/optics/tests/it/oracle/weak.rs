@@ -1,9 +1,9 @@
 //! Weak turbulence: the monostatic efficiency to first order in Cn2 for the actual beam.
 //!
-//! Both beams of a monostatic lidar cross the same air, so that eta = (C/..) <integral of j^2> exceeds
-//! the bistatic value by the variance of the irradiance j. A phase wave of wave vector kappa at
-//! distance z tilts a copy of the beam: at the target it arrives displaced by s = kappa (R - z)/k and
-//! late by kappa^2 (R - z)/(2k). To first order in Cn2 therefore
+//! Both beams of a monostatic lidar cross the same air, so that eta = (C/..) <integral of j^2>
+//! exceeds the bistatic value by the variance of the irradiance j. A phase wave of wave vector
+//! kappa at distance z tilts a copy of the beam: at the target it arrives displaced by s = kappa
+//! (R - z)/k and late by kappa^2 (R - z)/(2k). To first order in Cn2 therefore
 //!
 //! integral of var(j) = integral dz 2 pi k^2 Cn2(z) integral d^2 kappa Phi_n
 //!     2 \[Q(s) - Re exp(-j kappa^2 (R - z) z/(k R)) X(s)\],
@@ -65,7 +65,8 @@ pub(crate) fn weak_turbulence_efficiency(
     }
 }
 
-/// Overlaps Q(s) and X(s) of the beam at the target with displaced copies of itself, over their common value at s = 0.
+/// Overlaps Q(s) and X(s) of the beam at the target with displaced copies of itself, over their
+/// common value at s = 0.
 struct DisplacedOverlaps {
     wavenumber_rad_m: f64,
     range_m: f64,
@@ -81,7 +82,8 @@ impl DisplacedOverlaps {
         let lit_m = telescope
             .aperture_radius_m
             .min(6.0 * telescope.intensity_radius_m());
-        // U has no wave number above 1/lobe: sums over a lattice of less than 2 pi/(4 lobe) integrate products of four exactly.
+        // U has no wave number above 1/lobe: sums over a lattice of less than 2 pi/(4 lobe)
+        // integrate products of four exactly.
         let lobe_m = range_m / (wavenumber_rad_m * lit_m);
         let step_m = 0.5 * lobe_m;
         let shadow_m = lit_m * (1.0 - range_m * telescope.focus.curvature_per_m()).abs();
@@ -153,7 +155,8 @@ impl DisplacedOverlaps {
         q - (re * cos + im * sin)
     }
 
-    /// Relative variance of the irradiance at the target, weighted with its square, for unit Cn2 dz at distance `z`.
+    /// Relative variance of the irradiance at the target, weighted with its square, for unit Cn2 dz
+    /// at distance `z`.
     fn variance_of_layer(&self, spectrum: &dyn Spectrum, z: f64) -> f64 {
         let k = self.wavenumber_rad_m;
         let rest = self.range_m - z;
@@ -235,8 +238,9 @@ mod tests {
 
     #[test]
     fn overlaps_of_a_gaussian_beam_are_gaussians() {
-        // U = exp(-g w^2): Q = exp(-2 Re g ... ) in closed form. |U|^2 = exp(-2 a w^2), g = a + jb:
-        // Q(s)/Q(0) = exp(-a s^2); X(s) = exp(-2 g s^2) integral of exp(-(2 g* + 2 g) w^2) = exp(-2 g s^2) Q(0).
+        // U = exp(-g w^2): Q = exp(-2 Re g ... ) in closed form. |U|^2 = exp(-2 a w^2), g = a +
+        // jb: Q(s)/Q(0) = exp(-a s^2); X(s) = exp(-2 g s^2) integral of exp(-(2 g* + 2 g) w^2) =
+        // exp(-2 g s^2) Q(0).
         let s = 0.02;
         let t = Telescope {
             aperture_radius_m: 0.2,
@@ -247,7 +251,8 @@ mod tests {
         let range_m = 1500.0;
         let k = t.wavenumber_rad_m();
         let overlaps = DisplacedOverlaps::new(&t, range_m);
-        // Field at the aperture exp(-p r'^2), p = 1/(2 s^2) - j k (1/R - 1/F)/2; its transform is exp(-(k/R)^2 r^2/(4p)).
+        // Field at the aperture exp(-p r'^2), p = 1/(2 s^2) - j k (1/R - 1/F)/2; its transform is
+        // exp(-(k/R)^2 r^2/(4p)).
         let (re, im) = (0.5 / (s * s), -0.5 * k * (1.0 / range_m - 1.0 / 900.0));
         let scale = (k / range_m).powi(2) / (4.0 * (re * re + im * im));
         let (a, b) = (scale * re, -scale * im);
