@@ -41,20 +41,19 @@ pub enum Error {
         /// The offending entry.
         value: f64,
     },
-    /// A profile was asked for a range that it does not cover.
+    /// A range lies outside an efficiency profile.
     #[error(
         "range {range_m:?} m lies outside the profile, which covers {first_m:?} m to {last_m:?} m: nothing is extrapolated"
     )]
     Extrapolation {
-        /// The range that was asked for \[m\].
+        /// The range \[m\].
         range_m: f64,
         /// First range of the profile \[m\].
         first_m: f64,
         /// Last range of the profile \[m\].
         last_m: f64,
     },
-    /// A grid cannot hold what it is asked to hold: every limit that it violates, and a
-    /// set-up that does not.
+    /// A grid cannot hold the beam: every limit that it violates, and a set-up without violations.
     #[cfg(feature = "screens")]
     #[error("sampling: {}", listed(violations, would_do.as_ref()))]
     Sampling {
@@ -100,7 +99,7 @@ pub enum Error {
         /// Realisations that were done.
         realisations: usize,
     },
-    /// The beam has so many Fresnel zones that no quadrature follows them.
+    /// The beam has too many Fresnel zones for a quadrature.
     #[error(
         "the Fresnel number a^2 |1/R - 1/F| / lambda is {found:.4e} at {range_m:?} m, {:?} at most: the range must be nearer to \
          the focus, or the aperture smaller",
@@ -121,7 +120,7 @@ pub enum Error {
         quantity: &'static str,
         /// Estimated relative error when it stopped.
         error: f64,
-        /// Tolerance that was asked for.
+        /// Required tolerance.
         tolerance: f64,
     },
 }

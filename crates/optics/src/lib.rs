@@ -20,8 +20,8 @@
 //! ([`theory::bistatic_efficiency`]); the monostatic one is a Monte Carlo (`MonteCarlo`), which
 //! gives both receivers from one set of realisations.
 //!
-//! **Read first** `literal`: (16) to (19) as they are written, one path in sixty lines. It is what
-//! the fast walk of the Monte Carlo is tested against.
+//! **Read first** `literal`: (16) to (19) as they are written, one path in sixty lines. It is the
+//! oracle of the tests of the Monte Carlo.
 //!
 //! | equation | where |
 //! |---|---|
@@ -38,7 +38,7 @@
 //! | [`efficiency`] | efficiency profile with scatter and error |
 //! | `screens` | transverse grid, phase screens, split step, inner loops |
 //! | `monte_carlo` | layers of the path; efficiency by Monte Carlo |
-//! | `plan` | grid, layers, memory, time; refusals that name the limit and what would do |
+//! | `plan` | grid, layers, memory, run time; errors that name the limit and a set-up that holds |
 //! | `literal` | (16) to (19) term by term, as oracle |
 //!
 //! Features: `screens` (default) compiles the modules without a link above, with their FFT and

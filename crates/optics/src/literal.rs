@@ -5,14 +5,13 @@
 //! field at the telescope -> for each layer: half of it in free space, its screen, the other half -> irradiance -> overlap
 //! ```
 //!
-//! Sums are done as printed (no fast transform), so that grids of some 50 points are what this
-//! is for. The fast form ([`MonteCarlo`](crate::MonteCarlo)) does the same with transforms of
-//! which one serves several ranges, screens that hold the eddies wider than the grid, many
-//! paths, and errors.
+//! Sums are evaluated as printed (no fast transform), for grids of about 50 points along an axis.
+//! The fast form ([`MonteCarlo`](crate::MonteCarlo)) adds fast transforms that serve several
+//! ranges, screens with the eddies wider than the grid, many paths, and errors.
 //!
-//! Check: shares the field at the telescope with the fast form, and nothing else
-//! (`fast_walk_is_the_literal_loop_to_round_off`); screens have the structure function of (17)
-//! (`literal_screens_have_the_structure_function_of_their_spectrum`).
+//! Check: the fast form, which uses the same field at the telescope and nothing else of this
+//! module, agrees to round-off (`fast_walk_is_the_literal_loop_to_round_off`); screens have the
+//! structure function of (17) (`literal_screens_have_the_structure_function_of_their_spectrum`).
 
 use crate::air::Spectrum;
 use crate::beam::source::aperture_field;
@@ -82,7 +81,7 @@ pub fn phase_screen(
 /// before truncation: (16), with the screen in the middle of its layer.
 ///
 /// # Errors
-/// [`Error`] for a telescope or a grid that is none; [`Error::Length`] for a screen that has not
+/// [`Error`] for an invalid telescope or grid; [`Error::Length`] for a screen that does not have
 /// the size of the grid.
 pub fn irradiance_per_m2(
     telescope: &Telescope,

@@ -68,8 +68,8 @@ impl LayerEfficiency {
 
     /// The efficiencies of pulse `index`, one per layer, for
     /// [`Shot::efficiency`](crate::Shot::efficiency): its own realisation. Pulses beyond the last
-    /// realisation use them again from the first on, so more pulses than realisations do not lower
-    /// the variance that turbulence brings.
+    /// realisation use them again from the first on, so more pulses than realisations do not reduce
+    /// the variance due to turbulence.
     pub fn of_pulse(&self, index: usize) -> &[f64] {
         let first = index % self.realisations() * self.layers;
         &self.efficiency[first..first + self.layers]

@@ -1,4 +1,4 @@
-//! What many pulses average to, without drawing any: mean power, signal-to-noise ratio (14) and
+//! Expected values over pulses, without random numbers: mean power, signal-to-noise ratio (14) and
 //! covariance of the samples.
 //!
 //! Check: closed forms of the covariance in a uniform wind and a linear gradient; the mean square

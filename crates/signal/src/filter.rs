@@ -340,7 +340,7 @@ mod tests {
     fn filters() -> [(RangeFilter, f64); 3] {
         let gate =
             |window: &[f64]| RangeFilter::gate(pulse(), window, 250e6, STEP_M / 3.0).unwrap();
-        // A gate is seen half a sample before its range.
+        // The samples of a gate are centred half a sample before its range.
         [
             (RangeFilter::pulse(pulse(), STEP_M / 3.0).unwrap(), 0.0),
             (gate(&[1.0; 64]), -0.5 * STEP_M),

@@ -2,9 +2,9 @@
 //!
 //! `s(t_k) = sqrt(2) S sqrt(E_t P_LO) sqrt(DeltaR) sum_l f(t_k - 2 R_l/c) b_l exp(-j 4 pi v_l
 //! t_k/lambda)`, (15), corrected: by `sqrt 2`, so that (14) holds; `sqrt(DeltaR)`, since layers are
-//! independent; the sum centred on the range that sample k sees. `b_l` is circular complex normal
-//! of variance `weight_per_m`, drawn for each pulse and the same throughout it. Air moving away
-//! lowers the frequency, `f = f_c - 2 v/lambda`.
+//! independent; the sum centred on the range of sample k. `b_l` is circular complex normal of
+//! variance `weight_per_m`, drawn for each pulse and the same throughout it. Air moving away lowers
+//! the frequency, `f = f_c - 2 v/lambda`.
 //!
 //! Each layer is a phasor that is rotated once per sample; it is computed afresh when the pulse
 //! reaches the layer and every 1024 samples.
@@ -152,10 +152,10 @@ impl Simulator {
     /// number per real number for `White`, two per frequency for `BandLimited`.
     ///
     /// # Errors
-    /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` has not one place per sample;
-    /// [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any use;
-    /// [`Error::Overflow`]; [`Error::BandBeyondNyquist`] if the simulator was planned for complex
-    /// records and a real one does not hold the band.
+    /// As [`Shot::validate`]; [`Error::LengthMismatch`] if `out_a` does not have one element per
+    /// sample; [`Error::OutOfRange`] for layers too thick for the pulse, or far thinner than any
+    /// use; [`Error::Overflow`]; [`Error::BandBeyondNyquist`] if the simulator was planned for
+    /// complex records and a real one does not hold the band.
     pub fn record_into<'a, T: Sample, R: Rng + ?Sized>(
         &self,
         shot: impl Into<Shot<'a>>,

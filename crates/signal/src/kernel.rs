@@ -2,8 +2,8 @@
 //! the pulse lights.
 //!
 //! The loop is compiled for several instruction sets and the best is chosen at run time.
-//! Products and sums are kept apart (no fused operation) and lanes are fixed, so every version
-//! gives the same bits.
+//! Products and sums are separate operations (none is fused) and lanes are fixed, so every
+//! version gives the same bits.
 //!
 //! Check: the tests of `heterodyne` against the literal sum.
 

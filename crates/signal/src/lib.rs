@@ -2,7 +2,7 @@
 //! detector current.
 //!
 //! Each thin layer of air returns light with a random complex amplitude (speckle), shifted by its
-//! radial velocity; the receiver sees the sum over the layers that the pulse lights, and shot
+//! radial velocity; the receiver measures the sum over the layers that the pulse lights, and shot
 //! noise: equations (6)-(15) of the chapter this project follows, with its errors corrected. The
 //! crate also computes the velocity that such a measurement can at best report: the radial velocity
 //! weighted by the pulse, (28). SI units, `f64`; a unit is the suffix of each name.
@@ -35,7 +35,7 @@
 //! | [`efficiency`] | [`LayerEfficiency`](efficiency::LayerEfficiency): heterodyne efficiency, one curve or one realisation per pulse |
 //! | `table` | tables over range |
 //! | `line` | [`LineOfSight`]; how thin a layer must be, [`LayerLimits`] |
-//! | `shot` | [`Shot`]: what one pulse meets |
+//! | `shot` | [`Shot`]: line of sight and efficiency of one pulse |
 //! | [`receiver`] | sampling, responsivity, noise power (13), signal-to-noise ratio (14); what a real receiver adds |
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
 //! | `record` | [`Record`]: when the receiver samples; carrier and noise of the samples |
@@ -44,7 +44,7 @@
 //! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
 //! | [`literal`] | the same sum term by term, as oracle |
 //! | `noise` | band-limited or white shot noise, real or complex |
-//! | `expected` | mean power, (14), and covariance of the samples, without drawing any |
+//! | `expected` | mean power, (14), and covariance of the samples, without random numbers |
 //! | [`digitise`] | [`Digitiser`](digitise::Digitiser): rounding and saturation |
 //! | [`scan`] | [`Scan`]: all pulses of a scan, in parallel and in bounded memory |
 //! | `parallel` | loops on the caller's thread pool |

@@ -1,5 +1,5 @@
-//! What a line of sight shows to the receiver: radial velocity and return of each thin layer of
-//! air, and how thin a layer must be.
+//! A line of sight: radial velocity and return of each thin layer of air, and the largest
+//! thickness of a layer.
 //!
 //! Check: the thickness divides the range step of one sample and obeys the rule of the
 //! steepest gradient.

@@ -1,6 +1,6 @@
 //! The heterodyne sum term by term, as (15) is written: the oracle of the fast form.
 //!
-//! Check: nothing here is shared with the fast form but the pulse, the receiver and the
+//! Check: the only common code with the fast form is the pulse, the receiver and the
 //! rule for `L_c`.
 
 use std::f64::consts::PI;

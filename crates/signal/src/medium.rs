@@ -1,8 +1,7 @@
-//! The air as the laser sees it: backscatter and extinction by range, and the return
-//! (9) that follows.
+//! Backscatter and extinction of the air by range, and the return (9) that follows.
 //!
 //! Check: uniform air gives the closed form; extinction integrates exactly, so a table of more
-//! points with the same values changes nothing; a cloud darkens what lies behind it.
+//! points with the same values changes nothing; a cloud attenuates the return from behind it.
 
 use crate::error::{check_each, check_positive};
 use crate::table::{check_ranges, check_values, locate, value};

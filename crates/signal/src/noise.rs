@@ -2,8 +2,8 @@
 //! frequency or complex at baseband.
 //!
 //! Band-limited noise is made from its spectrum on a circular record of at least twice the length,
-//! then cut, so that the end of the record does not know its beginning. Frequencies that the edge
-//! of the band cuts have their share of the power, so the variance is exact.
+//! then cut, so that the end of the record is not correlated with its beginning. Frequencies at the
+//! edge of the band have the power of the fraction inside, so the variance is exact.
 //!
 //! Check: variance (13); nothing outside the band; flat inside.
 

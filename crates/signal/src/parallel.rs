@@ -1,7 +1,7 @@
 //! Loops that run on the caller's thread pool with feature `rayon` and one after the other without.
 //!
-//! Every item is computed alone and results stand in the order of the items, so the bits do not
-//! depend on the number of threads.
+//! Items are independent and results are in the order of the items, so the bits do not depend on
+//! the number of threads.
 
 /// `f(state, index, chunk)` for every chunk of `size` elements; `state` is made once per worker.
 pub(crate) fn map_chunks<T: Send, S, O: Send>(

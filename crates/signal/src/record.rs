@@ -9,8 +9,7 @@ use crate::noise::{BasebandNoise, RealNoise};
 /// When and how long the receiver samples after each pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Record {
-    /// Time of the first sample after the middle of the pulse leaves \[s\]; it sees
-    /// the range `c t/2`.
+    /// Time of the first sample after the middle of the pulse leaves \[s\]; its range is `c t/2`.
     pub time_of_first_sample_s: f64,
     /// Number of samples.
     pub samples: usize,

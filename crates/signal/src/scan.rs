@@ -51,7 +51,7 @@ fn mix(mut x: u64) -> u64 {
     x ^ (x >> 31)
 }
 
-/// A scan: which pulses there are, what each meets, and its random numbers.
+/// A scan: its pulses, their lines of sight and their random numbers.
 #[derive(Debug, Clone, Copy)]
 pub struct Scan<'s, S, G> {
     /// Pulse, receiver and sampling times.
@@ -60,7 +60,7 @@ pub struct Scan<'s, S, G> {
     pub lines: usize,
     /// Number of pulses along each.
     pub pulses_per_line: usize,
-    /// What a pulse meets, `Fn(PulseKey) -> Shot`; called from any thread.
+    /// Line of sight and efficiency of a pulse, `Fn(PulseKey) -> Shot`; called from any thread.
     pub shot: S,
     /// The random generator of a pulse, `Fn(PulseKey) -> impl Rng`, such as [`pulse_generator`];
     /// called from any thread.

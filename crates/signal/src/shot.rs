@@ -1,5 +1,5 @@
-//! What one pulse meets: a line of sight, and the efficiency of the air's turbulence
-//! at that moment.
+//! Conditions of one pulse: a line of sight, and the heterodyne efficiency in the turbulence
+//! of that moment.
 //!
 //! Check: a factor of one changes nothing; a factor scales the mean power of its layer.
 
@@ -18,8 +18,8 @@ pub struct Shot<'a> {
     /// leave it out, or its ratio to the mean if they contain the mean. `None`: the line's
     /// weights as they are.
     pub efficiency: Option<&'a [f64]>,
-    /// The air that the pulse before lights meanwhile: what lies at `R + c/(2 PRF)` stands at `R`.
-    /// `None`: it is long gone.
+    /// The air that the previous pulse lights at the same time, for its second-trip echo: what lies
+    /// at `R + c/(2 PRF)` is at `R` of this line. `None`: no second-trip echo.
     pub previous: Option<&'a LineOfSight>,
     /// Seed of what is random beside speckle and noise: phases of the laser and of the telescope's
     /// reflex, speckle of `previous`. Not used where the receiver has none of them.

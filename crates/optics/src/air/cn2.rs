@@ -16,7 +16,7 @@ pub enum Cn2Path {
         /// Cn2 \[m^(-2/3)\], above 0.
         cn2_m_m23: f64,
     },
-    /// A profile over height, seen along a slanted line; linear between the points.
+    /// A profile over height along a slanted line; linear between the points.
     Heights {
         /// Heights above ground \[m\], increasing strictly.
         height_m: Vec<f64>,

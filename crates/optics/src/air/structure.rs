@@ -128,8 +128,8 @@ impl StructureTable {
     }
 
     /// Structure function D(rho) \[rad^2\] of two spherical waves from `range_m` that are rho apart
-    /// at the telescope: k^2 times the sum of w G(rho (1 - z/R)) over places z \[m\] with weights
-    /// w = Cn2 dz \[m^(1/3)\].
+    /// at the telescope: k^2 times the sum of w G(rho (1 - z/R)) over positions z \[m\] with
+    /// weights w = Cn2 dz \[m^(1/3)\].
     pub(crate) fn of_spherical_waves(
         &self,
         wavenumber_rad_m: f64,

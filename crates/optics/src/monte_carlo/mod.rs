@@ -157,7 +157,7 @@ impl MonteCarlo {
         })
     }
 
-    /// Runs so many realisations in single precision.
+    /// Runs a number of realisations in single precision.
     ///
     /// # Errors
     /// As [`MonteCarlo::run_in`].

@@ -59,7 +59,7 @@ fn bistatic_test_passes_and_finds_a_wrong_sign_of_the_frequency_shift() {
         .as_mut()
         .expect("a valid set-up")
         .shift_sign = -1.0;
-    // Every run holds itself against theory.
+    // Every run compares its mean with theory.
     match run.run_prepared(&prepared, Stop::after(800), &mut go) {
         Err(Error::AgainstTheory {
             mean,

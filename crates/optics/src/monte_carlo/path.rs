@@ -1,8 +1,8 @@
 //! The path as layers with one screen each, laid out as legs from screen to screen that serve every
 //! range in one pass.
 //!
-//! The screen stands in the middle of its layer (half step, screen, half step), and layers end at
-//! the ranges. Check: the legs add up to each range; the screens of a range carry the turbulence of
+//! The screen is in the middle of its layer (half step, screen, half step), and layers end at the
+//! ranges. Check: the legs add up to each range; the screens of a range carry the turbulence of
 //! the path up to it.
 
 use crate::Error;

@@ -113,7 +113,8 @@ impl Folding {
                 sum += whole;
                 continue;
             }
-            // Most columns stand for two; the first and, for even sizes, the last stand for one.
+            // Most columns are two of the full grid; the first and, for even sizes,
+            // the last are one.
             let mut line = 0.5 * whole + 0.5 * (a[0] * b[0]).wide();
             let last = width - 1;
             if self.grid.nx.is_multiple_of(2) {
@@ -169,8 +170,7 @@ pub(crate) struct Sample {
     pub(crate) lost: f64,
 }
 
-/// Mean and variance of a list; the variance of fewer than two values is NaN, as nothing
-/// is known of it.
+/// Mean and variance of a list; the variance of fewer than two values is NaN.
 pub(crate) fn mean_and_variance(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let n = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / n;

@@ -18,9 +18,9 @@ pub enum Sampling {
     /// Independent realisations.
     #[default]
     Independent,
-    /// Half of the realisations see the screens of another with the opposite sign, an equally
+    /// Half of the realisations have the screens of another with the opposite sign, an equally
     /// probable path: every effect odd in the phase cancels in the mean of the two. Means stay
-    /// unbiased; errors are taken over such pairs.
+    /// unbiased; errors are computed over such pairs.
     Antithetic,
 }
 

@@ -31,7 +31,7 @@ const NEGLIGIBLE_GAP: f64 = 1e-4;
 pub struct LayerGap {
     /// Range \[m\].
     pub range_m: f64,
-    /// Mean bistatic efficiency for the very screens over that for the continuous path,
+    /// Mean bistatic efficiency for these screens over that for the continuous path,
     /// less one. Exact.
     pub relative: f64,
     /// Forecast of the relative standard error of the Monte Carlo.
@@ -72,7 +72,7 @@ pub(super) fn worst_rytov(
     Ok(worst)
 }
 
-/// Equal layers to `furthest_m`, as many as keep each below [`LARGEST_LAYER_RYTOV`].
+/// Equal layers to `furthest_m`, each with a Rytov variance of at most [`LARGEST_LAYER_RYTOV`].
 pub(super) fn thin_layers(
     cn2: &Cn2Path,
     wavelength_m: f64,
@@ -150,16 +150,16 @@ impl<'a> Gaps<'a> {
         Ok(gaps)
     }
 
-    /// Integral of M^2 exp(-D) for a path that is a sum over places z with weights Cn2 dz.
+    /// Integral of M^2 exp(-D) for a path with `positions` z and weights Cn2 dz.
     fn integral(
         &self,
         node: &[(f64, f64)],
         range_m: f64,
-        places: impl IntoIterator<Item = (f64, f64)>,
+        positions: impl IntoIterator<Item = (f64, f64)>,
     ) -> f64 {
-        let structure_rad2 = self
-            .table
-            .of_spherical_waves(self.wavenumber_rad_m, range_m, places);
+        let structure_rad2 =
+            self.table
+                .of_spherical_waves(self.wavenumber_rad_m, range_m, positions);
         node.iter()
             .map(|&(rho, weight)| weight * (-structure_rad2(rho)).exp())
             .sum()

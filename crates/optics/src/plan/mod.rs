@@ -32,7 +32,7 @@ use limits::{Limits, last};
 const LAYER_S: f64 = 9e-9;
 /// CPU time of one f32 screen per point \[s\].
 const SCREEN_S: f64 = 9e-9;
-/// Share of the light above which its loss at the border is doubtful.
+/// Fraction of the light above which its loss at the border is doubtful.
 pub const DOUBTFUL_LOSS: f64 = 0.01;
 
 /// The cheapest model that is valid for a receiver.
@@ -116,7 +116,7 @@ pub enum Warning {
     ThickLayers {
         /// Largest Rytov variance of a layer.
         rytov_variance: f64,
-        /// Number of equal layers that would do for all runs, if one of at most 1000 does.
+        /// Number of equal layers that is enough for all runs, if 1000 are.
         layers_needed: Option<usize>,
     },
     /// The layers shift the mean by more than a third of its standard error.
@@ -141,7 +141,7 @@ pub enum Warning {
     },
 }
 
-/// What a Monte Carlo is to simulate.
+/// What a Monte Carlo simulates.
 #[derive(Debug, Clone)]
 pub struct Case {
     /// Telescope of both beams.
@@ -150,7 +150,7 @@ pub struct Case {
     pub misalignment: Misalignment,
     /// Turbulence along the path.
     pub turbulence: Turbulence,
-    /// Realisations to be done: their standard error bounds that of the layers.
+    /// Number of realisations: its standard error bounds that of the layers.
     pub realisations: usize,
 }
 
@@ -170,8 +170,7 @@ impl Case {
         self.examine(&grid, &layers, range_m)
     }
 
-    /// Examines a set-up that someone else chose, the chapter's 512 x 2 mm and 10
-    /// layers for example.
+    /// Examines a given set-up, such as the chapter's 512 x 2 mm and 10 layers.
     ///
     /// # Errors
     /// As [`Case::examine_runs`].
@@ -192,7 +191,7 @@ impl Case {
     ///
     /// # Errors
     /// [`Error::Sampling`] names every limit that is violated with the smallest (for a spacing:
-    /// largest) value that works, and a whole set-up that was tried and works.
+    /// largest) accepted value, and a complete set-up that was examined and accepted.
     pub fn examine_runs(
         &self,
         grid: &Grid,
@@ -351,8 +350,8 @@ fn folded_points(grid: &Grid, beams: usize) -> usize {
     }
 }
 
-/// Buffers of a group under way in f32: fields and taps of two realisations, what steps and screens
-/// work with, four screens; planes that wait for their antithetic partners at each range.
+/// Buffers of a running group in f32: fields and taps of two realisations, work space of steps and
+/// screens, four screens; planes that wait for their antithetic partners at each range.
 fn group_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let complex = 8 * grid.points();
     complex * (4 * beams + 2)
@@ -361,7 +360,7 @@ fn group_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
 }
 
 /// What all groups share, in f32: the sums of a wave of groups and of all before them, the spectrum
-/// of the screens, the field at the telescope, places of the folded points.
+/// of the screens, the field at the telescope, rings of the folded points.
 fn shared_bytes(grid: &Grid, ranges: usize, beams: usize) -> usize {
     let folded = folded_points(grid, beams);
     (GROUPS_PER_WAVE + 1) * 4 * folded * beams * ranges

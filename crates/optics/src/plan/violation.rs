@@ -1,5 +1,5 @@
-//! What a transverse grid must hold, in numbers that a user can take over: limits, what violates
-//! them, a set-up that does not.
+//! Limits of a transverse grid, their violations, and a set-up without violations, in numbers that
+//! a user can copy.
 
 use crate::screens::grid::Grid;
 use std::fmt;
@@ -26,7 +26,7 @@ pub enum Limit {
 }
 
 impl Limit {
-    /// Whether it bounds the spacing from above; the others bound the width, or the
+    /// Whether the limit is a largest spacing; the others are smallest widths, or a
     /// number of points.
     pub fn is_spacing(self) -> bool {
         matches!(self, Self::Aperture | Self::WaveFront | Self::Scatter)
@@ -49,12 +49,12 @@ impl Limit {
 /// A violated limit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Violation {
-    /// Which.
+    /// The limit.
     pub limit: Limit,
-    /// Least width \[m\] (or points), or largest spacing \[m\], that is accepted: rounded
-    /// to the safe side.
+    /// Smallest width \[m\] (or number of points), or largest spacing \[m\], that is accepted,
+    /// rounded to the safe side.
     pub needed: f64,
-    /// What the set-up has.
+    /// Value of the set-up.
     pub found: f64,
 }
 
@@ -108,7 +108,7 @@ impl fmt::Display for Violation {
     }
 }
 
-/// A square grid with equal layers that was examined and found good.
+/// A square grid with equal layers that was examined and accepted.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SetUp {
     /// Points along each axis.
@@ -135,7 +135,7 @@ pub(crate) fn listed(violations: &[Violation], would_do: Option<&SetUp>) -> Stri
     items.join("; ")
 }
 
-/// The least number of four digits that is not below `value`, above 0.
+/// The smallest number of four digits that is not below `value`, above 0.
 pub(crate) fn not_below(value: f64) -> f64 {
     four_digits(value, 1).unwrap_or(value)
 }

@@ -29,8 +29,8 @@ use std::sync::Arc;
 /// mean over the cell.
 const EXACT: usize = 24;
 
-/// Generator of phase screens for one grid and spectrum. Screens have unit k^2 Cn2 dz: a layer
-/// multiplies them with sqrt(k^2 Cn2 dz).
+/// Generator of phase screens for one grid and spectrum. Screens have unit k^2 Cn2 dz: they are
+/// multiplied by sqrt(k^2 Cn2 dz) of the layer.
 pub struct ScreenGenerator<T: Real> {
     grid: Grid,
     spectrum: Arc<dyn Spectrum>,
@@ -42,7 +42,8 @@ pub struct ScreenGenerator<T: Real> {
     low: LowFrequencies<T>,
     delta_rad_m: [f64; 2],
     exact: [usize; 2],
-    /// +1; a test sets it to -1 to show that the bistatic test finds a wrong sign.
+    /// Sign of the phase of the frequency shift: 1; a test sets it to -1 and verifies that the
+    /// bistatic test detects it.
     pub(crate) shift_sign: f64,
 }
 

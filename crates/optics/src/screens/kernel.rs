@@ -207,8 +207,7 @@ macro_rules! scalar {
             #[inline(always)]
             fn sin_cos(self) -> (Self, Self) {
                 const PI_HALF: [$real; 3] = $pi_half;
-                /// Adding 1.5 2^mantissa rounds to an integer, which then stands in
-                /// the lowest bits.
+                /// Adding 1.5 2^mantissa rounds to an integer, which is then in the lowest bits.
                 const ROUND: $real = 1.5 * (1u64 << $mantissa) as $real;
                 let rounded = self * (1.0 / std::$real::consts::FRAC_PI_2) + ROUND;
                 let n = rounded - ROUND;

@@ -1,6 +1,6 @@
 //! Low frequencies of a screen: randomised subharmonics, carried by a polynomial.
 //!
-//! The frequencies |kx| <= 1.5 dkx, |ky| <= 1.5 dky are left out of the Fourier synthesis. Level by
+//! The frequencies |kx| <= 1.5 dkx, |ky| <= 1.5 dky are not part of the Fourier synthesis. Level by
 //! level the central block is cut into 6 x 6 cells of half the spacing, of which the innermost 2 x
 //! 2 are cut again (three times finer); the last 2 x 2 stay. Each cell carries one plane wave with
 //! a frequency drawn evenly in the cell, so that the expected spectrum is the exact integral (Lane

@@ -1,11 +1,12 @@
 //! Integrals of f(x) cos(kappa x) under an arc of the aperture's edge by steepest descent,
 //! for large kappa.
 //!
-//! f(x) = exp(-x^2/s^2) integral of exp(-y^2/s^2) from -h(x) to h(x), h^2 = p^2 - (x - centre)^2,
-//! is analytic but for the square roots where the arc meets the axis. Each end of the interval can
-//! therefore be left straight into the upper half plane, where exp(j kappa x) decays: one
-//! Gauss-Laguerre rule at each end, however many waves lie between. Check: against Gauss-Legendre
-//! panels where both hold; the complex error function on the real axis and by its symmetry.
+//! f(x) = exp(-x^2/s^2) integral of exp(-y^2/s^2) from -h(x) to h(x), h^2 = p^2 - (x -
+//! centre)^2, is analytic but for the square roots where the arc meets the axis. The path of
+//! integration can therefore leave each end of the interval straight into the upper half plane,
+//! where exp(j kappa x) decays: one Gauss-Laguerre rule at each end, however many waves lie
+//! between. Check: against Gauss-Legendre panels where both hold; the complex error function on
+//! the real axis and by its symmetry.
 
 use num_complex::Complex;
 use std::f64::consts::PI;

@@ -6,9 +6,8 @@
 //!
 //! P(r) = integral from 0 to 2a of M(rho) exp(-D(rho)/2) (k r/R) J1(k r rho/R) drho.
 //!
-//! A hard edge throws light outwards that falls only as 1/r: this is what a grid must hold.
-//! Check: the Gaussian beam; the Airy pattern's 1 - J0^2 - J1^2; all of the transmitted power
-//! within a large circle.
+//! The light diffracted by a hard edge falls only as 1/r: a grid must hold it. Check: the Gaussian
+//! beam; the Airy pattern's 1 - J0^2 - J1^2; all of the transmitted power within a large circle.
 
 use crate::Error;
 use crate::air::cn2::Cn2Path;

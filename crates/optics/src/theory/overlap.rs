@@ -45,7 +45,8 @@ pub fn quadrature_cost_s(telescope: &Telescope, screens: usize, range_m: f64) ->
     let through = (60.0 + 126.0 * fresnel) * 1e-7 * screens as f64;
     let obscured = telescope.obscuration_radius_m / telescope.aperture_radius_m;
     if obscured > 0.0 {
-        // Four strips in place of one, and three kinks of M(rho) that are halved to.
+        // Four strips instead of one, and three kinks of M(rho), at which the adaptive integral
+        // halves its panels.
         return 3.2e-3 + 0.7 * overlaps * (1.3 + 3.2 * obscured) + through;
     }
     0.7 * overlaps + through
