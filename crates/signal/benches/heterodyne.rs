@@ -1,5 +1,6 @@
-//! Cost of a record: 1000 samples at 200 ns, by layer thickness and kind of pulse, beside the same sum in its plain form
-//! (exponentials over the band, term by term); and of a scan of 185 such lines. Throughput is in samples.
+//! Cost of a record: 1000 samples at 200 ns, by layer thickness and kind of pulse, beside the same
+//! sum in its plain form (exponentials over the band, term by term); and of a scan of 185 such
+//! lines. Throughput is in samples.
 
 use std::hint::black_box;
 
@@ -47,7 +48,8 @@ fn simulator(noise: NoiseModel, pulse: impl Into<Pulse>) -> Result<Simulator, Er
     )
 }
 
-/// A line that covers the record and the pulse around it, `parts` layers per sample: 225 `parts` scatterers in the sum.
+/// A line that covers the record and the pulse around it, `parts` layers per sample: 225 `parts`
+/// scatterers in the sum.
 fn line(parts: usize) -> LineOfSight {
     let layer_thickness_m = SPEED_OF_LIGHT_M_S / (2.0 * 250e6 * parts as f64);
     let layers = (SAMPLES + 260) * parts;

@@ -1,7 +1,7 @@
 //! Mean power of simulated pulses against equation (14), range by range.
 //!
-//! `cargo run --release -p wakescope-signal --example pulse_power -- [pulses]`; 600 000 pulses take a minute and agree
-//! within half a per cent at every range.
+//! `cargo run --release -p wakescope-signal --example pulse_power -- [pulses]`; 600 000 pulses take
+//! a minute and agree within half a per cent at every range.
 
 #![allow(clippy::print_stdout)] // the table is what the example is for
 

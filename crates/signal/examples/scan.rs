@@ -1,7 +1,9 @@
-//! A scan past a vortex with a measured pulse through hazy turbulent air into a converter of 8 bits; streamed.
+//! A scan past a vortex with a measured pulse through hazy turbulent air into a converter of 8
+//! bits; streamed.
 //!
-//! The pulse is a table of power and phase against time, as an oscilloscope writes it; each pulse meets a turbulence of its own;
-//! the phase of the complex baseband after 20 ns, averaged over the pulses of a line, shows the wind.
+//! The pulse is a table of power and phase against time, as an oscilloscope writes it; each pulse
+//! meets a turbulence of its own; the phase of the complex baseband after 20 ns, averaged over the
+//! pulses of a line, shows the wind.
 //!
 //! `cargo run --release -p wakescope-signal --example scan`
 
@@ -31,7 +33,8 @@ const RECEIVER: Receiver = Receiver {
     ..Receiver::table2()
 };
 
-/// A pulse with a fast rise and a slow fall, every 4 ns, in any unit; its frequency rises by 20 kHz/ns.
+/// A pulse with a fast rise and a slow fall, every 4 ns, in any unit; its frequency
+/// rises by 20 kHz/ns.
 fn measured_pulse() -> Result<Pulse, Error> {
     let time_s: Vec<f64> = (0..200).map(|i| f64::from(i) * 4e-9).collect();
     let centroid_s = 1.8e-7;
@@ -47,7 +50,8 @@ fn measured_pulse() -> Result<Pulse, Error> {
         .into())
 }
 
-/// Radial velocity past a vortex of 450 m^2/s at 400 m, on a line that passes its axis at `distance_m`.
+/// Radial velocity past a vortex of 450 m^2/s at 400 m, on a line that passes its axis
+/// at `distance_m`.
 fn wind_m_s(distance_m: f64, range_m: f64) -> f64 {
     let square = (range_m - 400.0).powi(2) + distance_m * distance_m + 2.35 * 2.35;
     450.0 * distance_m / (2.0 * PI * square)
@@ -110,7 +114,8 @@ fn main() -> Result<(), Error> {
             4.0 * RECEIVER.noise_variance_a2().sqrt(),
         )?),
     };
-    // One complex number per line is all that is kept. Noise of 50 MHz is uncorrelated at a lag of 5 samples, 20 ns.
+    // One complex number per line is all that is kept. Noise of 50 MHz is uncorrelated at a lag of
+    // 5 samples, 20 ns.
     let mut lags = [Complex::<f64>::ZERO; LINES];
     let clipped = scan.for_each::<Complex<f64>, Error>(|key, baseband| {
         lags[key.line] += GATE

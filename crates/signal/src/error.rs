@@ -1,6 +1,7 @@
-//! What can be wrong with a signal: one error type for the crate.
+//! The error type of the crate.
 
-/// Why a signal could not be made. Every variant carries the values and what is allowed.
+/// Error in the input of a simulation of signals. Every variant has the value found and the
+/// values allowed.
 #[non_exhaustive]
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum Error {

@@ -1,7 +1,9 @@
-//! Effects beside (15): phase noise of the laser, reflex of the telescope, echo of the pulse before, each off by default. Nothing of
-//! it is computed where it is off, and its random numbers are a stream of their own.
+//! Effects beyond (15): phase noise of the laser, reflex of the telescope, second-trip echo of the
+//! previous pulse, each off by default. An effect that is off costs nothing. Their random numbers
+//! are a separate stream.
 //!
-//! Check: speckle and noise keep their numbers; power of the reflex and of the echo; velocities of a point target.
+//! Check: speckle and noise do not change; power of the reflex and of the echo; velocities of
+//! a point target.
 
 use std::f64::consts::PI;
 
@@ -21,10 +23,10 @@ impl Simulator {
         front.linewidth_hz == 0.0 && front.reflection == 0.0 && shot.previous.is_none()
     }
 
-    /// The sum (15) with all that stands beside it, of a shot that is valid.
+    /// The sum (15) with these effects, for a valid shot.
     ///
-    /// Draws from the stream of the shot's own seed: phases of the local oscillator over the record and of the pulse, the phase of
-    /// the reflex, phases and speckle of the pulse before.
+    /// Draws from the stream of the shot's seed: phases of the local oscillator over the record and
+    /// of the pulse, the phase of the reflex, phases and speckle of the previous pulse.
     pub(crate) fn sum_with_impairments_into(
         &self,
         shot: Shot<'_>,
@@ -57,21 +59,21 @@ impl Simulator {
         }
         if let Some(previous) = shot.previous {
             let phases = self.laser_phases(previous, &mut rng)?;
-            let (mut speckle, mut echo) = (Vec::new(), vec![Complex::ZERO; out_a.len()]);
+            let mut speckle = Vec::new();
             draw_speckle(previous.layers(), &mut rng, &mut speckle);
+            let mut echo = vec![Complex::ZERO; out_a.len()];
             self.sum_into(Shot::from(previous), &speckle, &phases, scratch, &mut echo)?;
-            out_a
-                .iter_mut()
-                .zip(&echo)
-                .for_each(|(out, echo)| *out += echo);
+            for (out, echo) in out_a.iter_mut().zip(&echo) {
+                *out += echo;
+            }
         }
-        out_a
-            .iter_mut()
-            .zip(&oscillator)
-            .for_each(|(out, turn)| *out *= turn.conj());
+        for (out, turn) in out_a.iter_mut().zip(&oscillator) {
+            *out *= turn.conj();
+        }
         Ok(())
     }
-    /// Factors `exp(j phase)` of the laser while it sends a pulse, one for each layer that a sample sees.
+    /// Factors `exp(j phase)` of the laser while it sends a pulse, one for each layer in the
+    /// range of a sample.
     fn laser_phases(
         &self,
         line: &LineOfSight,

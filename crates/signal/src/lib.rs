@@ -30,7 +30,7 @@
 //! |---|---|
 //! | `pulse` | [`Pulse`]: [`GaussianPulse`] (7) or sampled; its moments and range weight, and the layers it needs |
 //! | [`sampled`] | [`SampledPulse`](sampled::SampledPulse): any envelope given by samples, joined by a spline |
-//! | `piecewise` | the cubic pieces that a sampled envelope is kept in |
+//! | `piecewise` | cubic pieces of a sampled envelope |
 //! | `medium` | [`Medium`]: backscatter and extinction by range |
 //! | [`efficiency`] | [`LayerEfficiency`](efficiency::LayerEfficiency): heterodyne efficiency, one curve or one realisation per pulse |
 //! | `table` | tables over range |
@@ -40,7 +40,7 @@
 //! | `heterodyne` | [`Simulator`]: one record per pulse, (15), (12), fast form |
 //! | `record` | [`Record`]: when the receiver samples; carrier and noise of the samples |
 //! | `sample` | [`Sample`]: the current, or both quadratures of the baseband |
-//! | `impairments` | effects beside (15): laser phases, reflex of the telescope, echo of the pulse before |
+//! | `impairments` | effects beyond (15): laser phases, reflex of the telescope, second-trip echo |
 //! | `window`, `kernel` | which layers are lit at a sample; the inner loop |
 //! | [`literal`] | the same sum term by term, as oracle |
 //! | `noise` | band-limited or white shot noise, real or complex |
@@ -52,6 +52,8 @@
 //!
 //! Feature `rayon` (default): the pulses of a scan in the caller's thread pool; the bits of the
 //! result do not depend on it.
+
+#![warn(clippy::too_many_lines, clippy::type_complexity)]
 
 pub mod constants;
 pub mod digitise;

@@ -25,7 +25,7 @@ pub struct LineOfSight {
 }
 
 impl LineOfSight {
-    /// Says what is wrong with the line, if anything.
+    /// Checks the line.
     ///
     /// # Errors
     /// [`Error::Empty`] without layers; [`Error::LengthMismatch`] if velocities and weights differ
@@ -66,7 +66,7 @@ impl LineOfSight {
     }
 }
 
-/// What bounds the thickness of the layers, beside the pulse.
+/// Limits on the thickness of the layers, in addition to those of the pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LayerLimits {
     /// Sampling rate `F_s` \[Hz\].

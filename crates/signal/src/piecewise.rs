@@ -1,12 +1,14 @@
-//! A complex function of time made of cubic pieces between knots, zero outside: how a sampled envelope is kept.
+//! A complex function of time made of cubic pieces between knots, zero outside: a sampled envelope.
 //!
-//! Check: a spline through a cubic with vanishing curvature at its ends is that cubic; moments are those of closed forms.
+//! Check: a spline through a cubic with vanishing curvature at its ends is that cubic; moments are
+//! those of closed forms.
 
 use std::f64::consts::PI;
 
 use num_complex::Complex;
 
-/// Abscissae on (0, 1) and weights of the 5-point Gauss-Legendre rule, exact for `t^2 |f|^2` of cubic pieces.
+/// Abscissae on (0, 1) and weights of the 5-point Gauss-Legendre rule, exact for `t^2 |f|^2`
+/// of cubic pieces.
 const GAUSS: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_094_54),
     (0.230_765_344_947_158_45, 0.239_314_335_249_683_23),
@@ -15,7 +17,7 @@ const GAUSS: [(f64, f64); 5] = [
     (0.953_089_922_969_332, 0.118_463_442_528_094_54),
 ];
 
-/// Knots this evenly spaced, in parts of a step, are found without a search.
+/// Knots this evenly spaced, in fractions of a step, are found without a search.
 const EVEN: f64 = 1e-9;
 
 /// Integrals of an envelope over time: of `|f|^2` and of its spectrum.
@@ -42,21 +44,22 @@ pub(crate) struct Piecewise {
 }
 
 impl Piecewise {
-    /// The cubic spline through the values, without curvature at both ends. The knots increase; there are as many values, two or more.
+    /// The cubic spline through the values, without curvature at both ends. The knots increase;
+    /// there are as many values, two or more.
     pub(crate) fn spline(knots_s: Vec<f64>, values: &[Complex<f64>]) -> Self {
         let curvature = natural_curvature(&knots_s, values);
-        let pieces = (0..values.len() - 1)
-            .map(|i| {
-                let square = (knots_s[i + 1] - knots_s[i]).powi(2);
-                let (a, b) = (curvature[i] * square, curvature[i + 1] * square);
-                [
-                    values[i],
-                    values[i + 1] - values[i] - (a * 2.0 + b) / 6.0,
-                    a * 0.5,
-                    (b - a) / 6.0,
-                ]
-            })
-            .collect();
+        let mut pieces = Vec::with_capacity(values.len() - 1);
+        for i in 0..values.len() - 1 {
+            let square = (knots_s[i + 1] - knots_s[i]).powi(2);
+            let a = curvature[i] * square;
+            let b = curvature[i + 1] * square;
+            pieces.push([
+                values[i],
+                values[i + 1] - values[i] - (a * 2.0 + b) / 6.0,
+                a * 0.5,
+                (b - a) / 6.0,
+            ]);
+        }
         Self {
             even: is_even(&knots_s),
             knots_s,
@@ -86,49 +89,41 @@ impl Piecewise {
         let index = index.min(end);
         let start = self.knots_s[index];
         let u = (time_s - start) / (self.knots_s[index + 1] - start);
-        at(&self.pieces[index], u)
+        piece_value(&self.pieces[index], u)
     }
 
     /// Multiplies the function.
     pub(crate) fn scale(&mut self, factor: f64) {
-        self.pieces.iter_mut().flatten().for_each(|c| *c *= factor);
+        for coefficient in self.pieces.iter_mut().flatten() {
+            *coefficient *= factor;
+        }
     }
 
     /// Moves the function to later times.
     pub(crate) fn shift(&mut self, delay_s: f64) {
-        self.knots_s.iter_mut().for_each(|knot| *knot += delay_s);
+        for knot in &mut self.knots_s {
+            *knot += delay_s;
+        }
     }
 
     /// Energy of each piece.
     fn energies(&self) -> Vec<f64> {
-        let energy = |(piece, knots): (&[Complex<f64>; 4], &[f64])| {
-            (knots[1] - knots[0])
-                * GAUSS
-                    .iter()
-                    .map(|&(u, weight)| weight * at(piece, u).norm_sqr())
-                    .sum::<f64>()
-        };
-        self.pieces
-            .iter()
-            .zip(self.knots_s.windows(2))
-            .map(energy)
-            .collect()
+        let mut energies = Vec::with_capacity(self.pieces.len());
+        for (piece, knots) in self.pieces.iter().zip(self.knots_s.windows(2)) {
+            let powers = GAUSS
+                .iter()
+                .map(|&(u, weight)| weight * piece_value(piece, u).norm_sqr());
+            energies.push((knots[1] - knots[0]) * powers.sum::<f64>());
+        }
+        energies
     }
 
-    /// Drops pieces from both ends that hold at most the part `lost` of the energy each side.
+    /// Drops pieces from both ends with at most the fraction `lost` of the energy on each side.
     pub(crate) fn trim(&mut self, lost: f64) {
         let energies = self.energies();
         let limit = lost * energies.iter().sum::<f64>();
-        let idle = |energies: &mut dyn Iterator<Item = &f64>| {
-            let mut sum = 0.0;
-            energies
-                .take_while(|energy| {
-                    sum += **energy;
-                    sum <= limit
-                })
-                .count()
-        };
-        let (front, back) = (idle(&mut energies.iter()), idle(&mut energies.iter().rev()));
+        let front = count_up_to(energies.iter(), limit);
+        let back = count_up_to(energies.iter().rev(), limit);
         if front + back < self.pieces.len() {
             self.pieces = self.pieces[front..self.pieces.len() - back].to_vec();
             self.knots_s = self.knots_s[front..self.knots_s.len() - back].to_vec();
@@ -137,20 +132,24 @@ impl Piecewise {
 
     /// The integrals of the function; the means are not numbers if it has no energy.
     pub(crate) fn moments(&self) -> Moments {
-        let (mut energy, mut mean_s, mut square_s2) = (0.0, 0.0, 0.0);
-        let (mut mean_hz, mut square_hz2) = (0.0, 0.0);
+        let mut energy = 0.0;
+        let mut mean_s = 0.0;
+        let mut square_s2 = 0.0;
+        let mut mean_hz = 0.0;
+        let mut square_hz2 = 0.0;
         for (piece, knots) in self.pieces.iter().zip(self.knots_s.windows(2)) {
             let step_s = knots[1] - knots[0];
             let [_, c1, c2, c3] = *piece;
             for (u, weight) in GAUSS {
-                let (time_s, weight) = (knots[0] + u * step_s, weight * step_s);
-                let f = at(piece, u);
+                let time_s = knots[0] + u * step_s;
+                let weight = weight * step_s;
+                let f = piece_value(piece, u);
                 let slope = (c1 + (c2 * 2.0 + c3 * (3.0 * u)) * u) / (2.0 * PI * step_s);
-                let (power, turning) = (weight * f.norm_sqr(), weight * (f.conj() * slope).im);
+                let power = weight * f.norm_sqr();
                 energy += power;
                 mean_s += power * time_s;
                 square_s2 += power * time_s * time_s;
-                mean_hz += turning;
+                mean_hz += weight * (f.conj() * slope).im;
                 square_hz2 += weight * slope.norm_sqr();
             }
         }
@@ -164,24 +163,42 @@ impl Piecewise {
     }
 }
 
-/// Value of a piece at the part `u` of its length.
-fn at([c0, c1, c2, c3]: &[Complex<f64>; 4], u: f64) -> Complex<f64> {
+/// Value of a piece at the fraction `u` of its length.
+fn piece_value([c0, c1, c2, c3]: &[Complex<f64>; 4], u: f64) -> Complex<f64> {
     c0 + (c1 + (c2 + c3 * u) * u) * u
 }
 
-fn is_even(knots_s: &[f64]) -> bool {
-    let step_s = (knots_s[knots_s.len() - 1] - knots_s[0]) / (knots_s.len() - 1) as f64;
-    let off = |(i, knot): (usize, &f64)| (knot - knots_s[0] - i as f64 * step_s).abs();
-    knots_s.iter().enumerate().map(off).fold(0.0, f64::max) <= EVEN * step_s
+/// Number of leading energies whose sum is at most `limit`.
+fn count_up_to<'a>(energies: impl Iterator<Item = &'a f64>, limit: f64) -> usize {
+    let mut sum = 0.0;
+    energies
+        .take_while(|energy| {
+            sum += **energy;
+            sum <= limit
+        })
+        .count()
 }
 
-/// Second derivatives of the natural cubic spline at its knots (Thomas algorithm; the system is diagonally dominant).
+/// Whether the knots are evenly spaced.
+fn is_even(knots_s: &[f64]) -> bool {
+    let step_s = (knots_s[knots_s.len() - 1] - knots_s[0]) / (knots_s.len() - 1) as f64;
+    let mut largest_s = 0.0_f64;
+    for (i, knot) in knots_s.iter().enumerate() {
+        let deviation_s = (knot - knots_s[0] - i as f64 * step_s).abs();
+        largest_s = largest_s.max(deviation_s);
+    }
+    largest_s <= EVEN * step_s
+}
+
+/// Second derivatives of the natural cubic spline at its knots (Thomas algorithm; the system is
+/// diagonally dominant).
 fn natural_curvature(knots_s: &[f64], values: &[Complex<f64>]) -> Vec<Complex<f64>> {
     let count = values.len();
     let mut curvature = vec![Complex::ZERO; count];
     let mut upper = vec![0.0; count];
     for i in 1..count - 1 {
-        let (before, after) = (knots_s[i] - knots_s[i - 1], knots_s[i + 1] - knots_s[i]);
+        let before = knots_s[i] - knots_s[i - 1];
+        let after = knots_s[i + 1] - knots_s[i];
         let bend = (values[i + 1] - values[i]) / after - (values[i] - values[i - 1]) / before;
         let pivot = 2.0 * (before + after) - before * upper[i - 1];
         upper[i] = after / pivot;
@@ -201,7 +218,8 @@ mod tests {
 
     #[test]
     fn a_spline_through_a_cubic_without_end_curvature_is_that_cubic() {
-        // x^3 - 3 x^2 on [1, 1 + 2]: second derivative 6 x - 6 vanishes at x = 1; mirror it to get a second end.
+        // x^3 - 3 x^2 on [1, 1 + 2]: second derivative 6 x - 6 vanishes at x = 1; mirror it to
+        // get a second end.
         let cubic = |x: f64| Complex::new((x - 1.0).powi(3) - 2.0 * x, 3.0 * x);
         let knots = vec![0.0, 0.1, 0.35, 0.7, 1.0];
         let values: Vec<_> = knots.iter().map(|x| cubic(*x)).collect();

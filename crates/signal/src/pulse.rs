@@ -1,9 +1,9 @@
-//! The transmitted pulse of any shape: Gaussian, (7), or sampled; its energy, and the weight that it
-//! gives to each range, (28), corrected.
+//! The transmitted pulse of any shape: Gaussian, (7), or sampled; its energy, and the weight that
+//! it gives to each range, (28), corrected.
 //!
-//! Check: `|f|^2` integrates to 1 over time, falls to one half at half the full width at half maximum,
-//! and the range weight integrates to 1 over range; a sampled phase spreads the spectrum as the closed
-//! form of a chirp says; the advised layers hold the energy of each shape.
+//! Check: `|f|^2` integrates to 1 over time, falls to one half at half the full width at half
+//! maximum, and the range weight integrates to 1 over range; a sampled phase spreads the spectrum
+//! as the closed form of a chirp says; the advised layers hold the energy of each shape.
 
 use std::f64::consts::PI;
 
@@ -14,8 +14,8 @@ use crate::piecewise::{Moments, Piecewise};
 use crate::sampled::SampledPulse;
 use crate::{Error, LayerLimits, SPEED_OF_LIGHT_M_S};
 
-/// Half-length of the sum over a Gaussian in units of `sigma` (Frehlich 1997): outside lies `erfc(3.72)` = 1.4e-7 of the
-/// energy.
+/// Half-length of the sum over a Gaussian in units of `sigma` (Frehlich 1997): outside lies
+/// `erfc(3.72)` = 1.4e-7 of the energy.
 const HALF_LENGTH_SIGMAS: f64 = 3.72;
 
 /// Largest error of the energy in a sum over layers that a record may have.
@@ -51,7 +51,8 @@ pub struct GaussianPulse {
 }
 
 impl GaussianPulse {
-    /// Table 2's 150 uJ in 200 ns (full width at half maximum), the shorter of the chapter's two pulses.
+    /// Table 2's 150 uJ in 200 ns (full width at half maximum), the shorter of the
+    /// chapter's two pulses.
     pub fn table2() -> Self {
         Self {
             sigma_s: PulseDuration::FullWidthHalfMaximum(200e-9).sigma_s(),
@@ -136,15 +137,14 @@ impl From<GaussianPulse> for Pulse {
         // The sum over a Gaussian in steps d is wrong by 2 exp(-(pi sigma/d)^2): 1e-4 at d = sigma.
         let allowed_s = PI * sigma_s / (2.0 / ALLOWED_ENERGY_ERROR).ln().sqrt();
         let support_s = (-HALF_LENGTH_SIGMAS * sigma_s, HALF_LENGTH_SIGMAS * sigma_s);
-        let (shape, advised_s) = (Shape::Gaussian(pulse), sigma_s);
         Self {
-            shape,
+            shape: Shape::Gaussian(pulse),
             energy_j,
             real: true,
             moments,
             support_s,
             allowed_s,
-            advised_s,
+            advised_s: sigma_s,
         }
     }
 }
@@ -158,19 +158,14 @@ impl From<SampledPulse> for Pulse {
             real,
         }: SampledPulse,
     ) -> Self {
-        let (allowed_s, advised_s) = (
-            thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR),
-            thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR),
-        );
-        let (support_s, shape) = (envelope.support_s(), Shape::Sampled(envelope));
         Self {
-            shape,
             energy_j,
             real,
             moments,
-            support_s,
-            allowed_s,
-            advised_s,
+            support_s: envelope.support_s(),
+            allowed_s: thickest_layer_s(&envelope, ALLOWED_ENERGY_ERROR),
+            advised_s: thickest_layer_s(&envelope, ADVISED_ENERGY_ERROR),
+            shape: Shape::Sampled(envelope),
         }
     }
 }
@@ -203,20 +198,21 @@ impl Pulse {
         }
     }
 
-    /// Weight `|f(2 offset/c)|^2 2/c` \[1/m\] of the air at `offset_m` on this side of the range in question, (28), corrected;
-    /// integrates to 1 over range.
+    /// Weight `|f(2 offset/c)|^2 2/c` \[1/m\] of the air `offset_m` before a range, (28),
+    /// corrected; integrates to 1 over range.
     pub fn range_weight_per_m(&self, offset_m: f64) -> f64 {
         let per_range = 2.0 / SPEED_OF_LIGHT_M_S;
         self.intensity_per_s(offset_m * per_range) * per_range
     }
 
-    /// First and last time at which the envelope enters the sum (15) \[s\]: at most 2e-7 of the energy lies outside.
+    /// First and last time at which the envelope enters the sum (15) \[s\]: at most 2e-7 of the
+    /// energy lies outside.
     pub fn support_s(&self) -> (f64, f64) {
         self.support_s
     }
 
-    /// The 1/e half-width `sigma` \[s\] of the Gaussian with the same spread in time: `sqrt 2` times the standard deviation
-    /// of `|f|^2`.
+    /// The 1/e half-width `sigma` \[s\] of the Gaussian with the same spread in time: `sqrt 2`
+    /// times the standard deviation of `|f|^2`.
     pub fn sigma_s(&self) -> f64 {
         (2.0 * (self.moments.square_s2 - self.moments.mean_s.powi(2)))
             .max(0.0)
@@ -238,14 +234,14 @@ impl Pulse {
         self.moments.mean_s
     }
 
-    /// Mean frequency of the envelope \[Hz\]: an estimator that knows nothing of it reads the velocity
-    /// `-lambda/2` times this in still air.
+    /// Mean frequency of the envelope \[Hz\]: an estimator that does not correct for it reports the
+    /// velocity `-lambda/2` times this frequency in still air.
     pub fn mean_frequency_hz(&self) -> f64 {
         self.moments.mean_hz
     }
 
-    /// Standard deviation of the spectrum `|F(nu)|^2` of the envelope \[Hz\]: `1/(2 sqrt2 pi sigma)`
-    /// for a Gaussian.
+    /// Standard deviation of the spectrum `|F(nu)|^2` of the envelope \[Hz\]:
+    /// `1/(2 sqrt2 pi sigma)` for a Gaussian.
     pub fn spectral_width_hz(&self) -> f64 {
         (self.moments.square_hz2 - self.mean_frequency_hz().powi(2))
             .max(0.0)
@@ -258,43 +254,43 @@ impl Pulse {
         if let Shape::Gaussian(_) = self.shape {
             return 2.0 * (2.0 * std::f64::consts::LN_2).sqrt() * self.spectral_width_hz();
         }
-        let ((first_s, last_s), reach_hz) = (self.support_s(), 8.0 * self.spectral_width_hz());
+        let (first_s, last_s) = self.support_s();
         let length_s = last_s - first_s;
-        // Sixteen frequencies in the finest structure of a pulse of this length, and eight points in the fastest of its waves.
+        let reach_hz = 8.0 * self.spectral_width_hz();
+        // Sixteen frequencies in the finest structure of the spectrum of a pulse of this length,
+        // and eight points in the fastest of its waves.
         let times = (8.0 * reach_hz * length_s).max(2000.0) as u32;
-        let point = |i: u32| first_s + length_s * (f64::from(i) + 0.5) / f64::from(times);
-        let envelope: Vec<_> = (0..times)
-            .map(point)
-            .map(|s| (s, self.envelope_per_sqrt_s(s)))
-            .collect();
+        let mut envelope = Vec::with_capacity(times as usize);
+        for i in 0..times {
+            let time_s = first_s + length_s * (f64::from(i) + 0.5) / f64::from(times);
+            envelope.push((time_s, self.envelope_per_sqrt_s(time_s)));
+        }
         let frequencies = (32.0 * reach_hz * length_s).ceil() as u32;
         let step_hz = 2.0 * reach_hz / f64::from(frequencies);
-        let power = |i: u32| {
+        let mut power = Vec::new();
+        for i in 0..=frequencies {
             let hz = self.mean_frequency_hz() - reach_hz + f64::from(i) * step_hz;
-            envelope
+            let waves = envelope
                 .iter()
-                .map(|(s, f)| f * Complex::cis(-2.0 * PI * hz * s))
-                .sum::<Complex<f64>>()
-                .norm_sqr()
-        };
-        let found: Vec<f64> = (0..=frequencies).map(power).collect();
-        let half = 0.5 * found.iter().copied().fold(0.0, f64::max);
-        // From one outer neighbour below half to the other, less what of these steps lies below.
-        let first = found.iter().position(|p| *p >= half).unwrap_or(0).max(1);
-        let last = found
-            .iter()
-            .rposition(|p| *p >= half)
-            .unwrap_or(0)
-            .min(found.len() - 2);
-        let below = |inside: usize, outside: usize| {
-            (half - found[outside]) / (found[inside] - found[outside])
-        };
-        step_hz * ((last - first) as f64 + 2.0 - below(first, first - 1) - below(last, last + 1))
+                .map(|(time_s, f)| f * Complex::cis(-2.0 * PI * hz * time_s));
+            power.push(waves.sum::<Complex<f64>>().norm_sqr());
+        }
+        let half = 0.5 * power.iter().copied().fold(0.0, f64::max);
+        let first = power.iter().position(|p| *p >= half).unwrap_or(0).max(1);
+        let last = power.iter().rposition(|p| *p >= half).unwrap_or(0);
+        let last = last.min(power.len() - 2);
+        // From the neighbour below half on one side to that on the other, less the fractions of
+        // these two steps below half.
+        let steps = (last - first) as f64 + 2.0;
+        let below_first = fraction_below(half, power[first], power[first - 1]);
+        let below_last = fraction_below(half, power[last], power[last + 1]);
+        step_hz * (steps - below_first - below_last)
     }
 
-    /// Thickness of the layers \[m\] for this pulse: the largest that divides the range step of a sample, `c/(2 F_s)`, and is
-    /// at most `lambda/(16 sigma g_max)` and `c sigma/2`, holds the energy of the pulse within 5e-4, and resolves its phase
-    /// (`2 DeltaR/c` at most an eighth of the inverse spectral width).
+    /// Thickness of the layers \[m\] for this pulse: the largest that divides the range step of a
+    /// sample, `c/(2 F_s)`, and is at most `lambda/(16 sigma g_max)` and `c sigma/2`, holds the
+    /// energy of the pulse within 5e-4, and resolves its phase (`2 DeltaR/c` at most an eighth of
+    /// the inverse spectral width).
     ///
     /// # Errors
     /// [`Error::OutOfRange`] if a limit is not positive (the gradient may be zero).
@@ -312,8 +308,8 @@ impl Pulse {
         Ok(step_m / parts)
     }
 
-    /// Thickest layer that a record accepts \[m\]: the energy in a sum over layers is then within 5e-3, and the phase is
-    /// sampled.
+    /// Thickest layer that a record accepts \[m\]: the energy in a sum over layers is then within
+    /// 5e-3, and the phase is sampled.
     pub fn max_layer_thickness_m(&self) -> f64 {
         0.5 * SPEED_OF_LIGHT_M_S * self.allowed_s.min(0.25 / self.spectral_width_hz())
     }
@@ -336,33 +332,43 @@ impl Pulse {
     }
 }
 
-/// Largest step \[s\] in which sums over `|f|^2`, wherever they begin, differ from its integral by at most `limit`, and so do
-/// those in the next smaller steps.
+/// Fraction of a step from `outside` to `inside` below a level between them.
+fn fraction_below(level: f64, inside: f64, outside: f64) -> f64 {
+    (level - outside) / (inside - outside)
+}
+
+/// Largest step \[s\] in which sums over `|f|^2`, wherever they begin, differ from its integral by
+/// at most `limit`, and so do those in the next smaller steps.
 fn thickest_layer_s(envelope: &Piecewise, limit: f64) -> f64 {
-    /// Steps tried for each factor of two, and places where a sum begins.
+    /// Steps tried for each factor of two.
     const PER_OCTAVE: i32 = 4;
-    const PLACES: u32 = 8;
+    /// Positions in a step at which a sum begins.
+    const STARTS: u32 = 8;
     let (first_s, last_s) = envelope.support_s();
-    let sum = |step_s: f64, place: u32| {
-        let start_s = first_s + step_s * f64::from(place) / f64::from(PLACES);
-        let steps = ((last_s - start_s) / step_s).ceil() as usize;
-        let power = |i: usize| envelope.value(start_s + i as f64 * step_s).norm_sqr();
-        step_s * (0..=steps).map(power).sum::<f64>()
-    };
-    let mut good = 0;
+    let mut accurate_steps = 0;
     let mut step_s = last_s - first_s;
-    for octave in 0..12 * PER_OCTAVE {
-        step_s = (last_s - first_s) * (-f64::from(octave) / f64::from(PER_OCTAVE)).exp2();
-        good = if (0..PLACES).all(|place| (sum(step_s, place) - 1.0).abs() <= limit) {
-            good + 1
-        } else {
-            0
-        };
-        if good == PER_OCTAVE {
+    for index in 0..12 * PER_OCTAVE {
+        step_s = (last_s - first_s) * (-f64::from(index) / f64::from(PER_OCTAVE)).exp2();
+        let is_accurate = (0..STARTS).all(|start| {
+            let delay_s = step_s * f64::from(start) / f64::from(STARTS);
+            (stepped_energy(envelope, delay_s, step_s) - 1.0).abs() <= limit
+        });
+        accurate_steps = if is_accurate { accurate_steps + 1 } else { 0 };
+        if accurate_steps == PER_OCTAVE {
             return step_s * (f64::from(PER_OCTAVE - 1) / f64::from(PER_OCTAVE)).exp2();
         }
     }
     step_s
+}
+
+/// Sum of `|f|^2` times `step_s` over times in steps of `step_s`, from `delay_s` after
+/// the first knot.
+fn stepped_energy(envelope: &Piecewise, delay_s: f64, step_s: f64) -> f64 {
+    let (first_s, last_s) = envelope.support_s();
+    let start_s = first_s + delay_s;
+    let steps = ((last_s - start_s) / step_s).ceil() as usize;
+    let powers = (0..=steps).map(|i| envelope.value(start_s + i as f64 * step_s).norm_sqr());
+    step_s * powers.sum::<f64>()
 }
 
 #[cfg(test)]
@@ -529,9 +535,10 @@ mod tests {
                 max_relative = 1e-3
             );
         }
-        // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is half at 0.4429/T.
+        // A rectangle of T, whose tails make its standard deviation say nothing: |sinc|^2 is
+        // half at 0.4429/T.
         let flat = Pulse::from(rectangle(200e-9, 0.2e-9));
-        // What is left out of the energy at both ends shortens it.
+        // The energy cut off at both ends shortens it.
         assert_relative_eq!(
             flat.spectral_full_width_half_maximum_hz(),
             0.885_89 / 200e-9,

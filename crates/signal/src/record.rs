@@ -1,4 +1,4 @@
-//! When the receiver samples, and what its samples are made of.
+//! Sampling times of the receiver, and the carrier and noise of its samples.
 //!
 //! Check: the tests of `heterodyne`.
 
@@ -6,7 +6,7 @@ use num_complex::Complex;
 
 use crate::noise::{BasebandNoise, RealNoise};
 
-/// When and how long the receiver samples after each pulse.
+/// Sampling times of the receiver after each pulse.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Record {
     /// Time of the first sample after the middle of the pulse leaves \[s\]; its range is `c t/2`.
@@ -15,7 +15,7 @@ pub struct Record {
     pub samples: usize,
 }
 
-/// What turns an envelope into samples: the carrier at their times, and the noise of either kind.
+/// Converts an envelope into samples: the carrier at their times, and noise of either kind.
 pub struct Detector {
     pub(crate) carrier: Vec<Complex<f64>>,
     pub(crate) noise: RealNoise,

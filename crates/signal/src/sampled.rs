@@ -1,8 +1,8 @@
 //! A pulse whose envelope was measured or computed at sample times, of any shape, real or complex.
 //!
-//! A cubic spline joins the samples, at any times: its error is of order `(step/scale)^4`, 3e-6 of the peak
-//! for a Gaussian with five samples in `sigma`. It is scaled to unit energy, and cut where less than 1e-7
-//! of the energy is lost.
+//! A cubic spline joins the samples, at any times: its error is of order `(step/scale)^4`, 3e-6 of
+//! the peak for a Gaussian with five samples in `sigma`. It is scaled to unit energy, and cut where
+//! less than 1e-7 of the energy is lost.
 //!
 //! Check: a sampled Gaussian is the Gaussian, from fine and coarse samples, evenly spaced or not.
 
@@ -12,7 +12,7 @@ use crate::Error;
 use crate::error::{check, check_amounts, check_increasing, check_length, check_positive};
 use crate::piecewise::{Moments, Piecewise};
 
-/// Energy cut off at each end, as a part of the whole.
+/// Energy cut off at each end, as a fraction of the whole.
 const CUT_ENERGY: f64 = 0.5e-7;
 
 /// A transmitted pulse of any sampled shape.
@@ -26,16 +26,18 @@ pub struct SampledPulse {
 }
 
 impl SampledPulse {
-    /// A pulse from its complex envelope at increasing times \[s\]; zero before the first and after the last sample. The
-    /// unit of the amplitude does not matter: the envelope is scaled to unit energy.
+    /// A pulse from its complex envelope at increasing times \[s\]; zero before the first and
+    /// after the last sample. The unit of the amplitude does not matter: the envelope is scaled
+    /// to unit energy.
     ///
-    /// Time 0 is the moment from which ranges are counted, `R = c t/2`; see [`SampledPulse::centred`]. A positive
-    /// frequency of the envelope, `exp(+j 2 pi nu t)`, raises the intermediate frequency.
+    /// Time 0 is the moment from which ranges are counted, `R = c t/2`; see
+    /// [`SampledPulse::centred`]. A positive frequency of the envelope, `exp(+j 2 pi nu t)`, raises
+    /// the intermediate frequency.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for fewer than two samples or an energy that is not positive;
-    /// [`Error::LengthMismatch`]; [`Error::ElementOutOfRange`] for a value that is not finite, times that
-    /// do not increase, or an amplitude that is zero everywhere.
+    /// [`Error::LengthMismatch`]; [`Error::ElementOutOfRange`] for a value that is not finite,
+    /// times that do not increase, or an amplitude that is zero everywhere.
     pub fn new(time_s: &[f64], amplitude: &[Complex<f64>], energy_j: f64) -> Result<Self, Error> {
         check_positive("energy_j", energy_j)?;
         let largest = check_samples(time_s, amplitude)?;
@@ -60,7 +62,8 @@ impl SampledPulse {
         })
     }
 
-    /// A pulse from its power at increasing times \[s\], as a photodiode shows it, without phase; any unit.
+    /// A pulse from its power at increasing times \[s\], as a photodiode measures it, without
+    /// phase; any unit.
     ///
     /// # Errors
     /// As [`SampledPulse::new`]; [`Error::ElementOutOfRange`] for a negative power.
@@ -70,8 +73,8 @@ impl SampledPulse {
         Self::new(time_s, &amplitude, energy_j)
     }
 
-    /// The same pulse, moved in time so that the centroid of its power is at time 0: ranges then count from its middle,
-    /// as for a Gaussian.
+    /// The same pulse, moved in time so that the centroid of its power is at time 0: ranges then
+    /// count from its middle, as for a Gaussian.
     #[must_use]
     pub fn centred(mut self) -> Self {
         self.envelope.shift(-self.moments.mean_s);
@@ -90,24 +93,24 @@ fn check_samples(time_s: &[f64], amplitude: &[Complex<f64>]) -> Result<f64, Erro
     )?;
     check_length("amplitude", amplitude.len(), time_s.len())?;
     check_increasing("time_s", time_s, "later than the time before")?;
-    let bad_value = |index, value, allowed| Error::ElementOutOfRange {
-        field: "amplitude",
-        index,
-        value,
-        allowed,
-    };
     if let Some((index, a)) = amplitude.iter().enumerate().find(|(_, a)| !a.is_finite()) {
-        return Err(bad_value(
+        return Err(Error::ElementOutOfRange {
+            field: "amplitude",
             index,
-            if a.re.is_finite() { a.im } else { a.re },
-            "finite",
-        ));
+            value: if a.re.is_finite() { a.im } else { a.re },
+            allowed: "finite",
+        });
     }
     let largest = amplitude
         .iter()
         .fold(0.0_f64, |m, a| m.max(a.re.abs()).max(a.im.abs()));
     if largest == 0.0 {
-        return Err(bad_value(0, 0.0, "not zero in every place"));
+        return Err(Error::ElementOutOfRange {
+            field: "amplitude",
+            index: 0,
+            value: 0.0,
+            allowed: "not all zero",
+        });
     }
     Ok(largest)
 }
@@ -122,7 +125,8 @@ mod tests {
         GaussianPulse::table2()
     }
 
-    /// Largest difference from the Gaussian, in parts of its peak, of the spline through its samples at `times`.
+    /// Largest difference from the Gaussian, in parts of its peak, of the spline through its
+    /// samples at `times`.
     fn error_of(times: &[f64]) -> f64 {
         let amplitude: Vec<_> = times
             .iter()

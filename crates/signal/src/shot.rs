@@ -13,10 +13,9 @@ use crate::{Error, LineOfSight};
 pub struct Shot<'a> {
     /// The air; it may be shared by many pulses.
     pub line: &'a LineOfSight,
-    /// What the return of each layer is multiplied with for this pulse, one factor per layer,
-    /// finite and not negative: the heterodyne efficiency of this moment if the line's weights
-    /// leave it out, or its ratio to the mean if they contain the mean. `None`: the line's
-    /// weights as they are.
+    /// Factor of the return of each layer for this pulse, finite and not negative: the heterodyne
+    /// efficiency of this moment if the line's weights leave it out, or its ratio to the mean if
+    /// they contain the mean. `None`: the line's weights as they are.
     pub efficiency: Option<&'a [f64]>,
     /// The air that the previous pulse lights at the same time, for its second-trip echo: what lies
     /// at `R + c/(2 PRF)` is at `R` of this line. `None`: no second-trip echo.
@@ -38,7 +37,7 @@ impl<'a> From<&'a LineOfSight> for Shot<'a> {
 }
 
 impl Shot<'_> {
-    /// Says what is wrong with the shot, if anything.
+    /// Checks the shot.
     ///
     /// # Errors
     /// As [`LineOfSight::validate`]; [`Error::LengthMismatch`] if there is not one factor per

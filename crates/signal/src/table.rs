@@ -1,4 +1,4 @@
-//! Tables over range: what they must be, and straight lines between their points.
+//! Tables over range: checks, and linear interpolation.
 //!
 //! Check: the tests of `medium` and `efficiency`.
 

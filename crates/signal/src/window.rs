@@ -1,4 +1,4 @@
-//! Which layers the pulse lights at each sample, and with what amplitude.
+//! The layers that the pulse lights at each sample, and their amplitudes.
 //!
 //! The range of sample k is `c t_k/2`; the sum (15) is centred on the layer nearest to it
 //! (corrected: the chapter centres it on R = 0) and reaches over the support of the pulse, `L_c`

@@ -1,10 +1,11 @@
-//! Noise of the analogue-to-digital converter, as a share of the noise that enters it.
+//! Noise of the analogue-to-digital converter, relative to the noise at its input.
 //!
 //! Check: the stored tables of rounding and of clipping; samples that were rounded and clipped.
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
-/// A converter of `bits` and a full scale of `full_scale_over_noise` times the root mean square of the noise in the band.
+/// A converter of `bits` and a full scale of `full_scale_over_noise` times the root mean square of
+/// the noise in the band.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Converter {
     /// Bits of a sample.
@@ -15,8 +16,9 @@ pub struct Converter {
     pub bandwidth_hz: f64,
     /// Sampling rate `F_s` \[Hz\].
     pub sample_rate_hz: f64,
-    /// Root mean square of what enters the converter over that of the noise in the band: 1 for a band-limited current,
-    /// `1/sqrt 2` for each of its two quadratures, `sqrt(F_s/2B)` for either with white noise.
+    /// Root mean square of the input of the converter over that of the noise in the band: 1 for a
+    /// band-limited current, `1/sqrt 2` for each of its two quadratures, `sqrt(F_s/2B)` for either
+    /// with white noise.
     pub input_over_noise: f64,
 }
 
@@ -28,13 +30,13 @@ impl Converter {
             * (2.0 * self.bandwidth_hz / self.sample_rate_hz)
     }
 
-    /// What clipping does to the samples.
+    /// Effect of clipping on the samples.
     pub fn clipping(&self) -> Clipping {
         Clipping::at(self.full_scale_over_noise / self.input_over_noise)
     }
 
-    /// What clipping adds to [`Converter::rounding`]. The distortion spreads, as rounding does, evenly from zero to half the
-    /// sampling rate, which is exact for white noise.
+    /// What clipping adds to [`Converter::rounding`]. The distortion spreads, as rounding does,
+    /// evenly from zero to half the sampling rate, which is exact for white noise.
     pub fn clipping_noise(&self) -> f64 {
         let spread = self.input_over_noise.powi(2) * 2.0 * self.bandwidth_hz / self.sample_rate_hz;
         let Clipping {
@@ -45,8 +47,8 @@ impl Converter {
     }
 }
 
-/// Gaussian noise clipped at some standard deviations, in units of its variance (Bussgang: a scaled copy and a distortion that is
-/// uncorrelated with it).
+/// Gaussian noise clipped at some standard deviations, in units of its variance (Bussgang: a scaled
+/// copy and a distortion that is uncorrelated with it).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clipping {
     /// Part of the samples that are clipped, `erfc(k/sqrt 2)`.
@@ -66,7 +68,8 @@ impl Clipping {
         let clipped_fraction = libm::erfc(k * FRAC_1_SQRT_2);
         let gain = libm::erf(k * FRAC_1_SQRT_2);
         let density = (-0.5 * k * k).exp() / (2.0 * PI).sqrt();
-        // Without the rounding of differences between numbers near 1, which would leave a negative distortion.
+        // Without the rounding of differences between numbers near 1, which would leave a
+        // negative distortion.
         let missing = (k * k - 1.0) * clipped_fraction - 2.0 * k * density;
         let distortion =
             (missing + 2.0 * clipped_fraction - clipped_fraction * clipped_fraction).max(0.0);

@@ -1,17 +1,18 @@
-//! What a real receiver has and the shot-noise limit lacks: amplifier and dark current, intensity noise of the laser, a
-//! detector that saturates and one that is slow, a converter, a laser of finite linewidth, a telescope that reflects.
+//! Properties of a real receiver beyond the shot-noise limit: amplifier and dark current, intensity
+//! noise of the laser, a detector that saturates and one that is slow, a converter, a laser of
+//! finite linewidth, a telescope that reflects.
 //!
 //! Check: impossible values are refused by name.
 
 use crate::Error;
 use crate::error::check;
 
-/// What a receiver has beyond (12)-(14). [`FrontEnd::IDEAL`] has nothing.
+/// Properties of a receiver beyond (12)-(14). [`FrontEnd::IDEAL`] has none.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrontEnd {
     /// Current noise of the amplifier, `i_n` \[A/sqrt(Hz)\]; 0 for none.
     pub amplifier_noise_a_rthz: f64,
-    /// Resistor whose thermal noise `4 k T/R` the amplifier sees \[ohm\]; `inf` for none.
+    /// Resistor whose thermal noise `4 k T/R` enters the amplifier \[ohm\]; `inf` for none.
     pub load_ohm: f64,
     /// Its temperature \[K\].
     pub load_temperature_k: f64,
@@ -19,20 +20,24 @@ pub struct FrontEnd {
     pub dark_current_a: f64,
     /// Relative intensity noise of the local oscillator \[dB/Hz\]; `-inf` for none.
     pub intensity_noise_db_hz: f64,
-    /// Rejection of what both halves of a balanced detector see, electrical \[dB\]: 20 log of the ratio of currents.
+    /// Common-mode rejection of a balanced detector, electrical \[dB\]: 20 log of the
+    /// ratio of currents.
     pub rejection_db: f64,
-    /// Power `P_s` at which the current has fallen to half of `S P`, `I = S P/(1 + P/P_s)` \[W\]; `inf` for none.
+    /// Power `P_s` at which the current has fallen to half of `S P`, `I = S P/(1 + P/P_s)` \[W\];
+    /// `inf` for none.
     pub saturation_w: f64,
     /// How fast the detector is.
     pub response: Butterworth,
-    /// Noise of the converter's rounding over the density of all noises before it, [`super::Converter::rounding`]. It counts in
-    /// the signal-to-noise ratio alone: the samples have it from the converter itself.
+    /// Noise of the converter's rounding over the density of all noises before it,
+    /// [`super::Converter::rounding`]. It counts in the signal-to-noise ratio alone: the samples
+    /// have it from the converter itself.
     pub rounding_noise: f64,
     /// The same of its clipping, [`super::Converter::clipping_noise`].
     pub clipping_noise: f64,
     /// Lorentzian full width at half maximum of the laser's line \[Hz\]; 0 for none.
     pub linewidth_hz: f64,
-    /// Part of the pulse's power that the telescope sends straight to the receiver, `rho`; 0 for none.
+    /// Fraction of the pulse's power that the telescope reflects to the receiver,
+    /// `rho`; 0 for none.
     pub reflection: f64,
 }
 
@@ -41,7 +46,8 @@ pub struct FrontEnd {
 pub struct Butterworth {
     /// Number of poles `n`.
     pub order: u32,
-    /// Frequency at which the power has fallen to half \[Hz\]; `inf` for a detector that is fast enough.
+    /// Frequency at which the power has fallen to half \[Hz\]; `inf` for a detector that
+    /// is fast enough.
     pub half_power_hz: f64,
 }
 
@@ -56,7 +62,7 @@ impl Butterworth {
 }
 
 impl FrontEnd {
-    /// Nothing but shot noise.
+    /// Only shot noise.
     pub const IDEAL: Self = Self {
         amplifier_noise_a_rthz: 0.0,
         load_ohm: f64::INFINITY,

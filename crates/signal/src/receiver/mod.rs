@@ -1,14 +1,16 @@
-//! The receiver: what it samples, its responsivity, its noise (13) and the reference of the signal-to-noise ratio (14).
+//! The receiver: what it samples, its responsivity, its noise (13) and the reference of the
+//! signal-to-noise ratio (14).
 //!
 //! | module | what is in it |
 //! |---|---|
-//! | `front_end` | [`FrontEnd`]: what a real receiver has beyond shot noise |
-//! | `penalties` | [`NoiseDensities`], [`Penalties`]: what it costs |
+//! | `front_end` | [`FrontEnd`]: properties of a real receiver beyond shot noise |
+//! | `penalties` | [`NoiseDensities`], [`Penalties`]: noises and losses of a real receiver |
 //! | `converter` | [`Converter`]: noise of rounding and clipping |
 //! | [`phase_noise`] | effect of the laser's linewidth |
-//! | [`echoes`] | the telescope's own reflex, the pulse before |
+//! | [`echoes`] | reflex of the telescope, echo of the previous pulse |
 //!
-//! Check: the variance of the noise, the ratio of the two Planck conventions (2 pi), the band inside Nyquist.
+//! Check: the variance of the noise, the ratio of the two Planck conventions (2 pi), the band
+//! inside Nyquist.
 
 mod converter;
 pub mod echoes;
@@ -32,7 +34,8 @@ pub enum PlanckConvention {
     /// `h nu`: physics; the shot-noise limit `eta_Q P/(h nu B)`.
     #[default]
     H,
-    /// `hbar nu`, as the chapter prints: the signal has `2 pi` times (8.0 dB) more power for the same noise.
+    /// `hbar nu`, as the chapter prints: the signal has `2 pi` times (8.0 dB) more power for
+    /// the same noise.
     Hbar,
 }
 
@@ -42,7 +45,8 @@ pub enum NoiseModel {
     /// Flat in the detector band, nothing outside; variance (13).
     #[default]
     BandLimited,
-    /// The same density from zero to half the sampling rate: the variance is (13) times `(F_s/2)/B`.
+    /// The same density from zero to half the sampling rate: the variance is (13)
+    /// times `(F_s/2)/B`.
     White,
     /// No noise; no random number is drawn for it.
     None,
@@ -57,7 +61,8 @@ pub struct Receiver {
     pub sample_rate_hz: f64,
     /// Frequency of the return from air at rest, `f_c` \[Hz\].
     pub intermediate_frequency_hz: f64,
-    /// Width of the detector band, centred on `f_c`, `B` \[Hz\]. It limits the noise only: a return beyond it is kept.
+    /// Width of the detector band, centred on `f_c`, `B` \[Hz\]. It limits the noise only: a return
+    /// beyond it is not filtered.
     pub bandwidth_hz: f64,
     /// Electrons per photon, `eta_Q`, above 0 and at most 1.
     pub quantum_efficiency: f64,
@@ -67,13 +72,13 @@ pub struct Receiver {
     pub planck: PlanckConvention,
     /// Noise added to the signal.
     pub noise: NoiseModel,
-    /// What it has beyond shot noise.
+    /// Properties beyond shot noise.
     pub front_end: FrontEnd,
 }
 
 impl Receiver {
-    /// That of the chapter's Table 2, with what it does not state: quantum efficiency 1, a local oscillator of 1 mW, (14) with
-    /// `h`, noise in the detector band.
+    /// That of the chapter's Table 2, with what it does not state: quantum efficiency 1, a local
+    /// oscillator of 1 mW, (14) with `h`, noise in the detector band.
     pub const fn table2() -> Self {
         Self {
             wavelength_m: 1.55e-6,
@@ -88,7 +93,8 @@ impl Receiver {
         }
     }
 
-    /// What bounds the layers of air for this receiver in a wind of that largest gradient along any line \[1/s\].
+    /// Limits on the layers of air for this receiver in a wind with this largest gradient along
+    /// any line \[1/s\].
     pub fn layer_limits(&self, max_gradient_per_s: f64) -> LayerLimits {
         let Self {
             sample_rate_hz,
@@ -102,7 +108,7 @@ impl Receiver {
         }
     }
 
-    /// Says what is wrong with the receiver, if anything.
+    /// Checks a receiver of real currents.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] with the field that is not allowed; [`Error::BandBeyondNyquist`] if
@@ -112,8 +118,8 @@ impl Receiver {
         self.validate_band()
     }
 
-    /// The same for a receiver that delivers two quadratures: its band is within `-F_s/2` and `F_s/2` about `f_c`, which lies
-    /// above half of it.
+    /// Checks a receiver of two quadratures: its band is within `-F_s/2` and `F_s/2` about `f_c`,
+    /// which lies above half of it.
     ///
     /// # Errors
     /// As [`Receiver::validate`].
@@ -171,13 +177,14 @@ impl Receiver {
         self.quantum_efficiency * ELEMENTARY_CHARGE_C / self.photon_energy_j()
     }
 
-    /// Variance of the noise in the detector band before the converter \[A^2\], `2 e S P_LO B`, (13), where there is only shot
-    /// noise; whatever the noise model.
+    /// Variance of the noise in the detector band before the converter \[A^2\], `2 e S P_LO B`,
+    /// (13), where there is only shot noise; whatever the noise model.
     pub fn noise_variance_a2(&self) -> f64 {
         self.noise_density_a2_hz() * self.bandwidth_hz
     }
 
-    /// One-sided density of the noise before the converter, `2 e S P_LO` where there is only shot noise \[A^2/Hz\].
+    /// One-sided density of the noise before the converter, `2 e S P_LO` where there is only shot
+    /// noise \[A^2/Hz\].
     pub fn noise_density_a2_hz(&self) -> f64 {
         self.noise_densities().total_a2_hz()
     }
@@ -188,9 +195,10 @@ impl Receiver {
             * (1.0 + self.front_end.rounding_noise + self.front_end.clipping_noise)
     }
 
-    /// Power of the complex envelope per joule sent and per unit of returned fraction and `|f|^2`,
-    /// `2 S^2 P_LO` \[A^2/W\], from (10), (11), (15), corrected by a further `sqrt 2` so that (14) holds; times `2 pi` with
-    /// [`PlanckConvention::Hbar`], and what a saturated or slow detector leaves of it.
+    /// Power of the complex envelope per joule sent and per unit of returned fraction and
+    /// `|f|^2`, `2 S^2 P_LO` \[A^2/W\], from (10), (11), (15), corrected by a further `sqrt 2` so
+    /// that (14) holds; times `2 pi` with [`PlanckConvention::Hbar`], and what a saturated or
+    /// slow detector leaves of it.
     pub fn heterodyne_gain_a2_w(&self) -> f64 {
         let responsivity = self.responsivity_a_w();
         let convention = match self.planck {
@@ -200,8 +208,9 @@ impl Receiver {
         2.0 * responsivity * responsivity * self.local_oscillator_w * convention * self.beat_gain()
     }
 
-    /// Signal-to-noise ratio of a pulse of `energy_j` where the return `weight_per_m` changes slowly over the pulse:
-    /// `(eta_Q E_t/(h nu B)) (c/2) weight`, (14), corrected (with `hbar` if the convention says so).
+    /// Signal-to-noise ratio of a pulse of `energy_j` where the return `weight_per_m` changes
+    /// slowly over the pulse: `(eta_Q E_t/(h nu B)) (c/2) weight`, (14), corrected (with `hbar` if
+    /// the convention says so).
     pub fn slowly_varying_snr(&self, energy_j: f64, weight_per_m: f64) -> f64 {
         self.heterodyne_gain_a2_w() * energy_j * 0.5 * SPEED_OF_LIGHT_M_S * weight_per_m
             / self.snr_noise_a2()

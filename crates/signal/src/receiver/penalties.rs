@@ -1,7 +1,9 @@
-//! What a real receiver costs against the shot-noise limit: densities of its noises, saturation and response of its detector.
+//! Losses of a real receiver against the shot-noise limit: densities of its noises, saturation and
+//! response of its detector.
 //!
-//! All noises are Gaussian and flat in the band, so that their densities add. Check: the stored tables of densities,
-//! saturation and band response; nothing changes, to the bit, where everything is off.
+//! All noises are Gaussian and flat in the band, so that their densities add. Check: the stored
+//! tables of densities, saturation and band response; nothing changes, to the bit, where
+//! everything is off.
 
 use super::{FrontEnd, Receiver};
 use crate::constants::{BOLTZMANN_J_K, ELEMENTARY_CHARGE_C};
@@ -15,9 +17,10 @@ pub struct NoiseDensities {
     pub amplifier_a2_hz: f64,
     /// `2 e I_d`.
     pub dark_a2_hz: f64,
-    /// `(P dI/dP)^2` times the relative intensity noise that is left after the rejection.
+    /// `(P dI/dP)^2` times the relative intensity noise after the common-mode rejection.
     pub intensity_a2_hz: f64,
-    /// `|H|^2` at the intermediate frequency: what the detector lets through of all but the amplifier's.
+    /// `|H|^2` at the intermediate frequency: what the detector lets through of all but
+    /// the amplifier's.
     pub response: f64,
 }
 
@@ -29,7 +32,8 @@ impl NoiseDensities {
     }
 }
 
-/// What lies between the shot-noise limit and the signal-to-noise ratio of a receiver \[dB\], each beside those before it.
+/// Differences between the shot-noise limit and the signal-to-noise ratio of a receiver \[dB\],
+/// each in addition to those before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Penalties {
     /// Of the detector's saturation at the shot-noise limit, `30 log(1 + P/P_s)`.
@@ -65,7 +69,7 @@ fn decibels(ratio: f64) -> f64 {
 }
 
 impl Receiver {
-    /// How far the local oscillator drives the detector, `1 + P_LO/P_s`.
+    /// Factor by which saturation reduces the current of the local oscillator, `1 + P_LO/P_s`.
     fn drive(&self) -> f64 {
         1.0 + self.local_oscillator_w / self.front_end.saturation_w
     }
@@ -94,7 +98,7 @@ impl Receiver {
         }
     }
 
-    /// What it loses against the shot-noise limit.
+    /// Its losses against the shot-noise limit.
     pub fn penalties(&self) -> Penalties {
         let NoiseDensities {
             shot_a2_hz,
@@ -123,12 +127,13 @@ impl Receiver {
         }
     }
 
-    /// Power of the local oscillator that gives the best signal-to-noise ratio \[W\]: 0 if shot noise is all there is,
-    /// `inf` if nothing holds it back.
+    /// Power of the local oscillator that gives the best signal-to-noise ratio \[W\]: 0 if there is
+    /// only shot noise, `inf` if nothing limits it.
     ///
-    /// For amplifier noise and saturation `P_s (sqrt(4 A^2 + 3 A) - A)/(3 (1 + A))`, `A = i_n^2/(2 e S P_s)`.
+    /// For amplifier noise and saturation `P_s (sqrt(4 A^2 + 3 A) - A)/(3 (1 + A))`,
+    /// `A = i_n^2/(2 e S P_s)`.
     pub fn best_local_oscillator_w(&self) -> f64 {
-        let of = Self {
+        let per_watt = Self {
             local_oscillator_w: 1.0,
             front_end: FrontEnd {
                 saturation_w: f64::INFINITY,
@@ -142,23 +147,22 @@ impl Receiver {
             dark_a2_hz,
             intensity_a2_hz,
             response,
-        } = of.noise_densities();
+        } = per_watt.noise_densities();
         let constant = amplifier_a2_hz / response + dark_a2_hz;
         if constant == 0.0 {
             return 0.0;
         }
         let saturation_w = self.front_end.saturation_w;
-        // Slope of noise over signal, s (1 + x)^3 + constant (1 + x)^4/P + intensity P, in the logarithm of the power P.
+        // Slope of noise over signal, s (1 + x)^3 + constant (1 + x)^4/P + intensity P, in the
+        // logarithm of the power P.
         let slope = |power_w: f64| {
             let x = power_w / saturation_w;
             3.0 * x * (1.0 + x).powi(2) * shot_a2_hz
                 + (3.0 * x - 1.0) * (1.0 + x).powi(3) * constant / power_w
                 + intensity_a2_hz * power_w
         };
-        let (mut low_w, mut high_w) = (
-            0.0,
-            (saturation_w / 3.0).min((constant / intensity_a2_hz).sqrt()),
-        );
+        let mut low_w = 0.0;
+        let mut high_w = (saturation_w / 3.0).min((constant / intensity_a2_hz).sqrt());
         if high_w.is_infinite() {
             return f64::INFINITY;
         }

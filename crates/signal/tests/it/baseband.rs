@@ -1,4 +1,5 @@
-//! Complex baseband: noise of the same signal-to-noise ratio, flat in the band, and the real current that belongs to it.
+//! Complex baseband: noise of the same signal-to-noise ratio, flat in the band, and the real
+//! current that belongs to it.
 
 use std::f64::consts::PI;
 

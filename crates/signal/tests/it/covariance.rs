@@ -34,7 +34,8 @@ fn largest_difference(a: &Array2<Complex<f64>>, b: &Array2<Complex<f64>>, scale:
 
 #[test]
 fn a_chirped_pulse_in_a_linear_gradient_has_the_closed_form() {
-    // (pi sigma)^2 (chirp + c g/lambda)^2 tau^2: chirp and gradient add up or cancel; a wrong sign of either shows.
+    // (pi sigma)^2 (chirp + c g/lambda)^2 tau^2: chirp and gradient add up or cancel; a wrong sign
+    // of either shows.
     let sigma_s = gaussian(200e-9).sigma_s();
     for (chirp_hz_s, gradient_per_s) in [
         (0.0, 0.0),
@@ -160,8 +161,8 @@ fn sampled(
     sum / Complex::from(pulses as f64)
 }
 
-/// Frobenius norm of the error of a sample covariance, in parts of that of the covariance, and in parts of its expectation
-/// `trace/(sqrt(pulses) norm)` for circular normal windows.
+/// Frobenius norm of the error of a sample covariance, in parts of that of the covariance, and in
+/// parts of its expectation `trace/(sqrt(pulses) norm)` for circular normal windows.
 fn frobenius(
     found: &Array2<Complex<f64>>,
     expected: &Array2<Complex<f64>>,

@@ -13,7 +13,8 @@ use crate::setup::{
     simulator, skewed,
 };
 
-/// A Gaussian with a chirp; a real shape with a tail; a complex one; a box with edges of 4 ns; one that begins at time 0.
+/// A Gaussian with a chirp; a real shape with a tail; a complex one; a box with edges of 4 ns; one
+/// that begins at time 0.
 fn shapes() -> Vec<Pulse> {
     let times: Vec<f64> = (0..400).map(|i| f64::from(i) * 2e-9).collect();
     let tail: Vec<f64> = times
@@ -116,7 +117,8 @@ fn a_sampled_gaussian_gives_the_records_of_the_gaussian() {
 
 #[test]
 fn v_pulse_of_a_pulse_with_a_tail_looks_at_the_air_that_the_tail_lights() {
-    // At time t the light sent at time u comes from c (t - u)/2: the tail, sent late, sees nearer air.
+    // At time t the light sent at time u comes from c (t - u)/2: the tail, sent late,
+    // sees nearer air.
     let tail = shapes()[4].clone();
     let filter = RangeFilter::pulse(&tail, 0.2).unwrap();
     let shift_m = 0.5 * C * tail.mean_time_s();
@@ -133,7 +135,8 @@ fn v_pulse_of_a_pulse_with_a_tail_looks_at_the_air_that_the_tail_lights() {
 
 #[test]
 fn v_gate_of_any_pulse_is_the_first_moment_of_the_power_in_the_window() {
-    // Against the covariance of the simulated window: the layers' powers in the window are the weights.
+    // Against the covariance of the simulated window: the layers' powers in the window
+    // are the weights.
     let window: Vec<f64> = (0..48)
         .map(|n| 0.3 + (0.065 * f64::from(n)).sin())
         .collect();

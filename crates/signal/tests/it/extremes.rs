@@ -1,4 +1,5 @@
-//! Extreme cases: each has a stated outcome, a number or a typed error, never a panic or a silent wrong number.
+//! Extreme cases: each has a stated outcome, a number or a typed error, never a panic or a
+//! silent wrong number.
 
 use std::f64::consts::PI;
 
@@ -47,7 +48,8 @@ fn pulses_much_longer_and_much_shorter_than_the_gate_have_their_power_and_covari
                 "{width_s} s, lag {lag}"
             );
         }
-        // v_pulse of the longest pulse is a mean over kilometres, of the shortest the wind at the place.
+        // v_pulse of the longest pulse is a mean over kilometres, of the shortest the
+        // wind at the place.
         let wind = |r: f64| 5.0 * ((r - far_m) / 30.0).cos();
         let seen = RangeFilter::pulse(pulse, thickness_m)
             .unwrap()
@@ -90,7 +92,8 @@ fn layers_too_thick_for_the_pulse_are_refused_with_the_thickness() {
 
 #[test]
 fn velocities_beyond_the_sampled_band_appear_where_they_fold_to() {
-    // The current shows frequencies from 0 to F_s/2: -34.9 to 62.0 m/s; beyond, they are folded back.
+    // The current shows frequencies from 0 to F_s/2: -34.9 to 62.0 m/s; beyond, they
+    // are folded back.
     for (velocity_m_s, shown_m_s) in [(25.0, 25.0), (63.0, 61.0), (100.0, 24.0), (-36.0, -33.75)] {
         // The strongest frequency of a tone in the sampled current.
         let target = LineOfSight {

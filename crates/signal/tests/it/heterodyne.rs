@@ -1,4 +1,5 @@
-//! The heterodyne signal against the literal sum, the mean power (14), and the covariance of a uniform wind.
+//! The heterodyne signal against the literal sum, the mean power (14), and the covariance of
+//! a uniform wind.
 
 use std::f64::consts::PI;
 
@@ -31,7 +32,8 @@ fn table2_weight(range_m: f64) -> f64 {
 #[test]
 fn fast_sum_agrees_with_the_literal_one_for_any_layers_masks_and_lengths() {
     let mut scratch = Scratch::default();
-    // Layers that divide the step, that do not, and that are thicker; the line covers part of the record only.
+    // Layers that divide the step, that do not, and that are thicker; the line covers part of
+    // the record only.
     for (samples, thickness) in [(700, STEP_M), (700, STEP_M / 3.0), (300, 0.37), (1500, 0.9)] {
         let simulator = simulator(200.0, samples);
         let velocity = |r: f64| {
@@ -177,7 +179,8 @@ fn covariance_in_a_uniform_wind_is_that_of_the_pulse_with_the_doppler_phase() {
         let tau = lag as f64 / 250e6;
         let coherence = (-(tau / gaussian(200e-9).sigma_s()).powi(2) / 4.0).exp();
         let expected = Complex::from_polar(coherence, -4.0 * PI * velocity * tau / WAVELENGTH_M);
-        // Each part of the product of two circular normal numbers has a variance of at most (1 + coherence^2)/2.
+        // Each part of the product of two circular normal numbers has a variance of at most (1 +
+        // coherence^2)/2.
         let error = ((1.0 + coherence * coherence) / 2.0 / f64::from(pulses)).sqrt();
         let (z_re, z_im) = (
             (found.re - expected.re) / error,
@@ -192,7 +195,8 @@ fn covariance_in_a_uniform_wind_is_that_of_the_pulse_with_the_doppler_phase() {
 
 #[test]
 fn a_target_keeps_its_amplitude_for_the_whole_pulse_and_gets_a_new_one_with_the_next() {
-    // One layer: the record is the pulse itself, with one random amplitude and the frequency f_c - 2 v/lambda.
+    // One layer: the record is the pulse itself, with one random amplitude and the frequency
+    // f_c - 2 v/lambda.
     let simulator = simulator(380.0, 80);
     let mut scratch = Scratch::default();
     let mut rng = Xoshiro256PlusPlus::seed_from_u64(2);

@@ -1,5 +1,6 @@
-//! What a record holds beside (15): noises of a real receiver, phases of the laser, the reflex of the telescope, the echo of the
-//! pulse before. Each in the samples as in the numbers that the signal-to-noise ratio uses.
+//! What a record holds beside (15): noises of a real receiver, phases of the laser, the reflex of
+//! the telescope, the echo of the pulse before. Each in the samples as in the numbers that the
+//! signal-to-noise ratio uses.
 
 use std::f64::consts::PI;
 
@@ -191,7 +192,8 @@ fn point_target(range_m: f64) -> LineOfSight {
     line
 }
 
-/// Envelopes of a point target at 400 m by a laser of some linewidth, 65 samples within the flat pulse.
+/// Envelopes of a point target at 400 m by a laser of some linewidth, 65 samples within
+/// the flat pulse.
 fn target_envelope(linewidth_hz: f64, range_m: f64, impairment_seed: u64) -> Vec<Complex<f64>> {
     let front_end = FrontEnd {
         linewidth_hz,
@@ -219,7 +221,8 @@ fn target_envelope(linewidth_hz: f64, range_m: f64, impairment_seed: u64) -> Vec
     out
 }
 
-/// Frequency of the highest point of a spectrum near zero, in radians per sample, by Newton's method.
+/// Frequency of the highest point of a spectrum near zero, in radians per sample, by
+/// Newton's method.
 fn peak(samples: &[Complex<f64>]) -> f64 {
     let middle = 0.5 * (samples.len() - 1) as f64;
     let mut omega = 0.0;
@@ -261,7 +264,8 @@ fn velocities_of_a_point_target_scatter_as_phase_noise_says() {
 
 #[test]
 fn the_phases_of_a_pulse_are_new_for_each_and_the_same_at_all_its_ranges() {
-    // Ratio to a quiet laser: phase of the pulse at its place in the pulse, less that of the local oscillator.
+    // Ratio to a quiet laser: phase of the pulse at its place in the pulse, less that of the
+    // local oscillator.
     let turns = |range_m: f64, seed| -> Vec<Complex<f64>> {
         let (quiet, noisy) = (
             target_envelope(0.0, range_m, seed),

@@ -1,5 +1,5 @@
-//! Whole records: against the literal sum and closed forms, shapes of pulses, covariance of windows, noise, scans, converters,
-//! extreme cases.
+//! Whole records: against the literal sum and closed forms, shapes of pulses, covariance of
+//! windows, noise, scans, converters, extreme cases.
 #![allow(clippy::unwrap_used)] // a helper of a test may panic as the test may
 
 mod baseband;

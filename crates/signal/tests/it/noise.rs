@@ -1,4 +1,5 @@
-//! Shot noise: variance (13), flat in the band, nothing outside, no memory of the end of the record.
+//! Shot noise: variance (13), flat in the band, nothing outside, no memory of the end of the
+//! record.
 
 use std::f64::consts::PI;
 
@@ -63,7 +64,8 @@ fn variance(records: &[Vec<f64>]) -> f64 {
 fn band_noise_has_the_variance_of_equation_13_for_any_length_of_record() {
     for samples in [1, 2, 63, 64, 1000] {
         let found = variance(&records(NoiseModel::BandLimited, samples));
-        // Squares of normal numbers; of the samples, B/(F_s/2) are independent, one per record at least.
+        // Squares of normal numbers; of the samples, B/(F_s/2) are independent, one per
+        // record at least.
         let independent = RECORDS as f64 * (0.4 * samples as f64).max(1.0);
         let z = (found - 1.0) * (independent / 2.0).sqrt();
         assert!(z.abs() < 4.0, "{samples} samples: {found}, z = {z}");
@@ -103,8 +105,8 @@ fn the_end_of_a_record_does_not_know_its_beginning() {
         |a: usize, b: usize| records.iter().map(|r| r[a] * r[b]).sum::<f64>() / RECORDS as f64;
     let error = 1.0 / (RECORDS as f64).sqrt();
     for (a, b) in [(0, 999), (0, 998), (1, 999)] {
-        // The covariance of a flat band is sinc(B tau) cos(2 pi f_c tau), about -0.4 for neighbours and next neighbours,
-        // which these pairs would be on a circle of 1000 samples.
+        // The covariance of a flat band is sinc(B tau) cos(2 pi f_c tau), about -0.4 for neighbours
+        // and next neighbours, which these pairs would be on a circle of 1000 samples.
         let tau = (a + 1000 - b) as f64 / 250e6;
         let covariance =
             (PI * 50e6 * tau).sin() / (PI * 50e6 * tau) * (2.0 * PI * 80e6 * tau).cos();

@@ -134,7 +134,8 @@ fn velocities_beyond_the_band_and_pulses_longer_than_the_record_are_no_trouble()
             .envelope_of_speckle_into(&fast, &speckle, &mut Scratch::default(), &mut envelope)
             .unwrap();
         let literal = literal_envelope(&simulator, &fast, &speckle).unwrap();
-        // Equal amplitudes at one velocity cancel nothing, so each sample is of the size of the whole.
+        // Equal amplitudes at one velocity cancel nothing, so each sample is of the
+        // size of the whole.
         for (a, b) in envelope.iter().zip(&literal) {
             assert!(b.norm() > 0.0 && (a - b).norm() < 1e-9 * b.norm());
         }

@@ -31,7 +31,8 @@ fn digitiser() -> Digitiser {
     .unwrap()
 }
 
-/// Everything that a scan of 3 lines and 150 pulses each delivers: all records, their ordered and their folded sum.
+/// Everything that a scan of 3 lines and 150 pulses each delivers: all records, their ordered and
+/// their folded sum.
 fn deliver(digitiser: Option<Digitiser>) -> (Vec<f64>, [Clipped; 2]) {
     let (simulator, lines) = (noisy(), lines());
     let scan = Scan {
@@ -232,7 +233,8 @@ fn an_efficiency_of_its_own_for_each_pulse_adds_its_variance_to_that_of_the_spec
         let mean = mean_power(&simulator, &air);
         (sum[0] / mean[0], sum[1] / mean[0].powi(2))
     };
-    // Exponential power: E P^2 = 2 (E P)^2, with sd sqrt(20); times E eta^2 = 1 + 2/3 0.64 for efficiencies about 1.
+    // Exponential power: E P^2 = 2 (E P)^2, with sd sqrt(20); times E eta^2 = 1 + 2/3 0.64 for
+    // efficiencies about 1.
     let (mean, square) = moments(false);
     assert!((mean - 1.0).abs() < 4.0 / 12e3_f64.sqrt(), "{mean}");
     assert!(

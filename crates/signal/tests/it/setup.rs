@@ -135,7 +135,8 @@ pub(crate) fn mean_power(simulator: &Simulator, line: &LineOfSight) -> Vec<f64> 
     power
 }
 
-/// Radial velocity along a line that passes a vortex core of a heavy wake at one core radius from its axis, at 420 m.
+/// Radial velocity along a line that passes a vortex core of a heavy wake at one core radius from
+/// its axis, at 420 m.
 pub(crate) fn core(range_m: f64) -> f64 {
     let (circulation_m2_s, core_m, along_m) = (500.0, 2.35, range_m - 420.0);
     circulation_m2_s * core_m
