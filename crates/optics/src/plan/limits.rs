@@ -97,7 +97,7 @@ impl<'a> Limits<'a> {
         )
     }
 
-    /// Width \[m\] at which the border takes three quarters of what is doubtful, at the
+    /// Width \[m\] at which the border absorbs [`DERIVED_LOSS`] of the light, at the
     /// spacing of a grid.
     pub(super) fn width_for_light_m(&self, grid: &Grid, range_m: &[f64]) -> Result<f64, Error> {
         Ok(not_below(

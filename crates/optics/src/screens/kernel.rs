@@ -25,7 +25,7 @@ pub(crate) const LOW_ORDER: usize = 16;
 mod sealed {
     use super::{Arc, Fft, FftNum};
 
-    /// What the inner loops need of a number beside its arithmetic.
+    /// Operations of the inner loops on a number, beside its arithmetic.
     pub trait Scalar: FftNum {
         /// The forward and the inverse transform of a length; of each type by itself, so that the
         /// planner is compiled with this crate and not again by each program that names the type.
