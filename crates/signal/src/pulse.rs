@@ -508,7 +508,7 @@ mod tests {
             assert_relative_eq!(
                 chirped.intensity_per_s(time_s),
                 plain.intensity_per_s(time_s),
-                max_relative = 1e-6
+                max_relative = 1e-5
             );
         }
         let unchirped_hz = 1.0 / (8.0_f64.sqrt() * PI * sigma_s);
