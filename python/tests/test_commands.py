@@ -73,8 +73,8 @@ def test_accuracy_gives_the_scene_that_it_found():
 
 
 def test_a_flow_and_a_wake_tell_their_progress(tmp_path):
-    case = wakescope.case("taylor_green_plane")
-    case["case"]["cells"] = 8
+    case = wakescope.case("vortex_pair")
+    case["case"]["cells"] = [1, 16, 16]
     told = []
     result = wakescope.flow(case, end=0.05, progress=lambda *step: told.append(step))
     assert result.answer["is_complete"] and told and told[-1][0] == "flow simulation"

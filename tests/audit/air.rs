@@ -70,7 +70,6 @@ impl Wind<'_> {
                         + (0..3).map(|j| of(&g, j) * p[j]).sum::<f64>()
                 })
             }
-            "vortex_lines" => self.lines(p),
             _ => self.pair(p, time_s),
         }
     }
@@ -117,44 +116,6 @@ impl Wind<'_> {
                     / (2.0 * PI * r2);
                 out[1] -= strength * dz;
                 out[2] += strength * dy;
-            }
-        }
-        out
-    }
-
-    /// Endless straight vortices with images: Gamma/(2 pi) t x d/(d^2 + r_c^2).
-    fn lines(&self, p: [f64; 3]) -> [f64; 3] {
-        let nodes = (self.0)("nodes_m")
-            .and_then(|v| v.as_array().cloned())
-            .unwrap_or_default();
-        let gamma = numbers((self.0)("circulation_m2_s"));
-        let core = self.or("core_radius_m", 2.35);
-        let mut out = [0.0; 3];
-        for (vortex, gamma) in nodes.iter().zip(gamma) {
-            let ends: Vec<Vec<f64>> = vortex
-                .as_array()
-                .into_iter()
-                .flatten()
-                .map(|node| numbers(Some(node.clone())))
-                .collect();
-            for (mirror, sign) in [(1.0, 1.0), (-1.0, -1.0)] {
-                let a = [ends[0][0], ends[0][1], mirror * ends[0][2]];
-                let t: [f64; 3] = [
-                    ends[1][0] - a[0],
-                    ends[1][1] - a[1],
-                    mirror * ends[1][2] - a[2],
-                ];
-                let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
-                let t = t.map(|x| x / length);
-                let x: [f64; 3] = std::array::from_fn(|i| p[i] - a[i]);
-                let along: f64 = (0..3).map(|i| x[i] * t[i]).sum();
-                let d: [f64; 3] = std::array::from_fn(|i| x[i] - along * t[i]);
-                let strength = sign * gamma
-                    / (2.0 * PI * (d.iter().map(|x| x * x).sum::<f64>() + core * core));
-                // Components as if the axes were right-handed, as the book defines the product.
-                out[0] += strength * (t[1] * d[2] - t[2] * d[1]);
-                out[1] += strength * (t[2] * d[0] - t[0] * d[2]);
-                out[2] += strength * (t[0] * d[1] - t[1] * d[0]);
             }
         }
         out

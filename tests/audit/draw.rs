@@ -190,7 +190,7 @@ pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
                 .number("flow.lateral_m_s", r.between(-10.0, 10.0))
                 .number("flow.vertical_m_s", r.between(-1.0, 1.0));
         }
-        7 => {
+        _ => {
             s.word("flow.kind", "linear").set(
                 "flow.velocity_m_s",
                 format!("[1.0, {:?}, 0.1]", r.between(-5.0, 5.0)),
@@ -207,18 +207,6 @@ pub(crate) fn flow(r: &mut Random, s: &mut Scene) {
                 "flow.acceleration_m_s2",
                 format!("[0.0, {:?}, 0.0]", r.between(-3.0, 3.0)),
             );
-        }
-        _ => {
-            let gamma = r.between(-400.0, 400.0);
-            s.word("flow.kind", "vortex_lines").set(
-                "flow.circulation_m2_s",
-                format!("[{gamma:?}, {:?}]", -0.7 * gamma),
-            );
-            s.set(
-                "flow.nodes_m",
-                "[[[0.0, 380.0, 50.0], [10.0, 380.0, 52.0]], [[0.0, 405.0, 45.0], [10.0, 406.0, 45.0]]]",
-            );
-            s.number("flow.core_radius_m", r.between(1.2, 5.0));
         }
     }
     if r.chance(0.2) {

@@ -397,16 +397,6 @@ const KEYS: &[Key] = &[
         "map",
         "v_mean_m_s",
     ),
-    (
-        "scan.below_ground",
-        &[("scan.elevation_min_rad", "-0.02")],
-        [
-            "{ policy = \"mask\" }",
-            "{ policy = \"constant\", radial_velocity_m_s = 3.0 }",
-        ],
-        "map",
-        "v_exact_m_s",
-    ),
     ("scan.head.sweeps", &[], ["1", "2"], "map", "sweep"),
     (
         "scan.head.dead_time_s",

@@ -1,4 +1,4 @@
-//! Statements about results, measured: those of the chapter about its figures, bars of flows, tolerances of stored curves.
+//! Statements about results, measured: those of the chapter about its figures, tolerances of stored curves.
 
 use crate::statistics::{Bar, Estimate, Verdict};
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 /// A statement, measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Claim {
-    /// A number of its own, such as F7a; a flow's bar has none.
+    /// A number of its own, such as F7a.
     pub(crate) id: String,
     /// What it is about: a figure; empty where the task says it.
     pub(crate) figure: String,
@@ -114,7 +114,13 @@ impl Claim {
     pub(crate) fn exact(id: &str, measured: String, pass: bool) -> Self {
         let claim = Self {
             id: id.into(),
-            ..Self::of("", "", measured, pass)
+            figure: String::new(),
+            statement: String::new(),
+            expected: String::new(),
+            measured,
+            standard_error: f64::NAN,
+            verdict: Verdict::of(pass),
+            decided_by: String::new(),
         };
         let Some(Listed {
             statement,
@@ -128,19 +134,6 @@ impl Claim {
             statement: statement.clone(),
             expected: expected.clone(),
             ..claim
-        }
-    }
-
-    fn of(statement: &str, expected: &str, measured: String, pass: bool) -> Self {
-        Self {
-            id: String::new(),
-            figure: String::new(),
-            statement: statement.into(),
-            expected: expected.into(),
-            measured,
-            standard_error: f64::NAN,
-            verdict: Verdict::of(pass),
-            decided_by: String::new(),
         }
     }
 
@@ -246,47 +239,6 @@ impl Claim {
             ..self
         }
     }
-
-    /// A quantity that may be `allowed` from its reference, in its own unit; what is not a number passes no bar.
-    pub(crate) fn within(quantity: &str, measured: f64, reference: f64, allowed: f64) -> Self {
-        let expected = format!("{} ± {allowed:.2e}", number(reference));
-        Self::of(
-            quantity,
-            &expected,
-            number(measured),
-            (measured - reference).abs() <= allowed,
-        )
-    }
-
-    /// Within `share` of the reference.
-    pub(crate) fn relative(quantity: &str, measured: f64, reference: f64, share: f64) -> Self {
-        Self::within(quantity, measured, reference, share * reference.abs())
-    }
-
-    /// At least `reference`.
-    pub(crate) fn at_least(quantity: &str, measured: f64, reference: f64) -> Self {
-        let expected = format!("at least {}", number(reference));
-        Self::of(quantity, &expected, number(measured), measured >= reference)
-    }
-
-    /// At most `reference`.
-    pub(crate) fn at_most(quantity: &str, measured: f64, reference: f64) -> Self {
-        let expected = format!("at most {}", number(reference));
-        Self::of(quantity, &expected, number(measured), measured <= reference)
-    }
-
-    pub(crate) fn passes(&self) -> bool {
-        self.verdict == Verdict::Pass
-    }
-}
-
-/// Six digits after the point, or of a small number.
-fn number(x: f64) -> String {
-    if x == 0.0 || x.abs() >= 1e-3 {
-        format!("{x:.6}")
-    } else {
-        format!("{x:.6e}")
-    }
 }
 
 impl fmt::Display for Claim {
@@ -310,28 +262,6 @@ impl fmt::Display for Claim {
 mod tests {
     use super::*;
     use crate::workspace::root;
-
-    #[test]
-    fn bars_hold_their_ends_and_nothing_that_is_no_number() {
-        assert!(
-            Claim::relative("q", 1.01, 1.0, 0.0101).passes()
-                && !Claim::relative("q", 1.02, 1.0, 0.01).passes()
-        );
-        assert!(
-            Claim::at_least("q", 2.0, 2.0).passes() && !Claim::at_least("q", 1.9, 2.0).passes()
-        );
-        assert!(Claim::at_most("q", 2.0, 2.0).passes() && !Claim::at_most("q", 2.1, 2.0).passes());
-        for claim in [
-            Claim::within("q", f64::NAN, 0.0, 1.0),
-            Claim::at_least("q", f64::NAN, 0.0),
-        ] {
-            assert!(!claim.passes() && claim.measured == "NaN");
-        }
-        assert_eq!(
-            Claim::at_most("q", 2e-9, 0.5).to_string(),
-            "pass              q: expected at most 0.500000, measured 2.000000e-9"
-        );
-    }
 
     #[test]
     fn a_claim_of_parts_holds_if_all_do_and_tells_first_what_does_not() {

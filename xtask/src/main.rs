@@ -12,7 +12,6 @@ mod claim;
 mod cost;
 mod figures;
 mod fit_trials;
-mod histories;
 mod left_out;
 mod process;
 mod profile;
@@ -29,7 +28,6 @@ mod statistics;
 #[path = "../../crates/les/src/ranks/threads.rs"]
 mod thread_ranks;
 mod tidy;
-mod validate;
 mod wakes;
 mod work_precision;
 mod workspace;
@@ -55,8 +53,6 @@ enum Task {
     Regress(regress::Options),
     /// A wake under `mpirun` against one process; a run whose second process is killed.
     Ranks(ranks::Options),
-    /// What the wakes at the chapter's Reynolds number come to, from the histories that the book keeps.
-    Histories,
     /// Write stored reference curves from what the crates compute now.
     Bless(bless::Options),
     /// Measure error against run time.
@@ -65,8 +61,6 @@ enum Task {
     LeftOut(left_out::LeftOutArgs),
     /// Fit many scans of a vortex pair: bias, scatter, reported error, bound.
     FitTrials(fit_trials::FitTrialsArgs),
-    /// Run the flows with known answers and draw them beside their references.
-    Validate(validate::Options),
     /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
     Stability(stability::Options),
     /// Hold every number that the program writes or prints against its definition, on random scenes and cases.
@@ -84,12 +78,10 @@ fn main() -> std::process::ExitCode {
         Task::ReproduceFigs(options) => reproduce::run(&options),
         Task::Regress(options) => regress::run(&options),
         Task::Ranks(options) => ranks::run(&options),
-        Task::Histories => histories::run(),
         Task::Bless(options) => bless::run(&options),
         Task::WorkPrecision(options) => work_precision::run(&options),
         Task::LeftOut(options) => left_out::run(&options),
         Task::FitTrials(options) => fit_trials::run(&options),
-        Task::Validate(options) => validate::run(&options),
         Task::Stability(options) => stability::run(&options),
         Task::Audit(options) => audit::run(&options),
         Task::Book => book::run(),

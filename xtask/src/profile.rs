@@ -7,7 +7,7 @@ pub(crate) enum Profile {
     Quick,
     /// Tens of minutes: finer meshes and more samples.
     Standard,
-    /// The chapter's own numbers, and the turbulent channel.
+    /// The chapter's own numbers.
     Full,
 }
 

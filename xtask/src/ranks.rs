@@ -100,7 +100,7 @@ pub(crate) fn run(options: &Options) -> Outcome {
 fn measure(program: &Path, scratch: &Path) -> Result<f64, Failure> {
     let (cells, steps, stages) = (128, 4, 3);
     let case = format!(
-        "format = 1\n[case]\nkind = \"taylor_green\"\ncells = {cells}\n[time]\nscheme = \"runge_kutta3\"\n\
+        "format = 1\n[case]\nkind = \"vortex_pair\"\ncells = [{cells}, {cells}, {cells}]\n[time]\n\
          pause_after_steps = {steps}\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n[checkpoint]\nwrite = false\n"
     );
     std::fs::write(scratch.join("even.toml"), case)?;

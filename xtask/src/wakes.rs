@@ -120,7 +120,7 @@ pub(crate) fn bless() -> Outcome {
     let to = root().join(STORED);
     std::fs::create_dir_all(&to)?;
     let planes = (1..=STORED_TAU.len()).map(|k| format!("plane1_{k:04}.nc"));
-    for name in ["case.toml", "wake.csv", "wake_scaled.csv"]
+    for name in ["case.toml", "wake.csv"]
         .map(String::from)
         .into_iter()
         .chain(planes)

@@ -1,6 +1,6 @@
 //! Writes one small file of each format, with the table that the conformance check compares it with, into a folder:
 //!
-//! `cargo run -p wakescope-sim --features vtk --example sample_files -- FOLDER`
+//! `cargo run -p wakescope-sim --example sample_files -- FOLDER`
 //!
 //! The content is a made-up vortex pair seen by a noiseless lidar; it exercises two sweeps, missing values and a stretched mesh.
 
@@ -27,12 +27,7 @@ fn main() -> OutputResult<()> {
         wakescope_sim::io::hpl::hpl_bytes(&one, 0, "one.hpl")?,
     )?;
     let wind = planes();
-    for stem in ["planes", "wake"] {
-        files.add(
-            &format!("{stem}.csv"),
-            planes_table(&wind)?.to_csv(&origin)?,
-        )?;
-    }
+    files.add("planes.csv", planes_table(&wind)?.to_csv(&origin)?)?;
     {
         use wakescope_sim::io::{cf_planes::cf_planes_bytes, cfradial::cfradial_bytes};
         files.add("map.nc", cfradial_bytes(&both, &origin)?)?;
@@ -41,22 +36,6 @@ fn main() -> OutputResult<()> {
         exact.fields.retain(|f| f.name.starts_with("v_"));
         files.add("exact.nc", cfradial_bytes(&exact, &origin)?)?;
         files.add("exact.csv", map_table(&exact)?.to_csv(&origin)?)?;
-    }
-    #[cfg(feature = "vtk")]
-    {
-        use wakescope_sim::io::vtr::{plane_bytes, pvd_bytes};
-        let names: Vec<String> = (1..=wind.tau.len())
-            .map(|number| format!("wake_{number:04}.vtr"))
-            .collect();
-        for (age, name) in names.iter().enumerate() {
-            files.add(name, plane_bytes(&wind, age, &origin)?)?;
-        }
-        let members = wind
-            .tau
-            .iter()
-            .copied()
-            .zip(names.iter().map(String::as_str));
-        files.add("wake.pvd", pvd_bytes(members, &origin))?;
     }
     files.commit()?;
     Ok(())

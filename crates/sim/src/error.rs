@@ -69,7 +69,7 @@ pub enum Error {
     /// A line of sight leaves the simulated flow, and the scene does not say what is there.
     #[error(
         "the line at elevation {elevation_rad:.6} rad leaves the simulated flow at range {range_m:.2} m (x = {x_m:.2} m, y = {y_m:.2} m, \
-         z = {z_m:.2} m): shorten the scan, or set scan.outside_flow.policy to \"mask\" or \"constant\""
+         z = {z_m:.2} m): shorten the scan, or set scan.outside_flow.policy to \"mask\""
     )]
     OutsideFlow {
         /// Elevation of the line, rad.

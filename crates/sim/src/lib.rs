@@ -42,7 +42,7 @@
 //! | [`cli`] | the program `wakescope` |
 //!
 //! Features, all but the last two on by default: `cli` (the program), `flow` (simulations of the air, with `cli`), `netcdf4` (reading
-//! of NetCDF-4), `plots` (SVG and PNG), `vtk` (fields for ParaView), `mpi` (flows on several machines).
+//! of NetCDF-4), `plots` (SVG and PNG), `mpi` (flows on several machines).
 
 pub mod accuracy;
 pub mod detection;

@@ -77,7 +77,7 @@ def scene(preset: str | None = None, **keys: Any) -> dict[str, Any]:
 
 
 def case(name: str) -> dict[str, Any]:
-    """All keys of a wake of a preset, such as "coarse", or of an example of a flow, such as "dipole"."""
+    """All keys of a wake of a preset, such as "coarse", or of an example of a flow, such as "vortex_pair"."""
     def text(*words: str) -> str:
         return _wakescope.call(words, {}, None, True, None)[2]
 

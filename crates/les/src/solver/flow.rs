@@ -14,7 +14,7 @@ use rayon::prelude::*;
 
 mod project;
 
-use super::component_operators::{ComponentOperators, Scratch, add_laplacian_row};
+use super::component_operators::ComponentOperators;
 use super::implicit::LineSolvers;
 use super::layout::{Layout, Shape};
 use super::mesh::Mesh;
@@ -23,7 +23,6 @@ use super::pressure::{PressureSolver, Solved, accept_round_off};
 use super::projection::{Divergence, correct, weighted_dot};
 use super::report::{Powers, StartReport, StepReport};
 use super::settings::{FlowSettings, Stage, TimeScheme, refuse_sticking_without_viscosity};
-use super::slabs::WHOLE;
 use super::stiffness::{implicit_axes, viscous_rates_per_s};
 use super::subgrid::Subgrid;
 use crate::Error;
@@ -304,8 +303,7 @@ impl Flow {
     fn advance(&mut self, step_s: f64) -> Result<(Powers, Option<Solved>), Error> {
         let has_history = self.state.last_step_s > 0.0;
         let ratio = has_history.then(|| step_s / self.state.last_step_s);
-        let is_damped = self.state.step < self.settings.damped_steps;
-        let field = if is_damped || self.state.implicit == [false; 3] {
+        let field = if self.state.implicit == [false; 3] {
             PredictedField::Velocity
         } else {
             PredictedField::Increment
@@ -330,7 +328,7 @@ impl Flow {
                 powers = stage_powers;
                 first_terms = takes_first_terms.then(|| self.state.previous_terms.clone());
             }
-            self.solve_viscous(stage_s * self.settings.viscosity_m2_s, is_damped)?;
+            self.solve_viscous(stage_s * self.settings.viscosity_m2_s)?;
             solved = Some(self.project(stage_s)?);
             // (25).
             add(&mut self.state.pressure, &self.phi, self.layout.shape);
@@ -342,50 +340,30 @@ impl Flow {
     }
 
     /// Takes `nu_s_m2`, viscosity times the stage, along the implicit axes: solves for the
-    /// increments by Crank-Nicolson and adds the velocity, or by backward Euler along one axis
-    /// after the other. The factored increments of backward Euler would leave waves that are stiff
-    /// along two axes as they are, `1 - (d1 + d2)/((1 + d1) (1 + d2))`; one after the other it is
-    /// `1/((1 + d1) (1 + d2))`.
-    fn solve_viscous(&mut self, nu_s_m2: f64, is_damped: bool) -> Result<(), Error> {
+    /// increments by Crank-Nicolson and adds the velocity.
+    fn solve_viscous(&mut self, nu_s_m2: f64) -> Result<(), Error> {
         let Self {
             state,
             layout,
             ops,
             predicted,
-            phi,
             ..
         } = self;
         if state.implicit == [false; 3] {
             return Ok(());
         }
-        let a_m2 = if is_damped { nu_s_m2 } else { 0.5 * nu_s_m2 };
+        let a_m2 = 0.5 * nu_s_m2;
         let own = layout.shape.own_range();
         for solver in self.line_solvers.for_stage(ops, state.implicit, a_m2) {
             let predicted = &mut predicted[solver.component];
-            if is_damped {
-                layout.slabs.halos(&mut [predicted], WHOLE)?;
-                viscous_increment(
-                    layout,
-                    &ops[solver.component],
-                    solver.axis,
-                    a_m2,
-                    predicted,
-                    phi,
-                );
-                solver.solve(&layout.slabs, &mut phi[own.clone()])?;
-                add(predicted, phi, layout.shape);
-            } else {
-                solver.solve(&layout.slabs, &mut predicted[own.clone()])?;
-            }
+            solver.solve(&layout.slabs, &mut predicted[own.clone()])?;
         }
-        if !is_damped {
-            for (predicted, velocity) in predicted.iter_mut().zip(&state.velocity) {
-                add(
-                    &mut predicted[own.clone()],
-                    &velocity[own.clone()],
-                    layout.shape,
-                );
-            }
+        for (predicted, velocity) in predicted.iter_mut().zip(&state.velocity) {
+            add(
+                &mut predicted[own.clone()],
+                &velocity[own.clone()],
+                layout.shape,
+            );
         }
         Ok(())
     }
@@ -416,35 +394,6 @@ impl Flow {
 /// Three fields of zeros.
 fn zero_fields(length: usize) -> [Aligned; 3] {
     std::array::from_fn(|_| Aligned::zeros(length))
-}
-
-/// `a L field` along one axis for one component into `out`; zero on walls.
-fn viscous_increment(
-    layout: &Layout,
-    ops: &ComponentOperators,
-    axis: usize,
-    a_m2: f64,
-    field: &[f64],
-    out: &mut [f64],
-) {
-    let shape = layout.shape;
-    let n = shape.n[0];
-    let planes = out[shape.own_range()]
-        .par_chunks_mut(shape.plane())
-        .zip(shape.own());
-    planes.for_each_init(
-        || Scratch::new(n),
-        |scratch, (plane, k)| {
-            for (j, row) in plane.chunks_mut(n).enumerate() {
-                row.fill(0.0);
-                if !ops.is_wall_row(j, k) {
-                    add_laplacian_row(ops, field, axis, [j, k], row, &mut scratch.padded[0]);
-                }
-                row.iter_mut().for_each(|value| *value *= a_m2);
-                ops.hold_at_wall(row);
-            }
-        },
-    );
 }
 
 /// `to += from`, plane by plane.

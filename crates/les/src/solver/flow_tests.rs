@@ -1,5 +1,6 @@
 //! The discrete conservation laws, exact solutions and orders of the time step.
 
+use super::super::component_operators::Scratch;
 use super::super::mesh::{Direction, Ends, Mapping, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeStep};
 use super::*;

@@ -158,8 +158,8 @@ impl Stability {
     }
 
     /// Whether steps of `step_s` are too long for implicit viscosity, in a sentence.
-    pub fn stiff_note(&self, step_s: f64, damped_steps: u64) -> Option<String> {
-        self.stiffness.note(step_s, damped_steps)
+    pub fn stiff_note(&self, step_s: f64) -> Option<String> {
+        self.stiffness.note(step_s)
     }
 
     /// Largest `sum |u_i|/h_i` \[1/s\]: a Courant number over it is a time step.

@@ -138,10 +138,6 @@ pub struct FlowSettings {
     pub scheme: TimeScheme,
     /// Length of the time step.
     pub time_step: TimeStep,
-    /// Number of first steps in which viscosity is backward Euler instead of Crank-Nicolson
-    /// (Rannacher 1984). Crank-Nicolson keeps the wiggles of an impulsive start at a wall for many
-    /// steps when `nu dt/h^2` is large; four damped steps remove them and leave the order at two.
-    pub damped_steps: u64,
     /// Which pressure solver.
     pub pressure: PressureMethod,
     /// Relative residual at which the pressure equation counts as solved.
@@ -162,7 +158,6 @@ impl FlowSettings {
             force_m_s2: [0.0; 3],
             scheme: TimeScheme::default(),
             time_step,
-            damped_steps: 0,
             pressure: PressureMethod::Auto,
             pressure_tolerance: 1e-10,
             subgrid: SubgridModel::None,

@@ -76,7 +76,7 @@ impl Stiffness {
     }
 
     /// What steps of `step_s` do to the shortest waves, if it is not what viscosity does.
-    pub(super) fn note(self, step_s: f64, damped_steps: u64) -> Option<String> {
+    pub(super) fn note(self, step_s: f64) -> Option<String> {
         let [first, second] = self.0.map(|rate| step_s * rate / LAPLACIAN_SYMBOL);
         if step_s > (1.0 + 1e-9) * self.longest_s() {
             return Some(format!(
@@ -85,10 +85,11 @@ impl Stiffness {
                 self.longest_s()
             ));
         }
-        (damped_steps == 0 && first * LAPLACIAN_SYMBOL > RINGING_DECAY).then(|| {
+        (first * LAPLACIAN_SYMBOL > RINGING_DECAY).then(|| {
             format!(
-                "Crank-Nicolson keeps the shortest waves of a sudden start for many steps (nu dt/h^2 = {first:.3e}): \
-                 time.damped_steps = 4 takes them out"
+                "Crank-Nicolson keeps the shortest waves of a sudden start for many steps (nu dt/h^2 = {first:.3e}); steps of at \
+                 most {:.3e} s damp them",
+                RINGING_DECAY / self.0[0]
             )
         })
     }

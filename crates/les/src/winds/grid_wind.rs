@@ -13,13 +13,11 @@ use super::wind::Wind;
 use crate::error::{Error, check, check_lengths};
 
 /// What a point outside the mesh gets. A periodic direction has no outside.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum OutsidePolicy {
     /// [`Error::OutsideMesh`].
     #[default]
     Error,
-    /// This velocity `(u, v, w)` \[m/s\].
-    Constant([f64; 3]),
     /// NaN in all three components: nothing is known there.
     Mask,
 }
@@ -113,7 +111,6 @@ impl Wind for GridSnapshot {
         for (&[_, y_m, z_m], out) in points_m.iter().zip(out_m_s) {
             *out = match (self.interpolate(y_m, z_m), self.outside) {
                 (Some(velocity), _) => velocity,
-                (None, OutsidePolicy::Constant(velocity)) => velocity,
                 (None, OutsidePolicy::Mask) => [f64::NAN; 3],
                 (None, OutsidePolicy::Error) => return Err(Error::OutsideMesh { y_m, z_m }),
             };

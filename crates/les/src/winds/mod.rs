@@ -6,7 +6,6 @@
 //! | `wind` | the trait [`Wind`]; [`Sum`] |
 //! | `profile` | circulation against radius of one vortex, (3), (4); the two-scale profile |
 //! | `vortex` | the pair, its images and its path; [`Aircraft`], (5) |
-//! | `vortex_line` | vortices of any axis, polylines of them, and their images |
 //! | `along_flight` | the pair, older the farther it is behind the aircraft |
 //! | `linear` | [`Linear`]: uniform, or linear in place and time |
 //! | `grid_wind` | [`GridSnapshot`]: a field on a mesh, interpolated by (26) |
@@ -24,7 +23,6 @@ mod series;
 mod strain;
 mod volume;
 mod vortex;
-mod vortex_line;
 mod wind;
 
 pub use along_flight::AlongFlight;
@@ -35,5 +33,4 @@ pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;
 pub use volume::{VolumeComponent, VolumeSnapshot};
 pub use vortex::{Aircraft, Centres, Ground, Motion, VortexPair};
-pub use vortex_line::{VortexLine, VortexLines};
 pub use wind::{Sum, Wind};

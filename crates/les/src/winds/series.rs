@@ -146,25 +146,6 @@ impl Wind for Series {
         )
     }
 
-    /// As the velocity: linear between two times, unknown where one of them does not know it.
-    fn scalar_into(
-        &self,
-        points_m: &[[f64; 3]],
-        time_s: f64,
-        out: &mut [f64],
-    ) -> Result<(), Error> {
-        let (at, weight) = self.about(time_s)?;
-        self.field(at)?.scalar_into(points_m, time_s, out)?;
-        let Some(weight) = weight else { return Ok(()) };
-        let mut later = vec![0.0; out.len()];
-        self.field(at + 1)?
-            .scalar_into(points_m, time_s, &mut later)?;
-        out.iter_mut()
-            .zip(&later)
-            .for_each(|(out, later)| *out += weight * (later - *out));
-        Ok(())
-    }
-
     /// The larger of those of the two fields about the time; of a time outside the series, the
     /// largest of all.
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {

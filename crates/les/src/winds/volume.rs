@@ -6,18 +6,18 @@
 //! beyond: NaN. Check: linear fields are exact on staggered and stretched meshes, the error of a
 //! sampled vortex falls with the third power of the cell.
 
-use super::axis::{AXIS_NAMES, Axis, Edges, GHOSTS, Side};
+use super::axis::{AXIS_NAMES, Axis, Edges, GHOSTS};
 use super::grid_wind::{ghost_places, ghost_value};
 use super::strain::largest_strain_per_s;
 use super::wind::Wind;
 use crate::error::{Error, check, check_lengths};
 
-/// One component of the velocity, or a scalar, at its nodes.
+/// One component of the velocity at its nodes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VolumeComponent {
     /// Places of the nodes along x, y, z \[m\], increasing, four or more each.
     pub nodes_m: [Vec<f64>; 3],
-    /// Values `[z][y][x]` \[m/s\], of a scalar in a unit of its own.
+    /// Values `[z][y][x]` \[m/s\].
     pub values: Vec<f64>,
 }
 
@@ -25,7 +25,6 @@ pub struct VolumeComponent {
 #[derive(Debug, Clone)]
 pub struct VolumeSnapshot {
     components: [Padded; 3],
-    scalar: Option<Padded>,
     max_gradient_per_s: f64,
     max_speed_m_s: f64,
 }
@@ -45,42 +44,17 @@ impl VolumeSnapshot {
     /// What [`super::GridSnapshot::new`] refuses of a mesh; [`Error::OutOfRange`] for a velocity
     /// that is not finite and for a number of values that is not that of the nodes.
     pub fn new(components: &[VolumeComponent; 3], edges: [Edges; 3]) -> Result<Self, Error> {
-        let [u, v, w] = std::array::from_fn(|c| Padded::new(&components[c], edges, |_| c));
+        let [u, v, w] = std::array::from_fn(|c| Padded::new(&components[c], edges, c));
         let components = [u?, v?, w?];
         let squared: f64 = components.iter().map(|p| p.largest().powi(2)).sum();
         let max_speed_m_s = squared.sqrt();
         let mut field = Self {
             components,
-            scalar: None,
             max_gradient_per_s: 0.0,
             max_speed_m_s,
         };
         field.max_gradient_per_s = field.steepest_per_s()?;
         Ok(field)
-    }
-
-    /// The same air with a scalar that it carries, at nodes of its own; it does not change across
-    /// walls.
-    ///
-    /// # Errors
-    /// As [`VolumeSnapshot::new`].
-    pub fn with_scalar(self, scalar: &VolumeComponent, edges: [Edges; 3]) -> Result<Self, Error> {
-        let even = |side: Side| match side {
-            Side::NoSlipWall { position_m, .. } => Side::SlipWall { position_m },
-            other => other,
-        };
-        let edges = edges.map(|edges| match edges {
-            Edges::Bounded { low, high } => Edges::Bounded {
-                low: even(low),
-                high: even(high),
-            },
-            periodic @ Edges::Periodic { .. } => periodic,
-        });
-        // At a wall without friction the velocity along it is mirrored as it is.
-        Ok(Self {
-            scalar: Some(Padded::new(scalar, edges, |direction| (direction + 1) % 3)?),
-            ..self
-        })
     }
 
     /// The largest strain rate in the middle of the cells of u, from differences of their corners.
@@ -161,25 +135,6 @@ impl Wind for VolumeSnapshot {
     fn max_gradient_per_s(&self, _time_s: f64) -> f64 {
         self.max_gradient_per_s
     }
-
-    fn scalar_into(
-        &self,
-        points_m: &[[f64; 3]],
-        _time_s: f64,
-        out: &mut [f64],
-    ) -> Result<(), Error> {
-        check_lengths(points_m.len(), out.len())?;
-        let at = |point_m: &[f64; 3]| {
-            self.scalar
-                .as_ref()
-                .and_then(|scalar| scalar.at(point_m))
-                .unwrap_or(f64::NAN)
-        };
-        out.iter_mut()
-            .zip(points_m)
-            .for_each(|(out, point_m)| *out = at(point_m));
-        Ok(())
-    }
 }
 
 /// Velocity gradient `[component][direction]` in the middle of a cell \[1/s\]: the mean difference
@@ -197,12 +152,8 @@ fn corner_gradient_per_s(corners_m_s: &[[f64; 3]; 8], widths_m: [f64; 3]) -> [[f
 }
 
 impl Padded {
-    /// `number` says for each direction which component of a velocity the values are to its walls.
-    fn new(
-        component: &VolumeComponent,
-        edges: [Edges; 3],
-        number: impl Fn(usize) -> usize,
-    ) -> Result<Self, Error> {
+    /// `number` is that of the component of the velocity, 0 for u.
+    fn new(component: &VolumeComponent, edges: [Edges; 3], number: usize) -> Result<Self, Error> {
         let [x, y, z] =
             std::array::from_fn(|d| Axis::new(AXIS_NAMES[d], &component.nodes_m[d], edges[d]));
         let axes = [x?, y?, z?];
@@ -233,7 +184,7 @@ impl Padded {
                         for i in 0..count[0] {
                             let base = i + j * strides[1] + k * strides[2];
                             padded[base + ghost_at * strides[d]] =
-                                ghost_value(ghost, d, number(d), |node| {
+                                ghost_value(ghost, d, number, |node| {
                                     padded[base + (node + GHOSTS) * strides[d]]
                                 });
                         }

@@ -2,8 +2,7 @@
 //!
 //! Axes: x along the flight direction, y across it (to the right), z up; the ground is z = 0.
 //!
-//! Check: a sum of winds is the sum of the velocities and carries what the first of them knows, and
-//! wrong lengths are refused by every wind.
+//! Check: a sum of winds is the sum of the velocities, and wrong lengths are refused by every wind.
 
 use crate::error::{Error, check_lengths};
 
@@ -31,23 +30,6 @@ pub trait Wind: Send + Sync {
     /// `|e . grad(u) . e|` for unit `e` \[1/s\]: the largest eigenvalue of the strain rate. It sets
     /// how thin the layers of a lidar signal must be. Each wind says how sharp its bound is.
     fn max_gradient_per_s(&self, time_s: f64) -> f64;
-
-    /// Writes how much of a scalar the air carries at each of `points_m`, in the unit of the wind's
-    /// source (for a lidar: backscatter, 1/(m sr)); NaN where the wind does not know it, which by
-    /// default is everywhere.
-    ///
-    /// # Errors
-    /// As [`Wind::velocity_into`].
-    fn scalar_into(
-        &self,
-        points_m: &[[f64; 3]],
-        _time_s: f64,
-        out: &mut [f64],
-    ) -> Result<(), Error> {
-        check_lengths(points_m.len(), out.len())?;
-        out.fill(f64::NAN);
-        Ok(())
-    }
 }
 
 /// The sum of several winds, such as a vortex pair in a cross wind. An empty sum is air at rest.
@@ -97,26 +79,6 @@ impl Wind for Sum {
             .iter()
             .map(|wind| wind.max_gradient_per_s(time_s))
             .sum()
-    }
-
-    /// At each point that of the first wind that knows it.
-    fn scalar_into(
-        &self,
-        points_m: &[[f64; 3]],
-        time_s: f64,
-        out: &mut [f64],
-    ) -> Result<(), Error> {
-        check_lengths(points_m.len(), out.len())?;
-        out.fill(f64::NAN);
-        let mut part = vec![0.0; points_m.len()];
-        for wind in &self.winds {
-            wind.scalar_into(points_m, time_s, &mut part)?;
-            out.iter_mut()
-                .zip(&part)
-                .filter(|(out, _)| out.is_nan())
-                .for_each(|(out, known)| *out = *known);
-        }
-        Ok(())
     }
 }
 

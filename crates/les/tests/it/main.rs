@@ -6,7 +6,11 @@ mod exact_flows;
 #[cfg(feature = "solver")]
 mod extremes;
 mod grid_wind;
+#[cfg(feature = "solver")]
+mod references;
 mod scan_winds;
+#[cfg(feature = "solver")]
+mod stored_cases;
 mod vortex;
 #[cfg(feature = "solver")]
 mod wake_reference;

@@ -1,5 +1,4 @@
-//! The wake near the ground against the stored run of an independent code, in its plane phase: the fast part of
-//! `cargo xtask validate --only les_wake_coarse`.
+//! The wake near the ground against the stored run of an independent code, in its plane phase; `references::wakes` has the rest.
 
 use std::f64::consts::TAU;
 use wakescope_les::SubgridModel;

@@ -436,6 +436,7 @@ fn errors(spacings: &[f64], series: &[&[f64]]) -> (Option<f64>, Vec<f64>) {
 mod tests {
     use super::*;
     use crate::Silent;
+    use crate::flow::plane_vortices::PlaneVortices;
     use std::f64::consts::PI;
     use std::path::Path;
 
@@ -443,16 +444,18 @@ mod tests {
         CaseFile::parse(text, Path::new("c.toml")).unwrap()
     }
 
-    fn of(text: &str, within: f64, of: &[Figure]) -> Accuracy<CaseFile> {
-        Accuracy::of_case(&case(text), &Request::new(within, of), &Silent).unwrap()
+    fn of(file: &CaseFile, within: f64, of: &[Figure]) -> Accuracy<CaseFile> {
+        Accuracy::of_case(file, &Request::new(within, of), &Silent).unwrap()
     }
 
-    const VORTICES: &str =
-        "[case]\nkind = \"taylor_green_plane\"\ncells = 32\nviscosity_m2_s = 0.005\n";
+    fn vortices(field: &PlaneVortices) -> CaseFile {
+        field.case(32, 0.005, "[time]\nend_s = 1.0\nlongest_step_s = 0.005\n")
+    }
 
     #[test]
     fn the_error_of_decaying_vortices_is_that_against_the_closed_form() {
-        let found = of(VORTICES, 0.01, &[]);
+        let field = PlaneVortices::new();
+        let found = of(&vortices(&field), 0.01, &[]);
         assert_eq!(found.figures, [Figure::Energy, Figure::Dissipation]);
         let meshes = &found.ladders[0];
         // Convection and gradients are of fourth order.
@@ -465,7 +468,7 @@ mod tests {
         // Energy exp(-16 pi^2 nu t)/4, of which 16 pi^2 nu is lost in a time; at its start it is that of the mesh.
         let rate = 16.0 * PI * PI * 0.005;
         for (place, step) in meshes.steps.iter().enumerate() {
-            let own = case(VORTICES);
+            let own = vortices(&field);
             let file = if place == 0 {
                 own
             } else {
@@ -498,7 +501,8 @@ mod tests {
 
     #[test]
     fn a_target_out_of_reach_is_answered_with_the_cells_that_the_order_asks_for() {
-        let found = of(VORTICES, 2e-6, &[Figure::Energy]);
+        let field = PlaneVortices::new();
+        let found = of(&vortices(&field), 2e-6, &[Figure::Energy]);
         let (off, order) = (
             found.ladders[0].steps[0].bound(Figure::Energy),
             found.ladders[0].orders[0].1.unwrap(),
@@ -525,7 +529,7 @@ mod tests {
     #[test]
     fn cells_that_do_not_converge_say_so_and_are_off_by_the_finest_difference() {
         let found = of(
-            "[case]\nkind = \"taylor_green\"\ncells = 16\nreynolds = 800.0\n[time]\nend_s = 6.0\n",
+            &case("[case]\nkind = \"vortex_pair\"\ncells = [8, 32, 20]\nperturbation = 0.1\n"),
             0.5,
             &[],
         );
@@ -542,20 +546,22 @@ mod tests {
 
     #[test]
     fn budgets_and_figures_that_a_case_has_not_are_refused() {
-        let refused = |text: &str, request: &Request| {
-            Accuracy::of_case(&case(text), request, &Silent)
+        let refused = |file: &CaseFile, request: &Request| {
+            Accuracy::of_case(file, request, &Silent)
                 .unwrap_err()
                 .to_string()
         };
         let few = refused(
-            "[case]\nkind = \"taylor_green\"\ncells = 6\n",
+            &case("[case]\nkind = \"vortex_pair\"\ncells = [1, 6, 6]\n"),
             &Request::new(0.1, &[]),
         );
         assert!(
-            few.starts_with("c.toml:3: case.cells = 6 is not allowed: "),
+            few.starts_with("c.toml:3: case.cells = [1, 6, 6] is not allowed: "),
             "{few}"
         );
-        let none = refused(VORTICES, &Request::new(0.1, &[Figure::Height]));
+        let field = PlaneVortices::new();
+        let vortices = vortices(&field);
+        let none = refused(&vortices, &Request::new(0.1, &[Figure::Height]));
         assert!(
             none.contains("--of = height is not allowed: energy, dissipation"),
             "{none}"
@@ -563,13 +569,13 @@ mod tests {
         // Nothing is judged of air at rest, so that nothing would be within the target.
         let at_rest = "[case]\nkind = \"free\"\nviscosity_m2_s = 0.01\n[case.y]\ncells = 16\nlow_m = 0.0\nhigh_m = 8.0\n[case.z]\ncells = 16\n\
             low_m = 0.0\nhigh_m = 8.0\n[case.initial]\nkind = \"uniform\"\nvelocity_m_s = [0.0, 0.0, 0.0]\n[time]\nend_s = 1.0\nstep_s = 0.2\n";
-        let none = refused(at_rest, &Request::new(0.1, &[]));
+        let none = refused(&case(at_rest), &Request::new(0.1, &[]));
         assert!(
             none.contains("--of = energy is not allowed: a figure that the run has"),
             "{none}"
         );
         let small = refused(
-            VORTICES,
+            &vortices,
             &Request {
                 budget: 1.0,
                 ..Request::new(0.1, &[])
@@ -580,7 +586,7 @@ mod tests {
             "{small}"
         );
         let none = Accuracy::of_case(
-            &case(VORTICES),
+            &vortices,
             &Request {
                 budget: 1.8,
                 ..Request::new(0.1, &[])

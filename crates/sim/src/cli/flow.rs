@@ -79,7 +79,14 @@ pub(super) fn flow(words: &FlowWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Resu
     let Some(case) = &words.case else {
         return Ok(());
     };
-    simulate(cli.case(case, None)?, &words.run, cli, ranks)
+    let file = cli.case(case, None)?;
+    if matches!(file.content.case, CaseKind::Wake(_)) {
+        return Err(Error::Input {
+            path: case.clone(),
+            reason: "case.kind is \"wake\": wakescope wake runs it".into(),
+        });
+    }
+    simulate(file, &words.run, cli, ranks)
 }
 
 pub(super) fn wake(words: &WakeWords, cli: &Cli, ranks: &Arc<dyn Ranks>) -> Result<(), Error> {

@@ -4,7 +4,7 @@
 //! none, or is in the units of the case's literature.
 
 use super::kind::CaseKind;
-use super::named::TaylorGreenPlane;
+use super::vortex_pair::VortexPairFlow;
 use super::wake::WakeOutput;
 use crate::keys::{ABOVE_ZERO, Checker, Declared as _, FINITE, Is, Problem, keys};
 use std::fmt::Debug;
@@ -28,7 +28,7 @@ keys! {
         /// Version of the format; only [`FORMAT`] is read.
         format: u32 = FORMAT,
         /// The flow.
-        case: CaseKind = CaseKind::TaylorGreenPlane(TaylorGreenPlane::default()),
+        case: CaseKind = CaseKind::VortexPair(VortexPairFlow::default()),
         /// Time: the end, the scheme, the step.
         time: Time = Time::default(),
         /// How the equations are solved.
@@ -55,8 +55,6 @@ keys! {
         courant: Option<f64> = None => ABOVE_ZERO,
         /// Longest step that the Courant number may give \[s\].
         longest_step_s: Option<f64> = None => ABOVE_ZERO,
-        /// First steps in which viscosity is backward Euler, against the wiggles of an impulsive start.
-        damped_steps: u64 = 0,
         /// The run pauses after so many steps; it continues with `--restart` when this is raised or taken out.
         pause_after_steps: Option<u64> = None,
     }
@@ -97,12 +95,8 @@ keys! {
 
     /// Format of a file.
     choice FileFormat {
-        /// A table, one row for each value.
-        Csv = "csv",
         /// Classic NetCDF.
         Netcdf = "netcdf",
-        /// VTK rectilinear grids with a collection, for ParaView and PyVista.
-        Vtr = "vtr",
         /// All three velocity components on their own faces in full precision: an initial field for another run.
         InitialNetcdf = "initial_netcdf",
     }
@@ -203,17 +197,8 @@ impl FlowCase {
             !initial,
             "output.planes",
             &o.planes,
-            "csv, netcdf, vtr: an initial field is a whole field",
+            "netcdf: an initial field is a whole field",
         );
-        for (key, formats) in [("output.fields", &o.fields), ("output.planes", &o.planes)] {
-            let is_built = cfg!(feature = "vtk") || !formats.contains(&FileFormat::Vtr);
-            p.require(
-                is_built,
-                key,
-                formats,
-                "formats of this build, which lacks the feature `vtk`",
-            );
-        }
         p.into_problems()
     }
 
@@ -251,16 +236,5 @@ impl FlowCase {
             *last_s = end_s;
         }
         Ok(times_s)
-    }
-}
-
-impl FileFormat {
-    /// The ending of the names of its files.
-    pub(super) fn ending(self) -> &'static str {
-        match self {
-            Self::Csv => "csv",
-            Self::Netcdf | Self::InitialNetcdf => "nc",
-            Self::Vtr => "vtr",
-        }
     }
 }

@@ -3,6 +3,7 @@
 use super::*;
 use crate::flow::WakePreset;
 use crate::flow::files::CASE;
+use crate::flow::plane_vortices::PlaneVortices;
 use crate::setup::progress::Silent;
 use std::fs;
 
@@ -21,10 +22,9 @@ fn parse(text: &str) -> CaseFile {
 }
 
 /// Vortices that turn for ever where nothing damps them.
-fn vortices(case: &str, time: &str) -> CaseFile {
-    parse(&format!(
-        "[case]\nkind = \"taylor_green_plane\"\ncells = 16\n{case}[time]\nlongest_step_s = 1.0\n{time}[checkpoint]\nevery_steps = 10\n"
-    ))
+fn vortices(field: &PlaneVortices, viscosity_m2_s: f64, time: &str) -> CaseFile {
+    let sections = format!("[time]\nlongest_step_s = 1.0\n{time}[checkpoint]\nevery_steps = 10\n");
+    field.case(16, viscosity_m2_s, &sections)
 }
 
 fn check(
@@ -42,7 +42,8 @@ fn a_second_run_in_a_folder_is_refused_and_what_a_crashed_one_left_is_swept() {
     fs::create_dir_all(stage.join("new")).unwrap();
     fs::create_dir_all(stage.join("old")).unwrap();
     fs::write(stage.join("lock"), "").unwrap();
-    let case = vortices("", "end_s = 0.05\n");
+    let field = PlaneVortices::new();
+    let case = vortices(&field, 0.01, "end_s = 0.05\n");
     let lock = FolderLock::take(folder.path()).unwrap();
     let error = run(&case, folder.path(), Begin::New, &Silent)
         .unwrap_err()
@@ -66,7 +67,8 @@ fn a_run_killed_before_its_first_checkpoint_begins_anew_and_says_so() {
     // What such a run leaves: the head of its table and half a row.
     let half = format!("# source: {}\nstep,time_s\n1,0.0", crate::PROGRAM);
     fs::write(folder.path().join("steps.csv"), half).unwrap();
-    let case = vortices("", "end_s = 0.05\n");
+    let field = PlaneVortices::new();
+    let case = vortices(&field, 0.01, "end_s = 0.05\n");
     let notes = Notes::default();
     let outcome = run(&case, folder.path(), Begin::Restart, &notes).unwrap();
     assert!(
@@ -133,7 +135,10 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
         ended(own, 0.4),
         (vec![0.2], vec![0.2, 0.4], Some([0.1, 0.4]))
     );
-    let plane = vortices("", "end_s = 0.5\n").with_end(0.25).unwrap();
+    let field = PlaneVortices::new();
+    let plane = vortices(&field, 0.01, "end_s = 0.5\n")
+        .with_end(0.25)
+        .unwrap();
     assert_eq!(plane.content.time.end_s, Some(0.25));
     let refused = plane.with_end(-1.0).unwrap_err().to_string();
     assert!(
@@ -145,9 +150,10 @@ fn the_ages_of_outputs_follow_the_end_of_a_wake() {
 #[test]
 fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
     let folder = tempfile::tempdir().unwrap();
-    let inviscid = "viscosity_m2_s = 0.0\n";
+    let field = PlaneVortices::new();
     let case = vortices(
-        inviscid,
+        &field,
+        0.0,
         "end_s = 1000.0\nscheme = \"adams_bashforth2\"\ncourant = 0.4\n",
     );
     let notes = Notes::default();
@@ -173,7 +179,7 @@ fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
         "stopped at {last} times the energy of the start"
     );
     // Where the case names no scheme, one is taken that loses energy, if anything.
-    let long = vortices(inviscid, "end_s = 20.0\ncourant = 0.35\n");
+    let long = vortices(&field, 0.0, "end_s = 20.0\ncourant = 0.35\n");
     let folder = tempfile::tempdir().unwrap();
     let outcome = run(&long, folder.path(), Begin::New, &Silent).unwrap();
     let kept = outcome.kinetic_energy_m5_s2 / energies[0];
@@ -188,7 +194,8 @@ fn energy_from_nowhere_stops_a_run_whose_checkpoints_are_good() {
 fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
     let folder = tempfile::tempdir().unwrap();
     // Cells of Reynolds number 42: damped at a Courant number of 0.2, not at 0.35.
-    let case = |time: &str| vortices("viscosity_m2_s = 0.0015\nstretch = [0.0, 0.0]\n", time);
+    let field = PlaneVortices::new();
+    let case = |time: &str| vortices(&field, 0.0015, time);
     let scheme = |file: &CaseFile| {
         Setup::new(&file.content, Path::new(""))
             .unwrap()
@@ -225,14 +232,21 @@ fn a_run_goes_on_with_the_scheme_of_its_checkpoint() {
 fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosity() {
     let with = |case: &str, scheme: &str, courant: f64, model: &str| {
         let text = format!(
-            "[case]\nkind = {case}\n[time]\nend_s = 0.2\nscheme = \"{scheme}\"\ncourant = {courant:?}\nlongest_step_s = 10.0\n[solver]\n\
+            "[case]\n{case}\n[time]\nend_s = 0.2\nscheme = \"{scheme}\"\ncourant = {courant:?}\nlongest_step_s = 10.0\n[solver]\n\
              subgrid = {{ model = \"{model}\" }}\n"
         );
         check(&parse(&text), None, RunOptions::default())
     };
-    let [thin, mean, thick] =
-        ["1e6", "50.0", "20.0"].map(|re| format!("\"taylor_green\"\ncells = 12\nreynolds = {re}"));
-    let walls = "\"dipole\"\ncells = [32, 32]\nreynolds = 1e5".to_owned();
+    // A uniform flow through a periodic box of 12 cells along each direction.
+    let uniform = |viscosity: &str| {
+        let axis = "cells = 12, low_m = 0.0, high_m = 6.0, low_end = \"periodic\", high_end = \"periodic\"";
+        format!(
+            "kind = \"free\"\nviscosity_m2_s = {viscosity}\nx = {{ {axis} }}\ny = {{ {axis} }}\nz = {{ {axis} }}\n\
+             initial = {{ kind = \"uniform\", velocity_m_s = [0.5, 0.5, 0.0] }}"
+        )
+    };
+    let [thin, mean, thick] = ["1e-6", "0.02", "0.05"].map(uniform);
+    let walls = "kind = \"vortex_pair\"\ncells = [1, 32, 32]\nreynolds = 1e6".to_owned();
     for (case, least, most) in [
         (thin, 1.092, 1.093),
         (mean, 1.2, 1.35),
@@ -256,14 +270,14 @@ fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosit
         assert!(with(&case, "runge_kutta3", 2.0, "none").is_err());
     }
     // What a model will take does not count.
-    let thin = "\"taylor_green\"\ncells = 12\nreynolds = 1e6";
-    with(thin, "adams_bashforth2", 0.4, "multiscale_wale").unwrap();
-    let error = with(thin, "adams_bashforth2", 0.45, "multiscale_wale")
+    let thin = uniform("1e-6");
+    with(&thin, "adams_bashforth2", 0.4, "multiscale_wale").unwrap();
+    let error = with(&thin, "adams_bashforth2", 0.45, "multiscale_wale")
         .unwrap_err()
         .to_string();
     assert!(error.contains("time.courant = 0.45"), "{error}");
     let own = parse(&format!(
-        "[case]\nkind = {thin}\n[solver]\nsubgrid = {{ model = \"wale\", constant = 0.02 }}\n"
+        "[case]\n{thin}\n[time]\nend_s = 1.0\n[solver]\nsubgrid = {{ model = \"wale\", constant = 0.02 }}\n"
     ));
     let scheme = Setup::new(&own.content, Path::new(""))
         .unwrap()
@@ -271,7 +285,7 @@ fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosit
         .scheme;
     assert_eq!(scheme, wakescope_les::TimeScheme::RungeKutta3);
     // A note that a run would give is given by the check, too.
-    let noted = with(thin, "adams_bashforth2", 0.35, "none").unwrap_or_else(|e| panic!("{e}"));
+    let noted = with(&thin, "adams_bashforth2", 0.35, "none").unwrap_or_else(|e| panic!("{e}"));
     assert!(
         noted.notes.is_empty(),
         "too short a run for waves to grow: {:?}",
@@ -279,7 +293,7 @@ fn a_courant_number_is_checked_against_the_limit_of_its_scheme_mesh_and_viscosit
     );
     let long = "[time]\nend_s = 10.0\nscheme = \"adams_bashforth2\"\n";
     let noted = check(
-        &parse(&format!("[case]\nkind = {thin}\n{long}")),
+        &parse(&format!("[case]\n{thin}\n{long}")),
         None,
         RunOptions::default(),
     )
@@ -333,7 +347,8 @@ fn a_seed_of_the_command_line_is_that_of_the_noise_and_of_the_files() {
     assert!(seeded.toml.contains("seed = 7\n") && seeded.provenance().seed == 7);
     assert_eq!(tiny_wake("", "").with_seed(7).unwrap().toml, seeded.toml);
     assert_eq!(tiny_wake("", "").provenance().seed, 0);
-    let error = vortices("", "end_s = 0.1\n")
+    let field = PlaneVortices::new();
+    let error = vortices(&field, 0.01, "end_s = 0.1\n")
         .with_seed(7)
         .unwrap_err()
         .to_string();

@@ -1,4 +1,4 @@
-//! What a run writes at its output times: whole fields, planes, initial fields, collections.
+//! What a run writes at its output times: whole fields, planes, initial fields.
 //!
 //! The ranks of a flow write a file together: the first one makes it, each writes the parts that it has, and when all are on disk the
 //! first one puts them into place.
@@ -9,11 +9,9 @@ use super::Begin;
 use super::case::{FileFormat, Output};
 use super::wake::{self, Due, Schedule};
 use crate::Error;
-#[cfg(feature = "vtk")]
-use crate::io::vtr;
+use crate::io::cf_planes::cf_planes_bytes;
 use crate::io::{
     CrossPlanes, Existing, FileGroup, FileParts, Provenance, Share, VelocityField, cf_fields,
-    tables,
 };
 use ndarray::Array3;
 use std::path::{Path, PathBuf};
@@ -40,33 +38,20 @@ struct OutputFile {
 
 impl OutputFile {
     fn name(&self) -> String {
-        numbered(&self.stem, self.index, self.format.ending())
-    }
-
-    /// Of VTK grids the file that names all with the same beginning up to this one.
-    fn collection(&self) -> Option<String> {
-        (self.format == FileFormat::Vtr).then(|| format!("{}.pvd", self.stem))
+        format!("{}_{:04}.nc", self.stem, self.index + 1)
     }
 
     /// Its size, about, of a flow of so many cells \[bytes\].
     fn bytes(&self, cells: f64, plane: f64, variables: f64) -> f64 {
         match (self.plane, self.format) {
-            (None, FileFormat::Csv) => cells * CSV_CELL_BYTES,
             (None, FileFormat::InitialNetcdf) => cells * 24.0,
-            (None, _) => cells * variables * 4.0,
-            (Some(_), FileFormat::Csv) => plane * CSV_PLANE_BYTES,
+            (None, FileFormat::Netcdf) => cells * variables * 4.0,
             (Some(_), _) => plane * 8.0,
         }
     }
 }
 
-fn numbered(stem: &str, index: usize, ending: &str) -> String {
-    format!("{stem}_{:04}.{ending}", index + 1)
-}
-
-/// Row of a field as a table, of a plane, of `steps.csv`, of a record of a wake but for its centres \[bytes\].
-const CSV_CELL_BYTES: f64 = 140.0;
-const CSV_PLANE_BYTES: f64 = 90.0;
+/// Row of `steps.csv`, of a record of a wake but for its centres \[bytes\].
 const STEP_ROW_BYTES: f64 = 220.0;
 const RECORD_BYTES: f64 = 2500.0;
 
@@ -96,35 +81,35 @@ pub(super) struct Files {
 }
 
 impl Files {
-    /// The files of an output, in the order in which they are written; those of a format that this build lacks were refused.
+    /// The files of an output, in the order in which they are written.
     fn of_output(&self, due: Due) -> Vec<OutputFile> {
         let mut out = Vec::new();
         if let Some(index) = due.fields {
             let mut formats = self.output.fields.clone();
             formats.sort_by_key(|format| *format == FileFormat::InitialNetcdf);
-            out.extend(formats.into_iter().map(|format| {
-                let stem = if format == FileFormat::InitialNetcdf {
-                    "initial"
-                } else {
-                    "fields"
+            for format in formats {
+                let stem = match format {
+                    FileFormat::Netcdf => "fields",
+                    FileFormat::InitialNetcdf => "initial",
                 };
-                OutputFile {
+                out.push(OutputFile {
                     stem: stem.into(),
                     index,
                     format,
                     plane: None,
-                }
-            }));
+                });
+            }
         }
         if let Some(index) = due.planes {
             for number in 0..self.output.planes_x_m.len() {
-                let of = |&format: &FileFormat| OutputFile {
-                    stem: format!("plane{}", number + 1),
-                    index,
-                    format,
-                    plane: Some(number),
-                };
-                out.extend(self.output.planes.iter().map(of));
+                for &format in &self.output.planes {
+                    out.push(OutputFile {
+                        stem: format!("plane{}", number + 1),
+                        index,
+                        format,
+                        plane: Some(number),
+                    });
+                }
             }
         }
         out
@@ -146,10 +131,7 @@ impl Files {
             #[cfg(feature = "plots")]
             out.extend(wake::PICTURES.map(str::to_owned));
         }
-        out.extend(
-            self.of_outputs()
-                .flat_map(|file| std::iter::once(file.name()).chain(file.collection())),
-        );
+        out.extend(self.of_outputs().map(|file| file.name()));
         out
     }
 
@@ -184,7 +166,7 @@ impl Files {
                 &file.stem
             };
             add(
-                &format!("{stem}_*.{}", file.format.ending()),
+                &format!("{stem}_*.nc"),
                 1,
                 file.bytes(nx * ny * nz, ny * nz, variables),
             );
@@ -225,16 +207,11 @@ impl Files {
     ) -> Result<Vec<PathBuf>, Error> {
         let is_first = ranks.rank() == 0;
         let shown = agree(ranks, self.shown(flow, due, ranks))?;
-        let (mut group, mut rows) = (FileGroup::new(&self.folder), Vec::new());
+        let mut group = FileGroup::new(&self.folder);
         let mut add = || {
             for file in self.of_output(due) {
-                match self.parts(&file, &shown, is_first)? {
-                    Some(parts) => group.add_parts(&file.name(), parts)?,
-                    None => rows.push((file.name(), self.rows(&shown)?)),
-                }
-                #[cfg(feature = "vtk")]
-                if let Some(name) = file.collection() {
-                    group.add_parts(&name, of_first(self.collection(&file), is_first))?;
+                if let Some(parts) = self.parts(&file, &shown, is_first)? {
+                    group.add_parts(&file.name(), parts)?;
                 }
             }
             Ok(())
@@ -242,18 +219,6 @@ impl Files {
         agree(ranks, add())?;
         // The numbers are larger than the files.
         drop(shown);
-        for (name, text) in rows {
-            let lengths = all_gather(&**ranks, vec![text.len() as f64]).map_err(Error::Flow)?;
-            let before = lengths[..ranks.rank()].iter().sum::<f64>() as u64;
-            let length = lengths.iter().sum::<f64>() as u64;
-            group.add_parts(
-                &name,
-                FileParts {
-                    length,
-                    parts: vec![(before, text.into_bytes())],
-                },
-            )?;
-        }
         commit(&group, ranks)
     }
 
@@ -272,10 +237,6 @@ impl Files {
         } else {
             None
         };
-        #[cfg(feature = "vtk")]
-        let behind = field
-            .as_ref()
-            .map_or(Ok(None), |field| behind(field, ranks))?;
         let xs_m: &[f64] = if due.planes.is_some() {
             &self.output.planes_x_m
         } else {
@@ -287,8 +248,6 @@ impl Files {
             .collect::<Result<_, _>>()?;
         Ok(Shown {
             field,
-            #[cfg(feature = "vtk")]
-            behind,
             faces: if wants(&initial) {
                 Some(self.faces(flow, share)?)
             } else {
@@ -298,81 +257,29 @@ impl Files {
         })
     }
 
-    /// What this rank has of a file; none of the table of a field, in which the place of its text is not known yet.
+    /// What this rank has of a file; none where the field is not at hand.
     fn parts(
         &self,
         file: &OutputFile,
         shown: &Shown,
         is_first: bool,
     ) -> Result<Option<FileParts>, Error> {
-        let whole = |bytes: Vec<u8>| Some(of_first(bytes, is_first));
         let origin = &self.origin;
         Ok(match (file.plane, file.format, &shown.field) {
             (None, FileFormat::Netcdf, Some(field)) => {
                 Some(cf_fields::cf_field_parts(field, origin)?)
-            }
-            #[cfg(feature = "vtk")]
-            (None, FileFormat::Vtr, Some(field)) => {
-                Some(vtr::field_parts(field, shown.behind.as_deref(), origin)?)
             }
             (None, FileFormat::InitialNetcdf, _) => shown
                 .faces
                 .as_ref()
                 .map(|faces| cf_fields::cf_faces_parts(faces, origin))
                 .transpose()?,
-            (Some(at), FileFormat::Csv, _) => whole(
-                tables::planes_table(&shown.planes[at])?
-                    .to_csv(origin)?
-                    .into_bytes(),
-            ),
-            (Some(at), FileFormat::Netcdf, _) => whole(crate::io::cf_planes::cf_planes_bytes(
-                &shown.planes[at],
-                origin,
-            )?),
-            #[cfg(feature = "vtk")]
-            (Some(at), FileFormat::Vtr, _) => {
-                whole(vtr::plane_bytes(&shown.planes[at], 0, origin)?)
-            }
+            (Some(at), FileFormat::Netcdf, _) => Some(of_first(
+                cf_planes_bytes(&shown.planes[at], origin)?,
+                is_first,
+            )),
             _ => None,
         })
-    }
-
-    /// The rows of the field that this rank has, on the first one below their names.
-    fn rows(&self, shown: &Shown) -> Result<String, Error> {
-        let Some(field) = &shown.field else {
-            return Ok(String::new());
-        };
-        let table = field.table()?;
-        Ok(if field.share.is_first {
-            table.to_csv(&self.origin)?
-        } else {
-            table.rows()?
-        })
-    }
-
-    /// The collection of all outputs up to this one.
-    #[cfg(feature = "vtk")]
-    fn collection(&self, file: &OutputFile) -> Vec<u8> {
-        let of_planes = file.plane.is_some();
-        let names: Vec<String> = (0..=file.index)
-            .map(|i| numbered(&file.stem, i, "vtr"))
-            .collect();
-        let per_s = if of_planes { self.tau_per_s } else { 1.0 };
-        let due = |due: &Due| {
-            if of_planes {
-                due.planes.is_some()
-            } else {
-                due.fields.is_some()
-            }
-        };
-        let outputs = self
-            .schedule
-            .times_s
-            .iter()
-            .zip(&self.schedule.due)
-            .filter(|(_, own)| due(own));
-        let members = outputs.map(|(time_s, _)| time_s * per_s);
-        vtr::pvd_bytes(members.zip(names.iter().map(String::as_str)), &self.origin)
     }
 
     fn field(&self, flow: &Flow, share: Share) -> Result<VelocityField, Error> {
@@ -454,28 +361,8 @@ fn of_first(bytes: Vec<u8>, is_first: bool) -> FileParts {
 /// What is due of a flow: of fields what this rank has, planes whole.
 struct Shown {
     field: Option<VelocityField>,
-    /// Values of the field in the cell behind the last one that is here.
-    #[cfg(feature = "vtk")]
-    behind: Option<Vec<f64>>,
     faces: Option<cf_fields::FaceVelocities>,
     planes: Vec<CrossPlanes>,
-}
-
-/// Values of a field in the first cell of the next rank that has any.
-#[cfg(feature = "vtk")]
-fn behind(field: &VelocityField, ranks: &Arc<dyn Ranks>) -> Result<Option<Vec<f64>>, Error> {
-    let first: Vec<f64> = field
-        .named()
-        .filter_map(|(_, values)| values.first().copied())
-        .collect();
-    let count = field.named().count();
-    let place = (!first.is_empty()).then_some(field.share.planes.start as f64);
-    let own = place.into_iter().chain(first).collect();
-    let all = all_gather(&**ranks, own).map_err(Error::Flow)?;
-    let next = all
-        .chunks(count + 1)
-        .find(|values| values[0] == field.share.planes.end as f64);
-    Ok(next.map(|values| values[1..].to_vec()))
 }
 
 /// An error of one rank is that of all.

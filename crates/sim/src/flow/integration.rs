@@ -11,7 +11,6 @@ impl Setup {
     pub(super) fn new(case: &FlowCase, folder: &Path) -> Result<Self, Error> {
         let mut setup = case.case.setup(folder)?;
         let (s, solver) = (&mut setup.settings, &case.solver);
-        s.damped_steps = case.time.damped_steps;
         s.pressure = solver.pressure;
         s.pressure_tolerance = solver.pressure_tolerance;
         s.subgrid = subgrid(solver.subgrid);

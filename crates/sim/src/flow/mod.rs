@@ -1,8 +1,8 @@
 //! Simulations of the air: a case file goes in; a table of the steps, fields, planes and checkpoints come out.
 //!
-//! A [`CaseFile`] names a flow with a known answer and its parameters, or gives a mesh, a viscosity and an initial field of
-//! one's own. [`run`] runs it with the solver of `wakescope-les`, which does the computing; this module reads the case,
-//! writes the files and continues runs from their checkpoints.
+//! A [`CaseFile`] is a vortex pair or a wake with its parameters, or gives a mesh, a viscosity and an initial field of your own.
+//! [`run`] runs it with the solver of `wakescope-les`, which does the computing; this module reads the case, writes the files and
+//! continues runs from their checkpoints.
 //!
 //! Check: every example file is read and run; interrupted runs leave the same files as others; wrong cases are refused with
 //! key, value and what is allowed.
@@ -15,7 +15,8 @@ mod free;
 mod initial_file;
 mod integration;
 mod kind;
-mod named;
+#[cfg(test)]
+pub(crate) mod plane_vortices;
 #[cfg(test)]
 mod ranks_tests;
 mod setup;
@@ -24,6 +25,7 @@ mod text;
 #[path = "../../../les/src/ranks/threads.rs"]
 mod thread_ranks;
 pub(crate) mod trial;
+mod vortex_pair;
 mod wake;
 mod writer;
 
@@ -33,8 +35,8 @@ pub use files::FileForecast;
 pub use forecast::FlowForecast;
 pub use free::*;
 pub use kind::CaseKind;
-pub use named::*;
 pub use text::{EXAMPLES, example};
+pub use vortex_pair::VortexPairFlow;
 #[cfg(feature = "plots")]
 pub use wake::REPEATS;
 pub use wake::{FinishedWake, PairScale, WakeFlow, WakeOutput, WakePreset, WakeProfile, table};

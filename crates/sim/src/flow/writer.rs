@@ -161,7 +161,7 @@ impl RunObserver for Writer<'_> {
             let mut recorded = wake.record(flow);
             if self.ranks.rank() == 0 {
                 recorded = recorded
-                    .and_then(|()| wake.write_tables(&self.files.folder, &self.files.origin));
+                    .and_then(|()| wake.write_table(&self.files.folder, &self.files.origin));
             }
             let recorded = agree(&self.ranks, recorded);
             self.keep(recorded)?;

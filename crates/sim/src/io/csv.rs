@@ -182,25 +182,13 @@ impl Table {
     /// # Errors
     /// No column, columns of different lengths, a repeated or empty name, a name that would look like a comment.
     pub fn to_csv(&self, provenance: &Provenance) -> OutputResult<String> {
+        self.check()?;
         let header: Vec<String> = self
             .columns
             .iter()
             .map(|(name, _)| quoted(name.clone()))
             .collect();
-        self.with_rows(provenance.comment_lines() + &header.join(",") + "\n")
-    }
-
-    /// The rows alone.
-    ///
-    /// # Errors
-    /// As [`Self::to_csv`].
-    pub(crate) fn rows(&self) -> OutputResult<String> {
-        self.with_rows(String::new())
-    }
-
-    /// A text with the rows behind it.
-    fn with_rows(&self, mut out: String) -> OutputResult<String> {
-        self.check()?;
+        let mut out = provenance.comment_lines() + &header.join(",") + "\n";
         // Room for most texts at once, so that growing does not copy what is there.
         out.reserve(USUAL_CELL_BYTES * self.columns.len() * self.len());
         for row in 0..self.len() {

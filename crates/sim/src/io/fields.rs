@@ -1,7 +1,6 @@
-//! A whole velocity field at one time, at the centres of a stretched mesh, as data and as a table.
-//! Check: the table's rows are looked up at their places; the formats' tests read them back.
+//! A whole velocity field at one time, at the centres of a stretched mesh.
+//! Check: wrong lengths and values are refused; the formats' tests read fields back.
 
-use super::csv::Table;
 use super::error::{OutputError, OutputResult, increasing, same_length};
 use super::parts::Share;
 
@@ -69,25 +68,6 @@ impl VelocityField {
                 .map(|values| ("vorticity_magnitude_hz", values)),
         )
     }
-
-    /// The table `time_s, z_m, y_m, x_m, u_m_s, v_m_s, w_m_s, pressure_m2_s2`, and `vorticity_magnitude_hz` (1/s) where
-    /// it is there, x running fastest.
-    ///
-    /// # Errors
-    /// What [`Self::check`] finds.
-    pub fn table(&self) -> OutputResult<Table> {
-        self.check()?;
-        let (nx, ny) = (self.x_m.len(), self.y_m.len());
-        let cells = || self.first()..self.first() + self.velocity_m_s[0].len();
-        let table = Table::new()
-            .float("time_s", cells().map(|_| self.time_s))
-            .float("z_m", cells().map(|i| self.z_m[i / (nx * ny)]))
-            .float("y_m", cells().map(|i| self.y_m[i / nx % ny]))
-            .float("x_m", cells().map(|i| self.x_m[i % nx]));
-        Ok(self.named().fold(table, |table, (name, values)| {
-            table.float(name, values.iter().copied())
-        }))
-    }
 }
 
 #[cfg(test)]
@@ -135,22 +115,6 @@ pub(crate) fn example_on_ranks() -> Vec<VelocityField> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::io::csv::Column;
-
-    #[test]
-    fn a_row_of_the_table_holds_the_values_of_its_place() {
-        let field = example();
-        let table = field.table().unwrap();
-        let column = |name: &str| match table.columns().iter().find(|(n, _)| n == name) {
-            Some((_, Column::Float(values))) => values.clone(),
-            other => panic!("{other:?}"),
-        };
-        let (i, j, k) = (2, 1, 3);
-        let row = (k * 2 + j) * 3 + i;
-        let place = [column("x_m")[row], column("y_m")[row], column("z_m")[row]];
-        assert_eq!(place, [field.x_m[i], field.y_m[j], field.z_m[k]]);
-        assert_eq!(column("w_m_s")[row], field.velocity_m_s[2][row]);
-    }
 
     #[test]
     fn wrong_lengths_and_values_are_refused() {

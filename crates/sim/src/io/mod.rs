@@ -1,4 +1,4 @@
-//! Files in and out: readers of NetCDF and text; tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF and VTR.
+//! Files in and out: readers of NetCDF and text; tables as CSV, maps as CfRadial 1.4 and HALO `.hpl`, cross-planes as CF NetCDF.
 //! Every writer turns plain data and a [`Provenance`] into bytes (no clock, so the same run gives the same bytes);
 //! [`FileGroup`] puts a run's files on disk, all or none.
 //! Check: each format is read back by an independent reader in the tests.
@@ -22,7 +22,6 @@
 //! | `lock` | nothing: one writer for a folder at a time | - |
 //! | [`hpl`] | one sweep as HALO raw file | - |
 //! | `cfradial`, `cf_planes`, `cf_fields`, `cf_signals`, `cf_spectra` (through `netcdf`; their variables are described beside them in `.cdl`) | classic NetCDF | `netcdf` |
-//! | `vtr` | VTK rectilinear grids and their collection | `vtk` |
 
 pub mod atomic;
 pub(crate) mod fields_input;
@@ -57,8 +56,6 @@ pub mod scans;
 pub mod signals;
 pub mod tables;
 pub mod utc;
-#[cfg(feature = "vtk")]
-pub mod vtr;
 
 pub use atomic::{FileGroup, write_atomic};
 pub use csv::Table;

@@ -439,7 +439,6 @@ mod tests {
             "calm",
             "uniform",
             "linear",
-            "vortex_lines",
             "vortex_pair",
             "simulated",
             "fields",
@@ -452,7 +451,7 @@ mod tests {
                 .all(|key| key.is_required && key.kind == Kind::Number)
                 && kinds[1].1.len() == 2
         );
-        assert!(kinds[4].1.iter().all(|key| !key.is_required));
+        assert!(kinds[3].1.iter().all(|key| !key.is_required));
         let Kind::Table(estimator) = &find(&scene, "estimator").kind else {
             panic!("a table")
         };

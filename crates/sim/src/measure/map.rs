@@ -189,16 +189,12 @@ fn truth(
                 i,
                 &g.gate_range_m,
             )?));
-        let (line, backscatter) = (
-            &scanner.lines[i],
-            scanner.backscatter_per_m_sr.get(i).map(Vec::as_slice),
-        );
+        let line = &scanner.lines[i];
         for (filter, cells) in [(&by_pulse, &mut pulse_m_s), (&by_gate, &mut gate_m_s)] {
             cells.row_mut(i).assign(&Array1::from(seen_m_s(
                 filter,
                 g,
                 &line.radial_velocity_m_s,
-                backscatter,
             )?));
         }
     }

@@ -27,11 +27,10 @@ use wakescope_signal::{LineOfSight, RangeFilter, Record, Scan, Shot, Simulator};
 pub struct Scanner<'a> {
     plan: &'a Plan,
     simulator: Simulator,
-    returns: Returns,
+    /// Return per metre of each layer.
+    weight_per_m: Vec<f64>,
     /// The air of each line, in the order of the geometry's elevations: that of its middle, or the mean of the airs of its pulses.
     pub lines: Vec<LineOfSight>,
-    /// Backscatter that the flow carries \[line\]\[layer\], 1/(m sr); empty where it carries none.
-    pub(crate) backscatter_per_m_sr: Vec<Vec<f64>>,
     /// Standard deviation over the pulses of a line of the velocity weighted with the pulse \[line, gate\], m/s, where the pulses
     /// have airs of their own.
     pub spread_m_s: Option<Array2<f64>>,
@@ -67,7 +66,7 @@ impl<'a> Scanner<'a> {
             known,
             observer,
         };
-        let returns = layer_returns(&optics)?;
+        let weight_per_m = layer_returns(&optics)?;
         observer.begin(Stage::LinesOfSight, geometry.elevation_rad.len() as u64);
         let by_pulse = RangeFilter::pulse(&instrument.pulse, geometry.layer_thickness_m)?;
         let ranges_m: Vec<f64> = geometry.layer_range_m().collect();
@@ -78,16 +77,15 @@ impl<'a> Scanner<'a> {
             Ok(air)
         };
         let airs = in_time_order(plan, &all, |line| geometry.line_time_s[*line], of_line)?;
-        let lines: Vec<LineOfSight> = airs.iter().map(|air| returns.line(air, geometry)).collect();
+        let lines: Vec<LineOfSight> = airs
+            .iter()
+            .map(|air| line_of_sight(&weight_per_m, air, geometry))
+            .collect();
         let spreads: Option<Vec<&[f64]>> =
             airs.iter().map(|air| air.spread_m_s.as_deref()).collect();
         let shape = (lines.len(), geometry.gate_range_m.len());
         let spread_m_s =
             spreads.and_then(|values| Array2::from_shape_vec(shape, values.concat()).ok());
-        let backscatter_per_m_sr = airs
-            .into_iter()
-            .filter_map(|air| air.backscatter_per_m_sr)
-            .collect();
         observer.end();
         let efficiency = drawn_efficiency(&optics, &lines)?;
         let record = Record {
@@ -106,9 +104,8 @@ impl<'a> Scanner<'a> {
         Ok(Self {
             plan,
             simulator,
-            returns,
+            weight_per_m,
             lines,
-            backscatter_per_m_sr,
             spread_m_s,
             efficiency,
             previous,
@@ -116,24 +113,12 @@ impl<'a> Scanner<'a> {
         })
     }
 
-    /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio; backscatter that the flow
-    /// carries is its mean over the lines.
+    /// Range of each layer, m, and the signal-to-noise ratio (14) that air like it gives, a power ratio.
     pub fn layer_snr(&self) -> Vec<(f64, f64)> {
-        let Some(mut line) = self.lines.first().cloned() else {
+        let Some(line) = self.lines.first() else {
             return Vec::new();
         };
-        if !self.backscatter_per_m_sr.is_empty() {
-            let count = self.lines.len() as f64;
-            let mean = |layer: usize| {
-                self.lines
-                    .iter()
-                    .map(|line| line.weight_per_m[layer])
-                    .sum::<f64>()
-                    / count
-            };
-            line.weight_per_m = (0..line.layers()).map(mean).collect();
-        }
-        layer_snr(&self.plan.scene.content, &self.plan.instrument, &line)
+        layer_snr(&self.plan.scene.content, &self.plan.instrument, line)
     }
 
     /// The same without any wind, for records that were not made here.
@@ -152,10 +137,9 @@ impl<'a> Scanner<'a> {
         let radial_velocity_m_s = vec![0.0; plan.geometry.layers];
         let still = Air {
             radial_velocity_m_s,
-            backscatter_per_m_sr: None,
             spread_m_s: None,
         };
-        let line = layer_returns(&optics)?.line(&still, &plan.geometry);
+        let line = line_of_sight(&layer_returns(&optics)?, &still, &plan.geometry);
         Ok(layer_snr(&plan.scene.content, &plan.instrument, &line))
     }
 
@@ -247,9 +231,9 @@ impl<'a> Scanner<'a> {
             .map(|pulse| schedule.beam_of_pulse(pulse))
             .collect();
         let along = |beam: &Beam| {
-            Ok(self
-                .returns
-                .line(&air_along(self.plan, beam, &ranges_m)?, &self.plan.geometry))
+            let air = air_along(self.plan, beam, &ranges_m)?;
+            let geometry = &self.plan.geometry;
+            Ok(line_of_sight(&self.weight_per_m, &air, geometry))
         };
         in_time_order(self.plan, &beams, |beam| beam.time_s, along)
     }
@@ -301,65 +285,34 @@ pub(crate) fn median_snr(layer_snr: &[(f64, f64)]) -> f64 {
     all.get(all.len() / 2).copied().unwrap_or(0.0)
 }
 
-/// What the layers of a line return.
-struct Returns {
-    /// Return per metre of each layer of the scene's air, K^2 beta A_R eta_s/R^2, (9), with the mean efficiency.
-    weight_per_m: Vec<f64>,
-    /// The same over the backscatter, sr, where the flow carries some.
-    of_backscatter_sr: Vec<f64>,
-}
-
-impl Returns {
-    /// A line of sight through some air.
-    fn line(&self, air: &Air, geometry: &Geometry) -> LineOfSight {
-        let weight_per_m = match &air.backscatter_per_m_sr {
-            None => self.weight_per_m.clone(),
-            Some(carried) => carried
-                .iter()
-                .zip(&self.of_backscatter_sr)
-                .map(|(beta, of)| beta * of)
-                .collect(),
-        };
-        LineOfSight {
-            first_range_m: geometry.first_layer_range_m,
-            layer_thickness_m: geometry.layer_thickness_m,
-            radial_velocity_m_s: air.radial_velocity_m_s.clone(),
-            weight_per_m,
-        }
+/// A line of sight through some air whose layers return `weight_per_m`.
+fn line_of_sight(weight_per_m: &[f64], air: &Air, geometry: &Geometry) -> LineOfSight {
+    LineOfSight {
+        first_range_m: geometry.first_layer_range_m,
+        layer_thickness_m: geometry.layer_thickness_m,
+        radial_velocity_m_s: air.radial_velocity_m_s.clone(),
+        weight_per_m: weight_per_m.to_vec(),
     }
 }
 
-/// The returns of the layers; a signal-to-noise ratio that the scene states takes the place of all of it.
-fn layer_returns(optics: &LineOptics<'_>) -> Result<Returns, Error> {
+/// Return per metre of each layer, K^2 beta A_R eta_s/R^2, (9), with the mean efficiency; a signal-to-noise ratio that the scene
+/// states takes the place of all of it.
+fn layer_returns(optics: &LineOptics<'_>) -> Result<Vec<f64>, Error> {
     let plan = optics.plan;
     let (scene, instrument, geometry) = (&plan.scene.content, &plan.instrument, &plan.geometry);
     if let SnrReference::Fixed { snr_db } = scene.detector.snr {
         let unit = instrument
             .receiver
             .slowly_varying_snr(scene.pulse.energy_j, 1.0);
-        let weight_per_m = vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers];
-        return Ok(Returns {
-            weight_per_m,
-            of_backscatter_sr: Vec::new(),
-        });
+        return Ok(vec![10f64.powf(0.1 * snr_db) / unit; geometry.layers]);
     }
     let efficiency = optics.of_layers()?;
-    let with_efficiency = |of: &dyn Fn(f64) -> Result<f64, Error>| -> Result<Vec<f64>, Error> {
-        efficiency
-            .range_m
-            .iter()
-            .zip(&efficiency.mean)
-            .map(|(&range_m, eta)| Ok(of(range_m)? * eta))
-            .collect()
-    };
-    Ok(Returns {
-        weight_per_m: with_efficiency(&|range_m| instrument.return_per_m(range_m))?,
-        of_backscatter_sr: if plan.wind.carries_backscatter {
-            with_efficiency(&|range_m| instrument.return_of_backscatter_sr(range_m))?
-        } else {
-            Vec::new()
-        },
-    })
+    efficiency
+        .range_m
+        .iter()
+        .zip(&efficiency.mean)
+        .map(|(&range_m, eta)| Ok(instrument.return_per_m(range_m)? * eta))
+        .collect()
 }
 
 /// The air from which the pulse before comes back at the same time, c/(2 PRF) farther away, at the ranges of the lines.

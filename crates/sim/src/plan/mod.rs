@@ -293,8 +293,6 @@ mod tests {
             let scene = SceneFile::parse(words, std::path::Path::new("s.toml")).unwrap();
             Plan::new(scene, Target::Map).unwrap()
         };
-        let lines = "[flow]\nkind = \"vortex_lines\"\nnodes_m = [[[-1e4, 400.0, 57.65], [1e4, 400.0, 57.65]], \
-                     [[-1e4, 400.0, 62.35], [1e4, 400.0, 62.35]]]\ncirculation_m2_s = [500.0, -500.0]\ncore_radius_m = 2.35\n";
         // The largest speeds in brackets: where they are no radial velocities, nobody sees them.
         for (words, expected_m_s) in [
             // The horizontal line at 520 m; the air of the last line, 2.6 m/s faster each second.
@@ -313,7 +311,6 @@ mod tests {
             ("[flow]\nprofile = \"lamb_oseen\"\n", 24.5),
             ("[flow]\ncirculation_m2_s = 570.0\n", 19.6),
             ("[flow]\nspacing_m = 12.0\n", 16.5),
-            (lines, 33.9),
             (
                 "[flow]\nkind = \"uniform\"\nlateral_m_s = 12.0\nvertical_m_s = 0.0\n[[added_flows]]\nkind = \"uniform\"\n\
                  lateral_m_s = -12.0\nvertical_m_s = 0.0\n",

@@ -30,7 +30,6 @@ impl Times {
 pub(super) fn times(scene: &Scene, target: Target, n: &Sizes, optics_s: f64) -> Times {
     let wind_of = |flow: &Flow| match flow {
         Flow::Simulated(_) | Flow::Fields(_) => 4e-7,
-        Flow::VortexLines(lines) => 4e-8 * lines.nodes_m.len() as f64,
         _ => 7e-8,
     };
     let wind_s = std::iter::once(&scene.flow)

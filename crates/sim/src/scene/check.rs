@@ -7,8 +7,8 @@ use super::estimator::check_estimator;
 use super::flow::check_flow;
 use super::retrieval::check_retrieval;
 use super::{
-    DetectorSignal, EfficiencyOfPulse, FieldFlow, Flow, Method, Outside, Pattern, PulseShape, Scan,
-    Scene, SnrReference, SpectrumKind, Turbulence,
+    DetectorSignal, EfficiencyOfPulse, Flow, Method, Outside, Pattern, PulseShape, Scan, Scene,
+    SnrReference, SpectrumKind, Turbulence,
 };
 use crate::keys::{Checker, Declared as _, Problem, side};
 use crate::setup::instrument::{medium, pulse};
@@ -32,22 +32,6 @@ impl Scene {
             .map(|(i, flow)| (format!("added_flows[{i}]"), flow));
         for (at, flow) in std::iter::once(("flow".to_owned(), &self.flow)).chain(added) {
             check_flow(flow, &at, &mut c);
-            if let (
-                Flow::Fields(FieldFlow {
-                    backscatter: Some(carried),
-                    ..
-                }),
-                SnrReference::Fixed { .. },
-            ) = (flow, self.detector.snr)
-            {
-                let allowed =
-                    "absent with detector.snr.reference = \"fixed\", which asks for no backscatter";
-                c.refuse(
-                    &format!("{at}.backscatter.name"),
-                    &format!("{:?}", carried.name),
-                    allowed,
-                );
-            }
         }
         self.check_head(&mut c);
         check_estimator(self, &mut c);

@@ -19,8 +19,6 @@ keys! {
         },
         /// A wind that is linear in place and time.
         "linear" => Linear(LinearWind),
-        /// Vortices of any axis.
-        "vortex_lines" => VortexLines(VortexLines),
         /// The analytic vortex pair (3)-(5) with its images below the ground.
         "vortex_pair" => VortexPair(VortexPair),
         /// Cross-planes that `wakescope flow` wrote.
@@ -78,22 +76,6 @@ keys! {
         acceleration_m_s2: [f64; 3] = [0.0; 3] => -1e3..=1e3,
     }
 
-    /// Straight vortices without end, or polylines; one entry of each list for each vortex.
-    table VortexLines {
-        /// Places (x, y, z) that each vortex goes through, m: two of an endless one, all corners of another.
-        nodes_m: Vec<Vec<[f64; 3]>> = Vec::new() => -1e7..=1e7,
-        /// Circulation of each, m^2/s.
-        circulation_m2_s: Vec<f64> = Vec::new() => -1e5..=1e5,
-        /// Core radius of all, m.
-        core_radius_m: f64 = 2.35 => 1e-3..=1e3,
-        /// Speed of the air in the middle of each against the direction of its nodes, m/s.
-        axial_deficit_m_s: f64 = 0.0 => -1e3..=1e3,
-        /// Whether they go on beyond their ends.
-        endless: bool = true,
-        /// Whether there are images below the ground.
-        images: bool = true,
-    }
-
     /// Fields over (time, z, y, x), in one file or one for each time.
     table FieldFlow {
         /// The file, or the beginning of the names of numbered files, relative to the folder of the scene.
@@ -121,16 +103,6 @@ keys! {
         periodic_y: bool = false,
         /// What lies below its lowest nodes.
         ground: FieldGround = FieldGround::Open,
-        /// Backscatter that the air carries, in place of that of the atmosphere; absent: none.
-        backscatter: Option<CarriedBackscatter> = None,
-    }
-
-    /// Backscatter that a field brings for each of its nodes.
-    table CarriedBackscatter {
-        /// Name of its variable in the file.
-        name: String = String::new() => Named("the name of a variable of the file over (time, z, y, x)"),
-        /// Backscatter coefficient in the unit of the file, 1/(m sr).
-        unit_per_m_sr: f64 = 1.0 => 0.0..=1e6,
     }
 
     /// What lies below the lowest nodes of fields.
@@ -186,11 +158,6 @@ keys! {
         "error" => Error {},
         /// Nothing that returns light.
         "mask" => Mask {},
-        /// Air with this radial velocity.
-        "constant" => Constant {
-            /// Radial velocity, m/s, positive away from the lidar.
-            radial_velocity_m_s: f64 => -1e3..=1e3,
-        },
     }
 }
 
@@ -199,7 +166,6 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
     let key = |name: &str| format!("{at}.{name}");
     match flow {
         Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::Fields(_) => {}
-        Flow::VortexLines(lines) => check_lines(lines, at, c),
         Flow::Simulated(flow) => {
             if let Some(time_s) = flow.time_s {
                 c.require(
@@ -228,38 +194,5 @@ pub(super) fn check_flow(flow: &Flow, at: &str, c: &mut Checker<'_>) {
                 allowed,
             );
         }
-    }
-}
-
-fn check_lines(lines: &VortexLines, at: &str, c: &mut Checker<'_>) {
-    let key = |name: &str| format!("{at}.{name}");
-    let (count, circulations) = (lines.nodes_m.len(), lines.circulation_m2_s.len());
-    let allowed = "a list of 1 to 1000 vortices";
-    c.require(
-        (1..=1000).contains(&count),
-        &key("nodes_m"),
-        format!("a list of {count}"),
-        allowed,
-    );
-    let allowed = format!("as many values as {at}.nodes_m has vortices, {count}");
-    c.require(
-        circulations == count,
-        &key("circulation_m2_s"),
-        format!("a list of {circulations}"),
-        allowed,
-    );
-    let axial = lines.endless || lines.axial_deficit_m_s == 0.0;
-    let allowed =
-        format!("0 with {at}.endless = false: the middle of a polyline has no speed of its own");
-    c.require(
-        axial,
-        &key("axial_deficit_m_s"),
-        lines.axial_deficit_m_s,
-        allowed,
-    );
-    if c.is_good()
-        && let Err(e) = crate::setup::wind::vortex_lines(lines)
-    {
-        c.refuse(&key("nodes_m"), "", e.to_string());
     }
 }

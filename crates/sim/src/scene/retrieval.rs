@@ -97,11 +97,7 @@ pub(super) fn check_retrieval(scene: &Scene, c: &mut Checker<'_>) {
     let has_vortices = match &scene.flow {
         Flow::VortexPair(pair) => pair.circulation_m2_s > 0.0,
         Flow::Simulated(_) => true,
-        Flow::Calm {}
-        | Flow::Uniform { .. }
-        | Flow::Linear(_)
-        | Flow::VortexLines(_)
-        | Flow::Fields(_) => false,
+        Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) | Flow::Fields(_) => false,
     };
     let allowed =
         "a flow with vortices: flow.kind = \"vortex_pair\" with a circulation, or \"simulated\"";

@@ -1,6 +1,6 @@
-//! The air along beams: radial velocity and backscatter of each layer, and their means over the pulses of a line.
+//! The air along beams: the radial velocity of each layer, and its mean over the pulses of a line.
 //!
-//! Check: the truth of a line is the mean over its pulses; a cloud that the flow carries weighs the velocities that are seen.
+//! Check: the truth of a line is the mean over its pulses.
 
 use crate::Error;
 use crate::scene::{Outside, WindOfPulses};
@@ -13,14 +13,12 @@ use wakescope_signal::RangeFilter;
 pub(crate) struct Air {
     /// Radial velocity, m/s; NaN where nothing returns light.
     pub(crate) radial_velocity_m_s: Vec<f64>,
-    /// Backscatter, 1/(m sr), where the flow carries some; the atmosphere's in those layers that the flow says nothing of.
-    pub(crate) backscatter_per_m_sr: Option<Vec<f64>>,
     /// Of a line whose pulses have airs of their own, the standard deviation of what they see at the gates through the filter of the
     /// pulse, m/s.
     pub(crate) spread_m_s: Option<Vec<f64>>,
 }
 
-/// What a filter sees of an air at the gates: the mean velocity with its weights and those of the backscatter.
+/// Mean velocity that a filter sees at the gates, m/s.
 ///
 /// # Errors
 /// What the filter refuses; a checked scene gives none.
@@ -28,28 +26,15 @@ pub(crate) fn seen_m_s(
     filter: &RangeFilter,
     g: &Geometry,
     velocity_m_s: &[f64],
-    backscatter_per_m_sr: Option<&[f64]>,
 ) -> Result<Vec<f64>, Error> {
-    let apply = |values: Vec<f64>| -> Result<Vec<f64>, Error> {
-        let mut out = vec![0.0; g.gate_range_m.len()];
-        filter.apply_into(g.first_layer_range_m, &values, &g.gate_range_m, &mut out)?;
-        Ok(out)
-    };
-    let Some(backscatter) = backscatter_per_m_sr else {
-        return apply(velocity_m_s.to_vec());
-    };
-    let pairs = || velocity_m_s.iter().zip(backscatter);
-    let sums = apply(pairs().map(|(v, beta)| v * beta).collect())?;
-    let weights = apply(
-        pairs()
-            .map(|(v, beta)| if v.is_nan() { f64::NAN } else { *beta })
-            .collect(),
+    let mut out = vec![0.0; g.gate_range_m.len()];
+    filter.apply_into(
+        g.first_layer_range_m,
+        velocity_m_s,
+        &g.gate_range_m,
+        &mut out,
     )?;
-    Ok(sums
-        .into_iter()
-        .zip(weights)
-        .map(|(sum, weight)| sum / weight)
-        .collect())
+    Ok(out)
 }
 
 /// The air at ranges, m, in the middle of a line, or the mean over its pulses if they have airs of their own.
@@ -66,43 +51,21 @@ pub(crate) fn air_of_line(
         return air_along(setup, &schedule.middle(line), range_m);
     }
     let mut sums_m_s = vec![0.0; range_m.len()];
-    let mut backscatter: Option<Vec<f64>> = None;
     let mut sums = vec![(0.0, 0.0); g.gate_range_m.len()];
     let (mut first_m_s, mut first_seen_m_s) = (Vec::new(), Vec::new());
     let share = 1.0 / pulses as f64;
     for pulse in 0..pulses {
         let here = air_along(setup, &schedule.beam(line, pulse as f64), range_m)?;
-        let here_seen_m_s = seen_m_s(
-            filter,
-            g,
-            &here.radial_velocity_m_s,
-            here.backscatter_per_m_sr.as_deref(),
-        )?;
+        let here_seen_m_s = seen_m_s(filter, g, &here.radial_velocity_m_s)?;
         // About the first air, so that the mean of equal airs is that air.
         if pulse == 0 {
             (first_m_s, first_seen_m_s) = (here.radial_velocity_m_s.clone(), here_seen_m_s.clone());
-            backscatter = here
-                .backscatter_per_m_sr
-                .as_ref()
-                .map(|carried| vec![0.0; carried.len()]);
         }
-        let weight = |layer: usize| {
-            here.backscatter_per_m_sr
-                .as_ref()
-                .map_or(1.0, |carried| carried[layer])
-        };
-        for (layer, (sum, v)) in sums_m_s
+        for (sum, (v, first)) in sums_m_s
             .iter_mut()
-            .zip(&here.radial_velocity_m_s)
-            .enumerate()
+            .zip(here.radial_velocity_m_s.iter().zip(&first_m_s))
         {
-            *sum += share * weight(layer) * (v - first_m_s[layer]);
-        }
-        if let Some(backscatter) = &mut backscatter {
-            backscatter
-                .iter_mut()
-                .enumerate()
-                .for_each(|(layer, sum)| *sum += share * weight(layer));
+            *sum += share * (v - first);
         }
         for ((sum, square), (v, first)) in sums
             .iter_mut()
@@ -113,19 +76,13 @@ pub(crate) fn air_of_line(
             *square += share * beside * beside;
         }
     }
-    for (layer, (sum, first)) in sums_m_s.iter_mut().zip(&first_m_s).enumerate() {
-        match backscatter.as_ref().map_or(1.0, |mean| mean[layer]) {
-            // Nothing returns light: any velocity will do.
-            0.0 => *sum = 0.0,
-            total => *sum /= total,
-        }
+    for (sum, first) in sums_m_s.iter_mut().zip(&first_m_s) {
         *sum += first;
     }
     let spread = |(sum, square): (f64, f64)| (square - sum * sum).max(0.0).sqrt();
     let spread_m_s = Some(sums.into_iter().map(spread).collect());
     Ok(Air {
         radial_velocity_m_s: sums_m_s,
-        backscatter_per_m_sr: backscatter,
         spread_m_s,
     })
 }
@@ -137,32 +94,19 @@ pub(crate) fn radial_velocity_m_s(
     line: usize,
     range_m: &[f64],
 ) -> Result<Vec<f64>, Error> {
-    Ok(velocity_along(setup, &setup.geometry.schedule.middle(line), range_m)?.1)
+    velocity_along(setup, &setup.geometry.schedule.middle(line), range_m)
 }
 
 /// The air along a beam.
 pub(crate) fn air_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Air, Error> {
-    let (points_m, radial_velocity_m_s) = velocity_along(setup, beam, range_m)?;
-    let mut backscatter_per_m_sr = setup
-        .wind
-        .backscatter_per_m_sr(&points_m, setup.wind.start_s + beam.time_s)?;
-    for (beta, range_m) in backscatter_per_m_sr
-        .iter_mut()
-        .flatten()
-        .zip(range_m)
-        .filter(|(beta, _)| beta.is_nan())
-    {
-        *beta = setup.instrument.air.backscatter_per_m_sr(*range_m)?;
-    }
     Ok(Air {
-        radial_velocity_m_s,
-        backscatter_per_m_sr,
+        radial_velocity_m_s: velocity_along(setup, beam, range_m)?,
         spread_m_s: None,
     })
 }
 
 /// [`known_velocity_m_s`] with what the scene says of places where the flow is not known.
-fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, Error> {
+fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Vec<f64>, Error> {
     let (points_m, known_m_s) = known_velocity_m_s(setup, beam, range_m)?;
     let scan = &setup.scene.content.scan;
     let elevation_rad = beam.elevation_rad;
@@ -173,9 +117,6 @@ fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, 
             (false, false) => return Ok(known_m_s),
         };
         match outside {
-            Outside::Constant {
-                radial_velocity_m_s,
-            } => Ok(radial_velocity_m_s),
             // A scene with lines below the ground was refused, but for air behind its last sample.
             Outside::Error {} if z_m >= 0.0 => Err(Error::OutsideFlow {
                 elevation_rad,
@@ -187,13 +128,12 @@ fn velocity_along(setup: &Setup, beam: &Beam, range_m: &[f64]) -> Result<Along, 
             Outside::Error {} | Outside::Mask {} => Ok(f64::NAN),
         }
     };
-    let velocity_m_s = points_m
+    points_m
         .iter()
         .zip(known_m_s)
         .zip(range_m)
         .map(checked)
-        .collect::<Result<_, Error>>()?;
-    Ok((points_m, velocity_m_s))
+        .collect()
 }
 
 /// Places along a beam, m, and the radial velocity there, m/s.

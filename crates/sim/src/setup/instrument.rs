@@ -79,20 +79,6 @@ impl Instrument {
                 .return_per_m(range_m, self.telescope.aperture_area_m2())?)
     }
 
-    /// [`Self::return_per_m`] of air with a backscatter of 1/(m sr): K^2 A_R/R^2 less losses, sr.
-    ///
-    /// # Errors
-    /// What optics or signals refuse of a range.
-    pub(crate) fn return_of_backscatter_sr(&self, range_m: f64) -> Result<f64, Error> {
-        let one = self.air.transmission(range_m)?.powi(2) * self.telescope.aperture_area_m2()
-            / (range_m * range_m);
-        Ok(if range_m < self.blind_range_m {
-            0.0
-        } else {
-            self.transmission * one
-        })
-    }
-
     /// Full width at half maximum of the Gaussian pulse with the same spread, s.
     pub fn gaussian_fwhm_s(&self) -> f64 {
         2.0 * std::f64::consts::LN_2.sqrt() * self.pulse.sigma_s()

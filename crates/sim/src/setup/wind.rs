@@ -8,9 +8,7 @@ mod fields;
 mod planes;
 
 use crate::Error;
-use crate::scene::{
-    CoreProfile, Flow, SceneFile, SimulatedMotion, VortexLines, VortexMotion, VortexPair,
-};
+use crate::scene::{CoreProfile, Flow, SceneFile, SimulatedMotion, VortexMotion, VortexPair};
 use std::fmt;
 use wakescope_les::{self as les, Wind};
 
@@ -29,8 +27,6 @@ pub struct SceneWind {
     pub source: String,
     /// Times of fields that are read when they are needed, s.
     field_times_s: Vec<f64>,
-    /// Whether the air carries its backscatter somewhere.
-    pub(crate) carries_backscatter: bool,
 }
 
 impl fmt::Debug for SceneWind {
@@ -94,7 +90,6 @@ impl SceneWind {
             max_speed_m_s: self.max_speed_m_s + other.max_speed_m_s,
             source: format!("{}; added: {}", self.source, other.source),
             field_times_s,
-            carries_backscatter: self.carries_backscatter || other.carries_backscatter,
             ..self
         }
     }
@@ -109,7 +104,6 @@ impl SceneWind {
             max_speed_m_s: 0.0,
             source,
             field_times_s: Vec::new(),
-            carries_backscatter: false,
         }
     }
 
@@ -157,29 +151,6 @@ impl SceneWind {
         self.field_times_s.partition_point(|t| *t <= time_s)
     }
 
-    /// Backscatter that the air carries at places, 1/(m sr), NaN where it carries none; nothing where no wind carries any.
-    ///
-    /// # Errors
-    /// What the wind refuses.
-    pub(crate) fn backscatter_per_m_sr(
-        &self,
-        points_m: &[[f64; 3]],
-        time_s: f64,
-    ) -> Result<Option<Vec<f64>>, Error> {
-        if !self.carries_backscatter {
-            return Ok(None);
-        }
-        let mut carried = vec![0.0; points_m.len()];
-        self.wind.scalar_into(points_m, time_s, &mut carried)?;
-        // (26) swings below zero beside the edge of a cloud.
-        Ok(Some(
-            carried
-                .into_iter()
-                .map(|beta| if beta < 0.0 { 0.0 } else { beta })
-                .collect(),
-        ))
-    }
-
     /// The wind itself.
     pub fn wind(&self) -> &dyn Wind {
         &*self.wind
@@ -205,15 +176,6 @@ impl<T: Fn(f64) -> f64 + Send + Sync> Wind for Retimed<T> {
 
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.wind.max_gradient_per_s((self.time_s)(time_s))
-    }
-
-    fn scalar_into(
-        &self,
-        points_m: &[[f64; 3]],
-        time_s: f64,
-        out: &mut [f64],
-    ) -> Result<(), les::Error> {
-        self.wind.scalar_into(points_m, (self.time_s)(time_s), out)
     }
 }
 
@@ -244,7 +206,6 @@ fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
             };
             Box::new(linear.validated()?)
         }
-        Flow::VortexLines(lines) => Box::new(vortex_lines(lines)?),
         Flow::VortexPair(pair) => {
             let vortices: Box<dyn Wind> = match pair.aircraft {
                 Some(a) => Box::new(les::winds::AlongFlight::new(
@@ -267,34 +228,6 @@ fn analytic_wind(flow: &Flow) -> Result<Box<dyn Wind>, Error> {
             })
         }
     })
-}
-
-/// The vortices of a scene.
-///
-/// # Errors
-/// Nodes in one place.
-pub(crate) fn vortex_lines(lines: &VortexLines) -> Result<les::winds::VortexLines, les::Error> {
-    let line = |(nodes_m, circulation_m2_s): (&Vec<[f64; 3]>, &f64)| les::winds::VortexLine {
-        nodes_m: nodes_m.clone(),
-        endless: lines.endless,
-        circulation_m2_s: *circulation_m2_s,
-        core_radius_m: lines.core_radius_m,
-        axial_deficit_m_s: lines.axial_deficit_m_s,
-    };
-    let ground = if lines.images {
-        les::Ground::Image
-    } else {
-        les::Ground::None
-    };
-    les::winds::VortexLines::new(
-        lines
-            .nodes_m
-            .iter()
-            .zip(&lines.circulation_m2_s)
-            .map(line)
-            .collect(),
-        ground,
-    )
 }
 
 /// The vortex pair of a scene.

@@ -107,7 +107,7 @@ impl<'p> Collected<'p> {
                         let to = |centre_m: f64| (y_m - centre_m).hypot(z_m - centres.height_m);
                         to(centres.left_y_m).min(to(centres.right_y_m)) / pair.spacing_m
                     }
-                    Flow::Simulated(_) | Flow::Fields(_) | Flow::VortexLines(_) => f64::NAN,
+                    Flow::Simulated(_) | Flow::Fields(_) => f64::NAN,
                     Flow::Calm {} | Flow::Uniform { .. } | Flow::Linear(_) => f64::INFINITY,
                 }
             });

@@ -130,7 +130,7 @@ fn a_full_disk_is_an_error_and_a_closed_pipe_is_none() {
         &["check", "s.toml"][..],
         &["check", "s.toml", "--json"],
         &["wake", "--print"],
-        &["flow", "--example", "dipole"],
+        &["flow", "--example", "free"],
         &[
             "efficiency",
             "s.toml",

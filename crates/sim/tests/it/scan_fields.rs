@@ -1,16 +1,13 @@
 //! Scans of fields in three dimensions: of this program and of others, classic and NetCDF-4, with the air that they carry.
 
-use crate::scans::{RHI, SCENE, map, plan_in};
+use crate::scans::{RHI, map, plan_in};
 use netcdf3::{DataSet, FileWriter, Version};
 use std::f64::consts::TAU;
 use std::path::Path;
-use wakescope_sim::Silent;
 use wakescope_sim::io::Provenance;
 use wakescope_sim::io::Share;
 use wakescope_sim::io::cf_fields::{FaceVelocities, cf_faces_parts};
-use wakescope_sim::measure::scan::Scanner;
-use wakescope_sim::plan::{Plan, Target};
-use wakescope_sim::scene::SceneFile;
+use wakescope_sim::plan::Target;
 
 /// A smooth field that varies along the flight.
 fn wave([x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -240,139 +237,6 @@ fn near_vortex(folder: &Path, flow: &str) {
         largest = largest.max(expected.abs());
     }
     assert!(largest > 0.5);
-}
-
-#[test]
-fn a_cloud_that_the_air_carries_returns_light_and_weighs_the_velocities() {
-    let folder = tempfile::tempdir().unwrap();
-    // Right-handed: the scan at y > 0 of the scene looks at y < 0 of the file. The cloud thickens away from the lidar, and moves on.
-    let (x, y, z) = (
-        axis(-60.0, 60.0, 4),
-        axis(-560.0, -200.0, 91),
-        axis(2.0, 42.0, 5),
-    );
-    let slope_per_m = 0.004;
-    let cloud = |y: f64, time_s: f64| 3.0 * (1.0 + slope_per_m * (-y - 360.0 - 20.0 * time_s));
-    let shear_per_s = -0.05;
-    let wind = |[_, y, _]: [f64; 3]| [0.0, 2.0 + shear_per_s * (-y - 360.0), 0.0];
-    let both = |of: &dyn Fn(f64) -> Vec<f64>| [of(0.0), of(1.0)].concat();
-    let dims = ["time", "z", "y", "x"];
-    let component = |name, c| (name, dims, both(&|_| sampled([&x, &y, &z], c, wind)));
-    let amount = both(&|time_s| {
-        sampled([&x, &y, &z], 0, |[_, y, _]| {
-            [cloud(y, time_s).max(0.0), 0.0, 0.0]
-        })
-    });
-    let written = |name: &str, amount: Vec<f64>| {
-        netcdf(
-            &folder.path().join(name),
-            &[("time", 2), ("z", 5), ("y", 91), ("x", 4)],
-            &[
-                ("time", &["time"], vec![0.0, 1.0]),
-                ("z", &["z"], z.clone()),
-                ("y", &["y"], y.clone()),
-                ("x", &["x"], x.clone()),
-            ],
-            &[
-                component("u", 0),
-                component("v", 1),
-                component("w", 2),
-                ("dust", dims, amount),
-            ],
-            &[],
-        );
-    };
-    written("dusty.nc", amount.clone());
-    let flow = |more: &str| {
-        format!(
-            "kind = \"fields\"\nfiles = \"dusty.nc\"\nmirror_y = true\nground = \"slip\"\n{more}"
-        )
-    };
-    let level = "elevation_max_rad = 1e-7\nelevation_step_rad = 1e-7\nlidar_height_m = 12.0\n";
-    let of = |flow: &str, scan: &str| {
-        let snr = "[detector.snr]\nreference = \"fixed\"\nsnr_db = 10.0\n";
-        let text = SCENE
-            .replace("ADDED", "")
-            .replace(snr, "")
-            .replace("FLOW", flow)
-            .replace("SCAN", scan);
-        Plan::new(
-            SceneFile::parse(
-                &text.replace("OUTPUTS", ""),
-                &folder.path().join("scene.toml"),
-            )?,
-            Target::Map,
-        )
-    };
-    let dusty = flow("backscatter = { name = \"dust\", unit_per_m_sr = 1e-7 }\n");
-    let (plain, dusty) = (of(&flow(""), level).unwrap(), of(&dusty, level).unwrap());
-    let lines = |plan: &Plan| Scanner::new(plan, &Silent).unwrap().lines[0].clone();
-    let (clear, seen) = (lines(&plain), lines(&dusty));
-    let time_s = dusty.geometry.schedule.middle(0).time_s;
-    for layer in 0..clear.layers() {
-        // The atmosphere has 1e-7/(m sr); between the times and nodes the cloud is linear.
-        let expected = clear.weight_per_m[layer] * cloud(-clear.range_m(layer), time_s);
-        assert!(
-            (seen.weight_per_m[layer] / expected - 1.0).abs() < 1e-9,
-            "{layer}"
-        );
-    }
-    // Linear air in a linear cloud, seen with a weight of variance s^2 about its middle r: v(r) + g k s^2/(1 + k (r - r0)).
-    let (without, with) = (map(&plain), map(&dusty));
-    assert_eq!(without.v_exact_m_s, with.v_exact_m_s);
-    let s_m = 0.5 * 299_792_458.0 * dusty.instrument.pulse.sigma_s() / 2f64.sqrt();
-    for (gate, range_m) in with
-        .range_m
-        .iter()
-        .enumerate()
-        .filter(|(_, r)| (330.0..390.0).contains(*r))
-    {
-        let density = 1.0 + slope_per_m * (range_m - 360.0 - 20.0 * time_s);
-        let expected = -shear_per_s * slope_per_m * s_m * s_m / density;
-        let found = with.v_pulse_m_s[[0, gate]] - without.v_pulse_m_s[[0, gate]];
-        assert!((found / expected - 1.0).abs() < 1e-3, "{found} {expected}");
-        // Three times the light of the clear air and more.
-        assert!(with.snr_db[[0, gate]] > without.snr_db[[0, gate]], "{gate}");
-    }
-    // Each pulse meets the cloud as it is then: the mean of equal lines is that line.
-    let slow = format!("{level}wind_of_pulses.kind = \"pulse\"\n");
-    let each = of(
-        &flow("backscatter = { name = \"dust\", unit_per_m_sr = 1e-7 }\n"),
-        &slow,
-    )
-    .unwrap();
-    let each = lines(&each);
-    for layer in 0..each.layers() {
-        assert!(
-            (each.weight_per_m[layer] / seen.weight_per_m[layer] - 1.0).abs() < 1e-6,
-            "{layer}"
-        );
-    }
-    // Refused: no such variable, a density below nothing, a stated signal-to-noise ratio.
-    let message = |text: &str, scan: &str| of(&flow(text), scan).unwrap_err().to_string();
-    let absent = message("backscatter = { name = \"smoke\" }\n", level);
-    assert!(
-        absent.contains("flow.files") && absent.contains("smoke"),
-        "{absent}"
-    );
-    assert!(message("backscatter = {}\n", level).contains("flow.backscatter.name"));
-    let fixed = plan_in(
-        folder.path(),
-        [&flow("backscatter.name = \"dust\"\n"), level, ""],
-        Target::Map,
-    );
-    let fixed = fixed.unwrap_err().to_string();
-    assert!(
-        fixed.contains("flow.backscatter.name = \"dust\"")
-            && fixed.contains("detector.snr.reference"),
-        "{fixed}"
-    );
-    written("dusty.nc", amount.iter().map(|beta| beta - 2.0).collect());
-    let negative = message("backscatter.name = \"dust\"\n", level);
-    assert!(
-        negative.contains("dust") && negative.contains("must not be negative"),
-        "{negative}"
-    );
 }
 
 #[test]

@@ -477,14 +477,6 @@ fn what_a_scan_cannot_be_is_refused_with_key_and_what_is_allowed() {
             "{message}"
         );
     }
-    let message = refused(
-        "kind = \"vortex_lines\"\nnodes_m = [[[0.0, 1.0, 2.0]]]\ncirculation_m2_s = [5.0]",
-        RHI,
-    );
-    assert!(
-        message.contains("flow.nodes_m") && message.contains("2 of an endless vortex"),
-        "{message}"
-    );
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
         folder.path().join("l.csv"),

@@ -58,13 +58,7 @@ fn a_run_that_is_killed_and_continued_ends_with_the_same_bits() {
     );
     let read =
         |folder: &str, name: &str| std::fs::read(temp.path().join(folder).join(name)).unwrap();
-    let tables = [
-        "case.toml",
-        "wake.csv",
-        "wake_scaled.csv",
-        "steps.csv",
-        "flow.checkpoint",
-    ];
+    let tables = ["case.toml", "wake.csv", "steps.csv", "flow.checkpoint"];
     for name in tables.into_iter().chain(["wake.nc", "plane1_0001.nc"]) {
         assert!(
             read("whole", name) == read("killed", name),
@@ -264,16 +258,16 @@ fn a_check_says_what_a_run_would_take_refuses_what_it_would_and_writes_nothing()
         "the folder holds a checkpoint"
     );
     // Sizes beyond any machine are refused at once, by the run as by the check, with what fits.
-    for (name, cells) in [
-        ("taylor_green", "4000"),
-        ("taylor_green_plane", "100000"),
-        ("dipole", "[100000, 100000]"),
+    let free = |cells: usize| {
+        let axis = format!("{{ cells = {cells} }}");
+        format!("[case]\nkind = \"free\"\nx = {axis}\ny = {axis}\n[time]\nend_s = 1.0\n")
+    };
+    for case in [
+        "[case]\nkind = \"vortex_pair\"\ncells = [4000, 4000, 4000]\n".to_owned(),
+        "[case]\nkind = \"vortex_pair\"\ncells = [1, 100000, 100000]\n".to_owned(),
+        free(100_000),
     ] {
-        std::fs::write(
-            folder.join("large.toml"),
-            format!("[case]\nkind = \"{name}\"\ncells = {cells}\n"),
-        )
-        .unwrap();
+        std::fs::write(folder.join("large.toml"), case).unwrap();
         for more in [&["--check"][..], &["--out", "l"]] {
             let out = wakescope(folder, &[&["flow", "large.toml"], more].concat());
             let message = String::from_utf8(out.stderr).unwrap();
@@ -296,11 +290,22 @@ fn presets_print_themselves_and_other_cases_are_refused() {
         printed.status.success() && text.contains("cells = [48, 240, 128]"),
         "{text}"
     );
-    std::fs::write(temp.path().join("c.toml"), "[case]\nkind = \"dipole\"\n").unwrap();
+    std::fs::write(
+        temp.path().join("c.toml"),
+        "[case]\nkind = \"vortex_pair\"\n",
+    )
+    .unwrap();
     let other = wakescope(temp.path(), &["wake", "c.toml", "--out", "o"]);
     let message = String::from_utf8(other.stderr).unwrap();
     assert!(
         other.status.code() == Some(2) && message.contains("wakescope flow"),
+        "{message}"
+    );
+    std::fs::write(temp.path().join("w.toml"), "[case]\nkind = \"wake\"\n").unwrap();
+    let other = wakescope(temp.path(), &["flow", "w.toml", "--out", "o"]);
+    let message = String::from_utf8(other.stderr).unwrap();
+    assert!(
+        other.status.code() == Some(2) && message.contains("wakescope wake"),
         "{message}"
     );
     let nowhere = wakescope(temp.path(), &["wake"]);

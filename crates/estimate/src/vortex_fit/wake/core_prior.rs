@@ -58,7 +58,7 @@ impl CorePrior {
 }
 
 /// Circulation of a secondary vortex over that of its vortex, and distance over its height: mean and standard deviation. The strongest one of the
-/// medium wake (the mean along x, `wake_scaled.csv`) has -0.2 to -0.3 and 1.1 to 0.5 between tau = 1.25 and 2.5, without the weaker
+/// medium wake (the mean along x) has -0.2 to -0.3 and 1.1 to 0.5 between tau = 1.25 and 2.5, without the weaker
 /// vorticity about it that gates see as well.
 const KNOWN_RATIO: (f64, f64) = (-0.4, 0.25);
 const KNOWN_DISTANCE: (f64, f64) = (0.8, 0.4);

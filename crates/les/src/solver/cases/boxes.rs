@@ -9,7 +9,7 @@ use crate::Error;
 /// Vorticity at the centres of the two vortices \[1/s\]: makes the energy of the box 2 and its enstrophy 800.
 const CENTRE_VORTICITY_PER_S: f64 = 299.528_385_375_226;
 /// Radius of the vortices \[m\].
-pub(super) const RADIUS_M: f64 = 0.1;
+const RADIUS_M: f64 = 0.1;
 
 /// The dipole in the plane y, z of the box `[-1, 1]^2`, running along z between no-slip walls at z = -1 and 1, with y periodic;
 /// `1/reynolds` is the viscosity. `strength` refines y in its middle, where the vortices stay ([`Spread::Cluster`]), and z

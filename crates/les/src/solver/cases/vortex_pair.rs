@@ -6,7 +6,7 @@
 //! makes it three-dimensional, a cross wind carries it.
 //!
 //! Check: symmetry of the plane flow to round-off, drift with the wind, scales; the flow against
-//! independent codes (`cargo xtask validate --only wake`).
+//! independent codes (tests `references::wakes`).
 
 use std::f64::consts::TAU;
 

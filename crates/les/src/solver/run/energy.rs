@@ -127,7 +127,7 @@ fn cause(flow: &Flow) -> Result<String, Error> {
         };
         return Ok(format!("{growth}: {remedy}"));
     }
-    if let Some(note) = flow.stiffness().note(step_s, settings.damped_steps) {
+    if let Some(note) = flow.stiffness().note(step_s) {
         return Ok(note);
     }
     let tolerance = settings.pressure_tolerance;

@@ -1,7 +1,7 @@
 //! The wake of an aircraft near the ground: the keys of its case, their limits, the case of the solver.
 
-use super::super::named::{STRETCH, check_pair};
 use super::super::setup::{Setup, WakeSetup};
+use super::super::vortex_pair::{STRETCH, check_pair};
 use crate::Error;
 use crate::keys::{ABOVE_ZERO, Checker, Is, ZERO_OR_MORE, keys};
 use wakescope_les::cases::{Case, VortexPairCase};

@@ -5,6 +5,7 @@
 use super::super::kind::CaseKind;
 use super::super::{CaseFile, Subgrid};
 use super::case::WakeFlow;
+use super::history::SCALED;
 use crate::Error;
 use crate::io::csv_input::TextTable;
 use std::collections::HashMap;
@@ -43,15 +44,16 @@ impl FinishedWake {
             return Err(refuse("the case is no wake".into()));
         };
         let (flow, output) = ((**flow).clone(), output.clone());
+        let scales = flow.pair.scales().map_err(Error::Flow)?;
         let mut columns = table(&folder.join("wake.csv"))?;
-        let scaled = folder.join("wake_scaled.csv");
-        // Runs of earlier versions have all columns in one file.
-        if scaled.exists() {
-            columns.extend(table(&scaled)?);
-        }
+        let scaled: Vec<(String, Vec<f64>)> = columns
+            .iter()
+            .filter_map(|(name, values)| in_units_of_the_pair(name, values, &scales))
+            .collect();
+        columns.extend(scaled);
         let wake = Self {
             folder: folder.to_owned(),
-            scales: flow.pair.scales().map_err(Error::Flow)?,
+            scales,
             flow,
             file,
             fields_tau: output.fields_tau.unwrap_or_default(),
@@ -69,7 +71,8 @@ impl FinishedWake {
         Ok(wake)
     }
 
-    /// A column of the history.
+    /// A column of the history: in SI units by its name in `wake.csv` (`y_left_m`), in those of the pair by that name without the
+    /// unit (`y_left` in `b0`, circulations in `Gamma0`).
     ///
     /// # Errors
     /// There is none of that name.
@@ -117,6 +120,19 @@ impl FinishedWake {
              the span), noise {perturbation} V₀"
         )
     }
+}
+
+/// Name and values in the units of the pair of a column whose name ends in a unit.
+fn in_units_of_the_pair(
+    name: &str,
+    values: &[f64],
+    scales: &WakeScales,
+) -> Option<(String, Vec<f64>)> {
+    let kind = SCALED.iter().find(|kind| name.ends_with(kind.suffix))?;
+    let bare = name.strip_suffix(kind.suffix)?;
+    let unit = (kind.unit)(scales);
+    let scaled = values.iter().map(|value| value / unit).collect();
+    Some((bare.to_owned(), scaled))
 }
 
 /// Columns of a table by name; empty places are NaN.

@@ -13,15 +13,15 @@ use wakescope_les::analysis::{VortexRecord, WakeRecord, WakeScales};
 
 /// What a number is.
 #[derive(Debug)]
-struct Kind {
+pub(super) struct Kind {
     /// The end of its name in tables.
-    suffix: &'static str,
+    pub(super) suffix: &'static str,
     /// Its unit in NetCDF.
     udunits: &'static str,
     /// Whether a NetCDF variable has the end of the name, too: where it is no tag of column names.
     is_named: bool,
     /// Its unit in the scales of the pair; circulations in `Gamma0`.
-    unit: fn(&WakeScales) -> f64,
+    pub(super) unit: fn(&WakeScales) -> f64,
 }
 
 const LENGTH: &Kind = &Kind {
@@ -61,6 +61,9 @@ const NUMBER: &Kind = &Kind {
     is_named: false,
     unit: |_| 1.0,
 };
+
+/// Kinds whose names end in a unit; none of the ends is that of another.
+pub(super) const SCALED: [&Kind; 5] = [LENGTH, GAMMA, RATE, ENERGY, ENSTROPHY];
 
 type OfVortex = (
     &'static str,
@@ -180,11 +183,10 @@ const SIDES: [&str; 2] = ["left", "right"];
 const TABLE_MODES: usize = 8;
 /// Files of the history.
 const TABLE: &str = "wake.csv";
-const SCALED_TABLE: &str = "wake_scaled.csv";
 const NETCDF: &str = "wake.nc";
 
 /// All of them.
-pub(in super::super) const HISTORIES: [&str; 3] = [TABLE, SCALED_TABLE, NETCDF];
+pub(in super::super) const HISTORIES: [&str; 2] = [TABLE, NETCDF];
 
 /// A number of all records.
 struct Column {
@@ -352,34 +354,21 @@ impl WakeRun {
             .fold(table, |table, (name, values)| table.float(&name, values))
     }
 
-    /// The history in the scales of the pair, circulations in `Gamma0`.
-    fn scaled_table(&self) -> Table {
-        let table = Table::new().float("tau", self.tau());
-        self.columns()
-            .iter()
-            .skip(SIDES.len())
-            .fold(table, |table, column| {
-                let unit = (column.kind.unit)(&self.setup.scales);
-                table.float(&column.name, column.values.iter().map(|value| value / unit))
-            })
-    }
-
-    /// Writes the tables of the history so far.
-    pub(in super::super) fn write_tables(
+    /// Writes the table of the history so far.
+    pub(in super::super) fn write_table(
         &self,
         folder: &Path,
         origin: &Provenance,
     ) -> Result<(), Error> {
-        write_atomic(&folder.join(TABLE), self.table().to_csv(origin)?)?;
         Ok(write_atomic(
-            &folder.join(SCALED_TABLE),
-            self.scaled_table().to_csv(origin)?,
+            &folder.join(TABLE),
+            self.table().to_csv(origin)?,
         )?)
     }
 
     /// Writes all files of the whole history.
     pub(in super::super) fn finish(&self, folder: &Path, origin: &Provenance) -> Result<(), Error> {
-        self.write_tables(folder, origin)?;
+        self.write_table(folder, origin)?;
         Ok(write_atomic(&folder.join(NETCDF), self.netcdf(origin)?)?)
     }
 

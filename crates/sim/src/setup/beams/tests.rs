@@ -264,19 +264,17 @@ fn smear_of_uniform_linear_and_vortex_winds_is_that_of_the_tables() {
         near(spread, row("spread_m_s"));
     }
     for row in rows("smear_vortex") {
-        let vortices = |y_m: f64, sign: f64, height_m: f64| wakescope_les::winds::VortexLine {
-            nodes_m: vec![[0.0, y_m, height_m], [1.0, y_m, height_m]],
-            endless: true,
-            circulation_m2_s: sign * row("gamma_m2_s"),
+        let pair = wakescope_les::VortexPair {
+            circulation_m2_s: row("gamma_m2_s"),
+            spacing_m: row("b0_m"),
             core_radius_m: row("rc_m"),
-            axial_deficit_m_s: 0.0,
+            lateral_position_m: row("y0_m"),
+            height_m: row("z0_m"),
+            ground: Ground::Image,
+            profile: wakescope_les::CirculationProfile::Algebraic,
+            motion: wakescope_les::Motion::Frozen,
         };
-        let (middle_m, half_m, height_m) = (row("y0_m"), 0.5 * row("b0_m"), row("z0_m"));
-        let lines = vec![
-            vortices(middle_m - half_m, -1.0, height_m),
-            vortices(middle_m + half_m, 1.0, height_m),
-        ];
-        let wind = wakescope_les::winds::VortexLines::new(lines, Ground::Image).unwrap();
+        let wind = pair.wind().unwrap();
         let (pulses, prf_hz) = (row("pulses") as usize, 400.0);
         let rate = row("width_rad") / pulses as f64 * prf_hz;
         let angles = [

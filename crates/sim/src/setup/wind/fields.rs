@@ -3,7 +3,7 @@
 //! Check: a right-handed file with one vortex comes out unmirrored; a field off the cross-plane is what it says.
 
 use crate::Error;
-use crate::io::fields_input::{FieldPlace, places, read, read_scalar};
+use crate::io::fields_input::{FieldPlace, places, read};
 use crate::io::planes_input::files;
 use crate::scene::{FieldFlow, FieldGround, SceneFile, SimulatedMotion};
 use crate::setup::beams::direction::sin_cos_of_turn;
@@ -57,16 +57,6 @@ impl Wind for Placed {
 
     fn max_gradient_per_s(&self, time_s: f64) -> f64 {
         self.wind.max_gradient_per_s(time_s)
-    }
-
-    fn scalar_into(
-        &self,
-        points_m: &[[f64; 3]],
-        time_s: f64,
-        out: &mut [f64],
-    ) -> Result<(), LesError> {
-        let own: Vec<_> = points_m.iter().map(|point_m| self.own_m(point_m)).collect();
-        self.wind.scalar_into(&own, time_s, out)
     }
 }
 
@@ -131,17 +121,7 @@ fn snapshot(field: &FieldPlace, flow: &FieldFlow) -> Result<VolumeSnapshot, Erro
             high: Side::Open,
         },
     ];
-    let snapshot = VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))?;
-    let Some(backscatter) = &flow.backscatter else {
-        return Ok(snapshot);
-    };
-    let scalar = scaled(
-        read_scalar(field, &backscatter.name)?,
-        backscatter.unit_per_m_sr,
-    );
-    snapshot
-        .with_scalar(&scalar, edges)
-        .map_err(|e| refuse(e.to_string()))
+    VolumeSnapshot::new(&components, edges).map_err(|e| refuse(e.to_string()))
 }
 
 /// Reads fields: their times, and once each for its gradient; the rest when it is needed.
@@ -237,7 +217,6 @@ pub(super) fn fields(flow: &FieldFlow, file: &SceneFile) -> Result<SceneWind, Er
         } else {
             Vec::new()
         },
-        carries_backscatter: flow.backscatter.is_some(),
         ..found
     })
 }
