@@ -52,21 +52,6 @@ pub(super) struct Prediction {
     pub(super) measures_powers: bool,
 }
 
-/// Coefficients of `dt (c N + c' N' - grad p + nu L u) + w u`.
-#[derive(Debug, Clone, Copy)]
-struct RowCoefficients {
-    /// `c`.
-    new: f64,
-    /// `c'`.
-    old: f64,
-    /// `nu` of the implicit axes \[m^2/s\].
-    viscosity_m2_s: f64,
-    /// `dt` \[s\].
-    stage_s: f64,
-    /// `w`.
-    velocity_weight: f64,
-}
-
 /// Some rows of one plane, of the three components.
 #[derive(Debug)]
 struct Block<'a> {
@@ -196,15 +181,9 @@ impl Flow {
     ) -> [Powers; 3] {
         let n = self.layout.shape.n[0];
         let k = block.plane;
-        let coefficients = RowCoefficients {
-            new: prediction.stage.new,
-            old: prediction.stage.old,
-            viscosity_m2_s: match prediction.field {
-                PredictedField::Increment => self.settings.viscosity_m2_s,
-                PredictedField::Velocity => 0.0,
-            },
-            stage_s: prediction.stage_s,
-            velocity_weight: prediction.field.velocity_weight(),
+        let implicit_viscosity_m2_s = match prediction.field {
+            PredictedField::Increment => self.settings.viscosity_m2_s,
+            PredictedField::Velocity => 0.0,
         };
         let mut powers = [Powers::default(); 3];
         let components = block.predicted.into_iter().zip(block.previous);
@@ -223,7 +202,8 @@ impl Flow {
                 scratch.gradient(&self.ops[axis], &self.state.pressure, j, k);
                 let own = &self.state.velocity[axis][self.layout.shape.row(j, k)];
                 advance_row(
-                    coefficients,
+                    prediction,
+                    implicit_viscosity_m2_s,
                     predicted,
                     previous,
                     &scratch.implicit,
@@ -295,24 +275,21 @@ fn explicit_terms(out: &mut [f64], nu: f64, explicit: &[f64], convection: &[f64]
     }
 }
 
-/// `predicted = dt (c N + c' N' - grad p + nu L u) + w u`, `N` being what `predicted` held, which
-/// goes into the previous terms.
+/// `predicted = dt (c N + c' N' - grad p + nu L u) + w u`, `w` being the weight of the velocity `u`
+/// in the predicted field and `N` what `predicted` held, which goes into the previous terms.
 #[multiversion(targets("x86_64+avx512f+avx512dq+avx512vl", "x86_64+avx2", "aarch64+neon"))]
 fn advance_row(
-    coefficients: RowCoefficients,
+    prediction: &Prediction,
+    nu: f64,
     predicted: &mut [f64],
     previous: &mut [f64],
     implicit: &[f64],
     pressure: &[f64],
     own: &[f64],
 ) {
-    let RowCoefficients {
-        new,
-        old,
-        viscosity_m2_s: nu,
-        stage_s,
-        velocity_weight,
-    } = coefficients;
+    let Stage { new, old, .. } = prediction.stage;
+    let stage_s = prediction.stage_s;
+    let velocity_weight = prediction.field.velocity_weight();
     let n = predicted.len();
     let previous = &mut previous[..n];
     let implicit = &implicit[..n];

@@ -1,6 +1,8 @@
-//! Flows with known answers: mesh, settings and initial field of each, at any resolution and Reynolds number.
+//! Flows with known answers: mesh, settings and initial field of each, at any resolution and
+//! Reynolds number.
 //!
-//! All are in the units of their literature (lengths, speeds of order one), which the solver takes as SI.
+//! All are in the units of their literature (lengths, speeds of order one), which the solver takes
+//! as SI.
 
 mod boxes;
 mod channel;
@@ -37,7 +39,8 @@ impl Initial {
     /// The simulation that starts from this field.
     ///
     /// # Errors
-    /// As [`Flow::new`], and [`Error::LengthMismatch`] for velocities that are not one for each cell.
+    /// As [`Flow::new`], and [`Error::LengthMismatch`] for velocities that are not one for each
+    /// cell.
     pub fn start(&self, mesh: Mesh, settings: FlowSettings) -> Result<(Flow, StartReport), Error> {
         match self {
             Self::Field(field) => Flow::new(mesh, settings, field),

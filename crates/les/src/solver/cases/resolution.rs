@@ -1,4 +1,5 @@
-//! Whether a mesh resolves a vortex pair above the ground: cells per core radius, and across the boundary layer.
+//! Whether a mesh resolves a vortex pair above the ground: cells per core radius, and across the
+//! boundary layer.
 
 use std::f64::consts::TAU;
 
@@ -92,8 +93,8 @@ fn cell_width_m(face_m: &[f64], at_m: f64) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Cells, and the fraction of the last one, between a wall and the distance `layer_m` from it; `from_wall_m` are the distances of
-/// the faces from the wall.
+/// Cells, and the fraction of the last one, between a wall and the distance `layer_m` from it;
+/// `from_wall_m` are the distances of the faces from the wall.
 fn cells_within(from_wall_m: &[f64], layer_m: f64) -> f64 {
     from_wall_m
         .windows(2)
@@ -102,8 +103,8 @@ fn cells_within(from_wall_m: &[f64], layer_m: f64) -> f64 {
 }
 
 impl VortexLengths {
-    /// Those of a vortex pair of the spacing `b0 = unit_m` \[m\] above ground, core and height in `b0`: the layer is
-    /// `sqrt(nu b0/V0)` with `nu = 2 pi b0 V0/reynolds`.
+    /// Those of a vortex pair of the spacing `b0 = unit_m` \[m\] above ground, core and height in
+    /// `b0`: the layer is `sqrt(nu b0/V0)` with `nu = 2 pi b0 V0/reynolds`.
     pub fn pair(core_radius: f64, height: f64, reynolds: f64, unit_m: f64) -> Self {
         Self {
             core_radius_m: core_radius * unit_m,
