@@ -18,6 +18,15 @@ const METHODS: [Method; 4] = [Method::Fit, Method::Rv, Method::Envelope, Method:
 /// The operational method on what it is made for: radial velocities that are means over the gate, which peaks of spectra are not.
 const OF_MEANS: &str = "rv of first moments";
 
+/// The methods of a profile: signals, whose fits need the longest run time, in full alone, since the fits of all samples of the
+/// pair are in the other part of the figure.
+fn methods(profile: Profile) -> &'static [Method] {
+    match profile {
+        Profile::Quick | Profile::Standard => &METHODS[..METHODS.len() - 1],
+        Profile::Full => &METHODS,
+    }
+}
+
 /// All rows by name, in their order.
 fn names() -> impl Iterator<Item = &'static str> {
     METHODS.into_iter().map(Method::name).chain([OF_MEANS])
@@ -37,33 +46,45 @@ impl OfFlow {
         })
     }
 
-    /// Errors of the circulation over 5 to 15 m in per cent of the truth, how many vortices are missing, and the mean of the errors, each scan
-    /// a batch.
-    fn errors(&self, method: &str) -> (Vec<f64>, usize, Estimate) {
-        let rows: Vec<&RetrievalRow> = self
-            .rows
-            .iter()
-            .filter(|(name, _)| *name == method)
-            .map(|(_, row)| row)
-            .collect();
-        let error = |row: &&RetrievalRow| {
-            let error = 100.0
-                * (row.found?.circulation_5_15_m2_s.value / row.truth.circulation_5_15_m2_s.value
-                    - 1.0);
-            error.is_finite().then_some(error)
-        };
-        let scans = rows.chunk_by(|a, b| a.realisation == b.realisation);
-        let scans: Vec<Vec<f64>> = scans
-            .map(|scan| scan.iter().filter_map(error).collect())
-            .collect();
-        let means = scans
-            .iter()
-            .filter(|errors| !errors.is_empty())
-            .map(|errors| mean(errors, None));
-        let (known, bias) = (scans.concat(), Estimate::mean(&means.collect::<Vec<_>>()));
-        let missing = rows.len() - known.len();
-        (known, missing, bias)
+    /// The errors of a method.
+    fn errors(&self, method: &str) -> Errors {
+        let mut rows = Vec::new();
+        for (name, row) in &self.rows {
+            if *name == method {
+                rows.push(row);
+            }
+        }
+        let mut all = Vec::new();
+        let mut means = Vec::new();
+        for scan in rows.chunk_by(|a, b| a.realisation == b.realisation) {
+            let errors: Vec<f64> = scan.iter().filter_map(|row| error_percent(row)).collect();
+            if !errors.is_empty() {
+                means.push(mean(&errors, None));
+            }
+            all.extend(errors);
+        }
+        Errors {
+            missing: rows.len() - all.len(),
+            bias: Estimate::mean(&means),
+            percent: all,
+        }
     }
+}
+
+/// Errors of the circulation over 5 to 15 m in per cent of the truth.
+struct Errors {
+    percent: Vec<f64>,
+    /// Vortices that were not found.
+    missing: usize,
+    /// Mean error, each scan a batch.
+    bias: Estimate,
+}
+
+/// Error of the circulation over 5 to 15 m in per cent of the truth; none of a vortex that was not found.
+fn error_percent(row: &RetrievalRow) -> Option<f64> {
+    let found_m2_s = row.found?.circulation_5_15_m2_s.value;
+    let error = 100.0 * (found_m2_s / row.truth.circulation_5_15_m2_s.value - 1.0);
+    error.is_finite().then_some(error)
 }
 
 pub(super) fn all(context: &Context) -> Result<Vec<OfFlow>, Failure> {
@@ -74,45 +95,37 @@ pub(super) fn all(context: &Context) -> Result<Vec<OfFlow>, Failure> {
 }
 
 fn of_flow(context: &Context, tau: Option<f64>, wake: &FinishedWake) -> Result<OfFlow, Failure> {
-    let pair = || Ok(Sight::of_pair(VortexPair::default()));
-    let sight = tau.map_or_else(pair, |tau| Sight::of_wake(wake, tau))?;
-    let mut scene = sight.scene(
-        context,
-        Scene {
-            seed: 0,
-            ..scene()?
-        },
-    );
+    let sight = match tau {
+        Some(tau) => Sight::of_wake(wake, tau)?,
+        None => Sight::of_pair(VortexPair::default()),
+    };
+    let scene = Scene {
+        seed: 0,
+        ..scene()?
+    };
+    let mut scene = sight.scene(context, scene);
     if context.profile != Profile::Quick {
-        (
-            scene.scan.elevation_step_rad,
-            scene.estimator.gate_step_samples,
-        ) = (1.25e-3, 5);
+        scene.scan.elevation_step_rad = 1.25e-3;
+        scene.estimator.gate_step_samples = 5;
     }
     scene.scan.realisations = context.profile.choose(3, 12, 32);
-    // Signals take longest: the fits of all samples of the pair are in the other part of the figure.
-    let some = METHODS[..context.profile.choose(4, 4, 5)].to_vec();
-    let by = |scene: &Scene, methods| {
-        retrieved(
-            scene,
-            Retrieval {
-                methods,
-                ..Retrieval::default()
-            },
-            &sight.folder,
-        )
+    let retrieval = Retrieval {
+        methods: methods(context.profile).to_vec(),
+        ..Retrieval::default()
     };
-    let mut rows: Vec<_> = by(&scene, some)?
-        .into_iter()
-        .map(|row| (row.method.name(), row))
-        .collect();
+    let mut rows = Vec::new();
+    for row in retrieved(&scene, retrieval, &sight.folder)? {
+        rows.push((row.method.name(), row));
+    }
     scene.estimator.method = Estimator::FirstMoment(FirstMoment::default());
     scene.estimator.weighting = Weighting::Rectangular;
-    rows.extend(
-        by(&scene, vec![Method::Rv])?
-            .into_iter()
-            .map(|row| (OF_MEANS, row)),
-    );
+    let of_means = Retrieval {
+        methods: vec![Method::Rv],
+        ..Retrieval::default()
+    };
+    for row in retrieved(&scene, of_means, &sight.folder)? {
+        rows.push((OF_MEANS, row));
+    }
     Ok(OfFlow { tau, rows })
 }
 
@@ -139,47 +152,59 @@ pub(crate) fn retrieved(
         .rows)
 }
 
-/// Rows as those of the first part; positions have no stated deviation there where the method states none.
+/// A row of the table, with the flow and the name of its method.
+struct Row<'f> {
+    flow: &'f OfFlow,
+    method: &'static str,
+    row: &'f RetrievalRow,
+}
+
+impl Row<'_> {
+    /// A number of the vortex that was found; NaN of one that was not.
+    fn found(&self, number: impl Fn(&VortexResult) -> f64) -> f64 {
+        self.row.found.as_ref().map_or(f64::NAN, number)
+    }
+}
+
+/// Rows as those of the first part; positions have no standard deviation where the method reports none.
 pub(super) fn table(flows: &[OfFlow]) -> Table {
-    let rows: Vec<((&OfFlow, &str), &RetrievalRow)> = flows
-        .iter()
-        .flat_map(|flow| {
-            flow.rows
-                .iter()
-                .map(move |(name, row)| ((flow, *name), row))
-        })
-        .collect();
-    let float = |get: &dyn Fn(&RetrievalRow) -> Option<f64>| -> Vec<f64> {
-        rows.iter()
-            .map(|(_, row)| get(row).unwrap_or(f64::NAN))
-            .collect()
-    };
-    let found = |get: fn(&VortexResult) -> f64| {
-        float(&move |row: &RetrievalRow| row.found.as_ref().map(get))
-    };
+    let mut rows = Vec::new();
+    for flow in flows {
+        for (method, row) in &flow.rows {
+            rows.push(Row { flow, method, row });
+        }
+    }
+    let mut gamma_true = Vec::new();
+    let mut gamma = Vec::new();
+    let mut gamma_std = Vec::new();
+    let mut y_error = Vec::new();
+    let mut y_std = Vec::new();
+    let mut z_error = Vec::new();
+    let mut z_std = Vec::new();
+    for row in &rows {
+        let truth = &row.row.truth;
+        let true_y_m = truth.lateral_position_m.value;
+        let true_z_m = truth.height_m.value;
+        gamma_true.push(truth.circulation_5_15_m2_s.value);
+        gamma.push(row.found(|v| v.circulation_5_15_m2_s.value));
+        gamma_std.push(row.found(|v| v.circulation_5_15_m2_s.std));
+        y_error.push(row.found(|v| v.lateral_position_m.value - true_y_m));
+        y_std.push(row.found(|v| v.lateral_position_m.std));
+        z_error.push(row.found(|v| v.height_m.value - true_z_m));
+        z_std.push(row.found(|v| v.height_m.std));
+    }
     Table::new()
-        .text("flow", rows.iter().map(|((flow, _), _)| flow.name()))
-        .int("scan", rows.iter().map(|(_, row)| row.realisation as i64))
-        .text("method", rows.iter().map(|((_, name), _)| *name))
-        .float(
-            "gamma_true_m2_s",
-            float(&|row| Some(row.truth.circulation_5_15_m2_s.value)),
-        )
-        .float("gamma_m2_s", found(|v| v.circulation_5_15_m2_s.value))
-        .float("gamma_std_m2_s", found(|v| v.circulation_5_15_m2_s.std))
-        .float(
-            "y_error_m",
-            float(&|row| {
-                Some(row.found?.lateral_position_m.value - row.truth.lateral_position_m.value)
-            }),
-        )
-        .float(
-            "z_error_m",
-            float(&|row| Some(row.found?.height_m.value - row.truth.height_m.value)),
-        )
-        .text("vortex", rows.iter().map(|(_, row)| name(row.truth.side)))
-        .float("y_std_m", found(|v| v.lateral_position_m.std))
-        .float("z_std_m", found(|v| v.height_m.std))
+        .text("flow", rows.iter().map(|row| row.flow.name()))
+        .int("scan", rows.iter().map(|row| row.row.realisation as i64))
+        .text("method", rows.iter().map(|row| row.method))
+        .float("gamma_true_m2_s", gamma_true)
+        .float("gamma_m2_s", gamma)
+        .float("gamma_std_m2_s", gamma_std)
+        .float("y_error_m", y_error)
+        .float("z_error_m", z_error)
+        .text("vortex", rows.iter().map(|row| name(row.row.truth.side)))
+        .float("y_std_m", y_std)
+        .float("z_std_m", z_std)
         .float("snr_db", rows.iter().map(|_| SNR_DB))
 }
 
@@ -188,19 +213,19 @@ pub(super) fn picture(flows: &[OfFlow]) -> CurvePlot {
     let title = "all methods: bias and scatter of Γ_{5-15} (age 0: analytic pair)";
     let mut plot = CurvePlot::new(title, Axis::linear("τ"), Axis::linear("error [%]"));
     for (k, name) in names().enumerate() {
-        let known = flows
-            .iter()
-            .map(|flow| (flow.tau.unwrap_or(0.0), flow.errors(name).0));
-        let points: Vec<(f64, Vec<f64>)> = known.filter(|(_, errors)| !errors.is_empty()).collect();
-        if points.is_empty() {
-            continue;
+        let mut points = Vec::new();
+        for flow in flows {
+            let errors = flow.errors(name).percent;
+            if errors.is_empty() {
+                continue;
+            }
+            let scatter = Estimate::stated(mean(&errors, None), Estimate::deviation(&errors));
+            let x = flow.tau.unwrap_or(0.0) + 0.05 * (k as f64 - 2.0);
+            points.push((x, scatter));
         }
-        let scatter =
-            |errors: &[f64]| Estimate::stated(mean(errors, None), Estimate::deviation(errors));
-        let points = points
-            .iter()
-            .map(|(tau, errors)| (tau + 0.05 * (k as f64 - 2.0), scatter(errors)));
-        plot = plot.with(banded(name, Style::Markers, points).in_colour(k));
+        if !points.is_empty() {
+            plot = plot.with(banded(name, Style::Markers, points).in_colour(k));
+        }
     }
     plot.with(Series::new("", Style::Dash, [(-0.2, 0.0), (4.2, 0.0)]).in_colour(6))
 }
@@ -213,21 +238,23 @@ pub(super) fn claims(flows: &[OfFlow]) -> Vec<Claim> {
         .collect()
 }
 
-/// The bias of the method that is judged; all are told.
+/// The bias of the method that is judged; all are reported.
 fn claim(id: &str, flow: &OfFlow) -> Claim {
-    let others = names()
-        .filter(|name| *name != JUDGED)
-        .map(|name| (name, flow.errors(name)));
-    let told = others.filter(|(_, (errors, ..))| !errors.is_empty()).map(
-        |(name, (errors, failures, bias))| {
-            let scatter = Estimate::deviation(&errors);
-            format!(
-                "{name} {} %, scatter {scatter:.1} %, {failures} failed",
-                bias.words()
-            )
-        },
-    );
-    let (_, failures, bias) = flow.errors(JUDGED);
-    let words = format!("{failures} failed; {}", told.collect::<Vec<_>>().join("; "));
-    Claim::judged_alone(id, bias, " %", Bar::Between(-5.0, 5.0)).of_fits(failures, &words)
+    let judged = flow.errors(JUDGED);
+    let mut others = Vec::new();
+    for name in names() {
+        let errors = flow.errors(name);
+        if name == JUDGED || errors.percent.is_empty() {
+            continue;
+        }
+        others.push(format!(
+            "{name} {} %, scatter {:.1} %, {} failed",
+            errors.bias.words(),
+            Estimate::deviation(&errors.percent),
+            errors.missing
+        ));
+    }
+    let words = format!("{} failed; {}", judged.missing, others.join("; "));
+    Claim::judged_alone(id, judged.bias, " %", Bar::Between(-5.0, 5.0))
+        .of_fits(judged.missing, &words)
 }

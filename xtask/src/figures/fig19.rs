@@ -41,10 +41,11 @@ fn scene(range_m: f64, step_m: f64) -> Scene {
     scene.estimator.window_step_samples = 4;
     scene.scan.elevation_step_rad = step_m / range_m;
     scene.scan.elevation_max_rad = HEIGHT_M / range_m;
-    (scene.scan.range_min_m, scene.scan.range_max_m) =
-        (range_m - HALF_LENGTH_M, range_m + HALF_LENGTH_M);
+    scene.scan.range_min_m = range_m - HALF_LENGTH_M;
+    scene.scan.range_max_m = range_m + HALF_LENGTH_M;
     scene.scan.realisations = 1;
-    (scene.outputs.svg, scene.outputs.png) = (false, false);
+    scene.outputs.svg = false;
+    scene.outputs.png = false;
     scene
 }
 
@@ -76,7 +77,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let step_m = context.profile.choose(1.0, 0.5, 0.5);
     // Few scans tell a high rate alone.
     let (scans, rate) = context.profile.choose((24, 0.3), (300, 0.1), (1000, 0.1));
-    let (mut cases, mut alarmed) = (Vec::new(), None);
+    let mut cases = Vec::new();
+    let mut alarmed = None;
     for &range_m in &ranges_m {
         let plan = Plan::new(context.scene_file(scene(range_m, step_m))?, Target::Map)?;
         let snr_db = snr_without_screens_db(&plan, &[range_m])?
@@ -86,12 +88,9 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         let noise = SceneNoise::new(&plan, &Silent)?;
         for (background, turbulence) in [("still air", None), ("turbulence", Some(AIR))] {
             let settings = settings(&plan, &noise, turbulence, FALSE_ALARM)?;
-            let power = Calibration::new(
-                &strided(&noise.empty_scan(&plan), settings.stride),
-                &settings,
-                &Silent,
-            )?
-            .power(&settings, &Silent)?;
+            let empty = strided(&noise.empty_scan(&plan), settings.stride);
+            let calibration = Calibration::new(&empty, &settings, &Silent)?;
+            let power = calibration.power(&settings, &Silent)?;
             cases.push(Case {
                 background,
                 range_m,
@@ -100,7 +99,7 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
             });
         }
         if range_m == ALARM_RANGE_M {
-            alarmed = Some(alarms(&plan, &noise, (scans, rate))?);
+            alarmed = Some(Alarms::count(&plan, &noise, scans, rate)?);
         }
     }
     let alarmed = alarmed.ok_or_else(|| Failure::new(format!("no scan at {ALARM_RANGE_M} m")))?;
@@ -119,124 +118,102 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         AIR.deviation_m_s.to_string(),
         AIR.length_m.to_string(),
     ];
-    out.claims = claims(&cases, alarmed);
+    out.claims = claims(&cases, &alarmed);
     Ok(out)
 }
 
-/// Share of alarms at a rate in whole scans of still air, each with signals of its own, through the scene's estimator; the rate and its
-/// binomial standard error.
-fn alarms(
-    plan: &Plan,
-    noise: &SceneNoise,
-    (scans, rate): (usize, f64),
-) -> Result<(Share, [f64; 2]), Failure> {
-    let settings = settings(plan, noise, None, rate)?;
-    let mut file = plan.scene.clone();
-    file.content.scan.realisations = scans;
-    let shown_m_s = velocities(&Plan::new(file, Target::Map)?, &Silent)?;
-    let maps: Vec<_> = shown_m_s
-        .into_iter()
-        .map(|velocity_m_s| ScanMap {
-            velocity_m_s,
-            ..noise.empty_scan(plan)
+/// Alarms in whole scans of still air, each with signals of its own, through the scene's estimator.
+struct Alarms {
+    share: Share,
+    /// The rate that was set.
+    rate: f64,
+    /// Its binomial standard error.
+    rate_error: f64,
+}
+
+impl Alarms {
+    fn count(plan: &Plan, noise: &SceneNoise, scans: usize, rate: f64) -> Result<Self, Failure> {
+        let settings = settings(plan, noise, None, rate)?;
+        let mut file = plan.scene.clone();
+        file.content.scan.realisations = scans;
+        let mut maps = Vec::new();
+        for velocity_m_s in velocities(&Plan::new(file, Target::Map)?, &Silent)? {
+            maps.push(ScanMap {
+                velocity_m_s,
+                ..noise.empty_scan(plan)
+            });
+        }
+        let (found, _) = detect(&maps, &settings, &Silent)?;
+        let alarms = found.iter().filter(|scan| scan.is_wake()).count();
+        Ok(Self {
+            share: Share::of(alarms, maps.len()),
+            rate,
+            rate_error: (rate * (1.0 - rate) / maps.len() as f64).sqrt(),
         })
-        .collect();
-    let (found, _) = detect(&maps, &settings, &Silent)?;
-    let error = (rate * (1.0 - rate) / maps.len() as f64).sqrt();
-    Ok((
-        Share::of(
-            found.iter().filter(|scan| scan.is_wake()).count(),
-            maps.len(),
-        ),
-        [rate, error],
-    ))
+    }
+}
+
+/// A row of the table: circulation, rate of false alarms, share found and its standard error.
+struct Row<'c> {
+    case: &'c Case,
+    gamma_m2_s: f64,
+    false_alarm: f64,
+    detection: f64,
+    standard_error: f64,
 }
 
 /// Rows of operating curves, of shares at the rate, and of the smallest circulation.
 fn table(cases: &[Case]) -> Table {
-    let mut rows: Vec<(&Case, [f64; 4])> = Vec::new();
+    let mut rows = Vec::new();
     for case in cases {
-        rows.extend(
-            case.power
-                .roc
-                .iter()
-                .map(|r| (case, [r.0, r.1, r.3.value, r.3.standard_error])),
-        );
-        rows.extend(
-            case.power
-                .found
-                .iter()
-                .map(|r| (case, [r.0, FALSE_ALARM, r.3.value, r.3.standard_error])),
-        );
-        rows.push((
+        for (gamma_m2_s, false_alarm, _, share) in &case.power.roc {
+            rows.push(Row {
+                case,
+                gamma_m2_s: *gamma_m2_s,
+                false_alarm: *false_alarm,
+                detection: share.value,
+                standard_error: share.standard_error,
+            });
+        }
+        for (gamma_m2_s, _, _, share) in &case.power.found {
+            rows.push(Row {
+                case,
+                gamma_m2_s: *gamma_m2_s,
+                false_alarm: FALSE_ALARM,
+                detection: share.value,
+                standard_error: share.standard_error,
+            });
+        }
+        rows.push(Row {
             case,
-            [case.power.smallest_m2_s.0, FALSE_ALARM, 0.9, f64::NAN],
-        ));
+            gamma_m2_s: case.power.smallest_m2_s.0,
+            false_alarm: FALSE_ALARM,
+            detection: 0.9,
+            standard_error: f64::NAN,
+        });
     }
-    let column = |i: usize| rows.iter().map(move |row| row.1[i]).collect::<Vec<_>>();
     Table::new()
-        .text("background", rows.iter().map(|row| row.0.background))
+        .text("background", rows.iter().map(|row| row.case.background))
         .text("method", rows.iter().map(|_| "map"))
-        .float("range_m", rows.iter().map(|row| row.0.range_m))
-        .float("snr_db", rows.iter().map(|row| row.0.snr_db))
-        .float("gamma_m2_s", column(0))
-        .float("false_alarm", column(1))
-        .float("detection", column(2))
-        .float("standard_error", column(3))
+        .float("range_m", rows.iter().map(|row| row.case.range_m))
+        .float("snr_db", rows.iter().map(|row| row.case.snr_db))
+        .float("gamma_m2_s", rows.iter().map(|row| row.gamma_m2_s))
+        .float("false_alarm", rows.iter().map(|row| row.false_alarm))
+        .float("detection", rows.iter().map(|row| row.detection))
+        .float("standard_error", rows.iter().map(|row| row.standard_error))
         .float(
             "sigma_gamma_m2_s",
-            rows.iter().map(|row| row.0.power.circulation_std_m2_s),
+            rows.iter().map(|row| row.case.power.circulation_std_m2_s),
         )
         .float(
             "smallest_foretold_m2_s",
-            rows.iter().map(|row| row.0.power.smallest_m2_s.1),
+            rows.iter().map(|row| row.case.power.smallest_m2_s.1),
         )
 }
 
 fn picture(cases: &[Case]) -> Figure {
-    let mut roc = CurvePlot::new(
-        "Operating curves",
-        Axis::log("rate of false alarms"),
-        Axis::linear("share found").between(0.0, 1.0),
-    );
-    for (place, case) in cases
-        .iter()
-        .filter(|case| case.range_m == 400.0)
-        .enumerate()
-    {
-        let styles = [Style::Dot, Style::DashDot, Style::Dash, Style::Line];
-        for (curve, style) in case.power.roc.chunk_by(|a, b| a.0 == b.0).zip(styles) {
-            let label = format!(
-                "{}, {:.0} m²/s",
-                case.background,
-                curve.first().map_or(f64::NAN, |row| row.0)
-            );
-            let points = curve.iter().map(|row| (row.1, row.3.value));
-            roc = roc.with(Series::new(&label, style, points).in_colour(place));
-        }
-    }
-    let mut smallest = CurvePlot::new(
-        "Found nine times in ten",
-        Axis::linear("range [m]"),
-        Axis::linear("circulation [m²/s]"),
-    );
-    for (place, background) in ["still air", "turbulence"].into_iter().enumerate() {
-        let of = |get: fn(&Power) -> f64| -> Vec<(f64, f64)> {
-            let own = cases.iter().filter(|case| case.background == background);
-            own.map(|case| (case.range_m, get(&case.power))).collect()
-        };
-        smallest = smallest
-            .with(
-                Series::new(
-                    background,
-                    Style::LineMarkers,
-                    of(|power| power.smallest_m2_s.0),
-                )
-                .in_colour(place),
-            )
-            .with(Series::new("", Style::Dash, of(|power| power.smallest_m2_s.1)).in_colour(place));
-    }
-    let figure = Figure::side_by_side([roc, smallest].map(|plot| CurvePlot {
+    let panels = [operating_curves(cases), smallest_circulations(cases)];
+    let figure = Figure::side_by_side(panels.map(|plot| CurvePlot {
         shape: 0.75,
         ..plot
     }));
@@ -246,29 +223,67 @@ fn picture(cases: &[Case]) -> Figure {
     }
 }
 
-fn claims(cases: &[Case], (alarms, [rate, error]): (Share, [f64; 2])) -> Vec<Claim> {
-    let ratios: Vec<f64> = cases
+fn operating_curves(cases: &[Case]) -> CurvePlot {
+    let x = Axis::log("rate of false alarms");
+    let y = Axis::linear("share found").between(0.0, 1.0);
+    let mut plot = CurvePlot::new("Operating curves", x, y);
+    let near = cases.iter().filter(|case| case.range_m == 400.0);
+    for (colour, case) in near.enumerate() {
+        let styles = [Style::Dot, Style::DashDot, Style::Dash, Style::Line];
+        for (curve, style) in case.power.roc.chunk_by(|a, b| a.0 == b.0).zip(styles) {
+            let gamma_m2_s = curve.first().map_or(f64::NAN, |row| row.0);
+            let label = format!("{}, {gamma_m2_s:.0} m²/s", case.background);
+            let points = curve.iter().map(|row| (row.1, row.3.value));
+            plot = plot.with(Series::new(&label, style, points).in_colour(colour));
+        }
+    }
+    plot
+}
+
+/// What is found nine times in ten, and what the bound predicts.
+fn smallest_circulations(cases: &[Case]) -> CurvePlot {
+    let x = Axis::linear("range [m]");
+    let y = Axis::linear("circulation [m²/s]");
+    let mut plot = CurvePlot::new("Found nine times in ten", x, y);
+    for (colour, background) in ["still air", "turbulence"].into_iter().enumerate() {
+        let mut found = Vec::new();
+        let mut predicted = Vec::new();
+        for case in cases.iter().filter(|case| case.background == background) {
+            let (found_m2_s, predicted_m2_s) = case.power.smallest_m2_s;
+            found.push((case.range_m, found_m2_s));
+            predicted.push((case.range_m, predicted_m2_s));
+        }
+        let found = Series::new(background, Style::LineMarkers, found);
+        let predicted = Series::new("", Style::Dash, predicted);
+        plot = plot
+            .with(found.in_colour(colour))
+            .with(predicted.in_colour(colour));
+    }
+    plot
+}
+
+/// Of some numbers that which is farthest from a value; the value if there is none.
+fn farthest(numbers: impl Iterator<Item = f64>, from: f64) -> f64 {
+    let mut farthest = from;
+    for number in numbers {
+        if (number - from).abs() > (farthest - from).abs() {
+            farthest = number;
+        }
+    }
+    farthest
+}
+
+fn claims(cases: &[Case], alarms: &Alarms) -> Vec<Claim> {
+    let ratios = cases
         .iter()
-        .map(|c| c.power.smallest_m2_s.0 / c.power.smallest_m2_s.1)
-        .collect();
-    let worst = ratios.iter().fold(1.0_f64, |worst, r| {
-        if (r - 1.0).abs() > (worst - 1.0).abs() {
-            *r
-        } else {
-            worst
-        }
-    });
-    let betas: Vec<f64> = cases.iter().map(|c| c.power.gumbel.1).collect();
-    let far = betas.iter().fold(2.0_f64, |far, b| {
-        if (b - 2.0).abs() > (far - 2.0).abs() {
-            *b
-        } else {
-            far
-        }
-    });
-    // a test that would pass twice the rate tells nothing
-    let alarms = Estimate::stated(alarms.value, error);
-    let rates = Claim::judged_alone("F19c", alarms, "", Bar::Between(0.5 * rate, 2.0 * rate));
+        .map(|c| c.power.smallest_m2_s.0 / c.power.smallest_m2_s.1);
+    let worst = farthest(ratios, 1.0);
+    let far = farthest(cases.iter().map(|c| c.power.gumbel.1), 2.0);
+    let rate = alarms.rate;
+    // A test that would pass twice the rate tells nothing.
+    let bar = Bar::Between(0.5 * rate, 2.0 * rate);
+    let share = Estimate::stated(alarms.share.value, alarms.rate_error);
+    let rates = Claim::judged_alone("F19c", share, "", bar);
     vec![
         Claim::exact("F19a", format!("{worst:.3}"), (0.75..1.25).contains(&worst)),
         Claim::exact("F19b", format!("{far:.2}"), (1.6..2.5).contains(&far)),
