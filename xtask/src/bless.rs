@@ -6,11 +6,11 @@ use crate::wakes;
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
 use wakescope_sim::io::write_atomic;
-use wakescope_tests::curves::{ALL, Origin};
+use wakescope_tests::curves::{ALL, Curve, Origin};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+pub(crate) struct BlessArgs {
     /// Names of the curves, as `cargo xtask regress` prints them; `wake`, which the figures of the profile quick look at.
     #[arg(required = true)]
     names: Vec<String>,
@@ -20,20 +20,13 @@ pub(crate) struct Options {
 ///
 /// # Errors
 /// An unknown name, a curve of independent origin, or one that cannot be computed.
-pub(crate) fn run(options: &Options) -> Outcome {
-    for name in &options.names {
+pub(crate) fn run(args: &BlessArgs) -> Outcome {
+    for name in &args.names {
         if name == wakes::NAME {
             wakes::bless()?;
             continue;
         }
-        let curve = ALL.iter().find(|c| c.name == name).ok_or_else(|| {
-            let known: Vec<&str> = ALL.iter().map(|c| c.name).collect();
-            Failure::new(format!(
-                "bless {name}: no such curve; there are {}, {}",
-                wakes::NAME,
-                known.join(", ")
-            ))
-        })?;
+        let curve = curve(name)?;
         let Origin::Blessed { quantity, grid } = curve.origin else {
             let why = "it comes from an independent source and is not ours to write";
             return Err(Failure::new(format!("bless {name}: {why}")));
@@ -44,12 +37,27 @@ pub(crate) fn run(options: &Options) -> Outcome {
             "# {quantity}\n# Source: cargo xtask bless {name}\n# Uncertainty: the same seed gives the same curve; tolerance of the comparison {:e}\n{},{}\n",
             curve.tolerance, curve.x, curve.y
         );
-        text.extend(x.iter().zip(&y).map(|(x, y)| format!("{x:?},{y:?}\n")));
+        for (x, y) in x.iter().zip(&y) {
+            text += &format!("{x:?},{y:?}\n");
+        }
         write_atomic(&root().join(curve.file), text)?;
-        let (points, file) = (x.len(), curve.file);
         println!(
-            "wrote {points} points to {file}: say in CHANGELOG.md, under Numerics, why the curve changed"
+            "wrote {} points to {}: say in CHANGELOG.md, under Numerics, why the curve changed",
+            x.len(),
+            curve.file
         );
     }
     Ok(())
+}
+
+/// The stored curve of a name.
+fn curve(name: &str) -> Result<&'static Curve, Failure> {
+    ALL.iter().find(|curve| curve.name == name).ok_or_else(|| {
+        let known: Vec<&str> = ALL.iter().map(|curve| curve.name).collect();
+        Failure::new(format!(
+            "bless {name}: no such curve; there are {}, {}",
+            wakes::NAME,
+            known.join(", ")
+        ))
+    })
 }

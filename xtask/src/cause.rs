@@ -6,36 +6,39 @@ use sha2::{Digest, Sha256};
 use std::path::Path;
 use walkdir::WalkDir;
 
+/// Bytes of a hash that are kept.
+const HASH_BYTES: usize = 12;
+
 /// Twelve bytes in hexadecimal of the parameters and of the files and folders in `places`, below `root`; tests do not count.
 ///
 /// # Errors
 /// A place that is not there, a file that cannot be read.
 pub(crate) fn cause(root: &Path, parameters: &[&str], places: &[&str]) -> Result<String, Failure> {
     let mut hash = Sha256::new();
-    let mut add = |bytes: &[u8]| {
-        hash.update(bytes.len().to_le_bytes());
-        hash.update(bytes);
-    };
-    parameters
-        .iter()
-        .for_each(|parameter| add(parameter.as_bytes()));
-    for file in places
-        .iter()
-        .flat_map(|place| WalkDir::new(root.join(place)).sort_by_file_name())
-    {
-        let file = file?;
-        let name = file.path().strip_prefix(root)?.to_string_lossy();
-        if file.file_type().is_file() && !is_test_file(&name) {
-            add(name.as_bytes());
-            add(&std::fs::read(file.path())?);
+    for parameter in parameters {
+        add(&mut hash, parameter.as_bytes());
+    }
+    for place in places {
+        for file in WalkDir::new(root.join(place)).sort_by_file_name() {
+            let file = file?;
+            let name = file.path().strip_prefix(root)?.to_string_lossy();
+            if file.file_type().is_file() && !is_test_file(&name) {
+                add(&mut hash, name.as_bytes());
+                add(&mut hash, &std::fs::read(file.path())?);
+            }
         }
     }
-    Ok(hash
-        .finalize()
-        .iter()
-        .take(12)
-        .map(|b| format!("{b:02x}"))
-        .collect())
+    let mut digits = String::new();
+    for byte in hash.finalize().iter().take(HASH_BYTES) {
+        digits += &format!("{byte:02x}");
+    }
+    Ok(digits)
+}
+
+/// Adds some bytes and how many they are.
+fn add(hash: &mut Sha256, bytes: &[u8]) {
+    hash.update(bytes.len().to_le_bytes());
+    hash.update(bytes);
 }
 
 #[cfg(test)]

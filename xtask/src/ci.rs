@@ -12,7 +12,7 @@ use std::time::Instant;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+pub(crate) struct CiArgs {
     /// Run only the steps whose name contains this.
     #[arg(long, value_name = "WORD")]
     only: Option<String>,
@@ -46,46 +46,50 @@ fn readme_test_command(readme: &str) -> Result<String, Failure> {
 ///
 /// # Errors
 /// The step that failed.
-pub(crate) fn run(options: &Options) -> Outcome {
+pub(crate) fn run(args: &CiArgs) -> Outcome {
     let own = std::env::current_exe()?;
-    let words = [
+    let program = own.with_file_name("wakescope");
+    let bins = if cfg!(debug_assertions) {
+        "--bins --tests"
+    } else {
+        "--bins --release"
+    };
+    let replacements = [
         ("{xtask}", format!("'{}'", own.display())),
-        (
-            "{wakescope}",
-            format!("'{}'", own.with_file_name("wakescope").display()),
-        ),
-        (
-            "{bins}",
-            if cfg!(debug_assertions) {
-                "--bins --tests"
-            } else {
-                "--bins --release"
-            }
-            .into(),
-        ),
+        ("{wakescope}", format!("'{}'", program.display())),
+        ("{bins}", bins.into()),
         ("{test}", readme_test_command(&read("README.md")?)?),
     ];
-    let Steps { step } = toml::from_str(include_str!("ci.toml"))?;
-    for Step { name, commands } in step {
-        for command in commands.iter().filter(|_| {
-            options
-                .only
-                .as_ref()
-                .is_none_or(|word| name.contains(word.as_str()))
-        }) {
-            let command = words.iter().fold(command.clone(), |command, (word, text)| {
-                command.replace(word, text)
-            });
-            println!("== {name}: {command}");
-            let start = Instant::now();
-            call(Command::new("sh").args(["-c", &command]))
-                .map_err(|failure| Failure::new(format!("ci: {name}: {failure}")))?;
-            println!(
-                "== {name}: passed in {:.0} s",
-                start.elapsed().as_secs_f64()
-            );
+    let steps: Steps = toml::from_str(include_str!("ci.toml"))?;
+    for step in steps.step {
+        if args
+            .only
+            .as_ref()
+            .is_some_and(|word| !step.name.contains(word))
+        {
+            continue;
+        }
+        for command in &step.commands {
+            let mut command = command.clone();
+            for (name, text) in &replacements {
+                command = command.replace(name, text);
+            }
+            run_step(&step.name, &command)?;
         }
     }
+    Ok(())
+}
+
+/// Runs a command of a step and prints its run time.
+fn run_step(name: &str, command: &str) -> Outcome {
+    println!("== {name}: {command}");
+    let start = Instant::now();
+    call(Command::new("sh").args(["-c", command]))
+        .map_err(|failure| Failure::new(format!("ci: {name}: {failure}")))?;
+    println!(
+        "== {name}: passed in {:.0} s",
+        start.elapsed().as_secs_f64()
+    );
     Ok(())
 }
 

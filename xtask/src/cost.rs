@@ -1,5 +1,5 @@
-//! What a piece of work takes: processor time, time on the clock, memory; and on which machine. Linux only: memory and machine come
-//! from /proc.
+//! What a piece of work costs: processor time, time on the clock, memory; and on which machine. Linux only: memory and machine
+//! come from /proc.
 
 use crate::process::{output, resident_peak_bytes};
 use fixtures::failure::Failure;
@@ -40,17 +40,15 @@ impl Cost {
 
 /// Runs a piece of work and measures it.
 pub(crate) fn measured<T>(work: impl FnOnce() -> Result<T, Failure>) -> Result<(T, Cost), Failure> {
-    let (before_s, start) = (clock_s(ClockId::ProcessCPUTime), Instant::now());
+    let before_s = clock_s(ClockId::ProcessCPUTime);
+    let start = Instant::now();
     let value = work()?;
-    let cpu_s = clock_s(ClockId::ProcessCPUTime) - before_s;
-    Ok((
-        value,
-        Cost {
-            cpu_s,
-            wall_s: start.elapsed().as_secs_f64(),
-            peak_mem_bytes: resident_peak_bytes("self"),
-        },
-    ))
+    let cost = Cost {
+        cpu_s: clock_s(ClockId::ProcessCPUTime) - before_s,
+        wall_s: start.elapsed().as_secs_f64(),
+        peak_mem_bytes: resident_peak_bytes("self"),
+    };
+    Ok((value, cost))
 }
 
 /// What a clock says, s: that of the process counts all its threads, those that have ended included.
@@ -76,13 +74,13 @@ pub(crate) fn fastest<T>(
     let times = (TELLABLE_S / first.wall_s.max(1e-6))
         .ceil()
         .clamp(1.0, 10_000.0) as usize;
-    let mut batch = || {
-        measured(|| (0..times).try_for_each(|_| work().map(drop)))
-            .map(|((), cost)| cost.scaled(1.0 / times as f64))
+    let mut cost = if times == 1 {
+        first
+    } else {
+        repeated(&mut work, times)?
     };
-    let mut cost = if times == 1 { first } else { batch()? };
     for _ in 0..2 {
-        let again = batch()?;
+        let again = repeated(&mut work, times)?;
         cost = Cost {
             cpu_s: cost.cpu_s.min(again.cpu_s),
             wall_s: cost.wall_s.min(again.wall_s),
@@ -92,20 +90,31 @@ pub(crate) fn fastest<T>(
     Ok((value, cost))
 }
 
+/// Mean cost of work that is done several times in a row.
+fn repeated<T>(
+    work: &mut impl FnMut() -> Result<T, Failure>,
+    times: usize,
+) -> Result<Cost, Failure> {
+    let ((), cost) = measured(|| {
+        for _ in 0..times {
+            work()?;
+        }
+        Ok(())
+    })?;
+    Ok(cost.scaled(1.0 / times as f64))
+}
+
 /// Kind of processor, number of cores and compiler, as far as the system tells.
 pub(crate) fn machine() -> String {
-    let cpu = std::fs::read_to_string("/proc/cpuinfo")
-        .ok()
-        .and_then(|text| {
-            let line = text.lines().find(|l| l.starts_with("model name"))?;
-            line.split_once(':').map(|(_, name)| name.trim().to_owned())
-        });
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let line = cpuinfo.lines().find(|l| l.starts_with("model name"));
+    let cpu = line.and_then(|line| line.split_once(':'));
     let cores = std::thread::available_parallelism().map_or(0, usize::from);
     let compiler =
         output(Command::new("rustc").arg("--version")).map(|text| text.trim().to_owned());
     format!(
         "{} ({}, {}), {cores} cores, {}",
-        cpu.unwrap_or_else(|| "processor unknown".into()),
+        cpu.map_or("processor unknown", |(_, name)| name.trim()),
         std::env::consts::ARCH,
         std::env::consts::OS,
         compiler.unwrap_or_else(|_| "compiler unknown".into())

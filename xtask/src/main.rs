@@ -48,29 +48,29 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Task {
     /// Draw the figures, measure the claims, write the report.
-    ReproduceFigs(reproduce::Options),
+    ReproduceFigs(reproduce::ReproduceFigsArgs),
     /// Compare what the crates compute now with the stored reference curves.
-    Regress(regress::Options),
-    /// A wake under `mpirun` against one process; a run whose second process is killed.
-    Ranks(ranks::Options),
+    Regress(regress::RegressArgs),
+    /// Compare a wake under `mpirun` with one process; kill a process of a run.
+    Ranks(ranks::RanksArgs),
     /// Write stored reference curves from what the crates compute now.
-    Bless(bless::Options),
+    Bless(bless::BlessArgs),
     /// Measure error against run time.
     WorkPrecision(work_precision::WorkPrecisionArgs),
-    /// What a scene and a crate do not pay for: runs with and without, crates compiled.
+    /// Cost of each part of a scene and of each feature of a crate.
     LeftOut(left_out::LeftOutArgs),
     /// Fit many scans of a vortex pair: bias, scatter, reported error, bound.
     FitTrials(fit_trials::FitTrialsArgs),
-    /// Run every stiff and extreme case of the crates: what it must come to, what it came to.
-    Stability(stability::Options),
-    /// Hold every number that the program writes or prints against its definition, on random scenes and cases.
+    /// Run every stiff and extreme case of the crates against its expected outcome.
+    Stability(stability::StabilityArgs),
+    /// Compare every number of the program with its definition on random scenes and cases.
     Audit(audit::AuditArgs),
     /// Build the book as a static site, with the documentation of the crates beside it.
     Book,
     /// Check the rules of the house.
     Tidy,
-    /// Everything that continuous integration runs.
-    Ci(ci::Options),
+    /// Run everything that continuous integration runs.
+    Ci(ci::CiArgs),
 }
 
 fn main() -> std::process::ExitCode {

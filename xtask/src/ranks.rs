@@ -8,7 +8,6 @@ use crate::workspace::{built, root};
 use fixtures::failure::{Failure, Outcome};
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs::DirEntry;
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -34,107 +33,132 @@ pub(crate) const PLANES: f64 = 63.0;
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
-    /// Measure as well, which decides nothing: two ranks against one, and single exchanges.
+pub(crate) struct RanksArgs {
+    /// Also measure two ranks against one, and single exchanges; decides nothing.
     #[arg(long)]
     measure: bool,
 }
 
-/// Runs the checks, or says why there are none.
+/// Runs the checks, or prints why there are none.
 ///
 /// # Errors
-/// A build that fails, files that differ, a run that hangs or ends well although a process was killed.
-pub(crate) fn run(options: &Options) -> Outcome {
-    let succeeds = |command: &str| {
-        let status = Command::new("sh")
-            .args(["-c", command])
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .status();
-        status.is_ok_and(|status| status.success())
-    };
-    let is_there = || succeeds(IS_THERE);
-    let installed = || succeeds("[ $(id -u) = 0 ]") && succeeds(INSTALL) && is_there();
-    if !is_there() && !installed() {
+/// Fails if the build does, files differ, or a run hangs or succeeds although a process was killed.
+pub(crate) fn run(args: &RanksArgs) -> Outcome {
+    if !succeeds(IS_THERE) && !is_installed() {
         println!(
             "skipped: mpicc, mpirun or libclang is missing, and cannot be installed here ({INSTALL})"
         );
         return Ok(());
     }
-    // As one of the workspace, with the features that its other crates ask for.
-    let example: &[&str] = if options.measure {
-        &["--example", "exchange_times"]
-    } else {
-        &[]
-    };
-    let words = [
-        "build",
-        "--quiet",
-        "--workspace",
-        "--features",
-        "wakescope-sim/mpi",
-        "--bin",
-        "wakescope",
-    ];
-    call(Command::new(env!("CARGO")).args(words).args(example))?;
+    // As one of the workspace, with the features that its other crates need.
+    let mut build = Command::new(env!("CARGO"));
+    build.args(["build", "--quiet", "--workspace", "--bin", "wakescope"]);
+    build.args(["--features", "wakescope-sim/mpi"]);
+    if args.measure {
+        build.args(["--example", "exchange_times"]);
+    }
+    call(&mut build)?;
     let program = built().join("debug/wakescope");
     let scratch = root().join("target/ranks");
     let _ = std::fs::remove_dir_all(&scratch);
     std::fs::create_dir_all(&scratch)?;
-    std::fs::write(
-        scratch.join("short.toml"),
-        format!("{CASE}pause_after_steps = {STEPS}\n"),
-    )?;
+    let short = format!("{CASE}pause_after_steps = {STEPS}\n");
+    std::fs::write(scratch.join("short.toml"), short)?;
     std::fs::write(scratch.join("long.toml"), CASE)?;
     compare(&program, &scratch)?;
     kill_one(&program, &scratch)?;
-    if !options.measure {
+    if !args.measure {
         return Ok(());
     }
-    let work_s = measure(&program, &scratch)?;
-    exchanges(&built().join("debug/examples/exchange_times"), work_s)
+    let cell_s = measure(&program, &scratch)?;
+    exchanges(&built().join("debug/examples/exchange_times"), cell_s)
 }
 
-/// Prints how much less time steps take on two ranks of one thread than on one, and what they spend in turns and halos. A
+/// Whether a command of the shell succeeds.
+fn succeeds(command: &str) -> bool {
+    let mut shell = Command::new("sh");
+    shell.args(["-c", command]);
+    shell.stdout(Stdio::null()).stderr(Stdio::null());
+    shell.status().is_ok_and(|status| status.success())
+}
+
+/// Installs what is missing, as root alone; returns whether all is there.
+fn is_installed() -> bool {
+    succeeds("[ $(id -u) = 0 ]") && succeeds(INSTALL) && succeeds(IS_THERE)
+}
+
+/// What a flow reports of its steps.
+struct Times {
+    steps_s: f64,
+    /// In turns and halos.
+    exchange_s: f64,
+}
+
+/// Runs the flow of the measurement on some ranks of one thread.
+fn flow_times(program: &Path, scratch: &Path, ranks: usize, out: &str) -> Result<Times, Failure> {
+    let arguments = ["flow", "even.toml", "--quiet", "--json", "--threads", "1"];
+    let mut flow = mpirun(ranks);
+    flow.arg(program).args(arguments).args(["--out", out]);
+    let text = output(flow.current_dir(scratch))?;
+    let steps_s = json_number(&text, "steps_wall_s");
+    let exchange_s = json_number(&text, "exchange_wall_s");
+    let (Some(steps_s), Some(exchange_s)) = (steps_s, exchange_s) else {
+        return Err(Failure::new(format!("a flow reports no times: {text}")));
+    };
+    Ok(Times {
+        steps_s,
+        exchange_s,
+    })
+}
+
+/// The first number of a key in a text of JSON.
+fn json_number(text: &str, key: &str) -> Option<f64> {
+    let (_, rest) = text.split_once(&format!("\"{key}\":"))?;
+    rest.split([',', '}']).next()?.trim().parse().ok()
+}
+
+/// Prints how much less time steps need on two ranks of one thread than on one, and what they spend in turns and halos. A
 /// measurement, which depends on what else the machine does: nothing is decided by it. Returns the work on a cell in a stage by one \[s\].
 fn measure(program: &Path, scratch: &Path) -> Result<f64, Failure> {
-    let (cells, steps, stages) = (128, 4, 3);
+    let cells = 128;
+    let steps = 4;
+    let stages = 3;
     let case = format!(
         "format = 1\n[case]\nkind = \"vortex_pair\"\ncells = [{cells}, {cells}, {cells}]\n[time]\n\
          pause_after_steps = {steps}\n[solver]\nsubgrid = {{ model = \"multiscale_wale\" }}\n[checkpoint]\nwrite = false\n"
     );
     std::fs::write(scratch.join("even.toml"), case)?;
-    let times_s = |count: usize, out: &str| {
-        let words = [
-            "flow",
-            "even.toml",
-            "--quiet",
-            "--json",
-            "--threads",
-            "1",
-            "--out",
-            out,
-        ];
-        let text = output(mpirun(count).arg(program).args(words).current_dir(scratch))?;
-        let number = |key: &str| {
-            let (_, rest) = text.split_once(&format!("\"{key}\":"))?;
-            rest.split([',', '}']).next()?.trim().parse::<f64>().ok()
-        };
-        let both = number("steps_wall_s").zip(number("exchange_wall_s"));
-        both.ok_or_else(|| Failure::new(format!("a flow tells no times: {text}")))
-    };
-    let ((one_s, _), (two_s, exchange_s)) = (times_s(1, "even_one")?, times_s(2, "even_two")?);
+    let one = flow_times(program, scratch, 1, "even_one")?;
+    let two = flow_times(program, scratch, 2, "even_two")?;
     println!(
         "measured, {cells}^3 with the multiscale model: two ranks of one thread are {:.2} times as fast as one; {:.0} % of a \
          step in turns and halos",
-        one_s / two_s,
-        100.0 * exchange_s / two_s
+        one.steps_s / two.steps_s,
+        100.0 * two.exchange_s / two.steps_s
     );
-    Ok(one_s / f64::from(steps * stages * i32::pow(cells, 3)))
+    Ok(one.steps_s / f64::from(steps * stages * i32::pow(cells, 3)))
 }
 
-/// Prints how long single exchanges take on 2 to 4 ranks by the size of their messages, and how well equal slabs would scale by it if the
-/// work on a cell in a stage takes `cell_s` \[s\].
+/// A line of the example `exchange_times`: cells of a rank, bytes of a message and its time.
+struct Exchange {
+    cells: f64,
+    bytes: f64,
+    time_s: f64,
+}
+
+impl Exchange {
+    fn parse(line: &str) -> Option<Self> {
+        let mut numbers = line.split(',').skip(2).map(|word| word.parse().ok());
+        Some(Self {
+            cells: numbers.next()??,
+            bytes: numbers.next()??,
+            time_s: numbers.next()??,
+        })
+    }
+}
+
+/// Prints how long single exchanges last on 2 to 4 ranks by the size of their messages, and how well equal slabs would scale by it if the
+/// work on a cell in a stage needs `cell_s` \[s\].
 fn exchanges(program: &Path, cell_s: f64) -> Outcome {
     let cores = std::thread::available_parallelism()?.get();
     println!(
@@ -146,33 +170,23 @@ fn exchanges(program: &Path, cell_s: f64) -> Outcome {
     println!("|---|---|---|---|---|---|---|");
     for count in 2..=4 {
         let text = output(mpirun(count).arg(program))?;
-        let rows: Vec<Vec<&str>> = text
-            .lines()
-            .skip(1)
-            .map(|line| line.split(',').collect())
-            .collect();
-        for pair in rows.chunks(2) {
-            let [halos, turn] = [0, 1].map(|place| {
-                let numbers: Option<Vec<f64>> = pair
-                    .get(place)?
-                    .iter()
-                    .skip(2)
-                    .map(|word| word.parse().ok())
-                    .collect();
-                <[f64; 3]>::try_from(numbers?).ok()
-            });
-            let (Some([cells, halo_bytes, halo_s]), Some([_, turn_bytes, turn_s])) = (halos, turn)
-            else {
+        let lines: Vec<&str> = text.lines().skip(1).collect();
+        for pair in lines.chunks(2) {
+            let halos = pair.first().and_then(|line| Exchange::parse(line));
+            let turn = pair.get(1).and_then(|line| Exchange::parse(line));
+            let (Some(halos), Some(turn)) = (halos, turn) else {
                 return Err(Failure::new(format!("exchange_times prints\n{text}")));
             };
-            let work_s = cells * cell_s;
-            let efficiency = work_s / (work_s + TURNS * turn_s + PLANES / WHOLE * halo_s);
+            let work_s = halos.cells * cell_s;
+            let exchange_s = TURNS * turn.time_s + PLANES / WHOLE * halos.time_s;
             println!(
-                "| {count} | {cells} | {:.2} | {:.2} | {:.2} | {:.2} | {efficiency:.2} |",
-                1e-6 * turn_bytes,
-                1e3 * turn_s,
-                1e-6 * halo_bytes,
-                1e3 * halo_s
+                "| {count} | {} | {:.2} | {:.2} | {:.2} | {:.2} | {:.2} |",
+                halos.cells,
+                1e-6 * turn.bytes,
+                1e3 * turn.time_s,
+                1e-6 * halos.bytes,
+                1e3 * halos.time_s,
+                work_s / (work_s + exchange_s)
             );
         }
     }
@@ -196,120 +210,122 @@ fn mpirun(count: usize) -> Command {
     command
 }
 
+/// Options of a run of the wake in one thread.
+const ONE_THREAD: [&str; 3] = ["--quiet", "--threads", "1"];
+
+/// Runs some steps on one process and under `mpirun`: all files must be equal.
 fn compare(program: &Path, scratch: &Path) -> Outcome {
-    let words = |out: &'static str| {
-        [
-            "wake",
-            "short.toml",
-            "--quiet",
-            "--threads",
-            "1",
-            "--out",
-            out,
-        ]
-    };
-    let alone = watch(program, &words("one"), scratch, LONGEST_S)?;
+    let arguments = [&["wake", "short.toml", "--out", "one"][..], &ONE_THREAD].concat();
+    let alone = watch(program, &arguments, scratch, LONGEST_S)?;
     if alone.code != Some(0) {
         return Err(Failure::new(format!("one process: {}", alone.stderr)));
     }
     let expected = files(&scratch.join("one"))?;
     for (count, out) in [(2, "two"), (4, "four")] {
-        let begun = Instant::now();
-        let text = output(
-            mpirun(count)
-                .arg(program)
-                .args(words(out))
-                .current_dir(scratch),
-        )?;
-        let failed = |why: &str| Failure::new(format!("{count} processes: {why}\n{text}"));
-        if text.matches("wrote").count() != 1 {
-            return Err(failed("not exactly one of them says what was written"));
-        }
+        let start = Instant::now();
+        let mut wake = mpirun(count);
+        wake.arg(program).args(["wake", "short.toml", "--out", out]);
+        let text = output(wake.args(ONE_THREAD).current_dir(scratch))?;
         let found = files(&scratch.join(out))?;
-        if let Some(name) = expected
-            .keys()
-            .chain(found.keys())
-            .find(|name| found.get(*name) != expected.get(*name))
-        {
-            return Err(failed(&format!(
-                "{} is not that of one process",
-                name.display()
+        let problem = if text.matches("wrote").count() != 1 {
+            Some("not exactly one of them reports what was written".into())
+        } else {
+            difference(&expected, &found)
+        };
+        if let Some(problem) = problem {
+            return Err(Failure::new(format!(
+                "{count} processes: {problem}\n{text}"
             )));
         }
-        let seconds = begun.elapsed().as_secs_f64();
         println!(
-            "{count} processes: {} files of {STEPS} steps, the bytes of one process, {seconds:.0} s",
-            found.len()
+            "{count} processes: {} files of {STEPS} steps, the bytes of one process, {:.0} s",
+            found.len(),
+            start.elapsed().as_secs_f64()
         );
     }
     Ok(())
 }
 
+/// Files by name.
+type Files = BTreeMap<OsString, Vec<u8>>;
+
+/// The first file that is not the same in both folders.
+fn difference(expected: &Files, found: &Files) -> Option<String> {
+    let mut names = expected.keys().chain(found.keys());
+    let name = names.find(|name| found.get(*name) != expected.get(*name))?;
+    Some(format!("{} is not that of one process", name.display()))
+}
+
 /// The files of a folder.
-fn files(folder: &Path) -> Result<BTreeMap<OsString, Vec<u8>>, Failure> {
-    let read = |entry: std::io::Result<DirEntry>| {
+fn files(folder: &Path) -> Result<Files, Failure> {
+    let mut files = Files::new();
+    for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
-        Ok((entry.file_name(), std::fs::read(entry.path())?))
-    };
-    std::fs::read_dir(folder)?.map(read).collect()
+        files.insert(entry.file_name(), std::fs::read(entry.path())?);
+    }
+    Ok(files)
+}
+
+/// Waits until a process has ended or a condition holds; kills it if neither comes in time. Returns whether one did.
+fn ends_in_time(child: &mut Child, is_done: impl Fn() -> bool) -> Result<bool, Failure> {
+    let start = Instant::now();
+    while start.elapsed().as_secs_f64() < LONGEST_S {
+        if is_done() || child.try_wait()?.is_some() {
+            return Ok(true);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    child.kill()?;
+    Ok(false)
 }
 
 /// Kills one of two processes when there is a checkpoint: the other must end, and the checkpoint must be whole.
 fn kill_one(program: &Path, scratch: &Path) -> Outcome {
-    let words = |case| ["wake", case, "--quiet", "--threads", "1", "--out", "killed"];
     let mut command = mpirun(2);
     command
         .arg(program)
-        .args(words("long.toml"))
-        .current_dir(scratch)
-        .stderr(Stdio::null())
-        .stdout(Stdio::null());
+        .args(["wake", "long.toml", "--out", "killed"]);
+    command.args(ONE_THREAD).current_dir(scratch);
+    command.stderr(Stdio::null()).stdout(Stdio::null());
     let mut child = command.spawn()?;
-    let ends_within =
-        |child: &mut Child, seconds: f64, done: &dyn Fn() -> bool| -> Result<bool, Failure> {
-            let begun = Instant::now();
-            while begun.elapsed().as_secs_f64() < seconds {
-                if done() || child.try_wait()?.is_some() {
-                    return Ok(true);
-                }
-                std::thread::sleep(Duration::from_millis(20));
-            }
-            child.kill()?;
-            Ok(false)
-        };
     let previous = scratch.join("killed/flow.checkpoint.previous");
-    if !ends_within(&mut child, LONGEST_S, &|| previous.exists())? || child.try_wait()?.is_some() {
+    let is_written = ends_in_time(&mut child, || previous.exists())?;
+    if !is_written || child.try_wait()?.is_some() {
         return Err(Failure::new(
             "no two checkpoints were written by two processes".into(),
         ));
     }
-    let ranks = Command::new("pgrep")
-        .args(["-P", &child.id().to_string()])
-        .output()?;
-    let ranks = String::from_utf8_lossy(&ranks.stdout).into_owned();
-    let victim = ranks
-        .lines()
-        .last()
-        .ok_or_else(|| Failure::new("mpirun has no processes".into()))?;
-    let killed = Command::new("kill").args(["-9", victim]).status()?;
-    if !killed.success()
-        || !ends_within(&mut child, LONGEST_S, &|| false)?
-        || child.wait()?.success()
-    {
+    let is_killed = kill_last_child(&child)?;
+    if !is_killed || !ends_in_time(&mut child, || false)? || child.wait()?.success() {
         return Err(Failure::new(
-            "a process was killed, and the run hangs or ends well".into(),
+            "a process was killed, and the run hangs or succeeds".into(),
         ));
     }
-    let goes_on = [&words("short.toml")[..], &["--restart"]].concat();
-    let goes_on = watch(program, &goes_on, scratch, LONGEST_S)?;
-    if goes_on.code != Some(0) {
+    let restart = ["wake", "short.toml", "--out", "killed", "--restart"];
+    let arguments = [&restart[..], &ONE_THREAD].concat();
+    let restarted = watch(program, &arguments, scratch, LONGEST_S)?;
+    if restarted.code != Some(0) {
         return Err(Failure::new(format!(
             "the run of a killed process does not continue: {}",
-            goes_on.stderr
+            restarted.stderr
         )));
     }
     println!(
         "one of two processes killed: the other ended, one process continues from the checkpoint"
     );
     Ok(())
+}
+
+/// Kills the last process that another one has started; returns whether it could.
+fn kill_last_child(parent: &Child) -> Result<bool, Failure> {
+    let listed = Command::new("pgrep")
+        .args(["-P", &parent.id().to_string()])
+        .output()?;
+    let children = String::from_utf8_lossy(&listed.stdout);
+    let victim = children
+        .lines()
+        .last()
+        .ok_or_else(|| Failure::new("mpirun has no processes".into()))?;
+    let kill = Command::new("kill").args(["-9", victim]).status()?;
+    Ok(kill.success())
 }

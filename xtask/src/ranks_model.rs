@@ -54,23 +54,28 @@ fn stage_s(ranks: f64, halos: Halos) -> [f64; 3] {
     [work_s * (1.0 + LINES * (busiest - 1.0)), turns_s, halos_s]
 }
 
+/// Work of one rank over what a stage lasts.
+fn efficiency(stage_s: [f64; 3], alone_s: f64) -> f64 {
+    alone_s / stage_s.iter().sum::<f64>()
+}
+
 /// The table of the book.
 fn table() -> String {
     let mut text = "| ranks | planes | turns, ms a stage | halos, ms a stage | efficiency | halos with the multiscale model | efficiency with it |\n\
                     |---|---|---|---|---|---|---|\n"
         .to_owned();
+    let [alone_s, ..] = stage_s(1.0, Halos::PLAIN);
     for ranks in [1.0, 2.0, 4.0, 16.0, 64.0, 256.0, 1024.0] {
-        let [plain, model] = [Halos::PLAIN, Halos::MULTISCALE].map(|halos| stage_s(ranks, halos));
-        let efficiency =
-            |stage: [f64; 3]| stage_s(1.0, Halos::PLAIN)[0] / stage.iter().sum::<f64>();
+        let plain = stage_s(ranks, Halos::PLAIN);
+        let model = stage_s(ranks, Halos::MULTISCALE);
         text += &format!(
             "| {ranks} | {} | {:.1} | {:.1} | {:.2} | {:.1} | {:.2} |\n",
             ranks * SLAB[2],
             1e3 * plain[1],
             1e3 * plain[2],
-            efficiency(plain),
+            efficiency(plain, alone_s),
             1e3 * model[2],
-            efficiency(model)
+            efficiency(model, alone_s)
         );
     }
     text
@@ -83,6 +88,13 @@ struct Counting {
     least: usize,
     values: AtomicUsize,
     messages: AtomicUsize,
+}
+
+impl Counting {
+    /// Values and messages so far.
+    fn counts(&self) -> [usize; 2] {
+        [&self.values, &self.messages].map(|count| count.load(Ordering::Relaxed))
+    }
 }
 
 impl Ranks for Counting {
@@ -132,12 +144,9 @@ fn the_solver_sends_what_the_model_says() {
                 ..case.settings
             };
             let (mut flow, _) = case.initial.start(case.mesh, case.settings).unwrap();
-            let seen = || {
-                [&counting.values, &counting.messages].map(|count| count.load(Ordering::Relaxed))
-            };
-            let before = seen();
+            let before = counting.counts();
             flow.step().unwrap();
-            let after = seen();
+            let after = counting.counts();
             [after[0] - before[0], after[1] - before[1]]
         });
         let stages = 3.0;

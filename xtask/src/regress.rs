@@ -9,7 +9,7 @@ use wakescope_tests::curves::{ALL, Comparison, Curve};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+pub(crate) struct RegressArgs {
     /// Compare only the curves whose name contains this.
     #[arg(long, value_name = "WORD")]
     only: Option<String>,
@@ -19,47 +19,57 @@ pub(crate) struct Options {
 ///
 /// # Errors
 /// When a curve is out of tolerance or cannot be read or computed.
-pub(crate) fn run(options: &Options) -> Outcome {
-    let wanted = |c: &&Curve| {
-        options
+pub(crate) fn run(args: &RegressArgs) -> Outcome {
+    let mut failed = Vec::new();
+    for curve in &ALL {
+        if args
             .only
             .as_ref()
-            .is_none_or(|word| c.name.contains(word.as_str()))
-    };
-    let mut failed = Vec::new();
-    for curve in ALL.iter().filter(wanted) {
+            .is_some_and(|word| !curve.name.contains(word))
+        {
+            continue;
+        }
         let start = Instant::now();
         let compared = curve.compare();
         let time_s = start.elapsed().as_secs_f64();
-        let told = match compared {
-            Ok(c) if c.is_within(curve) => format!("pass, {}", told(curve, &c)),
-            Ok(c) => format!("FAIL, {}; see {}", told(curve, &c), draw(curve, &c)?),
-            Err(failure) => format!("ERROR: {failure}"),
+        let outcome = match compared {
+            Ok(c) if c.is_within(curve) => format!("pass, {}", words(curve, &c)),
+            Ok(c) => {
+                failed.push(curve.name);
+                format!("FAIL, {}; see {}", words(curve, &c), draw(curve, &c)?)
+            }
+            Err(failure) => {
+                failed.push(curve.name);
+                format!("ERROR: {failure}")
+            }
         };
-        println!("{:<34} {time_s:>7.3} s  {told}", curve.name);
-        failed.extend((!told.starts_with("pass")).then_some(curve.name));
+        println!("{:<34} {time_s:>7.3} s  {outcome}", curve.name);
     }
     unless("regress: out of tolerance", &failed)
 }
 
-fn told(curve: &Curve, c: &Comparison) -> String {
-    let (points, error, place) = (c.x.len(), c.worst_error, c.x[c.worst]);
+fn words(curve: &Curve, c: &Comparison) -> String {
     format!(
-        "{points} points, error {error:.3e} of {:.1e} at most, worst at {} = {place}",
-        curve.tolerance, curve.x
+        "{} points, error {:.3e} of {:.1e} at most, worst at {} = {}",
+        c.x.len(),
+        c.worst_error,
+        curve.tolerance,
+        curve.x,
+        c.x[c.worst]
     )
 }
 
+/// The points of a curve.
+fn points(x: &[f64], y: &[f64]) -> Vec<(f64, f64)> {
+    x.iter().copied().zip(y.iter().copied()).collect()
+}
+
 fn draw(curve: &Curve, c: &Comparison) -> Result<String, Failure> {
-    let points = |y: &[f64]| {
-        c.x.iter()
-            .copied()
-            .zip(y.iter().copied())
-            .collect::<Vec<_>>()
-    };
+    let stored = Series::new("stored", Style::Line, points(&c.x, &c.stored));
+    let computed = Series::new("computed", Style::Dash, points(&c.x, &c.computed));
     let plot = CurvePlot::new(curve.name, Axis::linear(curve.x), Axis::linear(curve.y))
-        .with(Series::new("stored", Style::Line, points(&c.stored)))
-        .with(Series::new("computed", Style::Dash, points(&c.computed)));
+        .with(stored)
+        .with(computed);
     let folder = root().join("target/regress");
     std::fs::create_dir_all(&folder)?;
     let path = folder.join(format!("{}.svg", curve.name.replace('/', "_")));

@@ -9,7 +9,7 @@ mod report;
 
 use crate::claim::{Claim, Kind};
 use crate::cost::clock_s;
-use crate::figures::context::{Context, Rendered};
+use crate::figures::context::{Context, Rendered, column};
 use crate::figures::{self, Figure, Lane};
 use crate::workspace::root;
 use fixtures::failure::{Failure, Outcome};
@@ -22,7 +22,7 @@ use wakescope_sim::io::{Table, write_atomic};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+pub(crate) struct ReproduceFigsArgs {
     /// Numbers of the figures to draw, such as 1,5; the default is all.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     only: Vec<u32>,
@@ -40,95 +40,130 @@ pub(crate) struct Options {
 ///
 /// # Errors
 /// Unknown figure, unusable output, or a figure that cannot be computed. A failed claim is no error.
-pub(crate) fn run(options: &Options) -> Outcome {
-    let chosen = choose(&options.only)?;
-    let out = options
+pub(crate) fn run(args: &ReproduceFigsArgs) -> Outcome {
+    let chosen = choose(&args.only)?;
+    let out = args
         .out
         .clone()
         .unwrap_or_else(|| root().join("target/figures"));
     std::fs::create_dir_all(&out)
         .map_err(|e| Failure::new(format!("cannot write to {}: {e}", out.display())))?;
-    let context = &options.context;
-    let bar = progress_bar(chosen.len() as u64);
     let start = Instant::now();
-    let draw = |lane: Lane| -> Result<Vec<(&'static Figure, Rendered)>, Failure> {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(options.threads)
-            .build()?;
-        let of_lane = chosen.iter().filter(|figure| figure.lane() == lane);
-        of_lane
-            .map(|figure| Ok((*figure, drawn(figure, context, (&pool, &bar, &out))?)))
-            .collect()
+    let bar = progress_bar(chosen.len() as u64);
+    let run = Run {
+        chosen: &chosen,
+        context: &args.context,
+        threads: args.threads,
+        out: &out,
+        bar: &bar,
     };
-    let (of_wake, others) = if options.threads == 0 {
-        std::thread::scope(|scope| {
-            let beside = scope.spawn(|| draw(Lane::Wake));
-            let others = draw(Lane::Formula);
-            (beside.join(), others)
-        })
+    let mut done = if args.threads == 0 {
+        run.draw_side_by_side()?
     } else {
-        // No more threads than were asked for.
-        (Ok(draw(Lane::Wake)), draw(Lane::Formula))
+        // No more threads than were requested.
+        let mut done = run.draw(Lane::Wake)?;
+        done.extend(run.draw(Lane::Formula)?);
+        done
     };
-    let mut done =
-        of_wake.map_err(|_| Failure::new("a figure of the wake stopped short".into()))??;
-    done.extend(others?);
-    done.extend(draw(Lane::Alone)?);
+    done.extend(run.draw(Lane::Alone)?);
     done.sort_by_key(|(figure, _)| figures::ALL.iter().position(|of| of.id == figure.id));
     bar.finish_and_clear();
-    finish(&out, context, &done, start.elapsed().as_secs_f64())
+    finish(&out, &args.context, &done, start.elapsed().as_secs_f64())
 }
 
-/// One figure, from the cache or made by the threads of the pool, and written.
-fn drawn(
-    figure: &'static Figure,
-    context: &Context,
-    (pool, bar, out): (&ThreadPool, &ProgressBar, &Path),
-) -> Result<Rendered, Failure> {
-    bar.set_message(figure.id);
-    // The key of the cache knows nothing of a wake from elsewhere.
-    let is_other = context.wake.is_some();
-    let place = cache::Place::new(figure.id, context)?;
-    let cached = if context.anew || is_other {
-        None
-    } else {
-        place.load()
-    };
-    let from_cache = cached.is_some();
-    let rendered = match cached {
-        Some(rendered) => rendered,
-        None => {
-            // Of the other lane the process's own clock would count the work, too.
-            let used_s = || match figure.lane() {
-                Lane::Alone => clock_s(ClockId::ProcessCPUTime),
-                Lane::Wake | Lane::Formula => pool
-                    .broadcast(|_| clock_s(ClockId::ThreadCPUTime))
-                    .into_iter()
-                    .sum(),
-            };
-            let (before_s, start) = (used_s(), Instant::now());
-            let mut rendered = pool.install(|| (figure.make)(context))?;
-            rendered.caption = figure.caption(&std::mem::take(&mut rendered.values))?;
-            rendered
-                .claims
-                .iter_mut()
-                .for_each(|claim| claim.figure = figure.id.into());
-            rendered.took_s = [start.elapsed().as_secs_f64(), used_s() - before_s];
-            if !is_other {
-                place.store(&rendered)?;
+/// Figures with what they gave.
+type Done = Vec<(&'static Figure, Rendered)>;
+
+/// What all figures of a run have in common.
+struct Run<'r> {
+    chosen: &'r [&'static Figure],
+    context: &'r Context,
+    threads: usize,
+    out: &'r Path,
+    bar: &'r ProgressBar,
+}
+
+impl Run<'_> {
+    /// Figures of the wake and those of formulas at once.
+    fn draw_side_by_side(&self) -> Result<Done, Failure> {
+        std::thread::scope(|scope| {
+            let beside = scope.spawn(|| self.draw(Lane::Wake));
+            let formulas = self.draw(Lane::Formula);
+            let mut done = beside
+                .join()
+                .map_err(|_| Failure::new("a figure of the wake panicked".into()))??;
+            done.extend(formulas?);
+            Ok(done)
+        })
+    }
+
+    /// The chosen figures of a lane, one after the other.
+    fn draw(&self, lane: Lane) -> Result<Done, Failure> {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(self.threads)
+            .build()?;
+        let mut done = Vec::new();
+        for figure in self.chosen {
+            if figure.lane() == lane {
+                done.push((*figure, self.figure(figure, &pool)?));
             }
-            rendered
         }
-    };
-    rendered.files_in(out, figure.id)?.commit()?;
-    bar.inc(1);
-    bar.println(format!(
-        "{}{}: {}",
-        figure.id,
-        if from_cache { " (cached)" } else { "" },
-        figure.title
-    ));
+        Ok(done)
+    }
+
+    /// One figure, from the cache or made by the threads of the pool, and written.
+    fn figure(&self, figure: &'static Figure, pool: &ThreadPool) -> Result<Rendered, Failure> {
+        self.bar.set_message(figure.id);
+        // The key of the cache knows nothing of a wake from elsewhere.
+        let is_other = self.context.wake.is_some();
+        let place = cache::Place::new(figure.id, self.context)?;
+        let cached = if self.context.anew || is_other {
+            None
+        } else {
+            place.load()
+        };
+        let note = if cached.is_some() { " (cached)" } else { "" };
+        let rendered = match cached {
+            Some(rendered) => rendered,
+            None => {
+                let rendered = make(figure, self.context, pool)?;
+                if !is_other {
+                    place.store(&rendered)?;
+                }
+                rendered
+            }
+        };
+        rendered.files_in(self.out, figure.id)?.commit()?;
+        self.bar.inc(1);
+        self.bar
+            .println(format!("{}{note}: {}", figure.id, figure.title));
+        Ok(rendered)
+    }
+}
+
+/// A figure made by the threads of a pool.
+fn make(figure: &Figure, context: &Context, pool: &ThreadPool) -> Result<Rendered, Failure> {
+    let before_s = used_s(figure.lane(), pool);
+    let start = Instant::now();
+    let mut rendered = pool.install(|| (figure.make)(context))?;
+    rendered.caption = figure.caption(&std::mem::take(&mut rendered.values))?;
+    for claim in &mut rendered.claims {
+        claim.figure = figure.id.into();
+    }
+    let cpu_s = used_s(figure.lane(), pool) - before_s;
+    rendered.took_s = [start.elapsed().as_secs_f64(), cpu_s];
     Ok(rendered)
+}
+
+/// Processor time so far \[s\]: of this process, or of the threads of a pool where the process works on the other lane, too.
+fn used_s(lane: Lane, pool: &ThreadPool) -> f64 {
+    match lane {
+        Lane::Alone => clock_s(ClockId::ProcessCPUTime),
+        Lane::Wake | Lane::Formula => {
+            let threads_s = pool.broadcast(|_| clock_s(ClockId::ThreadCPUTime));
+            threads_s.into_iter().sum()
+        }
+    }
 }
 
 fn choose(only: &[u32]) -> Result<Vec<&'static Figure>, Failure> {
@@ -161,10 +196,10 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
         claims_table(&claims).to_csv(&context.provenance_of_run())?,
     )?;
     let table = Table::new()
-        .text("figure", done.iter().map(|(figure, _)| figure.id))
-        .text("stage", done.iter().map(|_| report::STAGE))
-        .float("wall_s", done.iter().map(|(_, r)| r.took_s[0]))
-        .float("core_s", done.iter().map(|(_, r)| r.took_s[1]));
+        .text("figure", column(done, |(figure, _)| figure.id))
+        .text("stage", column(done, |_| report::STAGE))
+        .float("wall_s", column(done, |(_, r)| r.took_s[0]))
+        .float("core_s", column(done, |(_, r)| r.took_s[1]));
     write_atomic(
         &out.join("timings.csv"),
         table.to_csv(&context.provenance_of_run())?,
@@ -183,16 +218,15 @@ fn finish(out: &Path, context: &Context, done: &[(&Figure, Rendered)], run_s: f6
 }
 
 fn claims_table(claims: &[&Claim]) -> Table {
-    let text = |get: fn(&Claim) -> String| claims.iter().map(|c| get(c)).collect::<Vec<_>>();
     Table::new()
-        .text("id", text(|c| c.id.to_owned()))
-        .text("figure", text(|c| c.figure.to_owned()))
-        .text("statement", text(|c| c.statement.clone()))
-        .text("expected", text(|c| c.expected.clone()))
-        .text("measured", text(|c| c.measured.clone()))
-        .float("standard_error", claims.iter().map(|c| c.standard_error))
-        .text("verdict", text(|c| c.verdict.name().to_owned()))
-        .text("kind", text(|c| c.kind().name().to_owned()))
-        .text("source", text(|c| c.source()))
-        .text("decided_by", text(|c| c.decided_by.clone()))
+        .text("id", column(claims, |c| &c.id))
+        .text("figure", column(claims, |c| &c.figure))
+        .text("statement", column(claims, |c| &c.statement))
+        .text("expected", column(claims, |c| &c.expected))
+        .text("measured", column(claims, |c| &c.measured))
+        .float("standard_error", column(claims, |c| c.standard_error))
+        .text("verdict", column(claims, |c| c.verdict.name()))
+        .text("kind", column(claims, |c| c.kind().name()))
+        .text("source", column(claims, |c| c.source()))
+        .text("decided_by", column(claims, |c| &c.decided_by))
 }

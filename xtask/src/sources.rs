@@ -1,6 +1,6 @@
 //! Source files as tokens: which files of the workspace import which names from which.
 
-use proc_macro2::{Delimiter, TokenStream, TokenTree};
+use proc_macro2::{Delimiter, Group, TokenStream, TokenTree};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Whether a source file of a crate holds nothing but tests.
@@ -34,26 +34,13 @@ pub(crate) struct Modules<'a>(BTreeMap<Place, Module<'a>>);
 impl<'a> Modules<'a> {
     /// Of source files and their texts; what is not below a `src` is left out, and what is no Rust has no imports.
     pub(crate) fn new(files: &[(&'a str, &str)]) -> Self {
-        let module = |file: &'a str, text: &str| {
-            let mut module = Module {
-                file,
-                ..Module::default()
-            };
-            module.read(
-                &text
-                    .parse::<TokenStream>()
-                    .unwrap_or_default()
-                    .into_iter()
-                    .collect::<Vec<_>>(),
-            );
-            module
-        };
-        Self(
-            files
-                .iter()
-                .filter_map(|(file, text)| Some((place(file)?, module(file, text))))
-                .collect(),
-        )
+        let mut modules = BTreeMap::new();
+        for (file, text) in files {
+            if let Some(place) = place(file) {
+                modules.insert(place, Module::parse(file, text));
+            }
+        }
+        Self(modules)
     }
 
     /// Which file takes which names from which; constants that a module takes from the one above it do not count if
@@ -97,11 +84,12 @@ impl<'a> Modules<'a> {
             }
             rest = more;
         }
-        let is_child = || {
-            self.0
-                .contains_key(&(at.0.clone(), [&base[..], &rest[..1]].concat()))
+        let is_relative = rest.len() < path.len();
+        let is_child = |child: &[String]| {
+            let place = (at.0.clone(), [&base[..], child].concat());
+            self.0.contains_key(&place)
         };
-        (rest.len() < path.len() || is_child()).then(|| [&base[..], rest].concat())
+        (is_relative || is_child(&rest[..1])).then(|| [&base[..], rest].concat())
     }
 
     /// The module that holds what a path names, through what modules hand on.
@@ -116,58 +104,74 @@ impl<'a> Modules<'a> {
         else {
             return Some(to);
         };
-        let mut handed = module
-            .handed
-            .iter()
-            .filter(|path| path.last() == Some(name));
-        handed
-            .find_map(|path| self.resolve(to, &self.absolute(to, path)?, depth + 1))
-            .or(Some(to))
+        for path in &module.handed {
+            if path.last() != Some(name) {
+                continue;
+            }
+            let found = self
+                .absolute(to, path)
+                .and_then(|path| self.resolve(to, &path, depth + 1));
+            if found.is_some() {
+                return found;
+            }
+        }
+        Some(to)
     }
 }
 
 /// Groups of files each of which imports every other, in one step or several; a module and those right below it may.
 pub(crate) fn circles<'a>(imports: &Imports<'a>) -> Vec<Vec<&'a str>> {
-    let all: BTreeMap<&str, BTreeSet<&str>> = imports
-        .keys()
-        .map(|file| (*file, reached(imports, file)))
-        .collect();
-    let mut out: Vec<Vec<&str>> = Vec::new();
-    for (file, seen) in all.iter().filter(|(file, seen)| seen.contains(*file)) {
-        if !out.iter().any(|circle| circle.contains(file)) {
-            out.push(
-                seen.iter()
-                    .copied()
-                    .filter(|to| all.get(to).is_some_and(|back| back.contains(file)))
-                    .collect(),
-            );
-        }
+    let mut reachable = BTreeMap::new();
+    for file in imports.keys() {
+        reachable.insert(*file, reached(imports, file));
     }
-    let above =
-        |file: &str| place(file).map(|(folder, mut path)| path.pop().map(|_| (folder, path)));
-    let is_family = |circle: &Vec<&str>, parent: &str| {
-        circle
-            .iter()
-            .all(|file| *file == parent || above(file).is_some_and(|of| of == place(parent)))
-    };
-    out.retain(|circle| !circle.iter().any(|parent| is_family(circle, parent)));
-    out
+    let mut circles: Vec<Vec<&str>> = Vec::new();
+    for (file, others) in &reachable {
+        let is_known = circles.iter().any(|circle| circle.contains(file));
+        if is_known || !others.contains(file) {
+            continue;
+        }
+        let mut circle = Vec::new();
+        for other in others {
+            if reachable.get(other).is_some_and(|back| back.contains(file)) {
+                circle.push(*other);
+            }
+        }
+        circles.push(circle);
+    }
+    circles.retain(|circle| !circle.iter().any(|parent| is_family(circle, parent)));
+    circles
+}
+
+/// Whether a circle is of a module and those right below it.
+fn is_family(circle: &[&str], parent: &str) -> bool {
+    circle.iter().all(|file| {
+        *file == parent || above(file).is_some_and(|above| Some(above) == place(parent))
+    })
+}
+
+/// The module above that of a file.
+fn above(file: &str) -> Option<Place> {
+    let (folder, mut path) = place(file)?;
+    path.pop()?;
+    Some((folder, path))
 }
 
 /// What a file imports, in one step or several.
 fn reached<'a>(imports: &Imports<'a>, from: &'a str) -> BTreeSet<&'a str> {
-    let (mut seen, mut open) = (BTreeSet::new(), vec![from]);
+    let mut found = BTreeSet::new();
+    let mut open = vec![from];
     while let Some(file) = open.pop() {
-        open.extend(
-            imports
-                .get(file)
-                .into_iter()
-                .flat_map(BTreeMap::keys)
-                .copied()
-                .filter(|to| seen.insert(*to)),
-        );
+        let Some(imported) = imports.get(file) else {
+            continue;
+        };
+        for to in imported.keys() {
+            if found.insert(*to) {
+                open.push(to);
+            }
+        }
     }
-    seen
+    found
 }
 
 fn place(file: &str) -> Option<Place> {
@@ -190,73 +194,111 @@ fn name(tokens: &[TokenTree], place: usize) -> String {
 
 /// Whether there are two colons at a place of some tokens.
 fn is_joint(tokens: &[TokenTree], place: usize) -> bool {
-    let is_colon = |token: Option<&TokenTree>| matches!(token, Some(TokenTree::Punct(p)) if p.as_char() == ':');
-    is_colon(tokens.get(place)) && is_colon(tokens.get(place + 1))
+    let pair = tokens.get(place..place + 2);
+    pair.is_some_and(|pair| pair.iter().all(|token| is_mark(token, ':')))
 }
 
-fn is_end(token: &TokenTree) -> bool {
-    matches!(token, TokenTree::Punct(p) if p.as_char() == ';')
+fn is_mark(token: &TokenTree, mark: char) -> bool {
+    matches!(token, TokenTree::Punct(p) if p.as_char() == mark)
 }
 
-impl Module<'_> {
-    /// Takes what items, imports and paths some tokens have; items for tests alone are left out.
-    fn read(&mut self, tokens: &[TokenTree]) {
+/// Whether a token is the body of an item.
+fn is_body(token: &TokenTree) -> bool {
+    matches!(token, TokenTree::Group(group) if group.delimiter() == Delimiter::Brace)
+}
+
+/// The place of the next token from `start` on that ends an item; the number of tokens if none does.
+fn end_of(tokens: &[TokenTree], start: usize, is_end: impl Fn(&TokenTree) -> bool) -> usize {
+    let after = tokens[start..].iter().position(is_end);
+    after.map_or(tokens.len(), |length| start + length)
+}
+
+impl<'a> Module<'a> {
+    fn parse(file: &'a str, text: &str) -> Self {
+        let mut module = Self {
+            file,
+            ..Self::default()
+        };
+        module.read(text.parse().unwrap_or_default());
+        module
+    }
+
+    /// Takes what items, imports and paths some tokens have; items for tests alone are skipped.
+    fn read(&mut self, tokens: TokenStream) {
+        let tokens: Vec<TokenTree> = tokens.into_iter().collect();
         let mut at = 0;
         while let Some(token) = tokens.get(at) {
-            let (word, next) = (name(tokens, at), name(tokens, at + 1));
-            match (token, word.as_str()) {
-                (TokenTree::Group(group), _)
-                    if group.to_string().replace(' ', "") == "[cfg(test)]" =>
-                {
-                    let ends = |t: &TokenTree| matches!(t, TokenTree::Group(g) if g.delimiter() == Delimiter::Brace);
-                    at += tokens[at..]
-                        .iter()
-                        .position(|t| is_end(t) || ends(t))
-                        .unwrap_or(tokens.len());
-                }
-                // who may see an item
-                (TokenTree::Group(_), _) if at > 0 && name(tokens, at - 1) == "pub" => {}
-                (TokenTree::Group(group), _) => {
-                    self.read(&group.stream().into_iter().collect::<Vec<_>>())
-                }
-                (_, "use") => {
-                    let end = tokens[at..]
-                        .iter()
-                        .position(is_end)
-                        .map_or(tokens.len(), |length| at + length);
-                    let is_exported = at > 0 && name(tokens, at - 1) == "pub";
-                    let is_public = is_exported || at > 1 && name(tokens, at - 2) == "pub";
-                    let mut paths = Vec::new();
-                    write_out(&tokens[at + 1..end], &[], &mut paths);
-                    self.handed
-                        .extend(paths.iter().filter(|_| is_public).cloned());
-                    self.taken
-                        .extend(paths.into_iter().filter(|_| !is_exported));
-                    at = end;
-                }
-                (_, "const" | "static" | "type")
-                    if !["fn", "unsafe", "async", ""].contains(&next.as_str()) =>
-                {
-                    self.items.insert(next, true);
-                }
-                (_, "fn" | "struct" | "enum" | "trait" | "mod") if !next.is_empty() => {
-                    self.items.insert(next, false);
-                }
-                (_, "macro_rules") => {
-                    self.items.insert(name(tokens, at + 2), false);
-                }
-                (_, word) if !(word.is_empty() || at > 1 && is_joint(tokens, at - 2)) => {
-                    let mut path = vec![word.to_owned()];
-                    while is_joint(tokens, at + 1) && !name(tokens, at + 3).is_empty() {
-                        path.push(name(tokens, at + 3));
-                        at += 3;
-                    }
-                    self.taken.extend((path.len() > 1).then_some(path));
-                }
-                _ => {}
-            }
-            at += 1;
+            at = match token {
+                TokenTree::Group(group) => self.read_group(&tokens, at, group),
+                _ => self.read_word(&tokens, at),
+            };
         }
+    }
+
+    /// Takes what a group has; returns the place behind it, or behind the item that is for tests alone.
+    fn read_group(&mut self, tokens: &[TokenTree], at: usize, group: &Group) -> usize {
+        if group.to_string().replace(' ', "") == "[cfg(test)]" {
+            return end_of(tokens, at, |t| is_mark(t, ';') || is_body(t)) + 1;
+        }
+        let is_visibility = at > 0 && name(tokens, at - 1) == "pub";
+        if !is_visibility {
+            self.read(group.stream());
+        }
+        at + 1
+    }
+
+    /// Takes what begins with a word: an import, an item or a path; returns the place behind it.
+    fn read_word(&mut self, tokens: &[TokenTree], at: usize) -> usize {
+        let word = name(tokens, at);
+        let next = name(tokens, at + 1);
+        match word.as_str() {
+            "" => {}
+            "use" => return self.read_use(tokens, at),
+            "const" | "static" | "type"
+                if !["fn", "unsafe", "async", ""].contains(&next.as_str()) =>
+            {
+                self.items.insert(next, true);
+            }
+            "fn" | "struct" | "enum" | "trait" | "mod" if !next.is_empty() => {
+                self.items.insert(next, false);
+            }
+            "macro_rules" => {
+                self.items.insert(name(tokens, at + 2), false);
+            }
+            _ if at > 1 && is_joint(tokens, at - 2) => {}
+            _ => return self.read_path(tokens, at),
+        }
+        at + 1
+    }
+
+    /// Takes the paths of a `use`.
+    fn read_use(&mut self, tokens: &[TokenTree], at: usize) -> usize {
+        let end = end_of(tokens, at, |t| is_mark(t, ';'));
+        let is_exported = at > 0 && name(tokens, at - 1) == "pub";
+        let is_public = is_exported || at > 1 && name(tokens, at - 2) == "pub";
+        let mut paths = Vec::new();
+        write_out(&tokens[at + 1..end], &[], &mut paths);
+        if is_public {
+            self.handed.extend(paths.iter().cloned());
+        }
+        if !is_exported {
+            self.taken.extend(paths);
+        }
+        end + 1
+    }
+
+    /// Takes a path such as `a::b::c`.
+    fn read_path(&mut self, tokens: &[TokenTree], start: usize) -> usize {
+        let mut at = start;
+        let mut path = vec![name(tokens, at)];
+        while is_joint(tokens, at + 1) && !name(tokens, at + 3).is_empty() {
+            path.push(name(tokens, at + 3));
+            at += 3;
+        }
+        if path.len() > 1 {
+            self.taken.push(path);
+        }
+        at + 1
     }
 }
 

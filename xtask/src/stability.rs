@@ -1,9 +1,9 @@
-//! `cargo xtask stability`: every stiff and extreme case of the crates, what it must come to and what it came to.
+//! `cargo xtask stability`: every stiff and extreme case of the crates, its expected and its actual outcome.
 //!
-//! A case is a number within bounds or a refusal in stated words; a panic is neither. What the cases are: the lists of the
-//! numerics, which a solver that fears nothing would pass.
+//! A case is a number within bounds or a refusal in stated words; a panic is neither. What the cases are: the lists in
+//! `tests/extreme`.
 
-use crate::figures::context::Rendered;
+use crate::figures::context::{Rendered, column};
 use crate::profile::Profile;
 use crate::statistics::Verdict;
 use crate::workspace::{provenance, root, unless};
@@ -16,7 +16,7 @@ use wakescope_tests::extreme::{Ended, PARTS, Row, rows};
 
 /// Options of the task.
 #[derive(Debug, clap::Args)]
-pub(crate) struct Options {
+pub(crate) struct StabilityArgs {
     /// Quick leaves out what takes more than a few seconds.
     #[arg(long, value_enum, default_value_t = Profile::Full)]
     profile: Profile,
@@ -32,40 +32,45 @@ pub(crate) struct Options {
 ///
 /// # Errors
 /// A case that did not end as it must, an unusable output.
-pub(crate) fn run(options: &Options) -> Outcome {
+pub(crate) fn run(args: &StabilityArgs) -> Outcome {
     let start = Instant::now();
     println!(
         "{:<8} {:<50} {:<7} {:>7}  {:<30} outcome",
         "crate", "case", "verdict", "time", "expected"
     );
-    let named = |name: &str| {
-        options
+    let rows = rows(|_, case| {
+        let is_named = args
             .only
             .as_ref()
-            .is_none_or(|word| name.contains(word.as_str()))
-    };
-    let rows =
-        rows(|_, case| named(case.name) && !(case.long && options.profile == Profile::Quick));
-    for Row { part, case, ended } in &rows {
-        let (name, verdict, expected) = (case.name, verdict(ended), case.expected.to_string());
+            .is_none_or(|word| case.name.contains(word));
+        let is_skipped = case.long && args.profile == Profile::Quick;
+        is_named && !is_skipped
+    });
+    for row in &rows {
         println!(
-            "{part:<8} {name:<50} {verdict:<7} {:>5.1} s  {expected:<30} {}",
-            ended.took_s, ended.outcome
+            "{:<8} {:<50} {:<7} {:>5.1} s  {:<30} {}",
+            row.part,
+            row.case.name,
+            verdict(&row.ended),
+            row.ended.took_s,
+            row.case.expected.to_string(),
+            row.ended.outcome
         );
     }
-    let folder = options
+    let folder = args
         .out
         .clone()
         .unwrap_or_else(|| root().join("target/stability"));
-    let origin = provenance(&format!("profile = \"{}\"\n", options.profile.name()), 1);
+    let origin = provenance(&format!("profile = \"{}\"\n", args.profile.name()), 1);
     Rendered::new(&table(&rows), &picture(&rows), &origin)?
         .files_in(&folder, "stability")?
         .commit()?;
-    let missed: Vec<&str> = rows
-        .iter()
-        .filter(|row| !row.ended.passes)
-        .map(|row| row.case.name)
-        .collect();
+    let mut missed = Vec::new();
+    for row in &rows {
+        if !row.ended.passes {
+            missed.push(row.case.name);
+        }
+    }
     println!(
         "{} of {} cases end as they must, in {:.1} s; {}",
         rows.len() - missed.len(),
@@ -83,14 +88,14 @@ fn verdict(ended: &Ended) -> &'static str {
 /// One row a case.
 pub(crate) fn table(rows: &[Row]) -> Table {
     Table::new()
-        .text("case", rows.iter().map(|r| r.case.name))
-        .text("crate", rows.iter().map(|r| r.part))
-        .text("input", rows.iter().map(|r| r.case.input))
-        .text("outcome", rows.iter().map(|r| r.ended.outcome.clone()))
-        .text("expected", rows.iter().map(|r| r.case.expected.to_string()))
-        .text("verdict", rows.iter().map(|r| verdict(&r.ended)))
-        .text("quantity", rows.iter().map(|r| r.case.quantity))
-        .float("share_of_allowance", rows.iter().map(|r| r.ended.used))
+        .text("case", column(rows, |r| r.case.name))
+        .text("crate", column(rows, |r| r.part))
+        .text("input", column(rows, |r| r.case.input))
+        .text("outcome", column(rows, |r| r.ended.outcome.clone()))
+        .text("expected", column(rows, |r| r.case.expected.to_string()))
+        .text("verdict", column(rows, |r| verdict(&r.ended)))
+        .text("quantity", column(rows, |r| r.case.quantity))
+        .float("share_of_allowance", column(rows, |r| r.ended.used))
 }
 
 /// How much of what is allowed each case takes: the bar is 1, refusals stand on the floor, what is not as it must be on top.
@@ -102,22 +107,22 @@ pub(crate) fn picture(rows: &[Row]) -> Figure {
         Axis::linear("case, in the order of the table"),
         Axis::log("share of what is allowed").between(0.2 * FLOOR, 2.0 * TOP),
     );
-    let of = |accept: &dyn Fn(&Row) -> bool, height: &dyn Fn(&Row) -> f64| -> Vec<(f64, f64)> {
-        let chosen = rows.iter().enumerate().filter(|(_, row)| accept(row));
-        chosen
-            .map(|(number, row)| (number as f64 + 1.0, height(row)))
-            .collect()
-    };
-    let is_number = |row: &Row| row.ended.used.is_finite();
-    for (colour, (part, _)) in PARTS.into_iter().enumerate() {
-        let numbers = of(
-            &|row| row.part == part && row.ended.passes && is_number(row),
-            &|row| row.ended.used.max(FLOOR),
-        );
+    let mut numbers = vec![Vec::new(); PARTS.len()];
+    let mut refused = Vec::new();
+    let mut missed = Vec::new();
+    for (index, row) in rows.iter().enumerate() {
+        let x = index as f64 + 1.0;
+        if !row.ended.passes {
+            missed.push((x, TOP));
+        } else if !row.ended.used.is_finite() {
+            refused.push((x, 0.5 * FLOOR));
+        } else if let Some(part) = PARTS.iter().position(|(part, _)| *part == row.part) {
+            numbers[part].push((x, row.ended.used.max(FLOOR)));
+        }
+    }
+    for (colour, ((part, _), numbers)) in PARTS.into_iter().zip(numbers).enumerate() {
         plot = plot.with(Series::new(part, Style::Markers, numbers).in_colour(colour));
     }
-    let refused = of(&|row| row.ended.passes && !is_number(row), &|_| 0.5 * FLOOR);
-    let missed = of(&|row| !row.ended.passes, &|_| TOP);
     let bar = [(0.0, 1.0), (rows.len() as f64 + 1.0, 1.0)];
     plot = plot
         .with(Series::new("refused as it must be", Style::Markers, refused).in_colour(PARTS.len()))

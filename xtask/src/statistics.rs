@@ -97,17 +97,20 @@ impl Estimate {
     pub(crate) fn words(&self) -> String {
         with_error(self.value, self.standard_error)
     }
+
+    /// Both ends of an interval about the value.
+    fn interval(&self, half_width: f64) -> (f64, f64) {
+        (self.value - half_width, self.value + half_width)
+    }
 }
 
 /// The mean of some numbers without one of them.
-pub(crate) fn mean(of: &[f64], without: Option<usize>) -> f64 {
-    let kept = || {
-        of.iter()
-            .enumerate()
-            .filter(|(i, _)| Some(*i) != without)
-            .map(|(_, x)| x)
-    };
-    kept().sum::<f64>() / kept().count() as f64
+pub(crate) fn mean(numbers: &[f64], without: Option<usize>) -> f64 {
+    let mut retained = numbers.to_vec();
+    if let Some(index) = without.filter(|index| *index < numbers.len()) {
+        retained.remove(index);
+    }
+    retained.iter().sum::<f64>() / retained.len() as f64
 }
 
 /// Where a number must lie.
@@ -128,9 +131,8 @@ impl Bar {
     /// The same where so many numbers must all hold: each by its own interval, for all holding by chance is rarer than one; that one of
     /// them fails by chance is not, so it fails by the interval of all.
     pub(crate) fn verdict_among(self, of: &Estimate, parts: usize) -> Verdict {
-        let ends = |half_width: f64| (of.value - half_width, of.value + half_width);
-        let ((low, high), (lowest, highest)) =
-            (ends(of.half_width()), ends(of.half_width_of(parts)));
+        let (low, high) = of.interval(of.half_width());
+        let (lowest, highest) = of.interval(of.half_width_of(parts));
         let (holds, fails) = match self {
             Self::Below(bar) => (high < bar, lowest > bar),
             Self::Above(bar) => (low > bar, highest < bar),
@@ -148,11 +150,11 @@ impl Bar {
 
     /// How many times the data would decide, if the number stays.
     pub(crate) fn times_the_data(self, of: &Estimate) -> f64 {
-        let off = |bar: f64| (of.value - bar).abs();
+        let value = of.value;
         let reach = match self {
-            Self::Below(bar) | Self::Above(bar) => off(bar),
-            Self::Between(least, most) => off(least).min(off(most)),
-            Self::Less(trifle) => off(0.0).max(off(-trifle)),
+            Self::Below(bar) | Self::Above(bar) => (value - bar).abs(),
+            Self::Between(least, most) => (value - least).abs().min((value - most).abs()),
+            Self::Less(trifle) => value.abs().max((value + trifle).abs()),
         };
         let times = (of.half_width() / reach).powi(2);
         if times.is_nan() {

@@ -33,6 +33,7 @@ const COMPUTED_BY: [&str; 4] = [
 /// What `bless` calls the stored wake; where it is, and the ages of its cross-planes.
 pub(crate) const NAME: &str = "wake";
 const STORED: &str = "tests/reference/wake";
+const STORED_TABLES: [&str; 2] = ["case.toml", "wake.csv"];
 const STORED_TAU: [f64; 4] = [1.0, EARLY_TAU, 4.0, 5.0];
 /// The age that figures 10 to 14 and 25 call early; the claims on surfaces and short waves are decided before.
 const EARLY_TAU: f64 = 2.5;
@@ -47,7 +48,8 @@ fn stored() -> FlowCase {
         flow.cells = [32, 160, 96];
     }
     if let Some(output) = &mut case.wake {
-        (output.planes_tau, output.fields_tau) = (Some(STORED_TAU.to_vec()), Some(Vec::new()));
+        output.planes_tau = Some(STORED_TAU.to_vec());
+        output.fields_tau = Some(Vec::new());
     }
     case
 }
@@ -88,22 +90,21 @@ pub(crate) fn whole(context: &Context) -> Result<FinishedWake, Failure> {
         order: None,
     };
     if let Some(output) = &mut case.wake {
-        (output.end_tau, output.planes_tau) = (EARLY_TAU, Some(vec![EARLY_TAU]));
+        output.end_tau = EARLY_TAU;
+        output.planes_tau = Some(vec![EARLY_TAU]);
     }
     run(&pictured(case), &context.stages, context.anew)
 }
 
 /// Mean of both vortices against tau, the left one times a sign.
 pub(crate) fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f64, f64)>, Failure> {
-    let (left, right) = (
-        wake.curve(&format!("{name}_left"))?,
-        wake.curve(&format!("{name}_right"))?,
-    );
-    Ok(left
-        .iter()
-        .zip(right)
-        .map(|(l, r)| (l.0, 0.5 * (sign * l.1 + r.1)))
-        .collect())
+    let left = wake.curve(&format!("{name}_left"))?;
+    let right = wake.curve(&format!("{name}_right"))?;
+    let mut mean = Vec::new();
+    for ((tau, left), (_, right)) in left.into_iter().zip(right) {
+        mean.push((tau, 0.5 * (sign * left + right)));
+    }
+    Ok(mean)
 }
 
 /// Writes the stored wake anew.
@@ -111,20 +112,15 @@ pub(crate) fn mean(wake: &FinishedWake, name: &str, sign: f64) -> Result<Vec<(f6
 /// # Errors
 /// A run that fails, a folder that cannot be written.
 pub(crate) fn bless() -> Outcome {
-    let from = run(
-        &stored(),
-        &root().join("target/figures-cache/stages"),
-        false,
-    )?
-    .folder;
+    let stages = root().join("target/figures-cache/stages");
+    let from = run(&stored(), &stages, false)?.folder;
     let to = root().join(STORED);
     std::fs::create_dir_all(&to)?;
-    let planes = (1..=STORED_TAU.len()).map(|k| format!("plane1_{k:04}.nc"));
-    for name in ["case.toml", "wake.csv"]
-        .map(String::from)
-        .into_iter()
-        .chain(planes)
-    {
+    let mut names: Vec<String> = STORED_TABLES.map(String::from).to_vec();
+    for k in 1..=STORED_TAU.len() {
+        names.push(format!("plane1_{k:04}.nc"));
+    }
+    for name in names {
         std::fs::copy(from.join(&name), to.join(&name))?;
     }
     Ok(())
@@ -133,10 +129,8 @@ pub(crate) fn bless() -> Outcome {
 /// A wake from the cache, or run.
 pub(crate) fn run(case: &FlowCase, stages: &Path, anew: bool) -> Result<FinishedWake, Failure> {
     let file = CaseFile::parse(&case.to_toml(), Path::new("wake"))?;
-    let folder = stages.join(format!(
-        "wake-{}",
-        cause(&root(), &[&file.hash], &COMPUTED_BY)?
-    ));
+    let key = cause(&root(), &[&file.hash], &COMPUTED_BY)?;
+    let folder = stages.join(format!("wake-{key}"));
     let done = folder.join("done");
     {
         let mut made = MADE

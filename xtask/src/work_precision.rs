@@ -13,7 +13,7 @@ mod physics;
 mod report;
 
 use crate::cost::{Cost, machine};
-use crate::figures::context::Rendered;
+use crate::figures::context::{Rendered, column};
 use crate::workspace::{provenance, root};
 use cases::{CASES, Case};
 use fixtures::failure::{Failure, Outcome};
@@ -196,28 +196,25 @@ fn judge(rows: &mut [Row]) {
 /// One row a setting.
 pub(crate) fn table(rows: &[Row]) -> Table {
     let mut table = Table::new()
-        .text("case", rows.iter().map(|r| &r.case))
-        .text("method", rows.iter().map(|r| &r.method))
-        .text("knob", rows.iter().map(|r| &r.knob))
-        .float("value", rows.iter().map(|r| r.value))
-        .float("error", rows.iter().map(|r| r.found.error))
-        .text("metric", rows.iter().map(Row::metric))
-        .text("reference", rows.iter().map(Row::reference))
-        .float("cpu_s", rows.iter().map(|r| r.found.cost.cpu_s))
-        .float("wall_s", rows.iter().map(|r| r.found.cost.wall_s))
-        .int("threads", rows.iter().map(|_| 1))
+        .text("case", column(rows, |r| &r.case))
+        .text("method", column(rows, |r| &r.method))
+        .text("knob", column(rows, |r| &r.knob))
+        .float("value", column(rows, |r| r.value))
+        .float("error", column(rows, |r| r.found.error))
+        .text("metric", column(rows, Row::metric))
+        .text("reference", column(rows, Row::reference))
+        .float("cpu_s", column(rows, |r| r.found.cost.cpu_s))
+        .float("wall_s", column(rows, |r| r.found.cost.wall_s))
+        .int("threads", column(rows, |_| 1))
         .float(
             "peak_mem_bytes",
-            rows.iter().map(|r| r.found.cost.peak_mem_bytes),
+            column(rows, |r| r.found.cost.peak_mem_bytes),
         )
-        .float(
-            "standard_error",
-            rows.iter().map(|r| r.found.standard_error),
-        )
-        .float("set_up_s", rows.iter().map(|r| r.found.set_up_s))
-        .text("other_version", rows.iter().map(|r| &r.version))
-        .text("group", rows.iter().map(|r| r.group))
-        .int("is_on_front", rows.iter().map(|r| r.is_on_front.into()));
+        .float("standard_error", column(rows, |r| r.found.standard_error))
+        .float("set_up_s", column(rows, |r| r.found.set_up_s))
+        .text("other_version", column(rows, |r| &r.version))
+        .text("group", column(rows, |r| r.group))
+        .int("is_on_front", column(rows, |r| r.is_on_front.into()));
     for (index, (name, _)) in TARGETS.iter().enumerate() {
         let cheapest = rows.iter().map(|r| r.is_cheapest[index].into());
         table = table.int(name, cheapest);

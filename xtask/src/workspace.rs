@@ -6,14 +6,10 @@ use wakescope_sim::io::Provenance;
 
 /// Provenance of what follows from formulas and the parameters given as TOML.
 pub(crate) fn provenance(parameters: &str, seed: u64) -> Provenance {
-    let (program, scene_hash) = (
-        wakescope_sim::PROGRAM.into(),
-        wakescope_sim::scene::hash_of(parameters),
-    );
     Provenance {
-        program,
+        program: wakescope_sim::PROGRAM.into(),
         scene_toml: parameters.into(),
-        scene_hash,
+        scene_hash: wakescope_sim::scene::hash_of(parameters),
         seed,
     }
 }
@@ -50,11 +46,11 @@ pub(crate) fn read(file: &str) -> Result<String, Failure> {
 /// Numbers of a reference file without its comments, row by row.
 pub(crate) fn numbers(file: &str) -> Result<Vec<Vec<f64>>, Failure> {
     let text = read(&format!("tests/reference/les/{file}"))?;
-    let rows = text.lines().filter(|line| !line.starts_with('#'));
-    let parse = |line: &str| {
-        line.split(',')
-            .map(|cell| cell.trim().parse().ok())
-            .collect::<Option<Vec<f64>>>()
-    };
-    Ok(rows.filter_map(parse).collect())
+    let mut rows = Vec::new();
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let cells: Result<Vec<f64>, _> = line.split(',').map(|cell| cell.trim().parse()).collect();
+        // The names of the columns are no numbers.
+        rows.extend(cells.ok());
+    }
+    Ok(rows)
 }

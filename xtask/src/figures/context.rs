@@ -144,23 +144,31 @@ impl Rendered {
     }
 }
 
+/// A value of each row.
+pub(crate) fn column<'r, T, V>(rows: &'r [T], value: impl Fn(&'r T) -> V) -> Vec<V> {
+    rows.iter().map(value).collect()
+}
+
 /// A curve of points with the error of each.
 pub(super) fn banded(
     label: &str,
     style: Style,
     points: impl IntoIterator<Item = (f64, Estimate)>,
 ) -> Series {
-    let (points, errors): (Vec<_>, Vec<_>) = points
-        .into_iter()
-        .map(|(x, y)| ((x, y.value), y.standard_error))
-        .unzip();
-    Series::new(label, style, points).with_band(&errors)
+    let mut curve = Vec::new();
+    let mut errors = Vec::new();
+    for (x, y) in points {
+        curve.push((x, y.value));
+        errors.push(y.standard_error);
+    }
+    Series::new(label, style, curve).with_band(&errors)
 }
 
 /// A table of numbers, row by row, with the names of its columns between spaces.
 pub(super) fn numbers_table<const N: usize>(names: &str, rows: &[[f64; N]]) -> Table {
-    let columns = names.split(' ').enumerate();
-    columns.fold(Table::new(), |table, (k, name)| {
-        table.float(name, rows.iter().map(|row| row[k]))
-    })
+    let mut table = Table::new();
+    for (k, name) in names.split(' ').enumerate() {
+        table = table.float(name, column(rows, |row| row[k]));
+    }
+    table
 }

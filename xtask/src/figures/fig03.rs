@@ -16,10 +16,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let table = Table::new()
         .int("line", (0..elevation_rad.len()).map(|i| i as i64))
         .float("elevation_rad", elevation_rad.iter().copied())
-        .float("y_first_sample_m", first.iter().map(|p| p.0))
-        .float("z_first_sample_m", first.iter().map(|p| p.1))
-        .float("y_last_sample_m", last.iter().map(|p| p.0))
-        .float("z_last_sample_m", last.iter().map(|p| p.1));
+        .float("y_first_sample_m", column(&first, |p| p.0))
+        .float("z_first_sample_m", column(&first, |p| p.1))
+        .float("y_last_sample_m", column(&last, |p| p.0))
+        .float("z_last_sample_m", column(&last, |p| p.1));
     let mut fan = Vec::new();
     for &elevation_rad in elevation_rad.iter().step_by(DRAWN) {
         let lidar = point(0.0, elevation_rad, scan.lidar_height_m);

@@ -165,7 +165,7 @@ fn decibels(profile: &EfficiencyProfile) -> Result<Vec<f64>, Failure> {
 }
 
 /// A column of all curves, one after the other.
-fn column(curves: &[Curve], values: fn(&Curve) -> &Vec<f64>) -> Vec<f64> {
+fn values_of(curves: &[Curve], values: fn(&Curve) -> &Vec<f64>) -> Vec<f64> {
     curves.iter().flat_map(values).copied().collect()
 }
 
@@ -175,17 +175,17 @@ fn table(curves: &[Curve]) -> Table {
         .flat_map(|c| std::iter::repeat_n(c.name, c.profile.range_m.len()));
     Table::new()
         .text("configuration", names)
-        .float("range_m", column(curves, |c| &c.profile.range_m))
-        .float("efficiency", column(curves, |c| &c.profile.mean))
+        .float("range_m", values_of(curves, |c| &c.profile.range_m))
+        .float("efficiency", values_of(curves, |c| &c.profile.mean))
         .float(
             "efficiency_standard_deviation",
-            column(curves, |c| &c.profile.standard_deviation),
+            values_of(curves, |c| &c.profile.standard_deviation),
         )
         .float(
             "efficiency_standard_error",
-            column(curves, |c| &c.profile.standard_error),
+            values_of(curves, |c| &c.profile.standard_error),
         )
-        .float("snr_db", column(curves, |c| &c.snr_db))
+        .float("snr_db", values_of(curves, |c| &c.snr_db))
 }
 
 fn plot(title: &str, label: &str, curves: &[Curve], values: fn(&Curve) -> &Vec<f64>) -> CurvePlot {

@@ -94,10 +94,10 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         series.push(Series::new(&format!("rho = {radius_m} m"), style, points));
     }
     let table = Table::new()
-        .float("rho_m", levels.iter().map(|l| l.radius_m))
-        .float("range_m", levels.iter().map(|l| l.range_m))
-        .int("level", levels.iter().map(|l| l.windows as i64))
-        .float("n_eff", levels.iter().map(|l| l.n_eff));
+        .float("rho_m", column(&levels, |l| l.radius_m))
+        .float("range_m", column(&levels, |l| l.range_m))
+        .int("level", column(&levels, |l| l.windows as i64))
+        .float("n_eff", column(&levels, |l| l.n_eff));
     let x = Axis::linear("range [m]");
     let y = Axis::log("windows accumulated");
     let plot = CurvePlot {

@@ -158,28 +158,28 @@ fn table(curves: &[Curve]) -> Table {
         }
     }
     Table::new()
-        .float("pulse_energy_j", rows.iter().map(|(c, ..)| c.energy_j))
-        .text("snr_reference", rows.iter().map(|(c, ..)| c.reference))
-        .float("range_m", rows.iter().map(|(_, zone, _)| zone.range_m))
+        .float("pulse_energy_j", column(&rows, |(c, ..)| c.energy_j))
+        .text("snr_reference", column(&rows, |(c, ..)| c.reference))
+        .float("range_m", column(&rows, |(_, zone, _)| zone.range_m))
         .float(
             "sigma_v_m_s",
-            rows.iter().map(|(_, zone, _)| zone.rms_m_s(None)),
+            column(&rows, |(_, zone, _)| zone.rms_m_s(None)),
         )
         .float(
             "standard_error_m_s",
-            rows.iter().map(|(_, zone, _)| zone.rms().standard_error),
+            column(&rows, |(_, zone, _)| zone.rms().standard_error),
         )
         .float(
             "bias_m_s",
-            rows.iter().map(|(_, zone, _)| zone.average.bias_m_s),
+            column(&rows, |(_, zone, _)| zone.average.bias_m_s),
         )
         .float(
             "std_m_s",
-            rows.iter().map(|(_, zone, _)| zone.average.std_m_s),
+            column(&rows, |(_, zone, _)| zone.average.std_m_s),
         )
         .float(
             "mean_of_lines_m_s",
-            rows.iter().map(|(.., mean_m_s)| *mean_m_s),
+            column(&rows, |(.., mean_m_s)| *mean_m_s),
         )
 }
 

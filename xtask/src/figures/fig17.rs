@@ -242,18 +242,18 @@ fn table(fits: &[Fits]) -> Table {
     let y: Vec<(f64, f64)> = rows.iter().map(|row| row.coordinate_m(1)).collect();
     let z: Vec<(f64, f64)> = rows.iter().map(|row| row.coordinate_m(2)).collect();
     Table::new()
-        .text("flow", rows.iter().map(|_| "analytic pair"))
-        .int("scan", rows.iter().map(|row| row.fits.scan as i64))
-        .text("method", rows.iter().map(|row| METHODS[row.method]))
-        .float("gamma_true_m2_s", rows.iter().map(|_| CIRCULATION_M2_S))
-        .float("gamma_m2_s", gamma.iter().map(|g| g.0))
-        .float("gamma_std_m2_s", gamma.iter().map(|g| g.1))
-        .float("y_error_m", y.iter().map(|y| y.0))
-        .float("z_error_m", z.iter().map(|z| z.0))
-        .text("vortex", rows.iter().map(|row| name(row.vortex)))
-        .float("y_std_m", y.iter().map(|y| y.1))
-        .float("z_std_m", z.iter().map(|z| z.1))
-        .float("snr_db", rows.iter().map(|row| row.fits.snr_db))
+        .text("flow", column(&rows, |_| "analytic pair"))
+        .int("scan", column(&rows, |row| row.fits.scan as i64))
+        .text("method", column(&rows, |row| METHODS[row.method]))
+        .float("gamma_true_m2_s", column(&rows, |_| CIRCULATION_M2_S))
+        .float("gamma_m2_s", column(&gamma, |g| g.0))
+        .float("gamma_std_m2_s", column(&gamma, |g| g.1))
+        .float("y_error_m", column(&y, |y| y.0))
+        .float("z_error_m", column(&z, |z| z.0))
+        .text("vortex", column(&rows, |row| name(row.vortex)))
+        .float("y_std_m", column(&y, |y| y.1))
+        .float("z_std_m", column(&z, |z| z.1))
+        .float("snr_db", column(&rows, |row| row.fits.snr_db))
 }
 
 fn pictures(fits: &[&Fits]) -> Vec<CurvePlot> {

@@ -194,18 +194,18 @@ pub(super) fn table(flows: &[OfFlow]) -> Table {
         z_std.push(row.found(|v| v.height_m.std));
     }
     Table::new()
-        .text("flow", rows.iter().map(|row| row.flow.name()))
-        .int("scan", rows.iter().map(|row| row.row.realisation as i64))
-        .text("method", rows.iter().map(|row| row.method))
+        .text("flow", column(&rows, |row| row.flow.name()))
+        .int("scan", column(&rows, |row| row.row.realisation as i64))
+        .text("method", column(&rows, |row| row.method))
         .float("gamma_true_m2_s", gamma_true)
         .float("gamma_m2_s", gamma)
         .float("gamma_std_m2_s", gamma_std)
         .float("y_error_m", y_error)
         .float("z_error_m", z_error)
-        .text("vortex", rows.iter().map(|row| name(row.row.truth.side)))
+        .text("vortex", column(&rows, |row| name(row.row.truth.side)))
         .float("y_std_m", y_std)
         .float("z_std_m", z_std)
-        .float("snr_db", rows.iter().map(|_| SNR_DB))
+        .float("snr_db", column(&rows, |_| SNR_DB))
 }
 
 /// Errors of the circulations over 5 to 15 m by age, the pair at 0.

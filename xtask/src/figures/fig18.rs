@@ -130,28 +130,28 @@ fn name_of(noise: NoiseModel) -> &'static str {
 
 fn table(rows: &[Row]) -> Table {
     Table::new()
-        .text("estimator", rows.iter().map(|r| r.method))
-        .text("noise", rows.iter().map(|r| name_of(r.noise)))
-        .float("pulse_s", rows.iter().map(|r| r.pulse_s))
-        .int("n_pulses", rows.iter().map(|r| r.pulses as i64))
-        .float("snr_db", rows.iter().map(|r| r.snr_db))
-        .float("std_good_m_s", rows.iter().map(|r| r.found.std_good_m_s))
-        .float("bad_fraction", rows.iter().map(|r| r.found.bad_fraction))
-        .float("bias_m_s", rows.iter().map(|r| r.found.bias_m_s))
-        .float("bound_m_s", rows.iter().map(|r| r.bound_m_s))
+        .text("estimator", column(rows, |r| r.method))
+        .text("noise", column(rows, |r| name_of(r.noise)))
+        .float("pulse_s", column(rows, |r| r.pulse_s))
+        .int("n_pulses", column(rows, |r| r.pulses as i64))
+        .float("snr_db", column(rows, |r| r.snr_db))
+        .float("std_good_m_s", column(rows, |r| r.found.std_good_m_s))
+        .float("bad_fraction", column(rows, |r| r.found.bad_fraction))
+        .float("bias_m_s", column(rows, |r| r.found.bias_m_s))
+        .float("bound_m_s", column(rows, |r| r.bound_m_s))
         .float(
             "std_good_standard_error_m_s",
-            rows.iter().map(|r| r.found.std_good_error_m_s),
+            column(rows, |r| r.found.std_good_error_m_s),
         )
         .float(
             "bad_fraction_standard_error",
-            rows.iter().map(|r| r.found.bad_fraction_error),
+            column(rows, |r| r.found.bad_fraction_error),
         )
         .float(
             "bias_standard_error_m_s",
-            rows.iter().map(|r| r.found.bias_error_m_s),
+            column(rows, |r| r.found.bias_error_m_s),
         )
-        .float("std_good_over_bound", rows.iter().map(|r| r.ratio().value))
+        .float("std_good_over_bound", column(rows, |r| r.ratio().value))
 }
 
 /// What a row of panels shows.

@@ -193,21 +193,21 @@ fn table(cases: &[Case]) -> Table {
         });
     }
     Table::new()
-        .text("background", rows.iter().map(|row| row.case.background))
-        .text("method", rows.iter().map(|_| "map"))
-        .float("range_m", rows.iter().map(|row| row.case.range_m))
-        .float("snr_db", rows.iter().map(|row| row.case.snr_db))
-        .float("gamma_m2_s", rows.iter().map(|row| row.gamma_m2_s))
-        .float("false_alarm", rows.iter().map(|row| row.false_alarm))
-        .float("detection", rows.iter().map(|row| row.detection))
-        .float("standard_error", rows.iter().map(|row| row.standard_error))
+        .text("background", column(&rows, |row| row.case.background))
+        .text("method", column(&rows, |_| "map"))
+        .float("range_m", column(&rows, |row| row.case.range_m))
+        .float("snr_db", column(&rows, |row| row.case.snr_db))
+        .float("gamma_m2_s", column(&rows, |row| row.gamma_m2_s))
+        .float("false_alarm", column(&rows, |row| row.false_alarm))
+        .float("detection", column(&rows, |row| row.detection))
+        .float("standard_error", column(&rows, |row| row.standard_error))
         .float(
             "sigma_gamma_m2_s",
-            rows.iter().map(|row| row.case.power.circulation_std_m2_s),
+            column(&rows, |row| row.case.power.circulation_std_m2_s),
         )
         .float(
             "smallest_foretold_m2_s",
-            rows.iter().map(|row| row.case.power.smallest_m2_s.1),
+            column(&rows, |row| row.case.power.smallest_m2_s.1),
         )
 }
 

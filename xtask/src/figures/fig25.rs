@@ -287,17 +287,17 @@ fn table(all: &[Measured]) -> Table {
     }
     let cases: Vec<&Case> = rows.iter().map(|row| &row.measured.case).collect();
     Table::new()
-        .text("case", cases.iter().map(|case| case.name()))
-        .float("snr_db", cases.iter().map(|case| case.snr_db))
-        .float("core_b0", cases.iter().map(|case| case.core_b0()))
-        .text("zone", rows.iter().map(|row| row.region.name()))
-        .text("against", rows.iter().map(|row| METHODS[row.pa]))
-        .float("rms_pa_m_s", rows.iter().map(|row| row.rms_m_s(row.pa)))
-        .float("rms_ca_m_s", rows.iter().map(|row| row.rms_m_s(2)))
-        .float("share", rows.iter().map(|row| row.share().value))
+        .text("case", column(&cases, |case| case.name()))
+        .float("snr_db", column(&cases, |case| case.snr_db))
+        .float("core_b0", column(&cases, |case| case.core_b0()))
+        .text("zone", column(&rows, |row| row.region.name()))
+        .text("against", column(&rows, |row| METHODS[row.pa]))
+        .float("rms_pa_m_s", column(&rows, |row| row.rms_m_s(row.pa)))
+        .float("rms_ca_m_s", column(&rows, |row| row.rms_m_s(2)))
+        .float("share", column(&rows, |row| row.share().value))
         .float(
             "standard_error",
-            rows.iter().map(|row| row.share().standard_error),
+            column(&rows, |row| row.share().standard_error),
         )
 }
 

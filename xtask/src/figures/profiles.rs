@@ -225,24 +225,24 @@ pub(super) fn table(all: &[Profiles]) -> Table {
     }
     let averages: Vec<&CellAverage> = rows.iter().map(|(.., zone)| &zone.average).collect();
     Table::new()
-        .text("method", rows.iter().map(|(p, ..)| p.method))
-        .float("pulse_s", rows.iter().map(|(p, ..)| p.pulse_s))
-        .text("snr_reference", rows.iter().map(|(p, ..)| p.name))
-        .float("snr_db", rows.iter().map(|(p, ..)| p.snr_db))
+        .text("method", column(&rows, |(p, ..)| p.method))
+        .float("pulse_s", column(&rows, |(p, ..)| p.pulse_s))
+        .text("snr_reference", column(&rows, |(p, ..)| p.name))
+        .float("snr_db", column(&rows, |(p, ..)| p.snr_db))
         .float(
             "range_from_centre_m",
-            rows.iter().map(|(_, range_m, _)| *range_m),
+            column(&rows, |(_, range_m, _)| *range_m),
         )
-        .float("bias_m_s", averages.iter().map(|a| a.bias_m_s))
-        .float("std_m_s", averages.iter().map(|a| a.std_m_s))
-        .float("rms_m_s", averages.iter().map(|a| a.rms_m_s))
+        .float("bias_m_s", column(&averages, |a| a.bias_m_s))
+        .float("std_m_s", column(&averages, |a| a.std_m_s))
+        .float("rms_m_s", column(&averages, |a| a.rms_m_s))
         .float(
             "standard_error_m_s",
-            rows.iter().map(|(.., zone)| zone.rms().standard_error),
+            column(&rows, |(.., zone)| zone.rms().standard_error),
         )
         .float(
             "rms_less_evolution_m_s",
-            rows.iter().map(|(p, _, zone)| p.excess_m_s(zone, None)),
+            column(&rows, |(p, _, zone)| p.excess_m_s(zone, None)),
         )
 }
 

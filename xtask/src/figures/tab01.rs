@@ -22,11 +22,11 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
         pass &= (delay_s(miles) - chapter_s).abs() <= 0.5;
     }
     let table = Table::new()
-        .text("leader", ROWS.iter().map(|r| r.0))
-        .text("follower", ROWS.iter().map(|r| r.1))
-        .float("separation_m", ROWS.iter().map(|r| r.2 * NAUTICAL_MILE_M))
-        .float("delay_s", ROWS.iter().map(|r| delay_s(r.2)))
-        .float("delay_chapter_s", ROWS.iter().map(|r| r.3));
+        .text("leader", column(&ROWS, |r| r.0))
+        .text("follower", column(&ROWS, |r| r.1))
+        .float("separation_m", column(&ROWS, |r| r.2 * NAUTICAL_MILE_M))
+        .float("delay_s", column(&ROWS, |r| delay_s(r.2)))
+        .float("delay_chapter_s", column(&ROWS, |r| r.3));
     let parameters = format!("approach_speed_m_s = {APPROACH_SPEED_M_S:?}\n");
     let mut out = Rendered::of_table(&table, &context.provenance_of_formula(&parameters))?;
     out.claims.push(Claim::exact(

@@ -36,8 +36,8 @@ pub(super) fn make(context: &Context) -> Result<Rendered, Failure> {
     let back = SceneFile::parse(&plan.scene.toml, Path::new("scene.toml"))?.content;
     let values: Vec<f64> = ROWS.iter().map(|r| (r.2)(&back)).collect();
     let table = Table::new()
-        .text("parameter", ROWS.iter().map(|r| r.0))
-        .float("chapter", ROWS.iter().map(|r| r.1))
+        .text("parameter", column(&ROWS, |r| r.0))
+        .float("chapter", column(&ROWS, |r| r.1))
         .float("scene", values.iter().copied());
     let mut out = Rendered::of_table(&table, &plan.scene.provenance())?;
     let equal = ROWS.iter().zip(&values).filter(|(r, v)| r.1 == **v).count();

@@ -34,12 +34,10 @@ struct Index {
 
 impl Place {
     pub(super) fn new(id: &'static str, context: &Context) -> Result<Self, Failure> {
-        let (root, seed, flow) = (
-            root(),
-            context.seed.to_string(),
-            if context.analytic { "analytic" } else { "" },
-        );
-        let key = cause(&root, &[id, context.profile.name(), &seed, flow], &DRAWN_BY)?;
+        let seed = context.seed.to_string();
+        let flow = if context.analytic { "analytic" } else { "" };
+        let parameters = [id, context.profile.name(), &seed, flow];
+        let key = cause(&root(), &parameters, &DRAWN_BY)?;
         Ok(Self {
             id,
             folder: Context::cache().join(format!("{id}-{key}")),
@@ -48,15 +46,17 @@ impl Place {
 
     /// The figure, if it was made before and can be read.
     pub(super) fn load(&self) -> Option<Rendered> {
-        let Index {
-            extensions,
-            rendered,
-        }: Index =
-            toml::from_str(&std::fs::read_to_string(self.folder.join("index.toml")).ok()?).ok()?;
-        let name = |extension: &String| format!("{}.{extension}", self.id);
-        let file = |e: &String| Some((e.clone(), std::fs::read(self.folder.join(name(e))).ok()?));
-        let files = extensions.iter().map(file).collect::<Option<_>>()?;
-        Some(Rendered { files, ..rendered })
+        let text = std::fs::read_to_string(self.folder.join("index.toml")).ok()?;
+        let index: Index = toml::from_str(&text).ok()?;
+        let mut files = Vec::new();
+        for extension in index.extensions {
+            let path = self.folder.join(format!("{}.{extension}", self.id));
+            files.push((extension, std::fs::read(path).ok()?));
+        }
+        Some(Rendered {
+            files,
+            ..index.rendered
+        })
     }
 
     pub(super) fn store(&self, rendered: &Rendered) -> Outcome {
@@ -64,15 +64,12 @@ impl Place {
         let extensions = rendered
             .files
             .iter()
-            .map(|(extension, _)| extension.clone())
-            .collect();
-        group.add(
-            "index.toml",
-            toml::to_string(&Index {
-                extensions,
-                rendered: rendered.clone(),
-            })?,
-        )?;
+            .map(|(extension, _)| extension.clone());
+        let index = Index {
+            extensions: extensions.collect(),
+            rendered: rendered.clone(),
+        };
+        group.add("index.toml", toml::to_string(&index)?)?;
         group.commit()?;
         Ok(())
     }

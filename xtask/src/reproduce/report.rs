@@ -42,89 +42,116 @@ const FINDINGS: [(&str, bool, Verdict); 4] = [
 /// # Errors
 /// A row with another number of cells than its header, a picture that is not an `<svg>` element, two figures of one id.
 pub(super) fn html(context: &Context, done: &Done<'_>, run_s: f64) -> Result<String, Failure> {
-    let (mut findings, mut figures, mut made) = (String::new(), String::new(), String::new());
-    let mut class = "finding first";
-    for (heading, of_chapter, verdict) in FINDINGS {
-        let here = |c: &&Claim| c.verdict == verdict && (c.kind() == Kind::Chapter) == of_chapter;
-        let of = |(_, r): &(_, Rendered)| {
-            r.claims
-                .iter()
-                .filter(here)
-                .map(|claim| finding(class, claim, r.took_s[1]))
-                .collect::<String>()
-        };
-        let list: String = done.iter().map(of).collect();
-        if !list.is_empty() {
-            findings += &format!("<h2>{heading}</h2>\n{list}");
-            class = "finding";
-        }
-    }
-    let link = |id: &str, name: &str| format!("<li><a href=\"#{id}\">{}</a></li>\n", escape(name));
-    let links: String = done
-        .iter()
-        .map(|(figure, _)| link(figure.id, &figure.heading()))
-        .collect();
-    let links = links + &link("claims", "All claims") + &link("timings", "Run times");
-    for (place, (figure, rendered)) in done.iter().enumerate() {
-        if done[..place]
-            .iter()
-            .any(|(before, _)| before.id == figure.id)
-        {
-            return Err(Failure::new(format!(
-                "two figures of the report are called '{}'",
-                figure.id
-            )));
-        }
-        figures += &entry(figure, rendered)?;
-    }
-    let (profile, seed) = (context.profile.name(), context.seed);
-    for (name, value) in [
-        ("version", wakescope_sim::PROGRAM.into()),
-        ("seed", seed.to_string()),
-        ("profile", profile.into()),
-        ("machine", machine()),
-        (
-            "command",
-            format!("cargo xtask reproduce-figs --profile {profile} --seed {seed}"),
-        ),
-    ] {
-        made += &format!("<dt>{name}</dt><dd>{}</dd>\n", escape(&value));
-    }
-    let found = escape(&found(context, done, run_s));
     let parts = [
         include_str!("report.css").into(),
-        found,
-        findings,
-        links,
-        figures,
+        escape(&found(context, done, run_s)),
+        findings(done),
+        links(done),
+        figures(done)?,
         claims(done)?,
         timings(done)?,
-        made,
+        origin(context),
     ];
     filled(include_str!("report.html"), &parts)
         .ok_or_else(|| Failure::new("the page lacks parts".into()))
 }
 
+/// The claims that do not hold and those that are open, list by list.
+fn findings(done: &Done<'_>) -> String {
+    let mut findings = String::new();
+    let mut class = "finding first";
+    for (heading, of_chapter, verdict) in FINDINGS {
+        let mut list = String::new();
+        for (_, rendered) in done {
+            for claim in &rendered.claims {
+                let is_of_chapter = claim.kind() == Kind::Chapter;
+                if claim.verdict == verdict && is_of_chapter == of_chapter {
+                    list += &finding(class, claim, rendered.took_s[1]);
+                }
+            }
+        }
+        if !list.is_empty() {
+            findings += &format!("<h2>{heading}</h2>\n{list}");
+            class = "finding";
+        }
+    }
+    findings
+}
+
+/// Links to all figures and tables.
+fn links(done: &Done<'_>) -> String {
+    let mut links = String::new();
+    for (figure, _) in done {
+        links += &link(figure.id, &figure.heading());
+    }
+    links + &link("claims", "All claims") + &link("timings", "Run times")
+}
+
+fn link(id: &str, name: &str) -> String {
+    format!("<li><a href=\"#{id}\">{}</a></li>\n", escape(name))
+}
+
+/// All figures.
+///
+/// # Errors
+/// Fails if two have one id, or one is not as [`entry`] needs it.
+fn figures(done: &Done<'_>) -> Result<String, Failure> {
+    let mut figures = String::new();
+    let mut ids = Vec::new();
+    for (figure, rendered) in done {
+        if ids.contains(&figure.id) {
+            return Err(Failure::new(format!(
+                "two figures of the report are called '{}'",
+                figure.id
+            )));
+        }
+        ids.push(figure.id);
+        figures += &entry(figure, rendered)?;
+    }
+    Ok(figures)
+}
+
+/// Program, seed, profile and machine, and the command that makes the report again.
+fn origin(context: &Context) -> String {
+    let profile = context.profile.name();
+    let seed = context.seed;
+    let command = format!("cargo xtask reproduce-figs --profile {profile} --seed {seed}");
+    let items = [
+        ("version", wakescope_sim::PROGRAM.into()),
+        ("seed", seed.to_string()),
+        ("profile", profile.into()),
+        ("machine", machine()),
+        ("command", command),
+    ];
+    let mut list = String::new();
+    for (name, value) in items {
+        list += &format!("<dt>{name}</dt><dd>{}</dd>\n", escape(&value));
+    }
+    list
+}
+
 /// Of a list of claims how many hold, do not, are open.
 pub(super) fn counted(kind: Kind, claims: &[&Claim]) -> String {
-    let of: Vec<&&Claim> = claims.iter().filter(|claim| claim.kind() == kind).collect();
-    let count = |verdict| of.iter().filter(|claim| claim.verdict == verdict).count();
-    let [holds, fails, open] = [Verdict::Pass, Verdict::Fail, Verdict::Open].map(count);
-    format!(
-        "{} claims: {holds} hold, {fails} do not, {open} are open",
-        of.len()
-    )
+    let mut holds = 0;
+    let mut fails = 0;
+    let mut open = 0;
+    for claim in claims.iter().filter(|claim| claim.kind() == kind) {
+        match claim.verdict {
+            Verdict::Pass => holds += 1,
+            Verdict::Fail => fails += 1,
+            Verdict::Open => open += 1,
+        }
+    }
+    let all = holds + fails + open;
+    format!("{all} claims: {holds} hold, {fails} do not, {open} are open")
 }
 
 /// How many claims hold, what the figures say in words, and what it took.
 fn found(context: &Context, done: &Done<'_>, run_s: f64) -> String {
     let claims: Vec<&Claim> = done.iter().flat_map(|(_, r)| &r.claims).collect();
     let core_s: f64 = done.iter().map(|(_, r)| r.took_s[1]).sum();
-    let words: Vec<&str> = done
-        .iter()
-        .map(|(_, r)| r.words.as_str())
-        .filter(|words| !words.is_empty())
-        .collect();
+    let mut words: Vec<&str> = done.iter().map(|(_, r)| r.words.as_str()).collect();
+    words.retain(|words| !words.is_empty());
     format!(
         "The chapter's {}; the program's own {} (profile {}). {} {} figures and tables took {core_s:.0} s of processor time; this \
          run, with those that it found in the cache, {run_s:.0} s.",
@@ -167,73 +194,69 @@ fn finding(class: &str, claim: &Claim, core_s: f64) -> String {
 
 /// A figure, or a table with its rows.
 fn entry(figure: &Figure, rendered: &Rendered) -> Result<String, Failure> {
-    let Figure { id, .. } = figure;
-    let marks: String = rendered
-        .marks
-        .iter()
-        .map(|mark| format!("<span class=\"mark\">{}</span>", escape(mark)))
-        .collect();
-    let text = |extension: &str| rendered.file(extension).map(String::from_utf8_lossy);
-    let shown = match (text("svg"), text("csv")) {
-        (Some(svg), _) if svg.starts_with("<svg") && !svg.contains("<script") => svg.into_owned(),
-        (Some(svg), _) => {
-            let start: String = svg.chars().take(20).collect();
-            return Err(Failure::new(format!(
-                "picture of {id} = {start}: one <svg> element without script"
-            )));
-        }
-        (None, Some(csv)) => {
-            let mut rows = csv
-                .lines()
-                .filter(|line| !line.starts_with('#'))
-                .map(|line| line.split(','));
-            let header: Vec<&str> = rows.next().into_iter().flatten().collect();
-            table(id, &header, rows.map(|row| row.map(five_digits).collect()))?
-        }
-        (None, None) => String::new(),
+    let id = figure.id;
+    let mut marks = String::new();
+    for mark in &rendered.marks {
+        marks += &format!("<span class=\"mark\">{}</span>", escape(mark));
+    }
+    let content = if let Some(svg) = rendered.file("svg") {
+        picture(id, &String::from_utf8_lossy(svg))?
+    } else if let Some(csv) = rendered.file("csv") {
+        rows_of(id, &String::from_utf8_lossy(csv))?
+    } else {
+        String::new()
     };
-    let (heading, caption) = (escape(&figure.heading()), escape(&rendered.caption));
+    let heading = escape(&figure.heading());
+    let caption = escape(&rendered.caption);
     Ok(format!(
-        "<figure id=\"{id}\">\n<h3>{heading}{marks}</h3>\n{shown}<figcaption>{caption}</figcaption>\n</figure>\n"
+        "<figure id=\"{id}\">\n<h3>{heading}{marks}</h3>\n{content}<figcaption>{caption}</figcaption>\n</figure>\n"
     ))
+}
+
+/// A picture that is one element without script.
+fn picture(id: &str, svg: &str) -> Result<String, Failure> {
+    if svg.starts_with("<svg") && !svg.contains("<script") {
+        return Ok(svg.to_owned());
+    }
+    let start: String = svg.chars().take(20).collect();
+    Err(Failure::new(format!(
+        "picture of {id} = {start}: one <svg> element without script"
+    )))
+}
+
+/// The rows of a table.
+fn rows_of(id: &str, csv: &str) -> Result<String, Failure> {
+    let mut lines = csv.lines().filter(|line| !line.starts_with('#'));
+    let header: Vec<&str> = lines
+        .next()
+        .map_or(Vec::new(), |line| line.split(',').collect());
+    let mut rows = Vec::new();
+    for line in lines {
+        rows.push(line.split(',').map(five_digits).collect());
+    }
+    table(id, &header, &rows)
 }
 
 /// A cell; if it is a number, rounded to five digits.
 fn five_digits(cell: &str) -> String {
-    let rounded = cell
-        .parse::<f64>()
-        .ok()
-        .and_then(|x| format!("{x:.4e}").parse::<f64>().ok());
-    rounded.map_or_else(
-        || cell.to_owned(),
-        |x| {
-            if x.abs() < 1e-3 && x != 0.0 {
-                format!("{x:e}")
-            } else {
-                x.to_string()
-            }
-        },
-    )
+    let Ok(number) = cell.parse::<f64>() else {
+        return cell.to_owned();
+    };
+    let Ok(rounded) = format!("{number:.4e}").parse::<f64>() else {
+        return cell.to_owned();
+    };
+    if rounded.abs() < 1e-3 && rounded != 0.0 {
+        format!("{rounded:e}")
+    } else {
+        rounded.to_string()
+    }
 }
 
 fn claims(done: &Done<'_>) -> Result<String, Failure> {
-    let row = |c: &Claim| {
-        let error = if c.standard_error.is_nan() {
-            String::new()
-        } else {
-            two_digits(c.standard_error)
-        };
-        let (list, verdict) = (c.kind().name().to_owned(), c.verdict.name().to_owned());
-        vec![
-            c.id.clone(),
-            list,
-            c.statement.clone(),
-            c.expected.clone(),
-            c.measured.clone(),
-            error,
-            verdict,
-        ]
-    };
+    let mut rows = Vec::new();
+    for (_, rendered) in done {
+        rows.extend(rendered.claims.iter().map(claim_row));
+    }
     let header = [
         "id",
         "list",
@@ -243,38 +266,53 @@ fn claims(done: &Done<'_>) -> Result<String, Failure> {
         "standard error",
         "verdict",
     ];
-    table(
-        "claims",
-        &header,
-        done.iter().flat_map(|(_, r)| r.claims.iter().map(row)),
-    )
+    table("claims", &header, &rows)
+}
+
+fn claim_row(claim: &Claim) -> Vec<String> {
+    let error = if claim.standard_error.is_nan() {
+        String::new()
+    } else {
+        two_digits(claim.standard_error)
+    };
+    vec![
+        claim.id.clone(),
+        claim.kind().name().to_owned(),
+        claim.statement.clone(),
+        claim.expected.clone(),
+        claim.measured.clone(),
+        error,
+        claim.verdict.name().to_owned(),
+    ]
 }
 
 fn timings(done: &Done<'_>) -> Result<String, Failure> {
-    let row = |(figure, rendered): &(&Figure, Rendered)| {
+    let mut rows = Vec::new();
+    for (figure, rendered) in done {
         let [wall_s, core_s] = rendered.took_s.map(|time_s| format!("{time_s:.1}"));
-        vec![figure.title.to_owned(), STAGE.to_owned(), wall_s, core_s]
-    };
+        rows.push(vec![
+            figure.title.to_owned(),
+            STAGE.to_owned(),
+            wall_s,
+            core_s,
+        ]);
+    }
     let header = [
         "figure",
         "stage",
         "wall-clock time [s]",
         "processor time [s]",
     ];
-    table("timings", &header, done.iter().map(row))
+    table("timings", &header, &rows)
 }
 
 /// A table; on a narrow screen each row becomes a block of named cells. The words of verdicts are coloured.
-fn table(
-    name: &str,
-    header: &[&str],
-    rows: impl Iterator<Item = Vec<String>>,
-) -> Result<String, Failure> {
+fn table(name: &str, header: &[&str], rows: &[Vec<String>]) -> Result<String, Failure> {
     let header: Vec<String> = header.iter().map(|column| escape(column)).collect();
-    let names: String = header
-        .iter()
-        .map(|column| format!("<th>{column}</th>"))
-        .collect();
+    let mut names = String::new();
+    for column in &header {
+        names += &format!("<th>{column}</th>");
+    }
     let mut out =
         format!("<div class=\"scroll\"><table>\n<thead><tr>{names}</tr></thead>\n<tbody>\n");
     for row in rows {
@@ -285,19 +323,17 @@ fn table(
                 header.len()
             )));
         }
-        let cell = |(cell, column): (&String, &String)| {
+        out += "<tr>";
+        for (cell, column) in row.iter().zip(&header) {
             let is_verdict = ["pass", "fail", "open"].contains(&cell.as_str());
             let class = if is_verdict {
                 format!(" class=\"{cell}\"")
             } else {
                 String::new()
             };
-            format!("<td{class} data-label=\"{column}\">{}</td>", escape(cell))
-        };
-        out += &format!(
-            "<tr>{}</tr>\n",
-            row.iter().zip(&header).map(cell).collect::<String>()
-        );
+            out += &format!("<td{class} data-label=\"{column}\">{}</td>", escape(cell));
+        }
+        out += "</tr>\n";
     }
     Ok(out + "</tbody></table></div>\n")
 }
