@@ -25,6 +25,9 @@ pub trait Sample:
         self.into()
     }
 
+    /// The sample from a complex number; of a real one, its real part.
+    fn from_complex(value: Complex<f64>) -> Self;
+
     /// The sample times a real factor.
     #[inline]
     fn scaled(self, factor: f64) -> Self {
@@ -54,8 +57,18 @@ pub trait Sample:
 
 impl Sample for f64 {
     const KIND: SignalKind = SignalKind::Real;
+
+    #[inline]
+    fn from_complex(value: Complex<f64>) -> Self {
+        value.re
+    }
 }
 
 impl Sample for Complex<f64> {
     const KIND: SignalKind = SignalKind::Complex;
+
+    #[inline]
+    fn from_complex(value: Complex<f64>) -> Self {
+        value
+    }
 }

@@ -1,6 +1,6 @@
 //! `wakescope bound` and `wakescope budget`: what the instrument of a scene can measure at best, and its power budget.
 
-use super::words::{TableWords, range};
+use super::words::range;
 use super::{Cli, paths};
 use crate::io::Existing;
 use crate::measure::bound::{bound as of_plan, points};
@@ -19,8 +19,12 @@ use std::path::PathBuf;
 pub(super) struct BoundWords {
     /// The scene.
     scene: PathBuf,
-    #[command(flatten)]
-    table: TableWords,
+    /// File for the whole table, as CSV.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace an existing file.
+    #[arg(long)]
+    overwrite: bool,
     /// Compute even if the forecast of the memory is more than the machine has.
     #[arg(long)]
     allow_large: bool,
@@ -31,12 +35,16 @@ pub(super) fn bound(words: &BoundWords, cli: &Cli) -> Result<(), Error> {
     if !words.allow_large {
         plan.bound_fits()?;
     }
-    words.table.prepare(cli)?;
+    if let Some(file) = &words.out {
+        cli.prepare_file(file, Existing::with_overwrite(words.overwrite))?;
+    }
     let found = of_plan(&plan, &Silent)?;
     let mut text = found.text();
-    let file = words
-        .table
-        .write(cli, &found.table(), &plan.scene.provenance(), &mut text)?;
+    if let Some(file) = &words.out {
+        cli.write_file(file, found.table().to_csv(&plan.scene.provenance())?)?;
+        text += &format!("wrote {}\n", file.display());
+    }
+    let file = words.out.as_ref().map(|file| file.display().to_string());
     let object = json!({
         "version": crate::VERSION, "scene_hash": plan.scene.hash, "by_snr": points(&found.by_snr).objects(),
         "by_range": points(&found.by_range).objects(),

@@ -237,7 +237,7 @@ impl Cli {
     }
 
     /// Finds out whether a file can be written.
-    pub(super) fn prepare_one(&self, path: &Path, existing: Existing) -> Result<(), Error> {
+    pub(super) fn prepare_file(&self, path: &Path, existing: Existing) -> Result<(), Error> {
         let name = path
             .file_name()
             .and_then(|name| name.to_str())
@@ -246,7 +246,7 @@ impl Cli {
     }
 
     /// Writes a file, or keeps it.
-    pub(super) fn write_one(&self, path: &Path, content: String) -> Result<(), Error> {
+    pub(super) fn write_file(&self, path: &Path, content: String) -> Result<(), Error> {
         let Some(call) = self.keeper() else {
             return Ok(write_atomic(path, content)?);
         };

@@ -5,7 +5,7 @@ use super::output::paths;
 use crate::io::netcdf_input;
 use crate::io::raw::{RawFormat, RawRecords};
 use crate::io::scans::{self, ReadScan, ScanFormat};
-use crate::io::{Existing, Provenance, Table};
+use crate::io::{Existing, Provenance};
 use crate::measure::recorded::{
     self, MeasuredScan, NoiseLevel, Recorded, RecordedOptions, Spectra, record_shape,
 };
@@ -16,7 +16,7 @@ use crate::setup::progress::{Observer, Silent};
 use crate::{Error, retrieve, scene};
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{ArgAction, Args};
-use serde_json::{Value, json};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use wakescope_estimate::retrieval::Turbulence;
@@ -65,43 +65,6 @@ impl FolderWords {
                 self.out.display()
             ),
         )
-    }
-}
-
-/// The file of a command that prints its result as well.
-#[derive(Debug, Args)]
-pub(super) struct TableWords {
-    /// File for the whole table, as CSV.
-    #[arg(long, value_name = "FILE")]
-    out: Option<PathBuf>,
-    /// Replace an existing file.
-    #[arg(long)]
-    overwrite: bool,
-}
-
-impl TableWords {
-    /// Finds out whether the file can be written.
-    pub(super) fn prepare(&self, cli: &Cli) -> Result<(), Error> {
-        let existing = Existing::with_overwrite(self.overwrite);
-        self.out
-            .as_ref()
-            .map_or(Ok(()), |path| cli.prepare_one(path, existing))
-    }
-
-    /// Writes the file, if there is to be one, and says so in the text; returns its path for an object.
-    pub(super) fn write(
-        &self,
-        cli: &Cli,
-        table: &Table,
-        origin: &Provenance,
-        text: &mut String,
-    ) -> Result<Value, Error> {
-        let Some(path) = &self.out else {
-            return Ok(Value::Null);
-        };
-        cli.write_one(path, table.to_csv(origin)?)?;
-        *text += &format!("wrote {}\n", path.display());
-        Ok(json!(paths(&[path])[0]))
     }
 }
 

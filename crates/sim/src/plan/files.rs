@@ -80,7 +80,6 @@ pub(super) fn files(scene: &Scene, target: Target, g: &Geometry, n: &Sizes) -> P
         written.netcdf(netcdf, points * 8.0);
     }
     if n.kept > 0.0 {
-        written.table(o.csv, n.lines * n.samples, 2.0 + n.parts);
         let others = n.kept * n.records * 28.0 + n.lines * n.layers * 4.0;
         written.netcdf(
             netcdf,

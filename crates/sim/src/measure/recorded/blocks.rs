@@ -6,7 +6,7 @@
 use super::lines::{ScanLines, upward};
 use super::spectra::GateSpectra;
 use super::tiles::{Tile, tiles};
-use super::{FromParts, RecordedOptions, pieces, samples};
+use super::{RecordedOptions, pieces, samples};
 use crate::Error;
 use crate::io::raw::RawRecords;
 use crate::measure::gate_estimates::GateEstimate;
@@ -19,6 +19,7 @@ use ndarray::Array2;
 use wakescope_estimate::GateVelocity;
 use wakescope_estimate::estimators::Quality;
 use wakescope_estimate::map::{MapPoint, ScanGeometry, polar_points};
+use wakescope_estimate::window::Sample;
 
 /// Most bytes of the sums of a tile.
 const BLOCK_BYTES: usize = 256 << 20;
@@ -36,7 +37,7 @@ pub(super) struct ScanCells {
 }
 
 /// The gates of all scans, one after the other; `largest` is the largest part of a sample.
-pub(super) fn scans<S: FromParts>(
+pub(super) fn scans<S: Sample>(
     plan: &Plan,
     records: &mut RawRecords,
     largest: f64,
@@ -95,7 +96,7 @@ struct Blocks<'p, S> {
     spectra: Option<&'p GateSpectra>,
 }
 
-impl<S: FromParts> Blocks<'_, S> {
+impl<S: Sample> Blocks<'_, S> {
     fn scan(&self, records: &mut RawRecords, lines: &ScanLines) -> Result<ScanCells, Error> {
         let range_m = &self.plan.geometry.gate_range_m;
         let shape = (lines.elevation_rad.len(), range_m.len());

@@ -77,23 +77,6 @@ pub enum Recorded {
     },
 }
 
-/// A sample from the parts that a file holds.
-pub(crate) trait FromParts: Sample {
-    fn from_parts(parts: Complex<f64>) -> Self;
-}
-
-impl FromParts for f64 {
-    fn from_parts(parts: Complex<f64>) -> Self {
-        parts.re
-    }
-}
-
-impl FromParts for Complex<f64> {
-    fn from_parts(parts: Complex<f64>) -> Self {
-        parts
-    }
-}
-
 /// What a scene says of a record.
 pub fn record_shape(scene: &Scene) -> RecordShape {
     RecordShape {
@@ -241,7 +224,7 @@ pub fn estimate(
     .map_err(|error| plan.scene.of_key(error))
 }
 
-fn of_samples<S: FromParts>(
+fn of_samples<S: Sample>(
     plan: &Plan,
     is_own: bool,
     records: &mut RawRecords,
@@ -305,7 +288,7 @@ fn of_samples<S: FromParts>(
 }
 
 /// The maps of a simulation's own records, held against the truth of its scene.
-fn of_run<S: FromParts>(
+fn of_run<S: Sample>(
     plan: &Plan,
     records: &mut RawRecords,
     observer: &dyn Observer,
@@ -335,7 +318,7 @@ fn pieces(records: Range<usize>, samples: usize) -> impl Iterator<Item = Range<u
 }
 
 /// Some samples of some records \[record, sample\].
-pub(crate) fn samples<S: FromParts>(
+pub(crate) fn samples<S: Sample>(
     records: &mut RawRecords,
     range: Range<usize>,
     some: Range<usize>,
@@ -344,7 +327,7 @@ pub(crate) fn samples<S: FromParts>(
     let samples: Vec<S> = records
         .read_samples(range, some)?
         .into_iter()
-        .map(S::from_parts)
+        .map(S::from_complex)
         .collect();
     ndarray::Array2::from_shape_vec(shape, samples)
         .map_err(|_| records.refuse("it became shorter".into()))
