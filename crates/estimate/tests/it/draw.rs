@@ -37,15 +37,11 @@ fn cholesky(covariance: &Array2<Complex<f64>>) -> Vec<Vec<Complex<f64>>> {
 }
 
 pub(crate) trait Draw: Sample {
-    fn from_complex(value: Complex<f64>) -> Self;
     fn normal(rng: &mut Xoshiro256PlusPlus) -> Self;
     fn sum_of_products(row: &[Self], white: &[Self]) -> Self;
 }
 
 impl Draw for f64 {
-    fn from_complex(value: Complex<f64>) -> Self {
-        value.re
-    }
     fn normal(rng: &mut Xoshiro256PlusPlus) -> Self {
         StandardNormal.sample(rng)
     }
@@ -55,9 +51,6 @@ impl Draw for f64 {
 }
 
 impl Draw for Complex<f64> {
-    fn from_complex(value: Complex<f64>) -> Self {
-        value
-    }
     fn normal(rng: &mut Xoshiro256PlusPlus) -> Self {
         let part = |rng: &mut Xoshiro256PlusPlus| -> f64 { StandardNormal.sample(rng) };
         Complex::new(part(rng), part(rng)) * 0.5_f64.sqrt()

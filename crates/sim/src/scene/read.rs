@@ -188,8 +188,8 @@ mod tests {
         let (file, warning) = embedded(text).unwrap();
         assert_eq!(
             warning.unwrap(),
-            "map.nc: this program does not know all keys of the scene in it; skipped: added_flows[0].waves, colour, \
-             flow.spacing_m, laser.colours, pulse.shape.chirp"
+            "map.nc: this program does not know all keys of the scene in it; skipped: colour, flow.spacing_m, \
+             pulse.shape.chirp, added_flows[0].waves, laser.colours"
         );
         let known = "[flow]\nkind = \"uniform\"\nlateral_m_s = 1\nvertical_m_s = 0\n[[added_flows]]\nkind = \"calm\"\n";
         assert_eq!(

@@ -295,7 +295,7 @@ mod tests {
             Value::Integer(32)
         );
         assert_eq!(
-            value("outputs.signals", "true").unwrap(),
+            value("flow.mirror_y", "true").unwrap(),
             Value::Boolean(true)
         );
         assert_eq!(
@@ -308,7 +308,7 @@ mod tests {
             ("pulse.energy_j", "much"),
             ("pulse.energy_j", ""),
             ("estimator.method.kind", "pulse_par"),
-            ("outputs.signals", "1"),
+            ("flow.mirror_y", "1"),
         ] {
             let problem = value(key, text).unwrap_err();
             assert!(
