@@ -53,7 +53,7 @@
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-struct Readme;
+mod readme {}
 
 pub mod bound;
 mod error;

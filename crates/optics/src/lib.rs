@@ -73,4 +73,4 @@ pub use screens::Grid;
 /// The example of the README is run as a test.
 #[cfg(all(doctest, feature = "screens"))]
 #[doc = include_str!("../README.md")]
-struct Readme;
+mod readme {}

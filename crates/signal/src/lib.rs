@@ -96,4 +96,4 @@ pub use shot::Shot;
 /// The example of the README is run as a test.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-struct Readme;
+mod readme {}

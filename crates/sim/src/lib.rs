@@ -80,7 +80,7 @@ pub use write::write;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
-struct Readme;
+mod readme {}
 
 /// Version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
