@@ -58,14 +58,16 @@ pub(crate) fn aperture_field<T: Real>(
 ) -> Vec<Complex<T>> {
     let spectrum = aperture_spectrum(telescope, misalignment, grid);
     let fft = Fft2::<f64>::new(grid);
-    let Work {
-        whole: mut field,
-        mut scratch,
-    } = fft.work();
-    Fft2::transposing(&fft.inverse_y, &mut field, &mut scratch, |ix, block| {
+    let mut work = fft.work();
+    Fft2::transposing(&fft.inverse_y, &mut work, |ix, block| {
         let start = ix * grid.ny;
         block.copy_from_slice(&spectrum[start..start + block.len()]);
     });
+    let Work {
+        mut field,
+        mut scratch,
+        ..
+    } = work;
     fft.inverse_x(&mut field, &mut scratch, |_, _| {});
     let k = telescope.wavenumber_rad_m();
     let bend = 0.5 * k * telescope.focus.curvature_per_m();

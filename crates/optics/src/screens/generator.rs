@@ -200,14 +200,10 @@ impl<T: Real> ScreenGenerator<T> {
         let [nx, ny] = [self.grid.nx, self.grid.ny];
         let shift = [unit(rng) - 0.5, unit(rng) - 0.5];
         let low = self.low.draw(&*self.spectrum, self.shift_sign, rng);
-        let Work {
-            whole: field,
-            scratch,
-        } = work;
         let mut radius = vec![0; ny];
         let mut angle = vec![0; ny];
         let mut amplitude = vec![T::zero(); ny];
-        Fft2::transposing(&self.fft.inverse_y, field, scratch, |ix, block| {
+        Fft2::transposing(&self.fft.inverse_y, work, |ix, block| {
             for (i, line) in block.chunks_exact_mut(ny).enumerate() {
                 for (u, v) in radius.iter_mut().zip(&mut angle) {
                     let word = rng.next_u64();
@@ -219,6 +215,7 @@ impl<T: Real> ScreenGenerator<T> {
             }
         });
         let ramp: Vec<Complex<T>> = (0..nx).map(|x| self.shift_phase(shift[0], nx, x)).collect();
+        let Work { field, scratch, .. } = work;
         self.fft.inverse_x(field, scratch, |y, block| {
             for (i, line) in block.chunks_exact(nx).enumerate() {
                 let y = y + i;

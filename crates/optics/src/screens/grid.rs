@@ -111,17 +111,14 @@ impl Grid {
 
 /// Buffers of steps or of screens on one grid, reused from one to the next.
 pub struct Work<T> {
-    /// A field between the transforms along its axes.
-    pub(crate) whole: Vec<Complex<T>>,
-    pub(crate) scratch: FftScratch<T>,
-}
-
-/// Buffers of one transform: blocks of rows, which stay in the fastest cache, and the
-/// transform's own.
-pub(crate) struct FftScratch<T> {
+    /// A field between the transforms along its axes, transposed.
+    pub(crate) field: Vec<Complex<T>>,
+    /// A block of rows, which stays in the fastest cache.
     block: Vec<Complex<T>>,
+    /// The spectrum of a block.
     spectrum: Vec<Complex<T>>,
-    inner: Vec<Complex<T>>,
+    /// Scratch space of a transform of one row.
+    pub(crate) scratch: Vec<Complex<T>>,
 }
 
 /// Fourier transforms along either axis of one grid, planned once.
@@ -156,62 +153,64 @@ impl<T: Real> Fft2<T> {
             .map(|plan| ROWS * plan.len())
             .max()
             .unwrap_or(0);
-        let inner = plans
+        let scratch = plans
             .iter()
             .map(|plan| plan.get_inplace_scratch_len())
             .max()
             .unwrap_or(0);
-        let scratch = FftScratch {
+        Work {
+            field: vec![Complex::default(); self.forward_x.len() * self.forward_y.len()],
             block: vec![Complex::default(); block],
             spectrum: vec![Complex::default(); block],
-            inner: vec![Complex::default(); inner],
-        };
-        Work {
-            whole: vec![Complex::default(); self.forward_x.len() * self.forward_y.len()],
-            scratch,
+            scratch: vec![Complex::default(); scratch],
         }
     }
 
-    /// Transforms rows of the length of `plan` and stores them transposed in `out`. `fill` writes
-    /// each block of rows; its first argument is the index of the first row of the block.
+    /// Transforms rows of the length of `plan` and stores them transposed in the field of `work`.
+    /// `fill` writes each block of rows; its first argument is the index of the first row of the
+    /// block.
     pub(crate) fn transposing(
         plan: &Arc<dyn Fft<T>>,
-        out: &mut [Complex<T>],
-        scratch: &mut FftScratch<T>,
+        work: &mut Work<T>,
         mut fill: impl FnMut(usize, &mut [Complex<T>]),
     ) {
-        let FftScratch { block, inner, .. } = scratch;
-        let count = out.len() / plan.len();
+        let Work {
+            field,
+            block,
+            scratch,
+            ..
+        } = work;
+        let count = field.len() / plan.len();
         for first in (0..count).step_by(ROWS) {
             let block = &mut block[..ROWS.min(count - first) * plan.len()];
             fill(first, block);
-            transform(plan, block, inner);
-            store_transposed(out, plan.len(), first, block);
+            transform(plan, block, scratch);
+            store_transposed(field, plan.len(), first, block);
         }
     }
 
-    /// Filters one field along y into each of the fields `outs`: rows `[kx][y]` are transformed
-    /// forward along y; `middle` changes the spectrum `[kx][ky]` of each block; the inverse along y
-    /// is stored transposed, `[y]\[kx\]`. The arguments of `middle` are the index of the output,
-    /// the index of the first row of the block, and the block.
+    /// Filters the field of `work` along y into each of the fields `outs`: rows `[kx][y]` are
+    /// transformed forward along y; `filter` changes the spectrum `[kx][ky]` of each block; the
+    /// inverse along y is stored transposed, `[y]\[kx\]`. The arguments of `filter` are the index
+    /// of the output, the index of the first row of the block, and the block.
     pub(crate) fn filter_y<const N: usize>(
         &self,
-        field: &[Complex<T>],
+        work: &mut Work<T>,
         mut outs: [&mut [Complex<T>]; N],
-        scratch: &mut FftScratch<T>,
-        mut middle: impl FnMut(usize, usize, &mut [Complex<T>]),
+        mut filter: impl FnMut(usize, usize, &mut [Complex<T>]),
     ) {
-        let FftScratch {
+        let Work {
+            field,
             block,
             spectrum,
-            inner,
-        } = scratch;
+            scratch,
+        } = work;
         let length = self.forward_y.len();
         for (index, rows) in field.chunks(ROWS * length).enumerate() {
             let first = index * ROWS;
             let points = ..rows.len();
             spectrum[points].copy_from_slice(rows);
-            transform(&self.forward_y, &mut spectrum[points], inner);
+            transform(&self.forward_y, &mut spectrum[points], scratch);
             for (which, out) in outs.iter_mut().enumerate() {
                 // The last filter needs no copy.
                 if which + 1 < N {
@@ -220,23 +219,23 @@ impl<T: Real> Fft2<T> {
                     std::mem::swap(block, spectrum);
                 }
                 let block = &mut block[points];
-                middle(which, first, block);
-                transform(&self.inverse_y, block, inner);
+                filter(which, first, block);
+                transform(&self.inverse_y, block, scratch);
                 store_transposed(out, length, first, block);
             }
         }
     }
 
     /// Transforms rows `[y]\[kx\]` by the inverse along x, then calls `after` with the index of the
-    /// first row of each block and the block.
+    /// first row of each block and the block. `scratch` is that of [`Work`].
     pub(crate) fn inverse_x(
         &self,
         field: &mut [Complex<T>],
-        scratch: &mut FftScratch<T>,
+        scratch: &mut [Complex<T>],
         mut after: impl FnMut(usize, &mut [Complex<T>]),
     ) {
         for (block_index, block) in field.chunks_mut(ROWS * self.inverse_x.len()).enumerate() {
-            transform(&self.inverse_x, block, &mut scratch.inner);
+            transform(&self.inverse_x, block, scratch);
             after(block_index * ROWS, block);
         }
     }
@@ -277,18 +276,17 @@ mod tests {
             dy_m: 1.0,
         };
         let fft = Fft2::<f64>::new(&grid);
-        let mut scratch = fft.work().scratch;
+        let mut work = fft.work();
         let field: Vec<Complex<f64>> = (0..grid.points())
             .map(|i| Complex::new((i as f64 * 0.7).sin(), (i as f64 * 1.3).cos()))
             .collect();
-        let mut b = field.clone();
-        Fft2::transposing(&fft.forward_x, &mut b, &mut scratch, |first, block| {
+        Fft2::transposing(&fft.forward_x, &mut work, |first, block| {
             block.copy_from_slice(&field[first * 17..first * 17 + block.len()]);
         });
         let mut found = Complex::default();
         let (kx, ky) = (5usize, 3usize);
         let mut out = field.clone();
-        fft.filter_y(&b, [&mut out[..]], &mut scratch, |_, first, block| {
+        fft.filter_y(&mut work, [&mut out[..]], |_, first, block| {
             if (first..first + block.len() / 23).contains(&kx) {
                 found = block[(kx - first) * 23 + ky];
             }
@@ -303,7 +301,7 @@ mod tests {
             }
         }
         assert!((found - exact).norm() < 1e-11);
-        fft.inverse_x(&mut out, &mut scratch, |_, _| {});
+        fft.inverse_x(&mut out, &mut work.scratch, |_, _| {});
         for (o, f) in out.iter().zip(&field) {
             assert!((o / 391.0 - f).norm() < 1e-13);
         }

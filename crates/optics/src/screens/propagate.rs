@@ -147,11 +147,7 @@ impl<T: Real> Propagator<T> {
         if let Some((phase, _)) = screen {
             check_length("screen", phase.len(), self.grid.points())?;
         }
-        let Work {
-            whole: transposed,
-            scratch,
-        } = work;
-        Fft2::transposing(&self.fft.forward_x, transposed, scratch, |row, block| {
+        Fft2::transposing(&self.fft.forward_x, work, |row, block| {
             let points = row * self.grid.nx..row * self.grid.nx + block.len();
             block.copy_from_slice(&field[points.clone()]);
             if let Some((phase, scale)) = screen {
@@ -169,24 +165,16 @@ impl<T: Real> Propagator<T> {
         transfers: [&Transfer<T>; N],
         work: &mut Work<T>,
     ) -> [f64; N] {
-        let Work {
-            whole: transposed,
-            scratch,
-        } = work;
         let Grid { nx, ny, dx_m, dy_m } = self.grid;
-        self.fft.filter_y(
-            transposed,
-            fields.each_mut().map(|field| &mut **field),
-            scratch,
-            |which, kx, block| {
-                for (i, line) in block.chunks_exact_mut(ny).enumerate() {
-                    kernel::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
-                }
-            },
-        );
+        let outs = fields.each_mut().map(|field| &mut **field);
+        self.fft.filter_y(work, outs, |which, kx, block| {
+            for (i, line) in block.chunks_exact_mut(ny).enumerate() {
+                kernel::multiply_scaled(line, transfers[which].x[kx + i], &transfers[which].y);
+            }
+        });
         fields.map(|field| {
             let mut power = 0.0;
-            self.fft.inverse_x(field, scratch, |y, block| {
+            self.fft.inverse_x(field, &mut work.scratch, |y, block| {
                 for (i, line) in block.chunks_exact_mut(nx).enumerate() {
                     power += kernel::absorb(line, self.window[1][y + i], &self.window[0]);
                 }
