@@ -8,8 +8,8 @@
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_signal::{
-    GaussianPulse, LayerLimits, LineOfSight, NoiseModel, Pulse, Receiver, Record,
-    SPEED_OF_LIGHT_M_S, Scratch, Simulator,
+    GaussianPulse, LineOfSight, NoiseModel, Pulse, Receiver, Record, SPEED_OF_LIGHT_M_S, Scratch,
+    Simulator,
 };
 
 const SAMPLES: usize = 700;
@@ -27,12 +27,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     };
     let simulator = Simulator::new(&pulse, receiver, record)?;
 
-    let (sample_rate_hz, wavelength_m) = (receiver.sample_rate_hz, receiver.wavelength_m);
-    let thickness_m = pulse.layer_thickness_m(LayerLimits {
-        sample_rate_hz,
-        wavelength_m,
-        max_gradient_per_s: 0.0,
-    })?;
+    let thickness_m = pulse.layer_thickness_m(receiver.layer_limits(0.0))?;
     let ranges_m = (0..1200).map(|l| 80.0 + f64::from(l) * thickness_m);
     let solid_angle_m2 = 1e-7 * std::f64::consts::PI * 0.05 * 0.05 * 0.009;
     let line = LineOfSight {

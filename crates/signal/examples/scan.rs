@@ -2,8 +2,8 @@
 //! bits; streamed.
 //!
 //! The pulse is a table of power and phase against time, as an oscilloscope writes it; each pulse
-//! meets a turbulence of its own; the phase of the complex baseband after 20 ns, averaged over the
-//! pulses of a line, shows the wind.
+//! has a realisation of the turbulence; the phase of the complex baseband after 20 ns, averaged over
+//! the pulses of a line, gives the wind.
 //!
 //! `cargo run --release -p wakescope-signal --example scan`
 
@@ -17,8 +17,8 @@ use wakescope_signal::efficiency::LayerEfficiency;
 use wakescope_signal::sampled::SampledPulse;
 use wakescope_signal::scan::{PulseKey, pulse_generator};
 use wakescope_signal::{
-    Error, LayerLimits, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record,
-    SPEED_OF_LIGHT_M_S, Scan, Shot, Simulator,
+    Error, LineOfSight, Medium, Pulse, RangeFilter, Receiver, Record, SPEED_OF_LIGHT_M_S, Scan,
+    Shot, Simulator,
 };
 
 const LINES: usize = 9;
@@ -27,6 +27,8 @@ const SAMPLES: usize = 200;
 const FIRST_M: f64 = 360.0;
 /// Samples averaged for one velocity.
 const GATE: std::ops::Range<usize> = 60..76;
+/// Lag of the pulse pair in samples, 20 ns: noise of 50 MHz is uncorrelated there.
+const LAG: usize = 5;
 
 const RECEIVER: Receiver = Receiver {
     quantum_efficiency: 0.8,
@@ -57,30 +59,17 @@ fn wind_m_s(distance_m: f64, range_m: f64) -> f64 {
     450.0 * distance_m / (2.0 * PI * square)
 }
 
-fn main() -> Result<(), Error> {
-    let pulse = measured_pulse()?;
-    let record = Record {
-        time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S,
-        samples: SAMPLES,
-    };
-    let simulator = Simulator::new(&pulse, RECEIVER, record)?;
-
-    let (sample_rate_hz, wavelength_m) = (RECEIVER.sample_rate_hz, RECEIVER.wavelength_m);
-    let thickness_m = pulse.layer_thickness_m(LayerLimits {
-        sample_rate_hz,
-        wavelength_m,
-        max_gradient_per_s: 3.0,
-    })?;
+/// Lines of sight through haze, each past the vortex at one of the distances.
+fn lines_of_sight(distances_m: &[f64], thickness_m: f64) -> Result<Vec<LineOfSight>, Error> {
     let haze = Medium::new(
         vec![0.0, 300.0, 700.0],
         vec![8e-7, 5e-7, 2e-7],
         vec![5e-4, 3e-4, 1e-4],
     )?;
-    let distances_m: Vec<f64> = (0..LINES).map(|i| 5.0 * (i as f64 - 4.0)).collect();
+    let first_range_m = 200.0;
+    let layers = (400.0 / thickness_m) as usize;
     let mut lines = Vec::new();
-    for distance_m in &distances_m {
-        let first_range_m = 200.0;
-        let layers = (400.0 / thickness_m) as usize;
+    for distance_m in distances_m {
         let ranges_m = (0..layers).map(|l| first_range_m + l as f64 * thickness_m);
         let mut line = LineOfSight {
             first_range_m,
@@ -91,7 +80,38 @@ fn main() -> Result<(), Error> {
         haze.weigh(&mut line, PI * 0.05 * 0.05)?;
         lines.push(line);
     }
-    // Four realisations stand for the hundreds that optics would give.
+    Ok(lines)
+}
+
+/// Mean over the realisations of the efficiency of each layer.
+fn mean_efficiency(efficiency: &LayerEfficiency) -> Vec<f64> {
+    let realisations = efficiency.realisations();
+    let mut mean = vec![0.0; efficiency.of_pulse(0).len()];
+    for realisation in 0..realisations {
+        for (mean, e) in mean.iter_mut().zip(efficiency.of_pulse(realisation)) {
+            *mean += e / realisations as f64;
+        }
+    }
+    mean
+}
+
+/// Velocity of a covariance at the lag of the pulse pair.
+fn velocity_m_s(covariance: Complex<f64>) -> f64 {
+    let lag_s = LAG as f64 / RECEIVER.sample_rate_hz;
+    -covariance.arg() * RECEIVER.wavelength_m / (4.0 * PI * lag_s)
+}
+
+fn main() -> Result<(), Error> {
+    let pulse = measured_pulse()?;
+    let record = Record {
+        time_of_first_sample_s: 2.0 * FIRST_M / SPEED_OF_LIGHT_M_S,
+        samples: SAMPLES,
+    };
+    let simulator = Simulator::new(&pulse, RECEIVER, record)?;
+    let thickness_m = pulse.layer_thickness_m(RECEIVER.layer_limits(3.0))?;
+    let distances_m: Vec<f64> = (0..LINES).map(|i| 5.0 * (i as f64 - 4.0)).collect();
+    let lines = lines_of_sight(&distances_m, thickness_m)?;
+    // Four realisations; a Monte Carlo of the optics gives hundreds.
     let realisations = [
         [0.012, 0.004],
         [0.008, 0.009],
@@ -99,7 +119,7 @@ fn main() -> Result<(), Error> {
         [0.006, 0.005],
     ];
     let efficiency = LayerEfficiency::new(&[100.0, 700.0], &realisations, &lines[0])?;
-
+    let full_scale_a = 4.0 * RECEIVER.noise_variance_a2().sqrt();
     let scan = Scan {
         simulator: &simulator,
         lines: LINES,
@@ -109,56 +129,40 @@ fn main() -> Result<(), Error> {
             ..Shot::from(&lines[key.line])
         },
         generator: |key| pulse_generator(2024, key),
-        digitiser: Some(Digitiser::new(
-            8,
-            4.0 * RECEIVER.noise_variance_a2().sqrt(),
-        )?),
+        digitiser: Some(Digitiser::new(8, full_scale_a)?),
     };
-    // One complex number per line is all that is kept. Noise of 50 MHz is uncorrelated at a lag of
-    // 5 samples, 20 ns.
-    let mut lags = [Complex::<f64>::ZERO; LINES];
+    // Only one complex number per line is stored.
+    let mut sums = [Complex::<f64>::ZERO; LINES];
     let clipped = scan.for_each::<Complex<f64>, Error>(|key, baseband| {
-        lags[key.line] += GATE
-            .map(|k| baseband[k + 5] * baseband[k].conj())
+        sums[key.line] += GATE
+            .map(|k| baseband[k + LAG] * baseband[k].conj())
             .sum::<Complex<f64>>();
         Ok(())
     })?;
 
-    // What the gate sees: its samples, and those 5 later, weighted alike.
-    let window = vec![1.0; GATE.len() + 5];
+    // The samples of the gate, and those one lag later, with equal weights.
+    let window = vec![1.0; GATE.len() + LAG];
     let filter = RangeFilter::gate(&pulse, &window, RECEIVER.sample_rate_hz, thickness_m)?;
-    let middle_s =
-        simulator.time_s(GATE.start) + 0.5 * window.len() as f64 / RECEIVER.sample_rate_hz;
-    let range_m = 0.5 * SPEED_OF_LIGHT_M_S * middle_s;
-    let mut mean_efficiency = vec![0.0; lines[0].layers()];
-    for pulse in 0..realisations.len() {
-        let own = efficiency.of_pulse(pulse);
-        mean_efficiency
-            .iter_mut()
-            .zip(own)
-            .for_each(|(mean, e)| *mean += e / realisations.len() as f64);
-    }
-    let velocity_m_s = |lag: Complex<f64>| {
-        -lag.arg() * RECEIVER.wavelength_m * RECEIVER.sample_rate_hz / (20.0 * PI)
-    };
+    let half_s = 0.5 * window.len() as f64 / RECEIVER.sample_rate_hz;
+    let range_m = 0.5 * SPEED_OF_LIGHT_M_S * (simulator.time_s(GATE.start) + half_s);
+    let mean_efficiency = mean_efficiency(&efficiency);
     println!(
-        "Velocities at {range_m:.1} m [m/s], {PULSES} pulses per line. Near air returns more, and at any moment it returns"
+        "Velocities at {range_m:.1} m [m/s], {PULSES} pulses per line. The echo of near air is"
     );
     println!(
-        "light that was sent later: its rising frequency lowers what is measured below what the gate sees."
+        "stronger and, at any moment, of light that was sent later: the rising frequency lowers"
     );
+    println!("the measured velocity below v_gate.");
     println!("distance [m]  v_gate  expected of pulse pair  pulse pair");
-    for ((distance_m, lag), line) in distances_m.iter().zip(lags).zip(&lines) {
-        let seen = filter.at_range(range_m, |r| wind_m_s(*distance_m, r));
+    for ((distance_m, sum), line) in distances_m.iter().zip(sums).zip(&lines) {
+        let gate_m_s = filter.at_range(range_m, |r| wind_m_s(*distance_m, r));
         let covariance = simulator.covariance_a2(Shot {
             efficiency: Some(&mean_efficiency),
             ..Shot::from(line)
         })?;
-        let expected = velocity_m_s(GATE.map(|k| covariance[(k + 5, k)]).sum());
-        println!(
-            "{distance_m:12.1}  {seen:6.2}  {expected:22.2}  {:10.2}",
-            velocity_m_s(lag)
-        );
+        let expected_m_s = velocity_m_s(GATE.map(|k| covariance[(k + LAG, k)]).sum());
+        let found_m_s = velocity_m_s(sum);
+        println!("{distance_m:12.1}  {gate_m_s:6.2}  {expected_m_s:22.2}  {found_m_s:10.2}");
     }
     println!(
         "{} of {} parts of samples clipped",
