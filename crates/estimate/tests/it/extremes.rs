@@ -1,13 +1,14 @@
 //! Extreme cases: for each a typed outcome, never a panic and never a silent number.
 
 use crate::draw::Wind;
-use crate::fixtures::{noise, sigma_s, table_2, tone};
+use crate::fixtures::{baseband, noise, sigma_s, table_2, tone};
 use ndarray::Array2;
+use num_complex::Complex;
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wakescope_estimate::{
-    Error, Gates, Scratch, SignalKind, Weighting, bound::*, estimators::*, map::*, models::*,
-    spectrum::*,
+    Error, Gates, Sampling, Scratch, SignalKind, Weighting, bound::*, estimators::*, map::*,
+    models::*, spectrum::*, window::Sample,
 };
 
 type Named = (&'static str, Box<dyn Statistic<f64>>, Box<dyn Estimator>);
@@ -17,7 +18,7 @@ fn estimators() -> Vec<Named> {
     let (s, kind, refinement) = (&table_2(), SignalKind::Real, Refinement::Parabola);
     let rectangular = || Box::new(Correlogram::<f64>::new(Weighting::Rectangular, 64).unwrap());
     let peak = SpectralPeak::new(s, kind, &unweighted_lags(64), 1024, refinement).unwrap();
-    let (tapered, of_tapers) = likelihood(200e-9, 10.0);
+    let (tapered, of_tapers) = likelihood::<f64>(table_2(), 200e-9, 10.0);
     let short = ShortCorrelogram::<f64>::new(64, 17).unwrap();
     vec![
         ("periodogram", rectangular(), Box::new(peak)),
@@ -40,15 +41,19 @@ fn estimators() -> Vec<Named> {
     ]
 }
 
-/// The likelihood of a pulse of that full width and signal-to-noise ratio, for real windows of 64 samples.
-fn likelihood(full_width_s: f64, snr: f64) -> (Correlogram<f64>, SpectralPeak) {
-    let (s, sigma_s) = (table_2(), sigma_s(full_width_s));
+/// The likelihood of a pulse of that full width and signal-to-noise ratio, for windows of 64 samples.
+fn likelihood<S: Sample>(
+    s: Sampling,
+    full_width_s: f64,
+    snr: f64,
+) -> (Correlogram<S>, SpectralPeak) {
+    let sigma_s = sigma_s(full_width_s);
     let model = WindowModel::gaussian_pulse(&s, 64, sigma_s, Noise::White).unwrap();
     let tapers = likelihood_tapers(&model, snr).unwrap();
     let statistic = Correlogram::with_tapers(tapers).unwrap();
     let weights = statistic.lag_weights();
     let refinement = Refinement::Parabola;
-    let peak = SpectralPeak::new(&s, SignalKind::Real, &weights, 1024, refinement).unwrap();
+    let peak = SpectralPeak::new(&s, S::KIND, &weights, 1024, refinement).unwrap();
     (statistic, peak)
 }
 
@@ -202,8 +207,12 @@ fn snr_of_minus_40_and_plus_60_db_give_finite_velocities_in_the_band() {
             assert!(expected.contains(&near), "{name} {snr_db} dB: {near}");
         }
         // the likelihood's weights at any SNR
-        let (statistic, peak) = likelihood(200e-9, snr);
-        let found = single(&statistic, &peak, &tone(5.0, 0.4)).estimate;
+        let (statistic, peak) = likelihood(baseband(), 200e-9, snr);
+        let turn = std::f64::consts::TAU * baseband().frequency_hz(5.0) * baseband().period_s();
+        let line: Vec<_> = (0..64)
+            .map(|n| Complex::from_polar(1.0, turn * f64::from(n)))
+            .collect();
+        let found = estimate_window(&statistic, &peak, &line, &mut Scratch::new()).unwrap();
         assert!(
             (found.velocity_m_s - 5.0).abs() < 0.5,
             "{snr_db} dB: {found:?}"
@@ -215,11 +224,11 @@ fn snr_of_minus_40_and_plus_60_db_give_finite_velocities_in_the_band() {
 fn pulses_much_longer_and_much_shorter_than_the_gate_keep_their_velocity() {
     for full_width_s in [10e-9, 5e-6] {
         let model =
-            WindowModel::gaussian_pulse(&table_2(), 64, sigma_s(full_width_s), Noise::White)
+            WindowModel::gaussian_pulse(&baseband(), 64, sigma_s(full_width_s), Noise::White)
                 .unwrap();
-        let (statistic, peak) = likelihood(full_width_s, 10.0);
-        let [covariance, _] = model.covariance(4.0, 10.0, SignalKind::Real).unwrap();
-        let windows = crate::draw::Windows::<f64>::new(&covariance);
+        let (statistic, peak) = likelihood(baseband(), full_width_s, 10.0);
+        let [covariance, _] = model.covariance(4.0, 10.0, SignalKind::Complex).unwrap();
+        let windows = crate::draw::Windows::<Complex<f64>>::new(&covariance);
         let mut rng = Xoshiro256PlusPlus::seed_from_u64(1);
         let (mut scratch, mut one) = (Scratch::new(), vec![0.0; statistic.statistic_len()]);
         let mut mean = one.clone();
@@ -230,7 +239,9 @@ fn pulses_much_longer_and_much_shorter_than_the_gate_keep_their_velocity() {
                 .for_each(|(sum, value)| *sum += value / 200.0);
         }
         let found = peak.estimate(&mean, &mut scratch);
-        let bound_m_s = model.bound_m_s(4.0, 10.0, SignalKind::Real, 200.0).unwrap();
+        let bound_m_s = model
+            .bound_m_s(4.0, 10.0, SignalKind::Complex, 200.0)
+            .unwrap();
         assert!(
             (found.velocity_m_s - 4.0).abs() < 4.0 * bound_m_s + 0.02,
             "{full_width_s}: {found:?} {bound_m_s}"
