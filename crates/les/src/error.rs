@@ -248,14 +248,6 @@ pub enum Error {
         /// Its error.
         message: String,
     },
-    /// A point is outside the mesh and the policy is to refuse it.
-    #[error("the point y = {y_m:?} m, z = {z_m:?} m is outside the mesh")]
-    OutsideMesh {
-        /// Lateral coordinate of the point.
-        y_m: f64,
-        /// Height of the point.
-        z_m: f64,
-    },
 }
 
 /// Why a pressure solver went no further.

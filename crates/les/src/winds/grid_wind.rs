@@ -12,16 +12,6 @@ use super::axis::{Axis, Edges, GHOSTS, Ghost, Side};
 use super::wind::Wind;
 use crate::error::{Error, check, check_lengths};
 
-/// What a point outside the mesh gets. A periodic direction has no outside.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum OutsidePolicy {
-    /// [`Error::OutsideMesh`].
-    #[default]
-    Error,
-    /// NaN in all three components: nothing is known there.
-    Mask,
-}
-
 /// Nodes and boundaries of a plane mesh.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PlaneMesh {
@@ -33,8 +23,6 @@ pub struct PlaneMesh {
     pub y_edges: Edges,
     /// The two ends in z, such as a wall at the ground below and open air above.
     pub z_edges: Edges,
-    /// What a point outside gets.
-    pub outside: OutsidePolicy,
 }
 
 /// A velocity field at one instant on a [`PlaneMesh`]; the time it is asked for makes no
@@ -43,7 +31,6 @@ pub struct PlaneMesh {
 pub struct GridSnapshot {
     y: Axis,
     z: Axis,
-    outside: OutsidePolicy,
     /// Velocities with ghosts, y fastest.
     velocity_m_s: Vec<[f64; 3]>,
     max_gradient_per_s: f64,
@@ -73,7 +60,6 @@ impl GridSnapshot {
         Ok(Self {
             y,
             z,
-            outside: mesh.outside,
             velocity_m_s,
             max_gradient_per_s,
         })
@@ -99,8 +85,7 @@ impl GridSnapshot {
 }
 
 impl Wind for GridSnapshot {
-    /// As the trait says; outside the mesh as [`OutsidePolicy`] says. A coordinate that is NaN is
-    /// outside; x is not read.
+    /// As the trait says; NaN outside the mesh. x is not read.
     fn velocity_into(
         &self,
         points_m: &[[f64; 3]],
@@ -109,11 +94,7 @@ impl Wind for GridSnapshot {
     ) -> Result<(), Error> {
         check_lengths(points_m.len(), out_m_s.len())?;
         for (&[_, y_m, z_m], out) in points_m.iter().zip(out_m_s) {
-            *out = match (self.interpolate(y_m, z_m), self.outside) {
-                (Some(velocity), _) => velocity,
-                (None, OutsidePolicy::Mask) => [f64::NAN; 3],
-                (None, OutsidePolicy::Error) => return Err(Error::OutsideMesh { y_m, z_m }),
-            };
+            *out = self.interpolate(y_m, z_m).unwrap_or([f64::NAN; 3]);
         }
         Ok(())
     }

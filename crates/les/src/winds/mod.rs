@@ -27,7 +27,7 @@ mod wind;
 
 pub use along_flight::AlongFlight;
 pub use axis::{Edges, Side, m4_prime, m4_prime_weights};
-pub use grid_wind::{GridSnapshot, OutsidePolicy, PlaneMesh};
+pub use grid_wind::{GridSnapshot, PlaneMesh};
 pub use linear::Linear;
 pub use profile::{CirculationProfile, TwoScale};
 pub use series::Series;

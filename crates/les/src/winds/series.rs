@@ -159,7 +159,7 @@ impl Wind for Series {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Edges, GridSnapshot, OutsidePolicy, PlaneMesh, Side};
+    use super::super::{Edges, GridSnapshot, PlaneMesh, Side};
     use super::*;
 
     /// A uniform velocity on a small mesh.
@@ -174,7 +174,6 @@ mod tests {
             z_m: axis,
             y_edges: open,
             z_edges: open,
-            outside: OutsidePolicy::Error,
         };
         GridSnapshot::new(&mesh, &[velocity_m_s; 16]).unwrap()
     }

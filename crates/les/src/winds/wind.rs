@@ -17,8 +17,7 @@ pub trait Wind: Send + Sync {
     /// `out_m_s`.
     ///
     /// # Errors
-    /// [`Error::LengthMismatch`] if the slices differ in length; what else depends on the wind,
-    /// such as [`Error::OutsideMesh`].
+    /// [`Error::LengthMismatch`] if the slices differ in length; what else depends on the wind.
     fn velocity_into(
         &self,
         points_m: &[[f64; 3]],

@@ -1,7 +1,7 @@
 //! Interpolation on meshes: exactness, order, boundaries and what happens outside.
 
 use approx::{assert_abs_diff_eq, assert_relative_eq};
-use wakescope_les::winds::{Edges, Linear, OutsidePolicy, PlaneMesh, Side};
+use wakescope_les::winds::{Edges, Linear, PlaneMesh, Side};
 use wakescope_les::{CirculationProfile, Error, GridSnapshot, Ground, Motion, VortexPair, Wind};
 
 const OPEN: Edges = Edges::Bounded {
@@ -85,7 +85,6 @@ fn linear_fields_are_exact_on_a_strongly_stretched_mesh() {
         z_m: stretched(30, 80.0, 4.0),
         y_edges: OPEN,
         z_edges: OPEN,
-        outside: OutsidePolicy::Error,
     };
     let field = |y: f64, z: f64| {
         [
@@ -109,7 +108,6 @@ fn parabolas_are_exact_on_an_even_mesh_up_to_its_open_ends() {
         z_m: even(9, 0.0, 80.0),
         y_edges: OPEN,
         z_edges: OPEN,
-        outside: OutsidePolicy::Error,
     };
     let field = |y: f64, z: f64| [y * y - z * y, 3.0 * z * z, y * y * z * z * 1e-3];
     let wind = snapshot(&mesh, field);
@@ -127,7 +125,6 @@ fn a_cubic_misses_by_the_residual_of_the_kernel() {
         z_m: even(9, 0.0, 8.0),
         y_edges: OPEN,
         z_edges: OPEN,
-        outside: OutsidePolicy::Error,
     };
     let wind = snapshot(&mesh, |y, _| [y * y * y, 0.0, 0.0]);
     for s in [0.1, 0.25, 0.7] {
@@ -146,7 +143,6 @@ fn rms_error(nodes: usize, strength: f64) -> f64 {
             low: Side::SlipWall { position_m: 0.0 },
             high: Side::Open,
         },
-        outside: OutsidePolicy::Error,
     };
     let exact = pair().wind().unwrap();
     let sampled = at_nodes(&exact, &mesh);
@@ -183,7 +179,6 @@ fn no_air_crosses_a_slip_wall_on_a_node_or_beside_one() {
                 low: Side::SlipWall { position_m: 0.0 },
                 high: Side::Open,
             },
-            outside: OutsidePolicy::Mask,
         };
         let exact = pair().wind().unwrap();
         let wind = at_nodes(&exact, &mesh);
@@ -209,7 +204,6 @@ fn air_sticks_to_a_no_slip_wall_and_moves_with_it() {
             },
             high: Side::Open,
         },
-        outside: OutsidePolicy::Error,
     };
     let wind = snapshot(&mesh, |_, z| [0.3 * z, 2.0 + 4.0 * z, -z]);
     for z in [0.0, 0.1, 0.49, 0.5, 3.2] {
@@ -227,7 +221,6 @@ fn walls_at_the_high_end_mirror_as_those_at_the_low_end() {
         z_m,
         y_edges: OPEN,
         z_edges: Edges::Bounded { low, high },
-        outside: OutsidePolicy::Error,
     };
     let wall = Side::SlipWall { position_m: 0.0 };
     let up: Vec<f64> = stretched(12, 6.0, 1.5).iter().map(|z| z + 0.05).collect();
@@ -257,7 +250,6 @@ fn a_periodic_mesh_holds_every_point_and_repeats() {
         z_m: even(6, 0.0, 5.0),
         y_edges: Edges::Periodic { period_m },
         z_edges: OPEN,
-        outside: OutsidePolicy::Error,
     };
     let wave = |y: f64| (2.0 * std::f64::consts::PI * y / period_m).sin();
     let wind = snapshot(&mesh, |y, _| [wave(y), 1.0, 0.0]);
@@ -272,8 +264,8 @@ fn a_periodic_mesh_holds_every_point_and_repeats() {
 }
 
 #[test]
-fn points_outside_follow_the_policy() {
-    let mesh = |outside| PlaneMesh {
+fn points_outside_have_no_velocity() {
+    let mesh = PlaneMesh {
         y_m: even(5, 0.0, 4.0),
         z_m: even(5, 1.0, 5.0),
         y_edges: OPEN,
@@ -281,9 +273,8 @@ fn points_outside_follow_the_policy() {
             low: Side::SlipWall { position_m: 0.4 },
             high: Side::Open,
         },
-        outside,
     };
-    let make = |outside| snapshot(&mesh(outside), |_, _| [1.0, 2.0, 0.0]);
+    let wind = snapshot(&mesh, |_, _| [1.0, 2.0, 0.0]);
     for (y, z) in [
         (-0.01, 2.0),
         (4.01, 2.0),
@@ -292,20 +283,9 @@ fn points_outside_follow_the_policy() {
         (f64::NAN, 2.0),
         (2.0, f64::INFINITY),
     ] {
-        let refused =
-            make(OutsidePolicy::Error).velocity_into(&[[0.0, y, z]], 0.0, &mut [[0.0; 3]]);
-        assert!(matches!(refused, Err(Error::OutsideMesh { .. })), "{y} {z}");
-        assert!(
-            at(&make(OutsidePolicy::Mask), y, z)
-                .iter()
-                .all(|v| v.is_nan())
-        );
+        assert!(at(&wind, y, z).iter().all(|v| v.is_nan()), "{y} {z}");
     }
-    assert_abs_diff_eq!(
-        at(&make(OutsidePolicy::Error), 2.0, 0.4)[1],
-        2.0,
-        epsilon = 1e-14
-    );
+    assert_abs_diff_eq!(at(&wind, 2.0, 0.4)[1], 2.0, epsilon = 1e-14);
 }
 
 #[test]
@@ -318,7 +298,6 @@ fn gradient_of_a_resolved_vortex_is_that_of_its_profile() {
             low: Side::SlipWall { position_m: 0.0 },
             high: Side::Open,
         },
-        outside: OutsidePolicy::Error,
     };
     let exact = pair().wind().unwrap();
     let sampled = at_nodes(&exact, &mesh);
@@ -342,7 +321,6 @@ fn meshes_that_cannot_be_interpolated_are_refused() {
         z_m: even(6, 0.0, 5.0),
         y_edges: OPEN,
         z_edges: OPEN,
-        outside: OutsidePolicy::Error,
     };
     let refused = |mesh: PlaneMesh| {
         let count = mesh.y_m.len() * mesh.z_m.len();

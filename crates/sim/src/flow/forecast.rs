@@ -106,7 +106,7 @@ impl FlowForecast {
             }),
             courant: step_s * stability.courant_per_s(),
             damped_courant: stability.damped_courant(),
-            notes: notes(case, setup, &stability, step_s),
+            notes: notes(case, &stability, step_s),
             end_s: plan.end_s,
             end_tau: plan.end_s * setup.tau_per_s,
             step_s,
@@ -197,8 +197,8 @@ pub(crate) fn count(cells: [usize; 3]) -> f64 {
 }
 
 /// What deserves attention before a run.
-fn notes(case: &FlowCase, setup: &Setup, stability: &Stability, step_s: f64) -> Vec<String> {
-    let mut notes = case.case.unresolved(&setup.mesh);
+fn notes(case: &FlowCase, stability: &Stability, step_s: f64) -> Vec<String> {
+    let mut notes = case.case.unresolved();
     notes.extend(stability.stiff_note(step_s));
     if let CaseKind::Wake(wake) = &case.case {
         notes.extend(wake.idle());

@@ -7,8 +7,6 @@ use super::wake::WakeFlow;
 use crate::Error;
 use crate::keys::{Checker, keys};
 use std::path::Path;
-use wakescope_les::Mesh;
-use wakescope_les::cases::{Resolution, VortexLengths};
 
 keys! {
     /// Which flow.
@@ -32,26 +30,16 @@ impl CaseKind {
         }
     }
 
-    /// What `mesh` does not resolve of the vortices and of the boundary layer under them, in sentences.
-    pub(super) fn unresolved(&self, mesh: &Mesh) -> Vec<String> {
-        let lengths = match self {
-            Self::VortexPair(c) => Some(VortexLengths::pair(
-                c.core_radius,
-                c.height,
-                c.reynolds,
-                1.0,
-            )),
-            Self::Wake(c) => {
-                let scales = c.pair.scales().ok();
-                scales.map(|scales| {
-                    VortexLengths::pair(c.core_radius, c.height, c.reynolds, scales.spacing_m)
-                })
-            }
-            Self::Free(_) => None,
+    /// What the mesh of a pair does not resolve of its cores and of the boundary layer under them, in sentences.
+    pub(super) fn unresolved(&self) -> Vec<String> {
+        let pair = match self {
+            Self::VortexPair(pair) => Ok(pair.pair_case()),
+            Self::Wake(wake) => wake.pair_case(),
+            Self::Free(_) => return Vec::new(),
         };
-        lengths.map_or_else(Vec::new, |lengths| {
-            Resolution::new(mesh, &lengths).warnings()
-        })
+        // What makes no mesh has been refused.
+        let resolution = pair.and_then(|pair| pair.resolution());
+        resolution.map_or_else(|_| Vec::new(), |resolution| resolution.warnings())
     }
 
     /// Cells along x, y, z.

@@ -49,8 +49,9 @@ impl VortexPairFlow {
         check_pair(p, (self.height, self.size), wind, self.slip_sides);
     }
 
-    pub(super) fn setup(&self) -> Result<Setup, Error> {
-        let pair = VortexPairCase {
+    /// The case of the solver.
+    pub(super) fn pair_case(&self) -> VortexPairCase {
+        VortexPairCase {
             cells: self.cells,
             size: self.size,
             ground_stretch: self.ground_stretch,
@@ -63,13 +64,17 @@ impl VortexPairFlow {
             perturbation: self.perturbation,
             cross_wind: self.cross_wind,
             ..VortexPairCase::coarse()
-        };
+        }
+    }
+
+    pub(super) fn setup(&self) -> Result<Setup, Error> {
         let Case {
             mesh,
             settings,
             initial,
             end_s,
-        } = pair
+        } = self
+            .pair_case()
             .case(VortexPairCase::steps(LONGEST_STEP))
             .map_err(Error::Flow)?;
         Ok(Setup {

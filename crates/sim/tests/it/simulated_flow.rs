@@ -2,7 +2,7 @@
 
 use netcdf3::FileReader;
 use std::path::Path;
-use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Side};
+use wakescope_les::winds::{Edges, PlaneMesh, Side};
 use wakescope_les::{GridSnapshot, Wind};
 use wakescope_sim::flow::{Begin, CaseFile};
 use wakescope_sim::measure::map::VelocityEstimates;
@@ -91,7 +91,6 @@ fn snapshot(folder: &Path, index: usize) -> (f64, GridSnapshot) {
             low: ground,
             high: Side::SlipWall { position_m: 2.5 },
         },
-        outside: OutsidePolicy::Error,
     };
     let velocity: Vec<[f64; 3]> = v
         .iter()

@@ -15,7 +15,7 @@ use crate::ranks::Ranks;
 use crate::solver::flow::Flow;
 use crate::solver::mesh::{Ends, Mesh};
 use crate::solver::planes::Faces;
-use crate::winds::{GridSnapshot, OutsidePolicy};
+use crate::winds::GridSnapshot;
 
 /// Radius of the circle of a centroid, in `b0`.
 const CORE_RADIUS: f64 = 0.15;
@@ -160,7 +160,7 @@ impl WakeMeter {
         crate::error::check_lengths(cells, flow.mesh().cells().iter().product())?;
         let faces = flow.faces()?;
         let plane = self.mean_vorticity(&faces)?;
-        let wind = flow.plane_snapshot(&flow.mean_plane_of(&faces)?, OutsidePolicy::Mask)?;
+        let wind = flow.plane_snapshot(&flow.mean_plane_of(&faces)?)?;
         let time_s = flow.time_s();
         let radius_m = self.core_radius * self.scales.spacing_m;
         let mut cores = [None; 2];

@@ -4,19 +4,9 @@
 use std::f64::consts::TAU;
 
 use super::super::mesh::Mesh;
+use super::VortexPairCase;
 
-/// Lengths that a mesh must resolve, in the plane y, z.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct VortexLengths {
-    /// Core radius \[m\].
-    pub core_radius_m: f64,
-    /// Position (y, z) of the core \[m\].
-    pub core_m: [f64; 2],
-    /// Thickness of the boundary layer at no-slip walls across z, `sqrt(nu length/speed)` \[m\].
-    pub layer_m: f64,
-}
-
-/// Cells that a mesh has across these lengths.
+/// Cells of the mesh of a vortex pair across the lengths that it must resolve.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Resolution {
     /// Cells per core radius along y and z, at the core.
@@ -31,24 +21,26 @@ const CORE_CELLS: f64 = 2.5;
 const LAYER_CELLS: f64 = 3.0;
 
 impl Resolution {
-    /// What `mesh` has.
-    pub fn new(mesh: &Mesh, lengths: &VortexLengths) -> Self {
-        let core_cells = std::array::from_fn(|i| {
-            lengths.core_radius_m / cell_width_m(&mesh.face_m(i + 1), lengths.core_m[i])
-        });
+    /// Of the pair in its own units, in which its mesh has the given faces. The boundary layer is `sqrt(nu b0/V0)` thick with
+    /// `nu = 2 pi b0 V0/reynolds`.
+    pub(super) fn new(mesh: &Mesh, pair: &VortexPairCase) -> Self {
+        let core = [0.5, pair.height];
+        let core_cells =
+            std::array::from_fn(|i| pair.core_radius / cell_width(&mesh.face_m(i + 1), core[i]));
+        let layer = (TAU / pair.reynolds).sqrt();
         let [_, _, z] = mesh.directions();
         let [low, high] = z.ends.no_slip();
-        let mut from_low_m = mesh.face_m(2);
-        let mut from_high_m = from_low_m.clone();
-        from_high_m.reverse();
-        for height_m in &mut from_low_m {
-            *height_m -= z.low_m;
+        let mut from_low = mesh.face_m(2);
+        let mut from_high = from_low.clone();
+        from_high.reverse();
+        for height in &mut from_low {
+            *height -= z.low_m;
         }
-        for height_m in &mut from_high_m {
-            *height_m = z.high_m - *height_m;
+        for height in &mut from_high {
+            *height = z.high_m - *height;
         }
-        let at_low = low.then(|| cells_within(&from_low_m, lengths.layer_m));
-        let at_high = high.then(|| cells_within(&from_high_m, lengths.layer_m));
+        let at_low = low.then(|| cells_within(&from_low, layer));
+        let at_high = high.then(|| cells_within(&from_high, layer));
         Self {
             core_cells,
             layer_cells: at_low.into_iter().chain(at_high).reduce(f64::min),
@@ -84,45 +76,30 @@ fn warning(what: &str, cells: f64, least: f64) -> String {
     )
 }
 
-/// Width of the narrowest cell between `face_m` that contains `at_m` \[m\]; infinite if none does.
-fn cell_width_m(face_m: &[f64], at_m: f64) -> f64 {
-    face_m
+/// Width of the narrowest cell between `faces` that contains `position`; infinite if none does.
+fn cell_width(faces: &[f64], position: f64) -> f64 {
+    faces
         .windows(2)
-        .filter(|faces| faces[0] <= at_m && at_m <= faces[1])
-        .map(|faces| faces[1] - faces[0])
+        .filter(|pair| pair[0] <= position && position <= pair[1])
+        .map(|pair| pair[1] - pair[0])
         .fold(f64::INFINITY, f64::min)
 }
 
-/// Cells, and the fraction of the last one, between a wall and the distance `layer_m` from it;
-/// `from_wall_m` are the distances of the faces from the wall.
-fn cells_within(from_wall_m: &[f64], layer_m: f64) -> f64 {
-    from_wall_m
+/// Cells, and the fraction of the last one, between a wall and the distance `layer` from it;
+/// `from_wall` are the distances of the faces from the wall.
+fn cells_within(from_wall: &[f64], layer: f64) -> f64 {
+    from_wall
         .windows(2)
-        .map(|faces| ((layer_m - faces[0]) / (faces[1] - faces[0])).clamp(0.0, 1.0))
+        .map(|faces| ((layer - faces[0]) / (faces[1] - faces[0])).clamp(0.0, 1.0))
         .sum()
-}
-
-impl VortexLengths {
-    /// Those of a vortex pair of the spacing `b0 = unit_m` \[m\] above ground, core and height in
-    /// `b0`: the layer is `sqrt(nu b0/V0)` with `nu = 2 pi b0 V0/reynolds`.
-    pub fn pair(core_radius: f64, height: f64, reynolds: f64, unit_m: f64) -> Self {
-        Self {
-            core_radius_m: core_radius * unit_m,
-            core_m: [0.5 * unit_m, height * unit_m],
-            layer_m: (TAU / reynolds).sqrt() * unit_m,
-        }
-    }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::VortexPairCase;
     use super::*;
 
     fn warnings(pair: VortexPairCase) -> Vec<String> {
-        let lengths = VortexLengths::pair(pair.core_radius, pair.height, pair.reynolds, 1.0);
-        let case = pair.case(VortexPairCase::steps(0.02)).unwrap();
-        Resolution::new(&case.mesh, &lengths).warnings()
+        pair.resolution().unwrap().warnings()
     }
 
     #[test]

@@ -17,7 +17,7 @@ use super::super::mesh::{Direction, Ends, Mesh, Spread, Wall};
 use super::super::settings::{FlowSettings, TimeScheme, TimeStep};
 use super::super::subgrid::SubgridModel;
 use super::perturbation::Perturbation;
-use super::{Case, Initial, stretched};
+use super::{Case, Initial, Resolution, stretched};
 use crate::analysis::{WakeMeter, WakeScales};
 use crate::error::{Error, check};
 use crate::winds::{CirculationProfile, TwoScale};
@@ -173,6 +173,14 @@ impl VortexPairCase {
         let drift_m_s = self.cross_wind * scales.descent_speed_m_s();
         let [out_m_s, down_m_s] = [scale * y * y / z, -scale * z * z / y];
         Ok(meter.moving_with([-1.0, 1.0].map(|side| [drift_m_s + side * out_m_s, down_m_s])))
+    }
+
+    /// How well the mesh of the case resolves its cores and the boundary layer under them.
+    ///
+    /// # Errors
+    /// A mesh that [`Mesh::new`] refuses.
+    pub fn resolution(&self) -> Result<Resolution, Error> {
+        Ok(Resolution::new(&self.mesh(1.0)?, self))
     }
 
     fn validate(&self) -> Result<(), Error> {

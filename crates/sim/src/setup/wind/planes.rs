@@ -7,7 +7,7 @@ use crate::io::CrossPlanes;
 use crate::io::planes_input::{files, read};
 use crate::scene::{SceneFile, SimulatedFlow};
 use crate::setup::wind::SceneWind;
-use wakescope_les::winds::{Edges, OutsidePolicy, PlaneMesh, Series, Side};
+use wakescope_les::winds::{Edges, PlaneMesh, Series, Side};
 use wakescope_les::{Error as LesError, GridSnapshot};
 
 /// Edges in the units and at the place of the scene.
@@ -56,7 +56,6 @@ fn snapshots(
         z_m: planes.z_m.iter().map(|z| z * length_m).collect(),
         y_edges: edges(flow, planes.y_edges, shift_y_m),
         z_edges: edges(flow, planes.z_edges, 0.0),
-        outside: OutsidePolicy::Mask,
     };
     let fields = planes.v_m_s.outer_iter().zip(planes.w_m_s.outer_iter());
     let snapshot = |(time, (v, w)): (
